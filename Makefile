@@ -96,7 +96,8 @@ demo-peer: $(RUNS) ## The same on a full-duplex line
 
 .PHONY: test
 test: $(INSTALLED) ## Run the tests; PYTEST_ARGS='test/df1 -k poll' runs some
-	$(TEST_ENV) $(PY) -m pytest -n $(TEST_WORKERS) --dist loadfile --no-loadscope-reorder $(PYTEST_ARGS)
+	$(TEST_ENV) $(PY) -m pytest -n $(TEST_WORKERS) --dist loadfile \
+	    --no-loadscope-reorder --max-worker-restart 0 $(PYTEST_ARGS)
 
 # launch_ros asks for composition_interfaces, which has no wheel, for component containers alone.
 .PHONY: ros-tools

@@ -45,6 +45,7 @@ from abdf1_ros.simulator.commands import execute
 from abdf1_ros.simulator.ladder import Ladder
 from abdf1_ros.simulator.simulated_plc import load_plcs, SimulatedPlc
 import pytest
+from rcl_interfaces.srv import GetParameters
 from rclpy.context import Context
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
@@ -128,10 +129,32 @@ class Observer:
         return inbox
 
     def publisher(self, message_type: Any, topic: str) -> Any:
-        """Return a publisher that a subscriber has been found for."""
+        """Return a publisher for <node>/write/..., once the node knows all that is here."""
         publisher = self.node.create_publisher(message_type, topic, EVERYTHING)
         self.until(publisher.get_subscription_count, f'a subscriber of {topic}')
+        self.meet(topic.partition('/write/')[0])
         return publisher
+
+    def meet(self, node: str) -> None:
+        """
+        Wait until a node knows all publishers and subscriptions that were made here before.
+
+        To have found the node is not enough: what it publishes before it has found us is lost. DDS
+        announces endpoints in their order, so a node that answers knows those before the client.
+        """
+        client = self.node.create_client(GetParameters, f'{node}/get_parameters')
+        self.until(client.service_is_ready, f'the parameters of {node}')
+        answers, asked = [], 0.0
+
+        def is_answered() -> bool:
+            nonlocal asked
+            if time.monotonic() > asked + 1.0:  # an answer to a client not known yet is dropped
+                asked = time.monotonic()
+                answers.append(client.call_async(GetParameters.Request()))
+            return any(answer.done() for answer in answers)
+
+        self.until(is_answered, f'an answer of {node}')
+        self.node.destroy_client(client)
 
 
 class Plcs:

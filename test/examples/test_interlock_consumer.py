@@ -151,7 +151,7 @@ def test_end_of_the_bridge_takes_the_permit(
         reset(observer)
         cell.wait_for(PERMITTED)
         after = len(cell.lines)
-        node.send(number)
+        node.stop() if number is signal.SIGSTOP else node.send(number)
         assert cell.wait_for('not permitted', after=after) == STOPPED
         cell.end()
     assert cell.lines[after:] == [STOPPED]

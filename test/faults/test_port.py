@@ -24,7 +24,7 @@ from abdf1_ros.ports.settings import PortSettings
 import pytest
 from support.fault_rig import boxed, is_unanswered, NO_ANSWER, NOT_SENT, rigged, SETPOINT
 from support.ros import ERROR, Observer, Process
-from support.simulator_process import Files, make_files
+from support.simulator_process import Files, IMPATIENT_ROW, make_files
 
 REFUSED = 'not written: refused: the port is not open'
 
@@ -39,7 +39,7 @@ def observer() -> Iterator[Observer]:
 def test_device_vanishes_and_returns(
         observer: Observer, tmp_path: Path, is_elsewhere: bool) -> None:
     with boxed(observer, tmp_path) as (rig, box):
-        assert rig.write(3.0) == 'written'
+        rig.writes(3.0)
         device = os.readlink(box.name)
         box.unplug()
         rig.status('link', ERROR, 'cannot open the port: ')
@@ -47,26 +47,26 @@ def test_device_vanishes_and_returns(
         rig.node.wait_for('[ERROR]', f'{box.name}: cannot open the port: ', 'No such file')
         rig.status('mappings', ERROR, '25 failed')
         rig.status('station 2', ERROR, 'unknown: the port is not open')
-        assert rig.write(4.0) == REFUSED
+        rig.writes(4.0, REFUSED)
         lines = len(rig.node.lines)
         box.plug(other_than=device if is_elsewhere else '')
         assert not is_elsewhere or os.readlink(box.name) != device
-        rig.recovers(2.0)
+        rig.recovers()
         rig.node.wait_for('[INFO]', f'{box.name}: open', after=lines)
         assert rig.has_read_only(SETPOINT, 3.0)
 
 
 def test_port_that_is_busy_is_opened_when_it_is_free(observer: Observer, tmp_path: Path) -> None:
-    files = make_files(tmp_path)
+    files = make_files(tmp_path, IMPATIENT_ROW)
     simulator = files.start_simulator()
     other = open_port(PortSettings(str(files.port)))
     with rigged(observer, files, str(files.port), simulator) as rig:
         rig.node.wait_for('[ERROR]', 'cannot open the port: another program has it open')
         rig.status('link', ERROR, 'cannot open the port: another program has it open')
-        assert rig.write(4.0) == REFUSED
+        rig.writes(4.0, REFUSED)
         assert not rig.speeds
         other.close()
-        rig.recovers(2.0)
+        rig.recovers()
         assert rig.has_read_only(SETPOINT)
         assert rig.node.text.count('cannot open the port') == 1  # not once for each attempt
 
@@ -79,30 +79,30 @@ def start_tcp_simulator(files: Files, address: str = '127.0.0.1:0') -> tuple[Pro
 
 
 def test_process_at_the_far_end_of_tcp_is_frozen(observer: Observer, tmp_path: Path) -> None:
-    files = make_files(tmp_path)
+    files = make_files(tmp_path, IMPATIENT_ROW)
     simulator, url = start_tcp_simulator(files)
     with rigged(observer, files, url, simulator) as rig:
         rig.until_well()
-        simulator.send(signal.SIGSTOP)
+        simulator.stop()
         assert is_unanswered(rig.write(3.0))
         rig.status('link', ERROR, 'port open, but none of 2 stations answers')
-        assert rig.write(4.0) == NOT_SENT + NO_ANSWER
-        simulator.send(signal.SIGCONT)
-        rig.recovers(3.0)
+        rig.writes(4.0, NOT_SENT + NO_ANSWER)
+        simulator.go_on()
+        rig.recovers()
         # Commands that the connection has kept are expired for the far end, and not answered.
         assert rig.has_read_only(SETPOINT, 3.0)
 
 
 def test_process_at_the_far_end_of_tcp_ends_and_returns(
         observer: Observer, tmp_path: Path) -> None:
-    files = make_files(tmp_path)
+    files = make_files(tmp_path, IMPATIENT_ROW)
     simulator, url = start_tcp_simulator(files)
     with rigged(observer, files, url, simulator) as rig:
         rig.until_well()
         simulator.send(signal.SIGKILL)
         simulator.result()
         rig.status('link', ERROR, 'cannot open the port: ')
-        assert rig.write(4.0) == REFUSED
+        rig.writes(4.0, REFUSED)
         rig.simulator, _ = start_tcp_simulator(files, url.removeprefix('socket://'))
-        rig.recovers(2.0)
+        rig.recovers()
         assert rig.has_read_only(SETPOINT)

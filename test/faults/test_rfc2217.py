@@ -15,13 +15,15 @@
 """What happens to rfc2217:// device servers, done to a real node; see docs/troubleshooting.md."""
 
 from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
 from support.device_server import LineServer
 from support.fault_rig import is_unanswered, NO_ANSWER, NOT_SENT, Rig, rigged, SETPOINT
+from support.renewed import Renewed
 from support.ros import ERROR, Observer, OK, write_csv
-from support.simulator_process import Files, make_files, MAP_HEADER
+from support.simulator_process import Files, IMPATIENT_ROW, make_files, MAP_HEADER
 
 REFUSED = 'not written: refused: the port is not open'
 
@@ -38,28 +40,36 @@ def observer() -> Iterator[Observer]:
 
 def short_files(folder: Path) -> Files:
     """Return the usual files, but with two mappings."""
-    files = make_files(folder)
+    files = make_files(folder, IMPATIENT_ROW)
     write_csv(files.map, MAP_HEADER, MAP_ROWS)
     return files
 
 
 @pytest.fixture(scope='module')
-def shared(observer: Observer, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Served]:
-    """Return a node, and the device server between it and its PLCs."""
-    files = short_files(tmp_path_factory.mktemp('server'))
-    simulator = files.start_simulator()
-    with LineServer(files.port) as server, rigged(observer, files, server.url, simulator) as rig:
-        yield rig, server
+def shared(observer: Observer, tmp_path_factory: pytest.TempPathFactory
+           ) -> Iterator[Renewed[Served]]:
+    @contextmanager
+    def serve() -> Iterator[Served]:
+        """Run a node, and the device server between it and its PLCs."""
+        files = short_files(tmp_path_factory.mktemp('server'))
+        simulator = files.start_simulator()
+        with LineServer(files.port) as server, \
+                rigged(observer, files, server.url, simulator) as rig:
+            yield rig, server
+
+    renewed = Renewed(serve)
+    yield renewed
+    renewed.close()
 
 
 @pytest.fixture
-def served(shared: Served) -> Iterator[Served]:
+def served(shared: Renewed[Served], request: pytest.FixtureRequest) -> Iterator[Served]:
     """Return them when all is well; whatever is done to them, it works again afterwards."""
-    rig, _ = shared
-    rig.until_well()
-    yield shared
-    assert rig.write(3.0) == 'written'
-    assert rig.has_read_only(SETPOINT, 3.0)
+    with shared.lent(request) as (rig, server):
+        rig.until_well()
+        yield rig, server
+        rig.writes(3.0)
+        assert rig.has_read_only(SETPOINT, 3.0)
 
 
 def test_server_is_not_there_at_first(observer: Observer, tmp_path: Path) -> None:
@@ -69,10 +79,10 @@ def test_server_is_not_there_at_first(observer: Observer, tmp_path: Path) -> Non
         server.stop()
         with rigged(observer, files, server.url, simulator) as rig:
             rig.status('link', ERROR, 'cannot open the port: ')
-            assert rig.write(4.0) == REFUSED
+            rig.writes(4.0, REFUSED)
             assert not rig.speeds
             server.start()
-            rig.recovers(4.0)
+            rig.recovers()
             assert rig.has_read_only(SETPOINT)
             assert rig.node.text.count('cannot open the port') == 1  # not once for each attempt
 
@@ -85,10 +95,10 @@ def test_server_goes_away_and_returns(served: Served) -> None:
     rig.status('link', ERROR, 'cannot open the port: ')
     rig.status('mappings', ERROR, '2 failed')
     rig.status('station 2', ERROR, 'unknown: the port is not open')
-    assert rig.write(4.0) == REFUSED
+    rig.writes(4.0, REFUSED)
     lines = len(rig.node.lines)
     server.start()
-    rig.recovers(4.0)
+    rig.recovers()
     rig.node.wait_for('[INFO]', f'{server.url}: open', after=lines)
 
 
@@ -97,7 +107,7 @@ def test_connection_is_reset(served: Served) -> None:
     lines = len(rig.node.lines)
     server.reset()
     rig.node.wait_for('[ERROR]', f'{server.url}: the port was lost: ', after=lines)
-    rig.recovers(5.0)
+    rig.recovers()
     rig.node.wait_for('[INFO]', f'{server.url}: open', after=lines)
 
 
@@ -106,9 +116,9 @@ def test_frozen_server_takes_no_new_connection(served: Served) -> None:
     server.is_frozen = True
     server.reset()
     rig.status('link', ERROR, 'cannot open the port: the other end does not speak RFC 2217')
-    assert rig.write(4.0) == REFUSED
+    rig.writes(4.0, REFUSED)
     server.is_frozen = False
-    rig.recovers(6.0)
+    rig.recovers()
 
 
 def test_server_is_frozen_and_goes_on(served: Served) -> None:
@@ -117,9 +127,9 @@ def test_server_is_frozen_and_goes_on(served: Served) -> None:
     server.is_frozen = True
     assert is_unanswered(rig.write(3.0))
     rig.status('link', ERROR, 'port open, but none of 2 stations answers')
-    assert rig.write(4.0) == NOT_SENT + NO_ANSWER
+    rig.writes(4.0, NOT_SENT + NO_ANSWER)
     server.is_frozen = False
-    rig.recovers(3.0)
+    rig.recovers()
     rig.node.wait_for('[INFO]', 'station 2 answers again', after=lines)
 
 
@@ -128,15 +138,15 @@ def test_server_hangs_up_on_every_client(served: Served) -> None:
     server.hangs_up = True
     server.reset()
     rig.status('link', ERROR, 'cannot open the port: ')
-    assert rig.write(4.0) == REFUSED
+    rig.writes(4.0, REFUSED)
     server.hangs_up = False
-    rig.recovers(6.0)  # an attempt to open the port may take 3 s
+    rig.recovers()  # an attempt to open the port may take 3 s
 
 
 def test_server_takes_its_time(served: Served) -> None:
     rig, server = served
     server.latency = 0.02  # there and back within Timeout
-    assert rig.write(3.0) == 'written'
+    rig.writes(3.0)
     rig.speeds.next()
     rig.status('link', OK)
     server.latency = 0.5  # and beyond it
@@ -144,7 +154,7 @@ def test_server_takes_its_time(served: Served) -> None:
     assert result == 'written' or is_unanswered(result)
     rig.status('mappings', ERROR, '2 failed')  # a late answer may be taken for that to a poll
     server.latency = 0.0
-    rig.recovers(4.0)
+    rig.recovers()
 
 
 def test_all_mappings_are_read_in_time(observer: Observer, tmp_path: Path) -> None:

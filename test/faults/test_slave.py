@@ -22,6 +22,7 @@ import time
 from abdf1_ros.df1 import frames
 import pytest
 from support.fault_rig import is_unanswered, NOT_SENT, UNKNOWN
+from support.renewed import Renewed
 from support.ros import details, ERROR, find_status, Observer, until_status
 from support.slave_rig import End, Line, two_nodes
 
@@ -41,19 +42,21 @@ def observer() -> Iterator[Observer]:
 
 
 @pytest.fixture(scope='module')
-def shared_line(observer: Observer, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Line]:
-    with two_nodes(observer, tmp_path_factory.mktemp('line'), WRITE_TIMEOUT) as line:
-        yield line
+def lines(observer: Observer, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Renewed[Line]]:
+    renewed = Renewed(lambda: two_nodes(observer, tmp_path_factory.mktemp('line'), WRITE_TIMEOUT))
+    yield renewed
+    renewed.close()
 
 
 @pytest.fixture
-def line(shared_line: Line) -> Iterator[Line]:
+def line(lines: Renewed[Line], request: pytest.FixtureRequest) -> Iterator[Line]:
     """Return a line that is well; nothing that is done to it makes it lie."""
-    shared_line.box.mend()
-    shared_line.works()
-    shared_line.clear()
-    yield shared_line
-    shared_line.check()
+    with lines.lent(request) as line:
+        line.box.mend()
+        line.works()
+        line.clear()
+        yield line
+        line.check()
 
 
 def lose_slave(line: Line) -> int:
@@ -76,7 +79,7 @@ def test_master_is_killed_and_returns(line: Line) -> None:
     assert line.slave.write(value).startswith(TOO_OLD)
     line.master = line.start('Master')
     line.master.node.wait_for('[INFO]', 'open')
-    line.recovers(4.0)
+    line.recovers()
     line.works()
     assert not line.master.was_told(value)
 
@@ -89,7 +92,7 @@ def test_slave_is_killed_and_returns(line: Line) -> None:
     line.master.node.wait_for('[ERROR]', NO_ANSWER, after=lines)
     line.slave = line.start('Slave', WRITE_TIMEOUT)
     line.slave.node.wait_for('[INFO]', 'open')
-    line.recovers(3.0)
+    line.recovers()
     line.master.node.wait_for('[INFO]', 'station 9 answers again', after=lines)
     line.works()
     assert not line.slave.was_told(value)
@@ -102,7 +105,7 @@ def test_slave_that_hears_nothing_sends_nothing(line: Line) -> None:
     value = next(line.values)
     assert line.slave.write(value).startswith(TOO_OLD)
     line.box.mend()
-    line.recovers(3.0)
+    line.recovers()
     line.works()
     assert not line.master.was_told(value)
 
@@ -123,7 +126,7 @@ def test_slave_that_is_not_heard_does_not_know_what_it_has_written(line: Line) -
         tuple(UNKNOWN + why for why in ('2519 ', '2508 ', 'too old to be sent once more; '))
         if was_sent else TOO_OLD)
     line.box.mend()
-    line.recovers(3.0)
+    line.recovers()
     line.works()
     assert not line.master.was_told(value)
 
@@ -136,7 +139,7 @@ def test_line_babbles_at_the_slave(line: Line) -> None:
             value = next(line.values)
             written.append((reader, value, writer.write(value)))
     line.box.mend()
-    line.recovers(3.0)
+    line.recovers()
     line.works()
     for reader, value, result in written:
         assert result == 'written' or result.startswith((UNKNOWN, NOT_SENT))
@@ -151,22 +154,22 @@ def test_port_of_the_slave_vanishes_and_returns(line: Line) -> None:
     value = lose_slave(line)
     lines = len(line.slave.node.lines)
     line.box.plug()
-    line.recovers(3.0)
+    line.recovers()
     line.slave.node.wait_for('[INFO]', 'open', after=lines)
     line.works()
     assert not line.slave.was_told(value)
 
 
 def test_slave_is_stopped_and_goes_on(line: Line) -> None:
-    line.slave.node.send(signal.SIGSTOP)
+    line.slave.node.stop()
     own = next(line.values)
     line.slave.ask(own)
     asked = time.monotonic()
     value = lose_slave(line)
     was_sent = line.master.results[-2].message.startswith(UNKNOWN)
     line.observer.until(lambda: time.monotonic() - asked > 1.6, 'the write to become old')
-    line.slave.node.send(signal.SIGCONT)
-    line.recovers(3.0)
+    line.slave.node.go_on()
+    line.recovers()
     assert line.slave.result().startswith(REFUSED + 'it came ')
     line.works()
     assert not line.master.was_told(own)
@@ -214,12 +217,12 @@ def test_write_is_not_sent_by_a_slave_that_nobody_polls(
         observer: Observer, tmp_path_factory: pytest.TempPathFactory) -> None:
     with two_nodes(observer, tmp_path_factory.mktemp('line'), 'poll_timeout:=1.0') as line:
         line.clear()
-        line.master.node.send(signal.SIGSTOP)
+        line.master.node.stop()
         line.slave.status('mappings', ERROR, '1 failed')
         value = next(line.values)
         assert line.slave.write(value) == NOT_SENT + NO_REPLY
-        line.master.node.send(signal.SIGCONT)
-        line.recovers(3.0)
+        line.master.node.go_on()
+        line.recovers()
         line.works()
         assert not line.master.was_told(value)
 
@@ -239,6 +242,6 @@ def test_master_is_killed_while_the_slave_sends_a_command(line: Line) -> None:
     line.box.pass_on = lambda mode, data: data
     line.master = line.start('Master')
     line.master.node.wait_for('[INFO]', 'open')
-    line.recovers(4.0)
+    line.recovers()
     line.works()
     assert not line.master.was_told(word)

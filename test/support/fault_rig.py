@@ -24,7 +24,6 @@ from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticStatus
 from std_msgs.msg import Float32MultiArray, Int16MultiArray
-from support.clock import Stopwatch
 from support.fault_box import FaultBox
 from support.ros import (
     EVERYTHING,
@@ -34,7 +33,7 @@ from support.ros import (
     until_status,
     values_in,
 )
-from support.simulator_process import Files, make_files, OFTEN
+from support.simulator_process import Files, IMPATIENT_ROW, make_files, OFTEN
 
 SPEEDS = (1200, -800)  # of station 1
 SETPOINT = 21.5  # of station 2
@@ -120,8 +119,7 @@ class Rig(HeardNode):
         """Begin a test where another may have ended: all is well, and as at the start."""
         self.diagnostics.clear()
         self.until_well()
-        # On a busy host it may have no answer in time.
-        self.observer.until(lambda: self.write(SETPOINT) == 'written', 'a write')
+        self.writes(SETPOINT)
         self.setpoint.clear()
         self.setpoint.values([SETPOINT])
         for inbox in (self.diagnostics, self.speeds, self.setpoint):
@@ -137,24 +135,24 @@ class Rig(HeardNode):
         """Wait for a line of the node with these texts, said in this test; return it."""
         return self.node.wait_for(*texts, after=self.begun)
 
-    def recovers(self, limit: float) -> None:
-        """Wait for new values of both stations, ``limit`` s at most, and good diagnostics."""
-        watch = Stopwatch(self.node.number, self.simulator.number)
+    def recovers(self) -> None:
+        """Wait for new values of both stations, and good diagnostics."""
         self.diagnostics.clear()
         before = len(self.speeds), len(self.setpoint)
         self.observer.until(
             lambda: len(self.speeds) > before[0] and len(self.setpoint) > before[1],
             'new values')
-        duration = watch.seconds
         self.until_well()
-        print(f'values are back after {duration:.2f} s')
-        assert duration < limit
 
     def write(self, value: float) -> str:
         """Write the set point of station 2; return the text of the result."""
         self.results.clear()
         self.publish(value)
         return str(self.results.first().message)
+
+    def writes(self, value: float, outcome: str = 'written') -> None:
+        """Write the set point until that comes of it: a busy host may be too late at first."""
+        self.observer.until(lambda: self.write(value) == outcome, outcome)
 
     def has_read_only(self, *setpoints: float) -> bool:
         """Tell whether the true speeds and those set points are all that has ever come."""
@@ -201,7 +199,7 @@ def rigged(observer: Observer, files: Files, port: str, simulator: Process,
 def boxed(observer: Observer, folder: Path, *assignments: str,
           name: str = 'abdf1') -> Iterator[tuple[Rig, FaultBox]]:
     """Run simulator, box and node, all of them well when the block begins."""
-    files = make_files(folder)
+    files = make_files(folder, IMPATIENT_ROW)
     simulator = files.start_simulator()
     with FaultBox(files.port, folder / 'line') as box, rigged(
             observer, files, str(box.name), simulator, *assignments, name=name) as rig:

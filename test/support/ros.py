@@ -62,6 +62,7 @@ class Process:
     def __init__(self, program: str | Path, *args: str, is_forked: bool = True) -> None:
         self.lines: list[str] = []
         self._said = threading.Condition()
+        self._goes_on = threading.Event()
         self._process: Any
         if is_forked and 'PYTEST_CURRENT_TEST' in os.environ:
             self._process = Forked(program, args)
@@ -82,7 +83,8 @@ class Process:
     def __exit__(self, *exception: object) -> None:
         """End the process in any case, also one that a failed test has left."""
         if self.is_running:
-            self.send(signal.SIGCONT, signal.SIGINT)
+            self.go_on()
+            self.send(signal.SIGINT)
         self.result()
 
     @property
@@ -138,6 +140,21 @@ class Process:
         """Send signals, one straight after the other."""
         for number in numbers:
             self._process.send_signal(number)
+
+    def stop(self) -> None:
+        """Let it stand still until ``go_on``, whoever else lets it continue."""
+        self._goes_on.clear()
+        self.send(signal.SIGSTOP)
+        threading.Thread(target=self._keep_stopped, daemon=True).start()
+
+    def _keep_stopped(self) -> None:
+        while not self._goes_on.wait(0.005):
+            self.send(signal.SIGSTOP)
+
+    def go_on(self) -> None:
+        """Let it continue."""
+        self._goes_on.set()
+        self.send(signal.SIGCONT)
 
     def result(self) -> int:
         """Wait for the end; return the exit status, once all that was said has been read."""

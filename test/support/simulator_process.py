@@ -30,7 +30,10 @@ from std_msgs.msg import (  # noqa: I101
 from support.ros import Process, ros_args, write_csv
 
 NET_HEADER = 'NAK_Retries,ENQ_Retries,Cmd_Timeout,Baud,Timeout'
-NET_ROW = '2,2,500,115200,200'
+# On a busy host a process may stand still for longer than PLCs are usually given time; so what is
+# not about PLCs that do not answer gives them more.
+NET_ROW = '2,2,5000,115200,3000'
+IMPATIENT_ROW = '2,2,500,115200,200'
 
 MAP_HEADER = 'Tag,Command,Address,Station,PLC_Type,Length,Type,Period,Publish,Min,Max,' \
     'Scale,Offset,Word_Order'
@@ -153,10 +156,10 @@ class Files:
         return simulator
 
 
-def make_files(folder: Path) -> Files:
+def make_files(folder: Path, net_row: str = NET_ROW) -> Files:
     return Files(
         folder,
-        write_csv(folder / 'net.csv', NET_HEADER, [NET_ROW]),
+        write_csv(folder / 'net.csv', NET_HEADER, [net_row]),
         write_csv(folder / 'map.csv', MAP_HEADER, MAP_ROWS),
         write_csv(folder / 'simulator.csv', SIMULATOR_HEADER, SIMULATOR_ROWS),
         folder / 'plc')

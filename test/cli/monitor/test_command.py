@@ -32,7 +32,7 @@ import pytest
 from std_msgs.msg import UInt16MultiArray
 from support.commands import call
 from support.ros import Observer, OK, PATIENCE, Process, until_status
-from support.simulator_process import Files, make_files, READS, STATUSES
+from support.simulator_process import Files, IMPATIENT_ROW, make_files, READS, STATUSES
 
 NODE = '/cell/line_a'
 ARGUMENTS = ('-r', '__ns:=/cell', '-r', '__node:=line_a')
@@ -43,7 +43,7 @@ _SIZES = ('LINES', 'COLUMNS')
 
 @pytest.fixture(scope='module')
 def files(tmp_path_factory: pytest.TempPathFactory) -> Files:
-    return make_files(tmp_path_factory.mktemp('monitor'))
+    return make_files(tmp_path_factory.mktemp('monitor'), IMPATIENT_ROW)
 
 
 @pytest.fixture(scope='module')
