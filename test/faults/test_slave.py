@@ -66,7 +66,8 @@ def lose_slave(line: Line) -> int:
     assert is_unanswered(master.write(value).replace('(9)', '(2)'))
     master.status('link', ERROR, 'port open, but none of 1 stations answers')
     master.status('mappings', ERROR, '1 failed')
-    assert master.write(next(line.values)) == NOT_SENT + NO_ANSWER
+    line.observer.until(lambda: master.write(next(line.values)) == NOT_SENT + NO_ANSWER,
+                        'a write that is not sent')
     return value
 
 
@@ -164,9 +165,9 @@ def test_slave_is_stopped_and_goes_on(line: Line) -> None:
     line.slave.node.stop()
     own = next(line.values)
     line.slave.ask(own)
-    asked = time.monotonic()
+    asked, before = time.monotonic(), len(line.master.results)
     value = lose_slave(line)
-    was_sent = line.master.results[-2].message.startswith(UNKNOWN)
+    was_sent = line.master.results[before].message.startswith(UNKNOWN)
     line.observer.until(lambda: time.monotonic() - asked > 1.6, 'the write to become old')
     line.slave.node.go_on()
     line.recovers()
