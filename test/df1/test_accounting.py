@@ -74,7 +74,7 @@ def test_texts_of_the_vectors(name: str, text: str) -> None:
 def test_what_a_node_on_the_way_says_to_a_guest_says_nothing_about_the_station(
         blames: bool) -> None:
     stations = ActiveStationList([1])
-    accounting = Accounting(Counters(), stations, lambda event: None)
+    accounting = Accounting(Counters(), stations, lambda event: None, 5)
     task = CommandTask(Packet(1, 9, 0x0F, 0, 7, b''), lambda: 0.0)
     task.blames = blames
     accounting.complete(task, task.command.reply(sts=0x02), keeps_others_waiting=True)
