@@ -157,9 +157,10 @@ class StandardPollingMaster:
         self._slow_until: defaultdict[int, float] = defaultdict(lambda: -math.inf)  # of gateways
 
     def status(self) -> LinkStatus:
-        """Return the scan times of both lists."""
+        """Return the scan times of the lists that have stations."""
+        lists = {'normal': self._normal, 'priority': self._priority}
         return LinkStatus(
-            scans={'normal': self._normal.times, 'priority': self._priority.times})
+            scans={name: each.times for name, each in lists.items() if each.stations})
 
     def run(self, source: TaskSource) -> Procedure:
         """Poll for ever, and carry out the tasks of ``source`` meanwhile."""
@@ -239,13 +240,7 @@ class StandardPollingMaster:
                 answer = yield from self._line.poll_with_retries(
                     number, 0.0, self._reply_size(number))
             except StationInactive as error:
-                # A reply that cannot be had is that of a guest first of all: the next poll tells.
-                guests = [station for station, entry in self._waiting_for(number)
-                          if not entry.task.blames]
-                for station in guests:
-                    self._end(station, error)
-                if not guests:
-                    self._lost(number, begun, error)
+                self._lost(number, begun, error)
                 return
             yield from self._answered(number, answer)
             is_more_wanted = isinstance(answer, Frame) and self._polling.multiple \
@@ -365,10 +360,7 @@ class StandardPollingMaster:
         try:
             begun = yield from self._line.deliver(number, task.command, task.expires)
         except StationInactive as error:
-            if task.blames:
-                self._lost(number, now, error)
-            else:
-                self._end(station, error)
+            self._lost(number, now, error)
         except CommandExpired as error:
             task.sent = error.sent
             self._end(station, error)
@@ -378,7 +370,6 @@ class StandardPollingMaster:
 
     def _lost(self, number: int, begun: float, error: StationInactive) -> None:
         """Take note that a station does not answer any more, and has had the line since then."""
-        self._line.accounting.lost(number, self._machine.now)
         for station in self._stations.behind(number):
             self._end(station, error)
         if number in self._unproven:

@@ -49,6 +49,7 @@ ECHO_PERIOD = 2.0
 _UNANSWERED = 30
 
 _NOT_ASKED = 'unknown (not asked yet)'
+_NEVER_ASKED = 'unknown (not asked: processor_period is 0)'
 
 
 class CheckKind(Enum):
@@ -127,13 +128,18 @@ class Checks:
                                        period or math.inf) for station in stations}
         self._checks = [Check(self, number, CheckKind.STATUS, often)
                         for number, often in periods.items() if not math.isinf(often)]
+        self._asked = {check.station for check in self._checks}
         self._checks += [Check(self, station.number, CheckKind.ECHO, ECHO_PERIOD)
                          for station in stations if station.number not in read]
         self._next_due = 0.0
 
     def known(self, station: int) -> StationHealth:
         """Return what a station has told about itself."""
-        return self._known.get(station, StationHealth())
+        return self._known.get(station) or StationHealth(self._unknown(station, _NOT_ASKED))
+
+    def _unknown(self, station: int, text: str) -> str:
+        """Return a text for a processor that is unknown: for ever, if nobody asks."""
+        return text if station in self._asked else _NEVER_ASKED
 
     def request_counters(self, station: int) -> None:
         """
@@ -281,7 +287,7 @@ class Checks:
         """Drop what a station has told, and end the requests that it will not answer."""
         known = self.known(station)
         self._known[station] = StationHealth(
-            processor=f'unknown ({reason})', counters=known.counters,
+            processor=self._unknown(station, f'unknown ({reason})'), counters=known.counters,
             no_counters=known.no_counters)
         for check in [check for check in self._checks if check.station == station
                       and check.kind is CheckKind.COUNTERS and not math.isinf(check.due)]:

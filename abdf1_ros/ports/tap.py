@@ -145,8 +145,7 @@ class Tap:
         try:
             return SerialEndpoint(replace(self._settings, name=name))
         except OSError as error:
-            error.filename = name
-            raise
+            raise OSError(f'{name}: {error.strerror or error}') from error
 
     def _reader(self, port: Port, direction: Direction, onward: Port | None) -> _TapReader:
         return _TapReader(port, direction, onward, self._heard, self._wake_reader)

@@ -32,7 +32,7 @@ from abdf1_ros.ports.link_thread import LinkThread, PortState
 from abdf1_ros.ports.settings import PortSettings
 from abdf1_ros.ports.trace import PortOpener
 from abdf1_ros.problems import ConfigurationError
-from abdf1_ros.ros.diagnostics.graph import DuplicateNameWatch, Graph
+from abdf1_ros.ros.diagnostics.graph import Graph, NameWatch
 from abdf1_ros.ros.diagnostics.log import bug_text
 from abdf1_ros.ros.parameters.declared import Configuration, configure, read_again
 from abdf1_ros.ros.parameters.files import parameter_files
@@ -128,9 +128,8 @@ class BridgeNode(Node):
         self._opener = self._make_opener(configuration)
         self._writes = WriteTopics(self, self._take)
         self._surroundings = Surroundings(
-            self, graph, DuplicateNameWatch(
-                lambda now: graph.nodes(self.get_name(), self.get_namespace(), now)),
-            self._opener,
+            self, graph, NameWatch(self.get_fully_qualified_name(), lambda now: graph.nodes(
+                self.get_name(), self.get_namespace(), now)), self._opener,
             # All writes that wait can end at once, faster than a subscriber takes their results.
             self.create_publisher(DiagnosticStatus, '~/write_results', MAX_WAITING_WRITES),
             self.create_publisher(UInt16MultiArray, '~/active_stations', latched_qos()),
@@ -184,7 +183,7 @@ class BridgeNode(Node):
     def start(self) -> None:
         """Open the port and begin to read."""
         self.link.start()
-        self.session.start_guests()
+        self.session.guests.start()
 
     def begin_end(self) -> None:
         """Begin the end, as ``Session`` does; no request takes it back."""
@@ -207,7 +206,7 @@ class BridgeNode(Node):
             self._is_ending = True
             self.tell_plcs()
         self.link.stop()
-        self.session.stop_guests()
+        self.session.guests.stop()
         self._opener.close()
         self.session.publish_diagnostics(line_time())
         # Messages that are still under way would be lost with their publisher.
@@ -262,7 +261,7 @@ class BridgeNode(Node):
         self.session.begin()
         if self._is_ending:  # since then
             self.session.begin_end()
-        self.session.start_guests()
+        self.session.guests.start()
         self._shown.show(configuration.network, configuration.shown_rows())
         self._hold_ports(self.port)
         return True
@@ -286,7 +285,7 @@ class BridgeNode(Node):
 
     def _reset_counters(self, request: Trigger.Request,
                         response: Trigger.Response) -> Trigger.Response:
-        self.session.diagnostics.reset_counters()
+        self.session.diagnostics.counters.reset()
         response.success, response.message = True, 'all counters begin again at 0'
         return response
 

@@ -120,7 +120,6 @@ class Sending:
         self.sent = False
         self.reply_size = 0
         self.expires = math.inf
-        self.blames = True
         self._report = report
 
     def reply(self, packet: Packet) -> None:

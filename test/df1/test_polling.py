@@ -527,6 +527,11 @@ def test_last_and_longest_scan_of_each_list_are_known() -> None:
     assert normal.longest > 1.2 * normal.last
 
 
+def test_list_without_stations_has_no_scan() -> None:
+    rig = bench(PollingSettings((1,)))
+    assert rig.master.link.status().scans.keys() == {'normal'}
+
+
 def test_longest_scan_does_not_contain_the_time_without_a_port() -> None:
     rig = bench(PollingSettings((1,)))
     normal = rig.master.link.status().scans['normal']

@@ -134,6 +134,18 @@ def test_program_mode_and_fault_are_seen(network: Network) -> None:
     assert bench.listener.changes == []
 
 
+def test_processor_that_nobody_asks_is_said_to_be_unasked_before_and_after_a_silence() -> None:
+    bench, (plc,), _ = make_bench(word(1), period=0.0)
+    never = 'unknown (not asked: processor_period is 0)'
+    assert bench.driver.checks.known(1).processor == never
+    plc.faults = InjectedFaults(silent=True)
+    bench.run_until(lambda: (1, False) in bench.listener.changes)
+    plc.faults = InjectedFaults()
+    bench.run(10.0)
+    assert bench.driver.stations[1].active
+    assert bench.driver.checks.known(1).processor == never
+
+
 @pytest.mark.parametrize('network', NETWORKS, ids=['message', 'standard'])
 def test_station_that_comes_back_is_asked_at_once(network: Network) -> None:
     bench, (plc, _), (ears, _) = make_bench(word(1), word(2), network=network, period=1000.0)

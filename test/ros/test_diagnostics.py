@@ -24,23 +24,28 @@ from abdf1_ros.cli.monitor import plant, view
 from abdf1_ros.df1.frames import message_frame
 from abdf1_ros.df1.packet import Packet
 from abdf1_ros.df1.slave_link import SlaveLink
-from abdf1_ros.driver.driver import Driver, Listener
+from abdf1_ros.driver.driver import Driver
 from abdf1_ros.driver.interlocks.fallback import FallbackCause
 from abdf1_ros.driver.interlocks.heartbeat import BeatState
 from abdf1_ros.driver.links import DriverSettings
 from abdf1_ros.driver.reads.point import ReadPoint
 from abdf1_ros.driver.write import Outcome, Write, WriteResult
 from abdf1_ros.messages import Event, Message
+from abdf1_ros.pccc.values import Values
 from abdf1_ros.ports.link_thread import LinkThread, PortState
 from abdf1_ros.ports.settings import PortSettings
 from abdf1_ros.ports.trace import PortOpener
+from abdf1_ros.ros.diagnostics.events import LineEvents
+from abdf1_ros.ros.diagnostics.status import Seen
 from abdf1_ros.ros.diagnostics.statuses import Diagnostics
 from abdf1_ros.ros.diagnostics.writes import WriteLog
+from abdf1_ros.ros.session import stations_of
 from abdf1_ros.settings.map_file import load_mappings
 from abdf1_ros.settings.mapping import Command, Mapping
 from abdf1_ros.settings.network import Network
 from diagnostic_msgs.msg import DiagnosticStatus
 import pytest
+from rclpy.logging import get_logger
 from support.ros import details, ERROR, OK, WARN, write_csv
 
 PORT = '/dev/ttyUSB0'
@@ -52,10 +57,6 @@ ROWS = ('speed,Read,N7:0,1,PLC5,1000', 'level,ReadWrite,F8:4,2,SLC,1000',
 NOW = float(int(time.monotonic()) + 1000)
 
 
-class Quiet(Listener):
-    """Does nothing with what a driver tells."""
-
-
 class Bench:
     """Diagnostics of a driver that no port moves; tests set its state."""
 
@@ -63,12 +64,35 @@ class Bench:
                  header: str = HEADER) -> None:
         mappings, left_out = load_mappings(str(write_csv(folder / 'map.csv', header, rows)))
         self.folder = folder
-        self.driver = Driver(Network(mode=mode), mappings, DriverSettings(), Quiet())
+        self.seen = Seen()
+        self.now = NOW
+        self.results: list[DiagnosticStatus] = []
+        self.events = LineEvents(
+            get_logger('line_a'), PORT, stations_of(mappings), scans=True, seen=self.seen,
+            read=lambda mapping, values: None, results=self, table_changed=lambda: None,
+            clock=lambda: self.now)
+        self.driver = Driver(Network(mode=mode), mappings, DriverSettings(), self.events)
         self.link = LinkThread(self.driver.machine, lambda: pytest.fail('no port here'))
-        self.diagnostics = Diagnostics('line_a', self.driver, PORT, left_out)
+        self.diagnostics = Diagnostics(
+            'line_a', self.driver, PORT, self.seen, self.events.writes, left_out)
         self.opener = PortOpener(PortSettings.of(Network(), PORT))
-        self.diagnostics.attach(self.link, self.opener)
+        self.diagnostics.line.attach(self.link, self.opener)
         self.set_port(True, 'open')
+
+    def publish(self, result: DiagnosticStatus) -> None:
+        """Take the result of a write, as its publisher does."""
+        self.results.append(result)
+
+    def happened(self, message: Message, args: tuple[Any, ...], station: int,
+                 now: float = NOW) -> None:
+        """Have the driver tell of a numbered event."""
+        self.now = now
+        self.events.happened(Event(message, args, station))
+
+    def written(self, result: WriteResult, now: float = NOW) -> None:
+        """Have the driver tell what came of a write."""
+        self.now = now
+        self.events.written(result)
 
     def set_port(self, is_open: bool, text: str) -> None:
         self.link.state = PortState(is_open, text)
@@ -140,7 +164,7 @@ def test_names_and_hardware_ids(bench: Bench) -> None:
 
 
 def test_link_before_there_is_one(bench: Bench) -> None:
-    unattached = Diagnostics('line_a', bench.driver, PORT)
+    unattached = Diagnostics('line_a', bench.driver, PORT, Seen(), bench.events.writes)
     link = unattached.statuses(NOW)[0]
     assert (link.level, link.message) == (ERROR, 'ERROR: not started yet')
     assert details(link)['port'] == 'closed'
@@ -163,12 +187,25 @@ def test_link_is_as_good_as_its_stations(bench: Bench) -> None:
     assert bench.says('link')[0] == OK
 
 
+def test_station_that_takes_commands_and_never_replies_is_told(bench: Bench) -> None:
+    for number in (1, 2):
+        bench.driver.stations.heard(number, NOW)
+    bench.driver.stations[2].unanswered = 5
+    assert bench.says('link') == (
+        WARN, 'WARN: port open, 1 of 2 stations take commands and do not reply')
+    bench.driver.stations[1].unanswered = 5
+    assert bench.says('link') == (
+        ERROR, 'ERROR: port open, but none of 2 stations replies to commands')
+    bench.driver.stations.lost(1, NOW)  # and the other one is gone
+    assert bench.says('link')[0] == ERROR
+
+
 def test_link_of_a_node_with_a_duplicate_name(bench: Bench) -> None:
-    bench.diagnostics.has_duplicate_name = True
+    bench.seen.duplicate_name = 'another node is called /line_a too'
     assert bench.says('link') == (WARN, 'WARN: port open, 0 of 2 stations have answered; '
-                                        'another node is called line_a too')
+                                        'another node is called /line_a too')
     bench.set_port(False, 'gone')
-    assert bench.says('link') == (ERROR, 'ERROR: gone; another node is called line_a too')
+    assert bench.says('link') == (ERROR, 'ERROR: gone; another node is called /line_a too')
 
 
 def test_slave_that_nobody_polls_is_a_warning(make_bench: Callable[..., Bench]) -> None:
@@ -188,10 +225,10 @@ def test_last_numbered_error_has_its_age(bench: Bench) -> None:
         return details(bench.status('link', now))['last error']
 
     assert last_error(NOW) == 'none'
-    bench.diagnostics.happened(Event(Message.ERR_COMMAND_TIMEOUT, (), 2), NOW)
+    bench.happened(Message.ERR_COMMAND_TIMEOUT, (), 2, NOW)
     expected = '2508 ERR_COMMAND_TIMEOUT: Command Timed Out [station 2]'
     assert last_error(NOW + 2.5) == f'{expected} (2.5 s ago)'
-    bench.diagnostics.happened(Event(Message.NTC_ENQ_LIMIT_EXCEEDED, (3,), 2), NOW + 3)
+    bench.happened(Message.NTC_ENQ_LIMIT_EXCEEDED, (3,), 2, NOW + 3)
     assert last_error(NOW + 100) == f'{expected} (100.0 s ago)'  # a notice is no error
 
 
@@ -210,7 +247,7 @@ def test_rates_are_those_since_the_last_look(bench: Bench) -> None:
     values = details(bench.status('link', NOW + 2))
     assert values['transactions per second'] == '15.0'
     assert values['line load'] == '50 %'  # 960 characters of 10 bits at 9600 baud, in 2 s
-    assert values['settings'] == '9600 baud, CRC'
+    assert values['settings'] == '9600 baud, 8 data bits, parity None, 1 stop bits, CRC'
     values = details(bench.status('link', NOW + 3))
     assert (values['transactions per second'], values['line load']) == ('0.0', '0 %')
 
@@ -249,7 +286,7 @@ def test_counters_begin_again_after_a_reset(bench: Bench) -> None:
     counters = bench.driver.counters
     counters.commands_sent, counters.replies_received, counters.crc_errors = 7, 6, 2
     assert bench.says('counters') == (OK, 'OK: 7 commands sent, 6 replies received')
-    bench.diagnostics.reset_counters()
+    bench.diagnostics.counters.reset()
     assert set(details(bench.status('counters')).values()) == {'0'}
     counters.commands_sent += 1
     assert bench.says('counters') == (OK, 'OK: 1 commands sent, 0 replies received')
@@ -265,7 +302,8 @@ def test_station_before_its_first_answer(bench: Bench) -> None:
     assert details(bench.status('station 1')) == {
         'active': 'yes', 'last answer': 'none yet', 'last TNS': 'none yet', 'replies': '0',
         'transactions without reply': '0', 'error replies': '0', 'last event': 'none',
-        'processor': 'unknown (not asked yet)', 'mode': 'unknown', 'faults': 'unknown'}
+        'processor': 'unknown (not asked: processor_period is 0)', 'mode': 'unknown',
+        'faults': 'unknown'}
 
 
 def test_station_that_answers_is_ok_and_tells_its_last_answer(bench: Bench) -> None:
@@ -281,8 +319,8 @@ def test_station_that_answers_is_ok_and_tells_its_last_answer(bench: Bench) -> N
 def test_station_that_is_silent(bench: Bench) -> None:
     bench.driver.stations.heard(2, NOW - 20)
     bench.driver.stations.lost(2, NOW - 12.3)
-    bench.diagnostics.happened(Event(Message.NTC_ENQ_LIMIT_EXCEEDED, (3,), 2), NOW - 12.3)
-    bench.diagnostics.happened(Event(Message.ERR_INACTIVE_STATION, (2,), 2), NOW - 12.3)
+    bench.happened(Message.NTC_ENQ_LIMIT_EXCEEDED, (3,), 2, NOW - 12.3)
+    bench.happened(Message.ERR_INACTIVE_STATION, (2,), 2, NOW - 12.3)
     assert bench.says('station 2') == (ERROR, 'ERROR: station 2 inactive since 12.3 s')
     values = details(bench.status('station 2'))
     assert (values['active'], values['last answer']) == ('no', '20.0 s ago')
@@ -326,8 +364,8 @@ def test_plc_that_its_gateway_does_not_reach(bench: Bench) -> None:
 
 
 def test_routine_is_no_event_of_a_station(bench: Bench) -> None:
-    bench.diagnostics.happened(Event(Message.NTC_NAK_LIMIT_EXCEEDED, (3,), 1), NOW)
-    bench.diagnostics.happened(Event(Message.NTC_REPLY_MSG_RCVD, (1,), 1), NOW)
+    bench.happened(Message.NTC_NAK_LIMIT_EXCEEDED, (3,), 1, NOW)
+    bench.happened(Message.NTC_REPLY_MSG_RCVD, (1,), 1, NOW)
     assert details(bench.status('station 1'))['last event'].startswith(
         '2519 NTC_NAK_LIMIT_EXCEEDED: ')
 
@@ -456,7 +494,7 @@ OUTCOMES: list[tuple[Outcome, dict[str, str]]] = [
                          ids=[outcome.name for outcome, _ in OUTCOMES])
 def test_every_outcome_is_counted_in_its_place(
         bench: Bench, outcome: Outcome, expected: dict[str, Any]) -> None:
-    log = WriteLog()
+    log = WriteLog(PORT)
     log.add(result(bench, outcome, 'why'), NOW)
     values = log.values(NOW + 1)
     last = values.pop('last failure')
@@ -476,7 +514,7 @@ def test_writes_before_the_first(bench: Bench) -> None:
     (FallbackCause.RETURN, WARN), (FallbackCause.RUN, WARN)])
 def test_fallback_value_is_no_message_and_usual_at_start_and_end(
         bench: Bench, cause: FallbackCause, level: bytes) -> None:
-    bench.diagnostics.written(result(bench, Outcome.FALLBACK, cause.value), NOW)
+    bench.written(result(bench, Outcome.FALLBACK, cause.value), NOW)
     told, text = bench.says('writes')
     assert told == level
     assert '0 of 0 writes confirmed' in text
@@ -503,7 +541,8 @@ def test_bit_of_the_plc_confirms_control_while_it_is_fresh_and_1(
     bench = make_bench('alive,Heartbeat,N10:0,1,PLC5,60000,',
                        'ruled,Read,B12:0/2,1,PLC5,1000,alive', header=f'{HEADER},Confirms')
     beat, bit = bench.driver.interlocks.heartbeats[0], bench.point('ruled')
-    latest = bench.diagnostics.interlocks.latest = {}
+    latest: dict[str, Values] = {}
+    bench.seen.latest = latest
 
     def station(value: int | None, now: float) -> tuple[bytes, str]:
         if value is not None:
@@ -547,7 +586,7 @@ def test_heartbeat_that_another_program_writes_is_an_error_with_what_it_wrote(
     beat.confirmed, beat.state = NOW, BeatState.CONFLICT
     assert bench.says('interlocks')[0] == ERROR
     text = 'N10:0: another program writes this word: 7 was read where 3 was written'
-    bench.diagnostics.interlocks.conflicts['alive'] = text
+    bench.events.foreign_value(beat.mapping, text.removeprefix('N10:0: '), is_conflict=True)
     assert details(bench.status('interlocks'))['station 1'] == f'not in control: {text}'
 
 
@@ -557,14 +596,14 @@ def test_last_fallback_value_of_a_station_is_told_with_its_cause(
     row, = bench.driver.mappings
     assert 'line_a: interlocks' not in [status.name for status in bench.diagnostics.statuses(NOW)]
     told = Write(row, [0], NOW).result(Outcome.FALLBACK, FallbackCause.TIMEOUT.value, NOW)
-    bench.diagnostics.written(told, NOW)
-    assert bench.diagnostics.interlocks.values(NOW + 2)['station 1 last fallback'] == \
-        'speed: timeout (2.0 s ago)'
+    bench.written(told, NOW)
+    assert bench.seen.last_fallbacks == {1: ('speed: timeout', NOW)}
 
 
 def test_lost_message_is_counted_and_a_warning_for_ten_seconds(bench: Bench) -> None:
-    bench.diagnostics.lost('level', 3, NOW)
-    bench.diagnostics.lost('pulses', 1, NOW + 1)
+    bench.events.lost('level', 3)
+    bench.now = NOW + 1
+    bench.events.lost('pulses', 1)
     assert bench.says('writes', NOW + 10.9) == (
         WARN, 'WARN: 0 of 0 writes confirmed; 4 messages were lost on their way here')
     assert bench.says('writes', NOW + 11) == (OK, 'OK: 0 of 0 writes confirmed')
@@ -574,9 +613,9 @@ def test_lost_message_is_counted_and_a_warning_for_ten_seconds(bench: Bench) -> 
 
 
 def test_failed_write_is_a_warning_for_ten_seconds(bench: Bench) -> None:
-    bench.diagnostics.written(result(bench, Outcome.WRITTEN), NOW)
-    bench.diagnostics.written(result(bench, Outcome.UNKNOWN, 'no reply'), NOW)
-    bench.diagnostics.written(result(bench, Outcome.WRITTEN), NOW + 1)
+    bench.written(result(bench, Outcome.WRITTEN), NOW)
+    bench.written(result(bench, Outcome.UNKNOWN, 'no reply'), NOW)
+    bench.written(result(bench, Outcome.WRITTEN), NOW + 1)
     warning = 'WARN: 2 of 3 writes confirmed; level unknown whether written: no reply'
     assert bench.says('writes', NOW + 1) == (WARN, warning)
     assert bench.says('writes', NOW + 9.9) == (WARN, warning)

@@ -14,10 +14,11 @@
 
 """Nodes of our name, and topics that somebody uses with another message type."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable
 
 from abdf1_ros.ros.diagnostics import graph as graph_module
-from abdf1_ros.ros.diagnostics.graph import DuplicateNameWatch, Graph, TypeWatch
+from abdf1_ros.ros.diagnostics.graph import Graph, NameWatch, TypeWatch
+from abdf1_ros.ros.diagnostics.log import News
 import pytest
 from support.mappings import make_mapping
 
@@ -51,6 +52,10 @@ def graph(domain: Domain) -> Graph:
     return Graph(domain)
 
 
+def texts(news: Iterable[News]) -> list[str]:
+    return [text for _, _, text in news]
+
+
 def watch_of(graph: Graph) -> TypeWatch:
     return TypeWatch(graph, lambda topic: topic.replace('~', '/cell/abdf1'), [
         make_mapping('B3:0/0', 'ReadWrite', topic='door'), make_mapping('N7:0', topic='n')])
@@ -64,11 +69,11 @@ def test_other_type_is_told_once_and_again_when_it_comes_back(
                      '/other/read/door': [BITS, WORDS]}
     told = [f'/cell/abdf1/write/door is {BITS}; somebody uses it as std_msgs/msg/Bool, and DDS '
             'connects different types to nothing']
-    assert [watch.look(now) for now in (10.0, 20.0)] == [told, []]
+    assert [texts(watch.look(now)) for now in (10.0, 20.0)] == [told, []]
     domain.topics['/cell/abdf1/write/door'] = [BITS]
     assert watch.look(30.0) == []
     domain.topics['/cell/abdf1/write/door'] = [BITS, 'std_msgs/msg/Bool']
-    assert watch.look(40.0) == told
+    assert texts(watch.look(40.0)) == told
 
 
 def test_looks_at_topics_are_as_far_apart_as_they_are_long(
@@ -93,17 +98,22 @@ def test_each_node_of_a_name_counts(domain: Domain, graph: Graph) -> None:
     assert graph.nodes('press', '/cell', 0.0) == 2
 
 
-def changes_of(counts: Sequence[int]) -> list[tuple[int, bool]]:
-    """Return when a watch that counts these nodes, one a second, changes its mind."""
-    watch = DuplicateNameWatch(lambda now: counts[int(now)])
-    return [(now, watch.has_found) for now in range(len(counts))
-            if any([watch.look(now), watch.look(now + 0.9)])]
+def changes_of(*counts: int) -> list[tuple[int, str]]:
+    """Return what is told, and when (s), where so many nodes are called so, one look a second."""
+    watch = NameWatch('/press', lambda now: counts[int(now)])
+    return [(now, news.text.partition(':')[0]) for now in range(len(counts))
+            for news in (*watch.look(now), *watch.look(now + 0.1))]
 
 
-def test_duplicate_name_is_found_when_it_stays() -> None:
-    assert changes_of([1] * 5 + [2] * 40 + [1] * 5) == [(34, True), (45, False)]
-    assert changes_of([3] * 30) == [(29, True)]
+MAYBE = 'another node is called /press too, or an earlier run of it was killed less than 20 s ago'
+GONE = 'no other node is called /press any more'
 
 
-def test_earlier_run_that_was_killed_is_not_a_duplicate() -> None:
-    assert changes_of([2] * 25 + [1] + [2] * 25 + [0] + [2] * 29) == []
+def test_other_node_of_our_name_is_told_at_once_and_again_when_it_is_no_earlier_run() -> None:
+    assert changes_of(*[1] * 5, *[2] * 40, *[1] * 5) == [
+        (5, MAYBE), (35, 'another node is called /press too'), (45, GONE)]
+
+
+def test_earlier_run_that_was_killed_is_forgotten() -> None:
+    assert changes_of(*[2] * 25, 1, *[2] * 25, 0) == [(0, MAYBE), (25, GONE), (26, MAYBE),
+                                                      (51, GONE)]

@@ -25,6 +25,7 @@ from abdf1_ros.ros.diagnostics.log import (
     MOST_ENTRIES,
     UnreadableRows,
 )
+from abdf1_ros.settings.mapping import Mapping
 import pytest
 from rclpy.logging import get_logger, LoggingSeverity
 from support.clock import Clock
@@ -242,11 +243,14 @@ def test_only_a_few_lines_a_minute_are_about_one_thing(
 def test_rows_of_a_file_that_fail_for_one_reason_are_one_line(
         lines: LimitedLog, logged: Callable[[], Lines]) -> None:
     rows = UnreadableRows(lines)
+    mappings: dict[tuple[str, int], Mapping] = {}
     for now, address, station, reason in (
             (0.0, 'N7:5', 1, 'no'), (0.9, 'N7:2', 1, 'no'), (1.0, 'N7:1', 2, 'no'),
             (1.1, 'N7:3', 1, 'never'), (1.2, 'N9:3', 1, 'no'), (1.2, 'N7:5', 1, 'no')):
         rows.look(now)
-        rows.add(now, make_mapping(address, station=station, tag=address), reason)
+        mapping = mappings.setdefault(
+            (address, station), make_mapping(address, station=station, tag=address))
+        rows.add(now, mapping, reason)
     rows.look(2.1)
     assert logged() == []
     rows.look(2.2)

@@ -23,7 +23,7 @@ from abdf1_ros.ports.link_thread import LinkThread
 from abdf1_ros.ports.opening import open_port
 from abdf1_ros.ports.settings import PortSettings
 from abdf1_ros.ros.diagnostics.graph import Graph
-from abdf1_ros.ros.diagnostics.statuses import Diagnostics
+from abdf1_ros.ros.diagnostics.line import LineView
 from abdf1_ros.ros.files import FileWatch
 from abdf1_ros.ros.node import BridgeNode
 from abdf1_ros.testing import Plcs
@@ -103,7 +103,7 @@ class Bench:
 
 @pytest.fixture
 def bench(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Bench]:
-    monkeypatch.setattr('abdf1_ros.ros.session._FILE_PERIOD', 0.3)
+    monkeypatch.setattr('abdf1_ros.ros.diagnostics.watches._FILE_PERIOD', 0.3)
     rows = ['1,PLC5,N7:0,16,7 8', '1,PLC5,F8:0,4,1.5']
     data = write_csv(tmp_path / 'plc.csv', 'Station,PLC_Type,Address,Length,Values', rows)
     with Observer() as observer, Plcs(data) as plcs:
@@ -222,13 +222,13 @@ def test_second_publisher_is_found_again(bench: Bench, capfd: pytest.CaptureFixt
 def test_station_that_took_no_commands_does_not_answer_by_new_files(
         bench: Bench, monkeypatch: pytest.MonkeyPatch,
         capfd: pytest.CaptureFixture[str]) -> None:
-    asked: list[Diagnostics] = []
+    asked: list[LineView] = []
 
-    def deaf_stations(diagnostics: Diagnostics, now: float) -> list[int]:
-        asked.append(diagnostics)
-        return [1] if diagnostics is asked[0] else []  # not known yet
+    def deaf_stations(line: LineView, now: float) -> list[int]:
+        asked.append(line)
+        return [1] if line is asked[0] else []  # not known yet
 
-    monkeypatch.setattr(Diagnostics, 'deaf_stations', deaf_stations)
+    monkeypatch.setattr(LineView, 'deaf_stations', deaf_stations)
     said = ''
     while 'station 1 answers polls, but no command' not in said:
         bench.diagnostics.next()
@@ -240,9 +240,8 @@ def test_station_that_took_no_commands_does_not_answer_by_new_files(
 
 
 def test_other_node_of_our_name_stays_known(bench: Bench, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr('abdf1_ros.ros.diagnostics.graph._LOOKS_FOR_DUPLICATES', 1)
     monkeypatch.setattr(Graph, 'nodes', lambda *arguments: 2)
-    text = 'another node is called abdf1 too'
+    text = 'another node is called /abdf1 too'
     until_status(bench.diagnostics, 'link', WARN, lambda status: text in status.message)
     assert bench.reload()[0]
     for _ in range(2):

@@ -23,22 +23,24 @@ of them, and seldom where a look is long.
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator
 from collections.abc import Mapping as MappingType
 from time import thread_time
 from typing import Protocol
 
+from abdf1_ros.ros.diagnostics.log import INFO, News, WARN
 from abdf1_ros.settings.mapping import Mapping
 
-_NAMES_PERIOD = 1.0  # s
+# s; a node of our name is to be told before it has taken many of our messages.
+_NAMES_PERIOD = 0.25
 
 # Between two looks at topics (s): at least, and as a multiple of the processor time of one.
 _LEAST = 2.0
 _MULTIPLE = 2000
 
 # A node that was killed stays visible for up to 20 s, the lease of its DDS participant. A node of
-# our name that is seen in so many looks in a row, a second apart, is not an earlier run of ours.
-_LOOKS_FOR_DUPLICATES = 30
+# our name that is seen for longer (s) is not an earlier run of ours.
+_KILLED_IS_SEEN = 30.0
 
 
 class GraphSource(Protocol):
@@ -77,27 +79,39 @@ class Graph:
         return self._clashes
 
 
-class DuplicateNameWatch:
+class NameWatch:
     """
     Find out when another node has our name, so that topics and services of both are one.
 
-    ``count`` tells how many nodes of the name there are; ours is one of them.
+    ``count`` tells how many nodes of the name there are; ours is one of them. It is told as soon
+    as it is seen, before it is known whether it is an earlier run: both may take the next command.
     """
 
-    def __init__(self, count: Callable[[float], int]) -> None:
-        self.has_found = False
+    def __init__(self, name: str, count: Callable[[float], int]) -> None:
+        self.text = ''
+        self._name = name
         self._count = count
-        self._looks = 0
+        self._since: float | None = None
         self._next_look = 0.0
 
-    def look(self, now: float) -> bool:
-        """Look once a second; return whether ``has_found`` has changed."""
+    def look(self, now: float) -> Iterator[News]:
+        """Look now and then; tell when it comes, stays, and goes."""
         if now < self._next_look:
-            return False
+            return
         self._next_look = now + _NAMES_PERIOD
-        self._looks = self._looks + 1 if self._count(now) > 1 else 0
-        before, self.has_found = self.has_found, self._looks >= _LOOKS_FOR_DUPLICATES
-        return self.has_found != before
+        if self._count(now) > 1:
+            self._since = now if self._since is None else self._since
+            stays = now - self._since >= _KILLED_IS_SEEN
+            text = f'another node is called {self._name} too' + (
+                '' if stays else ', or an earlier run of it was killed less than 20 s ago')
+            news = News(WARN, 'the name', f'{text}: both publish and take the same topics; give '
+                        'one another name, as in -r __node:=line_2')
+        else:
+            self._since, text = None, ''
+            news = News(INFO, 'the name', f'no other node is called {self._name} any more')
+        if text != self.text:
+            self.text = text
+            yield news
 
 
 class TypeWatch:
@@ -117,7 +131,7 @@ class TypeWatch:
         self._seen: MappingType[str, list[str]] = {}
         self._told: set[tuple[str, str]] = set()
 
-    def look(self, now: float) -> list[str]:
+    def look(self, now: float) -> list[News]:
         """Return what is new at the clock value ``now`` (s), each once."""
         clashes = self._graph.clashes(now)
         if clashes is self._seen:
@@ -126,5 +140,6 @@ class TypeWatch:
         found = {(topic, kind) for topic in clashes.keys() & self._own.keys()
                  for kind in clashes[topic] if kind != self._own[topic]}
         news, self._told = found - self._told, found
-        return [f'{topic} is {self._own[topic]}; somebody uses it as {kind}, and DDS connects '
-                'different types to nothing' for topic, kind in sorted(news)]
+        return [News(WARN, 'types of topics', (
+            f'{topic} is {self._own[topic]}; somebody uses it as {kind}, and DDS connects '
+            'different types to nothing')) for topic, kind in sorted(news)]

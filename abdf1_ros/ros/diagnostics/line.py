@@ -20,11 +20,96 @@ from collections import defaultdict
 from collections.abc import Iterable, Sequence
 from statistics import fmean
 
+from abdf1_ros.df1.echo import COMES_BACK
+from abdf1_ros.df1.stations import Station
 from abdf1_ros.driver.driver import Driver
 from abdf1_ros.driver.reads.point import ReadPoint
+from abdf1_ros.pccc.file_types import PlcType
 from abdf1_ros.pccc.link_counters import NO_MEMORY, UNSENT
 from abdf1_ros.ports.clock import line_time
+from abdf1_ros.ports.link_thread import LinkThread
+from abdf1_ros.ports.trace import PortOpener
+from abdf1_ros.ros.diagnostics.stations import wrong_type
 from abdf1_ros.ros.diagnostics.status import milliseconds
+from abdf1_ros.settings.mapping import Mapping
+
+# For so long (s) another node with our number is told after its last packet.
+_SAME_NUMBER_TOLD = 60.0
+
+# A station that takes no commands and has not been heard for so long (s) is silent.
+_HEARD_LATELY = 10.0
+
+
+class LineView:
+    """
+    What is wrong on the line of a driver, for statuses and watches.
+
+    ``link`` and ``opener`` are there once the driver is on the line.
+    """
+
+    def __init__(self, driver: Driver) -> None:
+        self.driver = driver
+        self.link: LinkThread | None = None
+        self.opener: PortOpener | None = None
+        self._rows_by_type = _rows_by_type(driver.mappings)
+
+    def attach(self, link: LinkThread, opener: PortOpener) -> None:
+        """Set the thread whose port is reported, and what opens it."""
+        self.link, self.opener = link, opener
+
+    @property
+    def is_open(self) -> bool:
+        return self.link is not None and self.link.state.is_open
+
+    def fault(self, now: float) -> str:
+        """Return what is wrong with who is on the line, mostly nothing: an echo, or our number."""
+        driver = self.driver
+        told = driver.link.status().same_number
+        if told is not None and now - told < _SAME_NUMBER_TOLD:
+            return (f'another node on the air has our number, {driver.network.station}: its '
+                    'replies and ours cannot be told apart; give each node its own Station')
+        mode = driver.network.mode  # by radio a node that sends on gives our packets back
+        nobody_answers = not any(station.active for station in driver.stations)
+        does_harm = driver.machine.echoes and mode != 'Radio' and (
+            mode == 'Peer' or nobody_answers)
+        return COMES_BACK if does_harm else ''
+
+    def deaf_stations(self, now: float) -> list[int]:
+        """Return the stations of a master that are heard, but not with replies to commands."""
+        return [station.number for station in self.driver.stations if self.is_deaf(station, now)]
+
+    def is_deaf(self, station: Station, now: float) -> bool:
+        return (station.takes_no_commands and station.last_heard is not None
+                and now - station.last_heard < _HEARD_LATELY
+                and self.driver.network.mode == 'Master')
+
+    def wrong_types(self) -> list[str]:
+        """Return which PLCs are of another family than the map says."""
+        found = (self.wrong_type(station.number) for station in self.driver.stations)
+        return [text for text in found if text is not None]
+
+    def wrong_type(self, station: int) -> str | None:
+        identity = self.driver.checks.known(station).identity
+        return wrong_type(station, identity, self._rows_by_type[station].values())
+
+
+def _rows_by_type(mappings: Iterable[Mapping]) -> dict[int, dict[PlcType, Mapping]]:
+    """Return the first row of each PLC type at each station."""
+    rows: defaultdict[int, dict[PlcType, Mapping]] = defaultdict(dict)
+    for mapping in mappings:
+        if not mapping.serves:
+            rows[mapping.station].setdefault(mapping.plc_type, mapping)
+    return rows
+
+
+def takes_in_silence(station: Station) -> bool:
+    """Tell whether a station takes commands and does not reply to them, or too late."""
+    return station.active and (not station.replies_in_time or station.has_no_replies)
+
+
+def deaf_text(station: int) -> str:
+    """Return what is wrong with a station that is heard, but not with replies to commands."""
+    return f'station {station} answers polls, but no command: is Error_Code right?'
 
 
 class LoadMeter:

@@ -28,6 +28,7 @@ from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass, field
 import traceback
+from typing import NamedTuple
 
 from abdf1_ros.messages import Event, Message, Severity
 from abdf1_ros.pccc.address import Area
@@ -61,6 +62,17 @@ _MOST_ROWS = 10_000
 _ROUTINE = (
     Message.NTC_REPLY_MSG_RCVD, Message.NTC_NAK_RETRY, Message.NTC_ENQ_RETRY,
     Message.NTC_ACK_EXPECTED, Message.NTC_EOT_STX_EXPECTED)
+
+
+INFO, WARN, ERROR = LoggingSeverity.INFO, LoggingSeverity.WARN, LoggingSeverity.ERROR
+
+
+class News(NamedTuple):
+    """Something to be logged: how bad it is, what it is about, and what to say."""
+
+    severity: LoggingSeverity
+    about: str
+    text: str
 
 
 def where(mapping: Mapping) -> str:
@@ -164,6 +176,11 @@ class LimitedLog:
         self._logger = logger
         self._clock = clock
         self._subjects: dict[str, _Subject] = {}
+
+    def tell(self, news: News) -> None:
+        # rclpy raises ValueError when one place in the code logs at two levels.
+        write = {INFO: self.info, WARN: self.warning, ERROR: self.error}[news.severity]
+        write(news.about, news.text)
 
     def info(self, about: str, text: str) -> None:
         if self._may_write(about):

@@ -16,7 +16,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Protocol
+
 from abdf1_ros.messages import Event
+from abdf1_ros.pccc.values import Values
 from diagnostic_msgs.msg import DiagnosticStatus
 
 OK, WARN, ERROR = DiagnosticStatus.OK, DiagnosticStatus.WARN, DiagnosticStatus.ERROR
@@ -27,6 +32,40 @@ Judgement = tuple[bytes, str]
 
 Moment = tuple[Event | str, float]
 """What has happened, and when (clock value in s)."""
+
+
+class Status(Protocol):
+    """One status of a node: its level and text are cheap to ask for, the details are not."""
+
+    name: str
+    hardware_id: str
+
+    def judge(self, now: float) -> Judgement:
+        """Return level and text at the clock value ``now`` (s)."""
+
+    def values(self, now: float) -> dict[str, str]:
+        """Return the details at the clock value ``now`` (s)."""
+
+
+@dataclass(slots=True)
+class Seen:
+    """What watches and the events of the line have shown, for the statuses."""
+
+    duplicate_name: str = ''
+    """That another node has our name, empty while none has."""
+    changed_files: Sequence[str] = ()
+    """Names of files that have changed since they were read."""
+    crowded: Sequence[str] = ()
+    """Topics with a Fallback and more than one publisher."""
+    conflicts: dict[str, str] = field(default_factory=dict)
+    """What another program has written over a heartbeat, by its tag."""
+    latest: Mapping[str, Values] = field(default_factory=dict)
+    """The last values that were published, by topic."""
+    last_error: Moment | None = None
+    last_events: dict[int | None, Moment] = field(default_factory=dict)
+    """The last thing unusual at each station."""
+    last_fallbacks: dict[int, Moment] = field(default_factory=dict)
+    """The last fallback value of each station."""
 
 
 def with_age(moment: Moment | None, now: float) -> str:

@@ -42,7 +42,10 @@ class WriteLog:
     the link, so no count has two writers.
     """
 
-    def __init__(self) -> None:
+    name = 'writes'
+
+    def __init__(self, port: str) -> None:
+        self.hardware_id = port
         self._counts: Counter[Outcome] = Counter()
         self._lost = 0
         self._last_loss: tuple[str, float] | None = None

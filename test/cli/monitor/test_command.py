@@ -73,7 +73,7 @@ def test_one_picture_shows_every_topic_and_status(
         assert ('no promise' if topic == 'recipe' else 'fresh') in line
     for status in STATUSES:
         assert any(re.match(f' *{status} +OK: ', line) for line in lines), status
-    assert re.search(r'settings 115200 baud, CRC, .*line load \d+ %', said.out)
+    assert re.search(r'settings 115200 baud, 8 data bits, .*CRC, .*line load \d+ %', said.out)
     assert 'active stations: 1, 2' in said.out
     assert 'CNT_REPLY_MSGS_RCVD' in said.out
 

@@ -34,7 +34,9 @@ from abdf1_ros.errors import PortLost
 from abdf1_ros.messages import Event
 from abdf1_ros.pccc.values import Values
 from abdf1_ros.ros.diagnostics.log import EventLog, LimitedLog
+from abdf1_ros.ros.diagnostics.status import Seen
 from abdf1_ros.ros.diagnostics.statuses import Diagnostics
+from abdf1_ros.ros.diagnostics.writes import WriteLog
 from abdf1_ros.settings.mapping import Mapping
 from abdf1_ros.settings.network import Network
 from soak.hostile import DEAD, hostile_message, LIAR, Liar, OTHER, PLC, SLC, US
@@ -76,7 +78,8 @@ class Ear(Listener):
         self.reads = 0
         self.results = 0
         self.events: Counter[str] = Counter()
-        self.diagnostics: Diagnostics | None = None
+        self.seen = Seen()
+        self.writes = WriteLog('line')
         self._clock = clock
         self._event_log = EventLog(self.log, clock)  # type: ignore[arg-type]
         self._lines = LimitedLog(self.log, clock)  # type: ignore[arg-type]
@@ -92,15 +95,13 @@ class Ear(Listener):
     def written(self, result: WriteResult) -> None:
         """Count the result of a write."""
         self.results += 1
-        if self.diagnostics is not None:
-            self.diagnostics.written(result, self._clock())
+        self.writes.add(result, self._clock())
         self._lines.warning(f'writes to {result.mapping.tag}', f'{result.value}: {result}')
 
     def happened(self, event: Event) -> None:
         """Take a numbered event."""
         self.events[event.message.name] += 1
-        if self.diagnostics is not None:
-            self.diagnostics.happened(event, self._clock())
+        self.seen.last_events[event.station] = event, self._clock()
         self._event_log.add(event)
 
     def station_changed(self, station: Station) -> None:
@@ -128,7 +129,8 @@ class FaultyLine:
         self._mappings = _mappings(mode)
         self.driver = Driver(
             _network(mode), self._mappings, DriverSettings(max_outstanding=3), self.ear)
-        self.ear.diagnostics = Diagnostics('soak', self.driver, 'line')
+        self._diagnostics = Diagnostics(
+            'soak', self.driver, 'line', self.ear.seen, self.ear.writes)
         self._plcs = [
             simulated_plc(PLC, 'PLC5', self.clock, ('N7:0', 100)),
             simulated_plc(SLC, 'SLC', self.clock, ('N7:0', 100), ('B3:0', 20))]
@@ -161,8 +163,7 @@ class FaultyLine:
     def run(self, seconds: float) -> None:
         """Let time pass."""
         self.line.run_for(seconds)
-        assert self.ear.diagnostics is not None
-        self.ear.diagnostics.statuses(self.clock())
+        self._diagnostics.statuses(self.clock())
 
     def disturb(self) -> None:
         """Let every kind of fault happen once, in any order; then all is well again."""

@@ -1,0 +1,114 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""What is looked at ten times a second, and what of it is news for the log."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Sequence
+from typing import Protocol
+
+from abdf1_ros.ros.diagnostics.line import deaf_text, LineView
+from abdf1_ros.ros.diagnostics.link import changed_text
+from abdf1_ros.ros.diagnostics.log import ERROR, INFO, News, WARN
+from abdf1_ros.ros.diagnostics.status import Seen
+from abdf1_ros.share.guest_line import GuestLine
+from rclpy.impl.logging_severity import LoggingSeverity
+
+# How often (s) it is looked whether the files have changed.
+_FILE_PERIOD = 2.0
+
+
+class Watch(Protocol):
+    """Something that is looked at."""
+
+    def look(self, now: float) -> Iterable[News]:
+        """Return what is new at the clock value ``now`` (s)."""
+
+
+class Standing:
+    """What is wrong as long as ``find`` returns it, and is told when it begins."""
+
+    def __init__(self, severity: LoggingSeverity, about: str,
+                 find: Callable[[float], Sequence[str]]) -> None:
+        self._severity = severity
+        self._about = about
+        self._find = find
+        self._told: Sequence[str] = ()
+
+    def look(self, now: float) -> list[News]:
+        """Return what was not there at the last look."""
+        texts, before = self._find(now), self._told
+        self._told = texts
+        return [News(self._severity, self._about, text) for text in texts if text not in before]
+
+
+class DeafStations:
+    """Stations that take no commands: each is told once, and once that it does again."""
+
+    def __init__(self, line: LineView) -> None:
+        self._line = line
+        self._told: list[int] = []
+
+    def look(self, now: float) -> list[News]:
+        """Return which have begun, and which answer commands again."""
+        before, deaf = self._told, self._line.deaf_stations(now)
+        self._told = deaf
+        return [
+            *(News(WARN, f'commands to {number}', f'{deaf_text(number)} "plc detect" finds it, '
+                   'with the node stopped') for number in deaf if number not in before),
+            *(News(INFO, f'commands to {station.number}',
+                   f'station {station.number} answers commands')
+              for station in self._line.driver.stations
+              if station.number in before and station.number not in deaf and station.active)]
+
+
+class ChangedFiles:
+    """Files that have changed since they were read, as ``changed`` returns them."""
+
+    def __init__(self, changed: Callable[[], Sequence[str]], seen: Seen) -> None:
+        self._changed = changed
+        self._seen = seen
+        self._next_look = 0.0
+
+    def texts(self, now: float) -> list[str]:
+        """Look every now and then; return what is to be told of all of them."""
+        if now >= self._next_look:
+            self._next_look = now + _FILE_PERIOD
+            self._seen.changed_files = self._changed()
+        return [changed_text(self._seen.changed_files)] if self._seen.changed_files else []
+
+
+def watches_of(line: LineView, port: str, seen: Seen, guests: Sequence[GuestLine],
+               files_changed: Callable[[], Sequence[str]],
+               crowded_topics: Callable[[float], Sequence[str]]) -> list[Watch]:
+    """Return the watches of a session; ``seen`` gets what statuses need of it."""
+    def crowded(now: float) -> list[str]:
+        seen.crowded = crowded_topics(now)
+        return [f'~/write/{topic} has more than one publisher: its fallback value is not written '
+                'while any of them goes on (a forgotten "ros2 topic pub -r"?)'
+                for topic in seen.crowded]
+
+    def fault(now: float) -> list[str]:
+        text = line.fault(now)
+        return [f'{port}: {text}'] if text else []
+
+    return [
+        Standing(WARN, 'the files', ChangedFiles(files_changed, seen).texts),
+        Standing(WARN, 'publishers', crowded),
+        Standing(ERROR, 'guests', lambda now: [
+            f'guest {guest.guest.name}: {guest.fault}' for guest in guests if guest.fault]),
+        Standing(WARN, 'types of PLCs', lambda now: line.wrong_types()),
+        DeafStations(line),
+        Standing(ERROR, 'line', fault)]

@@ -1,0 +1,81 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The places of other programs that share the port of a session."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from functools import partial
+
+from abdf1_ros.df1.packet import Packet
+from abdf1_ros.driver.driver import Driver
+from abdf1_ros.driver.guests import Guest
+from abdf1_ros.pccc.describe import describe
+from abdf1_ros.pccc.extent import Extent
+from abdf1_ros.ports.trace import PortOpener
+from abdf1_ros.ros.diagnostics.log import LimitedLog
+from abdf1_ros.ros.parameters.declared import Configuration
+from abdf1_ros.settings.share import share_places
+from abdf1_ros.share.guest_line import GuestLine
+from abdf1_ros.text import first
+
+
+class GuestPlaces:
+    """A line for each place, and what is logged of the programs there."""
+
+    def __init__(self, configuration: Configuration, driver: Driver, opener: PortOpener,
+                 notes: LimitedLog, wake: Callable[[], None]) -> None:
+        self._driver = driver
+        self._notes = notes
+        network = configuration.network
+        if configuration.parameters.read_only:
+            network = replace(network, share_access='Read')
+        self.lines = [GuestLine(place, network, driver.guests, wake, self._fault)
+                      for place in share_places(network.share)]
+        for line in self.lines:
+            line.guest.sends = partial(opener.note_guest, line.guest.name)
+            line.guest.wrote = partial(self._wrote, line.guest)
+            line.guest.was_refused = partial(self._refused, line.guest)
+
+    def start(self) -> None:
+        """Let guests connect."""
+        for line in self.lines:
+            line.start()
+
+    def stop(self) -> None:
+        """Let go of the guests."""
+        for line in self.lines:
+            line.stop()
+
+    def _wrote(self, guest: Guest, command: Packet, station: int,
+                     words: list[Extent]) -> None:
+        rows = [row for row in self._driver.mappings if (row.writes or row.heartbeat)
+                and any(row.extent.meets(extent) for extent in words)]
+        if rows:
+            guest.collisions += 1
+            self._notes.warning(
+                f'writes of {guest.name}', f'guest {guest.name} has sent to station {station}: '
+                f'{describe(command)}, words of {first([row.tag for row in rows])}')
+
+    def _refused(self, guest: Guest, command: Packet) -> None:
+        if guest.refused == 1:
+            self._notes.warning(f'guest {guest.name}', (
+                f'guest {guest.name} is refused: {describe(command)}: Share_Access is '
+                f'{guest.access.value}'))
+
+    def _fault(self, error: Exception) -> None:
+        self._notes.error(
+            'guests', f'internal error in the line of a guest: {error!r}; please report it')
