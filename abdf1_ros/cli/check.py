@@ -33,11 +33,13 @@ from typing import Any
 from abdf1_ros.cli.terminal import (
     colour,
     command_parser,
+    EXIT_INTERRUPTED,
+    EXIT_USAGE,
     GREEN,
-    has_reader_left,
     number_option,
     prepare_output,
     RED,
+    run_command,
     table,
     YELLOW,
 )
@@ -55,9 +57,6 @@ from abdf1_ros.settings.mapping import Mapping
 from abdf1_ros.settings.network import FIELDS, load_network, Network
 from abdf1_ros.settings.scaling import Scaling
 from abdf1_ros.text import by_number, first, printable
-
-EXIT_FAULTY = 2
-EXIT_INTERRUPTED = 130
 
 _SHOWN_TAGS = 8  # in the table; JSON has them all
 _EPILOG = """\
@@ -105,20 +104,13 @@ def main(args: Sequence[str] | None = None) -> int:
     """Print the findings; return 2 when there are errors, otherwise 0."""
     prepare_output()
     options = _parse(args)
-    is_good = False
-    try:
-        text, is_good = _folder(options) if options.map is None else _pair(options)
-        print(text, flush=True)
-    except OSError as error:
-        if not has_reader_left(error, _complain):
-            return EXIT_FAULTY
-    except KeyboardInterrupt:
-        return EXIT_INTERRUPTED
-    return 0 if is_good else EXIT_FAULTY
+    text, is_good = _folder(options) if options.map is None else _pair(options)
+    status = 0 if is_good else EXIT_USAGE
 
-
-def _complain(text: str) -> None:
-    print(f'check: {text}', file=sys.stderr)
+    def show() -> int:
+        print(text)
+        return status
+    return run_command('check', show, EXIT_INTERRUPTED, unread=status)
 
 
 def _pair(options: argparse.Namespace) -> tuple[str, bool]:

@@ -30,19 +30,22 @@ import os
 from pathlib import Path
 import random
 import re
-import sys
 import time
 
 from abdf1_ros.cli.plc.line import network_of
 from abdf1_ros.cli.plc.options import add_line_options, LineDefaults
 from abdf1_ros.cli.terminal import (
     command_parser,
-    drop_output,
-    interruptible,
+    EXIT_FAILED,
+    EXIT_INTERRUPTED,
+    EXIT_USAGE,
     may_replace,
+    NoPort,
     prepare_output,
     reason_of,
+    run_command,
     seconds_option,
+    tell,
     whole_option,
 )
 from abdf1_ros.conform import asking, client, damage, data, duplicates, master, peer, radio, slave
@@ -72,13 +75,9 @@ from abdf1_ros.ports.descriptor import Port
 from abdf1_ros.ports.endpoints import Endpoint, PtyEndpoint, TcpEndpoint
 from abdf1_ros.ports.opening import open_port
 from abdf1_ros.ports.settings import PortSettings
-from abdf1_ros.problems import ConfigurationError
+from abdf1_ros.problems import ConfigurationError, Problem
 from abdf1_ros.settings.network import Network
 from abdf1_ros.simulator.simulated_plc import load_plcs
-
-_EXIT_FAILED = 1
-_EXIT_USAGE = 2
-_INTERRUPTED = 130
 
 # Importing them enters their cases.
 _MODULES = (slave, master, peer, client, radio, damage, data, duplicates, asking)
@@ -86,8 +85,8 @@ _MODULES = (slave, master, peer, client, radio, damage, data, duplicates, asking
 _NOBODY = 'no byte was received: check cable, port, speed and power'
 
 _EPILOG = """\
-exit status: 0 when no case failed, 1 when one did or nothing was ever heard, 2 for bad options and
-ports that cannot be opened, 130 after Ctrl-C
+exit status: 0 when no case failed, 1 when one did, nothing was ever heard, or the port cannot be
+opened, 2 for bad options and files, 130 after Ctrl-C
 
 examples:
   conform slave --port /dev/ttyUSB0 --baud 19200 --station 1 --family SLC
@@ -135,25 +134,15 @@ def main(args: Sequence[str] | None = None) -> int:
     target = Target(options.target)
     cases = [case for case in CASES if target in case.targets
              and (not options.only or case.name in options.only)]
-    try:
-        if options.list:
-            for case in cases:
-                print(f'{case.name:24} {case.source:16} {case.rule}')
-            return 0
-        with interruptible():
-            return _run(options, target, cases)
-    except KeyboardInterrupt:
-        print('conform: interrupted', file=sys.stderr)
-        return _INTERRUPTED
-    except BrokenPipeError:
-        drop_output()
-        return _EXIT_FAILED
-    except (ConfigurationError, ValueError) as error:
-        print(f'conform: {error}', file=sys.stderr)
-        return _EXIT_USAGE
+    return run_command('conform', lambda: _run(options, target, cases), EXIT_INTERRUPTED,
+                       EXIT_FAILED)
 
 
 def _run(options: argparse.Namespace, target: Target, cases: Sequence[Case]) -> int:
+    if options.list:
+        for case in cases:
+            print(f'{case.name:24} {case.source:16} {case.rule}')
+        return 0
     options.duplex = 'half' if target.is_half_duplex else 'full'
     made = options.pty is not None or options.tcp is not None
     if made:
@@ -162,9 +151,7 @@ def _run(options: argparse.Namespace, target: Target, cases: Sequence[Case]) -> 
     try:
         line = _open(options, network)
     except OSError as error:
-        print(f'conform: {reason_of(options.tcp or options.pty or network.port, error)}',
-              file=sys.stderr)
-        return _EXIT_USAGE
+        raise NoPort(options.tcp or options.pty or network.port, error) from None
     try:
         wire = Wire(line, BlockCheck(network.error_code), time.monotonic,
                     is_half_duplex=target.is_half_duplex, is_radio=target.is_radio,
@@ -172,8 +159,8 @@ def _run(options: argparse.Namespace, target: Target, cases: Sequence[Case]) -> 
                     char_time=0.0 if made else network.timing.char_time)
         return _judge(options, target, cases, wire, network)
     except OSError as error:
-        print(f'conform: the line was lost: {reason_of("", error)}', file=sys.stderr)
-        return _EXIT_FAILED
+        tell('conform', f'the line was lost: {reason_of("", error)}')
+        return EXIT_FAILED
     finally:
         line.close()
 
@@ -204,12 +191,12 @@ def _judge(options: argparse.Namespace, target: Target, cases: Sequence[Case], w
         try:
             Path(options.junit).write_text(as_junit(facts, results) + '\n', encoding='utf-8')
         except OSError as error:
-            print(f'conform: --junit: {reason_of(options.junit, error)}', file=sys.stderr)
-            return _EXIT_USAGE
+            tell('conform', f'--junit: {reason_of(options.junit, error)}')
+            return EXIT_USAGE
     if not wire.has_heard:
-        print(f'conform: {_NOBODY}', file=sys.stderr)
-        return _EXIT_FAILED
-    return _EXIT_FAILED if any(result.verdict is Verdict.FAIL for result in results) else 0
+        tell('conform', _NOBODY)
+        return EXIT_FAILED
+    return EXIT_FAILED if any(result.verdict is Verdict.FAIL for result in results) else 0
 
 
 def _is_result(path: Path) -> bool:
@@ -267,8 +254,9 @@ def _server(options: argparse.Namespace, network: Network) -> Callable[[bytes], 
                      Checksum[network.error_code], time.monotonic)
     plc = next((plc for plc in plcs if plc.station == options.station), None)
     if plc is None:
-        raise ValueError(f'--station {options.station}: {options.data or "the example data"} '
-                         f'has stations {", ".join(str(plc.station) for plc in plcs)}')
+        raise ConfigurationError([Problem(f'--station {options.station}', (
+            f'{options.data or "the example data"} has stations '
+            f'{", ".join(str(plc.station) for plc in plcs)}'))])
     return lambda command: plc.serve(Packet.decode(command)).encode()
 
 
@@ -282,7 +270,7 @@ def _open(options: argparse.Namespace, network: Network) -> _PortLine:
         line = PtyEndpoint(options.pty)
     else:
         return _PortLine(open_port(PortSettings.of(network)), options.echo)
-    print(f'conform: at {line.name}', file=sys.stderr, flush=True)
+    tell('conform', f'at {line.name}')
     while True:
         try:
             return _PortLine(line.open(), options.echo)

@@ -39,10 +39,13 @@ import traceback
 from abdf1_ros.cli.terminal import (
     command_parser,
     drop_output,
-    interruptible,
+    EXIT_FAILED,
+    EXIT_USAGE,
+    NoPort,
     prepare_output,
-    reason_of,
+    run_command,
     seconds_option,
+    tell,
     whole_option,
 )
 from abdf1_ros.df1.checksum import Checksum
@@ -60,7 +63,6 @@ from abdf1_ros.ports.descriptor import Port, PortAround
 from abdf1_ros.ports.endpoints import Endpoint, PtyEndpoint, SerialEndpoint, TcpEndpoint, WAITING
 from abdf1_ros.ports.link_thread import LinkThread, PortState
 from abdf1_ros.ports.settings import PortSettings
-from abdf1_ros.problems import ConfigurationError
 from abdf1_ros.settings import BAUD_RATES
 from abdf1_ros.settings.network import make_network, Network, URLS
 from abdf1_ros.signals import EndRequest
@@ -68,9 +70,6 @@ from abdf1_ros.simulator.commands import CommandError, COMMANDS, execute
 from abdf1_ros.simulator.gateway import stations_of
 from abdf1_ros.simulator.ladder import Ladder, Lamp
 from abdf1_ros.simulator.simulated_plc import load_plcs, SimulatedPlc
-
-EXIT_FAULT = 1
-EXIT_CONFIGURATION = 2
 
 _EPILOG = COMMANDS + """
 exit status: 0 when it is ended, 1 when the port cannot be opened or the name of --pty is taken,
@@ -140,11 +139,7 @@ def main(args: Sequence[str] | None = None) -> int:
     """
     prepare_output()
     options = _parse(args)
-    try:
-        with interruptible():
-            return _run(options)
-    except KeyboardInterrupt:  # so early that nothing has to be ended, or after that
-        return 0
+    return run_command('simulator', lambda: _run(options))
 
 
 def _run(options: argparse.Namespace) -> int:
@@ -154,12 +149,9 @@ def _run(options: argparse.Namespace) -> int:
             _try_out(script, options)
         plcs = _load(options)
         line = _make_line(options)
-    except (CommandError, ConfigurationError, ValueError) as error:
-        print(f'simulator: {error}', file=sys.stderr)
-        return EXIT_CONFIGURATION
-    except OSError as error:  # of the line; a fault of a file is a ConfigurationError
-        print(f'simulator: {error}', file=sys.stderr)
-        return EXIT_FAULT
+    except (CommandError, ValueError) as error:
+        tell('simulator', str(error))
+        return EXIT_USAGE
     try:
         return _play(plcs, line, script, options)
     finally:
@@ -178,7 +170,7 @@ def _play(plcs: Sequence[SimulatedPlc], line: Endpoint, script: TimedCommands,
             _converse(plcs, script, link, options, ended)
     finally:  # the thread would keep the process alive
         link.stop()
-    return EXIT_FAULT if link.has_failed else 0
+    return EXIT_FAILED if link.has_failed else 0
 
 
 def _try_out(script: TimedCommands, options: argparse.Namespace) -> None:
@@ -308,15 +300,16 @@ def _scheduled(text: str) -> tuple[float, str]:
 
 
 def _make_line(options: argparse.Namespace) -> Endpoint:
-    """Return the line; OSError says which one cannot be had."""
+    """Return the line; NoPort says which one cannot be had."""
     try:
         if options.tcp is not None:
             return TcpEndpoint(*_host_and_port(options.tcp))
         if options.port is not None:
             return SerialEndpoint(_port_settings(options))
+        return PtyEndpoint(options.pty)
     except OSError as error:
-        raise OSError(reason_of(options.port or f'--tcp "{options.tcp}"', error)) from None
-    return PtyEndpoint(options.pty)
+        name = options.port or options.pty or f'--tcp "{options.tcp}"'
+        raise NoPort(name, error) from None
 
 
 def _port_settings(options: argparse.Namespace) -> PortSettings:

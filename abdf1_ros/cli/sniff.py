@@ -29,6 +29,7 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Iterator, Sequence
+from functools import partial
 import math
 import os
 from pathlib import Path
@@ -39,12 +40,16 @@ import time
 from abdf1_ros.cli.sniff_report import is_bundle, ReportBundle
 from abdf1_ros.cli.terminal import (
     command_parser,
+    EXIT_FAILED,
+    EXIT_USAGE,
     has_reader_left,
-    interruptible,
     may_replace,
+    NoPort,
     prepare_output,
     reason_of,
+    run_command,
     seconds_option,
+    tell,
     whole_option,
 )
 from abdf1_ros.df1.checksum import Checksum
@@ -53,7 +58,7 @@ from abdf1_ros.numbers import whole_number
 from abdf1_ros.ports.settings import PortSettings
 from abdf1_ros.ports.tap import is_pty, Tap
 from abdf1_ros.ports.trace import begun_now, Trace
-from abdf1_ros.problems import Problem
+from abdf1_ros.problems import ConfigurationError, Problem
 from abdf1_ros.settings import BAUD_RATES, PARITIES
 from abdf1_ros.settings.network import Network, URLS
 from abdf1_ros.sniffer.capture import Chunk
@@ -63,10 +68,6 @@ from abdf1_ros.sniffer.pcapng import PcapngWriter
 from abdf1_ros.sniffer.report import json_line, summary_json, summary_lines, text_line
 from abdf1_ros.sniffer.summary import Summary
 from abdf1_ros.sniffer.traffic import TrafficDecoder
-from abdf1_ros.text import printable
-
-EXIT_LOST = 1  # a port that was there, or a file that cannot be read
-EXIT_USAGE = 2
 
 _AUTO = 'auto'
 _CHECKS = {check.value.lower(): check for check in Checksum}
@@ -75,8 +76,7 @@ _DEFAULT_BAUD = Network().baud
 _PROGRESS_PERIOD = 2.0
 
 _EPILOG = """\
-exit status: 0 at the end, 1 when a port is lost or a file cannot be read, 2 for bad options,
-contents of files, or ports
+exit status: 0 at the end, 1 when a port cannot be opened or is lost, 2 for bad options and files
 
 examples:
   sniff --port /dev/ttyUSB0 --baud 19200
@@ -180,7 +180,12 @@ class _Output:
         if self._bundle:
             self._bundle.add(entry)
         if self._packets:
-            self._packets.write(entry)
+            try:
+                self._packets.write(entry)
+            except OSError as error:
+                self._packets = None
+                self.has_failed = True
+                _say(f'{reason_of(self._options.pcapng, error)}; no more packets are written')
         if self._options.json and not self._options.summary:
             print(json_line(entry))
         elif not self._options.summary:
@@ -195,25 +200,16 @@ def main(args: Sequence[str] | None = None) -> int:
     """
     prepare_output()
     options = _parse(args)
-    try:
-        with interruptible():
-            return _decode(options)
-    except KeyboardInterrupt:  # before there was anything to sum up, or after all was told
-        return 0
+    return run_command('sniff', lambda: _decode(options))
 
 
 def _decode(options: argparse.Namespace) -> int:
     try:
         output = _Output(options)
     except OSError as error:
-        print(f'sniff: --pcapng: {reason_of(options.pcapng, error)}', file=sys.stderr)
-        return EXIT_USAGE
-    try:
-        if options.files:
-            return _decode_files(options, output)
-        return _listen(options, output)
-    except OSError as error:
-        return 0 if has_reader_left(error, _say) else EXIT_USAGE
+        raise ConfigurationError([Problem(
+            '--pcapng', reason_of(options.pcapng, error))]) from None
+    return _decode_files(options, output) if options.files else _listen(options, output)
 
 
 def _parse(args: Sequence[str] | None) -> argparse.Namespace:
@@ -271,10 +267,6 @@ def _parse(args: Sequence[str] | None) -> argparse.Namespace:
     return options
 
 
-class _Unreadable(Exception):
-    """A file that cannot be read; the text says which and why."""
-
-
 def _decode_files(options: argparse.Namespace, output: _Output) -> int:
     status = 0
     end = time.monotonic() + options.seconds
@@ -297,9 +289,6 @@ def _decode_files(options: argparse.Namespace, output: _Output) -> int:
     except Problem as problem:
         status = EXIT_USAGE
         _say(str(problem))
-    except _Unreadable as error:
-        status = EXIT_LOST
-        _say(str(error))
     if not status or not output.is_empty:
         output.end()
     return EXIT_USAGE if output.has_failed else status
@@ -312,7 +301,7 @@ def _recorded(name: str, is_binary: bool) -> Iterator[tuple[Recording, Chunk]]:
         for chunk in recording.chunks():
             yield recording, chunk
     except OSError as error:
-        raise _Unreadable(f'{name}: cannot be read: {error.strerror or error}') from None
+        raise Problem(name, f'cannot be read: {error.strerror or error}') from None
 
 
 def _listen(options: argparse.Namespace, output: _Output) -> int:
@@ -325,43 +314,59 @@ def _listen(options: argparse.Namespace, output: _Output) -> int:
         settings['baud'] = str(baud)
     try:
         tap = Tap(names, PortSettings('', baud or _DEFAULT_BAUD, parity=options.parity))
-        for number in (signal.SIGINT, signal.SIGTERM):
-            signal.signal(number, lambda *_: tap.stop())
-        with tap:
-            trace = Trace(options.save, settings, _say) if options.save else None
-            _say(f'listening on {" and ".join(tap.names)}; Ctrl-C ends')
-            return _print_heard(tap, trace, output, settings, options.seconds)
-    except BrokenPipeError:  # of our output, not of a port
-        raise
     except OSError as error:
-        _say(reason_of(error.filename, error) if error.filename else str(error))
-        return EXIT_USAGE
+        raise NoPort(error.filename or '', error) from None
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, lambda *_: tap.stop())
+    with tap:
+        try:
+            trace = Trace(options.save, settings, _say) if options.save else None
+        except OSError as error:
+            raise ConfigurationError([Problem(
+                '--save', reason_of(options.save, error))]) from None
+        _say(f'listening on {" and ".join(tap.names)}; Ctrl-C ends')
+        status = _print_heard(tap, trace, output, settings, options)
+        output.end()
+    return status
 
 
 def _print_heard(tap: Tap, trace: Trace | None, output: _Output, settings: dict[str, str],
-                 seconds: float) -> int:
-    """Print what the tap hears, until the time is up, a signal, or a lost port."""
+                 options: argparse.Namespace) -> int:
+    """
+    Print what the tap hears, until the time is up, a signal, or a lost port.
+
+    Output that cannot be written never ends a tap: that would cut program and PLC.
+    """
     def idle() -> None:
         output.show_progress('listening')
 
     status = 0
-    try:
-        for chunk in tap.chunks(seconds, _PROGRESS_PERIOD, idle):
-            if trace:
-                trace.write(chunk)
+    chunks = tap.chunks(options.seconds, _PROGRESS_PERIOD, idle)
+    while True:
+        try:
+            chunk = next(chunks, None)
+        except OSError as error:
+            _say(f'a port was lost: {error}')
+            status = EXIT_FAILED
+            break
+        if chunk is None:
+            break
+        if trace:
+            trace.write(chunk)
+        try:
             output.take(chunk, settings)
             sys.stdout.flush()
-            idle()
-    except BrokenPipeError:
-        raise
-    except OSError as error:
-        _say(f'a port was lost: {error}')
-        status = EXIT_LOST
+        except OSError as error:
+            if not has_reader_left(error, _say):
+                status = EXIT_USAGE
+            elif not options.tap:
+                break
+            else:
+                _say('nobody reads this any more; the bytes are passed on until Ctrl-C')
+        idle()
     if trace:
         trace.close()
-    output.end()
     return status
 
 
-def _say(text: str) -> None:
-    print(f'sniff: {printable(text)}', file=sys.stderr, flush=True)
+_say = partial(tell, 'sniff')

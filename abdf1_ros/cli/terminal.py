@@ -18,9 +18,10 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 import difflib
 import errno
+from functools import partial
 import io
 import math
 import os
@@ -33,10 +34,19 @@ import time
 from types import FrameType
 from typing import Any, NoReturn, TextIO
 
+from abdf1_ros.errors import PortLost
 from abdf1_ros.numbers import decimal_number, whole_number
 from abdf1_ros.paths import ShowVersion
+from abdf1_ros.problems import ConfigurationError
+from abdf1_ros.text import printable
 
 RED, YELLOW, GREEN = 31, 33, 32
+
+# Exit statuses of all commands: 1 for what a port or a run brings, 2 for files and arguments.
+EXIT_FAILED = 1
+EXIT_USAGE = 2
+EXIT_UNKNOWN = 3  # of "plc write"
+EXIT_INTERRUPTED = 130
 
 _ENDING = (signal.SIGINT, signal.SIGTERM)
 
@@ -46,6 +56,47 @@ _ADVICE = {
     errno.ENOENT: '"plc ports" lists the ports that there are'}
 
 _PROGRESS_DELAY = 2.0  # shorter work shows no progress
+
+
+class NoPort(OSError):
+    """A port that cannot be opened; the text names it and gives advice."""
+
+    def __init__(self, name: str, error: OSError) -> None:
+        super().__init__(reason_of(name, error))
+
+
+def tell(name: str, text: str, code: int | None = None) -> None:
+    """Say ``text`` on standard error, in the name of a command; in a colour where it has one."""
+    line = f'{name}: {printable(text)}'
+    with suppress(OSError):  # nobody can be told
+        print(colour(line, code, sys.stderr) if code else line, file=sys.stderr, flush=True)
+
+
+def run_command(name: str, work: Callable[[], int], interrupted: int = 0,
+                unread: int = 0) -> int:
+    """
+    Carry out a command and tell its failures; return the exit status.
+
+    It is ``interrupted`` after a SIGINT or SIGTERM that the work has not handled, ``unread`` where
+    the reader of the output has left.
+    """
+    complain = partial(tell, name, code=RED)
+    try:
+        with interruptible():
+            status = work()
+            sys.stdout.flush()
+            return status
+    except KeyboardInterrupt:
+        return interrupted
+    except ConfigurationError as error:
+        for problem in error.problems:
+            complain(str(problem))
+        return EXIT_USAGE
+    except (NoPort, PortLost) as error:
+        complain(str(error))
+        return EXIT_FAILED
+    except OSError as error:
+        return unread if has_reader_left(error, complain) else EXIT_USAGE
 
 
 def is_terminal(stream: TextIO) -> bool:

@@ -111,31 +111,40 @@ class Accounting:
         A gateway replies in place of a PLC that it does not reach, maybe after a long time: this
         is as good as no reply in time, where waiting for it keeps others waiting.
         """
-        station = self._stations.records[reply.src]
+        number = reply.src
         expected = task.command.cmd | REPLY_BIT
         if reply.cmd != expected:
             self.counters.invalid_messages += 1
-            details = station.number, reply.cmd, expected
-            self.note(Message.ERR_BAD_FUNCTION_CODE, *details, station=station.number)
+            details = number, reply.cmd, expected
+            self.note(Message.ERR_BAD_FUNCTION_CODE, *details, station=number)
             task.fail(WrongCommandCode(*details))
             return
-        station.replies += 1
-        station.unanswered = 0
-        station.returns = 0
-        station.local_status = reply.sts if reply.sts and is_local_status(reply.sts) else 0
-        station.overdue = station.overdue + keeps_others_waiting if station.local_status else 0
-        station.last_tns = reply.tns
-        self.report(Event(Message.NTC_REPLY_MSG_RCVD, (station.number,), station.number))
+        local_status = reply.sts if reply.sts and is_local_status(reply.sts) else 0
+        if task.blames or not local_status:
+            station = self._stations.records[number]
+            station.replies += 1
+            station.unanswered = station.returns = 0
+            station.local_status = local_status
+            station.overdue = station.overdue + keeps_others_waiting if local_status else 0
+            station.last_tns = reply.tns
+        self.report(Event(Message.NTC_REPLY_MSG_RCVD, (number,), number))
         task.reply(reply)
 
-    def late(self, station: int, *, keeps_others_waiting: bool) -> None:
+    def late(self, task: Task, *, keeps_others_waiting: bool) -> None:
         """Count and report a reply that has not come within Cmd_Timeout (S0, counter 2545)."""
         self.counters.command_timeouts += 1
-        self._stations[station].overdue += keeps_others_waiting
-        self._stations[station].unanswered += 1
-        self.note(Message.ERR_COMMAND_TIMEOUT, station=station)
+        number = task.command.dst
+        if task.blames:
+            self._stations[number].overdue += keeps_others_waiting
+            self._stations[number].unanswered += 1
+        self.note(Message.ERR_COMMAND_TIMEOUT, station=number)
 
     def overdue(self, task: Task, *, keeps_others_waiting: bool) -> None:
         """End a task whose reply has not come within Cmd_Timeout."""
-        self.late(task.command.dst, keeps_others_waiting=keeps_others_waiting)
+        self.late(task, keeps_others_waiting=keeps_others_waiting)
         task.fail(CommandTimeout())
+
+    def lost(self, number: int, now: float) -> None:
+        """Make a station inactive, and report it."""
+        self._stations.lost(number, now)
+        self.note(Message.ERR_INACTIVE_STATION, number, station=number)

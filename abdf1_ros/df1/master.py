@@ -102,9 +102,11 @@ class HalfDuplexMaster:
             task.sent = error.sent
             task.fail(error)
         except StationInactive as error:
+            if task.blames:
+                self._line.accounting.lost(number, self._machine.now)
             task.fail(error)
         except CommandTimeout as error:
-            yield from self._give_up(command.dst)
+            yield from self._give_up(task)
             task.fail(error)
         else:
             if number == BROADCAST:
@@ -117,8 +119,9 @@ class HalfDuplexMaster:
         station = self._stations[command.dst]
         try:
             reply = yield from self._collect(number, command, self._machine.now)
-        except StationInactive:
-            return  # the sender of the command has a time-out of its own
+        except StationInactive:  # the sender of the command has a time-out of its own
+            self._line.accounting.lost(number, self._machine.now)
+            return
         except CommandTimeout:
             station.overdue += 1
             return
@@ -145,9 +148,9 @@ class HalfDuplexMaster:
             if is_over and not may_be_next:
                 raise CommandTimeout
 
-    def _give_up(self, number: int) -> Procedure:
+    def _give_up(self, task: Task) -> Procedure:
         """Count and report a reply that did not come in time (S0, counter 2545)."""
-        self._line.accounting.late(number, keeps_others_waiting=True)
+        self._line.accounting.late(task, keeps_others_waiting=True)
         if self._settings.nak_on_command_timeout:
             self._line.counters.naks_sent += 1
             yield Step(frames.NAK, 0)

@@ -31,7 +31,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cache
 import math
-from typing import NoReturn, TypeGuard
+from typing import TypeGuard
 
 from abdf1_ros.df1 import frames
 from abdf1_ros.df1.accounting import Accounting, count_fault, wrong_message
@@ -145,7 +145,8 @@ class MasterLine:
         """
         Send a message to a station until it is acknowledged (S0, "Network Reads"; M 3-12).
 
-        Return when the transmission began that was acknowledged (clock value in s).
+        Return when the transmission began that was acknowledged (clock value in s); raises
+        CommandExpired, and StationInactive after the last retry.
         """
         frame = frames.master_frame(number, packet.encode(), self.settings.checksum)
         self.accounting.sent(packet)
@@ -174,7 +175,7 @@ class MasterLine:
                 self.note(Message.NTC_NAK_RETRY, retry, cause.number, station=number)
         self.counters.nak_limit_exceeded += 1
         self.note(Message.NTC_NAK_LIMIT_EXCEEDED, self.settings.nak_retries, station=number)
-        self.fail_inactive(number)
+        raise StationInactive(number)
 
     def _note_cause(self, answer: Heard, number: int, expected: Message) -> Message:
         """Note why something has to be sent again, at worst what was ``expected``; return it."""
@@ -194,7 +195,7 @@ class MasterLine:
         """
         answer = yield from self.poll_inactive(number)
         if not is_good(answer):
-            self.fail_inactive(number)
+            raise StationInactive(number)
         if isinstance(answer, Frame):
             packet = yield from self.receive(number, answer)
             if packet is not None:
@@ -212,7 +213,7 @@ class MasterLine:
     def poll_with_retries(self, number: int, pause: float, reply_size: int = 0
                           ) -> Generator[Step, Heard, Control | Frame]:
         """
-        Poll until EOT or a good message; a station that gives neither becomes inactive.
+        Poll until EOT or a good message; raises StationInactive after the last retry.
 
         ``reply_size`` is that of the task whose reply is expected.
         """
@@ -228,7 +229,7 @@ class MasterLine:
                 self.note(Message.NTC_ENQ_RETRY, retry, cause.number, station=number)
         self.counters.enq_limit_exceeded += 1
         self.note(Message.NTC_ENQ_LIMIT_EXCEEDED, self.settings.enq_retries, station=number)
-        self.fail_inactive(number)
+        raise StationInactive(number)
 
     def _poll(self, number: int, pause: float = 0.0,
               reply_size: int = 0) -> Generator[Step, Heard, Heard]:
@@ -358,8 +359,7 @@ class MasterLine:
 
     def complete(self, task: Task, reply: Packet, *, keeps_others_waiting: bool) -> None:
         """End a task with the reply to its command."""
-        is_from_gateway = reply.sts and is_local_status(reply.sts)
-        if reply.src in self.stations.routes and not is_from_gateway:
+        if reply.src in self.stations.routes and not is_local_status(reply.sts):
             self.stations.heard(reply.src, self.machine.now)  # others were, when it came
         self.accounting.complete(task, reply, keeps_others_waiting=keeps_others_waiting)
 
@@ -410,6 +410,7 @@ class MasterLine:
                     yield from self.probe(number)
                 yield from self.deliver(number, packet)
             except StationInactive:
+                self.accounting.lost(number, self.machine.now)
                 self._refuse(packet)
                 return None
             if collect is not None and not packet.is_reply and number != BROADCAST:
@@ -439,12 +440,6 @@ class MasterLine:
     def is_full(self) -> bool:
         """Tell whether no more messages can be kept to be passed on."""
         return len(self.forwards) >= MAX_FORWARDS
-
-    def fail_inactive(self, number: int) -> NoReturn:
-        """Make a station inactive, and report it."""
-        self.stations.lost(number, self.machine.now)
-        self.note(Message.ERR_INACTIVE_STATION, number, station=number)
-        raise StationInactive(number)
 
     def _count_control(self, control: Control) -> None:
         if control is Control.ACK:

@@ -205,8 +205,8 @@ class FullDuplexPeer(EqualNode):
         if delivered is not None:
             entry.deadline = delivered + self._settings.cmd_timeout
         elif self._outstanding.pop(key, None):
-            self._stations.lost(number, self._machine.now)
-            self._note(Message.ERR_INACTIVE_STATION, number, station=number)
+            if task.blames:
+                self._accounting.lost(number, self._machine.now)
             task.fail(StationInactive(number))
 
     def _send_reply(self, reply: Packet) -> Procedure:

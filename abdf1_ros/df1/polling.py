@@ -240,7 +240,13 @@ class StandardPollingMaster:
                 answer = yield from self._line.poll_with_retries(
                     number, 0.0, self._reply_size(number))
             except StationInactive as error:
-                self._lost(number, begun, error)
+                # A reply that cannot be had is that of a guest first of all: the next poll tells.
+                guests = [station for station, entry in self._waiting_for(number)
+                          if not entry.task.blames]
+                for station in guests:
+                    self._end(station, error)
+                if not guests:
+                    self._lost(number, begun, error)
                 return
             yield from self._answered(number, answer)
             is_more_wanted = isinstance(answer, Frame) and self._polling.multiple \
@@ -360,7 +366,10 @@ class StandardPollingMaster:
         try:
             begun = yield from self._line.deliver(number, task.command, task.expires)
         except StationInactive as error:
-            self._lost(number, now, error)
+            if task.blames:
+                self._lost(number, now, error)
+            else:
+                self._end(station, error)
         except CommandExpired as error:
             task.sent = error.sent
             self._end(station, error)
@@ -370,6 +379,7 @@ class StandardPollingMaster:
 
     def _lost(self, number: int, begun: float, error: StationInactive) -> None:
         """Take note that a station does not answer any more, and has had the line since then."""
+        self._line.accounting.lost(number, self._machine.now)
         for station in self._stations.behind(number):
             self._end(station, error)
         if number in self._unproven:

@@ -267,12 +267,12 @@ class RadioNode(EqualNode):
         task, number = command.task, command.task.command.dst
         if command.tries == command.most:
             del self._under_way[number]
-            self._accounting.late(number, keeps_others_waiting=True)
+            self._accounting.late(task, keeps_others_waiting=True)
             if self._stations[number].active:  # not after the one try of a probe
                 self._counters.nak_limit_exceeded += 1
                 self._note(Message.NTC_NAK_LIMIT_EXCEEDED, self._settings.retries, station=number)
-            self._stations.lost(number, self._machine.now)
-            self._note(Message.ERR_INACTIVE_STATION, number, station=number)
+            if task.blames:
+                self._accounting.lost(number, self._machine.now)
             task.fail(StationInactive(number))
             return
         try:

@@ -32,13 +32,15 @@ class Task(Protocol):
     The link sets ``sent`` when the command has been on the line: without a reply its outcome
     is then unknown. It ends the command by calling ``reply`` or ``fail``, once. ``reply_size``
     is the bytes after the header of a good reply, 0 where that is not known. After ``expires``
-    (clock value in s) the command is neither sent nor repeated.
+    (clock value in s) the command is neither sent nor repeated. ``blames`` tells that a failure
+    says something about the station: that of a guest's command does not.
     """
 
     command: Packet
     sent: bool
     reply_size: int
     expires: float
+    blames: bool
 
     def reply(self, packet: Packet) -> None:
         """Take the reply."""

@@ -109,6 +109,8 @@ class GuestCommand:
 class GuestJob(Job):
     """A guest's command on the line, with our SRC and TNS."""
 
+    blames = False
+
     def __init__(self, queue: GuestQueue, command: GuestCommand, station: int,
                  expires: float) -> None:
         self.command = command
@@ -191,6 +193,8 @@ class GuestQueue:
             if guest.waiting:
                 self.waiting.append(guest)
             self._look()
+            if self._stations[station].last_heard is None:
+                self._silent(station, now)  # it may not exist: one poll or try at a time
             if self._stations.admits_message(station, now):
                 return GuestJob(self, command, station, command.requested + self._patience)
             self._give_up(command, _OFF_LINE)
@@ -215,16 +219,22 @@ class GuestQueue:
     def ended(self, job: GuestJob, begun: float, error: Exception | None) -> None:
         """Refuse a command that has no reply; tell what it may have changed."""
         command, station = job.command, job.station
-        self._stations.tried(station, begun, self._line.now, is_message=True,
-                             was_silent=not self._stations[station].replies_in_time)
         was_sent = error is None or getattr(error, 'sent', True)
         if error is not None:
+            self._silent(station, self._line.now)
             self._give_up(command, _sent_status(error) if was_sent else _unsent_status(error))
         if was_sent and _code(command.packet) not in _READS:
             extents = self._words(command.packet, station)
             self._reads.refresh_words(station, extents, self._line.now)
             self.wrote(station, extents)
             command.guest.wrote(command.packet, station, extents)
+        self._stations.tried(station, begun, self._line.now, is_message=True,
+                             was_silent=not self._stations[station].replies_in_time)
+
+    def _silent(self, station: int, now: float) -> None:
+        """Take a station for silent that only guests ask: nobody else says so."""
+        if station not in self._stations:
+            self._stations.lost(station, now)
 
     def _look(self) -> None:
         """Find out when the first command has waited too long."""

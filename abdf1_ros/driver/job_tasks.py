@@ -51,7 +51,7 @@ class Job:
     known. That command must not be sent after ``expires`` (clock value in s); each later one has
     ``patience`` s after the command before it, without that command's own time on the line.
     ``is_probe`` tells that a silent station is asked whether it is there again, ``is_own`` that
-    nobody has asked for it: a heartbeat or a fallback.
+    nobody has asked for it: a heartbeat or a fallback. ``blames`` is that of ``Task``.
     """
 
     station: int
@@ -60,6 +60,7 @@ class Job:
     patience = 0.0
     is_probe = False
     is_own = False
+    blames = True
 
     def steps(self, now: float) -> Steps[None]:
         """Return what is to be done from ``now`` on (clock value in s)."""
@@ -149,6 +150,7 @@ class JobTask:
         self.sent = False
         self.reply_size = job.reply_size
         self.expires = job.expires
+        self.blames = job.blames
         self.taken = now
         self.station = job.station
         self._tasks = tasks

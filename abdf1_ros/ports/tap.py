@@ -145,7 +145,8 @@ class Tap:
         try:
             return SerialEndpoint(replace(self._settings, name=name))
         except OSError as error:
-            raise OSError(f'{name}: {error.strerror or error}') from error
+            error.filename = name
+            raise
 
     def _reader(self, port: Port, direction: Direction, onward: Port | None) -> _TapReader:
         return _TapReader(port, direction, onward, self._heard, self._wake_reader)

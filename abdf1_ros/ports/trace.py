@@ -44,6 +44,7 @@ class Trace:
 
     def __init__(self, path: str, settings: dict[str, str], on_error: Callable[[str], None],
                  limit: float = math.inf) -> None:
+        self._path = path
         self._on_error = on_error
         self._writer: CaptureWriter | None = CaptureWriter(Path(path), limit, settings)
 
@@ -55,7 +56,7 @@ class Trace:
             self._writer.write(chunk)
         except OSError as error:
             self.close()
-            self._on_error(f'{error}; nothing more is recorded')
+            self._on_error(f'{self._path}: {error.strerror}; nothing more is recorded')
 
     def close(self) -> None:
         """End the capture."""

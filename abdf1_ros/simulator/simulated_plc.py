@@ -120,6 +120,7 @@ class Sending:
         self.sent = False
         self.reply_size = 0
         self.expires = math.inf
+        self.blames = True
         self._report = report
 
     def reply(self, packet: Packet) -> None:

@@ -38,7 +38,7 @@ from collections.abc import Iterable, Iterator, Mapping
 from enum import Enum
 import math
 from pathlib import Path
-from typing import NamedTuple, TextIO
+from typing import NamedTuple
 
 from abdf1_ros.numbers import decimal_number
 from abdf1_ros.problems import Problem
@@ -89,8 +89,8 @@ class CaptureWriter:
 
     ``limit`` is the most bytes on the disk: at half of it the file is renamed to ``<path>.1``,
     in place of an older one, as is a capture that is there already. Every line is handed to the
-    operating system at once. Raises OSError, also where ``path`` is something else than a
-    capture, which is left alone.
+    operating system at once, whole or not at all. Raises OSError, also where ``path`` is something
+    else than a capture, which is left alone.
     """
 
     def __init__(self, path: Path, limit: float = math.inf,
@@ -103,30 +103,36 @@ class CaptureWriter:
         for place in (path, Path(f'{path}.1')):
             if place.exists() and not _is_capture(place):
                 raise OSError(f'{place} exists and is not a capture; give another name')
-        self._file = self._begin()
+        self._begin()
 
     def write(self, chunk: Chunk | str) -> None:
         """Write a chunk, or a line that is one of ``setting_line``."""
         line = str(chunk)
         if self._written + len(line) + 1 > self._limit:
             self._file.close()
-            self._file = self._begin()
+            self._begin()
         self._put(line)
 
     def close(self) -> None:
         self._file.close()
 
-    def _begin(self) -> TextIO:
+    def _begin(self) -> None:
         if self.path.exists():
             self.path.replace(f'{self.path}.1')
         self.path.touch(0o640)  # not for every user: it holds the values of a plant
-        self._file = self.path.open('w', encoding='ascii', buffering=1)
+        self._file = self.path.open('wb', buffering=0)
         self._written = 0
         self._put(self._head)
-        return self._file
 
     def _put(self, text: str) -> None:
-        self._written += self._file.write(f'{text}\n')
+        left = line = f'{text}\n'.encode('ascii')
+        try:
+            while left:
+                left = left[self._file.write(left):]
+        except OSError:
+            self._file.truncate(self._written)  # half a line would tell of other bytes
+            raise
+        self._written += len(line)
 
 
 def setting_line(name: str, value: str) -> str:

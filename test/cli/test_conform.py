@@ -129,17 +129,12 @@ def test_simulator_is_a_node_of_a_radio_network_and_not_a_peer(
         assert 'FAIL  message-acknowledged' in capsys.readouterr().out
 
 
-@pytest.mark.parametrize(('args', 'text'), [
-    (['slave', '--port', '/nowhere/at/all'], 'No such file'),
-    (['slave'], '--port'),
-    (['master', '--pty', '', '--station', '9'], ''),
-])
-def test_bad_options_end_with_two(args: list[str], text: str, tmp_path: Path,
-                                  capsys: pytest.CaptureFixture[str]) -> None:
-    if '' in args:
-        args[args.index('')] = str(tmp_path / 'occupied')
-        (tmp_path / 'occupied').write_text('')
-    assert main(args) == 2
+@pytest.mark.parametrize(('args', 'status', 'text'), [
+    (['slave', '--port', '/nowhere/at/all'], 1, '/nowhere/at/all: No such file'),
+    (['slave'], 2, '--port'), (['master', '--pty', '/dev/null'], 1, '/dev/null')])
+def test_port_that_cannot_be_opened_is_one_and_what_is_wrong_in_options_two(
+        args: list[str], status: int, text: str, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(args) == status
     assert text in capsys.readouterr().err
 
 

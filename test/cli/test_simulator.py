@@ -262,8 +262,8 @@ def test_faults_of_a_data_file_are_told_with_their_cells(
     assert _refused(capsys, '--data', str(path)).splitlines() == [
         f'simulator: {path}:4:2 (PLC_Type): PLC_Type = "PLC7" should be one of PLC2, PLC3, PLC5, '
         'SLC',
-        f'{path}:5:3 (Address): SLC has no Q files; file types: O, I, S, B, T, C, R, N, F, ST, '
-        'A, D, L, PD, MG, HSC, PTO, PWM, STI, EII']
+        f'simulator: {path}:5:3 (Address): SLC has no Q files; file types: O, I, S, B, T, C, R, '
+        'N, F, ST, A, D, L, PD, MG, HSC, PTO, PWM, STI, EII']
 
 
 def test_data_file_that_is_missing_is_named(capsys: pytest.CaptureFixture[str]) -> None:

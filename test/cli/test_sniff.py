@@ -33,6 +33,7 @@ from abdf1_ros.df1 import frames
 from abdf1_ros.df1.checksum import Checksum
 from abdf1_ros.df1.packet import Packet
 from abdf1_ros.ports.endpoints import PtyEndpoint
+from abdf1_ros.sniffer.capture import read_capture
 import pytest
 from support.ptys import PATIENCE, Pty, read_exactly
 
@@ -165,9 +166,9 @@ def test_file_that_cannot_be_read_is_an_error_without_an_empty_summary(
         capsys: Output, tmp_path: Path, capture: str) -> None:
     none = tmp_path / 'none'
     for path, reason in ((none, 'No such file or directory'), (tmp_path, 'Is a directory')):
-        assert main([str(path)]) == 1
+        assert main([str(path)]) == 2
         assert capsys.readouterr() == ('', f'sniff: {path}: cannot be read: {reason}\n')
-    assert main([capture, str(none)]) == 1
+    assert main([capture, str(none)]) == 2
     captured = capsys.readouterr()
     assert captured.out.splitlines()[:5] == LINES
     assert 'summary: 0.0 s, 45 bytes' in captured.out
@@ -198,10 +199,11 @@ def test_speed_in_a_capture_that_is_none(capsys: Output, tmp_path: Path, baud: s
 
 def test_port_or_file_that_cannot_be_opened_is_named(capsys: Output, tmp_path: Path) -> None:
     none = tmp_path / 'none'
-    assert f'sniff: {none}: ' in refused(capsys, '--port', str(none))
-    assert f'sniff: {none}: ' in refused(capsys, '--tap', 'pty', str(none))
+    for args in (['--port', str(none)], ['--tap', 'pty', str(none)]):
+        assert main(args) == 1
+        assert capsys.readouterr().err == f'sniff: {none}: No such file or directory\n'
     assert refused(capsys, '--port', 'pty', '--save', '/nowhere/x').endswith(
-        'sniff: /nowhere/x: No such file or directory\n')
+        'sniff: --save: /nowhere/x: No such file or directory\n')
     assert 'is not a capture; give another name' in refused(
         capsys, '--port', 'pty', '--save', str(tmp_path))
 
@@ -361,6 +363,57 @@ def test_full_disk_is_no_traceback(capture: str) -> None:
     assert result.returncode == 2
     assert result.stderr.splitlines()[-1] == 'sniff: cannot print: No space left on device'
     assert 'Traceback' not in result.stderr
+
+
+def test_full_disk_does_not_cut_a_tap(tmp_path: Path) -> None:
+    """Neither what is printed nor what is saved can be written, and the bytes go on."""
+    names = [tmp_path / name for name in ('a', 'b', 'saved', 'packets')]
+    with open('/dev/full', 'w') as full, subprocess.Popen(
+            [sys.executable, '-m', 'abdf1_ros', 'sniff', '--tap', f'pty:{names[0]}',
+             f'pty:{names[1]}', '--save', str(names[2]), '--pcapng', str(names[3])], text=True,
+            stdout=full, stderr=subprocess.PIPE) as sniff:
+        assert sniff.stderr is not None
+        sniff.stderr.readline()
+        resource.prlimit(sniff.pid, resource.RLIMIT_FSIZE, (1000, 1000))
+        ends = [os.open(name, os.O_RDWR | os.O_NOCTTY) for name in names[:2]]
+        for _ in range(20):  # each time they are written, twice as much as fits
+            os.write(ends[0], SAID[0])
+            assert read_exactly(ends[1], len(SAID[0])) == SAID[0]
+            os.write(ends[1], frames.ACK)
+            assert read_exactly(ends[0], 2) == frames.ACK
+        for end in ends:
+            os.close(end)
+        sniff.send_signal(signal.SIGINT)
+        told = sorted(sniff.stderr.read().splitlines())
+        assert sniff.wait(PATIENCE) == 2
+    assert told == [
+        f'sniff: {names[3]}: File too large; no more packets are written',
+        f'sniff: {names[2]}: File too large; nothing more is recorded',
+        'sniff: cannot print: No space left on device']
+    saved = names[2].read_text(encoding='ascii')
+    assert saved.endswith('\n') and len([*read_capture('saved', saved.splitlines(), {})]) > 5
+
+
+@pytest.mark.parametrize(('way', 'goes_on'), [('--tap', True), ('--port', False)])
+def test_reader_that_leaves_does_not_cut_a_tap(tmp_path: Path, way: str, goes_on: bool) -> None:
+    names = [str(tmp_path / name) for name in 'ab']
+    with Command('sniff', way, *[f'pty:{name}' for name in names[:1 + goes_on]]) as sniff:
+        sniff.line(sniff.process.stderr)
+        assert sniff.process.stdout is not None
+        sniff.process.stdout.close()
+        near, far = (
+            os.open(name, os.O_RDWR | os.O_NOCTTY) for name in (names[0], names[goes_on]))
+        for _ in range(3 * goes_on):
+            os.write(near, SAID[0] + SAID[1])
+            assert read_exactly(far, len(SAID[0] + SAID[1])) == SAID[0] + SAID[1]
+        if not goes_on:
+            os.write(near, SAID[0] + SAID[1])
+            assert sniff.process.wait(PATIENCE) == 0
+            return
+        assert sniff.line(sniff.process.stderr) == (
+            'sniff: nobody reads this any more; the bytes are passed on until Ctrl-C')
+        sniff.process.send_signal(signal.SIGINT)
+        assert sniff.process.wait(PATIENCE) == 0
 
 
 def test_it_needs_no_ros(capture: str) -> None:

@@ -17,10 +17,13 @@
 from dataclasses import asdict
 
 from abdf1_ros.counters import Counters
-from abdf1_ros.df1.accounting import count_fault
+from abdf1_ros.df1.accounting import Accounting, count_fault
 from abdf1_ros.df1.checksum import Checksum
 from abdf1_ros.df1.frames import Duplex, Frame, FrameDecoder, FrameFault
+from abdf1_ros.df1.packet import Packet
+from abdf1_ros.df1.stations import ActiveStationList
 import pytest
+from support.peers import CommandTask
 from support.vectors import vector
 
 
@@ -65,3 +68,14 @@ def test_texts_of_the_vectors(name: str, text: str) -> None:
     said = str(count_fault(frame, entry.checksum, Counters(), 3))
     actual = int.from_bytes(entry.frame[-entry.checksum.size:], 'little')
     assert said == (f'{text} (actual=0x{actual:04x}, expected=0x{entry.expected:04x}) [station 3]')
+
+
+@pytest.mark.parametrize('blames', [True, False])
+def test_what_a_node_on_the_way_says_to_a_guest_says_nothing_about_the_station(
+        blames: bool) -> None:
+    stations = ActiveStationList([1])
+    accounting = Accounting(Counters(), stations, lambda event: None, 5)
+    task = CommandTask(Packet(1, 9, 0x0F, 0, 7, b''), lambda: 0.0)
+    task.blames = blames
+    accounting.complete(task, task.command.reply(sts=0x02), keeps_others_waiting=True)
+    assert (stations[1].local_status, stations[1].overdue) == ((2, 1) if blames else (0, 0))

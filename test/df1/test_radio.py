@@ -138,6 +138,16 @@ def test_command_without_reply_is_repeated_as_it_is_until_the_limit(retries: int
     assert (counters.nak_retries, counters.nak_limit_exceeded) == (retries, 1)
 
 
+def test_command_of_a_guest_without_reply_says_nothing_about_the_station() -> None:
+    bench = Bench(retries=1)
+    task = bench.begin(COMMAND)
+    task.blames = False
+    assert bench.wait(30.0) == [framed(COMMAND)] * 2
+    assert isinstance(task.result, StationInactive)
+    assert (bench.stations[PLC].active, bench.stations[PLC].unanswered) == (True, 0)
+    assert bench.numbers() == [2521, 2508, 2519]
+
+
 def test_commands_to_other_stations_go_out_meanwhile_where_radios_avoid_collisions() -> None:
     bench = Bench(avoids_collisions=True)
     first, again = (bench.add(COMMAND._replace(tns=tns)) for tns in (1, 2))

@@ -22,6 +22,8 @@ from itertools import count, pairwise
 from abdf1_ros.df1.packet import Packet
 from abdf1_ros.driver.guest_words import written_extents
 from abdf1_ros.driver.guests import Guest, GuestCommand, ShareAccess
+from abdf1_ros.driver.interlocks.heartbeat import BeatState
+from abdf1_ros.messages import Message
 from abdf1_ros.pccc.extent import Extent
 from abdf1_ros.settings.heartbeats import Heartbeat
 from abdf1_ros.settings.network import Network
@@ -274,6 +276,62 @@ def test_every_command_has_one_reply_in_time_when_replies_are_lost() -> None:
     assert len(program.replies) == 10
     assert set(program.statuses) <= {0x01, 0x02, 0x05, 0x07}
     assert program.statuses[0] in (0x02, 0x05)  # it was sent
+
+
+def beating_bench(mode: str, polling: str = 'Message') -> DriverBench:
+    """Return a driver that reads ten times a second and counts a heartbeat."""
+    rows = [make_mapping('N7:0', station=1, plc='SLC', period=100), make_mapping(
+        'N10:0', 'Heartbeat', station=1, plc='SLC', period=500, heartbeat=Heartbeat())]
+    bench = DriverBench(rows, network=Network(
+        mode=mode, polling=polling, baud=19200, timeout=100, cmd_timeout=1500))
+    bench.plc(1, 'SLC', ('N7:0', 20), ('N10:0', 4))
+    if mode == 'Peer':
+        bench.open()
+
+    def executor_runs() -> None:
+        bench.driver.interlocks.executor_ran(bench.clock())
+        bench.at(bench.clock() + 0.1, executor_runs)
+
+    executor_runs()
+    bench.run(3.0)
+    return bench
+
+
+MARK = b'GUEST'  # what is easily known in a command and in its reply
+
+
+def lost(data: bytes) -> bytes:
+    return b'' if MARK in data else data
+
+
+def damaged(data: bytes) -> bytes:
+    return data.replace(MARK, b'FEAST')
+
+
+@for_all('entry', [
+    (*line, *way) for line in [('Master', 'Message'), ('Master', 'Standard'), ('Peer', 'Message')]
+    for way in [('hear', lost), ('hear', damaged), ('say', lost), ('say', damaged)]])
+def test_failure_of_a_guest_says_nothing_about_the_station(
+        entry: tuple[str, str, str, Callable[[bytes], bytes]]) -> None:
+    """No ACK, NAK, no answer to polls, no reply: the PLC answers all of ours meanwhile."""
+    mode, polling, where, filtered = entry
+    bench = beating_bench(mode, polling)
+    setattr(bench.far, where, filtered)
+    program = Program(bench)
+    beats, reads = set(), len(bench.listener.reads)
+    for _ in range(10):
+        program.ask(b'\0' + MARK, cmd=0x06)
+        for _ in range(20):
+            bench.run(0.1)
+            beats.add(bench.driver.interlocks.heartbeats[0].state)
+    station = bench.driver.stations[1]
+    assert program.statuses in (10 * [0x02], 10 * [0x05])
+    assert bench.listener.changes == []
+    assert (station.active, station.overdue, station.unanswered, station.returns) == (
+        True, 0, 0, 0)
+    assert beats == {BeatState.COUNTS}
+    assert not bench.listener.numbers() & {Message.ERR_INACTIVE_STATION.number}
+    assert len(bench.listener.reads) - reads > 40
 
 
 def test_lost_port_is_told_and_what_waits_is_not_sent_later() -> None:

@@ -83,8 +83,9 @@ def test_new_pseudo_terminal_takes_its_name_away(ptys: tuple[Pty, Pty], tmp_path
 
 def test_port_that_cannot_be_opened(ptys: tuple[Pty, Pty], tmp_path: Path) -> None:
     first = tmp_path / 'first'
-    with pytest.raises(OSError, match=f'{tmp_path}/none: .*No such file'):
+    with pytest.raises(OSError, match='No such file') as error:
         tap(f'pty:{first}', tmp_path / 'none')
+    assert error.value.filename == str(tmp_path / 'none')
     assert not first.is_symlink()  # the first has been closed again
 
 

@@ -20,6 +20,7 @@ from abdf1_ros.ports.settings import PortSettings
 from abdf1_ros.ports.trace import PortOpener, Trace, TracedPort
 from abdf1_ros.sniffer.capture import Chunk, Direction, read_capture
 import pytest
+from support.disks import no_file_longer_than
 from support.ptys import Pty
 
 
@@ -80,6 +81,21 @@ def test_trace_that_fails_says_so_once_and_the_port_goes_on(tmp_path: Path) -> N
     (error,) = errors
     assert 'No such file or directory' in error
     assert error.endswith('; nothing more is recorded')
+
+
+def test_trace_that_cannot_grow_costs_neither_the_port_nor_its_whole_lines(
+        tmp_path: Path) -> None:
+    errors: list[str] = []
+    trace = Trace(str(tmp_path / 'x'), {}, errors.append)
+    port = TracedPort(Loop(), trace, 0.0, lambda: 0.0)
+    with no_file_longer_than(100):
+        for _ in range(20):
+            port.write(b'\x10\x05')
+            assert port.read(None, 0) == b'\x10\x05'
+    assert errors == [f'{tmp_path}/x: File too large; nothing more is recorded']
+    trace.close()
+    assert [chunk.data for chunk in chunks_of(tmp_path / 'x')] == [b'\x10\x05'] * 4
+    assert (tmp_path / 'x').read_bytes().endswith(b'10 05\n')
 
 
 def test_opener_without_a_trace_gives_the_port_itself(tmp_path: Path) -> None:

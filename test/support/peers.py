@@ -41,6 +41,7 @@ class CommandTask:
         self.sent = False
         self.reply_size = 0
         self.expires = math.inf
+        self.blames = True
         self.result: Packet | LinkError | None = None
         self.begun = clock()
         self.ended: float | None = None

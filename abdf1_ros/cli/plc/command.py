@@ -26,6 +26,7 @@ from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import replace
 import errno
+from functools import partial
 from pathlib import Path
 import shlex
 import sys
@@ -41,13 +42,17 @@ from abdf1_ros.cli.terminal import (
     called,
     colour,
     drop_output,
+    EXIT_FAILED,
+    EXIT_INTERRUPTED,
+    EXIT_UNKNOWN,
+    EXIT_USAGE,
     GREEN,
-    has_reader_left,
-    interruptible,
     prepare_output,
     Progress,
     RED,
+    run_command,
     table,
+    tell,
 )
 from abdf1_ros.df1.echo import COMES_BACK
 from abdf1_ros.driver.write import Outcome
@@ -64,11 +69,6 @@ from abdf1_ros.settings.mapping import Command, Mapping
 from abdf1_ros.settings.network import Network
 from abdf1_ros.text import printable
 
-EXIT_FAILED = 1
-EXIT_USAGE = 2
-EXIT_UNKNOWN = 3
-EXIT_INTERRUPTED = 130
-
 _ALL_TRIED_IN_VAIN = (
     'not one character came: cable, port, power? Or a station that was not asked (--stations; a '
     'PLC-5 shows its own in octal)')
@@ -82,31 +82,9 @@ def main(args: Sequence[str] | None = None) -> int:
     """Carry out one command; the exit statuses are those of --help."""
     prepare_output()
     options = make_parser(__doc__).parse_args(args)
-    try:
-        with interruptible():
-            return _run(options)
-    except KeyboardInterrupt:  # out of telling an error too
-        return EXIT_INTERRUPTED
-
-
-def _run(options: argparse.Namespace) -> int:
-    try:
-        status = _COMMANDS[options.command](options)
-        sys.stdout.flush()
-        return status
-    except ConfigurationError as error:
-        for problem in error.problems:
-            _complain(str(problem))
-        return EXIT_USAGE
-    except OSError as error:
-        if error.errno is None:  # of the port
-            _complain(str(error))
-        elif has_reader_left(error, _complain) and options.command != 'write':
-            return 0
-        return EXIT_USAGE  # nothing has been written then
-    except PortLost as error:
-        _complain(str(error))
-        return EXIT_FAILED
+    # Where nobody reads what a write says, nothing has been written.
+    return run_command('plc', lambda: _COMMANDS[options.command](options), EXIT_INTERRUPTED,
+                       EXIT_USAGE if options.command == 'write' else 0)
 
 
 def _cells(options: argparse.Namespace, command: Command, length: int | str) -> dict[str, str]:
@@ -388,7 +366,7 @@ def _found(options: argparse.Namespace, network: Network) -> detect.Found | None
 
 
 def _init(options: argparse.Namespace) -> int:
-    target = init.Files(Path(options.into))
+    target = init.NewFiles(Path(options.into), 'net.csv', 'map.csv')
     if not options.port and not options.net:
         options.port = _only_port()
     network = network_of(options)
@@ -407,9 +385,9 @@ def _init(options: argparse.Namespace) -> int:
     with Session(found.network(network)) as session:
         listed = {seen.station: files.listed(session, seen.station, seen.identity)
                   for seen in there}
-    target.write(network, found, there, listed)
-    net, map_file = shlex.quote(str(target.net)), shlex.quote(str(target.map))
-    print(f'written: {target.net}, {target.map}\n'
+    target.write(*init.files_of(network, found, there, listed))
+    net, map_file = (shlex.quote(str(path)) for path in target.paths)
+    print(f'written: {", ".join(map(str, target.paths))}\n'
           'how to go on: write the addresses that you need into map.csv, then\n'
           f'  {called("plc")} watch S:0 --station {there[0].station} --net {net}\n'
           f'  {called("check")} {net} {map_file}\n'
@@ -418,18 +396,10 @@ def _init(options: argparse.Namespace) -> int:
 
 
 def _import(options: argparse.Namespace) -> int:
-    target = Path(options.into) / 'map.csv'
+    file = init.NewFiles(Path(options.into), 'map.csv')
     result = exports.import_map(options.file, options.station, PlcType(options.plc_type))
-    try:
-        target.parent.mkdir(parents=True, exist_ok=True)
-        with target.open('x', encoding='utf-8') as file:
-            file.write(result.text)
-    except FileExistsError:
-        raise ConfigurationError([Problem(str(target), (
-            'is there already and stays as it is; name another folder with --into'))]) from None
-    except OSError as error:
-        raise ConfigurationError([Problem(
-            str(target), f'cannot be written: {error.strerror}')]) from None
+    file.write(result.text)
+    target, = file.paths
     for problem in result.left_out:
         _complain(str(problem))
     left_out = f', {len(result.left_out)} left out' if result.left_out else ''
@@ -542,7 +512,4 @@ _COMMANDS: dict[str, Callable[[argparse.Namespace], int]] = {
     'scan': _scan, 'detect': _detect, 'init': _init, 'ports': _ports, 'files': _files,
     'clock': _clock, 'import': _import}
 
-
-def _complain(text: str) -> None:
-    line = f'plc: {printable(text)}'
-    print(colour(line, RED, sys.stderr), file=sys.stderr, flush=True)
+_complain = partial(tell, 'plc', code=RED)

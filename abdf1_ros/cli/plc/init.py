@@ -17,6 +17,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Mapping, Sequence
+from contextlib import suppress
 import os
 from pathlib import Path
 
@@ -41,36 +42,45 @@ Tag,Command,Address,Station,PLC_Type,Processor,Length,Period,Publish_While,Fallb
 """
 
 
-class Files:
+class NewFiles:
     """
-    Where the two files are to be: ``net`` and ``map``.
+    Files that are not there yet, by their names in a folder.
 
-    ConfigurationError where a file is there already, or the folder cannot be made; it is made by
+    ConfigurationError where one is there already, or the folder cannot be made; it is made by
     ``write``.
     """
 
-    def __init__(self, folder: Path) -> None:
-        self.net, self.map = folder / 'net.csv', folder / 'map.csv'
+    def __init__(self, folder: Path, *names: str) -> None:
+        self.paths = [folder / name for name in names]
         there = next(path for path in (folder, *folder.absolute().parents) if path.exists())
         if not there.is_dir() or not os.access(there, os.W_OK):
             raise ConfigurationError([Problem(str(folder), (
                 f'cannot be used: {there} is not a folder that can be written to'))])
-        for path in (self.net, self.map):
+        for path in self.paths:
             if path.exists() and path.stat().st_size:  # a pipe that failed leaves an empty one
                 raise ConfigurationError([Problem(str(path), (
                     'is there already and stays as it is; name another folder with --into'))])
 
-    def write(self, network: Network, found: Found, stations: Sequence[Presence],
-              listed: Mapping[int, Sequence[DataFile]]) -> None:
-        """Write both, with the files that stations have listed; raises ConfigurationError."""
-        numbers = [presence.station for presence in stations]
+    def write(self, *texts: str) -> None:
+        """Write all, or leave none: ConfigurationError then."""
         try:
-            self.net.parent.mkdir(parents=True, exist_ok=True)
-            self.net.write_text(net_csv(network, found, numbers) + '\n', encoding='utf-8')
-            self.map.write_text(_HEAD + ''.join(map_rows(stations, listed)), encoding='utf-8')
+            self.paths[0].parent.mkdir(parents=True, exist_ok=True)
+            for path, text in zip(self.paths, texts, strict=True):
+                path.write_text(text, encoding='utf-8')
         except OSError as error:
+            for path in self.paths:
+                with suppress(OSError):
+                    path.unlink()
             raise ConfigurationError([Problem(
-                str(self.net.parent), f'cannot be written: {error.strerror}')]) from None
+                str(path), f'cannot be written: {error.strerror}')]) from None
+
+
+def files_of(network: Network, found: Found, stations: Sequence[Presence],
+             listed: Mapping[int, Sequence[DataFile]]) -> tuple[str, str]:
+    """Return net and map CSV of a line, with the files that its stations have listed."""
+    numbers = [presence.station for presence in stations]
+    return (net_csv(network, found, numbers) + '\n',
+            _HEAD + ''.join(map_rows(stations, listed)))
 
 
 def net_csv(network: Network, found: Found, stations: Collection[int]) -> str:

@@ -59,9 +59,9 @@ _DETECT_DEFAULTS = LineDefaults(
 _STATUSES = """\
 exit status:
   0    done: read, written and confirmed, answered, found
-  1    no answer, or the PLC refused it; the port was lost
-  2    wrong options, addresses or values; a port that cannot be opened; a write not confirmed
-       with --yes. Nothing was written
+  1    no answer, or the PLC refused it; the port cannot be opened or was lost
+  2    wrong options, files, addresses or values; a write not confirmed with --yes. Nothing was
+       written
   3    a write without a reply, or broken off: unknown whether the PLC has it, or has all of it
   130  interrupted by Ctrl-C; but watch and ping, once they have begun, end by it with 0 or 1
 """

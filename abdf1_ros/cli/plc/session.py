@@ -19,7 +19,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 
 from abdf1_ros import client
-from abdf1_ros.cli.terminal import reason_of
+from abdf1_ros.cli.terminal import NoPort
 from abdf1_ros.df1.stations import MAX_STATION
 from abdf1_ros.pccc.file_types import PlcType
 from abdf1_ros.ports.descriptor import Port
@@ -28,18 +28,18 @@ from abdf1_ros.settings.network import Network
 
 
 def opened(network: Network) -> Callable[[], Port]:
-    """Open the port of ``network``; OSError, in words, when that fails."""
+    """Open the port of ``network``; NoPort when that fails."""
     try:
         return client.opened(PortSettings.of(network))
     except OSError as error:
-        raise OSError(reason_of(network.port, error)) from None
+        raise NoPort(network.port, error) from None
 
 
 class Session(client.OpenLine):
     """
     The line of a net CSV; with ``via`` all stations are behind this gateway.
 
-    Raises OSError, in words, when the port cannot be opened.
+    Raises NoPort when the port cannot be opened.
     """
 
     def __init__(self, network: Network, absent: Sequence[int] = (),
@@ -50,4 +50,4 @@ class Session(client.OpenLine):
             super().__init__(network.line, PortSettings.of(network), absent, routes,
                              PlcType(network.plc_type))
         except OSError as error:
-            raise OSError(reason_of(network.port, error)) from None
+            raise NoPort(network.port, error) from None

@@ -624,8 +624,6 @@ def test_signals_end_it(tmp_path: Path, number: signal.Signals, status: int) -> 
 
 @pytest.mark.parametrize('args, text', [
     (('read', 'N7:0'), 'name the port, such as --port /dev/ttyUSB0'),
-    (('read', 'N7:0', '--port', '/nowhere/tty'), '/nowhere/tty'),
-    (('read', 'N7:0', '--port', '/dev/null'), 'plc: /dev/null: '),
     (('read', 'N7:0', '--port', 'x', '--peer', '--duplex', 'half'), 'not allowed with'),
     (('read', 'N7:0', '--port', 'x', '--baud', '1'), '--baud: Baud = "1" should be one of 1200'),
     (('read', 'N7:0', '--port', 'x'), '--port: Com_Port = "x" should be'),
@@ -640,6 +638,14 @@ def test_option_that_is_wrong_is_told_with_status_2(
     said = call(main, capsys, *args)
     assert said.status == 2
     assert text in said.err
+
+
+@pytest.mark.parametrize('port', ['/nowhere/tty', '/dev/null'])
+def test_port_that_cannot_be_opened_is_told_with_status_1(
+        port: str, capsys: pytest.CaptureFixture[str]) -> None:
+    for args in (['read', 'N7:0'], ['watch', 'N7:0'], ['detect']):
+        said = call(main, capsys, *args, '--port', port)
+        assert said.status == 1 and said.err.startswith(f'plc: {port}: ')
 
 
 @pytest.mark.parametrize('command', [

@@ -21,13 +21,16 @@ import time
 from abdf1_ros.cli.plc import command
 from abdf1_ros.cli.plc.command import main
 from abdf1_ros.cli.plc.files import find_files
+from abdf1_ros.cli.plc.init import NewFiles
 from abdf1_ros.cli.plc.session import Session
 from abdf1_ros.pccc.file_types import PlcType
 from abdf1_ros.pccc.processor import Processor
 from abdf1_ros.ports.listing import SerialPortInfo
+from abdf1_ros.problems import ConfigurationError
 from abdf1_ros.settings.map_file import load_mappings
 from abdf1_ros.settings.network import load_network, Network
 import pytest
+from support.disks import no_file_longer_than
 from support.driver_bench import simulated_plc, store, stored
 from support.plc_line import plc_line
 
@@ -62,6 +65,14 @@ def test_init_writes_files_that_the_node_takes(port: str, tmp_path: Path, capsys
     assert problems == []
     assert [(mapping.tag, mapping.plc_type.value, mapping.station) for mapping in mappings] == [
         ('status_1', 'PLC5', 1), ('status_2', 'SLC', 2)]
+
+
+def test_full_disk_leaves_no_file(tmp_path: Path) -> None:
+    files = NewFiles(tmp_path / 'new', 'net.csv', 'map.csv')
+    with no_file_longer_than(10), pytest.raises(ConfigurationError,
+                                                match='map.csv: cannot be written: File too'):
+        files.write('short', 'too long for it')
+    assert not any(path.exists() for path in files.paths)
 
 
 @pytest.mark.usefixtures('half_duplex_only')
@@ -239,5 +250,5 @@ def test_init_asks_for_the_port_where_it_is_not_plain(
 
 
 def test_port_that_is_not_there_leads_to_the_list(capsys: Output) -> None:
-    assert main(['read', 'N7:0', '--port', '/dev/ttyUSB99']) == 2
+    assert main(['read', 'N7:0', '--port', '/dev/ttyUSB99']) == 1
     assert '"plc ports" lists the ports' in capsys.readouterr().err

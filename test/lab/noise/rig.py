@@ -69,6 +69,7 @@ class _WatchedTask:
         self.command = task.command
         self.reply_size = task.reply_size
         self.expires = task.expires
+        self.blames = task.blames
         self.begun = end.driver.machine.now
         self._task = task
         self._end = end
