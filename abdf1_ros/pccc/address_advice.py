@@ -24,9 +24,9 @@ from __future__ import annotations
 import re
 
 _RANGE = re.compile(
-    r'(?P<first>[#$]?[A-Z]{1,2}\d*[:;](?P<element>\d+)(?:[./][A-Z0-9]+)?)\s*'
-    r'(?:\{(?P<braces>\d+)\}|\[(?P<brackets>\d+)\]|(?:,\s*L?|\s+L)(?P<comma>\d+)'
-    r'|(?:-|\.\.+|\bTO\b)\s*(?:[A-Z]{1,2}\d*[:;])?(?P<last>\d+))', re.ASCII)
+    r'(?P<first>[#$]?[A-Z]{1,2}\d*[:;](?P<element>\d{1,5})(?:[./][A-Z0-9]+)?)\s*'
+    r'(?:\{(?P<braces>\d{1,5})\}|\[(?P<brackets>\d{1,5})\]|(?:,\s*L?|\s+L)(?P<comma>\d{1,5})'
+    r'|(?:-|\.\.+|\bTO\b)\s*(?:[A-Z]{1,2}\d*[:;])?(?P<last>\d{1,5}))', re.ASCII)
 _BIT_AFTER_DOT = re.compile(
     r'(?P<word>[#$]?(?:B|N|S|A|D)\d*[:;]\d+)\.(?P<bit>\d{1,2})', re.ASCII)
 # Letters O among digits.

@@ -43,6 +43,7 @@ from abdf1_ros.settings.share import share_places
 from abdf1_ros.text import first
 
 _HIGH_LOAD = 0.8
+_PERIODS = tuple(step * 10**power for power in (2, 3, 4) for step in (1, 2, 5))  # ms
 _OURS_BESIDE_GUESTS = 0.75  # of the commands (driver.agenda)
 _WORTH_SAVING = 0.05  # of the poll cycle
 _NAMED_TAGS = 3
@@ -137,6 +138,13 @@ class Report:
         return next((baud for baud in BAUD_RATES if make_report(
             replace(self.network, baud=baud), self.mappings, self.default_period,
             self.response_time).load <= 1), None)
+
+    def needed_period(self) -> int | None:
+        """Return the ms that would do in place of all shorter periods, or None."""
+        others = self.load - forecast.load(self.blocks, self._answer_time)
+        return next((period for period in _PERIODS if others + sum(
+            self.time(block) / max(block.period, period / 1000) for block in self.blocks
+            if block.period) <= _HIGH_LOAD), None)
 
     def notes(self) -> list[str]:
         """Return what somebody should know, and what is not odd at all."""
@@ -333,7 +341,9 @@ def _load_remarks(report: Report) -> Iterator[Remark]:
     load = report.load
     if load > 1:
         baud = report.needed_baud()
+        period = report.needed_period()
         advice = f'{baud} baud would do' if baud else 'no baud rate is enough, only longer periods'
+        advice += f'; or Period {period} in place of shorter ones' if period else ''
         yield Remark(RemarkKind.LOAD, (
             f'the periods need {load:.0%} of the time there is at {report.network.baud} baud, '
             f'so reads come late; {advice}'))

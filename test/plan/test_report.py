@@ -137,7 +137,7 @@ def test_period_that_another_baud_rate_can_keep() -> None:
     assert report.needed_baud() == 19200  # 27.1 ms and 20 ms of 50 ms
     assert texts(report, RemarkKind.LOAD) == [
         'the periods need 148% of the time there is at 9600 baud, so reads come late; '
-        '19200 baud would do']
+        '19200 baud would do; or Period 100 in place of shorter ones']
     assert texts(report, RemarkKind.PERIOD) == [
         'speed: a read takes 74.2 ms, the period is 50.0 ms']
 

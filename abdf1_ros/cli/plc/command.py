@@ -55,6 +55,7 @@ from abdf1_ros.cli.terminal import (
     tell,
 )
 from abdf1_ros.df1.echo import COMES_BACK
+from abdf1_ros.driver.links import DriverSettings
 from abdf1_ros.driver.write import Outcome
 from abdf1_ros.errors import Abdf1Error, FormatError, LinkError, PortLost, RemoteError
 from abdf1_ros.pccc.file_search import DataFile
@@ -62,11 +63,12 @@ from abdf1_ros.pccc.file_types import PlcType
 from abdf1_ros.pccc.processor import Processor
 from abdf1_ros.pccc.status import is_address_fault
 from abdf1_ros.pccc.values import Values
+from abdf1_ros.plan.report import make_report
 from abdf1_ros.ports.listing import serial_ports
 from abdf1_ros.problems import ConfigurationError, Problem
 from abdf1_ros.settings.map_file import load_mappings
 from abdf1_ros.settings.mapping import Command, Mapping
-from abdf1_ros.settings.network import Network
+from abdf1_ros.settings.network import load_network, Network
 from abdf1_ros.text import printable
 
 _ALL_TRIED_IN_VAIN = (
@@ -397,7 +399,8 @@ def _init(options: argparse.Namespace) -> int:
 
 def _import(options: argparse.Namespace) -> int:
     file = init.NewFiles(Path(options.into), 'map.csv')
-    result = exports.import_map(options.file, options.station, PlcType(options.plc_type))
+    result = exports.import_map(options.file, exports.Wanted(
+        PlcType(options.plc_type), options.stations, options.read_only, options.period))
     file.write(result.text)
     target, = file.paths
     for problem in result.left_out:
@@ -410,6 +413,13 @@ def _import(options: argparse.Namespace) -> int:
           f'{shlex.quote(str(target))}')
     if net is None:
         print(f'net.csv is not there yet: {called("plc")} init --into ANOTHER_FOLDER makes one')
+        return EXIT_FAILED if result.left_out else 0
+    with suppress(ConfigurationError):  # "check" tells it
+        report = make_report(load_network(str(net)), load_mappings(str(target))[0],
+                             DriverSettings().default_period)
+        if report.load > 1 and (period := report.needed_period()):
+            print(f'these rows need {report.load:.0%} of the time of the line in {net}; '
+                  f'--period {period} would do')
     return EXIT_FAILED if result.left_out else 0
 
 

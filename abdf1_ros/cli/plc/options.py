@@ -29,6 +29,7 @@ from abdf1_ros.pccc.families import FAMILIES
 from abdf1_ros.pccc.processor import Processor
 from abdf1_ros.pccc.values import ValueType, WordOrder
 from abdf1_ros.settings import BAUD_RATES
+from abdf1_ros.settings.map_row import MAX_PERIOD
 from abdf1_ros.settings.station_lists import parse_stations
 
 DEFAULT_STATION = 1
@@ -145,13 +146,21 @@ def _add_import(commands: Any) -> None:
         'import', help='make a map of an export of RSLogix or KEPServerEX',
         description='Make map.csv of the symbols of RSLogix 500 or 5, or of the tags of '
                     'KEPServerEX.\nRows that cannot be used stay in it as comments.',
-        epilog='example:\n  plc import plant.csv --station 2 --plc-type SLC\n\n'
+        epilog='examples:\n  plc import plant.csv --station 2 --plc-type SLC\n'
+               '  plc import plant.csv --station 1-4 --read-only --period 1000\n\n'
                'exit status: 0 when all rows could be used, 1 when some are left out, 2 for files',
         allow_abbrev=False, formatter_class=argparse.RawDescriptionHelpFormatter)
     command.add_argument('file', metavar='FILE', help='the export, a CSV file')
     _add_folder(command, 'map.csv is')
-    command.add_argument('--station', metavar='N', type=_station, default=DEFAULT_STATION,
-                         help='of the PLC (default: %(default)s)')
+    command.add_argument('--station', metavar='LIST', type=_stations, dest='stations',
+                         default=(DEFAULT_STATION,),
+                         help='of the PLC, or of several with the same program, as in 1-4 '
+                              f'(default: {DEFAULT_STATION})')
+    command.add_argument('--read-only', action='store_true', help='make all rows Read rows')
+    command.add_argument('--period', metavar='MS', default=0,
+                         type=number_option(f'a whole number of ms up to {MAX_PERIOD}', 0,
+                                            MAX_PERIOD, whole_number),
+                         help='the shortest Period of a row (default: as the export has it)')
     _add_plc_type(command, 'of the PLC; a MicroLogix is SLC (default: %(default)s)', 'SLC')
 
 

@@ -24,10 +24,12 @@ read them: FactoryTalk Optix (RSLogix500_TagImporter) and a parser of exports of
 (SLCTagParser).
 """
 
+from collections.abc import Callable
+import math
 from pathlib import Path
 
 from abdf1_ros.cli.plc.command import main
-from abdf1_ros.cli.plc.exports import import_map
+from abdf1_ros.cli.plc.exports import import_map, Wanted
 from abdf1_ros.cli.terminal import called
 from abdf1_ros.pccc.file_types import PlcType
 from abdf1_ros.problems import ConfigurationError
@@ -47,13 +49,15 @@ RSLOGIX = (
     '"T4:0","Global","","Cycle timer","","","",""\n'
     '"T4:1.ACC","Global","WAIT","","","","",""\n')
 
+STATION_2 = Wanted(stations=(2,))
+
 
 def imported(folder: Path, text: str | bytes,
-             plc_type: PlcType = PlcType.SLC) -> tuple[list[Mapping], list[str]]:
+             wanted: Wanted = STATION_2) -> tuple[list[Mapping], list[str]]:
     """Return the mappings of the map that is made, which has to be good, and what is left out."""
     source, target = folder / 'export.csv', folder / 'map.csv'
     source.write_bytes(text if isinstance(text, bytes) else text.encode())
-    result = import_map(str(source), 2, plc_type)
+    result = import_map(str(source), wanted)
     target.write_text(result.text, encoding='utf-8')
     mappings, problems = load_mappings(str(target))
     assert problems == [] and len(mappings) == result.count
@@ -84,6 +88,11 @@ def imported(folder: Path, text: str | bytes,
      {'Scale': '0.00375', 'Offset': '-25', 'Min': '-10', 'Max': '50', 'Description': '[degC]'}),
     ('"Down","N7:22",Short,1,RO,100,Linear,0,100,0,10,Float,0,0,,"",1',
      {'Scale': '-0.1', 'Offset': '0'}),
+    ('"Back","N7:24",Short,1,R/W,100,Linear,0,100,0,10,Float,1,1,,"",1',
+     {'Scale': '-0.1', 'Min': '-10', 'Max': '0'}),
+    ('"#1 pump","N7:25",Short,1,RO,100,,,,,,,,,,"",', {'Tag': '#1 pump', 'Topic': 't1_pump'}),
+    ('"\x1b[1mBold\0","N7:26",Short,1,RO,100,,,,,,,,,,"a\x1bb",',
+     {'Tag': '[1mBold', 'Description': 'a b'}),
     ('"Turned","N7:23",Short,1,RO,100,,,,,,,,,,"",1', {'Scale': '-1'})])
 def test_tag_of_kepserver_becomes_a_row(
         tmp_path: Path, row: str, expected: dict[str, str]) -> None:
@@ -99,6 +108,8 @@ def test_tag_of_kepserver_becomes_a_row(
     ('"Flat","N7:0",Word,1,RO,100,Linear,5,5,0,10,Float,0,0,,"",',
      'Raw Low, Raw High, Scaled Low and Scaled High should be numbers, and both raw ones differ'),
     ('"Char","N7:0",Char,1,RO,100,,,,,,,,,,"",', 'Data Type "Char" has no counterpart'),
+    (f'"Long","N7:0 [{"9" * 5000}]",Word Array,1,RO,100,,,,,,,,,,"",',
+     'write type, file, ":", element, as in N7:0, B3:1/5, T4:0.ACC or I:1.0/3'),
     ('"Word","N7:0",Word,1,never,100,,,,,,,,,,"",', 'Client Access "never" has no counterpart'),
     (f'"Word","N7:0",{"x" * 5000},1,RO,100,,,,,,,,,,"",',
      f'Data Type "{"x" * 100}..." has no counterpart'),
@@ -112,7 +123,8 @@ def test_tag_that_cannot_be_used_is_left_out_and_stays_as_a_comment(
     first = '"Speed","N7:0",Short,1,R/W,100,,,,,,,,,,"",\n'
     mappings, left_out = imported(tmp_path, f'{KEPSERVER}{first}{row}\n')
     assert [mapping.tag for mapping in mappings] == ['Speed']
-    assert left_out == [f'3: {expected}']
+    tag = row.split(',')[0].strip('"')
+    assert left_out == [f'3: {tag}: {expected}']
     assert f'# line 3: {row.split(",")[0].strip(chr(34))},' in (tmp_path / 'map.csv').read_text()
 
 
@@ -125,12 +137,13 @@ def test_symbols_of_rslogix_become_rows_and_the_rest_is_told(tmp_path: Path) -> 
         ('LINE_SPEED', 'LINE_SPEED', 'N7:0', 1, 'Conveyor speed'),
         ('T4:0', 'T4_0', 'T4:0', 3, 'Cycle timer'), ('WAIT', 'WAIT', 'T4:1.ACC', 1, '')]
     assert [text.partition(': ')[0] for text in left_out] == ['5', '6', '7']
-    assert left_out[0] == '5: is about a file or a rung' and left_out[2] == '7: Address is missing'
+    assert left_out[0] == '5: DFILE:N7: is about a file or a rung'
+    assert left_out[2] == '7: LOST: Address is missing'
 
 
 def test_octal_addresses_are_for_a_plc5(tmp_path: Path) -> None:
     row = '"I:017/12","Global","DOOR"\n'
-    (mapping,), left_out = imported(tmp_path, row, PlcType.PLC5)
+    (mapping,), left_out = imported(tmp_path, row, Wanted(PlcType.PLC5, (2,)))
     assert (str(mapping.address), left_out) == ('I:017/12', [])
     assert 'octal form of a PLC-5' in imported(tmp_path, row)[1][0]
 
@@ -140,6 +153,54 @@ def test_text_of_windows_with_line_ends_in_cells_and_semicolons(tmp_path: Path) 
         KEPSERVER.replace(',', ';') + '"Höhe";"N7:0";Short;1;RO;100;;;;;;;;;mm;"Höhe\nlinks";\n'
         ).encode('cp1252'))
     assert (mapping.tag, mapping.name, mapping.description) == ('Höhe', 'H_he', 'Höhe links [mm]')
+
+
+@pytest.mark.parametrize('code', [
+    lambda text: text.encode('utf-16'), lambda text: text.replace('\n', '\r').encode(),
+    lambda text: text.replace('Guard door', 'Guard; the; left; door; of; it').encode(),
+    lambda text: text.replace('I:1.0/3', 'B3/5').encode()])
+def test_other_forms_of_text_are_read_as_well(
+        tmp_path: Path, code: Callable[[str], bytes]) -> None:
+    mappings, left_out = imported(tmp_path, code(RSLOGIX))
+    assert ([mapping.name for mapping in mappings], left_out) == (
+        ['DOOR_CLOSED', 'LINE_SPEED', 'T4_0', 'WAIT'], [])
+
+
+def test_bit_addresses_alone_are_an_export_too(tmp_path: Path) -> None:
+    (mapping,), _ = imported(tmp_path, '"B3/20","Global","DOOR","","","","",""\n')
+    assert str(mapping.address) == 'B3:1/4'
+
+
+def test_read_only_rows_of_several_stations_with_a_longer_period(tmp_path: Path) -> None:
+    rows = ('"Speed","N7:0",Short,1,R/W,100,Linear,0,100,0,10,Float,1,1,,"",\n'
+            '"Slow","N7:1",Short,1,RO,5000,,,,,,,,,,"",\n'
+            '"Out","N7:2",Short,1,WO,100,,,,,,,,,,"",\n')
+    mappings, left_out = imported(
+        tmp_path, KEPSERVER + rows, Wanted(stations=(1, 3), read_only=True, period=2000))
+    assert [(row.topic, row.station, row.period) for row in mappings] == [
+        ('station_1/Speed', 1, 2000), ('station_3/Speed', 3, 2000),
+        ('station_1/Slow', 1, 5000), ('station_3/Slow', 3, 5000)]
+    assert {(row.command.value, row.maximum) for row in mappings} == {('Read', math.inf)}
+    assert left_out == ['4: Out: is only written, and --read-only is given']
+
+
+def test_command_suggests_a_period_that_the_line_can_keep(
+        tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    source, net = tmp_path / 'tags.csv', tmp_path / 'net.csv'
+    source.write_text(KEPSERVER + ''.join(
+        f'"t{file}","N{file}:0 [100]",Short Array,1,RO,100,,,,,,,,,,"",\n'
+        for file in range(10, 20)), encoding='utf-8')
+    net.write_text('Com_Port,Baud\n/dev/x,9600\n', encoding='utf-8')
+    options = ['import', str(source), '--into', str(tmp_path)]
+    assert main(options) == 0
+    told = capsys.readouterr().out.splitlines()[-1]
+    assert told.startswith('these rows need ') and told.endswith('--period 5000 would do')
+    (tmp_path / 'map.csv').unlink()
+    assert main([*options, '--period', '5000']) == 0
+    assert 'would do' not in capsys.readouterr().out
+    (tmp_path / 'map.csv').unlink()
+    assert main(['import', str(source), '--into', str(source)]) == 2
+    assert f'{source} is not a folder' in capsys.readouterr().err
 
 
 def test_command_writes_a_map_once_and_says_how_to_go_on(
@@ -162,7 +223,9 @@ def test_command_writes_a_map_once_and_says_how_to_go_on(
     assert main([*options[:3], str(other.parent)]) == 1
     said = capsys.readouterr()
     assert f'{source}:5: ' in said.err
-    assert said.out.splitlines()[1:] == [f'how to go on: {called("check")} net.csv {other}']
+    assert said.out.splitlines()[1:] == [
+        f'how to go on: {called("check")} net.csv {other}',
+        'these rows need 205% of the time of the line in net.csv; --period 500 would do']
 
 
 @pytest.mark.parametrize('text', ['a,b\n1,2\n', '', 'Tag,Command,Address\n'])
