@@ -24,8 +24,9 @@ from typing import Protocol
 from abdf1_ros.df1.accounting import Accounting
 from abdf1_ros.df1.checksum import Checksum
 from abdf1_ros.df1.frames import ACK, Control, Duplex, Frame, Symbol
-from abdf1_ros.df1.machine import Heard, LineTiming, Machine, Procedure, Reflex
+from abdf1_ros.df1.machine import Heard, LineTiming, Machine, Procedure
 from abdf1_ros.df1.packet import Packet, REPLY_BIT
+from abdf1_ros.df1.sender import Reflex
 from abdf1_ros.df1.stations import ActiveStationList
 from abdf1_ros.df1.tasks import TaskSource
 from abdf1_ros.messages import Event

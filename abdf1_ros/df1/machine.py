@@ -15,7 +15,7 @@
 """
 The engine under every link procedure: bytes and a clock value in, bytes and a deadline out.
 
-A procedure is a generator with one effect. ``heard = yield Step(frame, timeout)`` means "put
+A procedure is a generator with one effect. ``heard = yield Send(frame, timeout)`` means "put
 this frame on the line, then give me the next symbol, or a Silence when the time is up". What the
 manual writes as a program is written here as the same program, and composed with ``yield
 from``. The machine alone knows of TX_Delay and of the time that characters take.
@@ -23,7 +23,7 @@ from``. The machine alone knows of TX_Delay and of the time that characters take
 The machine never reads a clock: every call brings ``now``, seconds of any monotonic clock. A
 driving loop (a thread with a port, or a test with a virtual line) does this::
 
-    machine.start(now)
+    machine.start(now, port)
     while ...:
         port.write(machine.data_to_send())
         data = port.read(until=machine.next_call)  # but not before machine.spare_time is over
@@ -40,49 +40,73 @@ from typing import NamedTuple, Protocol
 
 from abdf1_ros.counters import Counters
 from abdf1_ros.df1.checksum import Checksum
-from abdf1_ros.df1.echo import LineEcho
 from abdf1_ros.df1.frames import (
-    ACK,
     Control,
     Duplex,
     Frame,
     FrameDecoder,
     MAX_LINK_DATA,
-    NAK,
     NOISE,
     Symbol,
 )
-from abdf1_ros.df1.outgoing import Outgoing
 from abdf1_ros.df1.packet import begins_good_reply, HEADER_SIZE
+from abdf1_ros.df1.sender import Outlet, Reflex, Sender
 from abdf1_ros.errors import CommandExpired
 
-Reflex = Callable[[Symbol], bytes]
 
-
-class Step(NamedTuple):
+class Send(NamedTuple):
     """
-    What a procedure asks of the machine.
+    Put ``frame`` on the line, then wait for the next symbol.
 
-    ``frame`` goes on the line (empty: only listen; None: rest until the time is up or
-    ``Machine.wake``, deaf to a half-duplex line). ``timeout`` is in seconds from the moment the
-    last byte has left (0: do not wait; where there is nothing to send either, hear what is here
-    already; None: no limit; KEEP: what is left of the time of the last step). ``delay`` seconds
-    pass before the frame goes out, and TX_Delay at least, unless it is AT_ONCE. After ``expires``
-    (clock value in s) it does not go out any more: CommandExpired is raised at the ``yield``.
-    ``reply_size`` is the bytes after the header of the reply that is expected, if that tells no
-    error; 0 where it is not known.
+    ``timeout`` is in seconds from the moment the last byte has left, None for no limit; with 0
+    nothing is waited for. ``delay`` seconds pass before the frame goes out, and TX_Delay at least,
+    unless it goes ``at_once``. After ``expires`` (clock value in s) it does not go out any more:
+    CommandExpired is raised at the ``yield``. ``reply_size`` is the bytes after the header of the
+    reply that is expected, if that tells no error; 0 where it is not known.
 
     ``reflex`` gives the frame that answers the next symbol, empty for none. That goes on the line
     before the procedure hears of the symbol, and has to be what the procedure then sends. It is
     not asked where there is a TX_Delay, or something else still has to go out.
     """
 
-    frame: bytes | None
-    timeout: float | None
+    frame: bytes
+    timeout: float | None = 0.0
     delay: float = 0.0
     expires: float = math.inf
     reply_size: int = 0
     reflex: Reflex | None = None
+    at_once: bool = False
+
+
+class Listen(NamedTuple):
+    """
+    Wait for the next symbol, for ``timeout`` seconds after all has left, None for no limit.
+
+    With 0 only a symbol is heard that is here already. ``is_continued`` leaves the time-limit as
+    it was in the step before. ``reflex`` is that of ``Send``.
+    """
+
+    timeout: float | None
+    reflex: Reflex | None = None
+    is_continued: bool = False
+
+
+class Rest(NamedTuple):
+    """
+    Wait until ``timeout`` seconds are over, None for no limit, or ``Machine.wake``.
+
+    A half-duplex master is deaf meanwhile, all others hear the next symbol. ``reflex`` is that of
+    ``Send``.
+    """
+
+    timeout: float | None = None
+    reflex: Reflex | None = None
+
+
+Step = Send | Listen | Rest
+"""What a procedure asks of the machine."""
+
+LISTEN_ON = Listen(None, is_continued=True)
 
 
 class Silence(NamedTuple):
@@ -124,10 +148,6 @@ _LAST_CHARACTERS = 16
 
 # What nobody says in full duplex before he has heard a message or an ENQ to its end.
 _RESPONSES = (Control.ACK, Control.NAK)
-
-KEEP = -1.0
-AT_ONCE = -1.0
-LISTEN_ON = Step(b'', KEEP)
 
 Heard = Symbol | Silence
 Procedure = Generator[Step, Heard, None]
@@ -178,94 +198,50 @@ class Machine:
 
     ``procedure`` makes the generator, afresh at every ``start``. With ``forget_on_send`` what
     was heard before a transmission is dropped: for the master of a half-duplex line it cannot
-    be the answer. ``counters`` gets the characters in both directions.
+    be the answer. ``counters`` gets the characters in both directions. ``background`` has its time
+    whatever the line is busy with.
 
-    A reflex, and a frame after which nothing is waited for, such as an ACK, is handed to
-    ``send_at_once`` where that is set, so that it is on the line while the reply is made use of.
-    All others come from ``data_to_send``.
-
-    ``unsent`` asks the port how many bytes have still to leave, as far as it can tell;
-    ``position`` counts the bytes given out so far. Once the other end ``embeds`` responses, a long
-    message is given out in portions, and a response goes between two of them (M 4-3), as products
-    do with Embedded Responses = Auto-detect.
-    ``send_before`` is the clock value (s) after which ``withdraw`` is due in place of
-    ``data_to_send``. ``late`` is the sum of the seconds by which it was called after a deadline of
-    its procedure: so long this process, or its host, has not run.
+    ``sender`` has what goes out. ``late`` is the sum of the seconds by which the machine was
+    called after a deadline of its procedure: so long this process, or its host, has not run.
     """
 
     def __init__(self, procedure: Callable[[Machine], Procedure], *, checksum: Checksum,
                  duplex: Duplex = Duplex.HALF, timing: LineTiming | None = None,
-                 counters: Counters | None = None, forget_on_send: bool = False) -> None:
+                 counters: Counters | None = None, forget_on_send: bool = False,
+                 background: Background | None = None) -> None:
         self.decoder = FrameDecoder(checksum, duplex)
         self.counters = counters or Counters()
+        self.timing = timing or LineTiming()
+        self.sender = Sender(checksum, duplex, self.timing.char_time, self.counters)
         self.now = 0.0
         self.deadline: float | None = None
-        self.send_at_once: Callable[[bytes], None] = self._keep
-        self.unsent: Callable[[], int] = lambda: 0
-        self.background: Background | None = None
         self.late = 0.0
-        self._woke, self._slept = -math.inf, 0.0
-        self.position = 0
-        self.embeds = False
-        self.send_before = math.inf
-        self._fresh = b''  # the last of what is to be sent, which must leave before that
+        self._last_pause = -math.inf, 0.0  # its end, and its seconds
+        self._background = background
         self._make_procedure = procedure
-        self._timing = timing or LineTiming()
-        self._outgoing = Outgoing(checksum, self._timing.char_time)
-        self._pause_limit = 20 * self._timing.char_time + HELD_BACK  # inside a frame
+        self._pause_limit = 20 * self.timing.char_time + HELD_BACK  # inside a frame
         self._forget_on_send = forget_on_send
         self._is_half_duplex = duplex is Duplex.HALF
         self._procedure: Procedure | None = None
-        self._out = b''
-        self._pending: Step | None = None  # waits for its delay before it goes out
-        self._kept_deadline: float | None = None
-        self._resting = False
+        self._step: Step = Rest()
         self._is_listening = False
-        self._line_free = -math.inf
-        self._reply_size = 0
-        self._reflex: Reflex | None = None
-        self._ahead = b''  # on the line by reflex, and not yet sent by the procedure
         self._last_heard = -math.inf
-        self._echo = LineEcho(duplex is Duplex.HALF)
         self._due = -math.inf  # the deadline, before a message was heard out
         self._message = _Incoming()
 
     @property
     def next_call(self) -> float | None:
         """Return when to call ``handle_timeout`` (clock value in s), None for never."""
-        first = self.background.next_expiry() if self.background else math.inf
-        for moment in (self.deadline, self._outgoing.due):
+        first = self._background.next_expiry() if self._background else math.inf
+        for moment in (self.deadline, self.sender.outgoing.due):
             if moment is not None and moment < first:
                 first = moment
         return None if first == math.inf else first
 
     @property
-    def char_time(self) -> float:
-        """Return the seconds that a character takes on the line."""
-        return self._timing.char_time
-
-    @property
-    def tx_delay(self) -> float:
-        """Return the seconds that pass before each transmission."""
-        return self._timing.tx_delay
-
-    @property
-    def free_at(self) -> float:
-        """Return when what is being sent has left, by its size (clock value in s)."""
-        return self._line_free
-
-    @property
     def echoes(self) -> bool:
         """Tell whether the line gives back what is sent."""
-        return self._echo.is_heard
-
-    def has_left(self, position: int) -> bool:
-        """Tell whether the bytes up to this ``position`` have left, as far as the port knows."""
-        return self.position - self._still_here >= position
-
-    @property
-    def _still_here(self) -> int:
-        return self._outgoing.size + len(self._out) + self.unsent()
+        return self.sender.echo.is_heard
 
     @property
     def spare_time(self) -> float:
@@ -274,20 +250,21 @@ class Machine:
 
         To read it in one go spares most of the wakings that its bytes cost, a few at a time.
         """
-        if not self._reply_size or not self.decoder.in_message:
+        step, char_time = self._step, self.timing.char_time
+        if not isinstance(step, Send) or not step.reply_size or not self.decoder.in_message:
             return 0.0
         data = self.decoder.link_data
-        is_faster = self.now - self._line_free < len(data) * self._timing.char_time
+        is_faster = self.now - self.sender.free_at < len(data) * char_time
         if is_faster or not begins_good_reply(data):
             return 0.0  # it does not have that speed (a simulator's), or the reply is another
-        missing = HEADER_SIZE + self._reply_size - len(data) - _LAST_CHARACTERS
-        return max(missing, 0) * self._timing.char_time
+        missing = HEADER_SIZE + step.reply_size - len(data) - _LAST_CHARACTERS
+        return max(missing, 0) * char_time
 
-    def start(self, now: float) -> None:
-        """Begin the procedure from its beginning."""
+    def start(self, now: float, outlet: Outlet | None = None) -> None:
+        """Begin the procedure from its beginning, on a line that has this outlet."""
         self.stop()
         self.now = now
-        self._line_free = now
+        self.sender.begin(now, outlet)
         self._procedure = self._make_procedure(self)
         self._resume(None)
 
@@ -299,13 +276,9 @@ class Machine:
         is left without a result.
         """
         procedure, self._procedure = self._procedure, None
-        self._out, self._ahead, self.send_before = b'', b'', math.inf
-        self._outgoing.clear()
-        self.embeds = False
+        self.sender.clear()
         self.decoder.reset()
-        self._pending, self._resting, self.deadline = None, False, None
-        self._is_listening = False
-        self._echo.forget()
+        self.deadline, self._is_listening = None, False
         if procedure is None:
             return
         try:
@@ -314,16 +287,16 @@ class Machine:
                     procedure.throw(error)
             procedure.close()
         finally:
-            if self.background is not None:
-                self.background.ended(error)
+            if self._background is not None:
+                self._background.ended(error)
 
     def receive_data(self, data: bytes, now: float) -> None:
         """Take bytes from the line."""
         self.now = now
         self.counters.chars_received += len(data)
-        if self._forget_on_send and (self._out or not self._is_listening):
+        if self._forget_on_send and (self.sender.waiting or not self._is_listening):
             return  # it was said before what it would have to answer
-        is_idle = self._resting or self.deadline is None
+        is_idle = self.deadline is None or isinstance(self._step, Rest)
         if is_idle and self._is_listening and now - self._last_heard > self._pause_limit:
             self.decoder.reset()  # what broke off must not swallow what begins now
         self._last_heard = now
@@ -337,27 +310,29 @@ class Machine:
         heard = self.counters.chars_received
         if self._message.number != self.decoder.begun:
             self._message = _Incoming(self.decoder.begun, now, heard, now <= self._due)
-        if self.deadline is None or self._resting or not self._message.is_in_time \
+        if self.deadline is None or isinstance(self._step, Rest) or not self._message.is_in_time \
                 or not self._is_listening:
             return
         characters = min(_SLOWEST * (heard - self._message.heard), _LONGEST)
-        limit = self._message.begun + 2 * self._pause_limit + characters * self._timing.char_time
+        limit = self._message.begun + 2 * self._pause_limit + characters * self.timing.char_time
         self.deadline = max(self.deadline, min(now + self._pause_limit, limit))
 
     def handle_timeout(self, now: float) -> None:
         """Take note that the clock reads ``now``; does nothing before ``next_call``."""
         self.now = now
-        if self.background is not None and now >= self.background.next_expiry():
-            self.background.expire(now)
-        if self._outgoing.due is not None and now >= self._outgoing.due:
-            self._out += self._outgoing.next(now)
+        if self._background is not None and now >= self._background.next_expiry():
+            self._background.expire(now)
+        due = self.sender.outgoing.due
+        if due is not None and now >= due:
+            self.sender.next_portion(now)
         if self.deadline is None or now < self.deadline:
             return
         self.late += now - self.deadline
         if now - self.deadline > MOST_LATE:
-            self._woke, self._slept = now, now - self.deadline
-        if self._pending is not None:
-            self._transmit(self._pending)
+            self._last_pause = now, now - self.deadline
+        step = self._step
+        if isinstance(step, Send) and not self._is_listening:  # its delay is over
+            self._transmit(step)
         else:
             decoder = self.decoder
             self._resume(Silence(decoder.last_byte, decoder.in_message, now - self._last_heard))
@@ -365,32 +340,26 @@ class Machine:
 
     def took(self, begun: float, now: float) -> float:
         """Return the seconds from a clock value to now, but for the last pause."""
-        return now - begun - (self._slept if self._woke > begun else 0.0)
+        end, seconds = self._last_pause
+        return now - begun - (seconds if end > begun else 0.0)
 
     def wake(self, now: float) -> None:
         """End a rest early: there may be something new to do."""
         self.now = now
-        if self.background is not None and self._procedure is not None:
-            self.background.expire(now)
-        if self._resting:
+        if self._background is not None and self._procedure is not None:
+            self._background.expire(now)
+        if self._procedure is not None and isinstance(self._step, Rest):
             self._resume(_NOTHING)
             self._deliver_symbols()
 
     def data_to_send(self) -> bytes:
         """Return, once, the bytes to put on the line now."""
-        data, self._out, self.send_before = self._out, b'', math.inf
-        return data
+        return self.sender.data_to_send()
 
     def withdraw(self, now: float) -> None:
         """Take back a command that has become too old since it was looked at."""
         self.now = now
-        size = len(self._fresh) + self._outgoing.size
-        self._out = self._out.removesuffix(self._fresh)
-        self._outgoing.clear()
-        self._echo.withdrawn()
-        self.counters.chars_sent -= size
-        self.position -= size
-        self._line_free, self.send_before = now, math.inf
+        self.sender.withdraw(now)
         self._resume(_NOTHING, CommandExpired())
         self._deliver_symbols()
 
@@ -401,39 +370,31 @@ class Machine:
         A message of ours that comes back is noise in full duplex: a response that was given before
         must not count for it (M 4-8), in case that it is a PLC's after all.
         """
+        echo = self.sender.echo
         while (symbol := self.decoder.next_symbol()) is not None:
             # A master sends no frame without a station, and no response before it hears its echo.
             is_slaves = self._forget_on_send and (
                 symbol.station is None if isinstance(symbol, Frame)
-                else isinstance(symbol, Control) and not self._echo.is_heard)
-            if is_slaves or not self._echo.is_ours(symbol, self.has_left):
+                else isinstance(symbol, Control) and not echo.is_heard)
+            if is_slaves or not echo.is_ours(symbol, self.sender.has_left):
                 break
             if isinstance(symbol, Frame) and not self._is_half_duplex:
                 return NOISE
         return symbol
 
     def _deliver_symbols(self) -> None:
+        sender = self.sender
         while self._is_listening and self.decoder.waiting \
                 and (symbol := self._next_symbol()) is not None:
-            if self._reflex is not None and not (self._out or self._outgoing.size) \
-                    and (frame := self._reflex(symbol)):
-                self._ahead = frame
-                self.send_at_once(frame)
+            if self._step.reflex is not None and not self.timing.tx_delay:
+                sender.react(self._step.reflex, symbol)
             if self._is_half_duplex:  # what we have sent has left
-                self._line_free = min(self._line_free, self.now)
+                sender.free_at = min(sender.free_at, self.now)
             elif symbol in _RESPONSES:
-                self._take_as_answer()
+                sender.answered(self.now)
             if isinstance(symbol, Frame):
-                self.embeds |= symbol.has_response and symbol.fault is None
+                sender.embeds |= symbol.has_response and symbol.fault is None
             self._resume(symbol)
-
-    def _keep(self, data: bytes) -> None:
-        self._out += data
-
-    def _take_as_answer(self) -> None:
-        """Conclude from an answer that what we have sent has left, but what is still here."""
-        left = self.now + self._still_here * self._timing.char_time
-        self._line_free = min(self._line_free, left)
 
     def _resume(self, heard: Heard | None, error: CommandExpired | None = None) -> None:
         """Run the procedure up to a step that has to wait; None starts it."""
@@ -447,65 +408,55 @@ class Machine:
                 self._procedure, self.deadline, self._is_listening = None, None, False
                 return
             heard, error = _NOTHING, None
-            if self.now > step.expires:
-                error = CommandExpired()
-            elif not self._take_step(step):
+            self._step = step
+            if isinstance(step, Send):
+                if self.now > step.expires:
+                    error = CommandExpired()
+                elif not self._send(step):
+                    return
+            elif not self._wait(step):
                 return
-            elif not step.frame:
+            else:
                 heard = self._next_symbol() or _NOTHING
 
-    def _take_step(self, step: Step) -> bool:
-        """Carry out a step; return whether the procedure goes on at once."""
-        self._resting = step.frame is None
-        self._reflex = None if self._timing.tx_delay else step.reflex
-        if self._resting:
-            self._is_listening = not self._forget_on_send
-            self._reply_size, self._due = step.reply_size, self.now + (step.timeout or 0.0)
-            self.deadline = None if step.timeout is None else self._due
+    def _wait(self, step: Listen | Rest) -> bool:
+        """Begin to wait; return whether there is no time for it."""
+        if isinstance(step, Listen) and step.is_continued:
             return False
-        delay = max(step.delay, self._timing.tx_delay) if step.frame else 0.0
-        if delay and step.delay != AT_ONCE:
-            self._pending, self._kept_deadline, self._is_listening = step, self.deadline, False
-            self.deadline = max(self.now, self._line_free) + delay
-            return False
-        return self._put_on_line(step)
+        is_rest = isinstance(step, Rest)
+        self._is_listening = not (is_rest and self._forget_on_send)
+        begun = self.now if is_rest else max(self.now, self.sender.free_at)
+        self._due = begun + (step.timeout or 0.0)
+        self.deadline = None if step.timeout is None else self._due
+        return step.timeout == 0 and not is_rest
 
-    def _put_on_line(self, step: Step) -> bool:
+    def _send(self, step: Send, *, is_due: bool = False) -> bool:
+        """
+        Send a frame, after its delay unless it ``is_due``.
+
+        Return whether the procedure goes on at once.
+        """
+        sender = self.sender
+        if not is_due and not step.at_once and (
+                delay := max(step.delay, self.timing.tx_delay)):
+            self._is_listening = False
+            self.deadline = max(self.now, sender.free_at) + delay
+            return False
         self._is_listening = True
-        free = max(self.now, self._line_free)
-        if step.frame:
-            size = len(step.frame)
-            is_alone = not self._outgoing.size
-            is_divided = self.embeds or not is_alone
-            self._fresh = self._given_out(step.frame, free) if is_divided else step.frame
-            ahead, self._ahead = self._ahead, b''
-            assert ahead in (b'', step.frame)
-            self._out += b'' if ahead else self._fresh
-            self.send_before = step.expires if is_alone else math.inf
-            self.counters.chars_sent += size
-            self.position += size
-            self._line_free = free = free + size * self._timing.char_time
-            self._echo.sent(step.frame, self.position)
-            if self._forget_on_send:
-                self.decoder.reset()
-        if step.timeout != KEEP:
-            self._reply_size, self._due = step.reply_size, free + (step.timeout or 0.0)
-            self.deadline = None if step.timeout is None else self._due
+        sender.put(step.frame, self.now, step.expires)
+        if self._forget_on_send:
+            self.decoder.reset()
+        self._due = sender.free_at + (step.timeout or 0.0)
+        self.deadline = None if step.timeout is None else self._due
         if step.timeout != 0:
             return False
-        if self._out:
-            self.send_at_once(self.data_to_send())
+        if sender.waiting:
+            sender.flush()
         return True
 
-    def _given_out(self, frame: bytes, free: float) -> bytes:
-        """Return what goes out at once of a frame; the line is busy until ``free``."""
-        if self._outgoing.can_embed and frame in (ACK, NAK):
-            return frame  # after the portion of our message on the line, before the rest of it
-        return self._outgoing.put(frame, free)
-
-    def _transmit(self, step: Step) -> None:
-        self._pending, self.deadline = None, self._kept_deadline
+    def _transmit(self, step: Send) -> None:
+        """Send a frame whose delay is over, unless it has become too old."""
         if self.now > step.expires:
             self._resume(_NOTHING, CommandExpired())
-        elif self._put_on_line(step):
+        elif self._send(step, is_due=True):
             self._resume(_NOTHING)

@@ -42,7 +42,7 @@ from collections.abc import Callable, Generator
 from abdf1_ros.df1 import frames
 from abdf1_ros.df1.frames import Frame
 from abdf1_ros.df1.link import LinkStatus, NO_STATUS
-from abdf1_ros.df1.machine import Heard, Machine, Procedure, Step
+from abdf1_ros.df1.machine import Heard, Machine, Procedure, Rest, Send, Step
 from abdf1_ros.df1.master_line import MasterLine, MasterSettings, MOST_QUEUED, poll_on_ack
 from abdf1_ros.df1.packet import BROADCAST, Packet
 from abdf1_ros.df1.stations import ActiveStationList
@@ -83,7 +83,7 @@ class HalfDuplexMaster:
                 yield from self.carry_out(task)
             elif not self._line.forwards:
                 due = source.next_due()
-                yield Step(None, None if due is None else max(due - now, 0.0))
+                yield Rest(None if due is None else max(due - now, 0.0))
 
     def carry_out(self, task: Task) -> Procedure:
         """Send the command of a task and end it; a broadcast has no reply but our own."""
@@ -153,4 +153,4 @@ class HalfDuplexMaster:
         self._line.accounting.late(task, keeps_others_waiting=True)
         if self._settings.nak_on_command_timeout:
             self._line.counters.naks_sent += 1
-            yield Step(frames.NAK, 0)
+            yield Send(frames.NAK)

@@ -40,11 +40,12 @@ from abdf1_ros.df1.frames import Code, Control, Frame, FrameFault, Unknown
 from abdf1_ros.df1.link import ack_on_reply
 from abdf1_ros.df1.machine import (
     Heard,
+    Listen,
     LISTEN_ON,
     Machine,
     MIN_RESPONSE_TIME,
     Procedure,
-    Reflex,
+    Send,
     Silence,
     Step,
 )
@@ -55,6 +56,7 @@ from abdf1_ros.df1.packet import (
     REPLY_BIT,
     STS_NOT_DELIVERED,
 )
+from abdf1_ros.df1.sender import Reflex
 from abdf1_ros.df1.stations import ActiveStationList
 from abdf1_ros.df1.tasks import Task
 from abdf1_ros.errors import CommandExpired, StationInactive
@@ -74,7 +76,7 @@ _MOST_PASSED_ON = 2 * MAX_FORWARDS
 # older one for ever.
 MOST_QUEUED = 8
 
-_ACKNOWLEDGE = Step(frames.ACK, 0)
+_ACKNOWLEDGE = Send(frames.ACK)
 
 # What answers a message and a poll, but for the frames that answer a poll too.
 _MESSAGE_ANSWERS = (Control.ACK, Control.NAK)
@@ -114,22 +116,23 @@ class MasterLine:
     The line of a half-duplex master.
 
     ``serve`` executes commands of slaves for us and returns their replies; ``report`` is
-    called with every numbered error and notice as it happens.
+    called with every numbered error and notice as it happens. ``take_reply`` takes a reply that
+    came too late for its poll, and returns whether a command waited for it.
     """
 
     def __init__(self, machine: Machine, settings: MasterSettings, stations: ActiveStationList,
                  report: Callable[[Event], None] = lambda event: None,
-                 serve: Callable[[Packet], Packet] | None = None) -> None:
+                 serve: Callable[[Packet], Packet] | None = None,
+                 take_reply: Callable[[int, Packet], bool] = lambda number, reply: False) -> None:
         self.machine = machine
         self.counters = machine.counters
         self.settings = settings
         self.stations = stations
-        # Takes a reply that came too late for its poll; returns whether a command waited for it.
-        self.take_reply: Callable[[int, Packet], bool] = lambda number, reply: False
         self.accounting = Accounting(machine.counters, stations, report, settings.station)
         self.note = self.accounting.note
         self._report = report
         self._serve = serve
+        self._take_reply = take_reply
         self._timeout = max(settings.timeout, MIN_RESPONSE_TIME)
         self._last_code = 0
         self.begin()
@@ -153,14 +156,14 @@ class MasterLine:
         if number == BROADCAST:
             self.counters.messages_sent += 1
             begun = self.machine.now
-            yield Step(frame, BROADCAST_PAUSE)
+            yield Send(frame, BROADCAST_PAUSE)
             return begun
         for retry in range(1, self.settings.nak_retries + 2):
             self.counters.messages_sent += 1
             begun = self.machine.now
             try:
                 answer = yield from self._ask(
-                    Step(frame, self._timeout, expires=expires, reflex=reflex), number,
+                    Send(frame, self._timeout, expires=expires, reflex=reflex), number,
                     _MESSAGE_ANSWERS)
             except CommandExpired as error:
                 self.counters.messages_sent -= 1
@@ -236,7 +239,7 @@ class MasterLine:
         """Poll once; return EOT, NAK, a frame good or bad, or silence."""
         self.counters.polls_sent += 1
         return self._ask(
-            Step(frames.poll_frame(number), self._timeout, pause, reply_size=reply_size,
+            Send(frames.poll_frame(number), self._timeout, pause, reply_size=reply_size,
                  reflex=ack_on_reply(number)), number, _POLL_ANSWERS)
 
     def _ask(self, question: Step, number: int,
@@ -279,11 +282,11 @@ class MasterLine:
         A bit error that looks like a symbol ends the message for us, but its sender goes on
         sending and does not listen. Other symbols in the rest of the message mean nothing.
         """
-        quiet = MIN_RESPONSE_TIME + _QUIET_CHARACTERS * self.machine.char_time
-        end = self.machine.now + quiet + frames.MAX_LINK_DATA * self.machine.char_time
+        quiet = MIN_RESPONSE_TIME + _QUIET_CHARACTERS * self.machine.timing.char_time
+        end = self.machine.now + quiet + frames.MAX_LINK_DATA * self.machine.timing.char_time
         left = quiet
         while left > _MOMENT:
-            symbol = yield Step(b'', left)
+            symbol = yield Listen(left)
             heard = symbol.seconds if isinstance(symbol, Silence) else 0.0
             left = min(quiet - heard, end - self.machine.now)
             if isinstance(symbol, Unknown) and not symbol.is_misplaced:
@@ -309,7 +312,7 @@ class MasterLine:
         self.stations.heard(packet.src, self.machine.now)
         if packet.is_reply and packet.dst == self.settings.station and station.accepts(packet):
             self.accounting.received(packet)
-            if not self.take_reply(packet.src, packet):
+            if not self._take_reply(packet.src, packet):
                 self.take_unwanted(packet)
         return True
 

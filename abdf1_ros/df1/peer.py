@@ -55,9 +55,12 @@ from abdf1_ros.df1.frames import Code, Control, Frame, FrameFault, Symbol, Unkno
 from abdf1_ros.df1.link import ack_on_reply, EqualNode
 from abdf1_ros.df1.machine import (
     Heard,
+    Listen,
     Machine,
     MIN_RESPONSE_TIME,
     Procedure,
+    Rest,
+    Send,
     Silence,
     Step,
 )
@@ -162,7 +165,7 @@ class FullDuplexPeer(EqualNode):
                 continue
             if self.replies:
                 continue
-            symbol = yield Step(None, self._idle_time(source), reflex=_REFLEX)
+            symbol = yield Rest(self._idle_time(source), reflex=_REFLEX)
             if not isinstance(symbol, Silence):
                 yield from self._answer(symbol)
 
@@ -277,10 +280,10 @@ class FullDuplexPeer(EqualNode):
         """Send; return ACK, NAK, STX where the reply itself came first, or None for silence."""
         machine = self._machine
         last_byte, begun = 0, machine.now
-        symbol = yield Step(sending, min(self._timeout, _TICK), expires=expires, reflex=_REFLEX)
-        end, position = machine.free_at + self._timeout, machine.position
+        symbol = yield Send(sending, min(self._timeout, _TICK), expires=expires, reflex=_REFLEX)
+        end, position = machine.sender.free_at + self._timeout, machine.sender.position
         while not isinstance(symbol, Silence) or self._left(end) > 0:
-            if symbol in (Control.ACK, Control.NAK) and machine.has_left(position):
+            if symbol in (Control.ACK, Control.NAK) and machine.sender.has_left(position):
                 assert isinstance(symbol, Control)
                 self._count_symbol(symbol)
                 return symbol.code
@@ -301,7 +304,7 @@ class FullDuplexPeer(EqualNode):
 
     def _listen(self, seconds: float = _LATE_RESPONSE) -> Procedure:
         """Only receive for a while; responses that come now are late and count for nothing."""
-        end = max(self._machine.now, self._machine.free_at) + seconds
+        end = max(self._machine.now, self._machine.sender.free_at) + seconds
         symbol = yield from self._next(end)
         while not isinstance(symbol, Silence) or self._left(end) > 0:
             if not isinstance(symbol, Silence):
@@ -310,7 +313,7 @@ class FullDuplexPeer(EqualNode):
 
     def _left(self, end: float) -> float:
         """Return the seconds up to ``end`` in which nothing of ours is on the line."""
-        return end - max(self._machine.now, self._machine.free_at)
+        return end - max(self._machine.now, self._machine.sender.free_at)
 
     def _next(self, end: float) -> Generator[Step, Heard, Heard]:
         """Return the next symbol up to ``end``, or up to the next tick."""
@@ -318,15 +321,15 @@ class FullDuplexPeer(EqualNode):
         left = self._left(end)
         if left <= 0:
             return Silence()
-        return (yield Step(b'', min(left, _TICK), reflex=_REFLEX))
+        return (yield Listen(min(left, _TICK), reflex=_REFLEX))
 
     def _answer(self, symbol: Symbol) -> Procedure:
         """Send the response to a symbol, and make use of the message that it brings."""
         response = self._hear(symbol)
-        if self._machine.tx_delay:  # the response has to wait for that, the message need not
+        if self._machine.timing.tx_delay:  # the response waits for that, the message need not
             self._make_use()
         if response:
-            yield Step(response, 0)
+            yield Send(response)
         self._make_use()
 
     def _make_use(self) -> None:

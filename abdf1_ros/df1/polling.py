@@ -44,7 +44,7 @@ import math
 
 from abdf1_ros.df1.frames import Control, Frame
 from abdf1_ros.df1.link import LinkStatus, ScanTimes
-from abdf1_ros.df1.machine import Machine, Procedure, Step
+from abdf1_ros.df1.machine import Machine, Procedure, Rest
 from abdf1_ros.df1.master_line import (
     is_good,
     MasterLine,
@@ -136,15 +136,13 @@ class StandardPollingMaster:
         self._settings = settings
         self._polling = polling
         self._stations = stations
-        self._line = MasterLine(machine, settings, stations, report, serve)
+        self._line = MasterLine(machine, settings, stations, report, serve, self._take_reply)
         self._priority = _PollList(polling.priority)
         self._normal = _PollList(polling.normal)
         self._outstanding: dict[int, Outstanding] = {}
         self._listed = frozenset((*polling.priority, *polling.normal))
         self._polled = self._listed - {settings.station}
-        stations.polled = self._listed
-        self._line.take_reply = self._take_reply
-        stations.add(self._polled)
+        stations.add(self._polled, are_polled=True)
         # Stations that got a command of another station and have not replied, and until when
         # (clock value in s) they may. They get no second one meanwhile: several senders would
         # soon fill the sink, which a poll empties by one message only, and our own commands would
@@ -174,7 +172,7 @@ class StandardPollingMaster:
             yield from self._scan(source)
             if self._machine.now == begun:  # no station can be polled now
                 yield from self._between_polls(source)
-                yield Step(None, _PAUSE)
+                yield Rest(_PAUSE)
 
     def _is_active(self, number: int) -> bool:
         """Tell whether an entry of a list is polled; our own is not a station of the line."""
@@ -267,9 +265,9 @@ class StandardPollingMaster:
 
     def _pace(self, begun: float) -> Procedure:
         """Poll a line without a real speed, such as TCP, not faster than its Baud setting."""
-        rest = begun + _POLL_CHARACTERS * self._machine.char_time - self._machine.now
+        rest = begun + _POLL_CHARACTERS * self._machine.timing.char_time - self._machine.now
         if rest > 0:
-            yield Step(None, rest)
+            yield Rest(rest)
 
     def _answered(self, number: int, answer: Control | Frame) -> Procedure:
         """Take the answer of a station to a poll."""

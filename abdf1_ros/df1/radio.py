@@ -46,9 +46,12 @@ from abdf1_ros.df1.link import EqualNode, LinkSettings, LinkStatus
 from abdf1_ros.df1.machine import (
     Heard,
     HELD_BACK,
+    Listen,
     Machine,
     MIN_RESPONSE_TIME,
     Procedure,
+    Rest,
+    Send,
     Silence,
     Step,
 )
@@ -216,7 +219,7 @@ class RadioNode(EqualNode):
             yield from self._work(source)
         except PortLost:
             machine = self._machine
-            self._counters.unsent_messages += not machine.has_left(machine.position)
+            self._counters.unsent_messages += not machine.sender.has_left(machine.sender.position)
             raise
 
     def _work(self, source: TaskSource) -> Procedure:
@@ -245,10 +248,10 @@ class RadioNode(EqualNode):
         """Return the step up to the next moment at which something is due."""
         if not self._under_way:
             due = source.next_due()
-            return Step(None, None if due is None else max(due - self._machine.now, 0.0))
+            return Rest(None if due is None else max(due - self._machine.now, 0.0))
         first = min(command.deadline for command in self._under_way.values())
         left = max(first - self._machine.now, 0.0)
-        return Step(b'', min(left, _TICK) if self._has_room else left)
+        return Listen(min(left, _TICK) if self._has_room else left)
 
     def _begin(self, task: Task) -> Procedure:
         """Send a command the first time; a broadcast ends by that."""
@@ -282,7 +285,7 @@ class RadioNode(EqualNode):
             del self._under_way[number]
             task.fail(error)
         command.tries += 1
-        command.deadline = self._machine.free_at + self._settings.cmd_timeout
+        command.deadline = self._machine.sender.free_at + self._settings.cmd_timeout
 
     def _send(self, data: bytes, command: _Command | None = None) -> Procedure:
         """Send link data when the line is quiet, but no command that has its reply by then."""
@@ -297,28 +300,29 @@ class RadioNode(EqualNode):
         self._counters.messages_sent += 1
         self._sent.append(data)
         try:
-            symbol = yield Step(frame, _MOMENT, expires=expires)
+            symbol = yield Send(frame, _MOMENT, expires=expires)
         except CommandExpired:
             self._counters.messages_sent -= 1
             raise
         self._hear(symbol)
-        while (left := self._machine.free_at - self._machine.now) > 0:  # nothing of ours follows
-            self._hear((yield Step(b'', left)))
+        # Nothing of ours follows before it has left.
+        while (left := self._machine.sender.free_at - self._machine.now) > 0:
+            self._hear((yield Listen(left)))
 
     def _wait_for_quiet(self, size: int, command: _Command | None) -> Procedure:
         """Wait until a frame of so many characters may go, or its command has had its reply."""
         machine = self._machine
         if self._settings.avoids_collisions:
             return
-        quiet = MIN_RESPONSE_TIME + _QUIET_CHARACTERS * machine.char_time
+        quiet = MIN_RESPONSE_TIME + _QUIET_CHARACTERS * machine.timing.char_time
         most = min(1 << command.tries if command else 1, _MOST_BACK_OFF) * (
-            MIN_RESPONSE_TIME + machine.tx_delay + size * machine.char_time)
+            MIN_RESPONSE_TIME + machine.timing.tx_delay + size * machine.timing.char_time)
         give_up = machine.now + LONGEST_WAIT
         pause = quiet + self._random.uniform(0.0, most)
         begun = machine.now
         while (left := min(begun + pause, give_up) - machine.now) > 0 \
                 and not (command and self._is_over(command)):
-            symbol = yield Step(b'', left)
+            symbol = yield Listen(left)
             if isinstance(symbol, Silence):
                 begun = max(begun, machine.now - symbol.seconds)
             else:

@@ -33,7 +33,16 @@ from abdf1_ros.df1 import frames
 from abdf1_ros.df1.accounting import count_fault, wrong_message
 from abdf1_ros.df1.checksum import Checksum
 from abdf1_ros.df1.frames import Control, Frame, Poll, Symbol, Unknown
-from abdf1_ros.df1.machine import AT_ONCE, Heard, Machine, Procedure, Silence, Step
+from abdf1_ros.df1.machine import (
+    Heard,
+    Listen,
+    Machine,
+    Procedure,
+    Rest,
+    Send,
+    Silence,
+    Step,
+)
 from abdf1_ros.df1.packet import BROADCAST, Packet
 from abdf1_ros.errors import LineReset, LinkError, NeverTaken
 from abdf1_ros.messages import Event, Message
@@ -298,11 +307,12 @@ def answer(machine: Machine, symbol: Symbol, handle: Callable[[Symbol], bytes],
     while heard is not None:
         symbol, heard = heard, None
         if _wants_answer(symbol):
-            heard = yield from _next_within(machine, machine.tx_delay, look)
+            heard = yield from _next_within(machine, machine.timing.tx_delay, look)
         if heard is None and (data := handle(symbol)):
             # At once, but for what has an age: that is looked at by whoever has the port.
             limit = expires()
-            after = yield Step(data, 0 if limit == math.inf else _MOMENT, AT_ONCE, limit)
+            after = yield Send(
+                data, 0 if limit == math.inf else _MOMENT, expires=limit, at_once=True)
             heard = None if isinstance(after, Silence) else after
 
 
@@ -316,9 +326,9 @@ def _next_within(machine: Machine, seconds: float,
                  look: Callable[[], None]) -> Generator[Step, Heard, Symbol | None]:
     """Return the next symbol, if it is here already or comes within ``seconds``."""
     end = machine.now + seconds
-    heard = yield Step(b'', 0)
+    heard = yield Listen(0)
     while isinstance(heard, Silence) and (left := end - machine.now) > 0:
-        heard = yield Step(None, min(left, TICK))
+        heard = yield Rest(min(left, TICK))
         look()
     return None if isinstance(heard, Silence) else heard
 
@@ -330,7 +340,7 @@ def multidrop(stations: Sequence[Responder]) -> Callable[[Machine], Procedure]:
 
     def listen(machine: Machine) -> Procedure:
         while True:
-            symbol = yield Step(None, None)
+            symbol = yield Rest()
             if not isinstance(symbol, Silence):
                 yield from answer(machine, symbol, handle)
     return listen

@@ -27,7 +27,7 @@ import math
 
 from abdf1_ros.df1.accounting import Accounting
 from abdf1_ros.df1.link import LinkStatus
-from abdf1_ros.df1.machine import Machine, Procedure, Silence, Step
+from abdf1_ros.df1.machine import Machine, Procedure, Rest, Silence
 from abdf1_ros.df1.packet import BROADCAST, is_local_status, Packet
 from abdf1_ros.df1.slave import answer, HalfDuplexSlave, SlaveSettings, TICK
 from abdf1_ros.df1.stations import ActiveStationList
@@ -71,7 +71,7 @@ class SlaveLink:
         next_look = self._machine.now + TICK
         while True:
             # At a fixed time, not so long after each symbol: the line may never be quiet.
-            symbol = yield Step(None, max(0.0, next_look - self._machine.now))
+            symbol = yield Rest(max(0.0, next_look - self._machine.now))
             if not isinstance(symbol, Silence):
                 try:
                     yield from answer(self._machine, symbol, self._slave.respond,

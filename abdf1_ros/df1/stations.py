@@ -16,7 +16,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 import math
 
@@ -109,18 +109,18 @@ class ActiveStationList:
 
     ``records`` has the record of every station, of the list or not, by number. ``routes`` gives
     the gateway to a station, by number: the gateway is polled in place of the station, and all its
-    stations are active while the gateway is (M 3-7). ``polled`` are the stations of this line that
-    the link polls all the time: nobody else need ask whether they are there again. ``probes`` says
-    when others may be asked; one takes ``probe_time`` seconds. ``took`` tells how much of
-    the time between two clock values (s) this process has run.
+    stations are active while the gateway is (M 3-7). ``probes`` says when silent stations may be
+    asked; one takes ``probe_time`` seconds. ``took`` tells how much of the time between two clock
+    values (s) this process has run.
     """
 
     def __init__(self, numbers: Iterable[int] = (),
                  on_change: Callable[[Station], None] = lambda station: None,
-                 routes: Mapping[int, int] | None = None, probe_time: float = 0.0) -> None:
-        self.polled: Collection[int] = ()
+                 routes: Mapping[int, int] | None = None, probe_time: float = 0.0,
+                 took: Callable[[float, float], float] = lambda begun, now: now - begun) -> None:
+        self._polled: set[int] = set()
         self.probes = Probes(probe_time)
-        self.took: Callable[[float, float], float] = lambda begun, now: now - begun
+        self._took = took
         self.records = _Records()
         self._stations: dict[int, Station] = {}
         self._on_change = on_change
@@ -128,8 +128,14 @@ class ActiveStationList:
                        if station != gateway}
         self.add((*numbers, *self.routes.values()))
 
-    def add(self, numbers: Iterable[int]) -> None:
-        """Take stations into the list."""
+    def add(self, numbers: Iterable[int], *, are_polled: bool = False) -> None:
+        """
+        Take stations into the list.
+
+        Where the link polls them all the time, nobody else need ask whether they are there again.
+        """
+        numbers = list(numbers)
+        self._polled.update(numbers if are_polled else ())
         for number in numbers:
             self._stations[number] = self.records[number]
         self._stations = dict(sorted(self._stations.items()))
@@ -173,7 +179,7 @@ class ActiveStationList:
 
     def is_polled(self, number: int) -> bool:
         """Tell whether the link polls a station, or its gateway, all the time."""
-        return self.via(number) in self.polled
+        return self.via(number) in self._polled
 
     def admits_message(self, number: int, now: float) -> bool:
         """Tell whether a message may go to a station: to a silent one in its probes' time only."""
@@ -196,14 +202,14 @@ class ActiveStationList:
         if not self._someone_waits:
             self.probes.nobody_waits(now)
         elif was_silent:
-            self.probes.spent(self.took(begun, now), now, is_message=is_message)
+            self.probes.spent(self._took(begun, now), now, is_message=is_message)
         else:
-            self.probes.died(self.took(begun, now), now)
+            self.probes.died(self._took(begun, now), now)
 
     def polled_in_vain(self, begun: float, now: float) -> None:
         """Take note that the link has asked a silent station from ``begun`` until now."""
         if self._someone_waits:
-            self.probes.spent(self.took(begun, now), now)
+            self.probes.spent(self._took(begun, now), now)
         else:
             self.probes.nobody_waits(now)
 

@@ -93,13 +93,11 @@ class Driver:
         self.network = network
         self.mappings = tuple(mappings)
         self.counters = Counters()
+        self.machine = make_machine(network.line, self._run, self.counters, self)
         self.stations = ActiveStationList(
             (mapping.station for mapping in mappings
              if not mapping.serves and mapping.station != BROADCAST), self._station_changed,
-            _routes(network, mappings), longest_probe(network))
-        self.machine = make_machine(network.line, self._run, self.counters)
-        self.machine.background = self
-        self.stations.took = self.machine.took
+            _routes(network, mappings), longest_probe(network), self.machine.took)
         self.is_online = False
         self._is_ending = False
         self._settings = settings

@@ -21,7 +21,7 @@ from dataclasses import dataclass, replace
 
 from abdf1_ros.counters import Counters
 from abdf1_ros.df1.link import Link, LinkSettings
-from abdf1_ros.df1.machine import Machine, Procedure
+from abdf1_ros.df1.machine import Background, Machine, Procedure
 from abdf1_ros.df1.master import HalfDuplexMaster
 from abdf1_ros.df1.master_line import MasterSettings
 from abdf1_ros.df1.packet import Packet
@@ -62,11 +62,12 @@ class DriverSettings:
     first_tns: int = 0
 
 
-def make_machine(line: LinkSettings, run: Callable[[], Procedure], counters: Counters) -> Machine:
+def make_machine(line: LinkSettings, run: Callable[[], Procedure], counters: Counters,
+                 background: Background | None = None) -> Machine:
     """Return the machine for a line, with ``run`` as its procedure."""
     return Machine(
-        lambda machine: run(), checksum=line.checksum, duplex=line.duplex,
-        timing=line.timing, counters=counters, forget_on_send=line.mode == 'Master')
+        lambda machine: run(), checksum=line.checksum, duplex=line.duplex, timing=line.timing,
+        counters=counters, forget_on_send=line.mode == 'Master', background=background)
 
 
 def make_link(line: LinkSettings, settings: DriverSettings, machine: Machine,

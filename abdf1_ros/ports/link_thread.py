@@ -316,13 +316,13 @@ class LinkThread(threading.Thread):
     def _serve(self, port: Port) -> None:
         """Run the machine until something else is wanted."""
         machine, clock = self._machine, self._clock
-        machine.send_at_once, machine.unsent = port.write, port.unsent
-        machine.start(clock())
+        sender = machine.sender
+        machine.start(clock(), port)
         left = b''
         while not (self._stopping or self.is_released or self._next):
-            while machine.send_before < math.inf and (now := clock()) > machine.send_before:
+            while sender.send_before < math.inf and (now := clock()) > sender.send_before:
                 machine.withdraw(now)  # this process has not run for a while
-            data = machine.data_to_send()
+            data = sender.data_to_send()
             if data:
                 port.write(data)
             self._while_sending()
@@ -375,7 +375,7 @@ class LinkThread(threading.Thread):
         if self._paced == -math.inf:
             self._paced = now
         # Nothing is left where all of it were commands of a device server.
-        self._paced += (len(portion) or READ_SIZE) * (machine.char_time or _FASTEST)
+        self._paced += (len(portion) or READ_SIZE) * (machine.timing.char_time or _FASTEST)
         used = self._processor_clock() - self._worked
         self._rest(max(0.0, min(_OTHERS * used, self._paced - self._clock())))
         self._worked = self._processor_clock()

@@ -20,7 +20,7 @@ from random import Random
 
 from abdf1_ros.counters import Counters
 from abdf1_ros.df1.checksum import Checksum
-from abdf1_ros.df1.machine import LineTiming, Machine, Procedure, Step
+from abdf1_ros.df1.machine import LineTiming, Machine, Procedure, Rest
 from abdf1_ros.df1.master import HalfDuplexMaster
 from abdf1_ros.df1.master_line import MasterSettings
 from abdf1_ros.df1.packet import Packet
@@ -117,7 +117,7 @@ class Rig:
                 result = task.result
                 self.outcomes.append(Outcome(command, result, machine.now - started, was_active))
                 self._done = True
-            yield Step(None, None)
+            yield Rest()
 
     def exchange(self, number: int, request: Request) -> Outcome:
         """Carry out one transaction and return what became of it."""

@@ -34,18 +34,22 @@ from abdf1_ros.df1.frames import (
     Symbol,
 )
 from abdf1_ros.df1.machine import (
+    Background,
     Heard,
-    KEEP,
     LineTiming,
+    Listen,
     LISTEN_ON,
     Machine,
     Procedure,
+    Rest,
+    Send,
     Silence,
     Step,
 )
 from abdf1_ros.df1.packet import Packet
 from abdf1_ros.errors import CommandExpired
 import pytest
+from support.virtual_line import Wire
 
 FRAME = b'0123456789'
 MESSAGE = message_frame(bytes(20), Checksum.CRC)
@@ -57,12 +61,12 @@ class Bench:
 
     def __init__(self, *steps: Step, timing: LineTiming | None = None,
                  forget_on_send: bool = False, duplex: Duplex = Duplex.HALF,
-                 start: float | None = 0.0) -> None:
+                 start: float | None = 0.0, background: Background | None = None) -> None:
         self.got: list[Symbol | None] = []
         self.error: Exception | None = None
         self.machine = Machine(
             self._procedure, checksum=Checksum.CRC, duplex=duplex, timing=timing,
-            forget_on_send=forget_on_send)
+            forget_on_send=forget_on_send, background=background)
         self._steps = steps
         if start is not None:
             self.machine.start(start)
@@ -79,13 +83,13 @@ class Bench:
 
 
 def test_frame_goes_out_once() -> None:
-    bench = Bench(Step(FRAME, 1.0), start=5.0)
+    bench = Bench(Send(FRAME, 1.0), start=5.0)
     assert bench.machine.data_to_send() == FRAME
     assert bench.machine.data_to_send() == b''
 
 
 def test_nothing_happens_before_start() -> None:
-    bench = Bench(Step(FRAME, 1.0), start=None)
+    bench = Bench(Send(FRAME, 1.0), start=None)
     bench.machine.receive_data(ACK, 1.0)
     bench.machine.handle_timeout(2.0)
     bench.machine.wake(3.0)
@@ -93,19 +97,19 @@ def test_nothing_happens_before_start() -> None:
 
 
 def test_deadline_counts_from_the_last_byte_on_the_line() -> None:
-    bench = Bench(Step(FRAME, 1.0), timing=LineTiming(char_time=0.01), start=5.0)
+    bench = Bench(Send(FRAME, 1.0), timing=LineTiming(char_time=0.01), start=5.0)
     assert bench.machine.deadline == pytest.approx(5.0 + 10 * 0.01 + 1.0)
 
 
 def test_deadline_of_a_second_frame_waits_for_the_first_to_leave() -> None:
-    bench = Bench(Step(FRAME, 0), Step(FRAME, 1.0), timing=LineTiming(char_time=0.01), start=5.0)
+    bench = Bench(Send(FRAME), Send(FRAME, 1.0), timing=LineTiming(char_time=0.01), start=5.0)
     assert bench.machine.data_to_send() == FRAME + FRAME
     assert bench.got == [None]
     assert bench.machine.deadline == pytest.approx(5.0 + 20 * 0.01 + 1.0)
 
 
 def test_deadline_after_an_idle_line_counts_from_now() -> None:
-    bench = Bench(Step(FRAME, 1.0), Step(b'', 0.5), Step(FRAME, 1.0),
+    bench = Bench(Send(FRAME, 1.0), Listen(0.5), Send(FRAME, 1.0),
                   timing=LineTiming(char_time=0.01), start=5.0)
     bench.machine.receive_data(ACK, 6.0)
     assert bench.machine.deadline == pytest.approx(6.5)
@@ -114,14 +118,14 @@ def test_deadline_after_an_idle_line_counts_from_now() -> None:
 
 
 def test_line_time_never_runs_ahead_of_the_clock_where_the_line_is_faster_than_set() -> None:
-    bench = Bench(*[Step(FRAME, 1.0)] * 101, timing=LineTiming(char_time=0.01))
+    bench = Bench(*[Send(FRAME, 1.0)] * 101, timing=LineTiming(char_time=0.01))
     for count in range(1, 101):
         bench.machine.receive_data(EOT, 0.01 * count)
         assert bench.machine.deadline == pytest.approx(0.01 * count + 0.1 + 1.0)
 
 
 def test_only_a_response_proves_in_full_duplex_that_a_frame_has_left() -> None:
-    bench = Bench(*[Step(FRAME, 1.0)] * 3, timing=LineTiming(char_time=0.01), duplex=Duplex.FULL)
+    bench = Bench(*[Send(FRAME, 1.0)] * 3, timing=LineTiming(char_time=0.01), duplex=Duplex.FULL)
     bench.machine.data_to_send()
     bench.machine.receive_data(MESSAGE, 0.05)  # the other end speaks whenever it likes
     assert bench.machine.deadline == pytest.approx(0.2 + 1.0)
@@ -131,19 +135,18 @@ def test_only_a_response_proves_in_full_duplex_that_a_frame_has_left() -> None:
 
 
 def test_response_proves_nothing_while_bytes_have_still_to_leave() -> None:
-    bench = Bench(Step(FRAME, 1.0), Step(b'', 1.0), timing=LineTiming(char_time=0.01),
+    bench = Bench(Send(FRAME, 1.0), Listen(1.0), timing=LineTiming(char_time=0.01),
                   duplex=Duplex.FULL, start=None)
-    bench.machine.unsent = lambda: 3  # the line is no faster than it is set
-    bench.machine.start(0.0)
+    bench.machine.start(0.0, Wire(bench.machine, unsent=lambda: 3))  # no faster than it is set
     bench.machine.data_to_send()
     bench.machine.receive_data(ACK, 0.02)
-    assert not bench.machine.has_left(len(FRAME))
-    assert bench.machine.has_left(len(FRAME) - 3)
+    assert not bench.machine.sender.has_left(len(FRAME))
+    assert bench.machine.sender.has_left(len(FRAME) - 3)
     assert bench.machine.deadline == pytest.approx(0.02 + 3 * 0.01 + 1.0)
 
 
 def test_symbol_ends_a_step() -> None:
-    bench = Bench(Step(FRAME, 1.0), Step(FRAME, 1.0))
+    bench = Bench(Send(FRAME, 1.0), Send(FRAME, 1.0))
     bench.machine.receive_data(ACK[:1], 0.25)
     assert bench.got == []
     bench.machine.receive_data(ACK[1:], 0.5)
@@ -153,7 +156,7 @@ def test_symbol_ends_a_step() -> None:
 
 
 def test_timeout_ends_a_step_at_its_deadline_and_not_before() -> None:
-    bench = Bench(Step(FRAME, 1.0), Step(b'', 1.0))
+    bench = Bench(Send(FRAME, 1.0), Listen(1.0))
     bench.machine.handle_timeout(0.999)
     assert (bench.got, bench.machine.now) == ([], 0.999)
     bench.machine.handle_timeout(1.0)
@@ -162,24 +165,24 @@ def test_timeout_ends_a_step_at_its_deadline_and_not_before() -> None:
 
 
 def test_step_without_limit_has_no_deadline() -> None:
-    bench = Bench(Step(b'', None))
+    bench = Bench(Listen(None))
     assert bench.machine.deadline is None
     bench.machine.handle_timeout(1e9)
     assert bench.got == []
 
 
 def test_timeout_zero_does_not_wait() -> None:
-    bench = Bench(Step(ACK, 0), Step(EOT, 0), Step(FRAME, 1.0))
+    bench = Bench(Send(ACK), Send(EOT), Send(FRAME, 1.0))
     assert bench.machine.data_to_send() == ACK + EOT + FRAME
     assert bench.got == [None, None]
     assert bench.machine.deadline == 1.0
 
 
 def test_frame_that_nothing_is_waited_for_is_sent_before_the_procedure_goes_on() -> None:
-    bench = Bench(Step(ACK, 0), Step(EOT, 0), Step(FRAME, 1.0), start=None)
+    bench = Bench(Send(ACK), Send(EOT), Send(FRAME, 1.0), start=None)
     sent: list[tuple[bytes, int]] = []
-    bench.machine.send_at_once = lambda data: sent.append((data, len(bench.got)))
-    bench.machine.start(0.0)
+    bench.machine.start(0.0, Wire(bench.machine, lambda data: sent.append(
+        (data, len(bench.got)))))
     assert sent == [(ACK, 0), (EOT, 1)]
     assert bench.machine.data_to_send() == FRAME
 
@@ -192,21 +195,22 @@ def eot_on_ack(symbol: Symbol) -> bytes:
 def sends_of(bench: Bench) -> list[tuple[bytes, int]]:
     """Return a list that gets what is sent at once from now on, after so many symbols."""
     sent: list[tuple[bytes, int]] = []
-    bench.machine.send_at_once = lambda data: sent.append((data, len(bench.got)))
+    Wire(bench.machine, lambda data: sent.append((data, len(bench.got)))).attach(0.0)
     bench.machine.data_to_send()
     return sent
 
 
-@pytest.mark.parametrize('frame', [FRAME, None])
+@pytest.mark.parametrize('step', [Send(FRAME, 1.0, reflex=eot_on_ack), Rest(1.0, eot_on_ack)])
 def test_reflex_is_on_the_line_before_the_procedure_hears_of_the_symbol(
-        frame: bytes | None) -> None:
-    bench = Bench(Step(frame, 1.0, reflex=eot_on_ack), Step(EOT, 1.0), timing=LineTiming(0.25))
+        step: Send | Rest) -> None:
+    bench = Bench(step, Send(EOT, 1.0), timing=LineTiming(0.25))
     sent = sends_of(bench)
     machine = bench.machine
     machine.receive_data(ACK, 9.0)
     assert (sent, bench.got, machine.data_to_send()) == ([(EOT, 0)], [SAID_ACK], b'')
     assert machine.deadline == 9.0 + 2 * 0.25 + 1.0
-    assert machine.counters.chars_sent == machine.position == len((frame or b'') + EOT)
+    assert machine.counters.chars_sent == machine.sender.position == (
+        12 if isinstance(step, Send) else 2)
     machine.receive_data(ACK, 9.5)
     assert sent == [(EOT, 0)]
 
@@ -214,7 +218,7 @@ def test_reflex_is_on_the_line_before_the_procedure_hears_of_the_symbol(
 @pytest.mark.parametrize(('tx_delay', 'heard'), [(0.0, EOT), (0.0, EOT + ACK), (0.5, ACK)])
 def test_reflex_is_for_its_symbol_if_that_is_the_next_and_has_no_delay(
         tx_delay: float, heard: bytes) -> None:
-    bench = Bench(Step(b'', 1.0, reflex=eot_on_ack), LISTEN_ON,
+    bench = Bench(Listen(1.0, reflex=eot_on_ack), LISTEN_ON,
                   timing=LineTiming(tx_delay=tx_delay))
     sent = sends_of(bench)
     bench.machine.receive_data(heard, 0.5)
@@ -222,7 +226,7 @@ def test_reflex_is_for_its_symbol_if_that_is_the_next_and_has_no_delay(
 
 
 def test_reflex_does_not_overtake_what_still_has_to_go_out() -> None:
-    bench = Bench(Step(b'', 1.0), Step(FRAME, 1.0, reflex=eot_on_ack), Step(EOT, 0),
+    bench = Bench(Listen(1.0), Send(FRAME, 1.0, reflex=eot_on_ack), Send(EOT),
                   duplex=Duplex.FULL)
     sent = sends_of(bench)
     bench.machine.receive_data(ACK + ACK, 0.5)
@@ -231,9 +235,9 @@ def test_reflex_does_not_overtake_what_still_has_to_go_out() -> None:
 
 def test_reflex_waits_for_the_rest_of_a_divided_message() -> None:
     def run(machine: Machine) -> Procedure:
-        machine.embeds = True
-        yield Step(MESSAGE, 1.0, reflex=eot_on_ack)
-        yield Step(EOT, 1.0)
+        machine.sender.embeds = True
+        yield Send(MESSAGE, 1.0, reflex=eot_on_ack)
+        yield Send(EOT, 1.0)
 
     machine = Machine(run, checksum=Checksum.CRC, timing=LineTiming(0.01), duplex=Duplex.FULL)
     machine.start(0.0)
@@ -246,9 +250,9 @@ def test_reflex_waits_for_the_rest_of_a_divided_message() -> None:
 
 
 def test_procedure_that_does_not_send_its_reflex_is_a_bug_until_the_next_start() -> None:
-    for step, error in ((Step(NAK, 1.0), pytest.raises(AssertionError)),
-                        (Step(None, 1.0), nullcontext())):
-        bench = Bench(Step(FRAME, 1.0, reflex=eot_on_ack), step)
+    for step, error in ((Send(NAK, 1.0), pytest.raises(AssertionError)),
+                        (Rest(1.0), nullcontext())):
+        bench = Bench(Send(FRAME, 1.0, reflex=eot_on_ack), step)
         bench.machine.data_to_send()
         with error:
             bench.machine.receive_data(ACK, 0.5)
@@ -257,10 +261,9 @@ def test_procedure_that_does_not_send_its_reflex_is_a_bug_until_the_next_start()
 
 
 def test_nothing_is_sent_at_once_while_a_delay_passes() -> None:
-    bench = Bench(Step(ACK, 0), Step(b'', 0), timing=LineTiming(tx_delay=0.5), start=None)
+    bench = Bench(Send(ACK), Listen(0), timing=LineTiming(tx_delay=0.5), start=None)
     sent: list[bytes] = []
-    bench.machine.send_at_once = sent.append
-    bench.machine.start(0.0)
+    bench.machine.start(0.0, Wire(bench.machine, sent.append))
     assert sent == []
     bench.machine.handle_timeout(0.5)
     assert sent == [ACK]
@@ -268,13 +271,13 @@ def test_nothing_is_sent_at_once_while_a_delay_passes() -> None:
 
 
 def test_step_that_neither_sends_nor_waits_hears_what_is_here_already() -> None:
-    bench = Bench(Step(None, None), Step(b'', 0), Step(ACK, 0), Step(b'', 0), Step(b'', 0))
+    bench = Bench(Rest(), Listen(0), Send(ACK), Listen(0), Listen(0))
     bench.machine.receive_data(ACK + EOT + EOT, 1.0)
     assert bench.got == [SAID_ACK, SAID_EOT, None, SAID_EOT, None]
 
 
 def test_procedure_that_ends_leaves_no_deadline_and_its_last_bytes() -> None:
-    bench = Bench(Step(ACK, 0))
+    bench = Bench(Send(ACK))
     assert bench.machine.deadline is None
     assert bench.machine.data_to_send() == ACK
     bench.machine.receive_data(ACK, 1.0)
@@ -282,7 +285,7 @@ def test_procedure_that_ends_leaves_no_deadline_and_its_last_bytes() -> None:
 
 
 def test_tx_delay_passes_before_each_transmission() -> None:
-    bench = Bench(Step(FRAME, 1.0), Step(FRAME, 1.0), timing=LineTiming(tx_delay=0.25))
+    bench = Bench(Send(FRAME, 1.0), Send(FRAME, 1.0), timing=LineTiming(tx_delay=0.25))
     assert (bench.machine.data_to_send(), bench.machine.deadline) == (b'', 0.25)
     bench.machine.handle_timeout(0.2)
     assert bench.machine.data_to_send() == b''
@@ -295,7 +298,7 @@ def test_tx_delay_passes_before_each_transmission() -> None:
 
 
 def test_tx_delay_begins_when_the_line_is_free() -> None:
-    bench = Bench(Step(FRAME, 0), Step(FRAME, 1.0),
+    bench = Bench(Send(FRAME), Send(FRAME, 1.0),
                   timing=LineTiming(char_time=0.01, tx_delay=0.25))
     bench.machine.handle_timeout(0.25)
     assert bench.machine.data_to_send() == FRAME
@@ -308,19 +311,19 @@ def test_tx_delay_begins_when_the_line_is_free() -> None:
 @pytest.mark.parametrize(('tx_delay', 'delay', 'passes'), [
     (0.0, 0.25, 0.25), (0.5, 0.25, 0.5), (0.25, 0.5, 0.5)])
 def test_longer_of_the_two_delays_counts(tx_delay: float, delay: float, passes: float) -> None:
-    bench = Bench(Step(FRAME, 1.0, delay), timing=LineTiming(tx_delay=tx_delay))
+    bench = Bench(Send(FRAME, 1.0, delay), timing=LineTiming(tx_delay=tx_delay))
     assert (bench.machine.data_to_send(), bench.machine.deadline) == (b'', passes)
 
 
 def test_listening_is_not_delayed() -> None:
-    bench = Bench(Step(b'', 1.0, 0.5), timing=LineTiming(tx_delay=0.25))
+    bench = Bench(Listen(1.0), timing=LineTiming(tx_delay=0.25))
     assert bench.machine.deadline == 1.0
     bench.machine.receive_data(ACK, 0.1)
     assert bench.got == [SAID_ACK]
 
 
 def test_what_was_heard_before_a_transmission_is_forgotten() -> None:
-    bench = Bench(Step(FRAME, 1.0), Step(FRAME, 1.0), forget_on_send=True)
+    bench = Bench(Send(FRAME, 1.0), Send(FRAME, 1.0), forget_on_send=True)
     assert bench.machine.data_to_send() == FRAME
     bench.machine.receive_data(ACK + EOT + NAK[:1], 0.5)
     assert bench.got == [SAID_ACK]
@@ -330,7 +333,7 @@ def test_what_was_heard_before_a_transmission_is_forgotten() -> None:
 
 
 def test_what_has_come_before_a_frame_could_leave_is_no_answer_to_it() -> None:
-    bench = Bench(Step(FRAME, 1.0), Step(FRAME, 1.0), forget_on_send=True)
+    bench = Bench(Send(FRAME, 1.0), Send(FRAME, 1.0), forget_on_send=True)
     bench.machine.data_to_send()
     bench.machine.handle_timeout(10.0)  # after a pause of the process
     bench.machine.receive_data(ACK, 10.0)
@@ -341,7 +344,7 @@ def test_what_has_come_before_a_frame_could_leave_is_no_answer_to_it() -> None:
 
 
 def test_what_is_heard_while_a_transmission_waits_is_forgotten() -> None:
-    bench = Bench(Step(FRAME, 1.0), timing=LineTiming(tx_delay=0.25), forget_on_send=True)
+    bench = Bench(Send(FRAME, 1.0), timing=LineTiming(tx_delay=0.25), forget_on_send=True)
     bench.machine.receive_data(ACK + b'\x10', 0.1)
     bench.machine.handle_timeout(0.25)
     assert bench.machine.data_to_send() == FRAME
@@ -352,7 +355,7 @@ def test_what_is_heard_while_a_transmission_waits_is_forgotten() -> None:
 
 
 def test_without_forgetting_all_symbols_are_delivered() -> None:
-    bench = Bench(Step(FRAME, 1.0), Step(FRAME, 1.0, 0.25), Step(b'', 1.0))
+    bench = Bench(Send(FRAME, 1.0), Send(FRAME, 1.0, 0.25), Listen(1.0))
     bench.machine.receive_data(ACK + EOT, 0.5)
     assert bench.got == [SAID_ACK]
     bench.machine.handle_timeout(0.75)
@@ -367,7 +370,7 @@ REPLY = Packet(1, 5, 0x0F, 0, 7).reply(bytes(94))  # with DLE STX, 102 bytes bef
     (8, 78), (28, 58), (85, 1), (86, 0), (101, 0)])
 def test_reply_of_known_size_need_not_be_looked_at_until_its_last_characters(
         size: int, characters: int) -> None:
-    bench = Bench(Step(FRAME, 1.0, reply_size=94), Step(FRAME, 1.0),
+    bench = Bench(Send(FRAME, 1.0, reply_size=94), Send(FRAME, 1.0),
                   timing=LineTiming(char_time=0.01))
     frame = message_frame(REPLY.encode(), Checksum.CRC)
     bench.machine.receive_data(frame[:size], 0.1 + 0.01 * size)  # as fast as the line goes
@@ -378,7 +381,7 @@ def test_reply_of_known_size_need_not_be_looked_at_until_its_last_characters(
 
 
 def test_line_that_is_faster_than_it_is_set_is_looked_at_all_the_time() -> None:
-    bench = Bench(Step(FRAME, 1.0, reply_size=94), timing=LineTiming(char_time=0.01))
+    bench = Bench(Send(FRAME, 1.0, reply_size=94), timing=LineTiming(char_time=0.01))
     bench.machine.receive_data(message_frame(REPLY.encode(), Checksum.CRC)[:20], 0.2)
     assert bench.machine.decoder.in_message
     assert bench.machine.spare_time == 0.0
@@ -389,7 +392,7 @@ def test_line_that_is_faster_than_it_is_set_is_looked_at_all_the_time() -> None:
     (REPLY._replace(sts=0x10), 94),  # an error comes without data
     (REPLY._replace(cmd=0x0F), 94)])  # a command of the station's own
 def test_any_other_message_is_heard_as_it_comes(packet: Packet, reply_size: int) -> None:
-    bench = Bench(Step(FRAME, 1.0, reply_size=reply_size), timing=LineTiming(char_time=0.01))
+    bench = Bench(Send(FRAME, 1.0, reply_size=reply_size), timing=LineTiming(char_time=0.01))
     bench.machine.receive_data(message_frame(packet.encode(), Checksum.CRC)[:20], 0.5)
     assert bench.machine.decoder.in_message
     assert bench.machine.spare_time == 0.0
@@ -400,7 +403,7 @@ def test_silence_tells_what_was_heard_and_since_when() -> None:
 
     def procedure(machine: Machine) -> Procedure:
         for _ in range(3):
-            heard.append((yield Step(FRAME, 1.0)))
+            heard.append((yield Send(FRAME, 1.0)))
 
     machine = Machine(procedure, checksum=Checksum.CRC, timing=LineTiming(char_time=0.01))
     machine.start(0.0)
@@ -415,7 +418,7 @@ def test_silence_tells_what_was_heard_and_since_when() -> None:
 
 
 def test_listen_on_keeps_the_deadline() -> None:
-    bench = Bench(Step(FRAME, 1.0), LISTEN_ON, LISTEN_ON, Step(b'', 3.0))
+    bench = Bench(Send(FRAME, 1.0), LISTEN_ON, LISTEN_ON, Listen(3.0))
     bench.machine.receive_data(NAK, 0.5)
     bench.machine.receive_data(EOT, 0.75)
     assert bench.machine.deadline == 1.0
@@ -424,7 +427,7 @@ def test_listen_on_keeps_the_deadline() -> None:
 
 
 def test_answer_that_has_begun_extends_the_deadline() -> None:
-    bench = Bench(Step(FRAME, 1.0), timing=LineTiming(char_time=0.01), forget_on_send=True)
+    bench = Bench(Send(FRAME, 1.0), timing=LineTiming(char_time=0.01), forget_on_send=True)
     for number, byte in enumerate(MESSAGE):
         bench.machine.data_to_send()
         bench.machine.receive_data(bytes((byte,)), 0.9 + 0.04 * number)
@@ -436,7 +439,7 @@ def test_answer_that_has_begun_extends_the_deadline() -> None:
 @pytest.mark.parametrize('pause', [0.08, 0.2])
 def test_message_may_not_crawl_for_ever(pause: float) -> None:
     """A byte takes 0.01 s at the set speed; none of the pauses alone would end the message."""
-    bench = Bench(Step(FRAME, 1.0), timing=LineTiming(char_time=0.01))
+    bench = Bench(Send(FRAME, 1.0), timing=LineTiming(char_time=0.01))
     now = 1.0
     bench.machine.receive_data(STX, now)
     while not bench.got:
@@ -448,7 +451,7 @@ def test_message_may_not_crawl_for_ever(pause: float) -> None:
 
 
 def test_message_that_never_ends_is_given_up_after_the_time_of_the_longest() -> None:
-    bench = Bench(Step(FRAME, 1.0), timing=LineTiming(char_time=0.01))
+    bench = Bench(Send(FRAME, 1.0), timing=LineTiming(char_time=0.01))
     now = 1.0
     bench.machine.receive_data(STX, now)
     while not bench.got:
@@ -460,7 +463,7 @@ def test_message_that_never_ends_is_given_up_after_the_time_of_the_longest() -> 
 
 
 def test_message_that_begins_behind_the_time_limit_extends_nothing() -> None:
-    bench = Bench(Step(FRAME, 1.0), Step(b'', KEEP), timing=LineTiming(char_time=0.01))
+    bench = Bench(Send(FRAME, 1.0), LISTEN_ON, timing=LineTiming(char_time=0.01))
     bench.machine.receive_data(MESSAGE[:5], 1.0)
     bench.machine.receive_data(MESSAGE[5:], 1.2)  # heard out to its end
     assert isinstance(bench.got[0], Frame)
@@ -470,7 +473,7 @@ def test_message_that_begins_behind_the_time_limit_extends_nothing() -> None:
 
 
 def test_pause_ends_an_answer_that_has_begun() -> None:
-    bench = Bench(Step(FRAME, 1.0), timing=LineTiming(char_time=0.01))
+    bench = Bench(Send(FRAME, 1.0), timing=LineTiming(char_time=0.01))
     bench.machine.receive_data(MESSAGE[:5], 1.0)
     assert bench.machine.deadline == pytest.approx(1.0 + 20 * 0.01 + 0.1)
     bench.machine.handle_timeout(1.31)
@@ -478,19 +481,19 @@ def test_pause_ends_an_answer_that_has_begun() -> None:
 
 
 def test_answer_that_has_begun_does_not_shorten_the_deadline() -> None:
-    bench = Bench(Step(FRAME, 1.0))
+    bench = Bench(Send(FRAME, 1.0))
     bench.machine.receive_data(MESSAGE[:5], 0.1)
     assert bench.machine.deadline == 1.0
 
 
 def test_noise_outside_of_a_message_does_not_extend_the_deadline() -> None:
-    bench = Bench(Step(FRAME, 1.0))
+    bench = Bench(Send(FRAME, 1.0))
     bench.machine.receive_data(b'noise\x10', 0.95)
     assert bench.machine.deadline == 1.0
 
 
 def test_message_without_time_limit_gets_none() -> None:
-    bench = Bench(Step(b'', None))
+    bench = Bench(Listen(None))
     bench.machine.receive_data(MESSAGE[:5], 0.5)
     assert bench.machine.deadline is None
 
@@ -499,21 +502,21 @@ def test_message_without_time_limit_gets_none() -> None:
 @pytest.mark.parametrize(('pause', 'forgotten'), [(0.05, False), (0.31, True)])
 def test_pause_ends_what_broke_off_where_there_is_no_time_limit(broken: bytes, pause: float,
                                                                 forgotten: bool) -> None:
-    bench = Bench(*[Step(b'', None)] * 3, timing=LineTiming(char_time=0.01))
+    bench = Bench(*[Listen(None)] * 3, timing=LineTiming(char_time=0.01))
     bench.machine.receive_data(broken, 1.0)
     bench.machine.receive_data(EOT, 1.0 + pause)
     assert (bench.got == [SAID_EOT]) is (forgotten or broken == b'\x10\x01')
 
 
 def test_pause_within_a_time_limit_ends_nothing() -> None:
-    bench = Bench(Step(b'', 5.0))
+    bench = Bench(Listen(5.0))
     bench.machine.receive_data(EOT[:1], 1.0)
     bench.machine.receive_data(EOT[1:], 4.0)
     assert bench.got == [SAID_EOT]
 
 
 def test_wake_ends_a_rest() -> None:
-    bench = Bench(Step(None, 10.0), Step(FRAME, 1.0))
+    bench = Bench(Rest(10.0), Send(FRAME, 1.0))
     assert bench.machine.deadline == 10.0
     bench.machine.wake(3.0)
     assert bench.got == [None]
@@ -521,19 +524,19 @@ def test_wake_ends_a_rest() -> None:
 
 
 def test_time_ends_a_rest() -> None:
-    bench = Bench(Step(None, 10.0), Step(FRAME, 1.0))
+    bench = Bench(Rest(10.0), Send(FRAME, 1.0))
     bench.machine.handle_timeout(10.0)
     assert (bench.got, bench.machine.data_to_send()) == ([None], FRAME)
 
 
 def test_rest_without_limit_lasts_until_wake() -> None:
-    bench = Bench(Step(None, None), Step(FRAME, 1.0))
+    bench = Bench(Rest(), Send(FRAME, 1.0))
     assert bench.machine.deadline is None
     bench.machine.wake(3.0)
     assert bench.got == [None]
 
 
-@pytest.mark.parametrize('step', [Step(FRAME, 1.0), Step(b'', 1.0), Step(FRAME, 1.0, 0.5)])
+@pytest.mark.parametrize('step', [Send(FRAME, 1.0), Listen(1.0), Send(FRAME, 1.0, 0.5)])
 def test_wake_disturbs_no_transaction(step: Step) -> None:
     bench = Bench(step)
     deadline = bench.machine.deadline
@@ -542,7 +545,7 @@ def test_wake_disturbs_no_transaction(step: Step) -> None:
 
 
 def test_what_comes_during_a_rest_is_not_heard() -> None:
-    bench = Bench(Step(None, 1.0), Step(FRAME, 1.0), forget_on_send=True)
+    bench = Bench(Rest(1.0), Send(FRAME, 1.0), forget_on_send=True)
     bench.machine.receive_data(ACK, 0.5)
     bench.machine.handle_timeout(1.0)
     assert bench.got == [None]
@@ -550,7 +553,7 @@ def test_what_comes_during_a_rest_is_not_heard() -> None:
 
 
 def test_stop_raises_its_error_inside_the_procedure() -> None:
-    bench = Bench(Step(FRAME, 1.0))
+    bench = Bench(Send(FRAME, 1.0))
     error = OSError('unplugged')
     bench.machine.stop(error)
     assert bench.error is error
@@ -564,10 +567,10 @@ def test_stop_with_an_error_that_the_procedure_handles() -> None:
 
     def procedure(machine: Machine) -> Procedure:
         try:
-            yield Step(FRAME, 1.0)
+            yield Send(FRAME, 1.0)
         except OSError:
             seen.append('error')
-        yield Step(FRAME, 1.0)
+        yield Send(FRAME, 1.0)
         seen.append('went on')
 
     machine = Machine(procedure, checksum=Checksum.CRC)
@@ -580,7 +583,7 @@ def test_stop_with_an_error_that_the_procedure_handles() -> None:
 def test_stop_lets_another_error_through() -> None:
     def procedure(machine: Machine) -> Procedure:
         try:
-            yield Step(FRAME, 1.0)
+            yield Send(FRAME, 1.0)
         finally:
             raise KeyError('a bug')
 
@@ -591,14 +594,14 @@ def test_stop_lets_another_error_through() -> None:
 
 
 def test_stop_without_error_closes_the_procedure() -> None:
-    bench = Bench(Step(FRAME, 1.0))
+    bench = Bench(Send(FRAME, 1.0))
     bench.machine.stop()
     assert bench.error is None
     assert (bench.machine.data_to_send(), bench.machine.deadline) == (b'', None)
 
 
 def test_start_begins_afresh() -> None:
-    bench = Bench(Step(FRAME, 1.0), Step(b'', 1.0), timing=LineTiming(char_time=1.0))
+    bench = Bench(Send(FRAME, 1.0), Listen(1.0), timing=LineTiming(char_time=1.0))
     bench.machine.receive_data(ACK + b'\x10', 0.5)
     bench.machine.start(2.0)
     bench.machine.receive_data(b'\x06', 2.5)
@@ -608,7 +611,7 @@ def test_start_begins_afresh() -> None:
 
 def test_error_in_a_procedure_reaches_the_caller() -> None:
     def procedure(machine: Machine) -> Procedure:
-        yield Step(FRAME, 1.0)
+        yield Send(FRAME, 1.0)
         raise KeyError('a bug')
 
     machine = Machine(procedure, checksum=Checksum.CRC)
@@ -627,7 +630,7 @@ def _stopped(machine: Machine) -> None:
 
 @pytest.mark.parametrize('prepare', [_deaf, _stopped])
 def test_characters_are_counted_in_both_directions(prepare: Callable[[Machine], None]) -> None:
-    machine = Bench(Step(FRAME, None), Step(EOT, None), start=None).machine
+    machine = Bench(Send(FRAME, None), Send(EOT, None), start=None).machine
     machine.start(0.0)
     assert machine.counters.chars_sent == 10
     machine.receive_data(ACK, 0.5)
@@ -638,7 +641,7 @@ def test_characters_are_counted_in_both_directions(prepare: Callable[[Machine], 
 
 
 def test_frame_that_waits_is_counted_when_it_goes_out() -> None:
-    bench = Bench(Step(FRAME, 1.0), timing=LineTiming(tx_delay=0.25))
+    bench = Bench(Send(FRAME, 1.0), timing=LineTiming(tx_delay=0.25))
     assert bench.machine.counters.chars_sent == 0
     bench.machine.handle_timeout(0.25)
     assert bench.machine.counters.chars_sent == 10
@@ -646,7 +649,7 @@ def test_frame_that_waits_is_counted_when_it_goes_out() -> None:
 
 def test_given_counters_are_used() -> None:
     counters = Counters()
-    machine = Machine(lambda machine: iter_steps(Step(FRAME, 1.0)), checksum=Checksum.CRC,
+    machine = Machine(lambda machine: iter_steps(Send(FRAME, 1.0)), checksum=Checksum.CRC,
                       counters=counters)
     machine.start(0.0)
     assert machine.counters is counters
@@ -664,7 +667,7 @@ class Asked:
 
     def __init__(self, expires: float, delay: float = 0.0) -> None:
         self.told: list[str] = []
-        self._step = Step(FRAME, 1.0, delay, expires)
+        self._step = Send(FRAME, 1.0, delay, expires)
         self.machine = Machine(self.run, checksum=Checksum.CRC)
 
     def run(self, machine: Machine) -> Procedure:
@@ -675,7 +678,7 @@ class Asked:
                 self.told.append('silence')
         except CommandExpired:
             self.told.append('expired')
-        yield Step(None, None)
+        yield Rest()
 
 
 def test_command_that_has_expired_does_not_leave() -> None:
@@ -704,26 +707,27 @@ def test_command_that_expires_before_it_is_given_to_the_port_is_taken_back(embed
     told: list[str] = []
 
     def run(machine: Machine) -> Procedure:
-        machine.embeds = embeds
+        machine.sender.embeds = embeds
         try:
-            yield Step(MESSAGE, 1.0, expires=5.5)
+            yield Send(MESSAGE, 1.0, expires=5.5)
         except CommandExpired:
             told.append('expired')
-        yield Step(ACK, 1.0)
+        yield Send(ACK, 1.0)
 
     machine = Machine(run, checksum=Checksum.CRC, timing=LineTiming(0.001), duplex=Duplex.FULL)
     machine.start(5.0)
-    assert machine.send_before == 5.5
+    assert machine.sender.send_before == 5.5
     machine.withdraw(9.0)
-    assert (told, machine.data_to_send(), machine.send_before) == (['expired'], ACK, math.inf)
-    assert (machine.counters.chars_sent, machine.position) == (len(ACK), len(ACK))
+    assert (told, machine.data_to_send()) == (['expired'], ACK)
+    assert machine.sender.send_before == math.inf
+    assert (machine.counters.chars_sent, machine.sender.position) == (len(ACK), len(ACK))
     assert machine.next_call == pytest.approx(9.0 + 1.0 + 0.002)
     machine.handle_timeout(9.01)
     assert machine.data_to_send() == b''
 
 
 def test_lateness_is_what_the_machine_is_called_after_its_deadlines() -> None:
-    bench = Bench(Step(FRAME, 1.0), Step(FRAME, 1.0), Step(FRAME, 1.0), Step(None, None))
+    bench = Bench(Send(FRAME, 1.0), Send(FRAME, 1.0), Send(FRAME, 1.0), Rest())
     bench.machine.handle_timeout(0.5)
     bench.machine.handle_timeout(1.25)
     bench.machine.receive_data(ACK, 2.0)
@@ -756,8 +760,8 @@ class Clockwork:
 
 @pytest.mark.parametrize('due, call', [(math.inf, 2.0), (1.5, 1.5), (3.0, 2.0)])
 def test_background_has_its_time_while_a_step_waits(due: float, call: float) -> None:
-    bench = Bench(Step(FRAME, 1.0), Step(None, None), start=None)
-    bench.machine.background = clockwork = Clockwork(due)
+    clockwork = Clockwork(due)
+    bench = Bench(Send(FRAME, 1.0), Rest(), start=None, background=clockwork)
     bench.machine.start(1.0)
     assert bench.machine.next_call == call
     bench.machine.handle_timeout(1.75)
@@ -766,8 +770,8 @@ def test_background_has_its_time_while_a_step_waits(due: float, call: float) -> 
 
 
 def test_background_is_asked_when_the_machine_is_woken() -> None:
-    bench = Bench(Step(FRAME, 1.0), Step(None, None), start=None)
-    bench.machine.background = clockwork = Clockwork(math.inf)
+    clockwork = Clockwork(math.inf)
+    bench = Bench(Send(FRAME, 1.0), Rest(), start=None, background=clockwork)
     bench.machine.start(1.0)
     bench.machine.wake(1.5)
     assert clockwork.done == [1.5]
@@ -780,7 +784,7 @@ QUESTION = master_frame(3, bytes(8), Checksum.CRC)
 
 
 def test_echo_of_an_ack_may_be_held_back_until_the_next_question() -> None:
-    bench = Bench(Step(QUESTION, 1.0), Step(ACK, 0), Step(None, 0.015), Step(QUESTION, 1.0),
+    bench = Bench(Send(QUESTION, 1.0), Send(ACK), Rest(0.015), Send(QUESTION, 1.0),
                   forget_on_send=True, start=5.0)
     assert bench.machine.data_to_send() == QUESTION
     bench.machine.receive_data(QUESTION + EOT, 5.0)

@@ -26,6 +26,7 @@ from abdf1_ros.df1.packet import Packet
 from abdf1_ros.errors import CommandTimeout, LinkError, StationInactive, WrongCommandCode
 import pytest
 from support.script import Answer, Expect, MasterScript, Murmur, Silence
+from support.virtual_line import Wire
 
 SLAVE, MASTER = 17, 5
 COMMAND = Packet(SLAVE, MASTER, 0x0F, 0, 0x0102, bytes.fromhex('A2 02 07 89 00 00'))
@@ -106,10 +107,12 @@ def test_command_is_acknowledged_and_its_reply_polled_for() -> None:
 
 def test_poll_and_ack_of_the_reply_leave_before_anything_else_is_done() -> None:
     script = MasterScript(SETTINGS)
+    script.begin(COMMAND)
     counters, left = script.machine.counters, []
-    script.machine.send_at_once = lambda data: left.append(
-        (data, counters.acks_received, counters.messages_received))
-    script.begin(COMMAND, SENT, SAYS_ACK, SAYS_REPLY)
+    Wire(script.machine, lambda data: left.append(
+        (data, counters.acks_received, counters.messages_received))).attach(script.now)
+    for part in SENT, SAYS_ACK, SAYS_REPLY:
+        script.step(part)
     assert left == [(POLLED.data, 0, 0), (ACK, 1, 0)]
 
 
@@ -121,8 +124,8 @@ def test_only_a_reply_of_the_polled_slave_has_its_ack_before_it_is_looked_at(hea
     script = MasterScript(SETTINGS)
     looked_at: list[int] = []
     script.begin(COMMAND, SENT, SAYS_ACK, POLLED)
-    script.machine.send_at_once = lambda data: looked_at.append(
-        script.machine.counters.messages_received)
+    Wire(script.machine, lambda data: looked_at.append(
+        script.machine.counters.messages_received)).attach(script.now)
     script.machine.receive_data(heard, script.now)
     assert 0 not in looked_at
 

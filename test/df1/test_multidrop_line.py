@@ -18,10 +18,11 @@ from collections import Counter
 from random import Random
 
 from abdf1_ros.df1.checksum import Checksum
-from abdf1_ros.df1.machine import LineTiming, Machine
+from abdf1_ros.df1.machine import LineTiming
 from abdf1_ros.df1.master_line import MasterSettings
 from abdf1_ros.df1.packet import Packet
 from abdf1_ros.df1.polling import PollingSettings
+from abdf1_ros.df1.sender import Sender
 from abdf1_ros.df1.slave import SlaveSettings
 from abdf1_ros.errors import CommandTimeout, LineReset, NeverTaken, StationInactive
 from abdf1_ros.pccc.data_table import DataTable
@@ -175,14 +176,11 @@ def assert_recovers(rig: Rig) -> None:
 @pytest.mark.parametrize('mode', MODES)
 def test_reflexes_change_nothing_on_the_line(mode: str, monkeypatch: pytest.MonkeyPatch) -> None:
     seen = []
-    for change in lambda step: step, lambda step: step._replace(reflex=None):
-        take = Machine._take_step
-        with monkeypatch.context() as patch:
-            patch.setattr(Machine, '_take_step', lambda machine, step, take=take, change=change:
-                          take(machine, change(step)))
-            rig = Rig(mode, noise=noise_of(0.004), seed=3, chunk=8)
-            rig.run(25)
-            seen.append((rig.master.machine.sent, rig.master.counts(), rig.line.now))
+    for react in Sender.react, lambda sender, reflex, symbol: None:
+        monkeypatch.setattr(Sender, 'react', react)
+        rig = Rig(mode, noise=noise_of(0.004), seed=3, chunk=8)
+        rig.run(25)
+        seen.append((rig.master.machine.sent, rig.master.counts(), rig.line.now))
     assert seen[0] == seen[1]
 
 

@@ -30,6 +30,7 @@ import pytest
 from support.cases import for_all
 from support.peers import CommandTask, PeerBench, single_bytes
 from support.vectors import CAPTURED, MESSAGES, Vector, vector
+from support.virtual_line import Wire
 
 TIMEOUT, CMD_TIMEOUT = 1.0, 2.5
 COMMAND = Packet(dst=1, src=5, cmd=0x0F, sts=0, tns=0x1034, data=b'\x68\x10\x02\x10')
@@ -121,8 +122,8 @@ def test_command_is_acknowledged_and_answered_by_its_reply(checksum: Checksum) -
 def test_ack_of_a_reply_leaves_before_the_reply_is_looked_at(heard: list[Packet]) -> None:
     peer = bench()
     left: list[tuple[bytes, int]] = []
-    peer.machine.send_at_once = lambda data: left.append(
-        (data, peer.machine.counters.messages_received))
+    Wire(peer.machine, lambda data: left.append(
+        (data, peer.machine.counters.messages_received))).attach(peer.now)
     for packet in heard:
         peer.hear_packet(packet)
     assert left == [(ACK, number + (packet is THEIRS)) for number, packet in enumerate(heard)]
@@ -369,7 +370,7 @@ def test_response_while_our_message_is_leaving_does_not_count(response: bytes) -
     """M 4-5: WAIT follows SEND; what has still to leave is for the port to say."""
     peer = bench(timing=LineTiming(char_time=0.01))
     unsent = 1
-    peer.machine.unsent = lambda: unsent
+    Wire(peer.machine, unsent=lambda: unsent).attach(peer.now)
     task = peer.begin(COMMAND)
     size = len(peer.said())
     assert peer.wait(0.01 * size - 0.01) == []
@@ -384,7 +385,7 @@ def test_response_while_our_message_is_leaving_does_not_count(response: bytes) -
 def test_response_counts_while_only_our_answer_is_leaving() -> None:
     peer = bench()
     unsent = 0
-    peer.machine.unsent = lambda: unsent
+    Wire(peer.machine, unsent=lambda: unsent).attach(peer.now)
     task = peer.begin(COMMAND)
     peer.said()
     assert peer.hear_packet(THEIRS) == ACK
@@ -477,7 +478,7 @@ def test_response_waits_for_our_message_where_nobody_embeds() -> None:
     peer.begin(LONG)
     assert peer.said() == peer.frame(LONG)
     assert peer.hear_packet(THEIRS) == ACK
-    assert not peer.machine.embeds
+    assert not peer.machine.sender.embeds
 
 
 def test_ack_while_the_rest_of_our_message_is_kept_does_not_count() -> None:
@@ -495,9 +496,9 @@ def test_ack_while_the_rest_of_our_message_is_kept_does_not_count() -> None:
 def test_whether_to_embed_is_found_out_anew_with_the_port() -> None:
     peer = bench(timing=LineTiming(char_time=0.001))
     embedding(peer)
-    assert peer.machine.embeds
+    assert peer.machine.sender.embeds
     peer.start()
-    assert not peer.machine.embeds
+    assert not peer.machine.sender.embeds
 
 
 @pytest.mark.parametrize('name', ['embedded_ack', 'embedded_nak'])
@@ -603,7 +604,7 @@ def test_response_leaves_before_the_message_is_made_use_of() -> None:
         return command.reply()
 
     peer = PeerBench(PeerSettings(), serve=serve)
-    peer.machine.send_at_once = lambda data: order.append(data.hex())
+    Wire(peer.machine, lambda data: order.append(data.hex())).attach(peer.now)
     assert peer.hear_packet(THEIRS) == peer.frame(THEIRS.reply())
     assert order == [ACK.hex(), 'served']
 

@@ -24,6 +24,7 @@ from abdf1_ros.df1.checksum import Checksum
 from abdf1_ros.df1.machine import LineTiming, Machine
 from abdf1_ros.df1.packet import Packet
 from abdf1_ros.df1.peer import PeerSettings
+from abdf1_ros.df1.sender import Sender
 from abdf1_ros.errors import CommandTimeout, StationInactive
 from abdf1_ros.pccc.address import Address
 from abdf1_ros.pccc.data_table import DataTable
@@ -175,11 +176,10 @@ def assert_recovers(rig: Rig) -> None:
 
 
 def test_reflexes_change_nothing_on_the_line(monkeypatch: pytest.MonkeyPatch) -> None:
-    take, send, seen = Machine._take_step, Machine.data_to_send, []
-    for change in lambda step: step, lambda step: step._replace(reflex=None):
+    send, seen = Machine.data_to_send, []
+    for react in Sender.react, lambda sender, reflex, symbol: None:
         sent: list[bytes] = []
-        monkeypatch.setattr(Machine, '_take_step', lambda machine, step, change=change:
-                            take(machine, change(step)))
+        monkeypatch.setattr(Sender, 'react', react)
         monkeypatch.setattr(Machine, 'data_to_send', lambda machine, sent=sent:
                             sent.append(send(machine)) or sent[-1])
         rig = Rig(SETTINGS, noise=Noise(*[0.001] * 4), chunk=8)
@@ -300,7 +300,7 @@ def test_both_ends_embed_responses_once_one_does(rate: float, checksum: Checksum
               noise=noise_of(rate) if rate else QUIET, seed=5)
     rig.line.run_for(0.2)
     for end in rig.ends:
-        end.machine.embeds = True
+        end.machine.sender.embeds = True
     rig.run(200)
     assert_bounded(rig)
     if rate == 0.0 or checksum is Checksum.CRC:

@@ -79,6 +79,6 @@ def test_station_that_replies_too_late_is_silent_and_one_that_is_polled_is_not_a
     stations[1].overdue = 2
     stations.tried(1, 3.0, 5.0, was_silent=True)
     assert stations.probes.next == 19.0
-    stations.polled = {2}
+    stations.add((2,), are_polled=True)
     stations.lost(2, 20.0)
     assert stations.admits_message(1, 20.0) and not stations.admits_message(2, 20.0)

@@ -35,7 +35,7 @@ import pytest
 from support.multidrop import CommandTasks
 from support.peers import CommandTask
 from support.vectors import MESSAGES, Vector, vector
-from support.virtual_line import char_time, VirtualLine
+from support.virtual_line import char_time, VirtualLine, Wire
 
 US, PLC, OTHER = 5, 1, 2
 BAUD = 9600
@@ -309,7 +309,7 @@ def test_what_has_not_left_when_the_port_is_lost_is_undelivered(unsent: int) -> 
     bench = Bench()
     bench.begin(COMMAND)
     bench.wait(0.2)
-    bench.machine.unsent = lambda: unsent
+    Wire(bench.machine, unsent=lambda: unsent).attach(bench.now)
     bench.machine.stop(PortLost('the line takes nothing'))
     assert bench.machine.counters.unsent_messages == (unsent > 0)
 

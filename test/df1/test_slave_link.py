@@ -26,6 +26,7 @@ from abdf1_ros.errors import CommandExpired, CommandTimeout, PortLost, WrongComm
 import pytest
 from support.multidrop import SlaveBench
 from support.peers import CommandTask
+from support.virtual_line import Wire
 
 US, MASTER, OTHER = 7, 5, 8
 SETTINGS = SlaveSettings(US, retries=2)
@@ -81,7 +82,7 @@ def test_ack_leaves_before_the_message_is_made_use_of(tx_delay: float) -> None:
         return command.reply()
 
     bench = SlaveBench(SETTINGS, serve=serve, timing=LineTiming(tx_delay=tx_delay))
-    bench.machine.send_at_once = order.append
+    Wire(bench.machine, order.append).attach(bench.now)
     bench.hear(bench.frame(FROM_MASTER))
     bench.wait(tx_delay)
     assert order == [ACK, b'served']
@@ -138,7 +139,7 @@ def test_command_that_is_too_old_when_the_port_is_to_have_it_does_not_leave(
     task.expires = bench.now + 2.0
     assert [bench.poll() for _ in range(sent_before)] == [bench.own(own())] * sent_before
     bench.machine.receive_data(poll_frame(US), bench.now)
-    assert bench.machine.send_before == task.expires
+    assert bench.machine.sender.send_before == task.expires
     bench.machine.withdraw(bench.now + 3.0)  # this process was stopped just then
     assert bench.machine.data_to_send() == b''
     assert isinstance(task.result, CommandExpired)

@@ -28,7 +28,16 @@ import time
 
 from abdf1_ros.df1.checksum import Checksum
 from abdf1_ros.df1.frames import ACK, Code, Control, EOT, Frame, message_frame, Symbol
-from abdf1_ros.df1.machine import LineTiming, Machine, Procedure, Silence, Step
+from abdf1_ros.df1.machine import (
+    LineTiming,
+    Listen,
+    Machine,
+    Procedure,
+    Rest,
+    Send,
+    Silence,
+    Step,
+)
 from abdf1_ros.df1.packet import Packet
 from abdf1_ros.errors import PortLost
 from abdf1_ros.ports.descriptor import DescriptorPort, Port, READ_SIZE
@@ -56,14 +65,14 @@ class Script:
 
     def _run(self, machine: Machine) -> Procedure:
         try:
-            yield Step(READY, 0)
+            yield Send(READY)
             for step in self._steps:
                 heard = yield step
                 self.heard.put(None if isinstance(heard, Silence) else heard)
         except BaseException as error:
             self.ended.put(error)
             raise
-        yield Step(None, None)
+        yield Rest()
 
     def next(self) -> Symbol | None:  # noqa: A003
         """Return what came of the next step."""
@@ -140,7 +149,7 @@ def link() -> Iterator[Link]:
 
 
 def test_machine_runs_on_a_port(pty: Pty, link: Link) -> None:
-    script = Script(Step(b'', PATIENCE), Step(b'again', PATIENCE))
+    script = Script(Listen(PATIENCE), Send(b'again', PATIENCE))
     thread = link.start(script.machine, pty.name)
     assert link.state() == PortState(True, 'open') == thread.state
     assert pty.read(5) == READY
@@ -155,7 +164,7 @@ def test_machine_runs_on_a_port(pty: Pty, link: Link) -> None:
 
 
 def test_deadlines_of_the_machine_are_kept(pty: Pty, link: Link) -> None:
-    script = Script(*[Step(b'x', 0.02)] * 3)
+    script = Script(*[Send(b'x', 0.02)] * 3)
     began = time.monotonic()
     link.start(script.machine, pty.name)
     assert [script.next() for _ in range(3)] == [None] * 3
@@ -164,14 +173,14 @@ def test_deadlines_of_the_machine_are_kept(pty: Pty, link: Link) -> None:
 
 
 def test_wake_ends_a_rest(pty: Pty, link: Link) -> None:
-    script, thread = link.begin(pty, Step(None, None), Step(b'awake', None))
+    script, thread = link.begin(pty, Rest(), Send(b'awake', None))
     thread.wake()
     assert script.next() is None
     assert pty.read(5) == b'awake'
 
 
 def test_wake_may_come_in_any_number_and_before_the_start(pty: Pty, link: Link) -> None:
-    script = Script(Step(b'', PATIENCE))
+    script = Script(Listen(PATIENCE))
     machine = script.machine
     thread = LinkThread(machine, lambda: open_port(PortSettings(str(pty.name))))
     link.threads.append(thread)
@@ -184,7 +193,7 @@ def test_wake_may_come_in_any_number_and_before_the_start(pty: Pty, link: Link) 
 
 
 def test_port_that_vanishes_is_opened_again_when_it_is_back(pty: Pty, link: Link) -> None:
-    script, thread = link.begin(pty, Step(b'', None))
+    script, thread = link.begin(pty, Listen(None))
     assert link.state().is_open
     pty.close()
     lost = link.state()
@@ -225,7 +234,7 @@ def test_descriptors_have_no_limit_of_their_own(pty: Pty, link: Link) -> None:
     resource.setrlimit(resource.RLIMIT_NOFILE, (max(soft, 1100), hard))
     many = [os.dup(0) for _ in range(1024)]
     try:
-        script = Script(Step(None, None), Step(b'awake', None))
+        script = Script(Rest(), Send(b'awake', None))
         thread = link.start(script.machine, pty.name)
         assert link.state().is_open
         assert pty.read(5) == READY
@@ -324,7 +333,7 @@ class Paused(_NoLine):
 
 
 def test_time_that_is_up_goes_before_bytes_that_lie_in_the_buffer() -> None:
-    script, port = Script(Step(b'command', 1.0)), Paused()
+    script, port = Script(Send(b'command', 1.0)), Paused()
     thread = Impatient(script.machine, lambda: port, 1, clock=port.clock)
     thread.run_out()
     assert script.next() is None
@@ -332,7 +341,7 @@ def test_time_that_is_up_goes_before_bytes_that_lie_in_the_buffer() -> None:
 
 def test_process_that_stops_just_before_it_writes_sends_no_old_command() -> None:
     """The clock is looked at again after all that Python does, right before the write."""
-    script, written = Script(Step(b'command', 1.0, expires=2.0)), list[bytes]()
+    script, written = Script(Send(b'command', 1.0, expires=2.0)), list[bytes]()
     port = Paused()
     port.write = written.append  # type: ignore[method-assign]
     looks = iter([1.0])  # at the start; then the process does not run for a while
@@ -343,7 +352,7 @@ def test_process_that_stops_just_before_it_writes_sends_no_old_command() -> None
 
 
 @pytest.mark.parametrize('step', [
-    Step(None, None), Step(None, 3600.0), Step(b'', None), Step(b'x', 3600.0)])
+    Rest(), Rest(3600.0), Listen(None), Send(b'x', 3600.0)])
 def test_stop_ends_what_runs_with_an_error(pty: Pty, link: Link, step: Step) -> None:
     script, thread = link.begin(pty, step)
     thread.stop()
@@ -370,7 +379,7 @@ def test_stop_while_the_port_is_not_there(tmp_path: Path) -> None:
 
 
 def test_port_is_given_back_after_stop(pty: Pty, link: Link) -> None:
-    thread = link.start(Script(Step(b'', None)).machine, pty.name)
+    thread = link.start(Script(Listen(None)).machine, pty.name)
     assert link.state().is_open
     thread.stop()
     open_port(PortSettings(str(pty.name))).close()
@@ -399,7 +408,7 @@ class Diary(_NoLine):
 
 
 def test_work_that_can_wait_is_done_when_all_is_sent_and_never_left_undone() -> None:
-    script = Script(Step(b'question', PATIENCE), Step(b'thanks', 0), Step(b'next', PATIENCE))
+    script = Script(Send(b'question', PATIENCE), Send(b'thanks'), Send(b'next', PATIENCE))
     diary = Diary()
     thread = Impatient(script.machine, lambda: diary, 1,
                        while_sending=lambda: diary.notes.append('work'))
@@ -411,7 +420,7 @@ def test_work_that_can_wait_is_done_when_all_is_sent_and_never_left_undone() -> 
 
 def _script_of_a_reply() -> tuple[Script, bytes]:
     """Return a script that waits for a reply of 100 bytes, and the frame of that."""
-    script = Script(Step(b'', PATIENCE, reply_size=100), timing=LineTiming(char_time=0.001))
+    script = Script(Send(b'?', PATIENCE, reply_size=100), timing=LineTiming(char_time=0.001))
     packet = Packet(1, 5, 0x0F, 0, 7).reply(bytes(100))
     return script, message_frame(packet.encode(), Checksum.CRC)
 
@@ -513,7 +522,7 @@ class Restful(Impatient):
     (0.004, 0.0, 0.060)])  # up to the 64 ms that these bytes take on the line
 def test_connection_that_babbles_leaves_time_to_others(
         work: float, host: float, rest: float) -> None:
-    script = Script(Step(b'', None), timing=LineTiming(0.001))
+    script = Script(Listen(None), timing=LineTiming(0.001))
     thread = Restful(script, Babbler(bytes(READ_SIZE), 11), work=work, host=host)
     thread.run_out()
     assert thread.taken == [64] * 10 * 8
@@ -522,7 +531,7 @@ def test_connection_that_babbles_leaves_time_to_others(
 
 def test_burst_beside_load_takes_the_time_of_the_line() -> None:
     """Some portions wait long for the processor; the others make up for it."""
-    script = Script(Step(b'', None), timing=LineTiming(0.001))
+    script = Script(Listen(None), timing=LineTiming(0.001))
     port = Babbler(bytes(READ_SIZE), 11)
     late = iter([0.3] * 10)
     thread = Restful(script, port, work=0.01)
@@ -533,7 +542,7 @@ def test_burst_beside_load_takes_the_time_of_the_line() -> None:
 
 
 def test_commands_of_a_device_server_alone_are_rested_after_too() -> None:
-    script = Script(Step(b'', None), timing=LineTiming(0.001))
+    script = Script(Listen(None), timing=LineTiming(0.001))
     port = Babbler(b'', 11)
     thread = Restful(script, port)
     port.worked = 1.0
@@ -543,7 +552,7 @@ def test_commands_of_a_device_server_alone_are_rested_after_too() -> None:
 
 
 def test_connection_that_babbles_does_not_keep_a_request_from_the_machine() -> None:
-    script = Script(Step(None, None), Step(b'awake', None))
+    script = Script(Rest(), Send(b'awake', None))
     thread = Restful(script, Babbler(bytes(READ_SIZE), 11),
                      on_state=lambda state: thread.wake())  # as soon as the port is open
     thread.run_out()
@@ -551,7 +560,7 @@ def test_connection_that_babbles_does_not_keep_a_request_from_the_machine() -> N
 
 
 def test_line_is_not_left_alone_after_a_frame() -> None:
-    script = Script(Step(b'', None))
+    script = Script(Listen(None))
     thread = Restful(script, Babbler(bytes(READ_SIZE - 1), 11, has_more=False))
     thread.run_out()
     assert script.machine.counters.chars_received == 10 * (READ_SIZE - 1)
@@ -568,7 +577,7 @@ class Broken:
     def _run(self, machine: Machine) -> Procedure:
         self.runs += 1
         raise ZeroDivisionError
-        yield Step(None, None)
+        yield Rest()
 
 
 def test_three_faults_within_a_minute_end_the_thread() -> None:
@@ -599,7 +608,7 @@ def test_faults_that_are_rare_do_not_end_the_thread(apart: float, fails: bool) -
 def test_fault_ends_what_runs_and_the_next_port_has_a_fresh_procedure(
         pty: Pty, link: Link) -> None:
     faults: queue.Queue[Exception] = queue.Queue()
-    script = Script(Step(b'', None), Step(b'', None))
+    script = Script(Listen(None), Listen(None))
     script.heard.put = _fail_once(script.heard.put)  # type: ignore[method-assign]
     thread = link.start(script.machine, pty.name, on_fault=faults.put)
     assert pty.read(5) == READY
@@ -635,7 +644,7 @@ def test_busy_port_is_reported_and_opened_when_it_is_free(pty: Pty, link: Link) 
 
 def test_full_pty_is_a_lost_port(pty: Pty, link: Link, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr('abdf1_ros.ports.descriptor._WRITE_TIMEOUT', 0.05)
-    script = Script(Step(bytes(1_000_000), None))
+    script = Script(Send(bytes(1_000_000), None))
     link.start(script.machine, pty.name)
     assert link.state().is_open
     assert link.state() == PortState(
@@ -645,7 +654,7 @@ def test_full_pty_is_a_lost_port(pty: Pty, link: Link, monkeypatch: pytest.Monke
 
 
 def test_machine_runs_on_an_rfc2217_device_server(link: Link) -> None:
-    script = Script(Step(ACK, PATIENCE), Step(None, None))
+    script = Script(Send(ACK, PATIENCE), Rest())
     with DeviceServer() as server:  # its line gives back what is sent
         thread = link.start(script.machine, f'rfc2217://127.0.0.1:{server.port}')
         assert link.state().is_open
@@ -655,7 +664,7 @@ def test_machine_runs_on_an_rfc2217_device_server(link: Link) -> None:
 
 
 def test_machine_runs_on_a_socket_url(link: Link) -> None:
-    script = Script(Step(b'', None))
+    script = Script(Listen(None))
     with socket.create_server(('127.0.0.1', 0)) as server:
         server.settimeout(PATIENCE)
         link.start(script.machine, f'socket://127.0.0.1:{server.getsockname()[1]}')
@@ -731,7 +740,7 @@ def test_port_that_opens_while_the_end_begins_is_closed() -> None:
 
 
 def test_port_that_is_released_is_free_until_it_is_taken_again(pty: Pty, link: Link) -> None:
-    script, thread = link.begin(pty, Step(b'', None))
+    script, thread = link.begin(pty, Listen(None))
     assert link.state().is_open
     assert thread.release()
     assert link.state() == PortState(False, 'the port is left to others: polling is off')
@@ -764,7 +773,7 @@ def test_release_while_the_port_cannot_be_opened() -> None:
 
 
 def test_other_machine_goes_on_with_the_same_port(pty: Pty, link: Link) -> None:
-    before, after = Script(Step(b'before', None)), Script(Step(b'after', None))
+    before, after = Script(Send(b'before', None)), Script(Send(b'after', None))
     thread = link.start(before.machine, pty.name)
     assert pty.read(11) == READY + b'before'
     done: list[str] = []
@@ -779,7 +788,7 @@ def test_other_machine_goes_on_with_the_same_port(pty: Pty, link: Link) -> None:
 
 
 def test_other_machine_on_a_port_that_is_opened_anew(pty: Pty, link: Link) -> None:
-    before, after = Script(Step(b'', None)), Script(Step(b'', None))
+    before, after = Script(Listen(None)), Script(Listen(None))
     thread = link.start(before.machine, pty.name)
     assert pty.read(5) == READY
     assert thread.exchange(after.machine, lambda: None, reopen=True)
@@ -803,7 +812,7 @@ class _Stuck(_NoLine):
 
 def test_machine_that_came_to_nothing_does_not_come_later(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr('abdf1_ros.ports.link_thread._EXCHANGE_LIMIT', 0.0)
-    port, before, after = _Stuck(), Script(Step(None, None)), Script(Step(None, None))
+    port, before, after = _Stuck(), Script(Rest()), Script(Rest())
     thread = LinkThread(before.machine, lambda: port)
     thread.start()
     assert port.is_used.wait(PATIENCE)
@@ -832,7 +841,7 @@ def test_thread_that_has_ended_is_not_waited_for(ask: Callable[[LinkThread], boo
 
 
 def test_other_machine_while_there_is_no_port(tmp_path: Path, link: Link) -> None:
-    after = Script(Step(b'', None))
+    after = Script(Listen(None))
     thread = link.start(Script().machine, tmp_path / 'line')
     assert not link.state().is_open
     assert thread.exchange(after.machine, lambda: None, reopen=False)

@@ -224,7 +224,7 @@ class DriverBench:
         """Open the port; let so many seconds pass."""
         if isinstance(self.driver.link, RadioNode):
             self.driver.link._random = Random(1)
-        self.driver.machine.start(self.line.now)
+        self.driver.machine.start(self.line.now, self.line.outlet(self.driver.machine))
         self.line.wake(self.driver.machine)
         if run:
             self.run(run)

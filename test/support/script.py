@@ -18,7 +18,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, fields
 
-from abdf1_ros.df1.machine import LineTiming, Machine, Procedure, Step
+from abdf1_ros.df1.machine import LineTiming, Machine, Procedure, Rest
 from abdf1_ros.df1.master import HalfDuplexMaster
 from abdf1_ros.df1.master_line import MasterSettings
 from abdf1_ros.df1.packet import Packet
@@ -80,7 +80,7 @@ class MasterScript(Recorded):
             if self._result is None:
                 yield from self.master.carry_out(self.task)
                 self._result = self.task.result
-            yield Step(None, None)
+            yield Rest()
 
     def run(self, command: Packet, *script: Expect | Answer | Silence) -> Packet | LinkError:
         """Carry out one transaction and return its reply or its error."""
@@ -101,9 +101,10 @@ class MasterScript(Recorded):
         else:
             self.machine.wake(self.now)
         for step in script:
-            self._step(step)
+            self.step(step)
 
-    def _step(self, step: Expect | Answer | Silence) -> None:
+    def step(self, step: Expect | Answer | Silence) -> None:
+        """Carry out a part of a script."""
         if isinstance(step, Expect):
             self._expect(step)
         elif isinstance(step, Answer):

@@ -21,6 +21,8 @@ full-duplex peers. Nothing waits: the clock jumps to the next arrival or deadlin
 has time to spare hears nothing until it is over, and then all that has come.
 """
 
+from __future__ import annotations
+
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
@@ -75,6 +77,24 @@ class Damage(Protocol):
 QUIET = Noise()
 
 
+class Wire:
+    """An outlet whose ``write`` and ``unsent`` a test may give."""
+
+    def __init__(self, machine: Machine, write: Callable[[bytes], object] | None = None,
+                 unsent: Callable[[], int] = lambda: 0) -> None:
+        self._sender = machine.sender
+        self.write = write or self._keep
+        self.unsent = unsent
+
+    def attach(self, now: float) -> None:
+        """Be the outlet of a machine that runs."""
+        self._sender.begin(now, self)
+
+    def _keep(self, data: bytes) -> None:
+        """Let what is written at once go out with what the machine has to send."""
+        self._sender.waiting += data
+
+
 class VirtualLine:
     """
     The line between ``machines``, and their clock.
@@ -103,11 +123,14 @@ class VirtualLine:
 
     def start(self) -> None:
         """Start every machine."""
-        for sender, machine in enumerate(self._machines):
-            machine.unsent = partial(self._unsent, sender)
-            machine.start(self.now)
+        for machine in self._machines:
+            machine.start(self.now, self.outlet(machine))
         for sender in range(len(self._machines)):
             self._take(sender)
+
+    def outlet(self, machine: Machine) -> Wire:
+        """Return where a machine of this line puts its bytes."""
+        return Wire(machine, unsent=partial(self._unsent, self._machines.index(machine)))
 
     def _unsent(self, sender: int) -> int:
         """Return how many bytes of a sender have still to leave."""
@@ -129,7 +152,6 @@ class VirtualLine:
         """Put another machine in the place of one; it is started by who asks."""
         place = self._machines.index(old)
         self._machines[place] = new
-        new.unsent = partial(self._unsent, place)
         self._arrivals = [entry for entry in self._arrivals if entry[2] != place]
         heapq.heapify(self._arrivals)
         self._away[place] = 0.0
