@@ -43,6 +43,7 @@ from abdf1_ros.driver.job_tasks import JobTasks
 from abdf1_ros.driver.links import DriverSettings, make_link, make_machine
 from abdf1_ros.driver.reads.read_backs import ReadBacks
 from abdf1_ros.driver.reads.readings import Readings, ValueListener
+from abdf1_ros.driver.record import Claim, WriteRecord
 from abdf1_ros.driver.served import Served
 from abdf1_ros.driver.write import Outcome, show, Write, WriteResult
 from abdf1_ros.driver.writes.queue import MAX_WAITING_WRITES, waited_too_long, WriteQueue
@@ -118,7 +119,8 @@ class Driver:
         self._readings = Readings(network, self.mappings, settings, planner, self.stations,
                                   machine, self._listener, self._read_backs)
         self.points, self._reads = self._readings.points, self._readings.reads
-        writing = WritesUnderWay(planner, self.stations, machine, self._readings, self._read_backs)
+        self._record = record = WriteRecord(machine, 2 * network.cmd_timeout / 1000)
+        writing = WritesUnderWay(planner, self.stations, record, self._readings, self._read_backs)
         self._writes = WriteQueue(self.stations, writing, settings.write_timeout, report,
                                   network.timing.tx_delay)
         self.checks = Checks(
@@ -127,14 +129,13 @@ class Driver:
             self._station_told, self._status_periods())
         self.interlocks = Interlocks(
             () if settings.read_only else self.mappings, self.stations, self._writes, writing,
-            network.cmd_timeout / 1000,
             lambda write: self._served.store(write.mapping, write.raw), report,
             self._listener.unreadable, self._foreign_value,
             1 + settings.first_tns % LARGEST)
         self._readings.read_back = self.interlocks.read_back
         self.guests = GuestQueue(self.stations, machine, network.cmd_timeout / 1000,
-                                 self._station_of_guest, self._words_of_guest, self._reads)
-        self.guests.wrote = self.interlocks.guest_wrote
+                                 self._station_of_guest, self._words_of_guest, record)
+        record.connect(self._read_backs, self._reads, self.interlocks)
         self._tasks = JobTasks(network.station, settings.first_tns, network.timing.char_time)
         self._agenda = Agenda(self.stations, self.interlocks, self._writes, self.checks,
                               self._reads, self.guests, self._tasks)
@@ -273,7 +274,7 @@ class Driver:
             return dst
         return next((station.number for station in self.stations), dst)
 
-    def _words_of_guest(self, command: Packet, station: int) -> list[Extent]:
+    def _words_of_guest(self, command: Packet, station: int) -> list[Extent] | None:
         # A PLC-5 has words for each number that writes as to a PLC-2; on the line it is ours.
         return written_extents(command._replace(src=self.network.station), station, self.mappings)
 
@@ -291,7 +292,8 @@ class Driver:
                 self._end_write(write, Outcome.NOT_SENT, waited_too_long(timeout))
             else:
                 self._served.store(write.mapping, write.raw)
-                self.interlocks.message_ended(write, Outcome.WRITTEN)
+                self._record.ended(self._record.begin(Claim(
+                    write.mapping.station, (write.mapping.extent,), write)), Outcome.WRITTEN)
                 self._end_write(write, Outcome.WRITTEN)
 
     def _end_write(self, write: Write, outcome: Outcome, detail: str = '') -> None:

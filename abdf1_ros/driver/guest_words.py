@@ -18,22 +18,32 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from abdf1_ros.df1.packet import Packet
+from abdf1_ros.df1.packet import BROADCAST, Packet
 from abdf1_ros.pccc.address import Address
 from abdf1_ros.pccc.data_table import DataTable
 from abdf1_ros.pccc.extent import Extent
-from abdf1_ros.pccc.file_types import PlcType
+from abdf1_ros.pccc.file_types import FileType, PlcType
 from abdf1_ros.pccc.server import Server
 from abdf1_ros.settings.mapping import Mapping
 
 
 class _NotedTable(DataTable):
-    """The files of some rows, each without end; what is written is noted, and not kept."""
+    """
+    The files of some rows, each without end; what is written is noted, and not kept.
+
+    ``is_elsewhere`` tells that a command named a file of no row.
+    """
 
     def __init__(self, plc_type: PlcType, rows: Sequence[Mapping]) -> None:
         super().__init__(plc_type)
         self._types = {row.address.file: row.address.file_type for row in rows}
         self.written: list[tuple[Address, int]] = []
+        self.is_elsewhere = False
+
+    def file_type(self, file: int) -> FileType:
+        """Return the type of a file, or take note that no row is in it."""
+        self.is_elsewhere = file not in self._types
+        return super().file_type(file)
 
     def find(self, address: Address, words: int) -> tuple[bytearray, int]:
         """Return words that are forgotten."""
@@ -44,17 +54,22 @@ class _NotedTable(DataTable):
         self.written.append((address, len(data) // 2))
 
 
-def written_extents(command: Packet, station: int, mappings: Sequence[Mapping]) -> list[Extent]:
+def written_extents(command: Packet, station: int,
+                    mappings: Sequence[Mapping]) -> list[Extent] | None:
     """
     Return the words of the files of ``mappings`` that a command to a station writes.
 
-    A server of the family says so: a PLC-5's address does not tell the type of its file.
+    None where nobody knows: it may write any. A server of the family says so: a PLC-5's address
+    does not tell the type of its file. What goes to all stations writes the words of each.
     """
-    rows = [mapping for mapping in mappings if mapping.station == station]
-    found = []
-    for plc_type in {row.plc_type for row in rows}:
-        table = _NotedTable(plc_type, rows)
-        Server(table).serve(command)
-        found += [Extent(station, address.area, address.offset, address.offset + words)
+    rows = [mapping for mapping in mappings
+            if not mapping.serves and station in (mapping.station, BROADCAST)]
+    found: list[Extent] = []
+    for number, plc_type in {(row.station, row.plc_type): None for row in rows}:
+        table = _NotedTable(plc_type, [row for row in rows if row.station == number])
+        reply = Server(table).serve(command)
+        if reply.sts and not table.is_elsewhere:
+            return None
+        found += [Extent(number, address.area, address.offset, address.offset + words)
                   for address, words in table.written]
     return found

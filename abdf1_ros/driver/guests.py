@@ -25,16 +25,17 @@ in time): nobody knows then whether it was executed.
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Callable, Container, Sequence
+from collections.abc import Callable, Container
 from dataclasses import dataclass, field
 from enum import Enum
 import math
 
-from abdf1_ros.df1.packet import Packet, PRIORITY_BIT
+from abdf1_ros.df1.packet import BROADCAST, is_local_status, Packet, PRIORITY_BIT
 from abdf1_ros.df1.stations import ActiveStationList
 from abdf1_ros.driver.inbox import Inbox
 from abdf1_ros.driver.job_tasks import Job, LineTime
-from abdf1_ros.driver.reads.silent import Reads
+from abdf1_ros.driver.record import Claim, WriteRecord
+from abdf1_ros.driver.write import Outcome
 from abdf1_ros.errors import CommandExpired, PortLost, StationInactive
 from abdf1_ros.pccc.dialect import Steps
 from abdf1_ros.pccc.extent import Extent
@@ -112,10 +113,12 @@ class GuestJob(Job):
     blames = False
 
     def __init__(self, queue: GuestQueue, command: GuestCommand, station: int,
-                 expires: float) -> None:
+                 expires: float, claim: Claim | None) -> None:
         self.command = command
         self.station = station
         self.expires = expires
+        self.claim = claim
+        self.sts = 0  # of the reply
         self._queue = queue
         self._begun = 0.0
 
@@ -124,6 +127,7 @@ class GuestJob(Job):
         self._begun = now
         packet = self.command.packet
         reply = yield packet.cmd, packet.data
+        self.sts = reply.sts
         self._queue.answered(self.command, reply)
 
     def ended(self, error: Exception | None) -> None:
@@ -136,21 +140,21 @@ class GuestQueue:
 
     ``put`` may be called from any thread. A command that has waited ``patience`` s is not sent any
     more. ``station_of`` gives the station that a DST stands for, ``words`` what a command to a
-    station writes, where that is known. What a guest may have changed is read again at once.
+    station writes, where that is known. Each that may write is in the ``record``.
     """
 
     def __init__(self, stations: ActiveStationList, line: LineTime, patience: float,
                  station_of: Callable[[int], int],
-                 words: Callable[[Packet, int], list[Extent]], reads: Reads) -> None:
+                 words: Callable[[Packet, int], list[Extent] | None],
+                 record: WriteRecord) -> None:
         self._stations = stations
         self._line = line
         self._patience = patience
         self._station_of = station_of
         self._words = words
-        self._reads = reads
+        self._record = record
         self._inbox: Inbox[GuestCommand] = Inbox(is_open=False)
         self.has_news = False  # the inbox has something
-        self.wrote: Callable[[int, Sequence[Extent]], None] = lambda station, extents: None
         self.waiting: deque[Guest] = deque()  # who has commands, the next one first
         self.next_expiry = math.inf  # when ``expire`` has something to do (clock value in s)
 
@@ -196,9 +200,16 @@ class GuestQueue:
             if self._stations[station].last_heard is None:
                 self._silent(station, now)  # it may not exist: one poll or try at a time
             if self._stations.admits_message(station, now):
-                return GuestJob(self, command, station, command.requested + self._patience)
+                return GuestJob(self, command, station, command.requested + self._patience,
+                                self._claim(command.packet, station))
             self._give_up(command, _OFF_LINE)
         return None
+
+    def _claim(self, packet: Packet, station: int) -> Claim | None:
+        """Take note of a command that may write; of a read there is nothing to note."""
+        if _code(packet) in _READS:
+            return None
+        return self._record.begin(Claim(station, self._words(packet, station)))
 
     def expire(self, now: float) -> None:
         """Refuse what has waited too long."""
@@ -223,17 +234,18 @@ class GuestQueue:
         if error is not None:
             self._silent(station, self._line.now)
             self._give_up(command, _sent_status(error) if was_sent else _unsent_status(error))
-        if was_sent and _code(command.packet) not in _READS:
-            extents = self._words(command.packet, station)
-            self._reads.refresh_words(station, extents, self._line.now)
-            self.wrote(station, extents)
-            command.guest.wrote(command.packet, station, extents)
+        if (claim := job.claim) is not None:
+            self._record.ended(
+                claim, _outcome(station, job.sts, error, was_sent),
+                may_land=was_sent and (error is not None or is_local_status(job.sts)))
+            if was_sent:
+                command.guest.wrote(command.packet, station, list(claim.extents or ()))
         self._stations.tried(station, begun, self._line.now, is_message=True,
                              was_silent=not self._stations[station].replies_in_time)
 
     def _silent(self, station: int, now: float) -> None:
         """Take a station for silent that only guests ask: nobody else says so."""
-        if station not in self._stations:
+        if station not in self._stations and station != BROADCAST:
             self._stations.lost(station, now)
 
     def _look(self) -> None:
@@ -264,6 +276,16 @@ class GuestQueue:
 
 def _refuse(command: GuestCommand, sts: int) -> None:
     command.answer(command.packet.reply(sts=sts))
+
+
+def _outcome(station: int, sts: int, error: Exception | None, was_sent: bool) -> Outcome:
+    if not was_sent:
+        return Outcome.NOT_SENT
+    if error is not None or is_local_status(sts):
+        return Outcome.UNKNOWN
+    if sts:
+        return Outcome.FAILED
+    return Outcome.BROADCAST if station == BROADCAST else Outcome.WRITTEN
 
 
 def _sent_status(error: Exception) -> int:

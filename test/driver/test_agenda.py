@@ -34,6 +34,7 @@ from abdf1_ros.driver.reads.point import ReadPoint
 from abdf1_ros.driver.reads.queue import ReadJob
 from abdf1_ros.driver.reads.read_backs import ReadBacks
 from abdf1_ros.driver.reads.readings import Readings
+from abdf1_ros.driver.record import Claim, WriteRecord
 from abdf1_ros.driver.write import Outcome, Write, WriteResult
 from abdf1_ros.driver.writes.queue import MessageJob, WriteQueue
 from abdf1_ros.driver.writes.under_way import WritesUnderWay
@@ -70,28 +71,36 @@ def make_job(text: str = 'N7:0', station: int = 1, period: int = 100) -> ReadJob
                    lambda job, error: None)
 
 
+def written(write: Write, now: float) -> Claim:
+    """Return a write that has been confirmed."""
+    claim = Claim(write.mapping.station, [write.mapping.extent], write)
+    claim.done = claim.lands_until = now
+    return claim
+
+
 class Bench:
     """An agenda without checks, whose jobs are done by hand."""
 
     def __init__(self, *jobs: ReadJob, write_timeout: float = 2.0) -> None:
         self.results: list[WriteResult] = []
+        self.begun: dict[Write, MessageJob] = {}
         self.stations = ActiveStationList([job.station for job in jobs], probe_time=PROBE_TIME)
         self.tasks, line = JobTasks(5, 0), StillClock()
         planner, backs = Planner(LINE, 0.1), ReadBacks(write_timeout, self.results.append)
         readings = Readings(Network(), (), DriverSettings(), planner, self.stations, line,
                             Recorder(lambda: 0.0), backs)
-        writing = WritesUnderWay(planner, self.stations, line, readings, backs)
-        self.under_way = writing.under_way
+        self.record = WriteRecord(line, 1.0)
+        writing = WritesUnderWay(planner, self.stations, self.record, readings, backs)
         self.reads = readings.reads
         self.writes = WriteQueue(self.stations, writing, write_timeout, self.results.append)
         checks = Checks(self.stations, {job.station for job in jobs}, 0.0, line,
                         lambda station, error: None, lambda station, identity, asked: None)
         checks.begin(0.0)
-        interlocks = Interlocks((), self.stations, self.writes, writing, 1.0, lambda write: None,
+        interlocks = Interlocks((), self.stations, self.writes, writing, lambda write: None,
                                 self.results.append, lambda mapping, reason: None,
                                 lambda mapping, text, is_conflict: None)
         guests = GuestQueue(self.stations, line, 1.0, lambda dst: dst,
-                            lambda command, station: [], self.reads)
+                            lambda command, station: [], self.record)
         self.agenda = Agenda(
             self.stations, interlocks, self.writes, checks, self.reads, guests, self.tasks)
         self.reads.replace((), jobs, 0.0)
@@ -101,19 +110,25 @@ class Bench:
         task = self.agenda.next(now)
         if task is None or not isinstance(task.job, MessageJob):
             return task and task.job
-        self.under_way.remove(task.job.write)
+        self.end(task.job)
         return task.job.write
+
+    def end(self, job: MessageJob) -> None:
+        """Let a write end unsent."""
+        self.record.ended(job.claim, Outcome.NOT_SENT)
 
     def begin_write(self, now: float, busy: Container[int] = ()) -> Write | None:
         """Take the next write, which is under way from then on."""
         job = self.writes.next(now, busy)
+        if job is not None:
+            self.begun[job.write] = job
         return job and job.write
 
     def next_write(self, now: float) -> Write | None:
         """Take the next write, which ends at once."""
         write = self.begin_write(now)
         if write is not None:
-            self.under_way.remove(write)
+            self.end(self.begun[write])
         return write
 
     def next_read(self, now: float, busy: Container[int] = ()) -> ReadJob | None:
@@ -346,7 +361,7 @@ def test_writes_of_the_same_words_are_never_under_way_together() -> None:
     assert bench.begin_write(0.0) is first
     assert bench.begin_write(0.0) is other  # but not another of the same station, out of turn
     assert bench.begin_write(0.0) is None
-    bench.under_way.remove(first)
+    bench.end(bench.begun[first])
     assert bench.begin_write(0.0) is second
     assert bench.begin_write(0.0) is behind
     assert bench.begin_write(0.0) is None
@@ -570,7 +585,7 @@ def test_read_that_shows_a_write_is_due_at_once() -> None:
         bench.read(0.0)
     write = bench.write(WORD, 1, 1.0)
     assert bench.next(1.0) is write
-    bench.reads.refresh(write, 1.5)
+    bench.reads.write_ended(written(write, 1.5))
     assert bench.agenda.next_due() == 1.5
     assert [bench.read(1.5), bench.read(1.5)] == [covers, None]
     assert bench.read(5.0) is None  # the entry of before is void
@@ -585,7 +600,7 @@ def test_writes_that_refresh_a_slow_read_leave_no_entries() -> None:
     for second in range(1, 1000):
         write = bench.write(WORD, 1, float(second))
         assert bench.next(float(second)) is write
-        bench.reads.refresh(write, float(second))
+        bench.reads.write_ended(written(write, float(second)))
         assert [bench.read(float(second)), bench.read(float(second))] == [slow, None]
         assert len(bench.reads._due._heaps[86_400.0]) <= 8
     assert (slow.due, other.due) == (86_400.0 + 999.0, 86_400.0)
@@ -717,7 +732,7 @@ class AnyOrder(RuleBasedStateMachine):
             self.sent.append(write)
             if worked:
                 self.bench.stations.heard(write.mapping.station, self.now)
-                self.bench.reads.refresh(write, self.now)
+                self.bench.reads.write_ended(written(write, self.now))
 
     @rule()
     def drop(self) -> None:

@@ -172,7 +172,7 @@ def test_guest_reads_back_what_it_has_written(
     ('SLC', '0F AA 04 08 8A 02 00 00 00 80 3F', 'F8:2', 1),
     ('SLC', '0F AB 02 03 85 01 00 01 00 01 00', 'B3:1', 1),
     ('SLC', '0F AA 04 09 89 05 00 34 12 00 00', '', 0),  # no row is in N9
-    ('SLC', '0F A2 02 07 89 00 00', '', 0), ('SLC', '0F 80 01', '', 0), ('SLC', '0F', '', 0),
+    ('SLC', '0F A2 02 07 89 00 00', '', 0), ('SLC', '06 00 12', '', 0),
     # Typed writes: the third word of a transaction of 3; file 20, whose type no address tells.
     ('PLC5', '0F 67 02 00 03 00 06 07 05 93 09 42 34 12', 'N7:7', 1),
     ('PLC5', '0F 67 00 00 02 00 06 14 03 95 09 42 01 00 02 00', 'N20:3', 2),
@@ -188,6 +188,19 @@ def test_words_of_a_write_are_known_by_its_address(entry: tuple[str, str, str, i
     found = written_extents(Packet(1, 9, data[0], 0, 1, data[1:]), 1, rows)
     expected = [make_mapping(address, plc=plc, length=length).extent] if address else []
     assert found == expected
+
+
+@pytest.mark.parametrize('text', ['0F 80 01', '0F 57 00', '0F'])
+def test_words_of_a_command_that_nobody_knows_may_be_any(text: str) -> None:
+    data, rows = bytes.fromhex(text), [make_mapping('N7:0', plc='SLC')]
+    assert written_extents(Packet(1, 9, data[0], 0, 1, data[1:]), 1, rows) is None
+
+
+def test_words_of_a_broadcast_are_those_of_every_station() -> None:
+    rows = [make_mapping('N7:0', plc='SLC', station=number) for number in (1, 2)]
+    rows.append(make_mapping('N7:0', 'Serve', plc='SLC', station=0))
+    found = written_extents(Packet(255, 9, 0x0F, 0, 1, WRITE_N7), 255, rows)
+    assert found == [row.extent for row in rows[:2]]
 
 
 def test_guests_get_a_quarter_and_never_two_between_two_of_ours() -> None:

@@ -27,12 +27,13 @@ from abdf1_ros.df1.checksum import Checksum
 from abdf1_ros.df1.packet import Packet
 from abdf1_ros.df1.slave import HalfDuplexSlave, SlaveSettings
 from abdf1_ros.driver.guests import Guest, GuestCommand, ShareAccess
-from abdf1_ros.driver.interlocks.fallback import FallbackCause, FallbackRow
+from abdf1_ros.driver.interlocks.fallback import FallbackCause, FallbackRow, FallbackState
 from abdf1_ros.driver.interlocks.heartbeat import BeatState, LARGEST
 from abdf1_ros.driver.links import DriverSettings
 from abdf1_ros.driver.reads.guards import CounterGuard, RunGuard
 from abdf1_ros.driver.reads.point import Freshness, ReadPoint
-from abdf1_ros.driver.write import Outcome
+from abdf1_ros.driver.record import Claim, WriteRecord
+from abdf1_ros.driver.write import Outcome, Write
 from abdf1_ros.pccc.data_table import DataTable
 from abdf1_ros.pccc.emulated import Setting
 from abdf1_ros.pccc.families import parse_address
@@ -162,6 +163,40 @@ class Cell:
             self.bench.at(self.now + number * gap, lambda: self.bench.write(row, [value]))
         if run:
             self.run(run)
+
+
+class OneRow:
+    """A row with Fallback by itself, and writes of it that end as they are told."""
+
+    now = late = 0.0
+
+    def __init__(self, cmd_timeout: float = 0.5) -> None:
+        self.mapping = speed_row()
+        self.record = WriteRecord(self, 2 * cmd_timeout)
+        self.row = FallbackRow(self.record.words_of(self.mapping))
+
+    def took(self, begun: float, now: float) -> float:
+        """Return the time between two clock values."""
+        return now - begun
+
+    def message(self, begun: float, done: float, outcome: Outcome) -> None:
+        """Let a message end that was published when it began."""
+        self._write(Write(self.mapping, [3], begun), done, outcome)
+        self.row.message_ended(begun, outcome)
+
+    def fallback(self, write: Write, done: float, outcome: Outcome = Outcome.WRITTEN
+                 ) -> float | None:
+        """Let a write of the fallback end."""
+        write.is_own = True
+        self._write(write, done, outcome)
+        return self.row.ended(outcome, done)
+
+    def _write(self, write: Write, done: float, outcome: Outcome) -> None:
+        self.now = write.requested
+        claim = self.record.begin(Claim(1, [self.mapping.extent], write))
+        self.now = done
+        self.record.ended(claim, outcome,
+                          may_land=outcome in (Outcome.UNKNOWN, Outcome.PARTLY))
 
 
 def speed_cell() -> tuple[Cell, Mapping]:
@@ -552,18 +587,119 @@ def test_rule_5_end_asks_a_silent_plc_at_once_where_another_answers() -> None:
     assert (cell.word('N10:0'), cell.word('N7:0')) == (0, 7)
 
 
-def test_rule_5_fallback_that_a_guest_has_written_over_is_written_at_the_end() -> None:
-    cell = Cell(speed_row(), run=1.0)
-    cmd, data = cell.bench.driver.mappings[0].dialect.write(
-        parse_address('N7:0', PlcType.PLC5), b'\x63\0')
-    cell.bench.driver.guests.put(GuestCommand(
-        Guest('pty:hmi', ShareAccess.ALL), Packet(1, 9, cmd, 0, 1, data), cell.now,
-        lambda reply: None))
-    cell.bench.line.wake(cell.bench.driver.machine)
-    cell.run(0.5)
-    assert cell.word('N7:0') == 99
+class GuestCell(Cell):
+    """A cell whose PLC replies late, and a guest who writes there; row, then heartbeat."""
+
+    def __init__(self, *rows: Mapping, delay: float = 0.0, start: bool = True,
+                 run: float = 1.0) -> None:
+        super().__init__(*rows, start=False)
+        self.delay, self.held = delay, 0.0
+        self.replies: list[int] = []
+        if start:
+            self.bench.open()
+            self.run(run)
+
+    def ask(self, text: str, value: int, dst: int = 1) -> None:
+        """Let the guest write a word."""
+        row = make_mapping(text, 'Write')
+        cmd, data = row.dialect.write(row.address, value.to_bytes(2, 'little'))
+        self.bench.driver.guests.put(GuestCommand(
+            Guest('pty:hmi', ShareAccess.ALL), Packet(dst, 9, cmd, 0, 1, data), self.now,
+            lambda reply: self.replies.append(reply.sts)))
+        self.bench.line.wake(self.bench.driver.machine)
+
+    def hold_guests(self, seconds: float, sts: int = 0x02) -> None:
+        """Let a gateway say that a guest's write was not delivered, and deliver it later."""
+        serve, wanted = self.plc.serve, b'\x63\0'  # 99
+
+        def keep(command: Packet) -> Packet:
+            if not command.data.endswith(wanted):
+                return serve(command)
+            self.bench.at(self.now + seconds, lambda: serve(command))
+            return command.reply(sts=sts)
+
+        self.plc.serve = keep  # type: ignore[method-assign]
+
+
+WORDS = ('N7:0', 'N10:0')
+
+
+@pytest.mark.parametrize('text', WORDS)
+def test_rule_5_write_of_a_guest_on_the_line_when_the_end_begins_does_not_stay(
+        text: str) -> None:
+    cell = GuestCell(beat_row(), speed_row())
+    cell.ask(text, 99)
+    cell.bench.run_until(lambda: cell.word(text) == 99)  # its reply is not here yet
     end(cell)
+    assert [cell.word(name) for name in WORDS] == [7, 0]
+
+
+@pytest.mark.parametrize('text', WORDS)
+@pytest.mark.parametrize('held', [0.3, 0.9])
+def test_rule_5_write_of_a_guest_that_a_gateway_holds_does_not_stay(
+        text: str, held: float) -> None:
+    speed = make_mapping('N7:0', 'Write', tag='speed', fallback=FALLBACK, via=5)
+    beat = make_mapping('N10:0', 'Heartbeat', tag='beat', period=200, heartbeat=Heartbeat(), via=5)
+    cell = GuestCell(beat, speed, start=False)
+    cell.put_behind_gateway()
+    cell.run(4.0)
+    cell.hold_guests(held)
+    cell.ask(text, 99)
+    cell.run(0.02)
+    assert cell.replies == [0x02]
+    end(cell)
+    assert [cell.word(name) for name in WORDS] == [7, 0]
+
+
+def test_rule_5_what_may_still_land_after_the_end_is_named() -> None:
+    speed = make_mapping('N7:0', 'Write', tag='speed', fallback=FALLBACK, via=5)
+    cell = GuestCell(speed, start=False)
+    cell.bench.driver._record._settle_time = 20.0  # as with a Cmd_Timeout of 10 s
+    cell.put_behind_gateway()
+    cell.run(30.0)
+    cell.hold_guests(1.9)
+    cell.ask('N7:0', 99)
+    cell.run(0.02)
+    end(cell)
+    unconfirmed, = cell.bench.driver.interlocks.unconfirmed()
+    assert unconfirmed.startswith('speed (a gateway may hold a write to it for ')
+
+
+@pytest.mark.parametrize('dst', [1, 255])
+def test_rule_8_guests_write_over_a_fallback_is_written_over_at_once(dst: int) -> None:
+    cell = GuestCell(beat_row(), speed_row())
+    row, = cell.bench.driver.interlocks.fallbacks
+    cell.run(1.0)
+    since = cell.now
+    cell.ask('N7:0', 99, dst)
+    cell.bench.run_until(lambda: cell.word('N7:0') == 99)
+    cell.bench.run_until(lambda: not row.stands)
+    assert row.state is FallbackState.OVERWRITTEN
+    cell.run(0.1)
+    assert row.stands
+    assert cell.written('N7:0', since)[-1:] == [7]
+    assert cell.written('N10:0', since)[-1:] == [0]  # rule 3 b
+    cell.run(2.0)
+    assert cell.word('N10:0') > 0
+    assert cell.results() == [START]
+
+
+def test_rule_8_command_that_nobody_knows_refreshes_and_holds_no_heartbeat() -> None:
+    cell = GuestCell(beat_row(), speed_row())
+    cell.run(1.0)
+    since = cell.now
+    store(cell.plc, 'N7:0', [99])
+    cell.bench.driver.guests.put(GuestCommand(
+        Guest('pty:hmi', ShareAccess.ALL), Packet(1, 9, 0x0F, 0, 1, b'\x3A'), cell.now,
+        lambda reply: None))
+    cell.plc.serve = partial(_confirm_3a, cell.plc.serve)  # type: ignore[method-assign]
+    cell.run(0.3)
     assert cell.word('N7:0') == 7
+    assert 0 not in cell.written('N10:0', since)
+
+
+def _confirm_3a(serve: Callable[[Packet], Packet], command: Packet) -> Packet:
+    return command.reply() if command.data == b'\x3A' else serve(command)
 
 
 def test_rule_5_commands_of_guests_are_not_sent_while_the_bridge_ends() -> None:
@@ -683,14 +819,14 @@ def test_rule_8_cleared_fault_is_a_change_to_run() -> None:
 
 
 def test_rule_8_row_is_fresh_by_a_confirmed_message_only() -> None:
-    row = FallbackRow(speed_row(), 0.5)
+    one = OneRow()
+    row = one.row
     row.make_due(FallbackCause.START, 0.0)
-    row.take(0.0)
-    row.ended(Outcome.WRITTEN, 0.1)
-    row.message_ended(1.0, Outcome.UNKNOWN)  # counts once for the time that it stands (rule 7)
+    one.fallback(row.take(0.0), 0.1)
+    one.message(1.0, 1.0, Outcome.UNKNOWN)  # counts once for the time that it stands (rule 7)
     assert row.deadline(-math.inf) == 1.0 + AFTER
     assert not row.is_fresh(1.1)
-    row.message_ended(1.2, Outcome.WRITTEN)
+    one.message(1.2, 1.2, Outcome.WRITTEN)
     assert row.is_fresh(1.2 + 0.9 * AFTER)
 
 
@@ -774,7 +910,8 @@ def test_rule_9_write_of_another_row_to_the_same_words_holds_up_for_its_own_time
     assert cell.word('N7:0') == 3
     cell.bench.write(recipe, [4] * 200)  # under way when the fallback is due
     row, = cell.bench.driver.interlocks.fallbacks
-    cell.bench.run_until(lambda: row.is_held_up)
+    record = cell.bench.driver._record
+    cell.bench.run_until(lambda: row.cause is not None and not record.may_begin(speed))
     cell.run(0.5)
     assert cell.results()[-1] == TIMEOUT
     assert cell.word('N7:0') == 7
@@ -804,12 +941,13 @@ def test_rule_10_after_an_unknown_write_it_is_written_once_more() -> None:
     cell, speed = speed_cell()
     say, cell.bench.far.say = cell.bench.far.say, lambda data: b''
     cell.publish(speed, 3, run=0.05)
-    cell.run(1.0)
+    cell.run(0.5)
     cell.bench.far.say = say
     cell.run(15.0)
     assert cell.written('N7:0')[:4] == [7, 3, 7, 7]
-    first, second = [when for when, name, value in cell.writes if name == 'N7:0'][2:4]
-    assert second == pytest.approx(first + 2 * 0.5, abs=0.2)
+    unknown, _, second = [when for when, name, value in cell.writes if name == 'N7:0'][1:4]
+    # The message ended when station 1 had not answered its two frames of 0.2 s each.
+    assert second == pytest.approx(unknown + 2 * 0.2 + 2 * 0.5, abs=0.05)
     assert len([result for result in cell.results() if result.startswith('fallback')]) == 2
 
 
@@ -879,13 +1017,21 @@ def test_rule_10_first_try_of_each_row_goes_before_the_second_of_any() -> None:
     (Outcome.PARTLY, True), (Outcome.UNKNOWN, True), (Outcome.FAILED, False)])
 def test_rule_10_once_more_after_a_message_that_may_have_been_written(
         outcome: Outcome, again: bool) -> None:
-    row = FallbackRow(speed_row(), 0.5)
-    row.message_ended(1.0, outcome)
+    one = OneRow()
+    row = one.row
+    one.message(1.0, 1.9, outcome)
     assert row.judge(2.0, -math.inf)
-    row.take(2.0)
-    assert row.ended(Outcome.WRITTEN, 2.1) is not None
-    assert row.judge(3.0, -math.inf) is False
-    assert row.judge(3.2, -math.inf) is again  # 2 x Cmd_Timeout after it was confirmed
+    assert one.fallback(row.take(2.0), 2.1) is not None
+    assert row.judge(2.8, -math.inf) is False
+    assert row.judge(2.9, -math.inf) is again  # 2 x Cmd_Timeout after the message ended
+
+
+def test_rule_10_not_once_more_where_nothing_can_land_any_more() -> None:
+    one = OneRow()
+    one.message(1.0, 1.0, Outcome.UNKNOWN)
+    assert one.row.judge(2.0, -math.inf)
+    one.fallback(one.row.take(2.0), 2.1)
+    assert not one.row.judge(60.0, -math.inf)
 
 
 def test_rule_10_why_the_plc_refuses_is_told_once() -> None:
@@ -905,13 +1051,12 @@ def test_rule_10_why_the_plc_refuses_is_told_once() -> None:
 @pytest.mark.parametrize(('outcome', 'next_refresh'), [
     (Outcome.WRITTEN, 12.0), (Outcome.UNKNOWN, 8.0), (Outcome.FAILED, 8.0)])
 def test_rule_10_refresh_is_not_the_second_write(outcome: Outcome, next_refresh: float) -> None:
-    row = FallbackRow(speed_row(), 4.0)
-    row.message_ended(1.0, Outcome.UNKNOWN)
+    one = OneRow(cmd_timeout=4.0)
+    row = one.row
+    one.message(1.0, 2.0, Outcome.UNKNOWN)
     assert row.judge(2.0, -math.inf)
-    row.take(2.0)
-    row.ended(Outcome.WRITTEN, 2.0)
-    row.refresh(7.0)
-    row.ended(outcome, 7.0)
+    one.fallback(row.take(2.0), 2.0)
+    one.fallback(row.refresh(7.0), 7.0, outcome)
     assert not row.judge(7.0, -math.inf)
     assert row.due == 10.0
     assert row.refresh_at == next_refresh

@@ -20,6 +20,7 @@ import math
 from abdf1_ros.df1.frames import EOT, STX
 from abdf1_ros.driver.links import DriverSettings
 from abdf1_ros.driver.reads.read_backs import ReadBacks
+from abdf1_ros.driver.record import Claim
 from abdf1_ros.driver.write import Outcome, Write, WriteResult
 from abdf1_ros.errors import CommandTimeout
 from abdf1_ros.plan.forecast import line_model
@@ -126,7 +127,8 @@ def test_read_back_that_does_not_come_ends_when_patience_does() -> None:
 def test_newer_write_ends_the_wait_for_the_same_words(text: str, is_overtaken: bool) -> None:
     mapping = make_mapping('N7:0', 'ReadWrite')
     unconfirmed = Unconfirmed(mapping, mapping, [5])
-    unconfirmed.backs.overtaken(Write(make_mapping(text, 'Write'), [6], EARLY), EARLY)
+    newer = Write(make_mapping(text, 'Write'), [6], EARLY)
+    unconfirmed.backs.write_begins(Claim(1, [newer.mapping.extent], newer))
     assert unconfirmed.details == ([OVERTAKEN] if is_overtaken else [])
 
 

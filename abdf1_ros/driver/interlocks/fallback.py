@@ -19,17 +19,17 @@ The numbers of rules are those of docs/heartbeats.md.
 
 from __future__ import annotations
 
-from enum import auto, Enum
+from enum import Enum
 import math
 
+from abdf1_ros.driver.record import Claim, Words
 from abdf1_ros.driver.write import Outcome, Write
-from abdf1_ros.settings.mapping import Mapping
 
 # A fallback value that the PLC refuses is written again after so many seconds.
 _PAUSE_AFTER_REFUSAL = 1.0
 
 # At an orderly end the second write of rule 10 comes after so many seconds: there are two in all.
-_SETTLE_AT_END = 1.0
+SETTLE_AT_END = 1.0
 
 # One that stands is written again after so many seconds at least (rule 8).
 _LEAST_REFRESH = 5.0
@@ -51,30 +51,7 @@ class FallbackState(Enum):
     MESSAGE = 'a message stands'
     DUE = 'the fallback value is due'
     STANDS = 'the fallback value stands'
-
-
-class FallbackEvent(Enum):
-    """What changes the state: a message also when it may have been written."""
-
-    DUE = auto()
-    FALLBACK_WRITTEN = auto()
-    MESSAGE_WRITTEN = auto()
-
-
-_NEXT = {
-    FallbackState.MESSAGE: {
-        FallbackEvent.DUE: FallbackState.DUE,
-        FallbackEvent.MESSAGE_WRITTEN: FallbackState.MESSAGE,
-        FallbackEvent.FALLBACK_WRITTEN: FallbackState.STANDS},
-    FallbackState.DUE: {  # whatever is written, until the PLC has confirmed the fallback
-        FallbackEvent.DUE: FallbackState.DUE,
-        FallbackEvent.MESSAGE_WRITTEN: FallbackState.DUE,
-        FallbackEvent.FALLBACK_WRITTEN: FallbackState.STANDS},
-    FallbackState.STANDS: {
-        FallbackEvent.DUE: FallbackState.DUE,
-        FallbackEvent.MESSAGE_WRITTEN: FallbackState.MESSAGE,
-        FallbackEvent.FALLBACK_WRITTEN: FallbackState.STANDS},
-}
+    OVERWRITTEN = 'a guest has written over the fallback value'
 
 
 class FallbackRow:
@@ -84,15 +61,16 @@ class FallbackRow:
     ``cause`` says why the fallback is due, None where it is not. ``refreshed`` is when the last
     confirmed message was published, ``sent`` when the fallback was last sent: a message published
     before that is not sent any more. ``due`` is when the row has to be looked at. All are clock
-    values (s). ``is_held_up`` tells that the fallback waits for a message that is under way,
-    ``has_failed`` that a message has ended otherwise since the last that was confirmed.
-    ``refusal`` says why the last write of the fallback was not confirmed, ``is_overwritten`` that
-    a guest has written over one that stands.
+    values (s). ``has_failed`` tells that a message has ended otherwise since the last that was
+    confirmed. ``refusal`` says why the last write of the fallback was not confirmed. ``words``
+    tells what others may have written.
     """
 
-    def __init__(self, mapping: Mapping, cmd_timeout: float) -> None:
+    def __init__(self, words: Words) -> None:
+        mapping = words.row
         assert mapping.fallback is not None
         self.mapping = mapping
+        self.words = words
         self.after = mapping.fallback.after / 1000
         self.state = FallbackState.MESSAGE
         self.refreshed = -math.inf
@@ -102,25 +80,16 @@ class FallbackRow:
         self.cause: FallbackCause | None = None
         self.refusal = ''
         self.is_under_way = False
-        self.is_held_up = False
-        self.is_overwritten = False
         # From when the time counts: the last confirmed message, or, after a fallback, the first
         # whose outcome is unknown.
         self._counts_from = -math.inf
         self.has_failed = False
         self._values = mapping.fallback.values
-        self._cmd_timeout = cmd_timeout
-        self._is_ending = False
+        self._latest = math.inf  # for a second write (rule 10): at the end there is little time
         self._due_since = 0.0
         self._next_try = -math.inf
-        # Whether a write has ended as unknown since the last fallback was confirmed. What went out
-        # before we began is unknown: a gateway may still hold it.
-        self._is_unconfirmed = mapping.via is not None
-        self._again_at = math.inf  # once more for what a gateway may hold (rule 10)
+        self._again_at = math.inf  # once more, after what a gateway may hold (rule 10)
         self.refresh_at = math.inf  # for what nobody has seen (rule 8)
-
-    def _go(self, event: FallbackEvent) -> None:
-        self.state = _NEXT[self.state][event]
 
     @property
     def stands(self) -> bool:
@@ -132,20 +101,25 @@ class FallbackRow:
         if self.cause is None:
             self.cause, self._due_since = cause, now
         self._due_since = min(self._due_since, now)  # a message may have put it off
-        self._go(FallbackEvent.DUE)
+        self.state = FallbackState.DUE
         self._next_try = self.due = now
 
-    def end(self, *, is_ending: bool) -> None:
-        """Take note that there is an end, in which little time is left, or that there is none."""
-        self._is_ending = is_ending
-        if is_ending and self._again_at < math.inf:
-            self._again_at = min(self._again_at, self.tried + _SETTLE_AT_END)
-            self.due = -math.inf
+    def end(self, now: float) -> None:
+        """Take note that there is an end: write it unless nothing else can stand any more."""
+        self._latest = now + SETTLE_AT_END
+        self.due = -math.inf
+        if not self.stands or self.words.lands_until > -math.inf:
+            self.make_due(FallbackCause.END, now)
+
+    def resume(self) -> None:
+        """Take note that it was not the end."""
+        self._latest = math.inf
 
     @property
     def is_confirmed(self) -> bool:
         """Tell whether nothing is left to be written of what is due."""
-        return self.cause is None and not (self.stands and self._again_at < math.inf)
+        is_left = self.stands and self._again_at < math.inf
+        return self.cause is None and self.state is not FallbackState.OVERWRITTEN and not is_left
 
     @property
     def is_first_try(self) -> bool:
@@ -172,7 +146,7 @@ class FallbackRow:
         """
         if self.state is FallbackState.DUE:
             return self._due_since
-        if self.state is FallbackState.STANDS:
+        if self.state is not FallbackState.MESSAGE:
             return math.inf
         return self.after + (
             self._counts_from if self.has_failed else max(self._counts_from, youngest))
@@ -181,10 +155,12 @@ class FallbackRow:
         """Tell whether the fallback is to be written now; plan when to look again if it is not."""
         if self.state is FallbackState.MESSAGE and now >= self.deadline(youngest):
             self.make_due(FallbackCause.TIMEOUT, now)
-        if self.is_under_way or self.is_held_up:
+        if self.is_under_way:
             self.due = math.inf
         elif self.state is FallbackState.DUE:
             self.due = max(self._due_since, self._next_try)
+        elif self.state is FallbackState.OVERWRITTEN:
+            self.due = self._next_try
         elif self.state is FallbackState.STANDS:
             self.due = self._again_at
         else:
@@ -205,8 +181,8 @@ class FallbackRow:
         """
         Take note how it ended; return the seconds that it was due, None where none is reported.
 
-        It is written once more where a gateway may still hold a message of the row (rule 10), and
-        where it has become due since this write began.
+        It is written once more when nothing that a gateway may hold can land any more (rule 10),
+        and where it has become due since this write began.
         """
         self.is_under_way = False
         self.due = now
@@ -217,19 +193,33 @@ class FallbackRow:
             if not now < self._again_at < math.inf:  # a second write that is planned stays so
                 self._again_at = self.refresh_at
             return None
-        settle_time = 2 * self._cmd_timeout
-        if self._is_unconfirmed:
-            self._again_at = now + (
-                min(settle_time, _SETTLE_AT_END) if self._is_ending else settle_time)
-        elif self.tried >= self._again_at:  # this was it, not a refresh before its time
-            self._again_at = math.inf
-        self._is_unconfirmed = self.is_overwritten = False
         self.refresh_at = now + max(self.after, _LEAST_REFRESH)
+        until = min(self.words.lands_until, self._latest)
+        self._again_at = until if self.tried < until else math.inf
         if self.cause is not None and self.tried < self._due_since:
             return None
         was_due, self.cause = self.cause is not None, None
-        self._go(FallbackEvent.FALLBACK_WRITTEN)
+        self.state = FallbackState.OVERWRITTEN if self.words.are_guests else FallbackState.STANDS
         return now - self._due_since if was_due else None
+
+    def write_ended(self, claim: Claim, now: float) -> None:
+        """Take note how a write to these words ended, of a message or a guest."""
+        if claim.write is not None:
+            if claim.write.mapping is self.mapping and not claim.write.is_own:
+                assert claim.outcome is not None
+                self.message_ended(claim.write.requested, claim.outcome)
+        elif claim.has_changed and self.stands:
+            if claim.extents is None:  # it was hardly meant for these
+                self.refresh_at = now
+            else:
+                self.state, self._next_try = FallbackState.OVERWRITTEN, now
+
+    @property
+    def why_held(self) -> str:
+        """Return why no heartbeat of the station may count, empty if it may (rule 3 b)."""
+        if self.state is FallbackState.OVERWRITTEN:
+            return f'a guest has written over the fallback of {self.mapping.tag}'
+        return f'the fallback of {self.mapping.tag} is not confirmed' if self.cause else ''
 
     def message_ended(self, requested: float, outcome: Outcome) -> None:
         """Take note how a message of the row ended that had the line (rule 7)."""
@@ -238,12 +228,12 @@ class FallbackRow:
         if outcome is Outcome.WRITTEN:
             self._counts_from = self.refreshed = max(self.refreshed, requested)
         elif outcome in (Outcome.UNKNOWN, Outcome.PARTLY):
-            self._is_unconfirmed = True
-            if self.stands:
+            if self.state in (FallbackState.STANDS, FallbackState.OVERWRITTEN):
                 self._counts_from = requested
             elif self.state is FallbackState.DUE and not self.is_first_try:
                 # It may have been written over a fallback that the PLC has not confirmed.
                 self._due_since = max(self._due_since, requested + self.after)
         else:
             return
-        self._go(FallbackEvent.MESSAGE_WRITTEN)
+        if self.state is not FallbackState.DUE:  # until the PLC has confirmed the fallback
+            self.state = FallbackState.MESSAGE

@@ -20,11 +20,12 @@ The numbers of rules are those of docs/heartbeats.md.
 from __future__ import annotations
 
 from collections.abc import Mapping as MappingType
-from enum import auto, Enum
+from enum import Enum
 import math
 
+from abdf1_ros.driver.interlocks.fallback import SETTLE_AT_END
+from abdf1_ros.driver.record import Claim, Words
 from abdf1_ros.driver.write import Outcome, Write
-from abdf1_ros.settings.mapping import Mapping
 
 LARGEST = 32_767
 
@@ -58,30 +59,6 @@ class BeatState(Enum):
     CONFLICT = '0, as another writer writes this word'
 
 
-class BeatEvent(Enum):
-    """What changes the state."""
-
-    OPENED = auto()
-    RUN = auto()
-    CONTACT = auto()
-    OTHER_WRITER = auto()
-    ZERO_CONFIRMED = auto()
-    SEEN = auto()
-    HOLD = auto()
-    RELEASE = auto()
-
-
-_ALWAYS = {BeatEvent.OPENED: BeatState.CONTACT, BeatEvent.RUN: BeatState.CONTACT,
-           BeatEvent.CONTACT: BeatState.CONTACT, BeatEvent.OTHER_WRITER: BeatState.CONFLICT}
-_NEXT = {
-    BeatState.CONTACT: {**_ALWAYS, BeatEvent.ZERO_CONFIRMED: BeatState.SHOWN},
-    BeatState.SHOWN: {**_ALWAYS, BeatEvent.SEEN: BeatState.COUNTS},
-    BeatState.COUNTS: {**_ALWAYS, BeatEvent.HOLD: BeatState.HELD},
-    BeatState.HELD: {**_ALWAYS, BeatEvent.RELEASE: BeatState.COUNTS},
-    BeatState.CONFLICT: {**_ALWAYS, BeatEvent.CONTACT: BeatState.CONFLICT},
-}
-
-
 class HeartbeatRow:
     """
     One Heartbeat row, and what the PLC holds of it.
@@ -89,13 +66,16 @@ class HeartbeatRow:
     ``value`` was sent last; ``confirmed`` is the clock value (s) of the last reply that confirmed
     one. ``reason`` says why it does not count, empty while it does. ``refusal`` says why the last
     write was not confirmed, ``tried`` when that was sent. ``due`` is when the row has to be looked
-    at (clock values in s). It counts from ``first`` on.
+    at (clock values in s). It counts from ``first`` on. ``words`` tells what others may have
+    written.
     """
 
-    def __init__(self, mapping: Mapping, first: int = 1) -> None:
+    def __init__(self, words: Words, first: int = 1) -> None:
+        mapping = words.row
         assert mapping.heartbeat is not None
         assert mapping.period is not None
         self.mapping = mapping
+        self.words = words
         self._before_first = first - 1
         self.state = BeatState.CONTACT
         self.value = 0
@@ -110,14 +90,13 @@ class HeartbeatRow:
         self._requires_timeout = (mapping.heartbeat.requires_timeout or 0) / 1000
         self._period = mapping.period / 1000
         self._is_confirmed = False
+        self._again_at = math.inf  # a 0, after what a gateway may hold (rule 10)
+        self._latest = math.inf  # for that: at the end there is little time
         self._next = -math.inf
         self._foreign_at = -math.inf
         self._zeros = 0  # written again, where another writer goes on
         self._extra_zero = 0.0  # s
         self._holds_at = math.inf  # without a further message of the topics that it requires
-
-    def _go(self, event: BeatEvent) -> None:
-        self.state = _NEXT[self.state][event]
 
     def why_not(self, now: float) -> str:
         """Return why the PLC has no heartbeat that counts, empty if it has, or may have."""
@@ -136,13 +115,51 @@ class HeartbeatRow:
         """Tell whether the PLC has confirmed 0."""
         return self.value == 0 and self._is_confirmed
 
-    def begin(self, now: float, event: BeatEvent = BeatEvent.CONTACT) -> None:
-        """Start again with 0: the PLC may be another one by now (rule 2)."""
-        self._go(event)
-        if event is BeatEvent.RUN:  # whatever was foreign before came with a download
-            self._foreign_at = -math.inf
+    @property
+    def is_over(self) -> bool:
+        """Tell whether 0 stands, and is not to be written again after what may still land."""
+        return self.is_at_rest and self._again_at == math.inf
+
+    def begin(self, now: float, *, is_new: bool = False) -> None:
+        """
+        Start again with 0: the PLC may be another one by now (rule 2).
+
+        What another has written is forgotten where it ``is_new``: the port, or a change to RUN.
+        """
+        if is_new or self.state is not BeatState.CONFLICT:
+            self.state = BeatState.CONTACT
+        self._write_zero(now)
+
+    def ran(self, now: float) -> None:
+        """Take note of a change to RUN: whatever was foreign before came with a download."""
+        self._foreign_at = -math.inf
+        self.begin(now, is_new=True)
+
+    def _write_zero(self, now: float) -> None:
         self._is_confirmed, self.is_first_try = False, True
         self._next = self.due = now
+
+    def end(self, now: float) -> None:
+        """Take note that there is an end: 0 is to be written."""
+        self.due, self._latest = now, now + SETTLE_AT_END
+        if self.words.lands_until > -math.inf:
+            self._write_zero(now)
+
+    def resume(self) -> None:
+        """Take note that it was not the end."""
+        self._latest = math.inf
+
+    def write_ended(self, claim: Claim, now: float) -> None:
+        """Take note that a guest has written here: that is not a 0."""
+        if claim.is_guests and claim.has_changed and claim.extents is not None:
+            self.overwritten(now)
+
+    def overwritten(self, now: float) -> None:
+        """Take note that something else may stand where 0 has to: it is written again at once."""
+        if self.state is BeatState.SHOWN:
+            self.state = BeatState.CONTACT
+        if self.state is not BeatState.COUNTS and self.value == 0:
+            self._write_zero(now)
 
     def missing(self, messages: MappingType[str, float], now: float) -> str:
         """
@@ -172,15 +189,21 @@ class HeartbeatRow:
         """
         self.reason, self._holds_at = why_held, self.topics_until(messages)
         if self.state is BeatState.SHOWN and now >= self._next:
-            self._go(BeatEvent.SEEN)
+            self.state = BeatState.COUNTS
         if why_held:
             self.hold()
         elif self.state is BeatState.HELD and self.is_at_rest:  # the PLC has to see the 0
-            self._go(BeatEvent.RELEASE)
+            self.state = BeatState.COUNTS
         if self.is_under_way:
             self.due = math.inf
+        elif self.wants_zero and self.is_at_rest and now >= self._again_at:
+            self.due = now
+            return True
         elif self.state in (BeatState.HELD, BeatState.CONFLICT):
-            self.due = math.inf if self.is_at_rest else self._next if self.value == 0 else now
+            again = self._next if self.value == 0 else now
+            self.due = self._again_at if self.is_at_rest else again
+        elif self.state is BeatState.SHOWN:
+            self.due = min(self._next, self._again_at)
         elif self.state is not BeatState.COUNTS:
             self.due = self._next
         elif now >= self.executor_until(executor):
@@ -193,7 +216,7 @@ class HeartbeatRow:
     def hold(self) -> None:
         """Write 0 at once, if it counts (rule 3)."""
         if self.state is BeatState.COUNTS:
-            self._go(BeatEvent.HOLD)
+            self.state = BeatState.HELD
             self.is_first_try = not self.is_at_rest
 
     @property
@@ -214,10 +237,15 @@ class HeartbeatRow:
         is_known = self._is_confirmed and not self.is_under_way
         if not is_known or started < (self.confirmed or 0.0) or value == self.value:
             return ''
+        if self.words.may_hold(value):  # ours, which a gateway has held
+            self.overwritten(now)
+            return ''
         text = f'{value} was read where {self.value} was written'
         is_again = now - self._foreign_at < max(_CONFLICT_TIME, _CONFLICT_PERIODS * self._period)
         was_known, self._foreign_at = self.state is BeatState.CONFLICT, now
-        self.begin(now, BeatEvent.OTHER_WRITER if is_again else BeatEvent.CONTACT)
+        if is_again:
+            self.state = BeatState.CONFLICT
+        self.begin(now)
         if was_known:
             # At another moment of the other's period each time, for it to see the 0 before it
             # counts on.
@@ -256,8 +284,14 @@ class HeartbeatRow:
         if outcome is not Outcome.WRITTEN:
             return
         self._is_confirmed, self.confirmed = True, now
-        if self.value == 0 and self.state is not BeatState.CONFLICT:
+        if self.value:
+            return
+        until = min(self.words.lands_until, self._latest)
+        self._again_at = until if self.tried < until else math.inf
+        if self.state is not BeatState.CONFLICT:
             self._next = now + max(self._period, _LEAST_ZERO) + self._extra_zero
             self._extra_zero = 0.0
-        if self.value == 0 and self.state is BeatState.CONTACT:
-            self._go(BeatEvent.ZERO_CONFIRMED)
+        if self.state is BeatState.CONTACT:
+            self.state = BeatState.SHOWN
+        if self.words.are_guests:
+            self.overwritten(now)

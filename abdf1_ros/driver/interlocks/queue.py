@@ -29,12 +29,12 @@ import math
 
 from abdf1_ros.df1.stations import ActiveStationList
 from abdf1_ros.driver.interlocks.fallback import FallbackCause, FallbackRow
-from abdf1_ros.driver.interlocks.heartbeat import BeatEvent, BeatState, HeartbeatRow
+from abdf1_ros.driver.interlocks.heartbeat import BeatState, HeartbeatRow
+from abdf1_ros.driver.record import Claim, WriteListener
 from abdf1_ros.driver.write import Outcome, Write, WriteResult
 from abdf1_ros.driver.writes.queue import WriteQueue
 from abdf1_ros.driver.writes.under_way import WriteJob, WritesUnderWay
 from abdf1_ros.errors import RemoteError
-from abdf1_ros.pccc.extent import Extent
 from abdf1_ros.settings.mapping import Mapping
 
 # So often in a row a PLC has not answered that is taken as out of reach, though its station is
@@ -61,14 +61,13 @@ class OwnWrite(WriteJob):
 
     def __init__(self, row: OwnRow, write: Write, writing: WritesUnderWay, interlocks: Interlocks,
                  expires: float = math.inf) -> None:
+        write.is_own = True
         super().__init__(write, writing)
         # Of a fallback each packet goes out: the PLC may carry out what it does not answer.
         self.goes_on = isinstance(row, FallbackRow)
         self.row = row
         self.expires = expires
         self._interlocks = interlocks
-        write.is_own = True
-        writing.begin(write)
 
     def ended(self, error: Exception | None) -> None:
         """Tell the row."""
@@ -106,7 +105,7 @@ class _Plc:
         self.first_due = min([row.first_due for row in self.rows], default=math.inf)
 
 
-class Interlocks:
+class Interlocks(WriteListener):
     """
     All heartbeats and fallbacks of a line.
 
@@ -120,13 +119,14 @@ class Interlocks:
     """
 
     def __init__(self, mappings: Sequence[Mapping], stations: ActiveStationList,
-                 writes: WriteQueue, writing: WritesUnderWay, cmd_timeout: float,
+                 writes: WriteQueue, writing: WritesUnderWay,
                  store: Callable[[Write], None], report: Callable[[WriteResult], None],
                  tell: Callable[[Mapping, str], None],
                  warn: Callable[[Mapping, str, bool], None], first_beat: int = 1) -> None:
-        self.heartbeats = [HeartbeatRow(mapping, first_beat)
+        self._record = writing.record
+        self.heartbeats = [HeartbeatRow(self._record.words_of(mapping), first_beat)
                            for mapping in mappings if mapping.heartbeat]
-        self.fallbacks = [FallbackRow(mapping, cmd_timeout)
+        self.fallbacks = [FallbackRow(self._record.words_of(mapping))
                           for mapping in mappings if mapping.fallback]
         self._ours = _Plc(-1)  # the rows of our own table
         self._plcs: dict[int, _Plc] = {}
@@ -139,7 +139,6 @@ class Interlocks:
         self._by_mapping = {row.mapping: row for row in self.fallbacks}
         self._stations = stations
         self._writes = writes
-        writes.message_ended, writes.message_expired = self.message_ended, self.message_expired
         self._writing = writing
         self._store = store
         self._report = report
@@ -147,7 +146,7 @@ class Interlocks:
         self._due = self.next_expiry = math.inf
         self._refreshes: list[tuple[float, int, FallbackRow]] = []
         self._tickets = itertools.count()
-        self._held_up: list[FallbackRow] = []
+        self._held_up: list[OwnRow] = []
         self._messages: dict[str, float] = {}
         self._executor = -math.inf
         self._has_begun = False
@@ -178,8 +177,9 @@ class Interlocks:
     def resume(self) -> None:
         """Take note that it was not the end: the next opening of the port is a first contact."""
         self.is_ending = self._are_all_due = False
-        for row in self.fallbacks:
-            row.end(is_ending=False)
+        for plc in (*self._plcs.values(), self._ours):
+            for row in plc.rows:
+                row.resume()
 
     @property
     def is_over(self) -> bool:
@@ -188,19 +188,26 @@ class Interlocks:
             row.mapping.station in self._awaited for row in self._unconfirmed())
 
     def unconfirmed(self) -> list[str]:
-        """Return the tags of the rows that are not confirmed yet at the end."""
-        return [row.mapping.tag for row in self._unconfirmed()]
+        """Return the tags of the rows that are not confirmed at the end, or may not stay so."""
+        now = self._record.line.now
+        held = {row.mapping.tag: row.words.lands_until - now for plc in self._plcs.values()
+                for row in plc.rows if row.words.lands_until > now}
+        return [*(row.mapping.tag for row in self._unconfirmed()), *(
+            f'{tag} (a gateway may hold a write to it for {seconds:.1f} s)'
+            for tag, seconds in held.items())]
 
     def _unconfirmed(self) -> Iterator[OwnRow]:
-        yield from (row for row in self.heartbeats if not row.is_at_rest)
+        yield from (row for row in self.heartbeats if not row.is_over)
         yield from (row for row in self.fallbacks if not row.is_confirmed)
 
     def begin(self, now: float) -> None:
         """Take note that the port has been opened: a first contact with everybody (rule 2)."""
         for plc in self._plcs.values():
-            self._contact(plc, now, BeatEvent.OPENED)
-        for row in () if self._has_begun else self.fallbacks:
-            row.make_due(FallbackCause.START, now)
+            self._contact(plc, now, is_new=True)
+        if not self._has_begun:
+            self._record.opened()
+            for row in self.fallbacks:
+                row.make_due(FallbackCause.START, now)
         self._has_begun = True
         self._plan(*self._plcs.values(), self._ours)
 
@@ -209,13 +216,11 @@ class Interlocks:
         if station in self._plcs:
             self._contact(self._plcs[station], now)
 
-    def _contact(self, plc: _Plc, now: float, event: BeatEvent = BeatEvent.CONTACT) -> None:
+    def _contact(self, plc: _Plc, now: float, *, is_new: bool = False) -> None:
         for beat in plc.heartbeats:
-            beat.begin(now, event)
+            beat.begin(now, is_new=is_new)
         for row in plc.fallbacks if self._has_begun else ():
-            if event is BeatEvent.RUN:
-                row.make_due(FallbackCause.RUN, now)
-            elif not row.is_fresh(now):
+            if not row.is_fresh(now):
                 row.make_due(FallbackCause.RETURN, now)
             else:  # a message that it waits for may be gone with the port
                 row.due = -math.inf
@@ -227,7 +232,11 @@ class Interlocks:
         if plc is not None:
             was_running, plc.is_running = plc.is_running, is_running
             if is_running and was_running is False:
-                self._contact(plc, now, BeatEvent.RUN)
+                for beat in plc.heartbeats:
+                    beat.ran(now)
+                for row in plc.fallbacks:
+                    row.make_due(FallbackCause.RUN, now)
+                self._plan(plc)
 
     def read_back(self, mapping: Mapping, words: bytes, started: float) -> None:
         """Compare a heartbeat that was read from ``started`` on (clock value, s) (rule 19)."""
@@ -255,37 +264,38 @@ class Interlocks:
         row = self._by_mapping.get(write.mapping)
         return row is not None and (self._are_all_due or write.requested <= row.sent)
 
-    def message_ended(self, write: Write, outcome: Outcome) -> None:
-        """Take note how a message ended that had the line."""
-        row = self._by_mapping.get(write.mapping)
-        if row is not None:
-            row.message_ended(write.requested, outcome)
-            if self._are_all_due:
-                row.make_due(FallbackCause.END, self._writing.line.now)
-            self._look_again(row)
+    def write_ended(self, claim: Claim) -> None:
+        """Take note how a write ended, of whomever: fallbacks may wait for that (rules 7, 9)."""
+        now = self._record.line.now
+        rows: list[OwnRow] = []
+        if claim.write is None:
+            rows += (row for plc in self._plcs.values() for row in plc.rows
+                     if claim.meets(row.mapping.extent))
+        elif claim.write.mapping in self._by_mapping and not claim.write.is_own:
+            rows.append(self._by_mapping[claim.write.mapping])
+        for row in rows:
+            row.write_ended(claim, now)
+            if isinstance(row, FallbackRow):
+                self._written_over(row, now)
+        self._look_again(*rows, *self._held_up)
+        self._held_up.clear()
 
-    def guest_wrote(self, station: int, extents: Sequence[Extent]) -> None:
-        """Take note of what a guest may have written, all of a station where there is nothing."""
-        plc = self._plcs.get(station)
-        for row in plc.fallbacks if plc is not None else ():
-            row.is_overwritten |= not extents or any(map(row.mapping.extent.meets, extents))
+    def _written_over(self, row: FallbackRow, now: float) -> None:
+        if not row.stands and self._are_all_due:
+            row.make_due(FallbackCause.END, now)
+        elif row.stands and row.refresh_at <= now:
+            self._plan_refresh(row, now)
 
-    def message_expired(self, write: Write) -> None:
+    def write_expired(self, write: Write) -> None:
         """Take note that a message was too old to have the line: nobody waits for it any more."""
         row = self._by_mapping.get(write.mapping)
         if row is not None:
             self._look_again(row)
 
-    def _release(self) -> None:
-        """Let fallbacks go whose words nobody writes any more: they may be another row's, too."""
-        for row in [row for row in self._held_up if not self._writing.is_held_up(row.mapping)]:
-            self._held_up.remove(row)
-            row.is_held_up = False
-            self._look_again(row)
-
-    def _look_again(self, row: OwnRow) -> None:
-        row.due = -math.inf
-        self._plan(self._plc(row))
+    def _look_again(self, *rows: OwnRow) -> None:
+        for row in rows:
+            row.due = -math.inf
+        self._plan(*{self._plc(row) for row in rows})
 
     def _plan(self, *plcs: _Plc) -> None:
         for plc in plcs:
@@ -298,7 +308,6 @@ class Interlocks:
     def next(self, now: float, busy: Container[int] = ()) -> OwnWrite | None:  # noqa: A003
         """Return what has to be written next, None for nothing."""
         self.expire(now)
-        self._release()
         if self._are_all_due:  # there is no later for silent PLCs
             self._stations.probes.nobody_waits(now)
         if now < self._due:
@@ -319,10 +328,10 @@ class Interlocks:
         """Return the rows of a PLC that want to write now."""
         due = [row for row in plc.fallbacks
                if row.due <= now and row.judge(now, youngest.get(row.mapping, -math.inf))]
-        held_up = [row for row in due if self._writing.is_held_up(row.mapping)]
-        for row in held_up:  # by a message that is under way (rule 9); _release ends it
-            row.is_held_up, row.due = True, math.inf
-            self._held_up.append(row)
+        held_up = [row for row in due if not self._record.may_begin(row.mapping)]
+        for row in held_up:  # by a write that is under way (rule 9), whose end is told
+            row.due = math.inf
+        self._held_up += held_up
         why = self._why_held(plc) if plc.heartbeats else ''
         beats = [beat for beat in plc.heartbeats if beat.judge(
             now, why or self._missing(beat, now), self._executor, self._messages)]
@@ -332,8 +341,7 @@ class Interlocks:
         """Return why no heartbeat of a PLC may count, empty if it may (rules 3 b, 5)."""
         if self.is_ending:
             return 'the bridge ends'
-        due = next((row for row in plc.fallbacks if row.cause is not None), None)
-        return f'the fallback of {due.mapping.tag} is not confirmed' if due else ''
+        return next(filter(None, (row.why_held for row in plc.fallbacks)), '')
 
     def _missing(self, beat: HeartbeatRow, now: float) -> str:
         topic = beat.missing(self._messages, now)
@@ -400,7 +408,7 @@ class Interlocks:
                 continue
             is_waiting = row.mapping in self._writes.youngest()
             if row.is_under_way or is_waiting and not row.has_failed \
-                    or self._writing.is_held_up(row.mapping) \
+                    or not self._record.may_begin(row.mapping) \
                     or not self._stations[row.mapping.station].replies_in_time:
                 self._plan_refresh(row, now + row.after)
                 continue
@@ -482,13 +490,11 @@ class Interlocks:
     def _make_all_due(self, now: float) -> None:
         for row in self.fallbacks:
             self._writes.drop('fallback', now, row.mapping)
-            row.end(is_ending=True)
-            if not row.stands or row.is_overwritten or self._writing.is_held_up(row.mapping):
-                row.make_due(FallbackCause.END, now)
+            row.end(now)
         self._awaited = frozenset(
             number for number in self._plcs if self._stations[number].active)
         for beat in self.heartbeats:
-            beat.due = now
+            beat.end(now)
         self._are_all_due = True
         self._plan(*self._plcs.values(), self._ours)
 

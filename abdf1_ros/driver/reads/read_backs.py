@@ -25,6 +25,7 @@ from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
 import math
 
+from abdf1_ros.driver.record import Claim, WriteListener
 from abdf1_ros.driver.write import Write, WriteResult
 from abdf1_ros.plan.planner import Block
 
@@ -38,7 +39,7 @@ class _UnconfirmedWrite:
     since: float
 
 
-class ReadBacks:
+class ReadBacks(WriteListener):
     """
     The writes that wait to be read back, for ``patience`` seconds at most.
 
@@ -71,11 +72,12 @@ class ReadBacks:
                 which = 'the value' if is_held else 'another value'
                 self._end(entry, f'read back: the PLC holds {which}', now)
 
-    def overtaken(self, newer: Write, now: float) -> None:
-        """End those whose words the write ``newer`` changes, which is sent now."""
+    def write_begins(self, claim: Claim) -> None:
+        """End those whose words a newer write changes, which is sent now."""
         for entry in self._waiting[:]:
-            if entry.write.overlaps(newer):
-                self._end(entry, 'not read back: a newer write of these words has gone out', now)
+            if claim.meets(entry.write.mapping.extent):
+                self._end(entry, 'not read back: a newer write of these words has gone out',
+                          claim.begun)
 
     def expire(self, now: float) -> None:
         """End those that have waited too long."""

@@ -22,15 +22,14 @@ without replying in time. Now and then one of them is sent as a probe.
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Callable, Container, Iterable, Sequence
+from collections.abc import Container, Iterable
 
 from abdf1_ros.df1.stations import ActiveStationList
 from abdf1_ros.driver.reads.queue import ReadJob, ReadQueue
-from abdf1_ros.driver.write import Write
-from abdf1_ros.pccc.extent import Extent
+from abdf1_ros.driver.record import Claim, WriteListener
 
 
-class Reads:
+class Reads(WriteListener):
     """Keep all read jobs; ``stations.probes`` says when one of a silent station may be sent."""
 
     def __init__(self, stations: ActiveStationList) -> None:
@@ -149,22 +148,17 @@ class Reads:
         else:
             self._due.put(job, max(job.due + job.block.period, job.started))
 
-    def refresh(self, write: Write, now: float) -> None:
-        """Make the reads of all words that ``write`` changed due at once."""
-        station = write.mapping.station
-        self._refresh(station, now, lambda job: job.extent.meets(write.mapping.extent))
-
-    def refresh_words(self, station: int, extents: Sequence[Extent], now: float) -> None:
-        """Make the reads of these words due at once; all of the station where there are none."""
-        self._refresh(station, now, lambda job: job.station == station and (
-            not extents or any(job.extent.meets(extent) for extent in extents)))
-
-    def _refresh(self, station: int, now: float, is_meant: Callable[[ReadJob], bool]) -> None:
-        self.release(station, now)
-        for job in filter(is_meant, self._due.jobs):
-            job.is_refresh, job.refreshed = True, now
-            if job.due > now:
-                self._due.put(job, now)
+    def write_ended(self, claim: Claim) -> None:
+        """Make the reads of all words that it may have changed due at once."""
+        now = claim.done
+        if not claim.has_changed or claim.write is not None and claim.write.mapping.heartbeat:
+            return
+        self.release(claim.station, now)
+        for job in self._due.jobs:
+            if claim.meets(job.extent):
+                job.is_refresh, job.refreshed = True, now
+                if job.due > now:
+                    self._due.put(job, now)
 
     def release(self, station: int, now: float) -> None:
         """Make the reads of a station that were set aside due at once."""

@@ -63,15 +63,12 @@ class WriteQueue:
 
     They are in ``waiting``. ``report`` gets the results. ``tx_delay`` (s) comes before each
     transmission. A write to a silent station is a probe; one that ``stations.probes`` does not
-    admit ends unsent. ``message_ended`` is called for each that had the line, ``message_expired``
-    for each that was too old before. Another thread may only ask for the length. ``next_expiry``
-    is when ``expire`` has something to do (clock value in s).
+    admit ends unsent. Another thread may only ask for the length. ``next_expiry`` is when
+    ``expire`` has something to do (clock value in s).
     """
 
     def __init__(self, stations: ActiveStationList, writing: WritesUnderWay, patience: float,
                  report: Callable[[WriteResult], None], tx_delay: float = 0.0) -> None:
-        self.message_ended: Callable[[Write, Outcome], None] = lambda write, outcome: None
-        self.message_expired: Callable[[Write], None] = lambda write: None
         self._stations = stations
         self._writing = writing
         self._patience = patience
@@ -120,15 +117,12 @@ class WriteQueue:
         if write is None:
             return None
         self.waiting.remove(write)
-        self._writing.begin(write)
         return MessageJob(write, self._writing, self, self._slack)
 
     def ended(self, job: MessageJob) -> None:
         """Take note that a write that had the line has ended."""
         self._writing.report(job, self._report)
         self._writing.ended(job)
-        if job.result is not None:
-            self.message_ended(job.write, job.result.outcome)
 
     def _first_free(self, busy: Container[int]) -> Write | None:
         """Return the first write that does not have to wait."""
@@ -137,7 +131,7 @@ class WriteQueue:
             station = write.mapping.station
             if station in busy or station in held_up:
                 continue
-            if not self._writing.is_held_up(write.mapping):
+            if self._writing.record.may_begin(write.mapping):
                 return write
             held_up.add(station)
         return None
@@ -145,8 +139,8 @@ class WriteQueue:
     def youngest(self) -> dict[Mapping, float]:
         """Return when the youngest message that waits or is under way was published, by row."""
         found: dict[Mapping, float] = {}
-        for write in itertools.chain(self.waiting, self._writing.under_way):
-            if write.mapping.fallback is not None and not write.is_own:
+        for write in itertools.chain(self.waiting, self._writing.record.messages()):
+            if write.mapping.fallback is not None:
                 known = found.get(write.mapping, -math.inf)
                 found[write.mapping] = max(write.requested, known)
         return found
@@ -159,7 +153,7 @@ class WriteQueue:
             if reason:
                 self.waiting.remove(write)
                 self._report(write.result(Outcome.NOT_SENT, reason, now))
-                self.message_expired(write)
+                self._writing.record.expired(write)
             else:
                 self.next_expiry = min(self.next_expiry, self._expiry(write))
 

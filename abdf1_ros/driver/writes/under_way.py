@@ -19,15 +19,15 @@ from collections.abc import Callable
 
 from abdf1_ros.df1.packet import BROADCAST
 from abdf1_ros.df1.stations import ActiveStationList
-from abdf1_ros.driver.job_tasks import Job, LineTime
+from abdf1_ros.driver.job_tasks import Job
 from abdf1_ros.driver.reads.read_backs import ReadBacks
 from abdf1_ros.driver.reads.readings import Readings
-from abdf1_ros.driver.write import Write, WriteResult
+from abdf1_ros.driver.record import Claim, WriteRecord
+from abdf1_ros.driver.write import Outcome, Write, WriteResult
 from abdf1_ros.driver.writes.packets import carry_out
 from abdf1_ros.errors import CommandExpired, RemoteError
 from abdf1_ros.pccc.dialect import Steps
 from abdf1_ros.plan.planner import Planner
-from abdf1_ros.settings.mapping import Mapping
 
 
 class WriteJob(Job):
@@ -40,60 +40,51 @@ class WriteJob(Job):
         self.begun = write.requested
         self.goes_on = False  # also after a packet that is not confirmed
         self._writing = writing
+        self.claim = writing.begin(write)
 
     def steps(self, now: float) -> Steps[None]:
         """Send every packet."""
         self.begun = now
-        self.result = yield from self._writing.carry_out(self.write, now, self.goes_on)
+        self.result = yield from self._writing.carry_out(self.write, self.goes_on)
 
 
 class WritesUnderWay:
-    """
-    Carries out writes, and takes their ends: in records of stations, read backs and reads.
+    """Carries out writes, and takes their ends: in ``record``, of stations, and of reads."""
 
-    ``under_way`` are the writes that have the line: two of the same words never have it together.
-    """
-
-    def __init__(self, planner: Planner, stations: ActiveStationList, line: LineTime,
+    def __init__(self, planner: Planner, stations: ActiveStationList, record: WriteRecord,
                  readings: Readings, read_backs: ReadBacks) -> None:
-        self.under_way: list[Write] = []
-        self.line = line
+        self.record = record
+        self.line = record.line
         self._planner = planner
         self._stations = stations
         self._readings = readings
         self._read_backs = read_backs
 
-    def is_held_up(self, mapping: Mapping) -> bool:
-        """Tell whether a write has to wait for one of the same words that is under way."""
-        return any(mapping.extent.meets(write.mapping.extent) for write in self.under_way)
-
-    def begin(self, write: Write) -> None:
+    def begin(self, write: Write) -> Claim:
         """Take note that a write is under way, until it has ``ended``."""
-        self.under_way.append(write)
         station = write.mapping.station
         write.is_probe = station != BROADCAST and not self._stations[station].replies_in_time
+        return self.record.begin(Claim(station, (write.mapping.extent,), write))
 
-    def carry_out(self, write: Write, now: float, goes_on: bool) -> Steps[WriteResult]:
+    def carry_out(self, write: Write, goes_on: bool) -> Steps[WriteResult]:
         """Send every packet of a write, in the packets that its station takes."""
-        self._read_backs.overtaken(write, now)
         write.speak(self._planner.dialect(write.mapping))
         return (yield from carry_out(write, lambda: self.line.now, goes_on=goes_on))
 
     def ended(self, job: WriteJob) -> None:
-        """Take note of the end of a write, and read its words at once where they have changed."""
+        """Take note of the end of a write."""
         write, result, station = job.write, job.result, job.station
-        self.under_way.remove(write)
         if station != BROADCAST:
             self._stations.tried(station, job.begun, self.line.now, was_silent=write.is_probe,
                                  is_message=True)
-        if result is None:
+        if result is None:  # a bug
+            self.record.ended(job.claim, Outcome.UNKNOWN, may_land=True)
             return
         if isinstance(result.error, RemoteError):
             self._stations[station].remote_errors += 1
         elif result.error is not None and not isinstance(result.error, CommandExpired):
             self._readings.link_failed(station, (), result.error)
-        if (result.packets_done or result.is_unconfirmed) and not write.mapping.heartbeat:
-            self._readings.reads.refresh(write, self.line.now)
+        self.record.ended(job.claim, result.outcome, may_land=result.is_unconfirmed)
 
     def report(self, job: WriteJob, report: Callable[[WriteResult], None]) -> None:
         """Report the result of a message, after a read where it is unconfirmed."""
