@@ -43,8 +43,11 @@ from typing import Any, overload, Self, TYPE_CHECKING, TypeVar
 
 from abdf1_ros.counters import Counters
 from abdf1_ros.df1.checksum import Checksum
-from abdf1_ros.df1.link import LinkSettings
 from abdf1_ros.df1.machine import LineTiming
+from abdf1_ros.df1.master import MASTER
+from abdf1_ros.df1.mode import LineMode
+from abdf1_ros.df1.peer import PEER
+from abdf1_ros.df1.settings import LinkSettings
 from abdf1_ros.df1.stations import ActiveStationList, MAX_STATION
 from abdf1_ros.driver.requests import Requests
 from abdf1_ros.errors import FormatError, PortLost
@@ -68,7 +71,7 @@ if TYPE_CHECKING:
     from abdf1_ros.tagged_client import TaggedClient
 
 _GLANCE = 0.2  # s; while waiting, look so often whether the thread of the link still runs
-_MODES = {'full': 'Peer', 'half': 'Master'}
+_MODES = {'full': PEER, 'half': MASTER}
 _PARITIES = {name: name for name in ('None', 'Even', 'Odd')}
 _LONGEST = 60.0  # s
 
@@ -103,10 +106,11 @@ class OpenLine:
     To a PLC that asks us we are a ``plc_type``. Raises OSError when the port cannot be opened.
     """
 
-    def __init__(self, line: LinkSettings, port: PortSettings, absent: Sequence[int] = (),
-                 routes: Mapping[int, int] | None = None,
+    def __init__(self, mode: LineMode, line: LinkSettings, port: PortSettings,
+                 absent: Sequence[int] = (), routes: Mapping[int, int] | None = None,
                  plc_type: PlcType = PlcType.PLC5) -> None:
-        self._requests = Requests(line, absent, random.randrange(0x10000), routes, plc_type)
+        self._requests = Requests(
+            mode, line, absent, random.randrange(0x10000), routes, plc_type)
         self._link = LinkThread(
             self._requests.machine, opened(port), on_fault=print_exception)
         self._link.daemon = True  # a KeyboardInterrupt before ``with`` leaves nobody to stop it
@@ -195,8 +199,8 @@ class Client(OpenLine):
         settings = PortSettings(
             text_of('port', port), _whole('baud', baud, 1),
             parity=_choice('parity', _PARITIES, parity))
-        super().__init__(LinkSettings(
-            mode=_choice('duplex', _MODES, duplex), checksum=_member('check', Checksum, check),
+        super().__init__(_choice('duplex', _MODES, duplex), LinkSettings(
+            checksum=_member('check', Checksum, check),
             station=_whole('own_station', own_station, 0, MAX_STATION),
             timing=LineTiming(settings.char_time), timeout=_seconds('timeout', timeout),
             cmd_timeout=_seconds('cmd_timeout', cmd_timeout)), settings)

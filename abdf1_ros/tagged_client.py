@@ -45,7 +45,7 @@ class TaggedClient(OpenLine):
 
     def __init__(self, net_file: str, map_file: str) -> None:
         network = load_network(net_file)
-        if network.mode == 'Slave':
+        if network.line_mode.is_polled:
             raise FormatError(f'{net_file}: Mode Slave: a client asks, and a slave may not')
         mappings, problems = load_mappings(map_file)
         problems += [problem for _, problem in line_problems(mappings, network)]
@@ -53,7 +53,7 @@ class TaggedClient(OpenLine):
             raise ConfigurationError(problems)
         self.rows = {row.tag: row for row in mappings if not row.serves
                      and (row.polls or row.writes) and row.station <= MAX_STATION}
-        super().__init__(network.line, PortSettings.of(network), routes={
+        super().__init__(network.line_mode, network.line, PortSettings.of(network), routes={
             row.station: row.via for row in mappings if row.via is not None})
 
     def read(self, tag: str) -> float | str | list[float]:

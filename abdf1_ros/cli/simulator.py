@@ -52,8 +52,9 @@ from abdf1_ros.df1.checksum import Checksum
 from abdf1_ros.df1.frames import Control, Duplex, Frame, FrameDecoder, NAK
 from abdf1_ros.df1.machine import LineTiming, Machine, Procedure
 from abdf1_ros.df1.packet import BROADCAST, Packet
-from abdf1_ros.df1.peer import FullDuplexPeer, PeerSettings
-from abdf1_ros.df1.radio import RadioNode, RadioSettings
+from abdf1_ros.df1.peer import FullDuplexPeer
+from abdf1_ros.df1.radio import RadioNode
+from abdf1_ros.df1.settings import LinkSettings
 from abdf1_ros.df1.slave import multidrop
 from abdf1_ros.df1.stations import ActiveStationList
 from abdf1_ros.numbers import decimal_number, whole_number
@@ -333,7 +334,7 @@ def _full_duplex(plc: SimulatedPlc, checksum: Checksum, timing: LineTiming) -> M
     """Return a machine that is ``plc`` at the other end of a full-duplex line."""
     def run(machine: Machine) -> Procedure:
         peer = FullDuplexPeer(
-            machine, PeerSettings(checksum), ActiveStationList(), plc.serve)
+            machine, LinkSettings(station=None, checksum=checksum), ActiveStationList(), plc.serve)
         return peer.run(plc)
 
     plc.be_full_duplex()
@@ -351,7 +352,8 @@ def _radio(plcs: Sequence[SimulatedPlc], checksum: Checksum, timing: LineTiming)
     first, *others = plcs
     for plc in plcs:
         plc.be_radio(first.counters)
-    settings = RadioSettings(first.station, checksum, also=[plc.station for plc in others])
+    settings = LinkSettings(
+        station=first.station, checksum=checksum, also=[plc.station for plc in others])
     return Machine(
         lambda machine: RadioNode(machine, settings, ActiveStationList(), serve).run(first),
         checksum=checksum, duplex=Duplex.RADIO, timing=timing, counters=first.counters)

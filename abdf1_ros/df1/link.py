@@ -22,42 +22,13 @@ from functools import cache
 from typing import Protocol
 
 from abdf1_ros.df1.accounting import Accounting
-from abdf1_ros.df1.checksum import Checksum
-from abdf1_ros.df1.frames import ACK, Control, Duplex, Frame, Symbol
-from abdf1_ros.df1.machine import Heard, LineTiming, Machine, Procedure
+from abdf1_ros.df1.frames import ACK, Control, Frame, Symbol
+from abdf1_ros.df1.machine import Heard, Machine, MIN_RESPONSE_TIME, Procedure
 from abdf1_ros.df1.packet import Packet, REPLY_BIT
 from abdf1_ros.df1.sender import Reflex
 from abdf1_ros.df1.stations import ActiveStationList
 from abdf1_ros.df1.tasks import TaskSource
 from abdf1_ros.messages import Event
-
-
-@dataclass(frozen=True, slots=True)
-class LinkSettings:
-    """
-    What a link has to know of its line; times in seconds.
-
-    ``mode`` is Master, Slave, Peer or Radio, ``polling`` of a master Message or Standard.
-    ``timeout`` is for each answer of a station, ``cmd_timeout`` for a reply. ``store_forward`` and
-    ``avoids_collisions`` are those of a radio modem node.
-    """
-
-    mode: str
-    station: int
-    checksum: Checksum
-    timing: LineTiming
-    nak_retries: int = 3
-    enq_retries: int = 3
-    timeout: float = 1.0
-    cmd_timeout: float = 1.0
-    polling: str = 'Message'
-    store_forward: tuple[int, ...] = ()
-    avoids_collisions: bool = False
-
-    @property
-    def duplex(self) -> Duplex:
-        """Return the line discipline of the mode."""
-        return {'Peer': Duplex.FULL, 'Radio': Duplex.RADIO}.get(self.mode, Duplex.HALF)
 
 
 @cache
@@ -100,6 +71,15 @@ class LinkStatus:
 
 
 NO_STATUS = LinkStatus()
+
+# A pause of so many characters, plus the time that the equipment may hold bytes back, ends a
+# message that has broken off.
+_QUIET_CHARACTERS = 10
+
+
+def quiet_time(char_time: float) -> float:
+    """Return the seconds of silence after which nothing of a broken message follows."""
+    return MIN_RESPONSE_TIME + _QUIET_CHARACTERS * char_time
 
 
 class Link(Protocol):

@@ -41,10 +41,12 @@ from collections.abc import Callable, Generator
 
 from abdf1_ros.df1 import frames
 from abdf1_ros.df1.frames import Frame
-from abdf1_ros.df1.link import LinkStatus, NO_STATUS
+from abdf1_ros.df1.link import Link, LinkStatus, NO_STATUS
 from abdf1_ros.df1.machine import Heard, Machine, Procedure, Rest, Send, Step
-from abdf1_ros.df1.master_line import MasterLine, MasterSettings, MOST_QUEUED, poll_on_ack
+from abdf1_ros.df1.master_line import MasterLine, MOST_QUEUED, poll_on_ack
+from abdf1_ros.df1.mode import LineMode, Report, Serve
 from abdf1_ros.df1.packet import BROADCAST, Packet
+from abdf1_ros.df1.settings import LinkSettings
 from abdf1_ros.df1.stations import ActiveStationList
 from abdf1_ros.df1.tasks import Task, TaskSource
 from abdf1_ros.errors import CommandExpired, CommandTimeout, StationInactive
@@ -58,7 +60,7 @@ class HalfDuplexMaster:
     ``report`` and ``serve`` are those of ``MasterLine``.
     """
 
-    def __init__(self, machine: Machine, settings: MasterSettings, stations: ActiveStationList,
+    def __init__(self, machine: Machine, settings: LinkSettings, stations: ActiveStationList,
                  report: Callable[[Event], None] = lambda event: None,
                  serve: Callable[[Packet], Packet] | None = None) -> None:
         self._machine = machine
@@ -154,3 +156,21 @@ class HalfDuplexMaster:
         if self._settings.nak_on_command_timeout:
             self._line.counters.naks_sent += 1
             yield Send(frames.NAK)
+
+
+class MasterMode(LineMode):
+    """Master of a half-duplex line with message-based polling."""
+
+    name = 'Master'
+    polling = 'Message'
+    other_words = {'df1halfduplexmaster': 'Master', 'halfduplexmaster': 'Master',
+                   'halfduplex': 'Master, or Slave where another is the master'}
+    is_master = True
+    waits_for_acks = True
+
+    def make_link(self, machine: Machine, line: LinkSettings, stations: ActiveStationList,
+                  serve: Serve, report: Report) -> Link:
+        return HalfDuplexMaster(machine, line, stations, report, serve)
+
+
+MASTER = MasterMode()

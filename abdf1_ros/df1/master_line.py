@@ -28,27 +28,25 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Callable, Container, Generator, Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
 from functools import cache
 import math
 from typing import TypeGuard
 
 from abdf1_ros.df1 import frames
 from abdf1_ros.df1.accounting import Accounting, count_fault, wrong_message
-from abdf1_ros.df1.checksum import Checksum
 from abdf1_ros.df1.frames import Code, Control, Frame, FrameFault, Unknown
-from abdf1_ros.df1.link import ack_on_reply
+from abdf1_ros.df1.link import ack_on_reply, quiet_time
 from abdf1_ros.df1.machine import (
     Heard,
     Listen,
     LISTEN_ON,
     Machine,
-    MIN_RESPONSE_TIME,
     Procedure,
     Send,
     Silence,
     Step,
 )
+from abdf1_ros.df1.mode import answer_time
 from abdf1_ros.df1.packet import (
     BROADCAST,
     is_local_status,
@@ -57,6 +55,7 @@ from abdf1_ros.df1.packet import (
     STS_NOT_DELIVERED,
 )
 from abdf1_ros.df1.sender import Reflex
+from abdf1_ros.df1.settings import LinkSettings
 from abdf1_ros.df1.stations import ActiveStationList
 from abdf1_ros.df1.tasks import Task
 from abdf1_ros.errors import CommandExpired, StationInactive
@@ -85,31 +84,6 @@ _POLL_ANSWERS = (Control.EOT, Control.NAK)
 # A shorter time (s) counts as none: no wait ends so exactly.
 _MOMENT = 0.0001
 
-# A pause of so many characters, plus the time that the equipment may hold bytes back, ends a
-# message that has broken off.
-_QUIET_CHARACTERS = 10
-
-
-@dataclass(frozen=True, slots=True)
-class MasterSettings:
-    """
-    The settings of a half-duplex master, named as in S0; times in seconds.
-
-    ``poll_pause`` is the time between an EOT and the next poll of the same station, which lets it
-    finish. With ``accept_slave_messages`` commands of slaves are served, or passed on to their
-    destination; otherwise they are acknowledged and dropped.
-    """
-
-    station: int = 5
-    checksum: Checksum = Checksum.CRC
-    nak_retries: int = 3
-    enq_retries: int = 3
-    timeout: float = 1.0
-    cmd_timeout: float = 1.0
-    nak_on_command_timeout: bool = True
-    poll_pause: float = 0.005
-    accept_slave_messages: bool = True
-
 
 class MasterLine:
     """
@@ -120,7 +94,7 @@ class MasterLine:
     came too late for its poll, and returns whether a command waited for it.
     """
 
-    def __init__(self, machine: Machine, settings: MasterSettings, stations: ActiveStationList,
+    def __init__(self, machine: Machine, settings: LinkSettings, stations: ActiveStationList,
                  report: Callable[[Event], None] = lambda event: None,
                  serve: Callable[[Packet], Packet] | None = None,
                  take_reply: Callable[[int, Packet], bool] = lambda number, reply: False) -> None:
@@ -133,7 +107,7 @@ class MasterLine:
         self._report = report
         self._serve = serve
         self._take_reply = take_reply
-        self._timeout = max(settings.timeout, MIN_RESPONSE_TIME)
+        self._timeout = answer_time(settings)
         self._last_code = 0
         self.begin()
 
@@ -282,7 +256,7 @@ class MasterLine:
         A bit error that looks like a symbol ends the message for us, but its sender goes on
         sending and does not listen. Other symbols in the rest of the message mean nothing.
         """
-        quiet = MIN_RESPONSE_TIME + _QUIET_CHARACTERS * self.machine.timing.char_time
+        quiet = quiet_time(self.machine.timing.char_time)
         end = self.machine.now + quiet + frames.MAX_LINK_DATA * self.machine.timing.char_time
         left = quiet
         while left > _MOMENT:

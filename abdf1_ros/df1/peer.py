@@ -50,21 +50,21 @@ import math
 
 from abdf1_ros.df1 import frames
 from abdf1_ros.df1.accounting import count_fault, wrong_message
-from abdf1_ros.df1.checksum import Checksum
-from abdf1_ros.df1.frames import Code, Control, Frame, FrameFault, Symbol, Unknown
-from abdf1_ros.df1.link import ack_on_reply, EqualNode
+from abdf1_ros.df1.frames import Code, Control, Duplex, Frame, FrameFault, Symbol, Unknown
+from abdf1_ros.df1.link import ack_on_reply, EqualNode, Link
 from abdf1_ros.df1.machine import (
     Heard,
     Listen,
     Machine,
-    MIN_RESPONSE_TIME,
     Procedure,
     Rest,
     Send,
     Silence,
     Step,
 )
+from abdf1_ros.df1.mode import answer_time, LineMode, Report, Serve
 from abdf1_ros.df1.packet import Packet
+from abdf1_ros.df1.settings import LinkSettings
 from abdf1_ros.df1.stations import ActiveStationList
 from abdf1_ros.df1.tasks import Outstanding, Task, TaskSource
 from abdf1_ros.errors import (
@@ -94,29 +94,6 @@ _REFLEX = ack_on_reply()
 _TICK = 0.25
 
 
-@dataclass(frozen=True, slots=True)
-class PeerSettings:
-    """
-    The settings of a full-duplex peer, named as in S0; times in seconds.
-
-    Commands to another ``station`` than this are executed too, as the ports of SLC and MicroLogix
-    do, whose users therefore leave any number in a MSG; they are counted as wrongly addressed.
-    """
-
-    checksum: Checksum = Checksum.CRC
-    nak_retries: int = 3
-    enq_retries: int = 3
-    timeout: float = 1.0
-    cmd_timeout: float = 1.0
-    max_outstanding: int = 1
-    duplicate_detection: bool = True
-    station: int | None = None
-
-    def retry_time(self, enq_retries: int) -> float:
-        """Return the seconds that the other end needs for so many ENQs, at most."""
-        return (enq_retries + 1) * max(_ACK_TIMEOUT, self.timeout)
-
-
 @dataclass(slots=True)
 class _Accepted:
     """
@@ -142,12 +119,12 @@ class FullDuplexPeer(EqualNode):
     every numbered error and notice.
     """
 
-    def __init__(self, machine: Machine, settings: PeerSettings, stations: ActiveStationList,
+    def __init__(self, machine: Machine, settings: LinkSettings, stations: ActiveStationList,
                  serve: Callable[[Packet], Packet | None],
                  report: Callable[[Event], None] = lambda event: None) -> None:
         super().__init__(machine, stations, serve, report, settings.station)
         self._settings = settings
-        self._timeout = max(settings.timeout, MIN_RESPONSE_TIME)
+        self._timeout = answer_time(settings)
         self._forget()
 
     def run(self, source: TaskSource) -> Procedure:
@@ -396,7 +373,9 @@ class FullDuplexPeer(EqualNode):
             return False
         is_settled = last.is_answered and not last.may_come_again
         enq_retries = 0 if is_settled else max(_ENQ_LIMIT, settings.enq_retries)
-        return self._machine.now - last.when < settings.retry_time(enq_retries)
+        # What the other end needs for so many ENQs, at most.
+        retry_time = (enq_retries + 1) * max(_ACK_TIMEOUT, settings.timeout)
+        return self._machine.now - last.when < retry_time
 
     def _expect_repetition(self) -> None:
         """Take note that the other end may send its last message again."""
@@ -432,3 +411,37 @@ class FullDuplexPeer(EqualNode):
         self._counters.acks_sent += response == frames.ACK
         self._counters.naks_sent += response == frames.NAK
         return response
+
+
+class PeerMode(LineMode):
+    """One of the two ends of a full-duplex line."""
+
+    name = 'Peer'
+    other_words = {'fullduplex': 'Peer', 'full': 'Peer', 'df1fullduplex': 'Peer',
+                   'peertopeer': 'Peer'}
+    duplex = Duplex.FULL
+    has_one_plc = True
+    waits_for_acks = True
+    answers_by_itself = True
+
+    def make_link(self, machine: Machine, line: LinkSettings, stations: ActiveStationList,
+                  serve: Serve, report: Report) -> Link:
+        return FullDuplexPeer(machine, line, stations, serve, report)
+
+    def longest_transaction(self, line: LinkSettings, frames: float, others: float = 0.0,
+                            stations: int = 0) -> float:
+        """Return it with the pauses after NAKs and late responses."""
+        return super().longest_transaction(line, frames) + _pauses(line)
+
+    def longest_reply(self, line: LinkSettings, frames: float) -> float:
+        """Return how long the transfer of a reply takes: messages, ENQs and pauses."""
+        tries = line.nak_retries + line.enq_retries + 1
+        return tries * (answer_time(line) + frames) + _pauses(line)
+
+
+def _pauses(line: LinkSettings) -> float:
+    """Return the seconds of all pauses in a transfer that is repeated as often as can be."""
+    return _LATE_RESPONSE + _NAK_PAUSE * sum(range(line.nak_retries))
+
+
+PEER = PeerMode()

@@ -38,20 +38,22 @@ from __future__ import annotations
 
 from collections import defaultdict
 from collections.abc import Callable, Container
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from itertools import chain
 import math
 
 from abdf1_ros.df1.frames import Control, Frame
-from abdf1_ros.df1.link import LinkStatus, ScanTimes
+from abdf1_ros.df1.link import Link, LinkStatus, quiet_time, ScanTimes
 from abdf1_ros.df1.machine import Machine, Procedure, Rest
+from abdf1_ros.df1.master import MasterMode
 from abdf1_ros.df1.master_line import (
     is_good,
     MasterLine,
-    MasterSettings,
     MOST_QUEUED,
 )
+from abdf1_ros.df1.mode import answer_time, Report, Serve
 from abdf1_ros.df1.packet import BROADCAST, Packet
+from abdf1_ros.df1.settings import LinkSettings, PollingSettings
 from abdf1_ros.df1.stations import ActiveStationList
 from abdf1_ros.df1.tasks import Outstanding, Task, TaskSource
 from abdf1_ros.errors import (
@@ -74,23 +76,6 @@ _SLOW_TIME = 30.0
 
 # Pause between scans in which no station could be polled (s).
 _PAUSE = 0.05
-
-
-@dataclass(frozen=True, slots=True)
-class PollingSettings:
-    """
-    How stations are polled.
-
-    ``priority`` and ``normal`` are the poll lists; ``group_size`` normal stations are polled
-    in a scan, 0 for all. With ``multiple`` a station is polled until it has no more messages. With
-    ``in_sequence`` commands wait until the master's own address comes up.
-    """
-
-    normal: tuple[int, ...]
-    priority: tuple[int, ...] = ()
-    group_size: int = 0
-    multiple: bool = False
-    in_sequence: bool = False
 
 
 @dataclass(slots=True)
@@ -128,13 +113,13 @@ class StandardPollingMaster:
     ``report`` and ``serve`` are those of ``MasterLine``.
     """
 
-    def __init__(self, machine: Machine, settings: MasterSettings, polling: PollingSettings,
+    def __init__(self, machine: Machine, settings: LinkSettings,
                  stations: ActiveStationList,
                  report: Callable[[Event], None] = lambda event: None,
                  serve: Callable[[Packet], Packet] | None = None) -> None:
         self._machine = machine
         self._settings = settings
-        self._polling = polling
+        self._polling = polling = settings.polling or PollingSettings(())
         self._stations = stations
         self._line = MasterLine(machine, settings, stations, report, serve, self._take_reply)
         self._priority = _PollList(polling.priority)
@@ -383,3 +368,38 @@ class StandardPollingMaster:
         if number in self._unproven:
             self._unproven.remove(number)
             self._stations.polled_in_vain(begun, self._machine.now)
+
+
+class StandardPollingMode(MasterMode):
+    """Master of a half-duplex line that polls all stations in turns."""
+
+    polling = 'Standard'
+    takes_turns = True
+
+    def make_link(self, machine: Machine, line: LinkSettings, stations: ActiveStationList,
+                  serve: Serve, report: Report) -> Link:
+        """Return the link; every mapped station is polled: one without a poll could not reply."""
+        polling = line.polling or PollingSettings(())
+        listed = {*polling.priority, *polling.normal}
+        mapped = dict.fromkeys(stations.via(station.number) for station in stations)
+        polling = replace(polling, normal=(
+            *polling.normal, *(number for number in mapped if number not in listed)))
+        return StandardPollingMaster(
+            machine, replace(line, polling=polling), stations, report, serve)
+
+    def longest_transaction(self, line: LinkSettings, frames: float, others: float = 0.0,
+                            stations: int = 0) -> float:
+        """Return it with all that the other stations may have of the line meanwhile."""
+        poll = (line.enq_retries + 1) * (
+            answer_time(line) + others + quiet_time(line.timing.char_time))
+        # It leaves within a scan, and is polled for until Cmd_Timeout and for one scan more.
+        return super().longest_transaction(line, frames) + 2 * stations * (
+            poll + self.longest_reply(line, others))
+
+    def scan(self, line: LinkSettings, stations: int, response_time: float) -> float:
+        """Return how long a poll of every station takes, when none has anything to say."""
+        timing = line.timing
+        return stations * (_POLL_CHARACTERS * timing.char_time + timing.tx_delay + response_time)
+
+
+STANDARD = StandardPollingMode()

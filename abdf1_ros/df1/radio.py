@@ -33,16 +33,15 @@ its table, and not among the last packets.
 from __future__ import annotations
 
 from collections import defaultdict, deque
-from collections.abc import Callable, Collection
+from collections.abc import Callable
 from dataclasses import dataclass
 import math
 from random import Random
 
 from abdf1_ros.df1 import frames
 from abdf1_ros.df1.accounting import count_fault, wrong_message
-from abdf1_ros.df1.checksum import Checksum
-from abdf1_ros.df1.frames import Frame, MAX_LINK_DATA
-from abdf1_ros.df1.link import EqualNode, LinkSettings, LinkStatus
+from abdf1_ros.df1.frames import Duplex, Frame, MAX_LINK_DATA
+from abdf1_ros.df1.link import EqualNode, Link, LinkStatus
 from abdf1_ros.df1.machine import (
     Heard,
     HELD_BACK,
@@ -55,7 +54,9 @@ from abdf1_ros.df1.machine import (
     Silence,
     Step,
 )
+from abdf1_ros.df1.mode import LineMode, Report, Serve
 from abdf1_ros.df1.packet import BROADCAST, is_local_status, Packet
+from abdf1_ros.df1.settings import LinkSettings
 from abdf1_ros.df1.stations import ActiveStationList
 from abdf1_ros.df1.tasks import Task, TaskSource
 from abdf1_ros.errors import CommandExpired, PortLost, StationInactive
@@ -95,64 +96,6 @@ _TICK = 0.05
 MOST_UNDER_WAY = 4
 
 
-def usual_wait(line: LinkSettings) -> float:
-    """Return the seconds that a first try waits on a quiet line, mostly."""
-    if line.avoids_collisions:
-        return 0.0
-    timing = line.timing
-    most = MIN_RESPONSE_TIME + timing.tx_delay + _SHORT_FRAME * timing.char_time
-    return MIN_RESPONSE_TIME + _QUIET_CHARACTERS * timing.char_time + most / 2
-
-
-def longest_transaction(line: LinkSettings) -> float:
-    """Return the seconds of a command at most, with all its tries and frames."""
-    char_time = line.timing.char_time
-    frame = _LONG_FRAME * char_time
-    # What comes in is heard out, also where it breaks off.
-    heard = frame + _QUIET_CHARACTERS * char_time + HELD_BACK
-    wait = 0.0 if line.avoids_collisions else LONGEST_WAIT
-    send = wait + line.timing.tx_delay + frame + heard
-    # In turns go a packet of another, a repetition and, where there is room, a new command.
-    turns = 3 * MOST_UNDER_WAY if line.avoids_collisions else 2
-    return (line.nak_retries + 1) * (turns * send + line.cmd_timeout + heard)
-
-
-@dataclass(frozen=True, slots=True)
-class RadioSettings:
-    """
-    The settings of a node, times in seconds.
-
-    A command is sent again ``retries`` times, each ``cmd_timeout`` after the one before. Packets
-    between nodes of ``store_forward`` are sent again; 255 in it stands for broadcasts. ``also``
-    are further numbers that are ours: of PLCs that are simulated by one node. Where
-    the equipment ``avoids_collisions`` nothing waits for a quiet line, and several commands may
-    wait for their replies, one of each station.
-    """
-
-    station: int
-    checksum: Checksum = Checksum.CRC
-    retries: int = 3
-    cmd_timeout: float = 1.0
-    store_forward: Collection[int] = ()
-    also: Collection[int] = ()
-    avoids_collisions: bool = False
-
-    @property
-    def most_under_way(self) -> int:
-        """Return how many commands may wait for their replies."""
-        return MOST_UNDER_WAY if self.avoids_collisions else 1
-
-    @property
-    def repetition_time(self) -> float:
-        """Return the seconds within which a node of these settings repeats a command."""
-        return (self.retries + 1) * (self.cmd_timeout + 2 * LONGEST_WAIT)
-
-    @property
-    def numbers(self) -> set[int]:
-        """Return the numbers that this node answers to."""
-        return {self.station, *self.also}
-
-
 @dataclass(slots=True)
 class _Executed:
     """A command for us, when it came and was answered last (clock values in s), our reply."""
@@ -189,12 +132,17 @@ class RadioNode(EqualNode):
     ``report`` is called with every numbered error and notice. ``random`` gives times by chance.
     """
 
-    def __init__(self, machine: Machine, settings: RadioSettings, stations: ActiveStationList,
+    def __init__(self, machine: Machine, settings: LinkSettings, stations: ActiveStationList,
                  serve: Callable[[Packet], Packet | None],
                  report: Callable[[Event], None] = lambda event: None,
                  random: Random | None = None) -> None:
         super().__init__(machine, stations, serve, report, settings.station)
         self._settings = settings
+        self._numbers = {settings.station, *settings.also}
+        self._most_under_way = RADIO.most_under_way(settings)
+        # Within so many seconds a node of these settings repeats a command.
+        self._repetition_time = (settings.nak_retries + 1) * (
+            settings.cmd_timeout + 2 * LONGEST_WAIT)
         self._random = random or Random()
         self._same_number: float | None = None
         self._forget()
@@ -237,7 +185,7 @@ class RadioNode(EqualNode):
 
     @property
     def _has_room(self) -> bool:
-        return len(self._under_way) < self._settings.most_under_way
+        return len(self._under_way) < self._most_under_way
 
     def _overdue(self) -> _Command | None:
         """Return the command whose reply is overdue for the longest time, None for none."""
@@ -258,7 +206,7 @@ class RadioNode(EqualNode):
         number = task.command.dst
         self._accounting.sent(task.command)
         # A station that did not answer last time gets one try, not a whole cycle of them.
-        most = self._settings.retries + 1 if self._stations[number].active else 1
+        most = self._settings.nak_retries + 1 if self._stations[number].active else 1
         self._under_way[number] = command = _Command(task, most)
         yield from self._try(command)
         if number == BROADCAST and not self._is_over(command):
@@ -273,7 +221,8 @@ class RadioNode(EqualNode):
             self._accounting.late(task, keeps_others_waiting=True)
             if self._stations[number].active:  # not after the one try of a probe
                 self._counters.nak_limit_exceeded += 1
-                self._note(Message.NTC_NAK_LIMIT_EXCEEDED, self._settings.retries, station=number)
+                self._note(Message.NTC_NAK_LIMIT_EXCEEDED, self._settings.nak_retries,
+                           station=number)
             if task.blames:
                 self._accounting.lost(number, self._machine.now)
             task.fail(StationInactive(number))
@@ -356,10 +305,10 @@ class RadioNode(EqualNode):
             self._report(count_fault(symbol, self._settings.checksum, self._counters))
             return
         packet = Packet.decode(symbol.data)
-        if packet.src in self._settings.numbers:
+        if packet.src in self._numbers:
             self._hear_our_number(packet, symbol.data)
             return
-        is_ours = packet.dst in self._settings.numbers
+        is_ours = packet.dst in self._numbers
         is_known = self._is_known(symbol.data)
         between = {packet.src, packet.dst}
         if not is_known and not is_ours and between <= {*self._settings.store_forward}:
@@ -390,7 +339,7 @@ class RadioNode(EqualNode):
         """Execute a command once, and give its reply once more when it is repeated."""
         now, executed = self._machine.now, self._executed[command.src]
         known = next((entry for entry in executed if entry.command == command
-                      and now - entry.when < self._settings.repetition_time), None)
+                      and now - entry.when < self._repetition_time), None)
         if known is not None:
             self._counters.duplicate_messages += 1
             # What a node has sent on comes soon after the first; a sender waits for longer.
@@ -438,3 +387,52 @@ class RadioNode(EqualNode):
         if not is_local_status(packet.sts):
             self._stations.heard(packet.src, self._machine.now)
         self._accounting.complete(command.task, packet, keeps_others_waiting=True)
+
+
+class RadioMode(LineMode):
+    """A node of a network of radio modems."""
+
+    name = 'Radio'
+    other_words = {'df1radiomodem': 'Radio', 'radiomodem': 'Radio'}
+    duplex = Duplex.RADIO
+    answers = 1
+    why_unshared = 'in Mode Radio it has not been tried'
+
+    def make_link(self, machine: Machine, line: LinkSettings, stations: ActiveStationList,
+                  serve: Serve, report: Report) -> Link:
+        return RadioNode(machine, line, stations, serve, report)
+
+    def pause(self, line: LinkSettings) -> float:
+        """Return how long a first try waits for a quiet line, mostly."""
+        if line.avoids_collisions:
+            return 0.0
+        timing = line.timing
+        most = MIN_RESPONSE_TIME + timing.tx_delay + _SHORT_FRAME * timing.char_time
+        return MIN_RESPONSE_TIME + _QUIET_CHARACTERS * timing.char_time + most / 2
+
+    def most_under_way(self, line: LinkSettings) -> int:
+        return MOST_UNDER_WAY if line.avoids_collisions else 1
+
+    def longest_transaction(self, line: LinkSettings, frames: float = 0.0, others: float = 0.0,
+                            stations: int = 0) -> float:
+        """Return it with the longest frames there are."""
+        char_time = line.timing.char_time
+        frame = _LONG_FRAME * char_time
+        # What comes in is heard out, also where it breaks off.
+        heard = frame + _QUIET_CHARACTERS * char_time + HELD_BACK
+        wait = 0.0 if line.avoids_collisions else LONGEST_WAIT
+        send = wait + line.timing.tx_delay + frame + heard
+        # In turns go a packet of another, a repetition and, where there is room, a new command.
+        turns = 3 * MOST_UNDER_WAY if line.avoids_collisions else 2
+        return (line.nak_retries + 1) * (turns * send + line.cmd_timeout + heard)
+
+    def longest_reply(self, line: LinkSettings, frames: float) -> float:
+        """Return 0: packets that wait for their turn are part of a transaction."""
+        return 0.0
+
+    def longest_probe(self, line: LinkSettings) -> float:
+        """Return how long one command takes that is not answered."""
+        return line.cmd_timeout + self.pause(line)
+
+
+RADIO = RadioMode()

@@ -31,7 +31,6 @@ from typing import Protocol
 from abdf1_ros.counters import Counters
 from abdf1_ros.df1 import frames
 from abdf1_ros.df1.accounting import count_fault, wrong_message
-from abdf1_ros.df1.checksum import Checksum
 from abdf1_ros.df1.frames import Control, Frame, Poll, Symbol, Unknown
 from abdf1_ros.df1.machine import (
     Heard,
@@ -44,31 +43,13 @@ from abdf1_ros.df1.machine import (
     Step,
 )
 from abdf1_ros.df1.packet import BROADCAST, Packet
+from abdf1_ros.df1.settings import LinkSettings
 from abdf1_ros.errors import LineReset, LinkError, NeverTaken
 from abdf1_ros.messages import Event, Message
 
 # How often (s) a slave looks what has become overdue.
 TICK = 0.25
 _MOMENT = 0.0001  # s after the last byte
-
-
-@dataclass(frozen=True, slots=True)
-class SlaveSettings:
-    """
-    The settings of a slave, with the defaults of Allen-Bradley's.
-
-    ``retries`` is how often a message is sent again before it is given up; ``queue_size`` how
-    many replies may wait for a poll before the sink is full. With ``eot_suppression`` a poll is
-    not answered with EOT. That saves time with modems, but the master sees no difference to a
-    dead station.
-    """
-
-    station: int
-    checksum: Checksum = Checksum.CRC
-    retries: int = 3
-    queue_size: int = 4
-    eot_suppression: bool = False
-    duplicate_detection: bool = True
 
 
 class Initiator(Protocol):
@@ -110,7 +91,7 @@ class HalfDuplexSlave:
     ``respond`` returns, and calls ``make_use`` then; ``handle`` does both.
     """
 
-    def __init__(self, settings: SlaveSettings, serve: Callable[[Packet], Packet],
+    def __init__(self, settings: LinkSettings, serve: Callable[[Packet], Packet],
                  counters: Counters | None = None, initiator: Initiator | None = None,
                  report: Callable[[Event], None] = lambda event: None) -> None:
         self.counters = counters or Counters()
@@ -241,10 +222,10 @@ class HalfDuplexSlave:
         if not poll.valid or poll.station != self._settings.station:
             return b''
         self.counters.polls_received += 1
-        if self._held is not None and self._held.sent > self._settings.retries:
+        if self._held is not None and self._held.sent > self._settings.nak_retries:
             self.counters.nak_limit_exceeded += 1
-            self._report(Event(Message.NTC_NAK_LIMIT_EXCEEDED, (self._settings.retries,)))
-            self._release(NeverTaken(self._settings.retries))
+            self._report(Event(Message.NTC_NAK_LIMIT_EXCEEDED, (self._settings.nak_retries,)))
+            self._release(NeverTaken(self._settings.nak_retries))
         if self._initiator is not None:
             self._initiator.polled()
         if self._held is None:

@@ -26,10 +26,12 @@ from collections.abc import Callable
 import math
 
 from abdf1_ros.df1.accounting import Accounting
-from abdf1_ros.df1.link import LinkStatus
+from abdf1_ros.df1.link import Link, LinkStatus
 from abdf1_ros.df1.machine import Machine, Procedure, Rest, Silence
+from abdf1_ros.df1.mode import LineMode, Report, Serve
 from abdf1_ros.df1.packet import BROADCAST, is_local_status, Packet
-from abdf1_ros.df1.slave import answer, HalfDuplexSlave, SlaveSettings, TICK
+from abdf1_ros.df1.settings import LinkSettings
+from abdf1_ros.df1.slave import answer, HalfDuplexSlave, TICK
 from abdf1_ros.df1.stations import ActiveStationList
 from abdf1_ros.df1.tasks import Outstanding, TaskSource
 from abdf1_ros.errors import CommandExpired, CommandTimeout, LinkError
@@ -40,19 +42,17 @@ class SlaveLink:
     """
     Serve the master on the line of ``machine``, and send the commands of a source.
 
-    ``cmd_timeout`` (s) is how long a command waits for its reply after the master has taken
-    it, or before that for the next poll, ``poll_timeout`` (s, 0 for never) is when commands fail
-    without a poll. ``serve`` and ``report`` are those of every link. It is the ``Initiator`` of
+    A command waits Cmd_Timeout for its reply after the master has taken it, or before that for the
+    next poll. ``serve`` and ``report`` are those of every link. It is the ``Initiator`` of
     its own slave. ``last_poll`` is the clock value (s) of the last poll, or of the start.
     """
 
-    def __init__(self, machine: Machine, settings: SlaveSettings, stations: ActiveStationList,
-                 serve: Callable[[Packet], Packet], *, cmd_timeout: float, poll_timeout: float,
+    def __init__(self, machine: Machine, settings: LinkSettings, stations: ActiveStationList,
+                 serve: Callable[[Packet], Packet],
                  report: Callable[[Event], None] = lambda event: None) -> None:
         self._machine = machine
         self._stations = stations
-        self._cmd_timeout = cmd_timeout
-        self._poll_timeout = poll_timeout
+        self._settings = settings
         self._accounting = Accounting(machine.counters, stations, report, settings.station)
         self._slave = HalfDuplexSlave(settings, serve, machine.counters, self, report)
         self._source: TaskSource | None = None
@@ -102,7 +102,7 @@ class SlaveLink:
         if entry is None or entry.is_delivered:
             return
         # A command that is not repeated must not wait until a master comes back.
-        entry.deadline = self.last_poll + self._cmd_timeout
+        entry.deadline = self.last_poll + self._settings.cmd_timeout
         if self.last_poll > entry.task.expires:
             self._outstanding = None
             self._slave.withdraw()
@@ -117,7 +117,7 @@ class SlaveLink:
         if task is None:
             return None
         task.sent = True
-        self._outstanding = Outstanding(task, now + self._cmd_timeout)
+        self._outstanding = Outstanding(task, now + self._settings.cmd_timeout)
         return task.command
 
     def delivered(self, command: Packet) -> None:
@@ -130,7 +130,7 @@ class SlaveLink:
             entry.task.reply(command.reply())
             return
         entry.is_delivered = True
-        entry.deadline = self._machine.now + self._cmd_timeout
+        entry.deadline = self._machine.now + self._settings.cmd_timeout
 
     def undelivered(self, command: Packet, error: LinkError) -> None:
         """Fail the command that the master did not take."""
@@ -155,7 +155,7 @@ class SlaveLink:
         source.expire(now)
         entry = self._outstanding
         is_overdue = entry is not None and now >= entry.deadline
-        is_alone = 0 < self._poll_timeout <= now - self.last_poll
+        is_alone = 0 < self._settings.poll_timeout <= now - self.last_poll
         if is_overdue or is_alone:
             self._slave.withdraw()
             self._fail()
@@ -171,3 +171,19 @@ class SlaveLink:
         entry, self._outstanding = self._outstanding, None
         if entry is not None:
             self._accounting.overdue(entry.task, keeps_others_waiting=entry.is_delivered)
+
+
+class SlaveMode(LineMode):
+    """A slave: the master polls, and passes commands and replies on."""
+
+    name = 'Slave'
+    other_words = {'df1halfduplexslave': 'Slave', 'halfduplexslave': 'Slave'}
+    is_polled = True
+    why_unshared = "a slave cannot send a guest's commands"
+
+    def make_link(self, machine: Machine, line: LinkSettings, stations: ActiveStationList,
+                  serve: Serve, report: Report) -> Link:
+        return SlaveLink(machine, line, stations, serve, report)
+
+
+SLAVE = SlaveMode()

@@ -28,6 +28,7 @@ import math
 from typing import Protocol
 
 from abdf1_ros.counters import Counters
+from abdf1_ros.df1.frames import Duplex
 from abdf1_ros.df1.machine import Procedure
 from abdf1_ros.df1.packet import BROADCAST, Packet
 from abdf1_ros.df1.stations import ActiveStationList, Station
@@ -40,7 +41,7 @@ from abdf1_ros.driver.inbox import Inbox
 from abdf1_ros.driver.interlocks.heartbeat import LARGEST
 from abdf1_ros.driver.interlocks.queue import Interlocks
 from abdf1_ros.driver.job_tasks import JobTasks
-from abdf1_ros.driver.links import DriverSettings, make_link, make_machine
+from abdf1_ros.driver.links import DriverSettings, make_machine
 from abdf1_ros.driver.reads.read_backs import ReadBacks
 from abdf1_ros.driver.reads.readings import Readings, ValueListener
 from abdf1_ros.driver.record import Claim, WriteRecord
@@ -55,7 +56,7 @@ from abdf1_ros.pccc.families import served_counters
 from abdf1_ros.pccc.file_types import PlcType
 from abdf1_ros.pccc.identity import Identity
 from abdf1_ros.plan.bounds import MODE_PERIOD
-from abdf1_ros.plan.forecast import answer_time, line_model, longest_probe, poll_cycle
+from abdf1_ros.plan.forecast import answer_time, line_model, poll_cycle
 from abdf1_ros.plan.planner import Block, Planner
 from abdf1_ros.settings.mapping import Mapping
 from abdf1_ros.settings.network import Network
@@ -83,7 +84,7 @@ class Listener(ValueListener, Protocol):
 def _routes(network: Network, mappings: Iterable[Mapping]) -> dict[int, int]:
     """Return the gateway of each station that is behind one; only a master addresses them."""
     return {mapping.station: mapping.via for mapping in mappings
-            if mapping.via is not None and network.mode == 'Master'}
+            if mapping.via is not None and network.line_mode.is_master}
 
 
 class Driver:
@@ -94,11 +95,13 @@ class Driver:
         self.network = network
         self.mappings = tuple(mappings)
         self.counters = Counters()
-        self.machine = make_machine(network.line, self._run, self.counters, self)
+        self.machine = make_machine(
+            network.line_mode, network.line, self._run, self.counters, self)
         self.stations = ActiveStationList(
             (mapping.station for mapping in mappings
              if not mapping.serves and mapping.station != BROADCAST), self._station_changed,
-            _routes(network, mappings), longest_probe(network), self.machine.took)
+            _routes(network, mappings), network.line_mode.longest_probe(network.line),
+            self.machine.took)
         self.is_online = False
         self._is_ending = False
         self._settings = settings
@@ -106,8 +109,8 @@ class Driver:
         self._inbox: Inbox[Write] = Inbox(is_open=False)
         self._make_queues()
         self._served = self._make_served()
-        self.link = make_link(network.line, settings, self.machine, self.stations,
-                              self._serve, listener.happened)
+        self.link = network.line_mode.make_link(
+            self.machine, network.link(settings), self.stations, self._serve, listener.happened)
         self.expected_poll_cycle = poll_cycle(self.blocks, answer_time(network, self.blocks))
 
     def _make_queues(self) -> None:
@@ -233,7 +236,8 @@ class Driver:
         plc_type, mode = PlcType(self.network.plc_type), self.network.mode
         counters = served_counters(self.counters, plc_type, mode)
         return Served(
-            plc_type, self.mappings, self._readings.served, counters, mode == 'Peer')
+            plc_type, self.mappings, self._readings.served, counters,
+            self.network.duplex is Duplex.FULL)
 
     def next_task(self, now: float, busy: Container[int] = ()) -> Task | None:
         """Return the command that has the line next, not for a ``busy`` station."""
@@ -270,7 +274,7 @@ class Driver:
 
     def _station_of_guest(self, dst: int) -> int:
         """Return whom a guest means; a peer has one PLC, whatever number others give it."""
-        if self.network.mode != 'Peer':
+        if not self.network.line_mode.has_one_plc:
             return dst
         return next((station.number for station in self.stations), dst)
 

@@ -22,16 +22,18 @@ from __future__ import annotations
 
 from collections.abc import Callable, Container, Mapping, Sequence
 from contextlib import suppress
+from dataclasses import replace
 from typing import Any, TypeVar
 
 from abdf1_ros.counters import Counters
-from abdf1_ros.df1.link import LinkSettings
 from abdf1_ros.df1.machine import Procedure
+from abdf1_ros.df1.mode import LineMode
+from abdf1_ros.df1.settings import LinkSettings
 from abdf1_ros.df1.stations import ActiveStationList
 from abdf1_ros.df1.tasks import Task
 from abdf1_ros.driver.inbox import Inbox
 from abdf1_ros.driver.job_tasks import Job, JobTasks
-from abdf1_ros.driver.links import DriverSettings, make_link, make_machine
+from abdf1_ros.driver.links import make_machine
 from abdf1_ros.errors import LinkError, PortLost
 from abdf1_ros.pccc.data_table import DataTable
 from abdf1_ros.pccc.dialect import Steps
@@ -72,21 +74,21 @@ class Requests:
     are refused, except an echo and the diagnostic status, which is that of a ``plc_type``.
     """
 
-    def __init__(self, line: LinkSettings, absent: Sequence[int] = (), first_tns: int = 0,
-                 routes: Mapping[int, int] | None = None,
+    def __init__(self, mode: LineMode, line: LinkSettings, absent: Sequence[int] = (),
+                 first_tns: int = 0, routes: Mapping[int, int] | None = None,
                  plc_type: PlcType = PlcType.PLC5) -> None:
         self.counters = Counters()
         self.stations = ActiveStationList(absent, routes=routes)
         for number in absent:
             self.stations.lost(number, 0.0)
-        self.machine = make_machine(line, self._run, self.counters)
-        self._tasks = JobTasks(line.station, first_tns)
+        self.machine = make_machine(mode, line, self._run, self.counters)
+        self._tasks = JobTasks(line.station or 0, first_tns)
         self._waiting: Inbox[_RequestJob] = Inbox()
         self._lost: LinkError = PortLost('not opened yet')
         # Without DLE NAK, which would make other stations of a line in use drop their replies.
-        self._link = make_link(line, DriverSettings(nak_on_command_timeout=False),
-                               self.machine, self.stations, Server(DataTable(plc_type)).serve,
-                               lambda event: None)
+        self._link = mode.make_link(
+            self.machine, replace(line, nak_on_command_timeout=False), self.stations,
+            Server(DataTable(plc_type)).serve, lambda event: None)
 
     def add(self, station: int, work: Steps[_Result], succeed: Callable[[_Result], None],
             fail: Callable[[Exception], None]) -> None:

@@ -25,8 +25,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 import math
 
-from abdf1_ros.df1.frames import MAX_LINK_DATA
-from abdf1_ros.df1.machine import MIN_RESPONSE_TIME
+from abdf1_ros.df1.frames import Duplex, MAX_LINK_DATA
 from abdf1_ros.pccc.steps import write_requests
 from abdf1_ros.pccc.values import ValueType
 from abdf1_ros.plan import forecast
@@ -48,14 +47,6 @@ OWN_IN_A_ROW = 7
 # The time base (s) of the PLC's timers; so many units of it rung 5 is longer than rung 3.
 TIME_BASE = 0.01
 STABLE = 100
-
-# A poll, and DLE EOT as the answer.
-_POLL_CHARACTERS = 6
-
-# After so many characters of silence a message has broken off; the pauses of a peer (s).
-_QUIET_CHARACTERS = 10
-_LATE_RESPONSE = 0.1
-_NAK_PAUSE = 0.25
 
 # A heartbeat with a shorter Period (ms) may be quicker than a PLC's scan.
 _SHORT_PERIOD = 200
@@ -122,7 +113,8 @@ class Times:
                      if (mapping.heartbeat or mapping.fallback) and not mapping.serves]
         self._blocks = blocks
         self._response_time = response_time
-        self._is_standard = network.mode == 'Master' and network.polling == 'Standard'
+        self._mode = network.line_mode
+        self._stations = {mapping.station for mapping in mappings if not mapping.serves}
         own = max((max(_packets(network, mapping)) for mapping in self._own), default=0.0)
         read = max((forecast.longest_wait([block], 0.0) for block in blocks), default=0.0)
         written = max((max(_packets(network, mapping)) for mapping in mappings
@@ -132,7 +124,8 @@ class Times:
         guest = forecast.line_model(network).transaction_time(MAX_LINK_DATA, MAX_LINK_DATA) \
             if network.share else 0.0
         self._any_frames = max(own, read, written, guest, _question_time(network, 0.0))
-        self.longest = forecast.longest_transaction(network) + own
+        self.longest = self._mode.longest_transaction(
+            network.line, self._any_frames, self._any_frames, len(self._stations))
 
     def bounds(self) -> Iterator[Bound]:
         """Yield the bound of every row with Fallback, and the preset for every heartbeat."""
@@ -141,11 +134,11 @@ class Times:
 
     def _bound(self, mapping: Mapping) -> Bound:
         if mapping.fallback is None:
-            return Bound(mapping, None if self._network.mode == 'Slave' else self._preset(mapping))
+            return Bound(mapping, None if self._mode.is_polled else self._preset(mapping))
         after = mapping.fallback.after / 1000
         if mapping.serves:
             return Bound(mapping, after)
-        if self._network.mode == 'Slave':
+        if self._mode.is_polled:
             return Bound(mapping, None)
         return Bound(mapping, after + self._wait(mapping), after + self._usual_wait(mapping))
 
@@ -162,10 +155,10 @@ class Times:
         network = self._network
         # In standard polling the others have the line meanwhile; that is in each scan.
         own = [other for other in self._own
-               if not self._is_standard or other.station == mapping.station]
+               if not self._mode.takes_turns or other.station == mapping.station]
         writes = sum(len(_packets(network, other)) for other in own)
         reads = 1 + (writes - 1) // OWN_IN_A_ROW
-        if network.line.avoids_collisions or self._is_standard and len(own) < len(self._own):
+        if self._mode.most_under_way(network.line) > 1 or len(own) < len(self._own):
             reads = writes  # others may have had the writes between two reads
         # What is under way, the reads that have a turn in between, and all of ours.
         return (1 + reads) * self._at_most(self._any_frames) + writes * self._at_most(self._frames)
@@ -179,36 +172,15 @@ class Times:
 
     def _at_most(self, frames: float) -> float:
         """Return the seconds of a transaction whose ``frames`` take so long (s) on the line."""
-        network, char_time = self._network, self._network.timing.char_time
-        if network.mode == 'Radio':
-            return forecast.longest_transaction(network)
-        longest = max(network.nak_retries, network.enq_retries) + 1
-        # A frame that breaks off is over after a pause, and a peer pauses after NAKs and retries.
-        quiet = MIN_RESPONSE_TIME + _QUIET_CHARACTERS * char_time
-        # Cmd_Timeout runs from the beginning of the try that is acknowledged.
-        timeout, tries = network.timeout / 1000, network.nak_retries + network.enq_retries + 1
-        total = tries * timeout + max(network.cmd_timeout / 1000, timeout) \
-            + longest * (frames + quiet)
-        if network.mode == 'Peer':
-            total += _LATE_RESPONSE + _NAK_PAUSE * sum(range(network.nak_retries))
-        deliver = (network.nak_retries + 1) * (timeout + frames)
-        if any(mapping.serves for mapping in self._mappings):
-            total += deliver  # of a reply of ours, which takes turns with our commands
-        if not self._is_standard:
-            return total
-        stations = {mapping.station for mapping in self._mappings if not mapping.serves}
-        poll = (network.enq_retries + 1) * (timeout + self._any_frames + quiet)
-        # It leaves within a scan, and is polled for until Cmd_Timeout and for one scan more.
-        return total + 2 * len(stations) * (poll + deliver)
+        mode, line = self._mode, self._network.line
+        total = mode.longest_transaction(line, frames, self._any_frames, len(self._stations))
+        if mode.answers_by_itself or any(mapping.serves for mapping in self._mappings):
+            total += mode.longest_reply(line, self._any_frames)  # takes turns with our commands
+        return total
 
     def _poll_scan(self) -> float:
         """Return the seconds of one poll of every station, where these are polled in turns."""
-        if not self._is_standard:
-            return 0.0
-        stations = {mapping.station for mapping in self._mappings if not mapping.serves}
-        timing = self._network.timing
-        return len(stations) * (
-            _POLL_CHARACTERS * timing.char_time + timing.tx_delay + self._response_time)
+        return self._mode.scan(self._network.line, len(self._stations), self._response_time)
 
     def advice(self) -> Iterator[str]:
         """Yield which setting would shorten bounds and presets most, if that is worth it."""
@@ -309,7 +281,7 @@ def conditions(network: Network, mappings: Iterable[Mapping]) -> Iterator[str]:
     """Yield what has to be so that the bounds of a line hold, and is not in its settings."""
     own = any((mapping.heartbeat or mapping.fallback) and not mapping.serves
               for mapping in mappings)
-    if network.mode != 'Radio' or not own:
+    if network.duplex is not Duplex.RADIO or not own:
         return
     yield ('bounds by radio: NAK_Retries makes up for lost commands. It does not for lost replies '
            'of a PLC that drops repetitions, as SLC and MicroLogix do: that PLC then counts as '

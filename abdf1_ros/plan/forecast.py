@@ -24,9 +24,6 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
-from abdf1_ros.df1 import radio
-from abdf1_ros.df1.machine import MIN_RESPONSE_TIME
-from abdf1_ros.df1.radio import MOST_UNDER_WAY
 from abdf1_ros.plan.line_model import LineModel
 from abdf1_ros.plan.planner import Block
 from abdf1_ros.settings.mapping import Mapping
@@ -34,7 +31,6 @@ from abdf1_ros.settings.network import Network
 
 USUAL_RESPONSE_TIME = 0.01
 ANSWERS = 2
-_POLL_CHARACTERS = 4
 
 # A read without a period gets the time that the others leave, but at least one turn in so many
 # times the time of reading everything once.
@@ -43,8 +39,8 @@ PATIENCE = 4
 
 def line_model(network: Network) -> LineModel:
     """Return the line of a net CSV."""
-    wait = radio.usual_wait(network.line) if network.mode == 'Radio' else 0.0
-    return LineModel(network.checksum, network.duplex, network.timing, wait)
+    mode = network.line_mode
+    return LineModel(network.checksum, mode.duplex, network.timing, mode.pause(network.line))
 
 
 def block_time(block: Block, response_time: float = USUAL_RESPONSE_TIME) -> float:
@@ -59,11 +55,10 @@ def answer_time(network: Network, blocks: Iterable[Block],
 
     By radio a transaction has one answer, and several stations may work on theirs at a time.
     """
-    if network.mode != 'Radio':
-        return response_time
+    mode, line = network.line_mode, network.line
     stations = len({block.station for block in blocks})
-    at_once = MOST_UNDER_WAY if network.line.avoids_collisions else 1
-    return response_time / ANSWERS / max(1, min(at_once, stations))
+    at_once = max(1, min(mode.most_under_way(line), stations))
+    return response_time * mode.answers / ANSWERS / at_once
 
 
 def poll_cycle(blocks: Iterable[Block], response_time: float = USUAL_RESPONSE_TIME) -> float:
@@ -124,23 +119,3 @@ def stale_times(blocks: Iterable[Block], default_period: float, stale_after: flo
 def period_of(mapping: Mapping, default_period: float) -> float:
     """Return the seconds that a mapping wants from one read to the next."""
     return default_period if mapping.period is None else mapping.period / 1000
-
-
-def longest_transaction(network: Network) -> float:
-    """
-    Return the seconds that a transaction takes at most, every repetition included (S0).
-
-    The time of the frames on the line has to be added, but not by radio.
-    """
-    if network.mode == 'Radio':
-        return radio.longest_transaction(network.line)
-    tries = network.nak_retries + 1 + network.enq_retries + 1
-    return (tries * network.timeout + network.cmd_timeout) / 1000
-
-
-def longest_probe(network: Network) -> float:
-    """Return the seconds that one poll of a silent station takes, or one command by radio."""
-    if network.mode == 'Radio':
-        return network.cmd_timeout / 1000 + radio.usual_wait(network.line)
-    return max(network.timeout / 1000, MIN_RESPONSE_TIME) + network.timing.tx_delay \
-        + _POLL_CHARACTERS * network.timing.char_time

@@ -289,12 +289,12 @@ def _station_remarks(report: Report) -> Iterator[Remark]:
                 f'station {station} has more than one PLC_Type: {kinds}'), station)
         yield from _file_remarks(station, mappings)
     yield from _gateway_remarks(network, stations)
-    if network.mode == 'Peer' and 0 in (network.station, *stations):
+    if network.line_mode.has_one_plc and 0 in (network.station, *stations):
         whose = 'our own Station is 0' if network.station == 0 else 'station 0 is in the map'
         yield Remark(RemarkKind.STATION, (
             f'{whose}: a message to station 0 begins with 00, and neither BCC nor CRC notices '
             'when that is lost on a full-duplex line; any other number is safe'), 0)
-    if network.mode == 'Peer' and len(stations) > 1:
+    if network.line_mode.has_one_plc and len(stations) > 1:
         listed = ', '.join(map(str, sorted(stations)))
         yield Remark(RemarkKind.STATION, (
             f'a full-duplex line has one PLC, the map has stations {listed}; only a gateway '
@@ -325,7 +325,7 @@ def _gateway_remarks(network: Network,
         via = mappings[0].via
         if via is None:
             continue
-        if network.mode != 'Master':
+        if not network.line_mode.is_master:
             yield Remark(RemarkKind.STATION, (
                 f'station {station} of {_tags(mappings)}: Via is for Mode Master; in Mode '
                 f'{network.mode} the gateway is not addressed'), station)

@@ -35,17 +35,18 @@ def line_problems(mappings: Sequence[Mapping],
                   network: Network) -> list[tuple[Mapping, Problem]]:
     """Return the rows that clash with ``network`` or an earlier Serve row, and why."""
     found: list[tuple[Mapping, Problem]] = []
+    mode = network.line_mode
     table = DataTable(PlcType(network.plc_type))
     for mapping in mappings:
         text = None
         if mapping.serves:
             text = _fault(mapping, network, table)
-        elif mapping.station == BROADCAST and network.mode == 'Peer':
+        elif mapping.station == BROADCAST and mode.has_one_plc:
             text = 'Station 255 is for a line with many stations, not for Mode Peer'
-        elif mapping.station == network.station and network.mode != 'Peer':
+        elif mapping.station == network.station and not mode.has_one_plc:
             text = (f'Station {mapping.station} is our own in the net file; here belongs the '
                     'station to read or write')
-        elif mapping.via == network.station and network.mode == 'Master':
+        elif mapping.via == network.station and mode.is_master:
             text = f'Via {mapping.via} is our own Station in the net file, not a gateway'
         if text is not None:
             found.append((mapping, Problem(mapping.place, f'Item: {mapping.item}, {text}')))

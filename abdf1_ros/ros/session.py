@@ -101,9 +101,9 @@ class Session:
         self.reads = ReadTopics(node, surroundings.published)
         self._seen = Seen(latest=self.reads.latest)
         self._events = LineEvents(
-            node.get_logger(), self.port, stations_of(mappings), scans=network.mode != 'Peer',
-            seen=self._seen, read=self.reads.read, results=surroundings.results,
-            table_changed=self._publish_active)
+            node.get_logger(), self.port, stations_of(mappings),
+            scans=not network.line_mode.has_one_plc, seen=self._seen, read=self.reads.read,
+            results=surroundings.results, table_changed=self._publish_active)
         self.driver = Driver(network, mappings, configuration.driver_settings(), self._events)
         # Subscriptions first: where there are thousands of publishers, each takes DDS 5 ms.
         self._writers = surroundings.writes.open(

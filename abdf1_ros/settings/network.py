@@ -16,6 +16,7 @@
 
 from __future__ import annotations
 
+from collections import ChainMap
 from collections.abc import Iterator
 from collections.abc import Mapping as MappingType
 from dataclasses import dataclass, field, fields, replace
@@ -25,9 +26,11 @@ from urllib.parse import urlsplit
 
 from abdf1_ros.df1.checksum import Checksum
 from abdf1_ros.df1.frames import Duplex
-from abdf1_ros.df1.link import LinkSettings
 from abdf1_ros.df1.machine import LineTiming
+from abdf1_ros.df1.mode import LineMode
+from abdf1_ros.df1.modes import mode_of, MODES
 from abdf1_ros.df1.packet import BROADCAST
+from abdf1_ros.df1.settings import LinkOptions, LinkSettings
 from abdf1_ros.df1.stations import MAX_STATION
 from abdf1_ros.messages import Message
 from abdf1_ros.numbers import whole_number
@@ -40,16 +43,9 @@ from abdf1_ros.settings.share import share_places
 from abdf1_ros.settings.station_lists import octal_remarks, parse_stations
 from abdf1_ros.text import shown
 
-MODES = ('Master', 'Slave', 'Peer', 'Radio')
-_MODE_WORDS = {
-    'fullduplex': 'Peer', 'full': 'Peer', 'df1fullduplex': 'Peer', 'peertopeer': 'Peer',
-    'halfduplex': 'Master, or Slave where another is the master', 'df1halfduplexmaster': 'Master',
-    'halfduplexmaster': 'Master', 'df1halfduplexslave': 'Slave', 'halfduplexslave': 'Slave',
-    'df1radiomodem': 'Radio', 'radiomodem': 'Radio'}
-POLLING_MODES = ('Message', 'Standard')
+MODE_NAMES = tuple(dict.fromkeys(mode.name for mode in MODES))
+POLLING_MODES = tuple(mode.polling for mode in MODES if mode.polling)
 PLC_TYPES = tuple(entry.value for entry in FAMILIES)
-_WITHOUT_SHARE = {'Slave': "a slave cannot send a guest's commands",
-                  'Radio': 'in Mode Radio it has not been tried'}
 # Schemes of the URLs of device servers; each has a module in ``ports``.
 DEVICE_SERVERS = ('socket', 'rfc2217')
 URLS = ' or '.join(f'{scheme}://host:port' for scheme in DEVICE_SERVERS)
@@ -130,9 +126,10 @@ class Network:
         'Station', 5, 'DF1 address of this node', low=0, high=MAX_STATION,
         message=Message.CRT_BAD_STATION_ID, message_args=(255,))
     mode: str = _net(
-        'Mode', 'Master', 'driver mode', choices=MODES,
+        'Mode', 'Master', 'driver mode', choices=MODE_NAMES,
         message=Message.CRT_BAD_DRIVER_MODE,
-        message_args=('Master', 'Slave, Peer', 'Radio'), other_words=_MODE_WORDS)
+        message_args=('Master', 'Slave, Peer', 'Radio'),
+        other_words=dict(ChainMap(*(dict(mode.other_words) for mode in MODES))))
     plc_type: str = _net(
         'PLC_Type', 'PLC5', 'PLC that this node emulates', choices=PLC_TYPES,
         message=Message.CRT_BAD_PLC_TYPE, message_args=PLC_TYPES)
@@ -186,17 +183,27 @@ class Network:
 
     @property
     def line(self) -> LinkSettings:
-        """Return what a link has to know of it."""
-        return LinkSettings(
-            self.mode, self.station, self.checksum, self.timing, self.nak_retries,
-            self.enq_retries, self.timeout / 1000, self.cmd_timeout / 1000, self.polling,
-            parse_stations(self.store_forward, BROADCAST)[0],
-            self.mode == 'Radio' and self.collision_avoidance == 'Yes')
+        """Return the settings of the link, with the usual options."""
+        return self.link(LinkOptions())
+
+    def link(self, options: LinkOptions) -> LinkSettings:
+        """Return the settings of the link with such options."""
+        return LinkSettings.of(
+            options, station=self.station, checksum=self.checksum, timing=self.timing,
+            nak_retries=self.nak_retries, enq_retries=self.enq_retries,
+            timeout=self.timeout / 1000, cmd_timeout=self.cmd_timeout / 1000,
+            store_forward=parse_stations(self.store_forward, BROADCAST)[0],
+            avoids_collisions=self.duplex is Duplex.RADIO and self.collision_avoidance == 'Yes')
+
+    @property
+    def line_mode(self) -> LineMode:
+        """Return the mode of the line."""
+        return mode_of(self.mode, self.polling)
 
     @property
     def duplex(self) -> Duplex:
         """Return the line discipline of the mode."""
-        return self.line.duplex
+        return self.line_mode.duplex
 
     @property
     def port(self) -> str:
@@ -273,10 +280,10 @@ def make_network(values: MappingType[str, tuple[str, Place | str]],
         else:
             if fault := _FAULTS[name](checked[name]) if name in _FAULTS else '':
                 problems.append(Problem(where, fault))
-    if checked['share'] and checked['mode'] in _WITHOUT_SHARE:
+    why_unshared = mode_of(checked['mode'], checked['polling']).why_unshared
+    if checked['share'] and why_unshared:
         where = values.get('share', ('', 'Share'))[1]
-        problems.append(Problem(where, (
-            f'Share needs Mode Master or Peer: {_WITHOUT_SHARE[checked["mode"]]}')))
+        problems.append(Problem(where, f'Share needs Mode Master or Peer: {why_unshared}'))
     if problems:
         raise ConfigurationError(problems)
     given = {FIELDS[name].column for name in values}

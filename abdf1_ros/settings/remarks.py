@@ -20,6 +20,7 @@ from collections.abc import Iterator
 import math
 import re
 
+from abdf1_ros.df1.frames import Duplex
 from abdf1_ros.df1.machine import MIN_RESPONSE_TIME
 from abdf1_ros.pccc.address import Address
 from abdf1_ros.pccc.file_types import FileType, PlcType
@@ -44,9 +45,10 @@ def network_remarks(network: Network) -> Iterator[str]:
     if network.data_bits < 8:
         yield (f'Data_Bits {network.data_bits}: DF1 sends bytes of 8 bits; with less the check of '
                'nearly every message fails')
-    if network.mode in ('Master', 'Peer'):
+    mode = network.line_mode
+    if mode.waits_for_acks:
         yield from _time_remarks(network)
-    if network.mode != 'Radio':
+    if mode.duplex is not Duplex.RADIO:
         for column, value in (('Store_Forward', network.store_forward),
                               ('Collision_Avoidance', network.collision_avoidance == 'Yes')):
             if value:
@@ -61,7 +63,7 @@ def _time_remarks(network: Network) -> Iterator[str]:
                f'{MIN_RESPONSE_TIME * 1000:.0f} ms until a station answers and two characters at '
                f'{network.baud} baud; answers may come too late')
     # The command comes before the reply, and in half duplex the poll as well.
-    times = 1 if network.mode == 'Peer' else 2
+    times = 1 if network.duplex is Duplex.FULL else 2
     if times * network.tx_delay >= network.cmd_timeout:
         yield (f'TX_Delay {network.tx_delay} ms comes {"once" if times == 1 else "twice"} before '
                f'a reply can come, which is all of Cmd_Timeout {network.cmd_timeout} ms')

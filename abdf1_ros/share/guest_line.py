@@ -22,7 +22,8 @@ from functools import partial
 from abdf1_ros.df1.frames import Duplex
 from abdf1_ros.df1.machine import LineTiming, Machine, Procedure
 from abdf1_ros.df1.packet import Packet
-from abdf1_ros.df1.peer import FullDuplexPeer, PeerSettings
+from abdf1_ros.df1.peer import FullDuplexPeer
+from abdf1_ros.df1.settings import LinkSettings
 from abdf1_ros.df1.stations import ActiveStationList
 from abdf1_ros.df1.tasks import Task
 from abdf1_ros.driver.guests import Guest, GuestCommand, GuestQueue, ShareAccess
@@ -77,7 +78,8 @@ class GuestLine:
         self._machine = Machine(self._run, checksum=checksum, duplex=Duplex.FULL,
                                 timing=LineTiming(char_time))
         self._peer = FullDuplexPeer(
-            self._machine, PeerSettings(checksum), ActiveStationList(), self._take)
+            self._machine, LinkSettings(station=None, checksum=checksum), ActiveStationList(),
+            self._take)
         self.link = LinkThread(self._machine, self._open, on_state=self._changed, on_fault=fault)
         self.link.daemon = True  # a guest never holds the process
 

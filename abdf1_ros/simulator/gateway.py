@@ -21,7 +21,8 @@ from collections.abc import Sequence
 from abdf1_ros.df1.checksum import Checksum
 from abdf1_ros.df1.frames import Symbol
 from abdf1_ros.df1.packet import Packet, STS_NOT_DELIVERED
-from abdf1_ros.df1.slave import HalfDuplexSlave, Responder, SlaveSettings
+from abdf1_ros.df1.settings import LinkSettings
+from abdf1_ros.df1.slave import HalfDuplexSlave, Responder
 from abdf1_ros.pccc.diagnostics import CMD, ECHO, STATUS
 from abdf1_ros.pccc.status import STS_ILLEGAL_COMMAND
 from abdf1_ros.simulator.simulated_plc import SimulatedPlc
@@ -39,7 +40,7 @@ class SimulatedGateway:
     """
 
     def __init__(self, station: int, plcs: Sequence[SimulatedPlc], checksum: Checksum) -> None:
-        self.slave = HalfDuplexSlave(SlaveSettings(station, checksum), self._serve)
+        self.slave = HalfDuplexSlave(LinkSettings(station=station, checksum=checksum), self._serve)
         self._station = station
         self._plcs = {plc.station: plc for plc in plcs}
 

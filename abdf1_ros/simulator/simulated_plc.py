@@ -31,7 +31,8 @@ from abdf1_ros.df1 import frames
 from abdf1_ros.df1.checksum import Checksum
 from abdf1_ros.df1.frames import Frame, Poll, Symbol
 from abdf1_ros.df1.packet import Packet
-from abdf1_ros.df1.slave import HalfDuplexSlave, SlaveSettings
+from abdf1_ros.df1.settings import LinkSettings
+from abdf1_ros.df1.slave import HalfDuplexSlave
 from abdf1_ros.df1.stations import MAX_STATION
 from abdf1_ros.errors import FormatError, LinkError, RemoteError
 from abdf1_ros.numbers import decimal_number, whole_number
@@ -145,7 +146,7 @@ class SimulatedPlc:
         self.table = table
         self.faults = InjectedFaults()
         self.processor = EmulatedProcessor(table.plc_type)
-        self.slave = HalfDuplexSlave(SlaveSettings(station, checksum), self.serve)
+        self.slave = HalfDuplexSlave(LinkSettings(station=station, checksum=checksum), self.serve)
         self.outbox: deque[Sending] = deque()
         self._server = self._make_server('Slave')
         self._tns = random.Random(seed).randrange(0x10000)

@@ -24,8 +24,9 @@ from abdf1_ros.conform.wire import Wire
 from abdf1_ros.df1.checksum import Checksum
 from abdf1_ros.df1.frames import Duplex
 from abdf1_ros.df1.machine import Machine, Procedure
-from abdf1_ros.df1.peer import FullDuplexPeer, PeerSettings
-from abdf1_ros.df1.radio import RadioNode, RadioSettings
+from abdf1_ros.df1.peer import FullDuplexPeer
+from abdf1_ros.df1.radio import RadioNode
+from abdf1_ros.df1.settings import LinkSettings
 from abdf1_ros.df1.slave import multidrop
 from abdf1_ros.df1.stations import ActiveStationList
 from abdf1_ros.driver.driver import Driver
@@ -58,9 +59,11 @@ def answering(family: str, check: str, target: Target) -> SpoiledLine:
 
     def run(machine: Machine) -> Procedure:
         if target.is_radio:
-            settings = RadioSettings(1, Checksum[check], store_forward={1, 5, 254, 255})
+            settings = LinkSettings(
+                station=1, checksum=Checksum[check], store_forward={1, 5, 254, 255})
             return RadioNode(machine, settings, ActiveStationList(), plc.serve).run(plc)
-        return FullDuplexPeer(machine, PeerSettings(Checksum[check]), ActiveStationList(),
+        return FullDuplexPeer(machine, LinkSettings(station=None, checksum=Checksum[check]),
+                              ActiveStationList(),
                               plc.serve).run(plc)
 
     plc.be_full_duplex()

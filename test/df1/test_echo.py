@@ -20,11 +20,8 @@ from random import Random
 from abdf1_ros.df1.checksum import Checksum
 from abdf1_ros.df1.frames import ACK, ENQ, EOT, master_frame, message_frame, NAK, poll_frame
 from abdf1_ros.df1.machine import LineTiming
-from abdf1_ros.df1.master_line import MasterSettings
 from abdf1_ros.df1.packet import Packet
-from abdf1_ros.df1.peer import PeerSettings
-from abdf1_ros.df1.polling import PollingSettings
-from abdf1_ros.df1.slave import SlaveSettings
+from abdf1_ros.df1.settings import LinkSettings, PollingSettings
 from abdf1_ros.errors import StationInactive
 import pytest
 from support.multidrop import MasterBench, MasterNode, SlaveBench
@@ -32,7 +29,7 @@ from support.peers import CommandTask, PeerBench, PeerNode, single_bytes
 from support.virtual_line import char_time, Noise, VirtualLine
 
 US, PLC = 5, 1
-SETTINGS = PeerSettings(timeout=0.3, cmd_timeout=0.5)
+SETTINGS = LinkSettings(station=None, timeout=0.3, cmd_timeout=0.5)
 COMMAND = Packet(PLC, US, 0x0F, 0, 0x1034, b'\x68\x10\x02\x10')
 THEIRS = Packet(US, PLC, 0x0F, 0, 0x7710, b'\x67\x00\x01')
 NOISY = Noise(lost=0.002, flipped=0.005, doubled=0.002, inserted=0.002)
@@ -86,7 +83,7 @@ def test_noise_makes_no_plc_of_an_echo(seed: int) -> None:
 
 @pytest.mark.parametrize('polling', [None, PollingSettings((PLC,))])
 def test_master_alone_with_its_echo_hears_nobody(polling: PollingSettings | None) -> None:
-    settings = MasterSettings(US, timeout=0.1, cmd_timeout=0.5)
+    settings = LinkSettings(station=US, timeout=0.1, cmd_timeout=0.5)
     node = MasterNode(settings, lambda: line.now, polling, numbers=[PLC],
                       timing=LineTiming(char_time(19200)))
     line = VirtualLine(node.machine)
@@ -98,7 +95,7 @@ def test_master_alone_with_its_echo_hears_nobody(polling: PollingSettings | None
 
 
 def test_master_and_slaves_that_all_hear_themselves() -> None:
-    bench = MasterBench(1, 2, settings=MasterSettings(US, timeout=0.1))
+    bench = MasterBench(1, 2, settings=LinkSettings(station=US, timeout=0.1))
     bench.line.echoes = True
     bench.start()
     tasks = [bench.ask(number) for number in (1, 2) * 5]
@@ -111,7 +108,7 @@ def test_master_and_slaves_that_all_hear_themselves() -> None:
 
 
 def test_slave_passes_over_its_own_message_before_the_ack() -> None:
-    bench = SlaveBench(SlaveSettings(PLC))
+    bench = SlaveBench(LinkSettings(station=PLC))
     command = COMMAND._replace(data=b'\x68')
     assert bench.hear(master_frame(PLC, command.encode(), Checksum.CRC)) == ACK
     said = bench.hear(poll_frame(PLC))

@@ -22,9 +22,9 @@ from abdf1_ros.counters import Counters
 from abdf1_ros.df1.checksum import Checksum
 from abdf1_ros.df1.machine import LineTiming, Machine, Procedure, Rest
 from abdf1_ros.df1.master import HalfDuplexMaster
-from abdf1_ros.df1.master_line import MasterSettings
 from abdf1_ros.df1.packet import Packet
-from abdf1_ros.df1.slave import HalfDuplexSlave, multidrop, SlaveSettings
+from abdf1_ros.df1.settings import LinkSettings
+from abdf1_ros.df1.slave import HalfDuplexSlave, multidrop
 from abdf1_ros.df1.stations import ActiveStationList
 from abdf1_ros.errors import CommandTimeout, LinkError, StationInactive
 from abdf1_ros.pccc.data_table import DataTable
@@ -54,7 +54,7 @@ class Plc:
         self.executed: Counter[int] = Counter()
         self.commands: dict[int, Packet] = {}
         self.replies: dict[int, Packet] = {}
-        self.slave = HalfDuplexSlave(SlaveSettings(number, checksum), self._serve)
+        self.slave = HalfDuplexSlave(LinkSettings(station=number, checksum=checksum), self._serve)
         self._server = Server(self.table)
 
     def _serve(self, command: Packet) -> Packet:
@@ -84,12 +84,13 @@ class Rig:
     timing: LineTiming = LineTiming(char_time(BAUD))
     propagation: float = 0.001
     chunk: int = 1
-    settings: MasterSettings = field(init=False)
+    settings: LinkSettings = field(init=False)
     outcomes: list[Outcome] = field(default_factory=list)
 
     def __post_init__(self) -> None:
-        self.settings = MasterSettings(
-            MASTER, self.checksum, nak_retries=3, enq_retries=3, timeout=0.1, cmd_timeout=0.5,
+        self.settings = LinkSettings(
+            station=MASTER, checksum=self.checksum, nak_retries=3, enq_retries=3, timeout=0.1,
+            cmd_timeout=0.5,
             poll_pause=0.005)
         self.plcs = {number: Plc(number, self.checksum) for number in FAMILIES}
         self.stations = ActiveStationList(FAMILIES)

@@ -21,8 +21,9 @@ from abdf1_ros.df1.checksum import Checksum
 from abdf1_ros.df1.frames import ACK, EOT, master_frame, message_frame, NAK, poll_frame, STX
 from abdf1_ros.df1.machine import LineTiming, MIN_RESPONSE_TIME
 from abdf1_ros.df1.master import HalfDuplexMaster
-from abdf1_ros.df1.master_line import MasterSettings, MOST_QUEUED
+from abdf1_ros.df1.master_line import MOST_QUEUED
 from abdf1_ros.df1.packet import Packet
+from abdf1_ros.df1.settings import LinkSettings
 from abdf1_ros.errors import CommandTimeout, LinkError, StationInactive, WrongCommandCode
 import pytest
 from support.script import Answer, Expect, MasterScript, Murmur, Silence
@@ -32,7 +33,7 @@ SLAVE, MASTER = 17, 5
 COMMAND = Packet(SLAVE, MASTER, 0x0F, 0, 0x0102, bytes.fromhex('A2 02 07 89 00 00'))
 REPLY = COMMAND.reply(b'\x34\x12')
 STALE = REPLY._replace(tns=0x0101)
-SETTINGS = MasterSettings(
+SETTINGS = LinkSettings(
     station=MASTER, nak_retries=2, enq_retries=2, timeout=0.5, cmd_timeout=2.0, poll_pause=0.005)
 
 SENT = Expect(master_frame(SLAVE, COMMAND.encode(), Checksum.CRC))
@@ -77,7 +78,7 @@ def inactive_script() -> MasterScript:
     return script
 
 
-def replied(*parts: Expect | Answer | Silence, settings: MasterSettings = SETTINGS,
+def replied(*parts: Expect | Answer | Silence, settings: LinkSettings = SETTINGS,
             timing: LineTiming | None = None) -> MasterScript:
     """Play COMMAND with these parts, see that it brings REPLY, and return the script."""
     script = MasterScript(settings, timing)
@@ -393,7 +394,7 @@ def test_command_timeout_counts_from_the_transmission_that_was_acknowledged() ->
 
 
 def test_lost_command_with_the_defaults_of_the_specification() -> None:
-    settings = MasterSettings(station=MASTER)
+    settings = LinkSettings(station=MASTER)
     assert settings.timeout == settings.cmd_timeout
     script = MasterScript(settings)
     assert script.run(COMMAND, SENT, Silence(settings.timeout), SENT, SAYS_ACK, POLLED, SAYS_EOT,
@@ -826,7 +827,7 @@ def test_every_event_names_its_station() -> None:
 
 
 def test_settings_default_to_those_of_the_specification() -> None:
-    settings = MasterSettings()
+    settings = LinkSettings()
     assert (settings.station, settings.checksum, settings.nak_retries, settings.enq_retries) == (
         5, Checksum.CRC, 3, 3)
     assert (settings.timeout, settings.cmd_timeout) == (1.0, 1.0)

@@ -19,9 +19,9 @@ import itertools
 
 from abdf1_ros.df1.checksum import Checksum
 from abdf1_ros.df1.frames import master_frame, Poll, STX, Symbol
-from abdf1_ros.df1.master_line import BROADCAST_PAUSE, MasterSettings, MAX_FORWARDS
+from abdf1_ros.df1.master_line import BROADCAST_PAUSE, MAX_FORWARDS
 from abdf1_ros.df1.packet import BROADCAST, Packet
-from abdf1_ros.df1.polling import PollingSettings
+from abdf1_ros.df1.settings import LinkSettings, PollingSettings
 from abdf1_ros.df1.slave import multidrop
 from abdf1_ros.errors import PortLost, StationInactive
 import pytest
@@ -29,13 +29,13 @@ from support.multidrop import MasterBench, Slave
 from support.vectors import vector
 
 MASTER = 5
-SETTINGS = MasterSettings(
+SETTINGS = LinkSettings(
     station=MASTER, nak_retries=1, enq_retries=1, timeout=0.1, cmd_timeout=0.5)
 BOTH = pytest.mark.parametrize('standard', [False, True], ids=['message', 'standard'])
 
 
 def bench(standard: bool, *numbers: int, dead: tuple[int, ...] = (),
-          settings: MasterSettings = SETTINGS, serves: bool = True) -> MasterBench:
+          settings: LinkSettings = SETTINGS, serves: bool = True) -> MasterBench:
     """Return a master of either kind and its stations."""
     polling = PollingSettings(numbers) if standard else None
     return MasterBench(*numbers, settings=settings, polling=polling, dead=dead,
@@ -250,7 +250,7 @@ def test_broadcast_does_not_enter_the_list_of_stations(standard: bool) -> None:
 def test_no_ack_for_a_command_that_cannot_be_kept(dst: int) -> None:
     # Without the NAK, which would make the slave drop what it holds.
     rig = bench(False, 7, 8, settings=replace(SETTINGS, nak_on_command_timeout=False))
-    rig[7].slave._settings = replace(rig[7].slave._settings, retries=200)
+    rig[7].slave._settings = replace(rig[7].slave._settings, nak_retries=200)
     for _ in range(MAX_FORWARDS + 1):
         rig.message(7, dst)
     rig[7].delay = 0.0

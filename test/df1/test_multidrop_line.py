@@ -19,11 +19,9 @@ from random import Random
 
 from abdf1_ros.df1.checksum import Checksum
 from abdf1_ros.df1.machine import LineTiming
-from abdf1_ros.df1.master_line import MasterSettings
 from abdf1_ros.df1.packet import Packet
-from abdf1_ros.df1.polling import PollingSettings
 from abdf1_ros.df1.sender import Sender
-from abdf1_ros.df1.slave import SlaveSettings
+from abdf1_ros.df1.settings import LinkSettings, PollingSettings
 from abdf1_ros.errors import CommandTimeout, LineReset, NeverTaken, StationInactive
 from abdf1_ros.pccc.data_table import DataTable
 from abdf1_ros.pccc.families import dialect_of, parse_address
@@ -60,12 +58,13 @@ class Rig:
         self.replies: dict[tuple[int, int, int], Packet] = {}
         self.commands: dict[tuple[int, int, int], Packet] = {}
         timing = LineTiming(char_time(BAUD))
-        settings = MasterSettings(MASTER, checksum, timeout=0.1, cmd_timeout=0.5)
+        settings = LinkSettings(station=MASTER, checksum=checksum, timeout=0.1, cmd_timeout=0.5)
         self.master = MasterNode(settings, self.clock, MODES[mode], numbers=SLAVES,
                                  serve=lambda command: self.serve(MASTER, command),
                                  timing=timing)
         self.slaves = {number: SlaveNode(
-            SlaveSettings(number, checksum), self.clock, cmd_timeout=2.0, poll_timeout=5.0,
+            LinkSettings(station=number, checksum=checksum, cmd_timeout=2.0, poll_timeout=5.0),
+            self.clock,
             serve=lambda command, number=number: self.serve(number, command),
             timing=timing) for number in SLAVES}
         self.nodes: dict[int, MasterNode | SlaveNode] = {MASTER: self.master, **self.slaves}

@@ -22,7 +22,8 @@ from abdf1_ros.df1.checksum import Checksum
 from abdf1_ros.df1.frames import ACK, Duplex, ENQ, EOT, ETX, MAX_LINK_DATA, message_frame, NAK, STX
 from abdf1_ros.df1.machine import LineTiming
 from abdf1_ros.df1.packet import Packet
-from abdf1_ros.df1.peer import MAX_WAITING_REPLIES, PeerSettings
+from abdf1_ros.df1.peer import MAX_WAITING_REPLIES
+from abdf1_ros.df1.settings import LinkSettings
 from abdf1_ros.errors import CommandTimeout, StationInactive, WrongCommandCode
 from hypothesis import given
 from hypothesis import strategies as st
@@ -45,9 +46,10 @@ def bench(checksum: Checksum = Checksum.CRC, *, nak_retries: int = 3, enq_retrie
           duplicate_detection: bool = True,
           serve: Callable[[Packet], Packet] = Packet.reply) -> PeerBench:
     """Return a peer on a scripted line."""
-    settings = PeerSettings(
-        checksum, nak_retries, enq_retries, timeout, CMD_TIMEOUT, max_outstanding,
-        duplicate_detection)
+    settings = LinkSettings(
+        station=None, checksum=checksum, nak_retries=nak_retries, enq_retries=enq_retries,
+        timeout=timeout, cmd_timeout=CMD_TIMEOUT, max_outstanding=max_outstanding,
+        duplicate_detection=duplicate_detection)
     return PeerBench(settings, timing, serve)
 
 
@@ -79,7 +81,7 @@ def later(packet: Packet, number: int) -> Packet:
 
 @pytest.mark.parametrize(('dst', 'count'), [(5, 0), (6, 1), (255, 1)])
 def test_command_to_another_station_is_executed_and_counted(dst: int, count: int) -> None:
-    peer = PeerBench(PeerSettings(station=5))
+    peer = PeerBench(LinkSettings(station=5))
     command = THEIRS._replace(dst=dst)
     assert peer.hear_packet(command) == ACK + peer.frame(command.reply())
     assert peer.served == [command]
@@ -603,7 +605,7 @@ def test_response_leaves_before_the_message_is_made_use_of() -> None:
         order.append('served')
         return command.reply()
 
-    peer = PeerBench(PeerSettings(), serve=serve)
+    peer = PeerBench(LinkSettings(station=None), serve=serve)
     Wire(peer.machine, lambda data: order.append(data.hex())).attach(peer.now)
     assert peer.hear_packet(THEIRS) == peer.frame(THEIRS.reply())
     assert order == [ACK.hex(), 'served']
@@ -1167,7 +1169,7 @@ def test_reply_of_another_transaction_or_station_is_dropped(other: Packet, count
 
 
 def test_reply_for_another_node_is_dropped() -> None:
-    peer = PeerBench(PeerSettings(station=COMMAND.src, cmd_timeout=CMD_TIMEOUT))
+    peer = PeerBench(LinkSettings(station=COMMAND.src, cmd_timeout=CMD_TIMEOUT))
     task = peer.begin(COMMAND)
     assert peer.said() == peer.frame(COMMAND)
     assert peer.hear(ACK, peer.frame(REPLY._replace(dst=0))) == ACK

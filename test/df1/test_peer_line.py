@@ -23,8 +23,8 @@ from random import Random
 from abdf1_ros.df1.checksum import Checksum
 from abdf1_ros.df1.machine import LineTiming, Machine
 from abdf1_ros.df1.packet import Packet
-from abdf1_ros.df1.peer import PeerSettings
 from abdf1_ros.df1.sender import Sender
+from abdf1_ros.df1.settings import LinkSettings
 from abdf1_ros.errors import CommandTimeout, StationInactive
 from abdf1_ros.pccc.address import Address
 from abdf1_ros.pccc.data_table import DataTable
@@ -40,14 +40,14 @@ WORDS = 60
 STATIONS = {5: PlcType.SLC, 1: PlcType.PLC5}
 # The longest message, stuffed to the last byte, with the longest pause inside it.
 LONGEST = 2 * 270 * char_time(BAUD) + 20 * char_time(BAUD) + 0.1
-SETTINGS = PeerSettings(timeout=0.1, cmd_timeout=0.5)
-PATIENT = PeerSettings(timeout=1.0, cmd_timeout=3.0)
+SETTINGS = LinkSettings(station=None, timeout=0.1, cmd_timeout=0.5)
+PATIENT = LinkSettings(station=None, timeout=1.0, cmd_timeout=3.0)
 
 
 class End(PeerNode):
     """One end: it asks the other at random and remembers what it has executed."""
 
-    def __init__(self, rig: Rig, number: int, settings: PeerSettings) -> None:
+    def __init__(self, rig: Rig, number: int, settings: LinkSettings) -> None:
         super().__init__(settings, lambda: rig.line.now, serve=self._answer,
                          timing=LineTiming(char_time(BAUD)))
         self.number = number
@@ -92,7 +92,7 @@ class End(PeerNode):
 class Rig:
     """Two ends and the line between them."""
 
-    def __init__(self, settings: PeerSettings, *, noise: Noise = QUIET, chunk: int = 1,
+    def __init__(self, settings: LinkSettings, *, noise: Noise = QUIET, chunk: int = 1,
                  seed: int = 1) -> None:
         self.random = Random(seed)
         self.ends = [End(self, number, settings) for number in STATIONS]
@@ -275,7 +275,8 @@ def test_line_that_goes_and_comes_again() -> None:
 
 
 def test_ack_that_waits_behind_a_long_message_is_awaited() -> None:
-    rig = Rig(PeerSettings(timeout=0.02, cmd_timeout=1.0, enq_retries=0, max_outstanding=3))
+    rig = Rig(LinkSettings(station=None, timeout=0.02, cmd_timeout=1.0, enq_retries=0,
+                           max_outstanding=3))
     rig.run(100)
     assert_exact(rig)
     for end in rig.ends:

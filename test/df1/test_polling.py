@@ -23,9 +23,10 @@ from typing import Any
 
 from abdf1_ros.df1.checksum import Checksum
 from abdf1_ros.df1.frames import message_frame
-from abdf1_ros.df1.master_line import BROADCAST_PAUSE, MasterSettings, MOST_QUEUED
+from abdf1_ros.df1.master_line import BROADCAST_PAUSE, MOST_QUEUED
 from abdf1_ros.df1.packet import BROADCAST, Packet
-from abdf1_ros.df1.polling import COMMANDS_BETWEEN_POLLS, PollingSettings
+from abdf1_ros.df1.polling import COMMANDS_BETWEEN_POLLS
+from abdf1_ros.df1.settings import LinkSettings, PollingSettings
 from abdf1_ros.df1.slave import multidrop
 from abdf1_ros.errors import CommandTimeout, PortLost, StationInactive, WrongCommandCode
 import hypothesis
@@ -34,7 +35,7 @@ import pytest
 from support.multidrop import MasterBench
 from support.peers import CommandTask
 
-SETTINGS = MasterSettings(station=5, nak_retries=1, enq_retries=2, timeout=0.1, cmd_timeout=0.5)
+SETTINGS = LinkSettings(station=5, nak_retries=1, enq_retries=2, timeout=0.1, cmd_timeout=0.5)
 
 
 # Of a line with three stations: delivery and Cmd_Timeout, then a scan until the next answer, one
@@ -44,7 +45,7 @@ LONGEST = 2 * _TRY + 0.5 + 2 * (3 * (2 + 3) + 1) * _TRY
 
 
 def bench(polling: PollingSettings, *, dead: tuple[int, ...] = (),
-          settings: MasterSettings = SETTINGS, **options: Any) -> MasterBench:
+          settings: LinkSettings = SETTINGS, **options: Any) -> MasterBench:
     """Return a master and the stations of its lists."""
     numbers = sorted({*polling.priority, *polling.normal} - {settings.station})
     return MasterBench(*numbers, settings=settings, polling=polling, dead=dead, **options)

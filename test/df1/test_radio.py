@@ -18,16 +18,16 @@ from __future__ import annotations
 
 from collections import Counter, defaultdict
 from collections.abc import Callable, Container, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 import heapq
 from random import Random
 
 from abdf1_ros.df1.checksum import Checksum
 from abdf1_ros.df1.frames import ACK, Duplex, ENQ, message_frame, NAK
-from abdf1_ros.df1.link import LinkSettings
 from abdf1_ros.df1.machine import LineTiming, Machine
 from abdf1_ros.df1.packet import BROADCAST, Packet
-from abdf1_ros.df1.radio import longest_transaction, MOST_UNDER_WAY, RadioNode, RadioSettings
+from abdf1_ros.df1.radio import MOST_UNDER_WAY, RADIO, RadioNode
+from abdf1_ros.df1.settings import LinkSettings
 from abdf1_ros.df1.stations import ActiveStationList
 from abdf1_ros.errors import CommandExpired, PortLost, StationInactive
 from abdf1_ros.messages import Event
@@ -52,7 +52,7 @@ def framed(packet: Packet) -> bytes:
 class Node(CommandTasks):
     """A node with its machine, its commands, and what it has executed."""
 
-    def __init__(self, settings: RadioSettings, clock: Callable[[], float], seed: int = 1) -> None:
+    def __init__(self, settings: LinkSettings, clock: Callable[[], float], seed: int = 1) -> None:
         super().__init__(clock)
         self.settings = settings
         self.events: list[Event] = []
@@ -85,7 +85,7 @@ class Bench(Node):
 
     def __init__(self, **settings: object) -> None:
         self.now = 100.0
-        super().__init__(RadioSettings(US, **settings), lambda: self.now)  # type: ignore
+        super().__init__(LinkSettings(station=US, **settings), lambda: self.now)  # type: ignore
         self.stations.add((PLC, OTHER))
         self.machine.start(self.now)
 
@@ -124,7 +124,7 @@ def test_command_is_answered_by_its_reply_without_any_symbol() -> None:
 
 @pytest.mark.parametrize('retries', [0, 1, 3])
 def test_command_without_reply_is_repeated_as_it_is_until_the_limit(retries: int) -> None:
-    bench = Bench(retries=retries)
+    bench = Bench(nak_retries=retries)
     task = bench.begin(COMMAND)
     assert bench.wait(30.0) == [framed(COMMAND)] * (retries + 1)
     assert isinstance(task.result, StationInactive)
@@ -139,7 +139,7 @@ def test_command_without_reply_is_repeated_as_it_is_until_the_limit(retries: int
 
 
 def test_command_of_a_guest_without_reply_says_nothing_about_the_station() -> None:
-    bench = Bench(retries=1)
+    bench = Bench(nak_retries=1)
     task = bench.begin(COMMAND)
     task.blames = False
     assert bench.wait(30.0) == [framed(COMMAND)] * 2
@@ -489,8 +489,8 @@ def test_nothing_is_executed_twice_nothing_is_wrong_and_everything_ends(
     random = Random(f'{count} {loss} {seed}')
     retries = 3
     table = {*range(1, count + 1)} if reach is chain else set[int]()
-    nodes = [Node(RadioSettings(number, Checksum.CRC, retries, CMD_TIMEOUT, table,
-                                avoids_collisions=avoids_collisions),
+    nodes = [Node(LinkSettings(station=number, nak_retries=retries, cmd_timeout=CMD_TIMEOUT,
+                               store_forward=table, avoids_collisions=avoids_collisions),
                   lambda: air.now, seed + number) for number in range(1, count + 1)]
     holds_back = avoids_collisions and seed % 2 == 0  # or somebody has set what they cannot do
     air = Air([node.machine for node in nodes], reach, loss, seed, holds_back=holds_back)
@@ -538,17 +538,17 @@ def test_transaction_ends_within_its_bound_whatever_the_others_send(
         reach: Callable[[int, int], bool], avoids_collisions: bool, seed: int) -> None:
     random, retries = Random(seed), 2
     table = {*range(1, 6)} if reach is chain else set[int]()
-    nodes = [Node(RadioSettings(number, Checksum.CRC, retries, CMD_TIMEOUT, table,
-                                avoids_collisions=avoids_collisions), lambda: air.now, seed)
+    settings = LinkSettings(
+        timing=LineTiming(char_time(BAUD)), nak_retries=retries, cmd_timeout=CMD_TIMEOUT,
+        store_forward=table, avoids_collisions=avoids_collisions)
+    nodes = [Node(replace(settings, station=number), lambda: air.now, seed)
              for number in range(1, 6)]
     air = Air([node.machine for node in nodes], reach, 0.3, seed, holds_back=avoids_collisions)
     air.start()
     for node in nodes:
         node.stations.add(range(1, 6))
     ours = nodes[0]
-    bound = longest_transaction(LinkSettings(
-        'Radio', 1, Checksum.CRC, LineTiming(char_time(BAUD)), retries, cmd_timeout=CMD_TIMEOUT,
-        avoids_collisions=avoids_collisions))
+    bound = RADIO.longest_transaction(settings)
     for tns in range(30):
         for src, node in enumerate(nodes[1:], 2):
             dst = random.choice([number for number in range(1, 6) if number != src])

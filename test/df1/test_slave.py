@@ -35,7 +35,8 @@ from abdf1_ros.df1.frames import (
 )
 from abdf1_ros.df1.machine import Machine
 from abdf1_ros.df1.packet import BROADCAST, Packet
-from abdf1_ros.df1.slave import HalfDuplexSlave, multidrop, SlaveSettings
+from abdf1_ros.df1.settings import LinkSettings
+from abdf1_ros.df1.slave import HalfDuplexSlave, multidrop
 import pytest
 
 STATION = 7
@@ -47,10 +48,10 @@ HEARD_ACK, HEARD_NAK = Control(Code.ACK), Control(Code.NAK)
 class Bench:
     """A slave, and the commands it has executed."""
 
-    def __init__(self, sts: int = 0, settings: SlaveSettings | None = None) -> None:
+    def __init__(self, sts: int = 0, settings: LinkSettings | None = None) -> None:
         self.served: list[Packet] = []
         self._sts = sts
-        self.slave = HalfDuplexSlave(settings or SlaveSettings(STATION), self._serve)
+        self.slave = HalfDuplexSlave(settings or LinkSettings(station=STATION), self._serve)
 
     def _serve(self, command: Packet) -> Packet:
         self.served.append(command)
@@ -124,7 +125,7 @@ def test_frame_for_a_node_behind_the_station_is_accepted_by_its_stn() -> None:
     (FrameFault.NO_ETX, Checksum.BCC, 'invalid_messages')])
 def test_bad_frame_is_met_with_silence(fault: FrameFault, checksum: Checksum,
                                        counter: str) -> None:
-    bench = Bench(settings=SlaveSettings(STATION, checksum))
+    bench = Bench(settings=LinkSettings(station=STATION, checksum=checksum))
     assert bench.hear(sent(COMMAND, fault=fault)) == [b'']
     assert (bench.served, bench.counts()) == ([], {counter: 1})
 
@@ -133,7 +134,7 @@ def test_bad_frame_is_met_with_silence(fault: FrameFault, checksum: Checksum,
 @pytest.mark.parametrize('tns', [0x0107, 0x0100])
 def test_command_that_lost_its_leading_00_is_met_with_silence(checksum: Checksum,
                                                               tns: int) -> None:
-    bench = Bench(settings=SlaveSettings(0, checksum))
+    bench = Bench(settings=LinkSettings(station=0, checksum=checksum))
     command = COMMAND._replace(dst=0, tns=tns)
     moved = Frame(command.encode()[1:], 0)
     assert bench.hear(moved, sent(command, 0)) == [b'', ACK]
@@ -194,7 +195,7 @@ def test_master_ack_lost_reply_is_held_and_sent_again() -> None:
 
 @pytest.mark.parametrize('retries', [0, 1, 3])
 def test_reply_is_given_up_after_its_retries(retries: int) -> None:
-    bench = Bench(settings=SlaveSettings(STATION, retries=retries))
+    bench = Bench(settings=LinkSettings(station=STATION, nak_retries=retries))
     bench.hear(sent(COMMAND))
     reply = reply_frame(COMMAND)
     assert bench.hear(*[POLL] * (retries + 2)) == [reply] * (retries + 1) + [EOT]
@@ -204,7 +205,7 @@ def test_reply_is_given_up_after_its_retries(retries: int) -> None:
 
 
 def test_next_reply_follows_the_one_that_was_given_up() -> None:
-    bench = Bench(settings=SlaveSettings(STATION, retries=0))
+    bench = Bench(settings=LinkSettings(station=STATION, nak_retries=0))
     assert bench.hear(sent(COMMAND), sent(later(1)), POLL, POLL)[2:] == [
         reply_frame(COMMAND), reply_frame(later(1))]
 
@@ -212,7 +213,7 @@ def test_next_reply_follows_the_one_that_was_given_up() -> None:
 @pytest.mark.parametrize('between', [
     POLL, Poll(8, True), Poll(STATION, False), sent(later(1), 8), Control(Code.EOT), Unknown(0)])
 def test_ack_is_ours_only_straight_after_our_message(between: Symbol) -> None:
-    bench = Bench(settings=SlaveSettings(STATION, retries=9))
+    bench = Bench(settings=LinkSettings(station=STATION, nak_retries=9))
     reply = reply_frame(COMMAND)
     bench.hear(sent(COMMAND), POLL, between)
     if between == POLL:
@@ -235,7 +236,7 @@ def test_replies_leave_in_order_one_for_each_poll() -> None:
 
 
 def test_sink_full_command_is_neither_acknowledged_nor_executed_nor_remembered() -> None:
-    bench = Bench(settings=SlaveSettings(STATION, queue_size=2))
+    bench = Bench(settings=LinkSettings(station=STATION, queue_size=2))
     commands = [sent(later(number)) for number in range(3)]
     assert bench.hear(*commands) == [ACK, ACK, b'']
     assert len(bench.served) == 2
@@ -246,7 +247,7 @@ def test_sink_full_command_is_neither_acknowledged_nor_executed_nor_remembered()
 
 
 def test_duplicate_is_acknowledged_by_a_full_sink_too() -> None:
-    bench = Bench(settings=SlaveSettings(STATION, queue_size=1))
+    bench = Bench(settings=LinkSettings(station=STATION, queue_size=1))
     assert bench.hear(sent(COMMAND), sent(COMMAND)) == [ACK, ACK]
     assert len(bench.served) == 1
 
@@ -293,7 +294,7 @@ def test_reply_with_an_error_is_counted_once() -> None:
 
 
 def test_check_of_the_reply_is_that_of_the_line() -> None:
-    bench = Bench(settings=SlaveSettings(STATION, Checksum.BCC))
+    bench = Bench(settings=LinkSettings(station=STATION, checksum=Checksum.BCC))
     assert bench.hear(sent(COMMAND), POLL)[1] == reply_frame(COMMAND, 0, Checksum.BCC)
 
 
@@ -316,7 +317,7 @@ def echo(data: bytes) -> Callable[[Packet], Packet]:
 
 
 def test_multidrop_only_the_addressed_station_answers() -> None:
-    line = Line(*(HalfDuplexSlave(SlaveSettings(number), echo(bytes((number,))))
+    line = Line(*(HalfDuplexSlave(LinkSettings(station=number), echo(bytes((number,))))
                   for number in (1, 7, 8)))
     assert line.say(master_frame(7, COMMAND.encode(), Checksum.CRC)) == ACK
     assert line.say(poll_frame(8)) == EOT
@@ -326,7 +327,7 @@ def test_multidrop_only_the_addressed_station_answers() -> None:
 
 
 def test_multidrop_ack_goes_to_the_station_that_spoke() -> None:
-    slaves = [HalfDuplexSlave(SlaveSettings(number), echo(b'')) for number in (7, 8)]
+    slaves = [HalfDuplexSlave(LinkSettings(station=number), echo(b'')) for number in (7, 8)]
     line = Line(*slaves)
     for number in (7, 8):
         command = COMMAND._replace(dst=number)
@@ -339,7 +340,7 @@ def test_multidrop_ack_goes_to_the_station_that_spoke() -> None:
 
 
 def test_multidrop_broadcast_reaches_every_station() -> None:
-    benches = [Bench(settings=SlaveSettings(number)) for number in (7, 8)]
+    benches = [Bench(settings=LinkSettings(station=number)) for number in (7, 8)]
     line = Line(*(bench.slave for bench in benches))
     command = COMMAND._replace(dst=BROADCAST)
     assert line.say(master_frame(BROADCAST, command.encode(), Checksum.CRC)) == b''
@@ -347,7 +348,7 @@ def test_multidrop_broadcast_reaches_every_station() -> None:
 
 
 def test_multidrop_nak_resets_every_station() -> None:
-    benches = [Bench(settings=SlaveSettings(number)) for number in (7, 8)]
+    benches = [Bench(settings=LinkSettings(station=number)) for number in (7, 8)]
     line = Line(*(bench.slave for bench in benches))
     for number in (7, 8):
         line.say(master_frame(number, COMMAND.encode(), Checksum.CRC))
@@ -356,14 +357,14 @@ def test_multidrop_nak_resets_every_station() -> None:
 
 
 def test_duplicates_are_executed_when_nobody_looks_for_them() -> None:
-    bench = Bench(settings=SlaveSettings(STATION, duplicate_detection=False))
+    bench = Bench(settings=LinkSettings(station=STATION, duplicate_detection=False))
     assert bench.hear(sent(COMMAND), sent(COMMAND)) == [ACK, ACK]
     assert bench.served == [COMMAND, COMMAND]
     assert bench.slave.counters.duplicate_messages == 0
 
 
 def test_eot_suppression_leaves_messages_as_they_are() -> None:
-    bench = Bench(settings=SlaveSettings(STATION, eot_suppression=True))
+    bench = Bench(settings=LinkSettings(station=STATION, eot_suppression=True))
     assert bench.hear(POLL, sent(COMMAND), POLL, HEARD_ACK, POLL) == [
         b'', ACK, reply_frame(COMMAND), b'', b'']
     assert bench.slave.counters.eots_sent == 0
@@ -371,26 +372,26 @@ def test_eot_suppression_leaves_messages_as_they_are() -> None:
 
 
 def test_defaults_are_those_of_allen_bradley() -> None:
-    settings = SlaveSettings(STATION)
-    assert (settings.retries, settings.eot_suppression, settings.duplicate_detection) == (
+    settings = LinkSettings(station=STATION)
+    assert (settings.nak_retries, settings.eot_suppression, settings.duplicate_detection) == (
         3, False, True)
 
 
 def test_limit_counts_afresh_for_every_message() -> None:
-    bench = Bench(settings=SlaveSettings(STATION, retries=1))
+    bench = Bench(settings=LinkSettings(station=STATION, nak_retries=1))
     first, second = reply_frame(COMMAND), reply_frame(later(1))
     assert bench.hear(sent(COMMAND), sent(later(1)), POLL, POLL, HEARD_ACK, POLL, POLL)[2:] == [
         first, first, b'', second, second]
 
 
 def test_full_sink_does_not_forget_the_last_command() -> None:
-    bench = Bench(settings=SlaveSettings(STATION, queue_size=1))
+    bench = Bench(settings=LinkSettings(station=STATION, queue_size=1))
     assert bench.hear(sent(COMMAND), sent(later(1)), sent(COMMAND)) == [ACK, b'', ACK]
     assert bench.served == [COMMAND]
 
 
 def test_broadcast_and_reply_need_no_room() -> None:
-    bench = Bench(settings=SlaveSettings(STATION, queue_size=1))
+    bench = Bench(settings=LinkSettings(station=STATION, queue_size=1))
     broadcast = later(1)._replace(dst=BROADCAST)
     assert bench.hear(sent(COMMAND), sent(broadcast, BROADCAST), sent(later(2).reply())) == [
         ACK, b'', ACK]

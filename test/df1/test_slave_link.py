@@ -21,7 +21,7 @@ from abdf1_ros.df1.checksum import Checksum
 from abdf1_ros.df1.frames import ACK, EOT, master_frame, message_frame, NAK, poll_frame
 from abdf1_ros.df1.machine import LineTiming
 from abdf1_ros.df1.packet import BROADCAST, Packet
-from abdf1_ros.df1.slave import SlaveSettings
+from abdf1_ros.df1.settings import LinkSettings
 from abdf1_ros.errors import CommandExpired, CommandTimeout, PortLost, WrongCommandCode
 import pytest
 from support.multidrop import SlaveBench
@@ -29,7 +29,7 @@ from support.peers import CommandTask
 from support.virtual_line import Wire
 
 US, MASTER, OTHER = 7, 5, 8
-SETTINGS = SlaveSettings(US, retries=2)
+SETTINGS = LinkSettings(station=US, nak_retries=2)
 FROM_MASTER = Packet(US, MASTER, 0x0F, 0, 0x0102, b'\xA2\x01')
 OTHERS_TRAFFIC = poll_frame(OTHER) + EOT
 
@@ -39,7 +39,7 @@ def own(tns: int = 1, dst: int = OTHER) -> Packet:
     return Packet(dst, US, 0x0F, 0, tns, b'\x67')
 
 
-def polled(settings: SlaveSettings = SETTINGS, **options: Any) -> tuple[SlaveBench, CommandTask]:
+def polled(settings: LinkSettings = SETTINGS, **options: Any) -> tuple[SlaveBench, CommandTask]:
     """Return a slave that has sent own(1), and the task."""
     bench = SlaveBench(settings, **options)
     task = bench.add(own())
@@ -47,7 +47,7 @@ def polled(settings: SlaveSettings = SETTINGS, **options: Any) -> tuple[SlaveBen
     return bench, task
 
 
-def acknowledged(*args: SlaveSettings, **options: Any) -> tuple[SlaveBench, CommandTask]:
+def acknowledged(*args: LinkSettings, **options: Any) -> tuple[SlaveBench, CommandTask]:
     """Return a slave whose own(1) has got its ACK, and the task."""
     bench, task = polled(*args, **options)
     assert bench.hear(ACK) == b''

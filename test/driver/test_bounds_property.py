@@ -32,7 +32,8 @@ from random import Random
 from abdf1_ros.df1.checksum import Checksum
 from abdf1_ros.df1.frames import ACK, Code, message_frame
 from abdf1_ros.df1.packet import Packet, STS_NOT_DELIVERED
-from abdf1_ros.df1.slave import HalfDuplexSlave, SlaveSettings
+from abdf1_ros.df1.settings import LinkSettings
+from abdf1_ros.df1.slave import HalfDuplexSlave
 from abdf1_ros.driver.interlocks.queue import Interlocks
 from abdf1_ros.driver.links import DriverSettings
 from abdf1_ros.pccc.families import parse_address
@@ -266,7 +267,7 @@ class World:
             return reply
 
         plc.serve = execute  # type: ignore[method-assign]
-        plc.slave = HalfDuplexSlave(SlaveSettings(station), execute)
+        plc.slave = HalfDuplexSlave(LinkSettings(station=station), execute)
         return plc
 
     def _hear_others(self) -> None:

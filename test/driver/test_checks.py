@@ -19,7 +19,8 @@ from dataclasses import replace
 
 from abdf1_ros.df1.frames import Symbol
 from abdf1_ros.df1.packet import Packet
-from abdf1_ros.df1.slave import HalfDuplexSlave, SlaveSettings
+from abdf1_ros.df1.settings import LinkSettings
+from abdf1_ros.df1.slave import HalfDuplexSlave
 from abdf1_ros.driver.checks import ECHO_PERIOD
 from abdf1_ros.driver.links import DriverSettings
 from abdf1_ros.driver.reads.point import Freshness
@@ -52,7 +53,7 @@ class Ears:
         self.answer: Callable[[Packet], Packet] = plc.serve
         self._bench = bench
         self._plc = plc
-        self._slave = HalfDuplexSlave(SlaveSettings(plc.station), self._serve, plc.counters)
+        self._slave = HalfDuplexSlave(LinkSettings(station=plc.station), self._serve, plc.counters)
 
     def handle(self, symbol: Symbol) -> bytes:
         """Answer, unless the PLC is silent."""

@@ -20,7 +20,8 @@ Every word of the station is its clock (ms, modulo 65536), so each value tells i
 
 from abdf1_ros.df1.frames import Symbol
 from abdf1_ros.df1.packet import Packet
-from abdf1_ros.df1.slave import HalfDuplexSlave, SlaveSettings
+from abdf1_ros.df1.settings import LinkSettings
+from abdf1_ros.df1.slave import HalfDuplexSlave
 from abdf1_ros.driver.links import DriverSettings
 from abdf1_ros.driver.write import Outcome
 from abdf1_ros.settings.mapping import Mapping
@@ -44,7 +45,7 @@ class ClockPlc:
         self._bench = bench
         self._plc = SimulatedPlc(1, bench.plc(1, 'PLC5', ('N7:0', WORDS), ('N9:0', WORDS)).table,
                                  bench.network.checksum, bench.clock)
-        self._plc.slave = HalfDuplexSlave(SlaveSettings(1), self._serve)
+        self._plc.slave = HalfDuplexSlave(LinkSettings(station=1), self._serve)
         bench._stations[:] = [self]
 
     def handle(self, symbol: Symbol) -> bytes:

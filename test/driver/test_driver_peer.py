@@ -19,7 +19,8 @@ from collections.abc import Sequence
 from abdf1_ros.df1.frames import ACK, Code, Control, Duplex, Frame, FrameDecoder, message_frame
 from abdf1_ros.df1.machine import Machine, Procedure
 from abdf1_ros.df1.packet import Packet
-from abdf1_ros.df1.peer import FullDuplexPeer, PeerSettings
+from abdf1_ros.df1.peer import FullDuplexPeer
+from abdf1_ros.df1.settings import LinkSettings
 from abdf1_ros.df1.stations import ActiveStationList
 from abdf1_ros.driver.driver import Driver
 from abdf1_ros.driver.links import DriverSettings
@@ -67,7 +68,7 @@ class Bench:
         self._tns = 0x4000
 
     def _far_end(self, machine: Machine) -> Procedure:
-        settings = PeerSettings(self.network.checksum)
+        settings = LinkSettings(station=None, checksum=self.network.checksum)
         return FullDuplexPeer(machine, settings, ActiveStationList(), self.plc.serve).run(self.plc)
 
     def clock(self) -> float:

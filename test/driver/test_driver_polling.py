@@ -15,7 +15,8 @@
 """The driver as a master with standard polling, and broadcast rows with either polling."""
 
 from abdf1_ros.df1.packet import BROADCAST
-from abdf1_ros.df1.polling import PollingSettings, StandardPollingMaster
+from abdf1_ros.df1.polling import StandardPollingMaster
+from abdf1_ros.df1.settings import PollingSettings
 from abdf1_ros.driver.links import DriverSettings
 from abdf1_ros.driver.write import Outcome
 from abdf1_ros.settings.network import Network, POLLING_MODES

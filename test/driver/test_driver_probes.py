@@ -20,7 +20,6 @@ from abdf1_ros.df1.checksum import Checksum
 from abdf1_ros.df1.frames import Duplex, Frame, FrameDecoder, Poll
 from abdf1_ros.df1.packet import Packet
 from abdf1_ros.driver.links import DriverSettings
-from abdf1_ros.plan.forecast import longest_probe
 from abdf1_ros.settings.heartbeats import Fallback, Heartbeat
 from abdf1_ros.settings.mapping import Mapping
 from abdf1_ros.settings.network import Network
@@ -48,7 +47,7 @@ class Bench(DriverBench):
 
     def __init__(self, network: Network, gone: int, *, is_deaf: bool) -> None:
         kinds = 'Read', 'Write', 'ReadWrite'
-        self.unit = longest_probe(network)
+        self.unit = network.line_mode.longest_probe(network.line)
         self.living = make_mapping('N7:0', station=LIVING, period=max(100, int(500 * self.unit)))
         self.gone = [make_mapping('N7:0', kinds[station % 3], station=station, period=100)
                      for station in range(1, gone + 1) if station != network.station]

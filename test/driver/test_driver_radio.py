@@ -21,7 +21,6 @@ from random import Random
 
 from abdf1_ros.driver.write import Outcome
 from abdf1_ros.plan.bounds import Times
-from abdf1_ros.plan.forecast import longest_transaction
 from abdf1_ros.plan.report import make_report
 from abdf1_ros.settings.heartbeats import Fallback, Heartbeat, PublishWhile
 from abdf1_ros.settings.network import Network
@@ -102,7 +101,8 @@ def test_guarded_value_ends_with_the_program_of_its_plc(several: str, loss: floa
     stopped = bench.clock()
     bench.run(60.0)
     assert published >= 10
-    assert bench.listener.times(level)[-1] <= stopped + 3.0 + longest_transaction(network)
+    longest = network.line_mode.longest_transaction(network.line, 0.0)
+    assert bench.listener.times(level)[-1] <= stopped + 3.0 + longest
 
 
 def test_write_is_confirmed_by_its_reply() -> None:

@@ -17,10 +17,9 @@
 from collections.abc import Sequence
 
 from abdf1_ros.df1.machine import LineTiming, Machine
-from abdf1_ros.df1.master_line import MasterSettings
 from abdf1_ros.df1.packet import BROADCAST, Packet
-from abdf1_ros.df1.polling import PollingSettings
-from abdf1_ros.df1.slave import HalfDuplexSlave, multidrop, SlaveSettings
+from abdf1_ros.df1.settings import LinkSettings, PollingSettings
+from abdf1_ros.df1.slave import HalfDuplexSlave, multidrop
 from abdf1_ros.driver.driver import Driver
 from abdf1_ros.driver.links import DriverSettings
 from abdf1_ros.driver.write import Outcome
@@ -55,7 +54,7 @@ class Bench:
         self.driver = Driver(self.network, mappings, settings or DriverSettings(), self.listener)
         self.plc = simulated_plc(PLC, 'SLC', self.clock, ('N7:0', 100), checksum=check)
         self.master = MasterNode(
-            MasterSettings(MASTER, self.network.checksum, timeout=0.1), self.clock,
+            LinkSettings(station=MASTER, checksum=self.network.checksum, timeout=0.1), self.clock,
             PollingSettings(polled), numbers=polled, timing=LineTiming(char_time(BAUD)))
         self.far = Machine(multidrop([self.plc]), checksum=self.network.checksum)
         self.line = VirtualLine(self.driver.machine, self.master.machine, self.far, baud=BAUD)
@@ -263,7 +262,8 @@ class Interlocked(Bench):
                                        period=300, heartbeat=Heartbeat()), self.speed])
         self.is_alive = True
         self.seen: list[tuple[str, int]] = []
-        self.plc.slave = HalfDuplexSlave(SlaveSettings(PLC, self.network.checksum), self._keep)
+        self.plc.slave = HalfDuplexSlave(
+            LinkSettings(station=PLC, checksum=self.network.checksum), self._keep)
 
     def _keep(self, command: Packet) -> Packet:
         before = self._words()

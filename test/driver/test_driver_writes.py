@@ -23,7 +23,8 @@ import threading
 
 from abdf1_ros.df1 import frames
 from abdf1_ros.df1.packet import Packet
-from abdf1_ros.df1.slave import HalfDuplexSlave, SlaveSettings
+from abdf1_ros.df1.settings import LinkSettings
+from abdf1_ros.df1.slave import HalfDuplexSlave
 from abdf1_ros.driver.links import DriverSettings
 from abdf1_ros.driver.write import Outcome
 from abdf1_ros.driver.writes.queue import MAX_WAITING_WRITES
@@ -50,7 +51,7 @@ class Executed:
         self.writes: list[Packet] = []
         self._plc = plc
         plc.slave = HalfDuplexSlave(
-            SlaveSettings(plc.station, duplicate_detection=is_watchful), self._serve)
+            LinkSettings(station=plc.station, duplicate_detection=is_watchful), self._serve)
 
     def _serve(self, command: Packet) -> Packet:
         reply = self._plc.serve(command)

@@ -25,7 +25,8 @@ import math
 
 from abdf1_ros.df1.checksum import Checksum
 from abdf1_ros.df1.packet import Packet
-from abdf1_ros.df1.slave import HalfDuplexSlave, SlaveSettings
+from abdf1_ros.df1.settings import LinkSettings
+from abdf1_ros.df1.slave import HalfDuplexSlave
 from abdf1_ros.driver.guests import Guest, GuestCommand, ShareAccess
 from abdf1_ros.driver.interlocks.fallback import FallbackCause, FallbackRow, FallbackState
 from abdf1_ros.driver.interlocks.heartbeat import BeatState, LARGEST
@@ -79,7 +80,7 @@ class Cell:
             settings=DriverSettings(**settings), start=False)  # type: ignore
         self.plc = self.bench.plc(1, 'PLC5', ('N7:0', 200), ('N10:0', 20), ('N11:0', 20),
                                   ('B3:0', 4))
-        self.plc.slave = HalfDuplexSlave(SlaveSettings(1), self._serve)
+        self.plc.slave = HalfDuplexSlave(LinkSettings(station=1), self._serve)
         self.is_alive = True
         self.refused: set[str] = set()
         self.refusals = 0
@@ -105,7 +106,7 @@ class Cell:
 
     def put_behind_gateway(self) -> None:
         """Let station 5 answer for the PLC, and open the port."""
-        self.plc.slave, self.plc.station = HalfDuplexSlave(SlaveSettings(5), self._serve), 5
+        self.plc.slave, self.plc.station = HalfDuplexSlave(LinkSettings(station=5), self._serve), 5
         self.bench.open()
 
     def _serve(self, command: Packet) -> Packet:
@@ -961,7 +962,7 @@ class Line(DriverBench):
         self.asked: list[tuple[float, int, int]] = []
         for number in stations:
             plc = self.plc(number, 'PLC5', ('N7:0', 40), ('N10:0', 4))
-            plc.slave = HalfDuplexSlave(SlaveSettings(number), partial(self._serve, plc))
+            plc.slave = HalfDuplexSlave(LinkSettings(station=number), partial(self._serve, plc))
         self._tick()
 
     def _tick(self) -> None:

@@ -28,8 +28,9 @@ from random import Random
 from abdf1_ros.df1.frames import Duplex
 from abdf1_ros.df1.machine import Machine
 from abdf1_ros.df1.packet import Packet
-from abdf1_ros.df1.peer import FullDuplexPeer, PeerSettings
-from abdf1_ros.df1.slave import HalfDuplexSlave, multidrop, SlaveSettings
+from abdf1_ros.df1.peer import FullDuplexPeer
+from abdf1_ros.df1.settings import LinkSettings
+from abdf1_ros.df1.slave import HalfDuplexSlave, multidrop
 from abdf1_ros.df1.stations import ActiveStationList
 from abdf1_ros.driver.driver import Driver
 from abdf1_ros.driver.links import DriverSettings
@@ -37,7 +38,6 @@ from abdf1_ros.driver.write import Outcome
 from abdf1_ros.errors import PortLost
 from abdf1_ros.pccc.emulated import Setting
 from abdf1_ros.pccc.families import parse_address
-from abdf1_ros.plan.forecast import longest_transaction
 from abdf1_ros.settings.heartbeats import Fallback, Heartbeat
 from abdf1_ros.settings.mapping import Mapping
 from abdf1_ros.settings.network import Network
@@ -93,14 +93,15 @@ class World:
         self._outputs = parse_address('N7:0', self.plc.table.plc_type)
 
     def _slave(self) -> Machine:
-        self.plc.slave = HalfDuplexSlave(SlaveSettings(1), self._serve)
+        self.plc.slave = HalfDuplexSlave(LinkSettings(station=1), self._serve)
         return Machine(multidrop([self.plc]), checksum=self.network.checksum)
 
     def _peer(self) -> Machine:
         self.plc.be_full_duplex()
         return Machine(
             lambda machine: FullDuplexPeer(
-                machine, PeerSettings(self.network.checksum), ActiveStationList(),
+                machine, LinkSettings(station=None, checksum=self.network.checksum),
+                ActiveStationList(),
                 self._serve).run(self.plc),
             checksum=self.network.checksum, duplex=Duplex.FULL)
 
@@ -244,7 +245,8 @@ class World:
             return
         # Where replies are lost, a message of each row may wait for that of the other.
         turns = 2 if self.line.now < self.swallowed + 5 * AFTER else 1
-        bound = AFTER + turns * longest_transaction(self.network) + STEP
+        longest = self.network.line_mode.longest_transaction(self.network.line, 0.0)
+        bound = AFTER + turns * longest + STEP
         if self.line.now < self.troubled + bound:
             return
         for number, value in enumerate(self.words()[:2]):

@@ -18,6 +18,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from abdf1_ros.df1.machine import Machine
+from abdf1_ros.df1.peer import PEER
 from abdf1_ros.df1.slave import multidrop
 from abdf1_ros.driver.requests import Requests
 from abdf1_ros.errors import CommandTimeout, LinkError, PortLost, StationInactive
@@ -46,7 +47,7 @@ class Bench:
     """Requests at one end, an SLC that is station 1 at the other."""
 
     def __init__(self, absent: tuple[int, ...] = ()) -> None:
-        self.requests = Requests(NETWORK.line, absent, first_tns=7)
+        self.requests = Requests(NETWORK.line_mode, NETWORK.line, absent, first_tns=7)
         self.plc = simulated_plc(1, 'SLC', lambda: self.line.now, ('N7:0', 10))
         self.far = Machine(multidrop([self.plc]), checksum=NETWORK.checksum)
         self.line = VirtualLine(self.requests.machine, self.far, baud=115200)
@@ -165,7 +166,7 @@ def test_nothing_is_due_by_itself() -> None:
 
 
 def test_other_modes_are_served_by_the_same_requests() -> None:
-    requests = Requests(Network(mode='Peer', baud=115200).line)
+    requests = Requests(PEER, Network(baud=115200).line)
     ends = Ends()
     requests.add(1, identify(), ends.results.append, ends.errors.append)
     requests.machine.start(0.0)

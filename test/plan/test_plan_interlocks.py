@@ -25,7 +25,7 @@ from abdf1_ros.plan.bounds import (
     Times,
     write_time,
 )
-from abdf1_ros.plan.forecast import line_model, longest_transaction
+from abdf1_ros.plan.forecast import line_model
 from abdf1_ros.plan.planner import Planner
 from abdf1_ros.plan.report import make_report
 from abdf1_ros.settings.heartbeats import Fallback, Heartbeat, PublishWhile
@@ -35,6 +35,7 @@ import pytest
 from support.mappings import make_mapping
 
 QUICK = Network(timeout=200, cmd_timeout=500, nak_retries=1, enq_retries=1, baud=19200)
+QUIET = 0.02 + 10 * 10 / 19200
 
 
 def beat(period: int = 1000, tag: str = 'beat') -> Mapping:
@@ -49,15 +50,20 @@ def speed(after: int = 3000, command: str = 'Write', station: int = 1) -> Mappin
 
 
 @pytest.mark.parametrize('network, seconds', [
-    (Network(), 9.0), (Network(timeout=300, cmd_timeout=500), 2.9), (QUICK, 1.3),
-    (replace(QUICK, enq_retries=5), 2.1),
+    # Timeout for each try, Cmd_Timeout from the last of a command on, and for each try the pause
+    # after which a frame has broken off.
+    (Network(), 8.0 + 4 * (0.02 + 10 * 10 / 9600)), (QUICK, 1.1 + 2 * QUIET),
+    (replace(QUICK, enq_retries=5), 1.9 + 6 * QUIET),
+    (replace(QUICK, timeout=0), 3 * 0.02 + 0.5 + 2 * QUIET),  # not less is waited than that
+    (replace(QUICK, mode='Peer', nak_retries=3), 1.5 + 4 * QUIET + 0.1 + 3 * 0.25),
     # Two tries: Cmd_Timeout and what comes in then; before it, as often as there are turns, 2 s of
     # waiting, a frame of 0.14 s, and what comes in.
     (replace(QUICK, mode='Radio'), 2 * (0.5 + 0.25052 + 2 * (2.0 + 0.14010 + 0.25052))),
     (replace(QUICK, mode='Radio', collision_avoidance='Yes'),
      2 * (0.5 + 0.25052 + 12 * (0.14010 + 0.25052)))])
 def test_longest_transaction_is_that_of_the_settings(network: Network, seconds: float) -> None:
-    assert longest_transaction(network) == pytest.approx(seconds, rel=1e-4)
+    longest = network.line_mode.longest_transaction(network.line, 0.0)
+    assert longest == pytest.approx(seconds, rel=1e-4)
 
 
 def test_write_of_a_word_is_counted_by_its_frames() -> None:
@@ -71,7 +77,7 @@ def test_write_of_a_word_is_counted_by_its_frames() -> None:
 
 def at_most(line_time: float) -> float:
     """Return the seconds of a transaction on QUICK: three waits, all frames twice."""
-    return 1.1 + 2 * (line_time + 0.02 + 10 * 10 / 19200)
+    return 1.1 + 2 * (line_time + QUIET)
 
 
 @pytest.mark.parametrize('others, reads', [(0, 1), (5, 1), (6, 2)])
@@ -126,7 +132,8 @@ def test_rule_16_preset_of_the_timer(period: int, factor: int | None) -> None:
     mapping = beat(period)
     bound, = Times(QUICK, [mapping], (), 0.01).bounds()
     own = write_time(QUICK, mapping, 0.01)
-    longer = period / 1000 + 2 * (1.3 + write_time(QUICK, mapping, 0.0)) + own + 0.01
+    question = line_model(QUICK).transaction_time(1, 26)  # as long as any here
+    longer = period / 1000 + 2 * at_most(question) + own + 0.01
     assert bound.seconds == pytest.approx(factor * period / 1000 if factor else longer)
     watchdog = 18_000 if factor else math.ceil(longer * 100)
     assert bound.presets == (watchdog, watchdog + 100)
@@ -165,7 +172,7 @@ def test_rule_16_period_shorter_than_a_scan_is_warned_of() -> None:
 
 def test_rule_16_transactions_longer_than_period_or_fallback_after_are_warned_of() -> None:
     of_beat, of_speed = remarks(Network(), [beat(), speed()])
-    assert 'one transaction may take 90' in of_beat
+    assert 'one transaction may take 8380 ms' in of_beat
     assert 'its Period is 1000 ms' in of_beat
     assert 'Fallback_After 3000 ms is shorter than two transactions' in of_speed
 

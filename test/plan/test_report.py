@@ -16,6 +16,7 @@
 
 from dataclasses import replace
 
+from abdf1_ros.plan.forecast import line_model
 from abdf1_ros.plan.report import make_report, Remark, RemarkKind, Report
 from abdf1_ros.settings.heartbeats import Fallback, Heartbeat, PublishWhile
 from abdf1_ros.settings.mapping import Mapping
@@ -155,7 +156,11 @@ def test_baud_rate_has_to_do_for_heartbeats_and_questions_too() -> None:
 
 def test_longest_transaction_has_every_repetition() -> None:
     read = report_of(make_mapping('N7:0'), cmd_timeout=500, nak_retries=1, enq_retries=1)
-    assert read.longest_transaction == pytest.approx(4 * 0.3 + 0.5)
+    network = read.network
+    question = line_model(network).transaction_time(1, 26)  # longer than the read
+    assert read.longest_transaction == pytest.approx(
+        network.line_mode.longest_transaction(network.line, question))
+    assert read.longest_transaction > 3 * 0.3 + 0.5 + 2 * question
 
 
 def test_period_that_no_baud_rate_can_keep() -> None:

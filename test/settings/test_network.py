@@ -25,7 +25,7 @@ from abdf1_ros.settings.network import (
     FIELDS,
     load_network,
     make_network,
-    MODES,
+    MODE_NAMES,
     Network,
 )
 from hypothesis import given
@@ -45,7 +45,7 @@ NUMBERS = [
     ('TX_Delay', 'tx_delay', 0, ('0', '65535'), ('-1', '65536', '0.5')),
 ]
 CHOICES = [
-    ('Mode', 'mode', 'Master', MODES),
+    ('Mode', 'mode', 'Master', MODE_NAMES),
     ('PLC_Type', 'plc_type', 'PLC5', ('PLC2', 'PLC3', 'PLC5', 'SLC')),
     ('Error_Code', 'error_code', 'CRC', ('BCC', 'CRC')),
     ('Parity', 'parity', 'None', ('None', 'Even', 'Odd')),

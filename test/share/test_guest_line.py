@@ -31,7 +31,8 @@ from abdf1_ros.df1.checksum import Checksum
 from abdf1_ros.df1.frames import Duplex
 from abdf1_ros.df1.machine import Machine
 from abdf1_ros.df1.packet import Packet
-from abdf1_ros.df1.peer import FullDuplexPeer, PeerSettings
+from abdf1_ros.df1.peer import FullDuplexPeer
+from abdf1_ros.df1.settings import LinkSettings
 from abdf1_ros.df1.slave import multidrop
 from abdf1_ros.df1.stations import ActiveStationList
 from abdf1_ros.driver.driver import Driver
@@ -83,7 +84,8 @@ class Shared:
             return Machine(multidrop([self.plc]), checksum=Checksum.CRC)
         self.plc.be_full_duplex()
         return Machine(
-            lambda machine: FullDuplexPeer(machine, PeerSettings(), ActiveStationList(),
+            lambda machine: FullDuplexPeer(machine, LinkSettings(station=None),
+                                           ActiveStationList(),
                                            self.plc.serve).run(self.plc),
             checksum=Checksum.CRC, duplex=Duplex.FULL)
 

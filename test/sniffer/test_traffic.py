@@ -20,8 +20,8 @@ from abdf1_ros.df1 import frames
 from abdf1_ros.df1.checksum import Checksum
 from abdf1_ros.df1.frames import Duplex
 from abdf1_ros.df1.machine import Machine
-from abdf1_ros.df1.master_line import MasterSettings
 from abdf1_ros.df1.packet import Packet
+from abdf1_ros.df1.settings import LinkSettings
 from abdf1_ros.sniffer.capture import Chunk, Direction
 from abdf1_ros.sniffer.entries import Entry, Kind, Mark
 from abdf1_ros.sniffer.traffic import TrafficDecoder
@@ -268,7 +268,7 @@ def listen(bench: MasterBench) -> list[Chunk]:
 
 @pytest.mark.parametrize('noise', [QUIET, Noise(0.002, 0.002, 0.002, 0.002)])
 def test_conversation_of_a_master_and_two_slaves(noise: Noise) -> None:
-    bench = MasterBench(1, 2, settings=MasterSettings(5, Checksum.CRC, timeout=0.2))
+    bench = MasterBench(1, 2, settings=LinkSettings(station=5, checksum=Checksum.CRC, timeout=0.2))
     bench.line.noise = noise
     heard = listen(bench)
     bench.start()

@@ -22,8 +22,9 @@ from random import Random
 from abdf1_ros.df1.frames import Duplex
 from abdf1_ros.df1.machine import LineTiming, Machine, Procedure
 from abdf1_ros.df1.packet import Packet
-from abdf1_ros.df1.peer import FullDuplexPeer, PeerSettings
-from abdf1_ros.df1.radio import RadioNode, RadioSettings
+from abdf1_ros.df1.peer import FullDuplexPeer
+from abdf1_ros.df1.radio import RadioNode
+from abdf1_ros.df1.settings import LinkSettings
 from abdf1_ros.df1.slave import multidrop, Responder
 from abdf1_ros.df1.stations import ActiveStationList, Station
 from abdf1_ros.driver.driver import Driver, Listener
@@ -150,13 +151,14 @@ class FarEnd(Machine):
                 return None if is_radio and plc.faults.silent else plc.serve(command)
 
             if is_radio:
-                settings = RadioSettings(
-                    first.station, network.checksum, also=plcs, cmd_timeout=self.answers_again,
+                settings = LinkSettings(
+                    station=first.station, checksum=network.checksum, also=plcs,
+                    cmd_timeout=self.answers_again,
                     avoids_collisions=network.line.avoids_collisions)
                 node = RadioNode(machine, settings, ActiveStationList(), serve, random=Random(1))
                 return node.run(first)
-            return FullDuplexPeer(machine, PeerSettings(network.checksum), ActiveStationList(),
-                                  serve).run(first)
+            settings = LinkSettings(station=None, checksum=network.checksum)
+            return FullDuplexPeer(machine, settings, ActiveStationList(), serve).run(first)
 
         super().__init__(multidrop(stations) if network.duplex is Duplex.HALF else run_peer,
                          checksum=network.checksum, duplex=network.duplex,

@@ -16,15 +16,16 @@
 
 from collections import Counter, deque
 from collections.abc import Callable, Container, Iterable
+from dataclasses import replace
 
 from abdf1_ros.df1 import frames
 from abdf1_ros.df1.frames import Control, Duplex, Frame, FrameDecoder, Poll, Symbol
 from abdf1_ros.df1.machine import LineTiming, Machine, Procedure
 from abdf1_ros.df1.master import HalfDuplexMaster
-from abdf1_ros.df1.master_line import MasterSettings
 from abdf1_ros.df1.packet import Packet
-from abdf1_ros.df1.polling import PollingSettings, StandardPollingMaster
-from abdf1_ros.df1.slave import HalfDuplexSlave, multidrop, SlaveSettings
+from abdf1_ros.df1.polling import StandardPollingMaster
+from abdf1_ros.df1.settings import LinkSettings, PollingSettings
+from abdf1_ros.df1.slave import HalfDuplexSlave, multidrop
 from abdf1_ros.df1.slave_link import SlaveLink
 from abdf1_ros.df1.stations import ActiveStationList
 from abdf1_ros.errors import CommandTimeout, LinkError
@@ -73,7 +74,7 @@ class CommandTasks(Recorded):
 class Told(Machine):
     """A machine that keeps what it has put on the line, as symbols with their time."""
 
-    def __init__(self, procedure: Callable[[Machine], Procedure], settings: MasterSettings,
+    def __init__(self, procedure: Callable[[Machine], Procedure], settings: LinkSettings,
                  timing: LineTiming | None) -> None:
         super().__init__(procedure, checksum=settings.checksum, timing=timing, forget_on_send=True)
         self.log: list[tuple[float, str]] = []
@@ -104,7 +105,7 @@ def _text(symbol: Symbol) -> str:
 class MasterNode(CommandTasks):
     """A master with message-based polling, or with the standard one where ``polling`` is given."""
 
-    def __init__(self, settings: MasterSettings, clock: Callable[[], float],
+    def __init__(self, settings: LinkSettings, clock: Callable[[], float],
                  polling: PollingSettings | None = None, *, numbers: Iterable[int] = (),
                  timing: LineTiming | None = None, serve: Serve | None = Packet.reply) -> None:
         super().__init__(clock)
@@ -119,7 +120,8 @@ class MasterNode(CommandTasks):
                 self.machine, settings, self.stations, self.events.append, served)
         else:
             self.link = StandardPollingMaster(
-                self.machine, settings, polling, self.stations, self.events.append, served)
+                self.machine, replace(settings, polling=polling), self.stations,
+                self.events.append, served)
 
     def _serve(self, command: Packet) -> Packet:
         self.served.append(command)
@@ -159,7 +161,7 @@ class Slave:
         self._execute = serve
         self._ready = 0.0
         self.slave = HalfDuplexSlave(
-            SlaveSettings(number, queue_size=queue_size, retries=retries), self._serve,
+            LinkSettings(station=number, queue_size=queue_size, nak_retries=retries), self._serve,
             initiator=self)
 
     def handle(self, symbol: Symbol) -> bytes:
@@ -200,7 +202,7 @@ class Slave:
 class MasterBench:
     """A master and ``Slave``s on a line without noise; frames arrive whole."""
 
-    def __init__(self, *numbers: int, settings: MasterSettings,
+    def __init__(self, *numbers: int, settings: LinkSettings,
                  polling: PollingSettings | None = None, serve: Serve | None = Packet.reply,
                  baud: float = 19200, dead: Iterable[int] = (), retries: int = 3,
                  tx_delay: float = 0.0) -> None:
@@ -259,8 +261,7 @@ class MasterBench:
 class SlaveNode(CommandTasks):
     """A slave that is a driver of its own, on a machine of its own."""
 
-    def __init__(self, settings: SlaveSettings, clock: Callable[[], float], *,
-                 cmd_timeout: float = 1.0, poll_timeout: float = 60.0,
+    def __init__(self, settings: LinkSettings, clock: Callable[[], float], *,
                  patience: float = float('inf'), serve: Serve = Packet.reply,
                  timing: LineTiming | None = None) -> None:
         super().__init__(clock, patience)
@@ -274,8 +275,7 @@ class SlaveNode(CommandTasks):
         self.machine = Machine(lambda machine: self.link.run(self), checksum=settings.checksum,
                                timing=timing)
         self.link = SlaveLink(
-            self.machine, settings, self.stations, self._serve, cmd_timeout=cmd_timeout,
-            poll_timeout=poll_timeout, report=self.events.append)
+            self.machine, settings, self.stations, self._serve, self.events.append)
 
     def _serve(self, command: Packet) -> Packet:
         reply = self._execute(command)
@@ -288,13 +288,13 @@ class SlaveNode(CommandTasks):
 class SlaveBench(SlaveNode):
     """A slave whose line says what the test tells it."""
 
-    def __init__(self, settings: SlaveSettings, *, cmd_timeout: float = 1.0,
-                 poll_timeout: float = 60.0, patience: float = float('inf'),
-                 serve: Serve = Packet.reply, timing: LineTiming | None = None) -> None:
+    def __init__(self, settings: LinkSettings, *, patience: float = float('inf'),
+                 serve: Serve = Packet.reply, timing: LineTiming | None = None,
+                 **others: float) -> None:
         self.now = 100.0
-        super().__init__(settings, lambda: self.now, cmd_timeout=cmd_timeout,
-                         poll_timeout=poll_timeout, patience=patience, serve=serve,
-                         timing=timing)
+        super().__init__(
+            replace(settings, **others), lambda: self.now, patience=patience, serve=serve,
+            timing=timing)
         self.machine.start(self.now)
 
     def hear(self, *data: bytes) -> bytes:

@@ -24,7 +24,8 @@ import math
 from abdf1_ros.df1.frames import Duplex, message_frame
 from abdf1_ros.df1.machine import LineTiming, Machine, Procedure
 from abdf1_ros.df1.packet import Packet
-from abdf1_ros.df1.peer import FullDuplexPeer, PeerSettings
+from abdf1_ros.df1.peer import FullDuplexPeer
+from abdf1_ros.df1.settings import LinkSettings
 from abdf1_ros.df1.stations import ActiveStationList, Station
 from abdf1_ros.errors import LinkError
 from abdf1_ros.messages import Event
@@ -92,7 +93,7 @@ class Recorded:
 class PeerNode(Recorded):
     """A peer with its machine, its tasks, and all that it has done."""
 
-    def __init__(self, settings: PeerSettings, clock: Callable[[], float], *,
+    def __init__(self, settings: LinkSettings, clock: Callable[[], float], *,
                  timing: LineTiming | None = None,
                  serve: Callable[[Packet], Packet] = Packet.reply) -> None:
         super().__init__()
@@ -145,7 +146,7 @@ class PeerNode(Recorded):
 class PeerBench(PeerNode):
     """A peer whose line says what the test tells it."""
 
-    def __init__(self, settings: PeerSettings, timing: LineTiming | None = None,
+    def __init__(self, settings: LinkSettings, timing: LineTiming | None = None,
                  serve: Callable[[Packet], Packet] = Packet.reply) -> None:
         self.now = 99.9
         super().__init__(settings, lambda: self.now, timing=timing, serve=serve)

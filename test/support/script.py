@@ -20,8 +20,8 @@ from dataclasses import dataclass, fields
 
 from abdf1_ros.df1.machine import LineTiming, Machine, Procedure, Rest
 from abdf1_ros.df1.master import HalfDuplexMaster
-from abdf1_ros.df1.master_line import MasterSettings
 from abdf1_ros.df1.packet import Packet
+from abdf1_ros.df1.settings import LinkSettings
 from abdf1_ros.df1.stations import ActiveStationList
 from abdf1_ros.errors import LinkError
 from support.peers import CommandTask, Recorded
@@ -62,7 +62,7 @@ class MasterScript(Recorded):
 
     task: CommandTask
 
-    def __init__(self, settings: MasterSettings, timing: LineTiming | None = None,
+    def __init__(self, settings: LinkSettings, timing: LineTiming | None = None,
                  routes: dict[int, int] | None = None) -> None:
         super().__init__()
         self.now = 100.0

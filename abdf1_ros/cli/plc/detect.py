@@ -112,7 +112,7 @@ class Search:
                     return Found(LineSettings(baud, mode, check), presence)
                 if presence.is_there:
                     heard.append(presence.station)
-            if mode == 'Master' and not heard:
+            if mode == MODES['half'] and not heard:
                 return None  # polls have no check of their own that could be wrong
             stations = heard or stations
         return None

@@ -55,13 +55,13 @@ def network_of(options: argparse.Namespace) -> Network:
     if not options.net and not options.port:
         raise ConfigurationError([Problem(
             '--port', 'name the port, such as --port /dev/ttyUSB0, or a net CSV with --net')])
-    mode = MODES[options.duplex] if options.duplex else network.mode
-    if mode == 'Slave':
+    network = replace(network, mode=MODES.get(options.duplex, network.mode),
+                      polling=DEFAULTS.polling)
+    if network.line_mode.is_polled:
         raise ConfigurationError([Problem(
             options.net, 'Mode Slave: another node is the master of this line; plc can only '
             'be a master (--duplex half), have the PLC for itself (--duplex full), or be a node '
             'of radio modems (--radio)')])
-    network = replace(network, mode=mode, polling=DEFAULTS.polling)
     # By radio only the reply is waited for.
-    is_told = mode == 'Radio' and options.timeout is not None
+    is_told = network.duplex is Duplex.RADIO and options.timeout is not None
     return replace(network, cmd_timeout=network.timeout) if is_told else network

@@ -86,7 +86,7 @@ def scan(network: Network, stations: Sequence[int],
 
     Where each has a number, we take one that is none of theirs.
     """
-    if network.mode != 'Peer':
+    if not network.line_mode.has_one_plc:
         network = replace(network, station=free_station(network.station, stations))
     with Session(network, absent=stations, via=via) as session:
         for station in stations:

@@ -47,7 +47,7 @@ class Session(client.OpenLine):
         self.network = network
         routes = {} if via is None else dict.fromkeys(range(MAX_STATION + 1), via)
         try:
-            super().__init__(network.line, PortSettings.of(network), absent, routes,
-                             PlcType(network.plc_type))
+            super().__init__(network.line_mode, network.line, PortSettings.of(network), absent,
+                             routes, PlcType(network.plc_type))
         except OSError as error:
             raise NoPort(network.port, error) from None

@@ -33,7 +33,7 @@ from abdf1_ros.pccc.identity import Identity
 from abdf1_ros.pccc.status import is_address_fault
 from abdf1_ros.pccc.values import Values
 from abdf1_ros.plan.bounds import own_load
-from abdf1_ros.plan.forecast import block_time, longest_transaction, period_of, stale_times
+from abdf1_ros.plan.forecast import block_time, period_of, stale_times
 from abdf1_ros.plan.planner import Block, Planner
 from abdf1_ros.plan.refusals import Change, Refusals
 from abdf1_ros.settings.mapping import Mapping
@@ -88,7 +88,8 @@ class Readings:
         return [job.block for job in self.reads.jobs]
 
     def _job(self, block: Block) -> ReadJob:
-        longest = longest_transaction(self._network) + _TURNS_OF_A_READ * block_time(block)
+        longest = self._network.line_mode.longest_transaction(self._network.line, 0.0) \
+            + _TURNS_OF_A_READ * block_time(block)
         points = [self.points[mapping] for mapping in block.mappings if mapping.reads]
         return ReadJob(block, points, self._line, self._packet_ended, longest)
 

@@ -21,6 +21,7 @@ from collections.abc import Iterable, Sequence
 from statistics import fmean
 
 from abdf1_ros.df1.echo import COMES_BACK
+from abdf1_ros.df1.frames import Duplex
 from abdf1_ros.df1.stations import Station
 from abdf1_ros.driver.driver import Driver
 from abdf1_ros.driver.reads.point import ReadPoint
@@ -68,10 +69,11 @@ class LineView:
         if told is not None and now - told < _SAME_NUMBER_TOLD:
             return (f'another node on the air has our number, {driver.network.station}: its '
                     'replies and ours cannot be told apart; give each node its own Station')
-        mode = driver.network.mode  # by radio a node that sends on gives our packets back
+        # By radio a node that sends on gives our packets back.
+        duplex = driver.network.duplex
         nobody_answers = not any(station.active for station in driver.stations)
-        does_harm = driver.machine.echoes and mode != 'Radio' and (
-            mode == 'Peer' or nobody_answers)
+        does_harm = driver.machine.echoes and duplex is not Duplex.RADIO and (
+            duplex is Duplex.FULL or nobody_answers)
         return COMES_BACK if does_harm else ''
 
     def deaf_stations(self, now: float) -> list[int]:
@@ -81,7 +83,7 @@ class LineView:
     def is_deaf(self, station: Station, now: float) -> bool:
         return (station.takes_no_commands and station.last_heard is not None
                 and now - station.last_heard < _HEARD_LATELY
-                and self.driver.network.mode == 'Master')
+                and self.driver.network.line_mode.is_master)
 
     def wrong_types(self) -> list[str]:
         """Return which PLCs are of another family than the map says."""
@@ -151,7 +153,7 @@ def _pace(period: float, intervals: Sequence[float]) -> str:
 def unnumbered_counts(driver: Driver) -> dict[str, str]:
     """Return what a radio modem node counts besides the numbered counters, by its name."""
     counters = driver.counters
-    return {} if driver.network.mode != 'Radio' else {
+    return {} if driver.network.duplex is not Duplex.RADIO else {
         UNSENT: str(counters.unsent_messages), NO_MEMORY: str(counters.refused_for_memory)}
 
 

@@ -26,8 +26,9 @@ from abdf1_ros.cli.plc.init import net_csv
 from abdf1_ros.df1.checksum import Checksum
 from abdf1_ros.df1.frames import ACK, Duplex, Frame
 from abdf1_ros.df1.machine import Machine, Procedure
-from abdf1_ros.df1.peer import FullDuplexPeer, PeerSettings
-from abdf1_ros.df1.radio import RadioNode, RadioSettings
+from abdf1_ros.df1.peer import FullDuplexPeer
+from abdf1_ros.df1.radio import RadioNode
+from abdf1_ros.df1.settings import LinkSettings
 from abdf1_ros.df1.slave import multidrop
 from abdf1_ros.df1.stations import ActiveStationList
 from abdf1_ros.ports.endpoints import PtyEndpoint
@@ -69,10 +70,12 @@ def _everybody_sends(plc: SimulatedPlc, checksum: Checksum,
     def run(machine: Machine) -> Procedure:
         if issubclass(kind, FullDuplexPeer):
             timeout = 0.1 if issubclass(kind, Unheard) else 1.0  # until it asks with ENQ
-            return kind(machine, PeerSettings(checksum, timeout=timeout), ActiveStationList(),
+            return kind(machine, LinkSettings(station=None, checksum=checksum, timeout=timeout),
+                        ActiveStationList(),
                         plc.serve).run(plc)
         return RadioNode(
-            machine, RadioSettings(1, checksum), ActiveStationList(), plc.serve).run(plc)
+            machine, LinkSettings(station=1, checksum=checksum), ActiveStationList(),
+            plc.serve).run(plc)
     return run
 
 

@@ -38,7 +38,8 @@ import tty
 
 from abdf1_ros.df1.frames import ACK, Duplex
 from abdf1_ros.df1.machine import Machine
-from abdf1_ros.df1.peer import FullDuplexPeer, PeerSettings
+from abdf1_ros.df1.peer import FullDuplexPeer
+from abdf1_ros.df1.settings import LinkSettings
 from abdf1_ros.df1.slave import multidrop
 from abdf1_ros.df1.stations import ActiveStationList, Station
 from abdf1_ros.driver import driver
@@ -130,7 +131,8 @@ def far_end(network: Network, station: int, mappings: Sequence[Mapping]) -> Mach
         return Machine(multidrop([plc]), checksum=network.checksum)
     return Machine(
         lambda machine: FullDuplexPeer(
-            machine, PeerSettings(network.checksum), ActiveStationList(), plc.serve).run(plc),
+            machine, LinkSettings(station=None, checksum=network.checksum), ActiveStationList(),
+            plc.serve).run(plc),
         checksum=network.checksum, duplex=Duplex.FULL)
 
 

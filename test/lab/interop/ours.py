@@ -26,7 +26,8 @@ from typing import Any, Protocol
 from abdf1_ros.df1.checksum import Checksum
 from abdf1_ros.df1.frames import Duplex
 from abdf1_ros.df1.machine import Machine, Procedure
-from abdf1_ros.df1.peer import FullDuplexPeer, PeerSettings
+from abdf1_ros.df1.peer import FullDuplexPeer
+from abdf1_ros.df1.settings import LinkSettings
 from abdf1_ros.df1.slave import multidrop
 from abdf1_ros.df1.stations import ActiveStationList
 from abdf1_ros.pccc.address import Address
@@ -103,7 +104,8 @@ class PlcEnd:
 
         def run(machine: Machine) -> Procedure:
             peer = FullDuplexPeer(
-                machine, PeerSettings(setup.check), ActiveStationList(), self._plc.serve)
+                machine, LinkSettings(station=None, checksum=setup.check), ActiveStationList(),
+                self._plc.serve)
             return peer.run(self._plc)
 
         machine = Machine(run if is_peer else multidrop([self._plc]), checksum=setup.check,

@@ -26,7 +26,7 @@ from random import Random
 from abdf1_ros.df1.frames import Duplex
 from abdf1_ros.df1.machine import Machine
 from abdf1_ros.df1.packet import Packet
-from abdf1_ros.df1.radio import longest_transaction, RadioNode
+from abdf1_ros.df1.radio import RADIO, RadioNode
 from abdf1_ros.df1.tasks import Task
 from abdf1_ros.driver.driver import Driver, Listener
 from abdf1_ros.driver.links import DriverSettings
@@ -337,7 +337,7 @@ class Rig:
         if self.mode == 'Standard':  # while the other stations have their turns
             return 4 * one
         if self.mode == 'Radio':
-            return longest_transaction(network.line)
+            return RADIO.longest_transaction(network.line)
         if self.mode == 'Slave':
             return _POLL_TIMEOUT + one
         return one + (tries + 2) * wait

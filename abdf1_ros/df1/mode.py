@@ -1,0 +1,122 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""What is known of a mode of a line: how its link is made, and which times it can keep."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Mapping
+from typing import ClassVar
+
+from abdf1_ros.df1.frames import Duplex, poll_frame
+from abdf1_ros.df1.link import Link, quiet_time
+from abdf1_ros.df1.machine import Machine, MIN_RESPONSE_TIME
+from abdf1_ros.df1.packet import Packet
+from abdf1_ros.df1.settings import LinkSettings
+from abdf1_ros.df1.stations import ActiveStationList
+from abdf1_ros.messages import Event
+
+Serve = Callable[[Packet], Packet]
+"""Executes a command of another node, and returns its reply."""
+
+Report = Callable[[Event], None]
+"""Takes every numbered error and notice."""
+
+
+class LineMode(ABC):
+    """A mode, as the columns Mode and Polling of a net CSV name it; times are in seconds."""
+
+    name: ClassVar[str]
+    """What stands in the column Mode."""
+
+    polling: ClassVar[str] = ''
+    """What stands in the column Polling, where the mode depends on that."""
+
+    other_words: ClassVar[Mapping[str, str]] = {}
+    """What others call it, in lower case, and what to advise those."""
+
+    duplex: ClassVar[Duplex] = Duplex.HALF
+    """How symbols are understood."""
+
+    is_master: ClassVar[bool] = False
+    """We poll the stations of the line, and address gateways to stations behind them."""
+
+    has_one_plc: ClassVar[bool] = False
+    """There is one other end, whose number does not matter."""
+
+    is_polled: ClassVar[bool] = False
+    """Another node is the master, so when we may send is not ours to say."""
+
+    waits_for_acks: ClassVar[bool] = False
+    """Each of our messages waits Timeout for its response."""
+
+    takes_turns: ClassVar[bool] = False
+    """Stations are polled one after the other, whoever has a command."""
+
+    answers_by_itself: ClassVar[bool] = False
+    """Commands of the other end come and are answered also without Serve rows."""
+
+    answers: ClassVar[int] = 2
+    """So many answers of the station a transaction has: to the command, and the reply."""
+
+    why_unshared: ClassVar[str] = ''
+    """Why the line cannot be shared with guests, empty where it can."""
+
+    @abstractmethod
+    def make_link(self, machine: Machine, line: LinkSettings, stations: ActiveStationList,
+                  serve: Serve, report: Report) -> Link:
+        """Return the link that runs on a machine of this mode."""
+
+    def pause(self, line: LinkSettings) -> float:
+        """Return how long a command waits for a quiet line, mostly."""
+        return 0.0
+
+    def most_under_way(self, line: LinkSettings) -> int:
+        """Return how many stations may work on their replies at a time."""
+        return 1
+
+    def longest_transaction(self, line: LinkSettings, frames: float, others: float = 0.0,
+                            stations: int = 0) -> float:
+        """
+        Return how long a transaction takes at most that ends within its retries.
+
+        Its frames, each once, take ``frames``, those of another one up to ``others``.
+        ``stations`` are on the line.
+        """
+        timeout = answer_time(line)
+        # Cmd_Timeout runs from the beginning of the try that is acknowledged.
+        tries = line.nak_retries + line.enq_retries + 1
+        # A frame that breaks off is over after a pause.
+        return tries * timeout + max(line.cmd_timeout, timeout) \
+            + (max(line.nak_retries, line.enq_retries) + 1) \
+            * (frames + quiet_time(line.timing.char_time))
+
+    def longest_reply(self, line: LinkSettings, frames: float) -> float:
+        """Return how long a reply of ours takes at most, which takes turns with commands."""
+        return (line.nak_retries + 1) * (answer_time(line) + frames)
+
+    def scan(self, line: LinkSettings, stations: int, response_time: float) -> float:
+        """Return how long a command waits, at least, for so many stations to be polled."""
+        return 0.0
+
+    def longest_probe(self, line: LinkSettings) -> float:
+        """Return how long it takes to find a silent station silent."""
+        return answer_time(line) + line.timing.tx_delay \
+            + len(poll_frame(0)) * line.timing.char_time
+
+
+def answer_time(line: LinkSettings) -> float:
+    """Return how long an answer is waited for: never less than a node may take."""
+    return max(line.timeout, MIN_RESPONSE_TIME)
