@@ -199,7 +199,8 @@ class GuestQueue:
             self._look()
             if self._stations[station].last_heard is None:
                 self._silent(station, now)  # it may not exist: one poll or try at a time
-            if self._stations.admits_message(station, now):
+            is_vain = station == BROADCAST and _code(command.packet) in _READS  # nobody answers
+            if not is_vain and self._stations.admits_message(station, now):
                 return GuestJob(self, command, station, command.requested + self._patience,
                                 self._claim(command.packet, station))
             self._give_up(command, _OFF_LINE)

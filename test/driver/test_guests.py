@@ -278,6 +278,15 @@ def test_silent_station_is_told_at_once_and_costs_others_little() -> None:
     assert bench.driver.transactions - before > 200
 
 
+def test_read_of_all_stations_is_not_sent_and_has_no_success() -> None:
+    bench = bench_of()
+    program = Program(bench, ShareAccess.WRITE)
+    program.ask(READ_N7, dst=255)
+    program.ask(WRITE_N7, dst=255)
+    bench.run(1.0)
+    assert program.statuses == [0x07, 0x00]
+
+
 def test_every_command_has_one_reply_in_time_when_replies_are_lost() -> None:
     bench = bench_of()
     program = Program(bench, ShareAccess.WRITE)

@@ -166,6 +166,19 @@ class Cell:
             self.run(run)
 
 
+def hold(cell: Cell, seconds: float, is_meant: Callable[[Packet], bool]) -> None:
+    """Let a gateway say that a command was not delivered, and deliver it later."""
+    serve = cell.plc.serve
+
+    def keep(command: Packet) -> Packet:
+        if not is_meant(command):
+            return serve(command)
+        cell.bench.at(cell.now + seconds, lambda: serve(command))
+        return command.reply(sts=0x02)
+
+    cell.plc.serve = keep  # type: ignore[method-assign]
+
+
 class OneRow:
     """A row with Fallback by itself, and writes of it that end as they are told."""
 
@@ -609,17 +622,9 @@ class GuestCell(Cell):
             lambda reply: self.replies.append(reply.sts)))
         self.bench.line.wake(self.bench.driver.machine)
 
-    def hold_guests(self, seconds: float, sts: int = 0x02) -> None:
-        """Let a gateway say that a guest's write was not delivered, and deliver it later."""
-        serve, wanted = self.plc.serve, b'\x63\0'  # 99
-
-        def keep(command: Packet) -> Packet:
-            if not command.data.endswith(wanted):
-                return serve(command)
-            self.bench.at(self.now + seconds, lambda: serve(command))
-            return command.reply(sts=sts)
-
-        self.plc.serve = keep  # type: ignore[method-assign]
+    def hold_guests(self, seconds: float) -> None:
+        """Let a gateway keep the guest's 99."""
+        hold(self, seconds, lambda command: command.data.endswith(b'\x63\0'))
 
 
 WORDS = ('N7:0', 'N10:0')
@@ -683,6 +688,27 @@ def test_rule_8_guests_write_over_a_fallback_is_written_over_at_once(dst: int) -
     cell.run(2.0)
     assert cell.word('N10:0') > 0
     assert cell.results() == [START]
+
+
+@pytest.mark.parametrize('held', [0.5, 0.7, 0.9])
+@pytest.mark.parametrize('count', [1, 2, 3])
+def test_rule_19_own_heartbeats_that_a_gateway_holds_are_no_other_program(
+        held: float, count: int) -> None:
+    beat = make_mapping('N10:0', 'Heartbeat', tag='beat', period=200, heartbeat=Heartbeat(), via=5)
+    cell = Cell(beat, start=False)
+    cell.put_behind_gateway()
+    cell.run(5.0)
+    left = [count]
+
+    def is_meant(command: Packet) -> bool:
+        left[0] -= command.data[-2:] != b'\0\0' and 'N10:0' in cell._named(command)
+        return 0 <= left[0] < count
+
+    hold(cell, held, is_meant)
+    cell.run(5.0)
+    assert left[0] < 0
+    assert cell.bench.listener.foreign == []
+    assert cell.bench.driver.interlocks.heartbeats[0].why_not(cell.now) == ''
 
 
 def test_rule_8_command_that_nobody_knows_refreshes_and_holds_no_heartbeat() -> None:
