@@ -24,13 +24,17 @@ from abdf1_ros.cli.monitor import plant, view
 from abdf1_ros.df1.frames import message_frame
 from abdf1_ros.df1.packet import Packet
 from abdf1_ros.df1.slave_link import SlaveLink
+from abdf1_ros.driver.checks import StationHealth
 from abdf1_ros.driver.driver import Driver
-from abdf1_ros.driver.interlocks.fallback import FallbackCause
+from abdf1_ros.driver.interlocks.fallback import FallbackCause, FallbackState
 from abdf1_ros.driver.interlocks.heartbeat import BeatState
 from abdf1_ros.driver.links import DriverSettings
 from abdf1_ros.driver.reads.point import ReadPoint
+from abdf1_ros.driver.record import Claim
 from abdf1_ros.driver.write import Outcome, Write, WriteResult
 from abdf1_ros.messages import Event, Message
+from abdf1_ros.pccc.file_types import PlcType
+from abdf1_ros.pccc.identity import Identity, Mode
 from abdf1_ros.pccc.values import Values
 from abdf1_ros.ports.link_thread import LinkThread, PortState
 from abdf1_ros.ports.settings import PortSettings
@@ -570,6 +574,25 @@ def test_bit_of_the_plc_confirms_control_while_it_is_fresh_and_1(
     assert station(None, NOW + 31) == (WARN, 'not in control: no message')
     beat.reason = ''
     assert station(1, NOW + 32) == (OK, 'in control since 0.0 s')
+    stopped = Identity(PlcType.PLC5, 'PLC-5/40', mode=Mode.REMOTE_PROGRAM, mode_text='REM PROG')
+    bench.driver.checks._known[1] = StationHealth('PLC-5/40', stopped, NOW + 33)
+    assert station(1, NOW + 33) == (
+        WARN, 'not in control: ruled is 1, but the PLC is in program mode (REM PROG)')
+
+
+def test_value_of_a_guest_over_a_fallback_is_a_warning(make_bench: Callable[..., Bench]) -> None:
+    bench = make_bench('speed,Write,N10:1,1,PLC5,7,500',
+                       header='Tag,Command,Address,Station,PLC_Type,Fallback,Fallback_After')
+    row, = bench.driver.interlocks.fallbacks
+    row.state = FallbackState.STANDS
+    assert bench.says('interlocks')[0] == OK
+    guest = Claim(1, [row.mapping.extent])
+    guest.done = guest.lands_until = NOW
+    row.write_ended(guest, NOW)
+    assert bench.says('interlocks') == (WARN, (
+        'WARN: 0 of 0 heartbeats count; speed: a guest has written over the fallback value'))
+    assert details(bench.status('interlocks'))['speed'] == \
+        'a guest has written over the fallback value'
 
 
 def test_station_is_told_by_the_worst_of_its_heartbeats(make_bench: Callable[..., Bench]) -> None:

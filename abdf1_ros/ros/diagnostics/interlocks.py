@@ -20,10 +20,11 @@ from enum import IntEnum
 from operator import itemgetter
 
 from abdf1_ros.driver.driver import Driver
-from abdf1_ros.driver.interlocks.fallback import FallbackRow
+from abdf1_ros.driver.interlocks.fallback import FallbackRow, FallbackState
 from abdf1_ros.driver.interlocks.heartbeat import BeatState, HeartbeatRow
 from abdf1_ros.driver.reads.point import Freshness, ReadPoint
 from abdf1_ros.plan.bounds import Bound, Times
+from abdf1_ros.ros.diagnostics.stations import processor_fault
 from abdf1_ros.ros.diagnostics.status import (
     ERROR,
     Judgement,
@@ -54,6 +55,7 @@ class InterlockStatus:
         self._watched = seen
         self._beats = driver.interlocks.heartbeats
         self._fallbacks = driver.interlocks.fallbacks
+        self._checks = driver.checks
         self._bounds = [*Times(driver.network, driver.mappings, driver.blocks).bounds()]
         # By tag of the heartbeat, and all others at ''.
         self._bits = {point.mapping.confirms: point for point in driver.points.values()}
@@ -65,10 +67,13 @@ class InterlockStatus:
         unconfirmed = [beat.mapping.tag for beat in self._beats if beat.mapping.tag not in at_rest
                        and self._control(beat, now)[0] <= _Control.UNKNOWN]
         due = [row.mapping.tag for row in self._fallbacks if row.cause is not None]
+        guests = [row.mapping.tag for row in self._fallbacks
+                  if row.state is FallbackState.OVERWRITTEN]
         notes = [f'{", ".join(tags)}: {what}' for tags, what in (
             (at_rest, 'heartbeat does not count'),
             (unconfirmed, 'the PLC does not confirm that ROS is in control'),
             (due, 'fallback value is due'),
+            (guests, FallbackState.OVERWRITTEN.value),
             (self._watched.crowded, 'more than one publisher')) if tags]
         counting = len(self._beats) - len(at_rest)
         text = f'{counting} of {len(self._beats)} heartbeats count'
@@ -109,10 +114,13 @@ class InterlockStatus:
         if (point.last_good or 0.0) < begun:
             return _Control.UNKNOWN, \
                 f'unknown: {tag} has not been read since the heartbeat counts'
-        if bit[0]:
-            return _Control.IN_CONTROL, ''
-        return _Control.NOT_IN_CONTROL, f'not in control: the heartbeat counts, but {tag} is 0: ' \
-            'somebody has to press reset (docs/tutorials/heartbeats.md)'
+        if not bit[0]:
+            return _Control.NOT_IN_CONTROL, (
+                f'not in control: the heartbeat counts, but {tag} is 0: '
+                'somebody has to press reset (docs/tutorials/heartbeats.md)')
+        if fault := processor_fault(self._checks.known(point.mapping.station).identity):
+            return _Control.NOT_IN_CONTROL, f'not in control: {tag} is 1, but the PLC is {fault}'
+        return _Control.IN_CONTROL, ''
 
     def values(self, now: float) -> dict[str, str]:
         """Return the state of each PLC, of each heartbeat and fallback, and their bounds."""
