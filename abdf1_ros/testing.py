@@ -34,22 +34,26 @@ import threading
 import time
 from typing import Any, TypeVar
 
+from abdf1_ros.cli.check import examine
 from abdf1_ros.df1.checksum import Checksum
 from abdf1_ros.df1.machine import Machine
 from abdf1_ros.df1.slave import multidrop
 from abdf1_ros.pccc.families import parse_address
 from abdf1_ros.ports.endpoints import PtyEndpoint
 from abdf1_ros.ports.link_thread import LinkThread
+from abdf1_ros.problems import ConfigurationError
 from abdf1_ros.ros.topics.messages import latched_qos
 from abdf1_ros.simulator.commands import execute
 from abdf1_ros.simulator.ladder import Ladder
 from abdf1_ros.simulator.simulated_plc import load_plcs, SimulatedPlc
 import pytest
 from rcl_interfaces.srv import GetParameters
+import rclpy
 from rclpy.context import Context
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.qos import HistoryPolicy, QoSProfile
+from rclpy.signals import SignalHandlerOptions
 
 PATIENCE = 40.0  # s; what takes longer does not happen
 EVERYTHING = QoSProfile(history=HistoryPolicy.KEEP_ALL)
@@ -93,12 +97,55 @@ class Messages(list[Any]):
         return self.until(lambda message: True, 'a message')
 
 
-class Observer:
-    """A ROS node that looks at others from outside; also runs nodes that are added to it."""
+class Bridge:
+    """A bridge as a process, and what it says, in the file ``log``."""
 
-    def __init__(self, name: str = 'observer') -> None:
-        self.context = Context()
-        self.context.init(args=[])
+    def __init__(self, assignments: Sequence[str], log: Path) -> None:
+        self._words = [word for text in assignments for word in ('-p', text)]
+        self._log = log
+        self._process: subprocess.Popen[bytes] | None = None
+
+    def start(self) -> None:
+        """Start it; also again, after its end."""
+        with self._log.open('ab') as log:
+            self._process = subprocess.Popen(
+                [sys.executable, '-m', 'abdf1_ros', 'node', '--ros-args', *self._words],
+                stdout=log, stderr=log)
+
+    def end(self, number: signal.Signals) -> int:
+        """End it by a signal, if it runs; return its exit status."""
+        process, self._process = self._process, None
+        if process is None:
+            return 0
+        if process.poll() is None:
+            process.send_signal(number)
+        return process.wait(PATIENCE)
+
+    def check(self) -> None:
+        """Raise AssertionError where it has ended by itself."""
+        if self._process is not None and (status := self._process.poll()) is not None:
+            raise AssertionError(f'the bridge has ended with {status}{self.last_words()}')
+
+    def last_words(self) -> str:
+        """Return the end of its log."""
+        lines = self._log.read_text(errors='replace').splitlines() if self._log.exists() else []
+        return '; its last words:\n' + '\n'.join(lines[-10:]) if lines else ''
+
+
+class Observer:
+    """
+    A ROS node that looks at others from outside; also runs nodes that are added to it.
+
+    While it waits it checks that ``bridge`` still runs. It ends a context that it has made.
+    """
+
+    def __init__(self, name: str = 'observer', context: Context | None = None,
+                 bridge: Bridge | None = None) -> None:
+        self._bridge = bridge
+        self._owns_context = context is None
+        self.context = context or Context()
+        if self._owns_context:
+            self.context.init(args=[])
         self.node = Node(name, context=self.context)
         self.executor = SingleThreadedExecutor(context=self.context)
         self.executor.add_node(self.node)
@@ -109,15 +156,19 @@ class Observer:
     def __exit__(self, *exception: object) -> None:
         self.executor.shutdown()
         self.node.destroy_node()
-        self.context.try_shutdown()
+        if self._owns_context:
+            self.context.try_shutdown()
 
     def until(self, condition: Callable[[], _Result | None],
               what: str | Callable[[], str]) -> _Result:
         """Spin until ``condition`` gives something true; return that."""
         end = time.monotonic() + PATIENCE
         while not (result := condition()):
+            if self._bridge is not None:
+                self._bridge.check()
             if time.monotonic() > end:
-                raise AssertionError(f'waited for {what() if callable(what) else what}')
+                raise AssertionError(f'waited for {what() if callable(what) else what}'
+                                     + (self._bridge.last_words() if self._bridge else ''))
             self.executor.spin_once(timeout_sec=0.05)
         return result
 
@@ -168,8 +219,8 @@ class Plcs:
         self._plcs = load_plcs(str(data), Checksum.CRC, time.monotonic)
         for plc in self._plcs:
             plc.lock = threading.Lock()
-            if plc.station in ladders:
-                plc.run_ladder(Ladder(plc.table))
+        for station in ladders:
+            self[station].run_ladder(Ladder(self[station].table))
         self._line = PtyEndpoint(str(data.with_name('plcs')))
         self.port = self._line.name
         self.faults: list[Exception] = []
@@ -186,7 +237,11 @@ class Plcs:
         assert not self.faults
 
     def __getitem__(self, station: int) -> SimulatedPlc:
-        return next(plc for plc in self._plcs if plc.station == station)
+        for plc in self._plcs:
+            if plc.station == station:
+                return plc
+        raise LookupError(f'there is no station {station}; the data has '
+                          f'{", ".join(str(plc.station) for plc in self._plcs)}')
 
     def lose(self) -> None:
         """Take the line away, as when an adapter is unplugged."""
@@ -204,7 +259,10 @@ class Plcs:
         return int.from_bytes(table.read(parse_address(address, table.plc_type), 1), 'little')
 
     def set(self, address: str, *words: int, station: int = 1) -> None:  # noqa: A003
-        """Set words of a PLC, as its program does."""
+        """Set words of a PLC, as its program does; each from -32768 to 65535."""
+        for word in words:
+            if not -0x8000 <= word <= 0xFFFF:
+                raise ValueError(f'{word} is not a word, from -32768 to 65535')
         table = self[station].table
         table.write(parse_address(address, table.plc_type),
                     b''.join((word & 0xFFFF).to_bytes(2, 'little') for word in words))
@@ -216,20 +274,26 @@ class SimulatedCell:
 
     ``data``, ``rows`` and ``net`` are the texts of a simulator CSV, a map CSV and a net CSV, which
     go into ``folder``. ``ladders`` are stations that run the program of docs/heartbeats.md.
-    ``parameters`` are the bridge's, as ``'write_timeout:=1.0'``.
+    ``parameters`` are the bridge's, as ``'write_timeout:=1.0'``; ``context`` is for ``ros`` and
+    nodes that are added to it. Raises ConfigurationError with every fault of net and map CSV.
     """
 
     observer: type[Observer] = Observer
 
     def __init__(self, folder: Path, data: str, rows: str,
                  net: str = 'Com_Port,Baud,Timeout\n/dev/plc,115200,200', *,
-                 ladders: Sequence[int] = (), parameters: Sequence[str] = ()) -> None:
+                 ladders: Sequence[int] = (), parameters: Sequence[str] = (),
+                 context: Context | None = None) -> None:
         for name, text in (('data', data), ('map', rows), ('net', net)):
             (folder / f'{name}.csv').write_text(text, encoding='utf-8')
+        net_file, map_file = str(folder / 'net.csv'), str(folder / 'map.csv')
+        if problems := examine(net_file, map_file).problems:
+            raise ConfigurationError(problems)
         self.plcs = Plcs(folder / 'data.csv', ladders)
-        self.ros = self.observer()
-        self._assignments = [f'net_file:={folder / "net.csv"}', f'map_file:={folder / "map.csv"}',
+        self._assignments = [f'net_file:={net_file}', f'map_file:={map_file}',
                              f'port:={self.plcs.port}', *parameters]
+        self._bridge = Bridge(self._assignments, folder / 'bridge.log')
+        self.ros = self.observer(context=context, bridge=self._bridge)
 
     def __enter__(self) -> SimulatedCell:
         self.ros.__enter__()
@@ -244,20 +308,23 @@ class SimulatedCell:
 
     def start(self) -> None:
         """Start the bridge; also again, after its end."""
-        words = (word for text in self._assignments for word in ('-p', text))
-        self.bridge = subprocess.Popen(
-            [sys.executable, '-m', 'abdf1_ros', 'node', '--ros-args', *words])
+        self._bridge.start()
 
     def end(self, number: signal.Signals = signal.SIGTERM) -> int:
         """End the bridge by a signal, if it runs; return its exit status."""
-        if self.bridge.poll() is None:
-            self.bridge.send_signal(number)
-        return self.bridge.wait(PATIENCE)
+        return self._bridge.end(number)
 
 
 @pytest.fixture
 def abdf1_cell(tmp_path: Path) -> Iterator[Callable[..., SimulatedCell]]:
-    """Return what makes a ``SimulatedCell`` of texts; it ends with the test."""
+    """
+    Return what makes a ``SimulatedCell`` of texts; it ends with the test.
+
+    Its context is the default one, so a node of the test needs no context as an argument.
+    """
     with ExitStack() as stack:
+        if not rclpy.ok():
+            rclpy.init(args=[], signal_handler_options=SignalHandlerOptions.NO)
+            stack.callback(rclpy.try_shutdown)
         yield lambda *texts, **options: stack.enter_context(
-            SimulatedCell(tmp_path, *texts, **options))
+            SimulatedCell(tmp_path, *texts, context=rclpy.get_default_context(), **options))

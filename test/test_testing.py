@@ -16,10 +16,15 @@
 
 from collections.abc import Callable
 import re
+import time
 from typing import Any
 
-from abdf1_ros.testing import abdf1_cell, SimulatedCell
+from abdf1_ros.problems import ConfigurationError
+from abdf1_ros.ros.topics.messages import latched_qos
+from abdf1_ros.testing import abdf1_cell, PATIENCE, SimulatedCell
 import pytest
+from rclpy.node import Node
+from std_msgs.msg import Int16MultiArray
 from support.ros_tools import SOURCE
 
 EXAMPLE = SOURCE / 'examples' / 'testing'
@@ -62,3 +67,31 @@ def test_what_never_happens_is_named(
     with pytest.raises(AssertionError, match='waited for a word of 7'):
         cell.ros.until(lambda: cell.plcs.word('N7:0') == 7, 'a word of 7')
     monkeypatch.undo()
+    with pytest.raises(LookupError, match='there is no station 9; the data has 1'):
+        cell.plcs.word('N7:0', station=9)
+    with pytest.raises(ValueError, match='70000 is not a word'):
+        cell.plcs.set('N7:0', 70000)
+
+
+def test_what_can_never_come_is_told_at_once(abdf1_cell: Cells) -> None:  # noqa: F811
+    data = 'Station,PLC_Type,Address,Length,Values,Motion,Period\n1,SLC,N7:0,4,250,,\n'
+    rows = 'Tag,Command,Address,Station,PLC_Type\npressure,Read,N7:{},1,SLC\n'
+    with pytest.raises(ConfigurationError, match='map.csv:2:3'):
+        abdf1_cell(data, rows.format('x'))
+    with pytest.raises(LookupError, match='there is no station 3'):
+        abdf1_cell(data, rows.format(0), ladders=[3])
+    cell = abdf1_cell(data, rows.format(0), parameters=['net.baud:=7'])
+    begun = time.monotonic()
+    with pytest.raises(AssertionError, match='(?s)bridge has ended with 2.*Baud = "7"'):
+        cell.ros.listen(Int16MultiArray, '/abdf1/read/pressure').first()
+    assert time.monotonic() - begun < PATIENCE - 5.0
+
+
+def test_node_of_the_test_needs_no_context(abdf1_cell: Cells) -> None:  # noqa: F811
+    data = 'Station,PLC_Type,Address,Length,Values,Motion,Period\n1,SLC,N7:0,4,250,,\n'
+    cell = abdf1_cell(data, 'Tag,Command,Address,Station,PLC_Type\np,Read,N7:0,1,SLC\n')
+    node, heard = Node('mine'), []
+    node.create_subscription(Int16MultiArray, '/abdf1/read/p', heard.append, latched_qos())
+    cell.ros.executor.add_node(node)
+    cell.ros.until(lambda: heard, 'a value in our own node')
+    node.destroy_node()
