@@ -16,10 +16,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 import fcntl
 import os
 from pathlib import Path
+import select
 import socket
+from time import monotonic
 import tty
 from typing import Protocol
 
@@ -30,6 +33,18 @@ from abdf1_ros.ports.settings import PortSettings
 WAITING = 'waiting for a client'
 
 _PTYS = '/dev/pts/'
+
+_GLANCE = 200  # for a client (ms)
+
+# A client that has said nothing for so long (s) gives its place to the next one.
+_SILENT = 30.0
+
+# One that has vanished without a word is asked after 4 s, then every 2 s; the third time it is
+# gone. What it has been sent has to arrive within the same 10 s.
+_TCP = socket.IPPROTO_TCP
+_OPTIONS = ((_TCP, socket.TCP_NODELAY, 1), (socket.SOL_SOCKET, socket.SO_KEEPALIVE, 1),
+            (_TCP, socket.TCP_KEEPIDLE, 4), (_TCP, socket.TCP_KEEPINTVL, 2),
+            (_TCP, socket.TCP_KEEPCNT, 3), (_TCP, socket.TCP_USER_TIMEOUT, 10_000))
 
 
 class Endpoint(Protocol):
@@ -130,28 +145,80 @@ def _is_in_use(target: str) -> bool:
     return False
 
 
-class TcpEndpoint:
-    """A listening TCP port, any that is free for 0; one client at a time is the line."""
+class _Client(DescriptorPort):
+    """
+    The connection of the one client of a listening port.
 
-    def __init__(self, host: str, port: int) -> None:
+    ``look`` is called after each read with whether that has brought something; it raises OSError
+    where another client has taken the place.
+    """
+
+    def __init__(self, client: socket.socket, listener: socket.socket,
+                 look: Callable[[bool], None]) -> None:
+        super().__init__(client.fileno(), client.close)
+        self._poll.register(listener, select.POLLIN)
+        self._look = look
+
+    def read(self, timeout: float | None, wake: int) -> bytes:
+        data = super().read(timeout, wake)
+        self._look(bool(data))
+        return data
+
+
+class TcpEndpoint:
+    """
+    A listening TCP port, any that is free for 0; one client at a time is the line.
+
+    Another one is closed at once, and ``tell`` is called with its address; but it takes the place
+    of a client that has said nothing for 30 s. One that has vanished is missed within 10 s.
+    """
+
+    def __init__(self, host: str, port: int,
+                 tell: Callable[[str], None] = lambda other: None) -> None:
         family = socket.AF_INET6 if ':' in host else socket.AF_INET
         self._listener = socket.create_server((host, port), family=family)
-        self._listener.settimeout(0.2)
+        self._listener.setblocking(False)
+        self._tell = tell
+        self._next: socket.socket | None = None
+        self._heard = 0.0  # when the client has said something (s)
         host, port = self._listener.getsockname()[:2]
         self.name = f'socket://[{host}]:{port}' if ':' in host else f'socket://{host}:{port}'
 
     def open(self) -> Port:  # noqa: A003
         """Return the connection of a client; OSError while there is none."""
+        client, self._next = self._next, None
+        if client is None:
+            glance = select.poll()
+            glance.register(self._listener, select.POLLIN)
+            glance.poll(_GLANCE)
+            try:
+                client, _ = self._listener.accept()
+            except BlockingIOError:
+                raise OSError(WAITING) from None
+        for level, option, value in _OPTIONS:
+            client.setsockopt(level, option, value)
+        self._heard = monotonic()
+        return _Client(client, self._listener, self._look)
+
+    def _look(self, has_said: bool) -> None:
+        """Turn another client away, or raise OSError where it takes the place of a silent one."""
+        if has_said:
+            self._heard = monotonic()
         try:
-            client, _ = self._listener.accept()
-        except TimeoutError:
-            raise OSError(WAITING) from None
-        client.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
-        return DescriptorPort(client.fileno(), client.close)
+            other, address = self._listener.accept()
+        except BlockingIOError:
+            return
+        if monotonic() - self._heard > _SILENT:
+            self._next = other
+            raise OSError(f'it has said nothing for {_SILENT:.0f} s, and another one has come')
+        other.close()
+        self._tell(':'.join(map(str, address[:2])))
 
     def close(self) -> None:
         """Stop listening."""
         self._listener.close()
+        if self._next is not None:
+            self._next.close()
 
 
 class SerialEndpoint:

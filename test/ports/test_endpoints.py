@@ -15,13 +15,15 @@
 """Lines that are made or opened here: their names, who gets them, and what they leave behind."""
 
 from collections.abc import Iterator
-from contextlib import closing
+from contextlib import closing, suppress
 import os
 from pathlib import Path
 import socket
 import subprocess
 import sys
 
+from abdf1_ros.ports import endpoints
+from abdf1_ros.ports.descriptor import DescriptorPort
 from abdf1_ros.ports.endpoints import PtyEndpoint, SerialEndpoint, TcpEndpoint, WAITING
 from abdf1_ros.ports.link_thread import Port
 from abdf1_ros.ports.settings import PortSettings
@@ -126,6 +128,68 @@ def test_tcp_one_client_after_the_other(wake: int) -> None:
                 exchange(port, client.fileno(), wake)
     with pytest.raises(ConnectionRefusedError):
         socket.create_connection((host, int(number)), PATIENCE)
+
+
+@pytest.mark.parametrize('is_busy', [False, True])
+def test_tcp_second_client_is_closed_at_once_and_nothing_of_it_comes_later(
+        is_busy: bool, wake: int) -> None:
+    told: list[str] = []
+    with closing(TcpEndpoint(OWN_HOST, 0, told.append)) as line:
+        address = OWN_HOST, int(line.name.rpartition(':')[2])
+        first = socket.create_connection(address, PATIENCE)
+        with closing(line.open()) as port, socket.create_connection(address, PATIENCE) as second:
+            second.sendall(b'late')
+            if is_busy:
+                first.sendall(b'first')
+            assert port.read(PATIENCE, wake) == (b'first' if is_busy else b'')
+            with suppress(ConnectionResetError):
+                assert second.recv(1) == b''
+            first.close()
+            with pytest.raises(OSError, match='closed'):
+                port.read(PATIENCE, wake)
+        with pytest.raises(OSError, match=WAITING):
+            line.open()
+        who, = told
+        assert who.startswith('127.0.0.1:')
+
+
+@pytest.mark.parametrize(('seconds', 'is_taken'), [(29.9, False), (30.1, True)])
+def test_tcp_client_that_says_nothing_gives_its_place_to_the_next(
+        seconds: float, is_taken: bool, wake: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    now = 100.0
+    monkeypatch.setattr(endpoints, 'monotonic', lambda: now)
+    with closing(TcpEndpoint(OWN_HOST, 0)) as line:
+        address = OWN_HOST, int(line.name.rpartition(':')[2])
+        with socket.create_connection(address, PATIENCE) as silent:
+            port = line.open()
+            now += 29.0
+            silent.sendall(b'said')
+            assert port.read(PATIENCE, wake) == b'said'
+            now += seconds
+            with socket.create_connection(address, PATIENCE) as other:
+                other.sendall(b'of the other')
+                if not is_taken:
+                    assert port.read(PATIENCE, wake) == b''
+                    port.close()
+                    return
+                with pytest.raises(OSError, match='has said nothing for 30 s'):
+                    port.read(PATIENCE, wake)
+                port.close()
+                with closing(line.open()) as taken:
+                    assert taken.read(PATIENCE, wake) == b'of the other'
+
+
+def test_tcp_client_that_has_vanished_is_missed_within_ten_seconds() -> None:
+    with closing(TcpEndpoint(OWN_HOST, 0)) as line, socket.create_connection(
+            (OWN_HOST, int(line.name.rpartition(':')[2])), PATIENCE), closing(line.open()) as port:
+        assert isinstance(port, DescriptorPort)
+        with socket.socket(fileno=os.dup(port.fileno())) as ours:
+            ask = ours.getsockopt
+            assert ask(socket.SOL_SOCKET, socket.SO_KEEPALIVE) == 1
+            idle, pause, most = (ask(socket.IPPROTO_TCP, option) for option in (
+                socket.TCP_KEEPIDLE, socket.TCP_KEEPINTVL, socket.TCP_KEEPCNT))
+            assert idle + pause * most == 10
+            assert ask(socket.IPPROTO_TCP, socket.TCP_USER_TIMEOUT) == 10_000
 
 
 def test_tcp_port_in_use() -> None:
