@@ -118,7 +118,8 @@ class Agenda:
             return None
         self._since_guest = self._writes_in_a_row = 0
         task = self._tasks.start(job, now)
-        job.command.guest.sends(task.command)
+        guest = job.command.guest
+        guest.listener.sends(guest, task.command)
         return task
 
     def _write(self, now: float, busy: Container[int]) -> Job | JobTask | None:

@@ -71,6 +71,22 @@ def _code(command: Packet) -> tuple[int, int | None]:
     return cmd, command.data[0] if cmd in _WITH_FUNCTION and command.data else None
 
 
+class GuestListener:
+    """Is told what guests do, in any thread; what is not overridden does nothing."""
+
+    def sends(self, guest: Guest, command: Packet) -> None:
+        """Take note of a command on its way to the line, with our SRC and TNS."""
+
+    def wrote(self, guest: Guest, command: Packet, station: int, words: list[Extent]) -> None:
+        """Take note of a command other than a read that a PLC may have executed."""
+
+    def was_refused(self, guest: Guest, command: Packet) -> None:
+        """Take note of a command that is not allowed."""
+
+    def turned_away(self, guest: Guest, other: str) -> None:
+        """Take note that a program at this address came to a place that another one has."""
+
+
 @dataclass(slots=True, eq=False)
 class Guest:
     """
@@ -78,13 +94,12 @@ class Guest:
 
     ``refused`` counts commands that were not allowed, ``unanswered`` those for which the PLC has
     given no reply, ``collisions`` writes to words that we write too; ``slowest`` is the longest
-    time (s) to a reply. ``is_connected`` is what its port says. ``sends`` is called with each
-    command on its way to the line, ``wrote`` when a PLC may have executed one that is not a read,
-    with the station and the words as far as known, ``was_refused`` with one that is not allowed.
+    time (s) to a reply. ``is_connected`` is what its port says.
     """
 
     name: str
     access: ShareAccess = ShareAccess.READ
+    listener: GuestListener = field(default_factory=GuestListener)
     is_connected: bool = False
     commands: int = 0
     refused: int = 0
@@ -92,9 +107,6 @@ class Guest:
     slowest: float = 0.0
     collisions: int = 0
     waiting: deque[GuestCommand] = field(default_factory=deque)
-    sends: Callable[[Packet], None] = lambda command: None
-    wrote: Callable[[Packet, int, list[Extent]], None] = lambda command, station, words: None
-    was_refused: Callable[[Packet], None] = lambda command: None
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -164,7 +176,7 @@ class GuestQueue:
         guest.commands += 1
         if not guest.access.allows(command.packet):
             guest.refused += 1
-            guest.was_refused(command.packet)
+            guest.listener.was_refused(guest, command.packet)
             _refuse(command, _NOT_ALLOWED)
         elif not self._inbox.put(command):
             guest.unanswered += 1
@@ -240,7 +252,8 @@ class GuestQueue:
                 claim, _outcome(station, job.sts, error, was_sent),
                 may_land=was_sent and (error is not None or is_local_status(job.sts)))
             if was_sent:
-                command.guest.wrote(command.packet, station, list(claim.extents or ()))
+                command.guest.listener.wrote(
+                    command.guest, command.packet, station, list(claim.extents or ()))
         self._stations.tried(station, begun, self._line.now, is_message=True,
                              was_silent=not self._stations[station].replies_in_time)
 

@@ -18,11 +18,10 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
-from functools import partial
 
 from abdf1_ros.df1.packet import Packet
 from abdf1_ros.driver.driver import Driver
-from abdf1_ros.driver.guests import Guest
+from abdf1_ros.driver.guests import Guest, GuestListener
 from abdf1_ros.pccc.describe import describe
 from abdf1_ros.pccc.extent import Extent
 from abdf1_ros.ports.trace import PortOpener
@@ -33,22 +32,19 @@ from abdf1_ros.share.guest_line import GuestLine
 from abdf1_ros.text import first
 
 
-class GuestPlaces:
+class GuestPlaces(GuestListener):
     """A line for each place, and what is logged of the programs there."""
 
     def __init__(self, configuration: Configuration, driver: Driver, opener: PortOpener,
                  notes: LimitedLog, wake: Callable[[], None]) -> None:
         self._driver = driver
+        self._opener = opener
         self._notes = notes
         network = configuration.network
         if configuration.parameters.read_only:
             network = replace(network, share_access='Read')
-        self.lines = [GuestLine(place, network, driver.guests, wake, self._fault)
+        self.lines = [GuestLine(place, network, driver.guests, wake, self, self._fault)
                       for place in share_places(network.share)]
-        for line in self.lines:
-            line.guest.sends = partial(opener.note_guest, line.guest.name)
-            line.guest.wrote = partial(self._wrote, line.guest)
-            line.guest.was_refused = partial(self._refused, line.guest)
 
     def start(self) -> None:
         """Let guests connect."""
@@ -60,8 +56,18 @@ class GuestPlaces:
         for line in self.lines:
             line.stop()
 
-    def _wrote(self, guest: Guest, command: Packet, station: int,
-                     words: list[Extent]) -> None:
+    def sends(self, guest: Guest, command: Packet) -> None:
+        """Note in the trace whose command is sent."""
+        self._opener.note_guest(guest.name, command)
+
+    def turned_away(self, guest: Guest, other: str) -> None:
+        """Log that a second program wanted a place."""
+        self._notes.warning(f'guest {guest.name}', (
+            f'guest {guest.name}: a second program, at {other}, was turned away; one at a time '
+            'is at a place'))
+
+    def wrote(self, guest: Guest, command: Packet, station: int, words: list[Extent]) -> None:
+        """Log a write of words that we write, too."""
         rows = [row for row in self._driver.mappings if (row.writes or row.heartbeat)
                 and any(row.extent.meets(extent) for extent in words)]
         if rows:
@@ -70,7 +76,8 @@ class GuestPlaces:
                 f'writes of {guest.name}', f'guest {guest.name} has sent to station {station}: '
                 f'{describe(command)}, words of {first([row.tag for row in rows])}')
 
-    def _refused(self, guest: Guest, command: Packet) -> None:
+    def was_refused(self, guest: Guest, command: Packet) -> None:
+        """Log the first command that is not allowed."""
         if guest.refused == 1:
             self._notes.warning(f'guest {guest.name}', (
                 f'guest {guest.name} is refused: {describe(command)}: Share_Access is '

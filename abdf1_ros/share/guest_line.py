@@ -26,7 +26,13 @@ from abdf1_ros.df1.peer import FullDuplexPeer
 from abdf1_ros.df1.settings import LinkSettings
 from abdf1_ros.df1.stations import ActiveStationList
 from abdf1_ros.df1.tasks import Task
-from abdf1_ros.driver.guests import Guest, GuestCommand, GuestQueue, ShareAccess
+from abdf1_ros.driver.guests import (
+    Guest,
+    GuestCommand,
+    GuestListener,
+    GuestQueue,
+    ShareAccess,
+)
 from abdf1_ros.ports.descriptor import Port
 from abdf1_ros.ports.endpoints import (
     Endpoint,
@@ -60,13 +66,14 @@ class GuestLine:
     """
     Take the commands of the guest at ``place`` to ``queue``, and its replies back.
 
-    ``wake`` wakes the link of the PLC, ``fault`` is told of a bug. The guest's program may come
-    and go: a reply to one that has gone is dropped.
+    ``wake`` wakes the link of the PLC, ``listener`` is told what the guest does, ``fault`` of a
+    bug. The guest's program may come and go: a reply to one that has gone is dropped.
     """
 
     def __init__(self, place: SharePlace, network: Network, queue: GuestQueue,
-                 wake: Callable[[], None], fault: Callable[[Exception], None]) -> None:
-        self.guest = Guest(place.text, ShareAccess(network.share_access))
+                 wake: Callable[[], None], listener: GuestListener,
+                 fault: Callable[[Exception], None]) -> None:
+        self.guest = Guest(place.text, ShareAccess(network.share_access), listener)
         self._place = place
         self._queue = queue
         self._wake = wake
@@ -127,7 +134,8 @@ class GuestLine:
         if place.kind == 'pty':
             return PtyEndpoint(place.name)
         if place.kind == 'tcp':
-            return TcpEndpoint(place.host, place.port)
+            return TcpEndpoint(place.host, place.port,
+                               partial(self.guest.listener.turned_away, self.guest))
         return SerialEndpoint(self._port)
 
     def _changed(self, state: PortState) -> None:

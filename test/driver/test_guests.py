@@ -21,7 +21,7 @@ from itertools import count, pairwise
 
 from abdf1_ros.df1.packet import Packet
 from abdf1_ros.driver.guest_words import written_extents
-from abdf1_ros.driver.guests import Guest, GuestCommand, ShareAccess
+from abdf1_ros.driver.guests import Guest, GuestCommand, GuestListener, ShareAccess
 from abdf1_ros.driver.interlocks.heartbeat import BeatState
 from abdf1_ros.messages import Message
 from abdf1_ros.pccc.extent import Extent
@@ -141,9 +141,14 @@ def test_a_write_of_a_guest_is_read_again_at_once(kind: str, address: str, write
     bench = DriverBench([mapping])
     plc = bench.plc(1, kind, (address, 20))
     bench.run(1.0)
-    program = Program(bench, ShareAccess.WRITE)
     wrote: list[tuple[int, list[Extent]]] = []
-    program.guest.wrote = lambda command, station, words: wrote.append((station, words))
+
+    class Told(GuestListener):
+        def wrote(self, guest: Guest, command: Packet, station: int, words: list[Extent]) -> None:
+            wrote.append((station, words))
+
+    program = Program(bench, ShareAccess.WRITE)
+    program.guest.listener = Told()
     program.ask(write)
     bench.run(0.5)
     assert stored(plc, address) == b'\x34\x12'

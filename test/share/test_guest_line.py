@@ -36,6 +36,7 @@ from abdf1_ros.df1.settings import LinkSettings
 from abdf1_ros.df1.slave import multidrop
 from abdf1_ros.df1.stations import ActiveStationList
 from abdf1_ros.driver.driver import Driver
+from abdf1_ros.driver.guests import GuestListener
 from abdf1_ros.driver.links import DriverSettings
 from abdf1_ros.errors import RemoteError
 from abdf1_ros.ports.clock import line_time
@@ -77,7 +78,8 @@ class Shared:
         self._near = LinkThread(self.driver.machine, lambda: open_port(PortSettings(name)))
         self.faults: list[Exception] = []
         self.guests = [GuestLine(place, network, self.driver.guests, self._near.wake,
-                                 self.faults.append) for place in share_places(places)]
+                                 GuestListener(), self.faults.append)
+                       for place in share_places(places)]
 
     def _machine(self, mode: str) -> Machine:
         if mode == 'Master':
