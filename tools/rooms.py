@@ -66,7 +66,7 @@ class Room(NamedTuple):
 
 ROOMS = (
     Room(('messages.py', 'counters.py'), 'numbered errors and notices; status counters', ()),
-    Room(('text.py', 'numbers.py'), 'text and numbers from outside', ()),
+    Room(('text.py', 'numbers.py', 'line_names.py'), 'text, numbers and names from outside', ()),
     Room(('errors.py', 'problems.py'), 'the exceptions; faults in what users write',
          ('messages', 'text')),
     Room(('df1',), 'the link: frames, checksums, machine, stations; master, standard polling, '
@@ -75,7 +75,7 @@ ROOMS = (
          'family',
          (*_BASE, 'text', 'df1.packet')),
     Room(('settings',), 'both CSV files',
-         (*_BASE, 'problems', 'numbers', 'text', 'df1', 'pccc')),
+         (*_BASE, 'problems', 'numbers', 'text', 'line_names', 'df1', 'pccc')),
     Room(('plan',), 'what is read together, what it costs, what comes of it',
          ('problems', 'text', 'df1', 'pccc', 'settings')),
     Room(('driver',), 'carrying it out: who goes next, points, served words',
@@ -83,7 +83,7 @@ ROOMS = (
     Room(('sniffer',), 'recorded bytes, and traffic told to people',
          ('errors', 'problems', 'text', 'numbers', 'df1', 'pccc')),
     Room(('ports',), 'ports, the thread that runs a link on one, recording and listening',
-         ('errors', 'df1', 'settings', 'sniffer'), is_pure=False),
+         ('errors', 'line_names', 'df1', 'settings', 'sniffer'), is_pure=False),
     Room(('share',), 'the line shared with other programs: a place for each guest',
          ('errors', 'df1', 'pccc', 'settings', 'driver', 'ports'), is_pure=False),
     Room(('simulator',), 'simulated PLCs and the commands that they take',

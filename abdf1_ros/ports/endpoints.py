@@ -17,7 +17,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-import fcntl
 import os
 from pathlib import Path
 import select
@@ -26,8 +25,10 @@ from time import monotonic
 import tty
 from typing import Protocol
 
+from abdf1_ros.line_names import link_of
 from abdf1_ros.ports.descriptor import DescriptorPort, Port
 from abdf1_ros.ports.opening import open_port
+from abdf1_ros.ports.ownership import own
 from abdf1_ros.ports.settings import PortSettings
 
 WAITING = 'waiting for a client'
@@ -72,6 +73,7 @@ class PtyEndpoint:
 
     def __init__(self, link: str | None) -> None:
         self._link = Path(link) if link else None
+        self._lock = _own(self._link) if self._link else None
         if self._link:
             # Before we make a terminal: it may get the number that an old link points to.
             _remove_left_over(self._link)
@@ -81,8 +83,6 @@ class PtyEndpoint:
         self._target = os.ttyname(self._theirs)
         self.name = link or self._target
         if self._link:
-            # So others see that the link is in use. A client's lock is a flock, another kind.
-            fcntl.lockf(self._theirs, fcntl.LOCK_EX)
             try:
                 _make_link(self._link, self._target)
             except OSError:
@@ -100,14 +100,21 @@ class PtyEndpoint:
             self._link.unlink()
         os.close(self._ours)
         os.close(self._theirs)
+        if self._lock is not None:
+            self._lock.close()
+
+
+def _own(link: Path) -> socket.socket:
+    """Take a link; OSError where this or another process has it."""
+    try:
+        return own(link_of(str(link)))
+    except OSError:
+        raise OSError(f'{link} is in use by another simulator or sniff') from None
 
 
 def _remove_left_over(link: Path) -> None:
-    """Remove what an earlier run has left; OSError where that still runs."""
-    target = _target_of(link)
-    if target.startswith(_PTYS):
-        if _is_in_use(target):
-            raise OSError(f'{link} is in use by another simulator or sniff')
+    """Remove what an earlier run has left."""
+    if _target_of(link).startswith(_PTYS):
         link.unlink()
 
 
@@ -128,21 +135,6 @@ def _target_of(link: Path) -> str:
         return os.readlink(link)
     except OSError:
         return ''
-
-
-def _is_in_use(target: str) -> bool:
-    """Tell whether another process has made and still has a pseudo-terminal."""
-    try:
-        descriptor = os.open(target, os.O_RDWR | os.O_NOCTTY)
-    except OSError:
-        return False
-    try:
-        fcntl.lockf(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
-    except OSError:
-        return True
-    finally:
-        os.close(descriptor)
-    return False
 
 
 class _Client(DescriptorPort):

@@ -23,17 +23,16 @@ with its process.
 from __future__ import annotations
 
 import errno
-from ipaddress import ip_address, IPv6Address
-import os
+from hashlib import sha256
 import socket
-import stat
 from typing import Any
 from urllib.parse import urlsplit
+
+from abdf1_ros.line_names import address_of, device_of, LOOPBACK
 
 BUSY = 'another program has it open'
 
 _LOCK = '\0abdf1_ros.port.'
-_LOOPBACK = '127.0.0.1'
 
 
 def line_of(port: str) -> str:
@@ -45,13 +44,7 @@ def line_of(port: str) -> str:
     if '://' in port:
         url = urlsplit(port)
         return address_of(_number_of(url.hostname or ''), url.port or 0)
-    try:
-        status = os.stat(port)
-    except OSError:
-        return os.path.realpath(port)
-    if not stat.S_ISCHR(status.st_mode):
-        return os.path.realpath(port)
-    return f'device {os.major(status.st_rdev)}:{os.minor(status.st_rdev)}'
+    return device_of(port)
 
 
 def _number_of(host: str) -> str:
@@ -59,20 +52,19 @@ def _number_of(host: str) -> str:
     try:
         found = socket.getaddrinfo(host, None, flags=socket.AI_NUMERICHOST)
     except OSError:
-        return _LOOPBACK if host == 'localhost' else host
+        return LOOPBACK if host == 'localhost' else host
     return str(found[0][4][0])
 
 
-def address_of(host: str, port: int) -> str:
-    """Return the same text for all ways to write a host's address, and its port."""
+def own(name: str) -> socket.socket:
+    """Take a name of a line until the socket is closed; OSError where any process has it."""
+    lock = socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM)
     try:
-        address = ip_address(host)
-    except ValueError:
-        return f'{host.lower()}:{port}'
-    if isinstance(address, IPv6Address) and address.ipv4_mapped:
-        address = address.ipv4_mapped
-    is_here = address.is_loopback and host in ('::1', _LOOPBACK)
-    return f'{_LOOPBACK if is_here or address.is_unspecified else address}:{port}'
+        lock.bind(_LOCK + sha256(name.encode()).hexdigest())  # a path may be too long for a name
+    except OSError:
+        lock.close()
+        raise OSError(errno.EBUSY, BUSY) from None
+    return lock
 
 
 class OwnedConnection(socket.socket):
@@ -81,12 +73,11 @@ class OwnedConnection(socket.socket):
     def __init__(self, family: int, address: tuple[Any, ...]) -> None:
         """Take the port; OSError where another program of this host has it."""
         super().__init__(family, socket.SOCK_STREAM)
-        self._lock = socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM)
         try:
-            self._lock.bind(_LOCK + address_of(*address[:2]))
+            self._lock = own(address_of(*address[:2]))
         except OSError:
-            self.close()
-            raise OSError(errno.EBUSY, BUSY) from None
+            super().close()
+            raise
 
     def close(self) -> None:
         super().close()

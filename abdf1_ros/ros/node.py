@@ -110,7 +110,7 @@ class BridgeNode(Node):
             configuration = configure(self, files)
             self._shown = ShownFiles(self)
             self._shown.show(configuration.network, configuration.shown_rows())
-            self._hold_ports(configuration.port)
+            self._hold_ports(*configuration.held)
             self._set_up(configuration, graph or Graph(self))
         except Exception:  # other lines of this process go on
             self.destroy_node()
@@ -234,7 +234,7 @@ class BridgeNode(Node):
             return response
         try:
             configuration = read_again(self.session.configuration)
-            self._hold_ports(self.port, configuration.port)
+            self._hold_ports(*self.session.configuration.held, *configuration.held)
         except ConfigurationError as error:
             for problem in error.problems:
                 self.get_logger().error(f'{problem} (goes on as before)')
@@ -263,7 +263,7 @@ class BridgeNode(Node):
             self.session.begin_end()
         self.session.guests.start()
         self._shown.show(configuration.network, configuration.shown_rows())
-        self._hold_ports(self.port)
+        self._hold_ports(*configuration.held)
         return True
 
     def _set_polling(self, request: SetBool.Request,

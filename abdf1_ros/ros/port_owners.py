@@ -18,12 +18,14 @@ from __future__ import annotations
 
 from abdf1_ros.ports.ownership import line_of
 from abdf1_ros.problems import ConfigurationError, Problem
+from abdf1_ros.settings.share import share_places
 
 
 class PortOwners:
     """
     The ports of all lines: two masters on one line would disturb each other.
 
+    So would two lines with one place for guests: a command would go to either PLC.
     The system refuses a device that is open, but neither the port of a device server nor a device
     that its line has left for a while.
     """
@@ -31,17 +33,27 @@ class PortOwners:
     def __init__(self) -> None:
         self._devices: dict[str, dict[str, str]] = {}
 
-    def hold(self, owner: str, *ports: str) -> None:
+    def hold(self, owner: str, *names: str) -> None:
         """
-        Let a line have these ports, and no others any more; from any thread.
+        Let a line have these ports and places of Share, and no others any more; from any thread.
 
         Raises ConfigurationError, and leaves all as it was, where another line has one of them.
         """
-        before, wanted = self._devices.get(owner, {}), {line_of(port): port for port in ports}
+        before, wanted = self._devices.get(owner, {}), {_line(name): name for name in names}
         # Ours are entered first, so that of two lines that want a port at once none or one has it.
         self._devices[owner] = wanted
         for other, held in [*self._devices.items()]:
             if other != owner and (taken := wanted.keys() & held.keys()):
                 self._devices[owner] = before
-                raise ConfigurationError([
-                    Problem('port', f'{wanted[taken.pop()]} is the port of {other}')])
+                name = wanted[taken.pop()]
+                kind = 'place' if _is_place(name) else 'port'
+                raise ConfigurationError([Problem('port', f'{name} is the {kind} of {other}')])
+
+
+def _is_place(name: str) -> bool:
+    return name.startswith(('pty:', 'tcp:'))
+
+
+def _line(name: str) -> str:
+    where = name.partition('?')[0]
+    return share_places(where)[0].line if _is_place(where) else line_of(where)

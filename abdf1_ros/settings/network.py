@@ -286,6 +286,13 @@ def make_network(values: MappingType[str, tuple[str, Place | str]],
         problems.append(Problem(where, f'Share needs Mode Master or Peer: {why_unshared}'))
     if problems:
         raise ConfigurationError(problems)
+    port = Network(com_port=checked['com_port']).port
+    for place in share_places(checked['share']):
+        if place.is_port(port):
+            where = values.get('share', ('', 'Share'))[1]
+            raise ConfigurationError([Problem(where, (
+                f'Share: "{shown(place.text)}" is the port of the line, {shown(port)}; a guest '
+                'needs another'))])
     given = {FIELDS[name].column for name in values}
     checked['remarks'] = tuple(
         remark for remark in base.remarks if remark.place.column not in given)

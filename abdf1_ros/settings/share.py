@@ -20,14 +20,14 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 import ipaddress
 import re
-from urllib.parse import parse_qsl
+from urllib.parse import parse_qsl, urlsplit
 
 from abdf1_ros.df1.checksum import Checksum
+from abdf1_ros.line_names import address_of, device_of, link_of, LOOPBACK
 from abdf1_ros.numbers import whole_number
 from abdf1_ros.settings import BAUD_RATES, PARITIES
 from abdf1_ros.text import shown
 
-_LOOPBACK = '127.0.0.1'
 _MOST_PLACES = 16
 _RIGHT = ('pty:/a/name, tcp:PORT, tcp:ADDRESS:PORT, or a serial device such as '
           '/dev/ttyUSB1?baud=19200&check=CRC&parity=Even')
@@ -53,6 +53,20 @@ class SharePlace:
     parity: str | None = None
 
     @property
+    def line(self) -> str:
+        """Return the same text for all ways to write this place."""
+        if self.kind == 'tcp':
+            return address_of(self.host, self.port)
+        return link_of(self.name) if self.kind == 'pty' else device_of(self.name)
+
+    def is_port(self, port: str) -> bool:
+        """Tell whether this is the device path or URL of a port."""
+        if '://' in port:
+            url = urlsplit(port)
+            return self.line == address_of(url.hostname or '', url.port or 0)
+        return self.line in (device_of(port), link_of(port))
+
+    @property
     def is_open_to_others(self) -> bool:
         """Tell whether other machines can connect."""
         return self.kind == 'tcp' and not ipaddress.ip_address(self.host).is_loopback
@@ -61,10 +75,13 @@ class SharePlace:
 def share_places(text: str) -> list[SharePlace]:
     """Return the places of a cell, separated by blanks; ValueError says what would be right."""
     places = [_place(word) for word in text.split()]
-    names = [place.text.partition('?')[0] for place in places]
-    for name in names:
-        if names.count(name) > 1:
-            raise ValueError(f'"{shown(name)}" is there twice; each guest has a place of its own')
+    known: dict[str, str] = {}
+    for place in places:
+        name = place.text.partition('?')[0]
+        if (other := known.setdefault(place.line, name)) is not name:
+            same = '' if other == name else f', also as "{shown(other)}"'
+            raise ValueError(
+                f'"{shown(name)}" is there twice{same}; each guest has a place of its own')
     if len(places) > _MOST_PLACES:
         raise ValueError(f'{len(places)} places; the most are {_MOST_PLACES}')
     return places
@@ -97,7 +114,7 @@ def _host_and_port(name: str, text: str) -> tuple[str, int]:
     host, colon, digits = name.rpartition(':')
     port = whole_number(digits)
     try:
-        host = str(ipaddress.ip_address(re.sub(r'^\[|\]$', '', host))) if colon else _LOOPBACK
+        host = str(ipaddress.ip_address(re.sub(r'^\[|\]$', '', host))) if colon else LOOPBACK
     except ValueError:
         port = None  # a name may stand for any interface
     if port is None or not 0 < port < 65536:

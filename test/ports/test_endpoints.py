@@ -115,6 +115,20 @@ def test_name_that_another_process_has(tmp_path: Path) -> None:
         assert os.readlink(name) == before
 
 
+def test_link_is_one_however_it_is_written(tmp_path: Path) -> None:
+    (tmp_path / 'folder').mkdir()
+    (tmp_path / 'same').symlink_to('folder')
+    names = [f'{tmp_path}/folder/plc', f'{tmp_path}//folder/plc', f'{tmp_path}/same/plc',
+             f'{tmp_path}/same/../folder/./plc']
+    for first in names:
+        with closing(PtyEndpoint(first)):
+            before = os.readlink(names[0])
+            for other in names:
+                with pytest.raises(OSError, match='is in use by another simulator or sniff'):
+                    PtyEndpoint(other)
+            assert os.readlink(names[0]) == before
+
+
 def test_tcp_one_client_after_the_other(wake: int) -> None:
     with closing(TcpEndpoint(OWN_HOST, 0)) as line:
         scheme, _, address = line.name.partition('://')

@@ -50,3 +50,15 @@ def test_device_is_one_port_under_all_its_names(tmp_path: Path) -> None:
     owners.hold('/a', str(tmp_path / 'device'))
     with pytest.raises(ConfigurationError, match=f'{tmp_path}/link is the port of /a'):
         owners.hold('/b', str(tmp_path / 'link'))
+
+
+def test_place_is_that_of_one_line() -> None:
+    owners = PortOwners()
+    owners.hold('/a', '/dev/one', 'pty:/tmp/hmi', 'tcp:4501', '/dev/ttyS9?baud=9600')
+    for place in 'pty:/tmp//hmi', 'tcp:127.0.0.1:4501':
+        with pytest.raises(ConfigurationError, match=f'{place} is the place of /a'):
+            owners.hold('/b', '/dev/two', place)
+    for names in ('/dev/two', '/dev/one?check=BCC'), ('/dev/ttyS9',):
+        with pytest.raises(ConfigurationError, match='is the port of /a'):
+            owners.hold('/b', *names)
+    owners.hold('/b', '/dev/two', 'pty:/tmp/hmi_2', 'tcp:4502')

@@ -14,9 +14,11 @@
 
 """The column Share: places, and what is wrong with one."""
 
+from pathlib import Path
+
 from abdf1_ros.df1.checksum import Checksum
 from abdf1_ros.problems import ConfigurationError
-from abdf1_ros.settings.network import make_network, Network
+from abdf1_ros.settings.network import load_network, make_network, Network
 from abdf1_ros.settings.remarks import network_remarks
 from abdf1_ros.settings.share import share_places, SharePlace
 import pytest
@@ -51,6 +53,37 @@ def test_fault_says_what_would_be_right(text: str, words: str) -> None:
     problem, = error.value.problems
     assert words in str(problem)
     assert str(problem).startswith('net.csv:2: Share: ')
+
+
+def test_place_is_one_however_it_is_written(tmp_path: Path) -> None:
+    (tmp_path / 'tty').touch()
+    (tmp_path / 'link').symlink_to('tty')
+    (tmp_path / 'same').symlink_to('.')
+    for one, other in [(f'pty:{tmp_path}/a', f'pty:{tmp_path}//a'),
+                       (f'pty:{tmp_path}/a', f'pty:{tmp_path}/same/a'),
+                       (f'{tmp_path}/tty', f'{tmp_path}/link?baud=9600'),
+                       ('tcp:4501', 'tcp:127.0.0.1:4501'), ('tcp:4501', 'tcp:0.0.0.0:4501'),
+                       ('tcp:4501', 'tcp:[::1]:4501')]:
+        with pytest.raises(ValueError, match='there twice, also as'):
+            share_places(f'{one} tcp:99 {other}')
+    assert len(share_places('tcp:4501 tcp:4502 tcp:10.0.0.1:4501')) == 3
+
+
+@pytest.mark.parametrize(('port', 'place'), [
+    ('{0}/tty', '{0}/link?baud=9600'), ('{0}/link', '{0}/tty'), ('{0}/new', 'pty:{0}//new'),
+    ('socket://127.0.0.1:4501', 'tcp:4501'), ('1', '/dev/ttyS0')])
+def test_port_of_the_line_is_no_place(port: str, place: str, tmp_path: Path) -> None:
+    (tmp_path / 'tty').touch()
+    (tmp_path / 'link').symlink_to('tty')
+    port, place = port.format(tmp_path), place.format(tmp_path)
+    file = tmp_path / 'net.csv'
+    file.write_text(f'Com_Port,Share\n{port},tcp:4502 {place}\n')
+    with pytest.raises(ConfigurationError) as error:
+        load_network(str(file))
+    problem, = error.value.problems
+    assert str(problem.place).startswith(f'{file}:2')
+    assert problem.place.column == 'Share'
+    assert f'"{place}" is the port of the line' in str(problem)
 
 
 def test_slave_has_nothing_to_share() -> None:

@@ -141,6 +141,11 @@ class Configuration:
     ignored: list[str] = field(default_factory=list)
     files: FileWatch = field(default_factory=FileWatch)
 
+    @property
+    def held(self) -> tuple[str, ...]:
+        """Return the port and the places of Share, which no other line may have."""
+        return self.port, *self.network.share.split()
+
     def driver_settings(self) -> DriverSettings:
         """Return parameters of the same names, and what follows from others."""
         own = {entry.name for entry in fields(Parameters)}

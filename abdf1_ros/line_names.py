@@ -1,0 +1,50 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""One text for all ways to write a device, a link, or an address, as far as nobody is asked."""
+
+from __future__ import annotations
+
+from ipaddress import ip_address, IPv6Address
+from pathlib import Path
+import stat
+
+LOOPBACK = '127.0.0.1'
+
+
+def device_of(path: str) -> str:
+    """Return the same text for all names of a device: its number, or where there is none yet."""
+    try:
+        status = Path(path).stat()
+    except OSError:
+        return str(Path(path).resolve())
+    is_device = stat.S_ISCHR(status.st_mode)
+    return f'device {status.st_rdev}' if is_device else str(Path(path).resolve())
+
+
+def link_of(path: str) -> str:
+    """Return the same text for all ways to write the name of a link, wherever that leads."""
+    return str(Path(path).parent.resolve() / Path(path).name)
+
+
+def address_of(host: str, port: int) -> str:
+    """Return the same text for all ways to write a host's address, and its port."""
+    try:
+        address = ip_address(host)
+    except ValueError:
+        return f'{host.lower()}:{port}'
+    if isinstance(address, IPv6Address) and address.ipv4_mapped:
+        address = address.ipv4_mapped
+    is_here = address.is_loopback and host in ('::1', LOOPBACK)
+    return f'{LOOPBACK if is_here or address.is_unspecified else address}:{port}'
