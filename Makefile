@@ -103,7 +103,7 @@ ros-tools: $(INSTALLED) ## Get ros2 launch, topic, security and the linters of a
 	$(PY) -m pip install --quiet -r requirements/ros_tools_needs.txt
 	@$(PY) -m pip install --quiet --no-deps --no-build-isolation -r requirements/ros_tools.txt || { \
 	    echo 'These are sources from github.com. Without them "ros2 ..." is missing and its tests are'; \
-	    echo 'skipped; all else works: $(VENV)/bin/node, check, monitor, plc, simulator, make test.'; \
+	    echo 'skipped; all else works: $(VENV)/bin/abdf1 node, monitor, plc and others, make test.'; \
 	    exit 1; }
 	@$(PY) -c 'import composition_interfaces' 2>/dev/null || { \
 	    folder=$$($(PY) -c 'import sysconfig; print(sysconfig.get_path("purelib"))'); \
@@ -186,7 +186,7 @@ check-install: build ## Build, then see that what is installed starts
 	    test -e $(SHARE)/$$file || { echo "$(SHARE)/$$file is missing" >&2; exit 1; }; \
 	done
 	@source install/setup.bash; cd /; \
-	timeout 60 "$(CURDIR)/$(NODE)" --ros-args -p net_file:=/nowhere/net.csv; status=$$?; \
+	PATH="$(CURDIR)/$(VENV)/bin:$$PATH" timeout 60 "$(CURDIR)/$(NODE)" --ros-args -p net_file:=/nowhere/net.csv; status=$$?; \
 	if [ $$status -ne 2 ]; then \
 	    echo "the node ended with status $$status, expected was 2" >&2; exit 1; \
 	fi; \

@@ -45,7 +45,9 @@ setup(
         (f'share/{PACKAGE}/deploy', sorted(glob('deploy/*.*') + ['deploy/Dockerfile'])),
         (f'share/{PACKAGE}/examples', sorted(glob('examples/*.*'))),
         (f'share/{PACKAGE}/examples/testing', sorted(glob('examples/testing/*.py'))),
-        (f'lib/{PACKAGE}', sorted(glob('examples/*.py'))),  # where "ros2 run" finds them
+        # Where "ros2 run" finds them, and no PATH of pip does.
+        (f'lib/{PACKAGE}', sorted(glob('examples/*.py'))),
+        (f'lib/{PACKAGE}', ['scripts/node']),
         (f'share/{PACKAGE}/launch', sorted(glob('launch/*.py'))),
         (f'share/{PACKAGE}/wireshark', ['wireshark/abdf1.lua']),
     ],
@@ -55,7 +57,7 @@ setup(
     extras_require={'test': ['hypothesis', 'pytest', 'pytest-timeout']},
     entry_points={
         'console_scripts': [
-            f'node = {PACKAGE}.cli.main:node',
+            f'abdf1 = {PACKAGE}.__main__:main',
             f'lines = {PACKAGE}.cli.main:lines',
             f'simulator = {PACKAGE}.cli.main:simulator',
             f'sniff = {PACKAGE}.cli.main:sniff',

@@ -12,10 +12,11 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""``python3 -m abdf1_ros COMMAND``: the commands where no ROS has installed them."""
+"""``abdf1 COMMAND``, or ``python3 -m abdf1_ros COMMAND``: all commands by one name."""
 
 from __future__ import annotations
 
+from pathlib import Path
 import sys
 
 from abdf1_ros.cli.main import COMMANDS, run
@@ -23,12 +24,15 @@ from abdf1_ros.cli.main import COMMANDS, run
 
 def main() -> int:
     """Run the command that the first argument names; return its exit status, 2 for none."""
-    name = sys.argv[1] if len(sys.argv) > 1 else ''
-    if name not in COMMANDS:
-        print(f'usage: python3 -m abdf1_ros {{{",".join(COMMANDS)}}} ...', file=sys.stderr)
-        return 0 if name in ('-h', '--help') else 2
-    sys.argv[:2] = [name]
-    return run(name)
+    program, name = Path(sys.argv[0]).name, ''.join(sys.argv[1:2])
+    if name in COMMANDS:
+        sys.argv[:2] = [name]
+        return run(name)
+    is_help = name in ('-h', '--help')
+    print(f'usage: {"abdf1" if program == "abdf1" else "python3 -m abdf1_ros"} '
+          f'{{{",".join(COMMANDS)}}} ...\neach has --help',
+          file=sys.stdout if is_help else sys.stderr)
+    return 0 if is_help else 2
 
 
 if __name__ == '__main__':

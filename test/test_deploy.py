@@ -37,7 +37,7 @@ UNITS = pytest.mark.parametrize('path', [UNIT, LINES_UNIT], ids=['line', 'lines'
 RULES = DEPLOY / '99-abdf1.rules'
 DOCKERFILE = DEPLOY / 'Dockerfile'
 SETUP = (SOURCE / 'setup.py').read_text(encoding='utf-8')
-EXECUTABLES = set(re.findall(r"f'(\w+) = \{PACKAGE\}", SETUP))
+EXECUTABLES = set(re.findall(r"(?:f'|scripts/)(\w+)(?: = \{PACKAGE\}|')", SETUP))
 
 
 # systemd

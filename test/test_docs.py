@@ -40,8 +40,8 @@ from support.cases import for_all
 from support.simulator_process import STATUSES
 
 ROOT = documents.ROOT
-COMMANDS = tuple(re.findall(r"'(\w+) = \{PACKAGE\}", (ROOT / 'setup.py').read_text('utf-8')))
-OURS = re.compile(rf'(?:ros2 run abdf1_ros |python3? -m abdf1_ros\.|^(?:\$ )?)'
+COMMANDS = tuple(MAINS)
+OURS = re.compile(rf'(?:ros2 run abdf1_ros |python3? -m abdf1_ros |abdf1 |^(?:\$ )?)'
                   rf'({"|".join(COMMANDS)})\b(.*)')
 LAUNCH_ARGUMENTS = set(re.findall(
     r"DeclareLaunchArgument\(\s*'(\w+)'",
@@ -120,6 +120,40 @@ def test_every_command_and_topic_is_in_the_reference() -> None:
     assert 'active_stations' in TOPICS
     assert [command for command in COMMANDS if f'| `{command}' not in commands] == []
     assert [topic for topic in TOPICS if f'| `~/{topic}' not in topics] == []
+
+
+@pytest.mark.parametrize('command', ['plc', 'conform'])
+def test_every_subcommand_is_in_the_reference(command: str) -> None:
+    known = subcommands(command) or frozenset(
+        re.search(r'^  {([\w,-]+)}', help_of(command), re.MULTILINE)[1].split(','))
+    (table,) = [part for part in documents.text('docs/reference/commands.md').split('\n\n')
+                if part.startswith(f'| `{command}` |')]
+    named = re.findall('`([a-z-]+)`', ''.join(
+        line.split('|')[1] for line in table.splitlines()[2:]))
+    assert len(known) > 5
+    assert set(named) == known
+
+
+# Nodes that pages may name: those of config/three_lines.yaml, and of a service called press.
+NODES = {'/abdf1', '/press', '/interlock_consumer', '/lines', '/cell/line_1', *re.findall(
+    r'^(/[\w/]+):$', (ROOT / 'config' / 'three_lines.yaml').read_text('utf-8'), re.MULTILINE)}
+
+
+@for_all('name', documents.NAMES)
+def test_nodes_that_pages_name_exist(name: str) -> None:
+    for line in code(name):
+        named = re.findall(r'--node (\S+)', line) + re.findall(r'lines:=\[([\w/, ]+)\]', line)
+        for entry in named:
+            assert set(entry.split(', ')) <= NODES, line
+
+
+@for_all('name', documents.NAMES)
+def test_defaults_that_pages_quote_are_right(name: str) -> None:
+    defaults = {entry.name: entry.default for entry in fields(Parameters)}
+    for parameter, said in re.findall(r'`(\w+)`(?: \w+)? \((true|false|[\d.]+)[,)]', ' '.join(
+            documents.text(name).split())):
+        if parameter in defaults:
+            assert str(defaults[parameter]).lower().removesuffix('.0') == said, parameter
 
 
 def test_every_status_is_in_the_reference() -> None:

@@ -189,11 +189,13 @@ def called(name: str) -> str:
     if shutil.which('ros2') and any(
             Path(prefix, 'lib', 'abdf1_ros', name).exists() for prefix in filter(None, prefixes)):
         return f'ros2 run abdf1_ros {name}'
-    for script, words in ((shutil.which(name), name),
-                          (str(Path(sys.executable).with_name(name)), None)):
+    beside = Path(sys.executable).with_name
+    for script, words in ((shutil.which(name), name), (shutil.which('abdf1'), f'abdf1 {name}'),
+                          (str(beside(name)), shlex.quote(str(beside(name)))),
+                          (str(beside('abdf1')), f'{shlex.quote(str(beside("abdf1")))} {name}')):
         # Others have commands of these names too, such as Node.js.
         if script and Path(script).is_file() and b'abdf1_ros' in Path(script).read_bytes()[:1000]:
-            return words or shlex.quote(script)
+            return words
     return f'{shlex.quote(sys.executable)} -m abdf1_ros {name}'
 
 

@@ -68,7 +68,7 @@ _HELP = """\
 Run many bridges in one process, a node for each section of the parameter file.
 
   lines --ros-args --params-file lines.yaml
-  lines --ros-args --params-file lines.yaml -p 'lines:=[press_plc, paint_plc]'
+  lines --ros-args --params-file lines.yaml -p 'lines:=[/press/abdf1, /paint/abdf1]'
 
 A line whose files have faults is told and left out; -p strict_lines:=true ends the process then.
 A line that ends by an internal error is started again, the others notice nothing.
@@ -272,7 +272,7 @@ def _options(node: Node, files: Sequence[str]) -> tuple[list[str], bool]:
                          for name, default in OPTIONS.items())
     if isinstance(wanted, str) or not all(isinstance(name, str) for name in wanted):
         problems.append(Problem('parameter lines', (
-            f"{wanted!r} should be a list of names, as in -p 'lines:=[press_plc, paint_plc]'")))
+            f"{wanted!r} should be a list of names, as in -p 'lines:=[/press/abdf1]'")))
     if not isinstance(is_strict, bool):
         problems.append(Problem(
             'parameter strict_lines', f'{is_strict!r} should be true or false'))

@@ -21,6 +21,7 @@ import signal
 import subprocess
 import sys
 
+from abdf1_ros.cli import terminal
 from abdf1_ros.cli.main import COMMANDS
 import pytest
 
@@ -101,5 +102,5 @@ def test_signal_where_nothing_is_under_way_ends_quietly(
         raise KeyboardInterrupt
 
     module = import_module(COMMANDS[name])
-    monkeypatch.setattr(module, 'interruptible', interrupted)
+    monkeypatch.setattr(module if name == 'demo' else terminal, 'interruptible', interrupted)
     assert module.main(args) == status

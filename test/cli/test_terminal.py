@@ -220,8 +220,12 @@ def test_commands_are_told_as_they_can_be_pasted(
     monkeypatch.delenv('AMENT_PREFIX_PATH', raising=False)
     assert called('plc') == f"'{venv}/plc'"
     assert called('node') == f"'{venv}/python' -m abdf1_ros node"
+    (venv / 'abdf1').write_text('from abdf1_ros', encoding='utf-8')
+    (venv / 'abdf1').chmod(0o755)
+    assert called('node') == f"'{venv}/abdf1' node"
     monkeypatch.setenv('PATH', f'{venv}:{tmp_path}/ros')
     assert called('plc') == 'plc'
+    assert called('node') == 'abdf1 node'
     monkeypatch.setenv('AMENT_PREFIX_PATH', f'/nowhere:{workspace}')
     assert called('plc') == 'ros2 run abdf1_ros plc'
-    assert called('check') == f"'{venv}/python' -m abdf1_ros check"
+    assert called('check') == 'abdf1 check'

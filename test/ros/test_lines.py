@@ -411,7 +411,7 @@ def test_one_name_for_all_lines_is_refused(capfd: pytest.CaptureFixture[str]) ->
 
 
 @pytest.mark.parametrize(('option', 'text'), [
-    ('lines:=a', "parameter lines: 'a' should be a list of names, as in -p 'lines:=[press_plc"),
+    ('lines:=a', "parameter lines: 'a' should be a list of names, as in -p 'lines:=[/press/abdf1"),
     ('lines:=[1]', 'should be a list of names'),
     ('strict_lines:=3', 'parameter strict_lines: 3 should be true or false'),
     ('strict_line:=true', 'there is no such parameter; did you mean strict_lines?'),
