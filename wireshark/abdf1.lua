@@ -503,20 +503,27 @@ local function message(data, range, tree, pinfo, is_good)
       heard[whole] = {number = pinfo.number, time = pinfo.abs_ts}
       local key = is_reply and string.format('%d %d %d', dst, src, tns)
         or string.format('%d %d %d', src, dst, tns)
+      local command = open[key]
       if not is_reply then
-        open[key] = {number = pinfo.number, time = pinfo.abs_ts, text = text}
-      elseif open[key] then
-        local command = open[key]
-        found[pinfo.number] = {
-          request = command.number, text = command.text, seconds = pinfo.abs_ts - command.time}
+        local again = command and command.whole == whole and not command.answered
+          and pinfo.abs_ts - command.time < MEMORY
+        if not again then  -- a repeated command is timed from its first transmission
+          open[key] = {number = pinfo.number, time = pinfo.abs_ts, text = text, whole = whole}
+        end
+      elseif command then  -- a repeated reply has no latency
+        found[pinfo.number] = {request = command.number, text = command.text,
+          seconds = not command.answered and pinfo.abs_ts - command.time or nil}
         found[command.number] = found[command.number] or {reply = pinfo.number}
+        command.answered = true
       end
     end
     local known = found[pinfo.number]
     if known and known.request then
       tree:add(f.request, range, known.request)
-      local whole = math.floor(known.seconds)
-      tree:add(f.latency, range, NSTime.new(whole, math.floor((known.seconds - whole) * 1e9)))
+      if known.seconds then
+        local s = math.floor(known.seconds)
+        tree:add(f.latency, range, NSTime.new(s, math.floor((known.seconds - s) * 1e9)))
+      end
       text = (text == '' and 'done, ' or text .. ', to ') .. known.text
     elseif known and known.reply then
       tree:add(f.reply, range, known.reply)

@@ -137,6 +137,13 @@ class ListeningDecoder(FrameDecoder):
         self._keep(result)
         return result
 
+    def broken_off(self) -> Frame:
+        frame = super().broken_off()
+        self.waiting.clear()
+        self.in_message = False
+        self._keep(frame)
+        return frame
+
     def _begin(self, pair: bytes) -> Decoded:
         # What came before is noise, whose last byte may look like the beginning.
         del self._heard[:max(0, len(self._heard) - len(self.waiting) - len(pair))]

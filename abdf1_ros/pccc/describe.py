@@ -34,7 +34,7 @@ from abdf1_ros.pccc.plc3.address import BY_SECTION
 from abdf1_ros.pccc.plc3.commands import ExtendedAddress
 from abdf1_ros.pccc.plc5.commands import SystemAddress
 from abdf1_ros.pccc.plc5.describe import system_address
-from abdf1_ros.pccc.status import check_status, EXT_BAD_SYMBOL, EXT_NO_SUCH_SYMBOL
+from abdf1_ros.pccc.status import check_status, EXT_BAD_ADDRESS, EXT_BAD_SYMBOL, EXT_NO_SUCH_SYMBOL
 from abdf1_ros.pccc.word_range import commands as word_range
 from abdf1_ros.text import printable
 
@@ -93,7 +93,10 @@ def _describe_command(packet: Packet) -> str:
     try:
         return f'{entry.name} {entry.words(entry.read(Reader(parameters)))}'.rstrip()
     except FormatError as error:
-        return f'{entry.name}, malformed ({error}): {notation.hexadecimal(packet.data)}'
+        # An address of program files or the like is whole, though our servers have not such.
+        is_elsewhere = isinstance(error, AddressRefusal) and error.ext_sts == EXT_BAD_ADDRESS
+        fault = error if is_elsewhere else f'malformed ({error})'
+        return f'{entry.name}, {fault}: {notation.hexadecimal(packet.data)}'
 
 
 def _code(packet: Packet) -> CommandCode:

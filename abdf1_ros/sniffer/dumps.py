@@ -28,7 +28,7 @@ import re
 
 from abdf1_ros.problems import Problem
 from abdf1_ros.sniffer.capture import Chunk, Direction, is_capture_line, read_capture
-from abdf1_ros.sniffer.ethernet_ip import chunks_of
+from abdf1_ros.sniffer.ethernet_ip import chunks_of, CSP
 from abdf1_ros.sniffer.packet_files import is_packet_file, PacketFile
 from abdf1_ros.sniffer.pcapng import LINK_TYPE
 
@@ -90,13 +90,14 @@ class Recording:
 
     def _packets(self) -> Iterator[Chunk]:
         file = PacketFile(self._name, self._file)
-        is_empty = True
-        for chunk in chunks_of(file.packets()):
+        is_empty, ports = True, set[int]()
+        for chunk in chunks_of(file.packets(), ports):
             is_empty, self._position = False, file.position
             yield chunk
         if is_empty:
+            csp = f'; TCP port {CSP} is CSP, which is not decoded' if CSP in ports else ''
             raise Problem(self._name, f'byte {file.position}: no packet up to here has DF1 (link '
-                          f'type {LINK_TYPE}) or PCCC in EtherNet/IP (CIP service 4B)')
+                          f'type {LINK_TYPE}) or PCCC in EtherNet/IP (CIP service 4B)' + csp)
 
     def _binary(self) -> Iterator[Chunk]:
         while data := self._file.read(_BLOCK):

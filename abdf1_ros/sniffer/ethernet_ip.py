@@ -15,9 +15,10 @@
 """
 Traffic out of recorded packets: DF1 that ``sniff`` has written, and PCCC inside EtherNet/IP.
 
-PCCC goes through TCP port 44818 in CIP service 4B (Execute PCCC) of the PCCC object, as it is or
-inside of an Unconnected Send (52). It has no frame, check, DST and SRC: the last numbers of the IP
-addresses stand for these two.
+PCCC goes through TCP port 44818 in CIP service 4B (Execute PCCC) of the PCCC object (class 67), as
+it is or inside of an Unconnected Send (52). It has no frame, check, DST and SRC: the last numbers
+of the IP addresses stand for these two. A response names no class: it is PCCC where its request
+was seen.
 """
 
 from __future__ import annotations
@@ -37,6 +38,7 @@ _RTAC_EVENTS = {1: Direction.OUT, 2: Direction.IN, 3: Direction.OUT, 4: Directio
 _DIRECTIONS = {number: way for way, number in DIRECTIONS.items()}
 
 _PORT = 44818
+CSP = 2222  # PCCC of older Ethernet processors, in a way of its own
 # The bytes before an IPv4 header, and where among them its EtherType stands, by link type:
 # loopback, Ethernet, raw IP, Linux cooked 1 and 2.
 _LINKS = {0: (4, None), 1: (14, 12), 101: (0, None), 113: (16, 14), 276: (20, 0)}
@@ -47,6 +49,7 @@ _SEND_RR, _SEND_UNIT = 0x6F, 0x70
 _COMMANDS = (0x00, 0x01, 0x04, 0x63, 0x64, 0x65, 0x66, _SEND_RR, _SEND_UNIT, 0x72, 0x73)
 _CONNECTED, _UNCONNECTED = 0xB1, 0xB2  # items
 _EXECUTE_PCCC, _UNCONNECTED_SEND, _REPLY = 0x4B, 0x52, 0x80  # services
+_PCCC_OBJECT = b'\x20\x67', b'\x21\x00\x67\x00'  # a path begins with its class
 
 
 class _Stream:
@@ -77,9 +80,14 @@ class _Stream:
                     yield message
 
 
-def chunks_of(packets: Iterable[RecordedPacket]) -> Iterator[Chunk]:
-    """Yield what DF1 and PCCC there is in packets, with times (s) from the first packet on."""
+def chunks_of(packets: Iterable[RecordedPacket], ports: set[int]) -> Iterator[Chunk]:
+    """
+    Yield what DF1 and PCCC there is in packets, with times (s) from the first packet on.
+
+    All TCP ports that were seen come into ``ports``.
+    """
     streams: dict[bytes, _Stream] = {}
+    asked: set[bytes] = set()  # connection and TNS of requests
     begun: float | None = None
     for time, link_type, data in packets:
         begun = time if begun is None else begun
@@ -90,16 +98,27 @@ def chunks_of(packets: Iterable[RecordedPacket]) -> Iterator[Chunk]:
             yield Chunk(later, _RTAC_EVENTS[data[8]], data[12:])
         elif (segment := _tcp(link_type, data)) is not None:
             ends, number, payload = segment
+            both = {int.from_bytes(ends[8:10], 'big'), int.from_bytes(ends[10:], 'big')}
+            ports |= both
+            if _PORT not in both:
+                continue
             if len(streams) > _MOST_STREAMS:
                 streams.clear()
+                asked.clear()
             way = Direction.OUT if ends[10:12] == _PORT.to_bytes(2, 'big') else Direction.IN
             for message in streams.setdefault(ends, _Stream()).feed(number, payload):
-                for pccc in _pccc(message):
+                for is_reply, pccc in _pccc(message):
+                    key = (ends[4:8] + ends[:4] + ends[10:] + ends[8:10] if is_reply else ends) \
+                        + pccc[2:4]
+                    if not is_reply:
+                        asked.add(key)
+                    elif key not in asked:
+                        continue
                     yield Chunk(later, way, bytes((ends[7], ends[3])) + pccc, is_message=True)
 
 
 def _tcp(link_type: int, data: bytes) -> tuple[bytes, int, bytes] | None:
-    """Return addresses and ports, sequence number and payload of a segment to or from the port."""
+    """Return addresses and ports, sequence number and payload of a segment."""
     start, kind = _LINKS.get(link_type, (len(data), None))
     if kind is not None:
         while data[kind:kind + 2] == _VLAN:
@@ -114,15 +133,13 @@ def _tcp(link_type: int, data: bytes) -> tuple[bytes, int, bytes] | None:
     if len(segment) < 20:
         return None
     ports, number = segment[:4], int.from_bytes(segment[4:8], 'big')
-    if _PORT.to_bytes(2, 'big') not in (ports[:2], ports[2:]):
-        return None
     is_first = segment[13] & 0x02
     payload = segment[4 * (segment[12] >> 4):]
     return head[12:20] + ports, number + bool(is_first), payload
 
 
-def _pccc(message: bytes) -> Iterator[bytes]:
-    """Yield CMD, STS, TNS and what follows of each Execute PCCC in an EtherNet/IP message."""
+def _pccc(message: bytes) -> Iterator[tuple[bool, bytes]]:
+    """Yield whether it is a response, and CMD, STS, TNS and what follows of each Execute PCCC."""
     at = 8
     for _ in range(int.from_bytes(message[6:8], 'little')):
         item, size = int.from_bytes(message[at:at + 2], 'little'), int.from_bytes(
@@ -133,7 +150,7 @@ def _pccc(message: bytes) -> Iterator[bytes]:
         if item in (_CONNECTED, _UNCONNECTED):
             found = _executed(data)
             if len(found) >= 4:
-                yield found
+                yield bool(data[0] & _REPLY), found
 
 
 def _executed(cip: bytes) -> bytes:
@@ -146,6 +163,6 @@ def _executed(cip: bytes) -> bytes:
         body = cip[2 + 2 * cip[1]:]
         if cip[0] == _UNCONNECTED_SEND and len(body) >= 4:
             return _executed(body[4:4 + int.from_bytes(body[2:4], 'little')])
-        if cip[0] != _EXECUTE_PCCC:
+        if cip[0] != _EXECUTE_PCCC or not cip[2:].startswith(_PCCC_OBJECT):
             return b''
     return body[body[0]:] if body else b''  # after the requestor, which begins with its length

@@ -121,9 +121,11 @@ class TrafficDecoder:
             yield self._unanswered(transaction, max(times, default=None))
 
     def _whole(self, wire: _OneDirection, direction: Direction, is_end: bool) -> Iterator[Entry]:
-        """Yield a frame that has a right BCC and waits for more; at an end, drop what is left."""
+        """Yield a frame that has a right BCC and waits for more; at an end, what is left too."""
         symbol = wire.decoder.finish()
         if is_end:
+            if symbol is None and wire.decoder.in_message:
+                symbol = wire.decoder.broken_off()
             wire.decoder.reset()
         chunk = Chunk(wire.last_time, direction, b'')
         yield from self._noise(wire, chunk)

@@ -98,6 +98,11 @@ def test_command_without_fnc_is_described(cmd: int, data: str, text: str) -> Non
     assert describe(command(data, cmd)) == text
 
 
+def test_areas_of_a_plc5_beside_the_data_table_are_whole() -> None:
+    assert describe(command('68 00 00 01 00 0F 03 03 0A 00 01 00')) == (
+        'typed read, memory area 3 is not the data table: 68 00 00 01 00 0F 03 03 0A 00 01 00')
+
+
 @pytest.mark.parametrize('data', [
     'A2', 'A2 08 07', 'A2 08 07 89 1E 00 01', 'AA 04 07 89 00 00 01', '68 00 00 01 00 10',
     '67 00 00 01 00 07 00 07 00 42 01', '26', 'A9 02 07 89 1E 05 00 01'])

@@ -197,12 +197,20 @@ def test_damage_is_told_with_its_place(tmp_path: Path, content: bytes, fault: st
     assert fault in str(problem.value)
 
 
+def test_csp_is_named(tmp_path: Path) -> None:
+    packet = tcp(bytes(40), 0).replace((44818).to_bytes(2, 'big'), (2222).to_bytes(2, 'big'))
+    with pytest.raises(Problem, match='; TCP port 2222 is CSP, which is not decoded'):
+        chunks_of(tmp_path / 'x', pcap([(0.0, ethernet(packet))]))
+
+
 @pytest.mark.parametrize('packet', [
     b'', bytes(14), ethernet(b''), ethernet(bytes(60)), ethernet(tcp(b'', 0)[:30]),
     ethernet(tcp(bytes(100), 0)), ethernet(tcp(encapsulated(b''), 0)),
     ethernet(tcp(encapsulated(bytes.fromhex('4B 02 20 67 24 01')), 0)),
     ethernet(tcp(encapsulated(bytes.fromhex('52 02 20 06 24 01 05 F9 00 00')), 0)),
     ethernet(tcp(encapsulated(cip(b'\x06')), 0)),
+    ethernet(tcp(encapsulated(cip(STATUS).replace(b'\x20\x67', b'\x20\x04')), 0)),
+    ethernet(tcp(encapsulated(cip(STATUS, is_reply=True)), 0, to_plc=False)),
     ethernet(tcp(encapsulated(cip(STATUS)), 0).replace(b'\xAF\x12', b'\x01\x02'))])
 def test_other_packets_are_passed_over(tmp_path: Path, packet: bytes) -> None:
     found = chunks_of(tmp_path / 'x', pcap([(0.0, packet), *exchange()]))
