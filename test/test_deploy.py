@@ -77,6 +77,7 @@ def test_unit_starts_again_after_what_may_pass_only(path: Path) -> None:
     assert service['Restart'] == ['on-failure']
     assert service['RestartPreventExitStatus'] == ['2']  # faulty files
     assert service['KillSignal'] == ['SIGINT']
+    assert (service['Type'], service['WatchdogSec']) == (['notify'], ['30'])
     assert unit(path)['Unit']['StartLimitIntervalSec'] == ['0']
 
 

@@ -163,6 +163,7 @@ class LinkThread(threading.Thread):
         self._paced = -math.inf  # until then a line would have needed for a burst so far
         self._next: _Exchange | None = None
         self._is_lost = False
+        self.has_turned = True  # since a supervisor has set it to False
         self._stopping = False
         self._is_closed = False
         self._closing = threading.Lock()
@@ -285,6 +286,7 @@ class LinkThread(threading.Thread):
 
     def _exchange(self) -> None:
         """Put a machine on the line that has been handed over, if there is one."""
+        self.has_turned = True
         exchange, self._next = self._next, None
         if exchange is not None and exchange.claim():
             self._machine.stop(PortLost(_READ_AGAIN))
@@ -320,6 +322,7 @@ class LinkThread(threading.Thread):
         machine.start(clock(), port)
         left = b''
         while not (self._stopping or self.is_released or self._next):
+            self.has_turned = True
             while sender.send_before < math.inf and (now := clock()) > sender.send_before:
                 machine.withdraw(now)  # this process has not run for a while
             data = sender.data_to_send()

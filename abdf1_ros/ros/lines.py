@@ -48,6 +48,7 @@ from abdf1_ros.ros.process import (
     run_ros,
     take_last_writes,
 )
+from abdf1_ros.ros.supervisor import Supervisor
 from abdf1_ros.ros.topics.interlocks import END_LIMIT
 from abdf1_ros.signals import EndRequest
 from abdf1_ros.text import printable
@@ -325,7 +326,6 @@ class Lines:
         self._executor = SingleThreadedExecutor(context=node.context)
         self._executor.add_node(node)
         self._next_status = 0.0
-
         for line in self.lines:
             line.make()
 
@@ -353,6 +353,7 @@ class Lines:
         return 0
 
     def _look_after(self, ended: EndRequest) -> None:
+        supervisor = Supervisor()
         groups = min(_GROUPS, len(self.lines))
         for group in itertools.cycle(range(groups)):
             if ended.wait(LEVEL_CHECK_PERIOD / groups):
@@ -361,6 +362,7 @@ class Lines:
                 line.check()
             if group == 0:
                 self._look()
+                supervisor.look([line.node.link for line in self.lines if line.node is not None])
 
     def _look(self) -> None:
         """Take requests to the process, and tell of all lines."""

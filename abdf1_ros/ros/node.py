@@ -47,6 +47,7 @@ from abdf1_ros.ros.process import (
     take_last_writes,
 )
 from abdf1_ros.ros.session import Session, Surroundings
+from abdf1_ros.ros.supervisor import Supervisor
 from abdf1_ros.ros.topics.interlocks import END_LIMIT
 from abdf1_ros.ros.topics.messages import latched_qos
 from abdf1_ros.ros.topics.writes import WriteTopics
@@ -321,8 +322,10 @@ def _run(node: BridgeNode, ended: EndRequest) -> int:
     executor.add_node(node)
     try:
         node.start()
+        supervisor = Supervisor()
         while not ended.is_set() and not node.has_failed:
             executor.spin_once(timeout_sec=0.1)
+            supervisor.look([node.link])
     finally:
         ended.set()
         try:
