@@ -16,10 +16,11 @@
 Try for hours what the tests try for minutes, each time with something new.
 
 The parts, each for its share of the time: ``properties`` (all property tests, with new examples),
-``fuzz`` (all targets, from a corpus that is kept), ``noise`` and ``soak`` (every mode, in virtual
-time), ``bridge`` (node and simulator as processes, with faults) and ``kills``. What they say is in
-the folder of ``--work``, with the corpus and the examples that failed. At the end stands what was
-tried. The same seed draws the same, as far as time does not decide. Status 1 when a part failed.
+``fuzz`` (all targets, from a corpus that is kept), ``faults`` (each fault of a byte, and pairs),
+``noise`` and ``soak`` (every mode, in virtual time), ``bridge`` (node and simulator as processes,
+with faults) and ``kills``. What they say is in the folder of ``--work``, with the corpus and the
+examples that failed. At the end stands what was tried. The same seed draws the same, as far as
+time does not decide. Status 1 when a part failed.
 """
 
 import argparse
@@ -39,6 +40,7 @@ _HERE = Path(__file__).resolve().parent
 _ROOT = _HERE.parents[1]
 
 _MODES = ('Message', 'Standard', 'Peer', 'Slave', 'Radio')
+_LINKS = ('Master', *_MODES[1:])
 
 
 @dataclass(slots=True)
@@ -94,13 +96,18 @@ def parts(work: Path) -> dict[str, Part]:
         return [str(_HERE / name), *options]
 
     return {
-        'properties': Part(0.3, lambda seed, left: [
+        'properties': Part(0.2, lambda seed, left: [
             '-m', 'pytest', '-q', '-m', 'hypothesis', f'--hypothesis-seed={seed}',
             '-p', 'no:cacheprovider', '--hypothesis-show-statistics', '--timeout=3000'],
             {'examples': r'(\d+) passing', 'that failed': r'\d+ passing.*?, (\d+) failing'}),
         'fuzz': Part(0.2, lambda seed, left: script(
             'fuzz/run.py', f'--seconds={left:.0f}', f'--work={work / "fuzz"}'),
             {'inputs': r'(?m)^\w+ +([\d,]+)[ \d,]+  '}),
+        'faults': Part(0.1, lambda seed, left: script(
+            'single_faults.py', f'--mode={_LINKS[seed % len(_LINKS)]}',
+            f'--check={("CRC", "BCC")[seed // len(_LINKS) % 2]}', f'--seed={seed}',
+            f'--seconds={left:.0f}'), {'single faults': r'(?m) ([\d,]+) single',
+                                       'pairs': r'(?m) ([\d,]+) pairs'}),
         'noise': Part(0.1, lambda seed, left: script(
             'noise/run.py', _MODES[seed % len(_MODES)],
             f'--check={("CRC", "BCC")[seed // len(_MODES) % 2]}', f'--seed={seed}',
