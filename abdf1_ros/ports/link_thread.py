@@ -130,7 +130,9 @@ class LinkThread(threading.Thread):
     Run ``machine`` on the port that ``open_port`` opens; open it again when it is lost.
 
     ``on_state`` is called when the port opens, is lost, or cannot be opened (in this thread);
-    attempts to open it are ``retry_period`` seconds apart. ``while_sending`` is called whenever
+    attempts to open it are ``retry_period`` seconds apart. What is being received came after the
+    clock value ``came_after`` (s), where nothing was left to read; a wait takes ``longest_wait`` s
+    at most, so that this is no older without need. ``while_sending`` is called whenever
     all bytes to send have been given to the port: work done then delays nothing on the line.
     ``on_fault`` is called with an exception that is a bug; the machine starts again after it.
     Three within a minute end the thread, and ``has_failed`` tells so.
@@ -144,6 +146,7 @@ class LinkThread(threading.Thread):
                  on_fault: Callable[[Exception], None] = lambda error: None,
                  while_sending: Callable[[], None] = lambda: None,
                  retry_period: float = _RETRY_PERIOD,
+                 longest_wait: float = math.inf,
                  clock: Callable[[], float] = line_time,
                  processor_clock: Callable[[], float] = time.thread_time) -> None:
         super().__init__(name='df1 link')
@@ -157,6 +160,8 @@ class LinkThread(threading.Thread):
         self._on_fault = on_fault
         self._while_sending = while_sending
         self._retry_period = retry_period
+        self._longest_wait = longest_wait
+        self.came_after = -math.inf
         self._clock = clock
         self._processor_clock = processor_clock
         self._worked = 0.0  # processor time (s) up to the last portion of a burst
@@ -254,10 +259,11 @@ class LinkThread(threading.Thread):
                 self._wait()
                 continue
             self._is_lost = False
+            asked = self._clock()
             try:
                 port = self._opened_port()
             except OSError as error:
-                self._is_lost = True
+                self._is_lost, self.came_after = True, asked
                 self._set_state(False, f'cannot open the port: {_reason(error)}')
             else:
                 if port is not None:
@@ -332,10 +338,12 @@ class LinkThread(threading.Thread):
             # A connection is read as its bytes come: they may be here before their time.
             if port.is_terminal and (spare_time := machine.spare_time):
                 self._pause(spare_time)
-            deadline = machine.next_call
-            timeout = None if deadline is None else max(0.0, deadline - clock())
+            deadline, asked = machine.next_call, clock()
+            wait = self._longest_wait if deadline is None else max(0.0, deadline - asked)
+            timeout = min(wait, self._longest_wait)
             try:
-                data = left or port.read(timeout, self._wake_reader)
+                data = left or port.read(
+                    None if timeout == math.inf else timeout, self._wake_reader)
             except OSError:
                 machine.counters.read_errors += 1
                 raise
@@ -352,6 +360,7 @@ class LinkThread(threading.Thread):
                 machine.receive_data(data, now)
             elif self._take_wake() and not self._stopping:
                 machine.wake(now)
+            self.came_after = asked
 
     def _take_wake(self) -> bool:
         try:
