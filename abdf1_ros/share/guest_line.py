@@ -37,12 +37,11 @@ from abdf1_ros.ports.clock import line_time
 from abdf1_ros.ports.descriptor import Port
 from abdf1_ros.ports.endpoints import (
     Endpoint,
-    PtyEndpoint,
+    PtyPlace,
     SerialEndpoint,
     TcpEndpoint,
-    WAITING,
 )
-from abdf1_ros.ports.link_thread import LinkThread, PortState
+from abdf1_ros.ports.link_thread import LinkThread, PortKind, PortState
 from abdf1_ros.ports.settings import PortSettings
 from abdf1_ros.settings.network import Network
 from abdf1_ros.settings.share import SharePlace
@@ -102,13 +101,13 @@ class GuestLine:
     @property
     def state(self) -> str:
         """Return what a person is to know of the place."""
-        text = self.link.state.text
-        return WAITING if WAITING in text else text
+        return self.link.state.text
 
     @property
     def fault(self) -> str:
         """Return why nobody can connect, empty where somebody can."""
-        return self.state if self.state.startswith('cannot open') else ''
+        state = self.link.state
+        return state.text if state.kind is PortKind.UNAVAILABLE else ''
 
     def start(self) -> None:
         """Wait for the guest, and serve it."""
@@ -144,10 +143,10 @@ class GuestLine:
     def _made(self) -> Endpoint:
         place = self._place
         if place.kind == 'pty':
-            return PtyEndpoint(place.name)
+            return PtyPlace(place.name)
         if place.kind == 'tcp':
             return TcpEndpoint(place.host, place.port,
-                               partial(self.guest.listener.turned_away, self.guest))
+                               partial(self.guest.listener.turned_away, self.guest), 0.0)
         return SerialEndpoint(self._port)
 
     def _changed(self, state: PortState) -> None:
