@@ -63,10 +63,10 @@ _CRC_LOW = tuple(entry & 0xFF for entry in _CRC_TABLE)
 _CRC_HIGH = tuple(entry >> 8 for entry in _CRC_TABLE)
 
 
-def crc16(data: bytes | bytearray, start: int = 0) -> int:
-    """Return CRC-16 x^16+x^15+x^2+1, reflected (A001), continued from ``start`` (M 5-6)."""
+def crc16(data: bytes | bytearray) -> int:
+    """Return CRC-16 x^16+x^15+x^2+1, reflected (A001), begun with 0 (M 5-6)."""
     # Byte by byte: Python makes no new objects of small numbers.
-    low, high = start & 0xFF, start >> 8
+    low = high = 0
     for byte in data:
         index = low ^ byte
         low = high ^ _CRC_LOW[index]

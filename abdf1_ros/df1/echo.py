@@ -71,9 +71,9 @@ class LineEcho:
         self.is_heard = False
         self._expected.clear()
 
-    def is_ours(self, symbol: Symbol, has_left: Callable[[int], bool]) -> bool:
+    def take_ours(self, symbol: Symbol, has_left: Callable[[int], bool]) -> bool:
         """
-        Tell whether a symbol is our own, and nobody's answer; ``has_left`` knows positions.
+        Take a symbol; tell whether it is our own. ``has_left`` knows positions.
 
         ACK, NAK and ENQ are alike whoever sends them: they are ours only where an echo is known.
         """

@@ -376,7 +376,7 @@ class Machine:
             is_slaves = self._forget_on_send and (
                 symbol.station is None if isinstance(symbol, Frame)
                 else isinstance(symbol, Control) and not echo.is_heard)
-            if is_slaves or not echo.is_ours(symbol, self.sender.has_left):
+            if is_slaves or not echo.take_ours(symbol, self.sender.has_left):
                 break
             if isinstance(symbol, Frame) and not self._is_half_duplex:
                 return NOISE

@@ -284,7 +284,7 @@ class MasterLine:
         station = self.stations[self.stations.via(packet.src)]
         self.counters.messages_received += 1
         self.stations.heard(packet.src, self.machine.now)
-        if packet.is_reply and packet.dst == self.settings.station and station.accepts(packet):
+        if packet.is_reply and packet.dst == self.settings.station and station.note_new(packet):
             self.accounting.received(packet)
             if not self._take_reply(packet.src, packet):
                 self.take_unwanted(packet)
@@ -321,7 +321,7 @@ class MasterLine:
             return None  # not acknowledged: the slave keeps it; replies make room and go on
         self.counters.acks_sent += 1
         yield _ACKNOWLEDGE
-        if not station.accepts(packet):
+        if not station.note_new(packet):
             self.counters.duplicate_messages += 1
             self.note(Message.NTC_DUPLICATE_MSG_RCVD, number, station=number)
             return None
@@ -376,7 +376,7 @@ class MasterLine:
         packet = next(packet for packet in self.forwards if packet.dst not in busy)
         self.forwards.remove(packet)
         number = self.stations.via(packet.dst)
-        if not self.stations.admits_message(packet.dst, self.machine.now):
+        if not self.stations.claim_message(packet.dst, self.machine.now):
             self._refuse(packet)
             return None
         if not packet.is_reply and number != BROADCAST:

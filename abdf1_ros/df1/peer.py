@@ -216,14 +216,14 @@ class FullDuplexPeer(EqualNode):
             if response is Code.NAK:
                 naks += 1
                 self._accounting.nak_received(packet.dst)
-                if is_probe or not self._may_repeat(naks, packet.dst):
+                if is_probe or not self._note_nak(naks, packet.dst):
                     break
                 if naks > 1:
                     yield from self._listen((naks - 1) * _NAK_PAUSE)
                 sending = message
             else:
                 enqs += 1
-                if is_probe or not self._may_ask(enqs, packet.dst):
+                if is_probe or not self._note_silence(enqs, packet.dst):
                     break
                 sending = frames.ENQ
         delivered = self._machine.now if response in (Code.ACK, Code.STX) else None
@@ -231,7 +231,7 @@ class FullDuplexPeer(EqualNode):
             yield from self._listen()
         return delivered
 
-    def _may_repeat(self, naks: int, station: int) -> bool:
+    def _note_nak(self, naks: int, station: int) -> bool:
         """Count and report that a message is sent again, or is not any more."""
         if naks > self._settings.nak_retries:
             self._counters.nak_limit_exceeded += 1
@@ -242,7 +242,7 @@ class FullDuplexPeer(EqualNode):
                    station=station)
         return True
 
-    def _may_ask(self, enqs: int, station: int) -> bool:
+    def _note_silence(self, enqs: int, station: int) -> bool:
         """Count and report that an ENQ asks for the response, or does not any more."""
         if enqs > self._settings.enq_retries:
             self._counters.enq_limit_exceeded += 1
@@ -405,11 +405,12 @@ class FullDuplexPeer(EqualNode):
                 self._outstanding.pop(key).task, keeps_others_waiting=True)
 
     def _respond(self, response: bytes) -> bytes:
+        self._last_response = response
         if response == frames.NAK:
             self._expect_repetition()
-        self._last_response = response
-        self._counters.acks_sent += response == frames.ACK
-        self._counters.naks_sent += response == frames.NAK
+            self._counters.naks_sent += 1
+        else:
+            self._counters.acks_sent += 1
         return response
 
 

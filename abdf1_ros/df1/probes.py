@@ -48,8 +48,8 @@ class Probes:
         """Return from when on (clock value, s) a message may go to a silent station."""
         return self._free + self.pause if self._was_message else self._free
 
-    def admits_message(self, now: float) -> bool:
-        """Tell whether a message may go to a silent station now."""
+    def claim_message(self, now: float) -> bool:
+        """Take note of a message to a silent station; tell whether it may go now."""
         is_admitted = now >= self.next_message
         self._is_kept_for_message |= not is_admitted and not self._was_message
         return is_admitted

@@ -288,8 +288,8 @@ class RadioNode(EqualNode):
             self._note(Message.NTC_NAK_RETRY, command.tries, Message.ERR_COMMAND_TIMEOUT.number,
                        station=command.task.command.dst)
 
-    def _is_known(self, data: bytes) -> bool:
-        """Tell whether these link data are among the last ones that were heard, and keep them."""
+    def _note_heard(self, data: bytes) -> bool:
+        """Keep link data; tell whether they were among the last ones that were heard."""
         now = self._machine.now
         is_known = any(seen == data and now - when < _RECENT for seen, when in self._heard)
         if not is_known:
@@ -309,7 +309,7 @@ class RadioNode(EqualNode):
             self._hear_our_number(packet, symbol.data)
             return
         is_ours = packet.dst in self._numbers
-        is_known = self._is_known(symbol.data)
+        is_known = self._note_heard(symbol.data)
         between = {packet.src, packet.dst}
         if not is_known and not is_ours and between <= {*self._settings.store_forward}:
             self._put(symbol.data)

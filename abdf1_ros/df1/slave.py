@@ -156,8 +156,10 @@ class HalfDuplexSlave:
         assert held is not None
         was_sent = held.sent > 1
         self.counters.messages_sent -= 1
-        self.counters.nak_retries -= was_sent
-        self.counters.commands_sent -= not was_sent
+        if was_sent:
+            self.counters.nak_retries -= 1
+        else:
+            self.counters.commands_sent -= 1
         return was_sent
 
     def _release(self, error: LinkError | None = None) -> None:

@@ -78,7 +78,7 @@ class Station:
         """Tell whether it comes and goes: it answers polls, and no command between them."""
         return self.returns >= _MOST_RETURNS
 
-    def accepts(self, packet: Packet) -> bool:
+    def note_new(self, packet: Packet) -> bool:
         """Remember ``packet``; return False when it repeats the last message (M 3-7, 3-15)."""
         key = packet.dst, packet.src, packet.cmd, packet.tns  # with ``duplicate_key``
         if key == self.last_key:
@@ -181,10 +181,10 @@ class ActiveStationList:
         """Tell whether the link polls a station, or its gateway, all the time."""
         return self.via(number) in self._polled
 
-    def admits_message(self, number: int, now: float) -> bool:
-        """Tell whether a message may go to a station: to a silent one in its probes' time only."""
+    def claim_message(self, number: int, now: float) -> bool:
+        """Tell whether a message may go to a station; to a silent one in its probes' time only."""
         return self[number].replies_in_time or (
-            not self.is_polled(number) and self.probes.admits_message(now))
+            not self.is_polled(number) and self.probes.claim_message(now))
 
     def next_message(self, number: int) -> float:
         """Return from when on (clock value, s) a message may go to an active station."""

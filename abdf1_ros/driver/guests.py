@@ -212,7 +212,7 @@ class GuestQueue:
             if self._stations[station].last_heard is None:
                 self._silent(station, now)  # it may not exist: one poll or try at a time
             is_vain = station == BROADCAST and _code(command.packet) in _READS  # nobody answers
-            if not is_vain and self._stations.admits_message(station, now):
+            if not is_vain and self._stations.claim_message(station, now):
                 return GuestJob(self, command, station, command.requested + self._patience,
                                 self._claim(command.packet, station))
             self._give_up(command, _OFF_LINE)

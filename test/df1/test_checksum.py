@@ -79,11 +79,6 @@ def test_crc_goes_on_the_line_low_byte_first() -> None:
     assert (Checksum.CRC.size, Checksum.BCC.size) == (2, 1)
 
 
-@given(st.binary(max_size=64), st.binary(max_size=64))
-def test_crc_can_be_continued(first: bytes, second: bytes) -> None:
-    assert crc16(second, crc16(first)) == crc16(first + second)
-
-
 @given(st.binary(max_size=300), st.integers(0, 255))
 def test_sum_of_covered_bytes_and_bcc_is_zero(data: bytes, station: int) -> None:
     assert (station + sum(data) + bcc(data, station)) % 256 == 0

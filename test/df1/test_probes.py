@@ -33,24 +33,24 @@ def test_station_that_has_just_died_is_asked_at_once_for_a_message_only() -> Non
     for now in (0.0, 4.0, 8.0):
         probes.died(2.0, now)
     assert probes.next == 15.0
-    assert probes.admits_message(8.0)
+    assert probes.claim_message(8.0)
     probes.spent(1.0, 9.0, is_message=True)
-    assert probes.next == 16.0 and not probes.admits_message(16.0)
+    assert probes.next == 16.0 and not probes.claim_message(16.0)
 
 
 def test_message_that_came_too_early_has_the_next_turn_and_the_round_the_one_after() -> None:
     probes = Probes(1.0)
     probes.spent(1.0, 1.0)
     assert probes.next == 8.0
-    assert not probes.admits_message(7.9)
+    assert not probes.claim_message(7.9)
     assert probes.next == 15.0
-    assert probes.admits_message(8.0)
+    assert probes.claim_message(8.0)
     probes.spent(1.0, 9.0, is_message=True)
     assert probes.next == 16.0
-    assert not probes.admits_message(22.9) and probes.admits_message(23.0)
+    assert not probes.claim_message(22.9) and probes.claim_message(23.0)
     assert probes.next == 16.0  # kept for nobody: it was not the turn of a message
     probes.spent(1.0, 17.0)
-    assert probes.admits_message(24.0)
+    assert probes.claim_message(24.0)
 
 
 def test_silence_that_was_told_quickly_costs_what_it_took() -> None:
@@ -59,7 +59,7 @@ def test_silence_that_was_told_quickly_costs_what_it_took() -> None:
     assert probes.next == pytest.approx(0.07)
     probes.spent(0.01, 1.0)
     assert probes.next == pytest.approx(1.07)
-    assert not probes.admits_message(1.06)
+    assert not probes.claim_message(1.06)
     assert probes.next == pytest.approx(1.14)  # kept for a message
 
 
@@ -71,7 +71,7 @@ def test_where_nobody_waits_nobody_is_put_off() -> None:
     stations.lost(2, 2.0)
     stations.tried(2, 1.0, 2.0, was_silent=False)
     assert stations.probes.next == 2.0
-    assert stations.admits_message(1, 2.0) and stations.admits_message(2, 2.0)
+    assert stations.claim_message(1, 2.0) and stations.claim_message(2, 2.0)
 
 
 def test_station_that_replies_too_late_is_silent_and_one_that_is_polled_is_not_asked() -> None:
@@ -81,4 +81,4 @@ def test_station_that_replies_too_late_is_silent_and_one_that_is_polled_is_not_a
     assert stations.probes.next == 19.0
     stations.add((2,), are_polled=True)
     stations.lost(2, 20.0)
-    assert stations.admits_message(1, 20.0) and not stations.admits_message(2, 20.0)
+    assert stations.claim_message(1, 20.0) and not stations.claim_message(2, 20.0)

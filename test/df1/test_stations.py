@@ -104,24 +104,24 @@ def test_active_node_table_shows_all_active_stations() -> None:
 
 def test_repeated_message_is_not_accepted() -> None:
     station = Station(7)
-    assert station.accepts(REPLY)
-    assert not station.accepts(REPLY)
-    assert not station.accepts(Packet(5, 7, 0x4F, 0x10, 0x0102, b'other'))
+    assert station.note_new(REPLY)
+    assert not station.note_new(REPLY)
+    assert not station.note_new(Packet(5, 7, 0x4F, 0x10, 0x0102, b'other'))
 
 
 @pytest.mark.parametrize('other', [
     Packet(5, 7, 0x4F, 0, 0x0103), Packet(5, 8, 0x4F, 0, 0x0102), Packet(5, 7, 0x41, 0, 0x0102)])
 def test_only_the_last_message_counts_as_repeated(other: Packet) -> None:
     station = Station(7)
-    assert station.accepts(REPLY)
-    assert station.accepts(other)
-    assert station.accepts(REPLY)
+    assert station.note_new(REPLY)
+    assert station.note_new(other)
+    assert station.note_new(REPLY)
 
 
 def test_each_station_has_its_own_record() -> None:
     stations = ActiveStationList([7, 8])
-    assert stations[7].accepts(REPLY)
-    assert stations[8].accepts(REPLY)
+    assert stations[7].note_new(REPLY)
+    assert stations[8].note_new(REPLY)
 
 
 def test_one_late_reply_is_an_accident_and_two_are_not() -> None:

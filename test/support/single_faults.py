@@ -179,7 +179,7 @@ class Bench:
         self.line.start()
         self.guest = Guest('pty:/tmp/guest', ShareAccess.ALL)
         self.replies: list[Packet] = []
-        self.value = 0
+        self.value = 1
         rows, blocks = self.near.driver.mappings, self.near.driver.blocks
         # What is printed as the longest transaction takes turns with our replies.
         self.bound = self.period + (2 if kind == 'two packets' else 1) * (
@@ -221,7 +221,7 @@ class Bench:
 
     def carry_out(self, faults: tuple[Fault, ...]) -> str:
         """Carry out a transaction; return what is wrong with it, or nothing."""
-        self.value = self.value % 30_000 + 1
+        self.value = self.value * 12_345 % 30_011  # a prime number: it is never 0
         if self.is_read:  # none is under way then
             self._forget()
             self.line.run(self._has_ended, self.bound)

@@ -11,6 +11,7 @@
 # WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
 # See the License for the specific language governing permissions and
 # limitations under the License.
+
 """What comes of reads: values to publish, rows that fail, other blocks to be read instead."""
 
 from __future__ import annotations

@@ -178,7 +178,7 @@ class WriteQueue:
         if now >= self._expiry(write):
             return waited_too_long(self.patience_of(write.mapping))
         station = write.mapping.station
-        if self._stations.admits_message(station, now):
+        if self._stations.claim_message(station, now):
             return ''
         is_late = self._stations[station].active
         return (Message.ERR_COMMAND_TIMEOUT.entry() if is_late

@@ -11,6 +11,7 @@
 # WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
 # See the License for the specific language governing permissions and
 # limitations under the License.
+
 """What all writes have in common, whoever asked for them: packets, retries of bits, their end."""
 
 from __future__ import annotations

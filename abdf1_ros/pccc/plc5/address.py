@@ -28,10 +28,10 @@ from abdf1_ros.pccc import members
 from abdf1_ros.pccc.file_address import FileAddressing
 from abdf1_ros.pccc.file_types import FileType, Layout, PlcType
 
-# The files of a PLC-5, by the data types of its commands (M 7-28; PD, MG, SC, BT: practice).
 # Data types (M 7-29). A file's own type has to be named when it is written.
 _CHARACTERS, _INTEGER, _BCD = 3, 4, 16
 
+# The files of a PLC-5, by the data types of its commands (M 7-28; PD, MG, SC, BT: practice).
 FILES = {kind: Layout(code=_INTEGER) for kind in (
     FileType.OUTPUT, FileType.INPUT, FileType.STATUS, FileType.BINARY, FileType.INTEGER)} | {
     FileType.ASCII: Layout(code=_CHARACTERS),
