@@ -15,46 +15,40 @@
 """
 Many lines in one process: ``lines``.
 
-Each line is a node as ``node`` has it, in one ROS context: one DDS participant for all. Each has
-two threads, for its link and for its callbacks. One executor for all would need 17 ms for every
-message to a hundred nodes, in which no link gets on (`many_lines.py` of test/lab); an executor
-a line needs 1.3 ms. What goes wrong with one line stays with it.
+Each line is a node as ``node`` has it, in one ROS context: one DDS participant for all. What goes
+wrong with one line stays with it.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager, suppress
+from collections.abc import Callable, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
-import itertools
+from functools import partial
 import resource
 import threading
 import time
 from typing import Any
 
 from abdf1_ros.problems import ConfigurationError, Place, Problem
+from abdf1_ros.ros.bridge import BridgeNode
 from abdf1_ros.ros.diagnostics.graph import Graph
 from abdf1_ros.ros.diagnostics.log import bug_text
-from abdf1_ros.ros.node import BridgeNode, LEVEL_CHECK_PERIOD
 from abdf1_ros.ros.parameters.declared import take_given, unknown_names
 from abdf1_ros.ros.parameters.files import node_sections, parameter_files, parameter_tree
 from abdf1_ros.ros.port_owners import PortOwners
 from abdf1_ros.ros.process import (
     EXIT_CONFIGURATION,
-    LAST_WRITES,
     make_parser,
     Program,
     REFUSALS,
     run_ros,
-    take_last_writes,
 )
-from abdf1_ros.ros.supervisor import Supervisor
-from abdf1_ros.ros.topics.interlocks import END_LIMIT
+from abdf1_ros.ros.runner import Line, LinkFailed, Runner
 from abdf1_ros.signals import EndRequest
 from abdf1_ros.text import printable
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from rcl_interfaces.msg import ParameterDescriptor
-from rclpy.duration import Duration
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.logging import get_logger
 from rclpy.node import Node
@@ -86,18 +80,8 @@ _RESTART_AFTER = 2.0
 
 _STATUS_PERIOD = 1.0
 
-# Lines are looked at in so many groups, one after the other: to look at a hundred at once would
-# keep the interpreter lock from their links for a tenth of a second.
-_GROUPS = 10
-
 # Without this service, which is not needed, a hundred nodes take 13 MiB of 264 less.
 _NO_TYPE_DESCRIPTIONS = Parameter('start_type_description_service', value=False)
-
-# Of the end (s): until when writes that have come are waited for, and until when last diagnostics
-# are begun, both counted from its beginning; how long these may take.
-_LATEST_WRITES = 3.0
-_LATEST_WORDS = 4.0
-_LAST_WORDS = 0.5
 
 
 @dataclass(frozen=True, slots=True, order=True)
@@ -112,50 +96,23 @@ class LineName:
         return f'{self.namespace.rstrip("/")}/{self.name}'
 
 
-class _Callbacks(threading.Thread):
-    """Run the callbacks of a node until ``end``; ``error`` is a bug that has ended that."""
-
-    def __init__(self, node: Node) -> None:
-        super().__init__(name='callbacks', daemon=True)
-        self.error: Exception | None = None
-        self._executor = SingleThreadedExecutor(context=node.context)
-        self._executor.add_node(node)
-
-    def run(self) -> None:
-        """Run callbacks."""
-        try:
-            self._executor.spin()
-        except Exception as error:  # a bug must not end the other lines
-            self.error = error
-
-    def end(self, give_up: float) -> None:
-        """Take no more callbacks; wait for the one that runs up to a monotonic clock value."""
-        self._executor.shutdown(timeout_sec=0)
-        self.join(max(0.0, give_up - time.monotonic()))
-
-
-class Line:
+class RestartedLine(Line):
     """
-    One bridge with the thread of its callbacks.
+    A line that begins again after an internal error, while the others go on.
 
-    ``faults`` say why it does not run; ``restarts`` counts internal errors that ended it. All
-    is called by one thread. ``graph``, ``port_owners`` and ``files``, its parameter files, are
-    those of the process.
+    ``faults`` say why it does not run; ``restarts`` counts internal errors that ended it.
+    ``make`` makes its node.
     """
 
-    def __init__(self, name: LineName, graph: Graph, port_owners: PortOwners,
-                 files: Sequence[str]) -> None:
+    def __init__(self, name: LineName, make: Callable[[], BridgeNode]) -> None:
+        super().__init__()
         self.name = name
-        self._files = files
-        self._graph = graph
-        self._port_owners = port_owners
-        self.node: BridgeNode | None = None
         self.faults: tuple[str, ...] = ()
         self.restarts = 0
-        self._callbacks: _Callbacks | None = None
+        self._make = make
         self._closing: threading.Thread | None = None
         self._again: float | None = None
-        self._logger = get_logger(str(self.name).strip('/').replace('/', '.'))
+        self._logger = get_logger(str(name).strip('/').replace('/', '.'))
 
     def start(self) -> None:
         """Make the node and run it."""
@@ -167,10 +124,7 @@ class Line:
         """Make the node: none with faulty files, or with the port of another line."""
         self.faults = ()
         try:
-            self.node = BridgeNode(
-                self.name.name, namespace=self.name.namespace, has_timer=False,
-                graph=self._graph, port_owners=self._port_owners, files=self._files,
-                parameter_overrides=[_NO_TYPE_DESCRIPTIONS])
+            self.node = self._make()
         except ConfigurationError as error:
             self.faults = tuple(map(str, error.problems))
         except REFUSALS as error:
@@ -180,89 +134,34 @@ class Line:
         for fault in self.faults:
             self._logger.fatal(printable(fault))
 
-    def take_callbacks(self) -> None:
-        """Begin to take callbacks, if there is a node."""
-        if self.node is not None:
-            self._callbacks = _Callbacks(self.node)
-            self._callbacks.start()
-
-    def open_port(self) -> None:
-        """Begin to read and write, if there is a node."""
-        if self.node is not None:
-            self.node.start()
-
     def check(self) -> None:
         """Publish what is due; begin again after an internal error."""
-        node = self.node
-        if node is None:
-            is_closing = self._closing is not None and self._closing.is_alive()
-            if self._again is not None and time.monotonic() >= self._again and not is_closing:
-                self._again = None
-                self.start()
-        elif node.has_failed:
-            self._begin_again(node.link.state.text)
-        elif self._callbacks is not None and self._callbacks.error is not None:
-            self._begin_again(self._callbacks.error)
-        else:
-            try:
-                node.check()
-            except Exception as error:  # a bug ends this line, not the others
-                self._begin_again(error)
+        try:
+            super().check()
+        except Exception as error:  # a bug ends this line, not the others
+            self._begin_again(error)
+        is_closing = self._closing is not None and self._closing.is_alive()
+        if self._again is not None and time.monotonic() >= self._again and not is_closing:
+            self._again = None
+            self.start()
 
-    def _begin_again(self, error: Exception | str) -> None:
+    def _begin_again(self, error: Exception) -> None:
         """End the node, which may take seconds that the other lines do not have."""
         self.restarts += 1
-        text = error if isinstance(error, str) else bug_text(error)
+        text = str(error) if isinstance(error, LinkFailed) else bug_text(error)
         self._logger.error(f'ends by an internal error and begins again: {text}')
         self._again = time.monotonic() + _RESTART_AFTER
-        node, callbacks = self.node, self._callbacks
-        if node is not None:
+        if self.node is not None:
+            gone = Line(self.node, self._callbacks)
             self.node, self._callbacks = None, None
-            self._closing = threading.Thread(
-                target=_close, args=(node, callbacks), name='closing', daemon=True)
+            self._closing = threading.Thread(target=gone.close, name='closing', daemon=True)
             self._closing.start()
 
-    def ask_to_stop(self) -> None:
-        """Begin the end of the link."""
-        if self.node is not None:
-            self.node.link.ask_to_stop()
-
-    def quit(self, give_up: float) -> None:  # noqa: A003
-        """End the link and the callbacks, up to a monotonic clock value."""
+    def end_callbacks(self, give_up: float) -> None:
+        """Wait for a node that is being closed, too."""
         if self._closing is not None:
             self._closing.join(max(0.0, give_up - time.monotonic()))
-        if self.node is not None:
-            _say_last_words(self.node, give_up)
-        if self._callbacks is not None:
-            self._callbacks.end(give_up)
-
-    @property
-    def is_busy(self) -> bool:
-        """Tell whether a thread of it still runs."""
-        return any(thread is not None and thread.is_alive()
-                   for thread in (self._callbacks, self._closing))
-
-
-def _close(node: BridgeNode, callbacks: _Callbacks | None) -> None:
-    _say_last_words(node, time.monotonic() + _LAST_WORDS)
-    if callbacks is not None:
-        callbacks.end(time.monotonic() + _LAST_WORDS)
-    with _telling(node):
-        node.destroy_node()
-
-
-def _say_last_words(node: BridgeNode, give_up: float) -> None:
-    with _telling(node):
-        node.stop(Duration(seconds=max(0.0, give_up - time.monotonic())))
-
-
-@contextmanager
-def _telling(node: BridgeNode) -> Iterator[None]:
-    """Log an error at the end of a node: it may be broken, and the others go on."""
-    try:
-        yield
-    except Exception as error:
-        node.get_logger().error(f'its end fails: {bug_text(error)}')
+        super().end_callbacks(give_up)
 
 
 def _options(node: Node, files: Sequence[str]) -> tuple[list[str], bool]:
@@ -297,7 +196,7 @@ class LinesNode(Node):
         response.success, response.message = True, 'lines that do not run are tried again'
         return response
 
-    def publish(self, lines: Sequence[Line]) -> None:
+    def publish(self, lines: Sequence[RestartedLine]) -> None:
         """Publish which lines run, and why others do not."""
         faulty = [line for line in lines if line.node is None]
         level, text = DiagnosticStatus.OK, f'OK: {len(lines)} lines run'
@@ -319,50 +218,25 @@ class Lines:
     """All lines, from their start to their end."""
 
     def __init__(self, names: Sequence[LineName], node: LinesNode, files: Sequence[str]) -> None:
-        port_owners = PortOwners()
-        graph = Graph(node)
-        self.lines = [Line(name, graph, port_owners, files) for name in names]
+        port_owners, graph = PortOwners(), Graph(node)
+        self._lines = [RestartedLine(name, partial(
+            BridgeNode, name.name, namespace=name.namespace, graph=graph, port_owners=port_owners,
+            files=files, parameter_overrides=[_NO_TYPE_DESCRIPTIONS])) for name in names]
+        self._runner = Runner(self._lines, self._look)
         self._node = node
         self._executor = SingleThreadedExecutor(context=node.context)
         self._executor.add_node(node)
         self._next_status = 0.0
-        for line in self.lines:
+        for line in self._lines:
             line.make()
 
     def run(self, ended: EndRequest) -> int:
-        """
-        Run all lines until the end; return the exit status.
-
-        All nodes have been made before: lines that run would have the interpreter lock most of the
-        time that the others need: a hundred nodes took four times as long, and their threads half
-        as long again. Threads that take callbacks would wake up at each node that is made.
-        """
-        running = sum(line.node is not None for line in self.lines)
-        self._node.get_logger().info(f'{running} of {len(self.lines)} lines run')
-        if running < (len(self.lines) if self._node.is_strict else 1):
+        """Run all lines until the end, if enough of them can; return the exit status."""
+        running = sum(line.node is not None for line in self._lines)
+        self._node.get_logger().info(f'{running} of {len(self._lines)} lines run')
+        if running < (len(self._lines) if self._node.is_strict else 1):
             return EXIT_CONFIGURATION
-        try:
-            for line in self.lines:
-                line.take_callbacks()
-            for line in self.lines:
-                line.open_port()
-            self._look_after(ended)
-        finally:
-            ended.set()
-            self._end()
-        return 0
-
-    def _look_after(self, ended: EndRequest) -> None:
-        supervisor = Supervisor()
-        groups = min(_GROUPS, len(self.lines))
-        for group in itertools.cycle(range(groups)):
-            if ended.wait(LEVEL_CHECK_PERIOD / groups):
-                return
-            for line in self.lines[group::groups]:
-                line.check()
-            if group == 0:
-                self._look()
-                supervisor.look([line.node.link for line in self.lines if line.node is not None])
+        return self._runner.run(ended)
 
     def _look(self) -> None:
         """Take requests to the process, and tell of all lines."""
@@ -370,38 +244,18 @@ class Lines:
         self._executor.spin_once(timeout_sec=0)
         if self._node.is_asked_again:
             self._node.is_asked_again = False
-            for line in self.lines:
+            for line in self._lines:
                 if line.faults:
                     line.start()
         if now >= self._next_status:
             self._next_status = now + _STATUS_PERIOD
-            self._node.publish(self.lines)
-
-    def _end(self) -> None:
-        """End all links, then take the last writes and say the last words."""
-        began = time.monotonic()
-        nodes = [line.node for line in self.lines if line.node is not None]
-        for node in nodes:
-            node.begin_end()
-        for node in nodes:
-            node.session.finish_end(began + END_LIMIT, 'ends')  # for all of them together
-        for line in self.lines:
-            line.ask_to_stop()
-        for node in nodes:
-            node.link.stop()
-        take_last_writes(time.sleep, lambda: sum(node.writes_taken for node in nodes),
-                         min(time.monotonic() + LAST_WRITES, began + _LATEST_WRITES))
-        give_up = time.monotonic() + _LAST_WORDS
-        for line in self.lines:
-            if time.monotonic() < began + _LATEST_WORDS:  # a hundred on a busy host take seconds
-                line.quit(give_up)
+            self._node.publish(self._lines)
 
     def destroy(self) -> None:
         """Destroy all nodes that nobody uses any more."""
         self._executor.shutdown()
-        for node in (self._node, *(line.node for line in self.lines if not line.is_busy)):
-            if node is not None:
-                node.destroy_node()
+        self._node.destroy_node()
+        self._runner.destroy()
 
 
 def sections(path: str) -> list[LineName]:

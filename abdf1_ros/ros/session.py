@@ -25,6 +25,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 import random
+import time
 from typing import Any
 
 from abdf1_ros.df1.packet import BROADCAST
@@ -41,7 +42,7 @@ from abdf1_ros.ros.diagnostics.statuses import Diagnostics
 from abdf1_ros.ros.diagnostics.watches import Watch, watches_of
 from abdf1_ros.ros.guests import GuestPlaces
 from abdf1_ros.ros.parameters.declared import Configuration
-from abdf1_ros.ros.topics.interlocks import InterlockWatch, wait_for_end
+from abdf1_ros.ros.topics.interlocks import END_LIMIT, InterlockWatch, wait_for_end
 from abdf1_ros.ros.topics.messages import ACTIVE_LAYOUT
 from abdf1_ros.ros.topics.reads import ReadTopic, ReadTopics
 from abdf1_ros.ros.topics.snapshot import Snapshot
@@ -149,17 +150,13 @@ class Session:
         self._interlocks.end()
 
     def begin_end(self) -> None:
-        """Have heartbeats set to 0 and fallbacks written; ``finish_end`` waits for it (rule 5)."""
+        """Have heartbeats set to 0 and fallbacks written; ``tell_plcs`` waits for it (rule 5)."""
         self._events.unreadable_rows.tell()
         self.driver.wind_down()
         self._wake_link()
 
-    def finish_end(self, give_up: float, what: str) -> None:
-        """
-        Wait until the PLCs know, up to a monotonic clock value; name what is not confirmed.
-
-        ``what`` says in the log what goes on then.
-        """
+    def wait_for_plcs(self, give_up: float, what: str) -> None:
+        """Wait until the PLCs know, up to a monotonic clock value; name what is not confirmed."""
         tags = wait_for_end(self.driver, self._surroundings.link, give_up)
         if tags:
             self._surroundings.node.get_logger().error(
@@ -235,6 +232,19 @@ class Session:
         stamped = now if now.nanoseconds else Clock(clock_type=ClockType.SYSTEM_TIME).now()
         message.header.stamp = stamped.to_msg()
         publisher.publish(message)
+
+
+def tell_plcs(sessions: Sequence[Session], what: str) -> None:
+    """
+    Have heartbeats set to 0 and fallbacks written, and wait for all of it together (rule 5).
+
+    ``what`` says in the log what goes on then.
+    """
+    give_up = time.monotonic() + END_LIMIT
+    for session in sessions:
+        session.begin_end()
+    for session in sessions:
+        session.wait_for_plcs(give_up, what)
 
 
 def stations_of(mappings: Iterable[Mapping]) -> frozenset[int]:

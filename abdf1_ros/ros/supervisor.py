@@ -25,7 +25,7 @@ from typing import Protocol
 
 
 class Works(Protocol):
-    """A link whose thread shows that it goes on."""
+    """A thread that shows that it goes on."""
 
     has_turned: bool
 
@@ -40,8 +40,8 @@ class Supervisor:
     """
     Gets a sign of life of this process, if it has set NOTIFY_SOCKET and WATCHDOG_USEC.
 
-    The sign comes from the thread that runs callbacks, and only if each link has turned since the
-    last one: so it is missing where either hangs.
+    The sign comes from the main thread, and only if each link and each thread of callbacks has
+    turned since the last one: so it is missing where one of them hangs.
     """
 
     def __init__(self) -> None:

@@ -489,7 +489,7 @@ def test_link_status_tells_of_port_and_load(bridge: Bridge) -> None:
     said = details(status)
     assert status.message == 'OK: port open, 2 of 2 stations have answered'
     assert said['port'] == 'open'
-    assert said['settings'] == '115200 baud, CRC'
+    assert said['settings'] == '115200 baud, 8 data bits, parity None, 1 stop bits, CRC'
     assert re.fullmatch(r'[1-9]\d* %', said['line load'])
     assert re.fullmatch(r'[1-9]\d* ms', said['poll cycle'])
 

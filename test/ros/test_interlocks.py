@@ -30,7 +30,7 @@ from abdf1_ros.df1.slave import multidrop
 from abdf1_ros.pccc.address import Address
 from abdf1_ros.ports.endpoints import PtyEndpoint
 from abdf1_ros.ports.link_thread import LinkThread
-from abdf1_ros.ros.node import BridgeNode
+from abdf1_ros.ros.bridge import BridgeNode
 from abdf1_ros.simulator.ladder import Lamp
 from abdf1_ros.simulator.simulated_plc import SimulatedPlc
 import pytest
@@ -75,6 +75,7 @@ class Cell(testing.SimulatedCell):
     """A bridge with a heartbeat, in this process, a PLC, and who looks at both."""
 
     observer = Observer
+    ros: Observer
 
     def __init__(self, folder: Path, *assignments: str) -> None:
         super().__init__(folder, SIMULATOR, MAP, NET, parameters=assignments)
@@ -86,15 +87,11 @@ class Cell(testing.SimulatedCell):
         self.diagnostics = self.ros.diagnostics(self.plcs.port)
         self.node = BridgeNode(context=self.ros.context, use_global_arguments=False,
                                cli_args=ros_args(*self._assignments))
-        self.ros.executor.add_node(self.node)
-        self.node.start()
+        self.ros.run(self.node)
 
     def end(self, number: signal.Signals = signal.SIGTERM) -> int:
         """End the bridge in order, if it runs."""
-        if self.node in self.ros.executor.get_nodes():
-            self.ros.executor.remove_node(self.node)
-            self.node.stop()
-            self.node.destroy_node()
+        self.ros.end(self.node)
         return 0
 
     def word(self, address: str) -> int:
@@ -210,7 +207,7 @@ def test_rule_5_port_that_is_left_to_others_is_left_with_zero(
     assert cell.call(SetBool, 'polling', SetBool.Request(data=True)).success
     cell.until_counting()
     cell.plcs.say('silent 1')
-    monkeypatch.setattr('abdf1_ros.ros.node.END_LIMIT', 0.1)
+    monkeypatch.setattr('abdf1_ros.ros.session.END_LIMIT', 0.1)
     assert cell.call(SetBool, 'polling', SetBool.Request(data=False)).success
     assert 'the port is left before the PLC has confirmed: beat' in capfd.readouterr().err
 

@@ -27,8 +27,8 @@ from typing import Any
 from abdf1_ros.problems import ConfigurationError
 from abdf1_ros.ros import lines as module
 from abdf1_ros.ros import process
+from abdf1_ros.ros.bridge import BridgeNode
 from abdf1_ros.ros.lines import chosen, LineName, main, sections
-from abdf1_ros.ros.node import BridgeNode
 from abdf1_ros.ros.parameters.files import parameter_files, usable_files
 from abdf1_ros.signals import EndRequest
 from abdf1_ros.testing import Plcs
@@ -325,13 +325,12 @@ def test_line_that_ends_slowly_does_not_hold_up_the_others(
     monkeypatch.setattr(module, '_RESTART_AFTER', 0.1)
     slow, ended = threading.Event(), threading.Event()
 
-    def stop(node: BridgeNode, patience: Any) -> None:
+    def say_last_words(node: BridgeNode, give_up: float) -> None:
         slow.set()
         assert ended.wait(PATIENCE)
-        node.link.stop()
 
     plant.start(reads='abc')
-    monkeypatch.setattr(BridgeNode, 'stop', stop)
+    monkeypatch.setattr(BridgeNode, 'say_last_words', say_last_words)
     plant.fail('b')
     plant.observer.until(slow.is_set, 'the end of a line')
     assert until_status(plant.observer.diagnostics(plant.plcs['a'].port), 'link', OK)
@@ -360,12 +359,11 @@ def test_internal_error_restarts_its_line_only(
 def test_end_of_a_line_that_fails_is_told(
         plant: Plant, monkeypatch: pytest.MonkeyPatch,
         capfd: pytest.CaptureFixture[str]) -> None:
-    def stop(node: BridgeNode, patience: Any) -> None:
-        node.link.stop()
+    def say_last_words(node: BridgeNode, give_up: float) -> None:
         raise KeyError('a bug')
 
     plant.start('-p', 'lines:=[a]', reads='a')
-    monkeypatch.setattr(BridgeNode, 'stop', stop)
+    monkeypatch.setattr(BridgeNode, 'say_last_words', say_last_words)
     assert plant.end() == 0
     assert "its end fails: KeyError('a bug')" in capfd.readouterr().err
 

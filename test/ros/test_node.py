@@ -29,7 +29,8 @@ from abdf1_ros.messages import Event, Message
 from abdf1_ros.pccc.families import parse_address
 from abdf1_ros.pccc.file_types import PlcType
 from abdf1_ros.ports.link_thread import PortState
-from abdf1_ros.ros.node import BridgeNode, main
+from abdf1_ros.ros.bridge import BridgeNode
+from abdf1_ros.ros.node import main
 from abdf1_ros.testing import Plcs
 from diagnostic_msgs.msg import DiagnosticStatus
 import pytest
@@ -91,8 +92,7 @@ class Bench:
             f'net_file:={net}', f'map_file:={map_file}', f'port:={plcs.port}', *assignments)
         self.node = BridgeNode(context=observer.context, use_global_arguments=False,
                                cli_args=arguments)
-        observer.executor.add_node(self.node)
-        self.node.start()
+        observer.run(self.node)
         observer.until(lambda: self.node.driver.is_online, 'the port')
 
     def publisher(self, kind: Any, topic: str) -> Callable[..., None]:
@@ -116,10 +116,7 @@ class Bench:
 
     def stop(self) -> None:
         """End the bridge, unless it has ended."""
-        if self.node in self.observer.executor.get_nodes():
-            self.observer.executor.remove_node(self.node)
-            self.node.stop()
-            self.node.destroy_node()
+        self.observer.end(self.node)
 
 
 def messages(results: list[DiagnosticStatus]) -> Counter[str]:
@@ -387,7 +384,7 @@ def test_end_waits_until_results_and_diagnostics_have_arrived(
         return False
 
     monkeypatch.setattr(Publisher, 'wait_for_all_acked', wait)
-    bench.node.stop(Duration(seconds=0.3))
+    bench.node.stop(0.3)
     (first, patience), (second, rest) = waits
     assert (first, second) == ('/abdf1/write_results', '/diagnostics')
     assert patience <= 0.3 and 0.0 <= rest <= 0.2  # of a subscriber that is stuck, for both

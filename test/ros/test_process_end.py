@@ -77,7 +77,7 @@ def test_stream_of_signals_ends_it_as_one_does(
 
 @pytest.mark.parametrize('error', ['ValueError', 'RuntimeError'])
 @pytest.mark.parametrize(('name', 'function'), [
-    ('node', 'abdf1_ros.ros.node.BridgeNode.check'),
+    ('node', 'abdf1_ros.ros.bridge.BridgeNode.check'),
     ('lines', 'abdf1_ros.ros.lines.Lines._look')])
 def test_bug_ends_it_with_a_traceback(
         tmp_path: Path, name: str, function: str, error: str) -> None:
@@ -104,7 +104,7 @@ HANGS = {'held': 'ctypes.PyDLL(None).sleep(60)', 'slow': 'time.sleep(60)'}
 @pytest.mark.parametrize('name', ['node', 'lines'])
 def test_clock_ends_what_does_not_come_back(
         tmp_path: Path, name: str, where: str, how: str, status: int) -> None:
-    patch = (f'{EARLY}from abdf1_ros.ros.node import BridgeNode\n'
+    patch = (f'{EARLY}from abdf1_ros.ros.bridge import BridgeNode\n'
              f'def hang(self, *arguments): print("hangs", flush=True); {HANGS[how]}\n'
              f'BridgeNode.{where} = hang')
     with program(tmp_path, name, patch) as process:

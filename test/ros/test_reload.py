@@ -22,10 +22,13 @@ from typing import Any
 from abdf1_ros.ports.link_thread import LinkThread
 from abdf1_ros.ports.opening import open_port
 from abdf1_ros.ports.settings import PortSettings
+from abdf1_ros.ros.bridge import BridgeNode
 from abdf1_ros.ros.diagnostics.graph import Graph
 from abdf1_ros.ros.diagnostics.line import LineView
 from abdf1_ros.ros.files import FileWatch
-from abdf1_ros.ros.node import BridgeNode
+from abdf1_ros.ros.guests import GuestPlaces
+from abdf1_ros.ros.parameters.shown import ShownFiles
+from abdf1_ros.ros.session import Session
 from abdf1_ros.testing import Plcs
 import pytest
 from rcl_interfaces.srv import GetParameters
@@ -66,8 +69,7 @@ class Bench:
             f'net_file:={self.net}', f'map_file:={self.map}', f'port:={plcs.port}')
         self.node = BridgeNode(context=observer.context, use_global_arguments=False,
                                cli_args=arguments)
-        observer.executor.add_node(self.node)
-        self.node.start()
+        observer.run(self.node)
         observer.until(lambda: self.node.driver.is_online, 'the port')
 
     def write_net(self, timeout: int, baud: int = 115200) -> None:
@@ -96,9 +98,7 @@ class Bench:
 
     def stop(self) -> None:
         """End the bridge."""
-        self.observer.executor.remove_node(self.node)
-        self.node.stop()
-        self.node.destroy_node()
+        self.observer.end(self.node)
 
 
 @pytest.fixture
@@ -237,6 +237,28 @@ def test_station_that_took_no_commands_does_not_answer_by_new_files(
     for _ in range(2):
         bench.diagnostics.next()
     assert 'answers commands' not in capfd.readouterr().err
+
+
+def test_line_is_handed_over_in_order(bench: Bench, monkeypatch: pytest.MonkeyPatch) -> None:
+    calls: list[str] = []
+
+    def record(owner: Any, name: str, text: str) -> None:
+        original = getattr(owner, name)
+
+        def recorded(*arguments: Any, **named: Any) -> Any:
+            calls.append(text)
+            return original(*arguments, **named)
+        monkeypatch.setattr(owner, name, recorded)
+
+    for owner, name, text in (
+            (Session, 'begin_end', 'tell the PLCs'), (Session, 'wait_for_plcs', 'wait for them'),
+            (Session, '__init__', 'make the new'), (LinkThread, 'exchange', 'exchange'),
+            (Session, 'end', 'end the old'), (Session, 'begin', 'begin the new'),
+            (GuestPlaces, 'start', 'guests'), (ShownFiles, 'show', 'parameters')):
+        record(owner, name, text)
+    assert bench.reload()[0]
+    assert calls == ['tell the PLCs', 'wait for them', 'make the new', 'exchange', 'end the old',
+                     'begin the new', 'guests', 'parameters']
 
 
 def test_other_node_of_our_name_stays_known(bench: Bench, monkeypatch: pytest.MonkeyPatch) -> None:

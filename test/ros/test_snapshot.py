@@ -22,7 +22,7 @@ import time
 
 from abdf1_ros.driver.reads.point import ReadPoint
 from abdf1_ros.ports.clock import line_time
-from abdf1_ros.ros.node import BridgeNode
+from abdf1_ros.ros.bridge import BridgeNode
 from abdf1_ros.ros.topics.snapshot import Snapshot
 from abdf1_ros.settings.mapping import Mapping
 from abdf1_ros.testing import Plcs
@@ -99,12 +99,9 @@ def inbox(tmp_path: Path) -> Iterator[Inbox]:
     with Observer() as observer, Plcs(data) as plcs:
         node = BridgeNode(context=observer.context, use_global_arguments=False,
                           cli_args=[*arguments, '-p', f'port:={plcs.port}'])
-        observer.executor.add_node(node)
-        node.start()
+        observer.run(node)
         yield observer.listen(DiagnosticArray, '/abdf1/snapshot', EVERYTHING)
-        observer.executor.remove_node(node)
-        node.stop()
-        node.destroy_node()
+        observer.end(node)
 
 
 def test_snapshot_comes_to_who_subscribes(inbox: Inbox) -> None:

@@ -34,10 +34,12 @@ from typing import Any
 
 from abdf1_ros import testing
 from abdf1_ros.paths import config_file
+from abdf1_ros.ros.bridge import BridgeNode
 from abdf1_ros.ros.topics.messages import latched_qos
 from abdf1_ros.testing import EVERYTHING, PATIENCE
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from rcl_interfaces.srv import GetParameters
+from rclpy.clock import Clock, ClockType
 from rclpy.event_handler import SubscriptionEventCallbacks
 from rclpy.parameter import parameter_value_to_python
 from rclpy.qos import QoSProfile
@@ -236,6 +238,19 @@ class Observer(testing.Observer):
         inbox.subscription = self.node.create_subscription(
             message_type, topic, inbox.append, qos or latched_qos(), event_callbacks=events)
         return inbox
+
+    def run(self, bridge: BridgeNode) -> None:
+        """Run a bridge in this process until ``end``, as ``Runner`` does."""
+        bridge.create_timer(0.1, bridge.check, clock=Clock(clock_type=ClockType.STEADY_TIME))
+        self.executor.add_node(bridge)
+        bridge.start()
+
+    def end(self, bridge: BridgeNode) -> None:
+        """End a bridge that runs here, in order; do nothing with one that has ended."""
+        if bridge in self.executor.get_nodes():
+            self.executor.remove_node(bridge)
+            bridge.stop()
+            bridge.destroy_node()
 
     def forget(self, inbox: Inbox) -> None:
         """End a subscription."""

@@ -1,0 +1,293 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+The ROS node: a link, and the session of a pair of files on it; services, start and end.
+
+Everything is created before the link's thread starts and destroyed after it has ended.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import partial
+import time
+from typing import Any
+
+from abdf1_ros.driver.driver import Driver, ENDS
+from abdf1_ros.driver.writes.queue import MAX_WAITING_WRITES
+from abdf1_ros.ports.clock import line_time
+from abdf1_ros.ports.link_thread import LinkThread, PortState
+from abdf1_ros.ports.settings import PortSettings
+from abdf1_ros.ports.trace import PortOpener
+from abdf1_ros.problems import ConfigurationError
+from abdf1_ros.ros.diagnostics.graph import Graph, NameWatch
+from abdf1_ros.ros.diagnostics.log import bug_text
+from abdf1_ros.ros.parameters.declared import Configuration, configure, read_again
+from abdf1_ros.ros.parameters.shown import ShownFiles
+from abdf1_ros.ros.port_owners import PortOwners
+from abdf1_ros.ros.process import LAST_WRITES, take_last_writes
+from abdf1_ros.ros.session import Session, Surroundings, tell_plcs
+from abdf1_ros.ros.topics.messages import latched_qos
+from abdf1_ros.ros.topics.writes import WriteTopics
+from abdf1_ros.text import printable
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
+from rclpy.callback_groups import MutuallyExclusiveCallbackGroup
+from rclpy.duration import Duration
+from rclpy.node import Node
+from std_msgs.msg import UInt16MultiArray
+from std_srvs.srv import SetBool, Trigger
+
+NODE_NAME = 'abdf1'
+
+# Of the end (s): until when, counted from its beginning, writes that have come are waited for and
+# last diagnostics are begun; how long these may take, where a subscriber is stuck.
+_LATEST_WRITES = 3.0
+_LATEST_WORDS = 4.0
+_LAST_WORDS = 0.5
+
+_MOST_PROBLEMS = 20  # of a faulty file, in the answer of ~/reload
+
+
+class BridgeNode(Node):
+    """
+    The bridge; raises ConfigurationError when parameters or files are not fit to run with.
+
+    ``check`` is to be called every 0.1 s, in any one thread. ``graph`` and ``port_owners`` are
+    those of all lines of the process, ``files`` its parameter files.
+    """
+
+    def __init__(self, name: str = NODE_NAME, *, graph: Graph | None = None,
+                 port_owners: PortOwners | None = None, files: Sequence[str] = (),
+                 **kwargs: Any) -> None:
+        super().__init__(name, automatically_declare_parameters_from_overrides=True, **kwargs)
+        self._is_stuck = self._is_ending = False
+        self._hold_ports = partial(
+            (port_owners or PortOwners()).hold, self.get_fully_qualified_name())
+        try:
+            configuration = configure(self, files)
+            self._shown = ShownFiles(self)
+            self._shown.show(configuration.network, configuration.shown_rows())
+            self._hold_ports(*configuration.held)
+            self._set_up(configuration, graph or Graph(self))
+        except Exception:  # other lines of this process go on
+            self.destroy_node()
+            raise
+
+    def destroy_node(self) -> None:
+        self._hold_ports()
+        super().destroy_node()
+
+    def _set_up(self, configuration: Configuration, graph: Graph) -> None:
+        self._opener = self._make_opener(configuration)
+        self._writes = WriteTopics(self, self._take)
+        self._surroundings = Surroundings(
+            self, graph, NameWatch(self.get_fully_qualified_name(), lambda now: graph.nodes(
+                self.get_name(), self.get_namespace(), now)), self._opener,
+            # All writes that wait can end at once, faster than a subscriber takes their results.
+            self.create_publisher(DiagnosticStatus, '~/write_results', MAX_WAITING_WRITES),
+            self.create_publisher(UInt16MultiArray, '~/active_stations', latched_qos()),
+            self.create_publisher(DiagnosticArray, '/diagnostics', 10),
+            self.create_publisher(DiagnosticArray, '~/snapshot', 1), self._writes)
+        self.session = Session(self._surroundings, configuration)
+        self.link = self._surroundings.link = LinkThread(
+            self.driver.machine, self._opener.open,
+            on_state=self._port_changed, on_fault=self._fault,
+            while_sending=self.session.reads.publish_later_values)
+        self.session.begin()
+        self._create_services()
+
+    def _make_opener(self, configuration: Configuration) -> PortOpener:
+        parameters, network = configuration.parameters, configuration.network
+        opener = PortOpener(
+            _port_settings(configuration),
+            lambda text: self.get_logger().debug(f'{printable(self.port)}: {text}'))
+        if parameters.trace_file:
+            opener.trace(
+                parameters.trace_file, parameters.trace_limit * 1e6,
+                {'check': network.checksum.value, 'duplex': network.duplex.name.lower()},
+                lambda text: self.get_logger().error(f'trace_file: {printable(text)}'))
+        return opener
+
+    def _create_services(self) -> None:
+        self.create_service(Trigger, '~/reset_counters', self._reset_counters)
+        self.create_service(Trigger, '~/reload', self._reload)
+        self.create_service(SetBool, '~/polling', self._set_polling)
+        self.create_service(Trigger, '~/read_link_counters', self._read_link_counters,
+                            callback_group=MutuallyExclusiveCallbackGroup())
+
+    @property
+    def driver(self) -> Driver:
+        return self.session.driver
+
+    @property
+    def port(self) -> str:
+        return self.session.port
+
+    @property
+    def writes_taken(self) -> int:
+        """Return how many messages to write topics have come."""
+        return self._writes.taken
+
+    @property
+    def has_failed(self) -> bool:
+        """Tell whether the node has to end: its link is broken."""
+        return self._is_stuck or self.link.has_failed
+
+    def start(self) -> None:
+        """Open the port and begin to read."""
+        self.link.start()
+        self.session.guests.start()
+
+    def begin_end(self) -> None:
+        """Begin the end, as ``Session`` does; no request takes it back."""
+        self._is_ending = True
+        self.session.begin_end()
+
+    def stop(self, patience: float = _LAST_WORDS) -> None:
+        """
+        End in order; the node may be destroyed after it.
+
+        ``patience`` (s) is for a subscriber that is stuck.
+        """
+        end_together([self], patience)
+
+    def say_last_words(self, give_up: float) -> None:
+        """Let guests go and tell the last state, up to a monotonic clock value."""
+        self.session.guests.stop()
+        self._opener.close()
+        self.session.publish_diagnostics(line_time())
+        # Messages that are still under way would be lost with their publisher.
+        for publisher in (self._surroundings.results, self._surroundings.diagnostics):
+            publisher.wait_for_all_acked(Duration(seconds=max(0.0, give_up - time.monotonic())))
+
+    def check(self) -> None:
+        """Publish what is due."""
+        self.session.check()
+
+    def _take(self, topic: str, message: Any, info: Any) -> None:
+        self.session.write(topic, message, info)
+
+    def _port_changed(self, state: PortState) -> None:
+        self.session.port_changed(state)
+
+    def _fault(self, error: Exception) -> None:
+        self.get_logger().error(f'internal error: {bug_text(error)}')
+
+    def _reload(self, request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
+        """Use the files as they are now, or go on as before where these have faults."""
+        if self._is_ending:
+            response.message = ENDS
+            return response
+        try:
+            configuration = read_again(self.session.configuration)
+            self._hold_ports(*self.session.configuration.held, *configuration.held)
+        except ConfigurationError as error:
+            for problem in error.problems:
+                self.get_logger().error(f'{problem} (goes on as before)')
+            texts = [printable(str(problem)) for problem in error.problems]
+            response.message = 'goes on as before: ' + '; '.join(texts[:_MOST_PROBLEMS])
+            return response
+        if self._hand_over(configuration):
+            response.success, response.message = True, printable(str(configuration))
+        else:
+            response.message = 'ends: its link does not take the new files'
+            self.get_logger().fatal(response.message)
+            self._is_stuck = True
+        return response
+
+    def _hand_over(self, configuration: Configuration) -> bool:
+        """
+        Hand the line over to new files; return False where the link does not take them.
+
+        The order is what matters. PLCs are told first: for them new files are an end and a start.
+        The new session is made while the old one has the line, so topics of unchanged rows stay.
+        With its machine on the line the old one ends, then the new one begins, and only then may
+        guests come and the old port be taken by others.
+        """
+        tell_plcs([self.session], 'goes on with new files')
+        before, self.session = self.session, Session(self._surroundings, configuration)
+        if not self.link.exchange(self.driver.machine, self.session.reads.publish_later_values,
+                                  self._opener.use(_port_settings(configuration))):
+            return False
+        before.end()
+        self.session.begin()
+        if self._is_ending:  # since then
+            self.session.begin_end()
+        self.session.guests.start()
+        self._shown.show(configuration.network, configuration.shown_rows())
+        self._hold_ports(*configuration.held)
+        return True
+
+    def _set_polling(self, request: SetBool.Request,
+                     response: SetBool.Response) -> SetBool.Response:
+        """Leave the port to others, or take it again."""
+        if self._is_ending:
+            response.message = ENDS
+        elif request.data:
+            self.driver.resume()
+            if self._is_ending:  # since then
+                self.session.begin_end()
+            self.link.take()
+            response.success, response.message = True, f'{self.port} is being opened'
+        else:
+            tell_plcs([self.session], 'the port is left')
+            response.success = self.link.release()
+            response.message = f'{self.port}: {self.link.state.text}'
+        return response
+
+    def _reset_counters(self, request: Trigger.Request,
+                        response: Trigger.Response) -> Trigger.Response:
+        self.session.diagnostics.counters.reset()
+        response.success, response.message = True, 'all counters begin again at 0'
+        return response
+
+    async def _read_link_counters(self, request: Trigger.Request,
+                                  response: Trigger.Response) -> Trigger.Response:
+        return await self.session.link_counters.answer(request, response)
+
+
+def _port_settings(configuration: Configuration) -> PortSettings:
+    parameters = configuration.parameters
+    return PortSettings.of(
+        configuration.network, configuration.port, low_latency=parameters.low_latency,
+        rs485=parameters.rs485)
+
+
+def end_together(nodes: Sequence[BridgeNode], patience: float = _LAST_WORDS) -> None:
+    """
+    End nodes, all at once: PLCs, links, results of what has come, last words.
+
+    Callbacks may run meanwhile: what they still take gets its result, that it is not sent. A node
+    that fails here does not keep the others from their end. It takes 4 s at most, and ``patience``
+    more (s) for a subscriber that is stuck.
+    """
+    begun = time.monotonic()
+    for node in nodes:
+        node.begin_end()
+    tell_plcs([node.session for node in nodes if node.link.is_alive()], 'ends')
+    for node in nodes:
+        node.link.ask_to_stop()
+    for node in nodes:
+        node.link.stop()
+    take_last_writes(time.sleep, lambda: sum(node.writes_taken for node in nodes),
+                     min(time.monotonic() + LAST_WRITES, begun + _LATEST_WRITES))
+    give_up = time.monotonic() + patience
+    for node in nodes:
+        if time.monotonic() >= begun + _LATEST_WORDS:  # a hundred on a busy host take seconds
+            break
+        try:
+            node.say_last_words(give_up)
+        except Exception as error:  # it may be broken, and the others go on
+            node.get_logger().error(f'its end fails: {bug_text(error)}')

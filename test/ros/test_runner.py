@@ -1,0 +1,110 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""The threads of callbacks, and the one sequence of an end, for one bridge or many."""
+
+from itertools import groupby
+import threading
+import time
+from typing import Any
+
+from abdf1_ros.ros.bridge import end_together
+from abdf1_ros.ros.runner import _Callbacks
+from abdf1_ros.testing import PATIENCE
+import pytest
+from rclpy.logging import get_logger
+from rclpy.node import Node
+from support.ros import Observer
+
+
+class Recorder:
+    """Stand in for a bridge, its session and its link: write down what is called."""
+
+    def __init__(self, calls: list[str], fails: str = '') -> None:
+        self._calls = calls
+        self._fails = fails
+        self.writes_taken = 0
+        self.session = self.link = self
+
+    def _record(self, name: str) -> None:
+        self._calls.append(name)
+        if name == self._fails:
+            raise KeyError('a bug')
+
+    def begin_end(self) -> None:
+        self._record('begin')
+
+    def wait_for_plcs(self, give_up: float, what: str) -> None:
+        self._record(f'PLCs: {what}')
+
+    def is_alive(self) -> bool:
+        return True
+
+    def ask_to_stop(self) -> None:
+        self._record('ask link')
+
+    def stop(self) -> None:
+        self._record('stop link')
+
+    def say_last_words(self, give_up: float) -> None:
+        self._record('last words')
+
+    def get_logger(self) -> Any:
+        return get_logger('ending')
+
+
+def order(calls: list[str]) -> list[str]:
+    return [name for name, _ in groupby(calls)]
+
+
+def test_all_plcs_are_told_before_a_link_stops_and_results_come_before_the_last_words() -> None:
+    calls: list[str] = []
+    nodes: Any = [Recorder(calls) for _ in range(3)]
+    end_together(nodes)
+    assert order(calls) == ['begin', 'PLCs: ends', 'ask link', 'stop link', 'last words']
+    assert calls.count('stop link') == calls.count('last words') == 3
+
+
+def test_bridge_that_fails_at_its_end_keeps_no_other_from_it(
+        capfd: pytest.CaptureFixture[str]) -> None:
+    calls: list[str] = []
+    nodes: Any = [Recorder(calls, 'last words'), Recorder(calls)]
+    end_together(nodes)
+    assert calls[-2:] == ['last words', 'last words']
+    assert "its end fails: KeyError('a bug')" in capfd.readouterr().err
+
+
+def test_thread_of_callbacks_turns_when_it_is_woken_unless_a_callback_hangs() -> None:
+    hangs, goes_on = threading.Event(), threading.Event()
+    with Observer() as observer:
+        node = Node('hangs', context=observer.context)
+        callbacks = _Callbacks(node)
+        callbacks.start()
+        callbacks.has_turned = False
+        callbacks.wake()
+        observer.until(lambda: callbacks.has_turned, 'a turn')
+
+        def hang() -> None:
+            hangs.set()
+            goes_on.wait(PATIENCE)
+
+        timer = node.create_timer(0.01, hang)
+        assert hangs.wait(PATIENCE)
+        callbacks.has_turned = False
+        callbacks.wake()
+        assert not callbacks.has_turned
+        timer.cancel()
+        goes_on.set()
+        observer.until(lambda: callbacks.has_turned, 'a turn')
+        callbacks.end(time.monotonic() + PATIENCE)
+        node.destroy_node()
