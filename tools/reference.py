@@ -37,6 +37,7 @@ PARTS: dict[tuple[str, str], Callable[[], str]] = {
     ('CONTRIBUTING.md', 'rooms'): tables.rooms,
     ('docs/architecture.md', 'drawing'): drawing.mermaid,
     ('wireshark/abdf1.lua', 'tables'): dissector.lua,
+    ('docs/heartbeats.md', 'bounds'): tables.bounds,
     ('docs/protocol/framing.md', 'symbols'): tables.symbols,
     ('docs/protocol/addresses.md', 'file-codes'): tables.file_codes,
     ('docs/protocol/statuses.md', 'statuses'): tables.statuses,

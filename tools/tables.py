@@ -17,7 +17,8 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import fields
+from dataclasses import fields, replace
+from pathlib import Path
 import re
 
 from abdf1_ros.counters import numbered
@@ -32,11 +33,15 @@ from abdf1_ros.pccc.members import Members
 from abdf1_ros.pccc.processor import Processor
 from abdf1_ros.pccc.status import status_text
 from abdf1_ros.pccc.values import types_of
+from abdf1_ros.plan.report import make_report
 from abdf1_ros.settings.columns import MAP_COLUMNS
-from abdf1_ros.settings.network import FIELDS, NetField
+from abdf1_ros.settings.map_file import load_mappings
+from abdf1_ros.settings.network import FIELDS, load_network, NetField
 
 from tools.explanations import COUNTERS, MESSAGES, OUTCOMES
 from tools.rooms import ROOMS
+
+CONFIG = Path(__file__).resolve().parent.parent / 'config'
 
 FAMILIES = {PlcType.PLC5: 'PLC-5', PlcType.SLC: 'SLC, MicroLogix', PlcType.PLC3: 'PLC-3',
             PlcType.PLC2: 'PLC-2'}
@@ -236,6 +241,31 @@ def commands() -> str:
     return table(('CMD', 'FNC', 'name'), (
         (_code(f'{cmd:02X}'), '' if function is None else _code(f'{function:02X}'), name)
         for (cmd, function), name in command_codes().items()))
+
+
+def bounds() -> str:
+    """Return the times of the heartbeat and the fallbacks in config/ with other settings."""
+    network = load_network(str(CONFIG / 'net.csv'))
+    mappings, _ = load_mappings(str(CONFIG / 'heartbeat_map.csv'))
+
+    def row(timeout: int, cmd_timeout: int, retries: int) -> list[str]:
+        """Return the cells of such settings."""
+        settings = replace(network, timeout=timeout, cmd_timeout=cmd_timeout,
+                           nak_retries=retries, enq_retries=retries)
+        message, standard = (make_report(replace(settings, polling=polling), mappings, 0.1)
+                             for polling in ('Message', 'Standard'))
+        presets, = {bound.presets for bound in message.bounds if bound.presets}
+        longest, usual, polled = (max(filter(None, times)) for times in (
+            [bound.seconds for bound in message.bounds if bound.mapping.fallback],
+            [bound.usual for bound in message.bounds],
+            [bound.seconds for bound in standard.bounds if bound.mapping.fallback]))
+        return [f'{timeout}, {cmd_timeout}, {retries}', f'{message.longest_transaction:.2f} s',
+                f'{presets[0]}, {presets[1]}', f'{longest:.1f} s', f'{polled:.1f} s',
+                f'{usual:.1f} s']
+
+    return table(('Timeout, Cmd_Timeout, retries', 'T', 'rung 3, rung 5', 'fallback, at most',
+                  'with Polling Standard', 'no frame lost'),
+                 [row(100, 500, 1), row(200, 500, 1), row(300, 1000, 3), row(1000, 1000, 3)])
 
 
 def rooms() -> str:

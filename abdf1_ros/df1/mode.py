@@ -103,13 +103,18 @@ class LineMode(ABC):
             + (max(line.nak_retries, line.enq_retries) + 1) \
             * (frames + quiet_time(line.timing.char_time))
 
+    def undisturbed(self, line: LinkSettings, frames: float, response_time: float,
+                    others: float = 0.0, stations: int = 0) -> float:
+        """
+        Return how long a transaction takes at most where no frame gets lost.
+
+        Each answer comes after ``response_time``; the rest is as in ``longest_transaction``.
+        """
+        return frames + self.answers * response_time
+
     def longest_reply(self, line: LinkSettings, frames: float) -> float:
         """Return how long a reply of ours takes at most, which takes turns with commands."""
         return (line.nak_retries + 1) * (answer_time(line) + frames)
-
-    def scan(self, line: LinkSettings, stations: int, response_time: float) -> float:
-        """Return how long a command waits, at least, for so many stations to be polled."""
-        return 0.0
 
     def longest_probe(self, line: LinkSettings) -> float:
         """Return how long it takes to find a silent station silent."""

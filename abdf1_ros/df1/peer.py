@@ -437,7 +437,9 @@ class PeerMode(LineMode):
     def longest_reply(self, line: LinkSettings, frames: float) -> float:
         """Return how long the transfer of a reply takes: messages, ENQs and pauses."""
         tries = line.nak_retries + line.enq_retries + 1
-        return tries * (answer_time(line) + frames) + _pauses(line)
+        # A command that is overdue meanwhile is ended with the next look.
+        return tries * answer_time(line) + (line.nak_retries + 1) * frames \
+            + _pauses(line) + _TICK
 
 
 def _pauses(line: LinkSettings) -> float:

@@ -396,10 +396,12 @@ class StandardPollingMode(MasterMode):
         return super().longest_transaction(line, frames) + 2 * stations * (
             poll + self.longest_reply(line, others))
 
-    def scan(self, line: LinkSettings, stations: int, response_time: float) -> float:
-        """Return how long a poll of every station takes, when none has anything to say."""
-        timing = line.timing
-        return stations * (_POLL_CHARACTERS * timing.char_time + timing.tx_delay + response_time)
+    def undisturbed(self, line: LinkSettings, frames: float, response_time: float,
+                    others: float = 0.0, stations: int = 0) -> float:
+        """Return it with the scan in which every station is polled, and has a command."""
+        poll = _POLL_CHARACTERS * line.timing.char_time + line.timing.tx_delay + response_time
+        other = super().undisturbed(line, others, response_time)
+        return super().undisturbed(line, frames, response_time) + stations * (poll + other)
 
 
 STANDARD = StandardPollingMode()

@@ -426,6 +426,12 @@ class RadioMode(LineMode):
         turns = 3 * MOST_UNDER_WAY if line.avoids_collisions else 2
         return (line.nak_retries + 1) * (turns * send + line.cmd_timeout + heard)
 
+    def undisturbed(self, line: LinkSettings, frames: float, response_time: float,
+                    others: float = 0.0, stations: int = 0) -> float:
+        """Return it with the longest pause by chance before a first try."""
+        chance = 0.0 if line.avoids_collisions else MIN_RESPONSE_TIME + frames
+        return super().undisturbed(line, frames, response_time) + chance
+
     def longest_reply(self, line: LinkSettings, frames: float) -> float:
         """Return 0: packets that wait for their turn are part of a transaction."""
         return 0.0

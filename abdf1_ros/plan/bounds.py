@@ -21,7 +21,7 @@ settings allow, with all repetitions. Times are in seconds.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 import math
 
@@ -113,19 +113,20 @@ class Times:
                      if (mapping.heartbeat or mapping.fallback) and not mapping.serves]
         self._blocks = blocks
         self._response_time = response_time
-        self._mode = network.line_mode
+        self._mode, self._line = network.line_mode, network.line
         self._stations = {mapping.station for mapping in mappings if not mapping.serves}
-        own = max((max(_packets(network, mapping)) for mapping in self._own), default=0.0)
-        read = max((forecast.longest_wait([block], 0.0) for block in blocks), default=0.0)
-        written = max((max(_packets(network, mapping)) for mapping in mappings
-                       if mapping.writes and not mapping.serves), default=0.0)
-        self._frames = own
+        model = forecast.line_model(network)
+        reads = [forecast.longest_wait([block], 0.0) for block in blocks]
+        written = [max(_packets(network, mapping)) for mapping in mappings
+                   if (mapping.writes or mapping.heartbeat) and not mapping.serves]
         # A guest may have the longest command there is under way.
-        guest = forecast.line_model(network).transaction_time(MAX_LINK_DATA, MAX_LINK_DATA) \
-            if network.share else 0.0
-        self._any_frames = max(own, read, written, guest, _question_time(network, 0.0))
-        self.longest = self._mode.longest_transaction(
-            network.line, self._any_frames, self._any_frames, len(self._stations))
+        guest = model.transaction_time(MAX_LINK_DATA, MAX_LINK_DATA) if network.share else 0.0
+        self._any_frames = max(*reads, *written, guest, _question_time(network, 0.0))
+        served = [2 * mapping.codec.words for mapping in mappings if mapping.serves]
+        self._serves = bool(served)
+        self._reply = model.transaction_time(0, min(max(served, default=0), MAX_LINK_DATA))
+        self._longest_reply = model.transaction_time(0, MAX_LINK_DATA)
+        self.longest = self._repeated(self._any_frames)
 
     def bounds(self) -> Iterator[Bound]:
         """Yield the bound of every row with Fallback, and the preset for every heartbeat."""
@@ -140,7 +141,8 @@ class Times:
             return Bound(mapping, after)
         if self._mode.is_polled:
             return Bound(mapping, None)
-        return Bound(mapping, after + self._wait(mapping), after + self._usual_wait(mapping))
+        return Bound(mapping, after + self._wait(mapping, self._at_most),
+                     after + self._wait(mapping, self._undisturbed))
 
     def _preset(self, mapping: Mapping) -> float:
         assert mapping.period is not None
@@ -150,37 +152,37 @@ class Times:
         # The response time stands for the scan of the PLC.
         return max(3 * period, period + 2 * self.longest + beats + self._response_time)
 
-    def _wait(self, mapping: Mapping) -> float:
-        """Return how long a fallback that is due may have to wait, and take, at most (s)."""
-        network = self._network
+    def _wait(self, mapping: Mapping, time: Callable[[float], float]) -> float:
+        """
+        Return how long a fallback that is due may have to wait, and take, at most (s).
+
+        ``time`` gives the seconds of a transaction whose frames take so long (s) on the line.
+        """
         # In standard polling the others have the line meanwhile; that is in each scan.
         own = [other for other in self._own
                if not self._mode.takes_turns or other.station == mapping.station]
-        writes = sum(len(_packets(network, other)) for other in own)
-        reads = 1 + (writes - 1) // OWN_IN_A_ROW
-        if self._mode.most_under_way(network.line) > 1 or len(own) < len(self._own):
-            reads = writes  # others may have had the writes between two reads
+        writes = [frames for other in own for frames in _packets(self._network, other)]
+        reads = 1 + (len(writes) - 1) // OWN_IN_A_ROW
+        if self._mode.most_under_way(self._line) > 1 or len(own) < len(self._own):
+            reads = len(writes)  # others may have had the writes between two reads
         # What is under way, the reads that have a turn in between, and all of ours.
-        return (1 + reads) * self._at_most(self._any_frames) + writes * self._at_most(self._frames)
-
-    def _usual_wait(self, mapping: Mapping) -> float:
-        zeros = [other for other in self._own
-                 if other.heartbeat and other.station == mapping.station]
-        return forecast.longest_wait(self._blocks, self._response_time) + sum(
-            write_time(self._network, other, self._response_time) for other in [*zeros, mapping]
-        ) + (1 + len(zeros)) * self._poll_scan()
+        return (1 + reads) * time(self._any_frames) + sum(map(time, writes))
 
     def _at_most(self, frames: float) -> float:
-        """Return the seconds of a transaction whose ``frames`` take so long (s) on the line."""
-        mode, line = self._mode, self._network.line
-        total = mode.longest_transaction(line, frames, self._any_frames, len(self._stations))
-        if mode.answers_by_itself or any(mapping.serves for mapping in self._mappings):
-            total += mode.longest_reply(line, self._any_frames)  # takes turns with our commands
-        return total
+        """Return the seconds of a transaction, with a reply of ours that takes turns with it."""
+        reply = self._mode.longest_reply(self._line, self._longest_reply) \
+            if self._serves or self._mode.answers_by_itself else 0.0
+        return reply + self._repeated(frames)
 
-    def _poll_scan(self) -> float:
-        """Return the seconds of one poll of every station, where these are polled in turns."""
-        return self._mode.scan(self._network.line, len(self._stations), self._response_time)
+    def _repeated(self, frames: float) -> float:
+        return self._mode.longest_transaction(
+            self._line, frames, self._any_frames, len(self._stations))
+
+    def _undisturbed(self, frames: float) -> float:
+        """Return the same where no frame gets lost."""
+        reply = self._reply + self._response_time if self._serves else 0.0
+        return reply + self._mode.undisturbed(
+            self._line, frames, self._response_time, self._any_frames, len(self._stations))
 
     def advice(self) -> Iterator[str]:
         """Yield which setting would shorten bounds and presets most, if that is worth it."""

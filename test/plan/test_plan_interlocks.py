@@ -91,8 +91,8 @@ def test_rule_16_bound_counts_all_that_may_go_before_a_fallback(others: int, rea
     # What is under way, reads that have a turn, and our own writes, heartbeat 0 among them.
     assert first.seconds == pytest.approx(
         3.0 + (1 + reads) * at_most(question) + (2 + others) * own)
-    assert first.usual == pytest.approx(3.0 + write_time(QUICK, rows[0]) + write_time(
-        QUICK, rows[1]))
+    assert first.usual == pytest.approx(3.0 + (1 + reads) * (question + 0.02) + sum(
+        write_time(QUICK, row) for row in rows))
     assert str(first) == (f'fallback of speed, station 1: written after '
                           f'{first.seconds * 1000:.0f} ms at most, {first.usual * 1000:.0f} ms '
                           'where no frame gets lost')
@@ -103,7 +103,10 @@ def test_rule_16_standard_polling_adds_its_scans_and_slave_has_no_bound() -> Non
     message, = Times(QUICK, rows).bounds()
     standard, = Times(replace(QUICK, polling='Standard'), rows).bounds()
     assert message.seconds and standard.seconds and message.usual and standard.usual
-    assert standard.usual - message.usual == pytest.approx(11 * (60 / 19200 + 0.01))
+    # A scan for each of the three transactions below, in which every station has a command.
+    question = line_model(QUICK).transaction_time(1, 26)
+    assert standard.usual - message.usual == pytest.approx(
+        3 * 11 * (60 / 19200 + 0.01 + question + 0.02))
     # Of each station a poll and a command with all their retries, in two scans a transaction;
     # three transactions: what is under way, a read and the fallback.
     assert standard.seconds - message.seconds > 3 * 2 * 11 * 4 * 0.2
