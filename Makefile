@@ -5,6 +5,7 @@ DEMO_SECONDS ?= 30
 FUZZ_SECONDS ?= 60
 MUTANTS ?= 200
 LONG_HOURS ?= 1
+HOURS ?= 1
 LONG_ARGS ?=
 PYTEST_ARGS ?=
 TEST_WORKERS ?= 5
@@ -46,7 +47,7 @@ help: ## List the targets
 	@echo
 	@echo 'Variables: PYTHON (of setup), DEMO_SECONDS (of demo), PYTEST_ARGS (of test),'
 	@echo 'TEST_WORKERS (5: processes of test, more than processors, as many tests wait),'
-	@echo 'MUTANTS (of mutate), FUZZ_SECONDS (of fuzz), LONG_HOURS and LONG_ARGS (of long; LONG_ARGS=--help).'
+	@echo 'MUTANTS (of mutate), HOURS (of simulate), FUZZ_SECONDS (of fuzz), LONG_HOURS and LONG_ARGS (of long; LONG_ARGS=--help).'
 
 .PHONY: setup
 setup: $(INSTALLED) ## Make .venv with all that the other targets need
@@ -153,6 +154,10 @@ fuzz: $(INSTALLED) ## Fuzz what reads bytes and text for FUZZ_SECONDS (60), from
 long: $(INSTALLED) ## Try new examples, inputs, faults and kills for LONG_HOURS (1)
 	@$(GET_ATHERIS) || true
 	$(PY) test/lab/long.py --hours $(LONG_HOURS) $(LONG_ARGS)
+
+.PHONY: simulate
+simulate: $(INSTALLED) ## Simulate plants with every kind of fault for HOURS (1) of their time, all rules judged
+	$(PY) test/lab/simulate/run.py --hours $(HOURS)
 
 .PHONY: mutate
 mutate: $(INSTALLED) ## Make MUTANTS (200) small mistakes, tell which no test finds (hours)

@@ -1,0 +1,228 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+Make a mistake in each rule, and see how soon the simulation finds it.
+
+``mistakes.py`` prints a row for each: the rule, the mistake, which check has found it, after how
+many plants, hours of line time and seconds of processor time. The status is 1 where one is not
+found within ``--seconds``.
+"""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Callable
+from contextlib import ExitStack
+from dataclasses import dataclass, replace
+import math
+from pathlib import Path
+import sys
+import time
+from typing import Any
+from unittest import mock
+
+if __name__ == '__main__':  # pytest has its own paths
+    sys.path[:0] = [str(Path(__file__).parents[number]) for number in (1, 2, 3)]
+
+from abdf1_ros.driver.driver import Driver
+from abdf1_ros.driver.interlocks.fallback import FallbackRow
+from abdf1_ros.driver.interlocks.heartbeat import BeatState, HeartbeatRow
+from abdf1_ros.driver.interlocks.queue import Interlocks
+from abdf1_ros.driver.reads.guards import CounterGuard, RunGuard
+from abdf1_ros.driver.write import Outcome, Write
+from abdf1_ros.driver.writes.queue import WriteQueue
+from abdf1_ros.pccc.values import Codec
+from simulate.rules import Broken
+from simulate.run import Story
+
+
+@dataclass(frozen=True, slots=True)
+class Mistake:
+    """``make`` gets what stands in a class, and returns what is put there instead."""
+
+    rule: str
+    text: str
+    owner: type
+    name: str
+    make: Callable[[Any], Any]
+
+
+def _counts_by_two(take: Any) -> Any:
+    def take_wrongly(self: HeartbeatRow, now: float) -> Write:
+        take(self, now)
+        if self.value:
+            self.value = self.value % 32_767 + 1
+        return Write(self.mapping, [self.value], now)
+
+    return take_wrongly
+
+
+def _counts_unconfirmed(take: Any) -> Any:
+    def take_wrongly(self: HeartbeatRow, now: float) -> Write:
+        self._is_confirmed = True
+        return take(self, now)  # type: ignore[no-any-return]
+
+    return take_wrongly
+
+
+def _begins_to_count(begin: Any) -> Any:
+    def begin_wrongly(self: HeartbeatRow, now: float, *, is_new: bool = False) -> None:
+        self.state, self._is_confirmed = BeatState.COUNTS, True
+        self._next = self.due = now
+
+    return begin_wrongly
+
+
+def _short_zero(ended: Any) -> Any:
+    def end_wrongly(self: HeartbeatRow, outcome: Outcome, now: float) -> None:
+        ended(self, outcome, now)
+        if not self.value and self.state is BeatState.SHOWN:
+            self._next = self.due = now + 0.1
+
+    return end_wrongly
+
+
+def _always_confirmed(ended: Any) -> Any:
+    return lambda self, outcome, now: ended(self, Outcome.WRITTEN, now)
+
+
+def _value_before(decode: Any) -> Any:
+    last: dict[int, Any] = {}
+
+    def decode_wrongly(self: Codec, data: bytes) -> Any:
+        values = decode(self, data)
+        before = last.get(id(self), values)
+        last[id(self)] = values
+        return before
+
+    return decode_wrongly
+
+
+def _told_as_written(result: Any) -> Any:
+    def tell_wrongly(self: Write, outcome: Outcome, *arguments: Any, **named: Any) -> Any:
+        if outcome is Outcome.NOT_SENT:
+            outcome = Outcome.WRITTEN
+        return result(self, outcome, *arguments, **named)
+
+    return tell_wrongly
+
+
+def _told_as_not_sent(result: Any) -> Any:
+    def tell_wrongly(self: Write, outcome: Outcome, *arguments: Any, **named: Any) -> Any:
+        if outcome is Outcome.UNKNOWN:
+            outcome = Outcome.NOT_SENT
+        return result(self, outcome, *arguments, **named)
+
+    return tell_wrongly
+
+
+def _dropped_in_silence(drop: Any) -> Any:
+    def drop_wrongly(self: WriteQueue, reason: str, now: float, mapping: Any = None) -> None:
+        for write in [write for write in self.waiting if mapping in (None, write.mapping)]:
+            self.waiting.remove(write)
+
+    return drop_wrongly
+
+
+def _writes_in_spite(init: Any) -> Any:
+    def init_wrongly(self: Driver, network: Any, mappings: Any, settings: Any,
+                     listener: Any) -> None:
+        init(self, network, mappings, replace(settings, read_only=False), listener)
+
+    return init_wrongly
+
+
+def _refused_refreshes(ended: Any) -> Any:
+    return lambda self, requested, outcome: ended(self, requested, Outcome.WRITTEN)
+
+
+def _always(value: Any) -> Callable[[Any], Any]:
+    return lambda before: lambda *arguments, **named: value
+
+
+MISTAKES = (
+    Mistake('1', 'the heartbeat counts by two', HeartbeatRow, 'take', _counts_by_two),
+    Mistake('2', 'no 0 at first contact', HeartbeatRow, 'begin', _begins_to_count),
+    Mistake('2', 'the 0 stands for 0.1 s', HeartbeatRow, 'ended', _short_zero),
+    Mistake('3 a', 'it counts on without a confirmation', HeartbeatRow, 'take',
+            _counts_unconfirmed),
+    Mistake('3 b', 'it counts beside a fallback that is due', Interlocks, '_why_held',
+            _always('')),
+    Mistake('3 c', 'it counts while the executor stands still', HeartbeatRow, 'executor_until',
+            _always(math.inf)),
+    Mistake('3 d', 'it counts without the topics that it requires', HeartbeatRow, 'missing',
+            _always('')),
+    Mistake('5', 'no fallbacks at the end', FallbackRow, 'end', _always(None)),
+    Mistake('7', 'a refused message refreshes its row', FallbackRow, 'message_ended',
+            _refused_refreshes),
+    Mistake('7', 'messages wait for ever', WriteQueue, 'patience_of', _always(60.0)),
+    Mistake('8', 'no fallback after the timeout', FallbackRow, 'deadline', _always(math.inf)),
+    Mistake('8', 'a change to RUN is not seen', Interlocks, 'mode_seen', _always(None)),
+    Mistake('8', 'a fallback that stands is not written again', Interlocks, '_plan_refresh',
+            _always(None)),
+    Mistake('9', 'a message from before the fallback is sent after it', Interlocks,
+            'is_overruled', _always(False)),
+    Mistake('10', 'a fallback is tried once', FallbackRow, 'ended', _always_confirmed),
+    Mistake('13', 'RUN guards nothing', RunGuard, 'why_not', _always('')),
+    Mistake('14', 'the counter guards nothing', CounterGuard, 'why_not', _always('')),
+    Mistake('18', 'read_only is ignored', Driver, '__init__', _writes_in_spite),
+    Mistake('19', 'nobody looks for another writer', HeartbeatRow, 'read_back', _always('')),
+    Mistake('results', 'not sent is told as written', Write, 'result', _told_as_written),
+    Mistake('results', 'unknown is told as not sent', Write, 'result', _told_as_not_sent),
+    Mistake('results', 'messages are dropped in silence', WriteQueue, 'drop',
+            _dropped_in_silence),
+    Mistake('values', 'a value is that of the read before', Codec, 'decode', _value_before))
+
+
+def find(mistake: Mistake, seed: int, limit: float) -> tuple[str, int, float, float]:
+    """Return which check has found it, plants, hours of line time, and seconds it took."""
+    begun, hours, plants = time.process_time(), 0.0, 0
+    with ExitStack() as stack:
+        made = mistake.make(getattr(mistake.owner, mistake.name))
+        stack.enter_context(mock.patch.object(mistake.owner, mistake.name, made))
+        while time.process_time() - begun < limit:
+            story = Story(seed + plants)
+            plants += 1
+            try:
+                story.run()
+            except Broken as broken:
+                hours += story.world.line.now / 3600
+                return broken.check, plants, hours, time.process_time() - begun
+            hours += story.world.line.now / 3600
+    return '', plants, hours, time.process_time() - begun
+
+
+def main() -> int:
+    """Make each mistake; return the exit status."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[1])
+    parser.add_argument('--seed', type=int, default=1)
+    parser.add_argument('--seconds', type=float, default=600.0, help='for each, of a processor')
+    parser.add_argument('--only', default='', help='rules or texts that hold this')
+    wanted = parser.parse_args()
+    print('| rule | mistake | found by | plants | line time | processor |\n'
+          '| --- | --- | --- | --- | --- | --- |')
+    missed = 0
+    for mistake in MISTAKES:
+        if wanted.only not in f'{mistake.rule} {mistake.text}':
+            continue
+        check, plants, hours, seconds = find(mistake, wanted.seed, wanted.seconds)
+        missed += not check
+        print(f'| {mistake.rule} | {mistake.text} | {check or "NOT FOUND"} | {plants} | '
+              f'{3600 * hours:.0f} s | {seconds:.1f} s |', flush=True)
+    return int(missed > 0)
+
+
+if __name__ == '__main__':
+    sys.exit(main())

@@ -1,0 +1,363 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+What has to hold at every step of a simulated plant, whatever goes wrong.
+
+The numbers are those of docs/heartbeats.md. A rule looks at what came since its last look, from
+outside: at words that PLCs have executed, at values and results, not at the state of the driver.
+"""
+
+from __future__ import annotations
+
+from collections import defaultdict
+import math
+
+from abdf1_ros.driver.write import Outcome, WriteResult
+from abdf1_ros.plan.bounds import MODE_PERIOD
+from support.world import Executed, SAFE, STEP, World
+
+_LEAST_ZERO = 0.5  # s
+_LEAST_LIFE_SIGN = 1.0  # s
+_ON_THE_WIRE = 0.3  # s
+_REWRITTEN = 5.0  # s after which a fallback is written again
+_NEVER_EXECUTED = {Outcome.NOT_SENT, Outcome.REFUSED, Outcome.SUPERSEDED, Outcome.FAILED}
+
+
+class Broken(AssertionError):
+    """A rule does not hold, as ``check`` has found."""
+
+    def __init__(self, check: str, text: str, world: World) -> None:
+        super().__init__(f'{check}: {text} at {world.line.now:.3f} s of seed {world.seed}, '
+                         f'{world.plant}')
+        self.check = check
+
+
+class Rule:
+    """Something that has to hold, whatever is told of a world, and after each step of it."""
+
+    text = ''
+
+    def __init__(self, world: World) -> None:
+        self.world = world
+        # From the decision to send to its execution: all repetitions, and a step of the world.
+        self.flight = world.longest + 2 * STEP
+
+    def executed(self, entry: Executed) -> None:
+        """Judge what a PLC has executed."""
+
+    def told(self, result: WriteResult) -> None:
+        """Judge a result."""
+
+    def read(self, when: float, tag: str, station: int, values: list[int]) -> None:
+        """Judge what was published."""
+
+    def stand(self) -> None:
+        """Judge how things stand."""
+
+    @property
+    def held(self) -> float:
+        """Return for how long (s) what came for the process had to wait, as it stood still."""
+        return 3.0 if self.world.line.now < self.world.away + self.flight else 0.0
+
+    def demand(self, condition: bool, *what: object) -> None:
+        """Raise Broken, with the seed that replays it, where something does not hold."""
+        if not condition:
+            raise Broken(type(self).__name__, f'{self.text}: {what}', self.world)
+
+
+class Results(Rule):
+    text = 'each message has one result, and the result is true'
+
+    def __init__(self, world: World) -> None:
+        super().__init__(world)
+        self._waits: dict[tuple[str, int], float] = {}
+        self._outcomes: dict[tuple[str, int], Outcome] = {}
+        self._by: set[tuple[str, int]] = set()
+        self._seen = self._driver = 0
+        # To wait, to be sent and polled for, to be read back, and while the process stood still.
+        self._limit = 3 * world.plant.write_timeout + 4 * world.longest + 8.0
+
+    def executed(self, entry: Executed) -> None:
+        key = entry.tag, entry.value
+        if entry.tag[0] not in 'wf' or entry.value == SAFE:
+            return
+        self.demand(key in self.world.published, key, 'was never published')
+        self.demand(key not in self._by, key, 'was executed twice')
+        self.demand(self._outcomes.get(key) not in _NEVER_EXECUTED, key, 'was not to be sent')
+        self._by.add(key)
+
+    def told(self, result: WriteResult) -> None:
+        if result.outcome is Outcome.FALLBACK:
+            return
+        key = result.mapping.tag, int(result.value.strip('[]'))
+        self.demand(key not in self._outcomes, key, 'has two results')
+        self._outcomes[key] = result.outcome
+        self._waits.pop(key, None)
+        if result.outcome is Outcome.WRITTEN:
+            self.demand(key in self._by, key, 'is told as written')
+        elif result.outcome in _NEVER_EXECUTED:
+            self.demand(key not in self._by, key, f'was executed, and told as {result.outcome}')
+
+    def stand(self) -> None:
+        now = self.world.line.now
+        new = self.world.keys[self._seen:]
+        self._seen += len(new)
+        if self._driver != self.world.drivers:  # what the killed one knew is gone
+            self._driver = self.world.drivers
+            self._waits.clear()
+            return
+        self._waits.update((key, now) for key in new if key not in self._outcomes)
+        oldest = next(iter(self._waits.values()), math.inf)
+        self.demand(now - oldest < self._limit, next(iter(self._waits), None), 'has no result')
+
+
+class Ages(Rule):
+    text = 'no message older than write_timeout or a fallback is sent (7, 9)'
+
+    def __init__(self, world: World) -> None:
+        super().__init__(world)
+        self._fallbacks: defaultdict[str, float] = defaultdict(lambda: -math.inf)
+
+    def executed(self, entry: Executed) -> None:
+        world = self.world
+        if entry.tag[0] not in 'wf':
+            return
+        if entry.value == SAFE:
+            self._fallbacks[entry.tag] = entry.when
+            return
+        published = world.published[entry.tag, entry.value]
+        limit = world.plant.write_timeout
+        if entry.tag[0] == 'w':
+            limit = min(limit, world.plant.after / 1000)
+        self.demand(entry.when - published < limit + self.flight, entry, published)
+        self.demand(published > self._fallbacks[entry.tag] - self.flight, entry, published,
+                    'was published before the fallback of', self._fallbacks[entry.tag])
+
+
+class Values(Rule):
+    text = 'each value is one that the PLC has just had, whole'
+
+    def read(self, when: float, tag: str, station: int, values: list[int]) -> None:
+        name = tag.partition('_')[0]
+        if name not in ('clock', 'running', 'counter', 'counted'):
+            return
+        world = self.world
+        self.demand(len({*values}) == 1, tag, values, 'of two scans')
+        showed = world.plcs[station].last_showed(values[0], when)
+        self.demand(showed >= when - self.flight - self.held, tag, values, showed)
+
+
+class Guards(Rule):
+    text = 'guarded values come only while the program runs (13, 14)'
+
+    def __init__(self, world: World) -> None:
+        super().__init__(world)
+        self._patience = {mapping.tag: point.patience
+                          for mapping, point in world.driver.points.items()}
+
+    def read(self, when: float, tag: str, station: int, values: list[int]) -> None:
+        if tag.startswith(('running', 'counted')):
+            world = self.world
+            # The counter was read an interval after its last change at most, and so was this row.
+            limit = self._patience[tag] + 2 * self.flight + self.held + 0.5
+            self.demand(when - world.plcs[station].ran <= limit, tag, world.plcs[station].ran)
+
+
+class Beats(Rule):
+    text = 'a heartbeat is 0 first, for its time, and counts one by one for the living (1 to 3)'
+
+    def __init__(self, world: World) -> None:
+        super().__init__(world)
+        self._last: dict[str, int] = {}
+        self._zero: dict[str, float] = {}  # since when it is 0
+        self._driver: dict[str, int] = {}
+        self._stood = max(_LEAST_ZERO, world.plant.period / 1000)
+
+    def executed(self, entry: Executed) -> None:
+        if not entry.tag.startswith('beat'):
+            return
+        tag, value = entry.tag, entry.value
+        last = self._last.get(tag)
+        if self._driver.get(tag, -1) != entry.driver:
+            if value and entry.when < self.world.killed_at + _ON_THE_WIRE:
+                return  # what the killed one has sent
+            self.demand(value == 0, entry, 'is the first of a driver')
+            self._driver[tag] = entry.driver
+            self._zero[tag] = entry.when
+        elif value == 0:
+            if last:
+                self._zero[tag] = entry.when
+        else:
+            self.demand(not last or value in (last, last % 32_767 + 1), entry, 'after', last)
+            if not last:
+                self.demand(entry.when - self._zero[tag] >= self._stood - 1e-6, entry,
+                            '0 stood since', self._zero[tag])
+            self._judge_count(entry)
+        self._last[tag] = value
+
+    def _judge_count(self, entry: Executed) -> None:
+        world, plant = self.world, self.world.plant
+        limit = max(_LEAST_LIFE_SIGN, plant.period / 1000) + self.flight
+        self.demand(entry.when - world.executor_ran < limit + self.held, entry,
+                    'while the executor stands still since', world.executor_ran)
+        if plant.requires:
+            came = world.came.get(f'w0_{entry.station}', -math.inf)
+            self.demand(entry.when - came < plant.requires / 1000 + self.flight + self.held,
+                        entry, 'without a message since', came)
+
+
+class BeatsAfterFallbacks(Rule):
+    text = 'no heartbeat counts while a fallback of its station is due (3 b)'
+
+    def executed(self, entry: Executed) -> None:
+        if not entry.tag.startswith('beat') or not entry.value:
+            return
+        for row in self.world.driver.interlocks.fallbacks:
+            if row.mapping.station == entry.station:
+                is_due = row.cause is not None and row._due_since < entry.when - self.flight
+                self.demand(not is_due, entry, row.mapping.tag, row.cause)
+
+
+class Outputs(Rule):
+    text = 'no output stands longer than printed without a message (7, 8, 16)'
+
+    def __init__(self, world: World) -> None:
+        super().__init__(world)
+        self._stood = dict.fromkeys((row.tag for row in world.messages), 0.0)
+
+    def told(self, result: WriteResult) -> None:
+        tag = result.mapping.tag
+        if result.outcome is Outcome.WRITTEN:
+            when = self.world.published[tag, int(result.value.strip('[]'))]
+            self._stood[tag] = max(self._stood[tag], when)
+
+    def executed(self, entry: Executed) -> None:
+        # A message over the fallback counts once, also where its outcome is unknown.
+        if entry.tag[0] == 'w' and entry.value != SAFE:
+            when = self.world.published[entry.tag, entry.value]
+            self._stood[entry.tag] = max(self._stood[entry.tag], when)
+
+    def stand(self) -> None:
+        world = self.world
+        now = world.line.now
+        if world.plant.is_read_only:
+            return
+        for station, watched in world.plcs.items():
+            for row in world.rows_of(station):
+                limit = world.bounds[row.tag]
+                assert limit is not None
+                limit += STEP
+                calm = max(world.ill[station], world.ill[0])
+                if now < calm + limit + MODE_PERIOD + _REWRITTEN:
+                    continue
+                value = watched.word(watched.places[row.tag])
+                self.demand(value in (SAFE, 0) or now - self._stood[row.tag] < limit,
+                            row.tag, value, 'since', self._stood[row.tag])
+
+
+class AfterRun(Rule):
+    text = 'after a change to RUN that was seen come 0 and all fallbacks (2, 8)'
+
+    def stand(self) -> None:
+        world = self.world
+        now = world.line.now
+        for station, watched in world.plcs.items():
+            limits = [world.bounds[row.tag] or 0.0 for row in world.rows_of(station)]
+            limit = max(limits) - world.plant.after / 1000 + MODE_PERIOD + self.flight
+            stopped, ran = watched.stopped, watched.ran_again
+            was_seen = ran - stopped > MODE_PERIOD + self.flight
+            is_calm = max(world.ill[station], world.ill[0]) <= ran + STEP
+            if not was_seen or not ran + limit <= now < ran + limit + 2 * STEP or not is_calm \
+                    or world.plant.is_read_only:
+                continue
+            came = {entry.tag for entry in world.executed if entry.when > ran
+                    and entry.station == station and entry.value in (0, SAFE)}
+            missing = {row.tag for row in world.rows_of(station, ('w', 'beat'))} - came
+            self.demand(not missing, missing, 'since RUN at', ran)
+
+
+class Held(Rule):
+    text = 'without messages of the topics that it requires a heartbeat is 0 in time (3 d)'
+
+    def stand(self) -> None:
+        world, plant = self.world, self.world.plant
+        if not plant.requires or plant.is_read_only:
+            return
+        for station, watched in world.plcs.items():
+            beat = f'beat_{station}'
+            wait = world.bounds[f'w0_{station}']
+            assert wait is not None
+            limit = plant.requires / 1000 + wait - plant.after / 1000 + STEP
+            since = max(world.ill[station], world.ill[0], world.came.get(f'w0_{station}', 0.0))
+            if world.line.now > since + limit + MODE_PERIOD and not watched.other:
+                self.demand(watched.word(watched.places[beat]) == 0, beat, 'counts since', since)
+
+
+class ReadOnly(Rule):
+    text = 'with read_only nothing is written (18)'
+
+    def executed(self, entry: Executed) -> None:
+        self.demand(not self.world.plant.is_read_only, entry)
+
+
+class OneOwner(Rule):
+    text = 'beside another writer of its word a heartbeat ends with 0 (19)'
+
+    def __init__(self, world: World) -> None:
+        super().__init__(world)
+        self.since: dict[int, float] = {}  # when another one began, by station
+
+    def executed(self, entry: Executed) -> None:
+        world = self.world
+        if not entry.tag.startswith('beat') or not entry.value or entry.station not in self.since \
+                or world.plant.mode == 'Radio':  # whose reads may take longer than many Periods
+            return
+        # Each opening of the port and each change to RUN begins anew, and what is ill is not read.
+        began = max(self.since[entry.station], world.opened, world.ill[entry.station],
+                    world.ill[0], world.plcs[entry.station].ran_again + MODE_PERIOD)
+        limit = max(20 * world.plant.period / 1000, 3.0) + self.flight
+        self.demand(entry.when < began + limit, entry, 'other since', began)
+
+
+RULES: tuple[type[Rule], ...] = (
+    Results, Ages, Values, Guards, Beats, BeatsAfterFallbacks, Outputs, AfterRun, Held, ReadOnly)
+
+
+class Judge:
+    """All rules, looking at a world."""
+
+    def __init__(self, world: World) -> None:
+        self._world = world
+        self.owner = OneOwner(world)
+        self._rules = [*(rule(world) for rule in RULES), self.owner]
+        self._executed = self._results = self._reads = 0
+
+    def look(self) -> None:
+        """Look at what is new; raise Broken."""
+        world, rules = self._world, self._rules
+        for entry in world.executed[self._executed:]:
+            for rule in rules:
+                rule.executed(entry)
+        for result in world.results[self._results:]:
+            for rule in rules:
+                rule.told(result)
+        for when, mapping, values in world.reads[self._reads:]:
+            assert not isinstance(values, str)
+            for rule in rules:
+                rule.read(when, mapping.tag, mapping.station, [int(value) for value in values])
+        self._executed, self._results = len(world.executed), len(world.results)
+        self._reads = len(world.reads)
+        for rule in rules:
+            rule.stand()

@@ -1,0 +1,309 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+Days of a plant in minutes: any plants, with every kind of fault, and all rules at every step.
+
+``run.py --hours 1`` simulates until so many hours have passed on the virtual clock, ``--seconds
+60`` until so many seconds of processor time have. A seed and a commit replay a run to the byte:
+``--seed 7 --plants 1`` is the plant that failed. It prints seed, hours, and how many times faster
+than real it ran.
+"""
+
+from __future__ import annotations
+
+import argparse
+from collections import Counter
+from collections.abc import Callable
+from dataclasses import dataclass, field
+import math
+from pathlib import Path
+from random import Random
+import secrets
+import sys
+import time
+
+if __name__ == '__main__':  # pytest has its own paths
+    sys.path[:0] = [str(Path(__file__).parents[number]) for number in (1, 2, 3)]
+
+from abdf1_ros.driver.write import Outcome
+from abdf1_ros.pccc.emulated import Setting
+from simulate.rules import Broken, Judge
+from support.virtual_line import QUIET
+from support.world import Plant, SAFE, SMALL, STEP, World
+
+TURNS = 8  # troubles of a plant, with a calm after each
+RATES = (0.0, 0.0, 0.01, 0.05, 0.2)  # messages a step and row
+RECOVERY = 40.0  # s at most; an inactive station is probed every few seconds
+
+
+class Story:
+    """What happens to one plant."""
+
+    def __init__(self, seed: int, mode: str = '') -> None:
+        self.dice = Random(seed)
+        self.world = World(Plant.drawn(self.dice, mode), seed)
+        self.judge = Judge(self.world)
+        self.troubles: Counter[str] = Counter()
+        self._rates: dict[str, float] = {}
+
+    def run(self) -> None:
+        """Let it happen; raise Broken where a rule does not hold."""
+        self.wait(2.0)
+        for _ in range(TURNS):
+            self._publish_anew()
+            station = self.dice.randrange(1, self.world.plant.stations + 1)
+            name = self.dice.choice([*_TROUBLES])
+            self.troubles[name] += 1
+            _TROUBLES[name](self, station)
+            self._ail(station, self.dice.uniform(0.5, 4.0))
+            self._calm_down()
+        self._recover()
+        self._end()
+
+    def _publish_anew(self) -> None:
+        for row in self.world.messages:
+            self._rates[row.tag] = self.dice.choice(RATES)
+
+    def _ail(self, station: int, seconds: float) -> None:
+        """Let something be wrong for a while, then nothing any more."""
+        world = self.world
+        end = world.line.now + seconds
+        while world.line.now < end:
+            self._mark(station)
+            self.wait(STEP)
+        world.mend()
+        self._mark(station)
+
+    def _mark(self, station: int) -> None:
+        """Keep that something was wrong, with a PLC or (0) with the line."""
+        world = self.world
+        silent = [number for number in world.plcs if not world.driver.stations[number].active]
+        for number in (station, *silent):
+            world.ill[number] = world.line.now
+        if world.line.noise is not QUIET or world.line.now < world.away or not world.is_alive \
+                or not world.driver.is_online:
+            world.ill[0] = max(world.line.now, world.away)
+
+    def _calm_down(self) -> None:
+        """Let things be well until the bounds hold again, most often with fewer messages."""
+        world = self.world
+        limit = max(limit or 0.0 for limit in world.bounds.values())
+        end = world.line.now + min(limit + 9.0, 30.0)
+        half = world.line.now + self.dice.uniform(0.0, 4.0)
+        while world.line.now < end:
+            if world.line.now >= half:
+                half = math.inf
+                self._publish_anew()
+            for number in world.plcs:
+                if not world.driver.stations[number].active:
+                    world.ill[number] = world.line.now
+            self.wait(STEP)
+
+    def wait(self, seconds: float) -> None:
+        """Let time pass, with messages, and look at each step."""
+        world = self.world
+        end = world.line.now + seconds - STEP / 2
+        while world.line.now < end:
+            for row in world.messages:
+                if self.dice.random() < self._rates.get(row.tag, 0.0):
+                    late = self.dice.uniform(0.0, 1.2) if self.dice.random() < 0.1 else 0.0
+                    world.publish(row, late)
+            world.run(STEP)
+            self.judge.look()
+
+    def _recover(self) -> None:
+        """See that all is as at first when nothing is wrong any more: values, writes, beats."""
+        world = self.world
+        self._rates.clear()
+        limit = max(RECOVERY, 6 * world.longest)
+        results, executed, reads = len(world.results), len(world.executed), len(world.reads)
+        end = world.line.now + limit
+        wanted = {row.tag for row in world.messages} if not world.plant.is_read_only else set()
+        wanted |= {row.tag for row in world.rows.values() if row.reads
+                   and not (world.plant.mode == 'Radio' and row.publish_while)}
+        if not world.plant.is_read_only:
+            wanted |= {f'beat_{number}' for number in world.plcs
+                       if number not in self.judge.owner.since}
+        while wanted and world.line.now < end:
+            for row in world.messages:
+                if self.dice.random() < 0.02:
+                    world.publish(row)
+            self.wait(STEP)
+            wanted -= {result.mapping.tag for result in world.results[results:]
+                       if result.outcome is Outcome.WRITTEN}
+            wanted -= {entry.tag for entry in world.executed[executed:]
+                       if entry.tag.startswith('beat') and entry.value}
+            wanted -= {mapping.tag for _, mapping, _ in world.reads[reads:]}
+        if wanted:
+            raise Broken('Recovery', f'{sorted(wanted)} not back after {limit} s', world)
+
+    def _end(self) -> None:
+        """End in order at any moment (rule 5)."""
+        world = self.world
+        if world.plant.is_read_only or world.plant.mode == 'Radio':
+            return
+        for row in world.messages:
+            world.publish(row)
+        world.run(self.dice.uniform(0.0, 0.1))
+        world.end()
+        world.run(2.0)
+        for station, watched in world.plcs.items():
+            words = {row.tag: watched.word(watched.places[row.tag])
+                     for row in world.rows_of(station, ('w', 'beat'))}
+            is_zero = not words[f'beat_{station}'] or station in self.judge.owner.since
+            if {value for tag, value in words.items() if tag[0] == 'w'} != {SAFE} or not is_zero:
+                raise Broken('End', f'not in order (5): {words}', world)
+
+
+def _noise(story: Story, station: int) -> None:
+    story.world.line.noise = SMALL
+
+
+def _silence(story: Story, station: int) -> None:
+    story.world.fall_silent(station)
+
+
+def _refusal(story: Story, station: int) -> None:
+    story.world.plcs[station].refuses = True
+
+
+def _refused_messages(story: Story, station: int) -> None:
+    story.world.plcs[station].refuses_messages = True
+
+
+def _lost_replies(story: Story, station: int) -> None:
+    story.world.plcs[station].swallows_replies = True
+
+
+def _lost_port(story: Story, station: int) -> None:
+    story.world.unplug()
+
+
+def _pause(story: Story, station: int) -> None:
+    story.world.hold_up(story.dice.uniform(0.2, 3.0))
+
+
+def _hung_executor(story: Story, station: int) -> None:
+    story.world.is_alive = False
+
+
+def _program(story: Story, station: int) -> None:
+    story.world.plcs[station].plc.set_mode(Setting.PROGRAM)
+
+
+def _download(story: Story, station: int) -> None:
+    story.world.save(station)
+    story.world.at(story.world.line.now + 0.3, lambda: story.world.download(station))
+
+
+def _kill(story: Story, station: int) -> None:
+    story.world.kill(story.dice.choice([0.0, 0.5, 2.0]))
+
+
+def _slowness(story: Story, station: int) -> None:
+    plc = story.world.plcs[station].plc
+    plc.faults.delay = story.dice.uniform(0.05, 0.4)
+    story.world.at(story.world.line.now + 0.5, lambda: setattr(plc.faults, 'delay', 0.0))
+
+
+def _other_writer(story: Story, station: int) -> None:
+    """Let another one count for so long that both know of each other."""
+    world = story.world
+    if station in story.judge.owner.since:
+        return
+    story.judge.owner.since[station] = world.line.now
+
+    def count() -> None:
+        world.write_heartbeat(station)
+        world.at(world.line.now + 0.7 * world.plant.period / 1000, count)
+
+    count()
+
+
+_TROUBLES: dict[str, Callable[[Story, int], None]] = {
+    'noise': _noise, 'silence': _silence, 'refusal': _refusal,
+    'messages refused': _refused_messages, 'replies lost': _lost_replies,
+    'port lost': _lost_port, 'process stands still': _pause, 'executor hangs': _hung_executor,
+    'PROGRAM': _program, 'download': _download, 'killed': _kill, 'slow PLC': _slowness,
+    'other writer': _other_writer}
+
+
+@dataclass(slots=True)
+class Totals:
+    """What was simulated."""
+
+    plants: int = 0
+    seconds: float = 0.0
+    messages: int = 0
+    values: int = 0
+    executed: int = 0
+    troubles: Counter[str] = field(default_factory=Counter)
+    modes: Counter[str] = field(default_factory=Counter)
+
+    def add(self, story: Story) -> None:
+        """Add a plant."""
+        world = story.world
+        self.plants += 1
+        self.seconds += world.line.now
+        self.messages += len(world.published)
+        self.values += len(world.reads)
+        self.executed += len(world.executed)
+        self.troubles += story.troubles
+        self.modes[world.plant.mode] += 1
+
+
+def simulate(seed: int, is_enough: Callable[[Totals], bool]) -> Totals:
+    """Simulate plants, that of ``seed`` first and then the next seeds; raise Broken."""
+    totals = Totals()
+    while not is_enough(totals):
+        story = Story(seed + totals.plants)
+        story.run()
+        totals.add(story)
+    return totals
+
+
+def main() -> int:
+    """Simulate; return the exit status."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[1])
+    parser.add_argument('--hours', type=float, default=math.inf, help='to simulate')
+    parser.add_argument('--seconds', type=float, default=math.inf, help='of processor time')
+    parser.add_argument('--plants', type=int, default=math.inf)
+    parser.add_argument('--seed', type=int, default=secrets.randbelow(10**9))
+    wanted = parser.parse_args()
+    if math.inf == wanted.hours == wanted.seconds == wanted.plants:
+        wanted.hours = 1.0
+    begun = time.process_time()
+    print(f'seed {wanted.seed}', flush=True)
+
+    def is_enough(totals: Totals) -> bool:
+        return totals.seconds >= 3600 * wanted.hours or totals.plants >= wanted.plants \
+            or time.process_time() - begun >= wanted.seconds
+
+    try:
+        totals = simulate(wanted.seed, is_enough)
+    except Broken as broken:
+        print(f'FAILED {broken}')
+        return 1
+    took = time.process_time() - begun
+    print(f'{totals.plants} plants, {totals.seconds / 3600:.2f} h in {took:.0f} s of a processor, '
+          f'{totals.seconds / took:.0f} times faster than real: {totals.messages} messages, '
+          f'{totals.executed} words executed, {totals.values} values')
+    for counts in (totals.modes, totals.troubles):
+        print(', '.join(f'{name} {count}' for name, count in sorted(counts.items())))
+    return 0
+
+
+if __name__ == '__main__':
+    sys.exit(main())

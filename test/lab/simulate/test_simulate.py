@@ -1,0 +1,39 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""A few new plants in each run, and that a seed replays one."""
+
+import secrets
+import time
+
+import pytest
+from simulate.run import simulate, Story
+from support.world import MODES
+
+SECONDS = 8.0  # of processor time
+
+
+def test_new_plants_keep_all_rules() -> None:
+    seed, begun = secrets.randbelow(10**9), time.process_time()
+    simulate(seed, lambda totals: time.process_time() - begun > SECONDS)  # it names the seed
+
+
+@pytest.mark.parametrize('mode', MODES)
+def test_seed_replays_a_plant_to_the_byte(mode: str) -> None:
+    def bytes_of_a_run() -> str:
+        story = Story(1, mode)
+        story.wait(8.0)
+        return story.world.wire.hexdigest()
+
+    assert bytes_of_a_run() == bytes_of_a_run()

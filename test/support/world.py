@@ -1,0 +1,391 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+A plant on a virtual clock: a driver, its PLCs, publishers, and all that goes wrong between them.
+
+Everything but ROS itself; a seed and a commit replay a run to the byte. What is done goes through
+the ``World``, and what came of it is in its lists, with the time it came. Each value that is
+published is another one, so what a PLC executes tells who asked for it, and when.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, replace
+from functools import cache
+import hashlib
+import math
+from random import Random
+
+from abdf1_ros.df1.packet import Packet
+from abdf1_ros.df1.settings import LinkSettings
+from abdf1_ros.df1.slave import HalfDuplexSlave
+from abdf1_ros.driver.links import DriverSettings
+from abdf1_ros.driver.write import WriteResult
+from abdf1_ros.pccc.emulated import Setting
+from abdf1_ros.pccc.families import parse_address
+from abdf1_ros.pccc.values import Values
+from abdf1_ros.plan.report import make_report
+from abdf1_ros.settings.heartbeats import Fallback, Heartbeat, PublishWhile
+from abdf1_ros.settings.mapping import Mapping
+from abdf1_ros.settings.network import Network
+from abdf1_ros.simulator.simulated_plc import SimulatedPlc
+from support.driver_bench import DriverBench
+from support.mappings import make_mapping
+from support.virtual_line import Noise, QUIET
+
+STEP = 0.05  # s
+SAFE = 32_000  # the fallback of every row
+LARGEST = 31_000  # of what is published
+SMALL = Noise(lost=0.0005, flipped=0.001, inserted=0.0005)
+MODES: dict[str, dict[str, str]] = {
+    'Message': {}, 'Standard': {'polling': 'Standard'}, 'Peer': {'mode': 'Peer'},
+    'Radio': {'mode': 'Radio'}}
+
+# The words of each PLC: outputs, a row without Fallback after them, its program's own, heartbeat.
+OUTPUTS, FREE, CLOCK, COUNTER, BEAT = 'N7:0', 'N7:20', 'N9:0', 'N9:4', 'N10:0'
+
+
+@dataclass(frozen=True, slots=True)
+class Plant:
+    """
+    What there is: PLCs of a ``kind``, each with ``rows`` outputs; times in ms.
+
+    The heartbeat requires a message of the first output within ``requires``, None for nothing.
+    """
+
+    mode: str
+    stations: int = 1
+    rows: int = 2
+    kind: str = 'PLC5'
+    after: int = 1000
+    period: int = 500
+    requires: int | None = None
+    baud: int = 19200
+    retries: int = 1
+    write_timeout: float = 2.0
+    is_read_only: bool = False
+
+    @classmethod
+    def drawn(cls, dice: Random, mode: str = '') -> Plant:
+        """Return any plant."""
+        mode = mode or dice.choice([*MODES] + [name for name in MODES if name != 'Standard'] * 3)
+        stations = 1 if mode == 'Peer' else dice.choice([1, 1, 1, 2, 3])
+        return cls(
+            mode, stations, dice.choice([1, 2, 2, 3]), dice.choice(['PLC5', 'SLC']),
+            dice.choice([600, 1000, 2000]), dice.choice([500, 1000, 2000]),
+            dice.choice([None, None, 800, 1500]), dice.choice([9600, 19200, 38400]),
+            dice.choice([1, 2]), dice.choice([0.5, 2.0]), dice.random() < 0.04)
+
+    @property
+    def network(self) -> Network:
+        """Return the settings of its line."""
+        return Network(
+            station=200, baud=self.baud, timeout=100, cmd_timeout=500, nak_retries=self.retries,
+            enq_retries=self.retries, **MODES[self.mode])  # type: ignore[arg-type]
+
+    @property
+    def counts_within(self) -> int:
+        """Return the Heartbeat_Timeout of the counter; by radio reads take longer."""
+        return 20_000 if self.mode == 'Radio' else 3500
+
+    def mappings(self) -> list[Mapping]:
+        """Return its rows; their tags end with the number of the station."""
+        found: list[Mapping] = []
+        for station in range(1, self.stations + 1):
+            def add(text: str, command: str, name: str, station: int = station,
+                    **others: object) -> None:
+                found.append(make_mapping(
+                    text, command, station=station, plc=self.kind, tag=f'{name}_{station}',
+                    **others))  # type: ignore[arg-type]
+
+            fallback = Fallback((SAFE,), self.after)
+            for number in range(self.rows):
+                add(f'N7:{number}', 'Write', f'w{number}', fallback=fallback)
+            add(FREE, 'Write', 'free')
+            needed = (f'w0_{station}',) if self.requires else ()
+            add(BEAT, 'Heartbeat', 'beat', period=self.period,
+                heartbeat=Heartbeat(needed, self.requires))
+            add(CLOCK, 'Read', 'clock', length=2, period=1000)
+            add('N9:2', 'Read', 'running', period=1000, publish_while=PublishWhile(None, None))
+            add(COUNTER, 'Read', 'counter', period=1000)
+            add('N9:3', 'Read', 'counted', period=1000,
+                publish_while=PublishWhile(f'counter_{station}', self.counts_within))
+        return found
+
+
+@dataclass(frozen=True, slots=True)
+class Executed:
+    """A word that a PLC has taken from the line; ``driver`` counts the drivers there were."""
+
+    when: float
+    station: int
+    tag: str
+    value: int
+    driver: int
+
+
+@dataclass(slots=True)
+class WatchedPlc:
+    """A PLC, and what it does with what comes."""
+
+    plc: SimulatedPlc
+    places: dict[str, str]  # address by tag
+    refuses: bool = False  # everything but heartbeats
+    refuses_messages: bool = False  # but takes fallbacks
+    swallows_replies: bool = False  # to messages, which are executed
+    other: int = 0  # what another writer has put into the word of the heartbeat
+    ran: float = 0.0  # when its program ran last
+    stopped: float = 0.0  # when it stopped last
+    ran_again: float = 0.0  # and when it ran after that
+    # What its program showed last, and from when on.
+    shown: deque[tuple[float, int]] = field(default_factory=lambda: deque(maxlen=200))
+    saved: dict[str, int] = field(default_factory=dict)
+
+    def word(self, text: str) -> int:
+        """Return a word of its table."""
+        table = self.plc.table
+        return int.from_bytes(table.read(place_of(text, table.plc_type), 1), 'little')
+
+    def set(self, text: str, *words: int) -> None:  # noqa: A003
+        """Change words of its table."""
+        table = self.plc.table
+        table.write(place_of(text, table.plc_type),
+                    b''.join(word.to_bytes(2, 'little') for word in words))
+
+    def run_program(self, now: float) -> None:
+        """Let the program tell the time, so that each value that is read tells when it was."""
+        if self.plc.is_running:
+            if now - self.ran > 1.5 * STEP:
+                self.stopped, self.ran_again = self.ran, now
+            self.ran = now
+            tick = ticks(now)
+            self.set(CLOCK, tick, tick, tick, tick, tick)
+            self.shown.append((now, tick))
+
+    def last_showed(self, tick: int, now: float) -> float:
+        """Return until when its program showed a tick, minus infinity for never."""
+        until = now
+        for since, shown in reversed(self.shown):
+            if shown == tick:
+                return until
+            until = since
+        return -math.inf
+
+
+place_of = cache(parse_address)
+
+
+def ticks(now: float) -> int:
+    """Return what the program of a PLC tells of a time."""
+    return int(now / STEP) % 30_000
+
+
+class World(DriverBench):
+    """
+    A plant, and all that may happen to it.
+
+    ``executed``, ``results`` and ``reads`` only grow. ``published`` tells when each message was,
+    by tag and value; a message may be older than the moment in which it comes.
+    """
+
+    def __init__(self, plant: Plant, seed: int) -> None:
+        self.plant = plant
+        self.seed = seed
+        self.dice = Random(seed)
+        self.drivers = 0  # killed so far
+        self.killed_at = 0.0
+        self.opened = 0.0  # when the port was last
+        rows = plant.mappings()
+        settings = DriverSettings(
+            write_timeout=plant.write_timeout, read_only=plant.is_read_only, processor_period=0.0,
+            first_tns=self.dice.randrange(0x10000))
+        super().__init__(rows, network=plant.network, settings=settings, start=False, chunk=64)
+        self.rows = {row.tag: row for row in rows}
+        self.messages = [row for row in rows if row.tag[0] in 'wf']
+        self.executed: list[Executed] = []
+        self.published: dict[tuple[str, int], float] = {}
+        self.keys: list[tuple[str, int]] = []  # of all messages, in their order
+        self.came: dict[str, float] = {}  # when a message of a row came last
+        self.report = make_report(plant.network, rows, settings.default_period)
+        self.bounds = {bound.mapping.tag: bound.seconds for bound in self.report.bounds}
+        self.longest = self.report.longest_transaction  # s
+        self.is_alive = True  # the executor
+        self.away = 0.0  # until when the process stands still
+        self.ill: dict[int, float] = dict.fromkeys(range(plant.stations + 1), 0.0)
+        self.wire = hashlib.sha256()
+        self._values = dict.fromkeys(self.rows, 0)
+        self._is_silent = False
+        self.plcs = {station: self._watch(station) for station in range(1, plant.stations + 1)}
+        self.far.hear, self.far.say = self._hear, self._say
+        self.line._random = Random(seed)
+        self.executor_ran = 0.0
+        self._run_programs()
+        self._breathe()
+        self.open()
+
+    @property
+    def results(self) -> list[WriteResult]:
+        """Return all results so far."""
+        return self.listener.results
+
+    @property
+    def reads(self) -> list[tuple[float, Mapping, Values]]:
+        """Return all that was published so far."""
+        return self.listener.reads
+
+    def _watch(self, station: int) -> WatchedPlc:
+        plc = self.plc(station, self.plant.kind, ('N7:0', 24), ('N9:0', 8), ('N10:0', 1))
+        places = {row.tag: str(row.address) for row in self.rows.values()
+                  if row.station == station and (row.writes or row.heartbeat)}
+        watched = WatchedPlc(plc, places)
+        serve = plc.serve
+
+        def execute(command: Packet) -> Packet:
+            return self._execute(watched, command, serve)
+
+        plc.serve = execute  # type: ignore[method-assign]
+        plc.slave = HalfDuplexSlave(
+            LinkSettings(station=station, checksum=self.network.checksum), execute)
+        return watched
+
+    def _execute(self, watched: WatchedPlc, command: Packet,
+                 serve: Callable[[Packet], Packet]) -> Packet:
+        """Execute a command, unless it is refused; keep what it has written."""
+        station = watched.plc.station
+        written: list[tuple[str, int]] = []
+        table = watched.plc.table
+        write, by_address = table.write, {place: tag for tag, place in watched.places.items()}
+        saved = {place: watched.word(place) for place in by_address}
+
+        def note(address: object, data: bytes) -> None:
+            if str(address) in by_address:
+                written.append((by_address[str(address)], int.from_bytes(data, 'little')))
+            write(address, data)  # type: ignore[arg-type]
+
+        table.write = note  # type: ignore[method-assign]
+        reply = serve(command)
+        del table.write  # type: ignore[attr-defined]
+        values = {value for tag, value in written if not tag.startswith('beat')}
+        is_message = bool(values - {SAFE})
+        if values and (watched.refuses or watched.refuses_messages and is_message):
+            for tag, _ in written:
+                watched.set(watched.places[tag], saved[watched.places[tag]])
+            return command.reply(sts=0x10)
+        self.executed += [Executed(self.line.now, station, tag, value, self.drivers)
+                          for tag, value in written]
+        if is_message and watched.swallows_replies:
+            return reply._replace(tns=reply.tns ^ 0x8000)  # which nobody waits for
+        return reply
+
+    def _hear(self, data: bytes) -> bytes:
+        self.wire.update(b'%f>' % self.line.now + data)
+        return b'' if self._is_silent else data
+
+    def _say(self, data: bytes) -> bytes:
+        self.wire.update(b'%f<' % self.line.now + data)
+        return b'' if self._is_silent else data
+
+    def _run_programs(self) -> None:
+        for watched in self.plcs.values():
+            watched.run_program(self.line.now)
+        self.at(self.line.now + STEP, self._run_programs)
+
+    def _breathe(self) -> None:
+        """Let the executor run, as it does while nothing holds it up."""
+        if self.is_alive and self.line.now >= self.away:
+            self.executor_ran = self.line.now
+            self.driver.interlocks.executor_ran(self.line.now)
+        self.at(self.line.now + STEP, self._breathe)
+
+    # What people and programs do
+
+    def publish(self, row: Mapping, late: float = 0.0) -> None:
+        """Publish a value that nobody has published before, ``late`` s ago."""
+        value = self._values[row.tag] = self._values[row.tag] % LARGEST + 1
+        now = self.line.now
+        self.published[row.tag, value] = now - late
+        self.keys.append((row.tag, value))
+        self.came[row.tag] = now
+        self.driver.write([row], [value], now - late)
+        if now >= self.away:
+            self.line.wake(self.driver.machine)
+
+    # What goes wrong
+
+    def fall_silent(self, station: int, is_silent: bool = True) -> None:
+        """Let a PLC answer nothing; of a full-duplex line or a modem all of them."""
+        if self.network.mode == 'Master':
+            self.plcs[station].plc.faults.silent = is_silent
+        else:
+            self._is_silent = is_silent
+
+    def kill(self, pause: float) -> None:
+        """Kill the driver; another one begins after a pause."""
+        self.drivers += 1
+        self.killed_at = self.opened = self.line.now
+        self._settings = replace(self._settings, first_tns=self.dice.randrange(0x10000))
+        self.restart()
+        self.hold_up(pause)
+        self.executor_ran = self.line.now
+
+    def hold_up(self, seconds: float) -> None:
+        """Let the process of the driver stand still."""
+        self.line.pause(self.driver.machine, seconds)
+        self.away = self.line.now + seconds
+
+    def unplug(self) -> None:
+        """Lose the port for a moment."""
+        self.lose_port()
+        self.open()
+        self.opened = self.line.now
+
+    def write_heartbeat(self, station: int) -> None:
+        """Let another writer count in the word of the heartbeat."""
+        watched = self.plcs[station]
+        watched.other = watched.other % 30_000 + 7
+        watched.set(BEAT, watched.other)
+
+    def download(self, station: int) -> None:
+        """Bring old words back; the PLC is in PROGRAM from now on."""
+        watched = self.plcs[station]
+        watched.plc.set_mode(Setting.PROGRAM)
+        for place, value in watched.saved.items():
+            watched.set(place, value)
+
+    def save(self, station: int) -> None:
+        """Upload: keep the words for a download."""
+        watched = self.plcs[station]
+        watched.saved = {place: watched.word(place) for place in watched.places.values()}
+
+    def mend(self) -> None:
+        """End all that is wrong."""
+        for station, watched in self.plcs.items():
+            self.fall_silent(station, False)
+            watched.refuses = watched.refuses_messages = watched.swallows_replies = False
+            watched.plc.processor.setting = Setting.RUN
+        self.is_alive = True
+        self.line.noise = QUIET
+
+    def end(self) -> None:
+        """End in order (rule 5)."""
+        self.driver.wind_down()
+        self.line.wake(self.driver.machine)
+
+    def rows_of(self, station: int, tags: Sequence[str] = ('w',)) -> list[Mapping]:
+        """Return rows of a PLC whose tags begin so."""
+        return [row for row in self.rows.values()
+                if row.station == station and row.tag.startswith(tuple(tags))]
