@@ -61,8 +61,8 @@ from abdf1_ros.numbers import decimal_number, whole_number
 from abdf1_ros.paths import config_file
 from abdf1_ros.pccc.data_table import NoSuchFile
 from abdf1_ros.ports.descriptor import Port, PortAround
-from abdf1_ros.ports.endpoints import Endpoint, PtyEndpoint, SerialEndpoint, TcpEndpoint, WAITING
-from abdf1_ros.ports.link_thread import LinkThread, PortState
+from abdf1_ros.ports.endpoints import Endpoint, PtyEndpoint, SerialEndpoint, TcpEndpoint
+from abdf1_ros.ports.link_thread import LinkThread, PortKind, PortState
 from abdf1_ros.ports.settings import PortSettings
 from abdf1_ros.settings import BAUD_RATES
 from abdf1_ros.settings.network import make_network, Network, URLS
@@ -249,7 +249,7 @@ def _announcer() -> Callable[[PortState], None]:
         nonlocal last
         is_news = state.text != last and not state.is_open
         last = state.text
-        if is_news and WAITING not in state.text:
+        if is_news and state.kind is not PortKind.NO_CLIENT:
             _say(state.text)
     return announce
 

@@ -33,7 +33,7 @@ from abdf1_ros.driver.write import Outcome, Write
 from abdf1_ros.pccc.extent import Extent
 from abdf1_ros.settings.mapping import Mapping
 
-_CHANGED = (Outcome.WRITTEN, Outcome.PARTLY, Outcome.BROADCAST)
+_CHANGED = (Outcome.WRITTEN, Outcome.PARTLY)
 
 
 class _Writer(Enum):
@@ -207,7 +207,7 @@ class WriteRecord:
         """Take note how a write has ended, and whether some of it may land yet."""
         self._under_way.remove(claim)
         claim.outcome, claim.done = outcome, self.line.now
-        if may_land:
+        if may_land or outcome is Outcome.BROADCAST:  # which nobody answers
             claim.lands_until = claim.done + self._settle_time
         else:
             claim.lands_until = claim.done if outcome in _CHANGED else -math.inf

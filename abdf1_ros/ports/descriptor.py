@@ -38,6 +38,13 @@ READ_SIZE = 512
 _WRITE_TIMEOUT = 2.0
 
 
+class NoClient(OSError):
+    """Our end of a line is there, but nobody has the other one open."""
+
+    def __init__(self) -> None:
+        super().__init__('waiting for a client')
+
+
 class Port(Protocol):
     """
     An open line. Every method raises OSError when the line is gone.

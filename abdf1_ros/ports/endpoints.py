@@ -21,21 +21,20 @@ import os
 from pathlib import Path
 import select
 import socket
+import termios
 from time import monotonic
 import tty
 from typing import Protocol
 
 from abdf1_ros.line_names import link_of
-from abdf1_ros.ports.descriptor import DescriptorPort, Port
+from abdf1_ros.ports.descriptor import DescriptorPort, NoClient, Port
 from abdf1_ros.ports.opening import open_port
 from abdf1_ros.ports.ownership import own
 from abdf1_ros.ports.settings import PortSettings
 
-WAITING = 'waiting for a client'
-
 _PTYS = '/dev/pts/'
 
-_GLANCE = 200  # for a client (ms)
+_GLANCE = 0.2  # for a client (s)
 
 # A client that has said nothing for so long (s) gives its place to the next one.
 _SILENT = 30.0
@@ -98,10 +97,50 @@ class PtyEndpoint:
         """Remove the pseudo-terminal and its name."""
         if self._link and _target_of(self._link) == self._target:
             self._link.unlink()
-        os.close(self._ours)
-        os.close(self._theirs)
+        self._close_ends()
         if self._lock is not None:
             self._lock.close()
+
+    def _close_ends(self) -> None:
+        os.close(self._ours)
+        os.close(self._theirs)
+
+
+class PtyPlace(PtyEndpoint):
+    """
+    A pseudo-terminal for one program after the other: what one has left is gone with it.
+
+    That is what it has not read, and what it has written shortly before it went.
+    """
+
+    def __init__(self, link: str) -> None:
+        super().__init__(link)
+        os.close(self._theirs)  # so that our end tells when nobody has the other one open
+        self._hangs_up = select.poll()
+        self._hangs_up.register(self._ours, 0)
+
+    def open(self) -> Port:  # noqa: A003
+        """Return our end when a program has opened the other one; OSError while none has."""
+        if self._hangs_up.poll(0):
+            self._forget()
+            raise NoClient
+        descriptor = os.dup(self._ours)
+
+        def close() -> None:
+            self._forget()
+            os.close(descriptor)
+
+        return DescriptorPort(descriptor, close)
+
+    def _forget(self) -> None:
+        """Drop what is in both directions."""
+        termios.tcflush(self._ours, termios.TCIFLUSH)
+        theirs = os.open(self._target, os.O_RDWR | os.O_NOCTTY)
+        termios.tcflush(theirs, termios.TCIFLUSH)
+        os.close(theirs)
+
+    def _close_ends(self) -> None:
+        os.close(self._ours)
 
 
 def _own(link: Path) -> socket.socket:
@@ -163,14 +202,16 @@ class TcpEndpoint:
 
     Another one is closed at once, and ``tell`` is called with its address; but it takes the place
     of a client that has said nothing for 30 s. One that has vanished is missed within 10 s.
+    ``open`` waits for a client for ``glance`` seconds.
     """
 
-    def __init__(self, host: str, port: int,
-                 tell: Callable[[str], None] = lambda other: None) -> None:
+    def __init__(self, host: str, port: int, tell: Callable[[str], None] = lambda other: None,
+                 glance: float = _GLANCE) -> None:
         family = socket.AF_INET6 if ':' in host else socket.AF_INET
         self._listener = socket.create_server((host, port), family=family)
         self._listener.setblocking(False)
         self._tell = tell
+        self._glance = glance
         self._next: socket.socket | None = None
         self._heard = 0.0  # when the client has said something (s)
         host, port = self._listener.getsockname()[:2]
@@ -182,11 +223,11 @@ class TcpEndpoint:
         if client is None:
             glance = select.poll()
             glance.register(self._listener, select.POLLIN)
-            glance.poll(_GLANCE)
+            glance.poll(self._glance * 1000)
             try:
                 client, _ = self._listener.accept()
             except BlockingIOError:
-                raise OSError(WAITING) from None
+                raise NoClient from None
         for level, option, value in _OPTIONS:
             client.setsockopt(level, option, value)
         self._heard = monotonic()

@@ -19,7 +19,8 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Callable
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from enum import Enum
 import math
 import os
 import select
@@ -29,7 +30,7 @@ import time
 from abdf1_ros.df1.machine import Machine
 from abdf1_ros.errors import PortLost
 from abdf1_ros.ports.clock import line_time
-from abdf1_ros.ports.descriptor import Port, READ_SIZE
+from abdf1_ros.ports.descriptor import NoClient, Port, READ_SIZE
 
 # Between attempts to open a port (s). They cost almost nothing, and a person who has plugged the
 # cable in again is waiting.
@@ -50,12 +51,21 @@ _OTHERS = 19
 _FASTEST = 10 / 115200  # s a character, where the line has no speed
 
 
+class PortKind(Enum):
+    """Why a port is not open."""
+
+    NO_CLIENT = 'our end is there, and nobody at the other one'
+    UNAVAILABLE = 'it cannot be opened'
+    OTHER = ''
+
+
 @dataclass(frozen=True, slots=True)
 class PortState:
-    """Whether the port is open, with a text for people."""
+    """Whether the port is open, with a text for people; ``kind`` tells more where it is not."""
 
     is_open: bool
     text: str
+    kind: PortKind = field(default=PortKind.OTHER, compare=False)
 
 
 RELEASED = 'the port is left to others: polling is off'
@@ -130,10 +140,12 @@ class LinkThread(threading.Thread):
     Run ``machine`` on the port that ``open_port`` opens; open it again when it is lost.
 
     ``on_state`` is called when the port opens, is lost, or cannot be opened (in this thread);
-    attempts to open it are ``retry_period`` seconds apart. ``while_sending`` is called whenever
-    all bytes to send have been given to the port: work done then delays nothing on the line.
-    ``on_fault`` is called with an exception that is a bug; the machine starts again after it.
-    Three within a minute end the thread, and ``has_failed`` tells so.
+    attempts to open it are ``retry_period`` seconds apart. What is being received came after the
+    clock value ``came_after`` (s), where nothing was left to read: about ``longest_wait`` s ago,
+    as no wait takes longer. ``while_sending`` is called whenever all bytes to send have been given
+    to the port: work done then delays nothing on the line. ``on_fault`` is called with an
+    exception that is a bug; the machine starts again after it. Three within a minute end the
+    thread, and ``has_failed`` tells so.
 
     ``release`` closes the port for others until ``take``. ``exchange`` puts another machine on
     the line.
@@ -144,6 +156,7 @@ class LinkThread(threading.Thread):
                  on_fault: Callable[[Exception], None] = lambda error: None,
                  while_sending: Callable[[], None] = lambda: None,
                  retry_period: float = _RETRY_PERIOD,
+                 longest_wait: float = math.inf,
                  clock: Callable[[], float] = line_time,
                  processor_clock: Callable[[], float] = time.thread_time) -> None:
         super().__init__(name='df1 link')
@@ -157,6 +170,8 @@ class LinkThread(threading.Thread):
         self._on_fault = on_fault
         self._while_sending = while_sending
         self._retry_period = retry_period
+        self._longest_wait = longest_wait
+        self.came_after = -math.inf
         self._clock = clock
         self._processor_clock = processor_clock
         self._worked = 0.0  # processor time (s) up to the last portion of a burst
@@ -232,6 +247,7 @@ class LinkThread(threading.Thread):
 
     def run(self) -> None:
         """Keep the port open and the machine running."""
+        self.came_after = self._clock()
         try:
             self._keep_open()
         except Exception as error:  # a bug outside of the machine
@@ -254,11 +270,16 @@ class LinkThread(threading.Thread):
                 self._wait()
                 continue
             self._is_lost = False
+            asked = self._clock()
             try:
                 port = self._opened_port()
             except OSError as error:
-                self._is_lost = True
-                self._set_state(False, f'cannot open the port: {_reason(error)}')
+                self._is_lost, self.came_after = True, asked
+                if isinstance(error, NoClient):
+                    self._set_state(False, str(error), PortKind.NO_CLIENT)
+                else:
+                    self._set_state(False, f'cannot open the port: {_reason(error)}',
+                                    PortKind.UNAVAILABLE)
             else:
                 if port is not None:
                     self._set_state(True, 'open')
@@ -332,10 +353,12 @@ class LinkThread(threading.Thread):
             # A connection is read as its bytes come: they may be here before their time.
             if port.is_terminal and (spare_time := machine.spare_time):
                 self._pause(spare_time)
-            deadline = machine.next_call
-            timeout = None if deadline is None else max(0.0, deadline - clock())
+            deadline, asked = machine.next_call, clock()
+            wait = self._longest_wait if deadline is None else max(0.0, deadline - asked)
+            timeout = min(wait, self._longest_wait)
             try:
-                data = left or port.read(timeout, self._wake_reader)
+                data = left or port.read(
+                    None if timeout == math.inf else timeout, self._wake_reader)
             except OSError:
                 machine.counters.read_errors += 1
                 raise
@@ -352,6 +375,7 @@ class LinkThread(threading.Thread):
                 machine.receive_data(data, now)
             elif self._take_wake() and not self._stopping:
                 machine.wake(now)
+            self.came_after = asked
 
     def _take_wake(self) -> bool:
         try:
@@ -403,8 +427,8 @@ class LinkThread(threading.Thread):
                 self._wakes.poll(int(left / _POLL_STEP))
                 self._take_wake()
 
-    def _set_state(self, is_open: bool, text: str) -> None:
-        self.state = PortState(is_open, text)
+    def _set_state(self, is_open: bool, text: str, kind: PortKind = PortKind.OTHER) -> None:
+        self.state = PortState(is_open, text, kind)
         self._on_state(self.state)
 
     def _take_fault(self, error: Exception) -> None:

@@ -20,7 +20,7 @@ from collections.abc import Callable, Container
 from functools import partial
 
 from abdf1_ros.df1.frames import Duplex
-from abdf1_ros.df1.machine import LineTiming, Machine, Procedure
+from abdf1_ros.df1.machine import LineTiming, Machine, MOST_LATE, Procedure
 from abdf1_ros.df1.packet import Packet
 from abdf1_ros.df1.peer import FullDuplexPeer
 from abdf1_ros.df1.settings import LinkSettings
@@ -33,18 +33,21 @@ from abdf1_ros.driver.guests import (
     GuestQueue,
     ShareAccess,
 )
+from abdf1_ros.ports.clock import line_time
 from abdf1_ros.ports.descriptor import Port
 from abdf1_ros.ports.endpoints import (
     Endpoint,
-    PtyEndpoint,
+    PtyPlace,
     SerialEndpoint,
     TcpEndpoint,
-    WAITING,
 )
-from abdf1_ros.ports.link_thread import LinkThread, PortState
+from abdf1_ros.ports.link_thread import LinkThread, PortKind, PortState
 from abdf1_ros.ports.settings import PortSettings
 from abdf1_ros.settings.network import Network
 from abdf1_ros.settings.share import SharePlace
+
+# So often (s) a place is looked at: for a program that comes, and for how old commands can be.
+_GLANCE = 0.1
 
 
 class _Nothing:
@@ -66,13 +69,17 @@ class GuestLine:
     """
     Take the commands of the guest at ``place`` to ``queue``, and its replies back.
 
+    Nobody knows when a command came that was here after a longer wait than asked for: this
+    process, or its host, stood still. It counts as old as it can be.
+
     ``wake`` wakes the link of the PLC, ``listener`` is told what the guest does, ``fault`` of a
     bug. The guest's program may come and go: a reply to one that has gone is dropped.
     """
 
     def __init__(self, place: SharePlace, network: Network, queue: GuestQueue,
                  wake: Callable[[], None], listener: GuestListener,
-                 fault: Callable[[Exception], None]) -> None:
+                 fault: Callable[[Exception], None],
+                 clock: Callable[[], float] = line_time) -> None:
         self.guest = Guest(place.text, ShareAccess(network.share_access), listener)
         self._place = place
         self._queue = queue
@@ -87,19 +94,20 @@ class GuestLine:
         self._peer = FullDuplexPeer(
             self._machine, LinkSettings(station=None, checksum=checksum), ActiveStationList(),
             self._take)
-        self.link = LinkThread(self._machine, self._open, on_state=self._changed, on_fault=fault)
+        self.link = LinkThread(self._machine, self._open, on_state=self._changed, on_fault=fault,
+                               retry_period=_GLANCE, longest_wait=_GLANCE, clock=clock)
         self.link.daemon = True  # a guest never holds the process
 
     @property
     def state(self) -> str:
         """Return what a person is to know of the place."""
-        text = self.link.state.text
-        return WAITING if WAITING in text else text
+        return self.link.state.text
 
     @property
     def fault(self) -> str:
         """Return why nobody can connect, empty where somebody can."""
-        return self.state if self.state.startswith('cannot open') else ''
+        state = self.link.state
+        return state.text if state.kind is PortKind.UNAVAILABLE else ''
 
     def start(self) -> None:
         """Wait for the guest, and serve it."""
@@ -116,7 +124,10 @@ class GuestLine:
 
     def _take(self, command: Packet) -> None:
         answer = partial(self._answer, self._peer.replies.append)
-        self._queue.put(GuestCommand(self.guest, command, self._machine.now, answer))
+        requested, came_after = self._machine.now, self.link.came_after
+        if requested - came_after > 2 * _GLANCE + MOST_LATE:
+            requested = came_after
+        self._queue.put(GuestCommand(self.guest, command, requested, answer))
         self._wake()
 
     def _answer(self, append: Callable[[Packet], None], reply: Packet) -> None:
@@ -132,10 +143,10 @@ class GuestLine:
     def _made(self) -> Endpoint:
         place = self._place
         if place.kind == 'pty':
-            return PtyEndpoint(place.name)
+            return PtyPlace(place.name)
         if place.kind == 'tcp':
             return TcpEndpoint(place.host, place.port,
-                               partial(self.guest.listener.turned_away, self.guest))
+                               partial(self.guest.listener.turned_away, self.guest), 0.0)
         return SerialEndpoint(self._port)
 
     def _changed(self, state: PortState) -> None:

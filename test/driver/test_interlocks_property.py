@@ -13,14 +13,18 @@
 # limitations under the License.
 
 """
-Heartbeats and fallbacks on a line with noise and faults, with publishers that come and go.
+Heartbeats and fallbacks on a line with noise and faults, with publishers and guests.
 
 Every value that is published is another one, so what the PLC executes tells who asked for it and
-when. Three things have to hold in every mode, whatever happens (docs/heartbeats.md).
+when. Some things have to hold in every mode, whatever happens and whoever writes
+(docs/heartbeats.md): no heartbeat vouches for what is overdue, nothing but a fallback stands for
+long, the last words in the PLC are ours, and each command of a guest has one reply.
 """
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+import heapq
 import itertools
 import math
 from random import Random
@@ -33,6 +37,7 @@ from abdf1_ros.df1.settings import LinkSettings
 from abdf1_ros.df1.slave import HalfDuplexSlave, multidrop
 from abdf1_ros.df1.stations import ActiveStationList
 from abdf1_ros.driver.driver import Driver
+from abdf1_ros.driver.guests import Guest, GuestCommand, ShareAccess
 from abdf1_ros.driver.links import DriverSettings
 from abdf1_ros.driver.write import Outcome
 from abdf1_ros.errors import PortLost
@@ -56,8 +61,15 @@ STEP = 0.05
 TURNS = 4  # a step: as many messages there may be
 FLIGHT = 0.05  # s that a frame takes to the PLC, at most
 SMALL = Noise(lost=0.0005, flipped=0.001, inserted=0.0005)
+CMD_TIMEOUT = 0.5
+GUESTS = range(32_100, 32_200)  # values that only guests write
+GATEWAY = 5
 MODES = {'Message': {'polling': 'Message'}, 'Standard': {'polling': 'Standard'},
-         'Peer': {'mode': 'Peer'}}
+         'Peer': {'mode': 'Peer'}, 'Gateway': {'polling': 'Message'}}
+
+
+def _is_write(command: Packet) -> bool:
+    return command.cmd == 0x0F and command.data[:1] == b'\x67'
 
 
 class World:
@@ -65,18 +77,26 @@ class World:
 
     def __init__(self, mode: str, seed: int) -> None:
         self.dice = Random(seed)
-        fallback = Fallback((SAFE,), int(AFTER * 1000))
-        self.rows = [make_mapping(f'N7:{number}', 'Write', tag=f'w{number}', fallback=fallback)
-                     for number in range(2)]
-        beat = make_mapping('N10:0', 'Heartbeat', tag='beat', period=300, heartbeat=Heartbeat())
-        read = make_mapping('N9:0', period=100)
+        self.is_behind = mode == 'Gateway'
+        fallback, via = Fallback((SAFE,), int(AFTER * 1000)), GATEWAY if self.is_behind else None
+        self.rows = [make_mapping(f'N7:{number}', 'Write', tag=f'w{number}', fallback=fallback,
+                                  via=via) for number in range(2)]
+        beat = make_mapping('N10:0', 'Heartbeat', tag='beat', period=300, heartbeat=Heartbeat(),
+                            via=via)
+        self.mappings = [*self.rows, beat, make_mapping('N9:0', period=100, via=via)]
         self.network = Network(
-            baud=19200, timeout=100, cmd_timeout=500, nak_retries=1, enq_retries=1,
-            **MODES[mode])  # type: ignore[arg-type]
+            baud=19200, timeout=100, cmd_timeout=int(1000 * CMD_TIMEOUT), nak_retries=1,
+            enq_retries=1, **MODES[mode])  # type: ignore[arg-type]
         self.listener = Recorder(self.clock)
-        self.driver = Driver(self.network, [*self.rows, beat, read], DriverSettings(),
-                             self.listener)
+        self.driver = Driver(self.network, self.mappings, DriverSettings(), self.listener)
         self.plc = simulated_plc(1, 'PLC5', self.clock, ('N7:0', 4), ('N9:0', 4), ('N10:0', 4))
+        self.guests = [Guest(f'pty:{number}', ShareAccess.ALL)
+                       for number in range(self.dice.choice([1, 2, 16]))]
+        self.asks = 0.0  # how often a guest does, by chance in a turn
+        self.asked: list[Packet] = []
+        self.answered: list[Packet] = []
+        self.holds = 0.0  # how often a gateway keeps a write for a while
+        self.held: list[tuple[float, int, Packet]] = []
         far = self._peer() if mode == 'Peer' else self._slave()
         self.line = VirtualLine(self.driver.machine, far, baud=19200, chunk=8, seed=seed)
         self.published: dict[int, float] = {}
@@ -90,10 +110,13 @@ class World:
         self.seen = 0  # results
         self.swallowed = -math.inf  # when a reply was lost last
         self._values = itertools.count(1)
+        self._tickets = itertools.count()
         self._outputs = parse_address('N7:0', self.plc.table.plc_type)
 
     def _slave(self) -> Machine:
-        self.plc.slave = HalfDuplexSlave(LinkSettings(station=1), self._serve)
+        if self.is_behind:
+            self.plc.station = GATEWAY
+        self.plc.slave = HalfDuplexSlave(LinkSettings(station=self.plc.station), self._serve)
         return Machine(multidrop([self.plc]), checksum=self.network.checksum)
 
     def _peer(self) -> Machine:
@@ -110,6 +133,19 @@ class World:
         return self.line.now if hasattr(self, 'line') else 0.0
 
     def _serve(self, command: Packet) -> Packet:
+        if _is_write(command) and self.dice.random() < self.holds:
+            late = self.line.now + self.dice.uniform(0.0, 2 * CMD_TIMEOUT - STEP)
+            heapq.heappush(self.held, (late, next(self._tickets), command))
+            return command.reply(sts=0x02)
+        return self._carry_out(command, self.line.now)
+
+    def _let_go(self) -> None:
+        """Let the gateway deliver what it has kept for its time."""
+        while self.held and self.held[0][0] <= self.line.now:
+            self._carry_out(heapq.heappop(self.held)[2], self.line.now + 2 * CMD_TIMEOUT)
+
+    def _carry_out(self, command: Packet, stands_until: float) -> Packet:
+        """Execute a command; what comes late of it may stand up to then (clock value in s)."""
         before = self.words()
         saved = self.plc.table.read(self._outputs, 2)
         reply = self.plc.serve(command)
@@ -118,18 +154,30 @@ class World:
         if changed and (self.refuses or self.refuses_messages and SAFE not in changed):
             self.plc.table.write(self._outputs, saved)
             return command.reply(sts=0x10)
-        if after[2] != before[2]:
+        is_late = stands_until > self.line.now
+        if after[2] != before[2] and after[2] not in GUESTS and not is_late:
             self._beaten(after[2])
         for number in range(2):
             if after[number] != before[number]:
-                sent = self.driver.interlocks.fallbacks[number].sent
-                self.executed.append((self.line.now, number, after[number], sent))
-                if before[number] in (SAFE, 0):
-                    self.stood[number] = self.published.get(after[number], math.inf)
+                self._changed(number, before[number], after[number], stands_until)
         if changed and self.swallows_replies and SAFE not in changed:
             self.swallowed = self.line.now
             reply = reply._replace(tns=reply.tns ^ 0x8000)  # which nobody waits for
         return reply
+
+    def _changed(self, number: int, before: int, after: int, stands_until: float) -> None:
+        """Take note of an output that has another value."""
+        is_late = stands_until > self.line.now
+        if after not in GUESTS and not is_late:
+            sent = self.driver.interlocks.fallbacks[number].sent
+            self.executed.append((self.line.now, number, after, sent))
+        if after in GUESTS or is_late:
+            if before in (SAFE, 0):  # it has to be written over at once
+                self.stood[number] = stands_until - AFTER
+            elif is_late:
+                self.stood[number] = max(self.stood[number], stands_until - AFTER)
+        elif before in (SAFE, 0):
+            self.stood[number] = self.published.get(after, math.inf)
 
     def words(self) -> list[int]:
         """Return both outputs and the heartbeat."""
@@ -152,6 +200,31 @@ class World:
         self.driver.write([row], [value], self.line.now - late)
         self.line.wake(self.driver.machine)
 
+    def ask(self, words: Iterable[str]) -> None:
+        """Let a guest write one of these words, to one or to all, or what no PLC knows."""
+        guest, dice = self.dice.choice(self.guests), self.dice
+        row = make_mapping(dice.choice([*words]), 'Write')
+        cmd, data = row.dialect.write(row.address, dice.choice(GUESTS).to_bytes(2, 'little'))
+        dst = 1
+        if dice.random() < 0.2:
+            cmd, data = dice.choice([(0x06, bytes(231)), (0x0F, b'\x68\0\0'), (0x0F, b'\x3A')])
+        elif dice.random() < 0.2 and self.network.mode == 'Master':
+            dst = 255
+        command = Packet(dst, 9, cmd, 0, len(self.asked), data)
+        self.asked.append(command)
+        self.driver.guests.put(GuestCommand(
+            guest, command, self.line.now, self.answered.append))
+        self.line.wake(self.driver.machine)
+
+    def pass_time(self, seconds: float) -> None:
+        """Let time pass on the line, and for what a gateway keeps."""
+        end = self.line.now + seconds
+        while self.held and self.held[0][0] <= end:
+            self.line.run_for(max(0.0, self.held[0][0] - self.line.now))
+            self._let_go()
+        self.line.run_for(end - self.line.now)
+        self._let_go()
+
     def run(self) -> None:
         """Let time pass, with all that can happen."""
         self.line.start()
@@ -170,7 +243,9 @@ class World:
                 for row, rate in zip(self.rows, rates, strict=True):
                     if turn < rate and self.dice.random() < rate:
                         self.publish(row)
-                self.line.run_for(STEP / TURNS)
+                if self.dice.random() < self.asks:
+                    self.ask(('N7:0', 'N7:1', 'N9:3'))
+                self.pass_time(STEP / TURNS)
             self._check_outputs()
 
     def recover(self) -> None:
@@ -180,18 +255,40 @@ class World:
             self.driver.interlocks.executor_ran(self.line.now)
             for row in self.rows:
                 self.publish(row)
-            self.line.run_for(STEP)
+            self.pass_time(STEP)
 
     def end(self) -> None:
-        """End in order at any moment, often with messages that wait or are under way (rule 5)."""
+        """
+        End in order at any moment, often with writes that wait or are under way (rule 5).
+
+        They are of messages and guests, and a gateway may keep them.
+        """
         self.driver.interlocks.executor_ran(self.line.now)
-        self.line.run_for(self.dice.choice([0.0, 0.3, AFTER + 0.3]))
-        for row in self.rows:
+        self.pass_time(self.dice.choice([0.0, 0.3, AFTER + 0.3]))
+        self.holds = self.dice.choice([0.0, 0.5])
+        for row in self.rows if self.dice.random() < 0.7 else ():
             self.publish(row)
-        self.line.run_for(self.dice.uniform(0.0, 0.1))
+        for _ in range(self.dice.randrange(3)):
+            self.ask(('N7:0', 'N7:1', 'N10:0'))
+            self.pass_time(self.dice.uniform(0.0, 0.1))
         self.driver.wind_down()
+        self.holds = 0.0
         self.line.wake(self.driver.machine)
-        self.line.run(lambda: self.driver.interlocks.is_over, 2.0)
+        give_up = self.line.now + 2.0
+        while not self.driver.interlocks.is_over:
+            assert self.line.now < give_up
+            self.pass_time(0.005)
+        self.driver.machine.stop(PortLost('the end'))
+        self.pass_time(2 * CMD_TIMEOUT)
+        assert self.words() == [SAFE, SAFE, 0]
+
+    def reload(self) -> None:
+        """Put another driver, with new files, in the place of one that has ended."""
+        driver = Driver(self.network, self.mappings, DriverSettings(), self.listener)
+        self.line.exchange(self.driver.machine, driver.machine)
+        self.driver = driver
+        driver.machine.start(self.line.now)
+        self.line.wake(driver.machine)
 
     def _end_trouble(self) -> None:
         self.plc.faults.silent = self.refuses = False
@@ -199,12 +296,13 @@ class World:
         self.plc.processor.setting = Setting.RUN
         self.is_alive = True
         self.line.noise = QUIET
+        self.asks = self.holds = 0.0
 
     def _trouble(self) -> None:
         """End what is wrong, and let something else go wrong."""
         self._end_trouble()
         machine = self.driver.machine
-        what = self.dice.randrange(12)
+        what = self.dice.randrange(18)
         if what < 2:
             self.line.noise = SMALL
         elif what == 2:
@@ -224,6 +322,11 @@ class World:
             self.refuses_messages = True
         elif what == 10:
             self.swallows_replies = True
+        elif what < 15:
+            self.asks = self.dice.choice([0.02, 0.3])
+            self.holds = self.dice.choice([0.0, 0.0, 0.3])
+        elif what == 15:
+            self.holds = 0.3
 
     @property
     def is_sound(self) -> bool:
@@ -243,6 +346,8 @@ class World:
         if not self.is_sound:
             self.troubled = self.line.now
             return
+        if self.holds:
+            self.swallowed = self.line.now
         # Where replies are lost, a message of each row may wait for that of the other.
         turns = 2 if self.line.now < self.swallowed + 5 * AFTER else 1
         longest = self.network.line_mode.longest_transaction(self.network.line, 0.0)
@@ -272,8 +377,12 @@ def test_whatever_happens_no_beat_vouches_for_it_and_no_output_stands(
     assert {result.mapping for result in afterwards if result.outcome is Outcome.WRITTEN} \
         == {*world.rows}
     world.end()
-    assert world.words() == [SAFE, SAFE, 0]
+    for _ in range(2):
+        world.reload()
+        world.recover()
+        world.end()
     outcomes = [result.outcome for result in world.listener.results]
     asked = len(world.published)
     told = len([outcome for outcome in outcomes if outcome is not Outcome.FALLBACK])
-    assert asked - told <= 2 * len(world.rows)  # those that wait or are being read back
+    assert asked == told
+    assert sorted(reply.tns for reply in world.answered) == [*range(len(world.asked))]

@@ -23,8 +23,8 @@ import subprocess
 import sys
 
 from abdf1_ros.ports import endpoints
-from abdf1_ros.ports.descriptor import DescriptorPort
-from abdf1_ros.ports.endpoints import PtyEndpoint, SerialEndpoint, TcpEndpoint, WAITING
+from abdf1_ros.ports.descriptor import DescriptorPort, NoClient
+from abdf1_ros.ports.endpoints import PtyEndpoint, PtyPlace, SerialEndpoint, TcpEndpoint
 from abdf1_ros.ports.link_thread import Port
 from abdf1_ros.ports.settings import PortSettings
 import pytest
@@ -63,6 +63,34 @@ def test_pseudo_terminal_one_client_after_the_other(tmp_path: Path, wake: int) -
             with closing(line.open()) as port:
                 exchange(port, client, wake)
             os.close(client)
+    assert not os.path.lexists(name)
+
+
+def test_place_has_nothing_of_the_program_before(tmp_path: Path, wake: int) -> None:
+    name = str(tmp_path / 'plc')
+    with closing(PtyPlace(name)) as line:
+        with pytest.raises(NoClient):
+            line.open()
+        for _ in range(3):
+            client = os.open(name, os.O_RDWR | os.O_NOCTTY)
+            port = line.open()
+            exchange(port, client, wake)
+            port.write(b'never read')
+            os.close(client)
+            with pytest.raises(OSError, match='Input/output error'):
+                port.read(PATIENCE, wake)
+            port.close()
+            client = os.open(name, os.O_RDWR | os.O_NOCTTY)  # at once
+            os.set_blocking(client, False)
+            with pytest.raises(BlockingIOError):
+                os.read(client, 99)
+            os.close(client)
+            # Another one that comes and goes before anybody looks.
+            client = os.open(name, os.O_RDWR | os.O_NOCTTY)
+            os.write(client, b'never to be executed')
+            os.close(client)
+            with pytest.raises(NoClient):
+                line.open()
     assert not os.path.lexists(name)
 
 
@@ -134,7 +162,7 @@ def test_tcp_one_client_after_the_other(wake: int) -> None:
         scheme, _, address = line.name.partition('://')
         host, _, number = address.partition(':')
         assert (scheme, host) == ('socket', OWN_HOST)
-        with pytest.raises(OSError, match=WAITING):
+        with pytest.raises(NoClient):
             line.open()
         for _ in range(2):
             with socket.create_connection((host, int(number)), PATIENCE) as client, \
@@ -161,7 +189,7 @@ def test_tcp_second_client_is_closed_at_once_and_nothing_of_it_comes_later(
             first.close()
             with pytest.raises(OSError, match='closed'):
                 port.read(PATIENCE, wake)
-        with pytest.raises(OSError, match=WAITING):
+        with pytest.raises(NoClient):
             line.open()
         who, = told
         assert who.startswith('127.0.0.1:')

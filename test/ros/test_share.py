@@ -15,6 +15,8 @@
 """A running node shares its line: an HMI reads and writes through it, and ROS is told."""
 
 from pathlib import Path
+import threading
+import time
 
 from abdf1_ros.cli.sniff import main as sniff
 from abdf1_ros.client import Client
@@ -76,3 +78,23 @@ def test_what_is_not_allowed_is_told_once(tmp_path: Path) -> None:
                       'F8:4 = 30.5: Share_Access is Read')
         node.end()
     assert node.text.count('is refused') == 1
+
+
+def test_what_comes_while_the_node_stands_still_is_not_sent(tmp_path: Path) -> None:
+    files, place = make_files(tmp_path), tmp_path / 'hmi'
+    with (files.start_simulator(), Observer() as observer,
+          Process('node', *files.args(OFTEN, f'net.share:="pty:{place}"', 'net.cmd_timeout:=1000',
+                                      'net.share_access:=Write')) as node):
+        setpoints = observer.listen(Float32MultiArray, '/abdf1/read/setpoint')
+        setpoints.values([21.5])
+        observer.until(place.is_symlink, 'the place')
+        with Client(str(place), plc_type='SLC', station=2, timeout=3.0, cmd_timeout=9.0) as hmi:
+            assert hmi.read('F8:4') == 21.5
+            node.stop()
+            threading.Timer(2.5, node.go_on).start()
+            with pytest.raises(RemoteError) as refusal:
+                hmi.write('F8:4', 99.0)
+            assert refusal.value.sts == 0x01
+            time.sleep(0.5)
+            assert hmi.read('F8:4') == 21.5
+        node.end()

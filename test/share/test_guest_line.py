@@ -36,10 +36,11 @@ from abdf1_ros.df1.settings import LinkSettings
 from abdf1_ros.df1.slave import multidrop
 from abdf1_ros.df1.stations import ActiveStationList
 from abdf1_ros.driver.driver import Driver
-from abdf1_ros.driver.guests import GuestListener
+from abdf1_ros.driver.guests import GuestCommand, GuestListener, GuestQueue
 from abdf1_ros.driver.links import DriverSettings
 from abdf1_ros.errors import RemoteError
 from abdf1_ros.ports.clock import line_time
+from abdf1_ros.ports.descriptor import READ_SIZE
 from abdf1_ros.ports.endpoints import PtyEndpoint
 from abdf1_ros.ports.link_thread import LinkThread
 from abdf1_ros.ports.opening import open_port
@@ -268,3 +269,70 @@ def test_place_that_cannot_be_opened_says_why_until_it_can(tmp_path: Path) -> No
         wait_for(lambda: not taken.fault)
         with client_at(tmp_path / 'hmi') as client:
             assert client.read('N7:1') == 1
+
+
+class Waits:
+    """A port whose reads take what they take, and bring what they bring."""
+
+    is_terminal = False
+
+    def __init__(self, *reads: tuple[float, bytes]) -> None:
+        self.now, self.has_more = 100.0, False
+        self._reads = iter(reads)
+
+    def clock(self) -> float:
+        return self.now
+
+    def read(self, timeout: float | None, wake: int) -> bytes:
+        seconds, data = next(self._reads, (0.0, None))
+        if data is None:
+            raise OSError('the end')
+        assert data or timeout is not None and timeout <= 0.1
+        self.now += seconds if data else timeout or 0.0
+        self.has_more = len(data) == READ_SIZE
+        return data
+
+    def write(self, data: bytes) -> None:
+        pass
+
+    def unsent(self) -> int:
+        return 0
+
+    def close(self) -> None:
+        pass
+
+
+def requested(*reads: tuple[float, bytes]) -> list[tuple[float, float]]:
+    """Return when each command may have come at the earliest, and when it was here."""
+    network = Network(share='tcp:4501')
+    port, found = Waits(*((0.1, b''),) * 5, *reads), list[tuple[float, float]]()
+
+    class Queue(GuestQueue):
+        def __init__(self) -> None:
+            pass
+
+        def put(self, command: GuestCommand) -> None:
+            found.append((round(command.requested - 100.5, 3), round(port.now - 100.5, 3)))
+
+    line = GuestLine(*share_places(network.share), network, Queue(), lambda: None, GuestListener(),
+                     lambda error: None, port.clock)
+    with pytest.raises(OSError, match='the end'):
+        line.link._serve(port)
+    line.link.stop()
+    return found
+
+
+def framed(tns: int) -> bytes:
+    return frames.message_frame(
+        Packet(1, 9, 0x0F, 0, tns, bytes.fromhex('A2 02 07 89 00 00')).encode(), Checksum.CRC)
+
+
+def test_command_is_as_old_as_it_can_be_where_this_process_stood_still() -> None:
+    assert requested((0.05, framed(1)), (3.0, framed(2)), (0.1, b''), (0.05, framed(3))) == [
+        (0.05, 0.05), (0.0, 3.05), (3.2, 3.2)]
+
+
+def test_command_in_a_flood_is_as_old_as_the_flood() -> None:
+    noise = (0.1, bytes(READ_SIZE))
+    (came, here), = requested((0.1, framed(1)), *(noise,) * 20, (0.1, framed(2)))[1:]
+    assert came <= 0.1 and here >= 2.0
