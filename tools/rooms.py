@@ -83,7 +83,7 @@ ROOMS = (
     Room(('sniffer',), 'recorded bytes, and traffic told to people',
          ('errors', 'problems', 'text', 'numbers', 'df1', 'pccc')),
     Room(('ports',), 'ports, the thread that runs a link on one, recording and listening',
-         ('errors', 'line_names', 'df1', 'settings', 'sniffer'), is_pure=False),
+         ('errors', 'line_names', 'numbers', 'df1', 'settings', 'sniffer'), is_pure=False),
     Room(('share',), 'the line shared with other programs: a place for each guest',
          ('errors', 'df1', 'pccc', 'settings', 'driver', 'ports'), is_pure=False),
     Room(('simulator',), 'simulated PLCs and the commands that they take',

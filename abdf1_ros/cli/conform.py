@@ -24,10 +24,9 @@ page.
 from __future__ import annotations
 
 import argparse
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 import os
-from pathlib import Path
 import random
 import re
 import time
@@ -38,8 +37,6 @@ from abdf1_ros.cli.terminal import (
     command_parser,
     EXIT_FAILED,
     EXIT_INTERRUPTED,
-    EXIT_USAGE,
-    may_replace,
     NoPort,
     prepare_output,
     reason_of,
@@ -57,11 +54,12 @@ from abdf1_ros.conform.ends import (
     PeerEnd,
     RadioEnd,
     RadioServerEnd,
+    Serve,
     ServerEnd,
     SlaveEnd,
     Words,
 )
-from abdf1_ros.conform.report import as_issue, as_json, as_junit, line_of, summary_of
+from abdf1_ros.conform.report import as_issue, as_json, line_of, summary_of
 from abdf1_ros.conform.wire import Failed, Wire
 from abdf1_ros.df1.checksum import Checksum
 from abdf1_ros.df1.packet import Packet
@@ -72,7 +70,7 @@ from abdf1_ros.pccc.families import decode_identity
 from abdf1_ros.pccc.file_types import PlcType
 from abdf1_ros.pccc.identity import Identity
 from abdf1_ros.ports.descriptor import Port
-from abdf1_ros.ports.endpoints import Endpoint, PtyEndpoint, TcpEndpoint
+from abdf1_ros.ports.endpoints import Endpoint, host_and_port, PtyEndpoint, TcpEndpoint
 from abdf1_ros.ports.opening import open_port
 from abdf1_ros.ports.settings import PortSettings
 from abdf1_ros.problems import ConfigurationError, Problem
@@ -82,7 +80,11 @@ from abdf1_ros.simulator.simulated_plc import load_plcs
 # Importing them enters their cases.
 _MODULES = (slave, master, peer, client, radio, damage, data, duplicates, asking)
 
+_NEAR = 2.0  # times --answer-time: a DLE ENQ that comes so early may be taken for an answer
+
 _NOBODY = 'no byte was received: check cable, port, speed and power'
+
+End = MasterEnd | PeerEnd | SlaveEnd | ServerEnd
 
 _EPILOG = """\
 exit status: 0 when no case failed, 1 when one did, nothing was ever heard, or the port cannot be
@@ -92,7 +94,7 @@ examples:
   conform slave --port /dev/ttyUSB0 --baud 19200 --station 1 --family SLC
   conform peer --port /dev/ttyUSB0 --family PLC5 --words N7:100 --yes
   conform master --pty /tmp/line --station 1        a driver opens /tmp/line and reads station 1
-  conform client --tcp 127.0.0.1:4001 --check BCC --junit result.xml
+  conform client --tcp 127.0.0.1:4001 --check BCC
   conform slave --list
 
 It is not to be run against a machine that is in use.
@@ -143,21 +145,22 @@ def _run(options: argparse.Namespace, target: Target, cases: Sequence[Case]) -> 
         for case in cases:
             print(f'{case.name:24} {case.source:16} {case.rule}')
         return 0
-    options.duplex = 'half' if target.is_half_duplex else 'full'
     made = options.pty is not None or options.tcp is not None
-    if made:
-        options.port = options.port or '/dev/null'  # only its other settings are used
-    network = network_of(options)
+    network = network_of(options, 'half' if target.is_half_duplex else 'full', not made)
+    asks = target in (Target.SLAVE, Target.PEER, Target.RADIO)
+    serve = None if asks else _server(options, network)
     try:
         line = _open(options, network)
     except OSError as error:
-        raise NoPort(options.tcp or options.pty or network.port, error) from None
+        name = options.pty or network.port if options.tcp is None else '--tcp'
+        raise NoPort(name, error) from None
     try:
         wire = Wire(line, BlockCheck(network.error_code), time.monotonic,
                     is_half_duplex=target.is_half_duplex, is_radio=target.is_radio,
                     answer_time=options.answer_time,
                     char_time=0.0 if made else network.timing.char_time)
-        return _judge(options, target, cases, wire, network)
+        return _judge(options, target, cases, wire, network,
+                      _end(options, target, wire, network, serve))
     except OSError as error:
         tell('conform', f'the line was lost: {reason_of("", error)}')
         return EXIT_FAILED
@@ -166,9 +169,8 @@ def _run(options: argparse.Namespace, target: Target, cases: Sequence[Case]) -> 
 
 
 def _judge(options: argparse.Namespace, target: Target, cases: Sequence[Case], wire: Wire,
-           network: Network) -> int:
+           network: Network, end: End) -> int:
     results: list[CaseResult] = []
-    end = _end(options, target, wire, network)
     identity = _identity(end) if isinstance(end, AskingEnd) else None
     for result in run_cases(cases, wire, end, _allowed(options)):
         results.append(result)
@@ -187,22 +189,16 @@ def _judge(options: argparse.Namespace, target: Target, cases: Sequence[Case], w
         print(as_issue(facts, results))
     else:
         print(summary_of(results))
-    if options.junit:
-        try:
-            Path(options.junit).write_text(as_junit(facts, results) + '\n', encoding='utf-8')
-        except OSError as error:
-            tell('conform', f'--junit: {reason_of(options.junit, error)}')
-            return EXIT_USAGE
     if not wire.has_heard:
         tell('conform', _NOBODY)
         return EXIT_FAILED
-    return EXIT_FAILED if any(result.verdict is Verdict.FAIL for result in results) else 0
-
-
-def _is_result(path: Path) -> bool:
-    """Tell whether a file is a result of ``--junit``, so that a new one may replace it."""
-    with path.open('rb') as file:
-        return b'<testsuite name="conform ' in file.read(100)
+    if not any(result.verdict is Verdict.FAIL for result in results):
+        return 0
+    if wire.enquired_after < _NEAR * options.answer_time:
+        tell('conform', f'the other end asks with DLE ENQ after {wire.enquired_after:.2f} s; with '
+             f'--answer-time {options.answer_time:g} that may look like a fault: try '
+             f'{wire.enquired_after / _NEAR:.1g}')
+    return EXIT_FAILED
 
 
 def _identity(end: AskingEnd) -> Identity | None:
@@ -226,16 +222,15 @@ def _allowed(options: argparse.Namespace) -> frozenset[Permission]:
     return frozenset(allowed)
 
 
-def _end(options: argparse.Namespace, target: Target, wire: Wire,
-         network: Network) -> MasterEnd | PeerEnd | SlaveEnd | ServerEnd:
-    """Return the end that we play."""
-    if target in (Target.SLAVE, Target.PEER, Target.RADIO):
+def _end(options: argparse.Namespace, target: Target, wire: Wire, network: Network,
+         serve: Serve | None) -> End:
+    """Return the end that we play; ``serve`` answers the commands of those that ask."""
+    if serve is None:
         kind = MasterEnd if target is Target.SLAVE else (
             PeerEnd if target is Target.PEER else RadioEnd)
         file, element = options.words or (7, 0)
         words = Words(file, element, options.count, options.family or '')
         return kind(wire, options.station, network.station, random.randrange(0x10000), words)
-    serve = _server(options, network)
     if target is Target.MASTER:
         return SlaveEnd(wire, options.station, serve)
     return RadioServerEnd(wire, serve) if target.is_radio else ServerEnd(wire, serve)
@@ -248,7 +243,7 @@ def _integer_words(text: str) -> tuple[int, int]:
     return int(found[1]), int(found[2])
 
 
-def _server(options: argparse.Namespace, network: Network) -> Callable[[bytes], bytes]:
+def _server(options: argparse.Namespace, network: Network) -> Serve:
     """Return a function that executes commands on the data table of a simulated PLC."""
     plcs = load_plcs(options.data or str(config_file('simulator.csv')),
                      Checksum[network.error_code], time.monotonic)
@@ -264,8 +259,7 @@ def _open(options: argparse.Namespace, network: Network) -> _PortLine:
     """Open the line; one that we have made waits for a client at its other end."""
     line: Endpoint
     if options.tcp is not None:
-        host, _, port = options.tcp.rpartition(':')
-        line = TcpEndpoint(host or '127.0.0.1', int(port))
+        line = TcpEndpoint(*options.tcp)
     elif options.pty is not None:
         line = PtyEndpoint(options.pty)
     else:
@@ -303,7 +297,6 @@ def _parse(args: Sequence[str] | None) -> argparse.Namespace:
                         help='run this case; may be given again')
     parser.add_argument('--list', action='store_true', help='show the cases and end')
     parser.add_argument('--json', action='store_true', help='print the result as JSON')
-    parser.add_argument('--junit', metavar='FILE', help='write the result as JUnit XML too')
     parser.add_argument('--report', action='store_true',
                         help='print the result as text for an issue, with the row for '
                              'docs/tested_with.md')
@@ -320,11 +313,11 @@ def _parse(args: Sequence[str] | None) -> argparse.Namespace:
         parser.error(f'--only {", ".join(sorted(unknown))}: no such case; --list shows them')
     if not 0 <= options.station <= MAX_STATION:
         parser.error(f'--station {options.station} should be from 0 to {MAX_STATION}')
-    if options.junit and not may_replace(options.junit, _is_result):
-        parser.error(f'--junit: {options.junit} is there and was not made by --junit; give '
-                     'another name')
     if not 1 <= options.count <= 100:
         parser.error(f'--count {options.count} should be from 1 to 100')
-    if options.tcp is not None and not re.fullmatch(r'[^:]*:\d{1,5}', options.tcp):
-        parser.error(f'--tcp "{options.tcp}" should be HOST:PORT')
+    if options.tcp is not None:
+        try:
+            options.tcp = host_and_port(options.tcp)
+        except ValueError as error:
+            parser.error(f'--tcp {error}')
     return options

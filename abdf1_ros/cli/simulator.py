@@ -25,7 +25,6 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Callable, Sequence
-from contextlib import suppress
 import math
 from operator import itemgetter
 import os
@@ -57,11 +56,17 @@ from abdf1_ros.df1.radio import RadioNode
 from abdf1_ros.df1.settings import LinkSettings
 from abdf1_ros.df1.slave import multidrop
 from abdf1_ros.df1.stations import ActiveStationList
-from abdf1_ros.numbers import decimal_number, whole_number
+from abdf1_ros.numbers import decimal_number
 from abdf1_ros.paths import config_file
 from abdf1_ros.pccc.data_table import NoSuchFile
 from abdf1_ros.ports.descriptor import Port, PortAround
-from abdf1_ros.ports.endpoints import Endpoint, PtyEndpoint, SerialEndpoint, TcpEndpoint
+from abdf1_ros.ports.endpoints import (
+    Endpoint,
+    host_and_port,
+    PtyEndpoint,
+    SerialEndpoint,
+    TcpEndpoint,
+)
 from abdf1_ros.ports.link_thread import LinkThread, PortKind, PortState
 from abdf1_ros.ports.settings import PortSettings
 from abdf1_ros.settings import BAUD_RATES
@@ -304,7 +309,10 @@ def _make_line(options: argparse.Namespace) -> Endpoint:
     """Return the line; NoPort says which one cannot be had."""
     try:
         if options.tcp is not None:
-            return TcpEndpoint(*_host_and_port(options.tcp))
+            try:
+                return TcpEndpoint(*host_and_port(options.tcp))
+            except ValueError as error:
+                raise ValueError(f'--tcp {error}') from None
         if options.port is not None:
             return SerialEndpoint(_port_settings(options))
         return PtyEndpoint(options.pty)
@@ -318,16 +326,6 @@ def _port_settings(options: argparse.Namespace) -> PortSettings:
     if '://' in options.port:
         make_network({'com_port': (options.port, '--port')})
     return PortSettings(options.port, options.baud)
-
-
-def _host_and_port(text: str) -> tuple[str, int]:
-    host, _, port = text.rpartition(':')
-    number = whole_number(port)
-    with suppress(UnicodeError):
-        host = host.encode('idna').decode()
-        if number is not None and 0 <= number <= 65535:
-            return host or '127.0.0.1', number
-    raise ValueError(f'--tcp "{text}" should be HOST:PORT')
 
 
 def _full_duplex(plc: SimulatedPlc, checksum: Checksum, timing: LineTiming) -> Machine:

@@ -34,6 +34,20 @@ PATIENCE = 30.0
 
 # A case does not wait for more repetitions or enquiries than this.
 MOST_REPETITIONS = 12
+HIGHEST_LIMIT = 255  # of repetitions that any product can be set to
+
+
+def expect_end_of_naks(wire: Wire, message: bytes, patience: float) -> None:
+    """Refuse a message whenever it comes, until it is given up; Failed where it never is."""
+    for _ in range(HIGHEST_LIMIT + 1):
+        wire.send(codec.NAK)
+        symbol = wire.hear(patience)
+        if symbol is None or symbol.data != message:
+            return
+    raise Failed(f'the message given up after {HIGHEST_LIMIT} repetitions at the latest, the '
+                 'highest limit of the products', 'the message once more')
+
+
 _MOST_TRIES = 3
 
 # A reply may take so many answer times.

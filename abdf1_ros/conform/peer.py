@@ -19,7 +19,7 @@ from __future__ import annotations
 from abdf1_ros.conform import codec
 from abdf1_ros.conform.case import case, Target
 from abdf1_ros.conform.codec import SymbolKind
-from abdf1_ros.conform.ends import check_reply, MOST_REPETITIONS, PeerEnd
+from abdf1_ros.conform.ends import check_reply, expect_end_of_naks, MOST_REPETITIONS, PeerEnd
 from abdf1_ros.conform.wire import Failed, Skipped
 
 _PEER = Target.PEER
@@ -84,15 +84,7 @@ def reply_repeated_after_nak(end: PeerEnd) -> None:
 @case('A message that is always answered with DLE NAK is given up.', 'M 4-5', _PEER)
 def nak_limit(end: PeerEnd) -> None:
     end.deliver(end.command())
-    for _ in range(MOST_REPETITIONS + 1):
-        symbol = end.wire.hear(_ACK_TIMEOUT)
-        if symbol is None:
-            return
-        if symbol.kind is not SymbolKind.MESSAGE:
-            raise Failed('the message again, or silence', str(symbol))
-        end.wire.send(codec.NAK)
-    end.settle()
-    raise Skipped(f'sent more than {MOST_REPETITIONS} times: a larger limit is set')
+    expect_end_of_naks(end.wire, end.collect(acknowledge=False), _ACK_TIMEOUT)
 
 
 @case('A message without any response is followed by DLE ENQ; DLE ACK ends it.', 'M 4-5', _PEER)

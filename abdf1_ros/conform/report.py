@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The results of a run: for people, as JSON, as JUnit XML, and as text for an issue."""
+"""The results of a run: for people, as JSON, and as text for an issue."""
 
 from __future__ import annotations
 
@@ -20,7 +20,6 @@ from collections import Counter
 from collections.abc import Mapping, Sequence
 import json
 from typing import Any
-from xml.etree import ElementTree
 
 from abdf1_ros.conform.case import CaseResult, Verdict
 
@@ -57,27 +56,6 @@ def _entry(result: CaseResult) -> dict[str, Any]:
 def as_json(facts: RunFacts, results: Sequence[CaseResult]) -> str:
     """Return the run as JSON: facts, and an entry for each case."""
     return json.dumps({**facts, 'cases': [_entry(result) for result in results]}, indent=1)
-
-
-def as_junit(facts: RunFacts, results: Sequence[CaseResult]) -> str:
-    """Return the run as JUnit XML: a test case for each case."""
-    counts = Counter(result.verdict for result in results)
-    suite = ElementTree.Element(
-        'testsuite', name=f'conform {facts["target"]}', tests=str(len(results)),
-        failures=str(counts[Verdict.FAIL]), skipped=str(counts[Verdict.SKIP]), errors='0',
-        time=f'{sum(result.seconds for result in results):.3f}')
-    for result in results:
-        entry = ElementTree.SubElement(
-            suite, 'testcase', classname=f'conform.{facts["target"]}', name=result.case.name,
-            time=f'{result.seconds:.3f}')
-        if result.verdict is Verdict.FAIL:
-            failure = ElementTree.SubElement(
-                entry, 'failure', message=f'expected {result.expected}, got {result.got}')
-            failure.text = '\n'.join((result.case.source, *result.transcript))
-        elif result.verdict is Verdict.SKIP:
-            ElementTree.SubElement(entry, 'skipped', message=result.got)
-    ElementTree.indent(suite)
-    return ElementTree.tostring(suite, encoding='unicode', xml_declaration=True)
 
 
 def as_issue(facts: RunFacts, results: Sequence[CaseResult]) -> str:

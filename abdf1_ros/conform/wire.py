@@ -19,6 +19,7 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+import math
 from typing import Protocol
 
 from abdf1_ros.conform import codec
@@ -71,7 +72,8 @@ class Wire:
     silence. It counts from the end of what was sent, at ``char_time`` s a byte. Where it
     ``is_radio`` nothing has a response, so DLE ENQ gets none. ``transcript`` keeps all bytes in
     order; ``has_heard`` tells whether any byte came. A response inside a message is heard before
-    that message.
+    that message. ``enquired_after`` is the shortest time (s) from a message of the other end to
+    its DLE ENQ.
     """
 
     def __init__(self, line: RawLine, check: BlockCheck, clock: Callable[[], float], *,
@@ -90,6 +92,8 @@ class Wire:
         self._embedded: deque[Symbol] = deque()
         self._sent_until = 0.0
         self._response = codec.NAK
+        self._message_at = math.inf
+        self.enquired_after = math.inf
 
     @property
     def now(self) -> float:
@@ -146,6 +150,9 @@ class Wire:
         self.transcript.append(symbol)
         if symbol.kind is SymbolKind.MESSAGE:
             self._response = codec.NAK  # until it has one
+            self._message_at = symbol.at
+        elif symbol.kind is SymbolKind.ENQ and symbol.at > self._message_at:
+            self.enquired_after = min(self.enquired_after, symbol.at - self._message_at)
         self._embedded.extend(Symbol(kind, b'', at=symbol.at) for kind in symbol.embedded)
         if not self._embedded:
             return symbol

@@ -18,7 +18,6 @@ from collections.abc import Iterator
 import json
 from pathlib import Path
 import time
-from xml.etree import ElementTree
 
 from abdf1_ros.cli.conform import main
 from abdf1_ros.df1.checksum import Checksum
@@ -46,30 +45,12 @@ def port(tmp_path: Path) -> Iterator[str]:
     line.close()
 
 
-def test_result_is_told_in_lines_and_as_junit(
-        port: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    junit = tmp_path / 'result.xml'
-    assert main(['slave', '--port', port, '--junit', str(junit), *QUICK]) == 0
+def test_result_is_told_in_lines(port: str, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(['slave', '--port', port, *QUICK]) == 0
     lines = capsys.readouterr().out.splitlines()
     assert [line.split()[:2] for line in lines if line[:4] in ('PASS', 'SKIP')] == [
         ['PASS', 'poll-idle'], ['PASS', 'message-acknowledged'], ['SKIP', 'nak-resets']]
     assert lines[-1] == '2 passed, 0 failed, 1 skipped'
-    suite = ElementTree.parse(junit).getroot()
-    assert (suite.get('tests'), suite.get('failures'), suite.get('skipped')) == ('3', '0', '1')
-
-
-def test_only_a_result_of_its_own_is_replaced(
-        port: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    mine, result = tmp_path / 'net.csv', tmp_path / 'result.xml'
-    mine.write_text('Station', encoding='utf-8')
-    with pytest.raises(SystemExit) as end:
-        main(['slave', '--port', port, '--junit', str(mine), *QUICK])
-    assert end.value.code == 2 and mine.read_text(encoding='utf-8') == 'Station'
-    assert 'was not made by --junit' in capsys.readouterr().err
-    options = ('slave', '--port', port, '--only', 'poll-idle', '--junit')
-    assert [main([*options, str(result)]) for _ in range(2)] == [0, 0]
-    assert main([*options, str(tmp_path / 'none' / 'x.xml')]) == 2
-    assert 'conform: --junit: ' in capsys.readouterr().err
 
 
 def test_failure_is_the_exit_status_and_shows_the_bytes(
@@ -131,7 +112,9 @@ def test_simulator_is_a_node_of_a_radio_network_and_not_a_peer(
 
 @pytest.mark.parametrize(('args', 'status', 'text'), [
     (['slave', '--port', '/nowhere/at/all'], 1, '/nowhere/at/all: No such file'),
-    (['slave'], 2, '--port'), (['master', '--pty', '/dev/null'], 1, '/dev/null')])
+    (['slave'], 2, '--port'), (['master', '--pty', '/dev/null'], 1, '/dev/null'),
+    (['master', '--tcp', '127.0.0.1:0', '--data', '/none'], 2, '/none: cannot be read'),
+    (['client', '--tcp', '[::1]:0', '--station', '9'], 2, 'the example data has stations')])
 def test_port_that_cannot_be_opened_is_one_and_what_is_wrong_in_options_two(
         args: list[str], status: int, text: str, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(args) == status
@@ -140,7 +123,8 @@ def test_port_that_cannot_be_opened_is_one_and_what_is_wrong_in_options_two(
 
 @pytest.mark.parametrize('args', [
     ['slave', '--only', 'nothing'], ['slave', '--station', '255'], ['slave', '--count', '0'],
-    ['slave', '--tcp', 'nowhere'], ['peer', '--words', 'F8:0'], ['peer', '--echo'], []])
+    ['slave', '--tcp', 'nowhere'], ['slave', '--tcp', 'a:99999'],
+    ['peer', '--words', 'F8:0'], ['peer', '--echo'], []])
 def test_usage_is_shown_for_impossible_options(args: list[str]) -> None:
     with pytest.raises(SystemExit) as end:
         main(args)

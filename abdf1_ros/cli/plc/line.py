@@ -45,17 +45,22 @@ def free_station(own: int, taken: Collection[int]) -> int:
     return next((number for number in candidates if number not in taken), own)
 
 
-def network_of(options: argparse.Namespace) -> Network:
-    """Return the line of the options; raises ConfigurationError with every fault."""
+def network_of(options: argparse.Namespace, duplex: str | None = None,
+               needs_port: bool = True) -> Network:
+    """
+    Return the line of the options; raises ConfigurationError with every fault.
+
+    ``duplex`` is that of a command without such an option.
+    """
     base = load_network(options.net) if options.net else DEFAULTS
     given = {column: (str(value), f'--{option.replace("_", "-")}')
              for option, column in _COLUMNS.items()
              if (value := getattr(options, option)) is not None}
     network = make_network(given, base)
-    if not options.net and not options.port:
+    if needs_port and not options.net and not options.port:
         raise ConfigurationError([Problem(
             '--port', 'name the port, such as --port /dev/ttyUSB0, or a net CSV with --net')])
-    network = replace(network, mode=MODES.get(options.duplex, network.mode),
+    network = replace(network, mode=MODES.get(duplex or options.duplex, network.mode),
                       polling=DEFAULTS.polling)
     if network.line_mode.is_polled:
         raise ConfigurationError([Problem(
