@@ -154,10 +154,19 @@ class Observer:
         return self
 
     def __exit__(self, *exception: object) -> None:
-        self.executor.shutdown()
-        self.node.destroy_node()
-        if self._owns_context:
-            self.context.try_shutdown()
+        """
+        End what spins, then the node, then the context, whatever fails on the way.
+
+        rclpy crashes where a node goes that something still waits for: the executor keeps a wait
+        set with what its nodes have until it is shut down.
+        """
+        with ExitStack() as stack:
+            if self._owns_context:
+                stack.callback(self.context.try_shutdown)
+            stack.callback(self.node.destroy_node)
+            stack.callback(self.executor.shutdown)
+            for node in self.executor.get_nodes():
+                self.executor.remove_node(node)
 
     def until(self, condition: Callable[[], _Result | None],
               what: str | Callable[[], str]) -> _Result:
@@ -296,15 +305,16 @@ class SimulatedCell:
         self.ros = self.observer(context=context, bridge=self._bridge)
 
     def __enter__(self) -> SimulatedCell:
-        self.ros.__enter__()
-        self.plcs.__enter__()
-        self.start()
+        with ExitStack() as stack:  # what fails here, or at the end, leaves no thread and no node
+            stack.enter_context(self.ros)
+            stack.enter_context(self.plcs)
+            stack.callback(self.end)
+            self.start()
+            self._ends = stack.pop_all()
         return self
 
     def __exit__(self, *exception: object) -> None:
-        self.end()
-        self.plcs.__exit__(*exception)
-        self.ros.__exit__(*exception)
+        self._ends.close()
 
     def start(self) -> None:
         """Start the bridge; also again, after its end."""

@@ -15,13 +15,15 @@
 """The fixture for tests of cells: the whole example, and the test that its tutorial shows."""
 
 from collections.abc import Callable
+from pathlib import Path
 import re
+import threading
 import time
 from typing import Any
 
 from abdf1_ros.problems import ConfigurationError
 from abdf1_ros.ros.topics.messages import latched_qos
-from abdf1_ros.testing import abdf1_cell, PATIENCE, SimulatedCell
+from abdf1_ros.testing import abdf1_cell, Bridge, Observer, PATIENCE, SimulatedCell
 import pytest
 from rclpy.node import Node
 from std_msgs.msg import Int16MultiArray
@@ -95,3 +97,46 @@ def test_node_of_the_test_needs_no_context(abdf1_cell: Cells) -> None:  # noqa: 
     cell.ros.executor.add_node(node)
     cell.ros.until(lambda: heard, 'a value in our own node')
     node.destroy_node()
+
+
+SMALL = ('Station,PLC_Type,Address,Length\n1,SLC,N7:0,2\n',
+         'Tag,Command,Address,Station,PLC_Type\na,Read,N7:0,1,SLC\n')
+
+
+def test_executor_ends_before_a_node_goes_and_the_context_last(
+        monkeypatch: pytest.MonkeyPatch) -> None:
+    calls: list[str] = []
+
+    def record(owner: Any, name: str) -> None:
+        original = getattr(owner, name)
+
+        def recorded(*arguments: Any, **named: Any) -> Any:
+            calls.append(name)
+            return original(*arguments, **named)
+        monkeypatch.setattr(owner, name, recorded)
+
+    with Observer() as observer:
+        other = Node('other', context=observer.context)
+        observer.executor.add_node(other)
+        for owner, name in ((observer.executor, 'shutdown'), (observer.node, 'destroy_node'),
+                            (observer.context, 'try_shutdown')):
+            record(owner, name)
+    assert calls == ['shutdown', 'destroy_node', 'try_shutdown']
+    assert observer.executor.get_nodes() == []
+
+
+@pytest.mark.parametrize('at', ['start', 'end'])
+def test_cell_that_fails_leaves_no_thread_and_no_context(
+        at: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def fail(*arguments: object) -> None:
+        raise TimeoutError('a busy host')
+
+    monkeypatch.setattr(Bridge, at, fail)
+    cell = SimulatedCell(tmp_path, *SMALL)
+    with pytest.raises(TimeoutError), cell:
+        assert at == 'end'
+        cell.plcs.word('N7:0')
+    assert not cell.ros.context.ok()
+    assert not [thread for thread in threading.enumerate() if thread is cell.plcs._link]
+    monkeypatch.undo()
+    cell.end()

@@ -249,8 +249,10 @@ class Observer(testing.Observer):
         """End a bridge that runs here, in order; do nothing with one that has ended."""
         if bridge in self.executor.get_nodes():
             self.executor.remove_node(bridge)
-            bridge.stop()
-            bridge.destroy_node()
+            try:
+                bridge.stop()
+            finally:
+                bridge.destroy_node()
 
     def forget(self, inbox: Inbox) -> None:
         """End a subscription."""
