@@ -33,10 +33,11 @@ from random import Random
 from abdf1_ros.df1.packet import Packet
 from abdf1_ros.df1.settings import LinkSettings
 from abdf1_ros.df1.slave import HalfDuplexSlave
+from abdf1_ros.driver.guests import Guest, GuestCommand, ShareAccess
 from abdf1_ros.driver.links import DriverSettings
 from abdf1_ros.driver.write import WriteResult
 from abdf1_ros.pccc.emulated import Setting
-from abdf1_ros.pccc.families import parse_address
+from abdf1_ros.pccc.families import dialect_of, parse_address
 from abdf1_ros.pccc.values import Values
 from abdf1_ros.plan.report import make_report
 from abdf1_ros.settings.heartbeats import Fallback, Heartbeat, PublishWhile
@@ -49,6 +50,7 @@ from support.virtual_line import Noise, QUIET
 
 STEP = 0.05  # s
 SAFE = 32_000  # the fallback of every row
+GUESTS = range(32_100, 32_700)  # what only guests write
 LARGEST = 31_000  # of what is published
 SMALL = Noise(lost=0.0005, flipped=0.001, inserted=0.0005)
 MODES: dict[str, dict[str, str]] = {
@@ -219,6 +221,9 @@ class World(DriverBench):
         self.executed: list[Executed] = []
         self.published: dict[tuple[str, int], float] = {}
         self.keys: list[tuple[str, int]] = []  # of all messages, in their order
+        self._guest = Guest('pty:guest', ShareAccess.ALL)
+        self.asked: list[Packet] = []  # by the guest
+        self.answered: list[Packet] = []
         self.came: dict[str, float] = {}  # when a message of a row came last
         self.report = make_report(plant.network, rows, settings.default_period)
         self.bounds = {bound.mapping.tag: bound.seconds for bound in self.report.bounds}
@@ -280,7 +285,7 @@ class World(DriverBench):
         reply = serve(command)
         del table.write  # type: ignore[attr-defined]
         values = {value for tag, value in written if not tag.startswith('beat')}
-        is_message = bool(values - {SAFE})
+        is_message = bool(values - {SAFE, *GUESTS})
         if values and (watched.refuses or watched.refuses_messages and is_message):
             for tag, _ in written:
                 watched.set(watched.places[tag], saved[watched.places[tag]])
@@ -323,6 +328,17 @@ class World(DriverBench):
         self.driver.write([row], [value], now - late)
         if now >= self.away:
             self.line.wake(self.driver.machine)
+
+    def ask(self, station: int, text: str) -> None:
+        """Let a guest write a value of its own to a word."""
+        value = GUESTS[len(self.asked) % len(GUESTS)]
+        address = place_of(text, self.plcs[station].plc.table.plc_type)
+        cmd, data = dialect_of(address.plc_type).write(address, value.to_bytes(2, 'little'))
+        command = Packet(station, 9, cmd, 0, len(self.asked), data)
+        self.asked.append(command)
+        self.driver.guests.put(GuestCommand(
+            self._guest, command, self.line.now, self.answered.append))
+        self.line.wake(self.driver.machine)
 
     # What goes wrong
 

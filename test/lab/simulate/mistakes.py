@@ -148,6 +148,14 @@ def _refused_refreshes(ended: Any) -> Any:
     return lambda self, requested, outcome: ended(self, requested, Outcome.WRITTEN)
 
 
+def _requires_nothing(init: Any) -> Any:
+    def init_wrongly(self: HeartbeatRow, *arguments: Any, **named: Any) -> None:
+        init(self, *arguments, **named)
+        self.requires = ()
+
+    return init_wrongly
+
+
 def _always(value: Any) -> Callable[[Any], Any]:
     return lambda before: lambda *arguments, **named: value
 
@@ -162,8 +170,8 @@ MISTAKES = (
             _always('')),
     Mistake('3 c', 'it counts while the executor stands still', HeartbeatRow, 'executor_until',
             _always(math.inf)),
-    Mistake('3 d', 'it counts without the topics that it requires', HeartbeatRow, 'missing',
-            _always('')),
+    Mistake('3 d', 'it counts without the topics that it requires', HeartbeatRow, '__init__',
+            _requires_nothing),
     Mistake('5', 'no fallbacks at the end', FallbackRow, 'end', _always(None)),
     Mistake('7', 'a refused message refreshes its row', FallbackRow, 'message_ended',
             _refused_refreshes),

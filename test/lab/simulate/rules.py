@@ -26,7 +26,7 @@ import math
 
 from abdf1_ros.driver.write import Outcome, WriteResult
 from abdf1_ros.plan.bounds import MODE_PERIOD
-from support.world import Executed, SAFE, STEP, World
+from support.world import Executed, GUESTS, SAFE, STEP, World
 
 _LEAST_ZERO = 0.5  # s
 _LEAST_LIFE_SIGN = 1.0  # s
@@ -91,7 +91,7 @@ class Results(Rule):
 
     def executed(self, entry: Executed) -> None:
         key = entry.tag, entry.value
-        if entry.tag[0] not in 'wf' or entry.value == SAFE:
+        if entry.tag[0] not in 'wf' or entry.value == SAFE or entry.value in GUESTS:
             return
         self.demand(key in self.world.published, key, 'was never published')
         self.demand(key not in self._by, key, 'was executed twice')
@@ -132,7 +132,7 @@ class Ages(Rule):
 
     def executed(self, entry: Executed) -> None:
         world = self.world
-        if entry.tag[0] not in 'wf':
+        if entry.tag[0] not in 'wf' or entry.value in GUESTS:
             return
         if entry.value == SAFE:
             self._fallbacks[entry.tag] = entry.when
@@ -245,7 +245,7 @@ class Outputs(Rule):
 
     def executed(self, entry: Executed) -> None:
         # A message over the fallback counts once, also where its outcome is unknown.
-        if entry.tag[0] == 'w' and entry.value != SAFE:
+        if entry.tag[0] == 'w' and entry.value != SAFE and entry.value not in GUESTS:
             when = self.world.published[entry.tag, entry.value]
             self._stood[entry.tag] = max(self._stood[entry.tag], when)
 
@@ -309,7 +309,36 @@ class ReadOnly(Rule):
     text = 'with read_only nothing is written (18)'
 
     def executed(self, entry: Executed) -> None:
-        self.demand(not self.world.plant.is_read_only, entry)
+        self.demand(not self.world.plant.is_read_only or entry.value in GUESTS, entry)
+
+
+class Guests(Rule):
+    text = 'each command of a guest has one reply, and is executed once'
+
+    def __init__(self, world: World) -> None:
+        super().__init__(world)
+        self._waits = 0.0  # since when there was a command without a reply
+        self._driver = 0
+        self._missing = 0
+        self._by: list[tuple[float, int]] = []
+
+    def executed(self, entry: Executed) -> None:
+        if entry.value in GUESTS:
+            times = [when for when, value in self._by if value == entry.value
+                     and entry.when - when < 30.0]
+            self.demand(not times, entry, 'executed before', times)
+            self._by.append((entry.when, entry.value))
+
+    def stand(self) -> None:
+        world = self.world
+        missing = len(world.asked) - len(world.answered) - self._missing
+        if self._driver != world.drivers:  # a killed one replies no more
+            self._driver, self._missing, missing = world.drivers, self._missing + missing, 0
+        self.demand(missing >= 0, 'more replies than commands')
+        if not missing:
+            self._waits = world.line.now
+        self.demand(world.line.now - self._waits < 20.0 + 2 * self.flight, missing,
+                    'without a reply since', self._waits)
 
 
 class OneOwner(Rule):
@@ -332,7 +361,8 @@ class OneOwner(Rule):
 
 
 RULES: tuple[type[Rule], ...] = (
-    Results, Ages, Values, Guards, Beats, BeatsAfterFallbacks, Outputs, AfterRun, Held, ReadOnly)
+    Results, Ages, Values, Guards, Beats, BeatsAfterFallbacks, Outputs, AfterRun, Held, ReadOnly,
+    Guests)
 
 
 class Judge:

@@ -27,6 +27,7 @@ import argparse
 from collections import Counter
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from functools import partial
 import math
 from pathlib import Path
 from random import Random
@@ -41,7 +42,7 @@ from abdf1_ros.driver.write import Outcome
 from abdf1_ros.pccc.emulated import Setting
 from simulate.rules import Broken, Judge
 from support.virtual_line import QUIET
-from support.world import Plant, SAFE, SMALL, STEP, World
+from support.world import FREE, OUTPUTS, Plant, SAFE, SMALL, STEP, World
 
 TURNS = 8  # troubles of a plant, with a calm after each
 RATES = (0.0, 0.0, 0.01, 0.05, 0.2)  # messages a step and row
@@ -218,6 +219,13 @@ def _slowness(story: Story, station: int) -> None:
     story.world.at(story.world.line.now + 0.5, lambda: setattr(plc.faults, 'delay', 0.0))
 
 
+def _guest(story: Story, station: int) -> None:
+    world = story.world
+    for number in range(story.dice.randrange(1, 6)):
+        place = story.dice.choice([OUTPUTS, FREE])
+        world.at(world.line.now + 0.3 * number, partial(world.ask, station, place))
+
+
 def _other_writer(story: Story, station: int) -> None:
     """Let another one count for so long that both know of each other."""
     world = story.world
@@ -237,7 +245,7 @@ _TROUBLES: dict[str, Callable[[Story, int], None]] = {
     'messages refused': _refused_messages, 'replies lost': _lost_replies,
     'port lost': _lost_port, 'process stands still': _pause, 'executor hangs': _hung_executor,
     'PROGRAM': _program, 'download': _download, 'killed': _kill, 'slow PLC': _slowness,
-    'other writer': _other_writer}
+    'other writer': _other_writer, 'guest': _guest}
 
 
 @dataclass(slots=True)
