@@ -62,3 +62,8 @@ def by_number(name: str) -> list[tuple[int, str]]:
     """Return a key that sorts names as people do: line2 before line10."""
     return [(int(part) if part.isdecimal() else 0, part)
             for part in re.split('([0-9]+)', name)]
+
+
+def milliseconds(seconds: float | None) -> str:
+    """Return a time (s) in whole ms, None as unknown."""
+    return 'unknown' if seconds is None else f'{seconds * 1000:.0f} ms'

@@ -43,10 +43,9 @@ from abdf1_ros.driver.interlocks.queue import Interlocks
 from abdf1_ros.driver.job_tasks import Job, JobTask, JobTasks
 from abdf1_ros.driver.reads.silent import Reads
 from abdf1_ros.driver.writes.queue import WriteQueue
-from abdf1_ros.plan.bounds import OWN_IN_A_ROW
+from abdf1_ros.plan.bounds import MOST_BETWEEN_GUESTS, OWN_IN_A_ROW
 
 MAX_WRITES_IN_A_ROW = 4
-MOST_BETWEEN_GUESTS = 3
 
 
 class Agenda:

@@ -30,9 +30,10 @@ from abdf1_ros.pccc.steps import write_requests
 from abdf1_ros.pccc.values import ValueType
 from abdf1_ros.plan import forecast
 from abdf1_ros.plan.planner import Block, Planner
-from abdf1_ros.settings.heartbeats import READS_IN_TIME
+from abdf1_ros.settings.heartbeats import READS_IN_TIME, STABLE, TIME_BASE
 from abdf1_ros.settings.mapping import Mapping
 from abdf1_ros.settings.network import Network
+from abdf1_ros.text import milliseconds
 
 # A station that we write heartbeats or fallbacks to is asked for its mode so often (s): a change
 # to RUN is a first contact (rule 2).
@@ -44,9 +45,8 @@ ANSWERS_IN_TIME = 3
 # After so many heartbeats and fallbacks in a row a read has its turn (rule 11).
 OWN_IN_A_ROW = 7
 
-# The time base (s) of the PLC's timers; so many units of it rung 5 is longer than rung 3.
-TIME_BASE = 0.01
-STABLE = 100
+# While they ask all the time, guests have a command after so many of ours.
+MOST_BETWEEN_GUESTS = 3
 
 # A heartbeat with a shorter Period (ms) may be quicker than a PLC's scan.
 _SHORT_PERIOD = 200
@@ -89,12 +89,10 @@ class Bound:
         kind = 'heartbeat' if self.mapping.heartbeat else 'fallback of'
         if self.seconds is None:
             return f'{kind} {tag}, station {station}: no bound, its master decides'
-        usual = '' if self.usual is None else f', {_ms(self.usual)} where no frame gets lost'
-        return f'{kind} {tag}, station {station}: written after {_ms(self.seconds)} at most{usual}'
-
-
-def _ms(seconds: float) -> str:
-    return f'{seconds * 1000:.0f} ms'
+        usual = '' if self.usual is None else \
+            f', {milliseconds(self.usual)} where no frame gets lost'
+        return f'{kind} {tag}, station {station}: written after ' \
+            f'{milliseconds(self.seconds)} at most{usual}'
 
 
 class Times:
@@ -197,7 +195,7 @@ class Times:
                          for way, other in ways.items())
         if least < _WORTH_IT * self._worst:
             yield (f'{way} would shorten the longest of these times most, from '
-                   f'{_ms(self._worst)} to {_ms(least)}')
+                   f'{milliseconds(self._worst)} to {milliseconds(least)}')
 
     @property
     def _worst(self) -> float:
@@ -211,15 +209,17 @@ def remarks(network: Network, mappings: Sequence[Mapping],
     for mapping in mappings:
         if mapping.heartbeat is not None and mapping.period is not None:
             if longest > mapping.period / 1000:
-                yield (f'{mapping.tag}: one transaction may take {_ms(longest)}, its Period is '
-                       f'{mapping.period} ms; shorten Timeout, Cmd_Timeout or the retries')
+                yield (f'{mapping.tag}: one transaction may take {milliseconds(longest)}, its '
+                       f'Period is {mapping.period} ms; shorten Timeout, Cmd_Timeout or the '
+                       'retries')
             if mapping.period < _SHORT_PERIOD:
                 yield (f'{mapping.tag}: a Period of {mapping.period} ms may be shorter than a '
                        'scan of the PLC, which then misses values')
         if mapping.fallback is not None and not mapping.serves \
                 and mapping.fallback.after / 1000 < 2 * longest:
             yield (f'{mapping.tag}: Fallback_After {mapping.fallback.after} ms is shorter than '
-                   f'two transactions of {_ms(longest)}; a few lost frames bring the fallback')
+                   f'two transactions of {milliseconds(longest)}; a few lost frames bring the '
+                   'fallback')
 
 
 def write_time(network: Network, mapping: Mapping,
@@ -276,7 +276,7 @@ def costs(network: Network, mappings: Sequence[Mapping], default_period: float,
         if station in guarded:
             part = _question_time(network, response_time) / period
             yield (f'Publish_While RUN: asking station {station} for its mode about every '
-                   f'{_ms(period)} takes {part:.0%} of the time')
+                   f'{milliseconds(period)} takes {part:.0%} of the time')
 
 
 def conditions(network: Network, mappings: Iterable[Mapping]) -> Iterator[str]:

@@ -32,7 +32,7 @@ from abdf1_ros.pccc.address import Address
 from abdf1_ros.pccc.file_types import FileType, PlcType
 from abdf1_ros.pccc.values import ValueType
 from abdf1_ros.plan import bounds, forecast
-from abdf1_ros.plan.bounds import Bound, Times
+from abdf1_ros.plan.bounds import Bound, MOST_BETWEEN_GUESTS, Times
 from abdf1_ros.plan.line_model import ReadRequest
 from abdf1_ros.plan.planner import Block, Planner, StationArea
 from abdf1_ros.settings import BAUD_RATES
@@ -44,7 +44,6 @@ from abdf1_ros.text import first
 
 _HIGH_LOAD = 0.8
 _PERIODS = tuple(step * 10**power for power in (2, 3, 4) for step in (1, 2, 5))  # ms
-_OURS_BESIDE_GUESTS = 0.75  # of the commands (driver.agenda)
 _WORTH_SAVING = 0.05  # of the poll cycle
 _NAMED_TAGS = 3
 _LONG_REQUIRES = 10_000  # ms
@@ -354,8 +353,8 @@ def _load_remarks(report: Report) -> Iterator[Remark]:
     if share_places(report.network.share):
         yield Remark(RemarkKind.LOAD, (
             'while guests (Share) ask, every fourth command may be theirs: the periods then need '
-            f'{load / _OURS_BESIDE_GUESTS:.0%} of the time that is left, and the poll cycle is up '
-            'to a third longer'))
+            f'{load * (1 + 1 / MOST_BETWEEN_GUESTS):.0%} of the time that is left, and the poll '
+            'cycle is up to a third longer'))
 
 
 def _interlock_remarks(report: Report) -> Iterator[Remark]:

@@ -23,7 +23,6 @@ from typing import Any, TypeVar
 
 from abdf1_ros.df1.packet import BROADCAST
 from abdf1_ros.df1.stations import MAX_STATION
-from abdf1_ros.errors import FormatError
 from abdf1_ros.messages import Message
 from abdf1_ros.numbers import decimal_number, two_readings, whole_number
 from abdf1_ros.pccc.access import Access
@@ -35,17 +34,9 @@ from abdf1_ros.pccc.structures import type_fault, write_fault, wrong_type
 from abdf1_ros.pccc.values import types_of, ValueType, WordOrder
 from abdf1_ros.problems import Problem
 from abdf1_ros.settings.columns import NEEDED
+from abdf1_ros.settings.conditions import with_conditions
 from abdf1_ros.settings.csv_table import Row
-from abdf1_ros.settings.heartbeats import (
-    DEFAULT_PERIOD,
-    heartbeat_file_fault,
-    heartbeat_type_fault,
-    read_fallback,
-    read_heartbeat,
-    read_publish_while,
-)
 from abdf1_ros.settings.hints import hint
-from abdf1_ros.settings.limits import raw_values
 from abdf1_ros.settings.mapping import Command, Mapping, Publish, READ_ONLY
 from abdf1_ros.settings.names import MAX_LENGTH, sanitise
 from abdf1_ros.settings.remarks import having, row_remarks
@@ -109,7 +100,7 @@ class RowReader:
             return None
         mapping = Mapping(item=self._row.item, place=self._row.where(), **cells)
         self._check(mapping)
-        mapping = self._with_conditions(mapping)
+        mapping = with_conditions(self._row, mapping, self._fault)
         if self.faults:
             return None
         remarks = tuple(row_remarks(self._row, mapping))
@@ -149,42 +140,6 @@ class RowReader:
             'type': kind or (address and _natural_type(address)), 'plc_type': plc_type,
             'access': access, 'is_read_only': self._is_read_only(command), 'address': address,
             'processor': processor}
-
-    def _with_conditions(self, mapping: Mapping) -> Mapping:
-        """Return the mapping with its heartbeat, fallback and condition for values."""
-        row, command, fault = self._row, mapping.command, self._fault
-        heartbeat = None
-        if command is Command.HEARTBEAT:
-            heartbeat = read_heartbeat(row, fault)
-            if text := heartbeat_type_fault(mapping.type, mapping.address.bit is not None):
-                fault('Type' if row.get('Type') else 'Address', text)
-            elif text := heartbeat_file_fault(mapping.address):
-                fault('Address', text)
-            mapping = replace(mapping, period=mapping.period or DEFAULT_PERIOD)
-        else:
-            for column in ('Requires', 'Requires_Timeout'):
-                if row.get(column):
-                    fault(column, f'{column} is for Heartbeat rows', is_superfluous=True)
-        low, high = mapping.limits
-        limits = max(low, mapping.minimum), min(high, mapping.maximum)
-        fallback = read_fallback(row, command.value, mapping.type, mapping.length, limits, fault)
-        if fallback and mapping.station == BROADCAST:
-            fault('Fallback', 'nobody confirms what is written to station 255',
-                  is_superfluous=True)
-        if fallback:
-            try:
-                raw_values(mapping, fallback.values)
-            except FormatError as error:
-                fault('Fallback', f'Fallback cannot be written: {error}')
-        publish_while = read_publish_while(
-            row, command.value, mapping.publish is Publish.ALWAYS, fault)
-        if publish_while and publish_while.tag == mapping.tag:
-            fault('Publish_While', 'a row cannot depend on itself; name the tag of a counter')
-        if mapping.confirms and (command, mapping.type, mapping.length) != (
-                Command.READ, ValueType.BOOL, 1):
-            fault('Confirms', 'Confirms is for a Read row of one bit (bool, Length 1)')
-        return replace(mapping, heartbeat=heartbeat, fallback=fallback,
-                       publish_while=publish_while)
 
     def _fault(self, column: str, text: str, message: Message | None = None,
                *args: object, is_superfluous: bool = False) -> None:

@@ -34,14 +34,11 @@ from abdf1_ros.pccc.address import Address
 from abdf1_ros.pccc.data_table import DataTable, NoSuchFile, OutOfRange
 from abdf1_ros.pccc.families import family_of
 from abdf1_ros.pccc.file_types import FileType
+from abdf1_ros.settings.heartbeats import STABLE, TIME_BASE
 
 USUAL_PRESET = 300
 """Of the watchdog, in units of the time base: 3 s."""
 
-STABLE = 100
-"""So much longer than the watchdog a heartbeat has to be alive before a reset is accepted."""
-
-_TIME_BASE = 0.01  # s
 _SCAN_TIME = 0.01  # s
 _PLC_HEARTBEAT = 10
 _LAST_COUNT = 32000
@@ -86,7 +83,7 @@ class _Timer:
     @property
     def accumulated(self) -> int:
         """Return the time in units of the time base."""
-        return min(int(self.time / _TIME_BASE + _ROUNDING), self.preset)
+        return min(int(self.time / TIME_BASE + _ROUNDING), self.preset)
 
     @property
     def words(self) -> tuple[int, int, int]:

@@ -18,8 +18,9 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from abdf1_ros.ros.diagnostics.status import ERROR, Judgement, milliseconds, OK, WARN
+from abdf1_ros.ros.diagnostics.status import ERROR, Judgement, OK, WARN
 from abdf1_ros.share.guest_line import GuestLine
+from abdf1_ros.text import milliseconds
 
 
 class GuestsStatus:

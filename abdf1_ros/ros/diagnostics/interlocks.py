@@ -28,12 +28,12 @@ from abdf1_ros.ros.diagnostics.stations import processor_fault
 from abdf1_ros.ros.diagnostics.status import (
     ERROR,
     Judgement,
-    milliseconds,
     OK,
     Seen,
     WARN,
     with_age,
 )
+from abdf1_ros.text import milliseconds
 
 
 class _Control(IntEnum):

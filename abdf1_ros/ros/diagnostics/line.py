@@ -31,8 +31,8 @@ from abdf1_ros.ports.clock import line_time
 from abdf1_ros.ports.link_thread import LinkThread
 from abdf1_ros.ports.trace import PortOpener
 from abdf1_ros.ros.diagnostics.stations import wrong_type
-from abdf1_ros.ros.diagnostics.status import milliseconds
 from abdf1_ros.settings.mapping import Mapping
+from abdf1_ros.text import milliseconds
 
 # For so long (s) another node with our number is told after its last packet.
 _SAME_NUMBER_TOLD = 60.0

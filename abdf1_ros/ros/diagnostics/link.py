@@ -30,13 +30,13 @@ from abdf1_ros.ros.diagnostics.line import (
 from abdf1_ros.ros.diagnostics.status import (
     ERROR,
     Judgement,
-    milliseconds,
     OK,
     Seen,
     WARN,
     with_age,
 )
 from abdf1_ros.settings.network import Network
+from abdf1_ros.text import milliseconds
 
 # After so many seconds without a poll of the master there is a warning.
 _LONGEST_UNPOLLED = 5.0

@@ -71,8 +71,3 @@ class Seen:
 def with_age(moment: Moment | None, now: float) -> str:
     """Return the last event, and how long ago it was."""
     return 'none' if moment is None else f'{moment[0]} ({now - moment[1]:.1f} s ago)'
-
-
-def milliseconds(seconds: float | None) -> str:
-    """Return a time (s) in whole ms, None as unknown."""
-    return 'unknown' if seconds is None else f'{seconds * 1000:.0f} ms'
