@@ -139,7 +139,7 @@ bench: $(INSTALLED) ## Measure plan, line, processor time, latency, scale (6 min
 test-pythons: $(INSTALLED) ## Run what needs no ROS on each other Python from 3.11 on that is found
 	.ci/pythons $(VENV)
 
-# There are wheels for Linux on x86-64 alone; elsewhere nothing is fuzzed, and that is told.
+# There are wheels for Linux on x86-64 alone; elsewhere nothing is fuzzed, and that is printed.
 GET_ATHERIS := $(PY) -c 'import atheris' 2>/dev/null || $(PY) -m pip install --quiet -r requirements/fuzz.txt
 
 .PHONY: fuzz

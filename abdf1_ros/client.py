@@ -113,7 +113,7 @@ class OpenLine:
             mode, line, absent, random.randrange(0x10000), routes, plc_type)
         self._link = LinkThread(
             self._requests.machine, opened(port), on_fault=print_exception)
-        self._link.daemon = True  # a KeyboardInterrupt before ``with`` leaves nobody to stop it
+        self._link.daemon = True  # a KeyboardInterrupt before ``with`` leaves nothing to stop it
         self._line = line_of(port.name)
         _ours.add(self._line)
         self._link.start()
@@ -148,7 +148,7 @@ class OpenLine:
               future: Future[_Result] | None = None) -> Future[_Result]:
         """Begin to carry out a request; ``future`` is where its result goes."""
         future = future or Future()
-        future.set_running_or_notify_cancel()  # nobody can call it off any more
+        future.set_running_or_notify_cancel()  # it can no longer be called off
         self._requests.add(station, work, future.set_result, future.set_exception)
         self._link.wake()
         return future

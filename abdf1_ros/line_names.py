@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""One text for all ways to write a device, a link, or an address, as far as nobody is asked."""
+"""One text for all ways to write a device, a link, or an address, as far as is known."""
 
 from __future__ import annotations
 

@@ -22,14 +22,14 @@ writers to one topic can tell their results apart. A text has no label: this pro
 first result that has its tag. So give a topic of texts one writer.
 
 With --station the command is sent only while the bridge says, in the status "interlocks" of
-/diagnostics, that it is in control of that station; otherwise it is told why not. Where no row of
+/diagnostics, that it is in control of that station; else the reason is printed. Where no row of
 the map Confirms that, a heartbeat that counts has to do: the PLC may still wait for a reset.
 
 A command whose result does not come is neither done nor not done. Look at the read topic before
 you send it again; for a pulse, a second one may be the wrong one.
 
 Exit status: 0 written, 1 not written, 2 bad arguments, 3 unknown whether written (or only partly,
-or sent to all stations, which nobody confirms).
+or sent to all stations, which no station confirms).
 """
 
 from __future__ import annotations
@@ -140,7 +140,7 @@ class CommandWriter(Node):
 
 
 def number(convert: Callable[[str], Any], text: str, what: str) -> Any:
-    """Return a value; ValueError, in words for people, when it is none."""
+    """Return a value; ValueError, in words, when it is none."""
     try:
         return convert(text)
     except ValueError:
@@ -191,7 +191,7 @@ def main() -> int:
                              'twice its write_timeout, for a write that is read back '
                              '(default: %(default)g)')
     options = parser.parse_args(remove_ros_args(sys.argv)[1:])
-    # rclpy's own handlers would leave nobody to say what became of the write.
+    # rclpy's own handlers would leave nothing to say what became of the write.
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, signal.default_int_handler)
     rclpy.init(signal_handler_options=SignalHandlerOptions.NO)

@@ -25,7 +25,7 @@ program of the PLC copies it to BUSY when it begins and to DONE when it has fini
 The race that people build without it: a bit "start" is set, and a bit "done" is waited for. Done
 is still set from the job before, so the robot drives on before this job has begun. A number that
 was never used before cannot be mistaken for an old one. The same race waits at the other end: a
-job that has not begun in time is given up, and begins afterwards, with nobody there. So the
+job that has not begun in time is given up, and begins afterwards, with no robot there. So the
 request is taken back, which has to be confirmed on ~/write_results, and only what is read after it
 counts.
 
@@ -108,7 +108,7 @@ class Handshake(Node):
         """Have one job done; times in seconds. Returns the exit status."""
         if not self._spin(lambda: self._state is not None
                           and self._requests.get_subscription_count() > 0, begin_within):
-            print('not begun: no job_state from the PLC, or nobody takes job_request')
+            print('not begun: no job_state from the PLC, or no bridge takes job_request')
             return NOT_BEGUN
         assert self._state is not None
         if not self._spin(lambda: self._is_in_control, begin_within):

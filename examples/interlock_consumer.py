@@ -124,7 +124,7 @@ class InterlockConsumer(Node):
         self._decide(False, 'values have stopped')
 
     def _incompatible(self, event: Any) -> None:
-        # Another publisher of the topic may be meant: that one is not heard, and changes nothing.
+        # Another publisher of the topic may be meant: its values change nothing.
         if not self._is_fresh:
             self._decide(False, f'the bridge does not promise a value every {self._patience:g} s')
 

@@ -126,7 +126,7 @@ def main() -> int:
     parser.add_argument('--wait', type=float, default=10.0,
                         help='seconds to look for the bridge (default: %(default)g)')
     options = parser.parse_args(remove_ros_args(sys.argv)[1:])
-    # rclpy's own handlers would not let the file be closed in order.
+    # rclpy's own handlers would not let the file be closed cleanly.
     ended: list[int] = []  # an event may deadlock when a second signal interrupts its set()
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, lambda number, _: ended.append(number))

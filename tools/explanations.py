@@ -64,7 +64,7 @@ MESSAGES: dict[Message, Cause] = {
         'As for 2506. Prefer CRC on both sides: BCC does not find exchanged bytes.'),
     Message.ERR_COMMAND_TIMEOUT: Cause(
         'The PLC has acknowledged a command, but its reply did not come within Cmd_Timeout. It '
-        'is busy, its scan is long, or a gateway behind the station waits for somebody else.',
+        'is busy, its scan is long, or a gateway behind the station waits for another.',
         'Compare with `plc ping`; raise Cmd_Timeout. In Mode Slave: is the master polling us, and '
         'does it pass messages on?'),
     Message.ERR_INACTIVE_STATION: Cause(
@@ -109,11 +109,11 @@ MESSAGES: dict[Message, Cause] = {
         'A message broke off before its DLE ETX.',
         'As for 2506; also an RS-485 transmitter that switches off too early.'),
     Message.NTC_NAK_LIMIT_EXCEEDED: Cause(
-        'A command was repeated NAK_Retries times in vain; 2509 follows.',
+        'A command was repeated NAK_Retries times without an answer; 2509 follows.',
         'See 2509.'),
     Message.NTC_ENQ_LIMIT_EXCEEDED: Cause(
         'A poll (in full duplex: the question for the last answer) was repeated ENQ_Retries times '
-        'in vain; 2509 follows.',
+        'without an answer; 2509 follows.',
         'See 2509.'),
     Message.NTC_NAK_RETRY: Cause(
         'A command is sent again; the number in the text says why.',

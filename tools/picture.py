@@ -80,7 +80,7 @@ def main(args: Sequence[str] | None = None) -> int:
     if done.returncode:
         print(done.stdout, end='')
         return done.returncode
-    # Where the repository lies is nobody's business.
+    # Where the repository lies does not matter.
     text = done.stdout.replace(f'{Path.cwd()}/', '')
     options.file.write_text(picture(options.title, text), encoding='utf-8')
     return 0

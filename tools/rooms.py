@@ -80,7 +80,7 @@ ROOMS = (
          ('problems', 'text', 'df1', 'pccc', 'settings')),
     Room(('driver',), 'carrying it out: who goes next, points, served words',
          (*_BASE, 'numbers', 'text', 'df1', 'pccc', 'settings', 'plan')),
-    Room(('sniffer',), 'recorded bytes, and traffic told to people',
+    Room(('sniffer',), 'recorded bytes, and traffic in words',
          ('errors', 'problems', 'text', 'numbers', 'df1', 'pccc')),
     Room(('ports',), 'ports, the thread that runs a link on one, recording and listening',
          ('errors', 'line_names', 'numbers', 'df1', 'settings', 'sniffer'), is_pure=False),

@@ -206,7 +206,7 @@ def _parse(args: Sequence[str] | None) -> argparse.Namespace:
 
 
 def _text(found: Findings, report: Report | None) -> str:
-    """Return the output for people."""
+    """Return the output as text."""
     parts = [colour(f'error: {problem}', RED, sys.stdout) for problem in found.problems]
     if report is None:
         return '\n'.join([*parts, 'no plan without a good net file'])

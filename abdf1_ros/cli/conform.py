@@ -307,7 +307,7 @@ def _parse(args: Sequence[str] | None) -> argparse.Namespace:
     add_line_options(parser, LineDefaults(), duplex=False)
     options = parser.parse_args(args)
     if options.echo and not Target(options.target).is_half_duplex:
-        parser.error('--echo: in full duplex nobody can tell what comes back from an answer')
+        parser.error('--echo: in full duplex what comes back looks like an answer')
     unknown = set(options.only) - {case.name for case in CASES}
     if unknown:
         parser.error(f'--only {", ".join(sorted(unknown))}: no such case; --list shows them')

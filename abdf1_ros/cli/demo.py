@@ -13,7 +13,7 @@
 # limitations under the License.
 
 """
-The demo: simulator and node as processes, and what a robot cell sees of them, told in order.
+The demo: simulator and node as processes, and what a robot cell sees of them, step by step.
 
 It needs no hardware. Everything stays on this machine: discovery is limited to localhost, and
 the domain is one of our own unless ROS_DOMAIN_ID is set.
@@ -99,13 +99,13 @@ class Missed(Exception):
 
 
 class Child:
-    """A process of ours; what it says is told between the lines of the story."""
+    """A process of ours; what it says is printed between the lines of the story."""
 
     def __init__(self, name: str, *args: str) -> None:
         self._name = name
         self._rest = b''
         # By its executable, which a signal during the imports ends quietly. A session of its own:
-        # Ctrl-C is for us, who then end both in order.
+        # Ctrl-C is for us, who then end both cleanly.
         code = f'import sys; from abdf1_ros.cli.main import {name}; sys.exit({name}())'
         self.process = subprocess.Popen(
             [sys.executable, '-c', code, *args], stdin=subprocess.PIPE, stdout=subprocess.PIPE,
@@ -154,7 +154,7 @@ class Watcher(Node):
         self.create_subscription(DiagnosticArray, '/diagnostics', self._diagnostics, 10)
 
     def expect(self, mapping: Mapping) -> float:
-        """Ask to be told when values stop for as long as the bridge promises; return that (s)."""
+        """Ask for an event when values stop as long as the bridge promises; return that (s)."""
         topic = f'/abdf1/read/{mapping.topic}'
         deadline = self.get_publishers_info_by_topic(topic)[0].qos_profile.deadline
 
@@ -229,7 +229,7 @@ class Demo:
         self._speed = Speed(self._watcher, self._mappings['speed']) if scene.guarded else None
 
     def run(self, seconds: float) -> None:
-        """Run for ``seconds`` (0: until interrupted), at least until the story is told."""
+        """Run for ``seconds`` (0: until interrupted), at least until the story is over."""
         self._simulator = self._start('simulator', *self._simulator_args)
         self._bridge = self._start('node', *self._bridge_args)
         print(f'\n{self._scene.title}', flush=True)
@@ -343,7 +343,7 @@ class Demo:
         self._simulator.command(f'silent {self._scene.failing_station}')
         self._wait('the loss to be noticed', lambda: self._watcher.missed[watched.tag] > 0)
         self._say(f'a subscriber of /abdf1/read/{watched.topic} with a deadline of '
-                  f'{deadline:.1f} s is told: no more values')
+                  f'{deadline:.1f} s is notified: no more values')
         self._wait('the station to be inactive', lambda: self._level(station) != _OK)
         self._print_statuses('link', station, 'mappings')
         if self._scene.surviving:
@@ -356,7 +356,7 @@ class Demo:
     def _show_survivor(self, tag: str) -> None:
         before = list(self._watcher.values[tag])
         self._wait('new values', lambda: list(self._watcher.values[tag]) != before)
-        self._say(f'the other goes on: /abdf1/read/{tag} {before} -> '
+        self._say(f'station 2 goes on: /abdf1/read/{tag} {before} -> '
                   f'{_shown(self._watcher.values[tag])}')
 
     def _take_control(self) -> Speed:
@@ -405,7 +405,7 @@ class Demo:
         self._simulator.command('program 2')
         self._wait('the silence to be noticed', lambda: self._watcher.missed[tag] > 0)
         self._say(f'/abdf1/read/{tag} is withheld; a subscriber with a deadline of '
-                  f'{deadline:.1f} s is told: no more values')
+                  f'{deadline:.1f} s is notified: no more values')
         self._wait('the diagnostics', lambda: self._level('mappings') != _OK)
         self._print_statuses('mappings')
         self._simulator.command('run 2')
@@ -435,7 +435,7 @@ class Demo:
 
     def _show_diagnostics(self) -> None:
         self._title('Diagnostics: what `ros2 topic echo /diagnostics` says, in short')
-        if self._speed:  # the bridge has come back, and nobody has pressed reset
+        if self._speed:  # the bridge has come back, and reset was not pressed
             self._wait('the reset to be missed', lambda: 'does not confirm' in
                        self._watcher.statuses['interlocks'].message)
             self._print_statuses('interlocks')
@@ -465,7 +465,7 @@ class Demo:
 
     def _wait(self, what: str, condition: Callable[[], bool]) -> None:
         if not self._spin_until(condition, _PATIENCE):
-            raise Missed(f'waited {_PATIENCE:g} s in vain for {what}')
+            raise Missed(f'waited {_PATIENCE:g} s for {what}, which did not come')
 
     def _spin_until(self, condition: Callable[[], bool], limit: float) -> bool:
         end = time.monotonic() + limit

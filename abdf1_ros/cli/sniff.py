@@ -283,7 +283,7 @@ def _decode_files(options: argparse.Namespace, output: _Output) -> int:
                     f'{name}: {recording.percent} %' if recording.has_size else name)
             if not has_bytes:
                 _say(f'{name}: there are no bytes in it')
-    except KeyboardInterrupt:  # also out of reading a pipe into which nobody writes
+    except KeyboardInterrupt:  # also out of reading a pipe into which no program writes
         output.sum_up()
         return status
     except Problem as problem:
@@ -362,7 +362,7 @@ def _print_heard(tap: Tap, trace: Trace | None, output: _Output, settings: dict[
             elif not options.tap:
                 break
             else:
-                _say('nobody reads this any more; the bytes are passed on until Ctrl-C')
+                _say('this output is no longer read; the bytes are passed on until Ctrl-C')
         idle()
     if trace:
         trace.close()

@@ -156,7 +156,7 @@ def is_bundle(path: Path) -> bool:
 
 
 def _free_name(folder: str, path: str, taken: Container[str]) -> str:
-    """Return the name of a file in the bundle; files of one name are told apart by a number."""
+    """Return the name of a file in the bundle; files of one name get numbers."""
     name = Path(path).name
     names = (f'{folder}/{number}_{name}' if number else f'{folder}/{name}' for number in count())
     return next(name for name in names if name not in taken)

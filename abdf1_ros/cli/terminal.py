@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The output of the commands for people: tables, colours, progress, and its failures."""
+"""What commands print: tables, colours, progress, and its failures."""
 
 from __future__ import annotations
 
@@ -68,7 +68,7 @@ class NoPort(OSError):
 def tell(name: str, text: str, code: int | None = None) -> None:
     """Say ``text`` on standard error, in the name of a command; in a colour where it has one."""
     line = f'{name}: {printable(text)}'
-    with suppress(OSError):  # nobody can be told
+    with suppress(OSError):  # there is no reader
         print(colour(line, code, sys.stderr) if code else line, file=sys.stderr, flush=True)
 
 
@@ -220,7 +220,7 @@ class _Parser(argparse.ArgumentParser):
     """
     A parser whose errors are two lines: a list of all options hides what is wrong.
 
-    An option that it does not know is told by the parser of its own command, with those that may
+    An option that it does not know is named by the parser of its own command, with those that may
     be meant.
     """
 

@@ -40,7 +40,7 @@ class BlockCheck(Enum):
 
 
 class SymbolKind(Enum):
-    """The kind of a received symbol, in words for people."""
+    """The kind of a received symbol, in words."""
 
     ACK = 'DLE ACK'
     NAK = 'DLE NAK'

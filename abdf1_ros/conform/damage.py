@@ -24,7 +24,7 @@ _SILENT = (Target.SLAVE, Target.RADIO)
 _SOURCE = 'KF2 4-31, SLC 13-76 to 13-80'
 
 
-@case('A message with a wrong check is ignored: nobody sends DLE NAK.', _SOURCE, *_SILENT)
+@case('A message with a wrong check is ignored: no slave sends DLE NAK.', _SOURCE, *_SILENT)
 def bad_check_ignored(end: AskingEnd) -> None:
     end.wire.send(codec.damaged(end.frame(end.command())))
     end.wire.expect_silence('the check was wrong')

@@ -106,7 +106,7 @@ class AskingEnd(ABC):
 
     def command(self, cmd: int = 0x06, body: bytes = b'\x00', tns: int | None = None) -> bytes:
         """
-        Return the link data of a command: an echo of nothing, if not told otherwise.
+        Return the link data of a command: an echo of nothing, if not given.
 
         None has the TNS of another in a run of 65,536.
         """

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The results of a run: for people, as JSON, and as text for an issue."""
+"""The results of a run: as text, as JSON, and as text for an issue."""
 
 from __future__ import annotations
 

@@ -19,7 +19,7 @@ A line that echoes gives back all that is sent, in its order, and before anybody
 answered. So a message that is byte for byte one of ours which has not come back yet is ours,
 not a PLC's. When an ACK that cannot be ours comes after a message of ours has left, and that
 has not come back before, the line does not echo: an equal message that comes later is a PLC's.
-Where nobody can tell, it counts as ours, once: a PLC that gets no response sends it again.
+Where that is unknown, it counts as ours, once: a PLC that gets no response sends it again.
 """
 
 from __future__ import annotations

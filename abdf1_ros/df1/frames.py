@@ -165,7 +165,7 @@ Symbol = Control | Unknown | Poll | Frame
 
 
 def beginning_of(symbol: Symbol) -> bytes:
-    """Return the bytes of a symbol up to its check; nothing where they cannot be told."""
+    """Return the bytes of a symbol up to its check; nothing where they are unknown."""
     if isinstance(symbol, Control):
         return bytes((Code.DLE, symbol.code))
     if isinstance(symbol, Poll):

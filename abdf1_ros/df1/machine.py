@@ -131,7 +131,7 @@ _NOTHING = Silence()
 MIN_RESPONSE_TIME = 0.02
 
 # Whoever is called so many seconds after a deadline has not run meanwhile: this process, or its
-# host, was paused, and nobody knows how long what comes then has lain in a buffer.
+# host, was paused, and it is unknown how long what comes then has lain in a buffer.
 MOST_LATE = 0.2
 
 # What an operating system or a device server may hold bytes of a frame back (s).
@@ -146,7 +146,7 @@ _LONGEST = 2 * MAX_LINK_DATA
 # Characters that a UART may hand on at once. The end of a reply is waited for as it comes.
 _LAST_CHARACTERS = 16
 
-# What nobody says in full duplex before he has heard a message or an ENQ to its end.
+# What no node says in full duplex before it has heard a message or an ENQ to its end.
 _RESPONSES = (Control.ACK, Control.NAK)
 
 Heard = Symbol | Silence
@@ -365,7 +365,7 @@ class Machine:
 
     def _next_symbol(self) -> Symbol | None:
         """
-        Return what somebody else has said, None when more bytes are needed.
+        Return what another node has said, None when more bytes are needed.
 
         A message of ours that comes back is noise in full duplex: a response that was given before
         must not count for it (M 4-8), in case that it is a PLC's after all.

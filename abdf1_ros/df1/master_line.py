@@ -18,7 +18,7 @@ What every half-duplex master does on its line: deliver, poll, receive, pass on.
 The rules are S0's, "Functional Overview", and those of M 3-12..3-17; how they make up a
 transaction is in ``master``, how they make up a polling scan in ``polling``.
 
-Every good message is acknowledged, also one that nobody waits for: the slave keeps it until then
+Every good message is acknowledged, also one that is not waited for: the slave keeps it until then
 (M 3-15). A master never asks for a repetition with DLE NAK, which resets all slaves of the line
 (M 2-7, 3-11).
 """
@@ -345,7 +345,7 @@ class MasterLine:
         Take a message that answers nothing of ours (S0, DispatchAbDf1Message).
 
         It is served, kept to be passed on, or dropped and counted: a reply to another node, too,
-        that answers no command which we have passed on. Its DST is damaged, or nobody waits.
+        that answers no command which we have passed on. Its DST is damaged, or it is late.
         """
         is_ours = packet.dst == self.settings.station
         is_kept = self.settings.accept_slave_messages

@@ -114,7 +114,7 @@ class FullDuplexPeer(EqualNode):
     Carry out tasks on the line of ``machine`` and answer the commands that come in.
 
     ``serve`` executes a command and returns its reply; it is called once for each command,
-    never for a repetition. Where it returns None, somebody adds the reply to ``replies`` (others
+    never for a repetition. Where it returns None, the caller adds the reply to ``replies`` (others
     after a start) later, in any thread, and then wakes the machine. ``report`` is called with
     every numbered error and notice.
     """

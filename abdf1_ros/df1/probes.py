@@ -64,11 +64,11 @@ class Probes:
         """
         Take note that a station does not answer any more, which took ``seconds`` until now.
 
-        Only a message asks it at once. Silence that was quickly told, by a gateway, costs little.
+        Only a message asks it at once. Silence that a gateway reports quickly, costs little.
         """
         self._put_off = now + min(self.pause, _OTHERS_SHARE * seconds)
 
-    def nobody_waits(self, now: float) -> None:
-        """Take note that there is nobody whom probes keep waiting."""
+    def none_waits(self, now: float) -> None:
+        """Take note that probes keep no station waiting."""
         self._free = self._put_off = now
         self._is_kept_for_message = self._was_message = False

@@ -20,7 +20,7 @@ frames of full duplex. A node takes what has its number or 255 as DST, and drops
 command is answered by its reply, or by nothing: then we send it again, with the same TNS, so that
 a PLC knows it as a repetition.
 
-Ours: a node waits until the line is quiet, and then for a time by chance, before it sends; that
+Ours: a node waits until the line is quiet, and then for a random time, before it sends; that
 time grows with each try, as everybody may have waited for the same end. A repetition of a command
 is answered with the reply that we have given, as that may be what was lost. A packet with our
 number as SRC that we have not sent is of another node with that number: no reply is taken for ours
@@ -76,7 +76,7 @@ _MOST_WAITING = 16
 # The line is quiet after a pause of so many characters, besides what equipment holds bytes back.
 _QUIET_CHARACTERS = 20
 
-# The time by chance before the first try is up to that of our frame, twice as much before each
+# The random time before the first try is up to that of our frame, twice as much before each
 # further one, but no more than this many times.
 _MOST_BACK_OFF = 8
 
@@ -112,7 +112,7 @@ class _Command:
     A command that waits for its reply, which is overdue at ``deadline`` (clock value in s).
 
     It has been sent ``tries`` times, and is sent ``most`` times. It ``is_doubtful`` where another
-    node with our number has asked the same station under the same TNS: nobody can tell whose
+    node with our number has asked the same station under the same TNS: it is unknown whose
     reply comes.
     """
 
@@ -129,7 +129,7 @@ class RadioNode(EqualNode):
 
     ``serve`` executes a command and returns its reply, if it gives one; it is called once for each
     command.
-    ``report`` is called with every numbered error and notice. ``random`` gives times by chance.
+    ``report`` is called with every numbered error and notice. ``random`` gives random times.
     """
 
     def __init__(self, machine: Machine, settings: LinkSettings, stations: ActiveStationList,

@@ -36,7 +36,7 @@ class Outlet(Protocol):
         """Put bytes on the line, after those of before."""
 
     def unsent(self) -> int:
-        """Return how many bytes have still to leave, as far as this can be told."""
+        """Return how many bytes have still to leave, as far as this is known."""
 
 
 class Sender:

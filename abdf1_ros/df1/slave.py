@@ -163,7 +163,7 @@ class HalfDuplexSlave:
         return was_sent
 
     def _release(self, error: LinkError | None = None) -> None:
-        """Drop the held message; the sender of a command is told the result (KF2 4-31)."""
+        """Drop the held message; the sender of a command gets the result (KF2 4-31)."""
         held, self._held = self._held, None
         if held is None or held.packet.is_reply or self._initiator is None:
             return

@@ -132,7 +132,7 @@ class ActiveStationList:
         """
         Take stations into the list.
 
-        Where the link polls them all the time, nobody else need ask whether they are there again.
+        Where the link polls them all the time, no probe need ask whether they are there again.
         """
         numbers = list(numbers)
         self._polled.update(numbers if are_polled else ())
@@ -200,7 +200,7 @@ class ActiveStationList:
         if self[number].replies_in_time or self.is_polled(number):
             return
         if not self._someone_waits:
-            self.probes.nobody_waits(now)
+            self.probes.none_waits(now)
         elif was_silent:
             self.probes.spent(self._took(begun, now), now, is_message=is_message)
         else:
@@ -211,7 +211,7 @@ class ActiveStationList:
         if self._someone_waits:
             self.probes.spent(self._took(begun, now), now)
         else:
-            self.probes.nobody_waits(now)
+            self.probes.none_waits(now)
 
     @property
     def _someone_waits(self) -> bool:

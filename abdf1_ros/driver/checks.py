@@ -17,7 +17,7 @@ Slow jobs of a driver: what each station is, in which mode, and whether it still
 
 A station is asked for its diagnostic status at the start, when it comes back, and every
 ``processor_period``. A station without reads gets an echo when it has not been heard for a while;
-without that nobody would notice its silence. Link counters are read on request only.
+without that its silence would not be noticed. Link counters are read on request only.
 
 Checks do not count as reads, nor in the poll cycle. A refusal is not a fault of the station.
 ``agenda`` decides when a check has the line.
@@ -86,9 +86,9 @@ class Check(Job):
 @dataclass(frozen=True, slots=True)
 class StationHealth:
     """
-    What a station has told about itself.
+    What a station has reported of itself.
 
-    ``processor`` is a text for people, also where there is no ``identity``. ``told`` is the clock
+    ``processor`` is a text to be read, also where there is no ``identity``. ``told`` is the clock
     value (s) of the last diagnostic status. ``counters`` are the link counters as last read;
     ``no_counters`` is the reason where that read failed.
     """
@@ -134,11 +134,11 @@ class Checks:
         self._next_due = 0.0
 
     def known(self, station: int) -> StationHealth:
-        """Return what a station has told about itself."""
+        """Return what a station has reported of itself."""
         return self._known.get(station) or StationHealth(self._unknown(station, _NOT_ASKED))
 
     def _unknown(self, station: int, text: str) -> str:
-        """Return a text for a processor that is unknown: for ever, if nobody asks."""
+        """Return a text for a processor that is unknown: for ever, if it is never asked."""
         return text if station in self._asked else _NEVER_ASKED
 
     def request_counters(self, station: int) -> None:
@@ -173,7 +173,7 @@ class Checks:
         self._plan()
 
     def went_away(self, station: int) -> None:
-        """Forget what a station has told that does not answer any more."""
+        """Forget what a station has reported that does not answer any more."""
         self._forget(station, 'the station does not answer')
         self.ask_status(station, math.inf)
 
@@ -284,7 +284,7 @@ class Checks:
             self._plan()
 
     def _forget(self, station: int, reason: str) -> None:
-        """Drop what a station has told, and end the requests that it will not answer."""
+        """Drop what a station has reported, and end the requests that it will not answer."""
         known = self.known(station)
         self._known[station] = StationHealth(
             processor=self._unknown(station, f'unknown ({reason})'), counters=known.counters,

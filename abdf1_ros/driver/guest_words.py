@@ -59,7 +59,7 @@ def written_extents(command: Packet, station: int,
     """
     Return the words of the files of ``mappings`` that a command to a station writes.
 
-    None where nobody knows: it may write any. A server of the family says so: a PLC-5's address
+    None where unknown: it may write any. A server of the family says so: a PLC-5's address
     does not tell the type of its file. What goes to all stations writes the words of each.
     """
     rows = [mapping for mapping in mappings

@@ -19,7 +19,7 @@ A guest's command waits here for its turn on the line and gets exactly one reply
 the PLC, or one with an STS of M 8-2 that says why there is none. What has not been sent gets 60
 (not allowed), 01 (no buffer, or too old to be sent), 04 (the port is not open) or 07 (the station
 is silent). What was sent and has no reply gets 02 (the station has become silent) or 05 (no reply
-in time): nobody knows then whether it was executed.
+in time): whether it was executed is then unknown.
 """
 
 from __future__ import annotations
@@ -72,7 +72,7 @@ def _code(command: Packet) -> tuple[int, int | None]:
 
 
 class GuestListener:
-    """Is told what guests do, in any thread; what is not overridden does nothing."""
+    """Gets notice of what guests do, in any thread; what is not overridden does nothing."""
 
     def sends(self, guest: Guest, command: Packet) -> None:
         """Take note of a command on its way to the line, with our SRC and TNS."""
@@ -211,7 +211,7 @@ class GuestQueue:
             self._look()
             if self._stations[station].last_heard is None:
                 self._silent(station, now)  # it may not exist: one poll or try at a time
-            is_vain = station == BROADCAST and _code(command.packet) in _READS  # nobody answers
+            is_vain = station == BROADCAST and _code(command.packet) in _READS  # no answer
             if not is_vain and self._stations.claim_message(station, now):
                 return GuestJob(self, command, station, command.requested + self._patience,
                                 self._claim(command.packet, station))
@@ -258,7 +258,7 @@ class GuestQueue:
                              was_silent=not self._stations[station].replies_in_time)
 
     def _silent(self, station: int, now: float) -> None:
-        """Take a station for silent that only guests ask: nobody else says so."""
+        """Take a station for silent that only guests ask: there is no other sign."""
         if station not in self._stations and station != BROADCAST:
             self._stations.lost(station, now)
 

@@ -25,7 +25,7 @@ _Item = TypeVar('_Item')
 
 class Inbox(Generic[_Item]):
     """
-    Hand items from any number of threads to the one that takes them, in order, each once.
+    Hand items from any number of threads to the one that takes them, in their order, each once.
 
     ``items`` are those that wait. A closed inbox takes nothing. There is no lock: every step is
     one atomic operation of a deque. The items are never copied and then cleared: an item that
@@ -50,7 +50,7 @@ class Inbox(Generic[_Item]):
         return self.take()
 
     def put(self, item: _Item) -> bool:
-        """Add an item; return False when the inbox is closed, and nobody will take it."""
+        """Add an item; return False when the inbox is closed, and it will not be taken."""
         self.items.append(item)
         if self._is_open:
             return True

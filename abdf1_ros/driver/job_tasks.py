@@ -51,7 +51,7 @@ class Job:
     known. That command must not be sent after ``expires`` (clock value in s); each later one has
     ``patience`` s after the command before it, without that command's own time on the line.
     ``is_probe`` tells that a silent station is asked whether it is there again, ``is_own`` that
-    nobody has asked for it: a heartbeat or a fallback. ``blames`` is that of ``Task``.
+    no message has asked for it: a heartbeat or a fallback. ``blames`` is that of ``Task``.
     """
 
     station: int

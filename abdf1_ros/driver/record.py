@@ -42,7 +42,7 @@ class _Writer(Enum):
     MESSAGE = auto()
     OURS = auto()
     GUEST = auto()
-    GUEST_SOMEWHERE = auto()  # by a command of which nobody knows what it does
+    GUEST_SOMEWHERE = auto()  # by a command whose effect is not known
     BEFORE = auto()  # whoever had the line before the port was opened
 
 
@@ -54,7 +54,7 @@ class Claim:
     """
     One write to words of a PLC, under way or done.
 
-    ``extents`` are its words, None where nobody knows: any of the ``station``, which may be
+    ``extents`` are its words, None where they are not known: any of the ``station``, which may be
     BROADCAST. ``write`` is that of a message or of ours. It had the line from ``begun`` until it
     was ``done``, and lands up to ``lands_until`` (clock values in s): infinite while it is under
     way, -inf where nothing was written. ``outcome`` is how it ended.
@@ -94,7 +94,7 @@ class Claim:
 
 
 class WriteListener:
-    """Gets told of all writes; what is not overridden does nothing."""
+    """Gets notice of all writes; what is not overridden does nothing."""
 
     def write_begins(self, claim: Claim) -> None:
         """Take note that a write goes out."""
@@ -187,7 +187,7 @@ class WriteRecord:
                 words.opened(self.line.now + self._settle_time)
 
     def may_begin(self, row: Mapping) -> bool:
-        """Tell whether nobody is writing words of a row: packets of two writes must not mix."""
+        """Tell whether no write of these words is under way: packets of two must not mix."""
         return not any(claim.meets(row.extent) for claim in self._under_way)
 
     def messages(self) -> Iterator[Write]:

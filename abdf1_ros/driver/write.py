@@ -38,7 +38,7 @@ class Outcome(Enum):
     """How a write ended."""
 
     WRITTEN = 'written'
-    BROADCAST = 'sent to all stations; nobody confirms a broadcast'
+    BROADCAST = 'sent to all stations; no station confirms a broadcast'
     SUPERSEDED = 'not written: superseded by a newer value'
     REFUSED = 'not written: refused'
     NOT_SENT = 'not written: not sent'
@@ -146,7 +146,7 @@ class Write:
 
 
 def show(values: Sequence[float] | str) -> str:
-    """Return values as text for people, cut short when there are many."""
+    """Return values as text, cut short when there are many."""
     if isinstance(values, str):
         rest = len(values) - _SHOWN_CHARACTERS
         more = f' and {rest} more characters' if rest > 0 else ''

@@ -150,8 +150,8 @@ class Address:
         """
         Tell whether both may lie in one file, or slot, of a PLC.
 
-        A PLC finds a file by its number, whatever type or family a command names. Where nobody
-        can tell they may.
+        A PLC finds a file by its number, whatever type or family a command names. Where that
+        is unknown they may.
         """
         mine, others = self.area, other.area
         if None not in (mine.slot, others.slot) and mine.slot != others.slot:

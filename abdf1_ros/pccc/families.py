@@ -53,7 +53,7 @@ def decode_identity(data: bytes) -> Identity:
 
 
 def known_commands() -> dict[CommandCode, KnownCommand]:
-    """Return how the commands of all families are told to people."""
+    """Return how the commands of all families are put into words."""
     return {code: command for family in FAMILIES.values()
             for code, command in family.described.items()}
 

@@ -42,7 +42,7 @@ class Family:
     ``dialects`` has the usual access first. ``decode_identity`` returns None for the reply of
     another family to 06/03; ``encode_identity`` makes one for a mode, a fault, full duplex, and
     a processor, None for the usual.
-    ``described`` has its commands for people. ``meanings`` are those of its own error codes.
+    ``described`` has its commands in words. ``meanings`` are those of its own error codes.
     ``by_processor`` is for a family whose processors take packets of different lengths.
     ``served_counters`` returns the layout of a port in a mode (Master, Slave, Peer, Radio), None
     where its counters are not emulated; they are at every address where ``counters_anywhere``.

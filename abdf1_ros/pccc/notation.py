@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""How commands are told to people: what the families share."""
+"""How commands are put into words: what the families share."""
 
 from __future__ import annotations
 

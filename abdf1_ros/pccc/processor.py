@@ -60,7 +60,7 @@ class Processor(Enum):
 
 
 USUAL = Processor.SLC_5_03
-"""What an SLC is taken for when nobody says which it is."""
+"""What an SLC is taken for when it is not known which it is."""
 
 
 @dataclass(frozen=True, slots=True)

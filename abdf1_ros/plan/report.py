@@ -16,7 +16,7 @@
 The report on two checked files: the read plan, its times, and remarks.
 
 All times are forecasts (see ``forecast``), in seconds. A remark is about a setting that is valid,
-but may have an effect that nobody expects.
+but may have an unexpected effect.
 """
 
 from __future__ import annotations
@@ -146,7 +146,7 @@ class Report:
             if block.period) <= _HIGH_LOAD), None)
 
     def notes(self) -> list[str]:
-        """Return what somebody should know, and what is not odd at all."""
+        """Return what a reader should know, and what is not odd at all."""
         found = list(bounds.costs(
             self.network, self.mappings, self.default_period, self.response_time))
         found += bounds.conditions(self.network, self.mappings)
@@ -194,7 +194,7 @@ def _unprotected(mappings: Sequence[Mapping]) -> Iterator[str]:
     pushed = [mapping for mapping in mappings
               if mapping.serves and not mapping.is_read_only and not mapping.period]
     if pushed:
-        yield ('topics of Serve rows without Period, which nobody misses when the PLC stops: '
+        yield ('topics of Serve rows without Period, so a PLC that stops is not noticed: '
                f'{_tags(pushed)}')
 
 

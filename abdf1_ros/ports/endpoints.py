@@ -282,6 +282,6 @@ class SerialEndpoint:
         return port or open_port(self._settings)
 
     def close(self) -> None:
-        """Close the port if nobody has taken it."""
+        """Close the port if no program has taken it."""
         if self._first is not None:
             self._first.close()

@@ -42,8 +42,8 @@ _FAULT_WINDOW = 60.0
 _WAKES = 4096  # read at a time
 _POLL_STEP = 0.001  # poll(2) counts milliseconds
 
-# Where bytes come faster than they can be worked on, so many are at a time: symbols that nobody
-# wants take up to 18 us a byte. Before the next the other lines have so many times as long as that
+# Where bytes come faster than they can be worked on, so many are at a time: symbols of no
+# use take up to 18 us a byte. Before the next the other lines have so many times as long as that
 # took of the processor, but no longer than the line would have needed for these bytes.
 _PORTION = 64
 _OTHERS = 19
@@ -61,7 +61,7 @@ class PortKind(Enum):
 
 @dataclass(frozen=True, slots=True)
 class PortState:
-    """Whether the port is open, with a text for people; ``kind`` tells more where it is not."""
+    """Whether the port is open, with a text to be read; ``kind`` tells more where it is not."""
 
     is_open: bool
     text: str
@@ -87,7 +87,7 @@ class _Exchange:
         self._claim = threading.Lock()
 
     def claim(self) -> bool:
-        """Return True to the first caller only: that one does the exchange, or withdraws it."""
+        """Return True to the first caller only: that caller does the exchange, or withdraws it."""
         return self._claim.acquire(blocking=False)
 
 
@@ -364,7 +364,7 @@ class LinkThread(threading.Thread):
                 raise
             now = clock()
             if deadline is not None and now >= deadline:
-                # The deadline first: after a pause of this process nobody can tell whether an
+                # The deadline first: after a pause of this process it is unknown whether an
                 # answer in the buffer came in time.
                 machine.handle_timeout(now)
             if left or port.has_more:

@@ -53,7 +53,7 @@ class _TapReader(threading.Thread):
         self._wake = wake
 
     def run(self) -> None:
-        """Read until told to stop, or until a port is lost."""
+        """Read until asked to stop, or until a port is lost."""
         try:
             while not self.stopping:
                 data = self._port.read(None, self._wake)

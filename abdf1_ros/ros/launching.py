@@ -38,7 +38,7 @@ def descriptions() -> dict[str, str]:
 
 def unknown_arguments(file: str, known: Iterable[str], argv: Sequence[str]) -> list[str]:
     """
-    Return what is wrong with the arguments ``name:=value`` of ``ros2 launch``, for people.
+    Return what is wrong with the arguments ``name:=value`` of ``ros2 launch``, in words.
 
     ``file`` is the launch file, ``known`` what it takes, ``argv`` the command line. A file that
     others include gets none of their arguments, so nothing is wrong with them.

@@ -65,7 +65,7 @@ Run many bridges in one process, a node for each section of the parameter file.
   lines --ros-args --params-file lines.yaml
   lines --ros-args --params-file lines.yaml -p 'lines:=[/press/abdf1, /paint/abdf1]'
 
-A line whose files have faults is told and left out; -p strict_lines:=true ends the process then.
+A line whose files have faults is named and left out; -p strict_lines:=true ends the process then.
 A line that ends by an internal error is started again, the others notice nothing.
 
 exit status: 0 after Ctrl-C, SIGTERM or SIGHUP, 2 for faulty parameters or where no line can
@@ -252,7 +252,7 @@ class Lines:
             self._node.publish(self._lines)
 
     def destroy(self) -> None:
-        """Destroy all nodes that nobody uses any more."""
+        """Destroy all nodes that are no longer used."""
         self._executor.shutdown()
         self._node.destroy_node()
         self._runner.destroy()

@@ -106,7 +106,7 @@ def run_ros(name: str, parser: argparse.ArgumentParser,
     Run in a ROS context until SIGINT, SIGTERM or SIGHUP, and return the exit status.
 
     ``make`` gets the arguments of the process (``args``, by default its own) and opens no port
-    yet. What keeps it from making a program is told as ``name``: EXIT_CONFIGURATION where
+    yet. What keeps it from making a program is reported as ``name``: EXIT_CONFIGURATION where
     arguments, parameters or files have to be changed, EXIT_FAULT for a reason that may pass. An
     error while the program runs is a bug, with a traceback and EXIT_FAULT. With ``leaves_out``
     sections of parameter files whose names ROS refuses are not given to it.
@@ -114,7 +114,7 @@ def run_ros(name: str, parser: argparse.ArgumentParser,
     program: Program | None = None
 
     def begin_end() -> None:
-        if program is None:  # no port is open: nobody has to be told
+        if program is None:  # no port is open, no PLC has to hear of it
             os._exit(0)
         _end_by_the_clock()
 

@@ -15,7 +15,7 @@
 """
 What is made of one pair of files, and dropped with it: nothing of it survives a reload.
 
-The driver, its topics, what watches over them, and what has been told so far. Values and results
+The driver, its topics, what watches over them, and what has been said so far. Values and results
 are published from the link's thread itself, without the executor in between; publishers may be
 used from any thread.
 """
@@ -139,7 +139,7 @@ class Session:
         _tell_files(self._surroundings.node.get_logger(), self.configuration)
         self.diagnostics.line.attach(self._surroundings.link, self._surroundings.opener)
         self.reads.take_over()
-        if self._surroundings.link.state.is_open:  # otherwise it is told when it has been tried
+        if self._surroundings.link.state.is_open:  # otherwise it is said when it has been tried
             self._publish_active()
 
     def end(self) -> None:
@@ -217,7 +217,7 @@ class Session:
                       DiagnosticArray(status=self.diagnostics.statuses(now)))
 
     def _publish_snapshot(self, now: float) -> None:
-        """Publish all values where that is due and somebody wants to see them."""
+        """Publish all values where that is due and there is a subscriber."""
         period = self.configuration.parameters.snapshot_period
         if not period or now < self._next_snapshot:
             return

@@ -83,7 +83,7 @@ MAP_COLUMNS = (
     Column('Via', 'Station',
            'with Mode Master: the station of a gateway on this line (KF2, KF3, KE) behind which '
            'Station is'),
-    Column('Description', 'none', 'what it is in the plant, for people'),
+    Column('Description', 'none', 'what it is in the plant, to be read'),
 )
 
 COLUMNS = tuple(column.name for column in MAP_COLUMNS)

@@ -122,7 +122,7 @@ def _fallback(row: Row, mapping: Mapping, fault: ReportFault) -> Fallback | None
     if after is None or len(values) != mapping.length:
         return None
     if mapping.station == BROADCAST:
-        fault('Fallback', 'nobody confirms what is written to station 255', is_superfluous=True)
+        fault('Fallback', 'no station confirms what is written to 255', is_superfluous=True)
     try:
         raw_values(mapping, values)
     except FormatError as error:

@@ -115,8 +115,8 @@ def _no_confirmation(mapping: Mapping, tags: dict[str, Mapping],
         return 'should be the tag of a good Heartbeat row of station ' \
             f'{mapping.station} that no row before it confirms'
     ours = next((row for row in mappings if _changes(row) and row.shares_words(mapping)), None)
-    return f'cannot be confirmed by {mapping.address}, which {shown(ours.tag)} writes: nobody ' \
-        'vouches for himself; name a bit that the program of the PLC sets' if ours else ''
+    return f'cannot be confirmed by {mapping.address}, which {shown(ours.tag)} writes: no ' \
+        'heartbeat confirms itself; name a bit that the program of the PLC sets' if ours else ''
 
 
 def _no_counter(mapping: Mapping, counter: Mapping, mappings: Sequence[Mapping]) -> str:

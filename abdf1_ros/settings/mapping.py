@@ -69,7 +69,7 @@ class Mapping:
     ``is_read_only`` the words of a Serve row may not be written by the other end.
     ``heartbeat`` is there in a Heartbeat row, ``fallback`` and ``publish_while`` where asked for.
     ``confirms`` is the tag of the heartbeat whose control the bit tells, empty for none.
-    ``description`` is for people. ``remarks`` say what is odd about the row.
+    ``description`` is to be read. ``remarks`` say what is odd about the row.
     """
 
     item: int
@@ -160,7 +160,7 @@ class Mapping:
         if self.serves != other.serves or self.station != other.station \
                 and BROADCAST not in (self.station, other.station):
             return False
-        # Where they count in other ways nobody can tell which words they are.
+        # Where they count in other ways it is unknown which words they are.
         return any(not mine.counts_like(theirs) or self._meets(other)
                    for mine in self._places(other) for theirs in other._places(self)
                    if mine.may_share_file(theirs))

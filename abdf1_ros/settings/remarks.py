@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Remarks about settings that are valid, but may have effects that nobody expects."""
+"""Remarks about settings that are valid, but may have unexpected effects."""
 
 from __future__ import annotations
 

@@ -72,7 +72,7 @@ class GuestLine:
     Nobody knows when a command came that was here after a longer wait than asked for: this
     process, or its host, stood still. It counts as old as it can be.
 
-    ``wake`` wakes the link of the PLC, ``listener`` is told what the guest does, ``fault`` of a
+    ``wake`` wakes the link of the PLC, ``listener`` gets what the guest does, ``fault`` of a
     bug. The guest's program may come and go: a reply to one that has gone is dropped.
     """
 
@@ -105,7 +105,7 @@ class GuestLine:
 
     @property
     def fault(self) -> str:
-        """Return why nobody can connect, empty where somebody can."""
+        """Return why no program can connect, empty where one can."""
         state = self.link.state
         return state.text if state.kind is PortKind.UNAVAILABLE else ''
 

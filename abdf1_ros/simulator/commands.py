@@ -41,7 +41,7 @@ commands, on standard input or with --at:
   download STATION            a program is loaded: words are as at the start, mode program
   power STATION               it loses power and comes back
   scan STATION MS             a scan of its ladder takes so long (10 at the start)
-  reset STATION               somebody presses the reset button of its ladder (--ladder)
+  reset STATION               the reset button of its ladder is pressed (--ladder)
   counters STATION            say what its port has counted
   msg STATION ADDRESS VALUE.. it writes to the bridge (with --full-duplex)
   quit                        end the simulator

@@ -114,7 +114,7 @@ class InjectedFaults:
 
 
 class Sending:
-    """A command of a simulated PLC on its way; ``report`` is told how it ended."""
+    """A command of a simulated PLC on its way; ``report`` gets how it ended."""
 
     def __init__(self, command: Packet, report: Callable[[str], None]) -> None:
         self.command = command
@@ -252,7 +252,7 @@ class SimulatedPlc:
         """
         Write to ``station`` with commands of our own, as a MSG instruction does.
 
-        Only a full-duplex line carries them. ``report`` is told how each of them ended. Raises
+        Only a full-duplex line carries them. ``report`` gets how each of them ended. Raises
         FormatError for values that do not fit.
         """
         codec = _natural_codec(address, len(values))

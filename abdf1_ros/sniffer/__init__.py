@@ -13,7 +13,7 @@
 # limitations under the License.
 
 """
-Decoding of the traffic on a DF1 line, for people; without clock, port or file.
+Decoding of the traffic on a DF1 line, in words; without clock, port or file.
 
 ``TrafficDecoder`` takes chunks of bytes and gives entries, ``Summary`` counts those, ``report``
 writes both as text or JSON.

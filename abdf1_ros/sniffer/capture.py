@@ -13,7 +13,7 @@
 # limitations under the License.
 
 """
-Captures: the recorded bytes of a line, as text that can be sent to somebody else.
+Captures: the recorded bytes of a line, as text that can be read and mailed.
 
 A capture is ASCII, one line for each chunk of bytes as it was read or written::
 

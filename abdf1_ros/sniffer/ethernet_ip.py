@@ -53,7 +53,7 @@ _PCCC_OBJECT = b'\x20\x67', b'\x21\x00\x67\x00'  # a path begins with its class
 
 
 class _Stream:
-    """The bytes of one direction of a TCP connection, in order."""
+    """The bytes of one direction of a TCP connection, in their order."""
 
     def __init__(self) -> None:
         self._next: int | None = None

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Entries and summaries as text for people and as JSON for programs."""
+"""Entries and summaries as text and as JSON."""
 
 from __future__ import annotations
 

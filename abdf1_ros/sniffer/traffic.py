@@ -210,7 +210,7 @@ class TrafficDecoder:
         return Entry(time, direction, kind, text, station)
 
     def _guess_duplex(self, before: Duplex, now: Duplex) -> None:
-        """Take the line for another kind, if it is one of this kind and nobody has said so."""
+        """Take the line for another kind, if it is one of this kind and no option has said so."""
         if self._finds_duplex and self.kind.duplex is before:
             self.kind.duplex = now
 

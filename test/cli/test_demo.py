@@ -66,8 +66,9 @@ class Told:
 @for_all(('end', 'status', 'text'), [
     (None, 0, 'demo: all 7 steps were seen as they should be'),
     (KeyboardInterrupt(), 0, 'demo: interrupted in step 3 of 7'),
-    (demo.Missed('waited 30 s in vain for values'), 1,
-     'demo: step 3 of 7 was not seen as it should be: waited 30 s in vain for values')])
+    (demo.Missed('waited 30 s for values, which did not come'), 1,
+     'demo: step 3 of 7 was not seen as it should be: waited 30 s for values, which did '
+     'not come')])
 def test_the_last_line_says_what_was_not_seen(
         monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str],
         end: BaseException | None, status: int, text: str) -> None:

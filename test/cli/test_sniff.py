@@ -411,7 +411,7 @@ def test_reader_that_leaves_does_not_cut_a_tap(tmp_path: Path, way: str, goes_on
             assert sniff.process.wait(PATIENCE) == 0
             return
         assert sniff.line(sniff.process.stderr) == (
-            'sniff: nobody reads this any more; the bytes are passed on until Ctrl-C')
+            'sniff: this output is no longer read; the bytes are passed on until Ctrl-C')
         sniff.process.send_signal(signal.SIGINT)
         assert sniff.process.wait(PATIENCE) == 0
 

@@ -63,7 +63,7 @@ def test_silence_that_was_told_quickly_costs_what_it_took() -> None:
     assert probes.next == pytest.approx(1.14)  # kept for a message
 
 
-def test_where_nobody_waits_nobody_is_put_off() -> None:
+def test_where_none_waits_nobody_is_put_off() -> None:
     stations = ActiveStationList((1, 2), probe_time=1.0)
     stations.lost(1, 0.0)
     stations.tried(1, 0.0, 1.0, was_silent=False)

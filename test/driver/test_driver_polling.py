@@ -166,7 +166,7 @@ def test_broadcast_row_is_written_to_every_station(polling: str) -> None:
     bench.write(everybody, [7], run=0.5)
     result, = bench.listener.results
     assert result.outcome is Outcome.BROADCAST
-    assert str(result) == 'sent to all stations; nobody confirms a broadcast'
+    assert str(result) == 'sent to all stations; no station confirms a broadcast'
     assert [stored(plc, 'N7:0') for plc in plcs] == [b'\7\0'] * 2
     assert bench.listener.values(read)[-1] == [7]
     assert [station.number for station in bench.driver.stations] == [1]

@@ -1230,7 +1230,7 @@ def test_rule_13_answer_about_the_mode_is_no_older_than_the_stale_time() -> None
     guard.told(running, 10.0)
     begun = 'it has begun to run during this read'
     assert [why_not(10.0, 10.5), why_not(10.5, 13.0)] == [begun, '']
-    assert why_not(13.0, 13.5) == 'it has not told its mode for 3.5 s'
+    assert why_not(13.0, 13.5) == 'it has not reported its mode for 3.5 s'
     guard.told(running, 13.5)  # nobody knows what it did in between
     assert [why_not(13.5, 13.6), why_not(13.6, 13.6)] == [begun, '']
     guard.told(replace(running, faults=('bad RAM',)), 14.0)

@@ -185,7 +185,7 @@ def test_every_mapping_of_the_topic_has_to_be_written(answered: Answered) -> Non
     ('not written: the PLC refused it: STS 10', 1),
     ('only partly written: ...', 3),
     ('unknown whether written: ...', 3),
-    ('sent to all stations; nobody confirms a broadcast', 3),
+    ('sent to all stations; no station confirms a broadcast', 3),
 ])
 def test_text_of_a_result_decides_the_exit_status(message: str, status: int) -> None:
     assert runpy.run_path(str(EXAMPLE))['judge'](message) == status

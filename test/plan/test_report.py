@@ -307,7 +307,7 @@ def test_rule_20_what_nothing_protects_is_one_note() -> None:
     assert note == (
         'nothing protects: 4 of 5 written rows, without Fallback: lamp, bit, word and 1 more; '
         'heartbeats that count whoever publishes, without Requires: bare; Requires_Timeout over '
-        '10 s: slow; topics of Serve rows without Period, which nobody misses when the PLC stops: '
+        '10 s: slow; topics of Serve rows without Period, so a PLC that stops is not noticed: '
         'silent')
 
 

@@ -561,7 +561,7 @@ def test_bit_of_the_plc_confirms_control_while_it_is_fresh_and_1(
     assert station(1, NOW + 1) == (OK, 'in control since 0.0 s')
     assert station(1, NOW + 2.5) == (OK, 'in control since 1.5 s')
     assert station(0, NOW + 3) == (
-        WARN, 'not in control: the heartbeat counts, but ruled is 0: somebody has to press reset '
+        WARN, 'not in control: the heartbeat counts, but ruled is 0: a person has to press reset '
         '(docs/tutorials/heartbeats.md)')
     assert bench.says('interlocks', NOW + 3)[1] == (
         'WARN: 1 of 1 heartbeats count; alive: the PLC does not confirm that ROS is in control')

@@ -376,7 +376,7 @@ def test_rule_22_status_says_whether_ros_is_in_control_and_what_is_missing(cell:
     cell.map.write_text('\n'.join(rows), encoding='utf-8')
     assert cell.call(Trigger, 'reload', Trigger.Request()).success
     until_status(cell.diagnostics, 'interlocks', WARN,
-                 lambda status: 'ruled is 0: somebody has to press reset' in
+                 lambda status: 'ruled is 0: a person has to press reset' in
                  details(status)['station 1'])
 
     def is_in_control() -> bool:

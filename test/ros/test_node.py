@@ -577,7 +577,7 @@ def test_end_of_another_type_on_a_topic_is_told(
         observer.until(is_told, 'a line of the log')
     (line,) = [line for line in said[0].splitlines() if 'std_msgs/msg/Bool' in line]
     assert line.startswith('[WARN] ')
-    assert '/abdf1/read/speed is std_msgs/msg/Int16MultiArray; somebody uses it as' in line
+    assert '/abdf1/read/speed is std_msgs/msg/Int16MultiArray; a node uses it as' in line
 
 
 def test_plc_of_another_family_than_the_map_says_is_named_in_log_and_diagnostics(

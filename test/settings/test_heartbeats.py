@@ -192,7 +192,7 @@ def test_rule_12_write_and_serve_rows_take_a_fallback(
      'write a Write row and a Read row'),
     ({'Command': 'Read', 'Fallback': '0', 'Fallback_After': '500'}, 'a Read row has no Fallback'),
     ({'Address': 'ST9:0', 'Fallback': '0', 'Fallback_After': '500'}, 'a string has no Fallback'),
-    ({'Station': '255', 'Fallback': '0', 'Fallback_After': '500'}, 'nobody confirms')])
+    ({'Station': '255', 'Fallback': '0', 'Fallback_After': '500'}, 'no station confirms')])
 def test_rule_12_what_a_fallback_cannot_be(cells: dict[str, str], text: str) -> None:
     assert text in fault(**WRITE | cells)
 
@@ -300,7 +300,7 @@ def test_rule_21_no_bit_that_we_write_confirms(ours: dict[str, str]) -> None:
     rows = {entry['Tag']: row(**entry) for entry in (BIT, BEAT, WRITE, ours)}
     assert faults(*rows.values()) == [
         f'2:24 (Confirms): Item: 1, "beat" cannot be confirmed by B12:0/2, which {ours["Tag"]} '
-        'writes: nobody vouches for himself; name a bit that the program of the PLC sets']
+        'writes: no heartbeat confirms itself; name a bit that the program of the PLC sets']
 
 
 def test_rule_22_a_heartbeat_is_confirmed_once() -> None:

@@ -39,7 +39,7 @@ _COLUMNS = ('state', 5, 'state'), ('load', 5, 'line load'), ('cycle', 8, 'poll c
 
 @dataclass(frozen=True, slots=True)
 class LineState:
-    """What a bridge has told of itself last, at the clock value ``told`` (s)."""
+    """What a bridge has said of itself last, at the clock value ``told`` (s)."""
 
     name: str
     told: float

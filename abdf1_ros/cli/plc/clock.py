@@ -65,7 +65,7 @@ class Clock:
 
 
 def told(time: datetime, ahead: timedelta) -> str:
-    """Return a time and its drift for people."""
+    """Return a time and its drift as text."""
     seconds = round(ahead.total_seconds())
     if abs(seconds) <= 1:
         return f'{time}, as this computer'

@@ -84,7 +84,7 @@ def main(args: Sequence[str] | None = None) -> int:
     """Carry out one command; the exit statuses are those of --help."""
     prepare_output()
     options = make_parser(__doc__).parse_args(args)
-    # Where nobody reads what a write says, nothing has been written.
+    # Where what a write says is not read, nothing has been written.
     return run_command('plc', lambda: _COMMANDS[options.command](options), EXIT_INTERRUPTED,
                        EXIT_USAGE if options.command == 'write' else 0)
 
@@ -505,7 +505,7 @@ def _files(options: argparse.Namespace) -> int:
 
 def _family(options: argparse.Namespace,
             session: Session) -> tuple[PlcType, Processor | None]:
-    """Return family and processor of the station, which is asked where nobody has said it."""
+    """Return family and processor of the station, which is asked where no option says it."""
     if options.plc_type:
         return PlcType(options.plc_type), None
     return data.ask_family(session, options.station)

@@ -123,7 +123,7 @@ def ask_family(session: Session, station: int) -> tuple[PlcType, Processor | Non
     """
     Return family and processor of a station, as it says itself.
 
-    Raises LinkError, RemoteError, or FormatError where that cannot be told.
+    Raises LinkError, RemoteError, or FormatError where that is unknown.
     """
     identity = session.ask(station, steps.identify())
     if identity.plc_type is None:
@@ -155,7 +155,7 @@ class Writing:
 
     @property
     def value(self) -> str:
-        """Return what is to be written, for people."""
+        """Return what is to be written, as text."""
         return self._write.value
 
     def carry_out(self, session: Session) -> WriteResult:

@@ -17,7 +17,7 @@ Maps made of what other programs export: symbols of RSLogix 500 and 5, tags of K
 
 KEPServerEX writes a header and a row for each tag. RSLogix writes no header: address, scope,
 symbol, then up to five lines of description. A row that cannot become a mapping stays in the
-map as a comment, and is told with its line.
+map as a comment, and is named with its line.
 """
 
 from __future__ import annotations

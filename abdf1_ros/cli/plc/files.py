@@ -33,7 +33,7 @@ from abdf1_ros.settings.mapping import Mapping
 _DRAFT_PERIOD = 5000
 
 USUAL_NUMBERS = tuple(range(32))
-"""What is looked for one by one where nobody says what."""
+"""What is looked for one by one where no option says what."""
 
 
 def find_files(session: Session, station: int, plc_type: PlcType, processor: Processor | None,

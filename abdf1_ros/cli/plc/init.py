@@ -36,7 +36,7 @@ _HEAD = """\
 # One row a mapping: a PLC address that becomes a topic. A row that begins with # is not used:
 # take the # away, and write the address and tag that you need.
 # Command is Read, Write, ReadWrite, Serve or Heartbeat. With Fallback or Heartbeat take shorter
-# times in net.csv, or it takes long until somebody notices: Timeout 100, Cmd_Timeout 500,
+# times in net.csv, or it takes long until a failure is noticed: Timeout 100, Cmd_Timeout 500,
 # NAK_Retries 1, ENQ_Retries 1. "check" says how long, and what the timers of the PLC need.
 Tag,Command,Address,Station,PLC_Type,Processor,Length,Period,Publish_While,Fallback,Fallback_After
 """

@@ -28,7 +28,7 @@ from abdf1_ros.settings.network import load_network, make_network, Network
 # A Timeout of 1000 ms, the default of a net CSV, is long for a person who waits.
 DEFAULTS = Network(timeout=300)
 
-# PLCs mostly have small numbers, and 1 is asked where nobody says which.
+# PLCs mostly have small numbers, and 1 is asked where no option says which.
 _FIRST_SPARE = 10
 
 MODES = {Duplex.HALF.name.lower(): 'Master', Duplex.FULL.name.lower(): 'Peer',

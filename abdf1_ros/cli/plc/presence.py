@@ -57,7 +57,7 @@ class Presence:
     takes_commands: bool
 
     def __str__(self) -> str:
-        """Return one line for people."""
+        """Return one line of text."""
         return str(self.identity or f'answers, but not who it is: {self.error}')
 
 
@@ -144,7 +144,7 @@ def describe(presence: Presence) -> list[str]:
 
 
 def hint(session: Session, error: Abdf1Error) -> str:
-    """Return what to look at after an error, where that can be told."""
+    """Return what to look at after an error, where that is known."""
     if not isinstance(error, LinkError) or isinstance(error, PortLost):
         return ''
     if session.echoes:

@@ -13,7 +13,7 @@
 # limitations under the License.
 
 """
-Fallback values: what is written when nobody writes any more (rules 7 to 12 and 17).
+Fallback values: what is written when messages no longer come (rules 7 to 12 and 17).
 
 The numbers of rules are those of docs/heartbeats.md.
 """
@@ -90,7 +90,7 @@ class FallbackRow:
         self._due_since = 0.0
         self._next_try = -math.inf
         self._again_at = math.inf  # once more, after what a gateway may hold (rule 10)
-        self.refresh_at = math.inf  # for what nobody has seen (rule 8)
+        self.refresh_at = math.inf  # for what was not seen (rule 8)
 
     @property
     def stands(self) -> bool:
@@ -98,7 +98,7 @@ class FallbackRow:
         return self.state is FallbackState.STANDS
 
     def make_due(self, cause: FallbackCause, now: float) -> None:
-        """Make the fallback due at once; the first cause is the one that is told."""
+        """Make the fallback due at once; the first cause is the one that is reported."""
         if self.cause is None:
             self.cause, self._due_since = cause, now
         self._due_since = min(self._due_since, now)  # a message may have put it off

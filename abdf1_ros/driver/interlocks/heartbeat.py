@@ -229,7 +229,7 @@ class HeartbeatRow:
 
     def read_back(self, value: int, started: float, now: float) -> str:
         """
-        Compare a value that was read from ``started`` on; return what is told of another's.
+        Compare a value that was read from ``started`` on; return what is reported of another's.
 
         Only between the confirmation of ours and the next count one knows what it has to be. The
         first is taken for a download, a second one for another writer: 0 then stays, unless a

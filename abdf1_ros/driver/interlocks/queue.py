@@ -288,7 +288,7 @@ class Interlocks(WriteListener):
             self._plan_refresh(row, now)
 
     def write_expired(self, write: Write) -> None:
-        """Take note that a message was too old to have the line: nobody waits for it any more."""
+        """Take note that a message was too old to have the line: it is no longer waited for."""
         row = self._by_mapping.get(write.mapping)
         if row is not None:
             self._look_again(row)
@@ -310,7 +310,7 @@ class Interlocks(WriteListener):
         """Return what has to be written next, None for nothing."""
         self.expire(now)
         if self._are_all_due:  # there is no later for silent PLCs
-            self._stations.probes.nobody_waits(now)
+            self._stations.probes.none_waits(now)
         if now < self._due:
             return None
         best: tuple[TurnRank, _Plc, OwnRow] | None = None
@@ -330,7 +330,7 @@ class Interlocks(WriteListener):
         due = [row for row in plc.fallbacks
                if row.due <= now and row.judge(now, youngest.get(row.mapping, -math.inf))]
         held_up = [row for row in due if not self._record.may_begin(row.mapping)]
-        for row in held_up:  # by a write that is under way (rule 9), whose end is told
+        for row in held_up:  # by a write that is under way (rule 9), whose end is reported
             row.due = math.inf
         self._held_up += held_up
         why = self._why_held(plc) if plc.heartbeats else ''

@@ -64,7 +64,7 @@ class RunGuard(Guard):
         if since == math.inf:
             return f'not in RUN: {self._state}'
         if now - self._told > point.patience:
-            return f'it has not told its mode for {now - self._told:.1f} s'
+            return f'it has not reported its mode for {now - self._told:.1f} s'
         return '' if started > since else 'it has begun to run during this read'
 
 
@@ -119,7 +119,7 @@ class Guards:
         return {station: guard.status_period for station, guard in self._runs.items()}
 
     def mode_told(self, station: int, identity: Identity | None, asked: float) -> None:
-        """Take what a station has told about itself; it was ``asked`` at this clock value (s)."""
+        """Take what a station has reported of itself; it was ``asked`` at this clock value (s)."""
         if station in self._runs:
             self._runs[station].told(identity, asked)
 

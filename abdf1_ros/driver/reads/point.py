@@ -105,9 +105,9 @@ class ReadPoint:
 
     def withhold(self, reason: str, now: float) -> bool:
         """
-        Take note that a value is not published; return whether that is to be told, once a cause.
+        Take note that a value is not published; return whether to report that, once a cause.
 
-        At the start nothing holds; that is told when it has had its time to begin.
+        At the start nothing holds; that is reported when it has had its time to begin.
         """
         if not self.withheld:
             self.withheld_since, self._is_told = now, False
@@ -123,7 +123,7 @@ class ReadPoint:
 
     @property
     def is_withheld(self) -> bool:
-        """Tell whether its values are read and not published, and that has been told."""
+        """Tell whether its values are read and not published, and that has been reported."""
         return bool(self.withheld) and self._is_told and self.error is None
 
     def is_due(self, now: float, block_period: float) -> bool:
@@ -158,7 +158,7 @@ class Guard:
     """
     One condition of a station, and the ``points`` whose values may be published while it holds.
 
-    ``withheld`` are those of them that are withheld, which has been told.
+    ``withheld`` are those of them that are withheld, which has been reported.
     """
 
     def __init__(self) -> None:

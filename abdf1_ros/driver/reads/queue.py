@@ -57,7 +57,7 @@ class ReadJob(Job):
     ``late`` was ``Machine.late`` then; its last packet was ``asked`` for. All packets of a read
     have to come within ``longest_read`` seconds. ``is_under_way`` tells that there are packets
     already, and more to come, ``is_to_repeat`` that the last read was dropped. ``ticket`` is the
-    number of its valid entry in the queue. ``take`` is told of the end of each packet.
+    number of its valid entry in the queue. ``take`` is called at the end of each packet.
     """
 
     def __init__(self, block: Block, points: Sequence[ReadPoint], line: LineTime,

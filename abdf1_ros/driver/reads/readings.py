@@ -62,7 +62,7 @@ class Readings:
     """
     The ``points`` of all rows that are published, and the ``reads`` that serve them.
 
-    ``listener`` is told. ``read_backs`` compares what was read with unconfirmed writes,
+    ``listener`` is notified. ``read_backs`` compares what was read with unconfirmed writes,
     ``read_back`` with heartbeats.
     """
 
@@ -143,7 +143,7 @@ class Readings:
             self._change(self._refusals.read_again(job.block, self.blocks))
 
     def _withhold(self, point: ReadPoint, guard: Guard, reason: str) -> None:
-        """Withhold a value; told once for all rows that depend on the same (rule 15)."""
+        """Withhold a value; reported once for all rows that depend on the same (rule 15)."""
         is_first = not guard.withheld
         if point.withhold(reason, self._line.now) and is_first:
             count = len(guard.points)
@@ -151,7 +151,7 @@ class Readings:
             self._listener.unreadable(point.mapping, f'withheld: {reason}{more}')
 
     def _release(self, point: ReadPoint, guard: Guard, words: bytes) -> None:
-        """Update a point whose values were withheld; told with the last of the guard."""
+        """Update a point whose values were withheld; reported with the last of the guard."""
         self._update(point, words)
         if not guard.withheld:
             self._listener.published_again(

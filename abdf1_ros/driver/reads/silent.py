@@ -36,7 +36,7 @@ class Reads(WriteListener):
         self._stations = stations
         self._due = ReadQueue()
         self._aside: dict[int, deque[ReadJob]] = {}
-        self._put_off = 0.0  # until when, as nobody replies (clock value, s)
+        self._put_off = 0.0  # until when, as no station replies (clock value, s)
 
     @property
     def jobs(self) -> frozenset[ReadJob]:
@@ -94,7 +94,7 @@ class Reads(WriteListener):
     def _probe(self, now: float, busy: Container[int]) -> ReadJob | None:
         """Return the next read of a silent station, None while no probe may be sent."""
         for number in list(self._aside):
-            if self._stations[number].replies_in_time:  # to a write, or to somebody else
+            if self._stations[number].replies_in_time:  # to a write, or to a guest
                 self.release(number, now)
         if now < self._next_probe():
             return None

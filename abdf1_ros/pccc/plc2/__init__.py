@@ -28,7 +28,7 @@ from abdf1_ros.pccc.status import Meanings
 # What STS mean that a PLC-2's module sends (M 8-5).
 MEANINGS = Meanings(sts={
     0x20: 'the PLC has found errors when it verified a command',
-    0x30: 'somebody has to look after the PLC: switch, cable or fault',
+    0x30: 'the PLC needs attention: switch, cable or fault',
     0x40: 'error between module and PLC',
     0x50: 'address outside the data table or the window, or no compatibility file',
     0x60: 'function disabled by a switch of the module',

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The commands of a PLC-2, told to people."""
+"""The commands of a PLC-2, in words."""
 
 from __future__ import annotations
 

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The typed commands of a PLC-5, told to people."""
+"""The typed commands of a PLC-5, in words."""
 
 from __future__ import annotations
 

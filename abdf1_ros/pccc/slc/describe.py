@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The commands of an SLC 500 or MicroLogix, told to people."""
+"""The commands of an SLC 500 or MicroLogix, in words."""
 
 from __future__ import annotations
 

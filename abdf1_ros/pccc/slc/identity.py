@@ -103,7 +103,7 @@ ML1000_COUNTERS = CounterLayout((
 
 MAJOR_ERROR_HALTED = 0x20  # byte 20
 _ALWAYS_SET = 0x20  # byte 19 of a MicroLogix
-_NO_OWNER = 0xFC  # byte 24: nobody owns the program
+_NO_OWNER = 0xFC  # byte 24: the program has no owner
 _MINOR_ERROR_LEFT = 0x0020  # the major error of an emulated processor
 
 

@@ -142,7 +142,7 @@ class LineEvents:
         """Publish the Active Node Table and log the change."""
         self._table_changed()
         if station.takes_no_commands:
-            return  # it comes and goes, and that is told once
+            return  # it comes and goes, and that is reported once
         self._log.forget(station.number)
         about = f'station {station.number}'
         if station.active:

@@ -31,7 +31,7 @@ from typing import Protocol
 from abdf1_ros.ros.diagnostics.log import INFO, News, WARN
 from abdf1_ros.settings.mapping import Mapping
 
-# s; a node of our name is to be told before it has taken many of our messages.
+# s; a node of our name is to be reported before it has taken many of our messages.
 _NAMES_PERIOD = 0.25
 
 # Between two looks at topics (s): at least, and as a multiple of the processor time of one.
@@ -83,7 +83,7 @@ class NameWatch:
     """
     Find out when another node has our name, so that topics and services of both are one.
 
-    ``count`` tells how many nodes of the name there are; ours is one of them. It is told as soon
+    ``count`` tells how many nodes of the name there are; ours is one of them. That is said as soon
     as it is seen, before it is known whether it is an earlier run: both may take the next command.
     """
 
@@ -141,5 +141,5 @@ class TypeWatch:
                  for kind in clashes[topic] if kind != self._own[topic]}
         news, self._told = found - self._told, found
         return [News(WARN, 'types of topics', (
-            f'{topic} is {self._own[topic]}; somebody uses it as {kind}, and DDS connects '
+            f'{topic} is {self._own[topic]}; a node uses it as {kind}, and DDS connects '
             'different types to nothing')) for topic, kind in sorted(news)]

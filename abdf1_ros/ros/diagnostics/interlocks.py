@@ -46,7 +46,7 @@ class _Control(IntEnum):
 
 
 class InterlockStatus:
-    """What is told of the heartbeats and fallbacks of a driver; asked ten times a second."""
+    """What is said of the heartbeats and fallbacks of a driver; asked ten times a second."""
 
     name = 'interlocks'
 
@@ -117,7 +117,7 @@ class InterlockStatus:
         if not bit[0]:
             return _Control.NOT_IN_CONTROL, (
                 f'not in control: the heartbeat counts, but {tag} is 0: '
-                'somebody has to press reset (docs/tutorials/heartbeats.md)')
+                'a person has to press reset (docs/tutorials/heartbeats.md)')
         if fault := processor_fault(self._checks.known(point.mapping.station).identity):
             return _Control.NOT_IN_CONTROL, f'not in control: {tag} is 1, but the PLC is {fault}'
         return _Control.IN_CONTROL, ''

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""How fast a line works, in figures for people."""
+"""How fast a line works, in figures."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ from abdf1_ros.ros.diagnostics.stations import wrong_type
 from abdf1_ros.settings.mapping import Mapping
 from abdf1_ros.text import milliseconds
 
-# For so long (s) another node with our number is told after its last packet.
+# For so long (s) another node with our number is reported after its last packet.
 _SAME_NUMBER_TOLD = 60.0
 
 # A station that takes no commands and has not been heard for so long (s) is silent.
@@ -68,7 +68,7 @@ class LineView:
         told = driver.link.status().same_number
         if told is not None and now - told < _SAME_NUMBER_TOLD:
             return (f'another node on the air has our number, {driver.network.station}: its '
-                    'replies and ours cannot be told apart; give each node its own Station')
+                    'replies and ours cannot be distinguished; give each node its own Station')
         # By radio a node that sends on gives our packets back.
         duplex = driver.network.duplex
         nobody_answers = not any(station.active for station in driver.stations)

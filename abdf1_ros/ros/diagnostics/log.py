@@ -51,11 +51,11 @@ MOST_CAUSES = 1000
 MOST_ENTRIES = 10
 _MINUTE = 60.0
 
-# Rows of a file that fail one after the other are told together after a pause of so many seconds.
+# Rows of a file that fail one after the other are logged together after so many seconds.
 _PAUSE = 1.0
 _LONGEST = 10.0
 
-# So many wait to be told at most; what is in none of them is in /diagnostics.
+# So many wait to be reported at most; what is in none of them is in /diagnostics.
 _MOST_ROWS = 10_000
 
 # Events of every transaction, and those that come with another event that is logged.

@@ -24,7 +24,7 @@ from abdf1_ros.ros.diagnostics.status import ERROR, Judgement, OK, Seen, WARN, w
 
 
 class StationStatus:
-    """Whether a station answers, and what it has told about itself."""
+    """Whether a station answers, and what it has reported of itself."""
 
     def __init__(self, line: LineView, station: Station, port: str, seen: Seen) -> None:
         self.name = f'station {station.number}'

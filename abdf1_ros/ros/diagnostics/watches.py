@@ -38,7 +38,7 @@ class Watch(Protocol):
 
 
 class Standing:
-    """What is wrong as long as ``find`` returns it, and is told when it begins."""
+    """What is wrong as long as ``find`` returns it, and is reported when it begins."""
 
     def __init__(self, severity: LoggingSeverity, about: str,
                  find: Callable[[float], Sequence[str]]) -> None:
@@ -55,7 +55,7 @@ class Standing:
 
 
 class DeafStations:
-    """Stations that take no commands: each is told once, and once that it does again."""
+    """Stations that take no commands: each is reported once, and once that it does again."""
 
     def __init__(self, line: LineView) -> None:
         self._line = line
@@ -83,7 +83,7 @@ class ChangedFiles:
         self._next_look = 0.0
 
     def texts(self, now: float) -> list[str]:
-        """Look every now and then; return what is to be told of all of them."""
+        """Look every now and then; return what is to be reported of all of them."""
         if now >= self._next_look:
             self._next_look = now + _FILE_PERIOD
             self._seen.changed_files = self._changed()

@@ -69,7 +69,7 @@ class Parameters:
         0, MAX_PERIOD)
     diagnostics_period: float = _parameter(1.0, 's between diagnostics', 0.1, 60.0)
     snapshot_period: float = _parameter(
-        1.0, 's between snapshots of all values, while somebody subscribes; 0: never', 0.0, 3600.0)
+        1.0, 's between snapshots of all values, while subscribed to; 0: never', 0.0, 3600.0)
     stale_after: float = _parameter(
         3.0, 'periods after which a value counts as lost', 1.0, 1000.0)
     processor_period: float = _parameter(
@@ -176,7 +176,7 @@ def take_given(node: Node) -> Given:
     Return what the user has set, by name, and leave it to be declared.
 
     The node is to be made with ``automatically_declare_parameters_from_overrides``: otherwise
-    rclpy drops in silence what nobody declares.
+    rclpy drops in silence what is not declared.
     """
     declared: Any = node.get_parameters_by_prefix('')
     given = {name: parameter.value for name, parameter in declared.items()

@@ -80,7 +80,7 @@ class ShownFiles:
     """
     The parameters ``net.*`` and ``map.*`` of a node.
 
-    Nobody else can set them. They are not read-only for rclpy, which would never undeclare them.
+    Others cannot set them. They are not read-only for rclpy, which would never undeclare them.
     """
 
     def __init__(self, node: Node) -> None:

@@ -85,7 +85,7 @@ def read_qos(mapping: Mapping, stale_time: float) -> QoSProfile:
     Return the QoS of a read topic.
 
     A late subscriber gets the last value, but never one older than ``stale_time`` seconds. A
-    subscriber with deadline or liveliness QoS is told after that time that values have stopped.
+    subscriber with deadline or liveliness QoS gets an event that values have stopped.
     A topic that is published on change only, or when a PLC writes, cannot promise this.
     """
     profile = latched_qos()

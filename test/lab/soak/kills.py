@@ -158,7 +158,7 @@ class Cell:
         end = time.monotonic() + seconds
         while not condition():
             if time.monotonic() > end:
-                raise SystemExit(f'kills: waited {seconds:g} s in vain for {what}')
+                raise SystemExit(f'kills: waited {seconds:g} s for {what}, which did not come')
             self.plc.advance()
             time.sleep(0.005)
 
