@@ -15,24 +15,15 @@
 """Heartbeats, fallback values and guarded reads of a real node; named by the rules they show."""
 
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
-from itertools import groupby
 from pathlib import Path
 import signal
 import time
 from typing import Any
 
 from abdf1_ros import testing
-from abdf1_ros.df1.checksum import Checksum
 from abdf1_ros.df1.echo import COMES_BACK
-from abdf1_ros.df1.machine import Machine
-from abdf1_ros.df1.slave import multidrop
-from abdf1_ros.pccc.address import Address
-from abdf1_ros.ports.endpoints import PtyEndpoint
-from abdf1_ros.ports.link_thread import LinkThread
 from abdf1_ros.ros.bridge import BridgeNode
 from abdf1_ros.simulator.ladder import Lamp
-from abdf1_ros.simulator.simulated_plc import SimulatedPlc
 import pytest
 from std_msgs.msg import Int16MultiArray
 from std_srvs.srv import SetBool, Trigger
@@ -134,26 +125,6 @@ def fallbacks(results: Inbox) -> list[str]:
     """Return the causes of the fallback values that have been told."""
     return [result.message.partition(': ')[2] for result in results
             if result.message.startswith('fallback value written')]
-
-
-def test_rule_2_fallback_at_the_start_goes_before_the_count(
-        tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    made = Cell(tmp_path)
-    table = made.plcs[1].table
-    write, written = table.write, []
-
-    def record(address: Address, data: bytes) -> None:
-        written.append((address.offset, int.from_bytes(data, 'little')))
-        write(address, data)
-
-    monkeypatch.setattr(table, 'write', record)
-    with made as cell:
-        cell.until_counting()
-        assert cell.word('N10:1') == 7
-        cell.until(lambda: fallbacks(cell.results)[:1] == ['start'], 'its result')
-    once = [change for change, _ in groupby(written)]  # a busy host may need a second attempt
-    assert once[:2] == [(0, 0), (1, 7)]
-    assert once[2][0] == 0 < once[2][1]
 
 
 def test_rule_3_heartbeat_stands_still_with_the_executor(cell: Cell) -> None:
@@ -314,56 +285,6 @@ def test_rule_21_an_echo_is_no_plc(tmp_path: Path) -> None:
             node.end()
     assert [list(inbox) for inbox in heard] == [[], [], [], []]
     assert not any('written' in result.message.split(':')[0].split()[:1] for result in results)
-
-
-@contextmanager
-def second_port(cell: Cell, folder: Path) -> Iterator[str]:
-    """Give the PLC of a cell another port; yield its name."""
-    first = cell.plcs[1]
-    plc = SimulatedPlc(1, first.table, Checksum.CRC, time.monotonic)
-    plc.advance = first.advance  # type: ignore[method-assign]
-    plc.processor = first.processor
-    line = PtyEndpoint(str(folder / 'second'))
-    link = LinkThread(Machine(multidrop([plc]), checksum=Checksum.CRC), line.open)
-    link.start()
-    try:
-        yield line.name
-    finally:
-        link.stop()
-        line.close()
-
-
-def test_rule_19_second_bridge_takes_control_away_and_does_not_keep_it_alive(
-        tmp_path: Path) -> None:
-    rows = write_csv(tmp_path / 'second.csv', 'Tag,Command,Address,Station,PLC_Type,Period',
-                     ['mine,Heartbeat,N10:0,1,SLC,300'])
-    with Cell(tmp_path) as cell, second_port(cell, tmp_path) as port:
-        plc = cell.plcs[1]
-        ladder = PageLadder(plc.table, 150)
-        plc.run_ladder(ladder)
-        speed = cell.ros.publisher(Int16MultiArray, '/abdf1/write/speed')
-        cell.ros.node.create_timer(0.1, lambda: speed.publish(
-            Int16MultiArray(data=[800 * ladder.is_on(Lamp.IN_CONTROL)])))
-
-        def is_in_control() -> bool:
-            ladder.press_reset()
-            plc.advance()
-            return ladder.is_on(Lamp.IN_CONTROL)
-
-        # On a busy host control may be lost once more, and be taken again.
-        cell.until(lambda: is_in_control() and cell.word('N11:2') == 800, 'control, and the speed')
-        arguments = ros_args(f'net_file:={tmp_path / "net.csv"}', f'map_file:={rows}',
-                             f'port:={port}')
-        with Process('node', *arguments, '-r', '__node:=second') as other:
-            other.wait_for('[ERROR]', 'another program writes this word')
-            until_status(cell.diagnostics, 'interlocks', ERROR,
-                         lambda status: 'another program' in details(status)['station 1'])
-            other.send(signal.SIGKILL)
-        enough = time.monotonic() + 4.0  # a least time, so by the clock
-        cell.until(lambda: is_in_control() or time.monotonic() > enough, 'time')
-        assert (cell.word('N10:0'), cell.word('N11:2'), is_in_control()) == (0, 0, False)
-        assert cell.call(Trigger, 'reload', Trigger.Request()).success
-        cell.until(is_in_control, 'control by a bridge that is alone')
 
 
 def test_rule_22_status_says_whether_ros_is_in_control_and_what_is_missing(cell: Cell) -> None:

@@ -40,7 +40,6 @@ from rclpy.node import Node
 from rclpy.publisher import Publisher
 from std_msgs.msg import (  # noqa: I101
     Bool,
-    Float32MultiArray,
     Int16MultiArray,
     MultiArrayDimension,
     MultiArrayLayout,
@@ -48,12 +47,10 @@ from std_msgs.msg import (  # noqa: I101
     UInt16MultiArray,
 )
 from std_srvs.srv import SetBool, Trigger
-from support.ptys import wait_until
 from support.ros import (
     details,
     ERROR,
     EXAMPLE_FILES,
-    find_status,
     Inbox,
     Observer,
     OK,
@@ -74,7 +71,6 @@ SPEED = 'speed,Read,N7:0,1,PLC5,2,'
 LAMPS = ('lamp_a,Write,B3:0/1,1,PLC5,2,lamps', 'lamp_b,Write,B3:2/8,2,SLC,2,lamps')
 PULSES = 'pulses,Write,B3:1/0,1,PLC5,8,'
 RECIPE = 'recipe,Write,N7:4,1,PLC5,2,'
-LEVEL = 'level,Write,F8:0,1,PLC5,1,'
 
 
 class Bench:
@@ -167,18 +163,6 @@ PATIENT = ('write_timeout:=30.0', 'net.cmd_timeout:=5000')  # where a busy host 
 # One message, several results
 
 
-def test_one_topic_writes_to_every_mapping_of_it(make_bench: Benches) -> None:
-    bench = make_bench(*LAMPS)
-    bench.publisher(UInt8MultiArray, 'lamps')(1, 1)
-    results = {result.name: result for result in bench.until_results(2)}
-    assert {tag: result.message for tag, result in results.items()} == {
-        'lamp_a': 'written', 'lamp_b': 'written'}
-    assert details(results['lamp_a'])['address'] == 'B3:0/1'
-    assert details(results['lamp_b'])['station'] == '2'
-    assert bench.words('B3:0') == [0b110]
-    assert bench.words('B3:2', station=2) == [0x300]
-
-
 def test_each_mapping_of_a_topic_has_a_result_of_its_own(make_bench: Benches) -> None:
     bench = make_bench(*LAMPS)
     bench.plcs.say('error 2 60')
@@ -189,14 +173,6 @@ def test_each_mapping_of_a_topic_has_a_result_of_its_own(make_bench: Benches) ->
     assert results['lamp_b'].message.startswith('not written: the PLC refused it: STS 60: ')
     assert bench.words('B3:0') == [0b010]
     assert bench.words('B3:2', station=2) == [0]
-
-
-def test_unfit_message_is_refused_for_every_mapping(make_bench: Benches) -> None:
-    bench = make_bench(*LAMPS)
-    bench.publisher(UInt8MultiArray, 'lamps')(1, 0, 1)
-    results = bench.until_results(2)
-    assert sorted(result.name for result in results) == ['lamp_a', 'lamp_b']
-    assert messages(results) == {'not written: refused: 3 values, the mapping has 2': 2}
 
 
 # Bursts
@@ -253,21 +229,6 @@ def test_waiting_words_are_superseded_by_newer_ones(make_bench: Benches) -> None
     last = [result for result in results if details(result)['value'] == '[99, -99]']
     assert [result.message for result in last] == ['written']
     assert bench.words('N7:4', 2) == [99, 0x10000 - 99]
-
-
-def test_floats_of_several_topics_do_not_supersede_each_other(make_bench: Benches) -> None:
-    bench = make_bench(RECIPE, LEVEL, parameters=PATIENT)
-    bench.plcs.say('slow 1 10')
-    recipe = bench.publisher(Int16MultiArray, 'recipe')
-    level = bench.publisher(Float32MultiArray, 'level')
-    for number in range(10):
-        recipe(number, number)
-        level(number / 4)
-    results = bench.until_results(20)
-    assert Counter(result.name for result in results) == {'recipe': 10, 'level': 10}
-    last = {result.name: details(result)['value'] for result in results
-            if result.message == 'written'}
-    assert last == {'recipe': '[9, 9]', 'level': '[2.25]'}
 
 
 # Writes that do not go well
@@ -334,43 +295,6 @@ def test_station_with_another_error_code_is_told_once(
         '2519 NTC_NAK_LIMIT_EXCEEDED': 3, '2509 ERR_INACTIVE_STATION': 2,
         'station 1 has never been heard': 1, 'station 1 answers again': 1,
         'station 1 answers polls': 1}
-
-
-def test_write_that_waits_too_long_for_the_line_is_not_sent(make_bench: Benches) -> None:
-    bench = make_bench(PULSES, parameters=(
-        'write_timeout:=1.0', 'processor_period:=0.0', 'net.cmd_timeout:=1500'))
-    publish = begin_writing(bench)
-    bench.plcs.say('slow 1 100000')  # the first one takes all of Cmd_Timeout
-    for bit in range(3):
-        publish(*(int(n == bit) for n in range(8)))
-    first, *others = sorted(  # the first one ends last: [1, 0, ...]
-        bench.until_results(3), key=lambda result: details(result)['value'], reverse=True)
-    assert first.message == ('unknown whether written: 2508 ERR_COMMAND_TIMEOUT: Command Timed '
-                             f'Out; {NOT_READ_BACK}')
-    assert messages(others) == {'not written: not sent: waited longer than 1 s for the line': 2}
-    assert float(details(others[0])['latency_ms']) >= 1000  # with one digit after the point
-    assert bench.words('B3:1') == [1]
-    bench.observer.until(lambda: bench.diagnostics and details(find_status(
-        bench.diagnostics[-1], 'station 1'))['last event'].startswith(
-            '2508 ERR_COMMAND_TIMEOUT: Command Timed Out'), 'the event in the diagnostics')
-
-
-def test_loss_of_the_port_leaves_no_write_without_a_result(make_bench: Benches) -> None:
-    bench = make_bench(PULSES, parameters=('processor_period:=0.0', 'net.cmd_timeout:=5000'))
-    publish = begin_writing(bench)
-    bench.plcs.say('slow 1 100000')
-    for _ in range(3):
-        publish(*8 * [1])
-    bench.observer.until(lambda: bench.node.writes_taken == 1 + 3, 'all writes')
-    wait_until(lambda: bench.words('B3:1') == [255])
-    bench.plcs.lose()
-    first, *others = bench.until_results(3)
-    assert first.message.startswith('unknown whether written: port lost: ')
-    assert len(others) == 2
-    assert all(result.message.startswith('not written: ') for result in others)
-    until_status(bench.diagnostics, 'link', ERROR)
-    publish(*8 * [0])
-    assert bench.until_results(4)[-1].message == 'not written: refused: the port is not open'
 
 
 def test_end_waits_until_results_and_diagnostics_have_arrived(

@@ -51,7 +51,6 @@ from support.simulator_process import (
     Files,
     make_files,
     MAP_HEADER,
-    MAP_ROWS,
     NET_HEADER,
     NET_ROW,
     STATUSES,
@@ -239,48 +238,6 @@ def test_faulty_parameter_ends_with_one_clear_line(files: Files, refusal: Refusa
     assert fatal(line) == (
         'parameter net.station: 2552 CRT_BAD_STATION_ID: Invalid station number (300) must be '
         'less than 255; Station = "300" should be a whole number from 0 to 254')
-
-
-def test_missing_files_end_with_one_clear_line_each(files: Files, refusal: Refusal) -> None:
-    lines = refusal(*ros_args('net_file:=/nowhere/net.csv', 'map_file:=map.csv'))
-    assert [fatal(line) for line in lines] == [
-        '/nowhere/net.csv: cannot be read: No such file or directory',
-        'map.csv: cannot be read: No such file or directory']
-
-
-def test_every_fault_of_the_net_file_is_told(files: Files, refusal: Refusal) -> None:
-    write_csv(files.net, 'Station,Mode,PLC_Type,Error_Code,NAK_Retries,ENQ_Retries,Cmd_Timeout,'
-                         'Baud', ['255,Client,PLC7,XOR,11,x,499,9601'])
-    lines = [fatal(line) for line in refusal(*files.args())]
-    assert [line.split('; ')[0] for line in lines] == [
-        f'{files.net}:2:1 (Station): 2552 CRT_BAD_STATION_ID: '
-        'Invalid station number (255) must be less than 255',
-        f'{files.net}:2:2 (Mode): 2553 CRT_BAD_DRIVER_MODE: '
-        'Invalid Driver Mode (Client), should be one of Master, Slave, Peer, or Radio',
-        f'{files.net}:2:3 (PLC_Type): 2555 CRT_BAD_PLC_TYPE: '
-        'Invalid or Unsupported PLC Type (PLC7) should be one of PLC2, PLC3, PLC5, SLC',
-        f'{files.net}:2:4 (Error_Code): 2556 CRT_BAD_ERROR_CODE: '
-        'Invalid Error Code (XOR), should be either BCC, or CRC',
-        f'{files.net}:2:5 (NAK_Retries): 2557 CRT_BAD_NAK_RETRIES: '
-        'Invalid NAK Retries (11) should be in range [0, 10]',
-        f'{files.net}:2:6 (ENQ_Retries): 2558 CRT_BAD_ENQ_RETRIES: '
-        'Invalid ENQ Retries (x) should be in range [0, 10]',
-        f'{files.net}:2:7 (Cmd_Timeout): 2559 CRT_BAD_CMD_TIMEOUT: '
-        'Invalid Cmd Timeout (499) should be in range [500, 5000]',
-        f'{files.net}:2:8 (Baud): Baud = "9601" should be one of 1200, 2400, 4800, 9600, 19200, '
-        '38400, 57600, 115200']
-
-
-BAD_ROWS = ('bad_station,Read,N7:0,255,SLC,,,,,,', 'bad_type,Read,N7:0,2,PLC9,,,,,,',
-            'bad_syntax,Read,N7-0,2,SLC,,,,,,', 'bad_range,Read,N7:250,2,SLC,20,,,,,')
-
-
-def test_strict_map_ends_with_every_bad_row(files: Files, refusal: Refusal) -> None:
-    write_csv(files.map, MAP_HEADER, [MAP_ROWS[0], *BAD_ROWS])
-    lines = [fatal(line) for line in refusal(*files.args('strict_map:=true'))]
-    assert [re.sub(r'^.*?: (\d{4} \w+: Item: \d).*', r'\1', line) for line in lines] == [
-        '2501 ERR_BAD_STATION: Item: 2', '2502 ERR_BAD_PLC_TYPE: Item: 3',
-        '2503 ERR_ADDRESS_SYNTAX: Item: 4', '2504 ERR_ADDRESS_RANGE: Item: 5']
 
 
 def test_malformed_arguments_end_with_one_clear_line(refusal: Refusal) -> None:

@@ -183,18 +183,18 @@ class LimitedLog:
         write(news.about, news.text)
 
     def info(self, about: str, text: str) -> None:
-        if self._may_write(about):
+        if self._take_entry(about):
             self._logger.info(self._line(about, text))
 
     def warning(self, about: str, text: str) -> None:
-        if self._may_write(about):
+        if self._take_entry(about):
             self._logger.warning(self._line(about, text))
 
     def error(self, about: str, text: str) -> None:
-        if self._may_write(about):
+        if self._take_entry(about):
             self._logger.error(self._line(about, text))
 
-    def _may_write(self, about: str) -> bool:
+    def _take_entry(self, about: str) -> bool:
         subject = self._subjects.setdefault(about, _Subject())
         now = self._clock()
         if subject.has_enough(now):

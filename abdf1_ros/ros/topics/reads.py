@@ -39,7 +39,7 @@ _VALUES_AT_ONCE = 4
 _MARGIN = 1.5
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class ReadTopic:
     """
     A publisher, and what it was made for.
@@ -88,9 +88,9 @@ class ReadTopics:
 
     def take_over(self) -> None:
         """Close the publishers that are not used any more, and make those that wait for it."""
-        kept = {id(topic) for topic in self._topics.values()}
+        kept = set(self._topics.values())
         for topic in self._published.values():
-            if id(topic) not in kept:
+            if topic not in kept:
                 self._node.destroy_publisher(topic.publisher)
         for mapping, point in self._to_come:
             topic = self._topics[mapping.topic] = self._topic(mapping, point, None)
