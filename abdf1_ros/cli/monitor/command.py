@@ -117,7 +117,6 @@ class _Screen:
         self._chosen = ''
         self.chosen = ''
         self._sections: dict[str, int] = {}
-        self._toggle: Callable[[], None] | None = None
         self._keys = keys
         self._colours: dict[Style, int] = {}
         window.nodelay(True)
@@ -128,10 +127,6 @@ class _Screen:
             for style, number in _COLOURS.items():
                 curses.init_pair(number, number, -1)
                 self._colours[style] = curses.color_pair(number)
-
-    def offer_toggle(self, toggle: Callable[[], None]) -> None:
-        """Let the key t call ``toggle``."""
-        self._toggle, self._keys = toggle, f't toggle  {self._keys}'
 
     @property
     def width(self) -> int:
@@ -161,22 +156,6 @@ class _Screen:
         with suppress(curses.error):  # a window just made smaller
             self._window.addnstr(
                 self._window.getmaxyx()[0] - 1, 0, text, self.width, curses.A_REVERSE)
-
-    def ask(self, question: str) -> str:
-        """Return what is typed after a question on the last line; empty for Escape or Ctrl-C."""
-        self._window.move(self._window.getmaxyx()[0] - 1, 0)
-        self._window.clrtoeol()
-        self._bottom(question)
-        self._window.nodelay(False)
-        curses.echo()
-        try:
-            row = self._window.getmaxyx()[0] - 1
-            return self._window.getstr(row, min(len(question), self.width - 1)).decode().strip()
-        except (KeyboardInterrupt, UnicodeError):
-            return ''
-        finally:
-            curses.noecho()
-            self._window.nodelay(True)
 
     def show_list(self, lines: Sequence[TextLine]) -> None:
         """Show lines of which one is marked, each with a ``section`` to know it by."""
@@ -217,8 +196,6 @@ class _Screen:
         for key, rows in self._pressed():
             if key == ord('q'):
                 return True
-            if key == ord('t') and self._toggle is not None:
-                self._toggle()
             if (section := _SECTION_KEYS.get(key)) in self._sections:
                 self._top = self._sections[section]
             self._top = max(0, self._top + rows)
@@ -246,7 +223,7 @@ def _run(options: argparse.Namespace, words: list[str]) -> int:
     has_ended = _Ending()
     if options.all:
         return _run_all(options, words, has_ended)
-    with NodeWatch(full_name(options.node), words, options.write) as watch:
+    with NodeWatch(full_name(options.node), words) as watch:
         if _find(watch, options.wait, has_ended):
             has_ended.limit(options.seconds)
             _show(watch, options, has_ended)
@@ -267,7 +244,7 @@ def _run_all(options: argparse.Namespace, words: list[str], has_ended: _Ending) 
             marked = curses.wrapper(_draw_all, plant, has_ended, marked)
         if not marked:
             return 0
-        with NodeWatch(marked, words, options.write) as watch:
+        with NodeWatch(marked, words) as watch:
             curses.wrapper(_draw, watch, has_ended)
 
 
@@ -292,8 +269,6 @@ def _parse(args: Sequence[str]) -> argparse.Namespace:
     parser.add_argument('--node', default='/abdf1',
                         help='name of the bridge with its namespace (default: %(default)s)')
     parser.add_argument('--all', action='store_true', help='show a line for each bridge')
-    parser.add_argument('--write', action='store_true',
-                        help='let the key t toggle a bit, after a question')
     parser.add_argument('--once', action='store_true', help='print one picture and end')
     parser.add_argument('--seconds', type=seconds_option, default=math.inf,
                         help='end so many seconds after the node has been found')
@@ -353,26 +328,9 @@ def _is_screen() -> bool:
 
 def _draw(window: curses.window, watch: NodeWatch, has_ended: _Ending) -> None:
     screen = _Screen(window)
-    if watch.may_write:
-        screen.offer_toggle(lambda: _toggle(screen, watch))
     while not has_ended() and not screen.wants_end():
         screen.show(render(watch.snapshot(), time.monotonic(), screen.width))
         watch.spin(_RENEWAL)
-
-
-def _toggle(screen: _Screen, watch: NodeWatch) -> None:
-    """Ask for a bit and for a confirmation; then write its other value."""
-    topic = screen.ask('toggle which topic (one bit)? ')
-    if not topic:
-        return
-    value = watch.bit(topic)
-    if value is None:
-        screen.ask(f'{printable(topic)}: there is no single bit of this name that is read and '
-                   'written; Return goes on ')
-        return
-    question = f'write {1 - value} to {printable(topic)}, which is {value} now? [y/N] '
-    if screen.ask(question).lower() in ('y', 'yes') and not watch.write_bit(topic, 1 - value):
-        screen.ask('not written: the bridge does not listen; Return goes on ')
 
 
 def _spin(watch: NodeWatch | PlantWatch, seconds: float, is_enough: Callable[[], bool]) -> None:

@@ -33,7 +33,7 @@ from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node, NodeNameNonExistentError
 from rclpy.signals import SignalHandlerOptions
 from rclpy.validate_full_topic_name import validate_full_topic_name
-from std_msgs.msg import String, UInt8MultiArray, UInt16MultiArray  # noqa: I101
+from std_msgs.msg import String, UInt16MultiArray  # noqa: I101
 
 # How often (s) the topics of the node are looked for; they do not change while it lives.
 _DISCOVERY_PERIOD = 0.5
@@ -111,15 +111,13 @@ class NodeWatch(Listening):
     Listen to the node with the full name ``name`` until it is closed.
 
     The bridge is not affected: subscriptions ask for no more than every bridge offers, no service
-    is called, and nothing is published unless ``may_write``. Ages of topics without a promised
+    is called, and nothing is published. Ages of topics without a promised
     time count from the publisher's time stamp, so for them the clocks of the hosts have to agree.
     """
 
-    def __init__(self, name: str, ros_arguments: list[str], may_write: bool = False) -> None:
+    def __init__(self, name: str, ros_arguments: list[str]) -> None:
         super().__init__(ros_arguments)
         self.name = name
-        self.may_write = may_write
-        self._writers: dict[str, Any] = {}
         self._subscriptions: dict[str, _Subscription] = {}
         self._statuses: list[Status] = []
         self._told: float | None = None
@@ -165,31 +163,6 @@ class NodeWatch(Listening):
         return Snapshot(
             self.name, self.is_there, self._told, tuple(self._statuses), readings,
             self._active, tuple(self._results))
-
-    def bit(self, topic: str) -> int | None:
-        """Return the value of a mapping of one bit that is fresh and may be written, or None."""
-        known = self._subscriptions.get(f'{self.name}/read/{topic}')
-        if known is None or known.type_name != _BITS or known.reading.values is None \
-                or len(known.reading.values) != 1:
-            return None
-        if known.reading.state(time.monotonic())[1] is Style.BAD \
-                or not self._node.count_subscribers(f'{self.name}/write/{topic}'):
-            return None
-        return int(known.reading.values[0])
-
-    def write_bit(self, topic: str, value: int) -> bool:
-        """Publish a bit once; tell whether the bridge listens."""
-        if topic not in self._writers:
-            self._writers[topic] = self._node.create_publisher(
-                UInt8MultiArray, f'{self.name}/write/{topic}', 10)
-        publisher = self._writers[topic]
-        end = time.monotonic() + _CONNECTION
-        while not publisher.get_subscription_count():
-            if time.monotonic() >= end:
-                return False
-            self.spin_once(0.05)
-        publisher.publish(UInt8MultiArray(data=[value]))
-        return True
 
     def _discover(self) -> None:
         """Subscribe to the read topics that the node publishes now."""

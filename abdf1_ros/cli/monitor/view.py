@@ -162,8 +162,8 @@ def _head(snapshot: Snapshot, now: float) -> Iterator[TextLine]:
 
 def _link(snapshot: Snapshot, width: int) -> Iterator[TextLine]:
     for status in _section(snapshot, 'link'):
-        yield _summary('link', status)
-        yield from _wrapped(_pairs(status.values, _LINK_KEYS), width)
+        yield from _summary('link', status, width)
+        yield from _table(status.values, _LINK_KEYS, width)
         error = status.values.get('last error', 'none')
         if error != 'none':
             yield from _wrapped(f'last error: {error}', width, Style.WARNING)
@@ -175,8 +175,8 @@ def _stations(snapshot: Snapshot, width: int) -> Iterator[TextLine]:
         yield TextLine(f'  active stations: {numbers}')
     for status in snapshot.statuses:
         if status.section.startswith('station '):
-            yield _summary(status.section, status)
-            yield from _wrapped(_pairs(status.values, _STATION_KEYS), width)
+            yield from _summary(status.section, status, width)
+            yield from _table(status.values, _STATION_KEYS, width)
 
 
 def _values(snapshot: Snapshot, now: float, width: int) -> Iterator[TextLine]:
@@ -210,7 +210,7 @@ def _values(snapshot: Snapshot, now: float, width: int) -> Iterator[TextLine]:
 
 def _mappings(snapshot: Snapshot, width: int) -> Iterator[TextLine]:
     for status in _section(snapshot, 'mappings'):
-        yield _summary('mappings', status)
+        yield from _summary('mappings', status, width)
         for key, value in status.values.items():
             if not value.isdecimal():  # the counts are in the summary
                 yield from _wrapped(f'{key}: {value}', width, status.style)
@@ -219,7 +219,8 @@ def _mappings(snapshot: Snapshot, width: int) -> Iterator[TextLine]:
 def _writes(snapshot: Snapshot, now: float, width: int) -> Iterator[TextLine]:
     for name in ('writes', 'interlocks'):
         for status in _section(snapshot, name):
-            yield _summary(name, status)
+            if status.style is not Style.GOOD or any(map(_says_something, status.values.values())):
+                yield from _summary(name, status, width)
     for result in snapshot.results:
         value, latency = (result.values.get(key, '?') for key in ('value', 'latency_ms'))
         yield from _wrapped(f'{now - result.received:.1f} s ago: {result.section} {value} '
@@ -229,7 +230,7 @@ def _writes(snapshot: Snapshot, now: float, width: int) -> Iterator[TextLine]:
 def _counters(snapshot: Snapshot, width: int) -> Iterator[TextLine]:
     """Yield the counters that are not 0, as many columns as fit."""
     for status in _section(snapshot, 'counters'):
-        yield _summary('counters', status)
+        yield from _summary('counters', status, width)
         cells = [f'{printable(key):<24} {printable(value):>9}'
                  for key, value in status.values.items() if value != '0']
         columns = max(1, (width - 2) // 38)
@@ -241,8 +242,11 @@ def _section(snapshot: Snapshot, name: str) -> Iterator[Status]:
     return (status for status in snapshot.statuses if status.section == name)
 
 
-def _summary(name: str, status: Status) -> TextLine:
-    return TextLine(f'  {printable(name):<12} {printable(status.message)}', status.style)
+def _summary(name: str, status: Status, width: int) -> Iterator[TextLine]:
+    """Yield the name and the message of a status, which is never cut."""
+    room = max(_LEAST_VALUE_WIDTH, width - 15)
+    for number, part in enumerate(textwrap.wrap(printable(status.message), room) or ['']):
+        yield TextLine(f'  {"" if number else printable(name):<12} {part}', status.style)
 
 
 def _wrapped(text: str, width: int, style: Style = Style.PLAIN) -> Iterator[TextLine]:
@@ -250,5 +254,15 @@ def _wrapped(text: str, width: int, style: Style = Style.PLAIN) -> Iterator[Text
         yield TextLine(f'      {part}', style)
 
 
-def _pairs(values: Mapping[str, str], keys: Sequence[str]) -> str:
-    return ', '.join(f'{key} {values[key]}' for key in keys if key in values)
+def _says_something(value: str) -> bool:
+    return value not in ('', '0', '0.0')
+
+
+def _table(values: Mapping[str, str], keys: Sequence[str], width: int) -> Iterator[TextLine]:
+    """Yield what is known of ``keys`` as a column of names and one of values, without zeros."""
+    known = [key for key in keys if _says_something(values.get(key, ''))]
+    longest = max(map(len, known), default=0)
+    for key in known:
+        room = max(_LEAST_VALUE_WIDTH, width - longest - 8)
+        for number, part in enumerate(textwrap.wrap(printable(values[key]), room)):
+            yield TextLine(f'      {"" if number else key:<{longest}}  {part}')

@@ -67,7 +67,8 @@ def test_value_is_the_last_column_to_go(width: int) -> None:
 def test_every_part_can_be_found_by_its_first_line() -> None:
     picture = snapshot(statuses=[
         Status('mappings', Style.BAD, 'ERROR', {'a': 'failed'}),
-        Status('writes', Style.GOOD, 'OK'), Status('counters', Style.GOOD, 'OK', {'A': '1'})])
+        Status('writes', Style.GOOD, 'OK', {'total': '1'}),
+        Status('counters', Style.GOOD, 'OK', {'A': '1'})])
     found = {line.section: line.text for line in render(picture, NOW, WIDTH) if line.section}
     assert {name: found[name].split()[0] for name in ('reasons', 'writes', 'counters')} == {
         'reasons': 'mappings', 'writes': 'writes', 'counters': 'counters'}
@@ -111,8 +112,8 @@ def test_link_shows_load_and_poll_cycle() -> None:
             'port': 'open', 'settings': '19200 baud, CRC', 'line load': '61 %',
             'poll cycle': '240 ms', 'last error': '2509 ERR'})])
     assert line_with('WARN: port open', picture).style is Style.WARNING
-    assert line_with('line load', picture).text.strip() == \
-        'settings 19200 baud, CRC, line load 61 %, poll cycle 240 ms'
+    assert line_with('settings', picture).text == '      settings    19200 baud, CRC'
+    assert line_with('line load', picture).text == '      line load   61 %'
     assert line_with('last error: 2509 ERR', picture).style is Style.WARNING
 
 
@@ -121,9 +122,20 @@ def test_stations_are_told_from_the_active_node_table_and_the_diagnostics() -> N
         'station 2', Style.BAD, 'ERROR: station 2 inactive', {'last answer': '4.7 s ago'})])
     assert 'active stations: 1, 17' in '\n'.join(lines(picture))
     assert line_with('station 2 ', picture).style is Style.BAD
-    assert line_with('last answer 4.7 s ago', picture).style is Style.PLAIN
+    assert line_with('last answer  4.7 s ago', picture).style is Style.PLAIN
     assert 'active stations: none' in '\n'.join(lines(snapshot(active=[])))
     assert 'active stations' not in '\n'.join(lines(snapshot(active=None)))
+
+
+def test_no_sentence_is_cut_and_zeros_are_left_out() -> None:
+    text = 'ERROR: port open, but none of the stations has ever answered a command'
+    picture = snapshot(statuses=[
+        Status('link', Style.BAD, text, {'settings': '9600 baud', 'line load': '0'}),
+        Status('writes', Style.GOOD, 'OK: 0 of 0 writes confirmed', {'total': '0'})])
+    shown = lines(picture, 44)
+    assert all(len(line) <= 44 for line in shown)
+    assert text in ' '.join(' '.join(line.split()) for line in shown)
+    assert not [line for line in shown if 'line load' in line or '0 of 0' in line]
 
 
 def test_mappings_name_what_is_wrong_and_leave_the_counts_to_the_summary() -> None:
