@@ -24,8 +24,9 @@ its turn. Then there are three queues:
   reads that were due when it began go before the next check.
 - ``reads`` go in the order of ``read_queue``.
 
-``guests`` share what heartbeats, fallbacks and writes leave: after three checks or reads one of
-their commands has its turn, and never a second one while anything of ours is due.
+``guests`` share what heartbeats, fallbacks and writes leave: a quarter of that time. After a
+command of theirs, checks and reads that are due have the line for three times as long as it had,
+whatever became of it; and never a second one goes while anything of ours is due.
 
 A command that asks a silent station whether it is there again is a probe. Probes get at most an
 eighth of the line's time (``df1.probes``).
@@ -38,12 +39,12 @@ import math
 
 from abdf1_ros.df1.stations import ActiveStationList
 from abdf1_ros.driver.checks import Checks
-from abdf1_ros.driver.guests import GuestQueue
+from abdf1_ros.driver.guests import GuestJob, GuestQueue
 from abdf1_ros.driver.interlocks.queue import Interlocks
 from abdf1_ros.driver.job_tasks import Job, JobTask, JobTasks
 from abdf1_ros.driver.reads.silent import Reads
 from abdf1_ros.driver.writes.queue import WriteQueue
-from abdf1_ros.plan.bounds import MOST_BETWEEN_GUESTS, OWN_IN_A_ROW
+from abdf1_ros.plan.bounds import OURS_BESIDE_GUESTS, OWN_IN_A_ROW
 
 MAX_WRITES_IN_A_ROW = 4
 
@@ -63,7 +64,8 @@ class Agenda:
         self._checks = checks
         self._reads = reads
         self._guests = guests
-        self._since_guest = 0  # checks and reads
+        self._owed = 0.0  # seconds of the line for checks and reads, before the next guest
+        self._counted: list[JobTask] = []  # under way: of guests, and of ours while that is so
         self._tasks = tasks
         self._own_in_a_row = 0
         self._writes_in_a_row = 0
@@ -73,10 +75,24 @@ class Agenda:
 
     def next(self, now: float, busy: Container[int] = ()) -> JobTask | None:  # noqa: A003
         """Return what has the line next, None for nothing; stations in ``busy`` have to wait."""
+        if self._counted:
+            self._settle(now)
         job = self._usual(now, busy) if self._interlocks is None else self._own_first(now, busy)
         if job is None or isinstance(job, JobTask):
             return job
         return JobTask(self._tasks, job, now)
+
+    def _settle(self, now: float) -> None:
+        """Count the time that commands which have ended have had, of guests and of ours."""
+        for task in [task for task in self._counted if task not in self._tasks.under_way]:
+            self._counted.remove(task)
+            took = self._guests.line.took(task.taken, now)
+            if isinstance(task.job, GuestJob):
+                # What ours had too much counts; what guests had while we rested does not add up.
+                owed = min(self._owed, 0.0) + OURS_BESIDE_GUESTS * took
+                self._owed = max(self._owed, owed)
+            else:
+                self._owed -= took
 
     def _own_first(self, now: float, busy: Container[int]) -> Job | JobTask | None:
         """Return a heartbeat or fallback if there is one: no write in a row (rule 11)."""
@@ -101,12 +117,16 @@ class Agenda:
         # A guest could write over a fallback that the end has confirmed already.
         is_end = self._interlocks is not None and self._interlocks.is_ending
         has_guests = (guests.has_news or guests.waiting) and not is_end
-        if has_guests and self._since_guest >= MOST_BETWEEN_GUESTS \
-                and (guest := self._guest(now, busy)):
+        is_guests_turn = self._owed <= 0 and not any(
+            isinstance(task.job, GuestJob) for task in self._counted)
+        if has_guests and is_guests_turn and (guest := self._guest(now, busy)):
             return guest
         job = self._checks.is_due(now) and self._check(now, busy) \
             or self._interlocks and self._refresh(now, busy) or self._read(now, busy)
-        self._since_guest += bool(job)
+        if job and self._owed > 0:
+            task = self._tasks.start(job, now)
+            self._counted.append(task)
+            return task
         return job or has_writes and self._write(now, busy) \
             or has_guests and self._guest(now, busy) or None
 
@@ -115,8 +135,9 @@ class Agenda:
         job = self._guests.next(now, busy)
         if job is None:
             return None
-        self._since_guest = self._writes_in_a_row = 0
+        self._writes_in_a_row = 0
         task = self._tasks.start(job, now)
+        self._counted.append(task)
         guest = job.command.guest
         guest.listener.sends(guest, task.command)
         return task

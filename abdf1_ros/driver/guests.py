@@ -83,6 +83,9 @@ class GuestListener:
     def was_refused(self, guest: Guest, command: Packet) -> None:
         """Take note of a command that is not allowed."""
 
+    def was_unanswered(self, guest: Guest, command: Packet, sts: int) -> None:
+        """Take note of a command that got this STS of ours in place of a reply of the PLC."""
+
     def turned_away(self, guest: Guest, other: str) -> None:
         """Take note that a program at this address came to a place that another one has."""
 
@@ -160,7 +163,7 @@ class GuestQueue:
                  words: Callable[[Packet, int], list[Extent] | None],
                  record: WriteRecord) -> None:
         self._stations = stations
-        self._line = line
+        self.line = line
         self._patience = patience
         self._station_of = station_of
         self._words = words
@@ -179,8 +182,7 @@ class GuestQueue:
             guest.listener.was_refused(guest, command.packet)
             _refuse(command, _NOT_ALLOWED)
         elif not self._inbox.put(command):
-            guest.unanswered += 1
-            _refuse(command, _NOT_CONNECTED)
+            self._give_up(command, _NOT_CONNECTED)
         self.has_news = True
 
     def begin(self) -> None:
@@ -237,7 +239,7 @@ class GuestQueue:
     def answered(self, command: GuestCommand, reply: Packet) -> None:
         """Hand a reply on, with the numbers of the guest."""
         guest = command.guest
-        guest.slowest = max(guest.slowest, self._line.now - command.requested)
+        guest.slowest = max(guest.slowest, self.line.now - command.requested)
         command.answer(command.packet.reply(reply.data, reply.sts))
 
     def ended(self, job: GuestJob, begun: float, error: Exception | None) -> None:
@@ -245,7 +247,7 @@ class GuestQueue:
         command, station = job.command, job.station
         was_sent = error is None or getattr(error, 'sent', True)
         if error is not None:
-            self._silent(station, self._line.now)
+            self._silent(station, self.line.now)
             self._give_up(command, _sent_status(error) if was_sent else _unsent_status(error))
         if (claim := job.claim) is not None:
             self._record.ended(
@@ -254,7 +256,7 @@ class GuestQueue:
             if was_sent:
                 command.guest.listener.wrote(
                     command.guest, command.packet, station, list(claim.extents or ()))
-        self._stations.tried(station, begun, self._line.now, is_message=True,
+        self._stations.tried(station, begun, self.line.now, is_message=True,
                              was_silent=not self._stations[station].replies_in_time)
 
     def _silent(self, station: int, now: float) -> None:
@@ -284,7 +286,9 @@ class GuestQueue:
 
     @staticmethod
     def _give_up(command: GuestCommand, sts: int) -> None:
-        command.guest.unanswered += 1
+        guest = command.guest
+        guest.unanswered += 1
+        guest.listener.was_unanswered(guest, command.packet, sts)
         _refuse(command, sts)
 
 

@@ -45,8 +45,8 @@ ANSWERS_IN_TIME = 3
 # After so many heartbeats and fallbacks in a row a read has its turn (rule 11).
 OWN_IN_A_ROW = 7
 
-# While they ask all the time, guests have a command after so many of ours.
-MOST_BETWEEN_GUESTS = 3
+# After a guest's command, checks and reads that are due have so many times as long as it had.
+OURS_BESIDE_GUESTS = 3
 
 # A heartbeat with a shorter Period (ms) may be quicker than a PLC's scan.
 _SHORT_PERIOD = 200

@@ -32,7 +32,7 @@ from abdf1_ros.pccc.address import Address
 from abdf1_ros.pccc.file_types import FileType, PlcType
 from abdf1_ros.pccc.values import ValueType
 from abdf1_ros.plan import bounds, forecast
-from abdf1_ros.plan.bounds import Bound, MOST_BETWEEN_GUESTS, Times
+from abdf1_ros.plan.bounds import Bound, OURS_BESIDE_GUESTS, Times
 from abdf1_ros.plan.line_model import ReadRequest
 from abdf1_ros.plan.planner import Block, Planner, StationArea
 from abdf1_ros.settings import BAUD_RATES
@@ -352,9 +352,9 @@ def _load_remarks(report: Report) -> Iterator[Remark]:
             'have to do with the rest'))
     if share_places(report.network.share):
         yield Remark(RemarkKind.LOAD, (
-            'while guests (Share) ask, every fourth command may be theirs: the periods then need '
-            f'{load * (1 + 1 / MOST_BETWEEN_GUESTS):.0%} of the time that is left, and the poll '
-            'cycle is up to a third longer'))
+            'while guests (Share) ask, a quarter of the time may be theirs: the periods then need '
+            f'{load * (1 + 1 / OURS_BESIDE_GUESTS):.0%} of the time that is left, and the '
+            'poll cycle is up to a third longer'))
 
 
 def _interlock_remarks(report: Report) -> Iterator[Remark]:

@@ -76,6 +76,13 @@ class GuestPlaces(GuestListener):
                 f'writes of {guest.name}', f'guest {guest.name} has sent to station {station}: '
                 f'{describe(command)}, words of {first([row.tag for row in rows])}')
 
+    def was_unanswered(self, guest: Guest, command: Packet, sts: int) -> None:
+        """Log the first command without a reply: a scan asks hundreds of stations."""
+        if guest.unanswered == 1:
+            self._notes.info(f'guest {guest.name}', (
+                f'guest {guest.name} gets no reply of station {command.dst} to '
+                f'{describe(command)}, but STS {sts:02X}; the status guests counts the next ones'))
+
     def was_refused(self, guest: Guest, command: Packet) -> None:
         """Log the first command that is not allowed."""
         if guest.refused == 1:

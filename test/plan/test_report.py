@@ -196,7 +196,7 @@ def test_guests_are_part_of_the_load() -> None:
     report = report_of(make_mapping('N7:0', period=100), share='pty:/tmp/hmi')
     text, = texts(report, RemarkKind.LOAD)
     assert text == (
-        'while guests (Share) ask, every fourth command may be theirs: the periods then need '
+        'while guests (Share) ask, a quarter of the time may be theirs: the periods then need '
         f'{report.load / 0.75:.0%} of the time that is left, and the poll cycle is up to a third '
         'longer')
 
