@@ -98,7 +98,7 @@ def net_fields() -> str:
     """Return the columns of the net CSV."""
     return table(
         ('column', 'default', 'values', 'meaning', 'error'),
-        ((entry.column, str(entry.default), _values(entry), entry.description,
+        ((entry.column, str(entry.default), _values(entry), entry.meaning,
           _linked(str(entry.message.number)) if entry.message else '')
          for entry in FIELDS.values()))
 

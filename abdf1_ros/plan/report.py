@@ -227,8 +227,8 @@ def _overlap_remarks(mappings: Sequence[Mapping]) -> Iterator[Remark]:
     for mapping in mappings:
         if not mapping.writes:
             continue
-        others = {id(other): other for place in _places(mapping) for other in here[place]
-                  if mapping.shares_words(other)}.values()
+        others = dict.fromkeys(other for place in _places(mapping) for other in here[place]
+                               if mapping.shares_words(other))
         read = [other for other in others if other.command is Command.READ]
         written = [other for other in others if other.writes and other.item < mapping.item]
         about = f'{mapping.place}: {mapping.tag} writes {mapping.address}'

@@ -73,6 +73,12 @@ class NetField:
     message_args: tuple[Any, ...] = ()
     other_words: MappingType[str, str] = field(default_factory=dict)
     also: MappingType[str, str] = field(default_factory=dict)
+    unit: str = ''
+
+    @property
+    def meaning(self) -> str:
+        """Return what a value says, with its unit."""
+        return f'{self.unit} {self.description}'.lstrip()
 
     @property
     def parameter(self) -> str:
@@ -92,8 +98,7 @@ class NetField:
         if self.choices:
             right = f'one of {", ".join(map(str, self.choices))}'
         else:
-            unit = ' ms' * self.description.startswith('ms ')
-            right = f'a whole number from {self.low} to {self.high}{unit}'
+            right = f'a whole number from {self.low} to {self.high} {self.unit}'.rstrip()
         meant = self.other_words.get(re.sub(r'[\W_]', '', text).lower())
         advice = f'; "{shown(text)}" is {meant}' if meant else hint(text)
         return f'{self.column} = "{shown(text)}" should be {right}{advice}'
@@ -143,8 +148,8 @@ class Network:
         'ENQ_Retries', 3, 'repetitions of a poll that is not answered', low=0, high=10,
         message=Message.CRT_BAD_ENQ_RETRIES, message_args=(10,))
     cmd_timeout: int = _net(
-        'Cmd_Timeout', 1000, 'ms until a reply is no longer polled for', low=500, high=5000,
-        message=Message.CRT_BAD_CMD_TIMEOUT, message_args=(500, 5000))
+        'Cmd_Timeout', 1000, 'until a reply is no longer polled for', low=500, high=5000,
+        unit='ms', message=Message.CRT_BAD_CMD_TIMEOUT, message_args=(500, 5000))
     com_port: str = _net(
         'Com_Port', '1',
         f'n for /dev/ttyS(n-1), a device path, {URLS}')
@@ -155,9 +160,10 @@ class Network:
         'Parity', 'None', 'parity bit per character', choices=PARITIES,
         also={'-': 'None'})  # as S0 prints the default
     timeout: int = _net(
-        'Timeout', 1000, 'ms to wait for each answer of a station', low=0, high=360000)
+        'Timeout', 1000, 'to wait for each answer of a station', low=0, high=360000,
+        unit='ms')
     tx_delay: int = _net(
-        'TX_Delay', 0, 'ms to wait before each transmission', low=0, high=65535)
+        'TX_Delay', 0, 'to wait before each transmission', low=0, high=65535, unit='ms')
     handshake: str = _net(
         'Handshake', 'No', 'hardware handshake RTS/CTS', choices=('Yes', 'No'))
     polling: str = _net(

@@ -123,6 +123,8 @@ def test_rule_16_what_plcs_ask_of_us_takes_turns_with_our_commands() -> None:
     assert beside.seconds - alone.seconds > 3 * 2 * 0.2
     shared, = Times(replace(QUICK, share='/tmp/guests'), [speed()]).bounds()
     assert shared.seconds and shared.seconds - alone.seconds > 2 * 2 * 400 * 10 / 19200
+    assert alone.usual and shared.usual and shared.usual - alone.usual > 2 * 400 * 10 / 19200
+    assert beside.usual and beside.usual > alone.usual
 
 
 def test_rule_16_fallback_of_our_own_table_needs_no_line() -> None:

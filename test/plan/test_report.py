@@ -16,7 +16,6 @@
 
 from dataclasses import replace
 
-from abdf1_ros.plan.forecast import line_model
 from abdf1_ros.plan.report import make_report, Remark, RemarkKind, Report
 from abdf1_ros.settings.heartbeats import Fallback, Heartbeat, PublishWhile
 from abdf1_ros.settings.mapping import Mapping
@@ -152,15 +151,6 @@ def test_baud_rate_has_to_do_for_heartbeats_and_questions_too() -> None:
     assert needed == 19200
     assert f'{needed} baud would do' in texts(report, RemarkKind.LOAD)[0]
     assert report_of(*rows, baud=needed).load <= 1
-
-
-def test_longest_transaction_has_every_repetition() -> None:
-    read = report_of(make_mapping('N7:0'), cmd_timeout=500, nak_retries=1, enq_retries=1)
-    network = read.network
-    question = line_model(network).transaction_time(1, 26)  # longer than the read
-    assert read.longest_transaction == pytest.approx(
-        network.line_mode.longest_transaction(network.line, question))
-    assert read.longest_transaction > 3 * 0.3 + 0.5 + 2 * question
 
 
 def test_period_that_no_baud_rate_can_keep() -> None:

@@ -21,7 +21,7 @@ from dataclasses import dataclass, replace
 import os
 import time
 
-from abdf1_ros.cli.plc.line import free_station, MODES
+from abdf1_ros.cli.plc.line import free_station
 from abdf1_ros.cli.plc.session import Session
 from abdf1_ros.df1.echo import COMES_BACK
 from abdf1_ros.errors import Abdf1Error, LinkError, PortLost, RemoteError, StationInactive
@@ -152,12 +152,10 @@ def hint(session: Session, error: Abdf1Error) -> str:
     received, network = session.counters.chars_received, session.network
     if session.counters.messages_received + session.counters.acks_received:
         return ''
-    kinds = {MODES['full']: 'full duplex', MODES['radio']: 'radio modem'}
-    duplex = kinds.get(network.mode, 'half duplex')
     cause = SILENCE if not received else (
         f'{received} characters came, but no answer that makes sense: baud rate, parity, check, '
         'duplex, or another master?')
-    return (f'asked with {network.baud} baud, parity {network.parity}, {duplex}, '
+    return (f'asked with {network.baud} baud, parity {network.parity}, {network.duplex.value}, '
             f'{network.error_code}: {cause} "plc detect" tries other settings')
 
 

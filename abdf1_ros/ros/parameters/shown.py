@@ -73,7 +73,7 @@ def _net_cells(network: Network) -> Iterator[_Cell]:
         choices = f' ({", ".join(map(str, entry.choices))})' if entry.choices else ''
         value = getattr(network, name)
         yield entry.parameter, value, descriptor_of(
-            value, entry.description + choices, entry.low, entry.high)
+            value, entry.meaning + choices, entry.low, entry.high)
 
 
 class ShownFiles:
