@@ -18,8 +18,10 @@ Faults of single bytes in a transaction between two drivers, and what must hold 
 Each byte of a dialogue, in both directions, can be lost, doubled, flipped in each bit, followed by
 00, 10 or FF, or come later than Timeout with all that follows it. Whatever happens: no value is
 published that the other end did not have, no write is executed twice or told wrong, each
-transaction ends within its bound, and the next one is undisturbed. Where the check of a message
-cannot tell that it is another one, nothing can be promised; such cases are counted.
+transaction ends within its bound, and the next one is undisturbed. One fault alone costs time and
+nothing else, but for a guest by radio, who has his answer before a command is repeated there.
+Where the check of a message cannot tell that it is another one, nothing can be promised; such
+cases are counted.
 """
 
 from __future__ import annotations
@@ -29,7 +31,7 @@ from dataclasses import dataclass
 import heapq
 from random import Random
 
-from abdf1_ros.df1.frames import Frame, FrameDecoder
+from abdf1_ros.df1.frames import Duplex, Frame, FrameDecoder, NAK
 from abdf1_ros.df1.packet import Packet
 from abdf1_ros.df1.radio import RadioNode
 from abdf1_ros.driver.driver import Driver
@@ -43,10 +45,12 @@ from support.driver_bench import Recorder
 from support.mappings import make_mapping
 from support.virtual_line import VirtualLine
 
-NEAR, FAR = 5, 1
+# Not those of symbols: where one byte of DLE STX 05 gets lost, DLE 05 is an ENQ.
+NEAR, FAR = 9, 7
 _TIMEOUT = 0.2
 _LATE = 1.3 * _TIMEOUT
 _WHOLE_FRAMES = 1000
+_MOST_TOLD = 5
 _FRAME = 30  # characters of a command or reply besides its data
 
 # What our end is, and the other one.
@@ -117,8 +121,14 @@ class FaultyLine(VirtualLine):
             heapq.heappush(self._arrivals, (here, self._count, receiver, data))
 
     def is_unseen(self, network: Network) -> bool:
-        """Tell whether a message came through with a good check that nobody has sent."""
-        return any(set(_messages(network, self.heard[side])) - set(_messages(
+        """
+        Tell whether something came through that nobody has sent.
+
+        It is a message with a good check, or to a slave DLE NAK, which resets it (M 2-7).
+        """
+        is_reset = network.duplex is Duplex.HALF and any(
+            self.heard[side].count(NAK) > self.said[side].count(NAK) for side in (0, 1))
+        return is_reset or any(set(_messages(network, self.heard[side])) - set(_messages(
             network, self.said[side])) for side in (0, 1))
 
 
@@ -236,7 +246,8 @@ class Bench:
         except AssertionError:
             return f'it has not ended after {self.line.now - begun:.2f} s'
         self.line.run_for(0.05)
-        return self._judge_read() if self.is_read else self._judge_write(bool(faults))
+        return self._judge_read() if self.is_read else self._judge_write(
+            len(faults) > 1 or self.mode == 'Radio' and self.kind == 'guest')
 
     def _forget(self) -> None:
         """Forget what both ends have told."""
@@ -255,7 +266,7 @@ class Bench:
         elif self.kind == 'guest':
             data = bytes.fromhex('AA 02 07 89 00 00') + self.value.to_bytes(2, 'little')
             self.near.driver.guests.put(GuestCommand(
-                self.guest, Packet(FAR, 9, 0x0F, 0, self.value, data), self.line.now,
+                self.guest, Packet(FAR, NEAR, 0x0F, 0, self.value, data), self.line.now,
                 self.replies.append))
             self.line.wake(self.near.driver.machine)
 
@@ -271,7 +282,7 @@ class Bench:
         wrong = [values for values in self.near.listener.values(self.row) if values != expected]
         return f'published {wrong[0]}, the PLC had {expected}' if wrong else ''
 
-    def _judge_write(self, is_disturbed: bool) -> str:
+    def _judge_write(self, may_fail: bool) -> str:
         asked, told = (self.far, self.near) if self.kind == 'unsolicited' else (
             self.near, self.far)
         row = self.taken if self.kind == 'unsolicited' else self.served
@@ -291,7 +302,7 @@ class Bench:
             return f'{outcome}, executed {len(executed)} times'
         if any(values != expected for values in executed):
             return f'{outcome}, {executed} instead of {expected}'
-        return '' if is_good or is_disturbed else f'{outcome}, and nothing was disturbed'
+        return '' if is_good or may_fail else f'{outcome}, though it could be repeated'
 
 
 class Tally:
@@ -328,4 +339,4 @@ class Tally:
         """Return a line of a table."""
         return (f'{self.name:<24}{self.singles:>8,} single {self.pairs:>8,} pairs '
                 f'{self.unseen:>6,} that no {self.name.split()[1]} can see'
-                + ''.join(f'\n  WRONG {why}' for why in self.wrong))
+                + ''.join(f'\n  WRONG {why}' for why in self.wrong[:_MOST_TOLD]))
