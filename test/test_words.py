@@ -19,6 +19,7 @@ from collections import Counter
 from collections.abc import Iterator
 from pathlib import Path
 import re
+import tokenize
 
 from tools.rooms import MODULES, PACKAGE
 
@@ -63,6 +64,32 @@ def test_no_two_classes_of_a_room_have_one_name() -> None:
                      for name in names_of((PACKAGE / module).read_text(encoding='utf-8')))
     assert [name for name, count in counts.items() if count > 1] == []
     assert counts['driver', 'Driver'] == counts['pccc', 'Request'] == 1
+
+
+# Of machines: reported, random, without effect, cleanly, a noun for the pronoun, and what does it.
+_IDIOMS = re.compile(
+    r'\b(?:nobody|somebody|by chance|in vain|reckon with|(?:for|to) people'
+    r'|(?:is|are|was|were|be|been|has|have|had|not|and) told|ends? (?:all |both )?in order(?! to)'
+    r'|that one(?=[.,;:)]|$)'
+    r'|(?<!after )the other(?= (?:goes|sends|waits)\b))(?!\w)', re.IGNORECASE)
+
+
+def texts(path: Path) -> Iterator[tuple[int, str]]:
+    """Yield what people read of a file, with its line number: of code comments and strings."""
+    if path.suffix != '.py':
+        yield from enumerate(path.read_text(encoding='utf-8').splitlines(), 1)
+        return
+    with tokenize.open(path) as file:
+        for token in tokenize.generate_tokens(file.readline):
+            if token.type in (tokenize.COMMENT, tokenize.STRING):
+                for number, line in enumerate(token.string.splitlines(), token.start[0]):
+                    yield number, re.sub('``.*?``|`.*?`', '', line)
+
+
+def test_plain_words() -> None:
+    found = [f'{path.relative_to(ROOT)}:{number}: {line.strip()}' for path in pages()
+             for number, line in texts(path) if _IDIOMS.search(line)]
+    assert found == []
 
 
 def test_one_term_for_one_thing() -> None:

@@ -428,7 +428,7 @@ class RadioMode(LineMode):
 
     def undisturbed(self, line: LinkSettings, frames: float, response_time: float,
                     others: float = 0.0, stations: int = 0) -> float:
-        """Return it with the longest pause by chance before a first try."""
+        """Return it with the longest random pause before a first try."""
         chance = 0.0 if line.avoids_collisions else MIN_RESPONSE_TIME + frames
         return super().undisturbed(line, frames, response_time) + chance
 

@@ -207,7 +207,7 @@ class WriteRecord:
         """Take note how a write has ended, and whether some of it may land yet."""
         self._under_way.remove(claim)
         claim.outcome, claim.done = outcome, self.line.now
-        if may_land or outcome is Outcome.BROADCAST:  # which nobody answers
+        if may_land or outcome is Outcome.BROADCAST:  # which is not answered
             claim.lands_until = claim.done + self._settle_time
         else:
             claim.lands_until = claim.done if outcome in _CHANGED else -math.inf

@@ -39,7 +39,7 @@ _WRITE_TIMEOUT = 2.0
 
 
 class NoClient(OSError):
-    """Our end of a line is there, but nobody has the other one open."""
+    """Our end of a line is there, but no program has the other one open."""
 
     def __init__(self) -> None:
         super().__init__('waiting for a client')

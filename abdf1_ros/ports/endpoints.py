@@ -117,7 +117,7 @@ class PtyPlace(PtyEndpoint):
 
     def __init__(self, link: str) -> None:
         super().__init__(link)
-        os.close(self._theirs)  # so that our end tells when nobody has the other one open
+        os.close(self._theirs)  # so that our end tells when no program has the other open
         self._hangs_up = select.poll()
         self._hangs_up.register(self._ours, 0)
 

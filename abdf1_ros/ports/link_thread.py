@@ -54,7 +54,7 @@ _FASTEST = 10 / 115200  # s a character, where the line has no speed
 class PortKind(Enum):
     """Why a port is not open."""
 
-    NO_CLIENT = 'our end is there, and nobody at the other one'
+    NO_CLIENT = 'our end is there, and no program at the other one'
     UNAVAILABLE = 'it cannot be opened'
     OTHER = ''
 

@@ -157,7 +157,7 @@ class BridgeNode(Node):
 
     def stop(self, patience: float = _LAST_WORDS) -> None:
         """
-        End in order; the node may be destroyed after it.
+        End cleanly; the node may be destroyed after it.
 
         ``patience`` (s) is for a subscriber that is stuck.
         """
@@ -211,7 +211,7 @@ class BridgeNode(Node):
         """
         Hand the line over to new files; return False where the link does not take them.
 
-        The order is what matters. PLCs are told first: for them new files are an end and a start.
+        The order is what matters. PLCs come first: for them new files are an end and a start.
         The new session is made while the old one has the line, so topics of unchanged rows stay.
         With its machine on the line the old one ends, then the new one begins, and only then may
         guests come and the old port be taken by others.

@@ -46,7 +46,7 @@ _LAST_CALLBACKS = 0.5
 
 
 class LinkFailed(Exception):
-    """The link of a bridge is broken; the argument says how, and the log has told it."""
+    """The link of a bridge is broken; the argument says how, and the log has it."""
 
 
 class _Callbacks(threading.Thread):
@@ -128,7 +128,7 @@ class Line:
         self.destroy()
 
     def destroy(self) -> None:
-        """Destroy the node, if nobody uses it any more."""
+        """Destroy the node, if it is no longer used."""
         is_used = self._callbacks is not None and self._callbacks.is_alive()
         if self.node is not None and not is_used:
             self.node.destroy_node()
@@ -178,6 +178,6 @@ class Runner:
                 supervisor.look([thread for line in self._lines for thread in line.threads()])
 
     def destroy(self) -> None:
-        """Destroy all nodes that nobody uses any more."""
+        """Destroy all nodes that are no longer used."""
         for line in self._lines:
             line.destroy()

@@ -69,7 +69,7 @@ class GuestLine:
     """
     Take the commands of the guest at ``place`` to ``queue``, and its replies back.
 
-    Nobody knows when a command came that was here after a longer wait than asked for: this
+    It is unknown when a command came that was here after a longer wait than asked for: this
     process, or its host, stood still. It counts as old as it can be.
 
     ``wake`` wakes the link of the PLC, ``listener`` gets what the guest does, ``fault`` of a
