@@ -224,8 +224,15 @@ class _Parser(argparse.ArgumentParser):
     be meant.
     """
 
+    def __init__(self, *args: Any, complete: Callable[[argparse.ArgumentParser], None]
+                 = lambda parser: None, **details: Any) -> None:
+        """Make a parser; ``complete`` adds its arguments when it is used."""
+        super().__init__(*args, **details)
+        self._complete = complete
+
     def parse_known_args(self, args: Any = None, namespace: Any = None) -> tuple[Any, list[str]]:
-        """Parse arguments; all have to be known."""
+        """Parse arguments, once; all have to be known."""
+        self._complete(self)
         found, unknown = super().parse_known_args(args, namespace)
         if unknown:
             option = next((text for text in unknown if text.startswith('-')), '')

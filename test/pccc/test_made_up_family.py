@@ -141,7 +141,7 @@ def main() -> None:
     FAMILIES[TOY] = FAMILY  # the line
 
     from abdf1_ros.cli.check import main as check
-    from abdf1_ros.cli.plc.options import make_parser
+    from abdf1_ros.cli.plc.parser import make_parser
     from abdf1_ros.driver.links import DriverSettings
     from abdf1_ros.driver.write import Outcome
     from abdf1_ros.pccc.describe import describe

@@ -17,12 +17,12 @@
 from __future__ import annotations
 
 import argparse
+from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
 
 from abdf1_ros.cli.plc.data import Radix
 from abdf1_ros.cli.plc.line import DEFAULTS, MODES
-from abdf1_ros.cli.terminal import command_parser, number_option
+from abdf1_ros.cli.terminal import number_option
 from abdf1_ros.numbers import whole_number
 from abdf1_ros.pccc.access import Access
 from abdf1_ros.pccc.families import FAMILIES
@@ -50,6 +50,8 @@ class LineDefaults:
 RADIXES = {'dec': Radix.DECIMAL, 'hex': Radix.HEXADECIMAL, 'oct': Radix.OCTAL,
            'bin': Radix.BINARY}
 
+_LINE_DEFAULTS = LineDefaults()
+_Adder = Callable[[argparse.ArgumentParser], None]
 _TRIED = 'all are tried'
 _DETECT_DEFAULTS = LineDefaults(
     baud=f'{_TRIED}, but none at a URL', check=_TRIED, duplex=_TRIED,
@@ -57,99 +59,7 @@ _DETECT_DEFAULTS = LineDefaults(
     net='port, parity and own station')
 
 
-_STATUSES = """\
-exit status:
-  0    done: read, written and confirmed, answered, found
-  1    no answer, or the PLC refused it; the port cannot be opened or was lost
-  2    wrong options, files, addresses or values; a write not confirmed with --yes. Nothing was
-       written
-  3    a write without a reply, or broken off: unknown whether the PLC has it, or has all of it
-  130  interrupted by Ctrl-C; but watch and ping, once they have begun, end by it with 0 or 1
-"""
-_EPILOG = _STATUSES + """
-examples:
-  plc ports                                   which ports are there?
-  plc init                                    find all, and write net.csv and map.csv
-  plc detect --port /dev/ttyUSB0              which settings does this line have?
-  plc scan 0-31 --net net.csv                 who is there?
-  plc files 1 --net net.csv                   which data files does it have?
-  plc status 1 --port /dev/ttyUSB0 --baud 19200
-  plc read N7:0 --length 10 --peer --port /dev/ttyUSB0
-  plc write N7:10 5 6 7 --station 1 --yes --net net.csv
-  plc write F8:2 --station 1 --yes --net net.csv -- -1.5e3
-  plc watch B3:0 N7:0 T4:0.ACC --net net.csv
-
-"plc COMMAND --help" explains each command.
-"""
-
-
-def make_parser(description: str | None) -> argparse.ArgumentParser:
-    """Return the parser; the name of the command is in ``command``."""
-    parser = command_parser('plc', description, _EPILOG)
-    commands = parser.add_subparsers(metavar='COMMAND', dest='command', required=True)
-
-    def add(name: str, text: str, *examples: str,
-            defaults: LineDefaults = LineDefaults()) -> argparse.ArgumentParser:
-        shown = '\n'.join(f'  plc {example}' for example in examples)
-        command = commands.add_parser(
-            name, help=text, description=f'{text[0].upper()}{text[1:]}.',
-            epilog=f'example:\n{shown}\n\n{_STATUSES}',
-            allow_abbrev=False, formatter_class=argparse.RawDescriptionHelpFormatter)
-        add_line_options(command, defaults)
-        if defaults is not _DETECT_DEFAULTS:
-            command.add_argument('--via', metavar='N', type=_station, default=None,
-                                 help='in half duplex: the gateway on the line that the station '
-                                      'is behind')
-        return command
-
-    _add_addresses(add('read', 'read addresses once', 'read N7:0 --length 10 --net net.csv'))
-    _complete_write(add('write', 'write values to an address',
-                        'write N7:10 5 6 7 --station 1 --yes --net net.csv',
-                        'write F8:2 --station 1 --yes --net net.csv -- -1.5e3'))
-    _complete_watch(add('watch', 'show values live until Ctrl-C',
-                        'watch B3:0 N7:0 --period 0.5 --net net.csv',
-                        'watch I:1.0 --radix bin --net net.csv'))
-    _add_station(add('status', 'tell model, mode and faults of a PLC', 'status 1 --net net.csv'))
-    ping = add('ping', 'measure how long a PLC takes to send something back',
-               'ping 1 --count 10 --net net.csv')
-    _add_station(ping)
-    ping.add_argument('--count', type=_COUNT, default=4, metavar='N',
-                      help='how often (default: %(default)s)')
-    scan = add('scan', 'look for stations', 'scan 0-31 --net net.csv')
-    scan.add_argument('stations', metavar='STATIONS', nargs='?', type=_stations,
-                      default=tuple(range(32)), help='such as 1,5 or 0-254 (default: 0-31)')
-    _complete_search(add('detect', 'find out the settings of a line by trying them',
-                         'detect --port /dev/ttyUSB0 --stations 1-4', defaults=_DETECT_DEFAULTS))
-    begin = add('init', 'find port, settings and stations, and write net.csv and map.csv',
-                'init --into line1', 'init --port /dev/ttyUSB0 --stations 1-4',
-                defaults=_DETECT_DEFAULTS)
-    _add_folder(begin, 'the files are')
-    _complete_search(begin)
-    _complete_files(add('files', 'tell which data files a PLC has and how long they are',
-                        'files 1 --net net.csv', 'files 1 --map --net net.csv',
-                        'files 1 --map map.csv --net net.csv'))
-    _add_import(commands)
-    clock = add('clock', "tell a PLC's time and its drift, or set it", 'clock 1 --net net.csv',
-                'clock 1 --set --yes --net net.csv')
-    _add_station(clock)
-    _add_plc_type(clock)
-    clock.add_argument('--set', action='store_true',
-                       help="write this computer's local time; a terminal is asked")
-    clock.add_argument('--yes', action='store_true', help='set it without a question')
-    commands.add_parser('ports', help='list serial ports and adapters',
-                        description='List serial ports and adapters.')
-    return parser
-
-
-def _add_import(commands: Any) -> None:
-    command = commands.add_parser(
-        'import', help='make a map of an export of RSLogix or KEPServerEX',
-        description='Make map.csv of the symbols of RSLogix 500 or 5, or of the tags of '
-                    'KEPServerEX.\nRows that cannot be used stay in it as comments.',
-        epilog='examples:\n  plc import plant.csv --station 2 --plc-type SLC\n'
-               '  plc import plant.csv --station 1-4 --read-only --period 1000\n\n'
-               'exit status: 0 when all rows could be used, 1 when some are left out, 2 for files',
-        allow_abbrev=False, formatter_class=argparse.RawDescriptionHelpFormatter)
+def _complete_import(command: argparse.ArgumentParser) -> None:
     command.add_argument('file', metavar='FILE', help='the export, a CSV file')
     _add_folder(command, 'map.csv is')
     command.add_argument('--station', metavar='LIST', type=_stations, dest='stations',
@@ -181,6 +91,30 @@ def _add_folder(parser: argparse.ArgumentParser, what: str) -> None:
                         help=f'where {what} to be (default: here)')
 
 
+def _complete_ping(ping: argparse.ArgumentParser) -> None:
+    _add_station(ping)
+    ping.add_argument('--count', type=_COUNT, default=4, metavar='N',
+                      help='how often (default: %(default)s)')
+
+
+def _complete_scan(scan: argparse.ArgumentParser) -> None:
+    scan.add_argument('stations', metavar='STATIONS', nargs='?', type=_stations,
+                      default=tuple(range(32)), help='such as 1,5 or 0-254 (default: 0-31)')
+
+
+def _complete_init(begin: argparse.ArgumentParser) -> None:
+    _add_folder(begin, 'the files are')
+    _complete_search(begin)
+
+
+def _complete_clock(clock: argparse.ArgumentParser) -> None:
+    _add_station(clock)
+    _add_plc_type(clock)
+    clock.add_argument('--set', action='store_true',
+                       help="write this computer's local time; a terminal is asked")
+    clock.add_argument('--yes', action='store_true', help='set it without a question')
+
+
 def _complete_search(search: argparse.ArgumentParser) -> None:
     search.add_argument('--stations', metavar='LIST', type=_stations, default=tuple(range(8)),
                         help='who may be there in half duplex (default: 0-7)')
@@ -189,7 +123,7 @@ def _complete_search(search: argparse.ArgumentParser) -> None:
 
 def _complete_files(found: argparse.ArgumentParser) -> None:
     _add_station(found)
-    found.add_argument('--files', metavar='LIST', type=_stations,
+    found.add_argument('--files', metavar='LIST', type=_numbers,
                        help='numbers up to 254 (default: all that the PLC lists, or 0-31)')
     _add_plc_type(found)
     found.add_argument('--map', metavar='FILE', nargs='?', const='',
@@ -211,8 +145,8 @@ def _complete_write(write: argparse.ArgumentParser) -> None:
 def _complete_watch(watch: argparse.ArgumentParser) -> None:
     _add_addresses(watch)
     watch.add_argument('--period', default=0.5, metavar='S',
-                       type=number_option('seconds from 0 to 86400', 0, 86400),
-                       help='s between reads (default: %(default)s)')
+                       type=number_option('seconds from 0 to 60; 0.5 is 500 ms', 0, 60),
+                       help='s between reads, up to 60 (default: %(default)s)')
     watch.add_argument('--count', type=_COUNT, metavar='N', help='end after so many reads')
 
 
@@ -285,3 +219,33 @@ def _station(text: str) -> int:
     if len(stations) != 1:
         raise argparse.ArgumentTypeError(f'"{text}" should be one station')
     return stations[0]
+
+
+def _numbers(text: str) -> tuple[int, ...]:
+    numbers, faults = parse_stations(text)
+    if faults or not numbers:
+        raise argparse.ArgumentTypeError(
+            f'"{text}" should be numbers of files from 0 to 254, as in 7,9-12')
+    return numbers
+
+
+def _on_line(add: _Adder, defaults: LineDefaults = _LINE_DEFAULTS) -> _Adder:
+    """Return what adds the options of the line, too."""
+    def complete(parser: argparse.ArgumentParser) -> None:
+        add_line_options(parser, defaults)
+        if defaults is not _DETECT_DEFAULTS:
+            parser.add_argument('--via', metavar='N', type=_station, default=None,
+                                help='in half duplex: the gateway on the line that the station '
+                                     'is behind')
+        add(parser)
+    return complete
+
+
+ADDERS: dict[str, _Adder] = {
+    'read': _on_line(_add_addresses), 'write': _on_line(_complete_write),
+    'watch': _on_line(_complete_watch), 'status': _on_line(_add_station),
+    'ping': _on_line(_complete_ping), 'scan': _on_line(_complete_scan),
+    'detect': _on_line(_complete_search, _DETECT_DEFAULTS),
+    'init': _on_line(_complete_init, _DETECT_DEFAULTS), 'files': _on_line(_complete_files),
+    'import': _complete_import, 'clock': _on_line(_complete_clock)}
+"""What adds the options of each command that has some."""

@@ -631,7 +631,11 @@ def test_signals_end_it(tmp_path: Path, number: signal.Signals, status: int) -> 
     (('scan', '0-300', '--port', 'x'), '"0-300" should be a station from 0 to 254'),
     (('status', '1,2', '--port', 'x'), '"1,2" should be one station'),
     (('ping', '1', '--count', '0', '--port', 'x'), '"0" should be a whole number from 1'),
-    (('watch', 'N7:0', '--period', 'x'), '"x" should be seconds from 0 to 86400'),
+    (('watch', 'N7:0', '--period', '500'), '"500" should be seconds from 0 to 60; 0.5 is 500 ms'),
+    (('files', '--files', '300'), '"300" should be numbers of files from 0 to 254, as in 7,9-12'),
+    (('--port', '/dev/x', 'read', 'N7:0'),
+     'options come after the command, as in "plc read ... --port ..."'),
+    (('raed', 'N7:0'), '"raed" is not a command; did you mean read?'),
     ((), 'the following arguments are required: COMMAND')])
 def test_option_that_is_wrong_is_told_with_status_2(
         args: tuple[str, ...], text: str, capsys: pytest.CaptureFixture[str]) -> None:
@@ -649,7 +653,7 @@ def test_port_that_cannot_be_opened_is_told_with_status_1(
 
 
 @pytest.mark.parametrize('command', [
-    '', 'read', 'write', 'watch', 'status', 'ping', 'scan', 'detect'])
+    '', 'read', 'write', 'watch', 'status', 'ping', 'scan', 'detect', 'import', 'ports'])
 def test_help_has_examples_and_exit_statuses(command: str,
                                              capsys: pytest.CaptureFixture[str]) -> None:
     said = call(main, capsys, *command.split(), '--help')

@@ -18,7 +18,7 @@ from collections.abc import Iterator
 from pathlib import Path
 import time
 
-from abdf1_ros.cli.plc import command
+from abdf1_ros.cli.plc import work
 from abdf1_ros.cli.plc.command import main
 from abdf1_ros.cli.plc.files import find_files
 from abdf1_ros.cli.plc.init import NewFiles
@@ -221,7 +221,7 @@ OTHER = SerialPortInfo('/dev/ttyS0', '', '', False)
 
 
 def _with_ports(monkeypatch: pytest.MonkeyPatch, *ports: SerialPortInfo) -> None:
-    monkeypatch.setattr(command, 'serial_ports', lambda: list(ports))
+    monkeypatch.setattr(work, 'serial_ports', lambda: list(ports))
 
 
 def test_ports_are_listed_with_what_keeps_one_from_opening_them(

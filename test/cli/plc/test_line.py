@@ -17,7 +17,7 @@
 from pathlib import Path
 
 from abdf1_ros.cli.plc.line import DEFAULTS, network_of
-from abdf1_ros.cli.plc.options import make_parser
+from abdf1_ros.cli.plc.parser import make_parser
 from abdf1_ros.problems import ConfigurationError
 from abdf1_ros.settings.network import Network
 import pytest

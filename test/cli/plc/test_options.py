@@ -15,8 +15,10 @@
 """The command line of ``plc``."""
 
 import argparse
+import subprocess
+import sys
 
-from abdf1_ros.cli.plc.options import make_parser
+from abdf1_ros.cli.plc.parser import make_parser
 import pytest
 
 
@@ -103,3 +105,13 @@ def test_place_that_is_written_as_an_option_is_told(
     with pytest.raises(SystemExit):
         parse(*args)
     assert hint in capsys.readouterr().err
+
+
+def test_help_of_all_commands_loads_next_to_nothing() -> None:
+    program = ('import sys; from abdf1_ros.cli.plc.command import main\n'
+               'try: main(["--help"])\nexcept SystemExit: print(*sys.modules, sep="\\n")')
+    said = subprocess.run([sys.executable, '-c', program], capture_output=True, text=True,
+                          check=True, timeout=60).stdout.splitlines()
+    ours = [name for name in said if name.startswith('abdf1_ros.')]
+    assert 'abdf1_ros.cli.plc.command' in ours and len(ours) < 16
+    assert not {'serial', 'decimal', 'csv', 'concurrent.futures'} & set(said)

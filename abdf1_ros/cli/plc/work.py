@@ -1,0 +1,508 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""What each command of ``plc`` does."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Callable, Sequence
+from contextlib import suppress
+from dataclasses import replace
+import errno
+from functools import partial
+from pathlib import Path
+import shlex
+import sys
+
+from abdf1_ros.cli.plc import data, detect, exports, files, init, presence
+from abdf1_ros.cli.plc.clock import Clock, TAKEN, told
+from abdf1_ros.cli.plc.line import free_station, MODES, network_of
+from abdf1_ros.cli.plc.options import DEFAULT_STATION, RADIXES
+from abdf1_ros.cli.plc.session import Session
+from abdf1_ros.cli.plc.watch import Watch
+from abdf1_ros.cli.terminal import (
+    advice_for,
+    called,
+    colour,
+    drop_output,
+    EXIT_FAILED,
+    EXIT_UNKNOWN,
+    EXIT_USAGE,
+    GREEN,
+    Progress,
+    RED,
+    table,
+    tell,
+)
+from abdf1_ros.df1.echo import COMES_BACK
+from abdf1_ros.driver.links import DriverSettings
+from abdf1_ros.driver.write import Outcome
+from abdf1_ros.errors import Abdf1Error, FormatError, LinkError, PortLost, RemoteError
+from abdf1_ros.pccc.file_search import DataFile
+from abdf1_ros.pccc.file_types import PlcType
+from abdf1_ros.pccc.processor import Processor
+from abdf1_ros.pccc.status import is_address_fault
+from abdf1_ros.pccc.values import Values
+from abdf1_ros.plan.report import make_report
+from abdf1_ros.ports.listing import serial_ports
+from abdf1_ros.problems import ConfigurationError, Problem
+from abdf1_ros.settings.map_file import load_mappings
+from abdf1_ros.settings.mapping import Command, Mapping
+from abdf1_ros.settings.network import load_network, Network
+from abdf1_ros.text import printable
+
+_ALL_TRIED_IN_VAIN = (
+    'not one character came: cable, port, power? Or a station that was not asked (--stations; a '
+    'PLC-5 shows its own in octal)')
+_ONE_PLC_ANSWERS_TO_ALL = (
+    'full duplex tells no addresses apart: most PLCs answer to every station, so these may be one')
+
+_UNCERTAIN = (Outcome.UNKNOWN, Outcome.PARTLY)
+
+
+def _cells(options: argparse.Namespace, command: Command, length: int | str) -> dict[str, str]:
+    """Return what the options say of the columns of a map CSV."""
+    given = {'Command': command.value, 'Station': str(options.station), 'Length': str(length),
+             'Type': options.type, 'Word_Order': options.word_order, 'Access': options.access,
+             'Processor': options.processor, 'PLC_Type': options.plc_type,
+             'Via': None if options.via is None else str(options.via)}
+    return {column: text for column, text in given.items() if text}
+
+
+def _mappings(options: argparse.Namespace, session: Session, cells: dict[str, str],
+              addresses: Sequence[str]) -> list[Mapping]:
+    """Return the mappings of addresses; where needed, ask the PLC for its type first."""
+    plc_type, processor = _family(options, session)
+    kind = {'PLC_Type': plc_type.value, 'Processor': data.processor_cell(processor)}
+    cells = {column: text for column, text in kind.items() if text} | cells
+    return [data.mapping_of(address, cells, item) for item, address in enumerate(addresses, 1)]
+
+
+def _line(options: argparse.Namespace) -> Network:
+    """
+    Return the line of a command for one station, and settle which station that is.
+
+    Raises ConfigurationError for a write to one of several that it does not name, and where the
+    station is ourselves.
+    """
+    network = network_of(options)
+    has_several = network.mode != MODES['full']
+    options.is_assumed = has_several and options.station is None
+    if options.is_assumed and (options.command == 'write' or getattr(options, 'set', False)):
+        raise ConfigurationError([Problem(
+            '--station', 'say which station to write to: this line may have several')])
+    if options.station is None:
+        options.station = DEFAULT_STATION
+    if not has_several or options.station != network.station:
+        return network
+    if options.is_assumed:
+        raise ConfigurationError([Problem(
+            '--station', f'say which station to ask; {options.station} is our own')])
+    if options.net or options.own_station is not None:
+        raise ConfigurationError([Problem('--own-station', (
+            f'{network.station} is our own Station, so no PLC can answer as {options.station}; '
+            'give us a number that no PLC of the line has'))])
+    return replace(network, station=free_station(network.station, [options.station]))
+
+
+def _failed(options: argparse.Namespace, session: Session, error: Abdf1Error, place: str = '',
+            plc_type: str | None = None) -> int:
+    """Tell why a request to a station, about ``place``, has failed; return the exit status."""
+    if isinstance(error, ConfigurationError | PortLost):
+        raise error
+    station = options.station
+    _complain(f'{place and f"{place} of "}station {station}: {error}')
+    if advice := presence.hint(session, error) \
+            or presence.type_hint(session, station, error, plc_type):
+        _complain(advice)
+    if options.is_assumed and isinstance(error, LinkError):
+        _complain(f'no station was given, so {station} was asked; "plc scan" tells who is there')
+        options.is_assumed = False  # once is enough
+    if place and isinstance(error, RemoteError) and is_address_fault(error):
+        _complain(f'"plc files {station}" tells which data files it has, and how long they are')
+    return EXIT_FAILED
+
+
+def _read(options: argparse.Namespace) -> int:
+    status = 0
+    network, cells = _line(options), _cells_to_read(options)
+    with Session(network, via=options.via) as session:
+        try:
+            mappings = _mappings(options, session, cells, options.addresses)
+        except Abdf1Error as error:
+            return _failed(options, session, error)
+        plc_type = options.plc_type
+        for mapping in mappings:
+            try:
+                values = data.read(session, mapping)
+            except Abdf1Error as error:
+                status = _failed(options, session, error, str(mapping.address), plc_type)
+                plc_type = None  # once is enough
+            else:
+                _print_values(mapping, values, RADIXES[options.radix])
+    return status
+
+
+def _cells_to_read(options: argparse.Namespace) -> dict[str, str]:
+    """Return the cells of a read; raises ConfigurationError where no PLC could have them."""
+    cells = _cells(options, Command.READ, options.length)
+    data.check_for_some_family(options.addresses, cells)
+    return cells
+
+
+def _print_values(mapping: Mapping, values: Values,
+                  radix: data.Radix = data.Radix.DECIMAL) -> None:
+    rows = list(data.rows(mapping, values, radix))
+    width = max(len(address) for address, _ in rows)
+    for address, text in rows:
+        print(f'{address:{width}}  {printable(text)}')
+
+
+def _write(options: argparse.Namespace) -> int:
+    network = _line(options)
+    cells = _cells(options, Command.READ_WRITE,
+                   data.length_of(options.address, options.type, options.values))
+    try:
+        data.check_for_some_family([options.address], cells, options.values)
+    except FormatError as error:
+        _complain(f'{options.address}: {error}')
+        return EXIT_USAGE
+    with Session(network, via=options.via) as session:
+        try:
+            mapping, = _mappings(options, session, cells, [options.address])
+        except Abdf1Error as error:
+            return _failed(options, session, error)
+        try:
+            writing = data.Writing(mapping, options.values)
+        except Abdf1Error as error:
+            _complain(f'{options.address}: {error}')
+            return EXIT_USAGE
+        for remark in mapping.remarks:
+            _complain(remark.text)
+        if not options.yes and not _is_confirmed(options, session, writing):
+            _complain('nothing was written; --yes writes')
+            return EXIT_USAGE
+        return _carry_out(session, writing)
+
+
+def _is_confirmed(options: argparse.Namespace, session: Session, writing: data.Writing) -> bool:
+    """Show what will be written; ask for a confirmation where there is a terminal."""
+    mapping = writing.mapping
+    try:
+        print('now:')
+        _print_values(mapping, data.read(session, mapping))
+    except Abdf1Error as error:
+        _failed(options, session, error, str(mapping.address))
+    return _is_wanted(
+        f'write {writing.value} to {mapping.address} of station {mapping.station}')
+
+
+def _is_wanted(question: str) -> bool:
+    """Ask for a confirmation where there is a terminal."""
+    if not sys.stdin.isatty():
+        print(f'would {printable(question)}')
+        return False
+    try:
+        return input(f'{printable(question)}? [y/N] ').strip().lower() in ('y', 'yes')
+    except EOFError:
+        return False
+
+
+def _carry_out(session: Session, writing: data.Writing) -> int:
+    """Write, show what the PLC holds after it, and return the exit status."""
+    mapping = writing.mapping
+    place = f'{mapping.address} of station {mapping.station}'
+    result = writing.carry_out(session)
+    text = str(result)
+    if result.outcome is not Outcome.WRITTEN:
+        _complain(f'{place}: {text}')
+        return EXIT_UNKNOWN if result.outcome in _UNCERTAIN else EXIT_FAILED
+    try:
+        print(f'{place}: {colour(text, GREEN, sys.stdout)}; now:', flush=True)
+        _print_values(mapping, data.read(session, mapping))
+        sys.stdout.flush()
+    except KeyboardInterrupt:  # it is written all the same
+        pass
+    except Abdf1Error as error:
+        _complain(f'cannot be read back: {error}')
+    except OSError as error:
+        drop_output()
+        _complain(f'{text}, but that cannot be printed: {error.strerror}')
+    return 0
+
+
+def _watch(options: argparse.Namespace) -> int:
+    network, cells = _line(options), _cells_to_read(options)
+    with Session(network, via=options.via) as session:
+        try:
+            mappings = _mappings(options, session, cells, options.addresses)
+        except Abdf1Error as error:
+            return _failed(options, session, error)
+    failed = Watch(network, mappings, options.period, RADIXES[options.radix]).run(options.count)
+    return EXIT_FAILED if failed else 0
+
+
+def _status(options: argparse.Namespace) -> int:
+    with Session(_line(options), via=options.via) as session:
+        there = presence.look_at(session, options.station)
+        if there.identity is None:
+            assert there.error is not None
+            return _failed(options, session, there.error)
+    print('\n'.join(presence.describe(there)))
+    return 0
+
+
+def _ping(options: argparse.Namespace) -> int:
+    times: list[float] = []
+    failures = 0
+    with Session(_line(options), via=options.via) as session:
+        try:
+            for _ in range(options.count):
+                try:
+                    times.append(presence.ping(session, options.station))
+                except Abdf1Error as error:
+                    failures += 1
+                    _failed(options, session, error)
+                else:
+                    print(f'station {options.station}: {times[-1] * 1000:.1f} ms', flush=True)
+        except KeyboardInterrupt:
+            pass  # the one under way does not count
+    text = f'{failures + len(times)} sent, {len(times)} answered'
+    if times:
+        text += (f'; shortest {min(times) * 1000:.1f}, mean '
+                 f'{sum(times) / len(times) * 1000:.1f}, longest {max(times) * 1000:.1f} ms')
+    print(text)
+    return 0 if times and not failures else EXIT_FAILED
+
+
+def _scan(options: argparse.Namespace) -> int:
+    progress = Progress()
+    found = 0
+    network = network_of(options)
+    for number, there in enumerate(presence.scan(network, options.stations, options.via), 1):
+        if there.is_there:
+            if not found:
+                print('station    answer  processor')
+            found += 1
+            progress.clear()
+            print(f'{there.station:7}  {there.seconds * 1000:5.0f} ms  {there}', flush=True)
+        progress.show(f'{number} of {len(options.stations)} stations asked, {found} found')
+    progress.clear()
+    print(f'{found} of {len(options.stations)} stations answer')
+    if found > 1 and network.mode == MODES['full']:
+        print(_ONE_PLC_ANSWERS_TO_ALL)
+    return 0 if found else EXIT_FAILED
+
+
+def _detect(options: argparse.Namespace) -> int:
+    network = network_of(options)
+    found = _found(options, network)
+    if found is None:
+        return EXIT_FAILED
+    there = found.presence
+    print(f'{colour(str(found.settings), GREEN, sys.stdout)}: station {there.station} {there}')
+    settings = found.settings
+    with Session(found.network(network)) as session, suppress(LinkError):
+        if ways := presence.io_access(session, there):
+            print(f'inputs and outputs: Access {" or ".join(ways)}')
+    whom = {MODES['full']: '--peer', MODES['half']: f'--station {there.station}'}.get(
+        settings.mode, f'--radio --station {there.station}')
+    parity = '' if network.parity == 'None' else f' --parity {network.parity}'
+    print(f'next: {called("plc")} read N7:0 {whom} --port {network.port} --baud {settings.baud} '
+          f'--check {settings.check}{parity}')
+    print(f'net.csv:\n{init.net_csv(network, found, [there.station])}')
+    return 0
+
+
+def _found(options: argparse.Namespace, network: Network) -> detect.Found | None:
+    """Return the settings that work; where none do, tell what was received."""
+    progress = Progress()
+    bauds: Sequence[int] = [network.baud] if options.baud or '://' in network.port \
+        else detect.BAUD_RATES
+    modes = [MODES[options.duplex]] if options.duplex else [MODES['full'], MODES['half']]
+    checks = [network.error_code] if options.check else detect.CHECKS
+    search = detect.Search(network, options.stations, progress.show)
+    found = search.run(bauds, modes, checks)
+    progress.clear()
+    if search.echoes:
+        _complain(COMES_BACK)
+    if found is None:
+        _complain('nothing answers with any of these settings')
+        for trace in search.traces or [_ALL_TRIED_IN_VAIN] * (not search.echoes):
+            _complain(trace)
+        kept = [option for option, value in (
+            ('--duplex', options.duplex), ('--baud', options.baud), ('--check', options.check))
+            if value]
+        if kept:
+            _complain(f'{" and ".join(kept)}: nothing else was tried; leave it out to try all')
+    return found
+
+
+def _init(options: argparse.Namespace) -> int:
+    target = init.NewFiles(Path(options.into), 'net.csv', 'map.csv')
+    if not options.port and not options.net:
+        options.port = _only_port()
+    network = network_of(options)
+    found = _found(options, network)
+    if found is None:
+        return EXIT_FAILED
+    print(f'{colour(str(found.settings), GREEN, sys.stdout)}')
+    # A full-duplex port mostly answers to every station, and 0 is the one to avoid (see "check").
+    others = options.stations if found.settings.mode != MODES['full'] else \
+        [1] if found.presence.station == 0 else []
+    there = [seen for seen in presence.scan(found.network(network), others)
+             if seen.is_there] if others else []
+    there = there or [found.presence]
+    for seen in there:
+        print(f'station {seen.station}: {seen}')
+    with Session(found.network(network)) as session:
+        listed = {seen.station: files.listed(session, seen.station, seen.identity)
+                  for seen in there}
+    target.write(*init.files_of(network, found, there, listed))
+    net, map_file = (shlex.quote(str(path)) for path in target.paths)
+    print(f'written: {", ".join(map(str, target.paths))}\n'
+          'how to go on: write the addresses that you need into map.csv, then\n'
+          f'  {called("plc")} watch S:0 --station {there[0].station} --net {net}\n'
+          f'  {called("check")} {net} {map_file}\n'
+          f'  {called("node")} --ros-args -p net_file:={net} -p map_file:={map_file}')
+    return 0
+
+
+def _import(options: argparse.Namespace) -> int:
+    file = init.NewFiles(Path(options.into), 'map.csv')
+    result = exports.import_map(options.file, exports.Wanted(
+        PlcType(options.plc_type), options.stations, options.read_only, options.period))
+    file.write(result.text)
+    target, = file.paths
+    for problem in result.left_out:
+        _complain(str(problem))
+    left_out = f', {len(result.left_out)} left out' if result.left_out else ''
+    print(f'written: {target}: {result.count} rows{left_out}')
+    nets = (target.with_name('net.csv'), Path('net.csv'))
+    net = next((path for path in nets if path.exists()), None)
+    print(f'how to go on: {called("check")} {shlex.quote(str(net or nets[1]))} '
+          f'{shlex.quote(str(target))}')
+    if net is None:
+        print(f'net.csv is not there yet: {called("plc")} init --into ANOTHER_FOLDER makes one')
+        return EXIT_FAILED if result.left_out else 0
+    with suppress(ConfigurationError):  # "check" tells it
+        report = make_report(load_network(str(net)), load_mappings(str(target))[0],
+                             DriverSettings().default_period)
+        if report.load > 1 and (period := report.needed_period()):
+            print(f'these rows need {report.load:.0%} of the time of the line in {net}; '
+                  f'--period {period} would do')
+    return EXIT_FAILED if result.left_out else 0
+
+
+def _only_port() -> str:
+    """Return the only port; ConfigurationError where there is none or more than one."""
+    ports = serial_ports()
+    if len(ports) == 1:
+        print(f'port: {ports[0].device} {ports[0].adapter}'.rstrip())
+        return ports[0].stable or ports[0].device
+    listed = ', '.join(port.device for port in ports) or 'this machine has none'
+    raise ConfigurationError([Problem('--port', f'name the port: {listed}')])
+
+
+def _ports(options: argparse.Namespace) -> int:
+    ports = serial_ports()
+    rows = [(port.device, port.adapter, port.stable,
+             '' if port.may_open else 'not for this user') for port in ports]
+    if not ports:
+        _complain('this machine has no serial port: is the adapter plugged in? In a virtual '
+                  'machine or container it has to be passed through')
+        return EXIT_FAILED
+    print(table(('port', 'adapter', 'name that stays', ''), rows))
+    if not all(port.may_open for port in ports):
+        _complain(advice_for(errno.EACCES))
+    return 0
+
+
+def _clock(options: argparse.Namespace) -> int:
+    place = ''
+    with Session(_line(options), via=options.via) as session:
+        try:
+            clock = Clock(session, options.station, _family(options, session)[0])
+            place = clock.address
+            if not options.set:
+                print(f'station {options.station}: {told(*clock.read())}')
+                return 0
+            if not options.yes and not _is_wanted(
+                    f'set the clock of station {options.station} ({clock.address})'):
+                _complain('nothing was written; --yes writes')
+                return EXIT_USAGE
+            clock.write()
+            time, ahead = clock.read()
+        except Abdf1Error as error:
+            return _failed(options, session, error, place)
+    print(f'station {options.station}: {told(time, ahead)}')
+    if abs(ahead) <= TAKEN:
+        return 0
+    _complain('it has not taken the time, though it has confirmed the write: a processor that '
+              'only shows its clock there is set by its own means')
+    return EXIT_FAILED
+
+
+def _files(options: argparse.Namespace) -> int:
+    mappings, problems = load_mappings(options.map) if options.map else ([], [])
+    for problem in problems:
+        _complain(str(problem))
+    with Session(_line(options), via=options.via) as session:
+        try:
+            family, processor = _family(options, session)
+            progress = Progress()
+            found = []
+            for entry in files.find_files(session, options.station, family, processor,
+                                          options.files, progress.show, _complain):
+                found.append(entry)
+                if options.map is None:
+                    progress.clear()
+                    print(f'{str(entry):6} {_extent(entry)}', flush=True)
+            progress.clear()
+        except Abdf1Error as error:
+            return _failed(options, session, error)
+    if options.map:
+        faults = [*files.outside(found, mappings, options.station)]
+        print('\n'.join(map(str, faults)) or f'all rows of station {options.station} lie inside')
+        return EXIT_FAILED if faults else 0
+    if options.map is not None:
+        print('Tag,Command,Address,Station,PLC_Type,Processor,Length,Period'
+              + ('' if options.via is None else ',Via'))
+        for row in files.map_rows(found, options.station, family,
+                                  data.processor_cell(processor), options.via):
+            print(row)
+    return 0 if found else EXIT_FAILED
+
+
+def _family(options: argparse.Namespace,
+            session: Session) -> tuple[PlcType, Processor | None]:
+    """Return family and processor of the station, which is asked where no option says it."""
+    if options.plc_type:
+        return PlcType(options.plc_type), None
+    return data.ask_family(session, options.station)
+
+
+def _extent(entry: DataFile) -> str:
+    if entry.type.is_io:
+        return f'{entry.elements:4} words' if entry.elements else '     by rack or slot'
+    return f'{entry.elements:4} elements'
+
+
+COMMANDS: dict[str, Callable[[argparse.Namespace], int]] = {
+    'read': _read, 'write': _write, 'watch': _watch, 'status': _status, 'ping': _ping,
+    'scan': _scan, 'detect': _detect, 'init': _init, 'ports': _ports, 'files': _files,
+    'clock': _clock, 'import': _import}
+
+_complain = partial(tell, 'plc', code=RED)
