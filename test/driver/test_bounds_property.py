@@ -51,11 +51,13 @@ from hypothesis import given, Phase, settings
 from hypothesis import strategies as st
 import pytest
 from support.driver_bench import DriverBench, simulated_plc
+from support.guests import Program
 from support.mappings import make_mapping
 
 AFTER = 2.0
 SAFE = 32_000
 GATEWAY = 99
+LONG_READ = bytes.fromhex('A2 50 09 89 00 00')  # 40 words from N9:0 on
 RADIO = {'mode': 'Radio', 'store_forward': '60,61'}
 MODES = {'Message': {}, 'Standard': {'polling': 'Standard'}, 'Peer': {'mode': 'Peer'},
          'Radio': RADIO, 'Radio, several': RADIO | {'collision_avoidance': 'Yes'}}
@@ -73,6 +75,7 @@ class Plant:
     and do not reply, ``silent`` ones do neither; the last ``behind`` stand behind a gateway. A row
     has ``length`` words. The publishers of the stations ``alive`` do not die. The driver hears
     ``chunk`` bytes at a time: of whole frames a long one may come after Timeout.
+    Of ``guests`` each has a long read for the first PLC all the time.
     In Mode Peer the PLC has a message for us every ``asks`` seconds, which we refuse.
     By radio the longest packets come from others every ``others`` seconds, to be sent on;
     ``drops`` has PLCs drop repetitions in silence.
@@ -105,12 +108,14 @@ class Plant:
     chunk: int = 8
     tx_delay: int = 0
     asks: float = math.inf
+    guests: int = 0
 
     @property
     def network(self) -> Network:
         return Network(station=200, baud=self.baud, timeout=self.timeout,
                        cmd_timeout=500, nak_retries=self.nak_retries,
                        enq_retries=self.enq_retries, tx_delay=self.tx_delay,
+                       share='tcp:6000' if self.guests else '',
                        **MODES[self.mode])  # type: ignore[arg-type]
 
     def mappings(self) -> list[Mapping]:
@@ -278,6 +283,8 @@ class World:
         self.bench.open()
         if plant.asks < math.inf:
             self.bench.at(3.0, self._ask)
+        for number in range(plant.guests):
+            Program(self.bench, src=210 + number).keep_asking(LONG_READ)
 
     def _plc(self, station: int, is_behind: bool) -> SimulatedPlc:
         areas = ('N7:0', self.plant.rows * self.plant.length), ('N9:0', 40), ('N10:0', 1)
@@ -566,6 +573,14 @@ def test_rule_16_nor_where_no_frame_gets_lost_than_is_told_for_that(
     for phase in (0.0, 0.07, 0.13):
         plant = Plant(mode, stations, rows, length=length, phase=phase, chunk=1)
         assert late_of(World(plant).run(is_usual=True)) == {}
+
+
+@pytest.mark.parametrize('mode', ['Message', 'Standard', 'Peer'])
+@pytest.mark.parametrize('lost', [0.0, 1.0])
+def test_rule_16_guests_that_ask_all_the_time_break_no_bound(mode: str, lost: float) -> None:
+    for number in range(3):
+        plant = Plant(mode, 1, 8, guests=3, lost=lost, phase=0.07 * number, seed=number)
+        assert late_of(World(plant).run(is_usual=not lost)) == {}
 
 
 def late_of(times: dict[str, tuple[float, float]]) -> dict[str, tuple[float, float]]:
