@@ -18,6 +18,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from contextlib import suppress
+from functools import partial
 import os
 from pathlib import Path
 import select
@@ -209,6 +210,13 @@ def host_and_port(text: str) -> tuple[str, int]:
     raise ValueError(f'"{text}" should be HOST:PORT')
 
 
+def _has_left(client: socket.socket) -> bool:
+    """Tell whether the other end has closed, also where we have not read all that it said."""
+    closed = select.poll()
+    closed.register(client, select.POLLRDHUP)
+    return bool(closed.poll(0))
+
+
 class TcpEndpoint:
     """
     A listening TCP port, any that is free for 0; one client at a time is the line.
@@ -244,16 +252,19 @@ class TcpEndpoint:
         for level, option, value in _OPTIONS:
             client.setsockopt(level, option, value)
         self._heard = monotonic()
-        return _Client(client, self._listener, self._look)
+        return _Client(client, self._listener, partial(self._look, client))
 
-    def _look(self, has_said: bool) -> None:
-        """Turn another client away, or raise OSError where it takes the place of a silent one."""
+    def _look(self, client: socket.socket, has_said: bool) -> None:
+        """Turn another client away, or raise OSError where it takes a place that is left."""
         if has_said:
             self._heard = monotonic()
         try:
             other, address = self._listener.accept()
         except BlockingIOError:
             return
+        if _has_left(client):
+            self._next = other
+            raise OSError('it was closed from the other end, and another one has come')
         if monotonic() - self._heard > _SILENT:
             self._next = other
             raise OSError(f'it has said nothing for {_SILENT:.0f} s, and another one has come')

@@ -195,6 +195,23 @@ def test_tcp_second_client_is_closed_at_once_and_nothing_of_it_comes_later(
         assert who.startswith('127.0.0.1:')
 
 
+def test_tcp_client_that_comes_right_after_another_has_left_is_not_turned_away(wake: int) -> None:
+    told: list[str] = []
+    with closing(TcpEndpoint(OWN_HOST, 0, told.append)) as line:
+        address = OWN_HOST, int(line.name.rpartition(':')[2])
+        first = socket.create_connection(address, PATIENCE)
+        with closing(line.open()) as port:
+            first.sendall(b'last')
+            first.close()
+            with socket.create_connection(address, PATIENCE) as second:
+                with pytest.raises(OSError, match='closed'):
+                    port.read(PATIENCE, wake)  # what it said last, and with it both events
+                second.sendall(b'first')
+                with closing(line.open()) as again:
+                    assert again.read(PATIENCE, wake) == b'first'
+    assert told == []
+
+
 @pytest.mark.parametrize(('seconds', 'is_taken'), [(29.9, False), (30.1, True)])
 def test_tcp_client_that_says_nothing_gives_its_place_to_the_next(
         seconds: float, is_taken: bool, wake: int, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -226,38 +226,6 @@ def test_commands_to_a_peer_are_executed_and_answered(line: Line, is_slow: bool)
 
 
 @both_checks
-def test_response_to_an_enq_is_the_last_one_again(line: Line) -> None:
-    client = line.client
-    client.say(ENQ)
-    assert client.hear() == NAK
-    command = client.frame(bytes((1, US, 0x0F, 0, 0x10, 0x10)) + typed_read(0, 1))
-    client.say(command[:-1] + bytes((command[-1] ^ 1,)))
-    assert client.hear() == NAK
-    client.say(ENQ)
-    assert client.hear() == NAK
-    client.say(command)
-    assert client.hear() == ACK
-    reply = client.hear()
-    client.say(ENQ)
-    assert client.hear() == ACK
-    client.say(NAK)
-    assert client.hear() == reply
-    client.say(ACK + command)
-    assert client.hear() == ACK  # a duplicate: no second reply
-    assert client.ask(1, 0x06, b'\0still there') == b'\0still there'
-    client.say(command[:12] + b'\x10\x0F')
-    assert client.hear() == NAK
-    client.say(command[:12] + ENQ)
-    assert client.hear() == NAK
-    # A message that begins anew, and an embedded response in it.
-    client.say(command[:10] + client.frame(bytes((1, US, 0x06, 0, 1, 1, 0)))[:7] + ACK
-               + client.frame(bytes((1, US, 0x06, 0, 1, 1, 0)))[7:])
-    assert client.hear() == ACK
-    assert client.hear() == bytes((US, 1, 0x46, 0, 1, 1))
-    client.say(ACK)
-
-
-@both_checks
 def test_message_of_the_plc(line: Line) -> None:
     client = line.client
     line.simulator.tell('msg 1 N7:50 11 22')
@@ -272,47 +240,6 @@ def test_message_of_the_plc(line: Line) -> None:
     client.say(client.frame(reply))
     assert client.hear() == ACK
     line.simulator.until('station 1: msg N7:50 confirmed')
-
-
-def test_message_that_is_refused_or_never_answered(line: Line) -> None:
-    client = line.client
-    line.simulator.tell('msg 1 N7:51 -5')
-    command = client.hear()
-    assert command[-2:] == b'\xFB\xFF'
-    client.say(ACK + client.frame(bytes((1, 5, 0x4F, 0xF0)) + command[4:6] + b'\x06'))
-    assert client.hear() == ACK
-    line.simulator.until('msg N7:51 STS F0 EXT STS 06')
-    line.simulator.tell('msg 1 N7:52 1')
-    following = client.hear()
-    assert following[4:6] != command[4:6]
-    client.say(ACK)
-    # Its own command waits; ours do not.
-    assert client.ask(1, 0x0F, typed_read(0, 1))[-2:] == b'\xB0\x04'
-    line.simulator.until('msg N7:52 2508')
-
-
-def test_message_that_nobody_acknowledges(line: Line) -> None:
-    client = line.client
-    line.simulator.tell('msg 1 N7:52 1')
-    command = client.hear()
-    assert client.hear() == ENQ
-    client.say(NAK)
-    assert client.hear() == command
-    client.say(ACK + client.frame(bytes((1, 5, 0x4F, 0)) + command[4:6]))
-    assert client.hear() == ACK
-    line.simulator.until('msg N7:52 confirmed')
-
-
-def test_faults_of_the_simulator(line: Line) -> None:
-    client = line.client
-    line.simulator.tell('error 1 F0 0B')
-    line.simulator.until('station 1: error F0 0B')
-    assert client.ask(1, 0x0F, typed_read(0, 1)) == b'\xF0\x0B'
-    line.simulator.tell('normal 1')
-    line.simulator.until('station 1: normal')
-    assert client.ask(1, 0x0F, typed_read(0, 1))[-2:] == b'\xB0\x04'
-    line.simulator.tell('slow 1 3')
-    line.simulator.until('"slow 1 3" is not a command')
 
 
 def test_slow_port_is_given_the_time_that_a_message_takes(tmp_path: Path) -> None:
