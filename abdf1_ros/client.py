@@ -183,7 +183,7 @@ class Client(OpenLine):
 
     def __init__(self, port: str | os.PathLike[str], *, plc_type: str | None = None,
                  station: int = 1, duplex: str = 'full', baud: int = 9600, parity: str = 'None',
-                 check: str = 'CRC', own_station: int = 0, processor: str | None = None,
+                 check: str = 'CRC', own_station: int = 5, processor: str | None = None,
                  access: str | None = None, timeout: float = 1.0,
                  cmd_timeout: float = 1.0) -> None:
         self.station = _whole('station', station, 0, MAX_STATION)

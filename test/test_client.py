@@ -16,6 +16,7 @@
 
 from collections.abc import Iterator
 from contextlib import ExitStack, suppress
+from inspect import signature
 import math
 from pathlib import Path
 import subprocess
@@ -33,7 +34,7 @@ from abdf1_ros.pccc.identity import Mode
 from abdf1_ros.ports.endpoints import PtyEndpoint
 from abdf1_ros.ports.link_thread import LinkThread
 from abdf1_ros.problems import ConfigurationError
-from abdf1_ros.settings.network import Network
+from abdf1_ros.settings.network import FIELDS, Network
 from abdf1_ros.simulator.simulated_plc import SimulatedPlc
 import numpy
 import pytest
@@ -312,3 +313,8 @@ class Nothing:
 
     def expire(self, now: float) -> None:
         """Do nothing."""
+
+
+def test_our_address_is_that_of_a_net_file_that_names_none() -> None:
+    """Not 0, which neither check protects (docs/connect.md)."""
+    assert signature(Client).parameters['own_station'].default == FIELDS['station'].default == 5

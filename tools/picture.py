@@ -17,7 +17,7 @@ Run a command and draw what it prints as a picture of a terminal.
 
 From the root, as docs/demo.svg was made::
 
-    python -m tools.picture docs/demo.svg 'make demo' python -m abdf1_ros demo --seconds 1
+    python -m tools.picture --lines 32 docs/demo.svg 'make demo' python -m abdf1_ros demo
 """
 
 from __future__ import annotations
@@ -71,6 +71,7 @@ def main(args: Sequence[str] | None = None) -> int:
     """Run the command; write the picture and return 0, or return the command's status."""
     parser = argparse.ArgumentParser(prog='picture', description=__doc__,
                                      formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument('--lines', type=int, help='show so many lines at most (default: all)')
     parser.add_argument('file', type=Path, help='SVG to write')
     parser.add_argument('title', help='what the first line shows after "$ "')
     parser.add_argument('command', nargs=argparse.REMAINDER, help='what is run')
@@ -82,7 +83,8 @@ def main(args: Sequence[str] | None = None) -> int:
         return done.returncode
     # Where the repository lies does not matter.
     text = done.stdout.replace(f'{Path.cwd()}/', '')
-    options.file.write_text(picture(options.title, text), encoding='utf-8')
+    shown = text.splitlines()[:options.lines]
+    options.file.write_text(picture(options.title, '\n'.join(shown)), encoding='utf-8')
     return 0
 
 
