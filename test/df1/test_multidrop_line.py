@@ -216,15 +216,13 @@ def test_counters_of_all_ends_agree_on_a_clean_line(mode: str, chunk: int) -> No
     assert_recovers(rig)
 
 
-@pytest.mark.parametrize(('rate', 'chunk'), [(1e-3, 14), (1e-2, 1)])
 @pytest.mark.parametrize('mode', MODES)
-def test_noise_costs_time_but_no_result_is_wrong(mode: str, rate: float, chunk: int) -> None:
-    rig = Rig(mode, noise=noise_of(rate), chunk=chunk, seed=int(rate * 1e4) + chunk)
+def test_noise_costs_time_but_no_result_is_wrong(mode: str) -> None:
+    rig = Rig(mode, noise=noise_of(1e-2), seed=101)
     rig.run(30)
     assert_exact(rig)
-    least = {1e-3: 0.9, 1e-2: 0.25}[rate]
     for src in (MASTER, *ASKING):
-        assert len(rig.results(src)) >= least * len(rig.nodes[src].all)
+        assert len(rig.results(src)) >= 0.25 * len(rig.nodes[src].all)
     assert rig.master.machine.counters.enq_retries > 0
     assert_recovers(rig)
     assert_exact(rig)
@@ -246,16 +244,6 @@ def test_line_that_goes_and_comes_again(mode: str) -> None:
             rig.ask(MASTER, number)
         rig.line.run_for(1.0)
     assert_exact(rig)
-    assert_recovers(rig)
-
-
-@pytest.mark.parametrize('mode', MODES)
-def test_noise_with_bcc_executes_no_command_twice(mode: str) -> None:
-    rig = Rig(mode, noise=noise_of(1e-3), seed=7, checksum=Checksum.BCC)
-    rig.run(20)
-    for src, node in rig.nodes.items():
-        for task in node.all:  # what a BCC does not see may be executed, but never twice
-            assert rig.executed[task.command.dst, src, task.command.tns] <= 1
     assert_recovers(rig)
 
 

@@ -214,39 +214,14 @@ def test_counters_of_both_ends_agree_on_a_clean_line(checksum: Checksum, outstan
 
 
 @pytest.mark.parametrize('outstanding', [1, 3])
-@pytest.mark.parametrize(('rate', 'chunk'), [(1e-4, 14), (1e-3, 14), (1e-2, 1)])
-def test_noise_costs_time_but_no_result_is_wrong(
-        rate: float, outstanding: int, chunk: int) -> None:
-    rig = Rig(replace(SETTINGS, max_outstanding=outstanding), noise=noise_of(rate), chunk=chunk,
-              seed=int(rate * 1e4) + outstanding)
+def test_noise_costs_time_but_no_result_is_wrong(outstanding: int) -> None:
+    rig = Rig(replace(SETTINGS, max_outstanding=outstanding), noise=noise_of(1e-2),
+              seed=100 + outstanding)
     rig.run(300)
     assert_exact(rig)
     assert_bounded(rig)
     replied = sum(isinstance(task.result, Packet) for end in rig.ends for task in end.all)
-    assert replied >= {1e-4: 598, 1e-3: 590, 1e-2: 300}[rate]
-    assert_recovers(rig)
-
-
-@pytest.mark.parametrize('outstanding', [1, 3])
-@pytest.mark.parametrize('rate', [1e-3, 1e-2])
-def test_noise_on_a_line_with_bcc(rate: float, outstanding: int) -> None:
-    rig = Rig(replace(SETTINGS, checksum=Checksum.BCC, max_outstanding=outstanding),
-              noise=noise_of(rate), seed=3)
-    rig.run(200)
-    assert_bounded(rig)
-    for asking, serving in rig.both():
-        for task in asking.all:
-            if isinstance(task.result, Packet):
-                assert serving.executed[task.command.tns] == 1
-    assert_recovers(rig)
-
-
-@pytest.mark.parametrize('kind', ['lost', 'flipped', 'doubled', 'inserted'])
-def test_noise_of_one_kind(kind: str) -> None:
-    rig = Rig(replace(SETTINGS, max_outstanding=2), noise=Noise(**{kind: 5e-3}), seed=11)
-    rig.run(150)
-    assert_exact(rig)
-    assert_bounded(rig)
+    assert replied >= 300
     assert_recovers(rig)
 
 
