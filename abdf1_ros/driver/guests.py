@@ -30,27 +30,22 @@ from dataclasses import dataclass, field
 from enum import Enum
 import math
 
-from abdf1_ros.df1.packet import BROADCAST, is_local_status, Packet, PRIORITY_BIT
+from abdf1_ros.df1.packet import BROADCAST, is_local_status, Packet
 from abdf1_ros.df1.stations import ActiveStationList
 from abdf1_ros.driver.inbox import Inbox
 from abdf1_ros.driver.job_tasks import Job, LineTime
 from abdf1_ros.driver.record import Claim, WriteRecord
 from abdf1_ros.driver.write import Outcome
 from abdf1_ros.errors import CommandExpired, PortLost, StationInactive
+from abdf1_ros.pccc.describe import effect_of
 from abdf1_ros.pccc.dialect import Steps
 from abdf1_ros.pccc.extent import Extent
+from abdf1_ros.pccc.notation import Effect
 
 _MOST_WAITING = 16  # of a guest: AbDf1 sends as many before it waits for a reply
 
 _NO_BUFFER, _NOT_ACKNOWLEDGED, _NOT_CONNECTED, _NO_REPLY, _OFF_LINE = 0x01, 0x02, 0x04, 0x05, 0x07
 _NOT_ALLOWED = 0x60
-
-# CMD and FNC (None: it has none) of the commands that only read, and of those that write data.
-_READS = frozenset(((0x01, None), (0x06, 0x00), (0x06, 0x01), (0x06, 0x03), *(
-    (0x0F, fnc) for fnc in (0x01, 0x04, 0x29, 0x68, 0x94, 0xA1, 0xA2, 0xA3))))
-_WRITES = frozenset((*((cmd, None) for cmd in (0x00, 0x02, 0x05, 0x08)), *(
-    (0x0F, fnc) for fnc in (0x00, 0x02, 0x03, 0x26, 0x67, 0x79, 0xA9, 0xAA, 0xAB))))
-_WITH_FUNCTION = (0x06, 0x07, 0x0F)
 
 
 class ShareAccess(Enum):
@@ -62,13 +57,9 @@ class ShareAccess(Enum):
 
     def allows(self, command: Packet) -> bool:
         """Tell whether a command may go to the line."""
-        return self is ShareAccess.ALL or _code(command) in _READS or (
-            self is ShareAccess.WRITE and _code(command) in _WRITES)
-
-
-def _code(command: Packet) -> tuple[int, int | None]:
-    cmd = command.cmd & ~PRIORITY_BIT
-    return cmd, command.data[0] if cmd in _WITH_FUNCTION and command.data else None
+        effect = effect_of(command)
+        return self is ShareAccess.ALL or effect is Effect.READS or (
+            self is ShareAccess.WRITE and effect is Effect.WRITES)
 
 
 class GuestListener:
@@ -213,7 +204,8 @@ class GuestQueue:
             self._look()
             if self._stations[station].last_heard is None:
                 self._silent(station, now)  # it may not exist: one poll or try at a time
-            is_vain = station == BROADCAST and _code(command.packet) in _READS  # no answer
+            # Nobody answers a broadcast.
+            is_vain = station == BROADCAST and effect_of(command.packet) is Effect.READS
             if not is_vain and self._stations.claim_message(station, now):
                 return GuestJob(self, command, station, command.requested + self._patience,
                                 self._claim(command.packet, station))
@@ -222,7 +214,7 @@ class GuestQueue:
 
     def _claim(self, packet: Packet, station: int) -> Claim | None:
         """Take note of a command that may write; of a read there is nothing to note."""
-        if _code(packet) in _READS:
+        if effect_of(packet) is Effect.READS:
             return None
         return self._record.begin(Claim(station, self._words(packet, station)))
 

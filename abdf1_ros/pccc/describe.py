@@ -27,7 +27,7 @@ from abdf1_ros.pccc import diagnostics, notation
 from abdf1_ros.pccc.address import Address, AddressRefusal
 from abdf1_ros.pccc.families import decode_identity, known_commands
 from abdf1_ros.pccc.fields import Reader
-from abdf1_ros.pccc.notation import CommandCode, KnownCommand
+from abdf1_ros.pccc.notation import CommandCode, Effect, KnownCommand
 from abdf1_ros.pccc.plc3 import commands as plc3
 from abdf1_ros.pccc.plc3.address import ADDRESSING as PLC3
 from abdf1_ros.pccc.plc3.address import BY_SECTION
@@ -70,6 +70,13 @@ def command_codes() -> dict[tuple[int, int | None], str]:
     """Return the name of every command that we know, by CMD and FNC (None: it has none)."""
     named = {code: entry.name for code, entry in _known().items()}
     return dict(sorted((named | _NAMES).items(), key=lambda item: (item[0][0], item[0][1] or 0)))
+
+
+def effect_of(packet: Packet) -> Effect:
+    """Return what a command does, as far as we know."""
+    code = _code(packet)
+    entry = _known().get(code)
+    return _EFFECTS.get(code, Effect.OTHER) if entry is None else entry.effect
 
 
 def command_name(packet: Packet) -> str:
@@ -207,20 +214,27 @@ def _ranged(read: Callable[[Reader, Callable[[Reader], _Range]], Any]) -> Callab
 # What every family has, or more than one.
 _SHARED: dict[CommandCode, KnownCommand] = {
     (diagnostics.CMD, diagnostics.STATUS): KnownCommand(
-        'diagnostic status', Reader.end, lambda request: '', _identity_reply),
+        'diagnostic status', Effect.READS, Reader.end, lambda request: '', _identity_reply),
     (diagnostics.CMD, diagnostics.READ_COUNTERS): KnownCommand(
-        'read diagnostic counters', diagnostics.ReadCounters.read,
+        'read diagnostic counters', Effect.READS, diagnostics.ReadCounters.read,
         lambda request: f'at {request.address}, {notation.count_of(request.size, "byte")}',
         _words_reply),
     (word_range.CMD, word_range.WRITE): KnownCommand(
-        'word range write', _ranged(word_range.WordRangeWrite.read), _range_write),
+        'word range write', Effect.WRITES, _ranged(word_range.WordRangeWrite.read), _range_write),
     (word_range.CMD, word_range.READ): KnownCommand(
-        'word range read', _ranged(word_range.WordRangeRead.read), _range_read, _words_reply),
+        'word range read', Effect.READS,
+        _ranged(word_range.WordRangeRead.read), _range_read, _words_reply),
     (word_range.CMD, word_range.BIT_WRITE): KnownCommand(
-        'bit write', _ranged(word_range.WordBitWrite.read), _bit_write),
+        'bit write', Effect.WRITES, _ranged(word_range.WordBitWrite.read), _bit_write),
     (word_range.CMD, word_range.FILE_READ): KnownCommand(
-        'file read', _ranged(word_range.WordRangeRead.read), _range_read, _words_reply),
+        'file read', Effect.READS,
+        _ranged(word_range.WordRangeRead.read), _range_read, _words_reply),
 }
+
+# What those of the other commands do that do not change how the PLC works.
+_EFFECTS: dict[CommandCode, Effect] = {
+    (0x06, 0x00): Effect.READS, (0x0F, 0x29): Effect.READS, (0x0F, 0x94): Effect.READS,
+    (0x0F, 0xA3): Effect.READS, (0x0F, 0x03): Effect.WRITES, (0x0F, 0x79): Effect.WRITES}
 
 # All other commands (M 7-2, 7-3; 0F/94 is from practice); their parameters are given as bytes.
 _NAMES: dict[CommandCode, str] = {

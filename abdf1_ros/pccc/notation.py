@@ -18,6 +18,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from enum import Enum
 from functools import partial
 import struct
 from typing import Any
@@ -31,11 +32,20 @@ CommandCode = tuple[int, int | None]
 """CMD and FNC; None for a command without FNC."""
 
 
+class Effect(Enum):
+    """What a command does: whoever may only read data, or write them, may not send the others."""
+
+    READS = 'reads'
+    WRITES = 'writes data'
+    OTHER = ''
+
+
 @dataclass(frozen=True, slots=True)
 class KnownCommand:
-    """A command: how it is read, what it says, and what its reply's data are."""
+    """A command: what it does, how it is read, what it says, and what its reply's data are."""
 
     name: str
+    effect: Effect
     read: Callable[[Reader], Any]
     words: Callable[[Any], str]
     values: Callable[[Any, bytes], str] = lambda request, data: hexadecimal(data)

@@ -38,7 +38,7 @@ from abdf1_ros.pccc.fields import Reader, word
 from abdf1_ros.pccc.file_types import FileType, Layout, PlcType
 from abdf1_ros.pccc.identity import Identity, Mode
 from abdf1_ros.pccc.link_counters import CounterLayout, RECEIVED, SENT
-from abdf1_ros.pccc.notation import KnownCommand
+from abdf1_ros.pccc.notation import Effect, KnownCommand
 from abdf1_ros.pccc.processor import Processor
 from abdf1_ros.pccc.serving import BasicCommands, Codes, Commands
 
@@ -132,7 +132,8 @@ def encode(mode: Mode, is_faulted: bool, is_full_duplex: bool,
 
 FAMILY = Family(
     ADDRESSING, {Access.TYPED: ToyDialect()}, ToyCommands, decode, encode,
-    {(CMD, READ): KnownCommand('toy read', Reader.rest, lambda data: f'W{data[0]:X}')},
+    {(CMD, READ): KnownCommand(
+        'toy read', Effect.READS, Reader.rest, lambda data: f'W{data[0]:X}')},
     served_counters=lambda mode: COUNTERS)
 
 

@@ -16,7 +16,7 @@
 
 from __future__ import annotations
 
-from abdf1_ros.pccc.notation import CommandCode, count_of, KnownCommand, words_text
+from abdf1_ros.pccc.notation import CommandCode, count_of, Effect, KnownCommand, words_text
 from abdf1_ros.pccc.plc2 import commands as plc2
 from abdf1_ros.pccc.plc2.address import show_word
 
@@ -42,11 +42,13 @@ def _bit_write(request: plc2.BasicBitWrite) -> str:
 
 DESCRIBED: dict[CommandCode, KnownCommand] = {
     (plc2.READ, None): KnownCommand(
-        'unprotected read', plc2.BasicRead.read, _read, lambda request, data: words_text(data)),
+        'unprotected read', Effect.READS,
+        plc2.BasicRead.read, _read, lambda request, data: words_text(data)),
     (plc2.UNPROTECTED_WRITE, None): KnownCommand(
-        'unprotected write', plc2.BasicWrite.read, _write),
-    (plc2.PROTECTED_WRITE, None): KnownCommand('protected write', plc2.BasicWrite.read, _write),
+        'unprotected write', Effect.WRITES, plc2.BasicWrite.read, _write),
+    (plc2.PROTECTED_WRITE, None): KnownCommand(
+        'protected write', Effect.WRITES, plc2.BasicWrite.read, _write),
     (plc2.UNPROTECTED_BIT_WRITE, None): KnownCommand(
-        'unprotected bit write', plc2.BasicBitWrite.read, _bit_write),
+        'unprotected bit write', Effect.WRITES, plc2.BasicBitWrite.read, _bit_write),
     (plc2.PROTECTED_BIT_WRITE, None): KnownCommand(
-        'protected bit write', plc2.BasicBitWrite.read, _bit_write)}
+        'protected bit write', Effect.WRITES, plc2.BasicBitWrite.read, _bit_write)}

@@ -19,7 +19,7 @@ from __future__ import annotations
 from abdf1_ros.pccc import notation, typed_data
 from abdf1_ros.pccc.address import Address
 from abdf1_ros.pccc.file_types import FileType
-from abdf1_ros.pccc.notation import CommandCode, KnownCommand
+from abdf1_ros.pccc.notation import CommandCode, Effect, KnownCommand
 from abdf1_ros.pccc.plc5 import commands as plc5
 from abdf1_ros.pccc.plc5.address import ADDRESSING
 from abdf1_ros.pccc.typed_data import TypedData
@@ -87,7 +87,8 @@ def _read_modify_write(request: plc5.ReadModifyWrite) -> str:
 
 DESCRIBED: dict[CommandCode, KnownCommand] = {
     (plc5.CMD, plc5.READ_MODIFY_WRITE): KnownCommand(
-        'read-modify-write', plc5.ReadModifyWrite.read, _read_modify_write),
-    (plc5.CMD, plc5.TYPED_WRITE): KnownCommand('typed write', plc5.TypedWrite.read, _typed_write),
+        'read-modify-write', Effect.WRITES, plc5.ReadModifyWrite.read, _read_modify_write),
+    (plc5.CMD, plc5.TYPED_WRITE): KnownCommand(
+        'typed write', Effect.WRITES, plc5.TypedWrite.read, _typed_write),
     (plc5.CMD, plc5.TYPED_READ): KnownCommand(
-        'typed read', plc5.TypedRead.read, _typed_read, _typed_reply)}
+        'typed read', Effect.READS, plc5.TypedRead.read, _typed_read, _typed_reply)}

@@ -19,7 +19,7 @@ from __future__ import annotations
 from functools import partial
 
 from abdf1_ros.pccc import notation
-from abdf1_ros.pccc.notation import CommandCode, KnownCommand
+from abdf1_ros.pccc.notation import CommandCode, Effect, KnownCommand
 from abdf1_ros.pccc.slc import commands as slc
 from abdf1_ros.pccc.slc.address import ADDRESSING, BY_CODE
 from abdf1_ros.pccc.slc.commands import LogicalRead, LogicalWrite
@@ -72,12 +72,14 @@ def _masked_write(request: slc.MaskedWrite) -> str:
 
 DESCRIBED: dict[CommandCode, KnownCommand] = {
     (slc.CMD, slc.SHORT_READ): KnownCommand(
-        'protected typed logical read', partial(LogicalRead.read, is_short=True), _read, _reply),
+        'protected typed logical read', Effect.READS,
+        partial(LogicalRead.read, is_short=True), _read, _reply),
     (slc.CMD, slc.LOGICAL_READ): KnownCommand(
-        'protected typed logical read', LogicalRead.read, _read, _reply),
+        'protected typed logical read', Effect.READS, LogicalRead.read, _read, _reply),
     (slc.CMD, slc.SHORT_WRITE): KnownCommand(
-        'protected typed logical write', partial(LogicalWrite.read, is_short=True), _write),
+        'protected typed logical write', Effect.WRITES,
+        partial(LogicalWrite.read, is_short=True), _write),
     (slc.CMD, slc.LOGICAL_WRITE): KnownCommand(
-        'protected typed logical write', LogicalWrite.read, _write),
+        'protected typed logical write', Effect.WRITES, LogicalWrite.read, _write),
     (slc.CMD, slc.MASKED_WRITE): KnownCommand(
-        'masked write', slc.MaskedWrite.read, _masked_write)}
+        'masked write', Effect.WRITES, slc.MaskedWrite.read, _masked_write)}
