@@ -204,7 +204,7 @@ class GuestQueue:
             self._look()
             if self._stations[station].last_heard is None:
                 self._silent(station, now)  # it may not exist: one poll or try at a time
-            # Nobody answers a broadcast.
+            # A broadcast has no reply.
             is_vain = station == BROADCAST and effect_of(command.packet) is Effect.READS
             if not is_vain and self._stations.claim_message(station, now):
                 return GuestJob(self, command, station, command.requested + self._patience,

@@ -32,11 +32,14 @@ def open_port(settings: PortSettings, tell: Callable[[str], None] = lambda text:
     settings that the port does not support, which is not an error. Raises OSError.
     """
     scheme, separator, _ = settings.name.lower().partition('://')
+    if not separator:
+        return open_device(settings, tell)
+    module = f'abdf1_ros.ports.{scheme}_port'
     try:
-        opener = import_module(f'abdf1_ros.ports.{scheme}_port') if separator else None
-    except ModuleNotFoundError:
-        opener = None
-    if opener is None:
+        opener = import_module(module)
+    except ModuleNotFoundError as error:
+        if error.name != module:  # what the scheme needs is not installed
+            raise
         return open_device(settings, tell)
     port: Port = opener.open_port(settings)
     return port

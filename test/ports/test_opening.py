@@ -52,3 +52,10 @@ def test_scheme_that_nobody_knows_is_no_port(name: str) -> None:
         network.make_network({'com_port': (name, 'test')})
     with pytest.raises(OSError, match='No such file'):
         open_port(PortSettings(name))
+
+
+def test_scheme_that_lacks_what_it_needs_says_so(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.delitem(sys.modules, 'abdf1_ros.ports.rfc2217_port', raising=False)
+    monkeypatch.setitem(sys.modules, 'struct', None)
+    with pytest.raises(ModuleNotFoundError, match='struct'):
+        open_port(PortSettings('rfc2217://host:1'))
