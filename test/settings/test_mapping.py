@@ -18,7 +18,7 @@ from dataclasses import replace
 
 from abdf1_ros.settings.columns import COLUMNS
 import pytest
-from support.mappings import one
+from support.mappings import make_mapping, one
 
 
 @pytest.mark.parametrize('cells, scale, offset', [
@@ -53,3 +53,10 @@ def test_limits_as_text_lose_nothing(text: str, cell: str) -> None:
 def test_period_of_zero_is_not_the_default() -> None:
     assert one(Period='0').period == 0
     assert one(Period='0').cell('Period') == '0'
+
+
+def test_function_file_of_a_micrologix_is_no_file_of_that_number() -> None:
+    binary, function = (make_mapping(text, plc='SLC') for text in ('B3:0', 'STI:0.PFN'))
+    assert function.address.file == binary.address.file
+    assert not binary.shares_words(function) and not function.shares_words(binary)
+    assert function.shares_words(make_mapping('STI:0.PFN', 'Write', plc='SLC'))
