@@ -40,6 +40,7 @@ from abdf1_ros.ports.link_thread import LinkThread, PortState
 from abdf1_ros.ports.settings import PortSettings
 from abdf1_ros.ports.trace import PortOpener
 from abdf1_ros.ros.diagnostics.events import LineEvents
+from abdf1_ros.ros.diagnostics.line import takes_in_silence
 from abdf1_ros.ros.diagnostics.status import Seen
 from abdf1_ros.ros.diagnostics.statuses import Diagnostics
 from abdf1_ros.ros.diagnostics.writes import WriteLog
@@ -47,9 +48,12 @@ from abdf1_ros.ros.session import stations_of
 from abdf1_ros.settings.map_file import load_mappings
 from abdf1_ros.settings.mapping import Command, Mapping
 from abdf1_ros.settings.network import Network
+from abdf1_ros.simulator.simulated_plc import InjectedFaults
 from diagnostic_msgs.msg import DiagnosticStatus
 import pytest
 from rclpy.logging import get_logger
+from support.driver_bench import DriverBench, simulated_plc
+from support.mappings import make_mapping
 from support.ros import details, ERROR, OK, WARN, write_csv
 
 PORT = '/dev/ttyUSB0'
@@ -202,6 +206,20 @@ def test_station_that_takes_commands_and_never_replies_is_told(bench: Bench) -> 
         ERROR, 'ERROR: port open, but none of 2 stations replies to commands')
     bench.driver.stations.lost(1, NOW)  # and the other one is gone
     assert bench.says('link')[0] == ERROR
+
+
+@pytest.mark.parametrize('polling', ['Message', 'Standard'])
+def test_plc_that_acknowledges_and_has_nothing_to_say_for_ever_takes_in_silence(
+        polling: str) -> None:
+    bench = DriverBench([make_mapping('N7:0', plc='SLC')], network=Network(polling=polling))
+    plc = simulated_plc(1, 'SLC', bench.clock, ('N7:0', 4))
+    bench.connect(plc)
+    bench.run(1.0)
+    station = bench.driver.stations[1]
+    assert station.active and not takes_in_silence(station)
+    plc.faults = InjectedFaults(slow=10**9)  # ACK of each command, EOT for each poll
+    bench.run(5.0)
+    assert station.active and takes_in_silence(station)
 
 
 def test_link_of_a_node_with_a_duplicate_name(bench: Bench) -> None:
