@@ -185,6 +185,25 @@ def test_guests_get_a_quarter_and_never_two_between_two_of_ours() -> None:
     assert max(counts) - min(counts) <= 1
 
 
+def test_guests_of_polled_stations_get_no_more_than_a_quarter() -> None:
+    """The commands of several stations are under way at a time, of guests never two."""
+    stations = range(1, 5)
+    bench = DriverBench(
+        [make_mapping(f'N{file}:0', station=station, plc='SLC', period=1)
+         for station in stations for file in (7, 8)],
+        network=Network(polling='Standard', baud=19200, timeout=200))
+    for station in stations:
+        bench.plc(station, 'SLC', ('N7:0', 20), ('N8:0', 20))
+    bench.run(1.0)
+    guests = [Program(bench, src=20 + station) for station in stations]
+    for station, program in zip(stations, guests, strict=True):
+        program.keep_asking(READ_N7, dst=station)
+    before = bench.driver.transactions
+    run(bench, 10.0)
+    total = bench.driver.transactions - before
+    assert 0.1 * total < sum(len(program.replies) for program in guests) < 0.26 * total
+
+
 def test_heartbeats_go_before_guests() -> None:
     beat = make_mapping('N10:0', 'Heartbeat', plc='SLC', period=200, heartbeat=Heartbeat())
     rows = [make_mapping(f'N{20 + row}:0', plc='SLC', period=1) for row in range(6)]
