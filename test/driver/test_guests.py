@@ -233,15 +233,6 @@ def test_idle_line_is_the_guests() -> None:
     assert len(program.replies) > 50
 
 
-def test_our_values_stay_as_old_as_the_share_allows() -> None:
-    alone, shared = bench_of(rows=12, period=1), bench_of(rows=12, period=1)
-    for number in range(10):
-        Program(shared, src=20 + number).keep_asking(READ_N7)
-    for bench in (alone, shared):
-        run(bench, 20.0)
-    assert len(shared.listener.reads) > 0.7 * len(alone.listener.reads)
-
-
 @pytest.mark.parametrize('how_many', [18, 50])
 def test_a_flood_gets_a_reply_to_each_command(how_many: int) -> None:
     bench = bench_of(rows=1, period=10000)
