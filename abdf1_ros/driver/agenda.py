@@ -59,7 +59,8 @@ class Agenda:
     def __init__(self, stations: ActiveStationList, interlocks: Interlocks, writes: WriteQueue,
                  checks: Checks, reads: Reads, guests: GuestQueue, tasks: JobTasks) -> None:
         self._stations = stations
-        self._interlocks = interlocks or None
+        self._interlocks = interlocks
+        self._has_own = bool(interlocks.heartbeats or interlocks.fallbacks)
         self._writes = writes
         self._checks = checks
         self._reads = reads
@@ -77,7 +78,7 @@ class Agenda:
         """Return what has the line next, None for nothing; stations in ``busy`` have to wait."""
         if self._counted:
             self._settle(now)
-        job = self._usual(now, busy) if self._interlocks is None else self._own_first(now, busy)
+        job = self._own_first(now, busy) if self._has_own else self._usual(now, busy)
         if job is None or isinstance(job, JobTask):
             return job
         return JobTask(self._tasks, job, now)
@@ -97,16 +98,19 @@ class Agenda:
     def _own_first(self, now: float, busy: Container[int]) -> Job | JobTask | None:
         """Return a heartbeat or fallback if there is one: no write in a row (rule 11)."""
         is_reads_turn = self._own_in_a_row >= OWN_IN_A_ROW
-        self._own_in_a_row *= not is_reads_turn
-        if is_reads_turn and (read := self._read(now, busy)):
-            return read
+        if is_reads_turn:
+            self._own_in_a_row = 0
+            if read := self._read(now, busy):
+                return read
         # The rest of a long fallback first: heartbeats that are always due would keep it waiting.
         if under_way := self._tasks.first(busy, is_own=True):
             self._own_in_a_row += 1
             return self._tasks.take(under_way, now)
-        own = self._interlocks.next(now, busy) if self._interlocks else None
-        self._own_in_a_row += own is not None
-        return own or self._usual(now, busy)
+        own = self._interlocks.next(now, busy)
+        if own is None:
+            return self._usual(now, busy)
+        self._own_in_a_row += 1
+        return own
 
     def _usual(self, now: float, busy: Container[int]) -> Job | JobTask | None:
         has_writes = self._writes.waiting or self._tasks.waiting
@@ -115,14 +119,13 @@ class Agenda:
             return write
         guests = self._guests
         # A guest could write over a fallback that the end has confirmed already.
-        is_end = self._interlocks is not None and self._interlocks.is_ending
-        has_guests = (guests.has_news or guests.waiting) and not is_end
+        has_guests = (guests.has_news or guests.waiting) and not self._interlocks.is_ending
         is_guests_turn = self._owed <= 0 and not any(
             isinstance(task.job, GuestJob) for task in self._counted)
         if has_guests and is_guests_turn and (guest := self._guest(now, busy)):
             return guest
         job = self._checks.is_due(now) and self._check(now, busy) \
-            or self._interlocks and self._refresh(now, busy) or self._read(now, busy)
+            or self._has_own and self._refresh(now, busy) or self._read(now, busy)
         if job and self._owed > 0:
             task = self._tasks.start(job, now)
             self._counted.append(task)
@@ -171,7 +174,7 @@ class Agenda:
         """Return a fallback that stands (rule 8); the turn of the reads comes after it."""
         if self._reads.is_due(self._last_refresh):
             return None
-        own = self._interlocks.refresh(now, busy) if self._interlocks else None
+        own = self._interlocks.refresh(now, busy)
         if own is not None:
             self._last_refresh = now
         return own
@@ -198,6 +201,6 @@ class Agenda:
         """Return when there is something to do next (clock value in s), None for never."""
         moments = [moment for moment in (self._reads.next_due(), self._checks.next_due())
                    if moment is not None]
-        if self._interlocks is not None and (own := self._interlocks.next_due()) < math.inf:
+        if self._has_own and (own := self._interlocks.next_due()) < math.inf:
             moments.append(own)
         return min(moments, default=None)

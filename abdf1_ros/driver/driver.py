@@ -261,7 +261,7 @@ class Driver:
     def next_expiry(self) -> float:
         """Return when ``expire`` has something to do (clock value in s), infinite for never."""
         return min(self._writes.next_expiry, self._tasks.next_expiry, self.guests.next_expiry,
-                   self.interlocks.next_expiry, self._read_backs.next_expiry)
+                   self.interlocks.ours.due, self._read_backs.next_expiry)
 
     def _station_changed(self, station: Station) -> None:
         if station.active:

@@ -36,6 +36,10 @@ from abdf1_ros.settings.mapping import Mapping
 _CHANGED = (Outcome.WRITTEN, Outcome.PARTLY)
 
 
+# At an orderly end the second write of rule 10 comes after so many seconds: there are two in all.
+_SETTLE_AT_END = 1.0
+
+
 class _Writer(Enum):
     """Who writes."""
 
@@ -110,11 +114,15 @@ class Words:
     """
     The words of a row that we write by ourselves, and what else may come to stand in them.
 
-    That is what had not landed when the last write of the row began that was confirmed.
+    That is what had not landed when the last write of the row began that was confirmed. What we
+    write is to be written once more at ``again_at`` (clock value in s): nothing older can land
+    then (rule 10).
     """
 
     def __init__(self, row: Mapping, record: WriteRecord) -> None:
         self.row = row
+        self.again_at = math.inf
+        self._latest = math.inf  # for that: at the end there is little time
         self._record = record
         self._lands_until: dict[_Source, float] = {}
         self._stands: _Source = ()
@@ -132,6 +140,24 @@ class Words:
                 self._guest_done = -math.inf
             self._lands_until = {source: until for source, until in self._lands_until.items()
                                  if until > claim.begun}
+
+    def plan_again(self, tried: float) -> None:
+        """Take note that what stands was sent at that clock value (s): is it written once more."""
+        until = min(self.lands_until, self._latest)
+        self.again_at = until if tried < until else math.inf
+
+    def try_again(self, when: float, now: float) -> None:
+        """Write it once more then, unless a second write is planned: this one failed."""
+        if not now < self.again_at < math.inf:
+            self.again_at = when
+
+    def end(self, now: float) -> None:
+        """Take note that there is an end."""
+        self._latest = now + _SETTLE_AT_END
+
+    def resume(self) -> None:
+        """Take note that it was not the end."""
+        self._latest = math.inf
 
     def opened(self, until: float) -> None:
         """Take note that something of the time before may land up to then (clock value, s)."""

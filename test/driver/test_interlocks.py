@@ -342,9 +342,9 @@ def test_rule_3_beat_is_not_sent_when_it_may_be_wrong_by_then() -> None:
     def expires(executor: float, message: float) -> float:
         """Return until when a beat may be sent that is due now."""
         interlocks.executor_ran(executor)
-        interlocks._messages['speed'] = message
-        beat._next = beat.due = now
-        interlocks._plan(*interlocks._plcs.values())
+        interlocks._conditions.messages['speed'] = message
+        beat._next = now
+        interlocks._plcs[1].look_again(beat)
         own = interlocks.next(now)
         assert own is not None
         assert own.row is beat

@@ -29,9 +29,6 @@ from abdf1_ros.driver.write import Outcome, Write
 # A fallback value that the PLC refuses is written again after so many seconds.
 _PAUSE_AFTER_REFUSAL = 1.0
 
-# At an orderly end the second write of rule 10 comes after so many seconds: there are two in all.
-SETTLE_AT_END = 1.0
-
 # One that stands is written again after so many seconds at least (rule 8).
 _LEAST_REFRESH = 5.0
 
@@ -86,10 +83,8 @@ class FallbackRow:
         self._counts_from = -math.inf
         self.has_failed = False
         self._values = mapping.fallback.values
-        self._latest = math.inf  # for a second write (rule 10): at the end there is little time
         self._due_since = 0.0
         self._next_try = -math.inf
-        self._again_at = math.inf  # once more, after what a gateway may hold (rule 10)
         self.refresh_at = math.inf  # for what was not seen (rule 8)
 
     @property
@@ -107,19 +102,15 @@ class FallbackRow:
 
     def end(self, now: float) -> None:
         """Take note that there is an end: write it unless nothing else can stand any more."""
-        self._latest = now + SETTLE_AT_END
+        self.words.end(now)
         self.due = -math.inf
         if not self.stands or self.words.lands_until > -math.inf:
             self.make_due(FallbackCause.END, now)
 
-    def resume(self) -> None:
-        """Take note that it was not the end."""
-        self._latest = math.inf
-
     @property
     def is_confirmed(self) -> bool:
         """Tell whether nothing is left to be written of what is due."""
-        is_left = self.stands and self._again_at < math.inf
+        is_left = self.stands and self.words.again_at < math.inf
         return self.cause is None and self.state is not FallbackState.OVERWRITTEN and not is_left
 
     @property
@@ -163,7 +154,7 @@ class FallbackRow:
         elif self.state is FallbackState.OVERWRITTEN:
             self.due = self._next_try
         elif self.state is FallbackState.STANDS:
-            self.due = self._again_at
+            self.due = self.words.again_at
         else:
             self.due = self.deadline(youngest)
         return self.due <= now
@@ -191,12 +182,10 @@ class FallbackRow:
             refused = outcome in (Outcome.FAILED, Outcome.PARTLY)
             self._next_try = now + _PAUSE_AFTER_REFUSAL if refused else now
             self.refresh_at = now + _PAUSE_AFTER_REFUSAL
-            if not now < self._again_at < math.inf:  # a second write that is planned stays so
-                self._again_at = self.refresh_at
+            self.words.try_again(self.refresh_at, now)
             return None
         self.refresh_at = now + max(self.after, _LEAST_REFRESH)
-        until = min(self.words.lands_until, self._latest)
-        self._again_at = until if self.tried < until else math.inf
+        self.words.plan_again(self.tried)
         if self.cause is not None and self.tried < self._due_since:
             return None
         was_due, self.cause = self.cause is not None, None

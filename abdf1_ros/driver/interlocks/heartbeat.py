@@ -24,7 +24,6 @@ from collections.abc import Mapping as MappingType
 from enum import Enum
 import math
 
-from abdf1_ros.driver.interlocks.fallback import SETTLE_AT_END
 from abdf1_ros.driver.record import Claim, Words
 from abdf1_ros.driver.write import Outcome, Write
 
@@ -60,6 +59,43 @@ class BeatState(Enum):
     CONFLICT = '0, as another writer writes this word'
 
 
+class _OtherWriter:
+    """
+    What one knows of another that writes the word of a heartbeat (rule 19).
+
+    It was ``seen`` last at that clock value (s).
+    """
+
+    def __init__(self, period: float) -> None:
+        self.seen = -math.inf
+        self._period = period
+        self._zeros = 0  # written again, where it goes on
+        self._extra_zero = 0.0  # s
+
+    def is_again(self, now: float) -> bool:
+        """Take note of a value that is not ours; tell whether it is not the first for long."""
+        before, self.seen = self.seen, now
+        return now - before < max(_CONFLICT_TIME, _CONFLICT_PERIODS * self._period)
+
+    def next_zero(self) -> float:
+        """Return after how long (s) 0 is written again, for it to see the 0 before it counts."""
+        self._zeros += 1  # at another moment of its period each time
+        return self._period * (0.5 + self._zeros * _GOLDEN % 1)
+
+    def differ(self, now: float) -> None:
+        """
+        Let the next 0 stand longer than the other's.
+
+        If two bridges counted from 1 at the same time, neither would see the other any more.
+        """
+        self._extra_zero = self._period * (1 + int(1000 * now) % _SHIFTS)
+
+    def take_extra_zero(self) -> float:
+        """Return how much longer (s) the next 0 stands, once."""
+        extra, self._extra_zero = self._extra_zero, 0.0
+        return extra
+
+
 class HeartbeatRow:
     """
     One Heartbeat row, and what the PLC holds of it.
@@ -91,12 +127,8 @@ class HeartbeatRow:
         self._requires_timeout = (mapping.heartbeat.requires_timeout or 0) / 1000
         self._period = mapping.period / 1000
         self._is_confirmed = False
-        self._again_at = math.inf  # a 0, after what a gateway may hold (rule 10)
-        self._latest = math.inf  # for that: at the end there is little time
         self._next = -math.inf
-        self._foreign_at = -math.inf
-        self._zeros = 0  # written again, where another writer goes on
-        self._extra_zero = 0.0  # s
+        self._other = _OtherWriter(self._period)
         self._holds_at = math.inf  # without a further message of the topics that it requires
 
     def why_not(self, now: float) -> str:
@@ -117,9 +149,9 @@ class HeartbeatRow:
         return self.value == 0 and self._is_confirmed
 
     @property
-    def is_over(self) -> bool:
+    def is_confirmed(self) -> bool:
         """Tell whether 0 stands, and is not to be written again after what may still land."""
-        return self.is_at_rest and self._again_at == math.inf
+        return self.is_at_rest and self.words.again_at == math.inf
 
     def begin(self, now: float, *, is_new: bool = False) -> None:
         """
@@ -133,7 +165,7 @@ class HeartbeatRow:
 
     def ran(self, now: float) -> None:
         """Take note of a change to RUN: whatever was foreign before came with a download."""
-        self._foreign_at = -math.inf
+        self._other.seen = -math.inf
         self.begin(now, is_new=True)
 
     def _write_zero(self, now: float) -> None:
@@ -142,13 +174,10 @@ class HeartbeatRow:
 
     def end(self, now: float) -> None:
         """Take note that there is an end: 0 is to be written."""
-        self.due, self._latest = now, now + SETTLE_AT_END
+        self.due = now
+        self.words.end(now)
         if self.words.lands_until > -math.inf:
             self._write_zero(now)
-
-    def resume(self) -> None:
-        """Take note that it was not the end."""
-        self._latest = math.inf
 
     def write_ended(self, claim: Claim, now: float) -> None:
         """Take note that a guest has written here: that is not a 0."""
@@ -170,6 +199,11 @@ class HeartbeatRow:
         """
         return next((topic for topic in self.requires
                      if now >= messages.get(topic, -math.inf) + self._requires_timeout), '')
+
+    def why_missing(self, messages: MappingType[str, float], now: float) -> str:
+        """Return that a topic has had no message in time, empty where all have."""
+        topic = self.missing(messages, now)
+        return f'no message of {topic} in time' if topic else ''
 
     def topics_until(self, messages: MappingType[str, float]) -> float:
         """Return until when it may count by rule 3 (d) without a further message."""
@@ -197,14 +231,14 @@ class HeartbeatRow:
             self.state = BeatState.COUNTS
         if self.is_under_way:
             self.due = math.inf
-        elif self.wants_zero and self.is_at_rest and now >= self._again_at:
+        elif self.wants_zero and self.is_at_rest and now >= self.words.again_at:
             self.due = now
             return True
         elif self.state in (BeatState.HELD, BeatState.CONFLICT):
             again = self._next if self.value == 0 else now
-            self.due = self._again_at if self.is_at_rest else again
+            self.due = self.words.again_at if self.is_at_rest else again
         elif self.state is BeatState.SHOWN:
-            self.due = min(self._next, self._again_at)
+            self.due = min(self._next, self.words.again_at)
         elif self.state is not BeatState.COUNTS:
             self.due = self._next
         elif now >= self.executor_until(executor):
@@ -242,22 +276,17 @@ class HeartbeatRow:
             self.overwritten(now)
             return ''
         text = f'{value} was read where {self.value} was written'
-        is_again = now - self._foreign_at < max(_CONFLICT_TIME, _CONFLICT_PERIODS * self._period)
-        was_known, self._foreign_at = self.state is BeatState.CONFLICT, now
+        was_known, is_again = self.state is BeatState.CONFLICT, self._other.is_again(now)
         if is_again:
             self.state = BeatState.CONFLICT
         self.begin(now)
         if was_known:
-            # At another moment of the other's period each time, for it to see the 0 before it
-            # counts on.
-            self._zeros += 1
-            self._next = self.due = now + self._period * (0.5 + self._zeros * _GOLDEN % 1)
+            self._next = self.due = now + self._other.next_zero()
             return ''
         if is_again:
             return (f'another program writes this word: {text}; 0 stays until the PLC goes from '
                     'PROGRAM to RUN, ~/reload, or the port is opened again')
-        # If two bridges counted from 1 at the same time, neither would see the other any more.
-        self._extra_zero = self._period * (1 + int(1000 * now) % _SHIFTS)
+        self._other.differ(now)
         return f'{text}: taken for a download'
 
     @property
@@ -268,6 +297,8 @@ class HeartbeatRow:
     def take(self, now: float) -> Write:
         """Return the write of 0, or of the next value, which ends with ``ended``."""
         self.is_under_way, self.is_first_try, self.tried = True, False, now
+        if self.state is BeatState.SHOWN:  # it is written once more
+            self.state = BeatState.CONTACT
         if self.wants_zero:
             self.value, self._is_confirmed = 0, False
         elif self._is_confirmed:  # otherwise the same value again (rule 3 a)
@@ -287,11 +318,9 @@ class HeartbeatRow:
         self._is_confirmed, self.confirmed = True, now
         if self.value:
             return
-        until = min(self.words.lands_until, self._latest)
-        self._again_at = until if self.tried < until else math.inf
+        self.words.plan_again(self.tried)
         if self.state is not BeatState.CONFLICT:
-            self._next = now + max(self._period, _LEAST_ZERO) + self._extra_zero
-            self._extra_zero = 0.0
+            self._next = now + max(self._period, _LEAST_ZERO) + self._other.take_extra_zero()
         if self.state is BeatState.CONTACT:
             self.state = BeatState.SHOWN
         if self.words.are_guests:

@@ -52,7 +52,7 @@ class Diagnostics:
             LinkStatus(self.line, port, seen), self.counters,
             *(StationStatus(self.line, station, port, seen) for station in driver.stations),
             MappingsStatus(driver, port, left_out), writes]
-        if driver.interlocks:
+        if driver.interlocks.heartbeats or driver.interlocks.fallbacks:
             self._statuses.append(InterlockStatus(driver, port, seen))
         if guests:
             self._statuses.append(GuestsStatus(guests, port))

@@ -93,4 +93,4 @@ def wait_for_end(driver: Driver, link: LinkThread, give_up: float) -> list[str]:
     while link.state.is_open and link.is_alive() and not interlocks.is_over \
             and time.monotonic() < give_up:
         time.sleep(_GLANCE)
-    return interlocks.unconfirmed() if interlocks else []
+    return interlocks.unconfirmed()

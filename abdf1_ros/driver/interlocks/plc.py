@@ -1,0 +1,239 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+One PLC: the heartbeats and fallbacks that are written to it, and which of them goes first.
+
+The numbers of rules are those of docs/heartbeats.md.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from collections.abc import Mapping as MappingType
+from dataclasses import dataclass, field
+import heapq
+import itertools
+import math
+
+from abdf1_ros.df1.stations import ActiveStationList
+from abdf1_ros.driver.interlocks.fallback import FallbackCause, FallbackRow
+from abdf1_ros.driver.interlocks.heartbeat import HeartbeatRow
+from abdf1_ros.driver.record import WriteRecord
+from abdf1_ros.driver.write import Outcome
+from abdf1_ros.settings.mapping import Mapping
+
+# So often in a row a PLC has not answered that is taken as out of reach, though its station is
+# active: that of a gateway is.
+_FAILURES = 2
+
+# Then it is left alone for so long (s) at least; others on the line of a gateway have that for so
+# many times as long as the last attempt took: an eighth is left to the silent.
+_LEAST_PAUSE = 1.0
+_SHARE_OF_OTHERS = 7
+
+OwnRow = HeartbeatRow | FallbackRow
+TurnRank = tuple[float, ...]
+
+
+@dataclass(slots=True)
+class Conditions:
+    """
+    What all PLCs of a line depend on.
+
+    The ROS executor ran last at ``executor``, the last accepted message of each topic was
+    published at ``messages`` (clock values in s). ``is_ending`` tells of the end.
+    """
+
+    executor: float = -math.inf
+    messages: dict[str, float] = field(default_factory=dict)
+    is_ending: bool = False
+
+
+class Wakes:
+    """When PLCs have to be looked at: one heap for all of a line."""
+
+    def __init__(self) -> None:
+        self._heap: list[tuple[float, int, Plc]] = []
+        self._tickets = itertools.count()
+
+    def plan(self, plc: Plc) -> None:
+        """Look at a PLC when it is due; what was planned before is void."""
+        heapq.heappush(self._heap, (plc.due, next(self._tickets), plc))
+        self.first()
+
+    def first(self) -> float:
+        """Forget what is void; return when the first is due (clock value in s), or infinity."""
+        while self._heap and self._heap[0][0] != self._heap[0][2].due:
+            heapq.heappop(self._heap)
+        return self._heap[0][0] if self._heap else math.inf
+
+
+class Plc:
+    """
+    The rows of one station, and how it has answered our own writes.
+
+    ``due`` is when its rows have to be looked at (clock value in s), ``first_due`` that for first
+    tries, which no pause holds up. ``failures`` counts the last ones that it has not answered;
+    from the second on it is left alone up to ``pause_end``.
+    """
+
+    def __init__(self, station: int, rows: Iterable[OwnRow], stations: ActiveStationList,
+                 record: WriteRecord, conditions: Conditions, wakes: Wakes) -> None:
+        self.station = station
+        self.rows = [*rows]
+        self.heartbeats = [row for row in self.rows if isinstance(row, HeartbeatRow)]
+        self.fallbacks = [row for row in self.rows if isinstance(row, FallbackRow)]
+        self.due = self.first_due = math.inf
+        self.failures = 0
+        self.pause_end = -math.inf
+        self._is_running: bool | None = None
+        self._held_up: list[FallbackRow] = []
+        self._stations = stations
+        self._record = record
+        self._conditions = conditions
+        self._wakes = wakes
+
+    @property
+    def is_lost(self) -> bool:
+        """Tell whether it is out of reach."""
+        return self.failures >= _FAILURES
+
+    @property
+    def is_active(self) -> bool:
+        """Tell whether its station is active."""
+        return self._stations[self.station].active
+
+    def plan(self) -> None:
+        """Look at its rows again when the first of them wants it."""
+        before, self.due = self.due, min([row.due for row in self.rows], default=math.inf)
+        if self.due != before:
+            self._wakes.plan(self)
+        self.first_due = min([row.first_due for row in self.rows], default=math.inf)
+
+    def look_again(self, *rows: OwnRow) -> None:
+        """Look at these rows at once."""
+        for row in rows:
+            row.due = -math.inf
+        if rows:
+            self.plan()
+
+    # What happens
+
+    def contact(self, now: float, *, is_new: bool = False) -> None:
+        """Take note of a contact with it, the first with this port where it ``is_new`` (2, 8)."""
+        for beat in self.heartbeats:
+            beat.begin(now, is_new=is_new)
+        for row in self.fallbacks:
+            if not row.is_fresh(now):
+                row.make_due(FallbackCause.RETURN, now)
+            else:  # a message that it waits for may be gone with the port
+                row.due = -math.inf
+        self.plan()
+
+    def mode_seen(self, is_running: bool, now: float) -> None:
+        """Take note of its mode; a change to RUN is a first contact (rules 2, 8)."""
+        was_running, self._is_running = self._is_running, is_running
+        if not is_running or was_running is not False:
+            return
+        for beat in self.heartbeats:
+            beat.ran(now)
+        for row in self.fallbacks:
+            row.make_due(FallbackCause.RUN, now)
+        self.plan()
+
+    def release(self) -> None:
+        """Let fallbacks go on that waited for a write of their words: one has ended (rule 9)."""
+        self.look_again(*self._held_up)
+        self._held_up.clear()
+
+    def answered(self, row: OwnRow, outcome: Outcome, took: float, now: float) -> None:
+        """
+        Take note how a write of ours ended, which ``took`` so many seconds.
+
+        A PLC that does not answer is left alone for a while, or it would take the whole line. When
+        one answers again that is behind a gateway, it is a first contact, as its station was
+        active all the time (rules 2, 8).
+        """
+        is_behind_gateway = row.mapping.via is not None
+        if outcome is Outcome.UNKNOWN:
+            self.failures += 1
+            if self.is_lost:
+                share = _SHARE_OF_OTHERS * took if is_behind_gateway else 0.0
+                self.pause_end = now + max(_LEAST_PAUSE, share)
+        elif outcome is not Outcome.NOT_SENT:
+            was_lost, self.failures, self.pause_end = self.is_lost, 0, -math.inf
+            if was_lost and is_behind_gateway:
+                self.contact(now)
+
+    # Which goes first
+
+    def ready(self, youngest: MappingType[Mapping, float], now: float) -> list[OwnRow]:
+        """Return the rows that want to write now; ``youngest`` is of messages by their row."""
+        due = [row for row in self.fallbacks
+               if row.due <= now and row.judge(now, youngest.get(row.mapping, -math.inf))]
+        held_up = [row for row in due if not self._record.may_begin(row.mapping)]
+        for row in held_up:  # by a write that is under way (rule 9), whose end is reported
+            row.due = math.inf
+        self._held_up += held_up
+        why, conditions = self._why_held() if self.heartbeats else '', self._conditions
+        beats = [beat for beat in self.heartbeats if beat.judge(
+            now, why or beat.why_missing(conditions.messages, now), conditions.executor,
+            conditions.messages)]
+        self.plan()
+        return [*beats, *(row for row in due if row not in held_up)]
+
+    def _why_held(self) -> str:
+        """Return why no heartbeat may count, empty if it may (rules 3 b, 5)."""
+        if self._conditions.is_ending:
+            return 'the bridge ends'
+        return next(filter(None, (row.why_held for row in self.fallbacks)), '')
+
+    def rank(self, row: OwnRow, now: float) -> TurnRank | None:
+        """
+        Return when a row has its turn, the least first; None where it has to wait (rules 10, 11).
+
+        First tries go at once: the PLC may well carry out what it does not answer. Those that
+        answer go before those that do not. Of these the one goes first that was tried the longest
+        ago, and those that reply late have the time for probes only.
+        """
+        is_zero = isinstance(row, HeartbeatRow) and row.wants_zero
+        is_beat = isinstance(row, HeartbeatRow) and not row.wants_zero
+        is_ill = self.failures > 0 or not self._stations[self.station].replies_in_time
+        if row.is_first_try and not is_beat:
+            return 0, is_ill, not is_zero
+        if not is_ill:
+            return (2, 0, 0, row.tried) if is_beat else (1, 0, not is_zero, row.tried)
+        if now < self._free_from:
+            return None
+        return 3, self.pause_end, is_beat, not is_zero, row.tried
+
+    @property
+    def _free_from(self) -> float:
+        """Return from when on more than first tries may be written (clock value in s)."""
+        if self._conditions.is_ending:  # there is no later
+            return -math.inf
+        return max(self.pause_end, self._stations.next_message(self.station))
+
+    def next_due(self, least: float) -> float:
+        """Return when something may be written, if that is before ``least`` (clock values, s)."""
+        if self.due >= least or not self.is_active:
+            return least
+        return min(least, self.first_due, max(self.due, self._free_from))
+
+    def good_until(self, beat: HeartbeatRow, youngest: MappingType[Mapping, float]) -> float:
+        """Return until when a heartbeat may be sent (clock value in s): later it may be wrong."""
+        ends = [row.deadline(youngest.get(row.mapping, -math.inf)) for row in self.fallbacks]
+        return min([beat.executor_until(self._conditions.executor),
+                    beat.topics_until(self._conditions.messages), *ends])
