@@ -690,6 +690,21 @@ def test_rule_8_guests_write_over_a_fallback_is_written_over_at_once(dst: int) -
     assert cell.results() == [START]
 
 
+def test_rule_11_only_the_first_try_over_a_guest_is_not_held_up_by_a_pause() -> None:
+    one = OneRow()
+    row = one.row
+    row.make_due(FallbackCause.START, 0.0)
+    one.fallback(row.take(0.0), 0.1)
+    guest = Claim(1, [one.mapping.extent])
+    guest.done = guest.lands_until = 1.0
+    row.write_ended(guest, 1.0)
+    assert row.judge(1.0, -math.inf)
+    assert row.first_due == 1.0
+    one.fallback(row.refresh(1.0), 1.2, Outcome.UNKNOWN)
+    assert row.judge(1.2, -math.inf)
+    assert row.first_due == math.inf
+
+
 @pytest.mark.parametrize('held', [0.5, 0.7, 0.9])
 @pytest.mark.parametrize('count', [1, 2, 3])
 def test_rule_19_own_heartbeats_that_a_gateway_holds_are_no_other_program(

@@ -115,13 +115,15 @@ class FallbackRow:
 
     @property
     def is_first_try(self) -> bool:
-        """Tell whether the fallback is due and was not sent since."""
+        """Tell whether the fallback is due, or written over, and was not sent since."""
+        if self.state is FallbackState.OVERWRITTEN:
+            return self.tried < self._due_since
         return self.cause is not None and self.sent < self._due_since
 
     @property
     def first_due(self) -> float:
         """Return when the next look at it may find a first try (clock value in s)."""
-        may_be = self.is_first_try or self.cause is None and not self.stands
+        may_be = self.is_first_try or self.state is FallbackState.MESSAGE
         return self.due if may_be else math.inf
 
     def is_fresh(self, now: float) -> bool:
@@ -202,7 +204,8 @@ class FallbackRow:
             if claim.extents is None:  # it was hardly meant for these
                 self.refresh_at = now
             else:
-                self.state, self._next_try = FallbackState.OVERWRITTEN, now
+                self.state = FallbackState.OVERWRITTEN
+                self._due_since = self._next_try = now
 
     @property
     def why_held(self) -> str:
