@@ -27,7 +27,7 @@ from abdf1_ros.messages import Message, Severity
 from abdf1_ros.pccc.access import Access
 from abdf1_ros.pccc.describe import command_codes
 from abdf1_ros.pccc.dialect import Dialect
-from abdf1_ros.pccc.families import dialect_of, file_types_of, layout_of, parse_address
+from abdf1_ros.pccc.families import dialect_of, FAMILIES, parse_address
 from abdf1_ros.pccc.file_types import FileType, PlcType
 from abdf1_ros.pccc.members import Members
 from abdf1_ros.pccc.processor import Processor
@@ -43,9 +43,9 @@ from tools.rooms import ROOMS
 
 CONFIG = Path(__file__).resolve().parent.parent / 'config'
 
-FAMILIES = {PlcType.PLC5: 'PLC-5', PlcType.SLC: 'SLC, MicroLogix', PlcType.PLC3: 'PLC-3',
-            PlcType.PLC2: 'PLC-2'}
-_5, _S, _3, _2 = FAMILIES
+NAMES = {PlcType.PLC5: 'PLC-5', PlcType.SLC: 'SLC, MicroLogix', PlcType.PLC3: 'PLC-3',
+         PlcType.PLC2: 'PLC-2'}
+_5, _S, _3, _2 = NAMES
 
 # Places of one kind in every family that has them; of each the types are the same.
 PLACES: tuple[tuple[str, dict[PlcType, str]], ...] = (
@@ -141,18 +141,18 @@ def addresses() -> str:
         kinds = types_of(parsed[0])
         assert all(types_of(address) == kinds for address in parsed), label
         rows.append((
-            label, *(_code(examples.get(plc_type, '')) for plc_type in FAMILIES),
+            label, *(_code(examples.get(plc_type, '')) for plc_type in NAMES),
             kinds[0].value, ', '.join(kind.value for kind in kinds[1:]),
             TOPIC_TYPES[kinds[0]].__name__))
-    return table(('file', *FAMILIES.values(), 'type', 'Type may also be', 'message'), rows)
+    return table(('file', *NAMES.values(), 'type', 'Type may also be', 'message'), rows)
 
 
 def members() -> str:
     """Return the named parts of the structures."""
     rows = []
-    for plc_type, family in FAMILIES.items():
-        for kind in file_types_of(plc_type):
-            parts = layout_of(kind, plc_type).members
+    for plc_type, family in NAMES.items():
+        for kind in FAMILIES[plc_type].file_types:
+            parts = FAMILIES[plc_type].layout(kind).members
             if parts:
                 rows.append((family, kind.value, _names(parts, False), _names(parts, True)))
     return table(('family', 'file', 'values', 'bits'), rows)
@@ -178,7 +178,7 @@ def packets() -> str:
 
 
 def _lacking(processor: Processor) -> str:
-    return ' '.join(kind.value for kind in file_types_of(PlcType.SLC)
+    return ' '.join(kind.value for kind in FAMILIES[PlcType.SLC].file_types
                     if not any(processor.has_file(file, kind) for file in range(256)))
 
 
@@ -221,10 +221,10 @@ def symbols() -> str:
 
 def file_codes() -> str:
     """Return the file types of SLC commands."""
-    types = (kind for kind in file_types_of(PlcType.SLC))
+    types = (kind for kind in FAMILIES[PlcType.SLC].file_types)
     return table(('file', 'type'), (
         (kind.value, _code(f'{layout.code:02X}')) for kind in types
-        if (layout := layout_of(kind, PlcType.SLC)).code))
+        if (layout := FAMILIES[PlcType.SLC].layout(kind)).code))
 
 
 def statuses() -> str:

@@ -19,7 +19,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from enum import Enum
 
-from abdf1_ros.pccc.families import family_of
+from abdf1_ros.pccc.families import FAMILIES
 from abdf1_ros.pccc.file_types import PlcType
 from abdf1_ros.pccc.identity import Mode
 from abdf1_ros.pccc.processor import Processor
@@ -58,7 +58,7 @@ class EmulatedProcessor:
 
     def encode(self) -> bytes:
         """Return the data of the reply to 06/03: SLC 24 bytes, PLC-5 36, PLC-3 18, PLC-2 10."""
-        return family_of(self.plc_type).encode_identity(
+        return FAMILIES[self.plc_type].encode_identity(
             self.mode, self.is_faulted, self.is_full_duplex, self.processor)
 
     @property

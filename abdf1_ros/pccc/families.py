@@ -23,7 +23,7 @@ from abdf1_ros.pccc.access import Access
 from abdf1_ros.pccc.address import Address
 from abdf1_ros.pccc.dialect import Dialect
 from abdf1_ros.pccc.family import Family
-from abdf1_ros.pccc.file_types import FileType, Layout, PlcType
+from abdf1_ros.pccc.file_types import PlcType
 from abdf1_ros.pccc.identity import Identity
 from abdf1_ros.pccc.link_counters import ServedCounters
 from abdf1_ros.pccc.notation import CommandCode, KnownCommand
@@ -69,11 +69,6 @@ def served_counters(counters: Counters, plc_type: PlcType, mode: str) -> ServedC
     return layout_in and ServedCounters(counters, layout_in(mode))
 
 
-def family_of(plc_type: PlcType) -> Family:
-    """Return the family of that name."""
-    return FAMILIES[plc_type]
-
-
 def parse_address(text: str, plc_type: PlcType, access: Access | None = None) -> Address:
     """
     Read the text of an address, reached by ``access`` where that makes a difference.
@@ -81,22 +76,6 @@ def parse_address(text: str, plc_type: PlcType, access: Access | None = None) ->
     Raises AddressSyntaxError or AddressRangeError, whose text says what would be right.
     """
     return FAMILIES[plc_type].addressing.parse(text, access)
-
-
-def file_types_of(plc_type: PlcType) -> tuple[FileType, ...]:
-    """Return the file types that a family can have."""
-    files = FAMILIES[plc_type].addressing.files
-    return tuple(kind for kind in FileType if kind in files)
-
-
-def layout_of(file_type: FileType, plc_type: PlcType) -> Layout:
-    """Return how elements of such a file are built; KeyError where the family has none."""
-    return FAMILIES[plc_type].addressing.files[file_type]
-
-
-def accesses_of(plc_type: PlcType) -> tuple[Access, ...]:
-    """Return the ways to the words of a family, the usual one first."""
-    return tuple(FAMILIES[plc_type].dialects)
 
 
 def dialect_of(plc_type: PlcType, access: Access | None = None,

@@ -25,7 +25,7 @@ from abdf1_ros.pccc.data_table import DataTable
 from abdf1_ros.pccc.diagnostics import MAX_ECHO
 from abdf1_ros.pccc.dialect import Dialect
 from abdf1_ros.pccc.file_search import FileSearch
-from abdf1_ros.pccc.file_types import PlcType
+from abdf1_ros.pccc.file_types import FileType, Layout, PlcType
 from abdf1_ros.pccc.identity import Identity, Mode
 from abdf1_ros.pccc.link_counters import CounterLayout
 from abdf1_ros.pccc.notation import CommandCode, KnownCommand
@@ -70,3 +70,17 @@ class Family:
     def plc_type(self) -> PlcType:
         """Return what the CSV files call it."""
         return self.addressing.plc_type
+
+    @property
+    def accesses(self) -> tuple[Access, ...]:
+        """Return the ways to its words, the usual one first."""
+        return tuple(self.dialects)
+
+    @property
+    def file_types(self) -> tuple[FileType, ...]:
+        """Return the file types that it can have."""
+        return tuple(kind for kind in FileType if kind in self.addressing.files)
+
+    def layout(self, file_type: FileType) -> Layout:
+        """Return how elements of such a file are built; KeyError where it has none."""
+        return self.addressing.files[file_type]

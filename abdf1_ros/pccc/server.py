@@ -30,7 +30,7 @@ from abdf1_ros.pccc import diagnostics, status
 from abdf1_ros.pccc.address import AddressRefusal
 from abdf1_ros.pccc.data_table import DataTable, NoSuchFile, OutOfRange, Protected
 from abdf1_ros.pccc.emulated import EmulatedProcessor
-from abdf1_ros.pccc.families import family_of
+from abdf1_ros.pccc.families import FAMILIES
 from abdf1_ros.pccc.family import Family
 from abdf1_ros.pccc.fields import Reader
 from abdf1_ros.pccc.link_counters import ServedCounters
@@ -42,7 +42,7 @@ class Server:
 
     def __init__(self, table: DataTable, processor: EmulatedProcessor | None = None,
                  counters: ServedCounters | None = None) -> None:
-        family = family_of(table.plc_type)
+        family = FAMILIES[table.plc_type]
         self._family = family.commands(table)
         processor = processor or EmulatedProcessor(table.plc_type)
         self._commands: Commands = self._family.commands | _diagnostics(

@@ -25,7 +25,7 @@ from abdf1_ros.pccc import diagnostics
 from abdf1_ros.pccc.access import Access
 from abdf1_ros.pccc.address import Address
 from abdf1_ros.pccc.dialect import Dialect, Request, Steps, Transfer
-from abdf1_ros.pccc.families import decode_identity, dialect_of, family_of, parse_address
+from abdf1_ros.pccc.families import decode_identity, dialect_of, FAMILIES, parse_address
 from abdf1_ros.pccc.file_types import FileType, PlcType
 from abdf1_ros.pccc.identity import Identity
 from abdf1_ros.pccc.processor import Processor
@@ -106,7 +106,7 @@ def data_of(reply: Packet, address: Address) -> bytes:
     if reply.sts == 0:
         return reply.data
     try:
-        return check_status(reply, family_of(address.plc_type).meanings)
+        return check_status(reply, FAMILIES[address.plc_type].meanings)
     except RemoteError as error:
         if address.addressing.slot_of(address) is None or not is_address_fault(error):
             raise

@@ -32,7 +32,7 @@ import math
 from abdf1_ros.pccc.address import Address, Area
 from abdf1_ros.pccc.dialect import Dialect, Transfer
 from abdf1_ros.pccc.extent import Extent
-from abdf1_ros.pccc.families import family_of
+from abdf1_ros.pccc.families import FAMILIES
 from abdf1_ros.pccc.file_types import FileType
 from abdf1_ros.pccc.processor import Processor
 from abdf1_ros.plan.line_model import LineModel, ReadRequest
@@ -189,7 +189,7 @@ class Planner:
     def dialect(self, mapping: Mapping) -> Dialect:
         """Return how the station of a mapping is spoken to, as far as one knows."""
         processor = self.processors.get(mapping.station)
-        others = family_of(mapping.plc_type).by_processor
+        others = FAMILIES[mapping.plc_type].by_processor
         if processor is None or processor not in others:
             return mapping.dialect
         return min(mapping.dialect, others[processor],

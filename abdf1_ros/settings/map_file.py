@@ -20,7 +20,7 @@ from collections.abc import Callable, Iterator, Sequence
 import re
 
 from abdf1_ros.df1.packet import BROADCAST
-from abdf1_ros.pccc.families import family_of
+from abdf1_ros.pccc.families import FAMILIES
 from abdf1_ros.pccc.processor import Processor, USUAL
 from abdf1_ros.problems import ConfigurationError, Problem
 from abdf1_ros.settings.columns import COLUMNS, NEEDED
@@ -134,7 +134,7 @@ def _no_counter(mapping: Mapping, counter: Mapping, mappings: Sequence[Mapping])
 
 def _processor(mapping: Mapping) -> Processor | None:
     """Return which SLC a mapping goes to, None for anything else."""
-    has_processors = bool(family_of(mapping.plc_type).by_processor)
+    has_processors = bool(FAMILIES[mapping.plc_type].by_processor)
     if not has_processors or mapping.serves or mapping.station == BROADCAST:
         return None
     return mapping.processor or USUAL

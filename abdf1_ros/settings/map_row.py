@@ -27,7 +27,7 @@ from abdf1_ros.messages import Message
 from abdf1_ros.numbers import decimal_number, two_readings, whole_number
 from abdf1_ros.pccc.access import Access
 from abdf1_ros.pccc.address import Address, AddressRangeError, AddressSyntaxError
-from abdf1_ros.pccc.families import accesses_of, FAMILIES, family_of, parse_address
+from abdf1_ros.pccc.families import FAMILIES, parse_address
 from abdf1_ros.pccc.file_types import FileType, PlcType
 from abdf1_ros.pccc.processor import Processor
 from abdf1_ros.pccc.structures import type_fault, write_fault, wrong_type
@@ -223,7 +223,7 @@ class RowReader:
 
     def _access(self, plc_type: PlcType, command: Command | None) -> Access | None:
         text = self._row.get('Access')
-        ways = accesses_of(plc_type)
+        ways = FAMILIES[plc_type].accesses
         if not text or self._is_read_only(command):
             return ways[0]
         access = next((way for way in ways if way.value.lower() == text.lower()), None)
@@ -243,7 +243,7 @@ class RowReader:
                    address: Address | None) -> Processor | None:
         if not self._row.get('Processor'):
             return None
-        if not family_of(plc_type).by_processor or command is Command.SERVE:
+        if not FAMILIES[plc_type].by_processor or command is Command.SERVE:
             self._fault('Processor', 'Processor is for PLCs of type SLC that we read or write',
                         is_superfluous=True)
             return None

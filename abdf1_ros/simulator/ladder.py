@@ -32,7 +32,7 @@ from enum import IntEnum
 
 from abdf1_ros.pccc.address import Address
 from abdf1_ros.pccc.data_table import DataTable, NoSuchFile, OutOfRange
-from abdf1_ros.pccc.families import family_of
+from abdf1_ros.pccc.families import FAMILIES
 from abdf1_ros.pccc.file_types import FileType
 from abdf1_ros.settings.heartbeats import STABLE, TIME_BASE
 
@@ -107,7 +107,7 @@ class Ladder:
                  scan_time: float = _SCAN_TIME) -> None:
         self.scan_time = scan_time
         self._table = table
-        self._addressing = family_of(table.plc_type).addressing
+        self._addressing = FAMILIES[table.plc_type].addressing
         self._on_lamp = on_lamp
         self._watchdog = _Timer(preset)
         self._stable = _Timer(preset + STABLE)

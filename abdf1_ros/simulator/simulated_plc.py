@@ -39,13 +39,7 @@ from abdf1_ros.numbers import decimal_number, whole_number
 from abdf1_ros.pccc.address import Address
 from abdf1_ros.pccc.data_table import DataTable, NoSuchFile
 from abdf1_ros.pccc.emulated import EmulatedProcessor, Setting
-from abdf1_ros.pccc.families import (
-    dialect_of,
-    FAMILIES,
-    family_of,
-    parse_address,
-    served_counters,
-)
+from abdf1_ros.pccc.families import dialect_of, FAMILIES, parse_address, served_counters
 from abdf1_ros.pccc.server import Server
 from abdf1_ros.pccc.status import check_status
 from abdf1_ros.pccc.steps import write_requests
@@ -324,7 +318,7 @@ def _load_row(row: Row, plcs: dict[int, SimulatedPlc], checksum: Checksum,
                       f'station {station} is a {plc.table.plc_type.value} already')
     if row.get('Processor'):
         plc.processor.processor = _choice(row, 'Processor', {
-            entry.value: entry for entry in family_of(plc_type).by_processor})
+            entry.value: entry for entry in FAMILIES[plc_type].by_processor})
     try:
         address = parse_address(row.get('Address'), plc_type)
         codec = _natural_codec(address, length)

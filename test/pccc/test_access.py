@@ -15,7 +15,7 @@
 """The ways to a PLC's words."""
 
 from abdf1_ros.pccc.access import Access
-from abdf1_ros.pccc.families import accesses_of, FAMILIES
+from abdf1_ros.pccc.families import FAMILIES
 from abdf1_ros.pccc.file_types import PlcType
 import pytest
 
@@ -24,8 +24,8 @@ import pytest
     ('PLC2', ['Unprotected', 'Protected', 'CIF']), ('PLC3', ['WordRange']),
     ('PLC5', ['Typed', 'WordRange']), ('SLC', ['Slot', 'Flat'])])
 def test_ways_of_a_family_the_usual_one_first(family: str, names: list[str]) -> None:
-    assert [access.value for access in accesses_of(PlcType(family))] == names
+    assert [access.value for access in FAMILIES[PlcType(family)].accesses] == names
 
 
 def test_every_access_belongs_to_a_family() -> None:
-    assert {way for family in FAMILIES for way in accesses_of(family)} == set(Access)
+    assert {way for family in FAMILIES for way in FAMILIES[family].accesses} == set(Access)

@@ -17,7 +17,7 @@
 from abdf1_ros.errors import FormatError
 from abdf1_ros.pccc.access import Access
 from abdf1_ros.pccc.address import Address, AddressRangeError, AddressSyntaxError, Area
-from abdf1_ros.pccc.families import family_of, file_types_of, layout_of, parse_address
+from abdf1_ros.pccc.families import FAMILIES, parse_address
 from abdf1_ros.pccc.file_types import FileType, PlcType
 from hypothesis import given
 from hypothesis import strategies as st
@@ -26,7 +26,7 @@ from support.cases import for_all
 
 PLC5, SLC = PlcType.PLC5, PlcType.SLC
 BOTH = (PLC5, SLC)
-FAMILIES = st.sampled_from(BOTH)
+KINDS = st.sampled_from(BOTH)
 
 
 @for_all('family', BOTH)
@@ -48,7 +48,7 @@ def test_address_has_the_parts_that_its_text_names(
         family: PlcType, text: str, kind: str, file: int, element: int, word: int,
         bit: int | None) -> None:
     assert parse_address(text, family) == Address(
-        family_of(family).addressing, FileType(kind), file, element, word, bit)
+        FAMILIES[family].addressing, FileType(kind), file, element, word, bit)
 
 
 @pytest.mark.parametrize(('text', 'file', 'element', 'bit'), [
@@ -172,7 +172,7 @@ texts = st.builds(
     st.sampled_from(['', '', '/0', '/07', '/15', '/17', '/DN', '/EN', '/FD', '/ACC', '/INI']))
 
 
-@given(texts, FAMILIES)
+@given(texts, KINDS)
 def test_parse_and_str_are_inverse(text: str, family: PlcType) -> None:
     try:
         address = parse_address(text, family)
@@ -185,9 +185,9 @@ def test_parse_and_str_are_inverse(text: str, family: PlcType) -> None:
 @st.composite
 def addresses(draw: st.DrawFn) -> Address:
     """Return any place of any file type."""
-    family = draw(FAMILIES)
-    kind = draw(st.sampled_from(file_types_of(family)))
-    layout = layout_of(kind, family)
+    family = draw(KINDS)
+    kind = draw(st.sampled_from(FAMILIES[family].file_types))
+    layout = FAMILIES[family].layout(kind)
     fixed = kind in (FileType.OUTPUT, FileType.INPUT, FileType.STATUS) or kind.is_function
     file = kind.default_file if fixed else draw(st.integers(3, 255))
     slot = kind.is_io and family == SLC
@@ -196,9 +196,9 @@ def addresses(draw: st.DrawFn) -> Address:
     bits = st.one_of(st.none(), st.integers(0, 15))
     bit = draw(bits) if kind.has_bits and layout.value_words(word) == 1 else None
     assert file is not None
-    last = family_of(family).addressing.last_element(kind)
+    last = FAMILIES[family].addressing.last_element(kind)
     element = draw(st.integers(0, 30 if slot else min(127, last)))
-    return Address(family_of(family).addressing, kind, file, element, word, bit)
+    return Address(FAMILIES[family].addressing, kind, file, element, word, bit)
 
 
 @given(addresses())
@@ -208,8 +208,8 @@ def test_every_address_is_read_back(address: Address) -> None:
 
 @pytest.mark.parametrize('family', BOTH)
 def test_every_member_has_its_name_in_text(family: PlcType) -> None:
-    for kind in file_types_of(family):
-        for name, member in layout_of(kind, family).members.items():
+    for kind in FAMILIES[family].file_types:
+        for name, member in FAMILIES[family].layout(kind).members.items():
             if (member.word, member.bit) == (0, None):
                 continue  # T4:1 is that already
             sign = '.' if member.bit is None else '/'
@@ -255,7 +255,7 @@ def test_what_is_no_part_of_a_structure(text: str, reason: str) -> None:
 @pytest.mark.parametrize(('letters', 'family'), [
     ('L', PLC5), ('BT', SLC), ('SC', SLC), ('X', PLC5), ('X', SLC)])
 def test_letters_of_no_file_of_the_family(letters: str, family: PlcType) -> None:
-    known = ', '.join(kind.value for kind in file_types_of(family))
+    known = ', '.join(kind.value for kind in FAMILIES[family].file_types)
     title = 'PLC-5' if family == PLC5 else 'SLC'
     with pytest.raises(AddressSyntaxError, match=(
             f'^{title} has no {letters} files; file types: {known}$')):
@@ -290,7 +290,7 @@ def test_flat_io_has_no_words_of_slots() -> None:
 
 
 @given(st.one_of(
-    st.text(max_size=20), st.text('NBTSIOPMG0123456789:;./#$ACDN \u0663', max_size=14)), FAMILIES)
+    st.text(max_size=20), st.text('NBTSIOPMG0123456789:;./#$ACDN \u0663', max_size=14)), KINDS)
 def test_any_text_is_an_address_or_a_format_error(text: str, family: PlcType) -> None:
     try:
         address = parse_address(text, family)
@@ -301,7 +301,7 @@ def test_any_text_is_an_address_or_a_format_error(text: str, family: PlcType) ->
 
 
 @given(st.sampled_from(['N7:5', 'T4:5', 'F8:5', 'ST9:5', 'I:5', 'R6:0.POS', 'PD9:3', 'MG9:1']),
-       FAMILIES, st.integers(0, 255))
+       KINDS, st.integers(0, 255))
 def test_offset_and_at_offset_are_inverse(text: str, family: PlcType, offset: int) -> None:
     address = parse_address(text, family)
     assert address.at_offset(address.offset) == address

@@ -17,7 +17,7 @@
 from abdf1_ros.errors import FormatError
 from abdf1_ros.pccc import diagnostics
 from abdf1_ros.pccc.diagnostics import Echo, ReadCounters
-from abdf1_ros.pccc.families import family_of
+from abdf1_ros.pccc.families import FAMILIES
 from abdf1_ros.pccc.fields import Reader
 from abdf1_ros.pccc.file_types import PlcType
 from hypothesis import given
@@ -66,4 +66,4 @@ def test_read_counters_of_another_length_is_refused(data: bytes) -> None:
 
 
 def test_slc_echoes_less() -> None:
-    assert [family_of(kind).max_echo for kind in (PlcType.SLC, PlcType.PLC5)] == [236, 243]
+    assert [FAMILIES[kind].max_echo for kind in (PlcType.SLC, PlcType.PLC5)] == [236, 243]

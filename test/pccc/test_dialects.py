@@ -19,15 +19,7 @@ from abdf1_ros.pccc.access import Access
 from abdf1_ros.pccc.address import Address
 from abdf1_ros.pccc.data_table import DataTable
 from abdf1_ros.pccc.dialect import Dialect, Transfer
-from abdf1_ros.pccc.families import (
-    accesses_of,
-    dialect_of,
-    FAMILIES,
-    family_of,
-    file_types_of,
-    layout_of,
-    parse_address,
-)
+from abdf1_ros.pccc.families import dialect_of, FAMILIES, parse_address
 from abdf1_ros.pccc.file_types import PlcType
 from abdf1_ros.pccc.processor import Processor
 from hypothesis import given
@@ -65,7 +57,7 @@ def bench(family: PlcType, access: Access, text: str,
 
 @pytest.mark.parametrize('family', FAMILIES)
 def test_every_family_has_a_dialect_for_every_access_it_serves(family: PlcType) -> None:
-    assert dialect_of(family) is dialect_of(family, accesses_of(family)[0])
+    assert dialect_of(family) is dialect_of(family, FAMILIES[family].accesses[0])
 
 
 @pytest.mark.parametrize(('family', 'access', 'right'), [
@@ -117,10 +109,10 @@ def test_largest_packets_are_served(place: tuple[PlcType, Access, str]) -> None:
 @pytest.mark.parametrize('place', FLOATS, ids=str)
 def test_every_value_of_every_file_type_goes_there_and_back(place: tuple[PlcType, Access]) -> None:
     family, dialect = place[0], dialect_of(*place)
-    for kind in file_types_of(family):
+    for kind in FAMILIES[family].file_types:
         file = kind.default_file if kind.default_file is not None else 9
-        layout = layout_of(kind, family)
-        start = Address(family_of(family).addressing, kind, file, 1)
+        layout = FAMILIES[family].layout(kind)
+        start = Address(FAMILIES[family].addressing, kind, file, 1)
         table = DataTable(family)
         table.create(start, 2 * layout.words)
         stored = bytearray(4 * layout.words)
@@ -142,8 +134,8 @@ def test_every_value_of_every_file_type_goes_there_and_back(place: tuple[PlcType
 @pytest.mark.parametrize('place', FLOATS, ids=str)
 def test_every_named_bit_is_set_alone(place: tuple[PlcType, Access]) -> None:
     family, dialect = place[0], dialect_of(*place)
-    for kind in file_types_of(family):
-        for name, member in layout_of(kind, family).members.items():
+    for kind in FAMILIES[family].file_types:
+        for name, member in FAMILIES[family].layout(kind).members.items():
             if member.bit is None:
                 continue
             address = parse_address(f'{kind.value}9:1/{name}', family)

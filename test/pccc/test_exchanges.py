@@ -29,13 +29,7 @@ from abdf1_ros.pccc.address import Address
 from abdf1_ros.pccc.data_table import DataTable
 from abdf1_ros.pccc.describe import describe
 from abdf1_ros.pccc.dialect import Request
-from abdf1_ros.pccc.families import (
-    accesses_of,
-    dialect_of,
-    FAMILIES,
-    parse_address,
-    served_counters,
-)
+from abdf1_ros.pccc.families import dialect_of, FAMILIES, parse_address, served_counters
 from abdf1_ros.pccc.file_types import PlcType
 from abdf1_ros.pccc.server import Server
 from abdf1_ros.pccc.status import check_status
@@ -169,7 +163,7 @@ def test_no_command_that_a_family_serves_is_left_out(family: PlcType) -> None:
 
 
 def test_no_request_that_a_dialect_makes_is_left_out() -> None:
-    ways = [(family, access) for family in FAMILIES for access in accesses_of(family)]
+    ways = [(family, access) for family in FAMILIES for access in FAMILIES[family].accesses]
     methods = {(*way, method) for way in ways for method in ('read', 'write', 'write_bits')
                if method != 'write_bits' or dialect_of(*way).writes_bits}
     assert {(entry.call.plc_type, entry.call.access, entry.call.method)

@@ -14,7 +14,7 @@
 
 """File types: letters, codes and layouts of the manual."""
 
-from abdf1_ros.pccc.families import FAMILIES, file_types_of, layout_of
+from abdf1_ros.pccc.families import FAMILIES
 from abdf1_ros.pccc.file_types import FileType, Layout, PlcType
 from abdf1_ros.pccc.slc.address import BY_CODE
 import pytest
@@ -38,13 +38,13 @@ def test_default_files_are_those_of_the_specification(letters: str, file: int | 
     ('A', 0x8E, 1), ('D', 0x8F, 1), ('L', 0x91, 2), ('MG', 0x92, 25), ('PD', 0x93, 23)])
 def test_slc_codes_and_sizes(letters: str, code: int, words: int) -> None:
     kind = FileType(letters)
-    layout = layout_of(kind, SLC)
+    layout = FAMILIES[SLC].layout(kind)
     assert (layout.code, layout.words, layout.wire_words) == (code, words, words)
     assert BY_CODE[code] is kind
 
 
 def test_every_file_type_of_an_slc_has_its_own_code() -> None:
-    assert len(BY_CODE) == len(file_types_of(SLC)) == 20
+    assert len(BY_CODE) == len(FAMILIES[SLC].file_types) == 20
 
 
 @pytest.mark.parametrize(('family', 'missing'), [
@@ -52,10 +52,10 @@ def test_every_file_type_of_an_slc_has_its_own_code() -> None:
     (PlcType.PLC3, {'R', 'F', 'ST', 'L', 'PD', 'MG', 'BT', 'SC', *FUNCTION})])
 def test_file_types_that_a_family_does_not_have(family: PlcType, missing: set[str]) -> None:
     assert {kind.value for kind in FileType} - {
-        kind.value for kind in file_types_of(family)} == missing
+        kind.value for kind in FAMILIES[family].file_types} == missing
     for letters in missing:
         with pytest.raises(KeyError):
-            layout_of(FileType(letters), family)
+            FAMILIES[family].layout(FileType(letters))
 
 
 def test_kinds_of_files() -> None:
@@ -68,8 +68,8 @@ def test_kinds_of_files() -> None:
 
 @pytest.mark.parametrize('family', FAMILIES)
 def test_members_are_those_of_structures_and_lie_inside(family: PlcType) -> None:
-    for kind in file_types_of(family):
-        layout = layout_of(kind, family)
+    for kind in FAMILIES[family].file_types:
+        layout = FAMILIES[family].layout(kind)
         assert bool(layout.members) is kind.is_structure
         ends = [member.word + member.words for member in layout.members.values()]
         assert max(ends, default=0) <= layout.words
@@ -77,8 +77,8 @@ def test_members_are_those_of_structures_and_lie_inside(family: PlcType) -> None
 
 @pytest.mark.parametrize('family', FAMILIES)
 def test_members_do_not_share_bits_or_words(family: PlcType) -> None:
-    for kind in file_types_of(family):
-        members = layout_of(kind, family).members.values()
+    for kind in FAMILIES[family].file_types:
+        members = FAMILIES[family].layout(kind).members.values()
         places = [(member.word, member.bit) for member in members]
         assert len(set(places)) == len(places)
         values = [member.word + n for member in members if member.bit is None
@@ -87,16 +87,16 @@ def test_members_do_not_share_bits_or_words(family: PlcType) -> None:
 
 
 def test_value_words_tell_floats_and_their_halves_from_words() -> None:
-    pid = layout_of(FileType.PID, PLC5)
+    pid = FAMILIES[PLC5].layout(FileType.PID)
     assert [pid.value_words(word) for word in range(6)] == [1, 1, 2, 0, 2, 0]
     assert [pid.value_words(word) for word in (48, 49, 50, 81)] == [2, 0, 1, 1]
-    assert {layout_of(FileType.PID, SLC).value_words(word) for word in range(23)} == {1}
+    assert {FAMILIES[SLC].layout(FileType.PID).value_words(word) for word in range(23)} == {1}
 
 
 @pytest.mark.parametrize('family', FAMILIES)
 def test_whole_control_words_are_never_written(family: PlcType) -> None:
-    for kind in file_types_of(family):
-        layout = layout_of(kind, family)
+    for kind in FAMILIES[family].file_types:
+        layout = FAMILIES[family].layout(kind)
         flagged = {member.word for member in layout.members.values() if member.bit is not None}
         assert bool(flagged) is (kind.is_structure and not kind.is_function)
         assert not any(layout.may_write(word) for word in flagged)
@@ -109,8 +109,8 @@ def test_everything_of_a_plain_file_may_be_written() -> None:
 
 def writable(letters: str, family: PlcType) -> str:
     """Return the names of what may be written."""
-    members = layout_of(FileType(letters), family).members
-    layout = layout_of(FileType(letters), family)
+    members = FAMILIES[family].layout(FileType(letters)).members
+    layout = FAMILIES[family].layout(FileType(letters))
     return ' '.join(name for name, member in members.items()
                     if layout.may_write(member.word, member.bit))
 
@@ -132,9 +132,9 @@ def test_what_may_be_written(letters: str, family: PlcType, names: str) -> None:
     ('MG', SLC, 16, 15), ('HSC', SLC, 5, None), ('PWM', SLC, 4, None)])
 def test_what_has_no_name_may_not_be_written(letters: str, family: PlcType, word: int,
                                              bit: int | None) -> None:
-    assert not layout_of(FileType(letters), family).may_write(word, bit)
+    assert not FAMILIES[family].layout(FileType(letters)).may_write(word, bit)
 
 
 def test_both_words_and_single_bits_of_a_writable_value_may_be_written() -> None:
-    assert layout_of(FileType.TIMER, PLC5).may_write(1, 7)
-    assert layout_of(FileType.PID, PLC5).may_write(3)
+    assert FAMILIES[PLC5].layout(FileType.TIMER).may_write(1, 7)
+    assert FAMILIES[PLC5].layout(FileType.PID).may_write(3)

@@ -14,12 +14,12 @@
 
 """What the SLC and MicroLogix processors take and have."""
 
-from abdf1_ros.pccc.families import dialect_of, file_types_of
+from abdf1_ros.pccc.families import dialect_of, FAMILIES
 from abdf1_ros.pccc.file_types import FileType, PlcType
 from abdf1_ros.pccc.processor import Processor, USUAL
 import pytest
 
-SLC_FILES = file_types_of(PlcType.SLC)
+SLC_FILES = FAMILIES[PlcType.SLC].file_types
 FUNCTION = ('HSC', 'PTO', 'PWM', 'STI', 'EII')
 
 

@@ -18,7 +18,7 @@ from enum import Enum
 import re
 
 from abdf1_ros.pccc.access import Access
-from abdf1_ros.pccc.families import accesses_of, FAMILIES
+from abdf1_ros.pccc.families import FAMILIES
 from abdf1_ros.pccc.file_types import PlcType
 from abdf1_ros.pccc.processor import Processor, USUAL
 from abdf1_ros.pccc.values import ValueType, WordOrder
@@ -53,7 +53,7 @@ def test_every_choice_is_named(name: str, choices: type[Enum]) -> None:
 
 @pytest.mark.parametrize('plc_type', [PlcType.PLC2, PlcType.PLC5, PlcType.SLC])
 def test_accesses_stand_in_their_order(plc_type: PlcType) -> None:
-    ways = ', '.join(way.value for way in accesses_of(plc_type))
+    ways = ', '.join(way.value for way in FAMILIES[plc_type].accesses)
     assert f'{plc_type.value}: {ways}' in BY_NAME['Access'].description
 
 

@@ -14,7 +14,7 @@
 
 """The generated tables leave nothing out."""
 
-from abdf1_ros.pccc.families import FAMILIES, file_types_of, parse_address
+from abdf1_ros.pccc.families import FAMILIES, parse_address
 from abdf1_ros.pccc.file_types import FileType, PlcType
 from abdf1_ros.pccc.values import types_of
 import pytest
@@ -33,7 +33,7 @@ def rows(text: str) -> list[list[str]]:
 def test_every_file_type_of_every_family_is_shown(plc_type: PlcType) -> None:
     shown = {parse_address(examples[plc_type], plc_type).file_type
              for _, examples in tables.PLACES if plc_type in examples}
-    assert shown == set(file_types_of(plc_type)) - {FileType.PWM}  # which is as PTO
+    assert shown == set(FAMILIES[plc_type].file_types) - {FileType.PWM}  # which is as PTO
 
 
 @for_all(('label', 'examples'), tables.PLACES)

@@ -21,7 +21,7 @@ from datetime import datetime, timedelta
 from abdf1_ros.cli.plc.session import Session
 from abdf1_ros.errors import FormatError
 from abdf1_ros.pccc import steps
-from abdf1_ros.pccc.families import family_of
+from abdf1_ros.pccc.families import FAMILIES
 from abdf1_ros.pccc.file_types import PlcType
 from abdf1_ros.pccc.steps import AddressedValues
 from abdf1_ros.pccc.values import ValueType
@@ -34,7 +34,7 @@ class Clock:
     """Year, month, day, hour, minute and second of a station; FormatError where none is known."""
 
     def __init__(self, session: Session, station: int, plc_type: PlcType) -> None:
-        family = family_of(plc_type)
+        family = FAMILIES[plc_type]
         if not family.clock:
             raise FormatError(f'is a {family.addressing.title}, whose clock is not known')
         self._session, self._station = session, station

@@ -21,7 +21,7 @@ from dataclasses import replace
 
 from abdf1_ros.cli.plc.session import Session
 from abdf1_ros.errors import FormatError, LinkError, RemoteError
-from abdf1_ros.pccc.families import dialect_of, family_of, layout_of
+from abdf1_ros.pccc.families import dialect_of, FAMILIES
 from abdf1_ros.pccc.file_search import DataFile
 from abdf1_ros.pccc.file_types import FileType, PlcType
 from abdf1_ros.pccc.identity import Identity
@@ -46,7 +46,7 @@ def find_files(session: Session, station: int, plc_type: PlcType, processor: Pro
     ``show`` gets a text about the file being asked for, ``warn`` why a list is not used. Raises
     FormatError for a family whose files cannot be looked for, and LinkError.
     """
-    family = family_of(plc_type)
+    family = FAMILIES[plc_type]
     search = family.file_search
     if search is None:
         raise FormatError(f'a {family.addressing.title} has no files that can be looked for')
@@ -68,7 +68,7 @@ def find_files(session: Session, station: int, plc_type: PlcType, processor: Pro
 
 def listed(session: Session, station: int, identity: Identity | None) -> list[DataFile]:
     """Return the files of the processor's own list, none where it has no list that is known."""
-    search = family_of(identity.plc_type).file_search if identity and identity.plc_type else None
+    search = FAMILIES[identity.plc_type].file_search if identity and identity.plc_type else None
     steps = search.directory(identity.processor) if search and identity else None
     try:
         return session.ask(station, steps) if steps else []
@@ -106,7 +106,7 @@ def map_rows(found: Sequence[DataFile], station: int, plc_type: PlcType,
             yield (f'# {entry}: addressed by ' + ('rack or slot' if kind.is_io else
                                                   'the names of its words'))
             continue
-        per_element = layout_of(kind, plc_type).words
+        per_element = FAMILIES[plc_type].layout(kind).words
         packet = dialect_of(plc_type).max_read(kind)
         length = 1 if kind is FileType.STRING else min(
             entry.elements * per_element, packet // per_element * per_element)

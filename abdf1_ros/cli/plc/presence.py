@@ -26,7 +26,7 @@ from abdf1_ros.cli.plc.session import Session
 from abdf1_ros.df1.echo import COMES_BACK
 from abdf1_ros.errors import Abdf1Error, LinkError, PortLost, RemoteError, StationInactive
 from abdf1_ros.pccc.access import Access
-from abdf1_ros.pccc.families import accesses_of, dialect_of, parse_address
+from abdf1_ros.pccc.families import dialect_of, FAMILIES, parse_address
 from abdf1_ros.pccc.file_search import is_there
 from abdf1_ros.pccc.identity import Identity
 from abdf1_ros.pccc.steps import echo, identify
@@ -114,7 +114,7 @@ def understands(session: Session, station: int) -> bool:
 def io_access(session: Session, there: Presence) -> list[str]:
     """Return with which Access inputs of an SLC or MicroLogix can be read; raises LinkError."""
     kind = there.identity.plc_type if there.identity else None
-    ways = () if kind is None else accesses_of(kind)
+    ways = () if kind is None else FAMILIES[kind].accesses
     if kind is None or Access.FLAT not in ways:
         return []
     return [way.value for way in ways if any(

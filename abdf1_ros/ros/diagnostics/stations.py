@@ -21,7 +21,7 @@ from pathlib import Path
 
 from abdf1_ros.driver.checks import StationHealth
 from abdf1_ros.driver.driver import Driver
-from abdf1_ros.pccc.families import family_of
+from abdf1_ros.pccc.families import FAMILIES
 from abdf1_ros.pccc.identity import Identity
 from abdf1_ros.ports.clock import line_time
 from abdf1_ros.settings.mapping import Mapping
@@ -54,7 +54,7 @@ def wrong_type(station: int, identity: Identity | None,
     if identity is None or identity.plc_type is None:
         return None
     for row in rows:
-        if row.plc_type != identity.plc_type and not family_of(row.plc_type).is_spoken_by_all:
+        if row.plc_type != identity.plc_type and not FAMILIES[row.plc_type].is_spoken_by_all:
             said = row.plc_type.value
         elif row.processor not in (identity.processor, None) and identity.processor is not None:
             said = f'{row.processor.value} in the column Processor'

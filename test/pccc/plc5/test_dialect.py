@@ -17,7 +17,7 @@
 from abdf1_ros.errors import FormatError
 from abdf1_ros.pccc.address import Address
 from abdf1_ros.pccc.data_table import DataTable
-from abdf1_ros.pccc.families import layout_of, parse_address
+from abdf1_ros.pccc.families import FAMILIES, parse_address
 from abdf1_ros.pccc.file_types import FileType, PlcType
 from abdf1_ros.pccc.plc5.dialect import Plc5Dialect
 from abdf1_ros.pccc.typed_data import TypedData
@@ -83,7 +83,7 @@ def test_bits_are_written_with_and_and_or_masks(text: str, encoded: str) -> None
     ('ST', 2, 2), ('PD', 1, 1), ('MG', 2, 2), ('BT', 19, 18), ('SC', 39, 38)])
 def test_limits_in_elements(letters: str, read: int, written: int) -> None:
     kind = FileType(letters)
-    words = layout_of(kind, PLC5).words
+    words = FAMILIES[PLC5].layout(kind).words
     assert DIALECT.max_read(kind) == read * words
     assert DIALECT.max_write(kind) == written * words
 
