@@ -54,6 +54,14 @@ from rclpy.node import Node
 from rclpy.qos import QoSProfile
 from rclpy.signals import SignalHandlerOptions
 
+_EPILOG = """\
+exit status: 0 when all was seen as it should be, or after Ctrl-C; 1 otherwise
+
+examples:
+  demo
+  demo --seconds 0
+  demo --peer
+"""
 _PATIENCE = 30.0
 _BRIDGE = 'abdf1: '
 _RESETS = 5  # on a busy machine the heartbeat may falter
@@ -207,8 +215,8 @@ class Speed:
             self._publisher.publish(self._message(data=[self.value]))
 
 
-class Demo:
-    """Show the scenes; every step waits until it has happened, or raises Missed."""
+class Stage:
+    """Both processes, who looks at them, and how the story is told line by line."""
 
     def __init__(self, scene: Scene, link: Path) -> None:
         net_file, map_file = config_file(scene.net_file), config_file(scene.map_file)
@@ -220,6 +228,7 @@ class Demo:
                              '-p', f'map_file:={map_file}')
         self._simulator_args = ('--pty', str(link), *scene.simulator)
         self._children: list[Child] = []
+        self._simulator: Child
         self._lamps: dict[str, float] = {}  # those that are on, and since when
         self.step = 0  # the number of the one that is shown
         self.last_step = 0
@@ -227,6 +236,87 @@ class Demo:
         rclpy.init(args=[], signal_handler_options=SignalHandlerOptions.NO)
         self._watcher = Watcher(mappings, str(link))
         self._speed = Speed(self._watcher, self._mappings['speed']) if scene.guarded else None
+
+    def close(self) -> None:
+        """End both processes, the bridge first."""
+        for child in reversed(self._children):
+            if child.process.poll() is None:
+                child.process.send_signal(signal.SIGINT)
+            child.process.wait(_PATIENCE)
+        self._relay()
+        self._watcher.destroy_node()
+        rclpy.try_shutdown()
+
+    def _start(self, name: str, *args: str) -> Child:
+        self._children.append(Child(name, *args))
+        return self._children[-1]
+
+    def _relay(self) -> None:
+        """Print what both say, and remember which lamps of the simulated PLC are on."""
+        for child in self._children:
+            for line in child.lines():
+                lamp, _, state = line.rpartition(' ')
+                self._lamps.pop(lamp, None)
+                if state == 'on':
+                    self._lamps[lamp] = time.monotonic()
+
+    def _print_values(self) -> None:
+        for tag, mapping in self._mappings.items():
+            if tag in self._watcher.values:
+                place = f'station {mapping.station}  {mapping.address!s:<9}'
+                print(f'    {place} -> /abdf1/read/{mapping.topic:<16}'
+                      f' {_shown(self._watcher.values[tag])}', flush=True)
+
+    def _level(self, section: str) -> bytes | None:
+        """Return the level of a status, None before it has come."""
+        status = self._watcher.statuses.get(section)
+        return status.level if status else None
+
+    def _print_statuses(self, *sections: str) -> None:
+        for section in sections:
+            status = self._watcher.statuses[section]
+            print(f'    {status.name:<18} {status.message}', flush=True)
+
+    def _pause(self, seconds: float) -> None:
+        end = time.monotonic() + seconds
+        self._spin_until(lambda: time.monotonic() >= end, seconds + _PATIENCE)
+
+    def _wait(self, what: str, condition: Callable[[], bool]) -> None:
+        if not self._spin_until(condition, _PATIENCE):
+            raise Missed(f'waited {_PATIENCE:g} s for {what}, which did not come')
+
+    def _until_missed(self, tag: str, command: str, what: str) -> float:
+        """Give the simulator a command that ends the values of a row; return its deadline (s)."""
+        deadline = self._watcher.expect(self._mappings[tag])
+        self._pause(1.0)
+        self._watcher.missed.clear()
+        self._simulator.command(command)
+        self._wait(what, lambda: self._watcher.missed[tag] > 0)
+        return deadline
+
+    def _spin_until(self, condition: Callable[[], bool], limit: float) -> bool:
+        end = time.monotonic() + limit
+        while time.monotonic() < end:
+            if condition():
+                return True
+            if any(child.process.poll() is not None for child in self._children):
+                raise Missed('the node or the simulator has ended; see above')
+            self._relay()
+            if self._speed:
+                self._speed.run()
+            rclpy.spin_once(self._watcher, timeout_sec=0.05)
+        return condition()
+
+    def _title(self, text: str) -> None:
+        self._relay()
+        print(f'\n{self.step}. {text}', flush=True)
+
+    def _say(self, text: str) -> None:
+        print(f'  [{time.monotonic() - self._begin:5.1f} s] {text}', flush=True)
+
+
+class Demo(Stage):
+    """Show the scenes; every step waits until it has happened, or raises Missed."""
 
     def run(self, seconds: float) -> None:
         """Run for ``seconds`` (0: until interrupted), at least until the story is over."""
@@ -259,29 +349,6 @@ class Demo:
                       self._show_death_of_bridge]
         return [*steps, self._show_diagnostics]
 
-    def close(self) -> None:
-        """End both processes, the bridge first."""
-        for child in reversed(self._children):
-            if child.process.poll() is None:
-                child.process.send_signal(signal.SIGINT)
-            child.process.wait(_PATIENCE)
-        self._relay()
-        self._watcher.destroy_node()
-        rclpy.try_shutdown()
-
-    def _start(self, name: str, *args: str) -> Child:
-        self._children.append(Child(name, *args))
-        return self._children[-1]
-
-    def _relay(self) -> None:
-        """Print what both say, and remember which lamps of the simulated PLC are on."""
-        for child in self._children:
-            for line in child.lines():
-                lamp, _, state = line.rpartition(' ')
-                self._lamps.pop(lamp, None)
-                if state == 'on':
-                    self._lamps[lamp] = time.monotonic()
-
     def _show_reads(self) -> None:
         polled = {tag for tag, mapping in self._mappings.items() if mapping.polls}
         self._wait('every mapped topic', lambda: polled <= self._watcher.values.keys())
@@ -292,13 +359,6 @@ class Demo:
         self._wait('values that change', lambda: list(self._watcher.values.values()) != first)
         self._say('two seconds later:')
         self._print_values()
-
-    def _print_values(self) -> None:
-        for tag, mapping in self._mappings.items():
-            if tag in self._watcher.values:
-                place = f'station {mapping.station}  {mapping.address!s:<9}'
-                print(f'    {place} -> /abdf1/read/{mapping.topic:<16}'
-                      f' {_shown(self._watcher.values[tag])}', flush=True)
 
     def _show_writes(self) -> None:
         self._title('Writes: published to ~/write/<topic>, answered on ~/write_results')
@@ -337,11 +397,8 @@ class Demo:
         station = f'station {self._scene.failing_station}'
         self._title(f'{station.capitalize()} loses its power')
         watched = self._mappings[self._scene.watched]
-        deadline = self._watcher.expect(watched)
-        self._pause(1.0)
-        self._watcher.missed.clear()
-        self._simulator.command(f'silent {self._scene.failing_station}')
-        self._wait('the loss to be noticed', lambda: self._watcher.missed[watched.tag] > 0)
+        deadline = self._until_missed(
+            watched.tag, f'silent {self._scene.failing_station}', 'the loss to be noticed')
         self._say(f'a subscriber of /abdf1/read/{watched.topic} with a deadline of '
                   f'{deadline:.1f} s is notified: no more values')
         self._wait('the station to be inactive', lambda: self._level(station) != _OK)
@@ -399,11 +456,7 @@ class Demo:
     def _show_death_of_program(self) -> None:
         self._title('The program of the PLC stands still, while its port goes on answering')
         tag = self._scene.guarded or ''
-        deadline = self._watcher.expect(self._mappings[tag])
-        self._pause(1.0)
-        self._watcher.missed.clear()
-        self._simulator.command('program 2')
-        self._wait('the silence to be noticed', lambda: self._watcher.missed[tag] > 0)
+        deadline = self._until_missed(tag, 'program 2', 'the silence to be noticed')
         self._say(f'/abdf1/read/{tag} is withheld; a subscriber with a deadline of '
                   f'{deadline:.1f} s is notified: no more values')
         self._wait('the diagnostics', lambda: self._level('mappings') != _OK)
@@ -449,44 +502,6 @@ class Demo:
             if pair.value != '0':
                 print(f'    {pair.key:<24} {pair.value:>7}', flush=True)
 
-    def _level(self, section: str) -> bytes | None:
-        """Return the level of a status, None before it has come."""
-        status = self._watcher.statuses.get(section)
-        return status.level if status else None
-
-    def _print_statuses(self, *sections: str) -> None:
-        for section in sections:
-            status = self._watcher.statuses[section]
-            print(f'    {status.name:<18} {status.message}', flush=True)
-
-    def _pause(self, seconds: float) -> None:
-        end = time.monotonic() + seconds
-        self._spin_until(lambda: time.monotonic() >= end, seconds + _PATIENCE)
-
-    def _wait(self, what: str, condition: Callable[[], bool]) -> None:
-        if not self._spin_until(condition, _PATIENCE):
-            raise Missed(f'waited {_PATIENCE:g} s for {what}, which did not come')
-
-    def _spin_until(self, condition: Callable[[], bool], limit: float) -> bool:
-        end = time.monotonic() + limit
-        while time.monotonic() < end:
-            if condition():
-                return True
-            if any(child.process.poll() is not None for child in self._children):
-                raise Missed('the node or the simulator has ended; see above')
-            self._relay()
-            if self._speed:
-                self._speed.run()
-            rclpy.spin_once(self._watcher, timeout_sec=0.05)
-        return condition()
-
-    def _title(self, text: str) -> None:
-        self._relay()
-        print(f'\n{self.step}. {text}', flush=True)
-
-    def _say(self, text: str) -> None:
-        print(f'  [{time.monotonic() - self._begin:5.1f} s] {text}', flush=True)
-
 
 def _shown(values: Any) -> str:
     if isinstance(values, str):
@@ -496,7 +511,7 @@ def _shown(values: Any) -> str:
 
 def main(args: Sequence[str] | None = None) -> int:
     """Run the demo; return 0, or 1 when a step was not seen as it should be."""
-    parser = command_parser('demo', __doc__)
+    parser = command_parser('demo', __doc__, _EPILOG)
     parser.add_argument('--seconds', default=30.0,
                         type=number_option('a number of seconds from 0', 0),
                         help='how long to run; 0 stays until Ctrl-C (default: %(default)g)')
