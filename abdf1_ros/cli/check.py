@@ -27,6 +27,7 @@ from dataclasses import asdict, dataclass, field
 import json
 import math
 from pathlib import Path
+import shutil
 import sys
 from typing import Any
 
@@ -56,8 +57,9 @@ from abdf1_ros.settings.map_row import MAX_PERIOD
 from abdf1_ros.settings.mapping import Mapping
 from abdf1_ros.settings.network import FIELDS, load_network, Network
 from abdf1_ros.settings.scaling import Scaling
-from abdf1_ros.text import by_number, first, printable
+from abdf1_ros.text import by_number, cut, first, printable
 
+_MOST_ROWS = 40  # of a table; JSON has them all
 _SHOWN_TAGS = 8  # in the table; JSON has them all
 _EPILOG = """\
 exit status: 0 when both files are good, also with warnings; 2 for errors;
@@ -162,7 +164,8 @@ def _folder(options: argparse.Namespace) -> tuple[str, bool]:
         texts.append(_summary(name, found, report))
     if contents:
         good = len(contents) - bad
-        texts.append(f'{len(contents)} lines: {good} good ({warned} of them with warnings), '
+        lines = 'line' if len(contents) == 1 else 'lines'
+        texts.append(f'{len(contents)} {lines}: {good} good ({warned} of them with warnings), '
                      f'{bad} with errors')
     else:
         texts.append(f'{printable(options.net)}: no files NAME_net.csv and NAME_map.csv, nor '
@@ -210,18 +213,29 @@ def _text(found: Findings, report: Report | None) -> str:
     parts = [colour(f'error: {problem}', RED, sys.stdout) for problem in found.problems]
     if report is None:
         return '\n'.join([*parts, 'no plan without a good net file'])
-    if found.mappings:
-        if parts:
-            parts.append('the plan is that of the rows without errors')
-        parts += ['', _line_text(report), '', _rows_text(report), '', _plan_text(report), '',
-                  _times_text(report)]
+    if found.mappings and parts:
+        parts.append('the plan is that of the rows without errors')
     remarks = report.remarks()
-    parts += [f'note: {printable(note)}' for note in report.notes()]
     parts += [colour(f'warning: {printable(remark.text)}', YELLOW, sys.stdout)
               for remark in remarks]
+    if found.mappings:
+        parts += ['', _line_text(report), '', _folded(_rows_text(report)), '',
+                  _folded(_plan_text(report)), '', _times_text(report)]
+    parts += [f'note: {printable(note)}' for note in report.notes()]
     if not found.problems and not remarks:
         parts.append(colour('no errors, no warnings', GREEN, sys.stdout))
     return '\n'.join(parts).lstrip('\n')
+
+
+def _folded(text: str) -> str:
+    """Return a table without the rows that are too many, in the width of a terminal."""
+    lines = text.split('\n')
+    if (more := len(lines) - 1 - _MOST_ROWS) > 0:
+        lines = [*lines[:1 + _MOST_ROWS], f'... and {more} more; --json has them all']
+    if sys.stdout.isatty():
+        width = shutil.get_terminal_size().columns
+        lines = [cut(line, width) for line in lines]
+    return '\n'.join(lines)
 
 
 def _line_text(report: Report) -> str:

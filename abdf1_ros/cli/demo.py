@@ -216,7 +216,7 @@ class Speed:
 
 
 class Stage:
-    """Both processes, who looks at them, and how the story is told line by line."""
+    """Both processes, who looks at them, and how the story is printed line by line."""
 
     def __init__(self, scene: Scene, link: Path) -> None:
         net_file, map_file = config_file(scene.net_file), config_file(scene.map_file)

@@ -202,6 +202,15 @@ def test_many_tags_of_a_block(files: tuple[Path, Path],
     assert parsed(capsys)['blocks'][0]['tags'] == [f't{number}' for number in range(10)]
 
 
+def test_warnings_come_first_and_long_tables_are_folded(
+        files: tuple[Path, Path], capsys: pytest.CaptureFixture[str]) -> None:
+    rows = tuple(f't{number},Read,N7:{number},1,PLC5,,100' for number in range(90))
+    assert check(files, GOOD_NET, (*rows, 't90,Read,B3:0,1,PLC5,,20')) == 0
+    lines = capsys.readouterr().out.splitlines()
+    assert lines[0].startswith('warning: ')
+    assert '... and 51 more; --json has them all' in lines and len(lines) < 70
+
+
 def test_row_without_a_period_has_the_default_one(
         files: tuple[Path, Path], capsys: pytest.CaptureFixture[str]) -> None:
     row = GOOD_ROW.removesuffix('1000')

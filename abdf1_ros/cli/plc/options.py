@@ -147,6 +147,8 @@ def _complete_watch(watch: argparse.ArgumentParser) -> None:
     watch.add_argument('--period', default=0.5, metavar='S',
                        type=number_option('seconds from 0 to 60; 0.5 is 500 ms', 0, 60),
                        help='s between reads, up to 60 (default: %(default)s)')
+    watch.add_argument('--csv', action='store_true',
+                       help='print each value that is read as time,station,address,value')
     watch.add_argument('--count', type=_COUNT, metavar='N', help='end after so many reads')
 
 

@@ -19,10 +19,12 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 import os
+import sys
 import time
 
 from abdf1_ros.cli.plc.line import free_station
 from abdf1_ros.cli.plc.session import Session
+from abdf1_ros.cli.terminal import colour, GREEN, RED, YELLOW
 from abdf1_ros.df1.echo import COMES_BACK
 from abdf1_ros.errors import Abdf1Error, LinkError, PortLost, RemoteError, StationInactive
 from abdf1_ros.pccc.access import Access
@@ -135,12 +137,18 @@ def describe(presence: Presence) -> list[str]:
     identity = presence.identity
     if identity is None:
         return [f'station {presence.station} {presence}']
-    lines = [('mode', identity.mode_text), ('faults', ', '.join(identity.faults) or 'none'),
-             ('remarks', ', '.join(identity.remarks)), ('name', identity.name),
-             ('program', '' if identity.program_id is None else f'0x{identity.program_id:04X}'),
-             ('memory', identity.memory), ('answered', f'after {presence.seconds * 1000:.0f} ms')]
-    return [f'station {presence.station}: {identity}',
-            *(f'  {name:9} {text}' for name, text in lines if text)]
+    is_running = identity.mode is not None and identity.mode.is_running
+    lines = [('mode', identity.mode_text, GREEN if is_running else YELLOW),
+             ('faults', ', '.join(identity.faults) or 'none', RED if identity.faults else GREEN),
+             ('remarks', ', '.join(identity.remarks), YELLOW),
+             ('own name', identity.name, None),
+             ('program ID', '' if identity.program_id is None
+              else f'0x{identity.program_id:04X}', None),
+             ('memory', identity.memory, None),
+             ('answered', f'after {presence.seconds * 1000:.0f} ms', None)]
+    return [f'station {presence.station}: {identity}', *(
+        f'  {name:10} {colour(text, code, sys.stdout) if code else text}'
+        for name, text, code in lines if text)]
 
 
 def hint(session: Session, error: Abdf1Error) -> str:

@@ -27,14 +27,12 @@ import sys
 import textwrap
 import threading
 
-from abdf1_ros.cli.plc.data import Radix, rows
+from abdf1_ros.cli.plc.data import Radix, rows, value_texts
 from abdf1_ros.cli.plc.session import opened
 from abdf1_ros.cli.terminal import is_terminal, table
 from abdf1_ros.df1.stations import Station
 from abdf1_ros.driver.driver import Driver
 from abdf1_ros.driver.links import DriverSettings
-from abdf1_ros.driver.write import WriteResult
-from abdf1_ros.messages import Event
 from abdf1_ros.pccc.values import Values
 from abdf1_ros.ports.link_thread import LinkThread
 from abdf1_ros.settings.mapping import Mapping
@@ -65,11 +63,14 @@ class Watch:
     """
     The driver without ROS: read ``mappings`` every ``period`` seconds and show them.
 
+    With ``csv`` each read is a line for each value, also where nothing has changed.
+
     It is the driver's ``Listener``. Raises OSError when the port cannot be opened.
     """
 
     def __init__(self, network: Network, mappings: Sequence[Mapping], period: float,
-                 radix: Radix = Radix.DECIMAL) -> None:
+                 radix: Radix = Radix.DECIMAL, csv: bool = False) -> None:
+        self._csv = csv
         self._mappings = mappings
         self._radix = radix
         self._changed: dict[Mapping, float] = {}
@@ -89,6 +90,8 @@ class Watch:
 
         A failed read counts too. Returns how many addresses have no value at the end.
         """
+        if self._csv:
+            print('time,station,address,value', flush=True)
         try:
             self._link.start()  # inside, as the thread would keep the process alive
             while not self._link.has_failed and not self._is_done(count):
@@ -111,20 +114,10 @@ class Watch:
         self._reads[mapping] += 1
         self._has_news.set()
 
-    def unreadable(self, mapping: Mapping, reason: str) -> None:
-        """Do nothing: the point has the reason."""
+    def unreadable(self, *args: object) -> None:
+        """Do nothing: the point has the reason, and nothing else of these can happen here."""
 
-    def published_again(self, mapping: Mapping, seconds: float) -> None:
-        """Do nothing: no row has Publish_While."""
-
-    def written(self, result: WriteResult) -> None:
-        """Do nothing: nothing is written."""
-
-    def foreign_value(self, mapping: Mapping, text: str, is_conflict: bool) -> None:
-        """Do nothing: no row is a heartbeat."""
-
-    def happened(self, event: Event) -> None:
-        """Do nothing: the reason of a failed read tells enough."""
+    published_again = written = foreign_value = happened = unreadable
 
     def station_changed(self, station: Station) -> None:
         """Show the news at once."""
@@ -145,7 +138,9 @@ class Watch:
             error = self._driver.points[mapping].error
             if error is not None:
                 changed.append((mapping, _NoValue(error)))
-        if is_terminal(sys.stdout):
+        if self._csv:
+            self._print_csv(changed)
+        elif is_terminal(sys.stdout):
             self._note_changes(changed)
             self._redraw()
         else:
@@ -159,6 +154,19 @@ class Watch:
                 time = datetime.now().isoformat(timespec='milliseconds').partition('T')[2]
                 for address, text in self._rows(mapping):
                     print(f'{time}  {address}  {text}', flush=True)
+
+    def _print_csv(self, news: Sequence[tuple[Mapping, Values | _NoValue]]) -> None:
+        """Print each value with its time of day and address; empty for a read that has failed."""
+        for mapping, what in news:
+            time = datetime.now().isoformat(timespec='milliseconds')
+            if isinstance(what, _NoValue) and self._shown.get(mapping) == what:
+                continue  # once is enough
+            self._shown[mapping] = what
+            texts = [''] if isinstance(what, _NoValue) else \
+                ['"' + printable(what).replace('"', '""') + '"'] if isinstance(what, str) else \
+                value_texts(mapping, what, self._radix)
+            for number, text in enumerate(texts):
+                print(f'{time},{mapping.station},{mapping.place_of(number)},{text}', flush=True)
 
     def _note_changes(self, news: Sequence[tuple[Mapping, Values | _NoValue]]) -> None:
         """Keep what to show, and the time of its last change."""

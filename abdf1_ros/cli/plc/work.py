@@ -250,7 +250,8 @@ def _watch(options: argparse.Namespace) -> int:
             mappings = _mappings(options, session, cells, options.addresses)
         except Abdf1Error as error:
             return _failed(options, session, error)
-    failed = Watch(network, mappings, options.period, RADIXES[options.radix]).run(options.count)
+    failed = Watch(network, mappings, options.period, RADIXES[options.radix],
+                   options.csv).run(options.count)
     return EXIT_FAILED if failed else 0
 
 

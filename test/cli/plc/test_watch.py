@@ -81,6 +81,22 @@ def test_what_stays_is_shown_once(plcs: Plcs, capsys: pytest.CaptureFixture[str]
     assert sorted(shown(capsys)) == ['N7:0  0', "ST9:0  'Tank'"]
 
 
+def test_each_read_is_a_line_of_csv_for_each_value(
+        plcs: Plcs, capsys: pytest.CaptureFixture[str]) -> None:
+    store(plcs[1], 'ST9:0', 'a,"b"')
+    words = make_mapping('N7:0', length=2, item=1)
+    assert Watch(network_on(plcs), [words, NAME], 0.01, csv=True).run(2) == 0
+    head, *lines = capsys.readouterr().out.splitlines()
+    assert head == 'time,station,address,value'
+    told = [line.partition(',')[2] for line in lines]
+    assert told.count('1,N7:0,0') == told.count('1,N7:1,0') >= 2
+    assert '1,ST9:0,"a,""b"""' in told
+    plcs.say('silent 1')
+    assert Watch(network_on(plcs), [SPEED], 0.01, csv=True).run(2) == 1
+    assert [line.partition(',')[2] for line in capsys.readouterr().out.splitlines()[1:]] == [
+        '1,N7:0,']
+
+
 def test_control_characters_of_a_plc_do_not_reach_the_screen(
         plcs: Plcs, capsys: pytest.CaptureFixture[str]) -> None:
     store(plcs[1], 'ST9:0', 'a\x1b[2J\x9b')
