@@ -25,7 +25,6 @@ from abdf1_ros.df1.packet import Packet
 from abdf1_ros.driver.links import DriverSettings
 from abdf1_ros.driver.reads.point import Freshness
 from abdf1_ros.driver.write import Outcome
-from abdf1_ros.driver.writes.queue import MAX_WAITING_WRITES
 from abdf1_ros.messages import Event
 from abdf1_ros.pccc.families import parse_address
 from abdf1_ros.pccc.file_types import PlcType
@@ -249,13 +248,6 @@ def test_refused_for_its_values(values: list[float], reason: str) -> None:
     assert stored(plc, 'N7:0', 2) == bytes(4)
 
 
-def test_refused_as_read_only() -> None:
-    mapping = make_mapping('N7:0', 'Write')
-    bench, plc = make_bench(mapping, read_only=True)
-    assert written(bench, mapping, [1], 1.0) == ['not written: refused: this node is read_only']
-    assert stored(plc, 'N7:0') == b'\0\0'
-
-
 def test_refused_while_the_port_is_closed() -> None:
     mapping = make_mapping('N7:0', 'Write')
     bench, plc = make_bench(mapping, start=False)
@@ -269,16 +261,6 @@ def test_refused_while_the_port_is_closed() -> None:
     bench.open(run=1.0)
     assert bench.listener.outcomes() == [Outcome.REFUSED] * 2
     assert stored(plc, 'N7:0') == b'\0\0'
-
-
-def test_refused_when_too_many_wait() -> None:
-    mapping = make_mapping('B3:0/0', 'Write')
-    bench, _ = make_bench(mapping)
-    for _ in range(MAX_WAITING_WRITES + 2):
-        bench.driver.write([mapping], [1], bench.clock())
-    assert write_results(bench) == ['not written: refused: too many writes are waiting'] * 2
-    bench.lose_port()
-    assert len(bench.listener.results) == MAX_WAITING_WRITES + 2
 
 
 @pytest.mark.parametrize('status, text', [
@@ -356,15 +338,6 @@ def test_unknown_when_the_reply_does_not_come_in_time() -> None:
         'unknown whether written: 2508 ERR_COMMAND_TIMEOUT: Command Timed Out; '
         'not read back: no row reads all of these words']
     assert bench.driver.stations[1].active
-
-
-def test_unknown_when_no_acknowledgement_comes() -> None:
-    mapping = make_mapping('N7:0', 'Write')
-    bench, plc = make_bench(mapping, run=0.5)
-    bench.far.say = lambda data: b''
-    bench.write(mapping, [1], run=5.0)
-    assert bench.listener.outcomes() == [Outcome.UNKNOWN]
-    assert stored(plc, 'N7:0') == b'\1\0'
 
 
 def test_unknown_when_the_port_is_lost_on_the_way() -> None:

@@ -31,17 +31,12 @@ from support.fault_rig import (
     NO_ANSWER,
     NOT_SENT,
     Rig,
-    rigged,
     SETPOINT,
     UNKNOWN,
 )
 from support.renewed import Renewed
 from support.ros import details, ERROR, Observer, OK, Process, until_status, WARN, write_csv
 from support.simulator_process import (
-    IMPATIENT_ROW,
-    make_files,
-    MAP_HEADER,
-    NET_HEADER,
     SIMULATOR_HEADER,
 )
 
@@ -100,16 +95,6 @@ def test_only_one_direction_works(line: Boxed, way: str) -> None:
     rig.recovers()
     rig.told('[INFO]', 'station 2 answers again')
     assert rig.has_read_only(SETPOINT, 3.0)
-
-
-def test_adapter_begins_to_echo_and_ends(line: Boxed) -> None:
-    rig, box = line
-    for value, echoes in ((3.0, True), (4.0, False)):
-        box.echoes = echoes
-        rig.recovers()
-        rig.writes(value)
-        rig.setpoint.values([value])
-    assert 'ERROR' not in rig.said
 
 
 def test_line_that_babbles_loses_writes_but_tells_no_lies(new_line: Boxed) -> None:
@@ -205,23 +190,6 @@ def test_stations_are_swapped(observer: Observer, tmp_path: Path) -> None:
         assert rig.has_read_only(SETPOINT)
 
 
-@pytest.mark.parametrize('fault, text', [
-    ('delay 2 150', 'written'),
-    # Not sent, where two reads before it were too late already.
-    ('delay 2 3000', '2508 ERR_COMMAND_TIMEOUT: Command Timed Out')])
-def test_station_that_is_slow_fails_alone(line: Boxed, fault: str, text: str) -> None:
-    rig, _ = line
-    rig.simulator.say(fault)
-    result = rig.write(3.0)
-    assert result == text if text == 'written' else text in result
-    rig.status('mappings', ERROR)
-    rig.status('link', OK)  # it answers its polls
-    rig.speeds.next()  # the other goes on
-    rig.simulator.say('normal 2')
-    rig.recovers()  # a try takes Cmd_Timeout and leaves seven of them to the other
-    assert rig.has_read_only(SETPOINT, 3.0)
-
-
 def test_sink_of_a_slave_is_full(line: Boxed) -> None:
     rig, _ = line
     rig.simulator.say('full 2')
@@ -234,23 +202,3 @@ def test_sink_of_a_slave_is_full(line: Boxed) -> None:
     # What it did not take has used up what silent stations get of the line.
     rig.recovers()
     assert rig.has_read_only(SETPOINT)
-
-
-def test_sink_of_a_peer_is_full(observer: Observer, tmp_path: Path) -> None:
-    files = make_files(tmp_path)
-    write_csv(files.net, f'Mode,{NET_HEADER}', [f'Peer,{IMPATIENT_ROW}'])
-    write_csv(files.map, MAP_HEADER, [
-        'speeds,Read,N7:0,1,PLC5,2', 'setpoint,ReadWrite,F8:0,1,PLC5'])
-    simulator = Process('simulator', '--pty', str(files.port), '--data', str(files.simulator),
-                        '--full-duplex', '1')
-    simulator.wait_for('stations 1 (PLC5) on')
-    with rigged(observer, files, str(files.port), simulator) as rig:
-        rig.until_well()
-        rig.simulator.say('full 1')
-        assert is_unanswered(rig.write(3.0).replace('(1)', '(2)'))
-        rig.node.wait_for('[INFO]', '2517 NTC_RCVD_NAK_SYMBOL')
-        rig.node.wait_for('[INFO]', '2519 NTC_NAK_LIMIT_EXCEEDED')
-        rig.status('link', ERROR, 'none of 1 stations answers')
-        rig.simulator.say('normal 1')
-        rig.recovers()
-        assert rig.has_read_only(12.5)

@@ -22,7 +22,7 @@ import pytest
 from support.device_server import LineServer
 from support.fault_rig import is_unanswered, NO_ANSWER, NOT_SENT, Rig, rigged, SETPOINT
 from support.renewed import Renewed
-from support.ros import ERROR, Observer, OK, write_csv
+from support.ros import ERROR, Observer, write_csv
 from support.simulator_process import Files, IMPATIENT_ROW, make_files, MAP_HEADER
 
 REFUSED = 'not written: refused: the port is not open'
@@ -141,25 +141,3 @@ def test_server_hangs_up_on_every_client(served: Served) -> None:
     rig.writes(4.0, REFUSED)
     server.hangs_up = False
     rig.recovers()  # an attempt to open the port may take 3 s
-
-
-def test_server_takes_its_time(served: Served) -> None:
-    rig, server = served
-    server.latency = 0.02  # there and back within Timeout
-    rig.writes(3.0)
-    rig.speeds.next()
-    rig.status('link', OK)
-    server.latency = 0.5  # and beyond it
-    result = rig.write(3.0)
-    assert result == 'written' or is_unanswered(result)
-    rig.status('mappings', ERROR, '2 failed')  # a late answer may be taken for that to a poll
-    server.latency = 0.0
-    rig.recovers()
-
-
-def test_all_mappings_are_read_in_time(observer: Observer, tmp_path: Path) -> None:
-    files = make_files(tmp_path)
-    simulator = files.start_simulator()
-    with LineServer(files.port) as server, rigged(  # beside that of the module
-            observer, files, server.url, simulator, name='whole') as rig:
-        rig.until_well()

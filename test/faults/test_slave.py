@@ -14,7 +14,7 @@
 
 """What happens to a line of two nodes, a master and a slave; see docs/troubleshooting.md."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 import re
 import signal
 import time
@@ -23,8 +23,8 @@ from abdf1_ros.df1 import frames
 import pytest
 from support.fault_rig import is_unanswered, NOT_SENT, UNKNOWN
 from support.renewed import Renewed
-from support.ros import details, ERROR, find_status, Observer, until_status
-from support.slave_rig import End, Line, two_nodes
+from support.ros import ERROR, Observer, until_status
+from support.slave_rig import Line, two_nodes
 
 NO_ANSWER = '2509 ERR_INACTIVE_STATION: Slave Station (9) Inactive'
 NO_REPLY = '2508 ERR_COMMAND_TIMEOUT: Command Timed Out'
@@ -132,21 +132,6 @@ def test_slave_that_is_not_heard_does_not_know_what_it_has_written(line: Line) -
     assert not line.master.was_told(value)
 
 
-def test_line_babbles_at_the_slave(line: Line) -> None:
-    line.box.babbles = True
-    written = []
-    for _ in range(3):
-        for writer, reader in ((line.master, line.slave), (line.slave, line.master)):
-            value = next(line.values)
-            written.append((reader, value, writer.write(value)))
-    line.box.mend()
-    line.recovers()
-    line.works()
-    for reader, value, result in written:
-        assert result == 'written' or result.startswith((UNKNOWN, NOT_SENT))
-        assert reader.was_told(value) in ((1,) if result == 'written' else (0, 1))
-
-
 def test_port_of_the_slave_vanishes_and_returns(line: Line) -> None:
     line.box.unplug()
     line.slave.status('link', ERROR, 'cannot open the port: ')
@@ -176,42 +161,6 @@ def test_slave_is_stopped_and_goes_on(line: Line) -> None:
     assert not line.master.was_told(own)
     # The port has kept the command and its repetitions: executed once at most, if it was sent.
     assert line.slave.was_told(value) <= was_sent
-
-
-@pytest.mark.parametrize('receiver', ['Slave', 'Master'])
-def test_command_whose_ack_is_lost_is_executed_once(line: Line, receiver: str) -> None:
-    writer, reader = (line.master, line.slave) if receiver == 'Slave' \
-        else (line.slave, line.master)
-    word = 0x1234 + (receiver == 'Slave')
-    before = repetitions(reader)
-    line.box.pass_on, lost = losing_ack(receiver, word.to_bytes(2, 'little'))
-    assert writer.hand_over(word)
-    assert lost == [frames.ACK]
-    line.works()
-    assert reader.was_told(word) == 1
-    assert repetitions(reader) > before
-
-
-def repetitions(end: End) -> int:
-    """Return how many messages have come a second time."""
-    counters = details(find_status(end.diagnostics.fresh(), 'counters'))
-    return int(counters['CNT_DUPLICATE_MSGS_RCVD'])
-
-
-def losing_ack(receiver: str, word: bytes) -> tuple[Callable[[str, bytes], bytes], list[bytes]]:
-    """Return what takes away the first ACK of a command with that word, and what was taken."""
-    heard: list[bytes] = []
-    lost: list[bytes] = []
-
-    def pass_on(mode: str, data: bytes) -> bytes:
-        if mode != receiver and word in data:
-            heard.append(data)
-        elif mode == receiver and heard and not lost and data.startswith(frames.ACK):
-            lost.append(frames.ACK)
-            return data.removeprefix(frames.ACK)
-        return data
-
-    return pass_on, lost
 
 
 def test_write_is_not_sent_by_a_slave_that_nobody_polls(

@@ -20,8 +20,6 @@ The line of ``DeviceServer`` gives back what is sent; ``LineServer`` has a port 
 
 from __future__ import annotations
 
-from collections import deque
-from collections.abc import Callable
 from contextlib import suppress
 import os
 from pathlib import Path
@@ -29,7 +27,6 @@ import select
 import socket
 import struct
 import threading
-import time
 
 from abdf1_ros.ports.descriptor import DescriptorPort
 from abdf1_ros.ports.opening import open_port
@@ -103,13 +100,11 @@ class LineServer:
     A device server on 127.0.0.1 with one client at a time, for the port ``line``.
 
     ``start`` and ``stop`` are its power switch; it comes back with the same ``url``. What is
-    set from outside holds from then on: bytes in both directions take ``latency`` seconds; while
-    ``is_frozen`` it neither takes nor gives anything, and the kernel keeps what it is sent;
-    ``hangs_up`` on every client.
+    set from outside holds from then on: while ``is_frozen`` it neither takes nor gives anything,
+    and the kernel keeps what it is sent; ``hangs_up`` on every client.
     """
 
     def __init__(self, line: Path) -> None:
-        self.latency = 0.0
         self.is_frozen = self.hangs_up = False
         self._line_name = str(line)
         self._port = 0
@@ -118,7 +113,6 @@ class LineServer:
         self._client: socket.socket | None = None
         self._manager: serial.rfc2217.PortManager
         self._is_lost = False
-        self._under_way: deque[tuple[float, Callable[[], None]]] = deque()
         self._thread: threading.Thread | None = None
 
     @property
@@ -173,8 +167,6 @@ class LineServer:
             self._drop_client()
 
     def _turn(self) -> None:
-        while self._under_way and self._under_way[0][0] <= time.monotonic():
-            self._under_way.popleft()[1]()
         near = self._listener if self._client is None else self._client
         ends = [] if self.is_frozen else [near, self._line]
         ready = select.select(ends, [], [], _TURN)[0]
@@ -184,9 +176,6 @@ class LineServer:
             self._accept()
         elif near in ready:
             self._take_from_client()
-
-    def _later(self, action: Callable[[], None]) -> None:
-        self._under_way.append((time.monotonic() + self.latency, action))
 
     def _accept(self) -> None:
         self._client = self._listener.accept()[0]
@@ -201,7 +190,7 @@ class LineServer:
         with suppress(OSError):  # the PLC has ended
             data = os.read(self._line.fileno(), 1024)
         if data and self._client is not None:
-            self._later(lambda: self.write(b''.join(self._manager.escape(data))))
+            self.write(b''.join(self._manager.escape(data)))
 
     def _take_from_client(self) -> None:
         assert self._client is not None
@@ -209,7 +198,7 @@ class LineServer:
         with suppress(OSError):
             data = self._client.recv(1024)
         if data:
-            self._later(lambda: self._tell_line(b''.join(self._manager.filter(data))))
+            self._tell_line(b''.join(self._manager.filter(data)))
         else:
             self._drop_client()
 
@@ -219,7 +208,6 @@ class LineServer:
 
     def _drop_client(self, is_reset: bool = False) -> None:
         client, self._client = self._client, None
-        self._under_way.clear()
         if client is not None:
             if is_reset:
                 client.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, _RESET)

@@ -25,7 +25,6 @@ from random import Random
 import select
 import threading
 
-from abdf1_ros.df1 import frames
 from abdf1_ros.ports.descriptor import DescriptorPort
 from abdf1_ros.ports.opening import open_port
 from abdf1_ros.ports.settings import PortSettings
@@ -39,17 +38,15 @@ class FaultBox:
     Pass on bytes between the port ``far`` and a pseudo-terminal of the name ``name``.
 
     The far end may come and go. What is set from outside holds from the next bytes on:
-    ``to_plc`` and ``to_node`` tell which direction works; with ``echoes`` the node hears
-    itself, beginning with a question: the echo of an ACK alone would be an answer to the next
-    command. With ``babbles`` it hears noise without end. ``overhear`` is called with what the
-    node has sent, before the PLC gets it; what it returns the node hears first.
+    ``to_plc`` and ``to_node`` tell which direction works; with ``babbles`` the node hears noise
+    without end. ``overhear`` is called with what the node has sent, before the PLC gets it; what
+    it returns the node hears first.
     """
 
     def __init__(self, far: Path, name: Path) -> None:
         self.name = name
         self.to_plc = self.to_node = True
-        self.echoes = self.babbles = False
-        self._is_echoing = False
+        self.babbles = False
         self.overhear: Callable[[bytes], bytes] = lambda data: b''
         self._far_name = str(far)
         self._far: DescriptorPort | None = None
@@ -133,10 +130,6 @@ class FaultBox:
             self._tell_node(self._random.randbytes(self._random.randrange(40)))
 
     def _take_from_node(self, data: bytes) -> None:
-        if not data.startswith(frames.ACK):
-            self._is_echoing = self.echoes
-        if self._is_echoing:
-            self._tell_node(data)
         self._tell_node(self.overhear(data))
         if self.to_plc and self._far is not None:
             with suppress(OSError):  # the PLC is gone, and the next turn finds that out

@@ -25,7 +25,7 @@ from pathlib import Path
 from abdf1_ros.ports.descriptor import DescriptorPort
 from std_msgs.msg import Int16MultiArray
 from support.fault_box import FaultBox
-from support.fault_rig import HeardNode, NOT_SENT, UNKNOWN
+from support.fault_rig import HeardNode
 from support.ptys import Pty
 from support.ros import (
     Observer,
@@ -98,19 +98,6 @@ class End(HeardNode):
         """Write the next value; return it if it is written, which a busy host may prevent."""
         value = next(values)
         return value if self.write(value) == 'written' else None
-
-    def hand_over(self, value: int) -> bool:
-        """
-        Write to the other end, again while it is not sent; tell whether the other end has it.
-
-        Where a busy host is too late with the reply, that is what reading back has found.
-        """
-        result = self.observer.until(
-            lambda: text if not (text := self.write(value)).startswith(NOT_SENT) else None,
-            'a write that is sent')
-        print(f'{self.name}: {result}')
-        return result == 'written' or (
-            result.startswith(UNKNOWN) and result.endswith('read back: the PLC holds the value'))
 
     def was_told(self, value: int) -> int:
         """Return how often the other end has written ``value`` here."""
