@@ -18,7 +18,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
-from itertools import pairwise
 from pathlib import Path
 import socket
 import threading
@@ -50,7 +49,6 @@ from abdf1_ros.settings.network import Network
 from abdf1_ros.settings.share import share_places
 from abdf1_ros.share.guest_line import GuestLine
 import pytest
-from support.clock import Stopwatch
 from support.device_server import OWN_HOST
 from support.driver_bench import Recorder, simulated_plc, store, stored
 from support.mappings import make_mapping
@@ -70,7 +68,9 @@ class Shared:
         store(self.plc, 'N7:0', range(50))
         self._line = PtyEndpoint(str(folder / 'plc'))
         self._far = LinkThread(self._machine(mode), self._line.open)
-        network = Network(mode=mode, timeout=300, baud=115200, share=places, share_access=access)
+        # All are threads of this process, which a busy host may let stand still for 2 s.
+        network = Network(mode=mode, timeout=3000, cmd_timeout=5000, baud=115200, share=places,
+                          share_access=access)
         self.listener = Recorder(line_time)
         rows = [make_mapping('N10:0', plc='SLC', period=50), make_mapping(
             'N10:10', 'Heartbeat', plc='SLC', period=200, heartbeat=Heartbeat())]
@@ -136,7 +136,7 @@ def client_at(port: Path | str) -> Client:
     """Return a client at a place."""
     if isinstance(port, Path):
         wait_for(port.exists)
-    return Client(str(port), plc_type='SLC', timeout=2.0, cmd_timeout=3.0)
+    return Client(str(port), plc_type='SLC', timeout=8.0, cmd_timeout=10.0)
 
 
 @pytest.mark.parametrize('mode', ['Master', 'Peer'])
@@ -217,24 +217,16 @@ def test_ten_guests_that_misbehave_harm_nobody(tmp_path: Path) -> None:
             thread.start()
         with client_at(tmp_path / 'hmi') as client:
             before = len(line.listener.reads)
-            begun, watch = time.monotonic(), Stopwatch()
-            beats, last = [0.0], b''
-            while time.monotonic() < begun + 4:
+            beats: set[bytes] = set()
+            while len(beats) < 6 or len(line.listener.reads) < before + 20:
                 assert client.read('N7:1', 2) == [1, 2]
                 line.driver.interlocks.executor_ran(line_time())
-                if (beat := stored(line.plc, 'N10:10')) != last:
-                    beats.append(watch.seconds)
-                    last = beat
-            seconds = watch.seconds
-            beats.append(seconds)
+                beats.add(stored(line.plc, 'N10:10'))
         ended.set()
         for thread in bad:
             thread.join(10)
-        # 20 reads and 5 beats a second are wanted; test_guests.py has it in virtual time.
-        assert len(line.listener.reads) - before > 5 * seconds
+        # That they come in time is in test_guests.py, in virtual time.
         assert all(isinstance(values, list) for _, _, values in line.listener.reads)
-        # A busy host may hold up one of them for longer.
-        assert last[0] and sorted(later - one for one, later in pairwise(beats))[-2] < 1.0
 
 
 def test_place_of_ipv6(tmp_path: Path) -> None:

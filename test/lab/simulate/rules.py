@@ -236,6 +236,8 @@ class Outputs(Rule):
     def __init__(self, world: World) -> None:
         super().__init__(world)
         self._stood = dict.fromkeys((row.tag for row in world.messages), 0.0)
+        self._rows = [(station, watched, row.tag) for station, watched in world.plcs.items()
+                      for row in world.rows_of(station)]
 
     def told(self, result: WriteResult) -> None:
         tag = result.mapping.tag
@@ -254,17 +256,14 @@ class Outputs(Rule):
         now = world.line.now
         if world.plant.is_read_only:
             return
-        for station, watched in world.plcs.items():
-            for row in world.rows_of(station):
-                limit = world.bounds[row.tag]
-                assert limit is not None
-                limit += STEP
-                calm = max(world.ill[station], world.ill[0])
-                if now < calm + limit + MODE_PERIOD + _REWRITTEN:
-                    continue
-                value = watched.word(watched.places[row.tag])
-                self.demand(value in (SAFE, 0) or now - self._stood[row.tag] < limit,
-                            row.tag, value, 'since', self._stood[row.tag])
+        for station, watched, tag in self._rows:
+            limit = (world.bounds[tag] or 0.0) + STEP
+            calm = max(world.ill[station], world.ill[0])
+            if now < calm + limit + MODE_PERIOD + _REWRITTEN:
+                continue
+            value = watched.word(watched.places[tag])
+            self.demand(value in (SAFE, 0) or now - self._stood[tag] < limit,
+                        tag, value, 'since', self._stood[tag])
 
 
 class AfterRun(Rule):
@@ -274,13 +273,14 @@ class AfterRun(Rule):
         world = self.world
         now = world.line.now
         for station, watched in world.plcs.items():
-            limits = [world.bounds[row.tag] or 0.0 for row in world.rows_of(station)]
-            limit = max(limits) - world.plant.after / 1000 + MODE_PERIOD + self.flight
-            stopped, ran = watched.stopped, watched.ran_again
-            was_seen = ran - stopped > MODE_PERIOD + self.flight
+            limit = (world.bounds[f'w0_{station}'] or 0.0) - world.plant.after / 1000 \
+                + MODE_PERIOD + self.flight
+            ran = watched.ran_again
+            if not ran + limit <= now < ran + limit + 2 * STEP or world.plant.is_read_only:
+                continue
+            was_seen = ran - watched.stopped > MODE_PERIOD + self.flight
             is_calm = max(world.ill[station], world.ill[0]) <= ran + STEP
-            if not was_seen or not ran + limit <= now < ran + limit + 2 * STEP or not is_calm \
-                    or world.plant.is_read_only:
+            if not was_seen or not is_calm:
                 continue
             came = {entry.tag for entry in world.executed if entry.when > ran
                     and entry.station == station and entry.value in (0, SAFE)}

@@ -155,9 +155,10 @@ class Story:
         world = self.world
         if world.plant.is_read_only or world.plant.mode == 'Radio':
             return
-        for row in world.messages:
-            world.publish(row)
-        world.run(self.dice.uniform(0.0, 0.1))
+        for pause in (0.0, 0.1, 0.5):  # with messages that are written, under way, and wait
+            for row in world.messages:
+                world.publish(row)
+            world.run(pause * self.dice.random())
         world.end()
         world.run(2.0)
         for station, watched in world.plcs.items():
