@@ -68,6 +68,8 @@ class Story:
             name = self.dice.choice([*_TROUBLES])
             self.troubles[name] += 1
             _TROUBLES[name](self, station)
+            if name == _NO_EXCUSE:  # for an output that stands
+                self.wait(self._longest_bound() + 2.0)
             self._ail(station, self.dice.uniform(0.5, 4.0))
             self._calm_down()
         self._recover()
@@ -97,11 +99,18 @@ class Story:
                 or not world.driver.is_online:
             world.ill[0] = max(world.line.now, world.away)
 
+    def be_quiet(self) -> None:
+        """Let nobody publish until the next trouble."""
+        self._rates.clear()
+
+    def _longest_bound(self) -> float:
+        """Return the longest bound that is printed, or 21 s where that is longer."""
+        return min(21.0, max(limit or 0.0 for limit in self.world.bounds.values()))
+
     def _calm_down(self) -> None:
         """Let things be well until the bounds hold again, most often with fewer messages."""
         world = self.world
-        limit = max(limit or 0.0 for limit in world.bounds.values())
-        end = world.line.now + min(limit + 9.0, 30.0)
+        end = world.line.now + self._longest_bound() + 9.0
         half = world.line.now + self.dice.uniform(0.0, 4.0)
         while world.line.now < end:
             if world.line.now >= half:
@@ -195,6 +204,10 @@ def _lost_port(story: Story, station: int) -> None:
 
 def _pause(story: Story, station: int) -> None:
     story.world.hold_up(story.dice.uniform(0.2, 3.0))
+    if story.dice.random() < 0.5:  # what comes now waits all the time, and nothing after it
+        for row in story.world.messages:
+            story.world.publish(row)
+        story.be_quiet()
 
 
 def _hung_executor(story: Story, station: int) -> None:
@@ -241,9 +254,10 @@ def _other_writer(story: Story, station: int) -> None:
     count()
 
 
+_NO_EXCUSE = 'messages refused'
 _TROUBLES: dict[str, Callable[[Story, int], None]] = {
     'noise': _noise, 'silence': _silence, 'refusal': _refusal,
-    'messages refused': _refused_messages, 'replies lost': _lost_replies,
+    _NO_EXCUSE: _refused_messages, 'replies lost': _lost_replies,
     'port lost': _lost_port, 'process stands still': _pause, 'executor hangs': _hung_executor,
     'PROGRAM': _program, 'download': _download, 'killed': _kill, 'slow PLC': _slowness,
     'other writer': _other_writer, 'guest': _guest}
