@@ -66,6 +66,8 @@ class Agenda:
         self._reads = reads
         self._guests = guests
         self._owed = 0.0  # seconds of the line for checks and reads, before the next guest
+        self._guests_from = -math.inf  # no command of a guest before (clock value in s)
+        self._held_until = math.inf  # the same, while one waits for that
         self._counted: list[JobTask] = []  # under way: of guests, and of ours while that is so
         self._tasks = tasks
         self._own_in_a_row = 0
@@ -92,6 +94,9 @@ class Agenda:
                 # What ours had too much counts; what guests had while we rested does not add up.
                 owed = min(self._owed, 0.0) + OURS_BESIDE_GUESTS * took
                 self._owed = max(self._owed, owed)
+                if task.job.has_failed and task.station in self._stations:
+                    # The next one may fail, too, and hold up what becomes due meanwhile.
+                    self._guests_from = now + OURS_BESIDE_GUESTS * took
             else:
                 self._owed -= took
 
@@ -120,6 +125,9 @@ class Agenda:
         guests = self._guests
         # A guest could write over a fallback that the end has confirmed already.
         has_guests = (guests.has_news or guests.waiting) and not self._interlocks.is_ending
+        is_held = has_guests and now < self._guests_from
+        self._held_until = self._guests_from if is_held else math.inf
+        has_guests = has_guests and not is_held
         is_guests_turn = self._owed <= 0 and not any(
             isinstance(task.job, GuestJob) for task in self._counted)
         if has_guests and is_guests_turn and (guest := self._guest(now, busy)):
@@ -203,4 +211,6 @@ class Agenda:
                    if moment is not None]
         if self._has_own and (own := self._interlocks.next_due()) < math.inf:
             moments.append(own)
+        if self._held_until < math.inf:
+            moments.append(self._held_until)
         return min(moments, default=None)

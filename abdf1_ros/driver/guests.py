@@ -125,6 +125,7 @@ class GuestJob(Job):
         self.expires = expires
         self.claim = claim
         self.sts = 0  # of the reply
+        self.has_failed = False  # there was none
         self._queue = queue
         self._begun = 0.0
 
@@ -237,6 +238,7 @@ class GuestQueue:
     def ended(self, job: GuestJob, begun: float, error: Exception | None) -> None:
         """Refuse a command that has no reply; tell what it may have changed."""
         command, station = job.command, job.station
+        job.has_failed = error is not None
         was_sent = error is None or getattr(error, 'sent', True)
         if error is not None:
             self._silent(station, self.line.now)
