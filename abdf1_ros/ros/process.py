@@ -23,6 +23,7 @@ from __future__ import annotations
 import argparse
 from collections.abc import Callable, Iterator, Sequence
 import faulthandler
+from itertools import pairwise
 import os
 import re
 import signal
@@ -155,6 +156,10 @@ def _begin(parser: argparse.ArgumentParser, given: list[str]) -> None:
     if unknown := parser.parse_known_args(remove_ros_args(given)[1:])[1]:
         parser.error(f'{printable(" ".join(unknown))}: not known here; parameters follow '
                      '--ros-args')
+    for before, word in pairwise(given):  # ROS would take it for the new name of a topic
+        if ':=' in word and (before == '--ros-args' or not before.startswith('-')):
+            option = '-r' if word.startswith(('__', '~', '/')) else '-p'
+            parser.error(f'{printable(word)}: {option} is missing before it')
     _check_log_directory()
     try:
         rclpy.init(args=given, signal_handler_options=SignalHandlerOptions.NO)

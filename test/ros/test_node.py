@@ -594,6 +594,15 @@ def test_unusable_arguments_are_told_in_one_line(
     assert 'Traceback' not in ' '.join(lines)
 
 
+@pytest.mark.parametrize(('word', 'option'), [('net_file:=x', '-p'), ('__ns:=/cell', '-r')])
+def test_option_that_is_missing_before_an_argument_is_named(
+        capsys: pytest.CaptureFixture[str], word: str, option: str) -> None:
+    with pytest.raises(SystemExit) as end:
+        main(['node', '--ros-args', word])
+    assert end.value.code == 2
+    assert f'{word}: {option} is missing before it' in capsys.readouterr().err
+
+
 def test_what_may_pass_at_the_start_has_the_status_of_a_fault(
         refusal: Callable[..., list[str]], monkeypatch: pytest.MonkeyPatch) -> None:
     def refuse(**named: object) -> None:
