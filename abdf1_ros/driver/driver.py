@@ -19,6 +19,21 @@ It does no input or output itself, like the link layer below it: ``Driver.machin
 and a clock value, and a ``Listener`` gets values, results and events.
 ``abdf1_ros.ports.link_thread.LinkThread`` gives it a port and a clock; the tests give it a
 virtual line.
+
+Where each fact lives:
+
+==================================================  ============================================
+who writes which words, until when it may land      ``record.WriteRecord``, ``record.Words``
+messages that wait                                  ``writes.queue.WriteQueue.waiting``
+commands of guests that wait                        ``guests.Guest.waiting``
+commands of jobs under way                          ``job_tasks.JobTasks``
+when an own row has to be looked at                 its ``due``; ``interlocks.plc.Wakes`` for PLCs
+how a PLC answers our own writes, a change to RUN   ``interlocks.plc.Plc``
+last message of a topic, executor, the end          ``interlocks.plc.Conditions``
+mode and type of a PLC                              ``checks.Checks.known``
+whether a station answers                           ``df1.stations.Station``
+last value, freshness, withheld                     ``reads.point.ReadPoint``
+==================================================  ============================================
 """
 
 from __future__ import annotations
@@ -120,7 +135,8 @@ class Driver:
         report = self._listener.written
         self._read_backs = ReadBacks(settings.write_timeout, report)
         self._readings = Readings(network, self.mappings, settings, planner, self.stations,
-                                  machine, self._listener, self._read_backs)
+                                  machine, self._listener, self._read_backs,
+                                  lambda *read: self.interlocks.read_back(*read))  # noqa: PLW0108
         self.points, self._reads = self._readings.points, self._readings.reads
         self._record = record = WriteRecord(machine, 2 * network.cmd_timeout / 1000)
         writing = WritesUnderWay(planner, self.stations, record, self._readings, self._read_backs)
@@ -135,7 +151,6 @@ class Driver:
             lambda write: self._served.store(write.mapping, write.raw), report,
             self._listener.unreadable, self._foreign_value,
             1 + settings.first_tns % LARGEST)
-        self._readings.read_back = self.interlocks.read_back
         self.guests = GuestQueue(self.stations, machine, network.cmd_timeout / 1000,
                                  self._station_of_guest, self._words_of_guest, record)
         record.connect(self._read_backs, self._reads, self.interlocks)

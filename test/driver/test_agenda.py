@@ -88,7 +88,7 @@ class Bench:
         self.tasks, line = JobTasks(5, 0), StillClock()
         planner, backs = Planner(LINE, 0.1), ReadBacks(write_timeout, self.results.append)
         readings = Readings(Network(), (), DriverSettings(), planner, self.stations, line,
-                            Recorder(lambda: 0.0), backs)
+                            Recorder(lambda: 0.0), backs, lambda mapping, words, started: None)
         self.record = WriteRecord(line, 1.0)
         writing = WritesUnderWay(planner, self.stations, self.record, readings, backs)
         self.reads = readings.reads

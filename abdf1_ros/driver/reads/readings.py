@@ -68,8 +68,8 @@ class Readings:
 
     def __init__(self, network: Network, mappings: Sequence[Mapping], settings: DriverSettings,
                  planner: Planner, stations: ActiveStationList, line: LineTime,
-                 listener: ValueListener, read_backs: ReadBacks) -> None:
-        self.read_back: Callable[[Mapping, bytes, float], None] | None = None
+                 listener: ValueListener, read_backs: ReadBacks,
+                 read_back: Callable[[Mapping, bytes, float], None]) -> None:
         blocks = planner.plan(mapping for mapping in mappings
                               if not (settings.read_only and mapping.heartbeat))
         self.points = _points(network, mappings, blocks, settings)
@@ -80,6 +80,7 @@ class Readings:
         self._line = line
         self._listener = listener
         self._read_backs = read_backs
+        self._read_back = read_back
         self._refusals = Refusals(planner)
         self.reads.replace((), map(self._job, blocks), 0.0)
 
@@ -120,9 +121,8 @@ class Readings:
             self._read_backs.read(job.block, data, job.started, now)
         if self.guards.counters:
             self.guards.values_read(job.points, job.slices, data, now)
-        if self.read_back is not None:
-            for mapping, place in job.heartbeats:
-                self.read_back(mapping, data[place], job.started)
+        for mapping, place in job.heartbeats:
+            self._read_back(mapping, data[place], job.started)
         has_recovered, period = False, job.block.period
         for point, place in zip(job.points, job.slices, strict=True):
             has_recovered |= point.error is not None
