@@ -23,7 +23,6 @@ from __future__ import annotations
 import argparse
 from collections.abc import Callable, Iterator, Sequence
 import faulthandler
-from itertools import pairwise
 import os
 import re
 import signal
@@ -74,6 +73,8 @@ _BAD_ARGUMENTS = re.compile("Couldn't parse|should not exceed")
 
 # What to say before such an error.
 _ADVICE = (
+    (r"^\['(?:__|~|/)[^']*:=", '-r is missing before '),
+    (r"^\['[^']*:=", '-p is missing before '),
     (r"parameter override rule: '-p \w+=", 'a parameter is NAME:=VALUE, with a colon; '),
     (r'remap rule: .*__(?:node|name):=', 'a node name has letters, digits and underscores; '))
 
@@ -156,10 +157,6 @@ def _begin(parser: argparse.ArgumentParser, given: list[str]) -> None:
     if unknown := parser.parse_known_args(remove_ros_args(given)[1:])[1]:
         parser.error(f'{printable(" ".join(unknown))}: not known here; parameters follow '
                      '--ros-args')
-    for before, word in pairwise(given):  # ROS would take it for the new name of a topic
-        if ':=' in word and (before == '--ros-args' or not before.startswith('-')):
-            option = '-r' if word.startswith(('__', '~', '/')) else '-p'
-            parser.error(f'{printable(word)}: {option} is missing before it')
     _check_log_directory()
     try:
         rclpy.init(args=given, signal_handler_options=SignalHandlerOptions.NO)

@@ -581,10 +581,12 @@ def test_faulty_parameter_is_told_in_one_line(
     (['--ros-args', '-r', '__node:=a-b'], 'a node name has letters, digits and underscores; '
      "Failed to parse ROS arguments: Couldn't parse remap rule: '-r __node:=a-b'."),
     (['--ros-args', '-p', 'net_file=net.csv'], 'a parameter is NAME:=VALUE, with a colon; '),
+    (['--ros-args', 'net_file:=x'], "-p is missing before ['net_file:=x']"),
+    (['--ros-args', '__ns:=/cell'], "-r is missing before ['__ns:=/cell']"),
     (['--ros-args', '-p'], "Couldn't parse trailing -p flag."),
     (['--ros-args', '--bogus'], '--bogus'),
     (['--ros-args', '-r', f'__ns:=/{240 * "n"}'], "length should not exceed '255U - 8U'")],
-    ids=['remap', 'colon', 'parameter', 'unknown', 'long'])
+    ids=['remap', 'colon', 'bare', 'bare_name', 'parameter', 'unknown', 'long'])
 def test_unusable_arguments_are_told_in_one_line(
         refusal: Callable[..., list[str]], arguments: list[str], expected: str) -> None:
     lines = refusal(*arguments)
@@ -592,15 +594,6 @@ def test_unusable_arguments_are_told_in_one_line(
     assert line.startswith('abdf1: bad arguments: ')
     assert expected in line
     assert 'Traceback' not in ' '.join(lines)
-
-
-@pytest.mark.parametrize(('word', 'option'), [('net_file:=x', '-p'), ('__ns:=/cell', '-r')])
-def test_option_that_is_missing_before_an_argument_is_named(
-        capsys: pytest.CaptureFixture[str], word: str, option: str) -> None:
-    with pytest.raises(SystemExit) as end:
-        main(['node', '--ros-args', word])
-    assert end.value.code == 2
-    assert f'{word}: {option} is missing before it' in capsys.readouterr().err
 
 
 def test_what_may_pass_at_the_start_has_the_status_of_a_fault(
