@@ -24,7 +24,7 @@ import subprocess
 from typing import Any
 from xml.etree import ElementTree
 
-from abdf1_ros.ros.bridge import BridgeNode
+from abdf1_ros.ros.bridge.node import BridgeNode
 import pytest
 from rclpy.node import Node
 import rclpy.utilities

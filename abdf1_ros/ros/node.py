@@ -18,10 +18,10 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from abdf1_ros.ros.bridge import BridgeNode, NODE_NAME
+from abdf1_ros.ros.bridge.node import BridgeNode, NODE_NAME
 from abdf1_ros.ros.parameters.files import parameter_files
-from abdf1_ros.ros.process import make_parser, Program, run_ros
-from abdf1_ros.ros.runner import Line, Runner
+from abdf1_ros.ros.process.main import make_parser, Program, run_ros
+from abdf1_ros.ros.process.runner import Line, Runner
 
 _USAGE = 'node --ros-args -p net_file:=net.csv -p map_file:=map.csv'
 

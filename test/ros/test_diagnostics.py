@@ -39,12 +39,12 @@ from abdf1_ros.pccc.values import Values
 from abdf1_ros.ports.link_thread import LinkThread, PortState
 from abdf1_ros.ports.settings import PortSettings
 from abdf1_ros.ports.trace import PortOpener
+from abdf1_ros.ros.bridge.session import stations_of
 from abdf1_ros.ros.diagnostics.events import LineEvents
 from abdf1_ros.ros.diagnostics.line import takes_in_silence
 from abdf1_ros.ros.diagnostics.status import Seen
 from abdf1_ros.ros.diagnostics.statuses import Diagnostics
 from abdf1_ros.ros.diagnostics.writes import WriteLog
-from abdf1_ros.ros.session import stations_of
 from abdf1_ros.settings.map_file import load_mappings
 from abdf1_ros.settings.mapping import Command, Mapping
 from abdf1_ros.settings.network import Network

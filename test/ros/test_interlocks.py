@@ -22,7 +22,7 @@ from typing import Any
 
 from abdf1_ros import testing
 from abdf1_ros.df1.echo import COMES_BACK
-from abdf1_ros.ros.bridge import BridgeNode
+from abdf1_ros.ros.bridge.node import BridgeNode
 from abdf1_ros.simulator.ladder import Lamp
 import pytest
 from std_msgs.msg import Int16MultiArray
@@ -178,7 +178,7 @@ def test_rule_5_port_that_is_left_to_others_is_left_with_zero(
     assert cell.call(SetBool, 'polling', SetBool.Request(data=True)).success
     cell.until_counting()
     cell.plcs.say('silent 1')
-    monkeypatch.setattr('abdf1_ros.ros.session.END_LIMIT', 0.1)
+    monkeypatch.setattr('abdf1_ros.ros.bridge.session.END_LIMIT', 0.1)
     assert cell.call(SetBool, 'polling', SetBool.Request(data=False)).success
     assert 'the port is left before the PLC has confirmed: beat' in capfd.readouterr().err
 

@@ -26,10 +26,10 @@ from typing import Any
 
 from abdf1_ros.problems import ConfigurationError
 from abdf1_ros.ros import lines as module
-from abdf1_ros.ros import process
-from abdf1_ros.ros.bridge import BridgeNode
+from abdf1_ros.ros.bridge.node import BridgeNode
 from abdf1_ros.ros.lines import chosen, LineName, main, sections
 from abdf1_ros.ros.parameters.files import parameter_files, usable_files
+from abdf1_ros.ros.process import main as process
 from abdf1_ros.signals import EndRequest
 from abdf1_ros.testing import Plcs
 import pytest

@@ -29,7 +29,7 @@ from abdf1_ros.messages import Event, Message
 from abdf1_ros.pccc.families import parse_address
 from abdf1_ros.pccc.file_types import PlcType
 from abdf1_ros.ports.link_thread import PortState
-from abdf1_ros.ros.bridge import BridgeNode
+from abdf1_ros.ros.bridge.node import BridgeNode
 from abdf1_ros.ros.node import main
 from abdf1_ros.testing import Plcs
 from diagnostic_msgs.msg import DiagnosticStatus

@@ -23,7 +23,7 @@ import time
 
 from abdf1_ros.plan.forecast import intervals, line_model, longest_wait
 from abdf1_ros.plan.planner import Planner
-from abdf1_ros.ros.process import LAST_WRITES, take_last_writes
+from abdf1_ros.ros.process.main import LAST_WRITES, take_last_writes
 from abdf1_ros.settings.map_file import load_mappings
 from abdf1_ros.settings.network import load_network
 import pytest

@@ -73,7 +73,7 @@ def test_stream_of_signals_ends_it_as_one_does(
 
 @pytest.mark.parametrize('error', ['ValueError', 'RuntimeError'])
 @pytest.mark.parametrize(('name', 'function'), [
-    ('node', 'abdf1_ros.ros.bridge.BridgeNode.check'),
+    ('node', 'abdf1_ros.ros.bridge.node.BridgeNode.check'),
     ('lines', 'abdf1_ros.ros.lines.Lines._look')])
 def test_bug_ends_it_with_a_traceback(
         tmp_path: Path, name: str, function: str, error: str) -> None:
@@ -89,7 +89,7 @@ def test_bug_ends_it_with_a_traceback(
 
 # Nodes get less time to be taken off the network, as what ends the process by the clock does not
 # wait for a busy host.
-EARLY = 'import abdf1_ros.ros.process\nabdf1_ros.ros.process._DESTRUCTION_LIMIT = 2.0\n'
+EARLY = 'import abdf1_ros.ros.process.main\nabdf1_ros.ros.process.main._DESTRUCTION_LIMIT = 2.0\n'
 HANGS = {'held': 'ctypes.PyDLL(None).sleep(60)', 'slow': 'time.sleep(60)'}
 
 
@@ -100,7 +100,7 @@ HANGS = {'held': 'ctypes.PyDLL(None).sleep(60)', 'slow': 'time.sleep(60)'}
 @pytest.mark.parametrize('name', ['node', 'lines'])
 def test_clock_ends_what_does_not_come_back(
         tmp_path: Path, name: str, where: str, how: str, status: int) -> None:
-    patch = (f'{EARLY}from abdf1_ros.ros.bridge import BridgeNode\n'
+    patch = (f'{EARLY}from abdf1_ros.ros.bridge.node import BridgeNode\n'
              f'def hang(self, *arguments): print("hangs", flush=True); {HANGS[how]}\n'
              f'BridgeNode.{where} = hang')
     with program(tmp_path, name, patch) as process:
@@ -113,7 +113,7 @@ def test_clock_ends_what_does_not_come_back(
 # What the node takes to be made, without what DDS does for its publishers and subscriptions: that
 # grows with the square of their number.
 COSTS = """
-from abdf1_ros.ros import process
+from abdf1_ros.ros.process import main as process
 from rclpy.node import Node
 costs_of_dds = []
 def timed(function, costs):

@@ -22,13 +22,13 @@ from typing import Any
 from abdf1_ros.ports.link_thread import LinkThread
 from abdf1_ros.ports.opening import open_port
 from abdf1_ros.ports.settings import PortSettings
-from abdf1_ros.ros.bridge import BridgeNode
+from abdf1_ros.ros.bridge.files import FileWatch
+from abdf1_ros.ros.bridge.guests import GuestPlaces
+from abdf1_ros.ros.bridge.node import BridgeNode
+from abdf1_ros.ros.bridge.session import Session
 from abdf1_ros.ros.diagnostics.graph import Graph
 from abdf1_ros.ros.diagnostics.line import LineView
-from abdf1_ros.ros.files import FileWatch
-from abdf1_ros.ros.guests import GuestPlaces
 from abdf1_ros.ros.parameters.shown import ShownFiles
-from abdf1_ros.ros.session import Session
 from abdf1_ros.testing import Plcs
 import pytest
 from rcl_interfaces.srv import GetParameters

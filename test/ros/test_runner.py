@@ -18,8 +18,8 @@ import threading
 import time
 from typing import Any
 
-from abdf1_ros.ros.bridge import end_together
-from abdf1_ros.ros.runner import _Callbacks
+from abdf1_ros.ros.bridge.node import end_together
+from abdf1_ros.ros.process.runner import _Callbacks
 from abdf1_ros.testing import PATIENCE
 import pytest
 from rclpy.logging import get_logger

@@ -22,7 +22,7 @@ import time
 
 from abdf1_ros.driver.reads.point import ReadPoint
 from abdf1_ros.ports.clock import line_time
-from abdf1_ros.ros.bridge import BridgeNode
+from abdf1_ros.ros.bridge.node import BridgeNode
 from abdf1_ros.ros.topics.snapshot import Snapshot
 from abdf1_ros.settings.mapping import Mapping
 from abdf1_ros.testing import Plcs

@@ -18,7 +18,7 @@ from collections.abc import Iterator
 from pathlib import Path
 import socket
 
-from abdf1_ros.ros.supervisor import Supervisor
+from abdf1_ros.ros.process.supervisor import Supervisor
 import pytest
 from support.ros import EXAMPLE_FILES, PATIENCE, Process, ros_args
 

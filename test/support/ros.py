@@ -34,7 +34,7 @@ from typing import Any
 
 from abdf1_ros import testing
 from abdf1_ros.paths import config_file
-from abdf1_ros.ros.bridge import BridgeNode
+from abdf1_ros.ros.bridge.node import BridgeNode
 from abdf1_ros.ros.topics.messages import latched_qos
 from abdf1_ros.testing import EVERYTHING, PATIENCE
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus

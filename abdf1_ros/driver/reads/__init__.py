@@ -12,4 +12,4 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The driver: what to read and write, when, and what comes of it; still without clock or ROS."""
+"""What is read: which blocks are due, what comes of them, and what is withheld."""

@@ -31,7 +31,7 @@ from abdf1_ros.driver.links import DriverSettings
 from abdf1_ros.paths import config_file
 from abdf1_ros.plan.usable_rows import usable_rows
 from abdf1_ros.problems import ConfigurationError, Problem
-from abdf1_ros.ros.files import FileWatch
+from abdf1_ros.ros.bridge.files import FileWatch
 from abdf1_ros.ros.parameters.files import names_in_sections_of
 from abdf1_ros.ros.parameters.shown import descriptor_of, map_cells, MOST_SHOWN_ROWS, text_of
 from abdf1_ros.settings.map_file import load_mappings

@@ -27,9 +27,9 @@ import itertools
 import threading
 import time
 
-from abdf1_ros.ros.bridge import BridgeNode, end_together
-from abdf1_ros.ros.process import EXIT_FAULT
-from abdf1_ros.ros.supervisor import Supervisor, Works
+from abdf1_ros.ros.bridge.node import BridgeNode, end_together
+from abdf1_ros.ros.process.main import EXIT_FAULT
+from abdf1_ros.ros.process.supervisor import Supervisor, Works
 from abdf1_ros.signals import EndRequest
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node

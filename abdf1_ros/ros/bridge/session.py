@@ -34,13 +34,13 @@ from abdf1_ros.plan.report import setting_remarks
 from abdf1_ros.ports.clock import line_time
 from abdf1_ros.ports.link_thread import LinkThread, PortState
 from abdf1_ros.ports.trace import PortOpener
+from abdf1_ros.ros.bridge.guests import GuestPlaces
 from abdf1_ros.ros.diagnostics.events import LineEvents
 from abdf1_ros.ros.diagnostics.graph import Graph, NameWatch, TypeWatch
 from abdf1_ros.ros.diagnostics.stations import LinkCounterService
 from abdf1_ros.ros.diagnostics.status import Seen
 from abdf1_ros.ros.diagnostics.statuses import Diagnostics
 from abdf1_ros.ros.diagnostics.watches import Watch, watches_of
-from abdf1_ros.ros.guests import GuestPlaces
 from abdf1_ros.ros.parameters.declared import Configuration
 from abdf1_ros.ros.topics.interlocks import END_LIMIT, InterlockWatch, wait_for_end
 from abdf1_ros.ros.topics.messages import ACTIVE_LAYOUT

@@ -32,13 +32,13 @@ from abdf1_ros.ports.link_thread import LinkThread, PortState
 from abdf1_ros.ports.settings import PortSettings
 from abdf1_ros.ports.trace import PortOpener
 from abdf1_ros.problems import ConfigurationError
+from abdf1_ros.ros.bridge.session import Session, Surroundings, tell_plcs
 from abdf1_ros.ros.diagnostics.graph import Graph, NameWatch
 from abdf1_ros.ros.diagnostics.log import bug_text
 from abdf1_ros.ros.parameters.declared import Configuration, configure, read_again
 from abdf1_ros.ros.parameters.shown import ShownFiles
-from abdf1_ros.ros.port_owners import PortOwners
-from abdf1_ros.ros.process import LAST_WRITES, take_last_writes
-from abdf1_ros.ros.session import Session, Surroundings, tell_plcs
+from abdf1_ros.ros.process.main import LAST_WRITES, take_last_writes
+from abdf1_ros.ros.process.port_owners import PortOwners
 from abdf1_ros.ros.topics.messages import latched_qos
 from abdf1_ros.ros.topics.writes import WriteTopics
 from abdf1_ros.text import printable
