@@ -58,9 +58,9 @@ _LEAVING = ('node', 'lines', 'simulator')
 
 def run(name: str) -> int:
     """Run a command with the arguments of this process; return its exit status."""
-    with _ending_quietly(_INTERRUPTED if name in _TELLING else 0):
-        module = import_module(COMMANDS[name])
-    status = module.main()
+    _end_quietly(_INTERRUPTED if name in _TELLING else 0)
+    with _missing_is_named():
+        status = import_module(COMMANDS[name]).main()
     if name in _LEAVING:
         _leave(status)
     return _ended(status)
@@ -78,13 +78,18 @@ plc = partial(run, 'plc')
 conform = partial(run, 'conform')
 
 
-@contextmanager
-def _ending_quietly(status: int = 0) -> Iterator[None]:
+def _end_quietly(status: int) -> None:
+    """End with that status where a signal comes before the command has handlers of its own."""
     def leave(number: int, frame: FrameType | None) -> None:
         os._exit(status)
 
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, leave)
+
+
+@contextmanager
+def _missing_is_named() -> Iterator[None]:
+    """Name a module that is missing, also one that a command imports when it needs it."""
     try:
         yield
     except ModuleNotFoundError as error:

@@ -30,6 +30,9 @@ NAMES = {'node': ('rclpy', 0), 'lines': ('yaml', 0), 'monitor': ('rclpy', 0), 'd
          'simulator': ('serial', 0), 'sniff': ('serial', 0), 'check': ('difflib', 130),
          'plc': ('serial', 130)}
 
+# Of a command that imports what it needs when it knows what is wanted.
+ARGUMENTS = {'plc': ['status', '--port', 'x']}
+
 # Stands in for a slow import: it says that it has begun, and does not end by itself soon. Python
 # sees a signal that comes just before a wait after it, so no wait is long.
 SLOW = """import select
@@ -45,7 +48,8 @@ def test_signal_during_the_imports_ends_quietly(
         tmp_path: Path, name: str, number: signal.Signals) -> None:
     slow, status = NAMES[name]
     (tmp_path / f'{slow}.py').write_text(SLOW)
-    call = f'import sys; from abdf1_ros.cli.main import {name}; sys.exit({name}())'
+    call = f'import sys; sys.argv += {ARGUMENTS.get(name, [])}; ' \
+        f'from abdf1_ros.cli.main import {name}; sys.exit({name}())'
     with subprocess.Popen(
             [sys.executable, '-c', call], text=True, stdout=subprocess.PIPE,
             stderr=subprocess.PIPE, env=os.environ | {'PYTHONPATH': str(tmp_path)}) as process:
@@ -74,7 +78,8 @@ def test_signal_before_a_command_has_its_own_handlers_ends_quietly(
 def test_module_that_is_missing_is_named(tmp_path: Path, name: str) -> None:
     slow, _ = NAMES[name]
     (tmp_path / f'{slow}.py').write_text("raise ModuleNotFoundError('no', name='rclpy')\n")
-    call = f'import sys; from abdf1_ros.cli.main import {name}; sys.exit({name}())'
+    call = f'import sys; sys.argv += {ARGUMENTS.get(name, [])}; ' \
+        f'from abdf1_ros.cli.main import {name}; sys.exit({name}())'
     result = subprocess.run([sys.executable, '-c', call], capture_output=True, text=True,
                             timeout=10, check=False,
                             env=os.environ | {'PYTHONPATH': str(tmp_path)})

@@ -36,7 +36,7 @@ from abdf1_ros.df1.frames import ACK, Code, message_frame
 from abdf1_ros.df1.packet import Packet, STS_NOT_DELIVERED
 from abdf1_ros.df1.settings import LinkSettings
 from abdf1_ros.df1.slave import HalfDuplexSlave
-from abdf1_ros.driver.interlocks.queue import Interlocks
+from abdf1_ros.driver.interlocks.plc import Plc
 from abdf1_ros.driver.job_tasks import JobTask
 from abdf1_ros.driver.links import DriverSettings
 from abdf1_ros.pccc.families import parse_address
@@ -555,9 +555,8 @@ def test_rule_16_nothing_can_be_left_out_of_the_bound() -> None:
     lambda rank, row: None if rank and rank[0] == 0 and rank[1] else rank])  # the ill never
 def test_rule_16_another_order_breaks_the_bound(
         mistake: Callable[..., object], monkeypatch: pytest.MonkeyPatch) -> None:
-    rank = Interlocks._rank
-    monkeypatch.setattr(Interlocks, '_rank', lambda self, plc, row, now: mistake(
-        rank(self, plc, row, now), row))
+    rank = Plc.rank
+    monkeypatch.setattr(Plc, 'rank', lambda self, row, now: mistake(rank(self, row, now), row))
     plants = [replace(WORST, mute=frozenset(range(1, 8)), silent=frozenset()),
               replace(WORST, rows=8, stations=2, mute=frozenset((1, 2)))]
     assert any(World(plant).late() for plant in plants)
