@@ -40,15 +40,7 @@ from typing import NamedTuple, Protocol
 
 from abdf1_ros.counters import Counters
 from abdf1_ros.df1.checksum import Checksum
-from abdf1_ros.df1.frames import (
-    Control,
-    Duplex,
-    Frame,
-    FrameDecoder,
-    MAX_LINK_DATA,
-    NOISE,
-    Symbol,
-)
+from abdf1_ros.df1.frames import Control, Duplex, Frame, FrameDecoder, MAX_LINK_DATA, NOISE, Symbol
 from abdf1_ros.df1.packet import begins_good_reply, HEADER_SIZE
 from abdf1_ros.df1.sender import Outlet, Reflex, Sender
 from abdf1_ros.errors import CommandExpired

@@ -36,24 +36,9 @@ from abdf1_ros.df1 import frames
 from abdf1_ros.df1.accounting import Accounting, count_fault, wrong_message
 from abdf1_ros.df1.frames import Code, Control, Frame, FrameFault, Unknown
 from abdf1_ros.df1.link import ack_on_reply, quiet_time
-from abdf1_ros.df1.machine import (
-    Heard,
-    Listen,
-    LISTEN_ON,
-    Machine,
-    Procedure,
-    Send,
-    Silence,
-    Step,
-)
+from abdf1_ros.df1.machine import Heard, Listen, LISTEN_ON, Machine, Procedure, Send, Silence, Step
 from abdf1_ros.df1.mode import answer_time
-from abdf1_ros.df1.packet import (
-    BROADCAST,
-    is_local_status,
-    Packet,
-    REPLY_BIT,
-    STS_NOT_DELIVERED,
-)
+from abdf1_ros.df1.packet import BROADCAST, is_local_status, Packet, REPLY_BIT, STS_NOT_DELIVERED
 from abdf1_ros.df1.sender import Reflex
 from abdf1_ros.df1.settings import LinkSettings
 from abdf1_ros.df1.stations import ActiveStationList

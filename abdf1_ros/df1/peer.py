@@ -52,25 +52,13 @@ from abdf1_ros.df1 import frames
 from abdf1_ros.df1.accounting import count_fault, wrong_message
 from abdf1_ros.df1.frames import Code, Control, Duplex, Frame, FrameFault, Symbol, Unknown
 from abdf1_ros.df1.link import ack_on_reply, EqualNode, Link
-from abdf1_ros.df1.machine import (
-    Heard,
-    Listen,
-    Machine,
-    Procedure,
-    Rest,
-    Send,
-    Silence,
-    Step,
-)
+from abdf1_ros.df1.machine import Heard, Listen, Machine, Procedure, Rest, Send, Silence, Step
 from abdf1_ros.df1.mode import answer_time, LineMode, Report, Serve
 from abdf1_ros.df1.packet import Packet
 from abdf1_ros.df1.settings import LinkSettings
 from abdf1_ros.df1.stations import ActiveStationList
 from abdf1_ros.df1.tasks import Outstanding, Task, TaskSource
-from abdf1_ros.errors import (
-    CommandExpired,
-    StationInactive,
-)
+from abdf1_ros.errors import CommandExpired, StationInactive
 from abdf1_ros.messages import Event, Message
 
 # Repeated NAKs mostly mean that the other end is out of buffers: from the second on, each

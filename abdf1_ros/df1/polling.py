@@ -46,21 +46,13 @@ from abdf1_ros.df1.frames import Control, Frame
 from abdf1_ros.df1.link import Link, LinkStatus, quiet_time, ScanTimes
 from abdf1_ros.df1.machine import Machine, Procedure, Rest
 from abdf1_ros.df1.master import MasterMode
-from abdf1_ros.df1.master_line import (
-    is_good,
-    MasterLine,
-    MOST_QUEUED,
-)
+from abdf1_ros.df1.master_line import is_good, MasterLine, MOST_QUEUED
 from abdf1_ros.df1.mode import answer_time, Report, Serve
 from abdf1_ros.df1.packet import BROADCAST, Packet
 from abdf1_ros.df1.settings import LinkSettings, PollingSettings
 from abdf1_ros.df1.stations import ActiveStationList
 from abdf1_ros.df1.tasks import Outstanding, Task, TaskSource
-from abdf1_ros.errors import (
-    CommandExpired,
-    LinkError,
-    StationInactive,
-)
+from abdf1_ros.errors import CommandExpired, LinkError, StationInactive
 from abdf1_ros.messages import Event
 
 # "At least four" may leave between two polls (1766-RM001).

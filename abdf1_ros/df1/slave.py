@@ -32,16 +32,7 @@ from abdf1_ros.counters import Counters
 from abdf1_ros.df1 import frames
 from abdf1_ros.df1.accounting import count_fault, wrong_message
 from abdf1_ros.df1.frames import Control, Frame, Poll, Symbol, Unknown
-from abdf1_ros.df1.machine import (
-    Heard,
-    Listen,
-    Machine,
-    Procedure,
-    Rest,
-    Send,
-    Silence,
-    Step,
-)
+from abdf1_ros.df1.machine import Heard, Listen, Machine, Procedure, Rest, Send, Silence, Step
 from abdf1_ros.df1.packet import BROADCAST, Packet
 from abdf1_ros.df1.settings import LinkSettings
 from abdf1_ros.errors import LineReset, LinkError, NeverTaken

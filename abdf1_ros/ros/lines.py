@@ -36,13 +36,7 @@ from abdf1_ros.ros.diagnostics.graph import Graph
 from abdf1_ros.ros.diagnostics.log import bug_text
 from abdf1_ros.ros.parameters.declared import take_given, unknown_names
 from abdf1_ros.ros.parameters.files import node_sections, parameter_files, parameter_tree
-from abdf1_ros.ros.process.main import (
-    EXIT_CONFIGURATION,
-    make_parser,
-    Program,
-    REFUSALS,
-    run_ros,
-)
+from abdf1_ros.ros.process.main import EXIT_CONFIGURATION, make_parser, Program, REFUSALS, run_ros
 from abdf1_ros.ros.process.port_owners import PortOwners
 from abdf1_ros.ros.process.runner import Line, LinkFailed, Runner
 from abdf1_ros.signals import EndRequest

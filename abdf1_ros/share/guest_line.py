@@ -26,21 +26,10 @@ from abdf1_ros.df1.peer import FullDuplexPeer
 from abdf1_ros.df1.settings import LinkSettings
 from abdf1_ros.df1.stations import ActiveStationList
 from abdf1_ros.df1.tasks import Task
-from abdf1_ros.driver.guests import (
-    Guest,
-    GuestCommand,
-    GuestListener,
-    GuestQueue,
-    ShareAccess,
-)
+from abdf1_ros.driver.guests import Guest, GuestCommand, GuestListener, GuestQueue, ShareAccess
 from abdf1_ros.ports.clock import line_time
 from abdf1_ros.ports.descriptor import Port
-from abdf1_ros.ports.endpoints import (
-    Endpoint,
-    PtyPlace,
-    SerialEndpoint,
-    TcpEndpoint,
-)
+from abdf1_ros.ports.endpoints import Endpoint, PtyPlace, SerialEndpoint, TcpEndpoint
 from abdf1_ros.ports.link_thread import LinkThread, PortKind, PortState
 from abdf1_ros.ports.settings import PortSettings
 from abdf1_ros.settings.network import Network

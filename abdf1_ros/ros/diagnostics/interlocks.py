@@ -25,14 +25,7 @@ from abdf1_ros.driver.interlocks.heartbeat import BeatState, HeartbeatRow
 from abdf1_ros.driver.reads.point import Freshness, ReadPoint
 from abdf1_ros.plan.bounds import Bound, Times
 from abdf1_ros.ros.diagnostics.stations import processor_fault
-from abdf1_ros.ros.diagnostics.status import (
-    ERROR,
-    Judgement,
-    OK,
-    Seen,
-    WARN,
-    with_age,
-)
+from abdf1_ros.ros.diagnostics.status import ERROR, Judgement, OK, Seen, WARN, with_age
 from abdf1_ros.text import milliseconds
 
 

@@ -27,14 +27,7 @@ from abdf1_ros.ros.diagnostics.line import (
     takes_in_silence,
     unnumbered_counts,
 )
-from abdf1_ros.ros.diagnostics.status import (
-    ERROR,
-    Judgement,
-    OK,
-    Seen,
-    WARN,
-    with_age,
-)
+from abdf1_ros.ros.diagnostics.status import ERROR, Judgement, OK, Seen, WARN, with_age
 from abdf1_ros.settings.network import Network
 from abdf1_ros.text import milliseconds
 
