@@ -39,6 +39,10 @@ class LineSettings:
     mode: str
     check: str
 
+    def on(self, line: Network) -> Network:
+        """Return ``line`` with these settings."""
+        return replace(line, baud=self.baud, mode=self.mode, error_code=self.check)
+
     def __str__(self) -> str:
         return f'{self.baud} baud, {_WORDS[self.mode]}, {self.check}'
 
@@ -58,11 +62,6 @@ class Found:
 
     settings: LineSettings
     presence: Presence
-
-    def network(self, base: Network) -> Network:
-        """Return ``base`` with these settings."""
-        return replace(base, baud=self.settings.baud, mode=self.settings.mode,
-                       error_code=self.settings.check)
 
 
 class Search:
@@ -120,7 +119,7 @@ class Search:
     def _look(self, settings: LineSettings, stations: Sequence[int],
               is_first: bool) -> Iterator[Presence]:
         """Yield the presence of each station; ignore one that only seems to take commands."""
-        network = self._with(settings)
+        network = settings.on(self._network)
         if settings.mode == MODES['half']:  # a PLC does not answer to its own address
             network = replace(network, station=free_station(network.station, stations))
         # One that is not absent is asked with ENQ when it is silent, which any full-duplex port
@@ -144,13 +143,9 @@ class Search:
     def _is_radio(self, settings: LineSettings, station: int) -> bool:
         """Tell whether replies come without any symbol, though we give none either."""
         self._show(f'trying {settings}, station {station}')
-        with Session(self._with(settings)) as session:
+        with Session(settings.on(self._network)) as session:
             if not all(understands(session, station) for _ in range(_RADIO_ECHOES)):
                 return False
             time.sleep(_ENQ_TIME)
             seen = session.counters
             return not seen.acks_received + seen.naks_received + seen.enqs_received
-
-    def _with(self, settings: LineSettings) -> Network:
-        return replace(self._network, baud=settings.baud, mode=settings.mode,
-                       error_code=settings.check)

@@ -315,7 +315,7 @@ def _detect(options: argparse.Namespace) -> int:
     there = found.presence
     print(f'{colour(str(found.settings), GREEN, sys.stdout)}: station {there.station} {there}')
     settings = found.settings
-    with Session(found.network(network)) as session, suppress(LinkError):
+    with Session(found.settings.on(network)) as session, suppress(LinkError):
         if ways := presence.io_access(session, there):
             print(f'inputs and outputs: Access {" or ".join(ways)}')
     whom = {MODES['full']: '--peer', MODES['half']: f'--station {there.station}'}.get(
@@ -363,12 +363,12 @@ def _init(options: argparse.Namespace) -> int:
     # A full-duplex port mostly answers to every station, and 0 is the one to avoid (see "check").
     others = options.stations if found.settings.mode != MODES['full'] else \
         [1] if found.presence.station == 0 else []
-    there = [seen for seen in presence.scan(found.network(network), others)
+    there = [seen for seen in presence.scan(found.settings.on(network), others)
              if seen.is_there] if others else []
     there = there or [found.presence]
     for seen in there:
         print(f'station {seen.station}: {seen}')
-    with Session(found.network(network)) as session:
+    with Session(found.settings.on(network)) as session:
         listed = {seen.station: files.listed(session, seen.station, seen.identity)
                   for seen in there}
     target.write(*init.files_of(network, found, there, listed))

@@ -16,7 +16,7 @@
 
 from dataclasses import replace
 
-from abdf1_ros.cli.plc.detect import LineSettings, Search
+from abdf1_ros.cli.plc.detect import LineSettings
 from abdf1_ros.settings.network import Network
 import pytest
 
@@ -24,10 +24,10 @@ import pytest
 @pytest.fixture
 def half_duplex_only(monkeypatch: pytest.MonkeyPatch) -> None:
     """Let searches wait for a short time where nobody answers: in full duplex."""
-    settled = Search._with
+    settled = LineSettings.on
 
-    def brief(search: Search, settings: LineSettings) -> Network:
-        network = settled(search, settings)
+    def brief(settings: LineSettings, line: Network) -> Network:
+        network = settled(settings, line)
         return replace(network, timeout=50, cmd_timeout=50) if settings.mode == 'Peer' else network
 
-    monkeypatch.setattr(Search, '_with', brief)
+    monkeypatch.setattr(LineSettings, 'on', brief)

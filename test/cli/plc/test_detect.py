@@ -143,7 +143,7 @@ def test_radio_modem_is_found_by_replies_without_ack(tmp_path: Path, check: str,
         assert (found.settings, found.presence.station) == (LineSettings(9600, 'Radio', check), 1)
         assert 'radio modem (replies come without ACK), ' in trying[-1]
         assert ',Radio,' in net_csv(network, found, [1])
-        assert found.network(network).mode == 'Radio'
+        assert found.settings.on(network).mode == 'Radio'
 
 
 class Unheard(FullDuplexPeer):
