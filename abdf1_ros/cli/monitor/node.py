@@ -40,11 +40,6 @@ _DISCOVERY_PERIOD = 0.5
 
 _RESULTS_KEPT = 8
 
-# How long (s) a publisher waits for the bridge before it gives up.
-_CONNECTION = 3.0
-
-_BITS = 'std_msgs/msg/UInt8MultiArray'
-
 _TYPES = {f'std_msgs/msg/{message.__name__}': message for message in MESSAGES.values()}
 
 _STYLES = {DiagnosticStatus.OK: Style.GOOD, DiagnosticStatus.WARN: Style.WARNING}
@@ -125,12 +120,10 @@ class NodeWatch(Listening):
         self._results: deque[Status] = deque(maxlen=_RESULTS_KEPT)
         self._next_discovery = 0.0
         self.is_there = False
-        for message_type, topic, callback, qos in (
-                (DiagnosticArray, '/diagnostics', self._take_diagnostics, 100),
-                (DiagnosticStatus, f'{name}/write_results', self._take_result, 100),
-                (UInt16MultiArray, f'{name}/active_stations', self._take_active,
-                 latched_qos())):
-            self.subscribe(message_type, topic, callback, qos)
+        self.subscribe(DiagnosticArray, '/diagnostics', self._take_diagnostics, 100)
+        self.subscribe(DiagnosticStatus, f'{name}/write_results', self._take_result, 100)
+        active = f'{name}/active_stations'
+        self.subscribe(UInt16MultiArray, active, self._take_active, latched_qos())
 
     @property
     def is_complete(self) -> bool:
@@ -185,8 +178,7 @@ class NodeWatch(Listening):
     def _listen(self, topic: str, type_name: str) -> None:
         known = self._subscriptions.get(topic)
         if known is None:
-            handle = self.subscribe(
-                _TYPES[type_name], topic, self._taker(topic), latched_qos())
+            handle = self.subscribe(_TYPES[type_name], topic, self._taker(topic), latched_qos())
             known = _Subscription(
                 type_name, handle, Reading(topic.removeprefix(f'{self.name}/read/')))
             self._subscriptions[topic] = known
@@ -214,10 +206,7 @@ class NodeWatch(Listening):
         return take
 
     def _take_diagnostics(self, message: DiagnosticArray) -> None:
-        node = self.name.lstrip('/')
-        statuses = [shown_status(status, node) for status in message.status
-                    if status.name.startswith(f'{node}: ')]
-        if statuses:
+        if statuses := shown_statuses(message, self.name.lstrip('/')):
             self._statuses, self._told = statuses, time.monotonic()
 
     def _take_result(self, status: DiagnosticStatus) -> None:
@@ -227,6 +216,12 @@ class NodeWatch(Listening):
     def _take_active(self, message: UInt16MultiArray) -> None:
         self._active = [16 * word + bit for word, bits in enumerate(message.data)
                         for bit in range(16) if bits >> bit & 1]
+
+
+def shown_statuses(message: DiagnosticArray, node: str) -> list[Status]:
+    """Return the statuses of a node as they are shown; there may be those of others too."""
+    return [shown_status(status, node) for status in message.status
+            if status.name.startswith(f'{node}: ')]
 
 
 def shown_status(status: DiagnosticStatus, node: str) -> Status:

@@ -25,7 +25,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 import time
 
-from abdf1_ros.cli.monitor.node import Listening, shown_status
+from abdf1_ros.cli.monitor.node import Listening, shown_statuses
 from abdf1_ros.cli.monitor.view import SILENCE, Status, Style, TextLine
 from abdf1_ros.text import by_number, cut, printable
 from diagnostic_msgs.msg import DiagnosticArray
@@ -73,8 +73,7 @@ class PlantWatch(Listening):
 
     def _take(self, message: DiagnosticArray) -> None:
         node = message.status[0].name.partition(': ')[0] if message.status else ''
-        statuses = [shown_status(status, node) for status in message.status
-                    if status.name.startswith(f'{node}: ')]
+        statuses = shown_statuses(message, node)
         sections = {status.section: status for status in statuses}
         now = time.monotonic()
         if 'lines' in sections:  # the process of many, which knows of those that do not run
