@@ -109,10 +109,8 @@ class OpenLine:
     def __init__(self, mode: LineMode, line: LinkSettings, port: PortSettings,
                  absent: Sequence[int] = (), routes: Mapping[int, int] | None = None,
                  plc_type: PlcType = PlcType.PLC5) -> None:
-        self._requests = Requests(
-            mode, line, absent, random.randrange(0x10000), routes, plc_type)
-        self._link = LinkThread(
-            self._requests.machine, opened(port), on_fault=print_exception)
+        self._requests = Requests(mode, line, absent, random.randrange(0x10000), routes, plc_type)
+        self._link = LinkThread(self._requests.machine, opened(port), on_fault=print_exception)
         self._link.daemon = True  # a KeyboardInterrupt before ``with`` leaves nothing to stop it
         self._line = line_of(port.name)
         _ours.add(self._line)

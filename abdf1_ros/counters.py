@@ -79,8 +79,7 @@ class Counters:
     invalid_messages: int = _counter(
         2550, 'CNT_INVALID_MSGS_RCVD',
         'messages received too short, too long, incomplete, or wrongly addressed')
-    read_errors: int = _counter(
-        2551, 'CNT_COM_READ_ERRORS', 'failures to read from the port')
+    read_errors: int = _counter(2551, 'CNT_COM_READ_ERRORS', 'failures to read from the port')
     chars_sent: int = _counter(2560, 'CRD_CHAR_SENT', 'characters transmitted')
     chars_received: int = _counter(2561, 'CRD_CHAR_RECV', 'characters received')
     # The specification has no numbers for these: a PLC's diagnostic counters show them (M 9-6).

@@ -42,8 +42,7 @@ class Message(Enum):
         2502, Severity.ERROR,
         'Item: %d, Invalid or Unsupported PLC Type (%s) should be one of %s, %s, %s, %s')
     ERR_ADDRESS_SYNTAX = (2503, Severity.ERROR, 'Item: %d, Invalid Address Syntax (%s)')
-    ERR_ADDRESS_RANGE = (
-        2504, Severity.ERROR, 'Item: %d, Address is out of range (%s, len=%d)')
+    ERR_ADDRESS_RANGE = (2504, Severity.ERROR, 'Item: %d, Address is out of range (%s, len=%d)')
     ERR_BAD_FUNCTION_CODE = (
         2505, Severity.ERROR,
         'Response with wrong command code (slv=%d, actual=%d, expected=%d)')
@@ -58,14 +57,10 @@ class Message(Enum):
     ERR_WRONG_MESSAGE = (
         2510, Severity.ERROR, 'Wrong Message Received Src:0x%02x, Dst:0x%02x, Tns:0x%04x')
     ERR_RCVD_NAK_SYMBOL = (2511, Severity.ERROR, 'Received NAK Symbol')
-    NTC_RCVD_MSG_TOO_LONG = (
-        2512, Severity.NOTICE, 'Received Message Too Long (> %d bytes)')
-    NTC_RCVD_MSG_TOO_SHORT = (
-        2513, Severity.NOTICE, 'Received Message Too Short (< %d bytes)')
-    NTC_INVALID_SYMBOL = (
-        2514, Severity.NOTICE, 'Invalid Symbol received after DLE - (0x%02x)')
-    NTC_ACK_EXPECTED = (
-        2515, Severity.NOTICE, 'ACK Expected (last symbol received was 0x%02x)')
+    NTC_RCVD_MSG_TOO_LONG = (2512, Severity.NOTICE, 'Received Message Too Long (> %d bytes)')
+    NTC_RCVD_MSG_TOO_SHORT = (2513, Severity.NOTICE, 'Received Message Too Short (< %d bytes)')
+    NTC_INVALID_SYMBOL = (2514, Severity.NOTICE, 'Invalid Symbol received after DLE - (0x%02x)')
+    NTC_ACK_EXPECTED = (2515, Severity.NOTICE, 'ACK Expected (last symbol received was 0x%02x)')
     NTC_EOT_STX_EXPECTED = (
         2516, Severity.NOTICE, 'EOT or STX Expected (last symbol received was 0x%02x)')
     NTC_RCVD_NAK_SYMBOL = (2517, Severity.NOTICE, 'Received NAK Symbol')
@@ -75,8 +70,7 @@ class Message(Enum):
     NTC_NAK_RETRY = (2521, Severity.NOTICE, 'NAK Retry #%d, due to error %d')
     NTC_ENQ_RETRY = (2522, Severity.NOTICE, 'ENQ Retry #%d, due to error %d')
     NTC_REPLY_MSG_RCVD = (2523, Severity.NOTICE, 'Reply Message received from Slave %d')
-    NTC_DUPLICATE_MSG_RCVD = (
-        2524, Severity.NOTICE, 'Duplicate Message received from Slave %d')
+    NTC_DUPLICATE_MSG_RCVD = (2524, Severity.NOTICE, 'Duplicate Message received from Slave %d')
     CRT_BAD_STATION_ID = (
         2552, Severity.CRITICAL, 'Invalid station number (%d) must be less than %d')
     CRT_BAD_DRIVER_MODE = (

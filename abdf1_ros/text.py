@@ -60,8 +60,7 @@ def first(names: Sequence[str], most: int = 5) -> str:
 
 def by_number(name: str) -> list[tuple[int, str]]:
     """Return a key that sorts names as people do: line2 before line10."""
-    return [(int(part) if part.isdecimal() else 0, part)
-            for part in re.split('([0-9]+)', name)]
+    return [(int(part) if part.isdecimal() else 0, part) for part in re.split('([0-9]+)', name)]
 
 
 def milliseconds(seconds: float | None) -> str:

@@ -96,8 +96,7 @@ def examine(net_file: str, map_file: str,
     except ConfigurationError as error:
         found.problems += error.problems
     if found.network is not None:
-        found.mappings, problems = usable_rows(
-            found.mappings, found.network, default_period)
+        found.mappings, problems = usable_rows(found.mappings, found.network, default_period)
         found.problems += problems
     return found
 

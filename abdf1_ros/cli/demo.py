@@ -157,8 +157,7 @@ class Watcher(Node):
                 self.create_subscription(
                     MESSAGES[mapping.message_type], f'/abdf1/read/{mapping.topic}',
                     self._taker(mapping), latched_qos())
-        self.create_subscription(
-            DiagnosticStatus, '/abdf1/write_results', self._result, 10)
+        self.create_subscription(DiagnosticStatus, '/abdf1/write_results', self._result, 10)
         self.create_subscription(DiagnosticArray, '/diagnostics', self._diagnostics, 10)
 
     def expect(self, mapping: Mapping) -> float:
@@ -448,8 +447,7 @@ class Demo(Stage):
         died = time.monotonic()
         speed.die()
         self._say('it publishes nothing any more')
-        self._wait('the fallback value',
-                   lambda: self._used() == 0 and not self._is_in_control())
+        self._wait('the fallback value', lambda: self._used() == 0 and not self._is_in_control())
         self._say(f'{time.monotonic() - died:.1f} s later the bridge has written the Fallback, '
                   'the program uses [0], and in_control is [0]')
 

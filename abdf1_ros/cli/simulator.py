@@ -266,8 +266,7 @@ def _parse(args: Sequence[str] | None) -> argparse.Namespace:
     line.add_argument('--pty', metavar='NAME', type=_name,
                       help='a pseudo-terminal of this name (default: one with the name that is '
                            'printed)')
-    line.add_argument('--port', type=_name,
-                      help=f'a serial port, {URLS}')
+    line.add_argument('--port', type=_name, help=f'a serial port, {URLS}')
     line.add_argument('--tcp', metavar='HOST:PORT', help='a TCP port to listen on')
     parser.add_argument('--ladder', metavar='STATION', action='append', default=[],
                         help='its program watches a heartbeat in N10:0 and says when ROS is in '

@@ -103,8 +103,7 @@ class _Output:
         self._packets = PcapngWriter(options.pcapng) if options.pcapng else None
         self.has_failed = False
         self._colour = sys.stdout.isatty() and 'NO_COLOR' not in os.environ
-        self._shows_progress = sys.stderr.isatty() and (
-            options.summary or not sys.stdout.isatty())
+        self._shows_progress = sys.stderr.isatty() and (options.summary or not sys.stdout.isatty())
         self._next_progress = time.monotonic() + _PROGRESS_PERIOD
 
     def begin(self, settings: dict[str, str]) -> TrafficDecoder:
@@ -207,8 +206,7 @@ def _decode(options: argparse.Namespace) -> int:
     try:
         output = _Output(options)
     except OSError as error:
-        raise ConfigurationError([Problem(
-            '--pcapng', reason_of(options.pcapng, error))]) from None
+        raise ConfigurationError([Problem('--pcapng', reason_of(options.pcapng, error))]) from None
     return _decode_files(options, output) if options.files else _listen(options, output)
 
 
@@ -322,8 +320,7 @@ def _listen(options: argparse.Namespace, output: _Output) -> int:
         try:
             trace = Trace(options.save, settings, _say) if options.save else None
         except OSError as error:
-            raise ConfigurationError([Problem(
-                '--save', reason_of(options.save, error))]) from None
+            raise ConfigurationError([Problem('--save', reason_of(options.save, error))]) from None
         _say(f'listening on {" and ".join(tap.names)}; Ctrl-C ends')
         status = _print_heard(tap, trace, output, settings, options)
         output.end()

@@ -129,8 +129,7 @@ class ReportBundle:
             bundle.comment = _COMMENT
             bundle.writestr('README.txt', self._readme(texts))
             for name, content in texts.items():
-                bundle.writestr(
-                    name, content if isinstance(content, bytes) else f'{content}\n')
+                bundle.writestr(name, content if isinstance(content, bytes) else f'{content}\n')
 
     def _readme(self, names: Iterable[str]) -> str:
         lines = ['A report about a DF1 line, made by "sniff --report" of abdf1_ros.', '',

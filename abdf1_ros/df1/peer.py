@@ -386,11 +386,9 @@ class FullDuplexPeer(EqualNode):
     def _expire(self) -> None:
         """End the commands whose reply is overdue (S0, counter 2545)."""
         now = self._machine.now
-        overdue = [key for key, entry in self._outstanding.items()
-                   if entry.deadline <= now]
+        overdue = [key for key, entry in self._outstanding.items() if entry.deadline <= now]
         for key in overdue:
-            self._accounting.overdue(
-                self._outstanding.pop(key).task, keeps_others_waiting=True)
+            self._accounting.overdue(self._outstanding.pop(key).task, keeps_others_waiting=True)
 
     def _respond(self, response: bytes) -> bytes:
         self._last_response = response

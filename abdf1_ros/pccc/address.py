@@ -160,8 +160,7 @@ class Address:
             return True
         is_by_type = self.addressing.has_sections or mine.file_type.is_function \
             or others.file_type.is_function
-        return mine.file == others.file and (
-            not is_by_type or mine.file_type is others.file_type)
+        return mine.file == others.file and (not is_by_type or mine.file_type is others.file_type)
 
     def counts_like(self, other: Address) -> bool:
         """Tell whether one offset means one word, where both lie in the same file."""

@@ -90,8 +90,7 @@ def dialect_of(plc_type: PlcType, access: Access | None = None,
     ways = tuple(family.dialects)
     if access is not None and access not in ways:
         right = ', '.join(entry.value for entry in ways)
-        raise FormatError(
-            f'Access of a {family.addressing.title} is {right}, not {access.value}')
+        raise FormatError(f'Access of a {family.addressing.title} is {right}, not {access.value}')
     if processor is None:
         return family.dialects[access or ways[0]]
     if not family.by_processor:

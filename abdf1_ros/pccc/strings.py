@@ -38,8 +38,7 @@ def encode_counted(text: str) -> bytes:
     """Return an ST element; FormatError for more than 82 characters or not Latin-1."""
     characters = _characters(text)
     if len(characters) > COUNTED_CHARACTERS:
-        raise FormatError(
-            f'{len(characters)} characters, a PLC string has {COUNTED_CHARACTERS}')
+        raise FormatError(f'{len(characters)} characters, a PLC string has {COUNTED_CHARACTERS}')
     length = len(characters).to_bytes(2, 'little')
     return length + _swap(characters.ljust(COUNTED_CHARACTERS, b'\0'))
 
@@ -53,8 +52,7 @@ def encode_packed(text: str, words: int) -> bytes:
     """Return words of characters, NULs after ``text``; FormatError when it is too long."""
     characters = _characters(text)
     if len(characters) > 2 * words:
-        raise FormatError(
-            f'{len(characters)} characters, the mapping has room for {2 * words}')
+        raise FormatError(f'{len(characters)} characters, the mapping has room for {2 * words}')
     return _swap(characters.ljust(2 * words, b'\0'))
 
 

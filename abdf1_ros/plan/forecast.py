@@ -72,8 +72,7 @@ def load(blocks: Iterable[Block], response_time: float = USUAL_RESPONSE_TIME) ->
 
     Blocks without a period take the rest and are not counted.
     """
-    return sum(block_time(block, response_time) / block.period
-               for block in blocks if block.period)
+    return sum(block_time(block, response_time) / block.period for block in blocks if block.period)
 
 
 def intervals(blocks: Iterable[Block], response_time: float = USUAL_RESPONSE_TIME,

@@ -106,8 +106,7 @@ class Block:
 
     def reply_sizes(self) -> list[int]:
         """Return the bytes after the header of a good reply to each request."""
-        return [self.dialect.reply_size(request.start, request.words)
-                for request in self.requests]
+        return [self.dialect.reply_size(request.start, request.words) for request in self.requests]
 
 
 @dataclass(frozen=True, slots=True)

@@ -110,8 +110,7 @@ class Mapping:
             and self.address.file_type is not FileType.STRING
         codec = Codec(self.type, self.length, self.address.bit or 0, self.word_order, packed)
         object.__setattr__(self, 'codec', codec)
-        object.__setattr__(
-            self, 'dialect', dialect_of(self.plc_type, self.access, self.processor))
+        object.__setattr__(self, 'dialect', dialect_of(self.plc_type, self.access, self.processor))
         first = self.address.offset
         object.__setattr__(self, 'extent', Extent(
             self.station, self.address.area, first, first + codec.words))

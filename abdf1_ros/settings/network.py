@@ -150,9 +150,7 @@ class Network:
     cmd_timeout: int = _net(
         'Cmd_Timeout', 1000, 'until a reply is no longer polled for', low=500, high=5000,
         unit='ms', message=Message.CRT_BAD_CMD_TIMEOUT, message_args=(500, 5000))
-    com_port: str = _net(
-        'Com_Port', '1',
-        f'n for /dev/ttyS(n-1), a device path, {URLS}')
+    com_port: str = _net('Com_Port', '1', f'n for /dev/ttyS(n-1), a device path, {URLS}')
     baud: int = _net('Baud', 9600, 'bits per second', choices=BAUD_RATES)
     data_bits: int = _net('Data_Bits', 8, 'data bits per character', low=5, high=8)
     stop_bits: int = _net('Stop_Bits', 1, 'stop bits per character', low=1, high=2)
@@ -164,10 +162,8 @@ class Network:
         unit='ms')
     tx_delay: int = _net(
         'TX_Delay', 0, 'to wait before each transmission', low=0, high=65535, unit='ms')
-    handshake: str = _net(
-        'Handshake', 'No', 'hardware handshake RTS/CTS', choices=('Yes', 'No'))
-    polling: str = _net(
-        'Polling', 'Message', 'how a master polls', choices=POLLING_MODES)
+    handshake: str = _net('Handshake', 'No', 'hardware handshake RTS/CTS', choices=('Yes', 'No'))
+    polling: str = _net('Polling', 'Message', 'how a master polls', choices=POLLING_MODES)
     share: str = _net(
         'Share', '', 'places where other programs connect to share the line, separated by blanks: '
         'pty:/name, tcp:port, tcp:address:port, or a serial device')

@@ -38,8 +38,7 @@ _BLOCK = 4096
 _LONGEST_LINE = 1_000_000
 # The bytes, and after two spaces the same as characters.
 _XXD = re.compile(r'(?P<offset>[0-9a-f]{6,}): (?P<bytes>\S.*?)(?:  .*)?', re.IGNORECASE)
-_HEXDUMP = re.compile(r'(?P<offset>[0-9a-f]{7,})  (?P<bytes>[0-9a-f ]+)(?:\|.*)?',
-                      re.IGNORECASE)
+_HEXDUMP = re.compile(r'(?P<offset>[0-9a-f]{7,})  (?P<bytes>[0-9a-f ]+)(?:\|.*)?', re.IGNORECASE)
 _REPEATED = '*'
 # Bytes that a dump may leave out: hours of one and the same byte on the fastest line.
 _MOST_LEFT_OUT = 100_000_000

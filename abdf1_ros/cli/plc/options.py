@@ -47,8 +47,7 @@ class LineDefaults:
     net: str = 'the line'
 
 
-RADIXES = {'dec': Radix.DECIMAL, 'hex': Radix.HEXADECIMAL, 'oct': Radix.OCTAL,
-           'bin': Radix.BINARY}
+RADIXES = {'dec': Radix.DECIMAL, 'hex': Radix.HEXADECIMAL, 'oct': Radix.OCTAL, 'bin': Radix.BINARY}
 
 _LINE_DEFAULTS = LineDefaults()
 _Adder = Callable[[argparse.ArgumentParser], None]
@@ -186,8 +185,7 @@ def _add_duplex(group: argparse._ArgumentGroup, defaults: LineDefaults) -> None:
 def _add_data_options(parser: argparse.ArgumentParser,
                       note: str = f'(default: {DEFAULT_STATION})') -> None:
     group = parser.add_argument_group('data')
-    group.add_argument('--station', metavar='N', type=_station,
-                       help=f'address of the PLC {note}')
+    group.add_argument('--station', metavar='N', type=_station, help=f'address of the PLC {note}')
     _add_plc_type(group)
     group.add_argument('--type', choices=[kind.value for kind in ValueType],
                        help='default: what is natural for the file')

@@ -205,8 +205,7 @@ def _is_confirmed(options: argparse.Namespace, session: Session, writing: data.W
         _print_values(mapping, data.read(session, mapping))
     except Abdf1Error as error:
         _failed(options, session, error, str(mapping.address))
-    return _is_wanted(
-        f'write {writing.value} to {mapping.address} of station {mapping.station}')
+    return _is_wanted(f'write {writing.value} to {mapping.address} of station {mapping.station}')
 
 
 def _is_wanted(question: str) -> bool:

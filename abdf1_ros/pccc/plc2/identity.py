@@ -26,8 +26,7 @@ SIZE = 10
 _KA3 = 0xD
 _EXPANSION = 0xE  # in the place of the processor: it is in the byte that follows (M 10-17)
 
-MODES = {0: Mode.PROGRAM, 1: Mode.TEST, 2: Mode.RUN, 4: Mode.REMOTE_PROGRAM,
-         5: Mode.REMOTE_TEST}
+MODES = {0: Mode.PROGRAM, 1: Mode.TEST, 2: Mode.RUN, 4: Mode.REMOTE_PROGRAM, 5: Mode.REMOTE_TEST}
 
 # Byte 2: the module's own type in bits 0-3, its processor in bits 4-7.
 _MODULES = {0: '1771-KC/KD', 1: '1771-KA2', 2: '1771-KA4', 3: '1771-KE/KF or 1770-KF2',

@@ -47,8 +47,7 @@ class ExtendedAddress:
     def encode(self) -> bytes:
         """Return the flag byte and the levels, those left out that the default stands for."""
         levels = (DATA_TABLE, CONTEXT, self.section, self.file, self.structure, self.word)
-        sent = [n for n, value in enumerate(levels)
-                if n in _ALWAYS_THERE or value != _DEFAULTS[n]]
+        sent = [n for n, value in enumerate(levels) if n in _ALWAYS_THERE or value != _DEFAULTS[n]]
         flag = sum(1 << n for n in sent)
         return bytes((flag,)) + b''.join(number(levels[n]) for n in sent)
 

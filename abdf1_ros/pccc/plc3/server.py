@@ -45,8 +45,7 @@ class Plc3Commands:
     def __init__(self, table: DataTable) -> None:
         words = WordRangeService(table, ExtendedAddress.read, _place, _CODES)
         files = WordRangeService(table, _read_file_address, _place, _CODES)
-        self.commands = words.commands() | {
-            (word_range.CMD, word_range.FILE_READ): files.read}
+        self.commands = words.commands() | {(word_range.CMD, word_range.FILE_READ): files.read}
         self.basic_commands = BasicService(table, _compatibility_file).everything()
 
 

@@ -93,8 +93,7 @@ class TypedService:
         count, left = divmod(len(values.data), step)
         if left or count == 0 or request.offset + count > request.total:
             raise extended(status.EXT_ILLEGAL_FIELD)
-        elements = (values.data[at:at + element.size]
-                    for at in range(0, len(values.data), step))
+        elements = (values.data[at:at + element.size] for at in range(0, len(values.data), step))
         self._table.write(address, b''.join(elements))
         return b''
 

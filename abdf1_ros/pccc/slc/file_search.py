@@ -102,8 +102,7 @@ class SlcFileSearch:
                 if (yield from is_there(place, dialect)):
                     if kind.is_io:
                         return DataFile(kind, number, 0)
-                    return (yield from counted(
-                        ADDRESSING, dialect, kind, number, _MOST_ELEMENTS))
+                    return (yield from counted(ADDRESSING, dialect, kind, number, _MOST_ELEMENTS))
         return None
 
 

@@ -130,5 +130,4 @@ class SlcCommands:
         kind = BY_CODE.get(address.type_code)
         if kind is None or self._table.file_type(address.file) is not kind:
             raise Refusal(*self.no_such_file)
-        return Address(
-            ADDRESSING, kind, address.file, address.element, address.sub_element or 0)
+        return Address(ADDRESSING, kind, address.file, address.element, address.sub_element or 0)

@@ -102,8 +102,7 @@ class LineEvents:
     def published_again(self, mapping: Mapping, seconds: float) -> None:
         """Log that a row is not withheld any more, nor are those that depend on the same."""
         self.unreadable_rows.tell()
-        self.notes.info(
-            mapping.tag, f'{where(mapping)}: published again after {seconds:.1f} s')
+        self.notes.info(mapping.tag, f'{where(mapping)}: published again after {seconds:.1f} s')
 
     def foreign_value(self, mapping: Mapping, text: str, is_conflict: bool) -> None:
         """Log that a heartbeat is not the one that we have written (rule 19)."""

@@ -46,8 +46,7 @@ from rclpy.node import Node
 
 def _parameter(default: bool | float | str, description: str, low: float | None = None,
                high: float | None = None) -> Any:
-    return field(default=default,
-                 metadata={'description': description, 'low': low, 'high': high})
+    return field(default=default, metadata={'description': description, 'low': low, 'high': high})
 
 
 @dataclass(frozen=True, slots=True)
@@ -56,8 +55,7 @@ class Parameters:
 
     net_file: str = _parameter('', 'path of the net CSV, needed')
     map_file: str = _parameter('', 'path of the map CSV, needed')
-    port: str = _parameter(
-        '', f'device path, {URLS} to use instead of Com_Port')
+    port: str = _parameter('', f'device path, {URLS} to use instead of Com_Port')
     low_latency: bool = _parameter(
         True, 'ask the driver of the port to hand on bytes at once, where it can')
     rs485: bool = _parameter(
@@ -70,13 +68,11 @@ class Parameters:
     diagnostics_period: float = _parameter(1.0, 's between diagnostics', 0.1, 60.0)
     snapshot_period: float = _parameter(
         1.0, 's between snapshots of all values, while subscribed to; 0: never', 0.0, 3600.0)
-    stale_after: float = _parameter(
-        3.0, 'periods after which a value counts as lost', 1.0, 1000.0)
+    stale_after: float = _parameter(3.0, 'periods after which a value counts as lost', 1.0, 1000.0)
     processor_period: float = _parameter(
         10.0, 's between questions for type, mode and faults of each processor; 0: never',
         0.0, 3600.0)
-    write_timeout: float = _parameter(
-        2.0, 's that a write may wait for the line', 0.05, 60.0)
+    write_timeout: float = _parameter(2.0, 's that a write may wait for the line', 0.05, 60.0)
     nak_on_command_timeout: bool = _parameter(
         True, 'send DLE NAK, which resets all slaves, when a reply does not come in time')
     max_outstanding: int = _parameter(
@@ -92,8 +88,7 @@ class Parameters:
         False, 'poll a station until it has nothing more; false: one message a scan')
     send_in_sequence: bool = _parameter(
         False, 'send commands when our own station comes up in the list; false: between polls')
-    eot_suppression: bool = _parameter(
-        False, 'Mode Slave: stay silent instead of answering EOT')
+    eot_suppression: bool = _parameter(False, 'Mode Slave: stay silent instead of answering EOT')
     duplicate_detection: bool = _parameter(
         True, 'Mode Slave and Peer: execute a repeated command only once')
     poll_timeout: float = _parameter(
@@ -225,8 +220,7 @@ def _from_files(given: Given, parameters: Parameters, problems: list[Problem], *
     try:
         map_file = _needed('map_file', parameters.map_file, problems)
         mappings, map_problems = load_mappings(map_file)
-        mappings, unusable = usable_rows(
-            mappings, network, parameters.default_period / 1000)
+        mappings, unusable = usable_rows(mappings, network, parameters.default_period / 1000)
         map_problems += unusable
     except ConfigurationError as error:
         problems += error.problems
@@ -290,8 +284,7 @@ def unknown_names(node: Node, given: Given, files: Sequence[str], known: Collect
         if name in found or name in known:
             continue
         if hint := _nearest(name, known, begins, 0.75):
-            problems.append(
-                Problem(f'parameter {name}', f'there is no such parameter; {hint}'))
+            problems.append(Problem(f'parameter {name}', f'there is no such parameter; {hint}'))
     return problems
 
 

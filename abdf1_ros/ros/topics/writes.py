@@ -154,8 +154,7 @@ class WriteTopics:
         for mapping in driver.mappings:
             if mapping.writes:
                 wanted[mapping.topic].append(mapping)
-        kinds = {topic: MESSAGES[mappings[0].message_type]
-                 for topic, mappings in wanted.items()}
+        kinds = {topic: MESSAGES[mappings[0].message_type] for topic, mappings in wanted.items()}
         for topic, (kind, subscription) in [*self._subscriptions.items()]:
             if kinds.get(topic) is not kind:
                 self._node.destroy_subscription(subscription)
