@@ -59,7 +59,7 @@ from abdf1_ros.driver.job_tasks import JobTasks
 from abdf1_ros.driver.links import DriverSettings, make_machine
 from abdf1_ros.driver.reads.read_backs import ReadBacks
 from abdf1_ros.driver.reads.readings import Readings, ValueListener
-from abdf1_ros.driver.record import Claim, WriteRecord
+from abdf1_ros.driver.record import WriteRecord
 from abdf1_ros.driver.served import Served
 from abdf1_ros.driver.write import Outcome, show, Write, WriteResult
 from abdf1_ros.driver.writes.queue import MAX_WAITING_WRITES, waited_too_long, WriteQueue
@@ -311,8 +311,8 @@ class Driver:
                 self._end_write(write, Outcome.NOT_SENT, waited_too_long(timeout))
             else:
                 self._served.store(write.mapping, write.raw)
-                self._record.ended(self._record.begin(Claim(
-                    write.mapping.station, (write.mapping.extent,), write)), Outcome.WRITTEN)
+                self._record.ended(self._record.begin(
+                    write.mapping.station, (write.mapping.extent,), write), Outcome.WRITTEN)
                 self._end_write(write, Outcome.WRITTEN)
 
     def _end_write(self, write: Write, outcome: Outcome, detail: str = '') -> None:

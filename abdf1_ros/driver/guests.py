@@ -217,7 +217,7 @@ class GuestQueue:
         """Take note of a command that may write; of a read there is nothing to note."""
         if effect_of(packet) is Effect.READS:
             return None
-        return self._record.begin(Claim(station, self._words(packet, station)))
+        return self._record.begin(station, self._words(packet, station))
 
     def expire(self, now: float) -> None:
         """Refuse what has waited too long."""

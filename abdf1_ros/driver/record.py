@@ -59,24 +59,22 @@ class Claim:
     One write to words of a PLC, under way or done.
 
     ``extents`` are its words, None where they are not known: any of the ``station``, which may be
-    BROADCAST. ``write`` is that of a message or of ours. It had the line from ``begun`` until it
-    was ``done``, and lands up to ``lands_until`` (clock values in s): infinite while it is under
-    way, -inf where nothing was written. ``outcome`` is how it ended.
+    BROADCAST. ``write`` is that of a message or of ours, None for a guest's. It had the line from
+    ``begun`` until it was ``done``, and lands up to ``lands_until`` (clock values in s): infinite
+    while it is under way, -inf where nothing was written. ``outcome`` is how it ended.
     """
 
     def __init__(self, station: int, extents: Sequence[Extent] | None,
-                 write: Write | None = None) -> None:
+                 write: Write | None = None, begun: float = -math.inf) -> None:
         self.station = station
         self.extents = extents
         self.write = write
         self.outcome: Outcome | None = None
-        self.begun = self.done = -math.inf
-        self.lands_until = math.inf
+        self.begun, self.done, self.lands_until = begun, -math.inf, math.inf
 
-    @property
-    def is_guests(self) -> bool:
-        """Tell whether neither a message nor we ourselves have asked for it."""
-        return self.write is None
+    def end(self, outcome: Outcome, now: float, may_land_for: float) -> None:
+        """Take note how it ended, and for how long (s) it may land: -inf where it cannot."""
+        self.outcome, self.done, self.lands_until = outcome, now, now + may_land_for
 
     @property
     def has_changed(self) -> bool:
@@ -221,9 +219,10 @@ class WriteRecord:
         return (claim.write for claim in self._under_way
                 if claim.write is not None and not claim.write.is_own)
 
-    def begin(self, claim: Claim) -> Claim:
+    def begin(self, station: int, extents: Sequence[Extent] | None,
+              write: Write | None = None) -> Claim:
         """Take note that a write has the line, until it has ``ended``."""
-        claim.begun = self.line.now
+        claim = Claim(station, extents, write, begun=self.line.now)
         self._under_way.append(claim)
         for listener in self._listeners:
             listener.write_begins(claim)
@@ -232,11 +231,9 @@ class WriteRecord:
     def ended(self, claim: Claim, outcome: Outcome, *, may_land: bool = False) -> None:
         """Take note how a write has ended, and whether some of it may land yet."""
         self._under_way.remove(claim)
-        claim.outcome, claim.done = outcome, self.line.now
-        if may_land or outcome is Outcome.BROADCAST:  # which is not answered
-            claim.lands_until = claim.done + self._settle_time
-        else:
-            claim.lands_until = claim.done if outcome in _CHANGED else -math.inf
+        landed = 0.0 if outcome in _CHANGED else -math.inf
+        may_land |= outcome is Outcome.BROADCAST  # which is not answered
+        claim.end(outcome, self.line.now, self._settle_time if may_land else landed)
         for words in self._concerned(claim):
             words.ended(claim)
         for listener in self._listeners:

@@ -207,7 +207,7 @@ class OneRow:
 
     def _write(self, write: Write, done: float, outcome: Outcome) -> None:
         self.now = write.requested
-        claim = self.record.begin(Claim(1, [self.mapping.extent], write))
+        claim = self.record.begin(1, [self.mapping.extent], write)
         self.now = done
         self.record.ended(claim, outcome,
                           may_land=outcome in (Outcome.UNKNOWN, Outcome.PARTLY))

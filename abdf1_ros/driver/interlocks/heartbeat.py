@@ -181,7 +181,7 @@ class HeartbeatRow:
 
     def write_ended(self, claim: Claim, now: float) -> None:
         """Take note that a guest has written here: that is not a 0."""
-        if claim.is_guests and claim.has_changed and claim.extents is not None:
+        if claim.write is None and claim.has_changed and claim.extents is not None:
             self.overwritten(now)
 
     def overwritten(self, now: float) -> None:

@@ -65,7 +65,7 @@ class WritesUnderWay:
         """Take note that a write is under way, until it has ``ended``."""
         station = write.mapping.station
         write.is_probe = station != BROADCAST and not self._stations[station].replies_in_time
-        return self.record.begin(Claim(station, (write.mapping.extent,), write))
+        return self.record.begin(station, (write.mapping.extent,), write)
 
     def carry_out(self, write: Write, goes_on: bool) -> Steps[WriteResult]:
         """Send every packet of a write, in the packets that its station takes."""
