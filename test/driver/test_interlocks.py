@@ -1248,8 +1248,8 @@ def test_rule_13_initially_run_is_not_believed() -> None:
 
 def test_rule_13_answer_about_the_mode_is_no_older_than_the_stale_time() -> None:
     row = make_mapping('N11:0', publish_while=PublishWhile(None, None))
-    point, guard = ReadPoint(row, 1.0, 3.0), RunGuard()
-    guard.add(point)
+    guard = RunGuard()
+    point = ReadPoint(row, 1.0, 3.0, guard)
     why_not = partial(guard.why_not, point)
     running = Identity(PlcType.SLC, 'SLC 5/03', mode=Mode.RUN, mode_text='RUN')
     assert why_not(9.0, 9.0) == 'not in RUN: its mode is not known'
@@ -1296,8 +1296,8 @@ def test_rule_14_counter_has_to_change_twice_before_anything_is_published() -> N
 
 def test_rule_14_late_change_ends_what_two_in_time_have_permitted() -> None:
     row = make_mapping('N7:0', publish_while=PublishWhile('alive', 500))
-    point, guard = ReadPoint(row, 0.1, 3.0), CounterGuard('alive')
-    guard.add(point)
+    guard = CounterGuard('alive')
+    point = ReadPoint(row, 0.1, 3.0, guard)
     for number, now in enumerate((0.0, 0.3, 0.6)):
         guard.read(bytes((number,)), now)
     assert guard.why_not(point, 0.7, 0.7) == ''

@@ -21,12 +21,13 @@ docs/heartbeats.md.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 import math
 
 from abdf1_ros.driver.reads.point import Guard, ReadPoint
 from abdf1_ros.pccc.identity import Identity
 from abdf1_ros.plan.bounds import ANSWERS_IN_TIME
+from abdf1_ros.settings.mapping import Mapping
 
 
 class RunGuard(Guard):
@@ -102,17 +103,19 @@ class CounterGuard(Guard):
 class Guards:
     """The guards of all rows with Publish_While; ``counters`` has those of counters, by tag."""
 
-    def __init__(self, points: Iterable[ReadPoint]) -> None:
+    def __init__(self) -> None:
         self._runs: dict[int, RunGuard] = {}
         self.counters: dict[str, CounterGuard] = {}
-        for point in points:
-            condition, station = point.mapping.publish_while, point.mapping.station
-            if condition is None:
-                continue
-            if condition.tag is None:
-                self._runs.setdefault(station, RunGuard()).add(point)
-            else:  # a tag is there once in the map
-                self.counters.setdefault(condition.tag, CounterGuard(condition.tag)).add(point)
+
+    def of(self, mapping: Mapping) -> Guard | None:
+        """Return the guard of a row, None where it has no condition."""
+        condition = mapping.publish_while
+        if condition is None:
+            return None
+        if condition.tag is None:
+            return self._runs.setdefault(mapping.station, RunGuard())
+        # A tag is there once in the map.
+        return self.counters.setdefault(condition.tag, CounterGuard(condition.tag))
 
     def status_periods(self) -> dict[int, float]:
         """Return how often (s) stations have to be asked for their mode."""

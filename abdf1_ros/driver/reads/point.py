@@ -47,7 +47,8 @@ class ReadPoint:
     rests on may be as old as ``patience``, in seconds.
     """
 
-    def __init__(self, mapping: Mapping, period: float, stale_time: float) -> None:
+    def __init__(self, mapping: Mapping, period: float, stale_time: float,
+                 guard: Guard | None = None) -> None:
         self.mapping = mapping
         self.period = period
         self.stale_time = stale_time
@@ -55,13 +56,15 @@ class ReadPoint:
         self.interval: float | None = None
         self.error: str | None = None
         self.failures = 0
-        self.guard: Guard | None = None
+        self.guard = guard
         self.withheld = ''
         self.withheld_since = 0.0
         self.withholdings = 0
         self._is_told = False
         timeout = mapping.publish_while.timeout if mapping.publish_while else None
         self.patience = stale_time if timeout is None else timeout / 1000
+        if guard is not None:
+            guard.add(self)
         self._decode = mapping.codec.decoder()
         self._scaling = mapping.scaling
         self._usual_age = min(max(1.5 * period, stale_time / 2), stale_time)
@@ -171,7 +174,6 @@ class Guard:
         """Take a point that depends on the condition."""
         self.points.append(point)
         self._since[point.patience] = math.inf
-        point.guard = self
 
     def why_not(self, point: ReadPoint, started: float, now: float) -> str:
         """Return why a value read from ``started`` on is not to be published, empty if it is."""

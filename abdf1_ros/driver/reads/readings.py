@@ -72,8 +72,8 @@ class Readings:
                  read_back: Callable[[Mapping, bytes, float], None]) -> None:
         blocks = planner.plan(mapping for mapping in mappings
                               if not (settings.read_only and mapping.heartbeat))
-        self.points = _points(network, mappings, blocks, settings)
-        self.guards = Guards(self.points.values())
+        self.guards = Guards()
+        self.points = _points(network, mappings, blocks, settings, self.guards)
         self.reads = Reads(stations)
         self._network = network
         self._stations = stations
@@ -223,13 +223,14 @@ class Readings:
 
 
 def _points(network: Network, mappings: Sequence[Mapping], blocks: Sequence[Block],
-            settings: DriverSettings) -> dict[Mapping, ReadPoint]:
+            settings: DriverSettings, guards: Guards) -> dict[Mapping, ReadPoint]:
     """Return the points of all mappings that read, in their order."""
     default = settings.default_period
     stale = stale_times(blocks, default, settings.stale_after,
                         own_load(network, mappings, default))
     return {mapping: _served_point(mapping, settings) if mapping.serves
-            else ReadPoint(mapping, period_of(mapping, default), stale[mapping])
+            else ReadPoint(mapping, period_of(mapping, default), stale[mapping],
+                           guards.of(mapping))
             for mapping in mappings if mapping.reads}
 
 
