@@ -223,7 +223,7 @@ def test_plc_that_acknowledges_and_has_nothing_to_say_for_ever_takes_in_silence(
 
 
 def test_link_of_a_node_with_a_duplicate_name(bench: Bench) -> None:
-    bench.seen.duplicate_name = 'another node is called /line_a too'
+    bench.seen.duplicate_name = lambda: 'another node is called /line_a too'
     assert bench.says('link') == (WARN, 'WARN: port open, 0 of 2 stations have answered; '
                                         'another node is called /line_a too')
     bench.set_port(False, 'gone')

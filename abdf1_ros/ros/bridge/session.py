@@ -100,7 +100,7 @@ class Session:
         node, parameters = surroundings.node, configuration.parameters
         network, mappings = configuration.network, configuration.mappings
         self.reads = ReadTopics(node, surroundings.published)
-        self._seen = Seen(latest=self.reads.latest)
+        self._seen = Seen(lambda: surroundings.names.text, latest=self.reads.latest)
         self._events = LineEvents(
             node.get_logger(), self.port, stations_of(mappings),
             scans=not network.line_mode.has_one_plc, seen=self._seen, read=self.reads.read,
@@ -202,7 +202,6 @@ class Session:
         for watch in self._watches:
             for news in watch.look(now):
                 self._events.notes.tell(news)
-        self._seen.duplicate_name = self._surroundings.names.text
         levels = self.diagnostics.levels(now)
         if now >= self._next_diagnostics or levels != self._levels:
             self._levels = levels

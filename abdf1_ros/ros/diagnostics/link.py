@@ -48,8 +48,8 @@ class LinkStatus:
 
     def judge(self, now: float) -> Judgement:
         level, text = self._judge_line(now)
-        if self._seen.duplicate_name:
-            return max(level, WARN), f'{text}; {self._seen.duplicate_name}'
+        if clash := self._seen.duplicate_name():
+            return max(level, WARN), f'{text}; {clash}'
         return level, text
 
     def _judge_line(self, now: float) -> Judgement:

@@ -16,7 +16,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Protocol
 
@@ -51,8 +51,8 @@ class Status(Protocol):
 class Seen:
     """What watches and the events of the line have shown, for the statuses."""
 
-    duplicate_name: str = ''
-    """That another node has our name, empty while none has."""
+    duplicate_name: Callable[[], str] = str
+    """Tells that another node has our name, empty while none has."""
     changed_files: Sequence[str] = ()
     """Names of files that have changed since they were read."""
     crowded: Sequence[str] = ()
