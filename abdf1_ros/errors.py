@@ -36,7 +36,10 @@ class LinkError(Abdf1Error):
     """
 
     message = Message.ERR_COMMAND_TIMEOUT
-    sent = True
+
+    def __init__(self, *args: object, sent: bool = True) -> None:
+        super().__init__(*args)
+        self.sent = sent
 
     def __str__(self) -> str:
         """Return the numbered text."""

@@ -167,8 +167,8 @@ class JobTask:
         """Raise ``error`` in the job, unless it has ended."""
         if getgeneratorstate(self._steps) == GEN_CLOSED:  # closed by the garbage collector
             return
-        error.sent = self.sent
-        self._advance(self._steps.throw, error)
+        # One of its own: where the port is lost, all tasks are failed with the same.
+        self._advance(self._steps.throw, type(error)(*error.args, sent=self.sent))
 
     def _advance(self, resume: Callable[[_With], Request], what: _With) -> None:
         try:

@@ -140,6 +140,4 @@ class Requests:
 
 
 def _refuse(request: _RequestJob, reason: LinkError) -> None:
-    error = PortLost(*reason.args)
-    error.sent = False
-    request.fail(error)
+    request.fail(PortLost(*reason.args, sent=False))
