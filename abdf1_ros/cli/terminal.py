@@ -72,8 +72,7 @@ def tell(name: str, text: str, code: int | None = None) -> None:
         print(colour(line, code, sys.stderr) if code else line, file=sys.stderr, flush=True)
 
 
-def run_command(name: str, work: Callable[[], int], interrupted: int = 0,
-                unread: int = 0) -> int:
+def run_command(name: str, work: Callable[[], int], interrupted: int = 0, unread: int = 0) -> int:
     """
     Carry out a command and tell its failures; return the exit status.
 

@@ -233,8 +233,7 @@ class MasterLine:
         self._last_code = self._last_code or symbol.last_byte
         return symbol
 
-    def _hear_rest(self, broken: Frame,
-                   number: int) -> Generator[Step, Heard, Frame]:
+    def _hear_rest(self, broken: Frame, number: int) -> Generator[Step, Heard, Frame]:
         """
         Listen until the line is quiet; return the good frame that follows, or else ``broken``.
 
@@ -279,8 +278,7 @@ class MasterLine:
         """Tell whether a message of ``src`` may come from station ``number`` of this line."""
         return src == number or self.stations.via(src) == number
 
-    def receive(self, number: int,
-                frame: Frame) -> Generator[Step, Heard, Packet | None]:
+    def receive(self, number: int, frame: Frame) -> Generator[Step, Heard, Packet | None]:
         """
         Acknowledge a good message; return it, or None when it is a repetition.
 

@@ -123,8 +123,7 @@ class Meanings:
 USUAL_MEANINGS = Meanings()
 
 
-def status_text(sts: int, ext_sts: int | None = None,
-                meanings: Meanings = USUAL_MEANINGS) -> str:
+def status_text(sts: int, ext_sts: int | None = None, meanings: Meanings = USUAL_MEANINGS) -> str:
     """
     Return codes and meaning, e.g. "STS 50: address not there, or memory protected".
 

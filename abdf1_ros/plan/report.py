@@ -316,8 +316,7 @@ def _file_remarks(station: int, mappings: Iterable[Mapping]) -> Iterator[Remark]
                 'a PLC has one type'), station)
 
 
-def _gateway_remarks(network: Network,
-                     stations: dict[int, list[Mapping]]) -> Iterator[Remark]:
+def _gateway_remarks(network: Network, stations: dict[int, list[Mapping]]) -> Iterator[Remark]:
     """Find unusual values in the column Via."""
     for station, mappings in sorted(stations.items()):
         via = mappings[0].via

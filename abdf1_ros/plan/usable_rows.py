@@ -31,8 +31,7 @@ from abdf1_ros.settings.mapping import Mapping
 from abdf1_ros.settings.network import Network
 
 
-def line_problems(mappings: Sequence[Mapping],
-                  network: Network) -> list[tuple[Mapping, Problem]]:
+def line_problems(mappings: Sequence[Mapping], network: Network) -> list[tuple[Mapping, Problem]]:
     """Return the rows that clash with ``network`` or an earlier Serve row, and why."""
     found: list[tuple[Mapping, Problem]] = []
     mode = network.line_mode

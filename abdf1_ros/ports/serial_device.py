@@ -93,8 +93,7 @@ def _plain(error: Exception) -> tuple[Any, ...]:
     return (args[0], _REASONS.get(args[0], args[1])) if len(args) > 1 else args
 
 
-def _set_options(port: serial.Serial, settings: PortSettings,
-                 tell: Callable[[str], None]) -> None:
+def _set_options(port: serial.Serial, settings: PortSettings, tell: Callable[[str], None]) -> None:
     """Set options of a device besides speed and character format."""
     if settings.low_latency:
         try:

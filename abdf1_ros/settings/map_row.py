@@ -158,8 +158,7 @@ class RowReader:
             self._fault(column, f'{column} has {len(name)} characters, at most {MAX_LENGTH} go')
         return name
 
-    def _choice(self, column: str, kind: type[_Choice],
-                default: _Choice | None) -> _Choice | None:
+    def _choice(self, column: str, kind: type[_Choice], default: _Choice | None) -> _Choice | None:
         text = self._row.get(column)
         if not text and default is not None:
             return default

@@ -176,8 +176,7 @@ def _send(plc: SimulatedPlc, address: str, values: Sequence[str],
     return f'station {plc.station}: msg {place} {" ".join(values)}'
 
 
-def _station(arguments: list[str],
-             plcs: Sequence[SimulatedPlc]) -> tuple[SimulatedPlc, list[str]]:
+def _station(arguments: list[str], plcs: Sequence[SimulatedPlc]) -> tuple[SimulatedPlc, list[str]]:
     for plc in plcs:
         if arguments and arguments[0] == str(plc.station):
             return plc, arguments[1:]

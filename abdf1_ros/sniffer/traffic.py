@@ -145,8 +145,7 @@ class TrafficDecoder:
                      f'{_route(command)}: {describe(command)}', command.dst, packet=command,
                      guest=transaction.guest)
 
-    def _entries(self, symbol: Symbol, chunk: Chunk,
-                 decoder: ListeningDecoder) -> Iterator[Entry]:
+    def _entries(self, symbol: Symbol, chunk: Chunk, decoder: ListeningDecoder) -> Iterator[Entry]:
         direction = self._direction(symbol, chunk.direction)
         yield from self._silence(symbol, chunk.time, direction)
         if isinstance(symbol, Poll):

@@ -81,8 +81,7 @@ def look_at(session: Session, station: int) -> Presence:
     return Presence(station, seconds, identity, error, is_there, takes_commands)
 
 
-def scan(network: Network, stations: Sequence[int],
-         via: int | None = None) -> Iterator[Presence]:
+def scan(network: Network, stations: Sequence[int], via: int | None = None) -> Iterator[Presence]:
     """
     Yield every station, there or not, ``via`` a gateway; raises OSError and PortLost.
 

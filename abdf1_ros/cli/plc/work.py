@@ -486,8 +486,7 @@ def _files(options: argparse.Namespace) -> int:
     return 0 if found else EXIT_FAILED
 
 
-def _family(options: argparse.Namespace,
-            session: Session) -> tuple[PlcType, Processor | None]:
+def _family(options: argparse.Namespace, session: Session) -> tuple[PlcType, Processor | None]:
     """Return family and processor of the station, which is asked where no option says it."""
     if options.plc_type:
         return PlcType(options.plc_type), None

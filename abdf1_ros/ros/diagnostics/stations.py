@@ -43,8 +43,7 @@ def processor_fault(identity: Identity | None) -> str | None:
     return f'in {identity.mode.words} mode ({identity.mode_text})'
 
 
-def wrong_type(station: int, identity: Identity | None,
-               rows: Iterable[Mapping]) -> str | None:
+def wrong_type(station: int, identity: Identity | None, rows: Iterable[Mapping]) -> str | None:
     """
     Return that a PLC is not what a row of the map says, None when it is.
 
