@@ -27,7 +27,7 @@ who writes which words, until when it may land      ``record.WriteRecord``, ``re
 messages that wait                                  ``writes.queue.WriteQueue.waiting``
 commands of guests that wait                        ``guests.Guest.waiting``
 commands of jobs under way                          ``job_tasks.JobTasks``
-when an own row has to be looked at                 its ``due``; ``interlocks.plc.Wakes`` for PLCs
+when an own row has to be looked at                 its ``due``; the first of a PLC in ``Plc.due``
 how a PLC answers our own writes, a change to RUN   ``interlocks.plc.Plc``
 last message of a topic, executor, the end          ``interlocks.plc.Conditions``
 mode and type of a PLC                              ``checks.Checks.known``

@@ -21,6 +21,7 @@ The numbers in the names are those of the rules in docs/heartbeats.md.
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import partial
+import gc
 import math
 
 from abdf1_ros.df1.checksum import Checksum
@@ -227,6 +228,14 @@ def test_rule_2_first_contact_is_0_then_the_fallbacks_then_1(polling: str) -> No
     assert [(name, value) for _, name, value in cell.writes][:4] == [
         ('N10:0', 0), ('N7:0', 7), ('N10:0', 1), ('N10:0', 2)]
     assert cell.results() == [START]
+
+
+def test_rule_1_nothing_is_kept_of_beats_that_have_been_written() -> None:
+    cell = Cell(beat_row(), speed_row(), run=2.0)
+    plc, = cell.bench.driver.interlocks._plcs.values()
+    before = len(gc.get_referrers(plc))
+    cell.run(20.0)
+    assert len(gc.get_referrers(plc)) <= before
 
 
 def test_rule_1_counts_to_32767_and_begins_again_with_1() -> None:

@@ -23,8 +23,6 @@ from __future__ import annotations
 from collections.abc import Iterable
 from collections.abc import Mapping as MappingType
 from dataclasses import dataclass, field
-import heapq
-import itertools
 import math
 
 from abdf1_ros.df1.stations import ActiveStationList
@@ -61,25 +59,6 @@ class Conditions:
     is_ending: bool = False
 
 
-class Wakes:
-    """When PLCs have to be looked at: one heap for all of a line."""
-
-    def __init__(self) -> None:
-        self._heap: list[tuple[float, int, Plc]] = []
-        self._tickets = itertools.count()
-
-    def plan(self, plc: Plc) -> None:
-        """Look at a PLC when it is due; what was planned before is void."""
-        heapq.heappush(self._heap, (plc.due, next(self._tickets), plc))
-        self.first()
-
-    def first(self) -> float:
-        """Forget what is void; return when the first is due (clock value in s), or infinity."""
-        while self._heap and self._heap[0][0] != self._heap[0][2].due:
-            heapq.heappop(self._heap)
-        return self._heap[0][0] if self._heap else math.inf
-
-
 class Plc:
     """
     The rows of one station, and how it has answered our own writes.
@@ -90,7 +69,7 @@ class Plc:
     """
 
     def __init__(self, station: int, rows: Iterable[OwnRow], stations: ActiveStationList,
-                 record: WriteRecord, conditions: Conditions, wakes: Wakes) -> None:
+                 record: WriteRecord, conditions: Conditions) -> None:
         self.station = station
         self.rows = [*rows]
         self.heartbeats = [row for row in self.rows if isinstance(row, HeartbeatRow)]
@@ -103,7 +82,6 @@ class Plc:
         self._stations = stations
         self._record = record
         self._conditions = conditions
-        self._wakes = wakes
 
     @property
     def is_lost(self) -> bool:
@@ -117,9 +95,7 @@ class Plc:
 
     def plan(self) -> None:
         """Look at its rows again when the first of them wants it."""
-        before, self.due = self.due, min([row.due for row in self.rows], default=math.inf)
-        if self.due != before:
-            self._wakes.plan(self)
+        self.due = min([row.due for row in self.rows], default=math.inf)
         self.first_due = min([row.first_due for row in self.rows], default=math.inf)
 
     def look_again(self, *rows: OwnRow) -> None:

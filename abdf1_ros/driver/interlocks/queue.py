@@ -31,7 +31,7 @@ import math
 from abdf1_ros.df1.stations import ActiveStationList
 from abdf1_ros.driver.interlocks.fallback import FallbackCause, FallbackRow
 from abdf1_ros.driver.interlocks.heartbeat import BeatState, HeartbeatRow
-from abdf1_ros.driver.interlocks.plc import Conditions, OwnRow, Plc, TurnRank, Wakes
+from abdf1_ros.driver.interlocks.plc import Conditions, OwnRow, Plc, TurnRank
 from abdf1_ros.driver.record import Claim, WriteListener
 from abdf1_ros.driver.write import Outcome, Write, WriteResult
 from abdf1_ros.driver.writes.queue import WriteQueue
@@ -92,10 +92,9 @@ class Interlocks(WriteListener):
         self._conditions = Conditions()
         rows: list[OwnRow] = [*self.heartbeats, *self.fallbacks]
         stations_of = {row: _OURS if row.mapping.serves else row.mapping.station for row in rows}
-        self._wakes = Wakes()
         self._plcs = {number: Plc(
             number, [row for row in rows if stations_of[row] == number], stations, record,
-            self._conditions, self._wakes if number != _OURS else Wakes())
+            self._conditions)
             for number in dict.fromkeys((_OURS, *stations_of.values()))}
         self._plc_of = {row: self._plcs[number] for row, number in stations_of.items()}
         self.ours = self._plcs.pop(_OURS)
@@ -229,8 +228,6 @@ class Interlocks(WriteListener):
         self.expire(now)
         if self._are_all_due:  # there is no later for silent PLCs
             self._stations.probes.none_waits(now)
-        if now < self._wakes.first():
-            return None
         best: tuple[TurnRank, Plc, OwnRow] | None = None
         youngest: dict[Mapping, float] | None = None
         for plc in self._plcs.values():
