@@ -37,7 +37,7 @@ from abdf1_ros.df1.settings import LinkSettings
 from abdf1_ros.df1.slave import HalfDuplexSlave, multidrop
 from abdf1_ros.df1.stations import ActiveStationList
 from abdf1_ros.driver.driver import Driver
-from abdf1_ros.driver.guests import Guest, GuestCommand, ShareAccess
+from abdf1_ros.driver.guests import Guest, GuestCommand, GuestJob, ShareAccess
 from abdf1_ros.driver.links import DriverSettings
 from abdf1_ros.driver.write import Outcome
 from abdf1_ros.errors import PortLost
@@ -56,6 +56,7 @@ from support.virtual_line import Noise, QUIET, VirtualLine
 AFTER = 0.6
 SAFE = 32_000
 SECONDS = 20.0
+SETTLED = 1.0  # s after something wrong, in which a station is known to answer
 RECOVERY = 5.0  # s, in which an inactive station is probed
 STEP = 0.05
 TURNS = 4  # a step: as many messages there may be
@@ -64,6 +65,7 @@ SMALL = Noise(lost=0.0005, flipped=0.001, inserted=0.0005)
 CMD_TIMEOUT = 0.5
 GUESTS = range(32_100, 32_200)  # values that only guests write
 GATEWAY = 5
+DAMAGED = b'ZZZZ'  # what the line does not carry: only guests send it
 MODES = {'Message': {'polling': 'Message'}, 'Standard': {'polling': 'Standard'},
          'Peer': {'mode': 'Peer'}, 'Gateway': {'polling': 'Message'}}
 
@@ -98,6 +100,9 @@ class World:
         self.holds = 0.0  # how often a gateway keeps a write for a while
         self.held: list[tuple[float, int, Packet]] = []
         far = self._peer() if mode == 'Peer' else self._slave()
+        hear = far.receive_data
+        far.receive_data = lambda data, now: hear(  # type: ignore[method-assign]
+            data.replace(DAMAGED, b'ZYZZ'), now)
         self.line = VirtualLine(self.driver.machine, far, baud=19200, chunk=8, seed=seed)
         self.published: dict[int, float] = {}
         self.beats: list[tuple[float, int]] = []
@@ -109,6 +114,8 @@ class World:
         self.troubled = 0.0  # when something was wrong last
         self.seen = 0  # results
         self.swallowed = -math.inf  # when a reply was lost last
+        self.well_since = -math.inf  # nothing has been wrong but what guests do
+        self.changes = 0  # of the station, as far as they are known
         self._values = itertools.count(1)
         self._tickets = itertools.count()
         self._outputs = parse_address('N7:0', self.plc.table.plc_type)
@@ -207,7 +214,7 @@ class World:
         cmd, data = row.dialect.write(row.address, dice.choice(GUESTS).to_bytes(2, 'little'))
         dst = 1
         if dice.random() < 0.2:
-            cmd, data = dice.choice([(0x06, bytes(231)), (0x0F, b'\x68\0\0'), (0x0F, b'\x3A')])
+            cmd, data = dice.choice([(0x06, DAMAGED * 50), (0x0F, b'\x68\0\0'), (0x0F, b'\x3A')])
         elif dice.random() < 0.2 and self.network.mode == 'Master':
             dst = 255
         command = Packet(dst, 9, cmd, 0, len(self.asked), data)
@@ -247,6 +254,7 @@ class World:
                     self.ask(('N7:0', 'N7:1', 'N9:3'))
                 self.pass_time(STEP / TURNS)
             self._check_outputs()
+            self._check_view()
 
     def recover(self) -> None:
         """End what is wrong, and publish until a message of each row must be written."""
@@ -256,6 +264,8 @@ class World:
             for row in self.rows:
                 self.publish(row)
             self.pass_time(STEP)
+            self._check_view()
+        assert [beat for when, beat in self.beats if beat and when > self.line.now - 1.0]
 
     def end(self) -> None:
         """
@@ -323,7 +333,7 @@ class World:
         elif what == 10:
             self.swallows_replies = True
         elif what < 15:
-            self.asks = self.dice.choice([0.02, 0.3])
+            self.asks = self.dice.choice([0.02, 0.05, 0.3])
             self.holds = self.dice.choice([0.0, 0.0, 0.3])
         elif what == 15:
             self.holds = 0.3
@@ -334,6 +344,18 @@ class World:
         is_quiet = self.line.noise is QUIET and not self.plc.faults.silent and not self.refuses
         return is_quiet and self.driver.is_online and self.driver.stations[1].active \
             and self.line._away[0] <= self.line.now
+
+    def _check_view(self) -> None:
+        """Check that a station which answers all of ours is not taken for one that does not."""
+        now, changes = self.line.now, len(self.listener.changes)
+        is_known = self.changes == changes and self.driver.stations[1].replies_in_time
+        is_wrong = self.line.noise is not QUIET or self.plc.faults.silent or self.holds \
+            or self.swallows_replies or not self.driver.is_online or self.line._away[0] > now
+        is_settled = not is_wrong and now > self.well_since + SETTLED
+        assert is_known or not is_settled, f'{now}: {self.driver.stations[1]}'
+        if is_wrong or not is_known:
+            self.well_since = now
+        self.changes = changes
 
     def _check_outputs(self) -> None:
         """Check that nothing but the fallback stands for long (rules 7, 8)."""
@@ -386,3 +408,19 @@ def test_whatever_happens_no_beat_vouches_for_it_and_no_output_stands(
     told = len([outcome for outcome in outcomes if outcome is not Outcome.FALLBACK])
     assert asked == told
     assert sorted(reply.tns for reply in world.answered) == [*range(len(world.asked))]
+
+
+@pytest.mark.parametrize('mode', MODES)
+def test_guest_that_is_blamed_for_the_station_is_seen(
+        mode: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    def calm(seed: int) -> World:
+        """Return a world where nothing goes wrong but what guests do."""
+        world = World(mode, seed)
+        monkeypatch.setattr(world, '_trouble', lambda: setattr(world, 'asks', 0.05))
+        return world
+
+    calm(0).run()
+    monkeypatch.setattr(GuestJob, 'blames', True)
+    with pytest.raises(AssertionError, match='Station'):
+        for seed in range(4):
+            calm(seed).run()
