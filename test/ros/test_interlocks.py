@@ -17,10 +17,12 @@
 from collections.abc import Callable, Iterator
 from pathlib import Path
 import signal
+import threading
 import time
 from typing import Any
 
 from abdf1_ros import testing
+from abdf1_ros.client import Client
 from abdf1_ros.df1.echo import COMES_BACK
 from abdf1_ros.ros.bridge.node import BridgeNode
 from abdf1_ros.simulator.ladder import Lamp
@@ -98,9 +100,16 @@ class Cell(testing.SimulatedCell):
         self.until(lambda: self.word('N10:0') > 2, 'a heartbeat that counts')
 
     def until_beats(self, count: int) -> None:
-        """Wait until the heartbeat has counted so far."""
-        enough = self.word('N10:0') + count
-        self.until(lambda: self.word('N10:0') >= enough, f'{count} beats')
+        """Wait until the heartbeat has counted so many times, from wherever it begins again."""
+        last = self.word('N10:0')
+
+        def have_come() -> bool:
+            nonlocal last, count
+            before, last = last, self.word('N10:0')
+            count -= last not in (0, before)
+            return count <= 0
+
+        self.until(have_come, f'{count} beats')
 
     def until_word(self, publisher: Any, value: int) -> None:
         """Publish a value until it is in the PLC, where it stays for Fallback_After."""
@@ -144,7 +153,7 @@ def test_rule_3_heartbeat_stands_still_with_the_executor(cell: Cell) -> None:
 
         cell.until(stands, 'a heartbeat that stands still')
         cell.ros.executor.add_node(cell.node)
-        cell.until(lambda: cell.word('N10:0') > last, 'a heartbeat that counts again')
+        cell.until_beats(1)
         return changed - begun
 
     # max(Period, 1 s) and one beat; a busy host makes some attempts longer.
@@ -181,6 +190,32 @@ def test_rule_5_port_that_is_left_to_others_is_left_with_zero(
     monkeypatch.setattr('abdf1_ros.ros.bridge.session.END_LIMIT', 0.1)
     assert cell.call(SetBool, 'polling', SetBool.Request(data=False)).success
     assert 'the port is left before the PLC has confirmed: beat' in capfd.readouterr().err
+
+
+@pytest.mark.parametrize(('is_end', 'rows'), [
+    (True, MAP.replace(',100,,,', ',1000,,,')),  # leaves time to guests
+    (True, MAP[:MAP.index('beat')]), (False, MAP[:MAP.index('beat')])])
+def test_rule_5_guest_under_way_is_written_over_at_the_end(
+        tmp_path: Path, is_end: bool, rows: str) -> None:
+    place = tmp_path / 'hmi'
+    with Cell(tmp_path, f'net.share:="pty:{place}"', 'net.share_access:=Write',
+              'net.cmd_timeout:=3000') as cell:
+        cell.until_counting()
+        cell.map.write_text(rows, encoding='utf-8')
+        before = len(fallbacks(cell.results))
+        assert cell.call(Trigger, 'reload', Trigger.Request()).success
+        cell.until(lambda: fallbacks(cell.results)[before:].count('start') > 0, 'the fallback')
+        cell.plcs.say('delay 1 250')  # it executes a command at once, and answers later
+        with Client(str(place), plc_type='SLC', timeout=3.0, cmd_timeout=3.0) as hmi:
+            writer = threading.Thread(target=hmi.write, args=('N10:1', 99))
+            writer.start()
+            cell.until(lambda: cell.word('N10:1') == 99, "the guest's value")
+            if is_end:
+                cell.end()
+            else:
+                assert cell.call(SetBool, 'polling', SetBool.Request(data=False)).success
+            writer.join()
+        assert (cell.word('N10:0'), cell.word('N10:1')) == (0, 7)
 
 
 def test_rule_5_new_files_are_a_new_start(cell: Cell) -> None:
