@@ -62,7 +62,7 @@ from abdf1_ros.driver.reads.readings import Readings, ValueListener
 from abdf1_ros.driver.record import WriteRecord
 from abdf1_ros.driver.served import Served
 from abdf1_ros.driver.write import Outcome, show, Write, WriteResult
-from abdf1_ros.driver.writes.queue import MAX_WAITING_WRITES, waited_too_long, WriteQueue
+from abdf1_ros.driver.writes.queue import MAX_WAITING_WRITES, WriteQueue
 from abdf1_ros.driver.writes.under_way import WritesUnderWay
 from abdf1_ros.errors import FormatError, PortLost
 from abdf1_ros.messages import Event
@@ -300,15 +300,14 @@ class Driver:
     def _sort_inbox(self, now: float) -> None:
         """Store messages of Serve rows in our table; let all others wait for the line."""
         for write in self._inbox.take():
-            timeout = self._writes.patience_of(write.mapping)
             if self.interlocks.is_overruled(write):
                 self._end_write(write, Outcome.NOT_SENT, 'fallback')
                 continue
             self.interlocks.message_came(write)
             if not write.mapping.serves:
                 self._writes.add(write, now)
-            elif now - write.requested >= timeout:
-                self._end_write(write, Outcome.NOT_SENT, waited_too_long(timeout))
+            elif reason := self._writes.why_too_old(write, now):
+                self._end_write(write, Outcome.NOT_SENT, reason)
             else:
                 self._served.store(write.mapping, write.raw)
                 self._record.ended(self._record.begin(

@@ -35,11 +35,6 @@ from abdf1_ros.settings.mapping import Mapping
 MAX_WAITING_WRITES = 1000
 
 
-def waited_too_long(seconds: float) -> str:
-    """Return the reason of a write that has waited for more than ``seconds``."""
-    return f'waited longer than {seconds:g} s for the line'
-
-
 class MessageJob(WriteJob):
     """A write that a message has asked for."""
 
@@ -173,10 +168,16 @@ class WriteQueue:
         """Return the clock value (s) from which a write is too old."""
         return write.requested + self.patience_of(write.mapping)
 
+    def why_too_old(self, write: Write, now: float) -> str:
+        """Return that a message has waited too long to be written, empty if it has not."""
+        if now < self._expiry(write):
+            return ''
+        return f'waited longer than {self.patience_of(write.mapping):g} s for the line'
+
     def _reject_reason(self, write: Write, now: float) -> str:
         """Return why a write is not to be sent any more, empty if it is."""
-        if now >= self._expiry(write):
-            return waited_too_long(self.patience_of(write.mapping))
+        if reason := self.why_too_old(write, now):
+            return reason
         station = write.mapping.station
         if self._stations.claim_message(station, now):
             return ''
