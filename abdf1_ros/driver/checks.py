@@ -143,9 +143,10 @@ class Checks:
 
     def request_counters(self, station: int) -> None:
         """
-        Ask for the link counters of a station; may be called from any thread.
+        Ask for the link counters of a station; may be called from any thread, then wake the link.
 
-        It is in ``counters_wanted`` until there is an answer, or none will come.
+        It is in ``counters_wanted`` until there is an answer, or none will come: without a port
+        nothing is asked.
         """
         self.counters_wanted.add(station)
         if not self._requests.put(station):

@@ -71,8 +71,8 @@ from abdf1_ros.pccc.families import served_counters
 from abdf1_ros.pccc.file_types import PlcType
 from abdf1_ros.pccc.identity import Identity
 from abdf1_ros.plan.bounds import MODE_PERIOD
-from abdf1_ros.plan.forecast import answer_time, line_model, poll_cycle
-from abdf1_ros.plan.planner import Block, Planner
+from abdf1_ros.plan.forecast import line_model
+from abdf1_ros.plan.planner import Planner
 from abdf1_ros.settings.mapping import Mapping
 from abdf1_ros.settings.network import Network
 
@@ -118,7 +118,6 @@ class Driver:
             _routes(network, mappings), network.line_mode.longest_probe(network.line),
             self.machine.took)
         self.is_online = False
-        self._is_ending = False
         self._settings = settings
         self._listener = listener
         self._inbox: Inbox[Write] = Inbox(is_open=False)
@@ -126,25 +125,25 @@ class Driver:
         self._served = self._make_served()
         self.link = network.line_mode.make_link(
             self.machine, network.link(settings), self.stations, self._serve, listener.happened)
-        self.expected_poll_cycle = poll_cycle(self.blocks, answer_time(network, self.blocks))
 
     def _make_queues(self) -> None:
         """Make the queues of jobs, and who decides between them."""
         network, settings, machine = self.network, self._settings, self.machine
         planner = Planner(line_model(network), settings.default_period)
         report = self._listener.written
-        self._read_backs = ReadBacks(settings.write_timeout, report)
-        self._readings = Readings(network, self.mappings, settings, planner, self.stations,
-                                  machine, self._listener, self._read_backs,
-                                  lambda *read: self.interlocks.read_back(*read))  # noqa: PLW0108
-        self.points, self._reads = self._readings.points, self._readings.reads
+        backs = ReadBacks(settings.write_timeout, report)
+        self.readings = Readings(
+            network, self.mappings, settings, planner, self.stations, machine, self._listener,
+            backs, lambda *read: self.interlocks.read_back(*read))  # noqa: PLW0108
+        self.points = self.readings.points
         self._record = record = WriteRecord(machine, 2 * network.cmd_timeout / 1000)
-        writing = WritesUnderWay(planner, self.stations, record, self._readings, self._read_backs)
+        writing = WritesUnderWay(planner, self.stations, record, self.readings, backs)
         self._writes = WriteQueue(self.stations, writing, settings.write_timeout, report,
                                   network.timing.tx_delay)
         self.checks = Checks(
-            self.stations, {block.station for block in self.blocks}, settings.processor_period,
-            machine, lambda station, error: self._readings.link_failed(station, (), error),
+            self.stations, {block.station for block in self.readings.blocks},
+            settings.processor_period, machine,
+            lambda station, error: self.readings.link_failed(station, (), error),
             self._station_told, self._status_periods())
         self.interlocks = Interlocks(
             () if settings.read_only else self.mappings, self.stations, self._writes, writing,
@@ -153,30 +152,10 @@ class Driver:
             1 + settings.first_tns % LARGEST)
         self.guests = GuestQueue(self.stations, machine, network.cmd_timeout / 1000,
                                  self._station_of_guest, self._words_of_guest, record)
-        record.connect(self._read_backs, self._reads, self.interlocks)
-        self._tasks = JobTasks(network.station, settings.first_tns, network.timing.char_time)
+        record.connect(backs, self.readings.reads, self.interlocks)
+        self.tasks = JobTasks(network.station, settings.first_tns, network.timing.char_time)
         self._agenda = Agenda(self.stations, self.interlocks, self._writes, self.checks,
-                              self._reads, self.guests, self._tasks)
-
-    @property
-    def transactions(self) -> int:
-        """Return how many commands have had a reply."""
-        return self._tasks.transactions
-
-    @property
-    def poll_cycle(self) -> float | None:
-        """Return how long (s) the slowest mapping has waited between its last two reads."""
-        return self._reads.poll_cycle
-
-    @property
-    def longest_poll_cycle(self) -> float | None:
-        """Return the longest ``poll_cycle`` (s) there has been, outages not counted."""
-        return self._reads.longest_poll_cycle
-
-    @property
-    def blocks(self) -> list[Block]:
-        """Return what is read together."""
-        return self._readings.blocks
+                              self.readings.reads, self.guests, self.tasks)
 
     def write(self, mappings: Sequence[Mapping], values: Sequence[float] | str,
               now: float, request: str = '') -> None:
@@ -212,33 +191,10 @@ class Driver:
             return 'this node is read_only'
         if not self.is_online:
             return _NOT_OPEN
-        if self._is_ending:
+        if self.interlocks.is_ending:
             return ENDS
         waiting = len(self._inbox) + len(self._writes)
         return 'too many writes are waiting' if waiting + count > MAX_WAITING_WRITES else ''
-
-    def wind_down(self) -> None:
-        """
-        Write heartbeats 0, then fallbacks, and take no more messages (rule 5).
-
-        May be called from any thread, then wake the link. ``interlocks.is_over`` tells when all
-        have been confirmed, ``interlocks.unconfirmed`` which have not.
-        """
-        self._is_ending = True
-        self.interlocks.wind_down()
-
-    def resume(self) -> None:
-        """Go on after ``wind_down``, once the port is to be opened again; in any thread."""
-        self.interlocks.resume()
-        self._is_ending = False
-
-    def request_counters(self, station: int) -> None:
-        """
-        Ask for the link counters of a station; may be called from any thread, then wake the link.
-
-        ``checks`` keeps the answer; without a port nothing is asked.
-        """
-        self.checks.request_counters(station)
 
     def refuse(self, mappings: Iterable[Mapping], reason: str,
                values: Sequence[float] | str, request: str = '') -> None:
@@ -251,7 +207,7 @@ class Driver:
         plc_type, mode = PlcType(self.network.plc_type), self.network.mode
         counters = served_counters(self.counters, plc_type, mode)
         return Served(
-            plc_type, self.mappings, self._readings.served, counters,
+            plc_type, self.mappings, self.readings.served, counters,
             self.network.duplex is Duplex.FULL)
 
     def next_task(self, now: float, busy: Container[int] = ()) -> Task | None:
@@ -269,18 +225,18 @@ class Driver:
         self._sort_inbox(now)
         self.interlocks.expire(now)
         self._writes.expire(now)
-        self._tasks.expire(now)
+        self.tasks.expire(now)
         self.guests.expire(now)
-        self._read_backs.expire(now)
+        self.readings.read_backs.expire(now)
 
     def next_expiry(self) -> float:
         """Return when ``expire`` has something to do (clock value in s), infinite for never."""
-        return min(self._writes.next_expiry, self._tasks.next_expiry, self.guests.next_expiry,
-                   self.interlocks.ours.due, self._read_backs.next_expiry)
+        return min(self._writes.next_expiry, self.tasks.next_expiry, self.guests.next_expiry,
+                   self.interlocks.ours.due, self.readings.read_backs.next_expiry)
 
     def _station_changed(self, station: Station) -> None:
         if station.active:
-            self._reads.release(station.number, self.machine.now)
+            self.readings.reads.release(station.number, self.machine.now)
             self.interlocks.contact(station.number, self.machine.now)
             self.checks.ask_status(station.number, self.machine.now)
         else:
@@ -324,7 +280,7 @@ class Driver:
 
     def _run(self) -> Procedure:
         """Begin to work, as long as there is a port."""
-        self._reads.begin(self.machine.now)
+        self.readings.reads.begin(self.machine.now)
         self.checks.begin(self.machine.now)
         self.interlocks.begin(self.machine.now)
         self._inbox.open()
@@ -337,14 +293,14 @@ class Driver:
         if not isinstance(error, PortLost):
             error = PortLost('internal error, see the log')
         self.is_online = False
-        self._tasks.fail(error)
+        self.tasks.fail(error)
         self.guests.end()
         self.checks.end(str(error))
-        self._readings.port_lost(str(error))
+        self.readings.port_lost(str(error))
         for write in self._inbox.close():
             self._end_write(write, Outcome.NOT_SENT, str(error))
         self._writes.drop(str(error), self.machine.now)
-        self._read_backs.end(self.machine.now)
+        self.readings.read_backs.end(self.machine.now)
 
     def _foreign_value(self, mapping: Mapping, text: str, is_conflict: bool) -> None:
         """Tell it, and ask for the mode at once: that of a PLC with a download is not RUN."""
@@ -356,11 +312,11 @@ class Driver:
         if identity is not None and identity.is_running is not None:
             self.interlocks.mode_seen(
                 station, identity.is_running and not identity.faults, self.machine.now)
-        self._readings.told(station, identity, asked)
+        self.readings.told(station, identity, asked)
 
     def _status_periods(self) -> dict[int, float]:
         """Return how often (s) stations have to be asked for their mode."""
-        periods = self._readings.guards.status_periods()
+        periods = self.readings.guards.status_periods()
         for mapping in () if self._settings.read_only else self.mappings:
             if (mapping.heartbeat or mapping.fallback) and not mapping.serves:
                 known = periods.get(mapping.station, math.inf)

@@ -231,7 +231,7 @@ def test_reads_that_are_due_wait_for_one_check_at_most(network: Network) -> None
         assert all(bool(heard.times(STATUS)) == bool(period) for heard in ears)
     transaction = 0.012 if network.polling == 'Message' else 0.02
     assert waits[1] - waits[0] < transaction
-    assert bench.driver.longest_poll_cycle == pytest.approx(waits[1], abs=1e-6)
+    assert bench.driver.readings.reads.longest_poll_cycle == pytest.approx(waits[1], abs=1e-6)
 
 
 def test_after_a_check_come_all_reads_that_were_due() -> None:
@@ -374,7 +374,7 @@ def test_packets_are_those_of_the_processor_that_a_station_says_to_be(network: N
     old = OldSlc(bench, plc)
     bench.connect(old)
     bench.run(1.0)
-    planned = bench.driver.blocks
+    planned = bench.driver.readings.blocks
     bench.write(rows[0], list(range(100)))
     bench.run(2 * PERIOD)
     assert old.refused == 0
@@ -382,14 +382,14 @@ def test_packets_are_those_of_the_processor_that_a_station_says_to_be(network: N
     assert old.writes == [82, 82, 36]
     assert bench.listener.outcomes() == [Outcome.WRITTEN]
     assert bench.listener.values(rows[0])[-1] == list(range(100))
-    assert bench.driver.blocks == planned  # once, not at each answer
+    assert bench.driver.readings.blocks == planned  # once, not at each answer
 
 
 def test_longer_packets_than_the_map_allows_are_not_sent() -> None:
     row = make_mapping('N7:0', plc='SLC', length=100, processor='ML1000')
     bench, _, _ = make_bench(row)  # it says that it is a 5/03
     bench.run(2 * PERIOD)
-    assert [request.words for request in bench.driver.blocks[0].requests] == [41, 41, 18]
+    assert [request.words for request in bench.driver.readings.blocks[0].requests] == [41, 41, 18]
 
 
 # link counters
@@ -399,7 +399,7 @@ def test_longer_packets_than_the_map_allows_are_not_sent() -> None:
 def test_counters_are_read_once_for_each_request_and_never_else(network: Network) -> None:
     bench, (plc,), (ears,) = make_bench(word(), network=network, run=2.0)
     assert ears.times(COUNTERS) == []
-    bench.driver.request_counters(1)
+    bench.driver.checks.request_counters(1)
     assert bench.driver.checks.counters_wanted == {1}
     before = plc.counters.messages_received
     bench.run(0.5)
@@ -416,7 +416,7 @@ def test_counters_are_read_once_for_each_request_and_never_else(network: Network
 def test_two_requests_at_once_are_one() -> None:
     bench, _, (ears,) = make_bench(word(), run=1.0)
     for _ in range(3):
-        bench.driver.request_counters(1)
+        bench.driver.checks.request_counters(1)
     bench.run(1.0)
     assert len(ears.times(COUNTERS)) == 1
 
@@ -424,7 +424,7 @@ def test_two_requests_at_once_are_one() -> None:
 def test_counters_that_a_station_refuses_are_told_as_refused() -> None:
     bench, _, (ears,) = make_bench(word())
     ears.answer_diagnostics(lambda command: command.reply(sts=0x10))
-    bench.driver.request_counters(1)
+    bench.driver.checks.request_counters(1)
     bench.run(1.0)
     known = bench.driver.checks.known(1)
     assert (known.counters, known.no_counters) == (
@@ -436,7 +436,7 @@ def test_absent_station_is_not_asked_for_counters() -> None:
     bench, (plc,), _ = make_bench(word())
     plc.faults = InjectedFaults(silent=True)
     bench.run(5.0)
-    bench.driver.request_counters(1)
+    bench.driver.checks.request_counters(1)
     bench.run(1.0)
     assert bench.driver.checks.known(1).no_counters == 'the station does not answer'
     assert bench.driver.checks.counters_wanted == set()
@@ -445,7 +445,7 @@ def test_absent_station_is_not_asked_for_counters() -> None:
 def test_station_that_falls_silent_ends_the_request() -> None:
     bench, (plc,), _ = make_bench(word(), run=1.0)
     plc.faults = InjectedFaults(silent=True)
-    bench.driver.request_counters(1)
+    bench.driver.checks.request_counters(1)
     bench.run(5.0)
     assert bench.driver.checks.known(1).no_counters
     assert bench.driver.checks.counters_wanted == set()
@@ -453,18 +453,18 @@ def test_station_that_falls_silent_ends_the_request() -> None:
 
 def test_lost_port_ends_the_request() -> None:
     bench, _, _ = make_bench(word(), run=1.0)
-    bench.driver.request_counters(1)
+    bench.driver.checks.request_counters(1)
     bench.lose_port()
     assert bench.driver.checks.known(1).no_counters == 'port lost: unplugged'
     assert bench.driver.checks.counters_wanted == set()
-    bench.driver.request_counters(1)
+    bench.driver.checks.request_counters(1)
     assert bench.driver.checks.counters_wanted == set()
 
 
 def test_lost_port_ends_a_request_that_waits_for_its_turn() -> None:
     bench, _, (ears,) = make_bench(word(), run=1.0)
     health = bench.driver.checks
-    bench.driver.request_counters(1)
+    bench.driver.checks.request_counters(1)
     assert health.is_due(bench.clock())  # it is among the checks now, and not on the line yet
     bench.lose_port()
     assert health.known(1).no_counters == 'port lost: unplugged'

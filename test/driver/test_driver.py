@@ -443,7 +443,7 @@ def test_address_that_the_plc_refuses_takes_down_only_its_own_mapping() -> None:
     good = [make_mapping(f'N9:{n}') for n in (0, 1, 2, 3, 5)]
     bad = make_mapping('N9:12')  # the file has ten words
     bench, _ = make_bench(*good[:3], bad, *good[3:], start=False)
-    assert len(bench.driver.blocks) == 1
+    assert len(bench.driver.readings.blocks) == 1
     bench.open(run=2.0)
     assert all(len(bench.listener.values(mapping)) >= 15 for mapping in good)
     assert bench.listener.values(bad) == []
@@ -452,8 +452,8 @@ def test_address_that_the_plc_refuses_takes_down_only_its_own_mapping() -> None:
     assert point.error == 'STS F0 EXT STS 07: file has the wrong size'
     assert bench.listener.reasons == [('N9:12', point.error)]
     assert all(bench.driver.points[mapping].error is None for mapping in good)
-    assert sorted(block.span.words for block in bench.driver.blocks) == [1, 6]
-    assert any(block.mappings == (bad,) for block in bench.driver.blocks)
+    assert sorted(block.span.words for block in bench.driver.readings.blocks) == [1, 6]
+    assert any(block.mappings == (bad,) for block in bench.driver.readings.blocks)
 
 
 def test_address_that_comes_into_being_is_read_with_its_neighbours_again() -> None:
@@ -461,17 +461,17 @@ def test_address_that_comes_into_being_is_read_with_its_neighbours_again() -> No
     bench = DriverBench(mappings)
     plc = bench.plc(1, 'SLC', ('N9:0', 6))
     bench.run(2.0)
-    assert len(bench.driver.blocks) == 3
+    assert len(bench.driver.readings.blocks) == 3
     plc.table.create(parse_address('N9:0', PlcType.SLC), 8)
     bench.run(2.0)
-    assert len(bench.driver.blocks) == 1
+    assert len(bench.driver.readings.blocks) == 1
     assert all(point.error is None for point in bench.driver.points.values())
 
 
 def test_slow_mapping_that_is_read_with_fast_ones_is_published_at_its_own_pace() -> None:
     fast, slow = make_mapping('N7:0', period=100), make_mapping('N7:1', 'ReadWrite', period=1000)
     bench, _ = make_bench(fast, slow, run=5.05)
-    assert len(bench.driver.blocks) == 1
+    assert len(bench.driver.readings.blocks) == 1
     assert len(bench.listener.values(fast)) == 51
     assert len(bench.listener.values(slow)) == 6
     bench.write(slow, [5], run=0.1)
@@ -492,7 +492,7 @@ def test_plc_in_trouble_fails_the_points_and_divides_nothing() -> None:
     bench, plc = make_bench(*mappings)
     plc.faults.status = (0x70,)
     bench.run(1.0)
-    assert len(bench.driver.blocks) == 1
+    assert len(bench.driver.readings.blocks) == 1
     assert [bench.driver.points[mapping].error for mapping in mappings] == [
         'STS 70: processor is in program mode'] * 2
     assert [address for address, _ in bench.listener.reasons] == ['N7:0', 'N7:1']
@@ -712,7 +712,7 @@ def test_reply_of_the_wrong_length_or_type_is_not_published() -> None:
 
     bench.connect(Odd())
     bench.run(3.0)
-    assert bench.driver.transactions >= len(answers)
+    assert bench.driver.tasks.transactions >= len(answers)
     assert bench.listener.reads == []
     assert str(bench.driver.points[mapping].error).startswith('unusable reply: ')
 
@@ -782,10 +782,11 @@ def test_no_write_is_executed_twice_when_answers_get_lost() -> None:
 def test_stale_time_follows_the_period_or_the_line() -> None:
     fast, slow = make_mapping('N7:0', period=10), make_mapping('F8:0', period=1000)
     bench, _ = make_bench(fast, slow, stale_after=5.0, network=Network(baud=1200), start=False)
-    scan = bench.driver.expected_poll_cycle
-    assert scan == pytest.approx(sum(block.line_time + 0.02 for block in bench.driver.blocks))
+    scan = bench.driver.readings.expected_poll_cycle
+    blocks = bench.driver.readings.blocks
+    assert scan == pytest.approx(sum(block.line_time + 0.02 for block in blocks))
     assert 0.4 < scan < 1.0
-    times = {block.period: block_time(block) for block in bench.driver.blocks}
+    times = {block.period: block_time(block) for block in blocks}
     needed = times[0.01] / 0.01 + times[1.0] / 1.0
     longest = max(times.values())
     assert bench.driver.points[fast].stale_time == pytest.approx(5 * 0.01 * needed + longest)
@@ -796,8 +797,8 @@ def test_slow_rows_do_not_make_the_stale_time_of_fast_ones_longer() -> None:
     fast = make_mapping('N7:0', period=200)
     slow = [make_mapping(f'N{file}:0', length=20, period=20_000) for file in range(9, 39)]
     bench, _ = make_bench(fast, *slow, stale_after=3.0, network=Network(baud=9600), start=False)
-    assert bench.driver.expected_poll_cycle > 2.5
-    wait = max(map(block_time, bench.driver.blocks))
+    assert bench.driver.readings.expected_poll_cycle > 2.5
+    wait = max(map(block_time, bench.driver.readings.blocks))
     assert bench.driver.points[fast].stale_time == pytest.approx(0.6 + wait)
     assert wait < 0.2
     assert bench.driver.points[slow[0]].stale_time == pytest.approx(60 + wait)
@@ -806,7 +807,7 @@ def test_slow_rows_do_not_make_the_stale_time_of_fast_ones_longer() -> None:
 def test_slow_row_that_is_read_with_a_fast_one_keeps_its_own_stale_time() -> None:
     fast, slow = make_mapping('N7:0', period=200), make_mapping('N7:1', period=400)
     bench, _ = make_bench(fast, slow, stale_after=3.0, start=False)
-    block, = bench.driver.blocks
+    block, = bench.driver.readings.blocks
     assert bench.driver.points[fast].stale_time == pytest.approx(0.6 + block_time(block))
     assert bench.driver.points[slow].stale_time == pytest.approx(1.2 + block_time(block))
 
@@ -814,7 +815,7 @@ def test_slow_row_that_is_read_with_a_fast_one_keeps_its_own_stale_time() -> Non
 def test_long_read_that_a_lost_port_has_broken_off_begins_anew() -> None:
     fast, long = make_mapping('N9:0', period=20), make_mapping('N7:0', length=250, period=1000)
     bench, plc = make_bench(fast, long, network=Network(baud=115200, timeout=200))
-    job, = (job for job in bench.driver._reads.jobs if job.block.mappings == (long,))
+    job, = (job for job in bench.driver.readings.reads.jobs if job.block.mappings == (long,))
     bench.run_until(lambda: job.is_under_way)  # while the fast one has the line
     bench.lose_port()
     store(plc, 'N7:0', [1] * 250)
@@ -822,7 +823,7 @@ def test_long_read_that_a_lost_port_has_broken_off_begins_anew() -> None:
     bench.open(run=0.5)
     values = bench.listener.values(long)
     assert values and all(entry == [1] * 250 for entry in values)
-    assert (bench.driver.longest_poll_cycle or 0) < 1
+    assert (bench.driver.readings.reads.longest_poll_cycle or 0) < 1
 
 
 def test_long_block_lets_others_go_between_its_packets() -> None:
@@ -833,9 +834,9 @@ def test_long_block_lets_others_go_between_its_packets() -> None:
     times = bench.listener.times(fast)
     gaps = [later - earlier for earlier, later in pairwise(times)]
     assert bench.listener.values(long) == [list(range(250))] * 4
-    wait = longest_wait(bench.driver.blocks)
+    wait = longest_wait(bench.driver.readings.blocks)
     assert max(gaps) <= 0.3 + wait
-    assert 2 * wait < max(map(block_time, bench.driver.blocks))
+    assert 2 * wait < max(map(block_time, bench.driver.readings.blocks))
 
 
 def test_default_period_is_a_setting() -> None:
@@ -850,9 +851,9 @@ def test_poll_cycle_is_close_to_the_expected_one_on_a_saturated_line(baud: int) 
     mappings = [make_mapping(f'{text}', length=length, period=0) for text, length in (
         ('N7:0', 40), ('F8:0', 10), ('B3:0', 4), ('T4:0', 9))]
     bench, _ = make_bench(*mappings, network=Network(baud=baud), run=20.0)
-    assert bench.driver.poll_cycle is not None
-    expected = bench.driver.expected_poll_cycle - 4 * 0.02  # our PLC answers at once
-    assert bench.driver.poll_cycle == pytest.approx(expected, rel=0.03, abs=0.002)
+    assert bench.driver.readings.reads.poll_cycle is not None
+    expected = bench.driver.readings.expected_poll_cycle - 4 * 0.02  # our PLC answers at once
+    assert bench.driver.readings.reads.poll_cycle == pytest.approx(expected, rel=0.03, abs=0.002)
 
 
 def test_driver_without_stations_rests_until_a_write_comes() -> None:
@@ -868,7 +869,8 @@ def test_driver_without_stations_rests_until_a_write_comes() -> None:
 def test_counters_of_the_driver() -> None:
     bench, _ = make_bench(make_mapping('N7:0'), run=0.95)
     counters = bench.driver.counters
-    assert bench.driver.transactions == counters.commands_sent == counters.replies_received == 10
+    assert counters.commands_sent == counters.replies_received == 10
+    assert bench.driver.tasks.transactions == 10
     assert bench.driver.stations[1].replies == 10
     assert bench.driver.stations[1].last_heard == pytest.approx(bench.clock(), abs=0.1)
 

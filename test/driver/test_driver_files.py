@@ -87,7 +87,7 @@ def test_members_of_one_pid_come_together_and_right() -> None:
         store(plc, f'PD10:1.{name}', [number + 0.5])
     store(plc, 'PD10:1/SPOR', [1])
     bench.run_until(lambda: len(bench.listener.reads) == len(mappings))
-    assert len(bench.driver.blocks) == 1
+    assert len(bench.driver.readings.blocks) == 1
     assert [bench.listener.values(mapping) for mapping in mappings] == [
         *([[number + 0.5]] for number in range(len(names))), [[1]]]
 
@@ -209,7 +209,8 @@ def test_flat_io_is_read_and_written_through_the_slots() -> None:
     assert bench.listener.values(slot)[-1] == [12]
     assert bench.listener.values(output)[-1] == [1]
     assert stored(plc, 'O:4.0') == bytes.fromhex('20 00')
-    assert len(bench.driver.blocks) == 3  # what is flat is never read with what is a slot's
+    # What is flat is never read with what is a slot's.
+    assert len(bench.driver.readings.blocks) == 3
 
 
 def test_flat_io_is_never_tried_the_other_way() -> None:

@@ -142,7 +142,7 @@ def test_reads_of_a_peer_come_in_time_and_true(
     assert bench.listener.changes == []
     counters = bench.driver.counters
     assert counters.commands_sent - counters.replies_received in range(outstanding + 1)
-    assert bench.driver.transactions == counters.replies_received > 10
+    assert bench.driver.tasks.transactions == counters.replies_received > 10
 
 
 @pytest.mark.parametrize('family', ['PLC5', 'SLC'])
@@ -333,7 +333,7 @@ def test_served_words_survive_a_lost_port() -> None:
 def test_our_own_station_is_no_station_of_the_line() -> None:
     bench = Bench([serve_row('N7:50'), make_mapping()])
     assert [station.number for station in bench.driver.stations] == [PLC]
-    assert len(bench.driver.blocks) == 1
+    assert len(bench.driver.readings.blocks) == 1
 
 
 def test_served_word_that_nobody_has_to_write_is_not_late() -> None:
@@ -382,7 +382,7 @@ def test_processor_and_counters_of_the_other_end(outstanding: int) -> None:
     health = bench.driver.checks
     assert health.known(PLC).processor == 'SLC 5/03 series A revision 1, REM RUN'
     bench.plc.processor.setting = Setting.PROGRAM
-    bench.driver.request_counters(PLC)
+    bench.driver.checks.request_counters(PLC)
     bench.run(2.0)
     identity = health.known(PLC).identity
     assert identity is not None

@@ -210,7 +210,7 @@ def test_processor_of_a_station_behind_the_master() -> None:
     bench.run(1.0)
     assert bench.driver.checks.known(PLC).processor == 'SLC 5/03 series A revision 1, REM RUN'
     bench.plc.processor.setting = Setting.TEST
-    bench.driver.request_counters(PLC)
+    bench.driver.checks.request_counters(PLC)
     bench.run(3.0)
     known = bench.driver.checks.known(PLC)
     assert known.processor == 'SLC 5/03 series A revision 1, REM TEST'
@@ -318,7 +318,7 @@ def test_rule_5_as_a_slave() -> None:
     bench.told(1.0)
     bench.write(bench.speed, [5])
     bench.told(0.3)
-    bench.driver.wind_down()
+    bench.driver.interlocks.wind_down()
     bench.line.wake(bench.driver.machine)
     assert bench.told(1.0) == [('beat', 0), ('speed', 7)]
     assert bench.driver.interlocks.is_over

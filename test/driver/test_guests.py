@@ -177,9 +177,9 @@ def test_guests_get_a_quarter_and_never_two_between_two_of_ours() -> None:
     guests = [Program(bench, src=20 + number) for number in range(3)]
     for program in guests:
         program.keep_asking(READ_N7)
-    before = bench.driver.transactions
+    before = bench.driver.tasks.transactions
     run(bench, 20.0)
-    total = bench.driver.transactions - before
+    total = bench.driver.tasks.transactions - before
     counts = [len(program.replies) for program in guests]
     assert sum(counts) == pytest.approx(total / 4, rel=0.05)
     assert max(counts) - min(counts) <= 1
@@ -212,9 +212,9 @@ def test_guests_of_polled_stations_get_no_more_than_a_quarter() -> None:
     guests = [Program(bench, src=20 + station) for station in stations]
     for station, program in zip(stations, guests, strict=True):
         program.keep_asking(READ_N7, dst=station)
-    before = bench.driver.transactions
+    before = bench.driver.tasks.transactions
     run(bench, 10.0)
-    total = bench.driver.transactions - before
+    total = bench.driver.tasks.transactions - before
     assert 0.1 * total < sum(len(program.replies) for program in guests) < 0.26 * total
 
 
@@ -264,12 +264,12 @@ def test_silent_station_is_told_at_once_and_costs_others_little() -> None:
     bench = bench_of()
     program = Program(bench)
     program.keep_asking(READ_N7, dst=77)
-    before = bench.driver.transactions
+    before = bench.driver.tasks.transactions
     run(bench, 10.0)
     assert set(program.statuses) <= {0x02, 0x07}
     assert bench.listener.numbers() == {Message.NTC_REPLY_MSG_RCVD.number}
     # The probes of silent stations have an eighth of the line.
-    assert bench.driver.transactions - before > 200
+    assert bench.driver.tasks.transactions - before > 200
 
 
 def test_read_of_all_stations_is_not_sent_and_has_no_success() -> None:

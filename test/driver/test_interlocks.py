@@ -487,7 +487,7 @@ def test_rule_5_orderly_end_is_0_then_the_fallbacks() -> None:
     since = cell.now
     driver = cell.bench.driver
     assert not driver.interlocks.is_over
-    driver.wind_down()
+    driver.interlocks.wind_down()
     cell.bench.line.wake(driver.machine)
     cell.bench.write(speed, [4])
     cell.run(0.3)
@@ -501,7 +501,7 @@ def test_rule_5_orderly_end_is_0_then_the_fallbacks() -> None:
 def end(cell: Cell, seconds: float = 2.0) -> None:
     """End in order: within so many seconds all has to be confirmed, and then the port closes."""
     driver = cell.bench.driver
-    driver.wind_down()
+    driver.interlocks.wind_down()
     cell.bench.line.wake(driver.machine)
     give_up = cell.now + seconds
     while not driver.interlocks.is_over:
@@ -604,7 +604,7 @@ def test_rule_5_end_asks_a_silent_plc_at_once_where_another_answers() -> None:
     cell.publish(speed, 42, times=20, run=1.95)
     cell.plc.faults.silent = True
     cell.bench.at(cell.now + 1.0, lambda: setattr(cell.plc.faults, 'silent', False))
-    cell.bench.driver.wind_down()
+    cell.bench.driver.interlocks.wind_down()
     cell.bench.line.wake(cell.bench.driver.machine)
     cell.run(1.5)
     assert (cell.word('N10:0'), cell.word('N7:0')) == (0, 7)
@@ -768,7 +768,7 @@ def test_rule_5_commands_of_guests_are_not_sent_while_the_bridge_ends() -> None:
     cell = Cell(speed_row(), run=1.0)
     driver, sts = cell.bench.driver, []
     cell.refused = {'N7:0'}  # so that the end lasts
-    driver.wind_down()
+    driver.interlocks.wind_down()
     command = Packet(1, 9, 0x0F, 0, 1, bytes.fromhex('67 00 00 01 00 07 00 07 00 42 2A 00'))
     driver.guests.put(GuestCommand(Guest('pty:hmi', ShareAccess.ALL), command, cell.now,
                                    lambda reply: sts.append(reply.sts)))
@@ -780,7 +780,7 @@ def test_rule_5_commands_of_guests_are_not_sent_while_the_bridge_ends() -> None:
 def test_rule_5_what_was_not_confirmed_at_the_end_is_named() -> None:
     cell = Cell(beat_row(), speed_row(), run=1.0)
     cell.refused = {'N10:0'}
-    cell.bench.driver.wind_down()
+    cell.bench.driver.interlocks.wind_down()
     cell.bench.line.wake(cell.bench.driver.machine)
     cell.run(2.0)
     assert not cell.bench.driver.interlocks.is_over
@@ -1167,7 +1167,7 @@ def test_rule_10_pause_of_this_process_does_not_put_off_a_silent_plc() -> None:
     line.run(0.1)
     line._stations[1].faults.silent = True
     line.run(4.0)
-    line.run_until(lambda: any(task.station == 2 for task in line.driver._tasks.under_way))
+    line.run_until(lambda: any(task.station == 2 for task in line.driver.tasks.under_way))
     line.line.pause(line.driver.machine, 600.0)
     line._stations[1].faults.silent = False
     asked = len(line.asked)

@@ -281,7 +281,7 @@ class World:
         for _ in range(self.dice.randrange(3)):
             self.ask(('N7:0', 'N7:1', 'N10:0'))
             self.pass_time(self.dice.uniform(0.0, 0.1))
-        self.driver.wind_down()
+        self.driver.interlocks.wind_down()
         self.holds = 0.0
         self.line.wake(self.driver.machine)
         give_up = self.line.now + 2.0

@@ -78,11 +78,11 @@ def work_of_a_transaction(fallback: Fallback | None) -> float:
     for number in range(100):
         bench.at(12.0 + 0.02 * number, lambda number=number: bench.write(  # type: ignore[misc]
             writes[7 * number % len(writes)], [number]))
-    before = bench.driver.transactions
+    before = bench.driver.tasks.transactions
     work = lines_run(lambda: bench.run(2.5), 'driver')
     assert bench.listener.outcomes().count(Outcome.WRITTEN) == 100
-    assert bench.driver.transactions - before > 250
-    return work / (bench.driver.transactions - before)
+    assert bench.driver.tasks.transactions - before > 250
+    return work / (bench.driver.tasks.transactions - before)
 
 
 def test_transaction_costs_little_more_with_900_fallbacks() -> None:

@@ -126,5 +126,5 @@ def test_forecast_is_what_a_line_does_whose_station_answers_at_once(
     bench = DriverBench(rows, network=Network(baud=baud, tx_delay=tx_delay), start=False)
     bench.plc(1, 'PLC5', ('N7:0', 40), ('F8:0', 20), ('T4:0', 9))
     bench.open(run=20.0)
-    measured = bench.driver.poll_cycle
-    assert measured == pytest.approx(poll_cycle(bench.driver.blocks, 0.0), rel=0.03)
+    measured = bench.driver.readings.reads.poll_cycle
+    assert measured == pytest.approx(poll_cycle(bench.driver.readings.blocks, 0.0), rel=0.03)

@@ -263,7 +263,7 @@ def test_link_tells_what_the_uart_has_counted(
 
 def test_rates_are_those_since_the_last_look(bench: Bench) -> None:
     bench.status('link', NOW)
-    bench.driver._tasks.transactions += 30
+    bench.driver.tasks.transactions += 30
     bench.driver.counters.chars_sent += 480
     bench.driver.counters.chars_received += 480
     values = details(bench.status('link', NOW + 2))
@@ -277,7 +277,7 @@ def test_rates_are_those_since_the_last_look(bench: Bench) -> None:
 def test_poll_cycle_is_unknown_before_the_second_read(bench: Bench) -> None:
     values = details(bench.status('link'))
     assert values['poll cycle'] == values['longest poll cycle'] == 'unknown'
-    expected = round(bench.driver.expected_poll_cycle * 1000)
+    expected = round(bench.driver.readings.expected_poll_cycle * 1000)
     assert values['expected poll cycle'] == f'{expected} ms'
 
 
@@ -472,7 +472,7 @@ def test_map_without_reads_is_ok(make_bench: Callable[..., Bench]) -> None:
 
 def test_blocks_may_be_divided_while_the_poll_cycle_is_asked_for(bench: Bench) -> None:
     # That is what the link thread does when a PLC refuses an address.
-    jobs: Any = bench.driver._reads._due.jobs
+    jobs: Any = bench.driver.readings.reads._due.jobs
 
     class Part:
         """A job that has not been done yet."""

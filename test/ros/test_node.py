@@ -395,7 +395,7 @@ def test_every_value_of_a_long_block_is_published(
     words = [f'w{number},Read,N7:{number},1,PLC5,1' for number in range(9)]
     bench = make_bench(*words)
     inboxes = [observer.listen(Int16MultiArray, f'/abdf1/read/w{number}') for number in range(9)]
-    assert len(bench.node.driver.blocks) == 1
+    assert len(bench.node.driver.readings.blocks) == 1
     plcs[1].table.write(parse_address('N7:0', PlcType.PLC5), bytes(range(18)))
     for number, inbox in enumerate(inboxes):
         inbox.values([0x202 * number + 0x100])

@@ -190,7 +190,7 @@ class Bench:
         self.guest = Guest('pty:/tmp/guest', ShareAccess.ALL)
         self.replies: list[Packet] = []
         self.value = 1
-        rows, blocks = self.near.driver.mappings, self.near.driver.blocks
+        rows, blocks = self.near.driver.mappings, self.near.driver.readings.blocks
         # What is printed as the longest transaction takes turns with our replies.
         self.bound = self.period + (2 if kind == 'two packets' else 1) * (
             Times(near, rows, blocks).longest + near.line_mode.longest_reply(

@@ -398,7 +398,7 @@ class World(DriverBench):
 
     def end(self) -> None:
         """End in order (rule 5)."""
-        self.driver.wind_down()
+        self.driver.interlocks.wind_down()
         self.line.wake(self.driver.machine)
 
     def rows_of(self, station: int, tags: Sequence[str] = ('w',)) -> list[Mapping]:

@@ -123,11 +123,16 @@ class Interlocks(WriteListener):
         self._conditions.executor = now
 
     def wind_down(self) -> None:
-        """Write 0, then every fallback, and nothing after that (rule 5)."""
+        """
+        Write heartbeats 0, then fallbacks, and let no more messages be taken (rule 5).
+
+        Wake the link then. ``is_over`` tells when all have been confirmed, ``unconfirmed`` which
+        have not.
+        """
         self._conditions.is_ending = True
 
     def resume(self) -> None:
-        """Take note that it was not the end: the next opening of the port is a first contact."""
+        """Go on after ``wind_down``: the next opening of the port is a first contact."""
         self._conditions.is_ending = self._are_all_due = False
         for row in self._plc_of:
             row.words.resume()

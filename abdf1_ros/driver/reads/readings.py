@@ -34,7 +34,7 @@ from abdf1_ros.pccc.identity import Identity
 from abdf1_ros.pccc.status import is_address_fault
 from abdf1_ros.pccc.values import Values
 from abdf1_ros.plan.bounds import own_load
-from abdf1_ros.plan.forecast import block_time, period_of, stale_times
+from abdf1_ros.plan.forecast import answer_time, block_time, period_of, poll_cycle, stale_times
 from abdf1_ros.plan.planner import Block, Planner
 from abdf1_ros.plan.refusals import Change, Refusals
 from abdf1_ros.settings.mapping import Mapping
@@ -75,11 +75,12 @@ class Readings:
         self.guards = Guards()
         self.points = _points(network, mappings, blocks, settings, self.guards)
         self.reads = Reads(stations)
+        self.expected_poll_cycle = poll_cycle(blocks, answer_time(network, blocks))
         self._network = network
         self._stations = stations
         self._line = line
         self._listener = listener
-        self._read_backs = read_backs
+        self.read_backs = read_backs
         self._read_back = read_back
         self._refusals = Refusals(planner)
         self.reads.replace((), map(self._job, blocks), 0.0)
@@ -117,8 +118,8 @@ class Readings:
     def _read(self, job: ReadJob, data: bytes) -> None:
         """Update the points for which this read was made."""
         now = self._line.now
-        if self._read_backs.next_expiry != math.inf:
-            self._read_backs.read(job.block, data, job.started, now)
+        if self.read_backs.next_expiry != math.inf:
+            self.read_backs.read(job.block, data, job.started, now)
         if self.guards.counters:
             self.guards.values_read(job.points, job.slices, data, now)
         for mapping, place in job.heartbeats:

@@ -236,7 +236,7 @@ class BridgeNode(Node):
         if self._is_ending:
             response.message = ENDS
         elif request.data:
-            self.driver.resume()
+            self.driver.interlocks.resume()
             if self._is_ending:  # since then
                 self.session.begin_end()
             self.link.take()

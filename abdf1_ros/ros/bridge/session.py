@@ -152,7 +152,7 @@ class Session:
     def begin_end(self) -> None:
         """Have heartbeats set to 0 and fallbacks written; ``tell_plcs`` waits for it (rule 5)."""
         self._events.unreadable_rows.tell()
-        self.driver.wind_down()
+        self.driver.interlocks.wind_down()
         self._wake_link()
 
     def wait_for_plcs(self, give_up: float, what: str) -> None:

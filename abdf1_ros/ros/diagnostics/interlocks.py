@@ -49,7 +49,7 @@ class InterlockStatus:
         self._beats = driver.interlocks.heartbeats
         self._fallbacks = driver.interlocks.fallbacks
         self._checks = driver.checks
-        self._bounds = [*Times(driver.network, driver.mappings, driver.blocks).bounds()]
+        self._bounds = [*Times(driver.network, driver.mappings, driver.readings.blocks).bounds()]
         # By tag of the heartbeat, and all others at ''.
         self._bits = {point.mapping.confirms: point for point in driver.points.values()}
         self._since: dict[str, float] = {}  # by tag of a heartbeat that counts, a bit that is 1

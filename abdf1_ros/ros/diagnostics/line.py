@@ -127,10 +127,10 @@ class LoadMeter:
         before, transactions, characters = self._seen
         total = driver.counters.chars_sent + driver.counters.chars_received
         if now > before:
-            self.transactions = (driver.transactions - transactions) / (now - before)
+            self.transactions = (driver.tasks.transactions - transactions) / (now - before)
             on_line = (total - characters) * driver.network.timing.char_time
             self.load = min(100.0, 100 * on_line / (now - before))
-            self._seen = now, driver.transactions, total
+            self._seen = now, driver.tasks.transactions, total
 
 
 def paces(points: Iterable[ReadPoint]) -> dict[str, str]:

@@ -104,7 +104,7 @@ class LinkCounterService:
             response.success, response.message = False, f'no station to ask: {what}'
             return response
         for station in self._asked:
-            self._driver.request_counters(station)
+            self._driver.checks.request_counters(station)
         self._wake_link()
         self._give_up = line_time() + _PATIENCE
         self._done = Future()

@@ -241,9 +241,9 @@ def measure(listener: Listener, warm_up: float, seconds: float) -> tuple[float, 
                           lambda: DescriptorPort(descriptor, lambda: os.close(descriptor)))
         link.start()
         time.sleep(warm_up)
-        began, used, before = time.monotonic(), time.process_time(), driver.transactions
+        began, used, before = time.monotonic(), time.process_time(), driver.tasks.transactions
         time.sleep(seconds)
-        used, done = time.process_time() - used, driver.transactions - before
+        used, done = time.process_time() - used, driver.tasks.transactions - before
         passed = time.monotonic() - began
         link.stop()
     return done / passed, used / max(done, 1)

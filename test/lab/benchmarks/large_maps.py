@@ -71,9 +71,9 @@ class Meter:
     def measure(self, run: Callable[[], None]) -> tuple[float, float]:
         """Return the time of a transaction, and the longest of one call."""
         self._total = self.longest = 0.0
-        before = self._driver.transactions
+        before = self._driver.tasks.transactions
         run()
-        return self._total / (self._driver.transactions - before), self.longest
+        return self._total / (self._driver.tasks.transactions - before), self.longest
 
 
 def with_fallbacks(fallback: Fallback | None) -> tuple[float, float]:

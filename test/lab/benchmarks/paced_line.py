@@ -324,14 +324,15 @@ def measure(network: Network, mappings: list[Mapping], stations: list[SimulatedP
     with paced_line(driver.machine, far, network.baud):
         time.sleep(settle)
         troubles = listener.troubles
-        began, before, polls = time.monotonic(), driver.transactions, driver.counters.polls_sent
+        began, polls = time.monotonic(), driver.counters.polls_sent
+        before = driver.tasks.transactions
         scans: list[float] = []
         while time.monotonic() - began < seconds:
             time.sleep(0.05)
-            if (scan := driver.poll_cycle) is not None:
+            if (scan := driver.readings.reads.poll_cycle) is not None:
                 scans.append(scan)
         passed = time.monotonic() - began
-        done, polled = driver.transactions - before, driver.counters.polls_sent - polls
+        done, polled = driver.tasks.transactions - before, driver.counters.polls_sent - polls
     mean = sum(scans) / len(scans) if scans else math.nan
     return Measured(done / passed, mean, max(scans, default=math.nan),
                     listener.troubles - troubles, polled / passed)

@@ -99,7 +99,7 @@ def measure(network: Network, words: int, count: int) -> tuple[float, list[float
         link.start()
         watch.is_full.wait()
         link.stop()
-    block, = driver.blocks
+    block, = driver.readings.blocks
     return block.line_time, _steps(watch.times, count), watch.troubles
 
 

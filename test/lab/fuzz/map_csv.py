@@ -45,7 +45,7 @@ def one_input(data: bytes) -> None:
         _check(mapping)
     assert len({mapping.name for mapping in good}) == len(good)
     bench = DriverBench(good, start=False)
-    planned = [mapping for block in bench.driver.blocks for mapping in block.mappings]
+    planned = [mapping for block in bench.driver.readings.blocks for mapping in block.mappings]
     assert sorted(mapping.item for mapping in planned) == sorted(
         mapping.item for mapping in good if mapping.polls)
 
