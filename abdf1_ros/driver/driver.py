@@ -57,7 +57,6 @@ from abdf1_ros.driver.interlocks.heartbeat import LARGEST
 from abdf1_ros.driver.interlocks.queue import Interlocks
 from abdf1_ros.driver.job_tasks import JobTasks
 from abdf1_ros.driver.links import DriverSettings, make_machine
-from abdf1_ros.driver.reads.read_backs import ReadBacks
 from abdf1_ros.driver.reads.readings import Readings, ValueListener
 from abdf1_ros.driver.record import WriteRecord
 from abdf1_ros.driver.served import Served
@@ -71,8 +70,6 @@ from abdf1_ros.pccc.families import served_counters
 from abdf1_ros.pccc.file_types import PlcType
 from abdf1_ros.pccc.identity import Identity
 from abdf1_ros.plan.bounds import MODE_PERIOD
-from abdf1_ros.plan.forecast import line_model
-from abdf1_ros.plan.planner import Planner
 from abdf1_ros.settings.mapping import Mapping
 from abdf1_ros.settings.network import Network
 
@@ -82,9 +79,6 @@ ENDS = 'this node ends'
 
 class Listener(ValueListener, Protocol):
     """Gets what happens; called in the link thread, ``written`` also in that of ``write``."""
-
-    def written(self, result: WriteResult) -> None:
-        """Take the one result of a write."""
 
     def happened(self, event: Event) -> None:
         """Take a numbered error or notice."""
@@ -129,15 +123,13 @@ class Driver:
     def _make_queues(self) -> None:
         """Make the queues of jobs, and who decides between them."""
         network, settings, machine = self.network, self._settings, self.machine
-        planner = Planner(line_model(network), settings.default_period)
         report = self._listener.written
-        backs = ReadBacks(settings.write_timeout, report)
         self.readings = Readings(
-            network, self.mappings, settings, planner, self.stations, machine, self._listener,
-            backs, lambda *read: self.interlocks.read_back(*read))  # noqa: PLW0108
+            network, self.mappings, settings, self.stations, machine, self._listener,
+            lambda *read: self.interlocks.read_back(*read))  # noqa: PLW0108
         self.points = self.readings.points
         self._record = record = WriteRecord(machine, 2 * network.cmd_timeout / 1000)
-        writing = WritesUnderWay(planner, self.stations, record, self.readings, backs)
+        writing = WritesUnderWay(self.stations, record, self.readings)
         self._writes = WriteQueue(self.stations, writing, settings.write_timeout, report,
                                   network.timing.tx_delay)
         self.checks = Checks(
@@ -152,7 +144,7 @@ class Driver:
             1 + settings.first_tns % LARGEST)
         self.guests = GuestQueue(self.stations, machine, network.cmd_timeout / 1000,
                                  self._station_of_guest, self._words_of_guest, record)
-        record.connect(backs, self.readings.reads, self.interlocks)
+        record.connect(self.readings.read_backs, self.readings.reads, self.interlocks)
         self.tasks = JobTasks(network.station, settings.first_tns, network.timing.char_time)
         self._agenda = Agenda(self.stations, self.interlocks, self._writes, self.checks,
                               self.readings.reads, self.guests, self.tasks)

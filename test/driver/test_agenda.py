@@ -32,7 +32,6 @@ from abdf1_ros.driver.job_tasks import Job, JobTasks
 from abdf1_ros.driver.links import DriverSettings
 from abdf1_ros.driver.reads.point import ReadPoint
 from abdf1_ros.driver.reads.queue import ReadJob
-from abdf1_ros.driver.reads.read_backs import ReadBacks
 from abdf1_ros.driver.reads.readings import Readings
 from abdf1_ros.driver.record import Claim, WriteRecord
 from abdf1_ros.driver.write import Outcome, Write, WriteResult
@@ -86,11 +85,10 @@ class Bench:
         self.begun: dict[Write, MessageJob] = {}
         self.stations = ActiveStationList([job.station for job in jobs], probe_time=PROBE_TIME)
         self.tasks, line = JobTasks(5, 0), StillClock()
-        planner, backs = Planner(LINE, 0.1), ReadBacks(write_timeout, self.results.append)
-        readings = Readings(Network(), (), DriverSettings(), planner, self.stations, line,
-                            Recorder(lambda: 0.0), backs, lambda mapping, words, started: None)
+        readings = Readings(Network(), (), DriverSettings(), self.stations, line,
+                            Recorder(lambda: 0.0), lambda mapping, words, started: None)
         self.record = WriteRecord(line, 1.0)
-        writing = WritesUnderWay(planner, self.stations, self.record, readings, backs)
+        writing = WritesUnderWay(self.stations, self.record, readings)
         self.reads = readings.reads
         self.writes = WriteQueue(self.stations, writing, write_timeout, self.results.append)
         checks = Checks(self.stations, {job.station for job in jobs}, 0.0, line,

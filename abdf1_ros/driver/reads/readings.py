@@ -29,12 +29,20 @@ from abdf1_ros.driver.reads.point import Guard, ReadPoint
 from abdf1_ros.driver.reads.queue import ReadJob
 from abdf1_ros.driver.reads.read_backs import ReadBacks
 from abdf1_ros.driver.reads.silent import Reads
+from abdf1_ros.driver.write import WriteResult
 from abdf1_ros.errors import FormatError, LinkError, RemoteError
 from abdf1_ros.pccc.identity import Identity
 from abdf1_ros.pccc.status import is_address_fault
 from abdf1_ros.pccc.values import Values
 from abdf1_ros.plan.bounds import own_load
-from abdf1_ros.plan.forecast import answer_time, block_time, period_of, poll_cycle, stale_times
+from abdf1_ros.plan.forecast import (
+    answer_time,
+    block_time,
+    line_model,
+    period_of,
+    poll_cycle,
+    stale_times,
+)
 from abdf1_ros.plan.planner import Block, Planner
 from abdf1_ros.plan.refusals import Change, Refusals
 from abdf1_ros.settings.mapping import Mapping
@@ -54,6 +62,9 @@ class ValueListener(Protocol):
     def unreadable(self, mapping: Mapping, reason: str) -> None:
         """Take note that a station answers without a usable value; once for each reason."""
 
+    def written(self, result: WriteResult) -> None:
+        """Take the one result of a write."""
+
     def published_again(self, mapping: Mapping, seconds: float) -> None:
         """Take note that rows are no longer withheld, of which ``mapping`` was the last one."""
 
@@ -63,14 +74,14 @@ class Readings:
     The ``points`` of all rows that are published, and the ``reads`` that serve them.
 
     ``listener`` is notified. ``read_backs`` compares what was read with unconfirmed writes,
-    ``read_back`` with heartbeats.
+    ``read_back`` with heartbeats. ``planner`` knows which packets each station takes.
     """
 
     def __init__(self, network: Network, mappings: Sequence[Mapping], settings: DriverSettings,
-                 planner: Planner, stations: ActiveStationList, line: LineTime,
-                 listener: ValueListener, read_backs: ReadBacks,
+                 stations: ActiveStationList, line: LineTime, listener: ValueListener,
                  read_back: Callable[[Mapping, bytes, float], None]) -> None:
-        blocks = planner.plan(mapping for mapping in mappings
+        self.planner = Planner(line_model(network), settings.default_period)
+        blocks = self.planner.plan(mapping for mapping in mappings
                               if not (settings.read_only and mapping.heartbeat))
         self.guards = Guards()
         self.points = _points(network, mappings, blocks, settings, self.guards)
@@ -80,9 +91,9 @@ class Readings:
         self._stations = stations
         self._line = line
         self._listener = listener
-        self.read_backs = read_backs
+        self.read_backs = ReadBacks(settings.write_timeout, listener.written)
         self._read_back = read_back
-        self._refusals = Refusals(planner)
+        self._refusals = Refusals(self.planner)
         self.reads.replace((), map(self._job, blocks), 0.0)
 
     @property

@@ -21,14 +21,12 @@ from collections.abc import Callable
 from abdf1_ros.df1.packet import BROADCAST
 from abdf1_ros.df1.stations import ActiveStationList
 from abdf1_ros.driver.job_tasks import Job
-from abdf1_ros.driver.reads.read_backs import ReadBacks
 from abdf1_ros.driver.reads.readings import Readings
 from abdf1_ros.driver.record import Claim, WriteRecord
 from abdf1_ros.driver.write import Outcome, Write, WriteResult
 from abdf1_ros.driver.writes.packets import carry_out
 from abdf1_ros.errors import CommandExpired, RemoteError
 from abdf1_ros.pccc.dialect import Steps
-from abdf1_ros.plan.planner import Planner
 
 
 class WriteJob(Job):
@@ -52,14 +50,12 @@ class WriteJob(Job):
 class WritesUnderWay:
     """Carries out writes, and takes their ends: in ``record``, of stations, and of reads."""
 
-    def __init__(self, planner: Planner, stations: ActiveStationList, record: WriteRecord,
-                 readings: Readings, read_backs: ReadBacks) -> None:
+    def __init__(self, stations: ActiveStationList, record: WriteRecord,
+                 readings: Readings) -> None:
         self.record = record
         self.line = record.line
-        self._planner = planner
         self._stations = stations
         self._readings = readings
-        self._read_backs = read_backs
 
     def begin(self, write: Write) -> Claim:
         """Take note that a write is under way, until it has ``ended``."""
@@ -69,7 +65,7 @@ class WritesUnderWay:
 
     def carry_out(self, write: Write, goes_on: bool) -> Steps[WriteResult]:
         """Send every packet of a write, in the packets that its station takes."""
-        write.speak(self._planner.dialect(write.mapping))
+        write.speak(self._readings.planner.dialect(write.mapping))
         return (yield from carry_out(write, lambda: self.line.now, goes_on=goes_on))
 
     def ended(self, job: WriteJob) -> None:
@@ -90,6 +86,7 @@ class WritesUnderWay:
     def report(self, job: WriteJob, report: Callable[[WriteResult], None]) -> None:
         """Report the result of a message, after a read where it is unconfirmed."""
         if job.result is not None and job.result.is_unconfirmed:
-            self._read_backs.add(job.write, job.result, self._readings.blocks, self.line.now)
+            readings = self._readings
+            readings.read_backs.add(job.write, job.result, readings.blocks, self.line.now)
         elif job.result is not None:
             report(job.result)
