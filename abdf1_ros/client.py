@@ -41,14 +41,13 @@ from traceback import print_exception
 from types import TracebackType
 from typing import Any, overload, Self, TYPE_CHECKING, TypeVar
 
-from abdf1_ros.counters import Counters
 from abdf1_ros.df1.checksum import Checksum
 from abdf1_ros.df1.machine import LineTiming
 from abdf1_ros.df1.master import MASTER
 from abdf1_ros.df1.mode import LineMode
 from abdf1_ros.df1.peer import PEER
 from abdf1_ros.df1.settings import LinkSettings
-from abdf1_ros.df1.stations import ActiveStationList, MAX_STATION
+from abdf1_ros.df1.stations import MAX_STATION
 from abdf1_ros.driver.requests import Requests
 from abdf1_ros.errors import FormatError, PortLost
 from abdf1_ros.pccc import steps
@@ -103,13 +102,15 @@ class OpenLine:
     A line on which one request is carried out after the other, from here to the end of ``with``.
 
     ``absent`` stations get one try; ``routes`` gives the gateways of stations that are behind one.
-    To a PLC that asks us we are a ``plc_type``. Raises OSError when the port cannot be opened.
+    To a PLC that asks us we are a ``plc_type``. ``counters`` are those of the line, ``stations``
+    what is known of each station. Raises OSError when the port cannot be opened.
     """
 
     def __init__(self, mode: LineMode, line: LinkSettings, port: PortSettings,
                  absent: Sequence[int] = (), routes: Mapping[int, int] | None = None,
                  plc_type: PlcType = PlcType.PLC5) -> None:
         self._requests = Requests(mode, line, absent, random.randrange(0x10000), routes, plc_type)
+        self.counters, self.stations = self._requests.counters, self._requests.stations
         self._link = LinkThread(self._requests.machine, opened(port), on_fault=print_exception)
         self._link.daemon = True  # a KeyboardInterrupt before ``with`` leaves nothing to stop it
         self._line = line_of(port.name)
@@ -124,19 +125,9 @@ class OpenLine:
         self.close()
 
     @property
-    def counters(self) -> Counters:
-        """Return the counters of the line."""
-        return self._requests.counters
-
-    @property
     def echoes(self) -> bool:
         """Tell whether the line gives back what is sent."""
         return self._requests.machine.echoes
-
-    @property
-    def stations(self) -> ActiveStationList:
-        """Return what is known of each station."""
-        return self._requests.stations
 
     def ask(self, station: int, work: Steps[_Result]) -> _Result:
         """Carry out a request and return its result; raises what its steps raise."""

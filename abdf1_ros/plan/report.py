@@ -169,8 +169,9 @@ class Report:
         if not self.mappings:
             text = 'the map has no usable row: nothing is read or written'
             return [*found, Remark(RemarkKind.MAP, text)]
+        times = bounds.remarks(self.network, self.mappings, self.response_time)
         return [*found, *_station_remarks(self), *_load_remarks(self), *_period_remarks(self),
-                *_gap_remarks(self), *_interlock_remarks(self)]
+                *_gap_remarks(self), *(Remark(RemarkKind.INTERLOCK, text) for text in times)]
 
 
 def _unprotected(mappings: Sequence[Mapping]) -> Iterator[str]:
@@ -353,12 +354,6 @@ def _load_remarks(report: Report) -> Iterator[Remark]:
             'while guests (Share) ask, a quarter of the time may be theirs: the periods then need '
             f'{load * (1 + 1 / OURS_BESIDE_GUESTS):.0%} of the time that is left, and the '
             'poll cycle is up to a third longer'))
-
-
-def _interlock_remarks(report: Report) -> Iterator[Remark]:
-    """Find heartbeats and fallbacks with times that the line cannot keep."""
-    for text in bounds.remarks(report.network, report.mappings, report.response_time):
-        yield Remark(RemarkKind.INTERLOCK, text)
 
 
 def _period_remarks(report: Report) -> Iterator[Remark]:

@@ -48,21 +48,18 @@ class Recording:
     """
     The chunks of a file; ``settings`` are those of a capture, as far as it has been read.
 
+    ``has_size`` tells whether the size of the file is known; that of a pipe or device is not.
     Raises OSError when the file cannot be opened.
     """
 
     def __init__(self, path: Path, is_binary: bool = False) -> None:
         self.settings: dict[str, str] = {}
         self._size = path.stat().st_size
+        self.has_size = self._size > 0
         self._position = 0
         self._name = str(path)
         self._is_binary = is_binary
         self._file = path.open('rb')
-
-    @property
-    def has_size(self) -> bool:
-        """Tell whether the size of the file is known; that of a pipe or device is not."""
-        return self._size > 0
 
     @property
     def percent(self) -> int:

@@ -31,7 +31,11 @@ TAKEN = timedelta(seconds=3)
 
 
 class Clock:
-    """Year, month, day, hour, minute and second of a station; FormatError where none is known."""
+    """
+    Year, month, day, hour, minute and second of a station; FormatError where none is known.
+
+    ``address`` is that of the first word.
+    """
 
     def __init__(self, session: Session, station: int, plc_type: PlcType) -> None:
         family = FAMILIES[plc_type]
@@ -39,11 +43,7 @@ class Clock:
             raise FormatError(f'is a {family.addressing.title}, whose clock is not known')
         self._session, self._station = session, station
         self._words = AddressedValues.of(family.clock, plc_type, 6, ValueType.UINT16)
-
-    @property
-    def address(self) -> str:
-        """Return the first of its words."""
-        return str(self._words.address)
+        self.address = str(self._words.address)
 
     def read(self) -> tuple[datetime, timedelta]:
         """Return its time, and how far it is ahead of this computer's local time."""

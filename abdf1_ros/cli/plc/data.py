@@ -144,7 +144,7 @@ def read(session: Session, mapping: Mapping) -> Values:
 
 class Writing:
     """
-    One write to one mapping.
+    One write to one mapping; ``value`` is what is to be written, as text.
 
     Raises FormatError, saying what is wrong, when ``texts`` are not values of the mapping.
     """
@@ -152,11 +152,7 @@ class Writing:
     def __init__(self, mapping: Mapping, texts: Sequence[str]) -> None:
         self.mapping = mapping
         self._write = Write(mapping, parse_values(mapping, texts), time.monotonic())
-
-    @property
-    def value(self) -> str:
-        """Return what is to be written, as text."""
-        return self._write.value
+        self.value = self._write.value
 
     def carry_out(self, session: Session) -> WriteResult:
         """Write; also when interrupted by KeyboardInterrupt, return how far it got."""
