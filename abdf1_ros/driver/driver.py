@@ -138,10 +138,9 @@ class Driver:
             lambda station, error: self.readings.link_failed(station, (), error),
             self._station_told, self._status_periods())
         self.interlocks = Interlocks(
-            () if settings.read_only else self.mappings, self.stations, self._writes, writing,
-            lambda write: self._served.store(write.mapping, write.raw), report,
-            self._listener.unreadable, self._foreign_value,
-            1 + settings.first_tns % LARGEST)
+            () if settings.read_only else self.mappings, self._writes, writing,
+            lambda write: self._served.store(write.mapping, write.raw), self._listener,
+            self._foreign_value, 1 + settings.first_tns % LARGEST)
         self.guests = GuestQueue(self.stations, machine, network.cmd_timeout / 1000,
                                  self._station_of_guest, self._words_of_guest, record)
         record.connect(self.readings.read_backs, self.readings.reads, self.interlocks)

@@ -85,8 +85,9 @@ class Bench:
         self.begun: dict[Write, MessageJob] = {}
         self.stations = ActiveStationList([job.station for job in jobs], probe_time=PROBE_TIME)
         self.tasks, line = JobTasks(5, 0), StillClock()
-        readings = Readings(Network(), (), DriverSettings(), self.stations, line,
-                            Recorder(lambda: 0.0), lambda mapping, words, started: None)
+        listener = Recorder(lambda: 0.0)
+        readings = Readings(Network(), (), DriverSettings(), self.stations, line, listener,
+                            lambda mapping, words, started: None)
         self.record = WriteRecord(line, 1.0)
         writing = WritesUnderWay(self.stations, self.record, readings)
         self.reads = readings.reads
@@ -94,8 +95,7 @@ class Bench:
         checks = Checks(self.stations, {job.station for job in jobs}, 0.0, line,
                         lambda station, error: None, lambda station, identity, asked: None)
         checks.begin(0.0)
-        interlocks = Interlocks((), self.stations, self.writes, writing, lambda write: None,
-                                self.results.append, lambda mapping, reason: None,
+        interlocks = Interlocks((), self.writes, writing, lambda write: None, listener,
                                 lambda mapping, text, is_conflict: None)
         guests = GuestQueue(self.stations, line, 1.0, lambda dst: dst,
                             lambda command, station: [], self.record)

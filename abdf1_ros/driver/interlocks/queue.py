@@ -28,10 +28,10 @@ import heapq
 import itertools
 import math
 
-from abdf1_ros.df1.stations import ActiveStationList
 from abdf1_ros.driver.interlocks.fallback import FallbackCause, FallbackRow
 from abdf1_ros.driver.interlocks.heartbeat import BeatState, HeartbeatRow
 from abdf1_ros.driver.interlocks.plc import Conditions, OwnRow, Plc, TurnRank
+from abdf1_ros.driver.reads.readings import ValueListener
 from abdf1_ros.driver.record import Claim, WriteListener
 from abdf1_ros.driver.write import Outcome, Write, WriteResult
 from abdf1_ros.driver.writes.queue import WriteQueue
@@ -72,17 +72,15 @@ class Interlocks(WriteListener):
     All heartbeats and fallbacks of a line.
 
     ``writes`` are the messages that wait or are under way. ``store`` puts the fallback of a Serve
-    row into our own table; ``report`` gets the result of each fallback that was written, ``tell``
-    why a PLC does not take one, ``warn`` that a heartbeat is not ours. Heartbeats count from
+    row into our own table; ``listener`` gets the result of each fallback that was written, and why
+    a PLC does not take one, ``warn`` that a heartbeat is not ours. Heartbeats count from
     ``first_beat`` on: two bridges that began together would not see each other if both did from 1.
     ``ours`` has the rows of our own table: ``expire`` has something to do when it is due.
     Only ``executor_ran``, ``wind_down`` and ``resume`` may be called from another thread.
     """
 
-    def __init__(self, mappings: Sequence[Mapping], stations: ActiveStationList,
-                 writes: WriteQueue, writing: WritesUnderWay,
-                 store: Callable[[Write], None], report: Callable[[WriteResult], None],
-                 tell: Callable[[Mapping, str], None],
+    def __init__(self, mappings: Sequence[Mapping], writes: WriteQueue, writing: WritesUnderWay,
+                 store: Callable[[Write], None], listener: ValueListener,
                  warn: Callable[[Mapping, str, bool], None], first_beat: int = 1) -> None:
         record = writing.record
         self.heartbeats = [HeartbeatRow(record.words_of(mapping), first_beat)
@@ -93,18 +91,16 @@ class Interlocks(WriteListener):
         rows: list[OwnRow] = [*self.heartbeats, *self.fallbacks]
         stations_of = {row: _OURS if row.mapping.serves else row.mapping.station for row in rows}
         self._plcs = {number: Plc(
-            number, [row for row in rows if stations_of[row] == number], stations, record,
+            number, [row for row in rows if stations_of[row] == number], writing.stations, record,
             self._conditions)
             for number in dict.fromkeys((_OURS, *stations_of.values()))}
         self._plc_of = {row: self._plcs[number] for row, number in stations_of.items()}
         self.ours = self._plcs.pop(_OURS)
         self._by_mapping = {row.mapping: row for row in self.fallbacks}
-        self._stations = stations
         self._writes = writes
         self._writing = writing
         self._store = store
-        self._report = report
-        self._tell, self._warn = tell, warn
+        self._listener, self._warn = listener, warn
         self._refreshes: list[tuple[float, int, FallbackRow]] = []
         self._tickets = itertools.count()
         self._has_begun = False
@@ -232,7 +228,7 @@ class Interlocks(WriteListener):
         """Return what has to be written next, None for nothing."""
         self.expire(now)
         if self._are_all_due:  # there is no later for silent PLCs
-            self._stations.probes.none_waits(now)
+            self._writing.stations.probes.none_waits(now)
         best: tuple[TurnRank, Plc, OwnRow] | None = None
         youngest: dict[Mapping, float] | None = None
         for plc in self._plcs.values():
@@ -278,7 +274,7 @@ class Interlocks(WriteListener):
             is_waiting = row.mapping in self._writes.youngest()
             if row.is_under_way or is_waiting and not row.has_failed \
                     or not self._writing.record.may_begin(row.mapping) \
-                    or not self._stations[row.mapping.station].replies_in_time:
+                    or not self._writing.stations[row.mapping.station].replies_in_time:
                 self._plan_refresh(row, now + row.after)
                 continue
             row.due = math.inf
@@ -307,7 +303,7 @@ class Interlocks(WriteListener):
         if result is not None and outcome is not Outcome.NOT_SENT:
             refusal = '' if outcome is Outcome.WRITTEN else str(result.error)
             if isinstance(result.error, RemoteError) and refusal != row.refusal:
-                self._tell(row.mapping, f'not written: {refusal}')
+                self._listener.unreadable(row.mapping, f'not written: {refusal}')
             row.refusal = refusal
 
     def _fallback_ended(self, row: FallbackRow, write: Write, outcome: Outcome,
@@ -317,7 +313,7 @@ class Interlocks(WriteListener):
         if row.stands and not row.mapping.serves:
             self._plan_refresh(row, row.refresh_at)
         if seconds is not None and cause is not None:
-            self._report(WriteResult(
+            self._listener.written(WriteResult(
                 row.mapping, Outcome.FALLBACK, cause.value, write.value, seconds))
 
     def expire(self, now: float) -> None:

@@ -54,13 +54,13 @@ class WritesUnderWay:
                  readings: Readings) -> None:
         self.record = record
         self.line = record.line
-        self._stations = stations
+        self.stations = stations
         self._readings = readings
 
     def begin(self, write: Write) -> Claim:
         """Take note that a write is under way, until it has ``ended``."""
         station = write.mapping.station
-        write.is_probe = station != BROADCAST and not self._stations[station].replies_in_time
+        write.is_probe = station != BROADCAST and not self.stations[station].replies_in_time
         return self.record.begin(station, (write.mapping.extent,), write)
 
     def carry_out(self, write: Write, goes_on: bool) -> Steps[WriteResult]:
@@ -72,13 +72,13 @@ class WritesUnderWay:
         """Take note of the end of a write."""
         write, result, station = job.write, job.result, job.station
         if station != BROADCAST:
-            self._stations.tried(station, job.begun, self.line.now, was_silent=write.is_probe,
-                                 is_message=True)
+            self.stations.tried(station, job.begun, self.line.now, was_silent=write.is_probe,
+                                is_message=True)
         if result is None:  # a bug
             self.record.ended(job.claim, Outcome.UNKNOWN, may_land=True)
             return
         if isinstance(result.error, RemoteError):
-            self._stations[station].remote_errors += 1
+            self.stations[station].remote_errors += 1
         elif result.error is not None and not isinstance(result.error, CommandExpired):
             self._readings.link_failed(station, (), result.error)
         self.record.ended(job.claim, result.outcome, may_land=result.is_unconfirmed)
