@@ -39,6 +39,7 @@ if __name__ == '__main__':  # pytest has its own paths
 from abdf1_ros.driver.driver import Driver
 from abdf1_ros.driver.interlocks.fallback import FallbackRow
 from abdf1_ros.driver.interlocks.heartbeat import BeatState, HeartbeatRow
+from abdf1_ros.driver.interlocks.plc import Plc
 from abdf1_ros.driver.interlocks.queue import Interlocks
 from abdf1_ros.driver.reads.guards import CounterGuard, RunGuard
 from abdf1_ros.driver.write import Outcome, Write
@@ -166,7 +167,7 @@ MISTAKES = (
     Mistake('2', 'the 0 stands for 0.1 s', HeartbeatRow, 'ended', _short_zero),
     Mistake('3 a', 'it counts on without a confirmation', HeartbeatRow, 'take',
             _counts_unconfirmed),
-    Mistake('3 b', 'it counts beside a fallback that is due', Interlocks, '_why_held',
+    Mistake('3 b', 'it counts beside a fallback that is due', Plc, '_why_held',
             _always('')),
     Mistake('3 c', 'it counts while the executor stands still', HeartbeatRow, 'executor_until',
             _always(math.inf)),

@@ -18,6 +18,7 @@ import secrets
 import time
 
 import pytest
+from simulate.mistakes import MISTAKES
 from simulate.run import simulate, Story
 from support.world import MODES
 
@@ -37,3 +38,8 @@ def test_seed_replays_a_plant_to_the_byte(mode: str) -> None:
         return story.world.wire.hexdigest()
 
     assert bytes_of_a_run() == bytes_of_a_run()
+
+
+def test_mistakes_are_made_in_methods_that_are_there() -> None:
+    assert [mistake.text for mistake in MISTAKES
+            if not callable(getattr(mistake.owner, mistake.name, None))] == []
