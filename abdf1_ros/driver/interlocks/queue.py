@@ -27,6 +27,7 @@ from collections.abc import Callable, Container, Sequence
 import heapq
 import itertools
 import math
+from operator import attrgetter
 
 from abdf1_ros.driver.interlocks.fallback import FallbackCause, FallbackRow
 from abdf1_ros.driver.interlocks.heartbeat import BeatState, HeartbeatRow
@@ -40,6 +41,7 @@ from abdf1_ros.errors import RemoteError
 from abdf1_ros.settings.mapping import Mapping
 
 _OURS = -1  # stands for our own table
+_due_of = attrgetter('due')
 
 
 class OwnWrite(WriteJob):
@@ -229,6 +231,8 @@ class Interlocks(WriteListener):
         self.expire(now)
         if self._are_all_due:  # there is no later for silent PLCs
             self._writing.stations.probes.none_waits(now)
+        if now < min(map(_due_of, self._plcs.values()), default=math.inf):
+            return None
         best: tuple[TurnRank, Plc, OwnRow] | None = None
         youngest: dict[Mapping, float] | None = None
         for plc in self._plcs.values():
