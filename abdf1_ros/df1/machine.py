@@ -349,11 +349,17 @@ class Machine:
         return self.sender.data_to_send()
 
     def withdraw(self, now: float) -> None:
-        """Take back a command that has become too old since it was looked at."""
+        """
+        Take back a command that has become too old since it was looked at.
+
+        The procedure gets no error where it has gone on by then.
+        """
         self.now = now
+        expires = self.sender.send_before
         self.sender.withdraw(now)
-        self._resume(_NOTHING, CommandExpired())
-        self._deliver_symbols()
+        if isinstance(self._step, Send) and self._step.expires == expires:
+            self._resume(_NOTHING, CommandExpired())
+            self._deliver_symbols()
 
     def _next_symbol(self) -> Symbol | None:
         """

@@ -726,6 +726,23 @@ def test_command_that_expires_before_it_is_given_to_the_port_is_taken_back(embed
     assert machine.data_to_send() == b''
 
 
+def test_command_that_is_taken_back_after_an_answer_to_another_ends_no_procedure() -> None:
+    heard: list[Heard] = []
+
+    def run(machine: Machine) -> Procedure:
+        yield Rest()
+        heard.append((yield Send(MESSAGE, 1.0, expires=5.5)))
+        heard.append((yield Rest()))
+
+    machine = Machine(run, checksum=Checksum.CRC, duplex=Duplex.FULL)
+    machine.start(5.0)
+    machine.receive_data(2 * ACK, 5.0)  # the second came before the command could leave
+    machine.withdraw(9.0)
+    assert machine.data_to_send() == b''
+    machine.wake(9.0)
+    assert heard == [Control.ACK, Silence()]
+
+
 def test_lateness_is_what_the_machine_is_called_after_its_deadlines() -> None:
     bench = Bench(Send(FRAME, 1.0), Send(FRAME, 1.0), Send(FRAME, 1.0), Rest())
     bench.machine.handle_timeout(0.5)
