@@ -205,6 +205,7 @@ def test_rule_5_guest_under_way_is_written_over_at_the_end(
         before = len(fallbacks(cell.results))
         assert cell.call(Trigger, 'reload', Trigger.Request()).success
         cell.until(lambda: fallbacks(cell.results)[before:].count('start') > 0, 'the fallback')
+        cell.until(place.exists, 'the place')
         cell.plcs.say('delay 1 250')  # it executes a command at once, and answers later
         with Client(str(place), plc_type='SLC', timeout=3.0, cmd_timeout=3.0) as hmi:
             writer = threading.Thread(target=hmi.write, args=('N10:1', 99))

@@ -45,10 +45,12 @@ from rclpy.parameter import parameter_value_to_python
 from rclpy.qos import QoSProfile
 from support.forked import Forked
 
-# Read when the first context is made, here and in every child process.
+# Read when the first context is made, here and in every child process. Shared memory is left out:
+# all sessions of a host have it in common, and processes that are killed leave locks in it.
 _LOGS = tempfile.TemporaryDirectory(prefix='abdf1_log_')  # goes away with this process
 os.environ |= {
     'ROS_LOG_DIR': _LOGS.name, 'RCUTILS_COLORIZED_OUTPUT': '0',
+    'FASTDDS_BUILTIN_TRANSPORTS': 'UDPv4',
     'FASTRTPS_DEFAULT_PROFILES_FILE': str(Path(__file__).with_name('dds.xml'))}
 
 OK, WARN, ERROR = DiagnosticStatus.OK, DiagnosticStatus.WARN, DiagnosticStatus.ERROR
@@ -65,6 +67,7 @@ class Process:
         self.lines: list[str] = []
         self._said = threading.Condition()
         self._goes_on = threading.Event()
+        self._keeper: threading.Thread | None = None
         self._process: Any
         if is_forked and 'PYTEST_CURRENT_TEST' in os.environ:
             self._process = Forked(program, args)
@@ -147,7 +150,8 @@ class Process:
         """Let it stand still until ``go_on``, whoever else lets it continue."""
         self._goes_on.clear()
         self.send(signal.SIGSTOP)
-        threading.Thread(target=self._keep_stopped, daemon=True).start()
+        self._keeper = threading.Thread(target=self._keep_stopped, daemon=True)
+        self._keeper.start()
 
     def _keep_stopped(self) -> None:
         while not self._goes_on.wait(0.005):
@@ -156,6 +160,8 @@ class Process:
     def go_on(self) -> None:
         """Let it continue."""
         self._goes_on.set()
+        if self._keeper is not None:  # its last SIGSTOP has to come before
+            self._keeper.join()
         self.send(signal.SIGCONT)
 
     def result(self) -> int:
