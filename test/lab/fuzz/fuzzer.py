@@ -34,7 +34,7 @@ def main() -> None:
     except ImportError:
         sys.exit('fuzzing needs atheris: pip install -r requirements/fuzz.txt '
                  '(there are wheels for CPython on Linux x86-64 only)')
-    sys.path[:0] = [str(_TESTS.parent), str(_TESTS)]
+    sys.path[:0] = [str(_TESTS.parent), str(_TESTS), str(_TESTS / 'lab')]
     (name,) = (word.removeprefix(_TARGET) for word in sys.argv if word.startswith(_TARGET))
     with atheris.instrument_imports(include=['abdf1_ros']):
         target = importlib.import_module(f'fuzz.{name}')
