@@ -357,6 +357,7 @@ def test_rule_3_beat_is_not_sent_when_it_may_be_wrong_by_then() -> None:
         own = interlocks.next(now)
         assert own is not None
         assert own.row is beat
+        own.result = own.write.result(Outcome.NOT_SENT, '', now)
         own.ended(None)
         return own.expires
 
@@ -1194,6 +1195,21 @@ def test_rule_11_every_eighth_turn_is_a_reads() -> None:
     read = make_mapping('N11:0', period=0)
     cell = Cell(*beats, read, run=5.0)
     assert len(cell.bench.listener.times(read)) > 10
+
+
+def test_rule_11_plc_is_not_left_alone_any_more_once_it_answers_a_write_of_anybody() -> None:
+    speed = speed_row()
+    cell = GuestCell(speed, start=False)
+    cell.is_undelivered = lambda command: command.data.endswith(b'\7\0')
+    cell.bench.open()
+    plc = cell.bench.driver.interlocks._plcs[1]
+    cell.bench.run_until(lambda: plc.is_lost)
+    cell.is_undelivered = lambda command: False
+    assert cell.now < 0.2 < plc.pause_end
+    cell.ask('N7:0', 99)
+    cell.bench.run_until(lambda: cell.word('N7:0') == 99)
+    cell.run(0.1)
+    assert cell.word('N7:0') == 7
 
 
 def test_rule_11_first_try_of_a_fallback_does_not_wait_for_the_turn_of_late_plcs() -> None:

@@ -28,7 +28,7 @@ import math
 from abdf1_ros.df1.stations import ActiveStationList
 from abdf1_ros.driver.interlocks.fallback import FallbackCause, FallbackRow
 from abdf1_ros.driver.interlocks.heartbeat import HeartbeatRow
-from abdf1_ros.driver.record import WriteRecord
+from abdf1_ros.driver.record import Claim, WriteRecord
 from abdf1_ros.driver.write import Outcome
 from abdf1_ros.settings.mapping import Mapping
 
@@ -40,6 +40,8 @@ _FAILURES = 2
 # many times as long as the last attempt took: an eighth is left to the silent.
 _LEAST_PAUSE = 1.0
 _SHARE_OF_OTHERS = 7
+
+_ANSWERED = (Outcome.WRITTEN, Outcome.PARTLY, Outcome.FAILED)
 
 OwnRow = HeartbeatRow | FallbackRow
 TurnRank = tuple[float, ...]
@@ -64,8 +66,8 @@ class Plc:
     The rows of one station, and how it has answered our own writes.
 
     ``due`` is when its rows have to be looked at (clock value in s), ``first_due`` that for first
-    tries, which no pause holds up. ``failures`` counts the last ones that it has not answered;
-    from the second on it is left alone up to ``pause_end``.
+    tries, which no pause holds up. ``failures`` counts those that it has not answered since it
+    answered a write of anybody; from the second on it is left alone up to ``pause_end``.
     """
 
     def __init__(self, station: int, rows: Iterable[OwnRow], stations: ActiveStationList,
@@ -134,24 +136,25 @@ class Plc:
         self.look_again(*self._held_up)
         self._held_up.clear()
 
-    def answered(self, row: OwnRow, outcome: Outcome, took: float, now: float) -> None:
+    def write_ended(self, claim: Claim, now: float) -> None:
         """
-        Take note how a write of ours ended, which ``took`` so many seconds.
+        Take note how a write to it ended, of whomever, and whether it has answered.
 
-        A PLC that does not answer is left alone for a while, or it would take the whole line. When
-        one answers again that is behind a gateway, it is a first contact, as its station was
+        One that does not answer ours is left alone for a while, or it would take the whole line.
+        When one answers again that is behind a gateway, it is a first contact, as its station was
         active all the time (rules 2, 8).
         """
-        is_behind_gateway = row.mapping.via is not None
-        if outcome is Outcome.UNKNOWN:
-            self.failures += 1
-            if self.is_lost:
-                share = _SHARE_OF_OTHERS * took if is_behind_gateway else 0.0
-                self.pause_end = now + max(_LEAST_PAUSE, share)
-        elif outcome is not Outcome.NOT_SENT:
+        is_behind_gateway = self.rows[0].mapping.via is not None
+        if claim.outcome in _ANSWERED:
             was_lost, self.failures, self.pause_end = self.is_lost, 0, -math.inf
             if was_lost and is_behind_gateway:
                 self.contact(now)
+        elif claim.outcome is Outcome.UNKNOWN and claim.write is not None and claim.write.is_own:
+            self.failures += 1
+            if self.is_lost:
+                took = self._record.line.took(claim.begun, now)
+                share = _SHARE_OF_OTHERS * took if is_behind_gateway else 0.0
+                self.pause_end = now + max(_LEAST_PAUSE, share)
 
     # Which goes first
 

@@ -201,6 +201,8 @@ class Interlocks(WriteListener):
     def write_ended(self, claim: Claim) -> None:
         """Take note how a write ended, of whomever: fallbacks may wait for that (rules 7, 9)."""
         now = self._writing.record.line.now
+        if claim.station in self._plcs:
+            self._plcs[claim.station].write_ended(claim, now)
         rows: list[OwnRow] = []
         if claim.write is None:
             rows += (row for plc in self._plcs.values() for row in plc.rows
@@ -296,7 +298,6 @@ class Interlocks(WriteListener):
         row, result, now = own.row, own.result, self._writing.line.now
         plc = self._plc_of[row]
         outcome = Outcome.NOT_SENT if result is None else result.outcome
-        plc.answered(row, outcome, self._writing.line.took(own.begun, now), now)
         if isinstance(row, HeartbeatRow):
             row.ended(outcome, now)
         else:
