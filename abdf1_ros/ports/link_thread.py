@@ -18,12 +18,9 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Callable
-from contextlib import suppress
 from dataclasses import dataclass, field
 from enum import Enum
 import math
-import os
-import select
 import threading
 import time
 
@@ -31,6 +28,8 @@ from abdf1_ros.df1.machine import Machine
 from abdf1_ros.errors import PortLost
 from abdf1_ros.ports.clock import line_time
 from abdf1_ros.ports.descriptor import NoClient, Port, READ_SIZE
+from abdf1_ros.ports.pace import Pace
+from abdf1_ros.ports.wake import Wake
 
 # Between attempts to open a port (s). They cost almost nothing, and a person who has plugged the
 # cable in again is waiting.
@@ -39,16 +38,9 @@ _RETRY_PERIOD = 0.5
 _MAX_FAULTS = 3
 _FAULT_WINDOW = 60.0
 
-_WAKES = 4096  # read at a time
 _POLL_STEP = 0.001  # poll(2) counts milliseconds
 
-# Where bytes come faster than they can be worked on, so many are at a time: symbols of no
-# use take up to 18 us a byte. Before the next the other lines have so many times as long as that
-# took of the processor, but no longer than the line would have needed for these bytes.
-_PORTION = 64
-_OTHERS = 19
-
-_FASTEST = 10 / 115200  # s a character, where the line has no speed
+_PORTION = 64  # bytes worked on at a time, where they come too fast
 
 
 class PortKind(Enum):
@@ -173,28 +165,16 @@ class LinkThread(threading.Thread):
         self._longest_wait = longest_wait
         self.came_after = -math.inf
         self._clock = clock
-        self._processor_clock = processor_clock
-        self._worked = 0.0  # processor time (s) up to the last portion of a burst
-        self._paced = -math.inf  # until then a line would have needed for a burst so far
+        self._pace = Pace(clock, processor_clock)
         self._next: _Exchange | None = None
-        self._is_lost = False
         self.has_turned = True  # since a supervisor has set it to False
         self._stopping = False
-        self._is_closed = False
-        self._closing = threading.Lock()
         self._faults: deque[float] = deque(maxlen=_MAX_FAULTS)
-        self._wake_reader, self._wake_writer = os.pipe()
-        self._wakes = select.poll()  # not select(): that knows no descriptor from 1024 on
-        self._wakes.register(self._wake_reader, select.POLLIN)
-        os.set_blocking(self._wake_reader, False)
-        os.set_blocking(self._wake_writer, False)
+        self._wake = Wake()
 
     def wake(self) -> None:
         """Tell the machine, from any thread, that there may be something new to do."""
-        with self._closing:
-            if not self._is_closed:
-                with suppress(BlockingIOError):  # it is being woken already
-                    os.write(self._wake_writer, b'w')
+        self._wake.set()
 
     def ask_to_stop(self) -> None:
         """Begin the end of the thread; ``stop`` waits for it."""
@@ -206,11 +186,7 @@ class LinkThread(threading.Thread):
         self.ask_to_stop()
         if self.is_alive():
             self.join()
-        with self._closing:  # or a wake of another thread might write to another file
-            if not self._is_closed:
-                self._is_closed = True
-                os.close(self._wake_reader)
-                os.close(self._wake_writer)
+        self._wake.close()
 
     def release(self) -> bool:
         """Close the port until ``take``; return whether it is closed within 5 s."""
@@ -268,26 +244,25 @@ class LinkThread(threading.Thread):
                 self._set_state(False, RELEASED)
                 self._is_free.set()
                 self._wait()
-                continue
-            self._is_lost = False
-            asked = self._clock()
-            try:
-                port = self._opened_port()
-            except OSError as error:
-                self._is_lost, self.came_after = True, asked
-                if isinstance(error, NoClient):
-                    self._set_state(False, str(error), PortKind.NO_CLIENT)
-                else:
-                    self._set_state(False, f'cannot open the port: {_reason(error)}',
-                                    PortKind.UNAVAILABLE)
-            else:
-                if port is not None:
-                    self._set_state(True, 'open')
-                    self._run_on(port)
-            if self._is_lost and not self.has_failed:
+            elif not self._is_done_with_port() and not self.has_failed:
                 self._pause(self._retry_period)
         if self.state.is_open:
             self.state = PortState(False, 'closed')
+
+    def _is_done_with_port(self) -> bool:
+        """Open the port and run on it; return False where it cannot be opened, or was lost."""
+        asked = self._clock()
+        try:
+            port = self._opened_port()
+        except NoClient as error:
+            self._set_state(False, str(error), PortKind.NO_CLIENT)
+        except OSError as error:
+            self._set_state(
+                False, f'cannot open the port: {_reason(error)}', PortKind.UNAVAILABLE)
+        else:
+            return port is None or self._run_on(port)
+        self.came_after = asked
+        return False
 
     def _opened_port(self) -> Port | None:
         """Return the port, None when it is not wanted any more; raises OSError."""
@@ -300,7 +275,7 @@ class LinkThread(threading.Thread):
             attempt.abandon()
             return None
         attempt.join()  # it only has to wake us
-        self._take_wake()
+        self._wake.take()
         if attempt.error is not None:
             raise attempt.error
         return attempt.port
@@ -315,7 +290,9 @@ class LinkThread(threading.Thread):
             self._machine, self._while_sending = exchange.machine, exchange.while_sending
             exchange.is_done.set()
 
-    def _run_on(self, port: Port) -> None:
+    def _run_on(self, port: Port) -> bool:
+        """Run machines until the port has to be closed; return False where it was lost."""
+        self._set_state(True, 'open')
         end = 'the driver is stopping'
         try:
             while not self._is_interrupted:
@@ -323,18 +300,18 @@ class LinkThread(threading.Thread):
                 self._serve(port)
             if self.is_released:
                 end = RELEASED
+            return True
         except OSError as error:
             end = _reason(error)
-            self._is_lost = True
             self._set_state(False, f'the port was lost: {end}')
         except Exception as error:  # a bug must not end the bridge when it happens first
             end = 'internal error, see the log'
-            self._is_lost = True
             self._take_fault(error)
         finally:
             self._machine.stop(PortLost(end))
             port.close()
             self._while_sending()  # work that waited for the next frame, which did not come
+        return False
 
     def _serve(self, port: Port) -> None:
         """Run the machine until something else is wanted."""
@@ -358,7 +335,7 @@ class LinkThread(threading.Thread):
             timeout = min(wait, self._longest_wait)
             try:
                 data = left or port.read(
-                    None if timeout == math.inf else timeout, self._wake_reader)
+                    None if timeout == math.inf else timeout, self._wake.descriptor)
             except OSError:
                 machine.counters.read_errors += 1
                 raise
@@ -370,43 +347,28 @@ class LinkThread(threading.Thread):
             if left or port.has_more:
                 left = self._take_portion(data, now)
                 continue
-            self._paced = -math.inf
+            self._pace.line_until = -math.inf
             if data:
                 machine.receive_data(data, now)
-            elif self._take_wake() and not self._stopping:
+            elif self._wake.take() and not self._stopping:
                 machine.wake(now)
             self.came_after = asked
 
-    def _take_wake(self) -> bool:
-        try:
-            return bool(os.read(self._wake_reader, _WAKES))
-        except BlockingIOError:
-            return False
-
     def _wait(self) -> None:
         """Wait for a wake."""
-        self._wakes.poll()
-        self._take_wake()
+        self._wake.wait()
+        self._wake.take()
 
     def _take_portion(self, data: bytes, now: float) -> bytes:
-        """
-        Work on some of what comes faster than it can be worked on, then rest; return what is left.
-
-        No line does that. But a connection can, to a server that is broken or means harm: it would
-        take a whole processor, and keep the interpreter lock from the other lines of this process.
-        A burst that ends is worked off in the time that it would have taken on the line.
-        """
+        """Work on some of what comes too fast, then rest; return what is left."""
         machine, portion = self._machine, data[:_PORTION]
         if portion:
             machine.receive_data(portion, now)
-        if self._paced == -math.inf:
-            self._paced = now
         # Nothing is left where all of it were commands of a device server.
-        self._paced += (len(portion) or READ_SIZE) * (machine.timing.char_time or _FASTEST)
-        used = self._processor_clock() - self._worked
-        self._rest(max(0.0, min(_OTHERS * used, self._paced - self._clock())))
-        self._worked = self._processor_clock()
-        if self._take_wake() and not self._stopping:
+        count = len(portion) or READ_SIZE
+        self._rest(self._pace.rest_after(count, machine.timing.char_time, now))
+        self._pace.go_on()
+        if self._wake.take() and not self._stopping:
             machine.wake(self._clock())
         return data[_PORTION:]
 
@@ -415,7 +377,7 @@ class LinkThread(threading.Thread):
         deadline = self._machine.next_call
         if deadline is not None:
             seconds = max(0.0, min(seconds, deadline - self._clock()))
-        self._wakes.poll(math.ceil(seconds * 1000))
+        self._wake.wait(math.ceil(seconds * 1000))
 
     def _pause(self, seconds: float) -> None:
         """Wait, but not when the port has to be closed or another one opened."""
@@ -424,8 +386,8 @@ class LinkThread(threading.Thread):
             if left < _POLL_STEP:
                 time.sleep(left)
             else:
-                self._wakes.poll(int(left / _POLL_STEP))
-                self._take_wake()
+                self._wake.wait(int(left / _POLL_STEP))
+                self._wake.take()
 
     def _set_state(self, is_open: bool, text: str, kind: PortKind = PortKind.OTHER) -> None:
         self.state = PortState(is_open, text, kind)

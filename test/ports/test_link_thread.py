@@ -21,7 +21,6 @@ import os
 from pathlib import Path
 import queue
 import resource
-import select
 import socket
 import threading
 import time
@@ -45,6 +44,7 @@ from abdf1_ros.ports.link_thread import _Attempt, LinkThread, PortState
 from abdf1_ros.ports.opening import open_port
 from abdf1_ros.ports.settings import PortSettings
 from abdf1_ros.ports.trace import PortOpener
+from abdf1_ros.ports.wake import Wake
 import pytest
 import serial
 from support.counting import open_files
@@ -184,7 +184,7 @@ def test_wake_may_come_in_any_number_and_before_the_start(pty: Pty, link: Link) 
     machine = script.machine
     thread = LinkThread(machine, lambda: open_port(PortSettings(str(pty.name))))
     link.threads.append(thread)
-    for _ in range(100_000):  # more than the pipe takes
+    for _ in range(100_000):
         thread.wake()
     thread.start()
     assert pty.read(5) == READY
@@ -253,7 +253,7 @@ def test_stop_before_start() -> None:
     before = open_files()
     thread = LinkThread(Script().machine, lambda: pytest.fail('opened'))
     ours = open_files() - before
-    assert len(ours) == 2
+    assert len(ours) == 1
     thread.stop()
     thread.wake()  # somebody who does not know
     assert not ours & open_files()
@@ -262,17 +262,17 @@ def test_stop_before_start() -> None:
     assert not thread.is_alive()
 
 
-class Counted:
-    """What waits for wakes, and how often it was asked to."""
+class Counted(Wake):
+    """A wake that notes how long it was waited for."""
 
-    def __init__(self, wakes: select.poll) -> None:
+    def __init__(self) -> None:
+        super().__init__()
         self.waits: list[float] = []
-        self._wakes = wakes
 
-    def poll(self, milliseconds: float | None = None) -> list[tuple[int, int]]:
+    def wait(self, milliseconds: int | None = None) -> None:
         """Wait."""
         self.waits.append(math.inf if milliseconds is None else milliseconds)
-        return self._wakes.poll(milliseconds)
+        super().wait(milliseconds)
 
 
 def test_missing_port_is_waited_for_asleep() -> None:
@@ -286,7 +286,8 @@ def test_missing_port_is_waited_for_asleep() -> None:
         raise OSError('no')
 
     thread = LinkThread(Script().machine, refuse, retry_period=0.05)
-    thread._wakes = counted = Counted(thread._wakes)  # type: ignore[assignment]
+    thread._wake.close()
+    thread._wake = counted = Counted()
     thread.run()
     pauses = [wait for wait in counted.waits if wait != math.inf]
     assert sum(pauses) >= 3 * 45

@@ -1,0 +1,55 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""How long a connection is left alone that brings bytes faster than they can be worked on."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+import math
+
+# Symbols of no use take up to 18 us a byte. The other lines have so many times as long as a
+# portion took of the processor, but no longer than the line would have needed for its bytes.
+_OTHERS = 19
+
+_FASTEST = 10 / 115200  # s a character, where the line has no speed
+
+
+class Pace:
+    """
+    The rests between the portions of a burst.
+
+    No line does that. But a connection can, to a server that is broken or means harm: it would
+    take a whole processor, and keep the interpreter lock from the other lines of this process.
+    A burst that ends is worked off in the time that it would have taken on the line: that is over
+    at ``line_until`` (clock value, s), minus infinity where there is no burst.
+    """
+
+    def __init__(self, clock: Callable[[], float], processor_clock: Callable[[], float]) -> None:
+        self.line_until = -math.inf
+        self._clock = clock
+        self._processor_clock = processor_clock
+        self._worked = 0.0  # processor time (s) up to the last portion
+
+    def rest_after(self, count: int, char_time: float, now: float) -> float:
+        """Return how long (s) to rest after ``count`` characters that were there at ``now``."""
+        if self.line_until == -math.inf:
+            self.line_until = now
+        self.line_until += count * (char_time or _FASTEST)
+        used = self._processor_clock() - self._worked
+        return max(0.0, min(_OTHERS * used, self.line_until - self._clock()))
+
+    def go_on(self) -> None:
+        """Count the processor's time for the next portion from now on."""
+        self._worked = self._processor_clock()
