@@ -32,7 +32,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Future, wait
-from enum import Enum
 import math
 from numbers import Real
 import os
@@ -50,6 +49,7 @@ from abdf1_ros.df1.settings import LinkSettings
 from abdf1_ros.df1.stations import MAX_STATION
 from abdf1_ros.driver.requests import Requests
 from abdf1_ros.errors import FormatError, PortLost
+from abdf1_ros.numbers import Kind, member_of, one_of
 from abdf1_ros.pccc import steps
 from abdf1_ros.pccc.access import Access
 from abdf1_ros.pccc.dialect import Steps
@@ -70,13 +70,12 @@ if TYPE_CHECKING:
     from abdf1_ros.tagged_client import TaggedClient
 
 _GLANCE = 0.2  # s; while waiting, look so often whether the thread of the link still runs
-_MODES = {'full': PEER, 'half': MASTER}
-_PARITIES = {name: name for name in ('None', 'Even', 'Odd')}
+_DUPLEX = one_of({'full': PEER, 'half': MASTER})
+_PARITY = one_of({name: name for name in ('None', 'Even', 'Odd')})
 _LONGEST = 60.0  # s
 
 _Result = TypeVar('_Result')
-_Kind = TypeVar('_Kind')
-_Choice = TypeVar('_Choice', bound=Enum)
+_T = TypeVar('_T')
 
 _ours: set[str] = set()  # the lines that this program has open
 
@@ -176,20 +175,21 @@ class Client(OpenLine):
                  access: str | None = None, timeout: float = 1.0,
                  cmd_timeout: float = 1.0) -> None:
         self.station = _whole('station', station, 0, MAX_STATION)
-        self._access = None if access is None else _member('access', Access, access)
+        self._access = None if access is None else _choice('access', member_of(Access), access)
         self._kinds: dict[int, tuple[PlcType, Processor | None]] = {}
         self._kind: tuple[PlcType, Processor | None] | None = None
         if plc_type is not None:
-            kind = _choice('plc_type', {family.value: family for family in FAMILIES}, plc_type)
-            self._kind = kind, None if processor is None else _member(
-                'processor', Processor, processor)
+            families = one_of({family.value: family for family in FAMILIES})
+            self._kind = _choice('plc_type', families, plc_type), (
+                None if processor is None else _choice(
+                    'processor', member_of(Processor), processor))
         elif processor is not None:
             raise FormatError('processor needs plc_type; without both the PLC is asked')
         settings = PortSettings(
             text_of('port', port), _whole('baud', baud, 1),
-            parity=_choice('parity', _PARITIES, parity))
-        super().__init__(_choice('duplex', _MODES, duplex), LinkSettings(
-            checksum=_member('check', Checksum, check),
+            parity=_choice('parity', _PARITY, parity))
+        super().__init__(_choice('duplex', _DUPLEX, duplex), LinkSettings(
+            checksum=_choice('check', member_of(Checksum), check),
             station=_whole('own_station', own_station, 0, MAX_STATION),
             timing=LineTiming(settings.char_time), timeout=_seconds('timeout', timeout),
             cmd_timeout=_seconds('cmd_timeout', cmd_timeout)), settings)
@@ -243,8 +243,8 @@ class Client(OpenLine):
                 station: int | None) -> tuple[int, AddressedValues]:
         number = self._of(station)
         place, count = text_of('address', address), _whole('length', length)
-        chosen = None if kind is None else _member('kind', ValueType, kind)
-        order = _member('word_order', WordOrder, word_order)
+        chosen = None if kind is None else _choice('kind', member_of(ValueType), kind)
+        order = _choice('word_order', member_of(WordOrder), word_order)
         plc_type, processor = self._kind or self._asked(number)
         return number, AddressedValues.of(place, plc_type, count, chosen, word_order=order,
                                           access=self._access, processor=processor)
@@ -304,13 +304,9 @@ def text_of(name: str, value: Any) -> str:
     return value
 
 
-def _member(name: str, kinds: type[_Choice], value: Any) -> _Choice:
-    return _choice(name, {str(member.value): member for member in kinds}, value)
-
-
-def _choice(name: str, known: Mapping[str, _Kind], value: Any) -> _Kind:
+def _choice(name: str, kind: Kind[_T], value: Any) -> _T:
     """Return what is meant by a value, in any letter case."""
-    for text, meaning in known.items():
-        if isinstance(value, str) and text.lower() == value.lower():
-            return meaning
-    raise FormatError(f'{name} {shown(repr(value))} should be one of {", ".join(known)}')
+    found = kind.read(value) if isinstance(value, str) else None
+    if found is None:
+        raise FormatError(f'{name} {shown(repr(value))} should be {kind.right}')
+    return found

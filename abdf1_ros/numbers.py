@@ -13,7 +13,7 @@
 # limitations under the License.
 
 """
-Numbers as people write them.
+Numbers and choices as people write them.
 
 Python's own ``int`` and ``float`` take more than that: "1_000", the digits of every script,
 "nan" and "infinity".
@@ -21,8 +21,16 @@ Python's own ``int`` and ``float`` take more than that: "1_000", the digits of e
 
 from __future__ import annotations
 
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from enum import Enum
+import functools
 import math
 import re
+from typing import Any, Generic, TypeVar
+
+_T = TypeVar('_T')
+_Member = TypeVar('_Member', bound=Enum)
 
 _WHOLE = re.compile(r'[+-]?[0-9]{1,20}')
 _DECIMAL = re.compile(r'[+-]?(?:[0-9]+(?:\.[0-9]*)?|\.[0-9]+)(?:[eE][+-]?[0-9]+)?')
@@ -45,3 +53,45 @@ def two_readings(text: str) -> str:
     if not _COMMA_AND_THREE.fullmatch(text):
         return ''
     return f'{text.replace(",", "")} or {text.replace(",", ".")}'
+
+
+@dataclass(frozen=True, slots=True)
+class Kind(Generic[_T]):
+    """
+    What may stand in a cell, an option or an argument.
+
+    ``read`` returns what a text means, None where it should be something else: ``right``. A
+    number lies from ``low`` to ``high``.
+    """
+
+    read: Callable[[str], _T | None]
+    right: str = ''
+    low: int | None = None
+    high: int | None = None
+    unit: str = ''
+    choices: tuple[str, ...] = ()
+
+
+TEXT = Kind(str)
+
+
+def whole(low: int, high: int, unit: str = '') -> Kind[int]:
+    """Return the kind of whole numbers in a range."""
+    def read(text: str) -> int | None:
+        value = whole_number(text)
+        return value if value is not None and low <= value <= high else None
+    return Kind(read, f'a whole number from {low} to {high} {unit}'.rstrip(), low, high, unit)
+
+
+def one_of(known: Mapping[str, _T], spelled: Callable[[str], Any] = str.lower) -> Kind[_T]:
+    """Return the kind of choices by name; two texts that are ``spelled`` alike are the same."""
+    meanings = {spelled(name): meaning for name, meaning in known.items()}
+    choices = tuple(filter(None, known))
+    return Kind(lambda text: meanings.get(spelled(text)), f'one of {", ".join(choices)}',
+                choices=choices)
+
+
+@functools.cache
+def member_of(kind: type[_Member]) -> Kind[_Member]:
+    """Return the kind of the members of an enumeration, by value."""
+    return one_of({str(member.value): member for member in kind})

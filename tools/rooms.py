@@ -90,7 +90,7 @@ ROOMS = (
          (*_BASE, 'problems', 'numbers', 'text', 'df1', 'pccc', 'settings')),
     Room(('conform',), 'cases of the manual, played against the other end of a line', ()),
     Room(('client.py', 'tagged_client.py'), 'a blocking client for programs without ROS',
-         ('errors', 'problems', 'counters', 'text', 'df1', 'pccc', 'settings',
+         ('errors', 'problems', 'counters', 'numbers', 'text', 'df1', 'pccc', 'settings',
           'plan.usable_rows', 'driver.requests', 'ports'), is_pure=False),
     Room(('paths.py', 'signals.py'), 'where installed files lie; the end that a signal asks for',
          (), is_pure=False),

@@ -20,10 +20,12 @@ from collections.abc import Iterable, Sequence
 from dataclasses import fields, replace
 from pathlib import Path
 import re
+from typing import Any
 
 from abdf1_ros.counters import numbered
 from abdf1_ros.df1.frames import Code
 from abdf1_ros.messages import Message, Severity
+from abdf1_ros.numbers import Kind
 from abdf1_ros.pccc.access import Access
 from abdf1_ros.pccc.describe import command_codes
 from abdf1_ros.pccc.dialect import Dialect
@@ -36,7 +38,7 @@ from abdf1_ros.pccc.values import types_of
 from abdf1_ros.plan.report import make_report
 from abdf1_ros.settings.columns import MAP_COLUMNS
 from abdf1_ros.settings.map_file import load_mappings
-from abdf1_ros.settings.network import FIELDS, load_network, NetField
+from abdf1_ros.settings.network import FIELDS, load_network, Network
 
 from tools.explanations import COUNTERS, MESSAGES, OUTCOMES
 from tools.rooms import ROOMS
@@ -98,15 +100,15 @@ def net_fields() -> str:
     """Return the columns of the net CSV."""
     return table(
         ('column', 'default', 'values', 'meaning', 'error'),
-        ((entry.column, str(entry.default), _values(entry), entry.meaning,
-          _linked(str(entry.message.number)) if entry.message else '')
-         for entry in FIELDS.values()))
+        ((FIELDS[name].column, str(value), _values(FIELDS[name].kind), FIELDS[name].meaning,
+          _linked(str(message.number)) if (message := FIELDS[name].message) else '')
+         for name, value in Network().cells().items()))
 
 
-def _values(entry: NetField) -> str:
-    if entry.choices:
-        return ', '.join(map(str, entry.choices))
-    return '' if entry.low is None else f'{entry.low}-{entry.high}'
+def _values(kind: Kind[Any]) -> str:
+    if kind.choices:
+        return ', '.join(kind.choices)
+    return '' if kind.low is None else f'{kind.low}-{kind.high}'
 
 
 def map_columns() -> str:

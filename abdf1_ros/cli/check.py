@@ -55,7 +55,7 @@ from abdf1_ros.problems import ConfigurationError, Problem
 from abdf1_ros.settings.map_file import load_mappings
 from abdf1_ros.settings.map_row import MAX_PERIOD
 from abdf1_ros.settings.mapping import Mapping
-from abdf1_ros.settings.network import FIELDS, load_network, Network
+from abdf1_ros.settings.network import load_network, Network
 from abdf1_ros.settings.scaling import Scaling
 from abdf1_ros.text import by_number, cut, first, printable
 
@@ -337,7 +337,7 @@ def _content(found: Findings, report: Report | None) -> dict[str, Any]:
         'response_time_ms': None}
     if report is not None:
         content |= {
-            'network': {name: getattr(report.network, name) for name in FIELDS},
+            'network': report.network.cells(),
             'warnings': [*map(_remark, report.remarks())], 'notes': report.notes(),
             'blocks': [_entry(report, block) for block in report.blocks],
             'scan_time_ms': _ms(report.poll_cycle), 'load': round(report.load, 4),

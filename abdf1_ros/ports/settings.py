@@ -48,7 +48,7 @@ class PortSettings:
            rs485: bool = False) -> PortSettings:
         """Return the settings of a net CSV, with ``name`` in place of its Com_Port."""
         return cls(name or network.port, network.baud, network.data_bits, network.parity,
-                   network.stop_bits, network.handshake == 'Yes', low_latency, rs485)
+                   network.stop_bits, network.handshake, low_latency, rs485)
 
     @property
     def char_time(self) -> float:

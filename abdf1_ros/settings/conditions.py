@@ -23,7 +23,7 @@ from typing import Protocol
 
 from abdf1_ros.df1.packet import BROADCAST
 from abdf1_ros.errors import FormatError
-from abdf1_ros.numbers import decimal_number, whole_number
+from abdf1_ros.numbers import decimal_number, Kind, whole
 from abdf1_ros.pccc.file_types import FileType
 from abdf1_ros.pccc.values import ValueType
 from abdf1_ros.settings.csv_table import Row
@@ -39,9 +39,14 @@ from abdf1_ros.settings.limits import raw_values
 from abdf1_ros.settings.mapping import Command, Mapping, Publish
 from abdf1_ros.text import shown
 
-_PERIODS = (100, 60_000)
-_FALLBACK_AFTER = (200, 60_000)
-_TIMEOUTS = (100, 3_600_000)
+
+def _ms(low: int, high: int) -> Kind[int]:
+    return replace(whole(low, high), right=f'ms from {low} to {high}')
+
+
+_PERIODS = _ms(100, 60_000)
+_FALLBACK_AFTER = _ms(200, 60_000)
+_TIMEOUTS = _ms(100, 3_600_000)
 
 # The processor reads or writes their words itself.
 _NO_COUNTING = (FileType.STATUS, FileType.INPUT, FileType.OUTPUT)
@@ -71,16 +76,14 @@ def with_conditions(row: Row, mapping: Mapping, fault: ReportFault) -> Mapping:
     return replace(mapping, heartbeat=heartbeat, fallback=fallback, publish_while=publish_while)
 
 
-def _number_in(row: Row, column: str, limits: tuple[int, int], fault: ReportFault) -> int | None:
-    """Return a whole number of ms; report a fault where it is not within ``limits``."""
+def _number_in(row: Row, column: str, kind: Kind[int], fault: ReportFault) -> int | None:
+    """Return a needed number; report a fault where it is none of this kind."""
     text = row.get(column)
-    value = whole_number(text)
-    if value is not None and limits[0] <= value <= limits[1]:
-        return value
-    right = f'ms from {limits[0]} to {limits[1]}'
-    fault(column, f'{column} = "{shown(text)}" should be {right}' if text
-          else f'{column} is missing: {right}')
-    return None
+    value = kind.read(text)
+    if value is None:
+        fault(column, f'{column} = "{shown(text)}" should be {kind.right}' if text
+              else f'{column} is missing: {kind.right}')
+    return value
 
 
 def _heartbeat(row: Row, mapping: Mapping, fault: ReportFault) -> Heartbeat:

@@ -17,14 +17,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from enum import Enum
 import math
 from typing import Any, TypeVar
 
 from abdf1_ros.df1.packet import BROADCAST
 from abdf1_ros.df1.stations import MAX_STATION
 from abdf1_ros.messages import Message
-from abdf1_ros.numbers import decimal_number, two_readings, whole_number
+from abdf1_ros.numbers import decimal_number, Kind, member_of, one_of, two_readings, whole
 from abdf1_ros.pccc.access import Access
 from abdf1_ros.pccc.address import Address, AddressRangeError, AddressSyntaxError
 from abdf1_ros.pccc.families import FAMILIES, parse_address
@@ -46,7 +45,7 @@ from abdf1_ros.text import shown
 MAX_PERIOD = 86_400_000  # ms
 _PLC_TYPE_NAMES = tuple(entry.value for entry in FAMILIES)
 
-_Choice = TypeVar('_Choice', bound=Enum)
+_T = TypeVar('_T')
 
 
 @dataclass(frozen=True, slots=True)
@@ -110,12 +109,12 @@ class RowReader:
         """Return by attribute what stands in a cell and depends on no other cell."""
         return {
             'tag': self._row.get('Tag'),
-            'length': self._number('Length', 1, 65535, 1),
-            'period': self._number('Period', 0, MAX_PERIOD, None, unit=' ms'),
-            'publish': self._choice('Publish', Publish, Publish.ALWAYS),
+            'length': self._value('Length', whole(1, 65535), 1),
+            'period': self._value('Period', whole(0, MAX_PERIOD, 'ms')),
+            'publish': self._value('Publish', member_of(Publish), Publish.ALWAYS),
             'minimum': self._decimal('Min', -math.inf),
             'maximum': self._decimal('Max', math.inf),
-            'word_order': self._choice('Word_Order', WordOrder, WordOrder.LOW),
+            'word_order': self._value('Word_Order', member_of(WordOrder), WordOrder.LOW),
             'scaling': self._scaling(),
             'confirms': self._row.get('Confirms'),
             'description': self._row.get('Description')}
@@ -124,13 +123,13 @@ class RowReader:
         """Return by attribute what depends on other cells as well."""
         name = self._name('Tag', self._row.get('Tag'))
         topic = self._name('Topic', self._row.get('Topic')) if self._row.get('Topic') else name
-        command = self._choice('Command', Command, None)
+        command = self._value('Command', member_of(Command))
         # 255 is a broadcast: all stations take it, and none answers.
         last_station = BROADCAST if command is Command.WRITE else MAX_STATION
-        station = self._number('Station', 0, last_station, None, Message.ERR_BAD_STATION,
-                               MAX_STATION + 1)
+        station = self._value('Station', whole(0, last_station), None,
+                              Message.ERR_BAD_STATION, MAX_STATION + 1)
         via = self._via(command, station)
-        kind = self._choice('Type', ValueType, None) if self._row.get('Type') else None
+        kind = self._value('Type', member_of(ValueType))
         plc_type = self._plc_type()
         access = self._access(plc_type, command) if plc_type else None
         address = self._address(plc_type, access) if plc_type else None
@@ -158,28 +157,15 @@ class RowReader:
             self._fault(column, f'{column} has {len(name)} characters, at most {MAX_LENGTH} go')
         return name
 
-    def _choice(self, column: str, kind: type[_Choice], default: _Choice | None) -> _Choice | None:
-        text = self._row.get(column)
-        if not text and default is not None:
-            return default
-        for entry in kind:
-            if entry.value.lower() == text.lower():
-                return entry
-        right = ', '.join(entry.value for entry in kind)
-        self._bad_value(column, f'should be one of {right}')
-        return None
-
-    def _number(self, column: str, low: int, high: int, default: int | None,
-                message: Message | None = None, *args: object, unit: str = '') -> int | None:
+    def _value(self, column: str, kind: Kind[_T], default: _T | None = None,
+               message: Message | None = None, *args: object) -> _T | None:
         text = self._row.get(column)
         if not text:
             return default
-        value = whole_number(text)
-        if value is not None and low <= value <= high:
-            return value
-        self._bad_value(column, f'should be a whole number from {low} to {high}{unit}', message,
-                        shown(text), *args)
-        return None
+        value = kind.read(text)
+        if value is None:
+            self._bad_value(column, f'should be {kind.right}', message, shown(text), *args)
+        return value
 
     def _decimal(self, column: str, default: float) -> float:
         text = self._row.get(column)
@@ -202,7 +188,7 @@ class RowReader:
 
     def _via(self, command: Command | None, station: int | None) -> int | None:
         """Return the gateway, None for a station that needs none."""
-        via = self._number('Via', 0, MAX_STATION, None)
+        via = self._value('Via', whole(0, MAX_STATION))
         if via is None or via == station:
             return None
         if command is Command.SERVE:
@@ -225,7 +211,7 @@ class RowReader:
         ways = FAMILIES[plc_type].accesses
         if not text or self._is_read_only(command):
             return ways[0]
-        access = next((way for way in ways if way.value.lower() == text.lower()), None)
+        access = one_of({way.value: way for way in ways}).read(text)
         if command is Command.SERVE:
             self._bad_value('Access', f'of a Serve row should be {READ_ONLY}, for words that the '
                                       'other end cannot write, or empty')
@@ -246,7 +232,7 @@ class RowReader:
             self._fault('Processor', 'Processor is for PLCs of type SLC that we read or write',
                         is_superfluous=True)
             return None
-        processor = self._choice('Processor', Processor, None)
+        processor = self._value('Processor', member_of(Processor))
         if processor and address and not processor.has_file(address.file, address.file_type):
             self._fault('Address', f'{processor.value} has no file {address.file_type.value}'
                                    f'{address.file}; {having(address)} may have it')

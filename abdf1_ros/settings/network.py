@@ -33,7 +33,7 @@ from abdf1_ros.df1.packet import BROADCAST
 from abdf1_ros.df1.settings import LinkOptions, LinkSettings
 from abdf1_ros.df1.stations import MAX_STATION
 from abdf1_ros.messages import Message
-from abdf1_ros.numbers import whole_number
+from abdf1_ros.numbers import Kind, one_of, TEXT, whole, whole_number
 from abdf1_ros.pccc.families import FAMILIES
 from abdf1_ros.problems import ConfigurationError, Place, Problem
 from abdf1_ros.settings import BAUD_RATES, PARITIES
@@ -56,71 +56,54 @@ class NetField:
     """
     One field of the net CSV.
 
-    A number lies from ``low`` to ``high`` or is one of ``choices``; a text is one of
-    ``choices`` in any letter case, or anything where there are none. A bad value is reported
-    with ``message``, whose places after the value are filled from ``message_args``.
-    ``other_words`` are names of choices in other programs, in lower case, with the choice to
-    advise; ``also`` are other spellings that are accepted.
+    A bad value is reported with ``message``, whose places after the value are filled from
+    ``message_args``. ``other_words`` are names of choices in other programs, in lower case, with
+    the choice to advise.
     """
 
     column: str
-    default: int | str
+    default: int | str | bool
     description: str
-    low: int | None = None
-    high: int | None = None
-    choices: tuple[int | str, ...] = ()
+    kind: Kind[Any]
     message: Message | None = None
     message_args: tuple[Any, ...] = ()
     other_words: MappingType[str, str] = field(default_factory=dict)
-    also: MappingType[str, str] = field(default_factory=dict)
-    unit: str = ''
 
     @property
     def meaning(self) -> str:
         """Return what a value says, with its unit."""
-        return f'{self.unit} {self.description}'.lstrip()
+        return f'{self.kind.unit} {self.description}'.lstrip()
 
     @property
     def parameter(self) -> str:
         """Return the name of the node's parameter."""
         return f'net.{self.column.lower()}'
 
-    def parse(self, text: str, where: Place | str) -> int | str:
+    def parse(self, text: str, where: Place | str) -> int | str | bool:
         """Return the value of a cell; raise Problem when it is not allowed."""
-        value = self._number(text) if isinstance(self.default, int) else self._choice(text)
+        value: int | str | bool | None = self.kind.read(text)
         if value is None:
-            args = (shown(text), *self.message_args)
-            raise Problem(where, self.advice(text), self.message, args if self.message else ())
+            meant = self.other_words.get(re.sub(r'[\W_]', '', text).lower())
+            advice = f'; "{shown(text)}" is {meant}' if meant else hint(text)
+            raise Problem(where, f'{self.column} = "{shown(text)}" should be {self.kind.right}'
+                          f'{advice}', self.message, (shown(text), *self.message_args)
+                          if self.message else ())
         return value
 
-    def advice(self, text: str) -> str:
-        """Return what is wrong with a value and what would be right."""
-        if self.choices:
-            right = f'one of {", ".join(map(str, self.choices))}'
-        else:
-            right = f'a whole number from {self.low} to {self.high} {self.unit}'.rstrip()
-        meant = self.other_words.get(re.sub(r'[\W_]', '', text).lower())
-        advice = f'; "{shown(text)}" is {meant}' if meant else hint(text)
-        return f'{self.column} = "{shown(text)}" should be {right}{advice}'
 
-    def _number(self, text: str) -> int | None:
-        value = whole_number(text)
-        if value is None or self.choices:
-            return value if value in self.choices else None
-        assert self.low is not None and self.high is not None
-        return value if self.low <= value <= self.high else None
-
-    def _choice(self, text: str) -> str | None:
-        if not self.choices:
-            return text
-        text = self.also.get(text, text)
-        return next((str(choice) for choice in self.choices
-                     if str(choice).lower() == text.lower()), None)
-
-
-def _net(column: str, default: int | str, description: str, **details: Any) -> Any:
-    entry = NetField(column, default, description, **details)
+def _net(column: str, default: int | str, description: str, kind: Kind[Any] = TEXT,
+         **details: Any) -> Any:
+    entry = NetField(column, default, description, kind, **details)
     return field(default=default, metadata={'net': entry})
+
+
+def _named(*names: str) -> Kind[str]:
+    return one_of({name: name for name in names})
+
+
+_YES = one_of({'Yes': True, 'No': False})
+# S0 prints the default as a dash.
+_PARITY = one_of({name: name for name in PARITIES}, lambda text: text.lower().replace('-', 'none'))
 
 
 @dataclass(frozen=True, slots=True)
@@ -128,55 +111,59 @@ class Network:
     """A checked net CSV; times in milliseconds, as in the file."""
 
     station: int = _net(
-        'Station', 5, 'DF1 address of this node', low=0, high=MAX_STATION,
+        'Station', 5, 'DF1 address of this node', whole(0, MAX_STATION),
         message=Message.CRT_BAD_STATION_ID, message_args=(255,))
     mode: str = _net(
-        'Mode', 'Master', 'driver mode', choices=MODE_NAMES,
+        'Mode', 'Master', 'driver mode', _named(*MODE_NAMES),
         message=Message.CRT_BAD_DRIVER_MODE,
         message_args=('Master', 'Slave, Peer', 'Radio'),
         other_words=dict(ChainMap(*(dict(mode.other_words) for mode in MODES))))
     plc_type: str = _net(
-        'PLC_Type', 'PLC5', 'PLC that this node emulates', choices=PLC_TYPES,
+        'PLC_Type', 'PLC5', 'PLC that this node emulates', _named(*PLC_TYPES),
         message=Message.CRT_BAD_PLC_TYPE, message_args=PLC_TYPES)
     error_code: str = _net(
-        'Error_Code', 'CRC', 'check of every message', choices=('BCC', 'CRC'),
+        'Error_Code', 'CRC', 'check of every message', _named('BCC', 'CRC'),
         message=Message.CRT_BAD_ERROR_CODE, message_args=('BCC', 'CRC'))
     nak_retries: int = _net(
-        'NAK_Retries', 3, 'repetitions of a command that is not acknowledged', low=0, high=10,
+        'NAK_Retries', 3, 'repetitions of a command that is not acknowledged', whole(0, 10),
         message=Message.CRT_BAD_NAK_RETRIES, message_args=(10,))
     enq_retries: int = _net(
-        'ENQ_Retries', 3, 'repetitions of a poll that is not answered', low=0, high=10,
+        'ENQ_Retries', 3, 'repetitions of a poll that is not answered', whole(0, 10),
         message=Message.CRT_BAD_ENQ_RETRIES, message_args=(10,))
     cmd_timeout: int = _net(
-        'Cmd_Timeout', 1000, 'until a reply is no longer polled for', low=500, high=5000,
-        unit='ms', message=Message.CRT_BAD_CMD_TIMEOUT, message_args=(500, 5000))
+        'Cmd_Timeout', 1000, 'until a reply is no longer polled for', whole(500, 5000, 'ms'),
+        message=Message.CRT_BAD_CMD_TIMEOUT, message_args=(500, 5000))
     com_port: str = _net('Com_Port', '1', f'n for /dev/ttyS(n-1), a device path, {URLS}')
-    baud: int = _net('Baud', 9600, 'bits per second', choices=BAUD_RATES)
-    data_bits: int = _net('Data_Bits', 8, 'data bits per character', low=5, high=8)
-    stop_bits: int = _net('Stop_Bits', 1, 'stop bits per character', low=1, high=2)
-    parity: str = _net(
-        'Parity', 'None', 'parity bit per character', choices=PARITIES,
-        also={'-': 'None'})  # as S0 prints the default
+    baud: int = _net('Baud', 9600, 'bits per second', one_of(
+        {str(baud): baud for baud in BAUD_RATES}, whole_number))
+    data_bits: int = _net('Data_Bits', 8, 'data bits per character', whole(5, 8))
+    stop_bits: int = _net('Stop_Bits', 1, 'stop bits per character', whole(1, 2))
+    parity: str = _net('Parity', 'None', 'parity bit per character', _PARITY)
     timeout: int = _net(
-        'Timeout', 1000, 'to wait for each answer of a station', low=0, high=360000,
-        unit='ms')
+        'Timeout', 1000, 'to wait for each answer of a station', whole(0, 360000, 'ms'))
     tx_delay: int = _net(
-        'TX_Delay', 0, 'to wait before each transmission', low=0, high=65535, unit='ms')
-    handshake: str = _net('Handshake', 'No', 'hardware handshake RTS/CTS', choices=('Yes', 'No'))
-    polling: str = _net('Polling', 'Message', 'how a master polls', choices=POLLING_MODES)
+        'TX_Delay', 0, 'to wait before each transmission', whole(0, 65535, 'ms'))
+    handshake: bool = _net('Handshake', False, 'hardware handshake RTS/CTS', _YES)
+    polling: str = _net('Polling', 'Message', 'how a master polls', _named(*POLLING_MODES))
     share: str = _net(
         'Share', '', 'places where other programs connect to share the line, separated by blanks: '
         'pty:/name, tcp:port, tcp:address:port, or a serial device')
     share_access: str = _net(
-        'Share_Access', 'Read', 'what they may do', choices=('Read', 'Write', 'All'))
+        'Share_Access', 'Read', 'what they may do', _named('Read', 'Write', 'All'))
     store_forward: str = _net(
         'Store_Forward', '', 'Mode Radio: nodes between which packets are sent on, as in 1,3-5; '
         '255 for broadcasts')
-    collision_avoidance: str = _net(
-        'Collision_Avoidance', 'No', 'Mode Radio, Yes: radios avoid collisions and buffer both '
-        'directions, so commands to several stations may be under way', choices=('Yes', 'No'))
+    collision_avoidance: bool = _net(
+        'Collision_Avoidance', False, 'Mode Radio, Yes: radios avoid collisions and buffer both '
+        'directions, so commands to several stations may be under way', _YES)
     # Remarks about the way the file is written.
     remarks: tuple[Problem, ...] = field(default=(), compare=False)
+
+    def cells(self) -> dict[str, int | str]:
+        """Return what would stand in the file, by field."""
+        values = {name: getattr(self, name) for name in FIELDS}
+        return {name: ('No', 'Yes')[value] if isinstance(value, bool) else value
+                for name, value in values.items()}
 
     @property
     def checksum(self) -> Checksum:
@@ -195,7 +182,7 @@ class Network:
             nak_retries=self.nak_retries, enq_retries=self.enq_retries,
             timeout=self.timeout / 1000, cmd_timeout=self.cmd_timeout / 1000,
             store_forward=parse_stations(self.store_forward, BROADCAST)[0],
-            avoids_collisions=self.duplex is Duplex.RADIO and self.collision_avoidance == 'Yes')
+            avoids_collisions=self.duplex is Duplex.RADIO and self.collision_avoidance)
 
     @property
     def line_mode(self) -> LineMode:

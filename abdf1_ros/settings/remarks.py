@@ -50,7 +50,7 @@ def network_remarks(network: Network) -> Iterator[str]:
         yield from _time_remarks(network)
     if mode.duplex is not Duplex.RADIO:
         for column, value in (('Store_Forward', network.store_forward),
-                              ('Collision_Avoidance', network.collision_avoidance == 'Yes')):
+                              ('Collision_Avoidance', network.collision_avoidance)):
             if value:
                 yield f'{column} is for Mode Radio; in Mode {network.mode} it does nothing'
     yield from share_remarks(share_places(network.share))

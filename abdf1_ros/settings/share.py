@@ -24,7 +24,7 @@ from urllib.parse import parse_qsl, urlsplit
 
 from abdf1_ros.df1.checksum import Checksum
 from abdf1_ros.line_names import address_of, device_of, link_of, LOOPBACK
-from abdf1_ros.numbers import whole_number
+from abdf1_ros.numbers import whole
 from abdf1_ros.settings import BAUD_RATES, PARITIES
 from abdf1_ros.text import shown
 
@@ -112,12 +112,12 @@ def _place(text: str) -> SharePlace:
 
 def _host_and_port(name: str, text: str) -> tuple[str, int]:
     host, colon, digits = name.rpartition(':')
-    port = whole_number(digits)
+    port = whole(1, 65535).read(digits)
     try:
         host = str(ipaddress.ip_address(re.sub(r'^\[|\]$', '', host))) if colon else LOOPBACK
     except ValueError:
         port = None  # a name may stand for any interface
-    if port is None or not 0 < port < 65536:
+    if port is None:
         raise ValueError(f'"{shown(text)}" should be tcp:PORT (for this machine only) or '
                          'tcp:ADDRESS:PORT, with the address of an interface')
     return host, port

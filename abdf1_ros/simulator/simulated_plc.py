@@ -35,7 +35,7 @@ from abdf1_ros.df1.settings import LinkSettings
 from abdf1_ros.df1.slave import HalfDuplexSlave
 from abdf1_ros.df1.stations import MAX_STATION
 from abdf1_ros.errors import FormatError, LinkError, RemoteError
-from abdf1_ros.numbers import decimal_number, whole_number
+from abdf1_ros.numbers import decimal_number, Kind, member_of, one_of, whole, whole_number
 from abdf1_ros.pccc.address import Address
 from abdf1_ros.pccc.data_table import DataTable, NoSuchFile
 from abdf1_ros.pccc.emulated import EmulatedProcessor, Setting
@@ -53,7 +53,7 @@ COLUMNS = ('Station', 'PLC_Type', 'Address', 'Length', 'Values', 'Motion', 'Peri
            'Processor')
 _RAMP_TOP = 1000
 
-_Choice = TypeVar('_Choice')
+_T = TypeVar('_T')
 
 
 class Motion(Enum):
@@ -303,11 +303,11 @@ def load_plcs(path: str, checksum: Checksum, clock: Callable[[], float]) -> list
 
 def _load_row(row: Row, plcs: dict[int, SimulatedPlc], checksum: Checksum,
               clock: Callable[[], float]) -> None:
-    station = _number(row, 'Station', 0, MAX_STATION)
-    via = _number(row, 'Via', 1, MAX_STATION) if row.get('Via') else None
-    length = _number(row, 'Length', 1, 1000) if row.get('Length') else 1
-    motion = _choice(row, 'Motion', {entry.value: entry for entry in Motion})
-    plc_type = _choice(row, 'PLC_Type', {kind.value: kind for kind in FAMILIES})
+    station = _value(row, 'Station', whole(0, MAX_STATION))
+    via = _value(row, 'Via', whole(1, MAX_STATION)) if row.get('Via') else None
+    length = _value(row, 'Length', whole(1, 1000)) if row.get('Length') else 1
+    motion = _value(row, 'Motion', member_of(Motion))
+    plc_type = _value(row, 'PLC_Type', one_of({kind.value: kind for kind in FAMILIES}))
     if station not in plcs:
         plcs[station] = SimulatedPlc(station, DataTable(plc_type), checksum, clock)
         plcs[station].via = via
@@ -317,8 +317,8 @@ def _load_row(row: Row, plcs: dict[int, SimulatedPlc], checksum: Checksum,
         raise Problem(row.where('PLC_Type'),
                       f'station {station} is a {plc.table.plc_type.value} already')
     if row.get('Processor'):
-        plc.processor.processor = _choice(row, 'Processor', {
-            entry.value: entry for entry in FAMILIES[plc_type].by_processor})
+        plc.processor.processor = _value(row, 'Processor', one_of({
+            entry.value: entry for entry in FAMILIES[plc_type].by_processor}))
     try:
         address = parse_address(row.get('Address'), plc_type)
         codec = _natural_codec(address, length)
@@ -333,7 +333,7 @@ def _load_row(row: Row, plcs: dict[int, SimulatedPlc], checksum: Checksum,
             raise Problem(row.where('Motion'), 'a string does not move')
         if codec.type is ValueType.BOOL and motion is Motion.RAMP:
             raise Problem(row.where('Motion'), 'bits have no Ramp, only Toggle')
-        period = _number(row, 'Period', 1, 3_600_000)
+        period = _value(row, 'Period', whole(1, 3_600_000))
         plc.move(_Mover(address, codec, motion, period / 1000))
 
 
@@ -358,20 +358,12 @@ def _natural_codec(address: Address, length: int) -> Codec:
     return Codec(types_of(address)[0], length, address.bit or 0)
 
 
-def _number(row: Row, column: str, low: int, high: int) -> int:
-    value = whole_number(row.get(column))
-    if value is None or not low <= value <= high:
-        raise Problem(row.where(column), f'{column} = "{shown(row.get(column))}" should be a '
-                                         f'whole number from {low} to {high}')
+def _value(row: Row, column: str, kind: Kind[_T]) -> _T:
+    value = kind.read(row.get(column))
+    if value is None:
+        raise Problem(row.where(column), f'{column} = "{shown(row.get(column))}" should be '
+                                         f'{kind.right}')
     return value
-
-
-def _choice(row: Row, column: str, choices: dict[str, _Choice]) -> _Choice:
-    for name, choice in choices.items():
-        if name.lower() == row.get(column).lower():
-            return choice
-    raise Problem(row.where(column), f'{column} = "{shown(row.get(column))}" should be one of '
-                                     f'{", ".join(filter(None, choices))}')
 
 
 def _values(row: Row, codec: Codec) -> list[float] | str:
@@ -390,8 +382,8 @@ def numbers(texts: Sequence[str]) -> list[float]:
     """Return whole and decimal numbers as such; ValueError for anything else."""
     values = []
     for text in texts:
-        whole = whole_number(text)
-        value = decimal_number(text) if whole is None else whole
+        number = whole_number(text)
+        value = decimal_number(text) if number is None else number
         if value is None:
             raise ValueError(f'"{shown(text)}" should be a number')
         values.append(value)

@@ -60,7 +60,7 @@ GATEWAY = 99
 LONG_READ = bytes.fromhex('A2 50 09 89 00 00')  # 40 words from N9:0 on
 RADIO = {'mode': 'Radio', 'store_forward': '60,61'}
 MODES = {'Message': {}, 'Standard': {'polling': 'Standard'}, 'Peer': {'mode': 'Peer'},
-         'Radio': RADIO, 'Radio, several': RADIO | {'collision_avoidance': 'Yes'}}
+         'Radio': RADIO, 'Radio, several': RADIO | {'collision_avoidance': True}}
 
 
 @dataclass(frozen=True, slots=True)

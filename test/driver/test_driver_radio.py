@@ -71,7 +71,7 @@ def test_values_come_over_the_air(loss: float) -> None:
 
 def test_radios_that_avoid_collisions_carry_several_commands_as_forecast() -> None:
     cycles = []
-    for several in ('No', 'Yes'):
+    for several in (False, True):
         bench = RadioBench(replace(NETWORK, collision_avoidance=several), stations=8)
         bench.line.propagation = 0.1
         bench.run(60.0)
@@ -82,9 +82,9 @@ def test_radios_that_avoid_collisions_carry_several_commands_as_forecast() -> No
     assert cycles[0] > 3 * cycles[1]
 
 
-@pytest.mark.parametrize('several', ['No', 'Yes'])
+@pytest.mark.parametrize('several', [False, True])
 @pytest.mark.parametrize('loss', [0.0, 0.3])
-def test_guarded_value_ends_with_the_program_of_its_plc(several: str, loss: float) -> None:
+def test_guarded_value_ends_with_the_program_of_its_plc(several: bool, loss: float) -> None:
     network = replace(NETWORK, collision_avoidance=several)
     alive = make_mapping('N11:3', plc='SLC', station=FIRST, tag='alive', period=500)
     level = make_mapping('N7:0', plc='SLC', station=FIRST, tag='level', period=500,

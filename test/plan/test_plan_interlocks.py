@@ -59,7 +59,7 @@ def speed(after: int = 3000, command: str = 'Write', station: int = 1) -> Mappin
     # Two tries: Cmd_Timeout and what comes in then; before it, as often as there are turns, 2 s of
     # waiting, a frame of 0.14 s, and what comes in.
     (replace(QUICK, mode='Radio'), 2 * (0.5 + 0.25052 + 2 * (2.0 + 0.14010 + 0.25052))),
-    (replace(QUICK, mode='Radio', collision_avoidance='Yes'),
+    (replace(QUICK, mode='Radio', collision_avoidance=True),
      2 * (0.5 + 0.25052 + 12 * (0.14010 + 0.25052)))])
 def test_longest_transaction_is_that_of_the_settings(network: Network, seconds: float) -> None:
     longest = network.line_mode.longest_transaction(network.line, 0.0)

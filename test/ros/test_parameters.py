@@ -167,9 +167,9 @@ def test_net_file_and_its_overrides(configured: Callable[..., Configuration]) ->
 
 
 @pytest.mark.parametrize(('name', 'value', 'field', 'expected'), [
-    ('net.handshake', True, 'handshake', 'Yes'),  # YAML makes that of Yes
-    ('net.handshake', False, 'handshake', 'No'),
-    ('net.handshake', 'yes', 'handshake', 'Yes'),
+    ('net.handshake', True, 'handshake', True),  # YAML makes that of Yes
+    ('net.handshake', False, 'handshake', False),
+    ('net.handshake', 'yes', 'handshake', True),
     ('net.parity', 'eVEN', 'parity', 'Even'),
     ('net.com_port', 2, 'com_port', '2'),
     ('net.com_port', '/dev/ttyUSB0', 'com_port', '/dev/ttyUSB0'),
@@ -321,7 +321,7 @@ def test_parameter_file_sets_parameters_of_node_and_net(
     assert configuration.parameters.default_period == 250
     assert configuration.parameters.stale_after == 4.0
     assert configuration.network == Network(
-        baud=38400, com_port='3', handshake='Yes', parity='Odd')
+        baud=38400, com_port='3', handshake=True, parity='Odd')
 
 
 @pytest.mark.parametrize(('name', 'right'), [

@@ -48,8 +48,8 @@ GOOD = Network(timeout=300)
         'TX_Delay 1000 ms comes once before a reply can come, which is all of Cmd_Timeout 1000 '
         'ms']),
     (Network(timeout=0, tx_delay=5000, mode='Slave'), []),
-    (Network(mode='Radio', store_forward='1,2', collision_avoidance='Yes'), []),
-    (Network(store_forward='1,2', collision_avoidance='Yes'), [
+    (Network(mode='Radio', store_forward='1,2', collision_avoidance=True), []),
+    (Network(store_forward='1,2', collision_avoidance=True), [
         'Store_Forward is for Mode Radio; in Mode Master it does nothing',
         'Collision_Avoidance is for Mode Radio; in Mode Master it does nothing'])])
 def test_settings_that_leave_no_room_or_do_nothing(network: Network, expected: list[str]) -> None:

@@ -244,9 +244,10 @@ def _overridden(given: Given, network: Network) -> Network:
     """Return the network with what overrides it."""
     texts = {name: text_of(given[entry.parameter]) for name, entry in FIELDS.items()
              if entry.parameter in given}
+    cells = network.cells()
     return make_network({  # as text: 5.0 equals 5, but is not a station
         name: (text, f'parameter {FIELDS[name].parameter}') for name, text in texts.items()
-        if text != str(getattr(network, name))}, network)
+        if text != str(cells[name])}, network)
 
 
 def _needed(name: str, path: str, problems: list[Problem]) -> str:

@@ -69,11 +69,11 @@ def map_cells(mappings: Iterable[Mapping]) -> Iterator[tuple[str, str, str]]:
 
 
 def _net_cells(network: Network) -> Iterator[_Cell]:
-    for name, entry in FIELDS.items():
-        choices = f' ({", ".join(map(str, entry.choices))})' if entry.choices else ''
-        value = getattr(network, name)
+    for name, value in network.cells().items():
+        entry, kind = FIELDS[name], FIELDS[name].kind
+        choices = f' ({", ".join(kind.choices)})' if kind.choices else ''
         yield entry.parameter, value, descriptor_of(
-            value, entry.meaning + choices, entry.low, entry.high)
+            value, entry.meaning + choices, kind.low, kind.high)
 
 
 class ShownFiles:

@@ -111,7 +111,7 @@ def _addresses() -> Iterable[bytes]:
 def _net_csv() -> Iterable[bytes]:
     yield from ((_CONFIG / name).read_bytes() for name in ('net.csv', 'peer_net.csv'))
     for entry in FIELDS.values():
-        for value in (entry.default, entry.low, entry.high, *entry.choices):
+        for value in (entry.default, entry.kind.low, entry.kind.high, *entry.kind.choices):
             yield f'{entry.column}\n{value}\n'.encode()
 
 

@@ -38,7 +38,7 @@ _NETWORKS = [
     for mode, polling, radio in (
         ('Master', 'Message', {}), ('Master', 'Standard', {}), ('Peer', 'Message', {}),
         ('Slave', 'Message', {}), ('Radio', 'Message', {'store_forward': '1 2 255'}),
-        ('Radio', 'Message', {'collision_avoidance': 'Yes'}))
+        ('Radio', 'Message', {'collision_avoidance': True}))
     for check in ('CRC', 'BCC') for delay in (0, 40)]
 _MAPPINGS = [
     make_mapping('N7:0', 'ReadWrite', station=1, plc='PLC5', length=4, period=50),
