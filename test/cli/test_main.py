@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Signals that come while an executable still imports: a real process that is held there."""
+"""Signals that come before a command has handlers of its own, and modules that are missing."""
 
 from importlib import import_module
 import os
@@ -20,10 +20,14 @@ from pathlib import Path
 import signal
 import subprocess
 import sys
+from types import SimpleNamespace
+from typing import NoReturn
 
+from abdf1_ros.cli import main as commands
 from abdf1_ros.cli import terminal
 from abdf1_ros.cli.main import COMMANDS
 import pytest
+from support.ptys import PATIENCE
 
 # Each with a module that it imports, and its status when it is interrupted.
 NAMES = {'node': ('rclpy', 0), 'lines': ('yaml', 0), 'monitor': ('rclpy', 0), 'demo': ('rclpy', 0),
@@ -32,6 +36,17 @@ NAMES = {'node': ('rclpy', 0), 'lines': ('yaml', 0), 'monitor': ('rclpy', 0), 'd
 
 # Of a command that imports what it needs when it knows what is wanted.
 ARGUMENTS = {'plc': ['status', '--port', 'x']}
+
+
+def held_at_an_import(folder: Path, name: str, text: str) -> subprocess.Popen[str]:
+    """Start a command that finds this text where a module of its imports would be."""
+    (folder / f'{NAMES[name][0]}.py').write_text(text)
+    call = f'import sys; sys.argv += {ARGUMENTS.get(name, [])}; ' \
+        f'from abdf1_ros.cli.main import {name}; sys.exit({name}())'
+    return subprocess.Popen(
+        [sys.executable, '-c', call], text=True, stdout=subprocess.PIPE, stderr=subprocess.PIPE,
+        env=os.environ | {'PYTHONPATH': str(folder)})
+
 
 # Stands in for a slow import: it says that it has begun, and does not end by itself soon. Python
 # sees a signal that comes just before a wait after it, so no wait is long.
@@ -42,50 +57,44 @@ for _ in range(300):
 """
 
 
-@pytest.mark.parametrize('number', [signal.SIGINT, signal.SIGTERM])
 @pytest.mark.parametrize('name', NAMES)
-def test_signal_during_the_imports_ends_quietly(
-        tmp_path: Path, name: str, number: signal.Signals) -> None:
-    slow, status = NAMES[name]
-    (tmp_path / f'{slow}.py').write_text(SLOW)
-    call = f'import sys; sys.argv += {ARGUMENTS.get(name, [])}; ' \
-        f'from abdf1_ros.cli.main import {name}; sys.exit({name}())'
-    with subprocess.Popen(
-            [sys.executable, '-c', call], text=True, stdout=subprocess.PIPE,
-            stderr=subprocess.PIPE, env=os.environ | {'PYTHONPATH': str(tmp_path)}) as process:
+def test_signal_during_the_imports_ends_quietly(tmp_path: Path, name: str) -> None:
+    with held_at_an_import(tmp_path, name, SLOW) as process:
         assert process.stdout is not None
         assert process.stdout.readline() == 'importing\n'
-        process.send_signal(number)
-        output, errors = process.communicate(timeout=10)
-    assert (process.returncode, output, errors) == (status, '', '')
+        process.send_signal(signal.SIGINT)
+        output, errors = process.communicate(timeout=PATIENCE)
+    assert (process.returncode, output, errors) == (NAMES[name][1], '', '')
 
 
-@pytest.mark.parametrize('name', NAMES)
+@pytest.mark.parametrize('name', COMMANDS)
 def test_signal_before_a_command_has_its_own_handlers_ends_quietly(
-        tmp_path: Path, name: str) -> None:
-    (tmp_path / 'fake.py').write_text(
-        'import os, signal, sys, types\n'
-        f'module = sys.modules["{COMMANDS[name]}"] = types.ModuleType("fake")\n'
-        'module.main = lambda: os.kill(os.getpid(), signal.SIGTERM)\n'
-        f'from abdf1_ros.cli.main import {name}\n'
-        f'{name}()\n')
-    result = subprocess.run([sys.executable, tmp_path / 'fake.py'], capture_output=True,
-                            text=True, timeout=10, check=False)
-    assert (result.returncode, result.stdout, result.stderr) == (NAMES[name][1], '', '')
+        name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Where the process would end, that is shown by an exception here."""
+    def leave(status: int) -> NoReturn:
+        raise SystemExit(status)
+
+    handlers = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)}
+    fake = SimpleNamespace(main=lambda: os.kill(os.getpid(), signal.SIGTERM))
+    monkeypatch.setitem(sys.modules, COMMANDS[name], fake)
+    monkeypatch.setattr(os, '_exit', leave)
+    try:
+        with pytest.raises(SystemExit) as end:
+            getattr(commands, name)()
+    finally:
+        for number, handler in handlers.items():
+            signal.signal(number, handler)
+    assert end.value.code == {**NAMES, 'conform': ('', 130)}[name][1]
 
 
-@pytest.mark.parametrize('name', NAMES)
+@pytest.mark.parametrize('name', ['node', 'plc'])
 def test_module_that_is_missing_is_named(tmp_path: Path, name: str) -> None:
-    slow, _ = NAMES[name]
-    (tmp_path / f'{slow}.py').write_text("raise ModuleNotFoundError('no', name='rclpy')\n")
-    call = f'import sys; sys.argv += {ARGUMENTS.get(name, [])}; ' \
-        f'from abdf1_ros.cli.main import {name}; sys.exit({name}())'
-    result = subprocess.run([sys.executable, '-c', call], capture_output=True, text=True,
-                            timeout=10, check=False,
-                            env=os.environ | {'PYTHONPATH': str(tmp_path)})
-    assert result.returncode == 2
-    assert result.stderr == ('-c: the Python module rclpy is missing; is ROS 2 sourced, as by '
-                             '". /opt/ros/jazzy/setup.bash"?\n')
+    text = "raise ModuleNotFoundError('no', name='rclpy')\n"
+    with held_at_an_import(tmp_path, name, text) as process:
+        _, errors = process.communicate(timeout=PATIENCE)
+    assert process.returncode == 2
+    assert errors == ('-c: the Python module rclpy is missing; is ROS 2 sourced, as by '
+                      '". /opt/ros/jazzy/setup.bash"?\n')
 
 
 @pytest.mark.parametrize('name', sorted(COMMANDS))

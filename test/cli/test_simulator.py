@@ -15,14 +15,13 @@
 """The simulator as a process on a pseudo-terminal and on TCP, and its options."""
 
 from collections.abc import Callable, Iterator
+from contextlib import ExitStack
 import errno
 import os
 from pathlib import Path
 import select
 import signal
 import socket
-import subprocess
-import sys
 import termios
 
 from abdf1_ros.cli.simulator import _input, main
@@ -30,7 +29,9 @@ from abdf1_ros.df1 import frames
 from abdf1_ros.df1.checksum import Checksum
 import pytest
 from support.commands import call
+from support.forked import Forked
 from support.ptys import PATIENCE, read_exactly
+from support.ros import Process
 
 DATA = """\
 Station,PLC_Type,Address,Length,Values,Motion,Period
@@ -52,77 +53,24 @@ def data(tmp_path: Path) -> Path:
     return path
 
 
-class Simulator:
-    """The simulator as a process."""
+Start = Callable[..., Process]
 
-    def __init__(self, *options: str) -> None:
-        self._process = subprocess.Popen(
-            [sys.executable, '-m', 'abdf1_ros', 'simulator', *options], stdin=subprocess.PIPE,
-            stdout=subprocess.PIPE, stderr=subprocess.PIPE)
-        self._rest = b''
-
-    def line(self) -> str:
-        """Return the next line that it prints."""
-        assert self._process.stdout is not None
-        while b'\n' not in self._rest:
-            ready = select.select([self._process.stdout], [], [], PATIENCE)[0]
-            data = os.read(self._process.stdout.fileno(), 4096) if ready else b''
-            assert data, 'it prints nothing more'
-            self._rest += data
-        line, self._rest = self._rest.split(b'\n', 1)
-        return line.decode()
-
-    def type(self, text: str) -> None:  # noqa: A003
-        """Give it lines on standard input."""
-        assert self._process.stdin is not None
-        self._process.stdin.write(text.encode())
-        self._process.stdin.flush()
-
-    def close_input(self) -> None:
-        """End its standard input."""
-        assert self._process.stdin is not None
-        self._process.stdin.close()
-
-    def close_output(self) -> None:
-        """Read nothing more of what it prints."""
-        assert self._process.stdout is not None
-        self._process.stdout.close()
-
-    def signal(self, number: signal.Signals) -> None:
-        """Send it a signal."""
-        self._process.send_signal(number)
-
-    def end(self) -> tuple[int, str]:
-        """Return exit status and standard error at its end."""
-        assert self._process.stderr is not None
-        status = self._process.wait(PATIENCE)
-        return status, self._process.stderr.read().decode()
-
-    def clean_up(self) -> None:
-        """Leave nothing behind."""
-        if self._process.poll() is None:
-            self._process.kill()
-            self._process.wait(PATIENCE)
-        for stream in (self._process.stdin, self._process.stdout, self._process.stderr):
-            assert stream is not None
-            stream.close()
-
-
-Start = Callable[..., Simulator]
+READY = 'simulator: stations 1 (PLC5), 2 (SLC) on '
 
 
 @pytest.fixture
 def start(data: Path) -> Iterator[Start]:
     """Start simulators that end with the test."""
-    running: list[Simulator] = []
+    with ExitStack() as running:
+        yield lambda *options: running.enter_context(
+            Process('simulator', '--data', str(data), *options))
 
-    def starter(*options: str) -> Simulator:
-        running.append(Simulator('--data', str(data), *options))
-        return running[-1]
 
-    yield starter
-    for simulator in running:
-        simulator.clean_up()
+def _ended(simulator: Process, *lines: str) -> None:
+    """Check that it ends well, and has said these lines alone after the first."""
+    assert simulator.result() == 0, simulator.text
+    assert simulator.lines[0].startswith(READY)
+    assert simulator.lines[1:] == [*lines]
 
 
 def _converse(descriptor: int, checksum: Checksum, tns: str = '10 02') -> None:
@@ -152,49 +100,47 @@ def descriptor() -> Iterator[Callable[[Path], int]]:
         os.close(number)
 
 
-@pytest.mark.parametrize('check', list(Checksum))
-@pytest.mark.parametrize('number', [signal.SIGTERM, signal.SIGINT])
+@pytest.mark.parametrize(('check', 'number'), [
+    (Checksum.CRC, signal.SIGTERM), (Checksum.BCC, signal.SIGINT)])
 def test_on_a_pty_until_a_signal(
         start: Start, tmp_path: Path, descriptor: Callable[[Path], int], check: Checksum,
         number: signal.Signals) -> None:
     name = tmp_path / 'plc'
     simulator = start('--pty', str(name), '--check', check.value)
-    assert simulator.line() == f'simulator: stations 1 (PLC5), 2 (SLC) on {name}, {check.value}'
+    simulator.wait_for(f'{READY}{name}, {check.value}')
     line = descriptor(name)
     assert not termios.tcgetattr(line)[3] & termios.ECHO
     _converse(line, check)
-    simulator.signal(number)
-    assert simulator.end() == (0, '')
+    simulator.send(number)
+    _ended(simulator)
     assert not name.is_symlink()
 
 
 @pytest.mark.parametrize('address', ['127.0.0.1:0', ':0'])
 def test_on_tcp_until_quit_one_client_after_the_other(start: Start, address: str) -> None:
     simulator = start('--tcp', address)
-    where = simulator.line().removesuffix(', CRC').rpartition(':')[2]
+    where = simulator.wait_for(READY).removesuffix(', CRC').rpartition(':')[2]
     for tns in ('10 02', '11 02'):
         with socket.create_connection(('127.0.0.1', int(where)), PATIENCE) as client:
             _converse(client.fileno(), Checksum.CRC, tns)
     simulator.type('quit\n')
-    assert simulator.end() == (0, '')
+    assert simulator.result() == 0, simulator.text
 
 
 def test_end_after_seconds_with_its_input_closed(start: Start) -> None:
     simulator = start('--seconds', '0.2')
     simulator.close_input()
-    assert simulator.line().startswith('simulator: stations 1 (PLC5), 2 (SLC) on /dev/pts/')
-    assert simulator.end() == (0, '')
+    _ended(simulator)
+    assert simulator.lines[0].startswith(f'{READY}/dev/pts/')
 
 
 def test_commands_on_input_several_at_once(
         start: Start, tmp_path: Path, descriptor: Callable[[Path], int]) -> None:
     simulator = start('--pty', str(tmp_path / 'plc'))
-    simulator.line()
     simulator.type('error 2 50\n\nhush 1\nsilent 1\n')
-    assert simulator.line() == 'simulator: station 2: error 50'
-    assert simulator.line() == 'simulator: "hush 1" is not a command'
-    while simulator.line() != 'simulator: station 1: silent':
-        pass
+    simulator.wait_for('simulator: station 1: silent')
+    assert simulator.lines[1:3] == [
+        'simulator: station 2: error 50', 'simulator: "hush 1" is not a command']
     line = descriptor(tmp_path / 'plc')
     for station, command, _ in CASES:
         os.write(line, frames.master_frame(station, bytes.fromhex(command), Checksum.CRC))
@@ -204,23 +150,20 @@ def test_commands_on_input_several_at_once(
     assert read_exactly(line, len(reply)) == reply
     simulator.type('normal 2\nqu')
     simulator.type('it\n')
-    assert simulator.end() == (0, '')
+    assert simulator.result() == 0
 
 
 def test_last_command_without_line_end(start: Start) -> None:
     simulator = start()
-    simulator.line()
     simulator.type('silent 1\nquit')
     simulator.close_input()
-    assert simulator.line() == 'simulator: station 1: silent'
-    assert simulator.end() == (0, '')
+    _ended(simulator, 'simulator: station 1: silent')
 
 
-def test_commands_by_the_clock(start: Start) -> None:
-    simulator = start('--at', '0.2 quit', '--at', '0.1 slow 1 2', '--at', '0 silent 2')
-    lines = [simulator.line() for _ in range(3)]
-    assert lines[1:] == ['simulator: station 2: silent', 'simulator: station 1: slow 2']
-    assert simulator.end() == (0, '')
+def test_commands_by_the_clock_keep_their_order(start: Start) -> None:
+    _ended(start('--at', '0.2 quit', '--at', '0.1 slow 1 2', '--at', '0 silent 2', '--at',
+                 '0 delay 1 5'), *(f'simulator: station {text}' for text in (
+                     '2: silent', '1: delay 5', '1: slow 2')))
 
 
 def _refused(capsys: pytest.CaptureFixture[str], *options: str, status: int = 2) -> str:
@@ -228,13 +171,6 @@ def _refused(capsys: pytest.CaptureFixture[str], *options: str, status: int = 2)
     assert (said.status, said.out) == (status, '')
     assert said.err.startswith('simulator: ')
     return said.err
-
-
-def test_commands_of_one_time_keep_their_order(start: Start) -> None:
-    simulator = start('--at', '0.1 quit', '--at', '0 slow 1 2', '--at', '0 delay 1 5')
-    lines = [simulator.line() for _ in range(3)]
-    assert lines[1:] == ['simulator: station 1: slow 2', 'simulator: station 1: delay 5']
-    assert simulator.end() == (0, '')
 
 
 @pytest.mark.parametrize('at', [
@@ -303,31 +239,24 @@ def test_link_of_somebody_else_is_left_alone(
     assert os.readlink(name) == '/dev/ttyUSB0'
 
 
-def test_two_simulators_do_not_share_a_name(
+def test_name_is_not_shared_and_what_a_killed_simulator_left_is_taken_by_the_next_and_removed(
         capsys: pytest.CaptureFixture[str], start: Start, data: Path, tmp_path: Path) -> None:
     name = tmp_path / 'plc'
-    start('--pty', str(name)).line()
+    killed = start('--pty', str(name))
+    killed.wait_for(READY)
+    held = os.open(name, os.O_RDWR | os.O_NOCTTY)  # no other simulator is to get this number
+    killed.send(signal.SIGKILL)
+    killed.result()
+    assert os.path.lexists(name)
+    again = start('--pty', str(name))
+    again.wait_for(READY)
+    os.close(held)
     before = os.readlink(name)
     assert _refused(capsys, '--data', str(data), '--pty', str(name), status=1) == \
         f'simulator: {name} is in use by another simulator or sniff\n'
     assert os.readlink(name) == before
-
-
-def test_name_that_a_killed_simulator_left_is_taken_by_the_next_and_removed(
-        capsys: pytest.CaptureFixture[str], start: Start, data: Path, tmp_path: Path) -> None:
-    name = tmp_path / 'plc'
-    killed = start('--pty', str(name))
-    killed.line()
-    held = os.open(name, os.O_RDWR | os.O_NOCTTY)  # no other simulator is to get this number
-    killed.signal(signal.SIGKILL)
-    killed.end()
-    assert os.path.lexists(name)
-    again = start('--pty', str(name))
-    assert again.line().startswith('simulator: stations')
-    os.close(held)
-    assert 'is in use' in _refused(capsys, '--data', str(data), '--pty', str(name), status=1)
-    again.signal(signal.SIGTERM)
-    assert again.end() == (0, '')
+    again.send(signal.SIGTERM)
+    _ended(again)
     assert not os.path.lexists(name)
 
 
@@ -364,13 +293,6 @@ def test_help_names_every_option_and_command(capsys: pytest.CaptureFixture[str])
         '--pty', '--tcp', '--port', '--data', '--check', '--at', '--seconds', 'silent STATION'))
 
 
-def test_bad_data_file_of_the_process(start: Start, data: Path) -> None:
-    data.write_text('Station,PLC_Typ\n', encoding='utf-8')
-    status, text = start().end()
-    assert status == 2
-    assert text == f'simulator: {data}:1:2: unknown column "PLC_Typ"; did you mean PLC_Type?\n'
-
-
 def _awaken(descriptor: int) -> None:
     """Poll until there is an answer: the simulator needs a moment to be there."""
     while not select.select([descriptor], [], [], 0.2)[0]:
@@ -389,21 +311,23 @@ def test_on_a_port_of_a_device_server(start: Start) -> None:
         server.settimeout(PATIENCE)
         name = f'socket://127.0.0.1:{server.getsockname()[1]}'
         simulator = start('--port', name, '--baud', '115200')
-        assert simulator.line() == f'simulator: stations 1 (PLC5), 2 (SLC) on {name}, CRC'
         client, _ = server.accept()
         with client:
             _awaken(client.fileno())
             _converse(client.fileno(), Checksum.CRC, '11 02')
-        simulator.signal(signal.SIGTERM)
-        assert simulator.end() == (0, '')
+            simulator.send(signal.SIGTERM)
+            _ended(simulator)
+        assert simulator.lines == [f'{READY}{name}, CRC']
 
 
-def test_simulator_goes_on_when_nobody_reads_it_and_ends_when_told(start: Start) -> None:
-    simulator = start()
-    simulator.line()
-    simulator.close_output()
-    simulator.type('silent 1\nnormal 1\nquit\n')
-    assert simulator.end() == (0, '')
+def test_simulator_goes_on_when_nobody_reads_it_and_ends_when_told(data: Path) -> None:
+    simulator = Forked('simulator', ['--data', str(data)])
+    assert simulator.stdout.readline().startswith(READY)
+    simulator.stdout.close()
+    simulator.stdin.write('silent 1\nnormal 1\nquit\n')
+    simulator.stdin.flush()
+    assert simulator.stderr.read() == ''
+    assert simulator.wait(PATIENCE) == 0
 
 
 def test_input_of_a_job_in_the_background_is_none(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -14,8 +14,6 @@
 
 """The command: files, a tap between the simulator and a master, and what it refuses."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 import json
 import os
@@ -25,17 +23,18 @@ import resource
 import signal
 import subprocess
 import sys
-from typing import Any
 
 from abdf1_ros.cli import sniff
 from abdf1_ros.cli.sniff import main
 from abdf1_ros.df1 import frames
 from abdf1_ros.df1.checksum import Checksum
 from abdf1_ros.df1.packet import Packet
-from abdf1_ros.ports.endpoints import PtyEndpoint
 from abdf1_ros.sniffer.capture import read_capture
 import pytest
-from support.ptys import PATIENCE, Pty, read_exactly
+from support.commands import running_simulator
+from support.forked import Forked
+from support.ptys import PATIENCE, Pty, read_exactly, wait_until
+from support.ros import Process
 
 COMMAND = Packet(2, 5, 0x0F, 0, 0x1234, bytes.fromhex('A2 04 07 89 00 00'))
 REPLY = COMMAND.reply(bytes.fromhex('34 12 FE FF'))
@@ -235,99 +234,70 @@ def test_help_has_examples_and_exit_status(capsys: Output) -> None:
     assert 'exit status: 0' in text
 
 
-class Command:
-    """A module of the package as a process; lines of its output are read as they come."""
-
-    def __init__(self, module: str, *args: str) -> None:
-        self.process = subprocess.Popen(
-            [sys.executable, '-m', 'abdf1_ros', module, *args], text=True,
-            stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.PIPE)
-
-    def __enter__(self) -> Command:
-        return self
-
-    def __exit__(self, *exception: object) -> None:
-        self.process.kill()
-        self.process.communicate()
-
-    def line(self, stream: Any) -> str:
-        """Return the next line of a stream of it."""
-        return str(stream.readline()).rstrip('\n')
-
-    def end(self, number: signal.Signals = signal.SIGINT) -> tuple[int, str, str]:
-        """End it; return exit status and what it has said besides."""
-        self.process.send_signal(number)
-        out, err = self.process.communicate(timeout=PATIENCE)
-        return self.process.returncode, out, err
+def _split(sniff: Process, stream: str) -> list[str]:
+    """Return what it has said on one of its streams; all else than traffic is on errors."""
+    return [line for line in sniff.lines if line.startswith('sniff: ') is (stream == 'errors')]
 
 
-def test_tap_between_the_simulator_and_a_master(tmp_path: Path) -> None:
+def test_tap_between_the_simulator_and_a_master(tmp_path: Path, capsys: Output) -> None:
     plc, tap, saved, packets = (str(tmp_path / name) for name in ('plc', 'tap', 'saved', 'pcapng'))
-    with Command('simulator', '--pty', plc) as simulator:
-        assert simulator.line(simulator.process.stdout).startswith('simulator: stations')
-        with Command('sniff', '--tap', f'pty:{tap}', plc, '--save', saved,
-                     '--pcapng', packets) as sniff:
-            assert sniff.line(sniff.process.stderr) == \
-                f'sniff: listening on {tap} and {plc}; Ctrl-C ends'
-            line = os.open(tap, os.O_RDWR | os.O_NOCTTY)
-            os.write(line, SAID[0])
-            assert read_exactly(line, 2) == frames.ACK
-            os.write(line, SAID[2])
-            reply = frames.message_frame(COMMAND.reply(bytes(4)).encode(), Checksum.CRC)
-            heard = read_exactly(line, len(reply))
-            os.write(line, frames.ACK)
-            live = [sniff.line(sniff.process.stdout) for _ in range(5)]
-            os.close(line)
-            status, out, err = sniff.end()
-    assert [entry.split()[1:4] for entry in live] == [
+    with running_simulator('--pty', plc), Process(
+            'sniff', '--tap', f'pty:{tap}', plc, '--save', saved, '--pcapng', packets) as sniff:
+        sniff.wait_for('sniff: ')
+        line = os.open(tap, os.O_RDWR | os.O_NOCTTY)
+        os.write(line, SAID[0])
+        assert read_exactly(line, 2) == frames.ACK
+        os.write(line, SAID[2])
+        reply = frames.message_frame(COMMAND.reply(bytes(4)).encode(), Checksum.CRC)
+        heard = read_exactly(line, len(reply))
+        os.write(line, frames.ACK)
+        wait_until(lambda: len(_split(sniff, 'output')) == 5)
+        os.close(line)
+        sniff.end()
+    said = _split(sniff, 'output')
+    assert [entry.split()[1:4] for entry in said[:5]] == [
         ['>', '2', 'command'], ['<', '2', 'ACK'], ['>', '2', 'poll'], ['<', '2', 'reply'],
         ['>', '2', 'ACK']]
     assert heard[:2] == frames.STX
-    assert (status, err) == (0, '')
-    assert '  seen: 1 commands, 1 replies, 1 polls, 2 ACK' in out
+    assert _split(sniff, 'errors') == [f'sniff: listening on {tap} and {plc}; Ctrl-C ends']
+    assert '  seen: 1 commands, 1 replies, 1 polls, 2 ACK' in said
     assert not os.path.lexists(tap)
-    again = subprocess.run(
-        [sys.executable, '-m', 'abdf1_ros', 'sniff', saved, '--pcapng', f'{packets}2'], text=True,
-        capture_output=True, timeout=PATIENCE, check=True)
-    assert again.stdout.splitlines()[:5] == live
+    assert lines_of(capsys, saved, '--pcapng', f'{packets}2')[:5] == said[:5]
     for path in (packets, f'{packets}2'):  # but for microseconds that a capture rounds
         assert all(entry in Path(path).read_bytes() for entry in (SAID[0], SAID[2], heard))
 
 
-@pytest.mark.parametrize('number', [signal.SIGINT, signal.SIGTERM])
-def test_port_until_a_signal(tmp_path: Path, number: signal.Signals) -> None:
+def test_port_until_a_signal(tmp_path: Path) -> None:
     pty = Pty(tmp_path / 'line')
-    with Command('sniff', '--port', str(pty.name), '--json') as sniff:
-        sniff.line(sniff.process.stderr)
+    with Process('sniff', '--port', str(pty.name), '--json') as sniff:
+        sniff.wait_for('sniff: ')
         pty.write(b''.join(SAID))
-        kinds = [json.loads(sniff.line(sniff.process.stdout))['kind'] for _ in range(5)]
-        status, out, err = sniff.end(number)
+        wait_until(lambda: len(sniff.lines) == 6)
+        sniff.end(signal.SIGTERM)
     pty.close()
-    assert kinds == ['command', 'ACK', 'poll', 'reply', 'ACK']
-    assert (status, err) == (0, '')
-    assert json.loads(out)['kind'] == 'summary'
+    assert [json.loads(line)['kind'] for line in _split(sniff, 'output')] == [
+        'command', 'ACK', 'poll', 'reply', 'ACK', 'summary']
+    assert len(_split(sniff, 'errors')) == 1
 
 
 def test_pipe_into_which_nobody_writes_until_a_signal(tmp_path: Path) -> None:
     name = tmp_path / 'pipe'
     os.mkfifo(name)
-    with Command('sniff', str(name)) as sniff:
+    with Process('sniff', str(name)) as sniff:
         writer = os.open(name, os.O_WRONLY)  # waits until it is opened there
-        status, out, err = sniff.end()
+        sniff.end()
         os.close(writer)
-    assert (status, err) == (0, '')
-    assert out.startswith('summary: 0 bytes')
+    assert sniff.lines[0].startswith('summary: 0 bytes')
 
 
 def test_lost_port_ends_with_the_summary(tmp_path: Path) -> None:
     pty = Pty(tmp_path / 'line')
-    with Command('sniff', '--port', str(pty.name)) as sniff:
-        sniff.line(sniff.process.stderr)
+    with Process('sniff', '--port', str(pty.name)) as sniff:
+        sniff.wait_for('sniff: ')
         pty.close()
-        out, err = sniff.process.communicate(timeout=PATIENCE)
-    assert sniff.process.returncode == 1
-    assert err.startswith('sniff: a port was lost: ')
-    assert out.startswith('summary: ')
+        assert sniff.result() == 1
+    assert _split(sniff, 'errors')[1].startswith('sniff: a port was lost: ')
+    assert _split(sniff, 'output')[0].startswith('summary: ')
 
 
 def test_reader_that_has_seen_enough(capture: str) -> None:
@@ -340,29 +310,14 @@ def test_reader_that_has_seen_enough(capture: str) -> None:
     assert (result.returncode, result.stderr) == (0, b'')
 
 
-def test_colour_is_for_terminals_only(capture: str) -> None:
-    line = PtyEndpoint(None)
-    terminal = os.open(line.name, os.O_RDWR | os.O_NOCTTY)
-    environment = {name: value for name, value in os.environ.items() if name != 'NO_COLOR'}
-    try:
-        for variables, expected in ((environment, True), (environment | {'NO_COLOR': '1'}, False)):
-            subprocess.run([sys.executable, '-m', 'abdf1_ros', 'sniff', capture], stdout=terminal,
-                           timeout=PATIENCE, check=True, env=variables)
-            shown = line.open().read(PATIENCE, terminal)
-            assert (b'\x1b[2m' in shown) is expected
-    finally:
-        os.close(terminal)
-        line.close()
-
-
-def test_full_disk_is_no_traceback(capture: str) -> None:
-    with open('/dev/full', 'w') as full:
-        result = subprocess.run([sys.executable, '-m', 'abdf1_ros', 'sniff', capture], text=True,
-                                stdout=full, stderr=subprocess.PIPE, timeout=PATIENCE,
-                                check=False)
-    assert result.returncode == 2
-    assert result.stderr.splitlines()[-1] == 'sniff: cannot print: No space left on device'
-    assert 'Traceback' not in result.stderr
+def test_colour_is_for_terminals_only(
+        capsys: Output, capture: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.delenv('NO_COLOR', raising=False)
+    assert '\x1b' not in ''.join(lines_of(capsys, capture))
+    monkeypatch.setattr(sys.stdout, 'isatty', lambda: True)
+    assert '\x1b[2m' in ''.join(lines_of(capsys, capture))
+    monkeypatch.setenv('NO_COLOR', '1')
+    assert '\x1b' not in ''.join(lines_of(capsys, capture))
 
 
 def test_full_disk_does_not_cut_a_tap(tmp_path: Path) -> None:
@@ -397,23 +352,20 @@ def test_full_disk_does_not_cut_a_tap(tmp_path: Path) -> None:
 @pytest.mark.parametrize(('way', 'goes_on'), [('--tap', True), ('--port', False)])
 def test_reader_that_leaves_does_not_cut_a_tap(tmp_path: Path, way: str, goes_on: bool) -> None:
     names = [str(tmp_path / name) for name in 'ab']
-    with Command('sniff', way, *[f'pty:{name}' for name in names[:1 + goes_on]]) as sniff:
-        sniff.line(sniff.process.stderr)
-        assert sniff.process.stdout is not None
-        sniff.process.stdout.close()
-        near, far = (
-            os.open(name, os.O_RDWR | os.O_NOCTTY) for name in (names[0], names[goes_on]))
-        for _ in range(3 * goes_on):
-            os.write(near, SAID[0] + SAID[1])
-            assert read_exactly(far, len(SAID[0] + SAID[1])) == SAID[0] + SAID[1]
-        if not goes_on:
-            os.write(near, SAID[0] + SAID[1])
-            assert sniff.process.wait(PATIENCE) == 0
-            return
-        assert sniff.line(sniff.process.stderr) == (
-            'sniff: this output is no longer read; the bytes are passed on until Ctrl-C')
-        sniff.process.send_signal(signal.SIGINT)
-        assert sniff.process.wait(PATIENCE) == 0
+    sniff = Forked('sniff', [way, *[f'pty:{name}' for name in names[:1 + goes_on]]])
+    sniff.stderr.readline()
+    sniff.stdout.close()
+    near, far = (os.open(name, os.O_RDWR | os.O_NOCTTY) for name in (names[0], names[goes_on]))
+    for _ in range(3 * goes_on):
+        os.write(near, SAID[0] + SAID[1])
+        assert read_exactly(far, len(SAID[0] + SAID[1])) == SAID[0] + SAID[1]
+    if goes_on:
+        assert sniff.stderr.readline() == (
+            'sniff: this output is no longer read; the bytes are passed on until Ctrl-C\n')
+        sniff.send_signal(signal.SIGINT)
+    else:
+        os.write(near, SAID[0] + SAID[1])
+    assert sniff.wait(PATIENCE) == 0
 
 
 def test_it_needs_no_ros(capture: str) -> None:

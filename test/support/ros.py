@@ -136,10 +136,17 @@ class Process:
     def say(self, line: str) -> str:
         """Give a line to its standard input; return the answer of the simulator to it."""
         after = len(self.lines)
-        assert self._process.stdin is not None
-        self._process.stdin.write(f'{line}\n')
-        self._process.stdin.flush()
+        self.type(f'{line}\n')
         return self.wait_for('simulator: station', after=after)
+
+    def type(self, text: str) -> None:  # noqa: A003
+        """Give text to its standard input."""
+        self._process.stdin.write(text)
+        self._process.stdin.flush()
+
+    def close_input(self) -> None:
+        """End its standard input."""
+        self._process.stdin.close()
 
     def send(self, *numbers: signal.Signals) -> None:
         """Send signals, one straight after the other."""
