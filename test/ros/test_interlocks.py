@@ -24,6 +24,10 @@ from typing import Any
 from abdf1_ros import testing
 from abdf1_ros.client import Client
 from abdf1_ros.df1.echo import COMES_BACK
+from abdf1_ros.df1.frames import Frame, NAK, Symbol
+from abdf1_ros.errors import RemoteError
+from abdf1_ros.pccc.file_types import PlcType
+from abdf1_ros.pccc.steps import AddressedValues, echo, write
 from abdf1_ros.ros.bridge.node import BridgeNode
 from abdf1_ros.simulator.ladder import Lamp
 import pytest
@@ -63,6 +67,8 @@ WAY = 0.25
 
 ATTEMPTS = 8  # to be as fast as that
 
+MARK = b'GUEST'  # what is easily known in a command
+
 
 class Cell(testing.SimulatedCell):
     """A bridge with a heartbeat, in this process, a PLC, and who looks at both."""
@@ -95,6 +101,11 @@ class Cell(testing.SimulatedCell):
         """Wait for something; the executor runs meanwhile."""
         self.ros.until(lambda: condition() or None, what)
 
+    def share(self, place: Path) -> Client:
+        """Return a guest at a place of the bridge, which is there soon."""
+        self.until(place.exists, 'the place')
+        return Client(str(place), plc_type='SLC', timeout=3.0, cmd_timeout=3.0)
+
     def until_counting(self) -> None:
         """Wait until the heartbeat counts."""
         self.until(lambda: self.word('N10:0') > 2, 'a heartbeat that counts')
@@ -122,6 +133,20 @@ class Cell(testing.SimulatedCell):
     def call(self, kind: Any, name: str, request: Any) -> Any:
         """Call a service of the bridge."""
         return self.ros.call(kind, f'/abdf1/{name}', request)
+
+
+class ProcessCell(Cell):
+    """The same with the bridge as a process."""
+
+    def start(self) -> None:
+        """Start it."""
+        self.results = self.ros.results()
+        self._process = Process('node', *ros_args(*self._assignments))
+
+    def end(self, number: signal.Signals = signal.SIGTERM) -> int:
+        """End it by a signal."""
+        self._process.send(number)
+        return self._process.result()
 
 
 @pytest.fixture
@@ -192,31 +217,91 @@ def test_rule_5_port_that_is_left_to_others_is_left_with_zero(
     assert 'the port is left before the PLC has confirmed: beat' in capfd.readouterr().err
 
 
-@pytest.mark.parametrize(('is_end', 'rows'), [
-    (True, MAP.replace(',100,,,', ',1000,,,')),  # leaves time to guests
-    (True, MAP[:MAP.index('beat')]), (False, MAP[:MAP.index('beat')])])
+@pytest.mark.parametrize(('made', 'is_end', 'rows'), [
+    (Cell, True, MAP.replace(',100,,,', ',1000,,,')),  # leaves time to guests
+    (Cell, True, MAP[:MAP.index('beat')]), (Cell, False, MAP[:MAP.index('beat')]),
+    (ProcessCell, True, MAP[:MAP.index('beat')])])
 def test_rule_5_guest_under_way_is_written_over_at_the_end(
-        tmp_path: Path, is_end: bool, rows: str) -> None:
+        tmp_path: Path, made: type[Cell], is_end: bool, rows: str) -> None:
     place = tmp_path / 'hmi'
-    with Cell(tmp_path, f'net.share:="pty:{place}"', 'net.share_access:=Write',
+    with made(tmp_path, f'net.share:="pty:{place}"', 'net.share_access:=Write',
               'net.cmd_timeout:=3000') as cell:
         cell.until_counting()
         cell.map.write_text(rows, encoding='utf-8')
         before = len(fallbacks(cell.results))
         assert cell.call(Trigger, 'reload', Trigger.Request()).success
         cell.until(lambda: fallbacks(cell.results)[before:].count('start') > 0, 'the fallback')
-        cell.until(place.exists, 'the place')
-        cell.plcs.say('delay 1 250')  # it executes a command at once, and answers later
-        with Client(str(place), plc_type='SLC', timeout=3.0, cmd_timeout=3.0) as hmi:
+        with cell.share(place) as hmi:
+            cell.plcs.say('delay 1 250')  # it executes a command at once, and answers later
             writer = threading.Thread(target=hmi.write, args=('N10:1', 99))
             writer.start()
             cell.until(lambda: cell.word('N10:1') == 99, "the guest's value")
             if is_end:
-                cell.end()
+                assert cell.end() == 0
             else:
                 assert cell.call(SetBool, 'polling', SetBool.Request(data=False)).success
             writer.join()
         assert (cell.word('N10:0'), cell.word('N10:1')) == (0, 7)
+
+
+def watched(cell: Cell, address: str,
+            answer: Callable[[Symbol], bytes | None] = lambda symbol: None) -> list[int]:
+    """Return the values of a word as they come; let the PLC ``answer`` some symbols otherwise."""
+    plc = cell.plcs[1]
+    handle, values = plc.handle, [cell.word(address)]
+
+    def handled(symbol: Symbol) -> bytes:
+        said = answer(symbol)
+        said = handle(symbol) if said is None else said
+        if (value := cell.word(address)) != values[-1]:
+            values.append(value)
+        return said
+
+    plc.handle = handled  # type: ignore[method-assign]
+    return values
+
+
+@pytest.mark.parametrize('answer', [NAK, b''])
+def test_rule_3_guests_command_that_the_plc_does_not_take_changes_no_heartbeat_and_no_read(
+        tmp_path: Path, answer: bytes) -> None:
+    place = tmp_path / 'hmi'
+
+    def answered(symbol: Symbol) -> bytes | None:
+        return answer if isinstance(symbol, Frame) and MARK in symbol.data else None
+
+    with Cell(tmp_path, f'net.share:="pty:{place}"') as cell:
+        doors = cell.ros.listen(Int16MultiArray, '/abdf1/read/doors')
+        beats, statuses = watched(cell, 'N10:0', answered), set[int]()
+
+        def goes_on() -> bool:
+            """Tell whether ours go on while a guest asks: on a busy host they may not."""
+            cell.until_counting()
+            cell.until_beats(3)
+            first, reads = len(beats), len(doors)
+            for _ in range(3):
+                with pytest.raises(RemoteError) as failure:
+                    hmi.ask(1, echo(MARK * 46))
+                statuses.add(failure.value.sts)
+                cell.until_beats(10)  # no guest has the line for a while
+            return 0 not in beats[first:] and len(doors) - reads > len(beats) - first
+
+        with cell.share(place) as hmi:
+            assert any(goes_on() for _ in range(ATTEMPTS))
+        assert statuses & {0x02, 0x05}  # it was sent
+
+
+def test_rule_8_broadcast_of_a_guest_over_a_fallback_is_told_and_written_over(
+        tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    place = tmp_path / 'hmi'
+    with Cell(tmp_path, f'net.share:="pty:{place}"', 'net.share_access:=Write') as cell:
+        cell.until_counting()
+        written = watched(cell, 'N10:1')
+        with cell.share(place) as hmi:
+            hmi.ask(255, write(AddressedValues.of('N10:1', PlcType.SLC), [99]))
+        cell.until(lambda: 7 in written[written.index(99):] if 99 in written else None,
+                   'the fallback after it')
+    assert (f'guest pty:{place} has sent to station 255: protected typed logical write '
+            'N10:1 = 99, words of speed') in capfd.readouterr().err
 
 
 def test_rule_5_new_files_are_a_new_start(cell: Cell) -> None:

@@ -14,7 +14,9 @@
 
 """A running node shares its line: an HMI reads and writes through it, and ROS is told."""
 
+from contextlib import suppress
 from pathlib import Path
+import socket
 import threading
 import time
 
@@ -23,6 +25,7 @@ from abdf1_ros.client import Client
 from abdf1_ros.errors import RemoteError
 import pytest
 from std_msgs.msg import Float32MultiArray
+from support.device_server import OWN_HOST
 from support.ros import Observer, OK, Process, until_status, WARN
 from support.simulator_process import make_files, OFTEN
 
@@ -63,19 +66,28 @@ def test_hmi_reads_and_writes_through_the_node(
     assert len([line for line in lines if ' command ' in line]) > 10
 
 
-def test_what_is_not_allowed_is_told_once(tmp_path: Path) -> None:
-    files, place = make_files(tmp_path), tmp_path / 'hmi'
+def test_what_is_not_allowed_and_who_is_turned_away_is_told_once(tmp_path: Path) -> None:
+    files = make_files(tmp_path)
+    with socket.create_server((OWN_HOST, 0)) as free:
+        address = OWN_HOST, int(free.getsockname()[1])
+    place = f'{OWN_HOST}:{address[1]}'
     with (files.start_simulator(), Observer() as observer,
-          Process('node', *files.args(f'net.share:="pty:{place}"')) as node):
+          Process('node', *files.args(f'net.share:="tcp:{place}"')) as node):
+        diagnostics = observer.diagnostics(files.port)
         observer.listen(Float32MultiArray, '/abdf1/read/setpoint').values([21.5])
-        observer.until(place.is_symlink, 'the place')
-        with Client(str(place), plc_type='SLC', station=2, timeout=3.0, cmd_timeout=3.0) as hmi:
+        until_status(diagnostics, 'guests', OK)  # another thread opens the place
+        with Client(f'socket://{place}', plc_type='SLC', station=2, timeout=3.0,
+                    cmd_timeout=3.0) as hmi:
             for _ in range(2):
                 with pytest.raises(RemoteError):
                     hmi.write('F8:4', 30.5)
+            with socket.create_connection(address) as second, suppress(ConnectionResetError):
+                assert second.recv(1) == b''
             assert hmi.read('F8:4') == 21.5
-        node.wait_for('[WARN] ', f'guest pty:{place} is refused: protected typed logical write '
-                      'F8:4 = 30.5: Share_Access is Read')
+        node.wait_for('[WARN] ', f'guest tcp:{place} is refused: protected typed logical '
+                      'write F8:4 = 30.5: Share_Access is Read')
+        node.wait_for('[WARN] ', f'guest tcp:{place}: a second program, at 127.0.0.1:',
+                      ', was turned away; one at a time is at a place')
         node.end()
     assert node.text.count('is refused') == 1
 
