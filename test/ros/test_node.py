@@ -29,6 +29,7 @@ from abdf1_ros.messages import Event, Message
 from abdf1_ros.pccc.families import parse_address
 from abdf1_ros.pccc.file_types import PlcType
 from abdf1_ros.ports.link_thread import PortState
+from abdf1_ros.ros.bridge import node as node_module
 from abdf1_ros.ros.bridge.node import BridgeNode
 from abdf1_ros.ros.node import main
 from abdf1_ros.testing import Plcs
@@ -485,6 +486,19 @@ def test_duplicate_name_is_told_and_forgotten(
     told = ''.join(capfd.readouterr())
     assert '[abdf1]: another node is called /abdf1 too' in told
     assert 'no other node is called /abdf1 any more' in told
+
+
+def test_other_node_of_our_name_is_told_before_the_first_write_is_taken(
+        make_bench: Benches, observer: Observer, monkeypatch: pytest.MonkeyPatch,
+        capfd: pytest.CaptureFixture[str]) -> None:
+    monkeypatch.setattr(node_module, 'DISCOVERY', 2.0)
+    bench = make_bench(RECIPE)
+    bench.publisher(Int16MultiArray, 'recipe')(1, 2)
+    other = Node('abdf1', context=observer.context, use_global_arguments=False)
+    observer.until(lambda: bench.node.writes_taken, 'the write')
+    assert '[abdf1]: another node is called /abdf1 too' in ''.join(capfd.readouterr())
+    assert bench.until_results(1)[0].message == 'written'
+    other.destroy_node()
 
 
 def test_end_of_another_type_on_a_topic_is_told(

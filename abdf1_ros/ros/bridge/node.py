@@ -33,7 +33,7 @@ from abdf1_ros.ports.settings import PortSettings
 from abdf1_ros.ports.trace import PortOpener
 from abdf1_ros.problems import ConfigurationError
 from abdf1_ros.ros.bridge.session import Session, Surroundings, tell_plcs
-from abdf1_ros.ros.diagnostics.graph import Graph, NameWatch
+from abdf1_ros.ros.diagnostics.graph import DISCOVERY, Graph, NameWatch
 from abdf1_ros.ros.diagnostics.log import bug_text
 from abdf1_ros.ros.parameters.declared import Configuration, configure, read_again
 from abdf1_ros.ros.parameters.shown import ShownFiles
@@ -94,7 +94,8 @@ class BridgeNode(Node):
         self._writes = WriteTopics(self, self._take)
         self._surroundings = Surroundings(
             self, graph, NameWatch(self.get_fully_qualified_name(), lambda now: graph.nodes(
-                self.get_name(), self.get_namespace(), now)), self._opener,
+                self.get_name(), self.get_namespace(), now), line_time() + DISCOVERY),
+            self._opener,
             # All writes that wait can end at once, faster than a subscriber takes their results.
             self.create_publisher(DiagnosticStatus, '~/write_results', MAX_WAITING_WRITES),
             self.create_publisher(UInt16MultiArray, '~/active_stations', latched_qos()),
@@ -153,6 +154,7 @@ class BridgeNode(Node):
     def begin_end(self) -> None:
         """Begin the end, as ``Session`` does; no request takes it back."""
         self._is_ending = True
+        self._writes.begin()
         self.session.begin_end()
 
     def stop(self, patience: float = _LAST_WORDS) -> None:
@@ -173,8 +175,10 @@ class BridgeNode(Node):
             publisher.wait_for_all_acked(Duration(seconds=max(0.0, give_up - time.monotonic())))
 
     def check(self) -> None:
-        """Publish what is due."""
+        """Publish what is due; take writes once it has been told whether both of a name do."""
         self.session.check()
+        if self._surroundings.names.has_looked:
+            self._writes.begin()
 
     def _take(self, topic: str, message: Any, info: Any) -> None:
         self.session.write(topic, message, info)

@@ -34,6 +34,9 @@ from abdf1_ros.settings.mapping import Mapping
 # s; a node of our name is to be reported before it has taken many of our messages.
 _NAMES_PERIOD = 0.25
 
+# After a start others are found in so long (s), mostly in a fifth of that.
+DISCOVERY = 0.5
+
 # Between two looks at topics (s): at least, and as a multiple of the processor time of one.
 _LEAST = 2.0
 _MULTIPLE = 2000
@@ -85,20 +88,23 @@ class NameWatch:
 
     ``count`` tells how many nodes of the name there are; ours is one of them. That is said as soon
     as it is seen, before it is known whether it is an earlier run: both may take the next command.
+    Nobody looks before the clock value ``first_look`` (s); ``has_looked`` since then.
     """
 
-    def __init__(self, name: str, count: Callable[[float], int]) -> None:
+    def __init__(self, name: str, count: Callable[[float], int], first_look: float = 0.0) -> None:
         self.text = ''
+        self.has_looked = False
         self._name = name
         self._count = count
         self._since: float | None = None
-        self._next_look = 0.0
+        self._next_look = first_look
 
     def look(self, now: float) -> Iterator[News]:
         """Look now and then; tell when it comes, stays, and goes."""
         if now < self._next_look:
             return
         self._next_look = now + _NAMES_PERIOD
+        self.has_looked = True
         if self._count(now) > 1:
             self._since = now if self._since is None else self._since
             stays = now - self._since >= _KILLED_IS_SEEN

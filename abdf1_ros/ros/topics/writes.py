@@ -34,6 +34,7 @@ from abdf1_ros.ports.clock import line_time
 from abdf1_ros.ros.topics.messages import MESSAGES, values_of, write_qos
 from abdf1_ros.settings.mapping import Mapping
 from abdf1_ros.text import printable
+from rclpy.callback_groups import ReentrantCallbackGroup
 from rclpy.node import Node
 from std_msgs.msg import String
 
@@ -133,18 +134,37 @@ class WriteTopic:
                 f'{self._patience:g} s; or the clocks of the two hosts differ')
 
 
+class _Gate(ReentrantCallbackGroup):
+    """Subscriptions whose messages wait in DDS until it is open."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.is_open = False
+
+    def can_execute(self, entity: Any) -> bool:
+        return self.is_open
+
+
 class WriteTopics:
     """
     The subscriptions of a node; ``open`` may be called again, in the thread of the executor.
 
-    ``take`` is called with the topic and what came; ``taken`` counts that.
+    ``take`` is called with the topic and what came, from ``begin`` on; ``taken`` counts that.
     """
 
     def __init__(self, node: Node, take: Callable[[str, Any, Any], None]) -> None:
         self._node = node
         self._take = take
+        self._gate = _Gate()
         self._subscriptions: dict[str, tuple[Any, Any]] = {}
         self.taken = 0
+
+    def begin(self) -> None:
+        """Begin to take messages, those that wait first."""
+        if not self._gate.is_open:
+            self._gate.is_open = True
+            if self._node.executor is not None:
+                self._node.executor.wake()
 
     def open(self, driver: Driver, patience: float,  # noqa: A003
              on_loss: Callable[[str, int], None], wake: Callable[[], None],
@@ -173,7 +193,8 @@ class WriteTopics:
             self._take(topic, message, info)
 
         callback: Any = take
-        return self._node.create_subscription(kind, _name(topic), callback, write_qos())
+        return self._node.create_subscription(
+            kind, _name(topic), callback, write_qos(), callback_group=self._gate)
 
 
 def _name(topic: str) -> str:
