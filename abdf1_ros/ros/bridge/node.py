@@ -175,7 +175,7 @@ class BridgeNode(Node):
             publisher.wait_for_all_acked(Duration(seconds=max(0.0, give_up - time.monotonic())))
 
     def check(self) -> None:
-        """Publish what is due; take writes once it has been told whether both of a name do."""
+        """Publish what is due; take writes after the first look for a node of our name."""
         self.session.check()
         if self._surroundings.names.has_looked:
             self._writes.begin()

@@ -88,7 +88,7 @@ class NameWatch:
 
     ``count`` tells how many nodes of the name there are; ours is one of them. That is said as soon
     as it is seen, before it is known whether it is an earlier run: both may take the next command.
-    Nobody looks before the clock value ``first_look`` (s); ``has_looked`` since then.
+    The first look is at the clock value ``first_look`` (s); ``has_looked`` is true from then on.
     """
 
     def __init__(self, name: str, count: Callable[[float], int], first_look: float = 0.0) -> None:

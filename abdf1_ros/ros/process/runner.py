@@ -56,13 +56,15 @@ class _Callbacks(threading.Thread):
         super().__init__(name='callbacks', daemon=True)
         self.error: Exception | None = None
         self.has_turned = True
+        self._ends = False
         self._executor = SingleThreadedExecutor(context=node.context)
         self._executor.add_node(node)
 
     def run(self) -> None:
         """Run callbacks."""
         try:
-            self._executor.spin()
+            while not self._ends:
+                self._executor.spin_once()
         except Exception as error:  # a bug must not end the other lines
             self.error = error
 
@@ -72,8 +74,11 @@ class _Callbacks(threading.Thread):
 
     def end(self, give_up: float) -> None:
         """Take no more callbacks; wait for the one that runs up to a monotonic clock value."""
-        self._executor.shutdown(timeout_sec=0)
+        self._ends = True
+        self.wake()
         self.join(max(0.0, give_up - time.monotonic()))
+        if not self.is_alive():  # before that it may wait with what would be destroyed
+            self._executor.shutdown()
 
 
 class Line:
