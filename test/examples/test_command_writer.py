@@ -18,16 +18,15 @@ from collections.abc import Callable, Iterator
 import runpy
 import sys
 import threading
-import time
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 import pytest
 from std_msgs.msg import Int16MultiArray
 from support.commands import call
 from support.ptys import wait_until
-from support.ros import Observer, PATIENCE, Process
+from support.ros import Observer, Process
 from support.ros_tools import SOURCE
-from support.simulator_process import Files, IMPATIENT_ROW, make_files
+from support.simulator_process import Files, make_files
 
 EXAMPLE = SOURCE / 'examples' / 'command_writer.py'
 OURS = 'the request that has been sent'
@@ -35,15 +34,15 @@ OURS = 'the request that has been sent'
 
 @pytest.fixture(scope='module')
 def files(tmp_path_factory: pytest.TempPathFactory) -> Files:
-    return make_files(tmp_path_factory.mktemp('writer'), IMPATIENT_ROW)
+    return make_files(tmp_path_factory.mktemp('writer'))
 
 
 @pytest.fixture(scope='module')
-def simulator(files: Files) -> Iterator[Process]:
-    with files.start_simulator() as simulator, \
+def bridge(files: Files) -> Iterator[Process]:
+    with files.start_simulator(), \
             Process('node', *files.args(), '-r', '__ns:=/writing') as node:
         node.wait_for(f'{files.port}: open')
-        yield simulator
+        yield node
         node.end()
 
 
@@ -68,31 +67,16 @@ def write(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -
     ('recipe', '1', '2', '3', '4'), ('setpoint', '0.1'), ('name', 'Tank', '5'), ('lamp', '1'),
     ('digits', '0x10', '99')])
 def test_value_that_the_plc_has_taken_is_written(
-        simulator: Process, write: Write, words: tuple[str, ...]) -> None:
+        bridge: Process, write: Write, words: tuple[str, ...]) -> None:
     status, (line,) = write(*words)
     assert status == 0, line
     assert line.startswith(f'{words[0]}: written (')
 
 
-def test_value_that_the_bridge_refuses_is_not_written(simulator: Process, write: Write) -> None:
+def test_value_that_the_bridge_refuses_is_not_written(bridge: Process, write: Write) -> None:
     status, (line,) = write('recipe', '1', '2', '3', '5000')
     assert status == 1
     assert line.startswith('recipe: not written: refused: value 5000 at index 3')
-
-
-def test_value_that_no_reply_confirms_is_unknown(simulator: Process, write: Write) -> None:
-    for _ in range(10):  # after reads that came late it has to wait, and is not sent
-        simulator.say('slow 2 100000')
-        status, (line,) = write('setpoint', '3.5')
-        simulator.say('normal 2')
-        if status == 3:
-            break
-        assert 'not written: ' in line
-        begun = time.monotonic()
-        while write('setpoint', '0.1')[0]:  # until it is asked again
-            assert time.monotonic() < begun + PATIENCE
-    assert status == 3
-    assert line.startswith('setpoint: unknown whether written')
 
 
 def test_nobody_who_listens_is_not_written(write: Write) -> None:
@@ -106,7 +90,7 @@ def test_nobody_who_listens_is_not_written(write: Write) -> None:
     (('a b', '1'), "1: cannot be sent: topic name '/writing/abdf1/write/a b' is invalid"),
 ])
 def test_what_is_no_value_is_refused(
-        simulator: Process, write: Write, words: tuple[str, ...], text: str) -> None:
+        bridge: Process, write: Write, words: tuple[str, ...], text: str) -> None:
     status, (line,) = write(*words)
     assert status == 2
     assert line.startswith(text)

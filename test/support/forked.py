@@ -34,7 +34,7 @@ from typing import IO
 _CONTEXT = get_context('forkserver')
 _CONTEXT.set_forkserver_preload([
     'abdf1_ros.ros.node', 'abdf1_ros.ros.lines', 'abdf1_ros.cli.simulator', 'abdf1_ros.cli.sniff',
-    'abdf1_ros.cli.plc.command',
+    'abdf1_ros.cli.plc.command', 'abdf1_ros.cli.monitor.command',
     # What rclpy imports only when a node is made:
     'rosidl_generator_py', 'service_msgs.msg', 'type_description_interfaces.msg'])
 
@@ -42,18 +42,30 @@ _CONTEXT.set_forkserver_preload([
 class Forked:
     """A program of Python without a new interpreter; as much of Popen as tests need."""
 
-    def __init__(self, program: str | Path, args: Sequence[str]) -> None:
-        """Start a command of the package, or a file; its standard streams are pipes."""
+    def __init__(self, program: str | Path, args: Sequence[str],
+                 terminal: int | None = None) -> None:
+        """
+        Start a command of the package, or a file.
+
+        Its standard streams are pipes, unless a descriptor of a ``terminal`` is given for all.
+        """
+        if terminal is not None:
+            self._start(program, args, [Connection(os.dup(terminal)) for _ in range(3)])
+            return
         (stdin, to_it), (out, stdout), (errors, stderr) = (
             _CONTEXT.Pipe(duplex=False) for _ in range(3))
-        self._process = _CONTEXT.Process(target=_run, args=(
-            program, args, dict(os.environ), os.getcwd(), (stdin, stdout, stderr)))
-        self._process.start()
-        for end in (stdin, stdout, stderr):
-            end.close()
+        self._start(program, args, (stdin, stdout, stderr))
         self.stdin = _opened(os.dup(to_it.fileno()), 'w')
         self.stdout = _opened(os.dup(out.fileno()), 'r')
         self.stderr = _opened(os.dup(errors.fileno()), 'r')
+
+    def _start(self, program: str | Path, args: Sequence[str],
+               streams: Sequence[Connection]) -> None:
+        self._process = _CONTEXT.Process(target=_run, args=(
+            program, args, dict(os.environ), os.getcwd(), streams))
+        self._process.start()
+        for end in streams:
+            end.close()
 
     @property
     def pid(self) -> int:
