@@ -122,18 +122,6 @@ def test_every_command_and_topic_is_in_the_reference() -> None:
     assert [topic for topic in TOPICS if f'| `~/{topic}' not in topics] == []
 
 
-@pytest.mark.parametrize('command', ['plc', 'conform'])
-def test_every_subcommand_is_in_the_reference(command: str) -> None:
-    known = subcommands(command) or frozenset(
-        re.search(r'^  {([\w,-]+)}', help_of(command), re.MULTILINE)[1].split(','))
-    (table,) = [part for part in documents.text('docs/reference/commands.md').split('\n\n')
-                if part.startswith(f'| `{command}` |')]
-    named = re.findall('`([a-z-]+)`', ''.join(
-        line.split('|')[1] for line in table.splitlines()[2:]))
-    assert len(known) > 5
-    assert set(named) == known
-
-
 # Nodes that pages may name: those of config/three_lines.yaml, and of a service called press.
 NODES = {'/abdf1', '/press', '/interlock_consumer', '/lines', '/cell/line_1', *re.findall(
     r'^(/[\w/]+):$', (ROOT / 'config' / 'three_lines.yaml').read_text('utf-8'), re.MULTILINE)}

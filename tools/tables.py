@@ -33,7 +33,7 @@ from abdf1_ros.pccc.families import dialect_of, FAMILIES, parse_address
 from abdf1_ros.pccc.file_types import FileType, PlcType
 from abdf1_ros.pccc.members import Members
 from abdf1_ros.pccc.processor import Processor
-from abdf1_ros.pccc.status import status_text
+from abdf1_ros.pccc.status import Meanings, status_text, USUAL_MEANINGS
 from abdf1_ros.pccc.values import types_of
 from abdf1_ros.plan.report import make_report
 from abdf1_ros.settings.columns import MAP_COLUMNS
@@ -230,12 +230,23 @@ def file_codes() -> str:
 
 
 def statuses() -> str:
-    """Return the meaning of every STS and EXT STS."""
-    plain = [(_code(f'{sts:02X}'), text) for sts in (*range(1, 16), *range(16, 256, 16))
-             if 'unknown' not in (text := status_text(sts).partition(': ')[2])]
-    extended = [(_code(f'F0 {ext:02X}'), text) for ext in range(1, 256)
-                if 'unknown code' not in (text := status_text(0xF0, ext).partition(': ')[2])]
-    return table(('STS', 'meaning'), [*plain, *extended])
+    """Return the meaning of every STS and EXT STS, and what else it means for a family."""
+    codes = [(sts, None) for sts in (*range(1, 16), *range(16, 256, 16))]
+    codes += [(0xF0, ext) for ext in range(1, 256)]
+    own = {NAMES[kind]: family.meanings for kind, family in FAMILIES.items()
+           if family.meanings is not USUAL_MEANINGS}
+    rows = []
+    for sts, ext in codes:
+        usual = _meaning(sts, ext)
+        others = [_meaning(sts, ext, meanings) for meanings in own.values()]
+        if any('unknown code' not in text for text in (usual, *others)):
+            rows.append([_code(f'{sts:02X}' if ext is None else f'{sts:02X} {ext:02X}'), usual,
+                         *('' if text == usual else text for text in others)])
+    return table(('STS', 'meaning', *own), rows)
+
+
+def _meaning(sts: int, ext: int | None, meanings: Meanings = USUAL_MEANINGS) -> str:
+    return status_text(sts, ext, meanings).partition(': ')[2]
 
 
 def commands() -> str:
