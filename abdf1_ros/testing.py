@@ -282,7 +282,7 @@ class SimulatedCell:
     Simulated PLCs, a bridge on their line as a process, and ``ros``, who looks at its topics.
 
     ``data``, ``rows`` and ``net`` are the texts of a simulator CSV, a map CSV and a net CSV, which
-    go into ``folder``. ``ladders`` are stations that run the program of docs/heartbeats.md.
+    go into ``folder``. ``ladders`` are stations with the program of docs/tutorials/heartbeats.md.
     ``parameters`` are the bridge's, as ``'write_timeout:=1.0'``; ``context`` is for ``ros`` and
     nodes that are added to it. Raises ConfigurationError with every fault of net and map CSV.
     """
