@@ -231,7 +231,8 @@ def file_codes() -> str:
 
 def statuses() -> str:
     """Return the meaning of every STS and EXT STS, and what else it means for a family."""
-    codes = [(sts, None) for sts in (*range(1, 16), *range(16, 256, 16))]
+    codes: list[tuple[int, int | None]] = [
+        (sts, None) for sts in (*range(1, 16), *range(16, 256, 16))]
     codes += [(0xF0, ext) for ext in range(1, 256)]
     own = {NAMES[kind]: family.meanings for kind, family in FAMILIES.items()
            if family.meanings is not USUAL_MEANINGS}
