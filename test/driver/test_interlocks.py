@@ -106,8 +106,8 @@ class Cell:
         self.bench.at(self.now + 0.1, self._tick)
 
     def put_behind_gateway(self) -> None:
-        """Let station 5 answer for the PLC, and open the port."""
-        self.plc.slave, self.plc.station = HalfDuplexSlave(LinkSettings(station=5), self._serve), 5
+        """Let station 7 answer for the PLC, and open the port."""
+        self.plc.slave, self.plc.station = HalfDuplexSlave(LinkSettings(station=7), self._serve), 7
         self.bench.open()
 
     def _serve(self, command: Packet) -> Packet:
@@ -565,7 +565,7 @@ def test_rules_5_and_8_message_over_a_fallback_that_is_due_puts_none_off(event: 
 @pytest.mark.parametrize('is_followed', [False, True])
 def test_rule_5_end_waits_for_the_second_write_of_rule_10(is_followed: bool) -> None:
     """A gateway delivers 0.9 s later what it has called undelivered."""
-    speed = make_mapping('N7:0', 'Write', tag='speed', fallback=FALLBACK, via=5)
+    speed = make_mapping('N7:0', 'Write', tag='speed', fallback=FALLBACK, via=7)
     cell = Cell(speed, start=False)
     cell.put_behind_gateway()
     cell.run(6.0)
@@ -656,8 +656,8 @@ def test_rule_5_write_of_a_guest_on_the_line_when_the_end_begins_does_not_stay(
 @pytest.mark.parametrize('held', [0.3, 0.9])
 def test_rule_5_write_of_a_guest_that_a_gateway_holds_does_not_stay(
         text: str, held: float) -> None:
-    speed = make_mapping('N7:0', 'Write', tag='speed', fallback=FALLBACK, via=5)
-    beat = make_mapping('N10:0', 'Heartbeat', tag='beat', period=200, heartbeat=Heartbeat(), via=5)
+    speed = make_mapping('N7:0', 'Write', tag='speed', fallback=FALLBACK, via=7)
+    beat = make_mapping('N10:0', 'Heartbeat', tag='beat', period=200, heartbeat=Heartbeat(), via=7)
     cell = GuestCell(beat, speed, start=False)
     cell.put_behind_gateway()
     cell.run(4.0)
@@ -670,7 +670,7 @@ def test_rule_5_write_of_a_guest_that_a_gateway_holds_does_not_stay(
 
 
 def test_rule_5_what_may_still_land_after_the_end_is_named() -> None:
-    speed = make_mapping('N7:0', 'Write', tag='speed', fallback=FALLBACK, via=5)
+    speed = make_mapping('N7:0', 'Write', tag='speed', fallback=FALLBACK, via=7)
     cell = GuestCell(speed, start=False)
     cell.bench.driver._record._settle_time = 20.0  # as with a Cmd_Timeout of 10 s
     cell.put_behind_gateway()
@@ -721,7 +721,7 @@ def test_rule_11_only_the_first_try_over_a_guest_is_not_held_up_by_a_pause() -> 
 @pytest.mark.parametrize('count', [1, 2, 3])
 def test_rule_19_own_heartbeats_that_a_gateway_holds_are_no_other_program(
         held: float, count: int) -> None:
-    beat = make_mapping('N10:0', 'Heartbeat', tag='beat', period=200, heartbeat=Heartbeat(), via=5)
+    beat = make_mapping('N10:0', 'Heartbeat', tag='beat', period=200, heartbeat=Heartbeat(), via=7)
     cell = Cell(beat, start=False)
     cell.put_behind_gateway()
     cell.run(5.0)
@@ -1126,7 +1126,7 @@ def test_rule_10_refresh_is_not_the_second_write(outcome: Outcome, next_refresh:
 
 
 def test_rule_10_first_try_is_not_held_up_by_the_pause_of_another_row() -> None:
-    speeds = [make_mapping(f'N7:{2 * number}', 'Write', tag=f'speed{number}', via=5,
+    speeds = [make_mapping(f'N7:{2 * number}', 'Write', tag=f'speed{number}', via=7,
                            fallback=Fallback((7,), 500 + 100 * number)) for number in range(2)]
     for offset in range(10):  # the pauses begin with the retries, a second before they end
         cell = Cell(*speeds, start=False)
@@ -1142,7 +1142,7 @@ def test_rule_10_first_try_is_not_held_up_by_the_pause_of_another_row() -> None:
 
 
 def test_rule_10_pause_of_this_process_is_no_pause_of_a_gateway() -> None:
-    speed = make_mapping('N7:0', 'Write', tag='speed', fallback=FALLBACK, via=5)
+    speed = make_mapping('N7:0', 'Write', tag='speed', fallback=FALLBACK, via=7)
     cell = Cell(speed, start=False)
     cell.put_behind_gateway()
     cell.run(6.0)

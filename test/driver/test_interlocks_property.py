@@ -64,10 +64,11 @@ FLIGHT = 0.05  # s that a frame takes to the PLC, at most
 SMALL = Noise(lost=0.0005, flipped=0.001, inserted=0.0005)
 CMD_TIMEOUT = 0.5
 GUESTS = range(32_100, 32_200)  # values that only guests write
-GATEWAY = 5
+GATEWAY = 7  # not our own number
 DAMAGED = b'ZZZZ'  # what the line does not carry: only guests send it
 MODES = {'Message': {'polling': 'Message'}, 'Standard': {'polling': 'Standard'},
-         'Peer': {'mode': 'Peer'}, 'Gateway': {'polling': 'Message'}}
+         'Peer': {'mode': 'Peer'}, 'Gateway': {'polling': 'Message'},
+         'Gateway, Standard': {'polling': 'Standard'}}
 
 
 def _is_write(command: Packet) -> bool:
@@ -79,7 +80,7 @@ class World:
 
     def __init__(self, mode: str, seed: int) -> None:
         self.dice = Random(seed)
-        self.is_behind = mode == 'Gateway'
+        self.is_behind = mode.startswith('Gateway')
         fallback, via = Fallback((SAFE,), int(AFTER * 1000)), GATEWAY if self.is_behind else None
         self.rows = [make_mapping(f'N7:{number}', 'Write', tag=f'w{number}', fallback=fallback,
                                   via=via) for number in range(2)]
