@@ -61,9 +61,9 @@ def test_subscriber_that_stalls_does_not_hold_up_the_others(
             print(f'longest pause between values {max(pauses):.3f} s')
             return median(pauses)
 
-        before = usual_pause(15)  # a busy machine makes all of them longer
+        before = usual_pause(8)  # a busy machine makes all of them longer
         stalling.stop()
-        assert usual_pause(30) < max(0.2, 2 * before)
+        assert usual_pause(16) < max(0.2, 2 * before)
         rig.writes(3.0)
         lines = len(stalling.lines)
         stalling.go_on()

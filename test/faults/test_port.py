@@ -17,14 +17,12 @@
 from collections.abc import Iterator
 import os
 from pathlib import Path
-import signal
 
-from abdf1_ros.ports.opening import open_port
-from abdf1_ros.ports.settings import PortSettings
 import pytest
+from support.device_server import LineServer
 from support.fault_rig import boxed, is_unanswered, NO_ANSWER, NOT_SENT, rigged, SETPOINT
 from support.ros import ERROR, Observer, Process
-from support.simulator_process import Files, IMPATIENT_ROW, make_files
+from support.simulator_process import IMPATIENT_ROW, make_files
 
 REFUSED = 'not written: refused: the port is not open'
 
@@ -35,9 +33,8 @@ def observer() -> Iterator[Observer]:
         yield observer
 
 
-@pytest.mark.parametrize('is_elsewhere', [False, True], ids=['same-name', 'another-device'])
-def test_device_vanishes_and_returns(
-        observer: Observer, tmp_path: Path, is_elsewhere: bool) -> None:
+def test_device_vanishes_and_returns_as_another_of_its_name(
+        observer: Observer, tmp_path: Path) -> None:
     with boxed(observer, tmp_path) as (rig, box):
         rig.writes(3.0)
         device = os.readlink(box.name)
@@ -49,38 +46,17 @@ def test_device_vanishes_and_returns(
         rig.status('station 2', ERROR, 'unknown: the port is not open')
         rig.writes(4.0, REFUSED)
         lines = len(rig.node.lines)
-        box.plug(other_than=device if is_elsewhere else '')
-        assert not is_elsewhere or os.readlink(box.name) != device
+        box.plug(other_than=device)
+        assert os.readlink(box.name) != device
         rig.recovers()
         rig.node.wait_for('[INFO]', f'{box.name}: open', after=lines)
         assert rig.has_read_only(SETPOINT, 3.0)
 
 
-def test_port_that_is_busy_is_opened_when_it_is_free(observer: Observer, tmp_path: Path) -> None:
-    files = make_files(tmp_path, IMPATIENT_ROW)
-    simulator = files.start_simulator()
-    other = open_port(PortSettings(str(files.port)))
-    with rigged(observer, files, str(files.port), simulator) as rig:
-        rig.node.wait_for('[ERROR]', 'cannot open the port: another program has it open')
-        rig.status('link', ERROR, 'cannot open the port: another program has it open')
-        rig.writes(4.0, REFUSED)
-        assert not rig.speeds
-        other.close()
-        rig.recovers()
-        assert rig.has_read_only(SETPOINT)
-        assert rig.node.text.count('cannot open the port') == 1  # not once for each attempt
-
-
-def start_tcp_simulator(files: Files, address: str = '127.0.0.1:0') -> tuple[Process, str]:
-    """Return the process and the URL of its port."""
-    simulator = Process('simulator', '--tcp', address, '--data', str(files.simulator))
-    line = simulator.wait_for(' on socket://')
-    return simulator, line.split(' on ')[1].split(',')[0]
-
-
 def test_process_at_the_far_end_of_tcp_is_frozen(observer: Observer, tmp_path: Path) -> None:
     files = make_files(tmp_path, IMPATIENT_ROW)
-    simulator, url = start_tcp_simulator(files)
+    simulator = Process('simulator', '--tcp', '127.0.0.1:0', '--data', str(files.simulator))
+    url = simulator.wait_for(' on socket://').split(' on ')[1].split(',')[0]
     with rigged(observer, files, url, simulator) as rig:
         rig.until_well()
         simulator.stop()
@@ -93,16 +69,19 @@ def test_process_at_the_far_end_of_tcp_is_frozen(observer: Observer, tmp_path: P
         assert rig.has_read_only(SETPOINT, 3.0)
 
 
-def test_process_at_the_far_end_of_tcp_ends_and_returns(
-        observer: Observer, tmp_path: Path) -> None:
+def test_device_server_goes_away_and_returns(observer: Observer, tmp_path: Path) -> None:
     files = make_files(tmp_path, IMPATIENT_ROW)
-    simulator, url = start_tcp_simulator(files)
-    with rigged(observer, files, url, simulator) as rig:
+    simulator = files.start_simulator()
+    with LineServer(files.port) as server, rigged(observer, files, server.url, simulator) as rig:
         rig.until_well()
-        simulator.send(signal.SIGKILL)
-        simulator.result()
+        server.stop()
+        rig.node.wait_for('[ERROR]', f'{server.url}: the port was lost: ')
+        rig.node.wait_for('[ERROR]', f'{server.url}: cannot open the port: ', 'refused')
         rig.status('link', ERROR, 'cannot open the port: ')
         rig.writes(4.0, REFUSED)
-        rig.simulator, _ = start_tcp_simulator(files, url.removeprefix('socket://'))
+        lines = len(rig.node.lines)
+        server.start()
         rig.recovers()
+        rig.node.wait_for('[INFO]', f'{server.url}: open', after=lines)
+        assert rig.node.text.count('cannot open the port') == 1  # not once for each attempt
         assert rig.has_read_only(SETPOINT)

@@ -19,7 +19,6 @@ import re
 import signal
 import time
 
-from abdf1_ros.df1 import frames
 import pytest
 from support.fault_rig import is_unanswered, NOT_SENT, UNKNOWN
 from support.renewed import Renewed
@@ -99,53 +98,6 @@ def test_slave_is_killed_and_returns(line: Line) -> None:
     assert not line.slave.was_told(value)
 
 
-def test_slave_that_hears_nothing_sends_nothing(line: Line) -> None:
-    line.box.to_node = False
-    lose_slave(line)
-    line.slave.status('mappings', ERROR)
-    value = next(line.values)
-    assert line.slave.write(value).startswith(TOO_OLD)
-    line.box.mend()
-    line.recovers()
-    line.works()
-    assert not line.master.was_told(value)
-
-
-def test_slave_that_is_not_heard_does_not_know_what_it_has_written(line: Line) -> None:
-    line.box.to_plc = False
-    lose_slave(line)
-    line.slave.status('mappings', ERROR)
-    value = next(line.values)
-    said = bytearray()
-    line.box.pass_on = lambda mode, data: said.extend(data) or data
-    result = line.slave.write(value)
-    line.box.pass_on = lambda mode, data: data
-    # The master polls a station that it does not hear seldom, so a message may be too old before
-    # it has been sent, or as often as it may be; or no poll comes within Cmd_Timeout.
-    was_sent = frames.stuff(value.to_bytes(2, 'little')) + frames.ETX in said
-    assert result.startswith(
-        tuple(UNKNOWN + why for why in ('2519 ', '2508 ', 'too old to be sent once more; '))
-        if was_sent else TOO_OLD)
-    line.box.mend()
-    line.recovers()
-    line.works()
-    assert not line.master.was_told(value)
-
-
-def test_port_of_the_slave_vanishes_and_returns(line: Line) -> None:
-    line.box.unplug()
-    line.slave.status('link', ERROR, 'cannot open the port: ')
-    line.slave.status('mappings', ERROR, '1 failed')
-    assert line.slave.write(next(line.values)) == REFUSED + 'the port is not open'
-    value = lose_slave(line)
-    lines = len(line.slave.node.lines)
-    line.box.plug()
-    line.recovers()
-    line.slave.node.wait_for('[INFO]', 'open', after=lines)
-    line.works()
-    assert not line.slave.was_told(value)
-
-
 def test_slave_is_stopped_and_goes_on(line: Line) -> None:
     line.slave.node.stop()
     own = next(line.values)
@@ -161,20 +113,6 @@ def test_slave_is_stopped_and_goes_on(line: Line) -> None:
     assert not line.master.was_told(own)
     # The port has kept the command and its repetitions: executed once at most, if it was sent.
     assert line.slave.was_told(value) <= was_sent
-
-
-def test_write_is_not_sent_by_a_slave_that_nobody_polls(
-        observer: Observer, tmp_path_factory: pytest.TempPathFactory) -> None:
-    with two_nodes(observer, tmp_path_factory.mktemp('line'), 'poll_timeout:=1.0') as line:
-        line.clear()
-        line.master.node.stop()
-        line.slave.status('mappings', ERROR, '1 failed')
-        value = next(line.values)
-        assert line.slave.write(value) == NOT_SENT + NO_REPLY
-        line.master.node.go_on()
-        line.recovers()
-        line.works()
-        assert not line.master.was_told(value)
 
 
 def test_master_is_killed_while_the_slave_sends_a_command(line: Line) -> None:

@@ -25,7 +25,6 @@ import os
 from pathlib import Path
 import select
 import socket
-import struct
 import threading
 
 from abdf1_ros.ports.descriptor import DescriptorPort
@@ -92,27 +91,21 @@ class DeviceServer:
 
 _TURN = 0.01  # s; so long the server listens before it looks at what it has been told
 
-_RESET = struct.pack('ii', 1, 0)  # SO_LINGER: closing drops what is under way, and tells so
-
 
 class LineServer:
     """
     A device server on 127.0.0.1 with one client at a time, for the port ``line``.
 
-    ``start`` and ``stop`` are its power switch; it comes back with the same ``url``. What is
-    set from outside holds from then on: while ``is_frozen`` it neither takes nor gives anything,
-    and the kernel keeps what it is sent; ``hangs_up`` on every client.
+    ``start`` and ``stop`` are its power switch; it comes back with the same ``url``.
     """
 
     def __init__(self, line: Path) -> None:
-        self.is_frozen = self.hangs_up = False
         self._line_name = str(line)
         self._port = 0
         self._line: DescriptorPort
         self._listener: socket.socket
         self._client: socket.socket | None = None
         self._manager: serial.rfc2217.PortManager
-        self._is_lost = False
         self._thread: threading.Thread | None = None
 
     @property
@@ -135,7 +128,6 @@ class LineServer:
         """Be there."""
         self._listener = socket.create_server(('127.0.0.1', self._port))
         self._port = self._listener.getsockname()[1]
-        self._is_lost = False
         self._thread = threading.Thread(target=self._run, name='device server')
         self._is_working = True
         self._thread.start()
@@ -147,10 +139,6 @@ class LineServer:
             self._is_working = False
             thread.join()
 
-    def reset(self) -> None:
-        """Lose the connection, as a server does that begins anew."""
-        self._is_lost = True
-
     def write(self, data: bytes) -> None:
         """Send to the client; what ``PortManager`` answers comes this way too."""
         if self._client is not None:
@@ -160,16 +148,12 @@ class LineServer:
     def _run(self) -> None:
         with self._listener:
             while self._is_working:
-                if self._is_lost:
-                    self._is_lost = False
-                    self._drop_client(is_reset=True)
                 self._turn()
             self._drop_client()
 
     def _turn(self) -> None:
         near = self._listener if self._client is None else self._client
-        ends = [] if self.is_frozen else [near, self._line]
-        ready = select.select(ends, [], [], _TURN)[0]
+        ready = select.select([near, self._line], [], [], _TURN)[0]
         if self._line in ready:
             self._take_from_line()
         if self._listener in ready:
@@ -182,8 +166,6 @@ class LineServer:
         self._client.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
         # It keeps the settings that are asked for; a pseudo-terminal has no modem lines.
         self._manager = serial.rfc2217.PortManager(serial.serial_for_url('loop://'), self)
-        if self.hangs_up:
-            self._drop_client()
 
     def _take_from_line(self) -> None:
         data = b''
@@ -206,9 +188,7 @@ class LineServer:
         with suppress(OSError):
             self._line.write(data)
 
-    def _drop_client(self, is_reset: bool = False) -> None:
+    def _drop_client(self) -> None:
         client, self._client = self._client, None
         if client is not None:
-            if is_reset:
-                client.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, _RESET)
             client.close()

@@ -21,7 +21,6 @@ from contextlib import suppress
 import os
 from pathlib import Path
 from queue import Empty, SimpleQueue
-from random import Random
 import select
 import threading
 
@@ -38,22 +37,19 @@ class FaultBox:
     Pass on bytes between the port ``far`` and a pseudo-terminal of the name ``name``.
 
     The far end may come and go. What is set from outside holds from the next bytes on:
-    ``to_plc`` and ``to_node`` tell which direction works; with ``babbles`` the node hears noise
-    without end. ``overhear`` is called with what the node has sent, before the PLC gets it; what
-    it returns the node hears first.
+    ``to_plc`` and ``to_node`` tell which direction works. ``overhear`` is called with what the
+    node has sent, before the PLC gets it; what it returns the node hears first.
     """
 
     def __init__(self, far: Path, name: Path) -> None:
         self.name = name
         self.to_plc = self.to_node = True
-        self.babbles = False
         self.overhear: Callable[[bytes], bytes] = lambda data: b''
         self._far_name = str(far)
         self._far: DescriptorPort | None = None
         self._near: Pty | None = _quick(Pty(name))
         self._orders: SimpleQueue[tuple[Callable[[], None], threading.Event]] = SimpleQueue()
         self._is_working = True
-        self._random = Random(1)
         self._thread = threading.Thread(target=self._run, name='fault box')
 
     def __enter__(self) -> FaultBox:
@@ -67,9 +63,8 @@ class FaultBox:
         self._lose_far()
 
     def mend(self) -> None:
-        """Let both directions work, and nothing babble."""
+        """Let both directions work."""
         self.to_plc = self.to_node = True
-        self.babbles = False
 
     def unplug(self) -> None:
         """Let the device of the node vanish."""
@@ -126,8 +121,6 @@ class FaultBox:
             self._take_from_node(os.read(near.fileno(), 4096))
         if far is not None and far in ready:
             self._take_from_plc(far)
-        if self.babbles:
-            self._tell_node(self._random.randbytes(self._random.randrange(40)))
 
     def _take_from_node(self, data: bytes) -> None:
         self._tell_node(self.overhear(data))
