@@ -67,7 +67,7 @@ class Job:
         raise NotImplementedError
 
     def ended(self, error: Exception | None) -> None:
-        """Take note that it has ended, by an error that it has not handled or by itself."""
+        """Take note, once, that it has ended, by an error that it has not handled or by itself."""
         raise NotImplementedError
 
 
@@ -155,7 +155,12 @@ class JobTask:
         self.station = job.station
         self._tasks = tasks
         self._steps = job.steps(now)
-        self.command = tasks.new_command(job.station, next(self._steps))
+        try:
+            request = next(self._steps)
+        except Exception as error:  # a bug, or it has ended before its first command
+            job.ended(error)
+            raise
+        self.command = tasks.new_command(job.station, request)
         tasks.under_way.add(self)
 
     def reply(self, packet: Packet) -> None:

@@ -15,12 +15,15 @@
 """Jobs as tasks of the link: requests out, replies in, and the numbers of their commands."""
 
 import math
+from unittest.mock import Mock
 
 from abdf1_ros.df1.packet import Packet
 from abdf1_ros.driver.job_tasks import Job, JobTasks
 from abdf1_ros.errors import CommandTimeout, PortLost
 from abdf1_ros.pccc.dialect import Steps
 import pytest
+from support.driver_bench import DriverBench
+from support.mappings import make_mapping
 
 OURS = 5
 NOW = 50.0
@@ -109,6 +112,18 @@ def test_error_in_a_job_ends_it() -> None:
     tasks.fail(PortLost('unplugged'))  # there is nothing left to be ended
     assert [type(error) for error in job.errors] == [ZeroDivisionError]
     assert tasks.first(()) is None
+
+
+def test_job_that_fails_before_its_first_command_has_ended_too() -> None:
+    mapping = make_mapping('N7:0', 'Write')
+    bench = DriverBench([mapping])
+    bench.run(1.0)
+    bench.driver.readings.planner.dialect = Mock(  # type: ignore[method-assign]
+        side_effect=ZeroDivisionError)
+    with pytest.raises(ZeroDivisionError):
+        bench.write(mapping, [1], run=1.0)
+    assert bench.driver._record.may_begin(mapping)
+    assert not bench.driver.tasks.under_way
 
 
 def test_transaction_number_is_passed_over_when_a_whole_round_lies_between() -> None:
