@@ -99,15 +99,6 @@ class Block:
         at = 2 * (mapping.address.offset - self.start.offset)
         return slice(at, at + 2 * mapping.codec.words)
 
-    def commands(self) -> list[tuple[int, bytes]]:
-        """Return CMD, and what stands after TNS, of each request."""
-        return [self.dialect.read(request.start, request.words, self.transfer)
-                for request in self.requests]
-
-    def reply_sizes(self) -> list[int]:
-        """Return the bytes after the header of a good reply to each request."""
-        return [self.dialect.reply_size(request.start, request.words) for request in self.requests]
-
 
 @dataclass(frozen=True, slots=True)
 class _Demand:

@@ -30,8 +30,8 @@ from abdf1_ros.driver.guests import GuestQueue
 from abdf1_ros.driver.interlocks.queue import Interlocks
 from abdf1_ros.driver.job_tasks import Job, JobTasks
 from abdf1_ros.driver.links import DriverSettings
+from abdf1_ros.driver.reads.job import ReadJob
 from abdf1_ros.driver.reads.point import ReadPoint
-from abdf1_ros.driver.reads.queue import ReadJob
 from abdf1_ros.driver.reads.readings import Readings
 from abdf1_ros.driver.record import Claim, WriteRecord
 from abdf1_ros.driver.write import Outcome, Write, WriteResult
@@ -67,7 +67,7 @@ def make_job(text: str = 'N7:0', station: int = 1, period: int = 100) -> ReadJob
     mapping = make_mapping(text, station=station, period=period)
     block, = Planner(LINE, 0.1).plan([mapping])
     return ReadJob(block, [ReadPoint(mapping, period / 1000, 1.0)], StillClock(),
-                   lambda job, error: None)
+                   lambda job, words, error: None)
 
 
 def written(write: Write, now: float) -> Claim:

@@ -816,7 +816,7 @@ def test_long_read_that_a_lost_port_has_broken_off_begins_anew() -> None:
     fast, long = make_mapping('N9:0', period=20), make_mapping('N7:0', length=250, period=1000)
     bench, plc = make_bench(fast, long, network=Network(baud=115200, timeout=200))
     job, = (job for job in bench.driver.readings.reads.jobs if job.block.mappings == (long,))
-    bench.run_until(lambda: job.is_under_way)  # while the fast one has the line
+    bench.run_until(lambda: job.is_unfinished)  # while the fast one has the line
     bench.lose_port()
     store(plc, 'N7:0', [1] * 250)
     bench.run(60.0)

@@ -23,8 +23,9 @@ from abdf1_ros.df1.checksum import Checksum
 from abdf1_ros.df1.frames import Duplex
 from abdf1_ros.df1.machine import LineTiming
 from abdf1_ros.df1.packet import Packet
+from abdf1_ros.driver.reads.job import ReadJob
 from abdf1_ros.driver.reads.point import ReadPoint
-from abdf1_ros.driver.reads.queue import ReadJob, ReadQueue
+from abdf1_ros.driver.reads.queue import ReadQueue
 from abdf1_ros.errors import RemoteError
 from abdf1_ros.plan.forecast import block_time, intervals, load, PATIENCE
 from abdf1_ros.plan.line_model import LineModel
@@ -57,7 +58,7 @@ class StillClock:
 def make_job(period: int = 100, text: str = 'N7:0', length: int = 1) -> ReadJob:
     block = make_block(period, text, length)
     return ReadJob(block, [ReadPoint(block.mappings[0], period / 1000, 1.0)], StillClock(),
-                   lambda job, error: None)
+                   lambda job, words, error: None)
 
 
 TOOK = block_time(make_job().block)
@@ -228,31 +229,32 @@ def test_packets_of_a_long_block_go_one_by_one_and_others_between_them() -> None
     order = []
     for number in range(4):
         for job in (queue.take(0.1 * number), queue.take(0.1 * number)):
-            if job is long and read_packet_of(job, 0.1 * number) is not None:
+            if job is long and is_last_packet_read(job, 0.1 * number):
                 order.append('done')
             elif job is not None:
                 order.append('long' if job is long else 'fast')
-                queue.put(job, job.due if job.is_under_way else job.due + job.block.period)
+                queue.put(job, job.due if job.is_unfinished else job.due + job.block.period)
     assert order == ['fast', 'long', 'fast', 'long', 'fast', 'done', 'fast']
 
 
-def read_packet_of(job: ReadJob, now: float) -> bytes | None:
-    """Have a job read its next packet; return what it returns."""
+def is_last_packet_read(job: ReadJob, now: float) -> bool:
+    """Have a job read its next packet; return whether that was the last one."""
     steps = job.steps(now)
     cmd, _ = next(steps)
     with pytest.raises(StopIteration):
         steps.send(Packet(0, 1, cmd | 0x40, 0, 1, bytes(2 * job.block.requests[0].words)))
-    return job.data()
+    job.ended(None)
+    return not job.is_unfinished
 
 
 def test_long_read_begins_anew_after_an_error() -> None:
     job = make_job(length=236)
-    assert read_packet_of(job, 1.0) is None
-    assert (job.is_under_way, job.started) == (True, 1.0)
+    assert not is_last_packet_read(job, 1.0)
+    assert (job.is_unfinished, job.started) == (True, 1.0)
     next(job.steps(2.0))
     job.ended(RemoteError(0x10, 0, 'refused'))
-    assert (job.is_under_way, job.started) == (False, 1.0)
-    assert read_packet_of(job, 3.0) is None
+    assert (job.is_unfinished, job.started) == (False, 1.0)
+    assert not is_last_packet_read(job, 3.0)
     assert job.started == 3.0
     job.interrupted()
-    assert not job.is_under_way
+    assert not job.is_unfinished

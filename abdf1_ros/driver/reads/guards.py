@@ -21,7 +21,6 @@ docs/heartbeats.md.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 import math
 
 from abdf1_ros.driver.reads.point import Guard, ReadPoint
@@ -126,10 +125,9 @@ class Guards:
         if station in self._runs:
             self._runs[station].told(identity, asked)
 
-    def values_read(self, points: Sequence[ReadPoint], places: Sequence[slice], data: bytes,
-                    now: float) -> None:
+    def values_read(self, points: dict[ReadPoint, slice], data: bytes, now: float) -> None:
         """Give the counters among the words that were read to their guards."""
-        for point, place in zip(points, places, strict=True):
+        for point, place in points.items():
             counter = self.counters.get(point.mapping.tag)
             if counter is not None:
                 counter.read(data[place], now)

@@ -29,128 +29,16 @@ others leave: its period counts as four times the time of reading everything onc
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Iterable
 import heapq
 import itertools
 import math
 
-from abdf1_ros.df1.machine import MOST_LATE
-from abdf1_ros.driver.job_tasks import Job, LineTime
-from abdf1_ros.driver.reads.point import ReadPoint
-from abdf1_ros.pccc.dialect import Steps
-from abdf1_ros.pccc.steps import words_in
+from abdf1_ros.driver.reads.job import ReadJob
 from abdf1_ros.plan.forecast import PATIENCE, poll_cycle
-from abdf1_ros.plan.planner import Block
 
 _TURNS = 4
 _MOST_ENTRIES = 4  # for each read
-
-
-class ReadJob(Job):
-    """
-    A block to be read again and again, and the points it serves.
-
-    ``due`` is the clock value (s) from which it wants the line. ``interval`` is the seconds
-    between its last two good reads and ``longest`` the greatest of these; an outage of the
-    station does not count. ``is_refresh`` tells that a write has changed words of the block, the
-    last time at ``refreshed``. ``started`` is when the read under way or the last one began, and
-    ``late`` was ``Machine.late`` then; its last packet was ``asked`` for. All packets of a read
-    have to come within ``longest_read`` seconds. ``is_under_way`` tells that there are packets
-    already, and more to come, ``is_to_repeat`` that the last read was dropped. ``ticket`` is the
-    number of its valid entry in the queue. ``take`` is called at the end of each packet.
-    """
-
-    def __init__(self, block: Block, points: Sequence[ReadPoint], line: LineTime,
-                 take: Callable[[ReadJob, Exception | None], None],
-                 longest_read: float = math.inf) -> None:
-        self.block = block
-        self.station = block.station
-        self.points = tuple(points)
-        # Needed at every read, and always the same.
-        self._commands = block.commands()
-        self._dialect = block.dialect
-        self.extent = block.extent
-        self._reply_sizes = block.reply_sizes()
-        self.reply_size, self.is_under_way = self._reply_sizes[0], False
-        self.slices = [block.slice_of(point.mapping) for point in points]
-        self.heartbeats = [(mapping, block.slice_of(mapping)) for mapping in block.mappings
-                           if mapping.heartbeat]
-        self.due = 0.0
-        self.interval: float | None = None
-        self.longest: float | None = None
-        self.is_refresh = False
-        self.refreshed = -math.inf
-        self.started = self.asked = 0.0
-        self.late = 0.0
-        self.is_to_repeat = False
-        self._line = line
-        self._take = take
-        self._longest_read = longest_read
-        self.ticket = 0
-        self._last_done: float | None = None
-        self._packets: list[bytes] = []
-
-    def steps(self, now: float) -> Steps[None]:
-        """Read one packet; raises LinkError, and like ``words_in``."""
-        self.asked, number = now, len(self._packets)
-        if not number:
-            self.started, self.late, self.is_to_repeat = now, self._line.late, False
-        reply = yield self._commands[number]
-        request = self.block.requests[number]
-        self._packets.append(words_in(reply, request.start, request.words, self._dialect))
-
-    def ended(self, error: Exception | None) -> None:
-        """Let the packet be made use of; after an error the next read begins anew."""
-        if error is not None:
-            self._forget()
-        self._take(self, error)
-
-    def data(self) -> bytes | None:
-        """Return all words after the last packet, None before."""
-        if len(self._packets) < len(self._commands):
-            self.reply_size, self.is_under_way = self._reply_sizes[len(self._packets)], True
-            return None
-        data = b''.join(self._packets)
-        self._packets.clear()
-        self.reply_size, self.is_under_way = self._reply_sizes[0], False
-        return data
-
-    def why_too_old(self) -> str:
-        """
-        Return why the data of this read must be dropped, empty where they are good.
-
-        Since its first command this process has stood still, or other commands had the line for so
-        long that words of one value differ too much in age.
-        """
-        stood_still = self._line.late - self.late
-        if stood_still > MOST_LATE:
-            return f'this process, or its host, stood still for {stood_still:.1f} s'
-        spent = self._line.now - self.started
-        if len(self._commands) > 1 and spent > self._longest_read:
-            return f'its packets took {spent:.1f} s, more than {self._longest_read:.1f} s'
-        return ''
-
-    def begin_anew(self) -> None:
-        """Drop the packets that were read; the whole block is due again."""
-        self._forget()
-        self.is_to_repeat = True
-
-    def _forget(self) -> None:
-        self._packets.clear()
-        self.reply_size, self.is_under_way = self._reply_sizes[0], False
-
-    def done(self, now: float) -> None:
-        """Take note of a good read."""
-        self.is_refresh = self.started < self.refreshed
-        if self._last_done is not None:
-            self.interval = now - self._last_done
-            self.longest = max(self.interval, self.longest or 0.0)
-        self._last_done = now
-
-    def interrupted(self) -> None:
-        """Take note that a read has failed: no interval spans an outage."""
-        self.interval = self._last_done = None
-        self._forget()
 
 
 _QueueEntry = tuple[float, int, ReadJob]

@@ -25,8 +25,8 @@ from abdf1_ros.df1.stations import ActiveStationList
 from abdf1_ros.driver.job_tasks import LineTime
 from abdf1_ros.driver.links import DriverSettings
 from abdf1_ros.driver.reads.guards import Guards
+from abdf1_ros.driver.reads.job import ReadJob, ReadTooOld
 from abdf1_ros.driver.reads.point import Guard, ReadPoint
-from abdf1_ros.driver.reads.queue import ReadJob
 from abdf1_ros.driver.reads.read_backs import ReadBacks
 from abdf1_ros.driver.reads.silent import Reads
 from abdf1_ros.driver.write import WriteResult
@@ -107,15 +107,13 @@ class Readings:
         points = [self.points[mapping] for mapping in block.mappings if mapping.reads]
         return ReadJob(block, points, self._line, self._packet_ended, longest)
 
-    def _packet_ended(self, job: ReadJob, error: Exception | None) -> None:
+    def _packet_ended(self, job: ReadJob, words: bytes | None, error: Exception | None) -> None:
         try:
-            if error is None and (reason := job.why_too_old()):
-                job.begin_anew()
+            if words is not None:
+                self._read(job, words)
+            elif isinstance(error, ReadTooOld):
                 for point in job.points:
-                    point.fail(f'read again: {reason}')
-            elif error is None:
-                if (data := job.data()) is not None:
-                    self._read(job, data)
+                    point.fail(f'read again: {error}')
             elif isinstance(error, LinkError):
                 self.link_failed(job.station, job.points, error)
             elif isinstance(error, RemoteError):
@@ -132,13 +130,14 @@ class Readings:
         if self.read_backs.next_expiry != math.inf:
             self.read_backs.read(job.block, data, job.started, now)
         if self.guards.counters:
-            self.guards.values_read(job.points, job.slices, data, now)
+            self.guards.values_read(job.points, data, now)
         for mapping, place in job.heartbeats:
             self._read_back(mapping, data[place], job.started)
         has_recovered, period = False, job.block.period
-        for point, place in zip(job.points, job.slices, strict=True):
+        is_refresh = job.refreshed > -math.inf
+        for point, place in job.points.items():
             has_recovered |= point.error is not None
-            is_rare = point.period > period and not job.is_refresh  # others are for every read
+            is_rare = point.period > period and not is_refresh  # others are for every read
             if is_rare and not point.is_due(now, period):
                 continue
             guard = point.guard

@@ -25,7 +25,8 @@ from collections import deque
 from collections.abc import Container, Iterable
 
 from abdf1_ros.df1.stations import ActiveStationList
-from abdf1_ros.driver.reads.queue import ReadJob, ReadQueue
+from abdf1_ros.driver.reads.job import ReadJob
+from abdf1_ros.driver.reads.queue import ReadQueue
 from abdf1_ros.driver.record import Claim, WriteListener
 
 
@@ -50,13 +51,14 @@ class Reads(WriteListener):
     @property
     def poll_cycle(self) -> float | None:
         """Return the longest time (s) between the last two good reads of any job."""
-        return max((job.interval for job in self.jobs if job.interval is not None),
+        return max((job.intervals.last for job in self.jobs if job.intervals.last is not None),
                    default=None)
 
     @property
     def longest_poll_cycle(self) -> float | None:
         """Return the longest time (s) there has ever been between two good reads of a job."""
-        return max((job.longest for job in self.jobs if job.longest is not None), default=None)
+        return max((job.intervals.longest for job in self.jobs
+                    if job.intervals.longest is not None), default=None)
 
     def replace(self, old: Iterable[ReadJob], new: Iterable[ReadJob], now: float) -> None:
         """Put ``new`` jobs, due at once, in the place of ``old`` ones."""
@@ -141,7 +143,7 @@ class Reads(WriteListener):
             return
         if self._aside:
             self.release(job.station, now)
-        if job.is_under_way or job.is_to_repeat:
+        if job.is_unfinished:
             self._due.put(job, job.due)
         elif job.started < job.refreshed:  # it had begun before the write
             self._due.put(job, now)
@@ -156,7 +158,7 @@ class Reads(WriteListener):
         self.release(claim.station, now)
         for job in self._due.jobs:
             if claim.meets(job.extent):
-                job.is_refresh, job.refreshed = True, now
+                job.refreshed = now
                 if job.due > now:
                     self._due.put(job, now)
 
