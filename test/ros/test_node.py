@@ -45,7 +45,6 @@ from std_msgs.msg import (  # noqa: I101
     MultiArrayDimension,
     MultiArrayLayout,
     UInt8MultiArray,
-    UInt16MultiArray,
 )
 from std_srvs.srv import SetBool, Trigger
 from support.ros import (
@@ -215,57 +214,10 @@ def test_messages_that_dds_drops_are_counted(
     assert '~/write/recipe: 200 messages were lost on their way here' in capfd.readouterr().err
 
 
-def test_waiting_words_are_superseded_by_newer_ones(make_bench: Benches) -> None:
-    bench = make_bench(RECIPE, PULSES, parameters=PATIENT)
-    bench.plcs.say('slow 1 10')
-    publish = bench.publisher(Int16MultiArray, 'recipe')
-    for number in range(100):
-        publish(number, -number)
-    results = bench.until_results(100)
-    superseded = 'not written: superseded by a newer value'
-    found = messages(results)
-    assert found['written'] + found[superseded] == 100
-    assert 1 <= found['written'] <= 50
-    assert {result.level for result in results if result.message == superseded} == {WARN}
-    last = [result for result in results if details(result)['value'] == '[99, -99]']
-    assert [result.message for result in last] == ['written']
-    assert bench.words('N7:4', 2) == [99, 0x10000 - 99]
-
-
 # Writes that do not go well
-
-NOT_READ_BACK = 'not read back: no row reads all of these words'
-
-
-def begin_writing(bench: Bench) -> Callable[..., None]:
-    """Write once, so that no echo is due for a while; return what writes more."""
-    publish = bench.publisher(UInt8MultiArray, 'pulses')
-    publish(*8 * [0])
-    assert bench.until_results(1)[0].message == 'written'
-    bench.results.clear()
-    return publish
-
 
 def test_results_of_all_writes_that_wait_fit_into_their_queue(make_bench: Benches) -> None:
     assert make_bench(PULSES).node._surroundings.results.qos_profile.depth == MAX_WAITING_WRITES
-
-
-def test_write_to_a_station_that_falls_silent(make_bench: Benches) -> None:
-    bench = make_bench(PULSES)
-    publish = begin_writing(bench)
-    bench.plcs.say('silent 1')
-    inactive = '2509 ERR_INACTIVE_STATION: Slave Station (1) Inactive'
-    for expected in (f'unknown whether written: {inactive}; {NOT_READ_BACK}',
-                     f'not written: not sent: {inactive}'):
-        publish(*8 * [1])
-        (result,) = bench.until_results(1)
-        assert (result.level, result.message) == (ERROR, expected)
-        bench.results.clear()
-    assert bench.words('B3:1') == [0]
-    bench.plcs.say('normal 1')
-    publish(*8 * [1])
-    assert bench.until_results(1)[0].message == 'written'
-    assert bench.words('B3:1') == [255]
 
 
 def test_reply_to_a_command_of_an_earlier_run_is_no_error(
@@ -315,13 +267,6 @@ def test_end_waits_until_results_and_diagnostics_have_arrived(
     assert patience <= 0.3 and 0.0 <= rest <= 0.2  # of a subscriber that is stuck, for both
 
 
-def test_read_only_node_refuses_every_write(make_bench: Benches) -> None:
-    bench = make_bench(*LAMPS, parameters=('read_only:=true',))
-    bench.publisher(UInt8MultiArray, 'lamps')(1, 1)
-    assert messages(bench.until_results(2)) == {'not written: refused: this node is read_only': 2}
-    assert bench.words('B3:0') == [0]
-
-
 # Maps with faults
 
 
@@ -353,24 +298,6 @@ def test_bad_row_is_told_and_left_out_and_the_rest_runs(
     read_topics = {name for name, _ in bench.node.get_topic_names_and_types()
                    if name.startswith('/abdf1/read/')}
     assert read_topics == {'/abdf1/read/missing', '/abdf1/read/speed'}
-
-
-def test_file_that_a_plc_lacks_is_told_in_one_line(
-        make_bench: Benches, capfd: pytest.CaptureFixture[str],
-        monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr('abdf1_ros.ros.diagnostics.log._PAUSE', 3.0)
-    bench = make_bench(*(f'm{n},Read,N99:{30 * n},1,PLC5,1,' for n in range(8)), SPEED)
-    told: list[str] = []
-
-    def is_told() -> bool:
-        told.extend(line.partition(': ')[2] for line in ''.join(capfd.readouterr()).splitlines()
-                    if 'N99' in line)
-        return bool(told)
-
-    bench.observer.until(is_told, lambda: 'an entry in the log')
-    assert told == [
-        '8 rows from N99:0 to N99:210 at station 1 (m0, m1, m2, m3, m4 and 3 more): '
-        'STS F0 EXT STS 06: address does not point to something usable']
 
 
 def test_tag_cannot_forge_lines_or_statuses(
@@ -518,17 +445,6 @@ def test_end_of_another_type_on_a_topic_is_told(
     assert '/abdf1/read/speed is std_msgs/msg/Int16MultiArray; a node uses it as' in line
 
 
-def test_plc_of_another_family_than_the_map_says_is_named_in_log_and_diagnostics(
-        make_bench: Benches, capfd: pytest.CaptureFixture[str]) -> None:
-    bench = make_bench('level,Read,N7:0,1,SLC,1,')
-    status = until_status(bench.diagnostics, 'station 1', WARN)
-    assert status.message == 'WARN: station 1 is a PLC-5/40, map.csv:2 says SLC'
-    bench.stop()
-    told = [line for line in ''.join(capfd.readouterr()).splitlines() if 'PLC-5/40' in line]
-    assert len(told) == 1
-    assert told[0].endswith('[abdf1]: station 1 is a PLC-5/40, map.csv:2 says SLC')
-
-
 def test_two_writers_of_a_topic_can_tell_their_results_apart(make_bench: Benches) -> None:
     bench = make_bench(RECIPE)
     publisher = bench.observer.publisher(Int16MultiArray, '/abdf1/write/recipe')
@@ -549,14 +465,6 @@ def test_simulated_time_that_has_not_begun_is_not_put_into_stamps(make_bench: Be
     assert abs(stamp.sec - time.time()) < 60
 
 
-def test_table_of_active_stations_says_what_it_is(make_bench: Benches) -> None:
-    bench = make_bench(SPEED)
-    dimension, = bench.observer.listen(
-        UInt16MultiArray, '/abdf1/active_stations').first().layout.dim
-    assert dimension.label == 'station n is active where bit n % 16 of word n / 16 is 1'
-    assert (dimension.size, dimension.stride) == (16, 16)
-
-
 def test_odd_settings_are_told_in_the_log_but_not_without_end(
         make_bench: Benches, capfd: pytest.CaptureFixture[str]) -> None:
     make_bench(*(f'N7:{number},Read,N7:{number},1,PLC5,1,' for number in range(23)))
@@ -573,14 +481,6 @@ def test_map_without_a_row_is_told(make_bench: Benches, capfd: pytest.CaptureFix
 
 @pytest.mark.parametrize(('assignment', 'expected'), [
     ('net_file:=/nowhere/net.csv', '/nowhere/net.csv: cannot be read: No such file or directory'),
-    ('net.station:=300',
-     'parameter net.station: 2552 CRT_BAD_STATION_ID: Invalid station number (300) must be less '
-     'than 255; Station = "300" should be a whole number from 0 to 254'),
-    ('net.station:=abc',
-     'parameter net.station: 2552 CRT_BAD_STATION_ID: Invalid station number (abc) must be less '
-     'than 255; Station = "abc" should be a whole number from 0 to 254'),
-    ('default_period:=-1', 'parameter default_period: default_period = -1 should be a whole '
-                           'number from 0 to 86400000'),
     ('diagnostics_period:=abc',
      "parameter diagnostics_period: diagnostics_period = 'abc' should be a number from 0.1 "
      'to 60')])

@@ -14,18 +14,13 @@
 
 """The node as a process: how it starts, ends, finds its port, and takes other names."""
 
-from collections.abc import Callable, Iterator
-from dataclasses import replace
+from collections.abc import Iterator
 from pathlib import Path
 import re
 import signal
 import time
 
-from abdf1_ros.plan.forecast import intervals, line_model, longest_wait
-from abdf1_ros.plan.planner import Planner
 from abdf1_ros.ros.process.main import LAST_WRITES, take_last_writes
-from abdf1_ros.settings.map_file import load_mappings
-from abdf1_ros.settings.network import load_network
 import pytest
 from rclpy.duration import Infinite
 from std_msgs.msg import (  # noqa: I101
@@ -56,8 +51,6 @@ from support.simulator_process import (
     STATUSES,
 )
 
-Refusal = Callable[..., list[str]]
-
 
 @pytest.fixture
 def files(tmp_path: Path) -> Files:
@@ -68,14 +61,6 @@ def files(tmp_path: Path) -> Files:
 def observer() -> Iterator[Observer]:
     with Observer() as observer:
         yield observer
-
-
-def stale_time_of_the_heartbeat(files: Files, baud: int, stale_after: float) -> float:
-    network = replace(load_network(str(files.net)), baud=baud)
-    blocks = Planner(line_model(network), 0.1).plan(load_mappings(str(files.map))[0])
-    period, = {block.period for block in blocks for mapping in block.mappings
-               if mapping.tag == 'heartbeat'}
-    return stale_after * intervals(blocks)[period] + longest_wait(blocks)
 
 
 def test_overrides_win_over_the_net_file(observer: Observer, files: Files) -> None:
@@ -92,11 +77,6 @@ def test_overrides_win_over_the_net_file(observer: Observer, files: Files) -> No
         assert (baud, period, stale_after) == (19200, 2, 5)
         assert limit == '999'  # the map is in its file alone
         node.wait_for('[WARN] ', 'without effect', ': map.recipe.max')
-        (endpoint,) = observer.until(
-            lambda: observer.node.get_publishers_info_by_topic('/overrides/read/heartbeat'),
-            'the publisher')
-        assert endpoint.qos_profile.deadline.nanoseconds == pytest.approx(
-            1e9 * stale_time_of_the_heartbeat(files, 19200, stale_after), rel=1e-6)
         link = find_status(diagnostics.first(), 'link')
         assert details(link)['settings'].startswith('19200 baud, ')
         node.end()
@@ -107,17 +87,14 @@ def test_overrides_win_over_the_net_file(observer: Observer, files: Files) -> No
 
 
 INTERRUPTS = [(signal.SIGINT,), (signal.SIGTERM,), (signal.SIGINT, signal.SIGINT)]
-INTERRUPT_NAMES = ['SIGINT', 'SIGTERM', 'SIGINT-twice']
 
 
-@pytest.mark.parametrize('signals', INTERRUPTS, ids=INTERRUPT_NAMES)
-def test_ends_well_while_values_come_in(
-        observer: Observer, files: Files, signals: tuple[signal.Signals, ...]) -> None:
+def test_ends_well_while_values_come_in(observer: Observer, files: Files) -> None:
     speeds = observer.listen(Int16MultiArray, '/ending/read/speeds')
     with files.start_simulator() as simulator, \
             Process('node', *files.args(), '-r', '__node:=ending', is_forked=False) as node:
         speeds.first()
-        node.end(*signals)
+        node.end(signal.SIGTERM)
         simulator.end()
     observer.forget(speeds)
 
@@ -207,22 +184,6 @@ def test_silent_station_is_told_at_once_and_does_not_delay_the_end(
     observer.forget(diagnostics)
 
 
-def test_leaves_nothing_behind_when_the_line_goes_away(observer: Observer, files: Files) -> None:
-    diagnostics, results = observer.diagnostics(files.port), observer.results()
-    with files.start_simulator() as simulator, Process('node', *files.args()) as node:
-        until_status(diagnostics, 'mappings', OK)
-        simulator.end()
-        until_status(diagnostics, 'link', ERROR, lambda status: re.match(
-            'ERROR: (the port was lost|cannot open the port): ', status.message) is not None)
-        publisher = observer.publisher(Float32MultiArray, '/abdf1/write/setpoint')
-        publisher.publish(Float32MultiArray(data=[3.0]))
-        assert results.first().message == 'not written: refused: the port is not open'
-        node.end(signal.SIGTERM)
-        observer.node.destroy_publisher(publisher)
-    observer.forget(diagnostics)
-    observer.forget(results)
-
-
 # Starts
 
 
@@ -231,20 +192,6 @@ def fatal(line: str) -> str:
     match = re.fullmatch(r'\[FATAL\] \[[0-9.]+\] \[abdf1\]: (.+)', line)
     assert match, line
     return match[1]
-
-
-def test_faulty_parameter_ends_with_one_clear_line(files: Files, refusal: Refusal) -> None:
-    (line,) = refusal(*files.args('net.station:=300'))
-    assert fatal(line) == (
-        'parameter net.station: 2552 CRT_BAD_STATION_ID: Invalid station number (300) must be '
-        'less than 255; Station = "300" should be a whole number from 0 to 254')
-
-
-def test_malformed_arguments_end_with_one_clear_line(refusal: Refusal) -> None:
-    lines = refusal('--ros-args', '-p', 'port')
-    (line,) = [line for line in lines if '[rcl]' not in line]
-    assert line.startswith('abdf1: bad arguments: ')
-    assert "Couldn't parse parameter override rule: '-p port'." in line
 
 
 def refused_start(*arguments: str, status: int = 2) -> list[str]:
@@ -270,24 +217,6 @@ def test_user_without_a_home_is_told_what_to_set(monkeypatch: pytest.MonkeyPatch
     (line,) = refused_start()
     assert fatal(line) == ('environment: HOME is not set, so there is no directory for the log; '
                            'set ROS_LOG_DIR to one that this user may write to')
-
-
-def test_connects_when_the_port_appears(observer: Observer, files: Files) -> None:
-    diagnostics = observer.diagnostics(files.port)
-    with Process('node', *files.args()) as node:
-        status = until_status(diagnostics, 'link', ERROR,
-                              lambda status: 'No such file' in status.message)
-        assert status.message.startswith('ERROR: cannot open the port: ')
-        assert details(status)['port'] == 'closed'
-        mappings = find_status(diagnostics[-1], 'mappings')
-        assert mappings.level != OK
-        with files.start_simulator() as simulator:
-            until_status(diagnostics, 'link', OK)
-            until_status(diagnostics, 'mappings', OK)
-            assert node.is_running
-            node.end()
-            simulator.end()
-    observer.forget(diagnostics)
 
 
 def test_second_node_waits_for_the_port_and_takes_over(observer: Observer, files: Files) -> None:
