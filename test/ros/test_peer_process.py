@@ -17,19 +17,13 @@
 from collections.abc import Iterator
 import os
 from pathlib import Path
-import re
 import select
 import socket
-import subprocess
-import sys
-import threading
-import time
 import tty
 
 import pytest
+from support.ros import PATIENCE, Process
 
-ROOT = Path(__file__).resolve().parents[2]
-PATIENCE = 20.0
 US = 9
 
 DATA = """\
@@ -114,54 +108,11 @@ class Client:
         return reply[3:4] + reply[6:]
 
 
-class Simulator:
-    """The process and what it says."""
-
-    def __init__(self, folder: Path, *args: str) -> None:
-        data = folder / 'data.csv'
-        data.write_text(DATA, encoding='utf-8')
-        self._process = subprocess.Popen(
-            [sys.executable, '-m', 'abdf1_ros', 'simulator', '--data', str(data), *args], cwd=ROOT,
-            text=True, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.STDOUT)
-        self.lines: list[str] = []
-        self._news = threading.Condition()
-        self._reader = threading.Thread(target=self._read)
-        self._reader.start()
-
-    def _read(self) -> None:
-        assert self._process.stdout
-        for line in self._process.stdout:
-            with self._news:
-                self.lines.append(line.strip())
-                self._news.notify()
-
-    def tell(self, command: str) -> None:
-        """Give it a command on its standard input."""
-        assert self._process.stdin
-        self._process.stdin.write(command + '\n')
-        self._process.stdin.flush()
-
-    def until(self, pattern: str) -> re.Match[str]:
-        """Wait for a line that it says, and return the match."""
-        end = time.monotonic() + PATIENCE
-        with self._news:
-            while True:
-                for line in self.lines:
-                    if match := re.search(pattern, line):
-                        return match
-                left = end - time.monotonic()
-                assert left > 0 and self._news.wait(left), f'no {pattern} in {self.lines}'
-
-    def close(self) -> int:
-        """End it and return its exit status."""
-        if self._process.poll() is None:
-            self.tell('quit')
-        status = self._process.wait(PATIENCE)
-        self._reader.join()
-        assert self._process.stdin and self._process.stdout
-        self._process.stdin.close()
-        self._process.stdout.close()
-        return status
+def simulator(folder: Path, *args: str) -> Process:
+    """Start a simulator with the data above."""
+    data = folder / 'data.csv'
+    data.write_text(DATA, encoding='utf-8')
+    return Process('simulator', '--data', str(data), *args)
 
 
 class Line:
@@ -169,9 +120,9 @@ class Line:
 
     def __init__(self, folder: Path, check: str, station: int = 1) -> None:
         name = folder / 'line'
-        self.simulator = Simulator(folder, '--full-duplex', str(station), '--pty', str(name),
+        self.simulator = simulator(folder, '--full-duplex', str(station), '--pty', str(name),
                                    '--check', check)
-        self.simulator.until(f'stations {station} .* on {re.escape(str(name))}, {check}')
+        self.simulator.wait_for(f'stations {station} ', f' on {name}, {check}')
         self._descriptor = os.open(name, os.O_RDWR | os.O_NOCTTY)
         tty.setraw(self._descriptor)
         self.client = Client(self._descriptor, check)
@@ -180,8 +131,7 @@ class Line:
         """End all of it; nothing may be left unsaid."""
         assert self.client.is_silent()
         os.close(self._descriptor)
-        assert self.simulator.close() == 0
-        assert not any('Traceback' in line for line in self.simulator.lines)
+        self.simulator.end()
 
 
 @pytest.fixture
@@ -205,11 +155,7 @@ def typed_write(element: int, *values: int) -> bytes:
                   0x99, 0x09, 1 + len(words), 0x42)) + words
 
 
-both_checks = pytest.mark.parametrize('line', ['CRC', 'BCC'], indirect=True)
-
-
-@both_checks
-@pytest.mark.parametrize('is_slow', [False, True])
+@pytest.mark.parametrize(('line', 'is_slow'), [('CRC', True), ('BCC', False)], indirect=['line'])
 def test_commands_to_a_peer_are_executed_and_answered(line: Line, is_slow: bool) -> None:
     client = line.client
     for _ in range(3):
@@ -225,10 +171,9 @@ def test_commands_to_a_peer_are_executed_and_answered(line: Line, is_slow: bool)
     assert client.ask(1, 0x0B, b'\2', is_slow) == b'\x10'
 
 
-@both_checks
 def test_message_of_the_plc(line: Line) -> None:
     client = line.client
-    line.simulator.tell('msg 1 N7:50 11 22')
+    line.simulator.type('msg 1 N7:50 11 22\n')
     command = client.hear()
     assert command[:4] == bytes((5, 1, 0x0F, 0))
     # Total 2, memory area 0, file 7, element 50, then an array of integers (M 7-30, 13-10).
@@ -239,55 +184,54 @@ def test_message_of_the_plc(line: Line) -> None:
     reply = bytes((1, 5, 0x4F, 0)) + command[4:6]
     client.say(client.frame(reply))
     assert client.hear() == ACK
-    line.simulator.until('station 1: msg N7:50 confirmed')
+    line.simulator.wait_for('station 1: msg N7:50 confirmed')
 
 
 def test_slow_port_is_given_the_time_that_a_message_takes(tmp_path: Path) -> None:
     ours, theirs = os.openpty()
     tty.setraw(theirs)
-    simulator = Simulator(tmp_path, '--full-duplex', '1', '--port', os.ttyname(theirs), '--baud',
-                          '1200')
-    simulator.until('stations 1')
-    client = Client(ours, 'CRC')
-    simulator.tell('msg 1 N7:0 ' + ' '.join(map(str, range(100))))
-    command = client.hear()  # a pseudo-terminal is fast; a port would take almost 2 s for it
-    assert not select.select([ours], [], [], 1.4)[0], 'an ENQ before the message has left'
-    client.say(ACK + client.frame(bytes((1, 5, 0x4F, 0)) + command[4:6]))
-    assert client.hear() == ACK
-    assert simulator.close() == 0
+    with simulator(tmp_path, '--full-duplex', '1', '--port', os.ttyname(theirs), '--baud',
+                   '1200') as process:
+        process.wait_for('stations 1')
+        client = Client(ours, 'CRC')
+        process.type('msg 1 N7:0 ' + ' '.join(map(str, range(100))) + '\n')
+        command = client.hear()  # a pseudo-terminal is fast; a port would take almost 2 s for it
+        assert not select.select([ours], [], [], 1.4)[0], 'an ENQ before the message has left'
+        client.say(ACK + client.frame(bytes((1, 5, 0x4F, 0)) + command[4:6]))
+        assert client.hear() == ACK
+        process.end()
     os.close(ours)
     os.close(theirs)
 
 
-@pytest.mark.parametrize('check', ['CRC', 'BCC'])
-def test_slc_answers_as_a_full_duplex_peer(tmp_path: Path, check: str) -> None:
-    made = Line(tmp_path, check, 2)
+def test_slc_answers_as_a_full_duplex_peer(tmp_path: Path) -> None:
+    made = Line(tmp_path, 'BCC', 2)
     read = bytes.fromhex('A2 04 07 89 00 00')
     assert made.client.ask(2, 0x0F, read) == bytes.fromhex('00 07 00 10 10')
     assert made.client.ask(2, 0x0F, bytes.fromhex('AA 02 07 89 01 00 10 03')) == b'\0'
     assert made.client.ask(2, 0x0F, read) == bytes.fromhex('00 07 00 10 03')
     assert made.client.ask(2, 0x0F, bytes.fromhex('A2 02 07 89 64 00')) == b'\x50'
     assert made.client.ask(2, 0x06, b'\3')[:4] == b'\0\0\xEE\x34'
-    made.simulator.tell('msg 2 N7:50 11')
+    made.simulator.type('msg 2 N7:50 11\n')
     command = made.client.hear()
     assert command[6:] == bytes.fromhex('AA 02 07 89 32 00 0B 00')
     made.client.say(ACK + made.client.frame(bytes((2, 5, 0x4F, 0)) + command[4:6]))
     assert made.client.hear() == ACK
-    made.simulator.until('station 2: msg N7:50 confirmed')
+    made.simulator.wait_for('station 2: msg N7:50 confirmed')
     made.close()
 
 
 def test_peer_on_tcp_takes_one_client_after_the_other(tmp_path: Path) -> None:
-    simulator = Simulator(tmp_path, '--full-duplex', '1', '--tcp', '127.0.0.1:0')
-    port = int(simulator.until(r'socket://127\.0\.0\.1:(\d+)')[1])
-    for _ in range(2):  # one client after the other
-        with socket.create_connection(('127.0.0.1', port), PATIENCE) as connection:
-            client = Client(connection, 'CRC')
-            assert client.ask(1, 0x0F, typed_read(0, 1))[-2:] == b'\xB0\x04'
-    assert simulator.close() == 0
+    with simulator(tmp_path, '--full-duplex', '1', '--tcp', '127.0.0.1:0') as process:
+        port = int(process.wait_for('socket://127.0.0.1:').split(':')[-1].split(',')[0])
+        for _ in range(2):  # one client after the other
+            with socket.create_connection(('127.0.0.1', port), PATIENCE) as connection:
+                client = Client(connection, 'CRC')
+                assert client.ask(1, 0x0F, typed_read(0, 1))[-2:] == b'\xB0\x04'
+        process.end()
 
 
 def test_station_that_is_not_there(tmp_path: Path) -> None:
-    simulator = Simulator(tmp_path, '--full-duplex', '7')
-    assert simulator.close() == 2
-    assert simulator.lines == ['simulator: --full-duplex: name a station (1, 2)']
+    with simulator(tmp_path, '--full-duplex', '7') as process:
+        assert process.result() == 2
+    assert process.lines == ['simulator: --full-duplex: name a station (1, 2)']
