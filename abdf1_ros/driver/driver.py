@@ -26,6 +26,7 @@ Where each fact lives:
 who writes which words, until when it may land      ``record.WriteRecord``, ``record.Words``
 messages that wait                                  ``writes.queue.WriteQueue.waiting``
 commands of guests that wait                        ``guests.Guest.waiting``
+until when a command may be sent                    ``job_tasks.Job.expires``
 commands of jobs under way                          ``job_tasks.JobTasks``
 when an own row has to be looked at                 its ``due``; the first of a PLC in ``Plc.due``
 how a PLC answers our own writes, a change to RUN   ``interlocks.plc.Plc``

@@ -119,10 +119,10 @@ class GuestJob(Job):
     blames = False
 
     def __init__(self, queue: GuestQueue, command: GuestCommand, station: int,
-                 expires: float, claim: Claim | None) -> None:
+                 claim: Claim | None) -> None:
         self.command = command
         self.station = station
-        self.expires = expires
+        self.expires = queue.expiry(command)
         self.claim = claim
         self.sts = 0  # of the reply
         self.has_failed = False  # there was none
@@ -208,8 +208,7 @@ class GuestQueue:
             # A broadcast has no reply.
             is_vain = station == BROADCAST and effect_of(command.packet) is Effect.READS
             if not is_vain and self._stations.claim_message(station, now):
-                return GuestJob(self, command, station, command.requested + self._patience,
-                                self._claim(command.packet, station))
+                return GuestJob(self, command, station, self._claim(command.packet, station))
             self._give_up(command, _OFF_LINE)
         return None
 
@@ -219,11 +218,15 @@ class GuestQueue:
             return None
         return self._record.begin(station, self._words(packet, station))
 
+    def expiry(self, command: GuestCommand) -> float:
+        """Return the clock value (s) from which a command is too old."""
+        return command.requested + self._patience
+
     def expire(self, now: float) -> None:
         """Refuse what has waited too long."""
         self._sort()
         for guest in list(self.waiting):
-            while guest.waiting and now >= guest.waiting[0].requested + self._patience:
+            while guest.waiting and now >= self.expiry(guest.waiting[0]):
                 self._give_up(guest.waiting.popleft(), _NO_BUFFER)
             if not guest.waiting:
                 self.waiting.remove(guest)
@@ -260,8 +263,8 @@ class GuestQueue:
 
     def _look(self) -> None:
         """Find out when the first command has waited too long."""
-        self.next_expiry = min((guest.waiting[0].requested + self._patience
-                                for guest in self.waiting), default=math.inf)
+        self.next_expiry = min((self.expiry(guest.waiting[0]) for guest in self.waiting),
+                               default=math.inf)
 
     def _sort(self) -> None:
         """Put what has come with the others of its guest."""

@@ -49,7 +49,11 @@ class Job:
 
     The reply to the first command has ``reply_size`` bytes after its header, 0 where that is not
     known. That command must not be sent after ``expires`` (clock value in s); each later one has
-    ``patience`` s after the command before it, without that command's own time on the line.
+    ``patience`` s after the command before it, without that command's own time on the line. The
+    link judges this for all kinds alike, when it sends. When that is, each kind says: a message
+    and a guest's command get old by the clock, a heartbeat when what it vouches for may no longer
+    be so, a 0 and a Fallback never. Queues end what has waited as long, for its result to come in
+    time.
     ``is_probe`` tells that a silent station is asked whether it is there again, ``is_own`` that
     no message has asked for it: a heartbeat or a fallback. ``blames`` is that of ``Task``.
     """
