@@ -25,17 +25,19 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
-from functools import cache
+from functools import cache, partial
 import hashlib
 import math
 from random import Random
 
+from abdf1_ros.df1.frames import stuff
 from abdf1_ros.df1.packet import Packet
 from abdf1_ros.df1.settings import LinkSettings
 from abdf1_ros.df1.slave import HalfDuplexSlave
 from abdf1_ros.driver.guests import Guest, GuestCommand, ShareAccess
 from abdf1_ros.driver.links import DriverSettings
 from abdf1_ros.driver.write import WriteResult
+from abdf1_ros.errors import PortLost
 from abdf1_ros.pccc.emulated import Setting
 from abdf1_ros.pccc.families import dialect_of, parse_address
 from abdf1_ros.pccc.values import Values
@@ -52,10 +54,15 @@ STEP = 0.05  # s
 SAFE = 32_000  # the fallback of every row
 GUESTS = range(32_100, 32_700)  # what only guests write
 LARGEST = 31_000  # of what is published
+_ALL = 255  # stations
+_WRITES = (b'\x67', b'\xAA')  # functions of a typed write
+_FAR = 1  # what a VirtualLine calls the far end
 SMALL = Noise(lost=0.0005, flipped=0.001, inserted=0.0005)
 MODES: dict[str, dict[str, str]] = {
     'Message': {}, 'Standard': {'polling': 'Standard'}, 'Peer': {'mode': 'Peer'},
-    'Radio': {'mode': 'Radio'}}
+    'Radio': {'mode': 'Radio'}, 'Gateway': {}, 'Standard gateway': {'polling': 'Standard'}}
+GATEWAY = 5  # the station on the line, behind which the PLC is
+DAMAGED = b'ZZZZ'  # what the line does not carry: only guests send it
 
 # The words of each PLC: outputs, a row without Fallback after them, its program's own, heartbeat.
 OUTPUTS, FREE, CLOCK, COUNTER, BEAT = 'N7:0', 'N7:20', 'N9:0', 'N9:4', 'N10:0'
@@ -84,8 +91,9 @@ class Plant:
     @classmethod
     def drawn(cls, dice: Random, mode: str = '') -> Plant:
         """Return any plant."""
-        mode = mode or dice.choice([*MODES] + [name for name in MODES if name != 'Standard'] * 3)
-        stations = 1 if mode == 'Peer' else dice.choice([1, 1, 1, 2, 3])
+        common = [name for name in MODES if 'Standard' not in name]
+        mode = mode or dice.choice([*MODES, *3 * common])
+        stations = 1 if mode == 'Peer' or 'ateway' in mode else dice.choice([1, 1, 1, 2, 3])
         return cls(
             mode, stations, dice.choice([1, 2, 2, 3]), dice.choice(['PLC5', 'SLC']),
             dice.choice([600, 1000, 2000]), dice.choice([500, 1000, 2000]),
@@ -100,6 +108,11 @@ class Plant:
             enq_retries=self.retries, **MODES[self.mode])  # type: ignore[arg-type]
 
     @property
+    def gateway(self) -> int | None:
+        """Return the station behind which the PLC is, None where it is on the line itself."""
+        return GATEWAY if 'ateway' in self.mode else None
+
+    @property
     def counts_within(self) -> int:
         """Return the Heartbeat_Timeout of the counter; by radio reads take longer."""
         return 20_000 if self.mode == 'Radio' else 3500
@@ -112,7 +125,7 @@ class Plant:
                     **others: object) -> None:
                 found.append(make_mapping(
                     text, command, station=station, plc=self.kind, tag=f'{name}_{station}',
-                    **others))  # type: ignore[arg-type]
+                    via=self.gateway, **others))  # type: ignore[arg-type]
 
             fallback = Fallback((SAFE,), self.after)
             for number in range(self.rows):
@@ -131,13 +144,21 @@ class Plant:
 
 @dataclass(frozen=True, slots=True)
 class Executed:
-    """A word that a PLC has taken from the line; ``driver`` counts the drivers there were."""
+    """
+    A word that a PLC has taken from the line.
+
+    ``sent`` is when its command was put on the line first; ``driver`` counts the drivers there
+    were. ``before`` was in the word. ``is_late`` tells that a gateway had kept it.
+    """
 
     when: float
+    sent: float
     station: int
     tag: str
     value: int
     driver: int
+    before: int
+    is_late: bool = False
 
 
 @dataclass(slots=True)
@@ -221,7 +242,8 @@ class World(DriverBench):
         self.executed: list[Executed] = []
         self.published: dict[tuple[str, int], float] = {}
         self.keys: list[tuple[str, int]] = []  # of all messages, in their order
-        self._guest = Guest('pty:guest', ShareAccess.ALL)
+        self._guests = [Guest(f'pty:{number}', ShareAccess.ALL)
+                        for number in range(self.dice.choice([1, 2, 16]))]
         self.asked: list[Packet] = []  # by the guest
         self.answered: list[Packet] = []
         self.came: dict[str, float] = {}  # when a message of a row came last
@@ -231,11 +253,14 @@ class World(DriverBench):
         self.is_alive = True  # the executor
         self.away = 0.0  # until when the process stands still
         self.ill: dict[int, float] = dict.fromkeys(range(plant.stations + 1), 0.0)
+        self.holds = 0.0  # how often the gateway keeps a write for a while
         self.wire = hashlib.sha256()
         self._values = dict.fromkeys(self.rows, 0)
         self._is_silent = False
         self.plcs = {station: self._watch(station) for station in range(1, plant.stations + 1)}
         self.far.hear, self.far.say = self._hear, self._say
+        self._sent: deque[tuple[float, bytes]] = deque()  # what the driver has put on the line
+        self._send, self.line._send = self.line._send, self._note_sent  # type: ignore[method-assign]
         self.line._random = Random(seed)
         self.executor_ran = 0.0
         self._run_programs()
@@ -259,16 +284,30 @@ class World(DriverBench):
         watched = WatchedPlc(plc, places)
         serve = plc.serve
 
-        def execute(command: Packet) -> Packet:
-            return self._execute(watched, command, serve)
+        def execute(command: Packet, *, is_late: bool = False) -> Packet:
+            return self._execute(watched, command, serve, is_late)
 
         plc.serve = execute  # type: ignore[method-assign]
         plc.slave = HalfDuplexSlave(
-            LinkSettings(station=station, checksum=self.network.checksum), execute)
+            LinkSettings(station=self.plant.gateway or station, checksum=self.network.checksum),
+            partial(self._pass_on, execute))
         return watched
 
+    def _pass_on(self, execute: Callable[..., Packet], command: Packet) -> Packet:
+        """Let the gateway keep a write for a while, and say that it has not delivered it."""
+        if command.data[:1] not in _WRITES or self.dice.random() >= self.holds:
+            return execute(command)
+        late = self.dice.uniform(0.0, self.held_for - STEP)
+        self.at(self.line.now + late, partial(execute, command, is_late=True))
+        return command.reply(sts=0x02)
+
+    @property
+    def held_for(self) -> float:
+        """Return for how long (s) a gateway may keep a write."""
+        return 2 * self.network.line.cmd_timeout
+
     def _execute(self, watched: WatchedPlc, command: Packet,
-                 serve: Callable[[Packet], Packet]) -> Packet:
+                 serve: Callable[[Packet], Packet], is_late: bool) -> Packet:
         """Execute a command, unless it is refused; keep what it has written."""
         station = watched.plc.station
         written: list[tuple[str, int]] = []
@@ -290,15 +329,29 @@ class World(DriverBench):
             for tag, _ in written:
                 watched.set(watched.places[tag], saved[watched.places[tag]])
             return command.reply(sts=0x10)
-        self.executed += [Executed(self.line.now, station, tag, value, self.drivers)
+        sent = self._first_sent(command)
+        self.executed += [Executed(self.line.now, sent, station, tag, value, self.drivers,
+                                   saved[watched.places[tag]], is_late)
                           for tag, value in written]
         if is_message and watched.swallows_replies:
             return reply._replace(tns=reply.tns ^ 0x8000)  # which nobody waits for
         return reply
 
+    def _note_sent(self, data: bytes, start: float, receiver: int) -> None:
+        if receiver == _FAR:
+            self._sent.append((start, data))
+        self._send(data, start, receiver)
+
+    def _first_sent(self, command: Packet) -> float:
+        """Return when the driver has put a command on the line first, as far as it is known."""
+        while self._sent[0][0] < self.line.now - 2 * self.longest:
+            self._sent.popleft()
+        wanted = stuff(command.tns.to_bytes(2, 'little') + command.data)
+        return next((when for when, data in self._sent if wanted in data), self.line.now)
+
     def _hear(self, data: bytes) -> bytes:
         self.wire.update(b'%f>' % self.line.now + data)
-        return b'' if self._is_silent else data
+        return b'' if self._is_silent else data.replace(DAMAGED, b'ZYZZ')
 
     def _say(self, data: bytes) -> bytes:
         self.wire.update(b'%f<' % self.line.now + data)
@@ -330,14 +383,18 @@ class World(DriverBench):
             self.line.wake(self.driver.machine)
 
     def ask(self, station: int, text: str) -> None:
-        """Let a guest write a value of its own to a word."""
-        value = GUESTS[len(self.asked) % len(GUESTS)]
+        """Let a guest write a value of its own to a word, of all stations, or what none knows."""
+        dice, value = self.dice, GUESTS[len(self.asked) % len(GUESTS)]
         address = place_of(text, self.plcs[station].plc.table.plc_type)
         cmd, data = dialect_of(address.plc_type).write(address, value.to_bytes(2, 'little'))
+        if dice.random() < 0.2:
+            cmd, data = dice.choice([(0x06, DAMAGED * 50), (0x0F, b'\x68\0\0'), (0x0F, b'\x3A')])
+        elif dice.random() < 0.2 and self.network.mode == 'Master':
+            station = _ALL
         command = Packet(station, 9, cmd, 0, len(self.asked), data)
         self.asked.append(command)
         self.driver.guests.put(GuestCommand(
-            self._guest, command, self.line.now, self.answered.append))
+            dice.choice(self._guests), command, self.line.now, self.answered.append))
         self.line.wake(self.driver.machine)
 
     # What goes wrong
@@ -395,11 +452,24 @@ class World(DriverBench):
             watched.plc.processor.setting = Setting.RUN
         self.is_alive = True
         self.line.noise = QUIET
+        self.holds = 0.0
 
     def end(self) -> None:
-        """End in order (rule 5)."""
-        self.driver.interlocks.wind_down()
+        """End in order (rule 5), within 2 s, and stay ended for as long as a gateway keeps."""
+        interlocks = self.driver.interlocks
+        interlocks.wind_down()
         self.line.wake(self.driver.machine)
+        limit = self.line.now + 2.0
+        while not interlocks.is_over and self.line.now < limit:
+            self.run(STEP / 10)
+        self.driver.machine.stop(PortLost('the end'))
+        self.run(self.held_for)
+
+    def reload(self) -> None:
+        """Put another driver in the place of one that has ended."""
+        self.drivers += 1
+        self.killed_at = self.opened = self.line.now
+        self.restart()
 
     def rows_of(self, station: int, tags: Sequence[str] = ('w',)) -> list[Mapping]:
         """Return rows of a PLC whose tags begin so."""

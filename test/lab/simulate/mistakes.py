@@ -37,11 +37,13 @@ if __name__ == '__main__':  # pytest has its own paths
     sys.path[:0] = [str(Path(__file__).parents[number]) for number in (1, 2, 3)]
 
 from abdf1_ros.driver.driver import Driver
+from abdf1_ros.driver.guests import GuestJob
 from abdf1_ros.driver.interlocks.fallback import FallbackRow
 from abdf1_ros.driver.interlocks.heartbeat import BeatState, HeartbeatRow
 from abdf1_ros.driver.interlocks.plc import Plc
 from abdf1_ros.driver.interlocks.queue import Interlocks
 from abdf1_ros.driver.reads.guards import CounterGuard, RunGuard
+from abdf1_ros.driver.record import Claim, Words
 from abdf1_ros.driver.write import Outcome, Write
 from abdf1_ros.driver.writes.queue import WriteQueue
 from abdf1_ros.pccc.values import Codec
@@ -157,6 +159,14 @@ def _requires_nothing(init: Any) -> Any:
     return init_wrongly
 
 
+def _sees_no_guest(ended: Any) -> Any:
+    return lambda self, claim, now: ended(self, claim, now) if claim.write else None
+
+
+def _meets_one_station(meets: Any) -> Any:
+    return lambda self, extent: self.station == extent.station and meets(self, extent)
+
+
 def _always(value: Any) -> Callable[[Any], Any]:
     return lambda before: lambda *arguments, **named: value
 
@@ -188,6 +198,15 @@ MISTAKES = (
     Mistake('14', 'the counter guards nothing', CounterGuard, 'why_not', _always('')),
     Mistake('18', 'read_only is ignored', Driver, '__init__', _writes_in_spite),
     Mistake('19', 'nobody looks for another writer', HeartbeatRow, 'read_back', _always('')),
+    Mistake('5', 'the end does not wait for what may land', Words, 'end', _always(None)),
+    Mistake('10', 'nothing is written again after what a gateway may hold', Words, 'plan_again',
+            _always(None)),
+    Mistake('8', 'a guest over a fallback is not seen', FallbackRow, 'write_ended',
+            _sees_no_guest),
+    Mistake('guests', 'a guest is blamed for the station', GuestJob, 'blames',
+            lambda before: True),
+    Mistake('guests', 'its broadcast has the words of one station', Claim, 'meets',
+            _meets_one_station),
     Mistake('results', 'not sent is told as written', Write, 'result', _told_as_written),
     Mistake('results', 'unknown is told as not sent', Write, 'result', _told_as_not_sent),
     Mistake('results', 'messages are dropped in silence', WriteQueue, 'drop',

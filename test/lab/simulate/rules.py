@@ -31,6 +31,7 @@ from support.world import Executed, GUESTS, SAFE, STEP, World
 _LEAST_ZERO = 0.5  # s
 _LEAST_LIFE_SIGN = 1.0  # s
 _ON_THE_WIRE = 0.3  # s
+_SETTLED = 1.0  # s after something wrong, in which a station is known to answer
 _REWRITTEN = 5.0  # s after which a fallback is written again
 _NEVER_EXECUTED = {Outcome.NOT_SENT, Outcome.REFUSED, Outcome.SUPERSEDED, Outcome.FAILED}
 
@@ -65,6 +66,9 @@ class Rule:
 
     def stand(self) -> None:
         """Judge how things stand."""
+
+    def over(self) -> None:
+        """Judge what is left after an orderly end."""
 
     @property
     def held(self) -> float:
@@ -110,6 +114,9 @@ class Results(Rule):
         elif result.outcome in _NEVER_EXECUTED:
             self.demand(key not in self._by, key, f'was executed, and told as {result.outcome}')
 
+    def over(self) -> None:
+        self.demand(not self._waits, [*self._waits], 'have no result')
+
     def stand(self) -> None:
         now = self.world.line.now
         new = self.world.keys[self._seen:]
@@ -132,18 +139,21 @@ class Ages(Rule):
 
     def executed(self, entry: Executed) -> None:
         world = self.world
-        if entry.tag[0] not in 'wf' or entry.value in GUESTS:
+        if entry.tag[0] not in 'wf' or entry.value in GUESTS or entry.is_late:
             return
         if entry.value == SAFE:
-            self._fallbacks[entry.tag] = entry.when
+            # One that stood and is written again (8) does not go before a message that waits.
+            spared = self.flight if entry.before == SAFE else 0.0
+            self._fallbacks[entry.tag] = max(self._fallbacks[entry.tag], entry.sent - spared)
             return
         published = world.published[entry.tag, entry.value]
         limit = world.plant.write_timeout
         if entry.tag[0] == 'w':
             limit = min(limit, world.plant.after / 1000)
-        self.demand(entry.when - published < limit + self.flight, entry, published)
-        self.demand(published > self._fallbacks[entry.tag] - self.flight, entry, published,
-                    'was published before the fallback of', self._fallbacks[entry.tag])
+        self.demand(entry.sent - published < limit + _ON_THE_WIRE, entry, published)
+        fallback = self._fallbacks[entry.tag]
+        self.demand(entry.sent < fallback or published > fallback - _ON_THE_WIRE, entry, published,
+                    'was published before the fallback of', fallback)
 
 
 class Values(Rule):
@@ -186,7 +196,7 @@ class Beats(Rule):
         self._stood = max(_LEAST_ZERO, world.plant.period / 1000)
 
     def executed(self, entry: Executed) -> None:
-        if not entry.tag.startswith('beat'):
+        if not entry.tag.startswith('beat') or entry.is_late or entry.value in GUESTS:
             return
         tag, value = entry.tag, entry.value
         last = self._last.get(tag)
@@ -222,7 +232,8 @@ class BeatsAfterFallbacks(Rule):
     text = 'no heartbeat counts while a fallback of its station is due (3 b)'
 
     def executed(self, entry: Executed) -> None:
-        if not entry.tag.startswith('beat') or not entry.value:
+        if not entry.tag.startswith('beat') or not entry.value or entry.is_late \
+                or entry.value in GUESTS:
             return
         for row in self.world.driver.interlocks.fallbacks:
             if row.mapping.station == entry.station:
@@ -246,10 +257,15 @@ class Outputs(Rule):
             self._stood[tag] = max(self._stood[tag], when)
 
     def executed(self, entry: Executed) -> None:
-        # A message over the fallback counts once, also where its outcome is unknown.
-        if entry.tag[0] == 'w' and entry.value != SAFE and entry.value not in GUESTS:
-            when = self.world.published[entry.tag, entry.value]
-            self._stood[entry.tag] = max(self._stood[entry.tag], when)
+        # A message over the fallback counts once, also where its outcome is unknown; what a guest
+        # or a gateway puts there is written over at once, when nothing more can come.
+        if entry.tag[0] != 'w' or entry.value == SAFE:
+            return
+        counts_from = self.world.published.get((entry.tag, entry.value), -math.inf)
+        if entry.is_late or entry.value in GUESTS and entry.before in (SAFE, 0):
+            held = self.world.held_for if entry.is_late else 0.0
+            counts_from = entry.when + held - self.world.plant.after / 1000
+        self._stood[entry.tag] = max(self._stood[entry.tag], counts_from)
 
     def stand(self) -> None:
         world = self.world
@@ -320,14 +336,14 @@ class Guests(Rule):
         self._waits = 0.0  # since when there was a command without a reply
         self._driver = 0
         self._missing = 0
-        self._by: list[tuple[float, int]] = []
+        self._by: list[tuple[float, int, int]] = []
 
     def executed(self, entry: Executed) -> None:
-        if entry.value in GUESTS and not entry.tag.startswith('beat'):  # which count so far
-            times = [when for when, value in self._by if value == entry.value
-                     and entry.when - when < 30.0]
+        if entry.value in GUESTS:
+            times = [when for when, station, value in self._by if value == entry.value
+                     and station == entry.station and entry.when - when < 30.0]
             self.demand(not times, entry, 'executed before', times)
-            self._by.append((entry.when, entry.value))
+            self._by.append((entry.when, entry.station, entry.value))
 
     def stand(self) -> None:
         world = self.world
@@ -341,6 +357,24 @@ class Guests(Rule):
                     'without a reply since', self._waits)
 
 
+class View(Rule):
+    text = 'a station that answers all of ours is not taken for one that does not'
+
+    def __init__(self, world: World) -> None:
+        super().__init__(world)
+        self._well_since = dict.fromkeys(world.plcs, math.inf)
+
+    def stand(self) -> None:
+        world, now = self.world, self.world.line.now
+        for number, since in self._well_since.items():
+            is_known = world.driver.stations[number].replies_in_time
+            is_well = now > max(world.ill[number], world.ill[0]) + 1.5 * STEP
+            self.demand(is_known or not is_well or now < since + _SETTLED + self.flight,
+                        world.driver.stations[number])
+            if not is_well or not is_known:
+                self._well_since[number] = now
+
+
 class OneOwner(Rule):
     text = 'beside another writer of its word a heartbeat ends with 0 (19)'
 
@@ -350,8 +384,9 @@ class OneOwner(Rule):
 
     def executed(self, entry: Executed) -> None:
         world = self.world
-        if not entry.tag.startswith('beat') or not entry.value or entry.station not in self.since \
-                or world.plant.mode == 'Radio':  # whose reads may take longer than many Periods
+        is_radio = world.plant.mode == 'Radio'  # whose reads may take longer than many Periods
+        is_counted = entry.tag.startswith('beat') and entry.value not in (0, *GUESTS)
+        if not is_counted or entry.is_late or is_radio or entry.station not in self.since:
             return
         # Each opening of the port and each change to RUN begins anew, and what is ill is not read.
         began = max(self.since[entry.station], world.opened, world.ill[entry.station],
@@ -362,7 +397,7 @@ class OneOwner(Rule):
 
 RULES: tuple[type[Rule], ...] = (
     Results, Ages, Values, Guards, Beats, BeatsAfterFallbacks, Outputs, AfterRun, Held, ReadOnly,
-    Guests)
+    Guests, View)
 
 
 class Judge:
@@ -391,3 +426,9 @@ class Judge:
         self._reads = len(world.reads)
         for rule in rules:
             rule.stand()
+
+    def over(self) -> None:
+        """Look at what is left after an orderly end; raise Broken."""
+        self.look()
+        for rule in self._rules:
+            rule.over()

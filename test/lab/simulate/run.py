@@ -42,7 +42,7 @@ from abdf1_ros.driver.write import Outcome
 from abdf1_ros.pccc.emulated import Setting
 from simulate.rules import Broken, Judge
 from support.virtual_line import QUIET
-from support.world import FREE, OUTPUTS, Plant, SAFE, SMALL, STEP, World
+from support.world import BEAT, FREE, MODES, OUTPUTS, Plant, SAFE, SMALL, STEP, World
 
 TURNS = 8  # troubles of a plant, with a calm after each
 RATES = (0.0, 0.0, 0.01, 0.05, 0.2)  # messages a step and row
@@ -70,7 +70,7 @@ class Story:
             _TROUBLES[name](self, station)
             if name == _NO_EXCUSE:  # for an output that stands
                 self.wait(self._longest_bound() + 2.0)
-            self._ail(station, self.dice.uniform(0.5, 4.0))
+            self._ail(station, self.dice.uniform(0.5, 4.0), is_ill=name not in _OF_OTHERS)
             self._calm_down()
         self._recover()
         self._end()
@@ -79,15 +79,17 @@ class Story:
         for row in self.world.messages:
             self._rates[row.tag] = self.dice.choice(RATES)
 
-    def _ail(self, station: int, seconds: float) -> None:
+    def _ail(self, station: int, seconds: float, *, is_ill: bool) -> None:
         """Let something be wrong for a while, then nothing any more."""
         world = self.world
         end = world.line.now + seconds
         while world.line.now < end:
-            self._mark(station)
+            if is_ill:
+                self._mark(station)
             self.wait(STEP)
         world.mend()
-        self._mark(station)
+        if is_ill:
+            self._mark(station)
 
     def _mark(self, station: int) -> None:
         """Keep that something was wrong, with a PLC or (0) with the line."""
@@ -160,16 +162,28 @@ class Story:
             raise Broken('Recovery', f'{sorted(wanted)} not back after {limit} s', world)
 
     def _end(self) -> None:
-        """End in order at any moment (rule 5)."""
+        """End in order at any moment (rule 5), reload, and end again."""
         world = self.world
         if world.plant.is_read_only or world.plant.mode == 'Radio':
             return
-        for pause in (0.0, 0.1, 0.5):  # with messages that are written, under way, and wait
-            for row in world.messages:
-                world.publish(row)
-            world.run(pause * self.dice.random())
-        world.end()
-        world.run(2.0)
+        for _ in range(2):
+            # With writes that are done, under way, and wait, some of them kept by a gateway.
+            world.holds = self.dice.choice([0.0, 0.5]) if world.plant.gateway else 0.0
+            for pause in (0.0, 0.1, 0.5):
+                for row in world.messages:
+                    world.publish(row)
+                for _ in range(self.dice.randrange(3)):
+                    world.ask(1, self.dice.choice([OUTPUTS, BEAT]))
+                world.run(pause * self.dice.random())
+            world.end()
+            self.judge.over()
+            self._demand_safe_words()
+            world.mend()
+            world.reload()
+            self._recover()
+
+    def _demand_safe_words(self) -> None:
+        world = self.world
         for station, watched in world.plcs.items():
             words = {row.tag: watched.word(watched.places[row.tag])
                      for row in world.rows_of(station, ('w', 'beat'))}
@@ -240,6 +254,10 @@ def _guest(story: Story, station: int) -> None:
         world.at(world.line.now + 0.3 * number, partial(world.ask, station, place))
 
 
+def _gateway_holds(story: Story, station: int) -> None:
+    story.world.holds = 0.3 if story.world.plant.gateway else 0.0
+
+
 def _other_writer(story: Story, station: int) -> None:
     """Let another one count for so long that both know of each other."""
     world = story.world
@@ -255,12 +273,13 @@ def _other_writer(story: Story, station: int) -> None:
 
 
 _NO_EXCUSE = 'messages refused'
+_OF_OTHERS = ('guest', 'gateway holds')  # which excuse nothing
 _TROUBLES: dict[str, Callable[[Story, int], None]] = {
     'noise': _noise, 'silence': _silence, 'refusal': _refusal,
     _NO_EXCUSE: _refused_messages, 'replies lost': _lost_replies,
     'port lost': _lost_port, 'process stands still': _pause, 'executor hangs': _hung_executor,
     'PROGRAM': _program, 'download': _download, 'killed': _kill, 'slow PLC': _slowness,
-    'other writer': _other_writer, 'guest': _guest}
+    'other writer': _other_writer, 'guest': _guest, 'gateway holds': _gateway_holds}
 
 
 @dataclass(slots=True)
@@ -287,11 +306,11 @@ class Totals:
         self.modes[world.plant.mode] += 1
 
 
-def simulate(seed: int, is_enough: Callable[[Totals], bool]) -> Totals:
-    """Simulate plants, that of ``seed`` first and then the next seeds; raise Broken."""
+def simulate(seed: int, is_enough: Callable[[Totals], bool], mode: str = '') -> Totals:
+    """Simulate plants of any or one mode, ``seed`` first and then the next; raise Broken."""
     totals = Totals()
     while not is_enough(totals):
-        story = Story(seed + totals.plants)
+        story = Story(seed + totals.plants, mode)
         story.run()
         totals.add(story)
     return totals
@@ -303,6 +322,7 @@ def main() -> int:
     parser.add_argument('--hours', type=float, default=math.inf, help='to simulate')
     parser.add_argument('--seconds', type=float, default=math.inf, help='of processor time')
     parser.add_argument('--plants', type=int, default=math.inf)
+    parser.add_argument('--mode', choices=MODES, default='', help='of all plants')
     parser.add_argument('--seed', type=int, default=secrets.randbelow(10**9))
     wanted = parser.parse_args()
     if math.inf == wanted.hours == wanted.seconds == wanted.plants:
@@ -315,7 +335,7 @@ def main() -> int:
             or time.process_time() - begun >= wanted.seconds
 
     try:
-        totals = simulate(wanted.seed, is_enough)
+        totals = simulate(wanted.seed, is_enough, wanted.mode)
     except Broken as broken:
         print(f'FAILED {broken}')
         return 1
