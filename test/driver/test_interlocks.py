@@ -639,14 +639,15 @@ class GuestCell(Cell):
 WORDS = ('N7:0', 'N10:0')
 
 
+@pytest.mark.parametrize('dst', [1, 255])
 @pytest.mark.parametrize('polling', POLLING_MODES)
 @pytest.mark.parametrize('text', WORDS)
 def test_rule_5_write_of_a_guest_on_the_line_when_the_end_begins_does_not_stay(
-        text: str, polling: str) -> None:
+        text: str, polling: str, dst: int) -> None:
     # Alone: nothing else keeps the end waiting.
     row = speed_row() if text == 'N7:0' else beat_row(requires=('speed',), timeout=300)
     cell = GuestCell(row, polling=polling)
-    cell.ask(text, 99)
+    cell.ask(text, 99, dst)
     cell.bench.run_until(lambda: cell.word(text) == 99)  # its reply is not here yet
     end(cell)
     assert cell.word(text) == (7 if text == 'N7:0' else 0)

@@ -253,7 +253,7 @@ def watched(cell: Cell, address: str,
 
 @pytest.mark.parametrize('answer', [NAK, b''])
 def test_rule_3_guests_command_that_the_plc_does_not_take_changes_no_heartbeat_and_no_read(
-        tmp_path: Path, answer: bytes) -> None:
+        tmp_path: Path, answer: bytes, capfd: pytest.CaptureFixture[str]) -> None:
     place = tmp_path / 'hmi'
 
     def answered(symbol: Symbol) -> bytes | None:
@@ -278,6 +278,7 @@ def test_rule_3_guests_command_that_the_plc_does_not_take_changes_no_heartbeat_a
         with cell.share(place) as hmi:
             assert any(goes_on() for _ in range(ATTEMPTS))
         assert statuses & {0x02, 0x05}  # it was sent
+    assert capfd.readouterr().err.count(' gets no reply of station 1 to echo ') == 1
 
 
 def test_rule_8_broadcast_of_a_guest_over_a_fallback_is_told_and_written_over(

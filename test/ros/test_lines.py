@@ -150,9 +150,10 @@ class Plant:
             self.write_map(name, 'speed,Read,N7:0,1,PLC5,2')
             self.write_net(name, self.plcs[name].port)
 
-    def write_net(self, name: str, port: str) -> None:
+    def write_net(self, name: str, port: str, share: str = '') -> None:
         """Write the net file of a line."""
-        write_csv(self.folder / f'{name}_net.csv', 'Com_Port,Baud,Timeout', [f'{port},115200,100'])
+        write_csv(self.folder / f'{name}_net.csv', 'Com_Port,Baud,Timeout,Share',
+                  [f'{port},115200,100,{share}'])
 
     def write_map(self, name: str, row: str) -> None:
         """Write the map of a line."""
@@ -269,23 +270,31 @@ def test_faulty_line_ends_all_where_that_is_asked_for(plant: Plant) -> None:
     assert plant.end() == 2
 
 
-def test_two_lines_on_one_port_are_not_two_masters(plant: Plant) -> None:
-    other_name = plant.folder / 'other_name'
+def test_two_lines_have_not_one_port_nor_one_place_of_guests(plant: Plant) -> None:
+    other_name, place = plant.folder / 'other_name', f'pty:{plant.folder}/hmi'
     other_name.symlink_to(plant.plcs['a'].port)
+    plant.write_net('a', plant.plcs['a'].port, place)
     plant.write_net('b', str(other_name))
-    plant.start(reads='ac')
-    assert line_status(plant, ERROR)['/hall/b'] == f'port: {other_name} is the port of /hall/a'
+    plant.write_net('c', plant.plcs['c'].port, place.replace('/hmi', '//hmi'))
+    plant.start(reads='a')
+    faults = line_status(plant, ERROR)
+    assert faults['/hall/b'] == f'port: {other_name} is the port of /hall/a'
+    assert faults['/hall/c'] == f'port: pty:{plant.folder}//hmi is the place of /hall/a'
 
 
 def test_new_files_do_not_make_a_line_the_second_master_on_the_port_of_another(
         plant: Plant) -> None:
-    plant.start('-p', 'lines:=[a, b]', reads='ab')
+    place = f'pty:{plant.folder}/hmi'
     taken, free = plant.plcs['a'].port, plant.plcs['c'].port
+    plant.write_net('a', taken, place)
+    plant.start('-p', 'lines:=[a, b]', reads='ab')
 
-    plant.write_net('b', taken)
-    response = plant.observer.call(Trigger, '/hall/b/reload', Trigger.Request())
-    assert (response.success, response.message) == (
-        False, f'goes on as before: port: {taken} is the port of /hall/a')
+    for net, why in [((taken,), f'{taken} is the port'),
+                     ((free, place), f'{place} is the place')]:
+        plant.write_net('b', *net)
+        response = plant.observer.call(Trigger, '/hall/b/reload', Trigger.Request())
+        assert (response.success, response.message) == (
+            False, f'goes on as before: port: {why} of /hall/a')
     assert plant.speeds('b') == [7, ord('b')]
 
     plant.write_net('b', free)
