@@ -38,7 +38,7 @@ import time
 import tty
 
 from abdf1_ros.df1.checksum import Checksum
-from abdf1_ros.df1.frames import ACK, Code, Control, Duplex, Frame, FrameDecoder, message_frame
+from abdf1_ros.df1.frames import ACK, Duplex, Frame, FrameDecoder, message_frame, NAK
 from abdf1_ros.df1.packet import Packet
 
 _HEADER = struct.Struct('<HHII8sI')  # command, length, session, status, context, options
@@ -75,19 +75,19 @@ class DuplexLine:
                 return packet.encode()[2:]
 
     def receive(self, end: float) -> Packet | None:
-        """Return the next message, acknowledged, or None for a symbol; TimeoutError at ``end``."""
+        """
+        Return the next message, acknowledged; TimeoutError at ``end``.
+
+        None stands for a symbol, or a damaged message, which is refused with NAK.
+        """
         while (symbol := self._decoder.next_symbol()) is None:
             seconds = end - time.monotonic()
             if seconds <= 0 or not select.select([self._descriptor], [], [], seconds)[0]:
                 raise TimeoutError('nothing comes')
             self._decoder.feed(os.read(self._descriptor, 4096))
         if isinstance(symbol, Frame):
-            if symbol.fault is not None:
-                raise ValueError(f'damaged: {symbol.fault.value}')
-            os.write(self._descriptor, ACK)
-            return Packet.decode(symbol.data)
-        if symbol == Control(Code.NAK):
-            raise ConnectionError('NAK')
+            os.write(self._descriptor, ACK if symbol.fault is None else NAK)
+            return Packet.decode(symbol.data) if symbol.fault is None else None
         return None
 
     def reply(self, packet: Packet) -> None:

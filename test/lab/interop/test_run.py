@@ -19,12 +19,17 @@ from __future__ import annotations
 import ast
 from contextlib import ExitStack
 from importlib.util import module_from_spec, spec_from_file_location
+import os
 from pathlib import Path
+import pty
 import sys
+import time
 from types import ModuleType
 from typing import Any
 
 from abdf1_ros.df1.checksum import Checksum
+from abdf1_ros.df1.frames import ACK, message_frame, NAK
+from abdf1_ros.df1.packet import Packet
 from abdf1_ros.pccc.families import dialect_of
 from abdf1_ros.pccc.file_types import PlcType
 import pytest
@@ -96,6 +101,56 @@ def test_two_guests_share_the_line_of_a_node_at_work(run: ModuleType) -> None:
         run.Run('ourselves', PlcType.SLC, Checksum.CRC, 'plc', start), 'Master', 20)
     assert tally.is_good, tally
     assert tally.right == 2 * 20 * 60
+
+
+class LateGuest:
+    """A guest, and its PLC: what it says is written comes ``delay`` reads of the PLC later."""
+
+    def __init__(self, count: int, delay: int, add: int = 0) -> None:
+        self._there, self._delay, self._add = [0] * count, delay, add
+        self._coming: list[list[Any]] = []
+
+    def write(self, case: Any, values: list[int]) -> dict[str, Any]:
+        self._coming.append([self._delay, values])
+        return {'done': True}
+
+    def read(self, case: Any) -> dict[str, Any]:
+        return {'values': [word + self._add for word in self.take(case, None)]}
+
+    def take(self, case: Any, expected: object) -> list[int]:
+        for entry in self._coming:
+            entry[0] -= 1
+        while self._coming and self._coming[0][0] < 0:
+            self._there = self._coming.pop(0)[1]
+        return self._there
+
+
+@pytest.mark.parametrize('delay', range(7))
+def test_a_late_write_of_a_guest_is_a_failure_and_no_wrong_value(
+        run: ModuleType, monkeypatch: pytest.MonkeyPatch, delay: int) -> None:
+    shared = sys.modules['shared']
+    monkeypatch.setattr(shared, '_PATIENCE', 0.0)
+    case = shared.Case('N7:0', [0.0] * 4, [])
+    late = LateGuest(4, delay)
+    counts = shared._work(late, case, late, 10)
+    assert counts['wrong'] == 0 and counts['right'] // 4 + counts['failures'] == 10
+    assert bool(counts['failures']) is bool(delay)
+    mixed = LateGuest(4, 0, add=1)
+    assert shared._work(mixed, case, mixed, 10) == {'wrong': 40}
+
+
+def test_a_damaged_message_is_refused_and_the_shim_goes_on(run: ModuleType) -> None:
+    ours, theirs = pty.openpty()
+    line = run.DuplexLine(os.ttyname(theirs), Checksum.BCC)
+    good = message_frame(b'\1\5\6\0\x34\x12\0', Checksum.BCC)
+    os.write(ours, good[:-1] + bytes((good[-1] ^ 1,)) + good)
+    end = time.monotonic() + 5
+    assert line.receive(end) is None
+    assert line.receive(end) == Packet.decode(b'\1\5\6\0\x34\x12\0')
+    assert os.read(ours, 4) == NAK + ACK
+    line.close()
+    os.close(ours)
+    os.close(theirs)
 
 
 @pytest.mark.parametrize('path', sorted((_HERE / 'players').glob('*.py')),
