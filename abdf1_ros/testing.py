@@ -225,9 +225,7 @@ class Plcs:
     """
 
     def __init__(self, data: Path, ladders: Sequence[int] = ()) -> None:
-        self._plcs = load_plcs(str(data), Checksum.CRC, time.monotonic)
-        for plc in self._plcs:
-            plc.lock = threading.Lock()
+        self._plcs = load_plcs(str(data), Checksum.CRC, time.monotonic, threading.Lock)
         for station in ladders:
             self[station].run_ladder(Ladder(self[station].table))
         self._line = PtyEndpoint(str(data.with_name('plcs')))

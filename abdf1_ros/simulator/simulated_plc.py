@@ -40,6 +40,7 @@ from abdf1_ros.pccc.address import Address
 from abdf1_ros.pccc.data_table import DataTable, NoSuchFile
 from abdf1_ros.pccc.emulated import EmulatedProcessor, Setting
 from abdf1_ros.pccc.families import dialect_of, FAMILIES, parse_address, served_counters
+from abdf1_ros.pccc.file_types import PlcType
 from abdf1_ros.pccc.server import Server
 from abdf1_ros.pccc.status import check_status
 from abdf1_ros.pccc.steps import write_requests
@@ -130,34 +131,38 @@ class Sending:
         self._report(str(error))
 
 
+_NO_LOCK = nullcontext()
+
+
 class SimulatedPlc:
-    """One station with its data table; ``clock`` gives seconds."""
+    """
+    One station with its data table; ``clock`` gives seconds.
+
+    ``via`` is the gateway to it. ``lock`` is held while its program advances, which more than one
+    thread may cause.
+    """
 
     def __init__(self, station: int, table: DataTable, checksum: Checksum,
-                 clock: Callable[[], float], seed: int = 0) -> None:
+                 clock: Callable[[], float], via: int | None = None,
+                 lock: AbstractContextManager[object] = _NO_LOCK) -> None:
         self.station = station
-        self.via: int | None = None  # the gateway to it
+        self.via = via
         self.table = table
         self.faults = InjectedFaults()
         self.processor = EmulatedProcessor(table.plc_type)
         self.slave = HalfDuplexSlave(LinkSettings(station=station, checksum=checksum), self.serve)
+        self.counters = self.slave.counters  # of our port
         self.outbox: deque[Sending] = deque()
         self._server = self._make_server('Slave')
-        self._tns = random.Random(seed).randrange(0x10000)
+        self._tns = random.Random(0).randrange(0x10000)
         self._clock = clock
         self._movers: list[_Mover] = []
-        self._random = random.Random(seed + station)
+        self._random = random.Random(station)
         self.ladder: Ladder | None = None
-        # Held while the program advances, which more than one thread may cause.
-        self.lock: AbstractContextManager[object] = nullcontext()
+        self.lock = lock
         self._saved: DataTable | None = None
         self._polls_to_refuse = 0
         self._ready = -math.inf  # clock value (s) from which the last command's reply is there
-
-    @property
-    def counters(self) -> Counters:
-        """Return the counters of our port."""
-        return self.slave.counters
 
     def be_full_duplex(self) -> None:
         """Answer from now on as a PLC with a full-duplex port."""
@@ -166,7 +171,7 @@ class SimulatedPlc:
 
     def be_radio(self, counters: Counters) -> None:
         """Answer from now on as a PLC behind a radio modem whose port has these counters."""
-        self.slave.counters = counters
+        self.counters = counters
         self._server = self._make_server('Radio')
 
     def _make_server(self, mode: str) -> Server:
@@ -287,13 +292,18 @@ class SimulatedPlc:
         return self._server.serve(command)
 
 
-def load_plcs(path: str, checksum: Checksum, clock: Callable[[], float]) -> list[SimulatedPlc]:
+def load_plcs(path: str, checksum: Checksum, clock: Callable[[], float],
+              make_lock: Callable[[], AbstractContextManager[object]] = nullcontext
+              ) -> list[SimulatedPlc]:
     """Read a simulator CSV; raise ConfigurationError with every fault found."""
+    def make(station: int, plc_type: PlcType, via: int | None) -> SimulatedPlc:
+        return SimulatedPlc(station, DataTable(plc_type), checksum, clock, via, make_lock())
+
     plcs: dict[int, SimulatedPlc] = {}
     problems: list[Problem] = []
     for row in read_rows(path, COLUMNS):
         try:
-            _load_row(row, plcs, checksum, clock)
+            _load_row(row, plcs, make)
         except Problem as problem:
             problems.append(problem)
     if problems:
@@ -301,16 +311,15 @@ def load_plcs(path: str, checksum: Checksum, clock: Callable[[], float]) -> list
     return list(plcs.values())
 
 
-def _load_row(row: Row, plcs: dict[int, SimulatedPlc], checksum: Checksum,
-              clock: Callable[[], float]) -> None:
+def _load_row(row: Row, plcs: dict[int, SimulatedPlc],
+              make: Callable[[int, PlcType, int | None], SimulatedPlc]) -> None:
     station = _value(row, 'Station', whole(0, MAX_STATION))
     via = _value(row, 'Via', whole(1, MAX_STATION)) if row.get('Via') else None
     length = _value(row, 'Length', whole(1, 1000)) if row.get('Length') else 1
     motion = _value(row, 'Motion', member_of(Motion))
     plc_type = _value(row, 'PLC_Type', one_of({kind.value: kind for kind in FAMILIES}))
     if station not in plcs:
-        plcs[station] = SimulatedPlc(station, DataTable(plc_type), checksum, clock)
-        plcs[station].via = via
+        plcs[station] = make(station, plc_type, via)
     plc = plcs[station]
     _check_route(row, plc, via, plcs)
     if plc.table.plc_type != plc_type:
