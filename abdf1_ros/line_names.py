@@ -16,9 +16,12 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
 from ipaddress import ip_address, IPv6Address
 from pathlib import Path
 import stat
+
+from abdf1_ros.numbers import whole_number
 
 LOOPBACK = '127.0.0.1'
 
@@ -36,6 +39,17 @@ def device_of(path: str) -> str:
 def link_of(path: str) -> str:
     """Return the same text for all ways to write the name of a link, wherever that leads."""
     return str(Path(path).parent.resolve() / Path(path).name)
+
+
+def host_and_port(text: str, default: str = LOOPBACK) -> tuple[str, int]:
+    """Return what "HOST:PORT" says, a host in [] too, the default for none; ValueError else."""
+    host, colon, port = text.rpartition(':')
+    number = whole_number(port)
+    with suppress(UnicodeError):
+        host = host.removeprefix('[').removesuffix(']').encode('idna').decode()
+        if colon and number is not None and 0 <= number <= 65535:
+            return host or default, number
+    raise ValueError(f'"{text}" should be HOST:PORT')
 
 
 def address_of(host: str, port: int) -> str:

@@ -26,7 +26,6 @@ from __future__ import annotations
 import argparse
 from collections.abc import Sequence
 from dataclasses import replace
-import os
 import random
 import re
 import time
@@ -45,8 +44,8 @@ from abdf1_ros.cli.terminal import (
     tell,
     whole_option,
 )
-from abdf1_ros.conform import asking, client, damage, data, duplicates, master, peer, radio, slave
-from abdf1_ros.conform.case import Case, CaseResult, CASES, Permission, run_cases, Target, Verdict
+from abdf1_ros.conform.case import Case, CaseResult, Permission, run_cases, Target, Verdict
+from abdf1_ros.conform.cases import CASES
 from abdf1_ros.conform.codec import BlockCheck, HEADER_SIZE
 from abdf1_ros.conform.ends import (
     AskingEnd,
@@ -65,20 +64,19 @@ from abdf1_ros.df1.checksum import Checksum
 from abdf1_ros.df1.packet import Packet
 from abdf1_ros.df1.stations import MAX_STATION
 from abdf1_ros.errors import FormatError
+from abdf1_ros.line_names import host_and_port
 from abdf1_ros.paths import config_file, package_version
 from abdf1_ros.pccc.families import decode_identity
 from abdf1_ros.pccc.file_types import PlcType
 from abdf1_ros.pccc.identity import Identity
 from abdf1_ros.ports.descriptor import Port
-from abdf1_ros.ports.endpoints import Endpoint, host_and_port, PtyEndpoint, TcpEndpoint
+from abdf1_ros.ports.endpoints import Endpoint, PtyEndpoint, TcpEndpoint
 from abdf1_ros.ports.opening import open_port
 from abdf1_ros.ports.settings import PortSettings
+from abdf1_ros.ports.wake import Wake
 from abdf1_ros.problems import ConfigurationError, Problem
 from abdf1_ros.settings.network import Network
 from abdf1_ros.simulator.simulated_plc import load_plcs
-
-# Importing them enters their cases.
-_MODULES = (slave, master, peer, client, radio, damage, data, duplicates, asking)
 
 _NEAR = 2.0  # times --answer-time: a DLE ENQ that comes so early may be taken for an answer
 
@@ -108,10 +106,10 @@ class _PortLine:
         self._port = port
         self._echoes = echoes
         self._echo = b''
-        self._never, self._keep = os.pipe()
+        self._never = Wake()
 
     def read(self, timeout: float) -> bytes:
-        data = self._port.read(timeout, self._never)
+        data = self._port.read(timeout, self._never.descriptor)
         size = min(len(data), len(self._echo))
         if data[:size] != self._echo[:size]:
             raise OSError('what is sent does not come back as it was; leave out --echo')
@@ -125,8 +123,7 @@ class _PortLine:
 
     def close(self) -> None:
         self._port.close()
-        os.close(self._never)
-        os.close(self._keep)
+        self._never.close()
 
 
 def main(args: Sequence[str] | None = None) -> int:

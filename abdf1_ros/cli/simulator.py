@@ -56,17 +56,12 @@ from abdf1_ros.df1.radio import RadioNode
 from abdf1_ros.df1.settings import LinkSettings
 from abdf1_ros.df1.slave import multidrop
 from abdf1_ros.df1.stations import ActiveStationList
+from abdf1_ros.line_names import host_and_port
 from abdf1_ros.numbers import decimal_number
 from abdf1_ros.paths import config_file
 from abdf1_ros.pccc.data_table import NoSuchFile
 from abdf1_ros.ports.descriptor import Port, PortAround
-from abdf1_ros.ports.endpoints import (
-    Endpoint,
-    host_and_port,
-    PtyEndpoint,
-    SerialEndpoint,
-    TcpEndpoint,
-)
+from abdf1_ros.ports.endpoints import Endpoint, PtyEndpoint, SerialEndpoint, TcpEndpoint
 from abdf1_ros.ports.link_thread import LinkThread, PortKind, PortState
 from abdf1_ros.ports.settings import PortSettings
 from abdf1_ros.settings import BAUD_RATES
@@ -193,7 +188,7 @@ def _try_out(script: TimedCommands, options: argparse.Namespace) -> None:
 def _load(options: argparse.Namespace) -> list[SimulatedPlc]:
     """Return the PLCs of the data file, or the one that has a line for itself."""
     plcs = load_plcs(options.data or str(config_file('simulator.csv')),
-                     Checksum(options.check), time.monotonic)
+                     Checksum(options.check), time.monotonic, threading.Lock)
     for station in options.ladder:
         _run_ladder(station, plcs)
     return plcs if options.full_duplex is None else [
@@ -217,7 +212,6 @@ def _run_ladder(station: str, plcs: Sequence[SimulatedPlc]) -> None:
         if lamp in _LAMPS:
             _say(f'station {station}: {_LAMPS[lamp]} {"on" if is_on else "off"}')
 
-    plc.lock = threading.Lock()
     try:
         plc.run_ladder(Ladder(plc.table, on_lamp=tell))
     except NoSuchFile as error:

@@ -17,8 +17,9 @@ The conformance kit: it plays one end of a line and checks the other end.
 
 ``codec`` makes and reads bytes, ``wire`` sends and receives them, ``case`` defines and runs a
 case, ``ends`` are the parts that we play. ``slave``, ``master``, ``peer``, ``client`` and
-``radio`` hold the cases, named after the other end; ``data``, ``duplicates``,
-``damage`` and ``asking`` hold those that are the same for several. ``report`` writes the results.
+``radio`` hold the cases, named after the other end; ``data``, ``duplicates``, ``damage`` and
+``asking`` hold those that are the same for several; ``cases`` has them all. ``report`` writes the
+results.
 
 The codec is a second one on purpose, written from the manual and not from ``df1``: with the same
 code at both ends a wrong rule would pass. Pages are cited as in ``df1``.

@@ -88,23 +88,16 @@ class CaseResult:
     transcript: tuple[str, ...] = field(default=())
 
 
-CASES: list[Case] = []
-
-
 CaseScript = Callable[[Any], None]
 """Plays a case with the end it is given; raises Failed or Skipped."""
 
 
 def case(rule: str, source: str, *targets: Target,
-         permission: Permission = Permission.NOTHING) -> Callable[[CaseScript], CaseScript]:
-    """Register a function as a case of ``targets``, by its own name."""
-    def enter(run: CaseScript) -> CaseScript:
-        name = run.__name__.replace('_', '-')
-        if any(other.name == name and set(other.targets) & set(targets) for other in CASES):
-            raise ValueError(f'there is a case {name} already')
-        CASES.append(Case(name, rule, source, targets, run, permission))
-        return run
-    return enter
+         permission: Permission = Permission.NOTHING) -> Callable[[CaseScript], Case]:
+    """Make a function a case of ``targets``, with its own name."""
+    def made(run: CaseScript) -> Case:
+        return Case(run.__name__.replace('_', '-'), rule, source, targets, run, permission)
+    return made
 
 
 def run_cases(cases: Iterable[Case], wire: Wire, end: Any,

@@ -17,7 +17,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from contextlib import suppress
 from functools import partial
 import os
 from pathlib import Path
@@ -29,7 +28,6 @@ import tty
 from typing import Protocol
 
 from abdf1_ros.line_names import link_of
-from abdf1_ros.numbers import whole_number
 from abdf1_ros.ports.descriptor import DescriptorPort, NoClient, Port
 from abdf1_ros.ports.opening import open_port
 from abdf1_ros.ports.ownership import own
@@ -197,17 +195,6 @@ class _Client(DescriptorPort):
         data = super().read(timeout, wake)
         self._look(bool(data))
         return data
-
-
-def host_and_port(text: str) -> tuple[str, int]:
-    """Return what "HOST:PORT" says, a host in [] too, 127.0.0.1 for none; ValueError otherwise."""
-    host, colon, port = text.rpartition(':')
-    number = whole_number(port)
-    with suppress(UnicodeError):
-        host = host.removeprefix('[').removesuffix(']').encode('idna').decode()
-        if colon and number is not None and 0 <= number <= 65535:
-            return host or '127.0.0.1', number
-    raise ValueError(f'"{text}" should be HOST:PORT')
 
 
 def _has_left(client: socket.socket) -> bool:

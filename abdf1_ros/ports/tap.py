@@ -19,7 +19,6 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack
 from dataclasses import replace
-import os
 from queue import Empty, SimpleQueue
 import threading
 import time
@@ -27,6 +26,7 @@ import time
 from abdf1_ros.ports.descriptor import Port
 from abdf1_ros.ports.endpoints import Endpoint, PtyEndpoint, SerialEndpoint
 from abdf1_ros.ports.settings import PortSettings
+from abdf1_ros.ports.wake import Wake
 from abdf1_ros.sniffer.capture import Chunk, Direction
 
 _PTY = 'pty'
@@ -83,7 +83,7 @@ class Tap:
             ports = [self._open(name, stack) for name in names]
             self._open_ports = stack.pop_all()
         self._begun = time.monotonic()
-        self._wake_reader, self._wake_writer = os.pipe()
+        self._wake = Wake()
         if len(ports) == 1:
             self._readers = [self._reader(ports[0], Direction.UNKNOWN, None)]
         else:
@@ -99,11 +99,10 @@ class Tap:
         """End all threads, then close the ports."""
         for reader in self._readers:
             reader.stopping = True
-        os.write(self._wake_writer, b'w')  # left in the pipe, so that every reader wakes up
+        self._wake.set()  # never taken, so that every reader wakes up
         for reader in self._readers:
             reader.join()
-        os.close(self._wake_reader)
-        os.close(self._wake_writer)
+        self._wake.close()
         self._open_ports.close()
 
     def stop(self) -> None:
@@ -149,4 +148,4 @@ class Tap:
             raise
 
     def _reader(self, port: Port, direction: Direction, onward: Port | None) -> _TapReader:
-        return _TapReader(port, direction, onward, self._heard, self._wake_reader)
+        return _TapReader(port, direction, onward, self._heard, self._wake.descriptor)

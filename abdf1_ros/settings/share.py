@@ -17,14 +17,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from contextlib import suppress
 from dataclasses import dataclass
-import ipaddress
-import re
+from ipaddress import ip_address
 from urllib.parse import parse_qsl, urlsplit
 
 from abdf1_ros.df1.checksum import Checksum
-from abdf1_ros.line_names import address_of, device_of, link_of, LOOPBACK
-from abdf1_ros.numbers import whole
+from abdf1_ros.line_names import address_of, device_of, host_and_port, link_of
 from abdf1_ros.settings import BAUD_RATES, PARITIES
 from abdf1_ros.text import shown
 
@@ -69,7 +68,7 @@ class SharePlace:
     @property
     def is_open_to_others(self) -> bool:
         """Tell whether other machines can connect."""
-        return self.kind == 'tcp' and not ipaddress.ip_address(self.host).is_loopback
+        return self.kind == 'tcp' and not ip_address(self.host).is_loopback
 
 
 def share_places(text: str) -> list[SharePlace]:
@@ -111,16 +110,13 @@ def _place(text: str) -> SharePlace:
 
 
 def _host_and_port(name: str, text: str) -> tuple[str, int]:
-    host, colon, digits = name.rpartition(':')
-    port = whole(1, 65535).read(digits)
-    try:
-        host = str(ipaddress.ip_address(re.sub(r'^\[|\]$', '', host))) if colon else LOOPBACK
-    except ValueError:
-        port = None  # a name may stand for any interface
-    if port is None:
-        raise ValueError(f'"{shown(text)}" should be tcp:PORT (for this machine only) or '
-                         'tcp:ADDRESS:PORT, with the address of an interface')
-    return host, port
+    """Return what stands after "tcp:"; a name of a host may stand for any interface."""
+    with suppress(ValueError):
+        host, port = host_and_port(name, '') if ':' in name else host_and_port(f':{name}')
+        if port:
+            return str(ip_address(host)), port
+    raise ValueError(f'"{shown(text)}" should be tcp:PORT (for this machine only) or '
+                     'tcp:ADDRESS:PORT, with the address of an interface')
 
 
 def share_remarks(places: list[SharePlace]) -> Iterator[str]:

@@ -17,7 +17,8 @@
 from collections.abc import Callable
 
 from abdf1_ros.conform import codec
-from abdf1_ros.conform.case import CASES, Permission, run_cases, Target, Verdict
+from abdf1_ros.conform.case import Permission, run_cases, Target, Verdict
+from abdf1_ros.conform.cases import CASES
 from abdf1_ros.conform.codec import BlockCheck
 from abdf1_ros.conform.ends import MasterEnd
 from abdf1_ros.conform.wire import Wire
@@ -30,10 +31,10 @@ from abdf1_ros.df1.settings import LinkSettings
 from abdf1_ros.df1.slave import multidrop
 from abdf1_ros.df1.stations import ActiveStationList
 from abdf1_ros.driver.driver import Driver
-from abdf1_ros.driver.links import DriverSettings
+from abdf1_ros.driver.settings import DriverSettings
 from abdf1_ros.settings.network import Network
 import pytest
-from support.conformance import failures, MODULES, results_of
+from support.conformance import failures, results_of
 from support.driver_bench import Recorder, simulated_plc
 from support.mappings import make_mapping
 from support.scripted_line import ScriptedLine
@@ -151,7 +152,8 @@ def test_case_that_needs_leave_is_skipped() -> None:
 
 
 def test_every_case_cites_its_source() -> None:
-    assert MODULES
+    names = [(case.name, target) for case in CASES for target in case.targets]
+    assert len({*names}) == len(names)
     assert {target: sum(target in case.targets for case in CASES) for target in Target} == {
         Target.SLAVE: 35, Target.MASTER: 10, Target.PEER: 31, Target.CLIENT: 13,
         Target.RADIO: 28, Target.RADIO_CLIENT: 9}

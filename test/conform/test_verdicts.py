@@ -15,7 +15,8 @@
 """Each fault of an end is found by the case that names its rule; what is allowed passes."""
 
 from abdf1_ros.conform import codec
-from abdf1_ros.conform.case import CaseResult, CASES, Target, Verdict
+from abdf1_ros.conform.case import CaseResult, Target, Verdict
+from abdf1_ros.conform.cases import CASES
 from abdf1_ros.conform.codec import BlockCheck
 from abdf1_ros.conform.ends import AskingEnd, MasterEnd, PeerEnd
 from abdf1_ros.conform.wire import Failed, Wire

@@ -17,8 +17,8 @@
 from collections.abc import Callable
 from typing import Any, Protocol
 
-from abdf1_ros.conform import asking, client, damage, data, duplicates, master, peer, radio, slave
-from abdf1_ros.conform.case import CaseResult, CASES, Permission, run_cases, Target, Verdict
+from abdf1_ros.conform.case import CaseResult, Permission, run_cases, Target, Verdict
+from abdf1_ros.conform.cases import CASES
 from abdf1_ros.conform.codec import BlockCheck
 from abdf1_ros.conform.ends import (
     MasterEnd,
@@ -32,9 +32,6 @@ from abdf1_ros.conform.ends import (
 from abdf1_ros.conform.wire import RawLine, Wire
 from abdf1_ros.df1.packet import Packet
 from support.driver_bench import simulated_plc
-
-# Importing them enters their cases.
-MODULES = (asking, client, damage, data, duplicates, master, peer, radio, slave)
 
 
 class TimedLine(RawLine, Protocol):

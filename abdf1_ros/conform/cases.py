@@ -1,0 +1,22 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""All cases, in the order in which they are run."""
+
+from abdf1_ros.conform import asking, client, damage, data, duplicates, master, peer, radio, slave
+from abdf1_ros.conform.case import Case
+
+CASES = tuple(
+    entry for module in (asking, client, damage, data, duplicates, master, peer, radio, slave)
+    for entry in vars(module).values() if isinstance(entry, Case))
