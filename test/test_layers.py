@@ -107,7 +107,7 @@ def test_every_layer_is_looked_at() -> None:
     ('cli/plc/session.py', 'import serial'),
     ('plan/report.py', 'import time'),
     ('driver/requests.py', 'from abdf1_ros.ports.link_thread import LinkThread'),
-    ('driver/requests.py', 'from abdf1_ros.commissioning import session'),
+    ('driver/requests.py', 'from abdf1_ros.cli.plc import session'),
     ('cli/simulator.py', 'import rclpy.node'),
     ('cli/simulator.py', 'import serial'),
     ('cli/demo.py', 'from threading import Thread'),

@@ -102,7 +102,7 @@ class JobTasks:
     def first(self, busy: Container[int], is_own: bool = False) -> JobTask | None:
         """Return the first that waits, but not for a ``busy`` station; only our own if asked."""
         return next((task for task in self.waiting if task.station not in busy
-                     and task.job.is_own >= is_own), None)
+                     and (task.job.is_own or not is_own)), None)
 
     def take(self, task: JobTask, now: float) -> JobTask:
         """Return a waiting task that is now to be sent."""
