@@ -28,7 +28,6 @@ from abdf1_ros.client import Client
 from abdf1_ros.counters import Counters
 from abdf1_ros.df1.peer import PEER
 from abdf1_ros.df1.stations import ActiveStationList
-from abdf1_ros.driver.links import make_machine
 from abdf1_ros.errors import FormatError, LinkError, RemoteError
 from abdf1_ros.pccc.identity import Mode
 from abdf1_ros.ports.endpoints import PtyEndpoint
@@ -266,7 +265,7 @@ def peer(tmp_path: Path) -> Iterator[str]:
     plc.be_full_duplex()
     line = PtyEndpoint(str(tmp_path / 'line'))
     settings = Network(baud=9600, station=1).line
-    machine = make_machine(PEER, settings, lambda: link.run(Nothing()), Counters())
+    machine = PEER.make_machine(settings, lambda: link.run(Nothing()), Counters())
     link = PEER.make_link(machine, settings, ActiveStationList(()), plc.serve, lambda event: None)
     thread = LinkThread(machine, line.open)
     thread.start()

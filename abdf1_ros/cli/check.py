@@ -44,7 +44,7 @@ from abdf1_ros.cli.terminal import (
     table,
     YELLOW,
 )
-from abdf1_ros.driver.links import DriverSettings
+from abdf1_ros.driver.settings import DriverSettings
 from abdf1_ros.plan.bounds import Bound
 from abdf1_ros.plan.forecast import USUAL_RESPONSE_TIME
 from abdf1_ros.plan.planner import Block

@@ -20,9 +20,10 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping
 from typing import ClassVar
 
+from abdf1_ros.counters import Counters
 from abdf1_ros.df1.frames import Duplex, poll_frame
 from abdf1_ros.df1.link import Link, quiet_time
-from abdf1_ros.df1.machine import Machine, MIN_RESPONSE_TIME
+from abdf1_ros.df1.machine import Background, Machine, MIN_RESPONSE_TIME, Procedure
 from abdf1_ros.df1.packet import Packet
 from abdf1_ros.df1.settings import LinkSettings
 from abdf1_ros.df1.stations import ActiveStationList
@@ -73,6 +74,13 @@ class LineMode(ABC):
 
     why_unshared: ClassVar[str] = ''
     """Why the line cannot be shared with guests, empty where it can."""
+
+    def make_machine(self, line: LinkSettings, run: Callable[[], Procedure], counters: Counters,
+                     background: Background | None = None) -> Machine:
+        """Return the machine for a line of this mode, with ``run`` as its procedure."""
+        return Machine(
+            lambda machine: run(), checksum=line.checksum, duplex=self.duplex, timing=line.timing,
+            counters=counters, forget_on_send=self.is_master, background=background)
 
     @abstractmethod
     def make_link(self, machine: Machine, line: LinkSettings, stations: ActiveStationList,

@@ -57,10 +57,10 @@ from abdf1_ros.driver.inbox import Inbox
 from abdf1_ros.driver.interlocks.heartbeat import LARGEST
 from abdf1_ros.driver.interlocks.queue import Interlocks
 from abdf1_ros.driver.job_tasks import JobTasks
-from abdf1_ros.driver.links import DriverSettings, make_machine
 from abdf1_ros.driver.reads.readings import Readings, ValueListener
 from abdf1_ros.driver.record import WriteRecord
 from abdf1_ros.driver.served import Served
+from abdf1_ros.driver.settings import DriverSettings
 from abdf1_ros.driver.write import Outcome, show, Write, WriteResult
 from abdf1_ros.driver.writes.queue import MAX_WAITING_WRITES, WriteQueue
 from abdf1_ros.driver.writes.under_way import WritesUnderWay
@@ -105,8 +105,8 @@ class Driver:
         self.network = network
         self.mappings = tuple(mappings)
         self.counters = Counters()
-        self.machine = make_machine(
-            network.line_mode, network.line, self._run, self.counters, self)
+        self.machine = network.line_mode.make_machine(
+            network.line, self._run, self.counters, self)
         self.stations = ActiveStationList(
             (mapping.station for mapping in mappings
              if not mapping.serves and mapping.station != BROADCAST), self._station_changed,

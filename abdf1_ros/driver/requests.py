@@ -33,7 +33,6 @@ from abdf1_ros.df1.stations import ActiveStationList
 from abdf1_ros.df1.tasks import Task
 from abdf1_ros.driver.inbox import Inbox
 from abdf1_ros.driver.job_tasks import Job, JobTasks
-from abdf1_ros.driver.links import make_machine
 from abdf1_ros.errors import LinkError, PortLost
 from abdf1_ros.pccc.data_table import DataTable
 from abdf1_ros.pccc.dialect import Steps
@@ -81,7 +80,7 @@ class Requests:
         self.stations = ActiveStationList(absent, routes=routes)
         for number in absent:
             self.stations.lost(number, 0.0)
-        self.machine = make_machine(mode, line, self._run, self.counters)
+        self.machine = mode.make_machine(line, self._run, self.counters)
         self._tasks = JobTasks(line.station or 0, first_tns)
         self._waiting: Inbox[_RequestJob] = Inbox()
         self._lost: LinkError = PortLost('not opened yet')

@@ -29,11 +29,11 @@ from abdf1_ros.driver.checks import Checks
 from abdf1_ros.driver.guests import GuestQueue
 from abdf1_ros.driver.interlocks.queue import Interlocks
 from abdf1_ros.driver.job_tasks import Job, JobTasks
-from abdf1_ros.driver.links import DriverSettings
 from abdf1_ros.driver.reads.job import ReadJob
 from abdf1_ros.driver.reads.point import ReadPoint
 from abdf1_ros.driver.reads.readings import Readings
 from abdf1_ros.driver.record import Claim, WriteRecord
+from abdf1_ros.driver.settings import DriverSettings
 from abdf1_ros.driver.write import Outcome, Write, WriteResult
 from abdf1_ros.driver.writes.queue import MessageJob, WriteQueue
 from abdf1_ros.driver.writes.under_way import WritesUnderWay

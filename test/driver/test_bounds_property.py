@@ -38,7 +38,7 @@ from abdf1_ros.df1.settings import LinkSettings
 from abdf1_ros.df1.slave import HalfDuplexSlave
 from abdf1_ros.driver.interlocks.plc import Plc
 from abdf1_ros.driver.job_tasks import JobTask
-from abdf1_ros.driver.links import DriverSettings
+from abdf1_ros.driver.settings import DriverSettings
 from abdf1_ros.pccc.families import parse_address
 from abdf1_ros.plan.bounds import Times
 from abdf1_ros.plan.report import make_report

@@ -22,8 +22,8 @@ from abdf1_ros.df1.packet import Packet
 from abdf1_ros.df1.settings import LinkSettings
 from abdf1_ros.df1.slave import HalfDuplexSlave
 from abdf1_ros.driver.checks import ECHO_PERIOD
-from abdf1_ros.driver.links import DriverSettings
 from abdf1_ros.driver.reads.point import Freshness
+from abdf1_ros.driver.settings import DriverSettings
 from abdf1_ros.driver.write import Outcome
 from abdf1_ros.pccc.emulated import Setting
 from abdf1_ros.settings.mapping import Mapping

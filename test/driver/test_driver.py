@@ -22,8 +22,8 @@ import random
 from abdf1_ros.df1 import frames
 from abdf1_ros.df1.frames import Frame, Poll, Symbol
 from abdf1_ros.df1.packet import Packet
-from abdf1_ros.driver.links import DriverSettings
 from abdf1_ros.driver.reads.point import Freshness
+from abdf1_ros.driver.settings import DriverSettings
 from abdf1_ros.driver.write import Outcome
 from abdf1_ros.messages import Event
 from abdf1_ros.pccc.families import parse_address

@@ -23,8 +23,8 @@ from abdf1_ros.df1.peer import FullDuplexPeer
 from abdf1_ros.df1.settings import LinkSettings
 from abdf1_ros.df1.stations import ActiveStationList
 from abdf1_ros.driver.driver import Driver
-from abdf1_ros.driver.links import DriverSettings
 from abdf1_ros.driver.reads.point import Freshness
+from abdf1_ros.driver.settings import DriverSettings
 from abdf1_ros.driver.write import Outcome
 from abdf1_ros.pccc.emulated import Setting
 from abdf1_ros.pccc.families import dialect_of, parse_address

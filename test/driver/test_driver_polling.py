@@ -17,7 +17,7 @@
 from abdf1_ros.df1.packet import BROADCAST
 from abdf1_ros.df1.polling import StandardPollingMaster
 from abdf1_ros.df1.settings import PollingSettings
-from abdf1_ros.driver.links import DriverSettings
+from abdf1_ros.driver.settings import DriverSettings
 from abdf1_ros.driver.write import Outcome
 from abdf1_ros.settings.network import Network, POLLING_MODES
 from abdf1_ros.simulator.simulated_plc import InjectedFaults

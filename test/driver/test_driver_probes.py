@@ -19,7 +19,7 @@ from itertools import pairwise
 from abdf1_ros.df1.checksum import Checksum
 from abdf1_ros.df1.frames import Duplex, Frame, FrameDecoder, Poll
 from abdf1_ros.df1.packet import Packet
-from abdf1_ros.driver.links import DriverSettings
+from abdf1_ros.driver.settings import DriverSettings
 from abdf1_ros.settings.heartbeats import Fallback, Heartbeat
 from abdf1_ros.settings.mapping import Mapping
 from abdf1_ros.settings.network import Network

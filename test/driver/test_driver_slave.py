@@ -21,7 +21,7 @@ from abdf1_ros.df1.packet import BROADCAST, Packet
 from abdf1_ros.df1.settings import LinkSettings, PollingSettings
 from abdf1_ros.df1.slave import HalfDuplexSlave, multidrop
 from abdf1_ros.driver.driver import Driver
-from abdf1_ros.driver.links import DriverSettings
+from abdf1_ros.driver.settings import DriverSettings
 from abdf1_ros.driver.write import Outcome
 from abdf1_ros.pccc.dialect import Request
 from abdf1_ros.pccc.emulated import Setting

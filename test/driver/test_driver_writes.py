@@ -25,7 +25,7 @@ from abdf1_ros.df1 import frames
 from abdf1_ros.df1.packet import Packet
 from abdf1_ros.df1.settings import LinkSettings
 from abdf1_ros.df1.slave import HalfDuplexSlave
-from abdf1_ros.driver.links import DriverSettings
+from abdf1_ros.driver.settings import DriverSettings
 from abdf1_ros.driver.write import Outcome
 from abdf1_ros.driver.writes.queue import MAX_WAITING_WRITES
 from abdf1_ros.settings.mapping import Mapping

@@ -31,10 +31,10 @@ from abdf1_ros.df1.slave import HalfDuplexSlave
 from abdf1_ros.driver.guests import Guest, GuestCommand, ShareAccess
 from abdf1_ros.driver.interlocks.fallback import FallbackCause, FallbackRow, FallbackState
 from abdf1_ros.driver.interlocks.heartbeat import BeatState, LARGEST
-from abdf1_ros.driver.links import DriverSettings
 from abdf1_ros.driver.reads.guards import CounterGuard, RunGuard
 from abdf1_ros.driver.reads.point import Freshness, ReadPoint
 from abdf1_ros.driver.record import Claim, WriteRecord
+from abdf1_ros.driver.settings import DriverSettings
 from abdf1_ros.driver.write import Outcome, Write
 from abdf1_ros.pccc.data_table import DataTable
 from abdf1_ros.pccc.emulated import Setting

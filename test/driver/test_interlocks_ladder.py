@@ -22,7 +22,7 @@ of the rules in docs/heartbeats.md.
 from collections.abc import Callable
 from random import Random
 
-from abdf1_ros.driver.links import DriverSettings
+from abdf1_ros.driver.settings import DriverSettings
 from abdf1_ros.pccc.emulated import Setting
 from abdf1_ros.settings.heartbeats import Fallback, Heartbeat
 from abdf1_ros.settings.network import Network

@@ -23,7 +23,7 @@ from __future__ import annotations
 import math
 
 from abdf1_ros.driver.interlocks.heartbeat import BeatState, HeartbeatRow
-from abdf1_ros.driver.links import DriverSettings
+from abdf1_ros.driver.settings import DriverSettings
 from abdf1_ros.pccc.emulated import Setting
 from abdf1_ros.plan.bounds import MODE_PERIOD
 from abdf1_ros.settings.heartbeats import Fallback, Heartbeat

@@ -38,7 +38,7 @@ from abdf1_ros.df1.slave import HalfDuplexSlave, multidrop
 from abdf1_ros.df1.stations import ActiveStationList
 from abdf1_ros.driver.driver import Driver
 from abdf1_ros.driver.guests import Guest, GuestCommand, GuestJob, ShareAccess
-from abdf1_ros.driver.links import DriverSettings
+from abdf1_ros.driver.settings import DriverSettings
 from abdf1_ros.driver.write import Outcome
 from abdf1_ros.errors import PortLost
 from abdf1_ros.pccc.emulated import Setting

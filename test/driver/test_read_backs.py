@@ -18,9 +18,9 @@ from collections.abc import Callable
 import math
 
 from abdf1_ros.df1.frames import EOT, STX
-from abdf1_ros.driver.links import DriverSettings
 from abdf1_ros.driver.reads.read_backs import ReadBacks
 from abdf1_ros.driver.record import Claim
+from abdf1_ros.driver.settings import DriverSettings
 from abdf1_ros.driver.write import Outcome, Write, WriteResult
 from abdf1_ros.errors import CommandTimeout
 from abdf1_ros.plan.forecast import line_model

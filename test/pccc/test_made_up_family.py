@@ -143,7 +143,7 @@ def main() -> None:
 
     from abdf1_ros.cli.check import main as check
     from abdf1_ros.cli.plc.parser import make_parser
-    from abdf1_ros.driver.links import DriverSettings
+    from abdf1_ros.driver.settings import DriverSettings
     from abdf1_ros.driver.write import Outcome
     from abdf1_ros.pccc.describe import describe
     from abdf1_ros.settings.network import load_network, Network

@@ -28,9 +28,9 @@ from abdf1_ros.driver.checks import StationHealth
 from abdf1_ros.driver.driver import Driver
 from abdf1_ros.driver.interlocks.fallback import FallbackCause, FallbackState
 from abdf1_ros.driver.interlocks.heartbeat import BeatState
-from abdf1_ros.driver.links import DriverSettings
 from abdf1_ros.driver.reads.point import ReadPoint
 from abdf1_ros.driver.record import Claim
+from abdf1_ros.driver.settings import DriverSettings
 from abdf1_ros.driver.write import Outcome, Write, WriteResult
 from abdf1_ros.messages import Event, Message
 from abdf1_ros.pccc.file_types import PlcType

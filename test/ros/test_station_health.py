@@ -21,7 +21,7 @@ import time
 
 from abdf1_ros.driver.checks import StationHealth
 from abdf1_ros.driver.driver import Driver
-from abdf1_ros.driver.links import DriverSettings
+from abdf1_ros.driver.settings import DriverSettings
 from abdf1_ros.pccc.file_types import PlcType
 from abdf1_ros.pccc.identity import Identity, Mode
 from abdf1_ros.pccc.processor import Processor

@@ -36,7 +36,7 @@ from abdf1_ros.df1.slave import multidrop
 from abdf1_ros.df1.stations import ActiveStationList
 from abdf1_ros.driver.driver import Driver
 from abdf1_ros.driver.guests import GuestCommand, GuestListener, GuestQueue
-from abdf1_ros.driver.links import DriverSettings
+from abdf1_ros.driver.settings import DriverSettings
 from abdf1_ros.errors import RemoteError
 from abdf1_ros.ports.clock import line_time
 from abdf1_ros.ports.descriptor import READ_SIZE

@@ -36,7 +36,7 @@ from abdf1_ros.df1.packet import Packet
 from abdf1_ros.df1.radio import RadioNode
 from abdf1_ros.driver.driver import Driver
 from abdf1_ros.driver.guests import Guest, GuestCommand, ShareAccess
-from abdf1_ros.driver.links import DriverSettings
+from abdf1_ros.driver.settings import DriverSettings
 from abdf1_ros.driver.write import Outcome
 from abdf1_ros.plan.bounds import Times
 from abdf1_ros.settings.mapping import Mapping

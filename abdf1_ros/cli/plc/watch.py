@@ -32,7 +32,7 @@ from abdf1_ros.cli.plc.session import opened
 from abdf1_ros.cli.terminal import is_terminal, table
 from abdf1_ros.df1.stations import Station
 from abdf1_ros.driver.driver import Driver
-from abdf1_ros.driver.links import DriverSettings
+from abdf1_ros.driver.settings import DriverSettings
 from abdf1_ros.pccc.values import Values
 from abdf1_ros.ports.link_thread import LinkThread
 from abdf1_ros.settings.mapping import Mapping

@@ -47,7 +47,7 @@ from abdf1_ros.cli.terminal import (
     tell,
 )
 from abdf1_ros.df1.echo import COMES_BACK
-from abdf1_ros.driver.links import DriverSettings
+from abdf1_ros.driver.settings import DriverSettings
 from abdf1_ros.driver.write import Outcome
 from abdf1_ros.errors import Abdf1Error, FormatError, LinkError, PortLost, RemoteError
 from abdf1_ros.pccc.file_search import DataFile

@@ -23,12 +23,12 @@ from typing import Protocol
 from abdf1_ros.df1.packet import BROADCAST
 from abdf1_ros.df1.stations import ActiveStationList
 from abdf1_ros.driver.job_tasks import LineTime
-from abdf1_ros.driver.links import DriverSettings
 from abdf1_ros.driver.reads.guards import Guards
 from abdf1_ros.driver.reads.job import ReadJob, ReadTooOld
 from abdf1_ros.driver.reads.point import Guard, ReadPoint
 from abdf1_ros.driver.reads.read_backs import ReadBacks
 from abdf1_ros.driver.reads.silent import Reads
+from abdf1_ros.driver.settings import DriverSettings
 from abdf1_ros.driver.write import WriteResult
 from abdf1_ros.errors import FormatError, LinkError, RemoteError
 from abdf1_ros.pccc.identity import Identity

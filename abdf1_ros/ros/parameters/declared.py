@@ -27,7 +27,7 @@ from typing import Any
 
 from abdf1_ros.df1.packet import BROADCAST
 from abdf1_ros.df1.settings import PollingSettings
-from abdf1_ros.driver.links import DriverSettings
+from abdf1_ros.driver.settings import DriverSettings
 from abdf1_ros.paths import config_file
 from abdf1_ros.plan.usable_rows import usable_rows
 from abdf1_ros.problems import ConfigurationError, Problem

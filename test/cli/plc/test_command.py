@@ -28,7 +28,7 @@ from abdf1_ros.cli.check import examine
 from abdf1_ros.cli.plc.command import main
 from abdf1_ros.df1.echo import COMES_BACK
 from abdf1_ros.driver.driver import Driver
-from abdf1_ros.driver.links import DriverSettings
+from abdf1_ros.driver.settings import DriverSettings
 from abdf1_ros.plan.report import make_report
 from abdf1_ros.ports.endpoints import PtyEndpoint
 from abdf1_ros.ports.link_thread import LinkThread

@@ -44,7 +44,7 @@ from abdf1_ros.df1.slave import multidrop
 from abdf1_ros.df1.stations import ActiveStationList, Station
 from abdf1_ros.driver import driver
 from abdf1_ros.driver.driver import Driver
-from abdf1_ros.driver.links import DriverSettings
+from abdf1_ros.driver.settings import DriverSettings
 from abdf1_ros.messages import Event, Severity
 from abdf1_ros.pccc.data_table import DataTable
 from abdf1_ros.pccc.families import parse_address  # noqa: E402

@@ -45,7 +45,7 @@ sys.path[:0] = map(str, Path(__file__).resolve().parents[1:4])
 from abdf1_ros.df1 import frames  # noqa: E402
 from abdf1_ros.df1.packet import Packet  # noqa: E402
 from abdf1_ros.driver.driver import Driver  # noqa: E402
-from abdf1_ros.driver.links import DriverSettings  # noqa: E402
+from abdf1_ros.driver.settings import DriverSettings  # noqa: E402
 from abdf1_ros.pccc.families import parse_address  # noqa: E402
 from abdf1_ros.pccc.file_types import PlcType  # noqa: E402
 from abdf1_ros.pccc.slc.dialect import SlcDialect  # noqa: E402

@@ -29,7 +29,7 @@ from abdf1_ros.df1.packet import Packet
 from abdf1_ros.df1.radio import RADIO, RadioNode
 from abdf1_ros.df1.tasks import Task
 from abdf1_ros.driver.driver import Driver, Listener
-from abdf1_ros.driver.links import DriverSettings
+from abdf1_ros.driver.settings import DriverSettings
 from abdf1_ros.driver.write import Outcome, show, WriteResult
 from abdf1_ros.errors import LinkError
 from abdf1_ros.messages import Event

@@ -28,7 +28,7 @@ from abdf1_ros.df1 import frames
 from abdf1_ros.df1.machine import Machine
 from abdf1_ros.df1.stations import Station
 from abdf1_ros.driver.driver import Driver, Listener
-from abdf1_ros.driver.links import DriverSettings
+from abdf1_ros.driver.settings import DriverSettings
 from abdf1_ros.driver.write import WriteResult
 from abdf1_ros.errors import PortLost
 from abdf1_ros.messages import Event

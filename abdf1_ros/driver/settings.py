@@ -12,17 +12,13 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The settings of a driver, and the machine that its link runs on."""
+"""The settings of a driver."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 
-from abdf1_ros.counters import Counters
-from abdf1_ros.df1.machine import Background, Machine, Procedure
-from abdf1_ros.df1.mode import LineMode
-from abdf1_ros.df1.settings import LinkOptions, LinkSettings
+from abdf1_ros.df1.settings import LinkOptions
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -49,11 +45,3 @@ class DriverSettings(LinkOptions):
     The first transaction number. It should be random: a station could take the first command of a
     restarted driver for a duplicate.
     """
-
-
-def make_machine(mode: LineMode, line: LinkSettings, run: Callable[[], Procedure],
-                 counters: Counters, background: Background | None = None) -> Machine:
-    """Return the machine for a line, with ``run`` as its procedure."""
-    return Machine(
-        lambda machine: run(), checksum=line.checksum, duplex=mode.duplex, timing=line.timing,
-        counters=counters, forget_on_send=mode.is_master, background=background)
