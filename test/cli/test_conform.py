@@ -106,7 +106,7 @@ def test_simulator_is_a_node_of_a_radio_network_and_not_a_peer(
         assert main(['radio', *options, 'broadcast-unanswered', '--only', 'read-words',
                      '--answer-time', '1']) == 0
         assert '2 passed, 0 failed, 0 skipped' in capsys.readouterr().out
-        assert main(['peer', *options, 'message-acknowledged', '--answer-time', '0.5']) == 1
+        assert main(['peer', *options, 'message-acknowledged', '--answer-time', '0.1']) == 1
         assert 'FAIL  message-acknowledged' in capsys.readouterr().out
 
 

@@ -106,7 +106,7 @@ def patient_read(client: Client, address: str) -> object:
 def test_what_comes_while_the_node_stands_still_is_not_sent(tmp_path: Path) -> None:
     files, place = make_files(tmp_path), tmp_path / 'hmi'
     with (files.start_simulator(), Observer() as observer,
-          Process('node', *files.args(OFTEN, f'net.share:="pty:{place}"', 'net.cmd_timeout:=2000',
+          Process('node', *files.args(OFTEN, f'net.share:="pty:{place}"', 'net.cmd_timeout:=500',
                                       'net.share_access:=Write')) as node):
         setpoints = observer.listen(Float32MultiArray, '/abdf1/read/setpoint')
         setpoints.values([21.5])
@@ -114,7 +114,7 @@ def test_what_comes_while_the_node_stands_still_is_not_sent(tmp_path: Path) -> N
         with Client(str(place), plc_type='SLC', station=2, timeout=3.0, cmd_timeout=9.0) as hmi:
             assert patient_read(hmi, 'F8:4') == 21.5
             node.stop()
-            threading.Timer(4.5, node.go_on).start()
+            threading.Timer(1.5, node.go_on).start()
             with pytest.raises(RemoteError) as refusal:
                 hmi.write('F8:4', 99.0)
             assert refusal.value.sts == 0x01

@@ -34,7 +34,7 @@ from support.disks import no_file_longer_than
 from support.driver_bench import simulated_plc, store, stored
 from support.plc_line import plc_line
 
-PATIENT = ('--timeout', '2000')  # ms; for who is there, but may be late on a busy host
+PATIENT = ('--timeout', '2000', '--duplex', 'half')  # ms; a busy host may be late
 
 Output = pytest.CaptureFixture[str]
 

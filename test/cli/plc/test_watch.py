@@ -44,8 +44,8 @@ def plcs(tmp_path: Path) -> Iterator[Plcs]:
         yield line
 
 
-def network_on(plcs: Plcs) -> Network:
-    return Network(com_port=plcs.port, baud=115200, timeout=1000, nak_retries=0)
+def network_on(plcs: Plcs, timeout: int = 1000) -> Network:
+    return Network(com_port=plcs.port, baud=115200, timeout=timeout, nak_retries=0)
 
 
 class Counting(Watch):
@@ -92,7 +92,7 @@ def test_each_read_is_a_line_of_csv_for_each_value(
     assert told.count('1,N7:0,0') == told.count('1,N7:1,0') >= 2
     assert '1,ST9:0,"a,""b"""' in told
     plcs.say('silent 1')
-    assert Watch(network_on(plcs), [SPEED], 0.01, csv=True).run(2) == 1
+    assert Watch(network_on(plcs, 100), [SPEED], 0.01, csv=True).run(2) == 1
     assert [line.partition(',')[2] for line in capsys.readouterr().out.splitlines()[1:]] == [
         '1,N7:0,']
 
@@ -114,7 +114,7 @@ def test_lost_line_is_shown(plcs: Plcs, capsys: pytest.CaptureFixture[str]) -> N
 
 def test_silent_station_is_shown(plcs: Plcs, capsys: pytest.CaptureFixture[str]) -> None:
     plcs.say('silent 1')
-    assert Watch(network_on(plcs), [SPEED], 0.01).run(2) == 1
+    assert Watch(network_on(plcs, 100), [SPEED], 0.01).run(2) == 1
     assert shown(capsys) == [
         'N7:0  no value: 2509 ERR_INACTIVE_STATION: Slave Station (1) Inactive']
 
