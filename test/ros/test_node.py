@@ -419,9 +419,10 @@ def test_other_node_of_our_name_is_told_before_the_first_write_is_taken(
         make_bench: Benches, observer: Observer, monkeypatch: pytest.MonkeyPatch,
         capfd: pytest.CaptureFixture[str]) -> None:
     monkeypatch.setattr(node_module, 'DISCOVERY', 2.0)
+    other = Node('abdf1', context=observer.context, use_global_arguments=False,
+                 start_parameter_services=False)
     bench = make_bench(RECIPE)
     bench.publisher(Int16MultiArray, 'recipe')(1, 2)
-    other = Node('abdf1', context=observer.context, use_global_arguments=False)
     observer.until(lambda: bench.node.writes_taken, 'the write')
     assert '[abdf1]: another node is called /abdf1 too' in ''.join(capfd.readouterr())
     assert bench.until_results(1)[0].message == 'written'

@@ -43,14 +43,14 @@ class Forked:
     """A program of Python without a new interpreter; as much of Popen as tests need."""
 
     def __init__(self, program: str | Path, args: Sequence[str],
-                 terminal: int | None = None) -> None:
+                 descriptor: int | None = None) -> None:
         """
         Start a command of the package, or a file.
 
-        Its standard streams are pipes, unless a descriptor of a ``terminal`` is given for all.
+        Its standard streams are pipes, unless the ``descriptor`` of a terminal or a file is given.
         """
-        if terminal is not None:
-            self._start(program, args, [Connection(os.dup(terminal)) for _ in range(3)])
+        if descriptor is not None:
+            self._start(program, args, [Connection(os.dup(descriptor)) for _ in range(3)])
             return
         (stdin, to_it), (out, stdout), (errors, stderr) = (
             _CONTEXT.Pipe(duplex=False) for _ in range(3))
