@@ -18,6 +18,7 @@ from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 import time
+from types import SimpleNamespace
 from typing import Any
 
 from abdf1_ros.cli.monitor import plant, view
@@ -477,17 +478,15 @@ def test_blocks_may_be_divided_while_the_poll_cycle_is_asked_for(bench: Bench) -
     class Part:
         """A job that has not been done yet."""
 
-        interval = longest = None
+        intervals = SimpleNamespace(last=None, longest=None)
 
     class Divided:
         """A job that gives way to two others while it is looked at."""
 
-        longest = None
-
         @property
-        def interval(self) -> float:
+        def intervals(self) -> SimpleNamespace:
             jobs.add(Part())
-            return 0.25
+            return SimpleNamespace(last=0.25, longest=None)
 
     jobs.clear()
     jobs.add(Divided())
