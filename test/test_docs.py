@@ -232,6 +232,14 @@ def test_no_sentence_is_said_twice() -> None:
     assert [sentence for sentence, times in said.items() if times > 1] == []
 
 
+def test_rules_are_in_short_sentences() -> None:
+    page = re.sub(r'\]\(.*?\)', ']', documents.prose(documents.text('docs/heartbeats.md')))
+    sentences = [sentence.split() for part in re.split(r'\n\n|\n *(?:\d+\.|\(\w\)|-) ', page)
+                 for sentence in re.split(r'(?<=[.:;])\s', part)]
+    assert len(sentences) > 100
+    assert [sentence for sentence in sentences if len(sentence) > 25] == []
+
+
 @cache
 def printed() -> str:
     """Return all texts of the program, of pyserial's port and of the system, one a line."""

@@ -43,7 +43,8 @@ def without_code(page: str) -> str:
 
 def prose(page: str) -> str:
     """Return a page without its code blocks and without what is made from the code."""
-    return without_code(re.sub(r'<!-- generated: .*?<!-- end: [\w-]+ -->', '', page, flags=re.DOTALL))
+    return without_code(re.sub(
+        r'<!-- generated: .*?<!-- end: [\w-]+ -->', '', page, flags=re.DOTALL))
 
 
 def spans(page: str) -> list[str]:
