@@ -202,6 +202,12 @@ def test_faults_of_a_data_file_are_told_with_their_cells(
         'N, F, ST, A, D, L, PD, MG, HSC, PTO, PWM, STI, EII']
 
 
+def test_station_of_a_full_duplex_line_is_named(
+        capsys: pytest.CaptureFixture[str], data: Path) -> None:
+    assert _refused(capsys, '--data', str(data), '--full-duplex', '7') == \
+        'simulator: --full-duplex: name a station (1, 2)\n'
+
+
 def test_data_file_that_is_missing_is_named(capsys: pytest.CaptureFixture[str]) -> None:
     assert _refused(capsys, '--data', '/nowhere') == \
         'simulator: /nowhere: cannot be read: No such file or directory\n'

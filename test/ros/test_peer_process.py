@@ -18,7 +18,6 @@ from collections.abc import Iterator
 import os
 from pathlib import Path
 import select
-import socket
 import tty
 
 import pytest
@@ -30,7 +29,6 @@ DATA = """\
 Station,PLC_Type,Address,Length,Values,Motion,Period
 1,PLC5,N7:0,100,1200 4099 -2 16,,
 1,PLC5,F8:0,4,1.5,,
-2,SLC,N7:0,100,7 4112,,
 """
 
 ACK, NAK, ENQ = b'\x10\x06', b'\x10\x15', b'\x10\x05'
@@ -54,8 +52,8 @@ def bcc(data: bytes) -> bytes:
 class Client:
     """The other end of the line, which knows the manual and nothing of the package."""
 
-    def __init__(self, line: int | socket.socket, check: str) -> None:
-        self._line = line if isinstance(line, int) else line.fileno()
+    def __init__(self, line: int, check: str) -> None:
+        self._line = line
         self._check = crc if check == 'CRC' else bcc
         self._tns = 0x0F0E
         self._heard = b''
@@ -118,11 +116,11 @@ def simulator(folder: Path, *args: str) -> Process:
 class Line:
     """A simulator and a client on one pseudo-terminal."""
 
-    def __init__(self, folder: Path, check: str, station: int = 1) -> None:
+    def __init__(self, folder: Path, check: str) -> None:
         name = folder / 'line'
-        self.simulator = simulator(folder, '--full-duplex', str(station), '--pty', str(name),
+        self.simulator = simulator(folder, '--full-duplex', '1', '--pty', str(name),
                                    '--check', check)
-        self.simulator.wait_for(f'stations {station} ', f' on {name}, {check}')
+        self.simulator.wait_for('stations 1 ', f' on {name}, {check}')
         self._descriptor = os.open(name, os.O_RDWR | os.O_NOCTTY)
         tty.setraw(self._descriptor)
         self.client = Client(self._descriptor, check)
@@ -202,36 +200,3 @@ def test_slow_port_is_given_the_time_that_a_message_takes(tmp_path: Path) -> Non
         process.end()
     os.close(ours)
     os.close(theirs)
-
-
-def test_slc_answers_as_a_full_duplex_peer(tmp_path: Path) -> None:
-    made = Line(tmp_path, 'BCC', 2)
-    read = bytes.fromhex('A2 04 07 89 00 00')
-    assert made.client.ask(2, 0x0F, read) == bytes.fromhex('00 07 00 10 10')
-    assert made.client.ask(2, 0x0F, bytes.fromhex('AA 02 07 89 01 00 10 03')) == b'\0'
-    assert made.client.ask(2, 0x0F, read) == bytes.fromhex('00 07 00 10 03')
-    assert made.client.ask(2, 0x0F, bytes.fromhex('A2 02 07 89 64 00')) == b'\x50'
-    assert made.client.ask(2, 0x06, b'\3')[:4] == b'\0\0\xEE\x34'
-    made.simulator.type('msg 2 N7:50 11\n')
-    command = made.client.hear()
-    assert command[6:] == bytes.fromhex('AA 02 07 89 32 00 0B 00')
-    made.client.say(ACK + made.client.frame(bytes((2, 5, 0x4F, 0)) + command[4:6]))
-    assert made.client.hear() == ACK
-    made.simulator.wait_for('station 2: msg N7:50 confirmed')
-    made.close()
-
-
-def test_peer_on_tcp_takes_one_client_after_the_other(tmp_path: Path) -> None:
-    with simulator(tmp_path, '--full-duplex', '1', '--tcp', '127.0.0.1:0') as process:
-        port = int(process.wait_for('socket://127.0.0.1:').split(':')[-1].split(',')[0])
-        for _ in range(2):  # one client after the other
-            with socket.create_connection(('127.0.0.1', port), PATIENCE) as connection:
-                client = Client(connection, 'CRC')
-                assert client.ask(1, 0x0F, typed_read(0, 1))[-2:] == b'\xB0\x04'
-        process.end()
-
-
-def test_station_that_is_not_there(tmp_path: Path) -> None:
-    with simulator(tmp_path, '--full-duplex', '7') as process:
-        assert process.result() == 2
-    assert process.lines == ['simulator: --full-duplex: name a station (1, 2)']

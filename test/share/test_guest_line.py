@@ -37,7 +37,6 @@ from abdf1_ros.df1.stations import ActiveStationList
 from abdf1_ros.driver.driver import Driver
 from abdf1_ros.driver.guests import GuestCommand, GuestListener, GuestQueue
 from abdf1_ros.driver.settings import DriverSettings
-from abdf1_ros.errors import RemoteError
 from abdf1_ros.ports.clock import line_time
 from abdf1_ros.ports.descriptor import READ_SIZE
 from abdf1_ros.ports.endpoints import PtyEndpoint
@@ -92,10 +91,6 @@ class Shared:
     def start(self) -> None:
         for thread in (self._far, self._near, *self.guests):
             thread.start()
-
-    def leave(self) -> None:
-        """Close the port of the PLC."""
-        self._near.release()
 
     def stop(self) -> None:
         for thread in (*self.guests, self._near, self._far):
@@ -165,15 +160,6 @@ def test_two_guests_read_and_write_and_none_gets_the_other_ones_values(
         assert stored(line.plc, 'N10:1') == b'\x27\x00'
 
 
-def test_only_what_is_allowed_goes_to_the_plc(tmp_path: Path) -> None:
-    with shared(tmp_path, f'pty:{tmp_path}/hmi') as line, client_at(tmp_path / 'hmi') as client:
-        with pytest.raises(RemoteError) as refusal:
-            client.write('N7:0', 1)
-        assert refusal.value.sts == 0x60
-        assert client.read('N7:0') == 0
-        assert line.guests[0].guest.refused == 1
-
-
 def test_place_is_a_peer_of_the_manual(
         tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """The link rules at a place, judged by the kit; BCC there, CRC on the line."""
@@ -236,15 +222,6 @@ def test_place_of_ipv6(tmp_path: Path) -> None:
             client_at(f'socket://[::1]:{port}') as client:
         assert client.read('N7:1', 2) == [1, 2]
         assert line.guests[0].guest.name == f'tcp:[::1]:{port}'
-
-
-def test_lost_line_is_told_to_the_guest(tmp_path: Path) -> None:
-    with shared(tmp_path, f'pty:{tmp_path}/hmi') as line, client_at(tmp_path / 'hmi') as client:
-        assert client.read('N7:1') == 1
-        line.leave()
-        with pytest.raises(RemoteError) as refusal:
-            client.read('N7:1')
-        assert refusal.value.sts == 0x04
 
 
 def test_place_that_cannot_be_opened_says_why_until_it_can(tmp_path: Path) -> None:

@@ -596,16 +596,6 @@ def test_commands_work_over_a_tcp_connection(
     assert said.lines[1].endswith(f'--port {url} --baud 9600 --check CRC --parity Even')
 
 
-def test_port_that_is_lost_ends_with_status_1(tmp_path: Path) -> None:
-    line = Pty(tmp_path / 'line')
-    with Process('plc', 'read', 'N7:0', '--port', str(line.name), '--plc-type', 'SLC',
-                 '--timeout', '5000') as process:
-        line.read(10)
-        line.close()
-        assert process.result() == 1
-    assert 'plc: port lost: ' in process.text
-
-
 def test_signal_ends_it(tmp_path: Path) -> None:
     line = Pty(tmp_path / 'line')
     with Process('plc', 'status', '1', '--port', str(line.name), '--timeout', '9000') as process:
