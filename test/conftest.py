@@ -29,7 +29,7 @@ _WAITING = (
     'test_docs', 'test_', 'cli/')
 _COMPUTING = (
     'lab/noise/', 'driver/test_interlocks_property.py', 'df1/test_multidrop_line.py', 'lab/soak/',
-    'df1/test_peer_line.py', 'driver/', 'df1/', 'lab/fuzz/', '')
+    'driver/', 'df1/', 'lab/fuzz/', '')
 
 _HERE = Path(__file__).parent
 

@@ -26,43 +26,10 @@ def test_crc_check_value_of_the_literature() -> None:
     assert crc16(b'123456789') == 0xBB3D
 
 
-def test_crc_begins_with_zero() -> None:
-    assert crc16(b'') == 0
-    assert crc16(b'\x00\x00') == 0
-
-
 @pytest.mark.parametrize(('data', 'value'), [
     ('08 09 06 00 02 04 03', 0xE0), ('08 09 06 00 10 04 03', 0xD2), ('', 0), ('80 80', 0)])
 def test_bcc_of_the_manual(data: str, value: int) -> None:
     assert bcc(bytes.fromhex(data)) == value
-
-
-@pytest.mark.parametrize(('station', 'value'), [(0, 0), (1, 0xFF), (0x11, 0xEF), (0xFE, 0x02)])
-def test_bcc_of_a_poll_is_the_complement_of_its_station(station: int, value: int) -> None:
-    assert bcc(b'', station) == value
-
-
-def test_bcc_covers_the_station_of_a_master_frame() -> None:
-    data = bytes.fromhex('08 09 06 00 10 04 03')
-    assert Checksum.BCC.of_message(data) == 0xD2
-    assert Checksum.BCC.of_message(data, 0x20) == 0xB2
-
-
-def test_crc_of_a_slave_frame_covers_data_and_etx() -> None:
-    data = bytes.fromhex('07 11 41 00 53 B9') + bytes(12)
-    assert Checksum.CRC.of_message(data) == 0x4C6B
-    assert Checksum.CRC.of_message(data) == crc16(data + b'\x03')
-
-
-def test_crc_of_a_master_frame_covers_stn_stx_data_and_etx() -> None:
-    data = bytes.fromhex('11 07 01 00 41 00 12 00 0C')
-    assert Checksum.CRC.of_message(data, 0x11) == 0x40CF
-    assert Checksum.CRC.of_message(data, 0x11) == crc16(b'\x11\x02' + data + b'\x03')
-
-
-def test_crc_of_a_master_frame_to_station_zero_covers_it_too() -> None:
-    assert Checksum.CRC.of_message(b'abc', 0) == crc16(b'\x00\x02abc\x03')
-    assert Checksum.CRC.of_message(b'abc', 0) != Checksum.CRC.of_message(b'abc')
 
 
 @for_all('vector', MESSAGES)
@@ -71,17 +38,6 @@ def test_check_of_every_vector(vector: Vector) -> None:
     assert vector.frame.endswith(check) is vector.valid
     if vector.expected is not None:
         assert int.from_bytes(check, 'little') == vector.expected
-
-
-def test_crc_goes_on_the_line_low_byte_first() -> None:
-    assert Checksum.CRC.encode(0x40CF) == b'\xCF\x40'
-    assert Checksum.BCC.encode(0xB2) == b'\xB2'
-    assert (Checksum.CRC.size, Checksum.BCC.size) == (2, 1)
-
-
-@given(st.binary(max_size=300), st.integers(0, 255))
-def test_sum_of_covered_bytes_and_bcc_is_zero(data: bytes, station: int) -> None:
-    assert (station + sum(data) + bcc(data, station)) % 256 == 0
 
 
 @given(st.binary(min_size=1, max_size=261), st.integers(0), st.integers(1, 0xFFFF))

@@ -26,13 +26,12 @@ from abdf1_ros.errors import StationInactive
 import pytest
 from support.multidrop import MasterBench, MasterNode, SlaveBench
 from support.peers import CommandTask, PeerBench, PeerNode, single_bytes
-from support.virtual_line import char_time, Noise, VirtualLine
+from support.virtual_line import char_time, VirtualLine
 
 US, PLC = 5, 1
 SETTINGS = LinkSettings(station=None, timeout=0.3, cmd_timeout=0.5)
 COMMAND = Packet(PLC, US, 0x0F, 0, 0x1034, b'\x68\x10\x02\x10')
 THEIRS = Packet(US, PLC, 0x0F, 0, 0x7710, b'\x67\x00\x01')
-NOISY = Noise(lost=0.002, flipped=0.005, doubled=0.002, inserted=0.002)
 
 
 def commands(count: int, station: int = PLC) -> list[Packet]:
@@ -69,16 +68,6 @@ def test_full_duplex_alone_with_its_echo_hears_nobody(
     assert set(node.counts()) <= {
         'messages_sent', 'commands_sent', 'enq_retries', 'enq_limit_exceeded'}
     assert node.machine.echoes
-
-
-@pytest.mark.parametrize('seed', range(12))
-def test_noise_makes_no_plc_of_an_echo(seed: int) -> None:
-    node = PeerNode(SETTINGS, lambda: line.now, timing=LineTiming(char_time(19200)))
-    line = VirtualLine(node.machine, noise=NOISY, seed=seed)
-    line.echoes = True
-    tasks = run_alone(node, line)
-    assert all(isinstance(task.result, StationInactive) for task in tasks)
-    assert (node.served, node.stations[PLC].last_heard) == ([], None)
 
 
 @pytest.mark.parametrize('polling', [None, PollingSettings((PLC,))])
@@ -191,14 +180,6 @@ def test_reply_that_equals_one_of_ours_ends_its_command() -> None:
     assert peer.hear(ACK, peer.frame(theirs.reply())) == ACK
     assert task.result == theirs.reply()
     assert not peer.machine.echoes
-
-
-def test_reply_that_holds_our_command_is_a_reply() -> None:
-    peer = PeerBench(SETTINGS)
-    task = peer.begin(COMMAND)
-    reply = COMMAND.reply(peer.said())
-    assert peer.hear(ACK, peer.frame(reply)) == ACK
-    assert task.result == reply
 
 
 def test_message_of_which_nobody_can_tell_whose_it_is_is_taken_when_it_comes_again() -> None:

@@ -83,12 +83,6 @@ def test_what_one_direction_has_found_holds_for_the_other() -> None:
     assert len(symbols(other, frame(Checksum.BCC, 3))) == 1
 
 
-def test_half_of_a_crc_is_no_frame() -> None:
-    decoder = ListeningDecoder(LineKind())
-    assert symbols(decoder, frame(Checksum.CRC)[:-1]) == []
-    assert decoder.finish() is None
-
-
 @pytest.mark.parametrize('data', [
     frames.poll_frame(3), frames.EOT, frames.master_frame(1, COMMAND, Checksum.CRC)])
 def test_half_duplex_is_found(data: bytes) -> None:
@@ -127,13 +121,6 @@ def test_recording_that_begins_in_the_middle_is_half_duplex_after_all() -> None:
     assert isinstance(command, Frame)
     assert (command.station, command.fault) == (1, None)
     assert poll == Poll(1, True)
-
-
-def test_what_is_given_is_not_found_anew() -> None:
-    kind = LineKind(Checksum.BCC, Duplex.FULL, is_certain=True)
-    decoder = ListeningDecoder(kind)
-    symbols(decoder, frames.EOT + frames.poll_frame(1) + frame(Checksum.CRC))
-    assert kind == LineKind(Checksum.BCC, Duplex.FULL, is_certain=True)
 
 
 @given(strategies.lists(strategies.binary(max_size=30), max_size=20))
@@ -196,17 +183,6 @@ def test_what_stood_on_the_line_is_kept_for_each_symbol(pieces: list[bytes], siz
             kept.append(decoder.wire)
     assert all(wire[:1] == frames.DLE and len(wire) > 1 for wire in kept)
     assert sum(map(len, kept)) <= len(data)
-
-
-@pytest.mark.parametrize('size', [1, 3, 100])
-def test_noise_before_a_symbol_is_not_kept_with_it(size: int) -> None:
-    data = 2 * frames.DLE + b'\x02' + frames.STX + b'\x10\x0A'  # DLE DLE 02 looks like STX
-    decoder, kept = ListeningDecoder(LineKind()), []
-    for start in range(0, len(data), size):
-        decoder.feed(data[start:start + size])
-        while decoder.next_symbol() is not None:
-            kept.append(decoder.wire)
-    assert kept[0] == frames.STX
 
 
 def test_a_response_inside_a_message_is_kept_apart_from_it() -> None:

@@ -18,7 +18,6 @@ from collections.abc import Callable
 from contextlib import nullcontext
 import math
 
-from abdf1_ros.counters import Counters
 from abdf1_ros.df1.checksum import Checksum
 from abdf1_ros.df1.frames import (
     ACK,
@@ -82,12 +81,6 @@ class Bench:
             raise
 
 
-def test_frame_goes_out_once() -> None:
-    bench = Bench(Send(FRAME, 1.0), start=5.0)
-    assert bench.machine.data_to_send() == FRAME
-    assert bench.machine.data_to_send() == b''
-
-
 def test_nothing_happens_before_start() -> None:
     bench = Bench(Send(FRAME, 1.0), start=None)
     bench.machine.receive_data(ACK, 1.0)
@@ -99,22 +92,6 @@ def test_nothing_happens_before_start() -> None:
 def test_deadline_counts_from_the_last_byte_on_the_line() -> None:
     bench = Bench(Send(FRAME, 1.0), timing=LineTiming(char_time=0.01), start=5.0)
     assert bench.machine.deadline == pytest.approx(5.0 + 10 * 0.01 + 1.0)
-
-
-def test_deadline_of_a_second_frame_waits_for_the_first_to_leave() -> None:
-    bench = Bench(Send(FRAME), Send(FRAME, 1.0), timing=LineTiming(char_time=0.01), start=5.0)
-    assert bench.machine.data_to_send() == FRAME + FRAME
-    assert bench.got == [None]
-    assert bench.machine.deadline == pytest.approx(5.0 + 20 * 0.01 + 1.0)
-
-
-def test_deadline_after_an_idle_line_counts_from_now() -> None:
-    bench = Bench(Send(FRAME, 1.0), Listen(0.5), Send(FRAME, 1.0),
-                  timing=LineTiming(char_time=0.01), start=5.0)
-    bench.machine.receive_data(ACK, 6.0)
-    assert bench.machine.deadline == pytest.approx(6.5)
-    bench.machine.receive_data(ACK, 6.25)
-    assert bench.machine.deadline == pytest.approx(6.25 + 0.1 + 1.0)
 
 
 def test_line_time_never_runs_ahead_of_the_clock_where_the_line_is_faster_than_set() -> None:
@@ -162,13 +139,6 @@ def test_timeout_ends_a_step_at_its_deadline_and_not_before() -> None:
     bench.machine.handle_timeout(1.0)
     assert bench.got == [None]
     assert bench.machine.deadline == 2.0
-
-
-def test_step_without_limit_has_no_deadline() -> None:
-    bench = Bench(Listen(None))
-    assert bench.machine.deadline is None
-    bench.machine.handle_timeout(1e9)
-    assert bench.got == []
 
 
 def test_timeout_zero_does_not_wait() -> None:
@@ -276,14 +246,6 @@ def test_step_that_neither_sends_nor_waits_hears_what_is_here_already() -> None:
     assert bench.got == [SAID_ACK, SAID_EOT, None, SAID_EOT, None]
 
 
-def test_procedure_that_ends_leaves_no_deadline_and_its_last_bytes() -> None:
-    bench = Bench(Send(ACK))
-    assert bench.machine.deadline is None
-    assert bench.machine.data_to_send() == ACK
-    bench.machine.receive_data(ACK, 1.0)
-    assert bench.got == [None]
-
-
 def test_tx_delay_passes_before_each_transmission() -> None:
     bench = Bench(Send(FRAME, 1.0), Send(FRAME, 1.0), timing=LineTiming(tx_delay=0.25))
     assert (bench.machine.data_to_send(), bench.machine.deadline) == (b'', 0.25)
@@ -297,29 +259,11 @@ def test_tx_delay_passes_before_each_transmission() -> None:
     assert (bench.machine.data_to_send(), bench.got) == (FRAME, [SAID_ACK])
 
 
-def test_tx_delay_begins_when_the_line_is_free() -> None:
-    bench = Bench(Send(FRAME), Send(FRAME, 1.0),
-                  timing=LineTiming(char_time=0.01, tx_delay=0.25))
-    bench.machine.handle_timeout(0.25)
-    assert bench.machine.data_to_send() == FRAME
-    assert bench.machine.deadline == pytest.approx(0.25 + 0.1 + 0.25)
-    bench.machine.handle_timeout(0.6)
-    assert bench.machine.data_to_send() == FRAME
-    assert bench.machine.deadline == pytest.approx(0.6 + 0.1 + 1.0)
-
-
 @pytest.mark.parametrize(('tx_delay', 'delay', 'passes'), [
     (0.0, 0.25, 0.25), (0.5, 0.25, 0.5), (0.25, 0.5, 0.5)])
 def test_longer_of_the_two_delays_counts(tx_delay: float, delay: float, passes: float) -> None:
     bench = Bench(Send(FRAME, 1.0, delay), timing=LineTiming(tx_delay=tx_delay))
     assert (bench.machine.data_to_send(), bench.machine.deadline) == (b'', passes)
-
-
-def test_listening_is_not_delayed() -> None:
-    bench = Bench(Listen(1.0), timing=LineTiming(tx_delay=0.25))
-    assert bench.machine.deadline == 1.0
-    bench.machine.receive_data(ACK, 0.1)
-    assert bench.got == [SAID_ACK]
 
 
 def test_what_was_heard_before_a_transmission_is_forgotten() -> None:
@@ -343,25 +287,6 @@ def test_what_has_come_before_a_frame_could_leave_is_no_answer_to_it() -> None:
     assert bench.got == [None, SAID_ACK]
 
 
-def test_what_is_heard_while_a_transmission_waits_is_forgotten() -> None:
-    bench = Bench(Send(FRAME, 1.0), timing=LineTiming(tx_delay=0.25), forget_on_send=True)
-    bench.machine.receive_data(ACK + b'\x10', 0.1)
-    bench.machine.handle_timeout(0.25)
-    assert bench.machine.data_to_send() == FRAME
-    bench.machine.receive_data(b'\x06', 0.3)
-    assert bench.got == []
-    bench.machine.receive_data(EOT, 0.4)
-    assert bench.got == [SAID_EOT]
-
-
-def test_without_forgetting_all_symbols_are_delivered() -> None:
-    bench = Bench(Send(FRAME, 1.0), Send(FRAME, 1.0, 0.25), Listen(1.0))
-    bench.machine.receive_data(ACK + EOT, 0.5)
-    assert bench.got == [SAID_ACK]
-    bench.machine.handle_timeout(0.75)
-    assert bench.got == [SAID_ACK, SAID_EOT]
-
-
 REPLY = Packet(1, 5, 0x0F, 0, 7).reply(bytes(94))  # with DLE STX, 102 bytes before DLE ETX
 
 
@@ -377,13 +302,6 @@ def test_reply_of_known_size_need_not_be_looked_at_until_its_last_characters(
     assert bench.machine.spare_time == pytest.approx(0.01 * characters)
     bench.machine.receive_data(frame[size:], 2.0)
     assert isinstance(bench.got[0], Frame)
-    assert bench.machine.spare_time == 0.0
-
-
-def test_line_that_is_faster_than_it_is_set_is_looked_at_all_the_time() -> None:
-    bench = Bench(Send(FRAME, 1.0, reply_size=94), timing=LineTiming(char_time=0.01))
-    bench.machine.receive_data(message_frame(REPLY.encode(), Checksum.CRC)[:20], 0.2)
-    assert bench.machine.decoder.in_message
     assert bench.machine.spare_time == 0.0
 
 
@@ -450,18 +368,6 @@ def test_message_may_not_crawl_for_ever(pause: float) -> None:
     assert now - 1.0 < 0.6 / (1 - 0.04 / pause) + 2 * pause
 
 
-def test_message_that_never_ends_is_given_up_after_the_time_of_the_longest() -> None:
-    bench = Bench(Send(FRAME, 1.0), timing=LineTiming(char_time=0.01))
-    now = 1.0
-    bench.machine.receive_data(STX, now)
-    while not bench.got:
-        now += 0.01
-        bench.machine.handle_timeout(now)
-        bench.machine.receive_data(bytes(1), now)
-    assert bench.got == [None]
-    assert now == pytest.approx(1.0 + 2 * 261 * 0.01 + 0.6, abs=0.02)
-
-
 def test_message_that_begins_behind_the_time_limit_extends_nothing() -> None:
     bench = Bench(Send(FRAME, 1.0), LISTEN_ON, timing=LineTiming(char_time=0.01))
     bench.machine.receive_data(MESSAGE[:5], 1.0)
@@ -480,24 +386,6 @@ def test_pause_ends_an_answer_that_has_begun() -> None:
     assert bench.got == [None]
 
 
-def test_answer_that_has_begun_does_not_shorten_the_deadline() -> None:
-    bench = Bench(Send(FRAME, 1.0))
-    bench.machine.receive_data(MESSAGE[:5], 0.1)
-    assert bench.machine.deadline == 1.0
-
-
-def test_noise_outside_of_a_message_does_not_extend_the_deadline() -> None:
-    bench = Bench(Send(FRAME, 1.0))
-    bench.machine.receive_data(b'noise\x10', 0.95)
-    assert bench.machine.deadline == 1.0
-
-
-def test_message_without_time_limit_gets_none() -> None:
-    bench = Bench(Listen(None))
-    bench.machine.receive_data(MESSAGE[:5], 0.5)
-    assert bench.machine.deadline is None
-
-
 @pytest.mark.parametrize('broken', [b'\x10', b'\x10\x01', b'\x10\x05\x10', MESSAGE[:-1]])
 @pytest.mark.parametrize(('pause', 'forgotten'), [(0.05, False), (0.31, True)])
 def test_pause_ends_what_broke_off_where_there_is_no_time_limit(broken: bytes, pause: float,
@@ -508,13 +396,6 @@ def test_pause_ends_what_broke_off_where_there_is_no_time_limit(broken: bytes, p
     assert (bench.got == [SAID_EOT]) is (forgotten or broken == b'\x10\x01')
 
 
-def test_pause_within_a_time_limit_ends_nothing() -> None:
-    bench = Bench(Listen(5.0))
-    bench.machine.receive_data(EOT[:1], 1.0)
-    bench.machine.receive_data(EOT[1:], 4.0)
-    assert bench.got == [SAID_EOT]
-
-
 def test_wake_ends_a_rest() -> None:
     bench = Bench(Rest(10.0), Send(FRAME, 1.0))
     assert bench.machine.deadline == 10.0
@@ -523,33 +404,12 @@ def test_wake_ends_a_rest() -> None:
     assert (bench.machine.data_to_send(), bench.machine.deadline) == (FRAME, 4.0)
 
 
-def test_time_ends_a_rest() -> None:
-    bench = Bench(Rest(10.0), Send(FRAME, 1.0))
-    bench.machine.handle_timeout(10.0)
-    assert (bench.got, bench.machine.data_to_send()) == ([None], FRAME)
-
-
-def test_rest_without_limit_lasts_until_wake() -> None:
-    bench = Bench(Rest(), Send(FRAME, 1.0))
-    assert bench.machine.deadline is None
-    bench.machine.wake(3.0)
-    assert bench.got == [None]
-
-
 @pytest.mark.parametrize('step', [Send(FRAME, 1.0), Listen(1.0), Send(FRAME, 1.0, 0.5)])
 def test_wake_disturbs_no_transaction(step: Step) -> None:
     bench = Bench(step)
     deadline = bench.machine.deadline
     bench.machine.wake(0.25)
     assert (bench.got, bench.machine.deadline) == ([], deadline)
-
-
-def test_what_comes_during_a_rest_is_not_heard() -> None:
-    bench = Bench(Rest(1.0), Send(FRAME, 1.0), forget_on_send=True)
-    bench.machine.receive_data(ACK, 0.5)
-    bench.machine.handle_timeout(1.0)
-    assert bench.got == [None]
-    assert bench.machine.deadline == 2.0
 
 
 def test_stop_raises_its_error_inside_the_procedure() -> None:
@@ -562,44 +422,6 @@ def test_stop_raises_its_error_inside_the_procedure() -> None:
     assert bench.got == []
 
 
-def test_stop_with_an_error_that_the_procedure_handles() -> None:
-    seen: list[str] = []
-
-    def procedure(machine: Machine) -> Procedure:
-        try:
-            yield Send(FRAME, 1.0)
-        except OSError:
-            seen.append('error')
-        yield Send(FRAME, 1.0)
-        seen.append('went on')
-
-    machine = Machine(procedure, checksum=Checksum.CRC)
-    machine.start(0.0)
-    machine.stop(OSError())
-    assert seen == ['error']
-    assert machine.data_to_send() == b''
-
-
-def test_stop_lets_another_error_through() -> None:
-    def procedure(machine: Machine) -> Procedure:
-        try:
-            yield Send(FRAME, 1.0)
-        finally:
-            raise KeyError('a bug')
-
-    machine = Machine(procedure, checksum=Checksum.CRC)
-    machine.start(0.0)
-    with pytest.raises(KeyError):
-        machine.stop(OSError())
-
-
-def test_stop_without_error_closes_the_procedure() -> None:
-    bench = Bench(Send(FRAME, 1.0))
-    bench.machine.stop()
-    assert bench.error is None
-    assert (bench.machine.data_to_send(), bench.machine.deadline) == (b'', None)
-
-
 def test_start_begins_afresh() -> None:
     bench = Bench(Send(FRAME, 1.0), Listen(1.0), timing=LineTiming(char_time=1.0))
     bench.machine.receive_data(ACK + b'\x10', 0.5)
@@ -607,17 +429,6 @@ def test_start_begins_afresh() -> None:
     bench.machine.receive_data(b'\x06', 2.5)
     assert bench.got == [SAID_ACK]
     assert (bench.machine.data_to_send(), bench.machine.deadline) == (FRAME, 13.0)
-
-
-def test_error_in_a_procedure_reaches_the_caller() -> None:
-    def procedure(machine: Machine) -> Procedure:
-        yield Send(FRAME, 1.0)
-        raise KeyError('a bug')
-
-    machine = Machine(procedure, checksum=Checksum.CRC)
-    machine.start(0.0)
-    with pytest.raises(KeyError):
-        machine.receive_data(ACK, 0.5)
 
 
 def _deaf(machine: Machine) -> None:
@@ -645,21 +456,6 @@ def test_frame_that_waits_is_counted_when_it_goes_out() -> None:
     assert bench.machine.counters.chars_sent == 0
     bench.machine.handle_timeout(0.25)
     assert bench.machine.counters.chars_sent == 10
-
-
-def test_given_counters_are_used() -> None:
-    counters = Counters()
-    machine = Machine(lambda machine: iter_steps(Send(FRAME, 1.0)), checksum=Checksum.CRC,
-                      counters=counters)
-    machine.start(0.0)
-    assert machine.counters is counters
-    assert counters.chars_sent == 10
-
-
-def iter_steps(*steps: Step) -> Procedure:
-    """Return a procedure of ``steps`` that does not care for answers."""
-    for step in steps:
-        yield step
 
 
 class Asked:
@@ -693,13 +489,6 @@ def test_command_that_expires_before_its_repetition_is_not_repeated() -> None:
     assert asked.machine.data_to_send() == FRAME
     asked.machine.handle_timeout(6.0)
     assert (asked.told, asked.machine.data_to_send()) == (['silence', 'expired'], b'')
-
-
-def test_command_that_expires_while_it_waits_for_its_delay_does_not_leave() -> None:
-    asked = Asked(expires=5.5, delay=0.25)
-    asked.machine.start(5.0)
-    asked.machine.handle_timeout(9.0)  # a pause
-    assert (asked.told, asked.machine.data_to_send()) == (['expired'], b'')
 
 
 @pytest.mark.parametrize('embeds', [False, True])
@@ -784,14 +573,6 @@ def test_background_has_its_time_while_a_step_waits(due: float, call: float) -> 
     bench.machine.handle_timeout(1.75)
     assert clockwork.done == ([1.75] if due == 1.5 else [])
     assert bench.got == []
-
-
-def test_background_is_asked_when_the_machine_is_woken() -> None:
-    clockwork = Clockwork(math.inf)
-    bench = Bench(Send(FRAME, 1.0), Rest(), start=None, background=clockwork)
-    bench.machine.start(1.0)
-    bench.machine.wake(1.5)
-    assert clockwork.done == [1.5]
 
 
 # echo

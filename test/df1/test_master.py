@@ -20,11 +20,10 @@ from typing import Any
 from abdf1_ros.df1.checksum import Checksum
 from abdf1_ros.df1.frames import ACK, EOT, master_frame, message_frame, NAK, poll_frame, STX
 from abdf1_ros.df1.machine import LineTiming, MIN_RESPONSE_TIME
-from abdf1_ros.df1.master import HalfDuplexMaster
 from abdf1_ros.df1.master_line import MOST_QUEUED
 from abdf1_ros.df1.packet import Packet
 from abdf1_ros.df1.settings import LinkSettings
-from abdf1_ros.errors import CommandTimeout, LinkError, StationInactive, WrongCommandCode
+from abdf1_ros.errors import CommandTimeout, StationInactive, WrongCommandCode
 import pytest
 from support.script import Answer, Expect, MasterScript, Murmur, Silence
 from support.virtual_line import Wire
@@ -43,7 +42,6 @@ ACKED, NAKED = Expect(ACK), Expect(NAK)
 ACKED_AND_SENT = Expect(ACK + SENT.data)
 SAYS_ACK, SAYS_EOT, SAYS_NAK = Answer(ACK, 0.1), Answer(EOT, 0.1), Answer(NAK, 0.1)
 TIMEOUT = Silence(0.5)
-QUIET = Silence(MIN_RESPONSE_TIME)
 
 DELIVERED = {'commands_sent': 1, 'messages_sent': 1, 'acks_received': 1}
 REPLIED = DELIVERED | {
@@ -131,14 +129,6 @@ def test_only_a_reply_of_the_polled_slave_has_its_ack_before_it_is_looked_at(hea
     assert 0 not in looked_at
 
 
-def test_command_and_reply_carry_a_bcc_where_that_is_set() -> None:
-    script = MasterScript(replace(SETTINGS, checksum=Checksum.BCC))
-    reply = script.run(
-        COMMAND, Expect(master_frame(SLAVE, COMMAND.encode(), Checksum.BCC)), SAYS_ACK,
-        POLLED, Answer(message_frame(REPLY.encode(), Checksum.BCC)), ACKED)
-    assert reply == REPLY
-
-
 def test_slow_slave_is_polled_until_it_replies() -> None:
     script = replied(SENT, SAYS_ACK, POLLED, SAYS_EOT, POLLED_AGAIN, SAYS_EOT, POLLED_AGAIN,
                      SAYS_REPLY, ACKED)
@@ -161,12 +151,6 @@ def test_ack_lost_or_damaged_the_command_is_sent_again(garbage: bytes, last: int
     assert script.counts()['nak_retries'] == 1
 
 
-def test_command_is_delivered_by_its_last_retry() -> None:
-    script = replied(SENT, TIMEOUT, SENT, TIMEOUT, SENT, SAYS_ACK, POLLED, SAYS_REPLY, ACKED)
-    assert script.counts()['nak_retries'] == 2
-    assert 'nak_limit_exceeded' not in script.counts()
-
-
 def test_reply_damaged_is_polled_for_again_without_nak() -> None:
     script = MasterScript(SETTINGS)
     bad = damaged(REPLY)
@@ -177,17 +161,6 @@ def test_reply_damaged_is_polled_for_again_without_nak() -> None:
     assert script.numbers() == [
         (2506, *divmod(check, 256), *divmod(expected, 256)), (2522, 1, 2506), (2523, SLAVE)]
     assert script.counts() == REPLIED | {'polls_sent': 2, 'crc_errors': 1, 'enq_retries': 1}
-
-
-def test_reply_damaged_on_a_bcc_line_is_a_bcc_error() -> None:
-    script = MasterScript(replace(SETTINGS, checksum=Checksum.BCC))
-    good = message_frame(REPLY.encode(), Checksum.BCC)
-    assert script.run(
-        COMMAND, Expect(master_frame(SLAVE, COMMAND.encode(), Checksum.BCC)), SAYS_ACK, POLLED,
-        Answer(good[:-1] + b'\x01'), POLLED, Answer(good), ACKED) == REPLY
-    assert script.numbers() == [(2507, 0, 1, 0, good[-1]), (2522, 1, 2507), (2523, SLAVE)]
-    assert script.counts()['bcc_errors'] == 1
-    assert 'crc_errors' not in script.counts()
 
 
 def test_poll_lost_is_sent_again() -> None:
@@ -211,26 +184,6 @@ def test_master_ack_lost_the_duplicate_is_acknowledged_and_passed_over() -> None
     assert script.counts() == REPLIED | {
         'messages_received': 2, 'duplicate_messages': 1, 'polls_sent': 2, 'acks_sent': 2}
     assert script.stations[SLAVE].replies == 2
-
-
-def test_reply_counts_as_duplicate_only_when_it_is_the_same_transaction() -> None:
-    script = MasterScript(SETTINGS)
-    for tns in range(0x0102, 0x0105):
-        command = COMMAND._replace(tns=tns)
-        sent = Expect(master_frame(SLAVE, command.encode(), Checksum.CRC))
-        reply = command.reply(b'\x34\x12')
-        assert script.run(command, sent, SAYS_ACK, POLLED, says(reply), ACKED) == reply
-    assert 'duplicate_messages' not in script.counts()
-
-
-def test_slave_sink_full_takes_the_command_at_a_retry() -> None:
-    script = replied(SENT, TIMEOUT, SENT, TIMEOUT, SENT, SAYS_ACK, POLLED, says(STALE), ACKED,
-                     POLLED_AGAIN, SAYS_REPLY, ACKED)
-    assert script.numbers() == [
-        (2515, 0), (2521, 1, 2515), (2515, 0), (2521, 2, 2515),
-        (2510, SLAVE, MASTER, 0x0101), (2523, SLAVE)]
-    assert script.counts()['nak_retries'] == 2
-    assert script.counts()['stale_messages'] == 1
 
 
 @pytest.mark.parametrize('retries', [0, 1, 3, 10])
@@ -283,25 +236,6 @@ def test_stale_message_makes_an_inactive_station_active() -> None:
         'stale_messages': 1}
 
 
-def test_duplicate_makes_an_inactive_station_active() -> None:
-    script = MasterScript(SETTINGS)
-    script.run(COMMAND, SENT, SAYS_ACK, POLLED, SAYS_REPLY, ACKED)
-    script.stations.lost(SLAVE, script.now)
-    script.forget()
-    command = COMMAND._replace(tns=0x0103)
-    sent = Expect(ACK + master_frame(SLAVE, command.encode(), Checksum.CRC))
-    assert isinstance(script.run(command, POLLED, SAYS_REPLY, sent, *_never_acknowledged(command)),
-                      StationInactive)
-    assert script.changes == [(SLAVE, True), (SLAVE, False)]
-    assert script.counts()['duplicate_messages'] == 1
-
-
-def _never_acknowledged(command: Packet) -> list[Expect | Silence]:
-    """Return the script of a slave that does not take ``command`` after its first sending."""
-    sent = Expect(master_frame(SLAVE, command.encode(), Checksum.CRC))
-    return [TIMEOUT, sent, TIMEOUT, sent, TIMEOUT]
-
-
 @pytest.mark.parametrize(('answer', 'numbers', 'counter'), [
     (damaged(REPLY), [2506], 'crc_errors'),
     (message_frame(b'abc', Checksum.CRC), [2513], 'invalid_messages'),
@@ -313,18 +247,6 @@ def test_bad_answer_leaves_an_inactive_station_inactive_and_is_told(
     assert (script.changes, script.counts()) == ([], {'polls_sent': 1, counter: 1})
     assert [number for number, *_ in script.numbers()] == [*numbers, 2509]
     assert not script.task.sent
-
-
-def test_noise_instead_of_an_answer_to_a_probe_is_told() -> None:
-    script = inactive_script()
-    script.run(COMMAND, POLLED, Answer(b'\x55', 0.1), Silence(0.4))
-    assert script.numbers() == [(2516, 0x55), (2509, SLAVE)]
-
-
-def test_ack_is_no_answer_to_a_probe() -> None:
-    script = inactive_script()
-    assert isinstance(script.run(COMMAND, POLLED, SAYS_ACK, Silence(0.4)), StationInactive)
-    assert script.counts() == {'polls_sent': 1, 'acks_received': 1}
 
 
 @pytest.mark.parametrize('retries', [0, 1, 3])
@@ -349,12 +271,6 @@ def test_enq_retries_count_afresh_after_an_eot() -> None:
                      settings=replace(SETTINGS, cmd_timeout=5.0))
     assert script.counts()['enq_retries'] == 4
     assert 'enq_limit_exceeded' not in script.counts()
-
-
-def test_retries_are_not_cut_short_by_the_command_timeout() -> None:
-    script = replied(SENT, TIMEOUT, SENT, TIMEOUT, SENT, SAYS_ACK, POLLED, TIMEOUT, POLLED,
-                     SAYS_REPLY, ACKED, settings=replace(SETTINGS, cmd_timeout=0.5))
-    assert 'command_timeouts' not in script.counts()
 
 
 @pytest.mark.parametrize('nak', [True, False])
@@ -393,20 +309,6 @@ def test_command_timeout_counts_from_the_transmission_that_was_acknowledged() ->
     assert script.now == pytest.approx(101.0)
 
 
-def test_lost_command_with_the_defaults_of_the_specification() -> None:
-    settings = LinkSettings(station=MASTER)
-    assert settings.timeout == settings.cmd_timeout
-    script = MasterScript(settings)
-    assert script.run(COMMAND, SENT, Silence(settings.timeout), SENT, SAYS_ACK, POLLED, SAYS_EOT,
-                      POLLED_AGAIN, SAYS_REPLY, ACKED) == REPLY
-    assert 'command_timeouts' not in script.counts()
-
-
-def test_command_timeout_is_not_early() -> None:
-    replied(SENT, Answer(ACK, 0.375), POLLED, Answer(EOT, 0.12), POLLED_AGAIN, SAYS_REPLY, ACKED,
-            settings=replace(SETTINGS, cmd_timeout=0.5))
-
-
 def test_command_timeout_by_stale_messages() -> None:
     script = MasterScript(replace(SETTINGS, cmd_timeout=0.0625))
     stale = [REPLY._replace(tns=0x0090 + n) for n in range(MOST_QUEUED + 1)]
@@ -420,13 +322,6 @@ def test_reply_behind_stale_messages_is_taken_even_after_the_command_timeout() -
     script = replied(SENT, Answer(ACK), POLLED, says(STALE), ACKED, POLLED_AGAIN, SAYS_REPLY,
                      ACKED, settings=replace(SETTINGS, cmd_timeout=0.0625))
     assert 'command_timeouts' not in script.counts()
-
-
-def test_eot_behind_stale_messages_ends_a_command_whose_time_is_up() -> None:
-    script = MasterScript(replace(SETTINGS, cmd_timeout=0.0625))
-    error = script.run(COMMAND, SENT, Answer(ACK), POLLED, says(STALE), ACKED, POLLED_AGAIN,
-                       SAYS_EOT, NAKED)
-    assert isinstance(error, CommandTimeout)
 
 
 def test_reply_at_the_last_poll_is_taken_even_after_the_command_timeout() -> None:
@@ -453,24 +348,10 @@ def test_nak_received_the_command_is_sent_again() -> None:
     assert script.counts() == REPLIED | {'messages_sent': 2, 'naks_received': 1, 'nak_retries': 1}
 
 
-def test_naks_only_end_as_inactive() -> None:
-    script = MasterScript(SETTINGS)
-    assert isinstance(script.run(COMMAND, *(SENT, SAYS_NAK) * 3), StationInactive)
-    assert script.numbers() == [
-        (2517,), (2511,), (2521, 1, 2511), (2517,), (2511,), (2521, 2, 2511), (2517,), (2511,),
-        (2519, 2), (2509, SLAVE)]
-
-
 def test_nak_instead_of_an_answer_to_a_poll_is_told_and_the_poll_repeated() -> None:
     script = replied(SENT, SAYS_ACK, POLLED, SAYS_NAK, POLLED, SAYS_REPLY, ACKED)
     assert script.numbers() == [(2517,), (2511,), (2522, 1, 2511), (2523, SLAVE)]
     assert script.counts()['naks_received'] == script.counts()['enq_retries'] == 1
-
-
-def test_eot_is_no_answer_to_a_command() -> None:
-    script = replied(SENT, SAYS_EOT, Silence(0.4), SENT, SAYS_ACK, POLLED, SAYS_REPLY, ACKED)
-    assert script.numbers() == [(2515, 0x04), (2521, 1, 2515), (2523, SLAVE)]
-    assert script.counts()['eots_received'] == 1
 
 
 def test_message_instead_of_an_ack_is_no_ack() -> None:
@@ -497,16 +378,6 @@ def test_stale_reply_is_acknowledged_and_counted() -> None:
         'messages_received': 2, 'replies_received': 2, 'polls_sent': 2, 'acks_sent': 2,
         'stale_messages': 1}
     assert script.stations[SLAVE].replies == 1
-
-
-def test_command_from_a_slave_is_acknowledged_and_passed_over() -> None:
-    script = MasterScript(SETTINGS)
-    message = Packet(MASTER, SLAVE, 0x0F, 0, COMMAND.tns, b'\x00')
-    assert script.run(COMMAND, SENT, SAYS_ACK, POLLED, says(message), ACKED, POLLED_AGAIN,
-                      SAYS_REPLY, ACKED) == REPLY
-    assert script.numbers() == [(2510, SLAVE, MASTER, COMMAND.tns), (2523, SLAVE)]
-    assert script.counts() == REPLIED | {
-        'messages_received': 2, 'commands_received': 1, 'polls_sent': 2, 'acks_sent': 2}
 
 
 def test_reply_to_another_station_is_invalid() -> None:
@@ -557,14 +428,6 @@ def test_reply_that_lost_its_leading_00_is_not_taken_for_a_command(checksum: Che
     assert [station.number for station in script.stations] == [SLAVE]
 
 
-def test_reply_with_an_error_status_is_a_reply() -> None:
-    script = MasterScript(SETTINGS)
-    refused = COMMAND.reply(sts=0x10)
-    assert script.run(COMMAND, SENT, SAYS_ACK, POLLED, says(refused), ACKED) == refused
-    assert script.numbers() == [(2523, SLAVE)]
-    assert script.counts() == REPLIED | {'error_messages_received': 1}
-
-
 def test_message_too_short_is_told_and_polled_for_again() -> None:
     script = MasterScript(SETTINGS)
     short = Answer(message_frame(b'abcde', Checksum.CRC))
@@ -572,14 +435,6 @@ def test_message_too_short_is_told_and_polled_for_again() -> None:
     assert script.numbers() == [(2513, 6), (2522, 1, 2513), (2523, SLAVE)]
     assert script.counts()['invalid_messages'] == 1
     assert script.counts()['messages_received'] == 1
-
-
-def test_message_too_long_is_told_and_polled_for_again() -> None:
-    script = MasterScript(SETTINGS)
-    long = Answer(message_frame(bytes(262), Checksum.CRC))
-    assert script.run(COMMAND, SENT, SAYS_ACK, POLLED, long, POLLED, SAYS_REPLY, ACKED) == REPLY
-    assert script.numbers() == [(2512, 261), (2522, 1, 2512), (2523, SLAVE)]
-    assert script.counts()['invalid_messages'] == 1
 
 
 def test_message_without_etx_ends_by_a_pause() -> None:
@@ -608,14 +463,6 @@ def test_message_without_the_end_of_its_check_has_a_wrong_check(
     assert script.counts()[counter] == 1  # S0, messages 2506 and 2507, not 2518
 
 
-def test_message_without_etx_ends_by_another_symbol() -> None:
-    script = MasterScript(SETTINGS)
-    broken = Answer(frame(REPLY)[:-4] + EOT)
-    assert script.run(COMMAND, SENT, SAYS_ACK, POLLED, broken, QUIET, POLLED, SAYS_REPLY,
-                      ACKED) == REPLY
-    assert script.numbers() == [(2518,), (2522, 1, 2518), (2523, SLAVE)]
-
-
 def test_nothing_is_said_over_a_slave_that_goes_on_after_what_looks_like_a_symbol() -> None:
     """A bit of a 00 turns over: DLE 00 inside of a message is no symbol (S0, message 2514)."""
     script = MasterScript(SETTINGS, LineTiming(char_time=0.001))
@@ -630,12 +477,6 @@ def test_nothing_is_said_over_a_slave_that_goes_on_after_what_looks_like_a_symbo
     assert script.counts()['invalid_messages'] == 1
 
 
-def test_good_message_after_a_false_start_is_taken() -> None:
-    script = replied(SENT, SAYS_ACK, POLLED, Answer(STX + b'\x55' + frame(REPLY), 0.1), ACKED)
-    assert script.numbers() == [(2518,), (2523, SLAVE)]
-    assert 'enq_retries' not in script.counts()
-
-
 def test_station_that_never_falls_quiet_is_not_listened_to_for_ever() -> None:
     script = MasterScript(SETTINGS, LineTiming(char_time=0.001))
     babble = [Murmur(b'\x55' * 10, 0.01)] * 29
@@ -643,18 +484,6 @@ def test_station_that_never_falls_quiet_is_not_listened_to_for_ever() -> None:
     assert script.run(
         COMMAND, SENT, Answer(ACK, 0.1), POLLED, Answer(STX + EOT, 0.1), *babble,
         Silence(longest - 0.29), POLLED, SAYS_REPLY, ACKED) == REPLY
-
-
-def test_bad_message_instead_of_an_ack_names_its_own_cause() -> None:
-    script = MasterScript(SETTINGS)
-    short = Answer(message_frame(b'abcde', Checksum.CRC))
-    assert script.run(COMMAND, SENT, short, SENT, SAYS_ACK, POLLED, SAYS_REPLY, ACKED) == REPLY
-    assert script.numbers() == [(2513, 6), (2521, 1, 2513), (2523, SLAVE)]
-
-
-def test_symbol_that_is_misplaced_is_passed_over_untold() -> None:
-    script = replied(SENT, Answer(b'\x10\x03'), SAYS_ACK, POLLED, SAYS_REPLY, ACKED)
-    assert script.numbers() == [(2523, SLAVE)]
 
 
 def test_invalid_symbol_is_told_and_passed_over() -> None:
@@ -671,21 +500,6 @@ def test_echo_of_our_own_frames_is_passed_over() -> None:
     assert script.counts() == REPLIED | {'polls_sent': 2, 'eots_received': 1}
 
 
-def test_echo_of_our_ack_does_not_acknowledge_the_next_command() -> None:
-    script = MasterScript(SETTINGS)
-    script.run(COMMAND, SENT, Answer(SENT.data), SAYS_ACK, POLLED, Answer(POLLED.data),
-               SAYS_REPLY, ACKED)
-    command = COMMAND._replace(tns=0x0103)
-    sent = master_frame(SLAVE, command.encode(), Checksum.CRC)
-    reply = command.reply()
-    assert script.run(command, Expect(sent), Answer(ACK), Answer(sent), SAYS_ACK, POLLED,
-                      Answer(POLLED.data), says(reply), ACKED) == reply
-
-
-def test_line_that_stops_echoing_is_heard_again_after_one_retry() -> None:
-    replied(SENT, Answer(SENT.data), SAYS_ACK, POLLED, TIMEOUT, POLLED, SAYS_REPLY, ACKED)
-
-
 @pytest.mark.parametrize('size', [1, 3, 1000])
 def test_answer_in_place_of_the_echo_is_heard(size: int) -> None:
     """An adapter ceases to echo between two frames, whatever bytes come at a time."""
@@ -694,27 +508,6 @@ def test_answer_in_place_of_the_echo_is_heard(size: int) -> None:
     parts = [Answer(reply[at:at + size]) for at in range(0, len(reply), size)]
     assert script.run(COMMAND, SENT, Answer(SENT.data), SAYS_ACK, POLLED, *parts, ACKED) == REPLY
     assert script.numbers() == [(2523, SLAVE)]
-
-
-@pytest.mark.parametrize('at', [2, 10])
-def test_echo_that_is_damaged_is_still_passed_over(at: int) -> None:
-    script = MasterScript(SETTINGS)
-    damaged = bytearray(SENT.data)
-    damaged[at] ^= 0x08
-    command = COMMAND._replace(tns=0x0103)
-    sent = master_frame(SLAVE, command.encode(), Checksum.CRC)
-    script.run(COMMAND, SENT, Answer(SENT.data), SAYS_ACK, POLLED, Answer(POLLED.data),
-               Answer(SAYS_REPLY.data), ACKED)
-    echo = bytes(damaged[:4]) + sent[4:]
-    assert script.run(command, Expect(sent), Answer(ACK), Answer(echo), SAYS_ACK, POLLED,
-                      Answer(POLLED.data), says(command.reply()), ACKED) == command.reply()
-
-
-def test_echo_alone_is_silence() -> None:
-    script = MasterScript(SETTINGS)
-    error = script.run(COMMAND, *(SENT, Answer(SENT.data), TIMEOUT) * 3)
-    assert isinstance(error, StationInactive)
-    assert script.counts()['nak_limit_exceeded'] == 1
 
 
 def test_answer_of_before_the_transmission_is_none() -> None:
@@ -727,27 +520,6 @@ def test_tx_delay_passes_before_each_transmission() -> None:
     replied(Expect(SENT.data, 0.05), SAYS_ACK, Expect(POLLED.data, 0.05), SAYS_EOT,
             Expect(POLLED.data, 0.05), TIMEOUT, Expect(POLLED.data, 0.05), SAYS_REPLY,
             Expect(ACK, 0.05), timing=LineTiming(tx_delay=0.05))
-
-
-def test_tx_delay_passes_before_a_nak_too() -> None:
-    script = MasterScript(replace(SETTINGS, cmd_timeout=0.5), LineTiming(tx_delay=0.05))
-    error = script.run(COMMAND, Expect(SENT.data, 0.05), SAYS_ACK, Expect(POLLED.data, 0.05),
-                       Answer(EOT, 0.4), Expect(NAK, 0.05))
-    assert isinstance(error, CommandTimeout)
-
-
-def test_timeout_begins_when_the_last_byte_has_left() -> None:
-    script = MasterScript(SETTINGS, LineTiming(char_time=0.01))
-    leaving = len(SENT.data) * 0.01
-    error = script.run(COMMAND, *(SENT, Silence(leaving + 0.5)) * 3)
-    assert isinstance(error, StationInactive)
-
-
-def test_timeout_zero_is_as_short_as_the_equipment_can_do() -> None:
-    script = MasterScript(replace(SETTINGS, timeout=0.0))
-    error = script.run(COMMAND, *(SENT, Silence(MIN_RESPONSE_TIME)) * 3)
-    assert isinstance(error, StationInactive)
-    assert MIN_RESPONSE_TIME > 0
 
 
 def test_station_behind_a_gateway() -> None:
@@ -801,16 +573,6 @@ def test_station_that_its_gateway_does_not_reach_is_not_heard() -> None:
     assert script.stations[99].last_heard is None
 
 
-def test_stations_are_kept_apart() -> None:
-    script = MasterScript(SETTINGS)
-    assert isinstance(script.run(COMMAND, *(SENT, TIMEOUT) * 3), StationInactive)
-    other = COMMAND._replace(dst=9)
-    assert script.run(
-        other, Expect(master_frame(9, other.encode(), Checksum.CRC)), SAYS_ACK,
-        Expect(poll_frame(9)), says(other.reply()), ACKED) == other.reply()
-    assert script.changes == [(SLAVE, False)]
-
-
 def test_task_is_told_when_its_command_has_been_on_the_line() -> None:
     script = inactive_script()
     script.begin(COMMAND, POLLED)
@@ -818,26 +580,6 @@ def test_task_is_told_when_its_command_has_been_on_the_line() -> None:
     script = inactive_script()
     script.begin(COMMAND, POLLED, SAYS_EOT, SENT)
     assert script.task.sent
-
-
-def test_every_event_names_its_station() -> None:
-    script = MasterScript(SETTINGS)
-    script.run(COMMAND, *(SENT, TIMEOUT) * 3)
-    assert {event.station for event in script.events} == {SLAVE}
-
-
-def test_settings_default_to_those_of_the_specification() -> None:
-    settings = LinkSettings()
-    assert (settings.station, settings.checksum, settings.nak_retries, settings.enq_retries) == (
-        5, Checksum.CRC, 3, 3)
-    assert (settings.timeout, settings.cmd_timeout) == (1.0, 1.0)
-
-
-def test_report_may_be_left_out() -> None:
-    script = MasterScript(SETTINGS)
-    script.master = HalfDuplexMaster(script.machine, SETTINGS, script.stations)
-    assert isinstance(script.run(COMMAND, *(SENT, TIMEOUT) * 3), LinkError)
-    assert script.events == []
 
 
 def test_slaves_command_instead_of_the_reply_is_acknowledged_and_polling_goes_on() -> None:

@@ -18,12 +18,11 @@ from dataclasses import replace
 import itertools
 
 from abdf1_ros.df1.checksum import Checksum
-from abdf1_ros.df1.frames import master_frame, Poll, STX, Symbol
+from abdf1_ros.df1.frames import master_frame
 from abdf1_ros.df1.master_line import BROADCAST_PAUSE, MAX_FORWARDS
 from abdf1_ros.df1.packet import BROADCAST, Packet
 from abdf1_ros.df1.settings import LinkSettings, PollingSettings
 from abdf1_ros.df1.slave import multidrop
-from abdf1_ros.errors import PortLost, StationInactive
 import pytest
 from support.multidrop import MasterBench, Slave
 from support.vectors import vector
@@ -138,14 +137,6 @@ def test_message_for_another_station_is_passed_on_unchanged(standard: bool) -> N
     assert not {'stale_messages', 'invalid_messages'} & counts.keys()
 
 
-def test_message_based_master_polls_for_the_reply_at_once() -> None:
-    rig = bench(False, 7, 8)
-    rig.message(7, 8)
-    rig.start()
-    poll(rig, 7)
-    assert rig.master.said == 'C7 P7 P7 C8 P8 R7'
-
-
 def test_message_based_master_gives_up_a_slow_reply_in_silence() -> None:
     rig = bench(False, 7, 8)
     rig[8].delay = 1.0
@@ -158,18 +149,6 @@ def test_message_based_master_gives_up_a_slow_reply_in_silence() -> None:
     rig[8].delay = 0.0
     poll(rig, 8)  # the late reply comes now, and is passed on all the same
     assert rig[7].heard == [command.reply()]
-
-
-@BOTH
-def test_reply_with_another_command_code_is_passed_on_as_it_is(standard: bool) -> None:
-    rig = bench(standard, 7, 8)
-    command = rig.message(7, 8)
-    wrong = command.reply()._replace(cmd=0x46)
-    rig[8].slave._serve = lambda packet: wrong if packet == command else packet.reply()
-    rig.start()
-    poll(rig, 7, 8, times=2)
-    assert rig[7].heard == [wrong]
-    assert {number for number, *_ in rig.master.numbers()} == {2523}
 
 
 @BOTH
@@ -234,16 +213,6 @@ def test_broadcast_of_ours_goes_once_and_is_left_to_the_slaves(standard: bool) -
     counts = rig.master.counts()
     assert counts['commands_sent'] == counts['messages_sent'] == 2
     assert 'nak_retries' not in counts
-
-
-@BOTH
-def test_broadcast_does_not_enter_the_list_of_stations(standard: bool) -> None:
-    rig = bench(standard, 7)
-    rig.ask(BROADCAST)
-    rig.message(7, BROADCAST)
-    rig.start()
-    poll(rig, 7)
-    assert [station.number for station in rig.master.stations] == [7]
 
 
 @pytest.mark.parametrize('dst', [8, MASTER])
@@ -354,19 +323,6 @@ def test_station_that_a_message_names_is_no_station_of_ours(
     assert rig.master.changes == []
 
 
-def test_message_to_pass_on_is_dropped_with_the_line() -> None:
-    rig = bench(False, 7, 8)
-    rig.message(7, 8)
-    rig.start()
-    rig.ask(7)
-    rig.line.run(rig.master.link._line.has_forwards, 1.0)
-    rig.master.machine.stop(PortLost('gone'))
-    rig.master.machine.start(rig.clock())
-    poll(rig, 7, 8)
-    assert [packet.src for packet in rig[8].served] == [MASTER]
-    assert rig[7].heard == []
-
-
 @BOTH
 def test_reply_for_a_node_that_has_asked_nothing_is_not_passed_on(standard: bool) -> None:
     rig = bench(standard, 7, 8)
@@ -431,46 +387,3 @@ def test_slaves_that_never_stop_talking_leave_the_master_its_turns(
     assert rig.master.changes == []
     assert {number for number, *_ in rig.master.numbers()} == {2523}
     assert all(len(rig[number].served) > 50 for number in numbers)
-
-
-@BOTH
-def test_line_that_is_faster_than_set_waits_no_longer_for_a_silent_station(standard: bool) -> None:
-    rig = bench(standard, 7, 8)
-    rig.line.char_time = 0.0  # as a network: what is written is there
-    rig.start()
-    for _ in range(500):
-        task = rig.ask(7)
-        rig.line.run(lambda task=task: task.result is not None, 1.0)
-    begun = rig.clock()
-    rig[7].silent = True
-    task = rig.ask(7)
-    rig.line.run(lambda: task.result is not None, 60.0)
-    assert isinstance(task.result, StationInactive)
-    assert rig.clock() - begun < 2 * (SETTINGS.timeout + 0.05)
-
-
-class Dribbler(Slave):
-    """A station that answers each poll with a beginning and then a byte every 60 ms."""
-
-    def handle(self, symbol: Symbol) -> bytes:
-        """Begin a message."""
-        return STX if symbol == Poll(self.number, True) else super().handle(symbol)
-
-
-@BOTH
-def test_station_that_dribbles_does_not_keep_the_line(standard: bool) -> None:
-    rig = bench(standard, 7, 8)
-    rig.slaves[7] = Dribbler(7, rig.clock)
-    rig.far._make_procedure = multidrop(list(rig.slaves.values()))
-    rig.start()
-    waits = []
-    for _ in range(20):
-        rig.ask(7)
-        task = rig.ask(8)
-        while task.result is None:
-            rig.run(0.06)
-            rig.master.machine.receive_data(bytes(1), rig.clock())
-        assert isinstance(task.result, Packet)
-        waits.append(task.seconds)
-    # Two polls of the other one, each until its message is given up.
-    assert max(waits) < 2 * (SETTINGS.timeout + 0.5)

@@ -245,12 +245,3 @@ def test_line_that_goes_and_comes_again(mode: str) -> None:
         rig.line.run_for(1.0)
     assert_exact(rig)
     assert_recovers(rig)
-
-
-def test_same_seed_gives_the_same_line() -> None:
-    times = []
-    for _ in range(2):
-        rig = Rig('single', noise=noise_of(1e-2), seed=3)
-        rig.run(5)
-        times.append([task.ended for node in rig.nodes.values() for task in node.all])
-    assert times[0] == times[1]

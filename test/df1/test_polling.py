@@ -90,13 +90,6 @@ def test_group_goes_on_where_it_stopped(size: int, expected: list[int]) -> None:
     assert polls(rig, len(expected)) == expected
 
 
-def test_group_counts_active_stations_only() -> None:
-    rig = bench(PollingSettings((1, 2, 3, 4), priority=(9,), group_size=2), dead=(1, 3))
-    rig.start(1, 3)
-    rig.master.stations.probes.spent(1e9, 0.0)
-    assert polls(rig, 6) == [9, 2, 4, 9, 2, 4]
-
-
 def test_one_inactive_station_of_each_list_in_a_scan() -> None:
     rig = bench(PollingSettings((1, 2, 3), priority=(9, 8, 7)))
     rig.start(1, 2, 3, 8, 7)
@@ -123,17 +116,6 @@ def test_nobody_lives_and_each_list_has_its_turn() -> None:
     # One after the other without any pause: there is nobody to spare the time for.
     times = [when for when, _ in rig.master.machine.log]
     assert all(after - before < SETTINGS.timeout + 0.01 for before, after in pairwise(times))
-
-
-@pytest.mark.parametrize('priority', [(), (9,)])
-def test_inactive_stations_get_an_eighth_of_the_time_at_most(priority: tuple[int, ...]) -> None:
-    dead = (2, 3, 4)
-    rig = bench(PollingSettings((1, *dead), priority=priority), dead=(*dead, *priority))
-    rig.start(*dead, *priority, run=20.0)
-    wasted = sum(len(rig.master.times(f'P{number}')) for number in (*dead, *priority))
-    assert 0.1 <= wasted * SETTINGS.timeout / 20.0 <= 1 / 8 + 0.01
-    each = [len(rig.master.times(f'P{number}')) for number in dead]
-    assert max(each) - min(each) <= 1
 
 
 def share_of(rig: MasterBench, names: Collection[str], count: int) -> float:
@@ -183,18 +165,6 @@ def test_dead_priority_station_does_not_keep_normal_ones_from_coming_back() -> N
     assert rig.master.times('P8')
 
 
-def test_dead_normal_station_does_not_keep_a_priority_one_from_coming_back() -> None:
-    rig = bench(PollingSettings((1, 2), priority=(9,)), dead=(2,))
-    rig.start(2, 9, run=20.0)
-    assert rig.master.changes == [(9, True)]
-
-
-def test_two_kinds_of_dead_share_what_there_is() -> None:
-    rig = bench(PollingSettings((1, 2), priority=(9,)), dead=(2, 9))
-    rig.start(2, 9, run=30.0)
-    assert abs(len(rig.master.times('P2')) - len(rig.master.times('P9'))) <= 1
-
-
 @pytest.mark.parametrize(('multiple', 'expected'), [
     (False, [1, 2, 1, 2, 1, 2, 1, 2]), (True, [1, 1, 1, 1, 2, 1, 2, 1])])
 def test_single_and_multiple_messages_per_scan(multiple: bool, expected: list[int]) -> None:
@@ -239,25 +209,6 @@ def test_at_most_four_commands_between_two_polls() -> None:
     assert rig.master.said.startswith('C10 C11 C12 C13 P10 C14 C15 C16 C17 P11 C18 C19 P12 P13')
 
 
-def test_never_two_commands_at_one_station() -> None:
-    rig = bench(PollingSettings((1, 2)))
-    first, second, other = rig.ask(1), rig.ask(1), rig.ask(2)
-    rig.start()
-    rig.line.run(lambda: ended(second), 1.0)
-    assert rig.master.said.startswith('C1 C2 P1 C1 P2 P1')
-    assert ended(first) and ended(other)
-
-
-def test_thinking_times_of_stations_run_side_by_side() -> None:
-    rig = bench(PollingSettings(tuple(range(10, 20))))
-    for slave in rig.slaves.values():
-        slave.delay = 0.3
-    tasks = [rig.ask(number) for number in rig.slaves]
-    rig.start()
-    rig.line.run(lambda: all(map(ended, tasks)), 5.0)
-    assert rig.clock() < 0.3 + 0.35
-
-
 @pytest.mark.parametrize(('normal', 'expected'), [
     ((1, 5, 2), 'P1 C1 C2 P2 P1 P2'), ((5, 1, 2), 'C1 C2 P1 P2'), ((1, 2), 'P1 P2 C1 C2 P1 P2')])
 def test_in_sequence_commands_leave_at_our_own_place(normal: tuple[int, ...],
@@ -267,23 +218,6 @@ def test_in_sequence_commands_leave_at_our_own_place(normal: tuple[int, ...],
     rig.start()
     rig.line.run(lambda: all(map(ended, tasks)), 1.0)
     assert rig.master.said.startswith(expected)
-
-
-def test_in_sequence_commands_leave_at_no_other_place() -> None:
-    rig = bench(PollingSettings((1, 5, 2), in_sequence=True))
-    rig.start()
-    rig.line.run(lambda: rig.master.said.endswith('P1 P2'), 1.0)
-    task = rig.ask(1)
-    rig.line.run(lambda: ended(task), 1.0)
-    assert rig.master.said.startswith('P1 P2 P1 C1 P2 P1')
-
-
-def test_our_own_place_may_be_in_the_priority_list() -> None:
-    rig = bench(PollingSettings((1, 2), priority=(5,), in_sequence=True))
-    task = rig.ask(2)
-    rig.start()
-    rig.line.run(lambda: ended(task), 1.0)
-    assert rig.master.said.startswith('C2 P1 P2')
 
 
 def test_our_own_place_is_no_station_of_the_line() -> None:
@@ -352,14 +286,6 @@ def test_any_answer_makes_a_station_active(answer: str) -> None:
     assert isinstance(task.result, Packet)
 
 
-def test_inactive_station_gets_no_second_poll_and_no_retry_counts() -> None:
-    rig = bench(PollingSettings((1, 2)), dead=(1,))
-    rig.start(1, run=0.5)
-    assert len(rig.master.times('P1')) == 1
-    assert not {'enq_retries', 'enq_limit_exceeded'} & set(rig.master.counts())
-    assert rig.master.numbers() == []
-
-
 class Losses:
     """A line that loses a share of its frames, commands as well as replies and ACKs."""
 
@@ -410,16 +336,6 @@ def test_command_timeout_is_noticed_at_the_stations_own_poll() -> None:
     assert 'NAK' not in rig.master.said
 
 
-def test_reply_that_comes_after_its_time_is_stale() -> None:
-    rig = bench(PollingSettings((1,)))
-    rig[1].delay = 0.7
-    task = rig.ask(1)
-    rig.start(run=1.0)
-    assert isinstance(task.result, CommandTimeout)
-    assert rig.master.counts()['stale_messages'] == 1
-    assert rig.master.numbers() == [(2508,), (2510, 1, 5, task.command.tns)]
-
-
 def test_each_reply_is_not_found_behind_the_one_before_it_for_ever() -> None:
     rig = bench(PollingSettings((1, 2)), settings=replace(SETTINGS, cmd_timeout=0.001))
     rig[1].delay = 0.1  # the first reply comes late, on a line too slow for Cmd_Timeout
@@ -443,16 +359,6 @@ def test_station_that_never_stops_sending_does_not_hold_off_the_command_timeout(
     assert isinstance(task.result, CommandTimeout)
     polled = [when for when in rig.master.times('P1') if when <= (task.ended or 0.0)]
     assert len(polled) == MOST_QUEUED + 1
-
-
-def test_next_command_may_leave_after_a_timeout() -> None:
-    rig = bench(PollingSettings((1,)))
-    rig[1].delay = 0.7
-    rig.ask(1)
-    rig.start(run=0.6)
-    rig[1].delay = 0.0
-    task = rig.ask(1, run=0.5)
-    assert task.result == task.command.reply()
 
 
 def test_nak_is_never_sent_to_a_station_that_never_replies() -> None:
@@ -528,11 +434,6 @@ def test_last_and_longest_scan_of_each_list_are_known() -> None:
     assert normal.longest > 1.2 * normal.last
 
 
-def test_list_without_stations_has_no_scan() -> None:
-    rig = bench(PollingSettings((1,)))
-    assert rig.master.link.status().scans.keys() == {'normal'}
-
-
 def test_longest_scan_does_not_contain_the_time_without_a_port() -> None:
     rig = bench(PollingSettings((1,)))
     normal = rig.master.link.status().scans['normal']
@@ -551,30 +452,6 @@ def test_line_without_a_speed_is_polled_no_faster_than_the_set_one() -> None:
     rig.line.char_time = 0.0  # as TCP: what is written is there
     rig.start(run=1.0)
     assert 0.8 < rig.master.counts()['polls_sent'] * 6 * 10 / 19200 <= 1.01
-
-
-def replies_of(polling: PollingSettings | None, delay: float) -> int:
-    """Return how many commands to three stations are done in 15 s on a line with this delay."""
-    settings = replace(SETTINGS, nak_retries=3, enq_retries=3, cmd_timeout=1.0)
-    rig = MasterBench(7, 8, 9, settings=settings, polling=polling)
-    setattr(rig.line, 'propagation', delay / 2)
-    rig.start()
-    waiting = [rig.ask(number) for number in (7, 8, 9)]
-    done = []
-    while rig.clock() < 15.0:
-        rig.line.run(lambda waiting=waiting: any(map(ended, waiting)), 5.0)
-        done += filter(ended, waiting)
-        waiting = [rig.ask(task.command.dst) if ended(task) else task for task in waiting]
-    assert all(task.result == task.command.reply() for task in done)
-    assert rig.master.changes == []
-    assert not {'stale_messages', 'invalid_messages'} & rig.master.counts().keys()
-    return len(done)
-
-
-@pytest.mark.parametrize('delay', [0.098, 0.105, 0.12, 0.14, 0.16])
-def test_constant_delay_beyond_timeout_costs_no_more_than_with_message_polling(
-        delay: float) -> None:
-    assert replies_of(PollingSettings((7, 8, 9)), delay) >= 0.95 * replies_of(None, delay)
 
 
 @pytest.mark.parametrize('is_waited_for', [True, False])
@@ -636,43 +513,12 @@ def test_fault_heard_while_probing_is_counted_and_told() -> None:
     assert not rig.master.stations[1].active
 
 
-def test_start_is_a_clean_one() -> None:
-    rig = bench(PollingSettings((1, 2)))
-    rig[1].delay = 0.2
-    rig.ask(1)
-    rig.start(run=0.1)
-    rig.master.machine.stop(PortLost('unplugged'))
-    rig.master.machine.start(rig.clock())
-    task = rig.ask(1, run=0.5)
-    assert task.result == task.command.reply()
-    assert rig.master.counts()['stale_messages'] == 1
-
-
-def test_station_that_always_has_a_message_does_not_keep_the_line() -> None:
-    rig = bench(PollingSettings((1, 2), multiple=True))
-    for number in range(5000):
-        rig[1].outbox.append(Packet(5, 1, 0x4F, 0, number))  # replies to nothing
-    tasks = [rig.ask(2) for _ in range(10)]
-    rig.start(run=3.0)
-    assert all(isinstance(task.result, Packet) for task in tasks)
-
-
 def test_one_visit_takes_no_more_messages_than_may_be_queued_before_a_reply() -> None:
     rig = bench(PollingSettings((1, 2), multiple=True))
     for _ in range(MOST_QUEUED + 3):
         rig.message(1, 5)
     rig.start()
     assert polls(rig, MOST_QUEUED + 6) == [*[1] * MOST_QUEUED, 2, 1, 1, 1, 1, 2]
-
-
-def test_multiple_messages_stop_when_no_more_can_be_kept() -> None:
-    rig = bench(PollingSettings((1, 2), multiple=True))
-    for _ in range(40):
-        rig.message(1, 2)
-    rig.start(run=10.0)
-    assert rig[1].failed == []
-    assert len(rig[2].served) == len(rig[1].heard) == 40
-    assert all(reply.sts == 0 for reply in rig[1].heard)
 
 
 def test_command_ends_when_its_station_is_lost_over_a_message_of_another() -> None:

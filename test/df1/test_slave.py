@@ -27,7 +27,6 @@ from abdf1_ros.df1.frames import (
     FrameFault,
     master_frame,
     message_frame,
-    NAK,
     Poll,
     poll_frame,
     Symbol,
@@ -111,12 +110,6 @@ def test_frame_of_another_is_passed_over(station: int | None) -> None:
     assert (bench.served, bench.counts()) == ([], {})
 
 
-def test_frame_for_a_node_behind_the_station_is_accepted_by_its_stn() -> None:
-    bench = Bench()
-    assert bench.hear(sent(COMMAND._replace(dst=99))) == [ACK]
-    assert bench.served == [COMMAND._replace(dst=99)]
-
-
 @pytest.mark.parametrize(('fault', 'checksum', 'counter'), [
     (FrameFault.BAD_CHECK, Checksum.CRC, 'crc_errors'),
     (FrameFault.BAD_CHECK, Checksum.BCC, 'bcc_errors'),
@@ -148,12 +141,6 @@ def test_command_with_a_status_is_met_with_silence() -> None:
     assert bench.served == [COMMAND]
 
 
-def test_damaged_command_is_accepted_when_it_comes_again() -> None:
-    bench = Bench()
-    assert bench.hear(sent(COMMAND, fault=FrameFault.BAD_CHECK), sent(COMMAND)) == [b'', ACK]
-    assert bench.served == [COMMAND]
-
-
 def test_ack_lost_duplicate_command_is_acknowledged_and_not_executed() -> None:
     bench = Bench()
     assert bench.hear(sent(COMMAND), sent(COMMAND), POLL) == [ACK, ACK, reply_frame(COMMAND)]
@@ -167,20 +154,6 @@ def test_duplicate_is_known_after_its_reply_too() -> None:
     bench = Bench()
     assert bench.hear(sent(COMMAND), POLL, HEARD_ACK, sent(COMMAND), POLL)[3:] == [ACK, EOT]
     assert bench.served == [COMMAND]
-
-
-@pytest.mark.parametrize('other', [
-    COMMAND._replace(tns=0x0202), COMMAND._replace(src=6), COMMAND._replace(cmd=0x06)])
-def test_command_with_another_src_cmd_or_tns_is_no_duplicate(other: Packet) -> None:
-    bench = Bench()
-    assert bench.hear(sent(COMMAND), sent(other)) == [ACK, ACK]
-    assert bench.served == [COMMAND, other]
-
-
-def test_only_the_last_command_is_remembered() -> None:
-    bench = Bench()
-    bench.hear(sent(COMMAND), sent(later(1)), sent(COMMAND))
-    assert bench.served == [COMMAND, later(1), COMMAND]
 
 
 def test_master_ack_lost_reply_is_held_and_sent_again() -> None:
@@ -204,12 +177,6 @@ def test_reply_is_given_up_after_its_retries(retries: int) -> None:
     assert bench.slave.counters.replies_sent == 1
 
 
-def test_next_reply_follows_the_one_that_was_given_up() -> None:
-    bench = Bench(settings=LinkSettings(station=STATION, nak_retries=0))
-    assert bench.hear(sent(COMMAND), sent(later(1)), POLL, POLL)[2:] == [
-        reply_frame(COMMAND), reply_frame(later(1))]
-
-
 @pytest.mark.parametrize('between', [
     POLL, Poll(8, True), Poll(STATION, False), sent(later(1), 8), Control(Code.EOT), Unknown(0)])
 def test_ack_is_ours_only_straight_after_our_message(between: Symbol) -> None:
@@ -220,19 +187,6 @@ def test_ack_is_ours_only_straight_after_our_message(between: Symbol) -> None:
         bench.hear(Unknown(0))
     assert bench.hear(HEARD_ACK, POLL) == [b'', reply]
     assert bench.slave.counters.acks_received == 0
-
-
-def test_ack_without_a_message_of_ours_is_not_counted() -> None:
-    bench = Bench()
-    assert bench.hear(HEARD_ACK, sent(COMMAND), HEARD_ACK, POLL)[2:] == [b'', reply_frame(COMMAND)]
-    assert bench.slave.counters.acks_received == 0
-
-
-def test_replies_leave_in_order_one_for_each_poll() -> None:
-    bench = Bench()
-    bench.hear(sent(COMMAND), sent(later(1)), sent(later(2)))
-    answers = bench.hear(*(POLL, HEARD_ACK) * 3)
-    assert answers[::2] == [reply_frame(entry) for entry in (COMMAND, later(1), later(2))]
 
 
 def test_sink_full_command_is_neither_acknowledged_nor_executed_nor_remembered() -> None:
@@ -272,13 +226,6 @@ def test_broadcast_is_executed_but_neither_acknowledged_nor_answered() -> None:
     assert bench.slave.counters.acks_sent == 0
 
 
-def test_slave_never_sends_nak() -> None:
-    bench = Bench()
-    faults = [sent(COMMAND, fault=fault) for fault in FrameFault]
-    assert bench.hear(*faults, sent(COMMAND.reply(), fault=FrameFault.BAD_CHECK)) == [b''] * 5
-    assert (bench.served, bench.slave.counters.naks_sent) == ([], 0)
-
-
 def test_reply_from_the_master_is_acknowledged_and_not_executed() -> None:
     bench = Bench()
     assert bench.hear(sent(COMMAND.reply()), POLL) == [ACK, EOT]
@@ -291,11 +238,6 @@ def test_reply_with_an_error_is_counted_once() -> None:
     bench = Bench(sts=0x10)
     assert bench.hear(sent(COMMAND), POLL, POLL)[1:] == [reply_frame(COMMAND, 0x10)] * 2
     assert bench.slave.counters.error_messages_sent == 1
-
-
-def test_check_of_the_reply_is_that_of_the_line() -> None:
-    bench = Bench(settings=LinkSettings(station=STATION, checksum=Checksum.BCC))
-    assert bench.hear(sent(COMMAND), POLL)[1] == reply_frame(COMMAND, 0, Checksum.BCC)
 
 
 class Line:
@@ -347,15 +289,6 @@ def test_multidrop_broadcast_reaches_every_station() -> None:
     assert [bench.served for bench in benches] == [[command], [command]]
 
 
-def test_multidrop_nak_resets_every_station() -> None:
-    benches = [Bench(settings=LinkSettings(station=number)) for number in (7, 8)]
-    line = Line(*(bench.slave for bench in benches))
-    for number in (7, 8):
-        line.say(master_frame(number, COMMAND.encode(), Checksum.CRC))
-    assert line.say(NAK) == b''
-    assert (line.say(poll_frame(7)), line.say(poll_frame(8))) == (EOT, EOT)
-
-
 def test_duplicates_are_executed_when_nobody_looks_for_them() -> None:
     bench = Bench(settings=LinkSettings(station=STATION, duplicate_detection=False))
     assert bench.hear(sent(COMMAND), sent(COMMAND)) == [ACK, ACK]
@@ -369,25 +302,6 @@ def test_eot_suppression_leaves_messages_as_they_are() -> None:
         b'', ACK, reply_frame(COMMAND), b'', b'']
     assert bench.slave.counters.eots_sent == 0
     assert bench.slave.counters.polls_received == 3
-
-
-def test_defaults_are_those_of_allen_bradley() -> None:
-    settings = LinkSettings(station=STATION)
-    assert (settings.nak_retries, settings.eot_suppression, settings.duplicate_detection) == (
-        3, False, True)
-
-
-def test_limit_counts_afresh_for_every_message() -> None:
-    bench = Bench(settings=LinkSettings(station=STATION, nak_retries=1))
-    first, second = reply_frame(COMMAND), reply_frame(later(1))
-    assert bench.hear(sent(COMMAND), sent(later(1)), POLL, POLL, HEARD_ACK, POLL, POLL)[2:] == [
-        first, first, b'', second, second]
-
-
-def test_full_sink_does_not_forget_the_last_command() -> None:
-    bench = Bench(settings=LinkSettings(station=STATION, queue_size=1))
-    assert bench.hear(sent(COMMAND), sent(later(1)), sent(COMMAND)) == [ACK, b'', ACK]
-    assert bench.served == [COMMAND]
 
 
 def test_broadcast_and_reply_need_no_room() -> None:

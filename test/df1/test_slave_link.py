@@ -187,14 +187,6 @@ def test_what_is_wrong_with_messages_for_us_is_told_by_number() -> None:
     assert [number for number, *_ in bench.numbers()] == [2506, 2524, 2514]
 
 
-def test_nak_leaves_a_command_that_the_master_has_taken() -> None:
-    bench, task = polled()
-    bench.hear(ACK, NAK)
-    assert task.result is None
-    bench.hear(bench.frame(own().reply()))
-    assert task.result == own().reply()
-
-
 @pytest.mark.parametrize('traffic', [poll_frame(OTHER), EOT, message_frame(
     FROM_MASTER.reply().encode(), Checksum.CRC), poll_frame(US)[:-1] + b'\x01'])
 def test_ack_after_any_other_traffic_is_another_stations(traffic: bytes) -> None:
@@ -241,39 +233,12 @@ def test_reply_that_fits_nothing_is_dropped(reply: Packet, counter: str) -> None
     assert bench.counts()[counter] == 1
 
 
-def test_reply_without_any_command_is_stale() -> None:
-    bench = SlaveBench(SETTINGS)
-    bench.stations.add((OTHER,))
-    assert bench.hear(bench.frame(own().reply())) == ACK
-    assert bench.counts()['stale_messages'] == 1
-
-
-def test_eot_of_other_stations_is_counted() -> None:
-    bench = SlaveBench(SETTINGS)
-    assert bench.hear(EOT, EOT) == b''
-    assert bench.counts() == {'eots_received': 2}  # S0, counter 2538
-
-
-def test_repeated_reply_is_acknowledged_and_passed_over() -> None:
-    bench, _ = polled()
-    assert bench.hear(ACK, *[bench.frame(own().reply())] * 2) == ACK + ACK
-    assert bench.counts()['duplicate_messages'] == 1
-    assert 'stale_messages' not in bench.counts()
-
-
 def test_reply_is_taken_by_a_sink_that_is_full_of_others() -> None:
     bench, task = acknowledged(replace(SETTINGS, queue_size=1))
     assert bench.hear(bench.frame(FROM_MASTER)) == ACK
     assert bench.hear(bench.frame(FROM_MASTER._replace(tns=9))) == b''
     assert bench.hear(bench.frame(own().reply())) == ACK
     assert task.result == own().reply()
-
-
-def test_reply_with_an_error_is_counted_and_handed_on() -> None:
-    bench, task = polled()
-    bench.hear(ACK, bench.frame(own().reply(sts=2)))
-    assert task.result == own().reply(sts=2)
-    assert bench.counts()['error_messages_received'] == 1
 
 
 @pytest.mark.parametrize('busy', [False, True])
@@ -307,14 +272,6 @@ def test_command_without_ack_is_not_kept_for_a_master_that_is_gone() -> None:
     assert EOT in bench.poll()
 
 
-def test_reply_that_comes_after_its_time_is_stale() -> None:
-    bench, task = acknowledged(cmd_timeout=1.0)
-    bench.wait(2.0)
-    bench.hear(bench.frame(own().reply()))
-    assert isinstance(task.result, CommandTimeout)
-    assert bench.numbers() == [(2508,), (2510, OTHER, US, 1)]
-
-
 @pytest.mark.parametrize('busy', [False, True])
 def test_poll_timeout_fails_what_waits(busy: bool) -> None:
     bench = SlaveBench(SETTINGS, poll_timeout=2.0)
@@ -338,15 +295,6 @@ def test_poll_timeout_fails_what_waits(busy: bool) -> None:
     assert bench.poll() == EOT
 
 
-def test_poll_timeout_begins_at_the_start() -> None:
-    bench = SlaveBench(SETTINGS, poll_timeout=2.0)
-    task = bench.add(own())
-    bench.wait(1.9)
-    assert task.result is None
-    bench.wait(0.5)
-    assert isinstance(task.result, CommandTimeout)
-
-
 def test_poll_timeout_zero_is_never() -> None:
     bench = SlaveBench(SETTINGS, poll_timeout=0.0)
     task = bench.add(own())
@@ -361,14 +309,6 @@ def test_held_command_is_not_sent_any_more_after_the_poll_timeout() -> None:
     assert isinstance(task.result, CommandTimeout)
     assert task.sent
     assert bench.poll() == EOT
-
-
-def test_held_reply_survives_the_poll_timeout() -> None:
-    bench = SlaveBench(SETTINGS, poll_timeout=2.0)
-    bench.hear(bench.frame(FROM_MASTER))
-    bench.poll()
-    bench.wait(10.0)
-    assert bench.poll() == bench.own(FROM_MASTER.reply())
 
 
 def test_poll_timeout_fails_a_command_that_waits_for_its_reply() -> None:
@@ -402,14 +342,6 @@ def test_broadcast_of_ours_is_done_when_the_master_has_it() -> None:
     assert bench.served == [command]
     assert bench.poll() == bench.own(own(2))
     assert later.result is None
-
-
-def test_broadcast_is_executed_by_a_sink_that_is_full() -> None:
-    bench = SlaveBench(replace(SETTINGS, queue_size=1))
-    bench.hear(bench.frame(FROM_MASTER))
-    command = Packet(BROADCAST, MASTER, 0x0F, 0, 0x33, b'\xAA')
-    assert bench.hear(bench.frame(command, BROADCAST)) == b''
-    assert bench.served == [FROM_MASTER, command]
 
 
 def test_start_is_a_clean_one() -> None:
@@ -491,28 +423,11 @@ def test_command_that_has_expired_during_tx_delay_is_executed_when_it_comes_agai
     assert 'duplicate_messages' not in bench.counts()
 
 
-def test_polls_that_lie_in_the_buffer_are_answered_once() -> None:
-    """This process stood still, and nobody has waited for it."""
-    bench = SlaveBench(SETTINGS)
-    bench.hear(bench.frame(FROM_MASTER))
-    assert bench.hear(3 * poll_frame(US)) == bench.own(FROM_MASTER.reply())
-    assert bench.hear(ACK) == b''
-    assert bench.hear(poll_frame(US) + poll_frame(OTHER)) == b''
-    assert bench.counts()['polls_received'] == 1
-
-
 def test_broadcast_is_executed_whatever_follows_it() -> None:
     bench = SlaveBench(SETTINGS, timing=SLOW)
     command = FROM_MASTER._replace(dst=BROADCAST)
     bench.hear(bench.frame(command, BROADCAST) + poll_frame(US))
     assert bench.served == [command]
-    assert said_within(bench, 1.0) == [(0.2, EOT)]
-
-
-def test_noise_during_tx_delay_does_not_take_the_answer_away() -> None:
-    bench = SlaveBench(SETTINGS, timing=SLOW)
-    bench.poll()
-    bench.hear(b'\xFF\0')  # as a two-wire driver makes when it is switched off
     assert said_within(bench, 1.0) == [(0.2, EOT)]
 
 
@@ -527,20 +442,6 @@ def test_what_is_overdue_ends_in_time_during_a_long_tx_delay() -> None:
     assert said_within(bench, 29.0) == []
     assert isinstance(task.result, CommandTimeout)
     assert task.ended is not None and 1.0 <= task.ended - begun <= 1.26
-
-
-def test_frame_that_breaks_off_does_not_swallow_the_next_one() -> None:
-    bench = SlaveBench(SETTINGS)
-    assert bench.hear(bench.frame(FROM_MASTER)[:-4]) == b''
-    bench.wait(0.5)
-    assert bench.hear(bench.frame(FROM_MASTER)) == ACK
-    assert bench.hear(bench.frame(FROM_MASTER)[:-4], poll_frame(US)) != b''
-
-
-def test_bytes_come_one_by_one() -> None:
-    bench = SlaveBench(SETTINGS)
-    assert bench.hear(*(bytes((byte,)) for byte in bench.frame(FROM_MASTER))) == ACK
-    assert bench.served == [FROM_MASTER]
 
 
 def test_suppressed_eot_leaves_a_poll_without_an_answer() -> None:

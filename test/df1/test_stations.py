@@ -28,15 +28,6 @@ def test_every_station_counts_as_active_at_start() -> None:
             for station in stations] == 2 * [(0, 0, 0, 0)]
 
 
-def test_stations_can_be_added() -> None:
-    stations = ActiveStationList([9])
-    stations.lost(9, 1.0)
-    stations.lost(7, 1.0)
-    stations.add([3, 7, 9])
-    assert [(entry.number, entry.active) for entry in stations] == [
-        (3, True), (7, False), (9, False)]
-
-
 def test_station_outside_of_the_list_has_a_record_and_no_place_in_it() -> None:
     told: list[Station] = []
     stations = ActiveStationList([9], told.append)
@@ -96,12 +87,6 @@ def test_active_node_table_has_a_bit_for_each_station(number: int, word: int, bi
     assert stations.words() == table
 
 
-def test_active_node_table_shows_all_active_stations() -> None:
-    stations = ActiveStationList([1, 2, 3, 40])
-    stations.lost(2, 0.0)
-    assert stations.words()[:3] == [0b1010, 0, 1 << 8]
-
-
 def test_repeated_message_is_not_accepted() -> None:
     station = Station(7)
     assert station.note_new(REPLY)
@@ -116,12 +101,6 @@ def test_only_the_last_message_counts_as_repeated(other: Packet) -> None:
     assert station.note_new(REPLY)
     assert station.note_new(other)
     assert station.note_new(REPLY)
-
-
-def test_each_station_has_its_own_record() -> None:
-    stations = ActiveStationList([7, 8])
-    assert stations[7].note_new(REPLY)
-    assert stations[8].note_new(REPLY)
 
 
 def test_one_late_reply_is_an_accident_and_two_are_not() -> None:
@@ -149,8 +128,3 @@ def test_stations_behind_a_gateway_are_what_it_is() -> None:
     stations.heard(10, 6.0)
     assert changes[3:] == [(10, True), (2, True), (3, True)]
     assert (stations[10].last_heard, stations[2].last_heard) == (6.0, None)
-
-
-def test_station_that_is_its_own_gateway_is_one_of_the_line() -> None:
-    stations = ActiveStationList((1,), routes={1: 1})
-    assert stations.behind(1) == [1]
