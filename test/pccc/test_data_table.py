@@ -38,10 +38,6 @@ def table(*files: tuple[str, int], family: PlcType = SLC) -> DataTable:
     return result
 
 
-def test_new_file_is_zero() -> None:
-    assert table(('N7:0', 3)).read(at('N7:0'), 3) == bytes(6)
-
-
 def test_words_are_written_and_read_low_byte_first() -> None:
     words = table(('N7:0', 10))
     words.write(at('N7:3'), b'\x34\x12\x78\x56')
@@ -78,13 +74,6 @@ def test_slots_are_files_of_their_own() -> None:
     with pytest.raises(NoSuchFile):
         words.read(at('I:3.0'), 1)
     assert [(area.file, area.slot) for area in words] == [(1, 1), (1, 2)]
-
-
-def test_members_are_words_of_their_element() -> None:
-    words = table(('T4:0', 6))
-    words.write(at('T4:1.PRE'), b'\x07\x00')
-    assert words.read(at('T4:1'), 3) == bytes.fromhex('00 00 07 00 00 00')
-    assert words.read(at('T4:0'), 3) == bytes(6)
 
 
 @pytest.mark.parametrize('act', [
@@ -128,9 +117,3 @@ def test_file_number_has_one_type() -> None:
         words.create(at('B7:0'), 1)
     with pytest.raises(NoSuchFile):
         words.file_type(8)
-
-
-def test_plc5_io_image_is_one_file() -> None:
-    words = table(('I:000', 16), family=PLC5)
-    words.write(at('I:017', PLC5), b'\x01\x00')
-    assert words.read(at('I:016', PLC5), 2) == b'\x00\x00\x01\x00'

@@ -19,7 +19,6 @@ from abdf1_ros.pccc.describe import command_name, describe
 from hypothesis import given, strategies
 import pytest
 from support.cases import for_all
-from support.vectors import MESSAGES, Vector
 
 
 def command(data: str, cmd: int = 0x0F) -> Packet:
@@ -145,10 +144,6 @@ def test_diagnostic_status_is_described_by_its_identity(data: str, text: str) ->
     assert describe(request.reply(bytes.fromhex(data)), request) == text
 
 
-def test_reply_without_its_command_is_bytes() -> None:
-    assert describe(command('').reply(b'\x34\x12')) == '34 12'
-
-
 def test_refusal_is_described_by_sts_and_ext_sts() -> None:
     assert describe(command('').reply(sts=0x50)) == \
         'STS 50: address not there, or memory protected'
@@ -164,24 +159,9 @@ def test_name_of_a_command_has_cmd_and_fnc() -> None:
     assert command_name(command('')) == '0F'
 
 
-@for_all('vector', [vector for vector in MESSAGES if vector.valid and len(vector.link_data) >= 6])
-def test_every_vector_has_a_text_of_one_line(vector: Vector) -> None:
-    assert describe(vector.packet).isprintable()
-    assert ('malformed' in describe(vector.packet)) is vector.name.endswith('_short')
-
-
 @given(strategies.integers(0, 255), strategies.binary(max_size=40), strategies.binary(max_size=40))
 def test_any_bytes_have_a_text(cmd: int, data: bytes, answer: bytes) -> None:
     request = Packet(1, 5, cmd & ~0x40, 0, 1, data)
     assert describe(request).isprintable()
     assert describe(request.reply(answer), request).isprintable()
     assert describe(request.reply(answer, 0xF0), request).isprintable()
-
-
-@given(strategies.sampled_from(
-    (0x00, 0x01, 0x02, 0x04, 0x26, 0x67, 0x68, 0xA1, 0xA2, 0xA9, 0xAA, 0xAB)),
-       strategies.binary(max_size=40), strategies.binary(max_size=40))
-def test_any_parameters_have_a_text(fnc: int, data: bytes, answer: bytes) -> None:
-    request = Packet(1, 5, 0x0F, 0, 1, bytes((fnc,)) + data)
-    assert describe(request).isprintable()
-    assert describe(request.reply(answer), request).isprintable()

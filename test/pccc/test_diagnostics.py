@@ -16,14 +16,13 @@
 
 from abdf1_ros.errors import FormatError
 from abdf1_ros.pccc import diagnostics
-from abdf1_ros.pccc.diagnostics import Echo, ReadCounters
+from abdf1_ros.pccc.diagnostics import ReadCounters
 from abdf1_ros.pccc.families import FAMILIES
 from abdf1_ros.pccc.fields import Reader
 from abdf1_ros.pccc.file_types import PlcType
 from hypothesis import given
 from hypothesis import strategies as st
 import pytest
-from support.vectors import pair
 
 
 def parameters(data: bytes, fnc: int) -> Reader:
@@ -31,22 +30,6 @@ def parameters(data: bytes, fnc: int) -> Reader:
     reader = Reader(data)
     assert reader.byte() == fnc
     return reader
-
-
-def test_echo_of_the_vectors() -> None:
-    command, reply = pair('diag_echo')
-    assert command.cmd == diagnostics.CMD
-    assert Echo(reply.data).encode() == command.data
-    assert Echo.read(parameters(command.data, diagnostics.ECHO)) == Echo(reply.data)
-
-
-@pytest.mark.parametrize('name', ['diag_status_slc504', 'diag_status_plc5_40'])
-def test_status_request_of_the_vectors(name: str) -> None:
-    assert pair(name)[0].data == diagnostics.STATUS_REQUEST
-
-
-def test_reset_of_the_vectors() -> None:
-    assert pair('diag_reset_counters')[0].data == b'\x07'
 
 
 def test_counters_are_asked_for_by_address_and_size() -> None:

@@ -152,15 +152,6 @@ def test_processor_is_for_an_slc_only() -> None:
         dialect_of(PlcType.PLC5, None, Processor.SLC_5_03)
 
 
-@pytest.mark.parametrize('place', FLOATS, ids=str)
-def test_floats_arrive_with_their_words_in_order(place: tuple[PlcType, Access]) -> None:
-    address, dialect, table = bench(*place, 'F8:1')
-    data = bytes.fromhex('00 00 7A 44 00 00 C0 BF')
-    assert replied(table, *dialect.write(address, data)) == b''
-    assert table.read(address, 4) == data
-    assert dialect.read_data(address, 4, replied(table, *dialect.read(address, 4))) == data
-
-
 @given(st.sampled_from([place for place in WORDS if '.' not in place[2]]),
        st.integers(1, 40), st.integers(1, 15))
 def test_parts_of_a_transfer_make_the_whole(place: tuple[PlcType, Access, str], words: int,
@@ -177,11 +168,3 @@ def test_parts_of_a_transfer_make_the_whole(place: tuple[PlcType, Access, str], 
         reply = replied(table, *dialect.read(part, count, whole))
         read += dialect.read_data(part, count, reply)
     assert table.read(address, words) == read == data
-
-
-@for_all('place', [key for key in PLACES if key[1] is not Access.TYPED])
-@for_all('size', [0, 2, 5, 8])
-def test_reply_of_another_length(place: tuple[PlcType, Access], size: int) -> None:
-    address = parse_address(PLACES[place][0], place[0])
-    with pytest.raises(FormatError, match=f'^the reply holds {size} bytes, asked were 4$'):
-        dialect_of(*place).read_data(address, 2, bytes(size))

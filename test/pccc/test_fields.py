@@ -17,7 +17,7 @@
 from collections.abc import Callable
 
 from abdf1_ros.errors import FormatError
-from abdf1_ros.pccc.fields import number, Reader, word
+from abdf1_ros.pccc.fields import number, Reader
 from hypothesis import given
 from hypothesis import strategies as st
 import pytest
@@ -31,20 +31,11 @@ def test_number_is_short_up_to_254(value: int, encoded: str) -> None:
     assert Reader(bytes.fromhex(encoded)).number() == value
 
 
-def test_long_form_of_a_small_number_is_read_too() -> None:
-    assert Reader(b'\xFF\x07\x00').number() == 7
-
-
 @given(st.lists(st.integers(0, 0xFFFF), max_size=8))
 def test_numbers_are_read_back(values: list[int]) -> None:
     reader = Reader(b''.join(map(number, values)))
     assert [reader.number() for _ in values] == values
     assert reader.is_empty
-
-
-def test_word_is_low_byte_first() -> None:
-    assert word(0x1234) == b'\x34\x12'
-    assert Reader(b'\x34\x12').word() == 0x1234
 
 
 def test_reader_takes_fields_in_order() -> None:

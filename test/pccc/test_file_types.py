@@ -15,7 +15,7 @@
 """File types: letters, codes and layouts of the manual."""
 
 from abdf1_ros.pccc.families import FAMILIES
-from abdf1_ros.pccc.file_types import FileType, Layout, PlcType
+from abdf1_ros.pccc.file_types import FileType, PlcType
 from abdf1_ros.pccc.slc.address import BY_CODE
 import pytest
 
@@ -41,10 +41,6 @@ def test_slc_codes_and_sizes(letters: str, code: int, words: int) -> None:
     layout = FAMILIES[SLC].layout(kind)
     assert (layout.code, layout.words, layout.wire_words) == (code, words, words)
     assert BY_CODE[code] is kind
-
-
-def test_every_file_type_of_an_slc_has_its_own_code() -> None:
-    assert len(BY_CODE) == len(FAMILIES[SLC].file_types) == 20
 
 
 @pytest.mark.parametrize(('family', 'missing'), [
@@ -86,13 +82,6 @@ def test_members_do_not_share_bits_or_words(family: PlcType) -> None:
         assert len(set(values)) == len(values)
 
 
-def test_value_words_tell_floats_and_their_halves_from_words() -> None:
-    pid = FAMILIES[PLC5].layout(FileType.PID)
-    assert [pid.value_words(word) for word in range(6)] == [1, 1, 2, 0, 2, 0]
-    assert [pid.value_words(word) for word in (48, 49, 50, 81)] == [2, 0, 1, 1]
-    assert {FAMILIES[SLC].layout(FileType.PID).value_words(word) for word in range(23)} == {1}
-
-
 @pytest.mark.parametrize('family', FAMILIES)
 def test_whole_control_words_are_never_written(family: PlcType) -> None:
     for kind in FAMILIES[family].file_types:
@@ -100,11 +89,6 @@ def test_whole_control_words_are_never_written(family: PlcType) -> None:
         flagged = {member.word for member in layout.members.values() if member.bit is not None}
         assert bool(flagged) is (kind.is_structure and not kind.is_function)
         assert not any(layout.may_write(word) for word in flagged)
-
-
-def test_everything_of_a_plain_file_may_be_written() -> None:
-    assert Layout().may_write(0)
-    assert Layout().may_write(0, 15)
 
 
 def writable(letters: str, family: PlcType) -> str:

@@ -27,7 +27,7 @@ from abdf1_ros.pccc.slc.identity import FULL_DUPLEX_COUNTERS, ML1000_COUNTERS, S
 from hypothesis import given
 from hypothesis import strategies as st
 import pytest
-from support.vectors import pair, vector
+from support.vectors import pair
 
 SLC = bytes.fromhex('00 EE 34 49 22') + b'5/03'.ljust(11) + bytes.fromhex('0000 06 00 3412 20 FC')
 PLC5 = pair('diag_status_plc5_40')[1].data
@@ -86,13 +86,6 @@ def test_mode_of_a_plc5_is_read_from_its_code(
     (Mode.SUSPEND, 'suspend'), (Mode.REMOTE_DOWNLOAD, 'download'), (Mode.RUN, 'run')])
 def test_modes_in_a_sentence(mode: Mode, words: str) -> None:
     assert mode.words == words
-
-
-def test_slc_that_has_halted() -> None:
-    identity = changed(SLC, byte17=0x34, byte19=0x01, byte20=0x20)
-    assert identity.faults == (
-        'major error 0x0034 (negative timer preset or accumulator), processor halted',)
-    assert identity.remarks == ()
 
 
 def test_other_bits_of_byte_20_do_not_halt_an_slc() -> None:
@@ -233,12 +226,6 @@ def test_module_of_a_plc2() -> None:
     assert bad.remarks == ('download or upload in progress',)
 
 
-def test_gateway_has_no_mode() -> None:
-    identity = decode_identity(bytes((0x00, 0xF3, 0, 0, 0, 0, 0x10, 0x20, 0x60, 0x1F)))
-    assert str(identity) == '1771-KE/KF or 1770-KF2 series D revision A'
-    assert (identity.is_running, identity.counter_address) == (None, 0x2010)
-
-
 @pytest.mark.parametrize(('data', 'text', 'counters'), [
     ('01 EE 10 10 34 12 00 20 21 00 00 30', '1785-KA series B revision B', 0x2000),  # M 10-16
     ('00 EE 30 2F 34 12 00 20 21 00 30', '1785-KA5 series B revision B', 0x2000),  # M 10-17
@@ -269,11 +256,6 @@ def test_gateway_with_a_name(kind: int, name: str, counters: ReadCounters) -> No
     identity = decode_identity(data)
     assert (str(identity), identity.is_running) == (f'{name} series A revision 1', None)
     assert identity.counters == counters
-
-
-def test_1785_ka5_that_is_asked_over_dh485_has_its_name() -> None:
-    data = bytes((0, 0xEE, 0x30, 0x2F, 0x21)) + b'1785-KA5'.ljust(11, b'\0') + bytes(8)
-    assert str(decode_identity(data)) == '1785-KA5 series B revision 2'
 
 
 def test_unknown_layout_is_shown_in_hexadecimal() -> None:
@@ -309,16 +291,6 @@ def test_any_bytes_are_an_identity_or_a_format_error(data: bytes) -> None:
     for text in (str(identity), identity.name, identity.mode_text, *identity.faults,
                  *identity.remarks):
         assert text.isprintable()
-
-
-@pytest.mark.parametrize(('name', 'model'), [
-    ('plc5_12', 'PLC-5/12'), ('plc5_25', 'PLC-5/25'), ('plc5_15', 'PLC-5/15'),
-    ('6008_ltv', 'PLC-5 VME (6008-LTV)'), ('1785_ka', '1785-KA'), ('1785_ka5', '1785-KA5'),
-    ('1785_ka3', 'PLC-2/16 at 1785-KA3'), ('1785_ke', '1785-KE'),
-    ('1784_kt', '1784-KT or 1784-KT2'), ('1770_kf3', '1770-KF3')])
-def test_models_of_the_vectors(name: str, model: str) -> None:
-    reply = vector(f'diag_status_{name}_rep_fd_crc').packet
-    assert decode_identity(reply.data).model == model
 
 
 @pytest.mark.parametrize(('data', 'layout', 'asked'), [

@@ -83,16 +83,6 @@ def test_modem_lines_that_are_on_are_named() -> None:
         assert decode_counters(bytes((1 << bit, 0)), COUNTERS) == {'modem lines': name}
 
 
-def test_reply_may_have_fewer_or_more_words() -> None:
-    assert decode_counters(words(2), ML1000_COUNTERS) == {'messages sent': '101'}
-    more = decode_counters(words(15), FULL_DUPLEX_COUNTERS)
-    assert (more['word 13'], more['word 14']) == ('113', '114')
-
-
-def test_counters_of_an_unknown_processor_are_bytes() -> None:
-    assert decode_counters(b'\x01\xAB\x02', None) == {'bytes': '01 AB 02'}
-
-
 @pytest.mark.parametrize('data', [b'', b'\0', bytes(25)])
 def test_half_a_word_is_no_counter(data: bytes) -> None:
     with pytest.raises(FormatError):
@@ -162,8 +152,3 @@ def test_words_of_a_radio_modem_port_are_where_its_channel_status_has_them() -> 
     assert served is not None
     status = struct.unpack('<10H', served.encode())  # from CSx:9 on
     assert status == (0, 10, 11, 12, 0, 0, 0, 16, 17, 18)
-
-
-@pytest.mark.parametrize('plc_type', [PlcType.PLC2, PlcType.PLC3])
-def test_modules_have_blocks_that_are_not_emulated(plc_type: PlcType) -> None:
-    assert served_counters(Counters(), plc_type, 'Peer') is None

@@ -26,11 +26,8 @@ from abdf1_ros.pccc.link_counters import ServedCounters
 from abdf1_ros.pccc.plc5.identity import COUNTERS
 from abdf1_ros.pccc.server import Server
 from abdf1_ros.pccc.slc.identity import SLAVE_COUNTERS
-from hypothesis import given
-from hypothesis import strategies as st
 import pytest
 from support.cases import for_all
-from support.vectors import pair
 
 REFUSED = 0x10
 
@@ -58,17 +55,6 @@ def test_echo_up_to_the_limit_of_the_family(plc_type: PlcType) -> None:
     for data in (b'', b'\0', b'\x10\x10\x02\x03', bytes(limit)):
         assert answer(plc_type, b'\0' + data) == reply(data)
     assert answer(plc_type, bytes(limit + 2)) == reply(sts=REFUSED)
-
-
-@pytest.mark.parametrize('plc_type', FAMILIES)
-def test_echo_of_the_vectors(plc_type: PlcType) -> None:
-    command, expected = pair('diag_echo')
-    assert Server(DataTable(plc_type)).serve(command) == expected
-
-
-@given(data=st.binary(max_size=236))
-def test_echo_of_anything(data: bytes) -> None:
-    assert answer(PlcType.SLC, b'\0' + data).data == data
 
 
 @pytest.mark.parametrize('plc_type', FAMILIES)
@@ -114,13 +100,6 @@ def test_reset_concerns_only_what_the_other_end_sees(counters: Counters) -> None
     b'', b'\x01\0\0\x10', b'\x03\x01', b'\x07', b'\x08\x80\0', b'\x09\0\0\x01', b'\xFF'])
 def test_what_there_is_not_is_refused(plc_type: PlcType, data: bytes) -> None:
     assert answer(plc_type, data) == reply(sts=REFUSED)
-
-
-@pytest.mark.parametrize('plc_type', FAMILIES)
-@pytest.mark.parametrize('name', ['setvars', 'set_timeout', 'set_naks', 'set_enqs'])
-def test_nobody_sets_up_our_link_from_the_line(plc_type: PlcType, name: str) -> None:
-    command = pair(f'diag_{name}')[0]
-    assert Server(DataTable(plc_type)).serve(command) == command.reply(sts=REFUSED)
 
 
 @for_all('plc_type', FAMILIES)

@@ -25,7 +25,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 import pytest
 from support.cases import for_all
-from support.tables import ask, counting, table, words_at
+from support.tables import counting, table
 from support.vectors import pair
 
 PLC5, SLC = PlcType.PLC5, PlcType.SLC
@@ -59,55 +59,10 @@ def test_reply_of_the_vectors(name: str, words: DataTable) -> None:
     assert Server(words).serve(command) == reply
 
 
-def test_element_beyond_255_of_the_vectors() -> None:
-    words = DataTable(SLC)
-    place = parse_address('N10:0', SLC).at_offset(300)
-    words.create(place, 1)
-    words.write(place, b'\xAA\x55')
-    command, reply = pair('slc_A2_N10_300')
-    assert Server(words).serve(command) == reply
-
-
-@pytest.mark.parametrize(('name', 'words', 'place', 'value'), [
-    ('plc5_rmw', table(PLC5, B3_4='FF 00'), 'B3:4', 'F7 01'),
-    ('slc_AB', table(SLC, B3_4='FF 00'), 'B3:4', 'F7 01'),
-    ('slc_AA_T4_PRE', table(SLC, T4_0='01 00 02 00 03 00'), 'T4:0.PRE', '2C 01')])
-def test_writes_of_the_vectors_are_stored(
-        name: str, words: DataTable, place: str, value: str) -> None:
-    command, reply = pair(name)
-    assert Server(words).serve(command) == reply
-    assert words_at(words, place) == value
-
-
 def contents(words: DataTable, family: PlcType) -> list[bytes]:
     """Return all words of a table that was made of FILES."""
     return [words.read(parse_address(name.replace('_', ':', 1).replace('_', '.'), family),
                        len(bytes.fromhex(data)) // 2) for name, data in FILES[family].items()]
-
-
-def test_float_write_of_the_vectors() -> None:
-    words = table(SLC, F8_0='00 00 00 00 00 00 00 00')
-    assert Server(words).serve(pair('slc_AA_F8')[0]).sts == 0
-    assert words_at(words, 'F8:0', 4) == '00 00 00 00 00 00 00 BF'
-
-
-def test_refused_write_of_the_vectors_changes_nothing() -> None:
-    words = table(PLC5, F8_0='00 00 00 00' * 6)
-    Server(words).serve(pair('plc5_typed_write_badtype')[0])
-    assert words_at(words, 'F8:5', 2) == '00 00 00 00'
-
-
-@for_all('family', [PLC5, SLC])
-@for_all(('cmd', 'data'), [
-    (0x0F, ''), (0x0F, '00'), (0x0F, 'FF'), (0x06, '02'), (0x03, ''), (0x4F, '68'),
-    (0x0F, '68'), (0x0F, '67 00'), (0x0F, '26'), (0x0F, 'A2'), (0x0F, 'AA 02'), (0x0F, 'AB')])
-def test_what_is_no_command_of_the_family(family: PlcType, cmd: int, data: str) -> None:
-    assert ask(table(family), data, cmd) == (0x10, '')
-
-
-def test_families_do_not_take_each_others_commands() -> None:
-    assert ask(table(SLC, B3_0='00 00'), '26 06 03 00 FF FF 01 00') == (0x10, '')
-    assert ask(table(PLC5, N7_0='00 00'), 'A2 02 07 89 00 00') == (0x10, '')
 
 
 @pytest.mark.parametrize('family', FAMILIES)
@@ -209,19 +164,3 @@ def test_refusals_leave_nothing_behind(family: PlcType, data: str,
     for _ in range(10):
         server.serve(Packet(1, 5, 0x0F, 0, 7, bytes.fromhex(data)))
     assert depths == [depths[0]] * 10
-
-
-@pytest.mark.parametrize('family', [PLC5, SLC])
-@pytest.mark.parametrize('data', ['', '10', '10 01 02 03 10 10'])
-def test_echo_gives_the_data_back(family: PlcType, data: str) -> None:
-    assert ask(table(family), f'00 {data}', 0x06) == (0, data)
-
-
-@pytest.mark.parametrize(('family', 'size', 'begin'), [
-    (PLC5, 36, '06 EB 15'), (SLC, 24, '00 EE 36 49')])
-def test_diagnostic_status_names_the_emulated_processor(
-        family: PlcType, size: int, begin: str) -> None:
-    sts, data = ask(table(family), '03', 0x06)
-    assert sts == 0
-    assert data.startswith(begin)
-    assert len(bytes.fromhex(data)) == size

@@ -25,8 +25,6 @@ from abdf1_ros.pccc.status import (
     USUAL_MEANINGS,
 )
 import pytest
-from support.cases import for_all
-from support.vectors import pair
 
 
 def reply(sts: int, data: bytes = b'') -> Packet:
@@ -39,10 +37,6 @@ def failure(sts: int, data: bytes = b'') -> RemoteError:
     with pytest.raises(RemoteError) as caught:
         check_status(reply(sts, data))
     return caught.value
-
-
-def test_success_returns_the_data() -> None:
-    assert check_status(reply(0, b'data')) == b'data'
 
 
 @pytest.mark.parametrize(('sts', 'data', 'ext_sts', 'text'), [
@@ -73,21 +67,6 @@ def test_extended_codes_with_words_are_those_of_the_manual() -> None:
     """M 8-4."""
     assert [code for code in range(0x100) if 'unknown code' not in str(
         failure(0xF0, bytes((code,))))] == [*range(0x01, 0x1C), 0x1E, 0x1F, 0x22, 0x23, 0x24]
-
-
-@for_all('sts', range(1, 256))
-def test_every_other_status_is_a_failure(sts: int) -> None:
-    assert str(failure(sts)) == status_text(sts)
-    assert failure(sts).sts == sts
-
-
-@pytest.mark.parametrize(('name', 'codes'), [
-    ('plc5_typed_write_badtype', (0xF0, 0x17)), ('slc_err_address', (0x50, None)),
-    ('sts_timeout_local', (0x05, None))])
-def test_failures_of_the_vectors(name: str, codes: tuple[int, int | None]) -> None:
-    with pytest.raises(RemoteError) as caught:
-        check_status(pair(name)[1])
-    assert (caught.value.sts, caught.value.ext_sts) == codes
 
 
 @pytest.mark.parametrize(('sts', 'data'), [

@@ -63,12 +63,6 @@ def test_write_stops_at_the_first_refusal() -> None:
         steps.send(reply(sts=0x60))
 
 
-def test_bits_are_masked_writes() -> None:
-    steps = write(AddressedValues.of('B3:0/15', SLC, 2), [True, True])
-    assert requests_of(steps, reply(), reply()) == [
-        'AB 02 03 85 00 00 00 80 00 80', 'AB 02 03 85 01 00 01 00 01 00']
-
-
 def test_what_must_not_be_written_is_refused_before_the_first_step() -> None:
     with pytest.raises(FormatError, match='HSC:0.ACC belongs to the processor'):
         write(AddressedValues.of('HSC:0.ACC', SLC), [1])

@@ -62,18 +62,6 @@ def test_string_for_a_plc(text: str, words: str) -> None:
     assert encode_counted(text) == bytes.fromhex(words).ljust(84, b'\0')
 
 
-@pytest.mark.parametrize('text, count, words', [
-    ('', 2, '00 00 00 00'), ('a', 1, '00 61'), ('abc', 2, '62 61 00 63'),
-    ('abcd', 2, '62 61 64 63'), ('HELLO', 4, '45 48 4c 4c 00 4f 00 00')])
-def test_characters_without_a_length(text: str, count: int, words: str) -> None:
-    assert encode_packed(text, count) == bytes.fromhex(words)
-    assert decode_packed(bytes.fromhex(words)) == text
-
-
-def test_nul_between_characters_is_kept_and_blanks_are() -> None:
-    assert decode_packed(bytes.fromhex('00 61 20 62 20 20 00 00')) == 'a\0b   '
-
-
 def test_string_length_that_no_plc_has() -> None:
     with pytest.raises(FormatError, match='^string length 83 is more than 82$'):
         decode_counted(b'\x53\0' + bytes(82))

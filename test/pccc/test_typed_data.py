@@ -20,10 +20,6 @@ from hypothesis import given
 from hypothesis import strategies as st
 import pytest
 from support.cases import for_all
-from support.vectors import pair, vector, VECTORS
-
-TYPED_READS = sorted({entry.pair for entry in VECTORS
-                      if entry.pair and entry.fnc == 0x68 and '_max' not in entry.pair})
 
 
 @pytest.mark.parametrize(('type_id', 'size', 'data', 'encoded'), [
@@ -51,19 +47,6 @@ def test_long_array_has_a_two_byte_size() -> None:
     assert values.count == 150
 
 
-@pytest.mark.parametrize('encoded', [
-    '93 09 42 D2 04', '99 09 03 42 D2 04', '9A 09 03 00 42 D2 04', '42 D2 04', '49 02 D2 04',
-    '4A 02 00 D2 04', '94 09 92 04 D2 04', 'B3 09 00 00 42 D2 04',
-    '9B 09 03 00 00 42 D2 04'])
-def test_every_legal_form_of_one_integer(encoded: str) -> None:
-    assert TypedData.decode(bytes.fromhex(encoded)) == TypedData(4, 2, b'\xD2\x04')
-
-
-def test_example_of_the_manual_with_a_padded_size() -> None:
-    data = bytes(range(20))
-    assert TypedData.decode(bytes.fromhex('9A 09 15 00 42') + data) == TypedData(4, 2, data)
-
-
 def test_padding_behind_an_array_is_passed_over() -> None:
     assert TypedData.decode(bytes.fromhex('93 09 42 D2 04 00 00')) == TypedData(4, 2, b'\xD2\x04')
 
@@ -75,30 +58,6 @@ def test_padding_behind_an_array_is_passed_over() -> None:
 def test_what_does_not_add_up_is_a_format_error(encoded: str) -> None:
     with pytest.raises(FormatError):
         TypedData.decode(bytes.fromhex(encoded))
-
-
-@pytest.mark.parametrize('name', TYPED_READS)
-def test_reply_of_every_typed_read_vector(name: str) -> None:
-    request, reply = pair(name)
-    size = int.from_bytes(request.data[-2:], 'little')
-    values = TypedData.decode(reply.data)
-    assert values.count == size
-    assert reply.data.endswith(values.data)
-    assert (values.type_id, values.element_size) in {(4, 2), (8, 4), (5, 10), (6, 6), (7, 6)}
-    if not name.endswith(('_ext', '_pad', '_bare')):
-        assert values.encode() == reply.data
-
-
-def test_vectors_of_one_value_mean_the_same() -> None:
-    names = [f'plc5_typed_read_N7_30_1_{form}' for form in ('short', 'ext', 'pad', 'bare')]
-    decoded = {TypedData.decode(pair(name)[1].data) for name in names}
-    assert decoded == {TypedData(4, 2, (1234).to_bytes(2, 'little'))}
-
-
-def test_data_of_the_typed_write_vector() -> None:
-    data = vector('plc5_typed_write_badtype_req_fd_crc').packet.data[9:]
-    assert TypedData.decode(data) == TypedData(4, 2, b'\x01\x00')
-    assert TypedData(4, 2, b'\x01\x00').encode() == data
 
 
 @given(st.integers(1, 0x20).filter(lambda value: value != 9), st.integers(1, 300),

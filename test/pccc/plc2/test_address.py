@@ -17,8 +17,6 @@
 from abdf1_ros.pccc.address import AddressRangeError, AddressSyntaxError
 from abdf1_ros.pccc.families import parse_address
 from abdf1_ros.pccc.file_types import PlcType
-from hypothesis import given
-from hypothesis import strategies as st
 import pytest
 
 PLC2 = PlcType.PLC2
@@ -32,17 +30,6 @@ PLC2 = PlcType.PLC2
 def test_words_and_bits_are_octal(text: str, word: int, bit: int | None, shown: str) -> None:
     address = parse_address(text, PLC2)
     assert (address.offset, address.bit, str(address)) == (word, bit, shown)
-
-
-@given(st.integers(0, 0x7FFF), st.one_of(st.none(), st.integers(0, 15)))
-def test_every_address_is_read_back(word: int, bit: int | None) -> None:
-    # Five digits alone are a word of three and a bit, as PLC-2 manuals write it.
-    digits = f'{word:06o}' if bit is None else f'{word:o}'
-    address = parse_address(digits + ('' if bit is None else f'/{bit:o}'), PLC2)
-    assert (address.offset, address.bit) == (word, bit)
-    assert parse_address(str(address), PLC2) == address
-    assert address.at_offset(word) == parse_address(f'{word:06o}', PLC2)
-    assert word < address.area_size
 
 
 @pytest.mark.parametrize('text', ['', 'N7:0', '020:1', '20/', '/1', '018', '20/9', '-1', '٢'])

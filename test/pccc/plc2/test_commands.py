@@ -17,14 +17,8 @@
 from abdf1_ros.errors import FormatError
 from abdf1_ros.pccc.fields import Reader
 from abdf1_ros.pccc.plc2.commands import BasicBitWrite, BasicRead, BasicWrite, ByteChange
-from hypothesis import given
-from hypothesis import strategies as st
 import pytest
 from support.vectors import vector
-
-changes = st.builds(
-    lambda address, mask, bits: ByteChange(address, bits & mask, ~bits & mask),
-    st.integers(0, 0xFFFF), st.integers(0, 0xFF), st.integers(0, 0xFF))
 
 
 @pytest.mark.parametrize(('name', 'cmd', 'request_'), [
@@ -37,17 +31,6 @@ def test_request_is_the_bytes_of_its_vector_and_back(
     assert packet.cmd == cmd
     assert packet.data == request_.encode()
     assert type(request_).read(Reader(packet.data)) == request_
-
-
-def test_bit_write_has_four_bytes_for_each_byte() -> None:
-    request = BasicBitWrite((ByteChange(0x20, 0x01, 0x80), ByteChange(0x21, 0x00, 0x0F)))
-    assert request.encode() == bytes.fromhex('20 00 01 80 21 00 00 0F')
-
-
-@given(st.lists(changes, min_size=1, max_size=60))
-def test_bit_write_is_read_back(entries: list[ByteChange]) -> None:
-    request = BasicBitWrite(tuple(entries))
-    assert BasicBitWrite.read(Reader(request.encode())) == request
 
 
 @pytest.mark.parametrize('data', ['', '20 00', '20 00 01', '20 00 01 00 21', '20 00 03 01'])

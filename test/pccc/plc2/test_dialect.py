@@ -21,7 +21,6 @@ from abdf1_ros.pccc.families import parse_address
 from abdf1_ros.pccc.file_types import FileType, PlcType
 from abdf1_ros.pccc.plc2.dialect import Plc2Dialect
 import pytest
-from support.vectors import vector
 
 UNPROTECTED = Plc2Dialect(Access.UNPROTECTED)
 PROTECTED = Plc2Dialect(Access.PROTECTED)
@@ -31,26 +30,6 @@ CIF = Plc2Dialect(Access.CIF)
 def at(text: str) -> Address:
     """Return an address."""
     return parse_address(text, PlcType.PLC2)
-
-
-@pytest.mark.parametrize(('name', 'request_'), [
-    ('plc2_write_unprot_req_fd_crc', UNPROTECTED.write(at('011'), b'\xFF\xFF')),
-    ('cif_read_word_req_fd_crc', CIF.read(at('011'), 1))])
-def test_dialect_asks_with_the_bytes_of_the_vector(name: str, request_: tuple[int, bytes]) -> None:
-    packet = vector(name).packet
-    assert (packet.cmd, packet.data) == request_
-
-
-@pytest.mark.parametrize(('dialect', 'read', 'write'), [
-    (UNPROTECTED, (0x01, '20 00 04'), (0x08, '20 00 01 02 03 04')),
-    (PROTECTED, (0x01, '20 00 04'), (0x00, '20 00 01 02 03 04')),
-    (CIF, (0x01, '10 00 04'), (0x08, '10 00 01 02 03 04'))])
-def test_read_and_write(dialect: Plc2Dialect, read: tuple[int, str],
-                        write: tuple[int, str]) -> None:
-    cmd, data = dialect.read(at('020'), 2)
-    assert (cmd, data) == (read[0], bytes.fromhex(read[1]))
-    cmd, data = dialect.write(at('020'), b'\1\2\3\4')
-    assert (cmd, data) == (write[0], bytes.fromhex(write[1]))
 
 
 @pytest.mark.parametrize(('mask', 'bits', 'encoded'), [

@@ -16,51 +16,16 @@
 
 from abdf1_ros.pccc.data_table import DataTable
 from abdf1_ros.pccc.file_types import PlcType
-from abdf1_ros.pccc.server import Server
 import pytest
 from support.cases import for_all
 from support.tables import ask, counting, table, words_at
-from support.vectors import pair, vector
 
 PLC2, PLC3, PLC5, SLC = PlcType.PLC2, PlcType.PLC3, PlcType.PLC5, PlcType.SLC
-BIT_WRITES = (0x02, 0x05)
 
 
 def words(count: int = 16) -> DataTable:
     """Return a PLC-2 whose words are their numbers."""
     return table(PLC2, **{'000': counting(count)})
-
-
-def test_reply_of_the_printed_read_whose_address_is_a_word_further() -> None:
-    answered = vector('516_fd_plc2_read_rep').packet
-    assert ask(table(PLC2, **{'011': 'FF FF'}), '12 00 02', 0x01) == (
-        0, answered.data.hex(' ').upper())
-
-
-def test_write_of_the_vectors() -> None:
-    memory = words()
-    command, reply = pair('plc2_write_unprot')
-    assert Server(memory).serve(command) == reply
-    assert words_at(memory, '010', 3) == '08 00 FF FF 0A 00'
-
-
-def test_common_interface_file_of_the_vectors() -> None:
-    command, reply = pair('cif_read_word')
-    assert Server(table(SLC, N9_0='00 00' * 9 + '02 01')).serve(command) == reply
-
-
-@pytest.mark.parametrize('cmd', [0x00, 0x08])
-def test_both_writes_store_words(cmd: int) -> None:
-    memory = words()
-    assert ask(memory, '04 00 AA BB CC DD', cmd) == (0, '')
-    assert words_at(memory, '001', 4) == '01 00 AA BB CC DD 04 00'
-
-
-@pytest.mark.parametrize('cmd', BIT_WRITES)
-def test_bit_writes_change_bytes(cmd: int) -> None:
-    memory = table(PLC2, **{'000': 'FF 00 00 FF 12 34'})
-    assert ask(memory, '00 00 00 0F 01 00 80 00 03 00 01 80', cmd) == (0, '')
-    assert words_at(memory, '000', 3) == 'F0 80 00 7F 12 34'
 
 
 def test_largest_packets_are_served_and_larger_ones_refused() -> None:

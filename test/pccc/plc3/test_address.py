@@ -45,16 +45,6 @@ def test_both_forms_name_the_same_place(text: str, levels: str, shown: str, offs
     assert (str(address), address.offset) == (shown, offset)
 
 
-@given(st.sampled_from(list(SECTIONS)), st.integers(0, 999), st.data(),
-       st.one_of(st.none(), st.integers(0, 15)))
-def test_every_address_is_read_back(kind: FileType, file: int, data: st.DataObject,
-                                    bit: int | None) -> None:
-    element = data.draw(st.integers(0, ADDRESSING.last_element(kind)))
-    word = data.draw(st.integers(0, 2)) if kind.is_structure else 0
-    address = Address(ADDRESSING, kind, 0 if kind.is_structure else file, element, word, bit)
-    assert parse_address(str(address), PLC3) == address
-
-
 @given(st.sampled_from(list(SECTIONS)), st.data(), st.one_of(st.none(), st.integers(0, 15)))
 def test_offset_leads_back_to_its_word(kind: FileType, data: st.DataObject,
                                        bit: int | None) -> None:

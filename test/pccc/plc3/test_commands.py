@@ -33,15 +33,6 @@ def test_extended_address_is_encoded_and_read_back(address: ExtendedAddress, enc
     assert ExtendedAddress.read(Reader(bytes.fromhex(encoded))) == address
 
 
-@pytest.mark.parametrize(('encoded', 'address'), [
-    ('3F 03 01 08 0A 00 05', ExtendedAddress(8, 10, 0, 5)),
-    ('0C 08 0A', ExtendedAddress(8, 10)), ('2C 08 FF 0A 00 00', ExtendedAddress(8, 10)),
-    ('21 03 07', ExtendedAddress(0, 0, 0, 7))])
-def test_levels_that_are_left_out_have_their_default(encoded: str,
-                                                     address: ExtendedAddress) -> None:
-    assert ExtendedAddress.read(Reader(bytes.fromhex(encoded))) == address
-
-
 @given(st.builds(ExtendedAddress, levels, levels, levels, levels))
 def test_every_address_is_read_back(address: ExtendedAddress) -> None:
     reader = Reader(address.encode())

@@ -15,33 +15,10 @@
 """What an emulated PLC-3 answers to its own commands."""
 
 from abdf1_ros.pccc.file_types import PlcType
-from abdf1_ros.pccc.server import Server
 import pytest
 from support.tables import ask, counting, table, words_at
-from support.vectors import pair, vector
 
 PLC3 = PlcType.PLC3
-
-
-@pytest.mark.parametrize('number', [1, 3])
-def test_word_range_reads_of_the_vectors(number: int) -> None:
-    memory = table(PLC3, B10_0='00 00' * 342)
-    reply = Server(memory).serve(vector(f'516_fd_plc3_wrr_cmd{number}').packet)
-    expected = vector(f'516_fd_plc3_wrr_rep{number}_zero_data').packet
-    assert (reply.cmd, reply.sts, reply.tns, reply.data) == (
-        expected.cmd, expected.sts, expected.tns, expected.data)
-
-
-def test_offset_of_the_vectors_is_honoured() -> None:
-    memory = table(PLC3, B10_0=counting(342))
-    replies = [Server(memory).serve(vector(f'516_fd_plc3_wrr_cmd{number}').packet)
-               for number in (1, 2, 3)]
-    assert b''.join(reply.data for reply in replies).hex() == counting(342)
-
-
-def test_file_read_of_the_vectors() -> None:
-    command, reply = pair('plc3_file_read')
-    assert Server(table(PLC3, B10_0='01 00 02 00 03 00 04 00 05 00')).serve(command) == reply
 
 
 def test_file_read_begins_at_the_first_word() -> None:
@@ -61,12 +38,6 @@ def test_timer_is_three_words_of_a_structure() -> None:
     assert ask(memory, '01 00 00 01 00 3C 03 00 02 02 02') == (0, '2A 00')
     assert ask(memory, '00 00 00 01 00 3C 03 00 02 01 77 00') == (0, '')
     assert words_at(memory, 'T:2.PRE') == '77 00'
-
-
-def test_bit_write_sets_and_resets() -> None:
-    memory = table(PLC3, B10_0='00 00 FF 00 00 00')
-    assert ask(memory, '02 2C 08 0A 01 00 80 0F 00') == (0, '')
-    assert words_at(memory, 'B10:0', 3) == '00 00 F0 80 00 00'
 
 
 @pytest.mark.parametrize(('data', 'ext_sts'), [

@@ -27,8 +27,6 @@ from abdf1_ros.pccc.plc5.commands import (
     TypedRead,
     TypedWrite,
 )
-from abdf1_ros.pccc.typed_data import TypedData
-from hypothesis import given
 from hypothesis import strategies as st
 import pytest
 from support.cases import for_all
@@ -37,11 +35,7 @@ from support.vectors import commands, Vector, without_area
 COMMANDS: dict[int, type[TypedRead | TypedWrite | ReadModifyWrite]] = {
     0x68: TypedRead, 0x67: TypedWrite, 0x26: ReadModifyWrite}
 
-levels = st.integers(0, 0xFFFF)
-addresses = st.builds(SystemAddress, levels, levels, st.one_of(st.none(), levels))
 words = st.integers(0, 0xFFFF)
-values = st.builds(lambda type_id, size, count: TypedData(type_id, size, bytes(size * count)),
-                   st.integers(1, 8), st.integers(1, 90), st.integers(0, 4))
 
 
 def parameters(data: str | bytes) -> Reader:
@@ -109,28 +103,6 @@ def test_descriptors_and_element_sizes(letters: str, descriptor: str, words: int
     assert encoded.endswith(bytes.fromhex(descriptor) + bytes(4 * size))
 
 
-def test_typed_read_of_the_manual() -> None:
-    read = TypedRead(SystemAddress(7, 0), 40, 110, 150)
-    encoded = '68 6E 00 96 00 06 07 00 28 00'
-    assert read.encode() == bytes.fromhex(encoded)
-    assert TypedRead.read(parameters(encoded[3:])) == read
-
-
-def test_typed_write_of_one_integer() -> None:
-    write = TypedWrite(SystemAddress(7, 10), TypedData(4, 2, b'\x10\x10'), 0, 1)
-    encoded = '67 00 00 01 00 06 07 0A 93 09 42 10 10'
-    assert write.encode() == bytes.fromhex(encoded)
-    assert TypedWrite.read(parameters(encoded[3:])) == write
-
-
-def test_read_modify_write_of_two_words() -> None:
-    change = ReadModifyWrite((BitSet(SystemAddress(3, 4), 0xFFF7, 0x0100),
-                              BitSet(SystemAddress(4, 2, 0), 0xFFFF, 1)))
-    encoded = '26 06 03 04 F7 FF 00 01 0E 04 02 00 FF FF 01 00'
-    assert change.encode() == bytes.fromhex(encoded)
-    assert ReadModifyWrite.read(parameters(encoded[3:])) == change
-
-
 def test_read_modify_write_takes_243_bytes() -> None:
     short, long = BitSet(SystemAddress(7, 0), 0, 0), BitSet(SystemAddress(300, 0, 0), 0, 0)
     fits = (*[short] * 33, long)
@@ -153,41 +125,6 @@ def test_command_of_every_vector(entry: Vector) -> None:
     again = command.encode()
     assert COMMANDS[data[0]].read(Reader(again[1:])) == command
     assert again == without_area(data) or b'\0$' in data
-
-
-def test_vectors_have_every_command() -> None:
-    assert {entry.fnc for entry in commands(*COMMANDS)} == set(COMMANDS)
-
-
-@given(addresses, words, words, words)
-def test_typed_read_is_read_back(address: SystemAddress, size: int, offset: int,
-                                 total: int) -> None:
-    command = TypedRead(address, size, offset, total)
-    assert TypedRead.read(Reader(command.encode()[1:])) == command
-
-
-@given(addresses, values, words, words)
-def test_typed_write_is_read_back(address: SystemAddress, data: TypedData, offset: int,
-                                  total: int) -> None:
-    command = TypedWrite(address, data, offset, total)
-    assert TypedWrite.read(Reader(command.encode()[1:])) == command
-
-
-@given(st.lists(st.builds(BitSet, addresses, words, words), min_size=1, max_size=10))
-def test_read_modify_write_is_read_back(sets: list[BitSet]) -> None:
-    command = ReadModifyWrite(tuple(sets))
-    assert ReadModifyWrite.read(Reader(command.encode()[1:])) == command
-
-
-@given(st.sampled_from(sorted(COMMANDS)), st.binary(max_size=30))
-def test_any_bytes_are_a_command_or_a_format_error(fnc: int, data: bytes) -> None:
-    reader = Reader(data)
-    try:
-        command = COMMANDS[fnc].read(reader)
-    except FormatError:
-        return
-    assert reader.is_empty
-    assert COMMANDS[fnc].read(Reader(command.encode()[1:])) == command
 
 
 def test_bytes_behind_a_typed_read_are_a_format_error() -> None:

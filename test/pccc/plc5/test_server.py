@@ -35,13 +35,6 @@ def test_plc5_timer_is_written_with_its_two_internal_words() -> None:
     assert words_at(words, 'T4:0', 9) == ('00 00 00 00 00 00 00 C2 0A 00 09 00 00 C3 0B 00 08 00')
 
 
-def test_plc5_member_is_an_integer() -> None:
-    words = table(PLC5, T4_0='00 E0 64 00 2A 00 01 00 02 00 03 00')
-    assert ask(words, '68 00 00 01 00 0F 00 04 01 02 01 00') == (0, '93 09 42 03 00')
-    assert ask(words, '67 00 00 01 00 0F 00 04 01 01 93 09 42 77 00') == (0, '')
-    assert words_at(words, 'T4:1', 3) == '01 00 77 00 03 00'
-
-
 def test_plc5_float_of_a_pid_is_a_float() -> None:
     words = table(PLC5, PD12_10='00 00' * 82)
     assert ask(words, '67 00 00 02 00 0F 00 0C 0A 02 99 09 0A 94 08 00 00 2A 42 00 00 80 3F') == (
@@ -75,14 +68,6 @@ def test_plc5_takes_members_in_logical_ascii() -> None:
     assert ask(words, f'68 00 00 01 00 {rgs} 01 00') == (0, '93 09 42 05 00')
 
 
-def test_plc5_offset_counts_elements() -> None:
-    words = table(PLC5, C5_0=counting(12), N7_0=counting(9))
-    assert ask(words, '68 02 00 03 00 07 00 07 01 01 00') == (0, '93 09 42 03 00')
-    assert ask(words, '68 01 00 03 00 07 00 05 01 01 00') == (0, '97 09 66 06 00 07 00 08 00')
-    assert ask(words, '67 02 00 03 00 07 00 07 01 93 09 42 FF 00') == (0, '')
-    assert words_at(words, 'N7:2', 3) == '02 00 FF 00 04 00'
-
-
 @for_all(('data', 'ext_sts'), [
     ('68 00 00 01 00 07 00 09 00 01 00', '06'), ('68 00 00 01 00 07 00 07 04 01 00', '07'),
     ('68 00 00 05 00 07 00 07 00 05 00', '07'), ('68 00 00 01 00 07 00 07 00 02 00', '01'),
@@ -112,26 +97,6 @@ def test_plc5_reply_beyond_240_bytes_is_refused() -> None:
     words = table(PLC5, N7_0='00 00' * 200)
     assert ask(words, '68 00 00 76 00 07 00 07 00 76 00')[0] == 0
     assert ask(words, '68 00 00 77 00 07 00 07 00 77 00') == (0xF0, '0A')
-
-
-def test_plc5_write_beyond_240_bytes_is_refused() -> None:
-    words = table(PLC5, N7_0='00 00' * 200)
-    most, more = '07 ' * 232, '07 ' * 234
-    assert ask(words, f'67 00 00 75 00 07 00 07 00 99 09 EB 42 {more}') == (0xF0, '0A')
-    assert words_at(words, 'N7:0') == '00 00'
-    assert ask(words, f'67 00 00 74 00 07 00 07 00 99 09 E9 42 {most}') == (0, '')
-    assert words_at(words, 'N7:115', 2) == '07 07 00 00'
-
-
-@pytest.mark.parametrize(('old', 'and_mask', 'or_mask', 'new'), [
-    ('FF FF', 'F7 FF', '00 01', 'F7 FF'), ('00 00', 'FF FF', '00 01', '00 01'),
-    ('34 12', '00 00', 'CD AB', 'CD AB'), ('34 12', 'FF FF', '00 00', '34 12'),
-    ('0F 00', 'F0 FF', '01 00', '01 00')])
-def test_plc5_read_modify_write_is_and_then_or(old: str, and_mask: str, or_mask: str,
-                                               new: str) -> None:
-    words = table(PLC5, B3_0=old)
-    assert ask(words, f'26 07 00 03 00 {and_mask} {or_mask}') == (0, '')
-    assert words_at(words, 'B3:0') == new
 
 
 def test_plc5_read_modify_write_of_the_same_word_twice_runs_in_order() -> None:

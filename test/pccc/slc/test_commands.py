@@ -19,10 +19,7 @@ from functools import partial
 
 from abdf1_ros.errors import FormatError
 from abdf1_ros.pccc.fields import Reader
-from abdf1_ros.pccc.file_types import FileType
-from abdf1_ros.pccc.slc.address import BY_CODE
 from abdf1_ros.pccc.slc.commands import (
-    FLAT_CODES,
     LogicalAddress,
     LogicalRead,
     LogicalWrite,
@@ -30,8 +27,6 @@ from abdf1_ros.pccc.slc.commands import (
     MAX_READ,
     MAX_WRITE,
 )
-from hypothesis import given
-from hypothesis import strategies as st
 import pytest
 from support.cases import for_all
 from support.vectors import commands, Vector
@@ -42,11 +37,6 @@ READERS: dict[int, Callable[[Reader], Command]] = {
     0xA1: partial(LogicalRead.read, is_short=True), 0xA2: LogicalRead.read,
     0xA9: partial(LogicalWrite.read, is_short=True), 0xAA: LogicalWrite.read,
     0xAB: MaskedWrite.read}
-
-levels = st.integers(0, 0xFFFF)
-places = levels, st.integers(0, 255), levels
-addresses = st.builds(LogicalAddress, *places, levels)
-short_addresses = st.builds(LogicalAddress, *places, st.none())
 
 
 @pytest.mark.parametrize(('command', 'encoded'), [
@@ -77,36 +67,6 @@ def test_command_of_every_vector(entry: Vector) -> None:
     assert command.encode() == data
 
 
-def test_vectors_have_every_command() -> None:
-    assert {entry.fnc for entry in commands(*READERS)} == set(READERS)
-
-
-@given(addresses, st.integers(0, 255), st.integers(0, 0xFFFF), st.binary(max_size=255))
-def test_commands_are_read_back(address: LogicalAddress, size: int, mask: int,
-                                data: bytes) -> None:
-    for command in (LogicalRead(address, size), LogicalWrite(address, data),
-                    MaskedWrite(address, mask, data)):
-        assert type(command).read(Reader(command.encode()[1:])) == command
-
-
-@given(short_addresses, st.integers(0, 255), st.binary(max_size=255))
-def test_short_commands_are_read_back(address: LogicalAddress, size: int, data: bytes) -> None:
-    for command in (LogicalRead(address, size), LogicalWrite(address, data)):
-        encoded = command.encode()
-        assert READERS[encoded[0]](Reader(encoded[1:])) == command
-
-
-@given(st.sampled_from(sorted(READERS)), st.binary(max_size=20))
-def test_any_bytes_are_a_command_or_a_format_error(fnc: int, data: bytes) -> None:
-    reader = Reader(data)
-    try:
-        command = READERS[fnc](reader)
-    except FormatError:
-        return
-    assert reader.is_empty
-    assert READERS[fnc](Reader(command.encode()[1:])) == command
-
-
 @pytest.mark.parametrize(('fnc', 'encoded'), [
     (0xA1, '02 07 89'), (0xA1, '02 07 89 00 01'), (0xA9, '02 07 89 00 01'),
     (0xA9, '02 07 89 00 01 02 03'), (0xA2, ''), (0xA2, '02 07 89 00'),
@@ -125,11 +85,6 @@ def test_sizes_that_do_not_add_up(fnc: int, encoded: str) -> None:
 def test_padding_behind_the_declared_size_is_passed_over(fnc: int, encoded: str) -> None:
     padded = READERS[fnc](Reader(bytes.fromhex(encoded + ' 00 00')))
     assert padded == READERS[fnc](Reader(bytes.fromhex(encoded)))
-
-
-def test_flat_codes_are_those_of_the_images() -> None:
-    assert FLAT_CODES == {FileType.OUTPUT: 0x82, FileType.INPUT: 0x83}
-    assert not FLAT_CODES.values() & BY_CODE.keys()
 
 
 def test_limits_of_the_manual() -> None:

@@ -14,7 +14,6 @@
 
 """Requests to an SLC or MicroLogix, and its replies."""
 
-from abdf1_ros.errors import FormatError
 from abdf1_ros.pccc.access import Access
 from abdf1_ros.pccc.address import Address
 from abdf1_ros.pccc.data_table import DataTable
@@ -25,7 +24,6 @@ from abdf1_ros.pccc.slc import commands as slc
 from abdf1_ros.pccc.slc.dialect import SlcDialect
 import pytest
 from support.tables import replied
-from support.vectors import pair
 
 SLC = PlcType.SLC
 DIALECT = SlcDialect()
@@ -34,36 +32,6 @@ DIALECT = SlcDialect()
 def at(text: str) -> Address:
     """Return an address."""
     return parse_address(text, SLC)
-
-
-@pytest.mark.parametrize(('text', 'words', 'encoded'), [
-    ('N7:0', 10, 'A2 14 07 89 00 00'), ('F8:0', 2, 'A2 04 08 8A 00 00'),
-    ('T4:0', 3, 'A2 06 04 86 00 00'), ('T4:0.ACC', 1, 'A2 02 04 86 00 02'),
-    ('ST9:0', 42, 'A2 54 09 8D 00 00'), ('O:2.0', 1, 'A2 02 00 8B 02 00'),
-    ('PD10:1.SPS', 1, 'A2 02 0A 93 01 02'), ('MG11:0/DN', 1, 'A2 02 0B 92 00 11'),
-    ('PD10:1', 23, 'A2 2E 0A 93 01 00'), ('I:1.3', 2, 'A2 04 01 8C 01 03'),
-    ('N7:255', 1, 'A2 02 07 89 FF FF 00 00'),
-])
-def test_read_is_the_typed_logical_read_of_the_manual(text: str, words: int, encoded: str) -> None:
-    assert DIALECT.read(at(text), words) == (0x0F, bytes.fromhex(encoded))
-
-
-@pytest.mark.parametrize(('text', 'data', 'encoded'), [
-    ('F8:1', '00 00 00 BF', 'AA 04 08 8A 01 00 00 00 00 BF'),
-    ('T4:0.PRE', '2C 01', 'AA 02 04 86 00 01 2C 01'),
-    ('O:2.1', '03 00', 'AA 02 00 8B 02 01 03 00'),
-])
-def test_write_is_the_typed_logical_write_of_the_manual(
-        text: str, data: str, encoded: str) -> None:
-    assert DIALECT.write(at(text), bytes.fromhex(data)) == (0x0F, bytes.fromhex(encoded))
-
-
-@pytest.mark.parametrize(('text', 'encoded'), [
-    ('B3:4', 'AB 02 03 85 04 00 08 01 00 01'), ('O:2.0', 'AB 02 00 8B 02 00 08 01 00 01'),
-])
-def test_bits_are_written_with_a_mask(text: str, encoded: str) -> None:
-    request = DIALECT.write_bits(at(text), 0x0108, 0x0100)
-    assert request == (0x0F, bytes.fromhex(encoded))
 
 
 @pytest.mark.parametrize(('letters', 'read', 'write'), [
@@ -102,16 +70,6 @@ def test_packets_are_as_long_as_the_processor_takes_them(name: str, read: int, w
     assert dialect.max_write(FileType.PID) == write // 46 * 23
 
 
-@pytest.mark.parametrize(('text', 'access', 'name'), [
-    ('O:0', Access.FLAT, 'slc_A2_O0_flat'), ('O:2', Access.SLOT, 'slc_A2_O0_slot'),
-    ('I:1', Access.SLOT, 'slc_A2_I1_slot')])
-def test_io_is_that_of_the_vectors(text: str, access: Access, name: str) -> None:
-    command, reply = pair(name)
-    address = parse_address(text, SLC, access)
-    assert DIALECT.read(address, 1) == (command.cmd, command.data)
-    assert DIALECT.read_data(address, 1, reply.data) == reply.data
-
-
 def test_flat_io_of_the_whole_image() -> None:
     address = parse_address('I:300', SLC, Access.FLAT)
     assert DIALECT.read(address, 2) == (0x0F, bytes.fromhex('A2 04 01 83 FF 2C 01 00'))
@@ -119,9 +77,3 @@ def test_flat_io_of_the_whole_image() -> None:
         0x0F, bytes.fromhex('AA 02 01 83 FF 2C 01 00 01 02'))
     assert DIALECT.write_bits(address, 0x0008, 0x0008) == (
         0x0F, bytes.fromhex('AB 02 01 83 FF 2C 01 00 08 00 08 00'))
-
-
-@pytest.mark.parametrize('size', [0, 2, 5, 8])
-def test_slc_reply_that_is_not_what_was_asked_is_a_format_error(size: int) -> None:
-    with pytest.raises(FormatError, match=f'^the reply holds {size} bytes'):
-        DIALECT.read_data(at('F8:0'), 2, bytes(size))

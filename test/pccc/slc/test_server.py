@@ -15,10 +15,8 @@
 """What an emulated SLC answers to its own commands."""
 
 from abdf1_ros.pccc.file_types import PlcType
-import pytest
 from support.cases import for_all
 from support.tables import ask, counting, table, words_at
-from support.vectors import pair
 
 SLC = PlcType.SLC
 
@@ -37,14 +35,6 @@ def test_command_that_an_slc_refuses_changes_nothing(data: str, sts: int) -> Non
     words = table(SLC, N7_0='00 00' * 4)
     assert ask(words, data) == (sts, '')
     assert words_at(words, 'N7:0', 4) == '00 00 ' * 3 + '00 00'
-
-
-@pytest.mark.parametrize('name', ['slc_A1', 'slc_A9'])
-def test_commands_of_two_fields_are_those_of_the_vectors(name: str) -> None:
-    words = table(SLC, N7_0='00 00 09 00 00 00')
-    command, reply = pair(name)
-    assert ask(words, command.data.hex()) == (reply.sts, reply.data.hex(' ').upper())
-    assert words_at(words, 'N7:0', 3) == '00 00 09 00 00 00'
 
 
 def test_commands_of_two_fields_begin_at_the_first_word() -> None:
@@ -71,18 +61,6 @@ def test_flat_image_is_written_across_slots_or_not_at_all() -> None:
     assert (words_at(words, 'O:0'), words_at(words, 'O:5')) == ('0F 00', '00 00')
     assert ask(words, 'AA 04 00 82 01 00 07 00 07 00') == (0x50, '')
     assert words_at(words, 'O:5') == '00 00'
-
-
-def test_slc_sub_element_is_a_word_of_the_element() -> None:
-    words = table(SLC, T4_0=counting(9), I_3_0=counting(4))
-    assert ask(words, 'A2 04 04 86 01 02') == (0, '05 00 06 00')
-    assert ask(words, 'A2 04 01 8C 03 02') == (0, '02 00 03 00')
-
-
-def test_slc_masked_write_masks_every_word() -> None:
-    words = table(SLC, N7_0='FF FF 00 00 FF FF')
-    assert ask(words, 'AB 04 07 89 00 00 0F 00 05 00 FF FF') == (0, '')
-    assert words_at(words, 'N7:0', 3) == 'F5 FF 0F 00 FF FF'
 
 
 def test_slc_takes_typed_commands_on_files_that_a_plc5_has_too() -> None:

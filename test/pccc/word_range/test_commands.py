@@ -19,8 +19,6 @@ from abdf1_ros.pccc.fields import Reader
 from abdf1_ros.pccc.plc3.commands import ExtendedAddress
 from abdf1_ros.pccc.plc5.commands import SystemAddress
 from abdf1_ros.pccc.word_range.commands import (
-    MAX_READ,
-    MAX_WRITE,
     WordBitWrite,
     WordRangeRead,
     WordRangeWrite,
@@ -60,20 +58,8 @@ def test_file_read_has_the_parameters_of_a_word_range_read() -> None:
         ExtendedAddress(8, 10), 8, 0, 4)
 
 
-def test_bit_write_is_encoded_and_read_back() -> None:
-    request = WordBitWrite(ExtendedAddress(8, 10, 0, 5), 0x0108, 0x8001)
-    assert request.encode() == bytes.fromhex('02 2C 08 0A 05 08 01 01 80')
-    reader = Reader(request.encode()[1:])
-    assert WordBitWrite.read(reader, ExtendedAddress.read) == request
-
-
 @pytest.mark.parametrize('data', ['', '2C 08 0A 05', '2C 08 0A 05 01 00 00', '2C 08 0A 05 01 00'
                                   ' 01 00', '2C 08 0A 05 01 00 02 00 07'])
 def test_what_is_no_bit_write(data: str) -> None:
     with pytest.raises(FormatError):
         WordBitWrite.read(Reader(bytes.fromhex(data)), ExtendedAddress.read)
-
-
-def test_limits_of_the_manual() -> None:
-    """M 7-34, 7-35."""
-    assert (MAX_READ, MAX_WRITE) == (244, 240)

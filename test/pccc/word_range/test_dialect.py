@@ -15,14 +15,12 @@
 """Word range requests to a PLC-3 and a PLC-5."""
 
 from abdf1_ros.pccc.address import Address
-from abdf1_ros.pccc.dialect import Transfer
 from abdf1_ros.pccc.families import parse_address
 from abdf1_ros.pccc.file_types import FileType, PlcType
 from abdf1_ros.pccc.plc3.dialect import PLC3
 from abdf1_ros.pccc.plc5.dialect import PLC5_WORD_RANGE
 from abdf1_ros.pccc.word_range.dialect import WordRangeDialect
 import pytest
-from support.vectors import vector, without_area
 
 FAMILIES = {PlcType.PLC3: PLC3, PlcType.PLC5: PLC5_WORD_RANGE}
 
@@ -30,32 +28,6 @@ FAMILIES = {PlcType.PLC3: PLC3, PlcType.PLC5: PLC5_WORD_RANGE}
 def at(text: str, family: str = 'PLC3') -> Address:
     """Return an address."""
     return parse_address(text, PlcType(family))
-
-
-@pytest.mark.parametrize('number', [1, 2, 3])
-def test_packets_of_a_printed_transfer(number: int) -> None:
-    whole = Transfer(at('E3.1.8.10.0.0'), 342)
-    part = whole.start.at_offset(114 * (number - 1))
-    packet = vector(f'516_fd_plc3_wrr_cmd{number}').packet
-    assert PLC3.read(part, 114, whole) == (packet.cmd, packet.data)
-
-
-@pytest.mark.parametrize(('name', 'request_'), [
-    ('plc5_wrr_F8_req_fd_crc', PLC5_WORD_RANGE.read(at('F8:0', 'PLC5'), 2)),
-    ('plc5_wrr_max_req_fd_crc', PLC5_WORD_RANGE.read(at('N7:0', 'PLC5'), 122)),
-    ('plc5_wrw_N7_req_fd_crc',
-     PLC5_WORD_RANGE.write(at('N7:10', 'PLC5'), b'\x10\x10\x07\0'))])
-def test_dialect_asks_with_the_bytes_of_the_vector(name: str, request_: tuple[int, bytes]) -> None:
-    packet = vector(name).packet
-    assert (packet.cmd, without_area(packet.data)) == request_
-
-
-def test_float_of_the_vectors() -> None:
-    reply = vector('plc5_wrr_F8_rep_fd_crc').packet
-    address = at('F8:0', 'PLC5')
-    assert PLC5_WORD_RANGE.read_data(address, 2, reply.data) == b'\0\0\x7A\x44'  # 1000.0
-    _, data = PLC5_WORD_RANGE.write(address, b'\0\0\x7A\x44')
-    assert data.endswith(reply.data)
 
 
 @pytest.mark.parametrize(('text', 'family', 'encoded'), [
@@ -68,14 +40,6 @@ def test_address_is_encoded_for_its_family(text: str, family: str, encoded: str)
     dialect: WordRangeDialect = FAMILIES[PlcType(family)]
     assert dialect.read(at(text, family), 1) == (
         0x0F, bytes.fromhex(f'01 00 00 01 00 {encoded} 02'))
-
-
-@pytest.mark.parametrize(('text', 'family', 'encoded'), [
-    ('B10:5', 'PLC3', '02 2C 08 0A 05 00 01 08 00'),
-    ('B3:4', 'PLC5', '26 06 03 04 F7 FE 00 01')])
-def test_bits_are_written_with_and_and_or_masks(text: str, family: str, encoded: str) -> None:
-    request = FAMILIES[PlcType(family)].write_bits(at(text, family), 0x0108, 0xFF00)
-    assert request == (0x0F, bytes.fromhex(encoded))
 
 
 @pytest.mark.parametrize(('family', 'letters', 'read', 'write'), [

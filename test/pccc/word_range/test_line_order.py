@@ -18,18 +18,12 @@ from abdf1_ros.pccc.address import Address
 from abdf1_ros.pccc.families import parse_address
 from abdf1_ros.pccc.file_types import PlcType
 from abdf1_ros.pccc.word_range.commands import in_line_order, word_on_line
-from hypothesis import given
-from hypothesis import strategies as st
 import pytest
 
 
 def at(text: str) -> Address:
     """Return an address of a PLC-5."""
     return parse_address(text, PlcType.PLC5)
-
-
-def test_the_high_word_of_a_float_comes_first() -> None:
-    assert in_line_order(at('F8:3'), b'\1\2\3\4\5\6\7\x08') == b'\3\4\1\2\7\x08\5\6'
 
 
 @pytest.mark.parametrize('text', ['N7:0', 'T4:0', 'B3:0', 'ST9:0', 'MG9:0'])
@@ -45,11 +39,6 @@ def test_only_the_floats_of_a_pid_block_are_exchanged() -> None:
         order[first], order[first + 1] = order[first + 1], order[first]
     line = in_line_order(at('PD10:1'), b''.join(words))
     assert list(line[::2]) == order
-
-
-@given(st.sampled_from(['F8:0', 'PD10:2']), st.binary(min_size=328, max_size=328))
-def test_the_line_order_of_the_line_order_is_ours(text: str, data: bytes) -> None:
-    assert in_line_order(at(text), in_line_order(at(text), data)) == data
 
 
 @pytest.mark.parametrize('text', ['F8:2', 'PD10:1', 'N7:0'])

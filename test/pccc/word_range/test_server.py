@@ -15,26 +15,10 @@
 """What an emulated PLC-5 answers to word range commands and bit writes."""
 
 from abdf1_ros.pccc.file_types import PlcType
-from abdf1_ros.pccc.server import Server
 import pytest
 from support.tables import ask, counting, table, words_at
-from support.vectors import pair
 
 PLC5 = PlcType.PLC5
-
-
-@pytest.mark.parametrize(('name', 'place', 'words'), [
-    ('plc5_wrr_F8', 'F8_0', '00 00 7A 44'), ('plc5_wrr_max', 'N7_0', '00 00' * 122)])
-def test_reads_of_the_vectors(name: str, place: str, words: str) -> None:
-    command, reply = pair(name)
-    assert Server(table(PLC5, **{place: words})).serve(command) == reply
-
-
-def test_write_of_the_vectors() -> None:
-    memory = table(PLC5, N7_0=counting(13))
-    command, reply = pair('plc5_wrw_N7')
-    assert Server(memory).serve(command) == reply
-    assert words_at(memory, 'N7:9', 4) == '09 00 10 10 07 00 0C 00'
 
 
 def test_floats_have_their_high_word_first() -> None:
@@ -59,12 +43,6 @@ def test_structures_are_words_in_the_order_of_storage() -> None:
     assert ask(memory, '01 00 00 01 00 0E 04 01 02 02') == (0, '05 00')
     assert ask(memory, '00 01 00 02 00 0E 04 01 01 FF 00') == (0, '')
     assert words_at(memory, 'T4:1', 3) == '03 00 04 00 FF 00'
-
-
-def test_bit_write_sets_and_resets() -> None:
-    memory = table(PLC5, B3_0='00 00 FF 00')
-    assert ask(memory, '02 06 03 01 00 80 0F 00') == (0, '')
-    assert words_at(memory, 'B3:0', 2) == '00 00 F0 80'
 
 
 @pytest.mark.parametrize(('data', 'sts', 'ext_sts'), [
