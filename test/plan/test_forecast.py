@@ -21,11 +21,9 @@ from abdf1_ros.plan.forecast import (
     intervals,
     line_model,
     load,
-    longest_wait,
     PATIENCE,
     poll_cycle,
 )
-from abdf1_ros.plan.line_model import ReadRequest
 from abdf1_ros.plan.planner import Planner
 from abdf1_ros.settings.network import Network
 import pytest
@@ -68,11 +66,6 @@ def expected(*rows: tuple[int, int]) -> tuple[dict[float, float], float]:
     return intervals(blocks), block_time(blocks[0])
 
 
-def test_periods_come_true_on_a_line_that_is_fast_enough() -> None:
-    found, _ = expected((500, 3), (1000, 5))
-    assert found == {0.5: 0.5, 1.0: 1.0}
-
-
 def test_periods_are_longer_by_the_load_of_the_line_but_by_no_more_than_a_scan() -> None:
     found, time = expected((100, 1), (1000, 20))
     needed = time / 0.1 + 20 * time / 1.0
@@ -99,23 +92,6 @@ def test_reads_without_a_period_are_expected_to_have_little_of_a_full_line() -> 
     stretch = needed + 2 * time / (PATIENCE * once)
     assert found[0.0] == pytest.approx(min(PATIENCE * once * stretch, (PATIENCE + 1) * once))
     assert found[0.1] == pytest.approx(min(0.1 * stretch, 0.1 + once))
-
-
-def test_nobody_waits_longer_than_for_one_packet() -> None:
-    blocks = blocks_of(NETWORK)
-    assert longest_wait(blocks) == max(map(block_time, blocks))
-    long, = Planner(line_model(NETWORK), 0.1).plan([make_mapping('N7:0', length=240)])
-    assert len(long.requests) > 1
-    assert longest_wait([long]) == pytest.approx(block_time(long) / len(long.requests))
-    assert longest_wait([]) == 0.0
-
-
-@pytest.mark.parametrize('mode, transmissions', [('Master', 3), ('Peer', 2)])
-def test_tx_delay_comes_before_each_transmission(mode: str, transmissions: int) -> None:
-    request = ReadRequest(ROWS[0].address, 10)
-    times = [line_model(Network(mode=mode, tx_delay=delay)).read_time(ROWS[0].dialect, request)
-             for delay in (0, 20)]
-    assert times[1] - times[0] == pytest.approx(transmissions * 0.02)
 
 
 @pytest.mark.parametrize('tx_delay', [0, 20])

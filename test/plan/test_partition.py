@@ -24,7 +24,6 @@ from abdf1_ros.plan.partition import (
     CostModel,
     partition,
     Span,
-    without_contained,
 )
 from hypothesis import given
 from hypothesis import strategies as st
@@ -54,17 +53,6 @@ def least_load(wanted: Sequence[Candidate], model: CostModel = MODEL) -> float:
     return min(load(map(joined, groups), model) for groups in groupings(wanted))
 
 
-@given(st.lists(SPANS, min_size=1, max_size=6, unique=True), st.sampled_from([1, 3]))
-def test_nothing_is_cheaper_where_all_have_one_period(spans: list[Span], element: int) -> None:
-    model = CostModel(COSTS[:LIMIT // element * element + 1], element)
-    wanted = [Candidate(span.aligned(element), 1.0) for span in spans]
-    blocks = cheapest([entry.span for entry in wanted], model)
-    assert load((Candidate(block, 1.0) for block in blocks), model) == pytest.approx(
-        least_load(list(dict.fromkeys(wanted)), model))
-    for entry in wanted:
-        assert any(block.holds(entry.span) for block in blocks)
-
-
 @given(st.lists(st.tuples(SPANS, st.sampled_from([0.1, 0.5, 1.0])), min_size=1, max_size=6,
                 unique=True))
 def test_plan_of_several_periods_serves_all_and_is_never_worse_than_apart(
@@ -90,12 +78,6 @@ def test_plan_of_two_periods_is_the_best_there_is() -> None:
     assert load(candidates) == pytest.approx(least_load(wanted))
 
 
-def test_on_a_full_line_periods_make_no_difference() -> None:
-    needed = {0.1: [Span(0, 1)], 5.0: [Span(20, 21)]}
-    assert len(partition(needed, MODEL, 0.0)) == 2
-    assert partition(needed, MODEL, 10.0) == [Candidate(Span(0, 21), 0.1)]
-
-
 @given(st.lists(SPANS, min_size=1, max_size=30), st.lists(SPANS, max_size=5))
 def test_blocks_hold_all_that_is_needed_within_the_limit_and_around_what_was_refused(
         spans: list[Span], refused: list[Span]) -> None:
@@ -114,11 +96,3 @@ def test_block_that_cannot_be_has_no_price() -> None:
     assert model.cost(Span(6, LIMIT)) < math.inf
     assert model.cost(Span(0, 6)) < math.inf
     assert model.cost(Span(10, 11 + LIMIT)) == math.inf
-
-
-@given(st.lists(SPANS))
-def test_without_contained_keeps_what_no_other_holds(spans: list[Span]) -> None:
-    kept = without_contained(spans)
-    assert kept == sorted(kept)
-    assert set(kept) == {span for span in spans if not any(
-        other.holds(span) and other != span for other in spans)}

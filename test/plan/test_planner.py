@@ -203,10 +203,6 @@ def test_float_of_a_pid_is_read_alone_or_with_its_whole_element(
     assert sorted(spans(plan(*rows))) == expected
 
 
-def test_bit_of_a_pid_is_read_as_its_word() -> None:
-    assert spans(plan(make_mapping('PD9:1/MO'))) == [('PD9:1', 1)]
-
-
 def test_halves_of_a_block_with_a_float_are_the_floats() -> None:
     planner = Planner(LINE, 0.1)
     block, = planner.plan([
@@ -222,16 +218,6 @@ def test_blocks_are_as_long_as_the_processor_takes_them(name: str, limit: int) -
     words = [make_mapping(f'N7:{n}', plc='SLC', processor=name) for n in range(limit + 1)]
     assert spans(plan(*words[:limit])) == [('N7:0', limit)]
     assert max(length for _, length in spans(plan(*words))) <= limit
-
-
-def test_neighbours_are_read_together() -> None:
-    assert spans(plan(*(make_mapping(f'N7:{n}') for n in range(10)))) == [('N7:0', 10)]
-
-
-def test_ten_words_alone_cost_about_seven_times_as_much_as_together() -> None:
-    together = cost(plan(make_mapping('N7:0', length=10)))
-    alone = 10 * cost(plan(make_mapping('N7:0')))
-    assert 5 < alone / together < 10
 
 
 @pytest.mark.parametrize('plc', ['PLC5', 'SLC'])
@@ -262,14 +248,6 @@ def test_what_differs_in_period_station_or_file_is_not_read_together(
     assert len(plan(one, other)) == 2
 
 
-def test_default_period_and_the_same_given_are_one() -> None:
-    assert len(plan(make_mapping('N7:0'), make_mapping('N7:1', period=100))) == 1
-
-
-def test_plc5_io_is_bridged_across_racks_and_groups() -> None:
-    assert spans(plan(make_mapping('I:007/3'), make_mapping('I:011'))) == [('I:007', 3)]
-
-
 @pytest.mark.parametrize('plc, limit', [('PLC5', 110), ('SLC', 118)])
 def test_mapping_that_fills_a_packet_is_one_request_and_one_longer_two(
         plc: str, limit: int) -> None:
@@ -278,23 +256,11 @@ def test_mapping_that_fills_a_packet_is_one_request_and_one_longer_two(
         ('N7:0', limit), (f'N7:{limit}', 1)]
 
 
-@pytest.mark.parametrize('plc, limit', [('PLC5', 110), ('SLC', 118)])
-def test_packet_is_filled_to_its_last_word_and_no_further(plc: str, limit: int) -> None:
-    first = make_mapping('N7:0', plc=plc, length=60)
-    assert len(plan(first, make_mapping('N7:60', plc=plc, length=limit - 60))) == 1
-    assert len(plan(first, make_mapping('N7:60', plc=plc, length=limit - 59))) == 2
-
-
 def test_mapping_is_never_torn_when_neighbours_overlap_the_limit() -> None:
     blocks = plan(make_mapping('N7:0', length=60), make_mapping('N7:50', length=60),
                   make_mapping('N7:100', length=60))
     assert sorted(spans(blocks)) in (
         [('N7:0', 110), ('N7:100', 60)], [('N7:0', 60), ('N7:50', 110)])
-
-
-def test_long_mapping_is_a_block_of_its_own() -> None:
-    long, short = make_mapping('N7:0', length=200), make_mapping('N7:10')
-    assert [block.mappings for block in plan(long, short)] == [(long,), (short,)]
 
 
 def test_long_structures_are_split_between_elements() -> None:
@@ -319,19 +285,6 @@ def test_no_packet_ends_within_a_value(
 def test_one_member_is_read_alone_and_two_as_the_whole_element() -> None:
     assert spans(plan(make_mapping('T4:3.ACC'))) == [('T4:3.ACC', 1)]
     assert spans(plan(make_mapping('T4:3.ACC'), make_mapping('T4:3.PRE'))) == [('T4:3', 3)]
-
-
-def test_mapping_inside_another_costs_nothing() -> None:
-    whole, part, bit = (make_mapping('N7:0', length=20), make_mapping('N7:5', length=2),
-                        make_mapping('N7:19/15'))
-    block, = plan(part, whole, bit)
-    assert spans([block]) == [('N7:0', 20)]
-    assert set(block.mappings) == {whole, part, bit}
-
-
-def test_mapping_that_only_writes_is_not_read() -> None:
-    assert plan(make_mapping('N7:0', 'Write')) == []
-    assert len(plan(make_mapping('N7:0', 'ReadWrite'))) == 1
 
 
 def test_words_of_a_mapping_in_the_data_of_its_block() -> None:
@@ -375,14 +328,6 @@ def test_string_that_is_refused_is_not_tried_in_packets_that_hold_no_string() ->
                 for request in half.requests] == packets
 
 
-def test_slow_mapping_among_fast_ones_costs_nothing() -> None:
-    fast = [make_mapping('N7:0', period=100), make_mapping('N7:9', period=100)]
-    slow = make_mapping('N7:5', period=1000)
-    block, = plan(slow, *fast)
-    assert spans([block]) == [('N7:0', 10)]
-    assert block.period == 0.1
-
-
 def test_slow_mapping_beside_a_fast_one_is_read_with_it_while_that_is_cheaper() -> None:
     """At a tenth of the rate, its words may cost a tenth of another transaction."""
     def blocks(gap: int, period: int) -> int:
@@ -394,20 +339,6 @@ def test_slow_mapping_beside_a_fast_one_is_read_with_it_while_that_is_cheaper() 
 
     assert blocks(1, 10_000) == 2
     assert 1 < words(1000) < words(500) < words(200) < words(100) < 40
-
-
-def test_on_a_full_line_periods_that_cannot_be_kept_make_no_difference() -> None:
-    others = [make_mapping(f'N{file}:0', length=100, period=0) for file in range(20, 30)]
-    blocks = plan(make_mapping('N7:0', period=0), make_mapping('N7:20', period=1000), *others)
-    assert len(blocks) == 11
-
-
-@given(st.lists(st.tuples(st.integers(0, 200), st.sampled_from([100, 300, 1000])),
-                min_size=1, max_size=40))
-def test_mapping_is_read_as_often_as_it_wants(places: list[tuple[int, int]]) -> None:
-    mappings = [make_mapping(f'N7:{first}', period=period, tag=f'm{number}')
-                for number, (first, period) in enumerate(places)]
-    check_plan(mappings, plan(*mappings))
 
 
 # refusals

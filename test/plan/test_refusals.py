@@ -93,20 +93,6 @@ class Plc:
         return set(self.blocks) == set(self._planner.plan(self._mappings))
 
 
-def test_neighbours_of_a_bad_mapping_are_read_together_again() -> None:
-    plc = Plc(words(*range(20)), 7)
-    assert plc.spans() == [(0, 20)]
-    plc.settle()
-    assert plc.spans() == [(0, 7), (7, 8), (8, 20)]
-    assert plc.failed == {'N7:7_1_Read_1'}
-
-
-def test_bad_one_is_found_by_halving() -> None:
-    plc = Plc(words(*range(64)), 41)
-    plc.settle()
-    assert plc.refused <= 1 + 6 + 2  # the whole, its halves, and the bad one as ever
-
-
 def test_gap_that_does_not_exist_is_not_bridged_again() -> None:
     plc = Plc(words(0, 1, 2, 9, 10, 11), 5)
     assert plc.spans() == [(0, 12)]
@@ -118,27 +104,11 @@ def test_gap_that_does_not_exist_is_not_bridged_again() -> None:
     assert plc.refused == before
 
 
-def test_end_of_a_file_that_is_too_short() -> None:
-    plc = Plc(words(*range(0, 40, 2)), *range(31, 40))
-    plc.settle()
-    assert (0, 31) in plc.spans()
-    assert plc.failed == {f'N7:{n}_1_Read_1' for n in range(32, 40, 2)}
-
-
 def test_bits_of_one_bad_word_stay_in_one_block() -> None:
     bits = [make_mapping(f'B3:4/{bit}') for bit in range(16)]
     plc = Plc([*bits, make_mapping('B3:3'), make_mapping('B3:5')], 4)
     plc.settle()
     assert plc.spans() == [(3, 4), (4, 5), (5, 6)]
-
-
-def test_mapping_within_a_bad_one_is_read_without_it() -> None:
-    inner, whole = make_mapping('N7:2'), make_mapping('N7:0', length=20)
-    plc = Plc([inner, whole], 15)
-    assert len(plc.blocks) == 1
-    plc.settle()
-    assert plc.spans() == [(0, 20), (2, 3)]
-    assert plc.failed == {whole.tag}
 
 
 def test_mapping_that_has_recovered_is_read_with_its_neighbours_again() -> None:
@@ -148,17 +118,6 @@ def test_mapping_that_has_recovered_is_read_with_its_neighbours_again() -> None:
     plc.settle()
     assert plc.spans() == [(0, 20)]
     assert not plc.failed
-
-
-def test_long_mapping_is_read_in_packets_as_short_as_the_processor_takes_them() -> None:
-    long = make_mapping('N7:10', length=118, plc='SLC')
-    plc = Plc([long, make_mapping('N7:0', plc='SLC')])
-    plc.packet = 41
-    plc.settle()
-    assert not plc.failed
-    assert [[request.words for request in block.requests]
-            for block in plc.blocks if block.mappings == (long,)] == [[41, 41, 36]]
-    assert plc.refused <= 3
 
 
 def test_long_mapping_that_is_not_there_is_asked_for_in_the_shortest_packets() -> None:

@@ -119,11 +119,6 @@ def test_via_is_for_a_master(mode: str) -> None:
     assert 'Via is for Mode Master' in text
 
 
-def test_slower_plc_makes_everything_slower() -> None:
-    report = report_of(make_mapping('N7:0', length=2), response=0.03)
-    assert report.poll_cycle == pytest.approx(TWO_WORDS + 0.06)
-
-
 def test_blocks_go_by_station_and_then_by_row() -> None:
     report = report_of(make_mapping('N7:0', station=2, item=1), make_mapping('F8:0', item=2),
                        make_mapping('B3:0', item=3))
@@ -153,12 +148,6 @@ def test_baud_rate_has_to_do_for_heartbeats_and_questions_too() -> None:
     assert report_of(*rows, baud=needed).load <= 1
 
 
-def test_period_that_no_baud_rate_can_keep() -> None:
-    report = report_of(make_mapping('N7:0', period=15))  # the answers alone take 20 ms
-    assert report.needed_baud() is None
-    assert 'no baud rate is enough, only longer periods' in texts(report, RemarkKind.LOAD)[0]
-
-
 def test_together_the_periods_may_be_too_short_though_none_is() -> None:
     mappings = [make_mapping('N7:0', length=2, station=station, period=100, item=station)
                 for station in (1, 2)]
@@ -174,12 +163,6 @@ def test_load_above_80_percent_is_warned_of(period: int, warned: bool) -> None:
     report = report_of(make_mapping('N7:0', length=2, period=period))
     assert bool(texts(report, RemarkKind.LOAD)) is warned
     assert not warned or '82% of the line' in texts(report, RemarkKind.LOAD)[0]
-
-
-def test_as_often_as_the_line_allows_is_no_load() -> None:
-    report = report_of(make_mapping('N7:0', period=0))
-    assert report.load == 0
-    assert report.remarks() == []
 
 
 def test_guests_are_part_of_the_load() -> None:
@@ -229,12 +212,6 @@ def test_file_of_a_plc_has_one_type() -> None:
                  RemarkKind.STATION) == []
 
 
-def test_common_interface_file_is_no_second_plc() -> None:
-    report = report_of(make_mapping('N7:0', plc='SLC'),
-                       make_mapping('011', plc='PLC2', access='CIF', item=2))
-    assert texts(report, RemarkKind.STATION) == []
-
-
 def test_several_stations_in_full_duplex() -> None:
     mappings = [make_mapping('N7:0', station=station, item=station) for station in (1, 3)]
     assert texts(report_of(*mappings), RemarkKind.STATION) == []
@@ -250,19 +227,6 @@ def test_gap_that_costs_a_second_read() -> None:
     assert remark.text == (
         'station 1, N7:0 to N7:200: 2 reads with 0 words that no tag needs take 144.2 ms; '
         'side by side in the PLC the tags would take 74.2 ms')
-
-
-def test_gap_that_is_read_across() -> None:
-    # 18 words nobody needs are 36 characters, and one more for each of two longer lengths.
-    report = report_of(make_mapping('N7:0', item=1), make_mapping('N7:19', item=2))
-    block, = report.blocks
-    assert block.words == 20
-    text, = texts(report, RemarkKind.GAP)
-    assert '1 read with 18 words that no tag needs' in text
-
-
-def test_neighbours_have_no_gap() -> None:
-    assert report_of(make_mapping('N7:0', item=1), make_mapping('N7:1', item=2)).remarks() == []
 
 
 def test_members_of_structures_apart_are_compared_with_whole_elements() -> None:

@@ -34,15 +34,6 @@ def texts(*mappings: Mapping, network: Network = PEER) -> list[str]:
     return [str(problem) for _, problem in line_problems(mappings, network)]
 
 
-def test_rows_that_fit_are_not_remarked() -> None:
-    assert texts(row('N7:50', length=4), row('N7:52', length=9), row('B3:5/0', length=8),
-                 make_mapping('N7:0', station=1), make_mapping('N7:0', 'Write', plc='SLC')) == []
-
-
-def test_other_commands_need_nothing_of_that() -> None:
-    assert texts(make_mapping('N7:0', plc='SLC', station=9), network=Network()) == []
-
-
 def test_serve_needs_our_plc_type() -> None:
     assert texts(row('N7:50', 'SLC')) == [
         'map.csv:2: Item: 1, a Serve row has the PLC_Type we emulate, which is PLC5 in the net '
@@ -58,13 +49,6 @@ def test_serve_needs_our_station() -> None:
 def test_serve_rows_of_one_file_have_one_type() -> None:
     assert texts(row('N9:0'), row('B9:0'), row('N9:1')) == [
         'map.csv:2: Item: 1, B9:0 does not fit an earlier Serve row: file 9 is of type N already']
-
-
-@pytest.mark.parametrize(('plc', 'text'), [('PLC2', '020'), ('PLC3', 'N7:0')])
-def test_every_plc_type_can_be_emulated(plc: str, text: str) -> None:
-    network = Network(mode='Peer', plc_type=plc)
-    assert texts(row(text, plc), network=network) == []
-    assert len(texts(row('N7:0'), network=network)) == 1
 
 
 def test_files_of_a_plc3_are_numbered_in_each_section() -> None:

@@ -106,17 +106,6 @@ def test_mode_is_told_by_the_diagnostic_status(plcs: list[SimulatedPlc], setting
         EmulatedProcessor(PlcType.SLC, setting).encode())
 
 
-@pytest.mark.parametrize('line, text', [
-    ('mode 12', '"mode 12" is not a command'), ('mode 12 run now', '"mode 12 run now" is not'),
-    ('mode 12 stop', 'mode 12 stop: the modes are run, program, remote, test, fault')])
-def test_mode_that_is_wrong_changes_nothing(
-        plcs: list[SimulatedPlc], line: str, text: str) -> None:
-    with pytest.raises(CommandError) as caught:
-        execute(line, plcs)
-    assert str(caught.value).startswith(text)
-    assert plcs[1].processor.setting is Setting.REMOTE
-
-
 def test_message_is_queued_and_its_end_reported(plcs: list[SimulatedPlc]) -> None:
     told: list[str] = []
     text = execute('msg 12 N7:0 5 -6', plcs, True, told.append)
@@ -127,25 +116,6 @@ def test_message_is_queued_and_its_end_reported(plcs: list[SimulatedPlc]) -> Non
     sending.fail(error := LinkError())
     assert told == [f'station 12: msg N7:0 {error}']
     assert not plcs[0].outbox
-
-
-@pytest.mark.parametrize('line, text', [
-    ('msg 12 N7:0', '"msg 12 N7:0" is not a command'),
-    ('msg 12 Q7:0 5', 'msg Q7:0: SLC has no Q files'),
-    ('msg 12 N7:0 x', 'msg N7:0: "x" should be a number'),
-    ('slow 12 3', '"slow 12 3" is not a command'),
-    ('delay 12 3', '"delay 12 3" is not a command')])
-def test_bad_command_on_a_full_duplex_line(plcs: list[SimulatedPlc], line: str, text: str) -> None:
-    with pytest.raises(CommandError) as caught:
-        execute(line, plcs, True)
-    assert str(caught.value).startswith(text)
-    assert not plcs[1].outbox
-
-
-def test_message_needs_a_full_duplex_line(plcs: list[SimulatedPlc]) -> None:
-    with pytest.raises(CommandError, match='"msg 12 N7:0 5" is not a command'):
-        execute('msg 12 N7:0 5', plcs)
-    assert not plcs[1].outbox
 
 
 @pytest.mark.parametrize(('verb', 'setting'), [

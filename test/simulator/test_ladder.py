@@ -72,18 +72,6 @@ class Program:
 
 
 @BOTH
-def test_nothing_is_in_control_before_a_person_has_reset(kind: type[Ladder]) -> None:
-    program = Program(kind)
-    program.put('N10:1', 0)
-    program.run(10.0)
-    assert program.ladder.is_on(Lamp.ALIVE)
-    assert not program.ladder.is_on(Lamp.IN_CONTROL)
-    program.ladder.press_reset()
-    program.run(1.0)
-    assert program.ladder.is_on(Lamp.IN_CONTROL)
-
-
-@BOTH
 @EACH
 def test_command_reaches_the_machine_only_while_ros_is_in_control(
         kind: type[Ladder], command: str) -> None:
@@ -127,28 +115,6 @@ def test_silence_is_lost_after_the_preset(kind: type[Ladder], preset: int) -> No
     program.run(5.0)
     assert program.ladder.is_on(Lamp.LOST)
     assert program.dropped() == pytest.approx(last + preset * 0.01, abs=0.03)
-
-
-@BOTH
-def test_control_does_not_come_back_by_itself(kind: type[Ladder]) -> None:
-    program = Program(kind)
-    program.take_control()
-    program.is_counting = False
-    program.run(5.0)
-    program.is_counting = True
-    program.run(10.0)
-    assert program.ladder.is_on(Lamp.ALIVE)
-    assert not program.ladder.is_on(Lamp.IN_CONTROL)
-
-
-@BOTH
-def test_negative_heartbeat_is_not_alive(kind: type[Ladder]) -> None:
-    program = Program(kind)
-    program.is_counting = False
-    for value in (0x8000, 0xFFFF, 0x8001):
-        program.put('N10:0', value)
-        program.run(0.1)
-        assert not program.ladder.is_on(Lamp.ALIVE)
 
 
 @BOTH

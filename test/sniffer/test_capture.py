@@ -139,20 +139,6 @@ def test_other_files_are_left_alone(tmp_path: Path) -> None:
         CaptureWriter(tmp_path / 'nowhere' / 'x')
 
 
-def test_settings_of_any_text_stay_on_their_line(tmp_path: Path) -> None:
-    path = tmp_path / 'x'
-    CaptureWriter(path, settings={'port': '/dev/s\xe9rie\n0 > 10 04\udcff'}).close()
-    assert lines_of(path)[1:] == ['# port: /dev/s\\xe9rie\\n0 > 10 04\\udcff']
-    assert chunks_of(path) == []
-
-
-def test_empty_file_is_taken(tmp_path: Path) -> None:
-    path = tmp_path / 'x'
-    path.touch()
-    CaptureWriter(path).close()
-    assert chunks_of(path) == []
-
-
 @pytest.mark.parametrize('line', [
     '0.1 > 10 0', '0.1 > zz', '0.1 = 10 04', '0.1', 'soon > 10 04', '> 10 04', 'x',
     'nan > 10 04', '-inf > 10 04', '1_0.5 > 10 04'])
@@ -160,12 +146,6 @@ def test_bad_line_is_named(line: str) -> None:
     with pytest.raises(Problem, match='should be seconds, ">", "<" or "[?]", and bytes') as caught:
         list(read_capture('a.cap', ['# abdf1_ros capture 1', '', line], {}))
     assert str(caught.value).startswith('a.cap:3: ')
-
-
-@pytest.mark.parametrize('time', ['1e10', '-1e10', '9' * 100])
-def test_time_is_a_number(time: str) -> None:
-    with pytest.raises(Problem, match='a.cap:2: .* is not a number of seconds'):
-        list(read_capture('a.cap', ['# abdf1_ros capture 1', f'{time} > 10 04'], {}))
 
 
 def test_other_version_is_refused() -> None:

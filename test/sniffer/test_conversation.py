@@ -91,12 +91,6 @@ def test_an_ack_is_for_what_went_the_other_way(talk: Talk) -> None:
     assert talk.out(COMMAND).marks == (Mark.DUPLICATE,)
 
 
-def test_only_the_last_message_of_a_path_can_be_repeated(talk: Talk) -> None:
-    talk.out(COMMAND)
-    talk.out(Packet(1, 5, 0x0F, 0, 8))
-    assert talk.out(COMMAND).marks == ()
-
-
 def test_program_that_never_changes_its_tns(talk: Talk) -> None:
     for count in range(3):
         marks = (Mark.DUPLICATE,) if count else ()
@@ -129,21 +123,6 @@ def test_another_recording_begins(talk: Talk) -> None:
     assert talk.back(REPLY) == MessageFacts(COMMAND, None)
     assert [entry.command.dst for entry in talk.expired(talk.now)] == [2]
     assert talk.unanswered() == []
-
-
-def test_command_that_waits_too_long(talk: Talk) -> None:
-    talk.out(COMMAND)
-    assert list(talk.expired(10.5)) == []
-    assert [entry.command for entry in talk.expired(10.6)] == [COMMAND]
-    assert list(talk.expired(100.0)) == []
-    assert talk.back(REPLY).marks == (Mark.STRAY,)
-
-
-def test_answered_commands_are_forgotten_in_silence(talk: Talk) -> None:
-    talk.out(COMMAND)
-    talk.back(REPLY)
-    assert list(talk.expired(100.0)) == []
-    assert talk.back(REPLY).marks == (Mark.RETRANSMISSION, Mark.STRAY)
 
 
 def test_tns_used_for_something_else_gives_the_first_command_up(talk: Talk) -> None:

@@ -116,30 +116,12 @@ def test_binary_of_any_size_is_read_whole(tmp_path: Path) -> None:
     assert b''.join(chunk.data for chunk in found) == DATA * 100
 
 
-def test_binary_file_taken_for_text(tmp_path: Path) -> None:
-    with pytest.raises(Problem, match=r'x:1: this is not text; for a file of raw bytes give --b'):
-        chunks(tmp_path / 'x', DATA)
-
-
-@pytest.mark.parametrize('content', [b'\0', b'10 04\0'])
-def test_zeros_are_no_text(tmp_path: Path, content: bytes) -> None:
-    with pytest.raises(Problem, match=r'x:1: this is not text; for a file of raw bytes give --b'):
-        chunks(tmp_path / 'x', content)
-
-
 def test_line_of_1_mb_is_read_and_a_longer_one_refused(tmp_path: Path) -> None:
     longest = b'10' * 500_000
     assert [len(chunk.data) for chunk in chunks(tmp_path / 'x', b'10\n' + longest)] == [1, 500_000]
     with pytest.raises(Problem, match='x:2: the line is longer than 1 MB; divide it, or for a '
                                       'file of raw bytes give --binary'):
         chunks(tmp_path / 'x', b'10\n' + longest + b'1')
-
-
-def test_file_without_an_end() -> None:
-    with pytest.raises(Problem, match='/dev/zero:1: this is not text'):
-        next(Recording(Path('/dev/zero')).chunks())
-    endless = Recording(Path('/dev/zero'), is_binary=True).chunks()
-    assert all(0 < len(next(endless).data) <= 65536 for _ in range(3))
 
 
 @pytest.fixture

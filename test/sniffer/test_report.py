@@ -60,10 +60,6 @@ def test_line_has_the_colour_of_its_kind(entry: Entry, shade: str) -> None:
     assert text_line(entry, colour=True) == f'{shade}{text_line(entry)}\x1b[0m'
 
 
-def test_what_is_well_has_no_colour() -> None:
-    assert text_line(REPLY, colour=True) == text_line(REPLY)
-
-
 def test_entry_is_told_as_json_with_all_its_fields() -> None:
     assert json.loads(json_line(COMMAND)) == {
         'time': 0.5, 'direction': '>', 'kind': 'command', 'station': 1,
@@ -97,11 +93,6 @@ def test_summary_counts_what_was_seen_and_what_was_wrong(summary: Summary) -> No
     assert latency == '  replies after: mean 750.0 ms, max 750.0 ms'
     assert one.split() == ['1', '0', '0', '1', '2', '1', '1', '1', '0', '750.0', '750.0']
     assert sixteen.split() == ['16', '1', '1', *'000000', '-', '-']
-
-
-def test_summary_of_nothing_says_none() -> None:
-    assert list(summary_lines(Summary(), LineKind())) == [
-        'summary: 0 bytes', '  seen: none', '  faults: none']
 
 
 def test_json_has_all_that_the_summary_tells(summary: Summary) -> None:

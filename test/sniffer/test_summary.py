@@ -18,7 +18,7 @@ from abdf1_ros.df1.frames import Duplex
 from abdf1_ros.df1.packet import Packet
 from abdf1_ros.sniffer.capture import Chunk, Direction
 from abdf1_ros.sniffer.entries import Entry, Kind, Mark
-from abdf1_ros.sniffer.summary import Latency, Summary
+from abdf1_ros.sniffer.summary import Summary
 import pytest
 
 OUT, IN = Direction.OUT, Direction.IN
@@ -48,10 +48,6 @@ def test_entries_are_counted_for_the_line_and_for_their_station() -> None:
     assert sorted(summary.stations) == [1, 2]
 
 
-def test_no_latency_has_a_mean_of_nothing() -> None:
-    assert Latency().mean == 0
-
-
 def _heard(summary: Summary) -> Summary:
     summary.take(Chunk(10.0, OUT, bytes(300)))
     summary.take(Chunk(11.0, IN, bytes(180)))
@@ -73,12 +69,3 @@ def test_recordings_one_after_the_other() -> None:
     summary = _heard(_heard(Summary(9600)))
     assert summary.seconds == 2.0
     assert summary.load(Duplex.HALF) == 0.5
-
-
-def test_without_times_there_is_no_load() -> None:
-    summary = Summary(9600)
-    assert summary.seconds is None
-    summary.take(Chunk(None, OUT, bytes(300)))
-    assert (summary.seconds, summary.load(Duplex.HALF)) == (None, None)
-    summary.take(Chunk(1.0, OUT, bytes(300)))
-    assert (summary.seconds, summary.load(Duplex.HALF)) == (0.0, None)

@@ -29,7 +29,7 @@ from hypothesis import given, strategies
 import pytest
 from support.cases import for_all
 from support.multidrop import MasterBench
-from support.vectors import CAPTURED, Vector, VECTORS
+from support.vectors import Vector, VECTORS
 from support.virtual_line import Noise, QUIET
 
 OUT, IN, UNKNOWN = Direction.OUT, Direction.IN, Direction.UNKNOWN
@@ -112,11 +112,6 @@ def test_wrong_check_is_marked_and_taken_no_further() -> None:
     assert (good.kind, good.marks) == (Kind.COMMAND, ())
 
 
-def test_poll_with_a_wrong_check() -> None:
-    entry = decode([(OUT, b'\x10\x05\x01\xfe')])[0]
-    assert (entry.kind, entry.station, entry.valid) == (Kind.POLL, 1, False)
-
-
 def test_repetitions_are_marked() -> None:
     command, reply = (OUT, master(COMMAND)), (IN, message(REPLY))
     ack, answer, poll = (IN, frames.ACK), (OUT, frames.ACK), (OUT, frames.poll_frame(1))
@@ -147,14 +142,6 @@ def test_command_without_a_reply_is_told_at_the_end() -> None:
     assert (entries[-1].kind, entries[-1].station, entries[-1].text) == (
         Kind.UNANSWERED, 1, f'5 to 1, TNS 1234: {WORDS}')
     assert entries[-1].time == pytest.approx(0.03)
-
-
-def test_command_is_given_up_while_the_line_goes_on() -> None:
-    said = [(OUT, master(COMMAND)), (IN, frames.ACK)]
-    said += [(OUT, frames.poll_frame(1)), (IN, frames.EOT)] * 10
-    entries = decode(said, pause=1.0)
-    (entry,) = (entry for entry in entries if entry.kind is Kind.UNANSWERED)
-    assert entry.time == 11.0
 
 
 def test_full_duplex_traffic_is_told_in_both_directions() -> None:
@@ -206,20 +193,6 @@ def test_frame_that_breaks_off_does_not_swallow_what_comes_after_a_pause() -> No
     assert kinds(decode(said, pause=0.1)) == [Kind.DAMAGED, Kind.SILENCE, Kind.POLL]
 
 
-def test_frame_that_breaks_off_does_not_reach_into_another_recording() -> None:
-    session = TrafficDecoder()
-    found = [*session.feed(Chunk(5.0, OUT, master(COMMAND)[:9])),
-             *session.feed(Chunk(0.0, OUT, frames.poll_frame(1)))]
-    assert kinds(found) == [Kind.DAMAGED, Kind.SILENCE, Kind.POLL]
-
-
-def test_nothing_is_lost_of_a_chunk_of_any_size() -> None:
-    polls = frames.poll_frame(1) * 20_000
-    assert len(polls) > frames.MAX_WAITING
-    found = kinds(decode([(UNKNOWN, polls)]))
-    assert (found.count(Kind.POLL), found.count(Kind.NOISE)) == (20_000, 0)
-
-
 def test_unknown_symbol_is_shown_with_its_code() -> None:
     (entry,) = decode([(IN, b'\x10\x1b')])
     assert (entry.kind, entry.text) == (Kind.UNKNOWN, 'DLE 1B')
@@ -246,28 +219,6 @@ def test_every_vector_is_told_as_what_it_is(vector: Vector) -> None:
     else:
         assert entry.valid
         assert entry.packet == vector.packet
-
-
-def test_capture_of_a_real_line() -> None:
-    """Three full-duplex transactions with CRC, as a radio modem has passed them on."""
-    recorded = [entry for entry in CAPTURED if entry.checksum is Checksum.CRC]
-    session = TrafficDecoder()
-    entries = decode([(OUT if entry.direction == 'tx' else IN, entry.frame)
-                      for entry in recorded], session)
-    assert session.kind.checksum is Checksum.CRC
-    assert session.kind.duplex is Duplex.FULL
-    assert kinds(entries) == [Kind.COMMAND, Kind.ACK, Kind.REPLY, Kind.ACK] * 3
-    assert not any(entry.marks for entry in entries)
-
-
-def test_recording_without_times_says_the_same_without_latencies() -> None:
-    session = TrafficDecoder()
-    entries: list[Entry] = []
-    for _, data in TRANSACTION:
-        entries += session.feed(Chunk(None, UNKNOWN, data))
-    assert [*session.finish()] == []
-    assert kinds(entries) == kinds(decode(TRANSACTION))
-    assert {entry.latency for entry in entries} == {None}
 
 
 def listen(bench: MasterBench) -> list[Chunk]:
@@ -354,8 +305,3 @@ def test_check_is_found_though_silence_follows_each_message(
     assert [entry.packet for entry in entries if entry.kind is Kind.COMMAND] == commands
     assert session.kind.checksum is checksum
     assert Kind.NOISE not in kinds(entries)
-
-
-def test_first_bcc_message_comes_before_its_answer() -> None:
-    said = [(OUT, master(COMMAND, Checksum.BCC)), (IN, frames.ACK)]
-    assert kinds(decode(said))[:2] == [Kind.COMMAND, Kind.ACK]
