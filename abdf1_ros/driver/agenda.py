@@ -132,7 +132,7 @@ class Agenda:
             isinstance(task.job, GuestJob) for task in self._counted)
         if has_guests and is_guests_turn and (guest := self._guest(now, busy)):
             return guest
-        job = self._checks.is_due(now) and self._check(now, busy) \
+        job = self._checks.find_due(now) and self._check(now, busy) \
             or self._has_own and self._refresh(now, busy) or self._read(now, busy)
         if job and self._owed > 0:
             task = self._tasks.start(job, now)
@@ -168,7 +168,7 @@ class Agenda:
 
     def _check(self, now: float, busy: Container[int]) -> Job | None:
         """Return a check that is due; the turn of the reads comes after it."""
-        if self._reads.is_due(self._last_check):
+        if self._reads.find_due(self._last_check):
             return None
         check = self._checks.next(now, busy, self._probe_from(now))
         if check is None:
@@ -181,7 +181,7 @@ class Agenda:
 
     def _refresh(self, now: float, busy: Container[int]) -> Job | None:
         """Return a fallback that stands (rule 8); the turn of the reads comes after it."""
-        if self._reads.is_due(self._last_refresh):
+        if self._reads.find_due(self._last_refresh):
             return None
         own = self._interlocks.refresh(now, busy)
         if own is not None:

@@ -182,7 +182,8 @@ class Checks:
         """Return when the next check is due (clock value in s), None for never."""
         return None if math.isinf(self._next_due) else self._next_due
 
-    def is_due(self, now: float) -> bool:
+    def find_due(self, now: float) -> bool:
+        """Take what was asked for; return whether a check is due."""
         if self._requests.items:
             for station in self._requests.take():
                 self._add_request(station, now)

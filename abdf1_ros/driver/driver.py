@@ -54,7 +54,6 @@ from abdf1_ros.driver.checks import Checks
 from abdf1_ros.driver.guest_words import written_extents
 from abdf1_ros.driver.guests import GuestQueue
 from abdf1_ros.driver.inbox import Inbox
-from abdf1_ros.driver.interlocks.heartbeat import LARGEST
 from abdf1_ros.driver.interlocks.queue import Interlocks
 from abdf1_ros.driver.job_tasks import JobTasks
 from abdf1_ros.driver.reads.readings import Readings, ValueListener
@@ -141,7 +140,7 @@ class Driver:
         self.interlocks = Interlocks(
             () if settings.read_only else self.mappings, self._writes, writing,
             lambda write: self._served.store(write.mapping, write.raw), self._listener,
-            self._foreign_value, 1 + settings.first_tns % LARGEST)
+            self._foreign_value, settings.first_tns)
         self.guests = GuestQueue(self.stations, machine, network.cmd_timeout / 1000,
                                  self._station_of_guest, self._words_of_guest, record)
         record.connect(self.readings.read_backs, self.readings.reads, self.interlocks)

@@ -465,7 +465,7 @@ def test_lost_port_ends_a_request_that_waits_for_its_turn() -> None:
     bench, _, (ears,) = make_bench(word(), run=1.0)
     health = bench.driver.checks
     bench.driver.checks.request_counters(1)
-    assert health.is_due(bench.clock())  # it is among the checks now, and not on the line yet
+    assert health.find_due(bench.clock())  # it is among the checks now, and not on the line yet
     bench.lose_port()
     assert health.known(1).no_counters == 'port lost: unplugged'
     assert health.counters_wanted == set()

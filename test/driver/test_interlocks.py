@@ -1393,9 +1393,11 @@ class Bridges:
         table.create(parse_address('N10:0', PlcType.PLC5), 4)
         self.word, self.table = parse_address('N10:0', PlcType.PLC5), table
         self.benches = []
-        for period in periods:
-            bench = DriverBench([beat_row(period)], network=Network(
-                baud=19200, timeout=200, cmd_timeout=500))
+        for number, period in enumerate(periods):
+            # Both count from 1: nothing but their dice is different.
+            bench = DriverBench(
+                [beat_row(period)], settings=DriverSettings(first_tns=number * LARGEST),
+                network=Network(baud=19200, timeout=200, cmd_timeout=500))
             bench.connect(SimulatedPlc(1, table, Checksum.CRC, bench.clock))
             self.benches.append(bench)
         self.running = list(self.benches)

@@ -23,6 +23,7 @@ from __future__ import annotations
 from collections.abc import Mapping as MappingType
 from enum import Enum
 import math
+from random import Random
 
 from abdf1_ros.driver.record import Claim, Words
 from abdf1_ros.driver.write import Outcome, Write
@@ -66,14 +67,15 @@ class _OtherWriter:
     It was ``seen`` last at that clock value (s).
     """
 
-    def __init__(self, period: float) -> None:
+    def __init__(self, period: float, dice: Random) -> None:
         self.seen = -math.inf
         self._period = period
+        self._dice = dice
         self._zeros = 0  # written again, where it goes on
         self._extra_zero = 0.0  # s
 
-    def is_again(self, now: float) -> bool:
-        """Take note of a value that is not ours; tell whether it is not the first for long."""
+    def note_value(self, now: float) -> bool:
+        """Take note of a value that is not ours; return whether it is not the first for long."""
         before, self.seen = self.seen, now
         return now - before < max(_CONFLICT_TIME, _CONFLICT_PERIODS * self._period)
 
@@ -82,13 +84,13 @@ class _OtherWriter:
         self._zeros += 1  # at another moment of its period each time
         return self._period * (0.5 + self._zeros * _GOLDEN % 1)
 
-    def differ(self, now: float) -> None:
+    def differ(self) -> None:
         """
         Let the next 0 stand longer than the other's.
 
         If two bridges counted from 1 at the same time, neither would see the other any more.
         """
-        self._extra_zero = self._period * (1 + int(1000 * now) % _SHIFTS)
+        self._extra_zero = self._period * self._dice.randint(1, _SHIFTS)
 
     def take_extra_zero(self) -> float:
         """Return how much longer (s) the next 0 stands, once."""
@@ -104,10 +106,10 @@ class HeartbeatRow:
     one. ``reason`` says why it does not count, empty while it does. ``refusal`` says why the last
     write was not confirmed, ``tried`` when that was sent. ``due`` is when the row has to be looked
     at (clock values in s). It counts from ``first`` on. ``words`` tells what others may have
-    written.
+    written; ``dice`` are thrown to differ from another bridge.
     """
 
-    def __init__(self, words: Words, first: int = 1) -> None:
+    def __init__(self, words: Words, first: int, dice: Random) -> None:
         mapping = words.row
         assert mapping.heartbeat is not None
         assert mapping.period is not None
@@ -128,7 +130,7 @@ class HeartbeatRow:
         self._period = mapping.period / 1000
         self._is_confirmed = False
         self._next = -math.inf
-        self._other = _OtherWriter(self._period)
+        self._other = _OtherWriter(self._period, dice)
         self._holds_at = math.inf  # without a further message of the topics that it requires
 
     def why_not(self, now: float) -> str:
@@ -276,7 +278,7 @@ class HeartbeatRow:
             self.overwritten(now)
             return ''
         text = f'{value} was read where {self.value} was written'
-        was_known, is_again = self.state is BeatState.CONFLICT, self._other.is_again(now)
+        was_known, is_again = self.state is BeatState.CONFLICT, self._other.note_value(now)
         if is_again:
             self.state = BeatState.CONFLICT
         self.begin(now)
@@ -286,7 +288,7 @@ class HeartbeatRow:
         if is_again:
             return (f'another program writes this word: {text}; 0 stays until the PLC goes from '
                     'PROGRAM to RUN, ~/reload, or the port is opened again')
-        self._other.differ(now)
+        self._other.differ()
         return f'{text}: taken for a download'
 
     @property

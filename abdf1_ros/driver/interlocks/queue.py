@@ -28,9 +28,10 @@ import heapq
 import itertools
 import math
 from operator import attrgetter
+from random import Random
 
 from abdf1_ros.driver.interlocks.fallback import FallbackCause, FallbackRow
-from abdf1_ros.driver.interlocks.heartbeat import BeatState, HeartbeatRow
+from abdf1_ros.driver.interlocks.heartbeat import BeatState, HeartbeatRow, LARGEST
 from abdf1_ros.driver.interlocks.plc import Conditions, OwnRow, Plc, TurnRank
 from abdf1_ros.driver.reads.readings import ValueListener
 from abdf1_ros.driver.record import Claim, WriteListener
@@ -75,17 +76,17 @@ class Interlocks(WriteListener):
 
     ``writes`` are the messages that wait or are under way. ``store`` puts the fallback of a Serve
     row into our own table; ``listener`` gets the result of each fallback that was written, and why
-    a PLC does not take one, ``warn`` that a heartbeat is not ours. Heartbeats count from
-    ``first_beat`` on: two bridges that began together would not see each other if both did from 1.
+    a PLC does not take one, ``warn`` that a heartbeat is not ours. ``seed`` is another number in
+    each bridge: two that began together would not see each other if both counted from 1.
     ``ours`` has the rows of our own table: ``expire`` has something to do when it is due.
     Only ``executor_ran``, ``wind_down`` and ``resume`` may be called from another thread.
     """
 
     def __init__(self, mappings: Sequence[Mapping], writes: WriteQueue, writing: WritesUnderWay,
                  store: Callable[[Write], None], listener: ValueListener,
-                 warn: Callable[[Mapping, str, bool], None], first_beat: int = 1) -> None:
-        record = writing.record
-        self.heartbeats = [HeartbeatRow(record.words_of(mapping), first_beat)
+                 warn: Callable[[Mapping, str, bool], None], seed: int = 0) -> None:
+        record, dice = writing.record, Random(seed)
+        self.heartbeats = [HeartbeatRow(record.words_of(mapping), 1 + seed % LARGEST, dice)
                            for mapping in mappings if mapping.heartbeat]
         self.fallbacks = [FallbackRow(record.words_of(mapping))
                           for mapping in mappings if mapping.fallback]

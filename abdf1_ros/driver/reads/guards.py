@@ -91,10 +91,8 @@ class CounterGuard(Guard):
     def why_not(self, point: ReadPoint, started: float, now: float) -> str:
         """Return why a value read from ``started`` on is not to be published, empty if it is."""
         limit = point.patience
-        if now - self._changed > limit:
-            self._since[limit] = math.inf
         since = self._since[limit]
-        if since == math.inf:
+        if since == math.inf or now - self._changed > limit:
             return f'{self._tag} has not changed twice within {limit:g} s'
         return '' if started > since else f'{self._tag} has begun to change during this read'
 

@@ -78,7 +78,7 @@ class ReadPoint:
         Raises FormatError when the words are no value of the mapping's type.
         """
         values = self._decode(words)
-        is_same = self._is_on_change and not self._is_change(values) and self.error is None
+        is_same = self._is_on_change and not self._remember(values) and self.error is None
         if self.withheld and self.guard is not None:
             self.guard.withheld.discard(self)
         if self.last_good is not None:
@@ -88,7 +88,7 @@ class ReadPoint:
             return None
         return values if self._scaling is None else self._scaling.publish(values)
 
-    def _is_change(self, values: Values) -> bool:
+    def _remember(self, values: Values) -> bool:
         """Remember values; return whether they differ from the last ones."""
         # Compare bytes of values: other bits of the same words are not a change, and a NaN equals
         # itself.

@@ -77,7 +77,7 @@ class Reads(WriteListener):
         It is of a station that answers and is not ``busy``.
         """
         if self._aside:
-            self.is_due(now)  # sets reads aside of a station that has died in another way
+            self.find_due(now)  # a station may have died in another way
             if job := self._probe(now, busy):
                 return job
         passed_over = []
@@ -111,8 +111,8 @@ class Reads(WriteListener):
             self._aside[station] = jobs  # to the end: the next probe goes to another station
         return job
 
-    def is_due(self, now: float) -> bool:
-        """Tell whether a read of a station that answers is due."""
+    def find_due(self, now: float) -> bool:
+        """Set reads of silent stations aside; return whether another one is due."""
         while (job := self._due.first(now)) is not None:
             if self._stations[job.station].replies_in_time:
                 return True
