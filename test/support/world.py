@@ -256,7 +256,7 @@ class World(DriverBench):
         self.holds = 0.0  # how often the gateway keeps a write for a while
         self.wire = hashlib.sha256()
         self._values = dict.fromkeys(self.rows, 0)
-        self._is_silent = False
+        self.is_silent = False
         self.plcs = {station: self._watch(station) for station in range(1, plant.stations + 1)}
         self.far.hear, self.far.say = self._hear, self._say
         self._sent: deque[tuple[float, bytes]] = deque()  # what the driver has put on the line
@@ -351,11 +351,11 @@ class World(DriverBench):
 
     def _hear(self, data: bytes) -> bytes:
         self.wire.update(b'%f>' % self.line.now + data)
-        return b'' if self._is_silent else data.replace(DAMAGED, b'ZYZZ')
+        return b'' if self.is_silent else data.replace(DAMAGED, b'ZYZZ')
 
     def _say(self, data: bytes) -> bytes:
         self.wire.update(b'%f<' % self.line.now + data)
-        return b'' if self._is_silent else data
+        return b'' if self.is_silent else data
 
     def _run_programs(self) -> None:
         for watched in self.plcs.values():
@@ -404,7 +404,7 @@ class World(DriverBench):
         if self.network.mode == 'Master':
             self.plcs[station].plc.faults.silent = is_silent
         else:
-            self._is_silent = is_silent
+            self.is_silent = is_silent
 
     def kill(self, pause: float) -> None:
         """Kill the driver; another one begins after a pause."""

@@ -99,7 +99,7 @@ class Story:
         for number in (station, *silent):
             world.ill[number] = world.line.now
         if world.line.noise is not QUIET or world.line.now < world.away or not world.is_alive \
-                or not world.driver.is_online:
+                or not world.driver.is_online or world.is_silent:
             world.ill[0] = max(world.line.now, world.away)
 
     def be_quiet(self) -> None:
