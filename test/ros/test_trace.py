@@ -16,12 +16,12 @@
 
 import json
 from pathlib import Path
-import subprocess
-import sys
 
+from abdf1_ros.cli.sniff import main as sniff
 from abdf1_ros.sniffer.entries import Kind
 import pytest
 from std_msgs.msg import Float32MultiArray
+from support.commands import call
 from support.ros import Observer, Process
 from support.simulator_process import Files, make_files
 
@@ -31,16 +31,14 @@ def files(tmp_path: Path) -> Files:
     return make_files(tmp_path)
 
 
-def test_trace_of_a_running_node_tells_what_it_has_read(files: Files) -> None:
+def test_trace_of_a_running_node_tells_what_it_has_read(
+        files: Files, capsys: pytest.CaptureFixture[str]) -> None:
     trace = files.folder / 'field.cap'
     with (files.start_simulator(), Observer() as observer,
           Process('node', *files.args(f'trace_file:={trace}')) as node):
         observer.listen(Float32MultiArray, '/abdf1/read/setpoint').values([21.5])
         node.end()
-    result = subprocess.run(
-        [sys.executable, '-m', 'abdf1_ros', 'sniff', '--json', str(trace)], text=True,
-        capture_output=True, timeout=20, check=True)
-    *entries, summary = map(json.loads, result.stdout.splitlines())
+    *entries, summary = map(json.loads, call(sniff, capsys, '--json', str(trace)).good_lines)
     texts = {entry.get('text', '').partition(': ')[2] for entry in entries}
     assert 'protected typed logical read F8:4, 1 element' in texts
     assert '21.5' in texts
