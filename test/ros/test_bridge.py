@@ -103,7 +103,8 @@ def bridge(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Bridge]:
     files = make_files(tmp_path_factory.mktemp('bridge'))
     # On a busy host a process may stand still: no station is lost by it, and no write too old.
     write_csv(files.net, NET_HEADER, ['2,2,1000,115200,300'])
-    arguments = files.args('net.com_port:=2', 'diagnostics_period:=0.25', 'write_timeout:=4.0')
+    arguments = files.args('net.com_port:=2', 'diagnostics_period:=0.25', 'write_timeout:=4.0',
+                           'processor_period:=0.3')
     with Observer() as observer:
         bridge = Bridge(files.port, observer)
         with files.start_simulator() as bridge.simulator, \
@@ -282,6 +283,24 @@ def test_all_counters_are_there_by_mnemonic_in_order_and_start_afresh(bridge: Br
     assert list(after) == COUNTERS
     assert 0 <= int(after['CNT_CMD_MSGS_SENT']) < int(before['CNT_CMD_MSGS_SENT'])
     assert int(after['CRD_CHAR_SENT']) < int(before['CRD_CHAR_SENT'])
+
+
+def test_processor_that_runs_no_program_is_a_warning(bridge: Bridge) -> None:
+    with bridge.fault('mode 2 program'):
+        status = until_status(
+            bridge.diagnostics, 'station 2', WARN, lambda status: status.message ==
+            'WARN: station 2 active, but in program mode (REM PROG)')
+        assert details(status)['processor'] == 'SLC 5/03 series A revision 1, REM PROG'
+        bridge.simulator.say('mode 2 run')
+
+
+def test_link_counters_are_read_by_the_service(bridge: Bridge) -> None:
+    response = bridge.observer.call(Trigger, '/abdf1/read_link_counters', Trigger.Request())
+    assert response.success, response.message
+    first, second = response.message.split('; ')
+    assert first.startswith('station 1: modem lines none on, messages sent ')
+    values = details(find_status(bridge.diagnostics.fresh(), 'station 2'))
+    assert f'messages sent {values["link counter messages sent"]},' in second
 
 
 # Parameters

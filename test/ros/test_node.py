@@ -157,8 +157,6 @@ def make_bench(tmp_path: Path, observer: Observer, plcs: Plcs) -> Iterator[Calla
 
 Benches = Callable[..., Bench]
 
-PATIENT = ('write_timeout:=30.0', 'net.cmd_timeout:=5000')  # where a busy host is held up
-
 
 # One message, several results
 

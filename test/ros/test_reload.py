@@ -337,6 +337,9 @@ def test_port_is_left_to_others_and_taken_again(bench: Bench) -> None:
     assert bench.polling(False) == (True, f'{bench.port}: {text}')
     open_port(PortSettings(bench.port)).close()  # which is exclusive
     assert until_status(bench.diagnostics, 'link', WARN).message == f'WARN: {text}'
+    counters = bench.observer.call(Trigger, '/abdf1/read_link_counters', Trigger.Request())
+    assert (counters.success, counters.message) == (
+        False, 'no station to ask: the port is not open')
     results = bench.observer.results()
     publisher = bench.observer.publisher(Int16MultiArray, '/abdf1/write/recipe')
     publisher.publish(Int16MultiArray(data=[1, 2]))

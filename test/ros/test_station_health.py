@@ -16,7 +16,6 @@
 
 from collections.abc import Iterator
 from dataclasses import replace
-from pathlib import Path
 import time
 
 from abdf1_ros.driver.checks import StationHealth
@@ -34,14 +33,12 @@ from abdf1_ros.ros.diagnostics.stations import (
 )
 from abdf1_ros.settings.mapping import Mapping
 from abdf1_ros.settings.network import Network
-from diagnostic_msgs.msg import DiagnosticStatus
 import pytest
 from rclpy.callback_groups import MutuallyExclusiveCallbackGroup
 from std_srvs.srv import Trigger
 from support.driver_bench import Recorder
 from support.mappings import make_mapping
-from support.ros import details, Inbox, Observer, OK, Process, until_status, WARN
-from support.simulator_process import Files, make_files
+from support.ros import Observer
 
 NOW = 1000.0
 SLC = Identity(PlcType.SLC, 'SLC 5/03', 'B', '3', Mode.REMOTE_RUN, 'REM RUN')
@@ -182,99 +179,3 @@ def test_service_ends_with_the_port(desk: Desk) -> None:
     desk.service.check(time.monotonic())
     assert desk.result() == (
         False, 'station 1: port lost: unplugged; station 2: port lost: unplugged')
-
-
-# With the simulator
-
-
-class Bridge:
-    """A node that runs against a simulator."""
-
-    def __init__(self, files: Files, observer: Observer) -> None:
-        self.observer = observer
-        self.diagnostics: Inbox = observer.diagnostics(files.port)
-        self.simulator: Process
-        self.node: Process
-
-    def until(self, level: bytes, text: str, station: int = 2) -> dict[str, str]:
-        """Wait until the status of a station says this; return its values."""
-        self.diagnostics.clear()
-
-        def says(status: DiagnosticStatus) -> bool:
-            return status.message == text
-
-        return details(until_status(self.diagnostics, f'station {station}', level, says))
-
-    def ask(self) -> Trigger.Response:
-        """Call the service."""
-        return self.observer.call(Trigger, '/abdf1/read_link_counters', Trigger.Request())
-
-
-@pytest.fixture(scope='module')
-def bridge(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Bridge]:
-    files = make_files(tmp_path_factory.mktemp('health'))
-    arguments = files.args('diagnostics_period:=0.25', 'processor_period:=0.3')
-    with Observer() as observer:
-        bridge = Bridge(files, observer)
-        with files.start_simulator() as bridge.simulator, \
-                Process('node', *arguments) as bridge.node:
-            until_status(bridge.diagnostics, 'mappings', OK)
-            yield bridge
-            bridge.node.end()
-
-
-def test_processors_are_named(bridge: Bridge) -> None:
-    values = bridge.until(OK, 'OK: station 1 active', 1)
-    assert values['processor'] == 'PLC-5/40 series A revision A, REM RUN'
-    values = bridge.until(OK, 'OK: station 2 active')
-    assert values['processor'] == 'SLC 5/03 series A revision 1, REM RUN'
-    assert values['mode'].startswith('REM RUN (')
-    assert values['faults'] == 'none'
-
-
-def test_program_mode_and_fault_are_warnings(bridge: Bridge) -> None:
-    bridge.simulator.say('mode 2 program')
-    bridge.until(WARN, 'WARN: station 2 active, but in program mode (REM PROG)')
-    bridge.simulator.say('mode 2 fault')
-    values = bridge.until(
-        WARN, 'WARN: station 2 active, but major error 0x0020 (minor error at the end of a scan), '
-        'processor halted (REM PROG)')
-    assert values['faults'] == (
-        'major error 0x0020 (minor error at the end of a scan), processor halted')
-    assert values['error replies'] == '0'
-    bridge.simulator.say('mode 2 run')
-    assert bridge.until(OK, 'OK: station 2 active')['mode'].startswith('RUN (')
-
-
-def test_link_counters_are_read_by_the_service(bridge: Bridge) -> None:
-    assert not [name for name in bridge.until(OK, 'OK: station 1 active', 1)
-                if name.startswith('link counter')]
-    response = bridge.ask()
-    assert response.success, response.message
-    first, second = response.message.split('; ')
-    assert first.startswith('station 1: modem lines none on, messages sent ')
-    assert second.startswith('station 2: modem lines none on, messages sent ')
-    bridge.diagnostics.fresh()
-    values = bridge.until(OK, 'OK: station 2 active')
-    assert f'messages sent {values["link counter messages sent"]},' in second
-    assert int(values['link counter polls received']) > 0
-
-
-def test_service_tells_of_a_refusal(bridge: Bridge) -> None:
-    bridge.simulator.say('error 2 10')
-    response = bridge.ask()
-    bridge.simulator.say('normal 2')
-    assert not response.success
-    first, second = response.message.split('; ')
-    assert first.startswith('station 1: modem lines')
-    assert second == ('station 2: STS 10: illegal command, format or length, or the file does '
-                      'not exist')
-
-
-def test_service_without_a_port(tmp_path: Path) -> None:
-    files = make_files(tmp_path)
-    with Observer() as observer, Process('node', *files.args(), '-r', '__node:=alone') as node:
-        response = observer.call(Trigger, '/alone/read_link_counters', Trigger.Request())
-        node.end()
-    assert (response.success, response.message) == (
-        False, 'no station to ask: the port is not open')
