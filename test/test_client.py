@@ -28,6 +28,7 @@ from abdf1_ros.client import Client
 from abdf1_ros.counters import Counters
 from abdf1_ros.df1.peer import PEER
 from abdf1_ros.df1.stations import ActiveStationList
+from abdf1_ros.df1.tasks import TaskSource
 from abdf1_ros.errors import FormatError, LinkError, RemoteError
 from abdf1_ros.pccc.identity import Mode
 from abdf1_ros.ports.endpoints import PtyEndpoint
@@ -300,17 +301,8 @@ def test_program_that_breaks_off_without_closing_ends(port: str) -> None:
     assert said.stderr.endswith('KeyboardInterrupt\n')
 
 
-class Nothing:
+class Nothing(TaskSource):
     """A node that has nothing to ask."""
-
-    def next_task(self, now: float, busy: object = ()) -> None:
-        """Return None."""
-
-    def next_due(self) -> None:
-        """Return None."""
-
-    def expire(self, now: float) -> None:
-        """Do nothing."""
 
 
 def test_our_address_is_that_of_a_net_file_that_names_none() -> None:

@@ -90,9 +90,10 @@ class Link(Protocol):
 
     def status(self) -> LinkStatus:
         """Return the details of this link; may be called from any thread."""
+        return NO_STATUS
 
 
-class EqualNode:
+class EqualNode(Link):
     """What a node has on a line where everybody may send at any time, and no master polls."""
 
     def __init__(self, machine: Machine, stations: ActiveStationList,
@@ -105,10 +106,6 @@ class EqualNode:
         self._report = report
         self._accounting = Accounting(machine.counters, stations, report, number)
         self._note = self._accounting.note
-
-    def status(self) -> LinkStatus:
-        """Return that there are no details."""
-        return NO_STATUS
 
     def _count_symbol(self, symbol: Heard) -> None:
         """Count DLE ACK, NAK, EOT and ENQ."""

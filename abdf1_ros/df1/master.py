@@ -41,10 +41,10 @@ from collections.abc import Callable, Generator
 
 from abdf1_ros.df1 import frames
 from abdf1_ros.df1.frames import Frame
-from abdf1_ros.df1.link import Link, LinkStatus, NO_STATUS
+from abdf1_ros.df1.link import Link
 from abdf1_ros.df1.machine import Heard, Machine, Procedure, Rest, Send, Step
 from abdf1_ros.df1.master_line import MasterLine, MOST_QUEUED, poll_on_ack
-from abdf1_ros.df1.mode import LineMode, Report, Serve
+from abdf1_ros.df1.mode import LineMode
 from abdf1_ros.df1.packet import BROADCAST, Packet
 from abdf1_ros.df1.settings import LinkSettings
 from abdf1_ros.df1.stations import ActiveStationList
@@ -53,7 +53,7 @@ from abdf1_ros.errors import CommandExpired, CommandTimeout, StationInactive
 from abdf1_ros.messages import Event
 
 
-class HalfDuplexMaster:
+class HalfDuplexMaster(Link):
     """
     Carry out transactions on the line of ``machine``.
 
@@ -61,16 +61,12 @@ class HalfDuplexMaster:
     """
 
     def __init__(self, machine: Machine, settings: LinkSettings, stations: ActiveStationList,
-                 report: Callable[[Event], None] = lambda event: None,
-                 serve: Callable[[Packet], Packet] | None = None) -> None:
+                 serve: Callable[[Packet], Packet] | None = None,
+                 report: Callable[[Event], None] = lambda event: None) -> None:
         self._machine = machine
         self._settings = settings
         self._stations = stations
-        self._line = MasterLine(machine, settings, stations, report, serve)
-
-    def status(self) -> LinkStatus:
-        """Return that there are no details."""
-        return NO_STATUS
+        self._line = MasterLine(machine, settings, stations, serve, report)
 
     def run(self, source: TaskSource) -> Procedure:
         """Carry out the tasks of ``source``, one after the other, for ever."""
@@ -162,15 +158,12 @@ class MasterMode(LineMode):
     """Master of a half-duplex line with message-based polling."""
 
     name = 'Master'
+    link = HalfDuplexMaster
     polling = 'Message'
     other_words = {'df1halfduplexmaster': 'Master', 'halfduplexmaster': 'Master',
                    'halfduplex': 'Master, or Slave where another is the master'}
     is_master = True
     waits_for_acks = True
-
-    def make_link(self, machine: Machine, line: LinkSettings, stations: ActiveStationList,
-                  serve: Serve, report: Report) -> Link:
-        return HalfDuplexMaster(machine, line, stations, report, serve)
 
 
 MASTER = MasterMode()

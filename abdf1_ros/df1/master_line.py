@@ -80,8 +80,8 @@ class MasterLine:
     """
 
     def __init__(self, machine: Machine, settings: LinkSettings, stations: ActiveStationList,
-                 report: Callable[[Event], None] = lambda event: None,
                  serve: Callable[[Packet], Packet] | None = None,
+                 report: Callable[[Event], None] = lambda event: None,
                  take_reply: Callable[[int, Packet], bool] = lambda number, reply: False) -> None:
         self.machine = machine
         self.counters = machine.counters

@@ -16,9 +16,8 @@
 
 from __future__ import annotations
 
-from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping
-from typing import ClassVar
+from typing import ClassVar, Protocol
 
 from abdf1_ros.counters import Counters
 from abdf1_ros.df1.frames import Duplex, poll_frame
@@ -36,11 +35,21 @@ Report = Callable[[Event], None]
 """Takes every numbered error and notice."""
 
 
-class LineMode(ABC):
+class LinkMaker(Protocol):
+    """What makes a link, such as its class."""
+
+    def __call__(self, machine: Machine, settings: LinkSettings, stations: ActiveStationList,
+                 serve: Serve, report: Report) -> Link: ...
+
+
+class LineMode:
     """A mode, as the columns Mode and Polling of a net CSV name it; times are in seconds."""
 
     name: ClassVar[str]
     """What stands in the column Mode."""
+
+    link: ClassVar[LinkMaker]
+    """Makes its link."""
 
     polling: ClassVar[str] = ''
     """What stands in the column Polling, where the mode depends on that."""
@@ -82,10 +91,10 @@ class LineMode(ABC):
             lambda machine: run(), checksum=line.checksum, duplex=self.duplex, timing=line.timing,
             counters=counters, forget_on_send=self.is_master, background=background)
 
-    @abstractmethod
     def make_link(self, machine: Machine, line: LinkSettings, stations: ActiveStationList,
                   serve: Serve, report: Report) -> Link:
         """Return the link that runs on a machine of this mode."""
+        return self.link(machine, line, stations, serve, report)
 
     def pause(self, line: LinkSettings) -> float:
         """Return how long a command waits for a quiet line, mostly."""

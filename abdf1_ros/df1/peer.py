@@ -51,9 +51,9 @@ import math
 from abdf1_ros.df1 import frames
 from abdf1_ros.df1.accounting import count_fault, wrong_message
 from abdf1_ros.df1.frames import Code, Control, Duplex, Frame, FrameFault, Symbol, Unknown
-from abdf1_ros.df1.link import ack_on_reply, EqualNode, Link
+from abdf1_ros.df1.link import ack_on_reply, EqualNode
 from abdf1_ros.df1.machine import Heard, Listen, Machine, Procedure, Rest, Send, Silence, Step
-from abdf1_ros.df1.mode import answer_time, LineMode, Report, Serve
+from abdf1_ros.df1.mode import answer_time, LineMode
 from abdf1_ros.df1.packet import Packet
 from abdf1_ros.df1.settings import LinkSettings
 from abdf1_ros.df1.stations import ActiveStationList
@@ -404,16 +404,13 @@ class PeerMode(LineMode):
     """One of the two ends of a full-duplex line."""
 
     name = 'Peer'
+    link = FullDuplexPeer
     other_words = {'fullduplex': 'Peer', 'full': 'Peer', 'df1fullduplex': 'Peer',
                    'peertopeer': 'Peer'}
     duplex = Duplex.FULL
     has_one_plc = True
     waits_for_acks = True
     answers_by_itself = True
-
-    def make_link(self, machine: Machine, line: LinkSettings, stations: ActiveStationList,
-                  serve: Serve, report: Report) -> Link:
-        return FullDuplexPeer(machine, line, stations, serve, report)
 
     def longest_transaction(self, line: LinkSettings, frames: float, others: float = 0.0,
                             stations: int = 0) -> float:

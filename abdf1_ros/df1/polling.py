@@ -107,13 +107,13 @@ class StandardPollingMaster:
 
     def __init__(self, machine: Machine, settings: LinkSettings,
                  stations: ActiveStationList,
-                 report: Callable[[Event], None] = lambda event: None,
-                 serve: Callable[[Packet], Packet] | None = None) -> None:
+                 serve: Callable[[Packet], Packet] | None = None,
+                 report: Callable[[Event], None] = lambda event: None) -> None:
         self._machine = machine
         self._settings = settings
         self._polling = polling = settings.polling or PollingSettings(())
         self._stations = stations
-        self._line = MasterLine(machine, settings, stations, report, serve, self._take_reply)
+        self._line = MasterLine(machine, settings, stations, serve, report, self._take_reply)
         self._priority = _PollList(polling.priority)
         self._normal = _PollList(polling.normal)
         self._outstanding: dict[int, Outstanding] = {}
@@ -377,7 +377,7 @@ class StandardPollingMode(MasterMode):
         polling = replace(polling, normal=(
             *polling.normal, *(number for number in mapped if number not in listed)))
         return StandardPollingMaster(
-            machine, replace(line, polling=polling), stations, report, serve)
+            machine, replace(line, polling=polling), stations, serve, report)
 
     def longest_transaction(self, line: LinkSettings, frames: float, others: float = 0.0,
                             stations: int = 0) -> float:

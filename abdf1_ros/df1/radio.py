@@ -41,7 +41,7 @@ from random import Random
 from abdf1_ros.df1 import frames
 from abdf1_ros.df1.accounting import count_fault, wrong_message
 from abdf1_ros.df1.frames import Duplex, Frame, MAX_LINK_DATA
-from abdf1_ros.df1.link import EqualNode, Link, LinkStatus
+from abdf1_ros.df1.link import EqualNode, LinkStatus
 from abdf1_ros.df1.machine import (
     Heard,
     HELD_BACK,
@@ -54,7 +54,7 @@ from abdf1_ros.df1.machine import (
     Silence,
     Step,
 )
-from abdf1_ros.df1.mode import LineMode, Report, Serve
+from abdf1_ros.df1.mode import LineMode
 from abdf1_ros.df1.packet import BROADCAST, is_local_status, Packet
 from abdf1_ros.df1.settings import LinkSettings
 from abdf1_ros.df1.stations import ActiveStationList
@@ -393,14 +393,11 @@ class RadioMode(LineMode):
     """A node of a network of radio modems."""
 
     name = 'Radio'
+    link = RadioNode
     other_words = {'df1radiomodem': 'Radio', 'radiomodem': 'Radio'}
     duplex = Duplex.RADIO
     answers = 1
     why_unshared = 'in Mode Radio it has not been tried'
-
-    def make_link(self, machine: Machine, line: LinkSettings, stations: ActiveStationList,
-                  serve: Serve, report: Report) -> Link:
-        return RadioNode(machine, line, stations, serve, report)
 
     def pause(self, line: LinkSettings) -> float:
         """Return how long a first try waits for a quiet line, mostly."""

@@ -43,14 +43,15 @@ TICK = 0.25
 _MOMENT = 0.0001  # s after the last byte
 
 
-class Initiator(Protocol):
-    """Gives a slave commands to send, and takes their results."""
+class Initiator:
+    """Gives a slave commands to send, and takes their results; by itself it has none."""
 
     def polled(self) -> None:
         """Take note that the master has polled us."""
 
     def next_command(self) -> Packet | None:
         """Return a command to send in answer to a poll."""
+        return None
 
     def delivered(self, command: Packet) -> None:
         """Take note that the master has acknowledged a command."""
@@ -86,7 +87,7 @@ class HalfDuplexSlave:
                  counters: Counters | None = None, initiator: Initiator | None = None,
                  report: Callable[[Event], None] = lambda event: None) -> None:
         self.counters = counters or Counters()
-        self._initiator = initiator
+        self._initiator = initiator or Initiator()
         self._report = report
         self._settings = settings
         self._serve = serve
@@ -156,7 +157,7 @@ class HalfDuplexSlave:
     def _release(self, error: LinkError | None = None) -> None:
         """Drop the held message; the sender of a command gets the result (KF2 4-31)."""
         held, self._held = self._held, None
-        if held is None or held.packet.is_reply or self._initiator is None:
+        if held is None or held.packet.is_reply:
             return
         if error is None:
             self._initiator.delivered(held.packet)
@@ -196,8 +197,7 @@ class HalfDuplexSlave:
         if packet.is_reply:
             self.counters.replies_received += 1
             self.counters.error_messages_received += packet.sts != 0
-            if self._initiator is not None:
-                self._initiator.replied(packet)
+            self._initiator.replied(packet)
             return
         self.counters.commands_received += 1
         reply = self._serve(packet)
@@ -219,8 +219,7 @@ class HalfDuplexSlave:
             self.counters.nak_limit_exceeded += 1
             self._report(Event(Message.NTC_NAK_LIMIT_EXCEEDED, (self._settings.nak_retries,)))
             self._release(NeverTaken(self._settings.nak_retries))
-        if self._initiator is not None:
-            self._initiator.polled()
+        self._initiator.polled()
         if self._held is None:
             packet = self._next_packet()
             self._held = _Held(packet) if packet is not None else None
@@ -237,7 +236,7 @@ class HalfDuplexSlave:
 
         They take turns, or a master that always has a reply to fetch would never get our commands.
         """
-        if self._initiator is not None and (self._sent_reply or not self._queue):
+        if self._sent_reply or not self._queue:
             command = self._initiator.next_command()
             if command is not None:
                 self._sent_reply = False

@@ -28,17 +28,17 @@ import math
 from abdf1_ros.df1.accounting import Accounting
 from abdf1_ros.df1.link import Link, LinkStatus
 from abdf1_ros.df1.machine import Machine, Procedure, Rest, Silence
-from abdf1_ros.df1.mode import LineMode, Report, Serve
+from abdf1_ros.df1.mode import LineMode
 from abdf1_ros.df1.packet import BROADCAST, is_local_status, Packet
 from abdf1_ros.df1.settings import LinkSettings
-from abdf1_ros.df1.slave import answer, HalfDuplexSlave, TICK
+from abdf1_ros.df1.slave import answer, HalfDuplexSlave, Initiator, TICK
 from abdf1_ros.df1.stations import ActiveStationList
 from abdf1_ros.df1.tasks import Outstanding, TaskSource
 from abdf1_ros.errors import CommandExpired, CommandTimeout, LinkError
 from abdf1_ros.messages import Event
 
 
-class SlaveLink:
+class SlaveLink(Link, Initiator):
     """
     Serve the master on the line of ``machine``, and send the commands of a source.
 
@@ -177,13 +177,10 @@ class SlaveMode(LineMode):
     """A slave: the master polls, and passes commands and replies on."""
 
     name = 'Slave'
+    link = SlaveLink
     other_words = {'df1halfduplexslave': 'Slave', 'halfduplexslave': 'Slave'}
     is_polled = True
     why_unshared = "a slave cannot send a guest's commands"
-
-    def make_link(self, machine: Machine, line: LinkSettings, stations: ActiveStationList,
-                  serve: Serve, report: Report) -> Link:
-        return SlaveLink(machine, line, stations, serve, report)
 
 
 SLAVE = SlaveMode()

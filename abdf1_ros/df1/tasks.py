@@ -66,13 +66,16 @@ class Outstanding:
 
 
 class TaskSource(Protocol):
-    """Where a link gets its tasks."""
+    """Where a link gets its tasks; by itself it has none."""
 
     def next_task(self, now: float, busy: Container[int] = ()) -> Task | None:
         """Return what has the line next, not for a ``busy`` station; None for nothing."""
+        return None
 
     def next_due(self) -> float | None:
         """Return when something will be due (clock value in s), None for never."""
+        return None
 
     def expire(self, now: float) -> None:
         """Do what needs no line, such as ending what has waited too long to be sent."""
+        return

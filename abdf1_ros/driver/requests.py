@@ -30,7 +30,7 @@ from abdf1_ros.df1.machine import Procedure
 from abdf1_ros.df1.mode import LineMode
 from abdf1_ros.df1.settings import LinkSettings
 from abdf1_ros.df1.stations import ActiveStationList
-from abdf1_ros.df1.tasks import Task
+from abdf1_ros.df1.tasks import Task, TaskSource
 from abdf1_ros.driver.inbox import Inbox
 from abdf1_ros.driver.job_tasks import Job, JobTasks
 from abdf1_ros.errors import LinkError, PortLost
@@ -63,7 +63,7 @@ class _RequestJob(Job):
         """Do nothing: the steps have reported it."""
 
 
-class Requests:
+class Requests(TaskSource):
     """
     Carry out requests over a line; ``machine`` is to be run on its port.
 
@@ -114,13 +114,6 @@ class Requests:
             with suppress(StopIteration):  # it has ended before its first command
                 return self._tasks.start(request, now)
         return None
-
-    def next_due(self) -> float | None:
-        """Return None: nothing comes by itself."""
-        return None
-
-    def expire(self, now: float) -> None:
-        """Do nothing: requests wait as long as they have to."""
 
     def _run(self) -> Procedure:
         self._waiting.open()

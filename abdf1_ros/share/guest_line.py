@@ -16,7 +16,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Container
+from collections.abc import Callable
 from functools import partial
 
 from abdf1_ros.df1.frames import Duplex
@@ -25,7 +25,7 @@ from abdf1_ros.df1.packet import Packet
 from abdf1_ros.df1.peer import FullDuplexPeer
 from abdf1_ros.df1.settings import LinkSettings
 from abdf1_ros.df1.stations import ActiveStationList
-from abdf1_ros.df1.tasks import Task
+from abdf1_ros.df1.tasks import TaskSource
 from abdf1_ros.driver.guests import Guest, GuestCommand, GuestListener, GuestQueue, ShareAccess
 from abdf1_ros.ports.clock import line_time
 from abdf1_ros.ports.descriptor import Port
@@ -39,19 +39,8 @@ from abdf1_ros.settings.share import SharePlace
 _GLANCE = 0.1
 
 
-class _Nothing:
+class _Nothing(TaskSource):
     """We send no commands of our own to a guest."""
-
-    def next_task(self, now: float, busy: Container[int] = ()) -> Task | None:
-        """Return nothing."""
-        return None
-
-    def next_due(self) -> float | None:
-        """Return that nothing will ever be due."""
-        return None
-
-    def expire(self, now: float) -> None:
-        """Do nothing."""
 
 
 class GuestLine:

@@ -34,6 +34,7 @@ from abdf1_ros.df1.packet import Packet
 from abdf1_ros.df1.settings import LinkSettings
 from abdf1_ros.df1.slave import HalfDuplexSlave
 from abdf1_ros.df1.stations import MAX_STATION
+from abdf1_ros.df1.tasks import TaskSource
 from abdf1_ros.errors import FormatError, LinkError, RemoteError
 from abdf1_ros.numbers import decimal_number, Kind, member_of, one_of, whole, whole_number
 from abdf1_ros.pccc.address import Address
@@ -134,7 +135,7 @@ class Sending:
 _NO_LOCK = nullcontext()
 
 
-class SimulatedPlc:
+class SimulatedPlc(TaskSource):
     """
     One station with its data table; ``clock`` gives seconds.
 
@@ -265,13 +266,6 @@ class SimulatedPlc:
         """Return a command of our own that waits to be sent."""
         is_free = self.outbox and self.outbox[0].command.dst not in busy
         return self.outbox.popleft() if is_free else None
-
-    def next_due(self) -> float | None:
-        """Return None: messages are sent on command only."""
-        return None
-
-    def expire(self, now: float) -> None:
-        """Do nothing: messages wait for ever."""
 
     def damaged(self, data: bytes) -> bytes:
         """Return ``data`` as they arrive at the other end."""

@@ -20,7 +20,6 @@ It is a full-duplex line whose commands have a pause before them, as if on a slo
 
 from __future__ import annotations
 
-from collections.abc import Callable
 import os
 from pathlib import Path
 import subprocess
@@ -28,16 +27,12 @@ import sys
 import tempfile
 
 from abdf1_ros.df1.frames import Duplex
-from abdf1_ros.df1.link import Link
-from abdf1_ros.df1.machine import Listen, Machine, Procedure
+from abdf1_ros.df1.machine import Listen, Procedure
 from abdf1_ros.df1.mode import LineMode
 from abdf1_ros.df1.modes import MODES
-from abdf1_ros.df1.packet import Packet
 from abdf1_ros.df1.peer import FullDuplexPeer
 from abdf1_ros.df1.settings import LinkSettings
-from abdf1_ros.df1.stations import ActiveStationList
 from abdf1_ros.df1.tasks import Task
-from abdf1_ros.messages import Event
 
 PAUSE = 0.2
 LONGEST = 7.0
@@ -53,14 +48,11 @@ class Modem(FullDuplexPeer):
 
 class ModemMode(LineMode):
     name = 'Modem'
+    link = Modem
     other_words = {'dialup': 'Modem'}
     duplex = Duplex.FULL
     why_unshared = 'a modem has one caller'
     answers = 1
-
-    def make_link(self, machine: Machine, line: LinkSettings, stations: ActiveStationList,
-                  serve: Callable[[Packet], Packet], report: Callable[[Event], None]) -> Link:
-        return Modem(machine, line, stations, serve, report)
 
     def pause(self, line: LinkSettings) -> float:
         return PAUSE

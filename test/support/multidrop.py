@@ -117,11 +117,11 @@ class MasterNode(CommandTasks):
         self.link: HalfDuplexMaster | StandardPollingMaster
         if polling is None:
             self.link = HalfDuplexMaster(
-                self.machine, settings, self.stations, self.events.append, served)
+                self.machine, settings, self.stations, served, self.events.append)
         else:
             self.link = StandardPollingMaster(
                 self.machine, replace(settings, polling=polling), self.stations,
-                self.events.append, served)
+                served, self.events.append)
 
     def _serve(self, command: Packet) -> Packet:
         self.served.append(command)

@@ -70,7 +70,7 @@ class MasterScript(Recorded):
         self.machine = Machine(self._procedure, checksum=settings.checksum, timing=timing,
                                forget_on_send=True)
         self.master = HalfDuplexMaster(
-            self.machine, settings, self.stations, self.events.append)
+            self.machine, settings, self.stations, report=self.events.append)
         self._result: Packet | LinkError | None = None
         self._sent = self._received = 0
         self._started = False
