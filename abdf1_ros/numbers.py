@@ -42,6 +42,11 @@ def whole_number(text: str) -> int | None:
     return int(text) if _WHOLE.fullmatch(text) else None
 
 
+def is_digits(text: str) -> bool:
+    """Tell whether ``text`` is a whole number without a sign."""
+    return text.isascii() and text.isdigit()
+
+
 def decimal_number(text: str) -> float | None:
     """Return the number that ``text`` stands for, None for others and too large ones."""
     value = float(text) if _DECIMAL.fullmatch(text) else math.inf

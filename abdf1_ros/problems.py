@@ -48,14 +48,17 @@ class Problem(Abdf1Error):
     One fault in a file or parameter that a user wrote.
 
     ``place`` is where it stands, ``text`` what is wrong and what would be right, ``message`` its
-    numbered entry, or None where the specification has none. What it shows is one visible line,
-    whatever stands in the file.
+    numbered entry, or None where the specification has none. Without ``args`` the words of the
+    entry would be false, so only its number is told; without ``text`` they say all. What it shows
+    is one visible line, whatever stands in the file.
     """
 
     def __init__(self, where: Place | str, text: str, message: Message | None = None,
                  args: tuple[Any, ...] = ()) -> None:
-        head = f'{message.entry(*args)}; ' if message else ''
-        super().__init__(printable(f'{where}: {head}{text}'))
+        entry = f'{message.number} {message.name}: ' if message else ''
+        if message and args:
+            entry = message.entry(*args) + ('; ' if text else '')
+        super().__init__(printable(f'{where}: {entry}{text}'))
         self.place = where if isinstance(where, Place) else Place(where)
         self.text = text
         self.message = message

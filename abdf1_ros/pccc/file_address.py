@@ -162,7 +162,9 @@ class FileAddressing(Addressing):
             raise AddressSyntaxError(f'bits of an L file have no address; read {address} as '
                                      f'int32 and take bit {text} from it')
         if not kind.has_bits or address.bit is not None:
-            raise AddressSyntaxError(f'{kind.value} files have no bits to address')
+            size = '; the length of a string is not written here' \
+                if kind is FileType.STRING else ''
+            raise AddressSyntaxError(f'{kind.value} files have no bits to address{size}')
         if layout.value_words(address.word) != 1:
             raise AddressSyntaxError(
                 f'{address} is {_two_words(kind)}, which has no bits to address')

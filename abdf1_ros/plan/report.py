@@ -374,8 +374,8 @@ def _gap_remarks(report: Report) -> Iterator[Remark]:
     for blocks in groups.values():
         time = sum(map(report.time, blocks))
         least = _time_side_by_side(report, blocks)
-        if time - least >= _WORTH_SAVING * report.poll_cycle:
-            mappings = [mapping for block in blocks for mapping in block.mappings]
+        mappings = [mapping for block in blocks for mapping in block.mappings]
+        if len(mappings) > 1 and time - least >= _WORTH_SAVING * report.poll_cycle:
             first, last = _ends(mappings)
             spare = sum(block.words for block in blocks) - len(_words(mappings))
             yield Remark(RemarkKind.GAP, (

@@ -25,10 +25,11 @@ from abdf1_ros.text import shown
 _ALIKE = str.maketrans(
     'АВЕКМНОРСТХІЅаеорсухіѕΑΒΕΖΗΙΚΜΝΟΡΤΥΧο‐‑‒–—−‘’“”⁄∕',
     'ABEKMHOPCTXISaeopcyxisABEZHIKMNOPTYXo------\'\'""//')
-_MONTH = '(?:jan|feb|mar|mär|apr|may|mai|jun|jul|aug|sep|oct|okt|nov|dec|dez)[a-zä]*'
+_MONTH = '(?:jan|feb|mar|mär|mrz|apr|may|mai|jun|jul|aug|sep|oct|okt|nov|dec|dez)[a-zä]*'
 _TIME = re.compile(
     rf'\d{{1,2}}:\d\d(?::\d\d)?(?: ?[ap]m)?|\d{{1,4}}[./-]\d{{1,2}}[./-]\d{{1,4}}|'
-    rf'\d{{1,2}}\.?[ -]{_MONTH}\.?(?:[ -]\d+)?|{_MONTH}\.?[ -]\d+', re.IGNORECASE)
+    rf'\d{{1,2}}-\d{{1,2}}|\d{{1,2}}\.?[ -]{_MONTH}\.?(?:[ -]\d+)?|{_MONTH}\.?[ -]\d+',
+    re.IGNORECASE)
 _WRAPPED = re.compile(r'="?(?P<formula>[^"]+)"?|\'(?P<text>.+)')
 _ERROR = re.compile(r'#(?:(?:N/A|NV|NAME\?|NOM\?)'
                     r'|(?:DIV/0|REF|VALUE|NULL|NUM|BEZUG|WERT|ZAHL|VALEUR|VALOR)!)')

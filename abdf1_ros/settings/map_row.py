@@ -23,7 +23,15 @@ from typing import Any, TypeVar
 from abdf1_ros.df1.packet import BROADCAST
 from abdf1_ros.df1.stations import MAX_STATION
 from abdf1_ros.messages import Message
-from abdf1_ros.numbers import decimal_number, Kind, member_of, one_of, two_readings, whole
+from abdf1_ros.numbers import (
+    decimal_number,
+    is_digits,
+    Kind,
+    member_of,
+    one_of,
+    two_readings,
+    whole,
+)
 from abdf1_ros.pccc.access import Access
 from abdf1_ros.pccc.address import Address, AddressRangeError, AddressSyntaxError
 from abdf1_ros.pccc.families import FAMILIES, parse_address
@@ -75,9 +83,10 @@ class CellFault:
     def in_file(self, row: Row) -> Problem:
         """Return the fault in the words of the map file that the row stands in."""
         text, where = self.words(), row.where(self.column)
-        if self.message is None:
-            return Problem(where, f'Item: {row.item}, {text}')
-        return Problem(where, text, self.message, (row.item, *self.args))
+        is_told = self.value is not None and is_digits(self.value)
+        if self.message is None or (self.value is not None and not is_told):
+            return Problem(where, f'Item: {row.item}, {text}', self.message)
+        return Problem(where, '' if is_told else text, self.message, (row.item, *self.args))
 
 
 class RowReader:

@@ -33,7 +33,7 @@ from abdf1_ros.df1.packet import BROADCAST
 from abdf1_ros.df1.settings import LinkOptions, LinkSettings
 from abdf1_ros.df1.stations import MAX_STATION
 from abdf1_ros.messages import Message
-from abdf1_ros.numbers import Kind, one_of, TEXT, whole, whole_number
+from abdf1_ros.numbers import is_digits, Kind, one_of, TEXT, whole, whole_number
 from abdf1_ros.pccc.families import FAMILIES
 from abdf1_ros.problems import ConfigurationError, Place, Problem
 from abdf1_ros.settings import BAUD_RATES, PARITIES
@@ -45,6 +45,7 @@ from abdf1_ros.text import shown
 
 MODE_NAMES = tuple(dict.fromkeys(mode.name for mode in MODES))
 POLLING_MODES = tuple(mode.polling for mode in MODES if mode.polling)
+_HOST = re.compile(r'(?P<scheme>\w+://)?(?P<host>[\w.-]+?)(?P<port>:\d{1,4})?')
 PLC_TYPES = tuple(entry.value for entry in FAMILIES)
 # Schemes of the URLs of device servers; each has a module in ``ports``.
 DEVICE_SERVERS = ('socket', 'rfc2217')
@@ -57,8 +58,8 @@ class NetField:
     One field of the net CSV.
 
     A bad value is reported with ``message``, whose places after the value are filled from
-    ``message_args``. ``other_words`` are names of choices in other programs, in lower case, with
-    the choice to advise.
+    ``message_args``; its words are true of numbers and choices. ``other_words`` are names of
+    choices in other programs, in lower case, with the choice to advise.
     """
 
     column: str
@@ -85,9 +86,11 @@ class NetField:
         if value is None:
             meant = self.other_words.get(re.sub(r'[\W_]', '', text).lower())
             advice = f'; "{shown(text)}" is {meant}' if meant else hint(text)
+            if self.message and (self.kind.choices or is_digits(text)):
+                raise Problem(where, advice.removeprefix('; '), self.message,
+                              (shown(text), *self.message_args))
             raise Problem(where, f'{self.column} = "{shown(text)}" should be {self.kind.right}'
-                          f'{advice}', self.message, (shown(text), *self.message_args)
-                          if self.message else ())
+                          f'{advice}', self.message)
         return value
 
 
@@ -116,7 +119,7 @@ class Network:
     mode: str = _net(
         'Mode', 'Master', 'driver mode', _named(*MODE_NAMES),
         message=Message.CRT_BAD_DRIVER_MODE,
-        message_args=('Master', 'Slave, Peer', 'Radio'),
+        message_args=(MODE_NAMES[0], ', '.join(MODE_NAMES[1:-1]), MODE_NAMES[-1]),
         other_words=dict(ChainMap(*(dict(mode.other_words) for mode in MODES))))
     plc_type: str = _net(
         'PLC_Type', 'PLC5', 'PLC that this node emulates', _named(*PLC_TYPES),
@@ -289,11 +292,16 @@ def make_network(values: MappingType[str, tuple[str, Place | str]],
 
 
 def _port_fault(text: str) -> str:
-    if _is_url(text) or text.startswith('/') or (
-            text.isdigit() and (whole_number(text) or 0) >= 1):
+    if _is_url(text) or text.startswith('/') or (is_digits(text) and whole_number(text)):
         return ''
+    advice = f'"plc ports" lists the devices{hint(text)}'
+    match = _HOST.fullmatch(text)
+    if match and match['port']:
+        advice = f'write socket://{shown(match["host"])}{match["port"]}'
+    elif match and match['scheme']:
+        advice = f'the port is missing, as in {shown(text)}:4001'
     return (f'Com_Port = "{shown(text)}" should be a number from 1, a device path such as '
-            f'/dev/ttyUSB0, {URLS}; "plc ports" lists the devices{hint(text)}')
+            f'/dev/ttyUSB0, {URLS}; {advice}')
 
 
 def _share_fault(text: str) -> str:

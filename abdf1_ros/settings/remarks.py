@@ -37,6 +37,15 @@ from abdf1_ros.text import shown
 
 _ACK_SIZE = 2
 _SHORT_PERIOD = 10  # ms; what is less was meant as seconds
+_LONG_TIMEOUT = 10_000  # ms
+
+
+# What comes of a write; of timers and counters to a bit.
+_WRITTEN = {
+    FileType.INPUT: 'is an input: the PLC overwrites what is written there with its next scan',
+    FileType.STATUS: 'is in the status file: a write may change how the processor runs',
+    FileType.TIMER: 'is set anew by the instruction of the timer with each scan',
+    FileType.COUNTER: 'is set anew by the instruction of the counter with each scan'}
 
 
 def network_remarks(network: Network) -> Iterator[str]:
@@ -48,12 +57,21 @@ def network_remarks(network: Network) -> Iterator[str]:
     mode = network.line_mode
     if mode.waits_for_acks:
         yield from _time_remarks(network)
-    if mode.duplex is not Duplex.RADIO:
-        for column, value in (('Store_Forward', network.store_forward),
-                              ('Collision_Avoidance', network.collision_avoidance)):
-            if value:
-                yield f'{column} is for Mode Radio; in Mode {network.mode} it does nothing'
+    is_radio = mode.duplex is Duplex.RADIO
+    for column, is_idle, right in (
+            ('Polling', not mode.is_master and network.polling != Network().polling, 'Master'),
+            ('Store_Forward', not is_radio and network.store_forward, 'Radio'),
+            ('Collision_Avoidance', not is_radio and network.collision_avoidance, 'Radio')):
+        if is_idle:
+            yield f'{column} is for Mode {right}; in Mode {network.mode} it does nothing'
+    if is_radio and network.station in network.line.store_forward:
+        yield (f'Store_Forward names our own Station {network.station}; it is for nodes that hear '
+               'each other only through us')
+    if network.share_access != Network().share_access and not network.share:
+        yield 'Share_Access is for a line with Share; without it it does nothing'
     yield from share_remarks(share_places(network.share))
+    if network.share and network.share_access == 'All':
+        yield 'Share_Access All: guests may change modes, download and reset, too'
 
 
 def _time_remarks(network: Network) -> Iterator[str]:
@@ -62,6 +80,9 @@ def _time_remarks(network: Network) -> Iterator[str]:
         yield (f'Timeout {network.timeout} ms: an ACK takes {least:.0f} ms on this line, '
                f'{MIN_RESPONSE_TIME * 1000:.0f} ms until a station answers and two characters at '
                f'{network.baud} baud; answers may come too late')
+    if network.timeout > _LONG_TIMEOUT:
+        yield (f'Timeout {network.timeout} is in ms: the line stands still for '
+               f'{network.timeout / 1000:.0f} s whenever an answer gets lost')
     # The command comes before the reply, and in half duplex the poll as well.
     times = 1 if network.duplex is Duplex.FULL else 2
     if times * network.tx_delay >= network.cmd_timeout:
@@ -81,12 +102,9 @@ def row_remarks(row: Row, mapping: Mapping) -> Iterator[Problem]:
                                   f'stands, has no such file; {having(address)} may have it')
     if not mapping.writes:
         return
-    if not mapping.serves and mapping.address.file_type is FileType.INPUT:
-        yield _at(row, 'Command', f'{mapping.address} is an input: the PLC overwrites what is '
-                                  'written there with its next scan')
-    if not mapping.serves and mapping.address.file_type is FileType.STATUS:
-        yield _at(row, 'Command', f'{mapping.address} is in the status file: a write may change '
-                                  'how the processor runs')
+    is_member = address.file_type.is_structure and address.bit is None
+    if address.file_type in _WRITTEN and not mapping.serves and not is_member:
+        yield _at(row, 'Command', f'{address} {_WRITTEN[address.file_type]}')
     if mapping.fallback is not None and mapping.type is ValueType.BOOL \
             and mapping.processor is not None and mapping.processor.may_lack_masked_write:
         yield _at(row, 'Fallback', f'{mapping.processor.value} may change bits by rewriting the '

@@ -59,7 +59,8 @@ SPREADSHEET = ('; a spreadsheet may have made a date or time of it: give the col
 @for_all(('address', 'expected'), [
     ('07:00:00', FORM + SPREADSHEET), ('7:00 PM', FORM + SPREADSHEET),
     ('03. May', FORM + SPREADSHEET), ('3-May', FORM + SPREADSHEET),
-    ('Mrz 05', FORM), ('05.03.2026', FORM + SPREADSHEET),
+    ('Mrz 05', FORM + SPREADSHEET), ('05. Mrz', FORM + SPREADSHEET), ('3-1', FORM + SPREADSHEET),
+    ('05.03.2026', FORM + SPREADSHEET),
     ('"=""N7:0"""', FORM + '; signs that only a spreadsheet needs: write N7:0'),
     ("'N7:0", FORM + '; signs that only a spreadsheet needs: write N7:0'),
     ('N7:0 - N7:9', 'write N7:0, and Length 10'), ('N7:0..9', 'write N7:0, and Length 10'),
@@ -95,9 +96,8 @@ def test_address_that_cannot_be_used(tmp_path: Path, address: str, expected: str
         '!2:2 (Command): Item: 1, Command = "Reаd" should be one of Read, Write, ReadWrite, '
         'Serve, Heartbeat; character 3 is U+0430 CYRILLIC SMALL LETTER A, not "a"']),
     (f'{HEAD}\na,Read,N7:0,１,SLC\n', [
-        '!2:4 (Station): 2501 ERR_BAD_STATION: Item: 1, Invalid station number (１) must be less '
-        'than 255; Station = "１" should be a whole number from 0 to 254; character 1 is U+FF11 '
-        'FULLWIDTH DIGIT ONE, not "1"']),
+        '!2:4 (Station): 2501 ERR_BAD_STATION: Item: 1, Station = "１" should be a whole number '
+        'from 0 to 254; character 1 is U+FF11 FULLWIDTH DIGIT ONE, not "1"']),
     ('Tag,Command,Address,PLC_Type\na,Read,N7:0,SLC\nb,Read,N7:1,SLC\nc,Rad,N7:2,SLC\n', [
         '!1: column Station is missing, and each row needs it']),
     ('Tag,Command,Address,Statoin,PLC_Type\na,Read,N7:0,1,SLC\n', [
@@ -109,7 +109,12 @@ def test_address_that_cannot_be_used(tmp_path: Path, address: str, expected: str
         '!2:2 (Command): Item: 1, Command = "Rad" should be one of Read, Write, ReadWrite, Serve, '
         'Heartbeat',
         '!3:4 (Station): 2501 ERR_BAD_STATION: Item: 2, Invalid station number (256) must be less '
-        'than 255; Station = "256" should be a whole number from 0 to 254']),
+        'than 255']),
+    (f'{HEAD}\na,Read,N7:0,1.0,SLC\nb,Read,ST9:0/20,1,SLC\n', [
+        '!2:4 (Station): 2501 ERR_BAD_STATION: Item: 1, Station = "1.0" should be a whole number '
+        'from 0 to 254',
+        '!3:3 (Address): 2503 ERR_ADDRESS_SYNTAX: Item: 2, Invalid Address Syntax (ST9:0/20); ST '
+        'files have no bits to address; the length of a string is not written here']),
     (f'{HEAD},Type\na,Read,N7:255,1,SLC,int32\n', [
         '!2 (Length): 2504 ERR_ADDRESS_RANGE: Item: 1, Address is out of range (N7:255, len=1); '
         '1 int32 from N7:255 on take 2 words; the last word there can be is N7:255']),
@@ -143,6 +148,9 @@ def test_what_is_told_of_a_map(tmp_path: Path, text: str, expected: list[str]) -
         '2:3 (Address): T4:0 is the control word of the element; its values are T4:0.PRE, '
         'T4:0.ACC']),
     (f'{HEAD},Length\na,Read,C5:0,1,PLC5,3\n', []),
+    (f'{HEAD},Length\na,Read,T4:0.ACC,1,SLC,2\n', []),  # one tag cannot lie side by side
+    (f'{HEAD}\na,Write,T4:0/DN,1,SLC\nb,Write,C5:0.ACC,1,SLC\nc,Serve,C5:0/CU,5,PLC5\n', [
+        '2:2 (Command): T4:0/DN is set anew by the instruction of the timer with each scan']),
     (f'{HEAD}\nSpeed,Read,N7:0,1,SLC\nspeed,Read,N7:1,1,SLC\nspeeds,Read,N7:2,1,SLC\n', [
         'tags that differ only in capital and small letters: Speed, speed']),
     (f'{HEAD}\na,Read,L9:0,1,SLC\n', [
@@ -176,6 +184,10 @@ def test_requires_that_names_no_write_topic(tmp_path: Path, requires: str, expec
     assert [text for text in told if text.startswith('!')] == [NO_TOPIC + expected]
 
 
+PORT = ('should be a number from 1, a device path such as /dev/ttyUSB0, socket://host:port or '
+        'rfc2217://host:port')
+
+
 @for_all(('text', 'expected'), [
     ('Com_Port,BaudRate\n1,9600\n', ['!1:2: unknown column "BaudRate"; did you mean Baud?']),
     ('Com_Port,Station No\n1,5\n', ['!1:2: unknown column "Station No"; did you mean Station?']),
@@ -197,10 +209,22 @@ def test_requires_that_names_no_write_topic(tmp_path: Path, requires: str, expec
         '2: the row ends before Baud, Mode: the defaults are taken']),
     ('Com_Port,Timeout\n1,1 s\n', [
         '!2:2 (Timeout): Timeout = "1 s" should be a whole number from 0 to 360000 ms']),
+    ('Com_Port\n192.168.0.9:4001\n', [f'!2:1 (Com_Port): Com_Port = "192.168.0.9:4001" {PORT}; '
+                                      'write socket://192.168.0.9:4001']),
+    ('Com_Port\ntcp://plc:4001\n', [f'!2:1 (Com_Port): Com_Port = "tcp://plc:4001" {PORT}; '
+                                    'write socket://plc:4001']),
+    ('Com_Port\nsocket://192.168.0.9\n', [
+        f'!2:1 (Com_Port): Com_Port = "socket://192.168.0.9" {PORT}; the port is missing, as in '
+        'socket://192.168.0.9:4001']),
+    ('Com_Port,Share\n1,tcp:+4501\n', [
+        '!2:2 (Share): Share: "tcp:+4501" should be tcp:PORT (for this machine only) or '
+        'tcp:ADDRESS:PORT, with the address of an interface']),
+    ('Com_Port,Mode\n1,Half\n', [
+        '!2:2 (Mode): 2553 CRT_BAD_DRIVER_MODE: Invalid Driver Mode (Half), should be one of '
+        'Master, Slave, Peer, or Radio']),
     ('Com_Port,Mode\n1,Peеr\n', [
         '!2:2 (Mode): 2553 CRT_BAD_DRIVER_MODE: Invalid Driver Mode (Peеr), should be one of '
-        'Master, Slave, Peer, or Radio; Mode = "Peеr" should be one of Master, Slave, Peer, '
-        'Radio; character 3 is U+0435 CYRILLIC SMALL LETTER IE, not "e"']),
+        'Master, Slave, Peer, or Radio; character 3 is U+0435 CYRILLIC SMALL LETTER IE, not "e"']),
 ])
 def test_what_is_told_of_a_net_file(tmp_path: Path, text: str, expected: list[str]) -> None:
     assert told_of_net(tmp_path, text) == expected

@@ -109,7 +109,8 @@ def test_number_in_its_range(path: Path, column: str, field: str, text: str) -> 
 def test_number_out_of_its_range(path: Path, column: str, text: str) -> None:
     fault, = faults(path, f'Handshake,{column}', f'No,{text}')
     assert fault.startswith(f'FILE:2:2 ({column}): ')
-    assert f'{column} = "{text}" should be ' in fault
+    assert fault.count(' should be ') + fault.count(' must be ') == 1  # said once
+    assert f'"{text}"' in fault or f'({text})' in fault
 
 
 @pytest.mark.parametrize('column, field, text', [
@@ -121,29 +122,23 @@ def test_choice_in_any_letter_case(path: Path, column: str, field: str, text: st
 
 @pytest.mark.parametrize('column, text, expected', [
     ('Station', '255',
-     '2552 CRT_BAD_STATION_ID: Invalid station number (255) must be less than 255; '
-     'Station = "255" should be a whole number from 0 to 254'),
-    ('Station', 'abc',
-     '2552 CRT_BAD_STATION_ID: Invalid station number (abc) must be less than 255; '
+     '2552 CRT_BAD_STATION_ID: Invalid station number (255) must be less than 255'),
+    ('Station', 'abc', '2552 CRT_BAD_STATION_ID: '
      'Station = "abc" should be a whole number from 0 to 254'),
     ('Mode', 'Boss',
      '2553 CRT_BAD_DRIVER_MODE: Invalid Driver Mode (Boss), should be one of Master, Slave, '
-     'Peer, or Radio; Mode = "Boss" should be one of Master, Slave, Peer, Radio'),
+     'Peer, or Radio'),
     ('PLC_Type', 'PLC4',
      '2555 CRT_BAD_PLC_TYPE: Invalid or Unsupported PLC Type (PLC4) should be one of PLC2, '
-     'PLC3, PLC5, SLC; PLC_Type = "PLC4" should be one of PLC2, PLC3, PLC5, SLC'),
+     'PLC3, PLC5, SLC'),
     ('Error_Code', 'XOR',
-     '2556 CRT_BAD_ERROR_CODE: Invalid Error Code (XOR), should be either BCC, or CRC; '
-     'Error_Code = "XOR" should be one of BCC, CRC'),
+     '2556 CRT_BAD_ERROR_CODE: Invalid Error Code (XOR), should be either BCC, or CRC'),
     ('NAK_Retries', '11',
-     '2557 CRT_BAD_NAK_RETRIES: Invalid NAK Retries (11) should be in range [0, 10]; '
-     'NAK_Retries = "11" should be a whole number from 0 to 10'),
+     '2557 CRT_BAD_NAK_RETRIES: Invalid NAK Retries (11) should be in range [0, 10]'),
     ('ENQ_Retries', '-1',
-     '2558 CRT_BAD_ENQ_RETRIES: Invalid ENQ Retries (-1) should be in range [0, 10]; '
-     'ENQ_Retries = "-1" should be a whole number from 0 to 10'),
+     '2558 CRT_BAD_ENQ_RETRIES: ENQ_Retries = "-1" should be a whole number from 0 to 10'),
     ('Cmd_Timeout', '499',
-     '2559 CRT_BAD_CMD_TIMEOUT: Invalid Cmd Timeout (499) should be in range [500, 5000]; '
-     'Cmd_Timeout = "499" should be a whole number from 500 to 5000 ms'),
+     '2559 CRT_BAD_CMD_TIMEOUT: Invalid Cmd Timeout (499) should be in range [500, 5000]'),
     ('Baud', '9601',
      'Baud = "9601" should be one of 1200, 2400, 4800, 9600, 19200, 38400, 57600, 115200'),
     ('Data_Bits', '9', 'Data_Bits = "9" should be a whole number from 5 to 8'),
@@ -162,7 +157,7 @@ def test_fault_of_a_cell_is_told_word_for_word(
 @pytest.mark.parametrize('column', ['Station', 'Mode', 'Com_Port', 'Baud'])
 def test_long_cell_is_shown_without_its_end(path: Path, column: str) -> None:
     fault, = faults(path, column, 'x' * 5000)
-    assert f'{column} = "{"x" * 100}..." should be ' in fault
+    assert 'x' * 100 + '...' in fault
     assert len(fault) < 500
 
 
@@ -194,8 +189,7 @@ def test_mode_in_the_words_of_other_programs_is_translated(
         path: Path, mode: str, meant: str) -> None:
     problem, = faults(path, 'Mode', mode)
     assert problem.startswith('FILE:2:1 (Mode): 2553 CRT_BAD_DRIVER_MODE: ')
-    assert problem.endswith(
-        f'; Mode = "{mode}" should be one of Master, Slave, Peer, Radio; "{mode}" is {meant}')
+    assert problem.endswith(f'Peer, or Radio; "{mode}" is {meant}')
 
 
 def test_all_faults_are_reported_at_once_each_in_its_place(path: Path) -> None:
@@ -280,8 +274,8 @@ def test_fault_of_an_override_names_the_parameter() -> None:
     assert [str(problem) for problem in caught.value.problems] == [
         'net.baud: Baud = "1" should be one of 1200, 2400, 4800, 9600, 19200, 38400, 57600, '
         '115200',
-        'net.station: 2552 CRT_BAD_STATION_ID: Invalid station number (-1) must be less than '
-        '255; Station = "-1" should be a whole number from 0 to 254']
+        'net.station: 2552 CRT_BAD_STATION_ID: Station = "-1" should be a whole number from 0 to '
+        '254']
 
 
 @given(st.sampled_from(sorted(FIELDS)), st.text(max_size=8))

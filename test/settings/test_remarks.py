@@ -51,7 +51,20 @@ GOOD = Network(timeout=300)
     (Network(mode='Radio', store_forward='1,2', collision_avoidance=True), []),
     (Network(store_forward='1,2', collision_avoidance=True), [
         'Store_Forward is for Mode Radio; in Mode Master it does nothing',
-        'Collision_Avoidance is for Mode Radio; in Mode Master it does nothing'])])
+        'Collision_Avoidance is for Mode Radio; in Mode Master it does nothing']),
+    (Network(mode='Peer', polling='Standard'), [
+        'Polling is for Mode Master; in Mode Peer it does nothing']),
+    (Network(mode='Radio', store_forward='5,6'), [
+        'Store_Forward names our own Station 5; it is for nodes that hear each other only through '
+        'us']),
+    (Network(share_access='Write'), [
+        'Share_Access is for a line with Share; without it it does nothing']),
+    (Network(share='pty:/tmp/hmi', share_access='Write'), []),
+    (Network(share='pty:/tmp/hmi', share_access='All'), [
+        'Share_Access All: guests may change modes, download and reset, too']),
+    (Network(timeout=10_000), []),
+    (Network(timeout=36_000), [
+        'Timeout 36000 is in ms: the line stands still for 36 s whenever an answer gets lost'])])
 def test_settings_that_leave_no_room_or_do_nothing(network: Network, expected: list[str]) -> None:
     assert list(network_remarks(network)) == expected
 
