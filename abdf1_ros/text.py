@@ -58,11 +58,22 @@ def first(names: Sequence[str], most: int = 5) -> str:
     return printable(', '.join(names[:most])) + more
 
 
+def counted(number: int, name: str) -> str:
+    """Return e.g. "1 word", "2 words" or "2 replies"."""
+    plural = f'{name[:-1]}ies' if name.endswith('y') else f'{name}s'
+    return f'{number} {name if number == 1 else plural}'
+
+
 def by_number(name: str) -> list[tuple[int, str]]:
     """Return a key that sorts names as people do: line2 before line10."""
     return [(int(part) if part.isdecimal() else 0, part) for part in re.split('([0-9]+)', name)]
 
 
-def milliseconds(seconds: float | None) -> str:
-    """Return a time (s) in whole ms, None as unknown."""
-    return 'unknown' if seconds is None else f'{seconds * 1000:.0f} ms'
+def milliseconds(seconds: float | None, digits: int = 0) -> str:
+    """Return a time (s) in ms, None as unknown."""
+    return 'unknown' if seconds is None else f'{seconds * 1000:.{digits}f} ms'
+
+
+def in_ms(seconds: float | None) -> float | None:
+    """Return a time (s) in ms as JSON has it."""
+    return None if seconds is None else round(seconds * 1000, 3)

@@ -57,10 +57,11 @@ from abdf1_ros.settings.map_row import MAX_PERIOD
 from abdf1_ros.settings.mapping import Mapping
 from abdf1_ros.settings.network import load_network, Network
 from abdf1_ros.settings.scaling import Scaling
-from abdf1_ros.text import by_number, cut, first, printable
+from abdf1_ros.text import by_number, counted, cut, first, in_ms, printable
 
 _MOST_ROWS = 40  # of a table; JSON has them all
 _SHOWN_TAGS = 8  # in the table; JSON has them all
+_ENDS = 'net.csv', 'map.csv'
 _EPILOG = """\
 exit status: 0 when both files are good, also with warnings; 2 for errors;
              130 when interrupted by Ctrl-C
@@ -129,18 +130,29 @@ def _report(found: Findings, options: argparse.Namespace) -> Report | None:
                        options.response_time / 1000)
 
 
-def pairs(folder: Path) -> list[tuple[str, Path, Path]]:
+def pairs(folder: Path) -> tuple[list[tuple[str, Path, Path]], list[str]]:
     """
-    Return name, net and map file of each line below a folder, by name: line2 before line10.
+    Return name, net and map file of each line below a folder, and which CSV files are of none.
 
     The files of a line are NAME_net.csv and NAME_map.csv, or net.csv and map.csv in a folder
-    NAME. One of them may be missing.
+    NAME. One of them may be missing. Lines are in the order of their names: line2 before line10.
     """
-    ends = 'net.csv', 'map.csv'
-    starts = {str(path.relative_to(folder))[:-len(ends[0])]
-              for path in folder.rglob('*.csv') if path.name.endswith(ends)}
-    return [(start.rstrip('/_-. ') or folder.name, folder / f'{start}net.csv',
-             folder / f'{start}map.csv') for start in sorted(starts, key=by_number)]
+    found: dict[str, dict[str, Path]] = {}
+    others = []
+    for path in sorted(folder.rglob('*.csv')):
+        name, end = str(path.relative_to(folder)), path.name[-len(_ENDS[0]):]
+        line = name[:-len(end)].rstrip('/_-. ') or folder.name
+        if end in _ENDS and end not in found.get(line, ()):
+            found.setdefault(line, {})[end] = path
+        else:
+            others.append(name)
+    lines = []
+    for line, files in sorted(found.items(), key=lambda item: by_number(item[0])):
+        known = next(iter(files.values()))
+        net, map_file = (files.get(end, known.with_name(known.name[:-len(end)] + end))
+                         for end in _ENDS)
+        lines.append((line, net, map_file))
+    return lines, others
 
 
 def _folder(options: argparse.Namespace) -> tuple[str, bool]:
@@ -149,7 +161,8 @@ def _folder(options: argparse.Namespace) -> tuple[str, bool]:
     texts = []
     bad = warned = 0
     owners: dict[str, str] = {}
-    for name, net, map_file in pairs(Path(options.net)):
+    lines, others = pairs(Path(options.net))
+    for name, net, map_file in lines:
         found = examine(str(net), str(map_file), options.default_period / 1000)
         if found.network is not None and found.network.com_port != Network().com_port:
             port = found.network.port  # without one a parameter gives it
@@ -163,13 +176,14 @@ def _folder(options: argparse.Namespace) -> tuple[str, bool]:
         texts.append(_summary(name, found, report))
     if contents:
         good = len(contents) - bad
-        lines = 'line' if len(contents) == 1 else 'lines'
-        texts.append(f'{len(contents)} {lines}: {good} good ({warned} of them with warnings), '
-                     f'{bad} with errors')
+        texts.append(f'{counted(len(contents), "line")}: {good} good ({warned} of them with '
+                     f'warnings), {bad} with errors'
+                     + (f'; of no line: {first(others)}' if others else ''))
     else:
         texts.append(f'{printable(options.net)}: no files NAME_net.csv and NAME_map.csv, nor '
                      'folders with net.csv and map.csv')
-    text = json.dumps({'lines': contents}, indent=2) if options.json else '\n'.join(texts)
+    text = '\n'.join(texts) if not options.json else \
+        json.dumps({'lines': contents, 'others': others}, indent=2)
     return text, bool(contents) and not bad
 
 
@@ -179,11 +193,11 @@ def _summary(name: str, found: Findings, report: Report | None) -> str:
               for problem in found.problems]
     if report is None:
         return '\n'.join(errors)
-    text = (f'{printable(name)}: {len(found.mappings)} rows, port '
+    text = (f'{printable(name)}: {counted(len(found.mappings), "row")}, port '
             f'{printable(report.network.port)}, poll cycle {report.poll_cycle * 1000:.0f} ms, '
             f'load {report.load:.0%}')
     if warnings := len(report.remarks()):
-        text += colour(f', {warnings} warning{"s" if warnings > 1 else ""}', YELLOW, sys.stdout)
+        text += colour(f', {counted(warnings, "warning")}', YELLOW, sys.stdout)
     return '\n'.join([*errors, text])
 
 
@@ -244,7 +258,7 @@ def _line_text(report: Report) -> str:
             f'{network.data_bits} data bits, parity {network.parity}, {network.stop_bits} stop, '
             f'{network.error_code}; our own Station is {network.station}\n'
             f'{mappings} {"mapping is" if mappings == 1 else "mappings are"} read with '
-            f'{blocks} {"block" if blocks == 1 else "blocks"}')
+            f'{counted(blocks, "block")}')
 
 
 def _rows_text(report: Report) -> str:
@@ -313,8 +327,8 @@ def _entry(report: Report, block: Block) -> dict[str, Any]:
         'station': block.station, 'plc_type': block.mappings[0].plc_type.value,
         'first': str(block.start), 'last': str(last), 'words': block.words,
         'bytes': 2 * block.words, 'packets': len(block.requests),
-        'line_ms': _ms(block.line_time), 'total_ms': _ms(report.time(block)),
-        'period_ms': _ms(block.period), 'tags': [mapping.tag for mapping in block.mappings]}
+        'line_ms': in_ms(block.line_time), 'total_ms': in_ms(report.time(block)),
+        'period_ms': in_ms(block.period), 'tags': [mapping.tag for mapping in block.mappings]}
 
 
 def _times_text(report: Report) -> str:
@@ -340,11 +354,11 @@ def _content(found: Findings, report: Report | None) -> dict[str, Any]:
             'network': report.network.cells(),
             'warnings': [*map(_remark, report.remarks())], 'notes': report.notes(),
             'blocks': [_entry(report, block) for block in report.blocks],
-            'scan_time_ms': _ms(report.poll_cycle), 'load': round(report.load, 4),
-            'longest_transaction_ms': _ms(report.longest_transaction),
+            'scan_time_ms': in_ms(report.poll_cycle), 'load': round(report.load, 4),
+            'longest_transaction_ms': in_ms(report.longest_transaction),
             'needed_baud': report.needed_baud(),
             'bounds': [_bound(bound) for bound in report.bounds],
-            'response_time_ms': _ms(report.response_time)}
+            'response_time_ms': in_ms(report.response_time)}
     return content
 
 
@@ -356,14 +370,9 @@ def _problem(problem: Problem) -> dict[str, Any]:
 
 def _bound(bound: Bound) -> dict[str, Any]:
     return {'tag': bound.mapping.tag, 'command': bound.mapping.command.value,
-            'ms': None if bound.seconds is None else _ms(bound.seconds),
-            'usual_ms': None if bound.usual is None else _ms(bound.usual),
+            'ms': in_ms(bound.seconds), 'usual_ms': in_ms(bound.usual),
             'presets': bound.presets}
 
 
 def _remark(remark: Remark) -> dict[str, Any]:
     return {'kind': remark.kind.value, 'station': remark.station, 'text': remark.text}
-
-
-def _ms(seconds: float) -> float:
-    return round(seconds * 1000, 3)

@@ -36,7 +36,7 @@ from abdf1_ros.pccc.plc5.commands import SystemAddress
 from abdf1_ros.pccc.plc5.describe import system_address
 from abdf1_ros.pccc.status import check_status, EXT_BAD_ADDRESS, EXT_BAD_SYMBOL, EXT_NO_SUCH_SYMBOL
 from abdf1_ros.pccc.word_range import commands as word_range
-from abdf1_ros.text import printable
+from abdf1_ros.text import counted, printable
 
 # Commands that carry a function code (M 7-2, 7-3).
 _WITH_FUNCTION = (0x06, 0x07, 0x0F)
@@ -181,7 +181,7 @@ def extended_address(address: ExtendedAddress) -> str:
 
 def _range_read(request: word_range.WordRangeRead[_Range]) -> str:
     words = request.size // 2
-    return (f'{_range_text(request.address)}, {notation.count_of(words, "word")}'
+    return (f'{_range_text(request.address)}, {counted(words, "word")}'
             f'{notation.part_of(request.offset, words, request.total)}')
 
 
@@ -217,7 +217,7 @@ _SHARED: dict[CommandCode, KnownCommand] = {
         'diagnostic status', Effect.READS, Reader.end, lambda request: '', _identity_reply),
     (diagnostics.CMD, diagnostics.READ_COUNTERS): KnownCommand(
         'read diagnostic counters', Effect.READS, diagnostics.ReadCounters.read,
-        lambda request: f'at {request.address}, {notation.count_of(request.size, "byte")}',
+        lambda request: f'at {request.address}, {counted(request.size, "byte")}',
         _words_reply),
     (word_range.CMD, word_range.WRITE): KnownCommand(
         'word range write', Effect.WRITES, _ranged(word_range.WordRangeWrite.read), _range_write),

@@ -26,7 +26,7 @@ from typing import Any
 from abdf1_ros.pccc.address import Address, Addressing
 from abdf1_ros.pccc.fields import Reader
 from abdf1_ros.pccc.file_types import FileType
-from abdf1_ros.text import value_text
+from abdf1_ros.text import counted, value_text
 
 CommandCode = tuple[int, int | None]
 """CMD and FNC; None for a command without FNC."""
@@ -51,11 +51,6 @@ class KnownCommand:
     values: Callable[[Any, bytes], str] = lambda request, data: hexadecimal(data)
 
 
-def count_of(number: int, name: str) -> str:
-    """Return e.g. "1 word" or "2 words"."""
-    return f'{number} {name}' if number == 1 else f'{number} {name}s'
-
-
 def part_of(offset: int, size: int, total: int) -> str:
     """Return where in a transaction of several packets this is, or nothing if it is all."""
     return '' if (offset, size) == (0, total) else f' (from {offset} of {total})'
@@ -76,7 +71,7 @@ def place_text(addressing: Addressing, kind: FileType, file: int, element: int, 
 
 def beyond(words: int) -> str:
     """Return that something is so many words after a place, nothing for none."""
-    return f' + {count_of(words, "word")}' if words else ''
+    return f' + {counted(words, "word")}' if words else ''
 
 
 def words_text(data: bytes) -> str:

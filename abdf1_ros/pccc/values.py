@@ -31,6 +31,7 @@ from abdf1_ros.pccc import strings
 from abdf1_ros.pccc.address import Address
 from abdf1_ros.pccc.data_table import DataTable
 from abdf1_ros.pccc.file_types import FileType
+from abdf1_ros.text import counted
 
 FLOAT_MAX = 3.4028234663852886e38  # the greatest float32
 
@@ -158,7 +159,7 @@ class Codec:
             self._encode_string(values)
             return
         if len(values) != self.length:
-            raise FormatError(f'{len(values)} values, the mapping has {self.length}')
+            raise FormatError(f'{counted(len(values), "value")}, the mapping has {self.length}')
         low, high = self.type.range
         for index, value in enumerate(values):
             is_whole = self.type is ValueType.FLOAT32 or value % 1 == 0

@@ -40,7 +40,7 @@ from abdf1_ros.settings.mapping import Command, Mapping, Publish
 from abdf1_ros.settings.network import Network
 from abdf1_ros.settings.remarks import network_remarks
 from abdf1_ros.settings.share import share_places
-from abdf1_ros.text import first
+from abdf1_ros.text import counted, first, milliseconds
 
 _HIGH_LOAD = 0.8
 _PERIODS = tuple(step * 10**power for power in (2, 3, 4) for step in (1, 2, 5))  # ms
@@ -362,8 +362,8 @@ def _period_remarks(report: Report) -> Iterator[Remark]:
         time = report.time(block)
         if 0 < block.period < time:
             yield Remark(RemarkKind.PERIOD, (
-                f'{_tags(block.mappings)}: a read takes {_ms(time)} ms, '
-                f'the period is {_ms(block.period)} ms'), block.station)
+                f'{_tags(block.mappings)}: a read takes {milliseconds(time, 1)}, '
+                f'the period is {milliseconds(block.period, 1)}'), block.station)
 
 
 def _gap_remarks(report: Report) -> Iterator[Remark]:
@@ -379,10 +379,10 @@ def _gap_remarks(report: Report) -> Iterator[Remark]:
             first, last = _ends(mappings)
             spare = sum(block.words for block in blocks) - len(_words(mappings))
             yield Remark(RemarkKind.GAP, (
-                f'station {blocks[0].station}, {first} to {last}: {len(blocks)} '
-                f'{"read" if len(blocks) == 1 else "reads"} with {spare} words that no tag '
-                f'needs take {_ms(time)} ms; side by side in the PLC the tags would take '
-                f'{_ms(least)} ms'), blocks[0].station)
+                f'station {blocks[0].station}, {first} to {last}: '
+                f'{counted(len(blocks), "read")} with {counted(spare, "word")} that no tag needs '
+                f'take {milliseconds(time, 1)}; side by side in the PLC the tags would take '
+                f'{milliseconds(least, 1)}'), blocks[0].station)
 
 
 def _time_side_by_side(report: Report, blocks: Sequence[Block]) -> float:
@@ -422,7 +422,3 @@ def last_address(address: Address, offset: int) -> Address:
 
 def _tags(mappings: Sequence[Mapping]) -> str:
     return first([mapping.tag for mapping in mappings], _NAMED_TAGS)
-
-
-def _ms(seconds: float) -> str:
-    return f'{seconds * 1000:.1f}'

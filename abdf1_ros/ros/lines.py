@@ -193,7 +193,7 @@ class LinesNode(Node):
     def publish(self, lines: Sequence[RestartedLine]) -> None:
         """Publish which lines run, and why others do not."""
         faulty = [line for line in lines if line.node is None]
-        level, text = DiagnosticStatus.OK, f'OK: {len(lines)} lines run'
+        level, text = DiagnosticStatus.OK, f'OK: {len(lines)} of {len(lines)} lines run'
         if faulty:
             level = DiagnosticStatus.ERROR
             text = f'ERROR: {len(faulty)} of {len(lines)} lines do not run'
@@ -263,7 +263,7 @@ def sections(path: str) -> list[LineName]:
     problems = []
     for full_name, line, _ in node_sections(parameter_tree(path)):
         namespace, _, node_name = full_name.rpartition('/')
-        if node_name == NODE_NAME:
+        if node_name == NODE_NAME or '*' in full_name:
             continue
         name = LineName(namespace or '/', node_name)
         first = found.setdefault(name, line)
@@ -288,13 +288,13 @@ def chosen(names: Sequence[LineName], wanted: Sequence[str]) -> list[LineName]:
             '--ros-args --params-file lines.yaml; config/three_lines.yaml is an example')])
     if not wanted:
         return list(names)
-    found = [name for name in names if name.name in wanted or str(name) in wanted]
-    known = {text for name in found for text in (name.name, str(name))}
-    if missing := [text for text in wanted if text not in known]:
+    meant = {text: [name for name in names if text in (name.name, str(name))]
+             or [name for name in names if text in str(name).split('/')] for text in wanted}
+    if missing := [text for text, found in meant.items() if not found]:
         raise ConfigurationError([Problem(
             'parameter lines', f'no section is called {printable(", ".join(missing))}; there are '
             + printable(', '.join(map(str, names))))])
-    return found
+    return [name for name in names if any(name in found for found in meant.values())]
 
 
 def main(args: Sequence[str] | None = None) -> int:

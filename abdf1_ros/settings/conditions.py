@@ -37,7 +37,7 @@ from abdf1_ros.settings.heartbeats import (
 )
 from abdf1_ros.settings.limits import raw_values
 from abdf1_ros.settings.mapping import Command, Mapping, Publish
-from abdf1_ros.text import shown
+from abdf1_ros.text import counted, shown
 
 
 def _ms(low: int, high: int) -> Kind[int]:
@@ -145,8 +145,9 @@ def _fallback_values(row: Row, mapping: Mapping, fault: ReportFault) -> Iterator
     length = mapping.length
     texts = row.get('Fallback').split()
     if len(texts) != length:
-        fault('Fallback', f'Fallback has {len(texts)} values, Length is {length}; separate them '
-                          'by spaces' if texts else 'Fallback is missing: the values to write')
+        fault('Fallback', f'Fallback has {counted(len(texts), "value")}, Length is {length}; '
+                          'separate them by spaces' if texts else
+              'Fallback is missing: the values to write')
         return
     low, high = mapping.limits
     low, high = max(low, mapping.minimum), min(high, mapping.maximum)

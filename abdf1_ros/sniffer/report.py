@@ -25,6 +25,7 @@ from abdf1_ros.pccc.describe import command_name
 from abdf1_ros.sniffer.capture import Direction
 from abdf1_ros.sniffer.entries import Entry, Kind, Mark
 from abdf1_ros.sniffer.summary import Counts, Summary
+from abdf1_ros.text import counted, in_ms
 
 _RED, _YELLOW, _FAINT, _PLAIN = '\x1b[31m', '\x1b[33m', '\x1b[2m', '\x1b[0m'
 _BAD = (Kind.DAMAGED, Kind.UNANSWERED, Kind.UNKNOWN, Kind.NOISE)
@@ -71,7 +72,7 @@ def json_line(entry: Entry) -> str:
         'direction': entry.direction.value, 'kind': entry.kind.value,
         'station': entry.station, 'text': entry.text or None, 'guest': entry.guest or None,
         'check': entry.checksum.value if entry.checksum else None, 'valid': entry.valid,
-        'latency_ms': _milliseconds(entry.latency),
+        'latency_ms': in_ms(entry.latency),
         'marks': [mark.value for mark in entry.marks] or None, 'bytes': entry.size or None}
     packet = entry.packet
     if packet is not None:
@@ -79,10 +80,6 @@ def json_line(entry: Entry) -> str:
             'dst': packet.dst, 'src': packet.src, 'command': command_name(packet),
             'sts': packet.sts, 'tns': packet.tns, 'data': packet.data.hex()}
     return json.dumps({name: value for name, value in fields.items() if value is not None})
-
-
-def _milliseconds(seconds: float | None) -> float | None:
-    return None if seconds is None else round(seconds * 1000, 3)
 
 
 def summary_json(summary: Summary, kind: LineKind) -> str:
@@ -105,8 +102,8 @@ def _counts(counts: Counts) -> dict[str, Any]:
         'marks': {mark.value: counts.marks[mark] for mark in Mark if counts.marks[mark]},
         'errors': counts.errors, 'damaged': counts.damaged, 'noise': counts.noise,
         'latency_ms': {
-            'mean': _milliseconds(counts.latency.mean),
-            'max': _milliseconds(counts.latency.longest)} if counts.latency.count else None}
+            'mean': in_ms(counts.latency.mean),
+            'max': in_ms(counts.latency.longest)} if counts.latency.count else None}
 
 
 def summary_lines(summary: Summary, kind: LineKind) -> Iterator[str]:
@@ -114,8 +111,8 @@ def summary_lines(summary: Summary, kind: LineKind) -> Iterator[str]:
     counts = summary.all
     yield f'summary: {", ".join(_line_facts(summary, kind))}'
     yield '  seen: ' + _listed(
-        (counts.kinds[Kind.COMMAND], 'commands'), (counts.kinds[Kind.REPLY], 'replies'),
-        (counts.errors, 'of them with an error'), (counts.kinds[Kind.POLL], 'polls'),
+        (counts.kinds[Kind.COMMAND], 'command'), (counts.kinds[Kind.REPLY], 'reply'),
+        (counts.errors, 'of them with an error'), (counts.kinds[Kind.POLL], 'poll'),
         (counts.kinds[Kind.EOT], 'EOT'), (counts.kinds[Kind.ACK], 'ACK'),
         (counts.kinds[Kind.NAK], 'NAK'), (counts.kinds[Kind.ENQ], 'ENQ'),
         (counts.marks[Mark.FORWARDED], 'forwarded'))
@@ -145,8 +142,12 @@ def _line_facts(summary: Summary, kind: LineKind) -> Iterator[str]:
         yield f'line load {load:.1%} at {summary.baud} baud'
 
 
+_NOUNS = 'command', 'reply', 'poll'
+
+
 def _listed(*entries: tuple[int, str]) -> str:
-    return ', '.join(f'{count} {name}' for count, name in entries if count) or 'none'
+    return ', '.join(counted(count, name) if name in _NOUNS else f'{count} {name}'
+                     for count, name in entries if count) or 'none'
 
 
 _COLUMNS = ('station', 'polls', 'silent', 'commands', 'replies', 'errors', 'damaged',

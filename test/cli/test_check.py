@@ -305,8 +305,9 @@ def test_folder_has_a_line_of_text_for_each_pair(
     assert main([str(tmp_path)]) == 0
     lines = capsys.readouterr().out.splitlines()
     assert [line.partition(':')[0] for line in lines] == ['glue', 'hall/paint', 'press', '3 lines']
-    assert lines[-1] == '3 lines: 3 good (0 of them with warnings), 0 with errors'
-    assert lines[0].startswith('glue: 1 rows, port /dev/ttyS0, poll cycle ')
+    assert lines[-1] == \
+        '3 lines: 3 good (0 of them with warnings), 0 with errors; of no line: notes.csv'
+    assert lines[0].startswith('glue: 1 row, port /dev/ttyS0, poll cycle ')
 
 
 def test_lines_stand_in_the_order_of_their_numbers(
@@ -314,9 +315,12 @@ def test_lines_stand_in_the_order_of_their_numbers(
     for name in ('line10_', 'line2.', 'line1-'):
         write_csv(tmp_path / f'{name}net.csv', NET_HEADER, [GOOD_NET])
         write_csv(tmp_path / f'{name}map.csv', MAP_HEADER, [GOOD_ROW])
+    (tmp_path / 'line1_map.csv').write_text('one too many')
+    (tmp_path / 'line2.map.csv').rename(tmp_path / 'line2_map.csv')
     main([str(tmp_path)])
     *lines, total = capsys.readouterr().out.splitlines()
     assert [line.partition(':')[0] for line in lines] == ['line1', 'line2', 'line10']
+    assert total.endswith(' 0 with errors; of no line: line1_map.csv')
 
 
 def test_error_of_one_pair_is_named_and_the_others_are_told(
@@ -327,7 +331,7 @@ def test_error_of_one_pair_is_named_and_the_others_are_told(
     out = capsys.readouterr().out
     assert f'glue: error: {tmp_path}/glue_net.csv:2:1 (Station): 2552 ' in out
     assert f'lone: error: {tmp_path}/lone_map.csv: ' in out
-    assert '\npress: 1 rows, ' in out
+    assert '\npress: 1 row, ' in out
 
 
 def test_two_lines_of_a_folder_on_one_port_are_an_error(
@@ -345,7 +349,9 @@ def test_two_lines_of_a_folder_on_one_port_are_an_error(
 def test_json_of_a_folder(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     plant(tmp_path, press=(GOOD_NET, GOOD_ROW), glue=(GOOD_NET, BAD_ROWS[0]))
     assert main(['--json', str(tmp_path)]) == 2
-    lines = parsed(capsys)['lines']
+    content = parsed(capsys)
+    assert content['others'] == []
+    lines = content['lines']
     assert list(lines) == ['glue', 'press']
     assert (len(lines['glue']['errors']), lines['press']['errors']) == (1, [])
     assert lines['press']['blocks'][0]['tags'] == ['speed']

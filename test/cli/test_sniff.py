@@ -87,7 +87,7 @@ def test_capture_is_shown_line_by_line_with_a_summary(capsys: Output, capture: s
     lines = lines_of(capsys, capture)
     assert lines[:5] == LINES
     assert lines[5].startswith('summary: 0.0 s, 45 bytes (27 >, 18 <), half duplex, CRC')
-    assert lines[6] == '  seen: 1 commands, 1 replies, 1 polls, 2 ACK'
+    assert lines[6] == '  seen: 1 command, 1 reply, 1 poll, 2 ACK'
     assert lines[7] == '  faults: none'
 
 
@@ -260,7 +260,7 @@ def test_tap_between_the_simulator_and_a_master(tmp_path: Path, capsys: Output) 
         ['>', '2', 'ACK']]
     assert heard[:2] == frames.STX
     assert _split(sniff, 'errors') == [f'sniff: listening on {tap} and {plc}; Ctrl-C ends']
-    assert '  seen: 1 commands, 1 replies, 1 polls, 2 ACK' in said
+    assert '  seen: 1 command, 1 reply, 1 poll, 2 ACK' in said
     assert not os.path.lexists(tap)
     assert lines_of(capsys, saved, '--pcapng', f'{packets}2')[:5] == said[:5]
     for path in (packets, f'{packets}2'):  # but for microseconds that a capture rounds

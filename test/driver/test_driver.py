@@ -238,7 +238,7 @@ def written(bench: DriverBench, row: Mapping, values: list[float], seconds: floa
 
 
 @pytest.mark.parametrize('values, reason', [
-    ([1], '1 values, the mapping has 2'),
+    ([1], '1 value, the mapping has 2'),
     ([1, 70000], 'value 70000 at index 1 is not a valid int16'),
     ([1, 51], 'value 51 at index 1 is outside Min 0, Max 50')])
 def test_refused_for_its_values(values: list[float], reason: str) -> None:

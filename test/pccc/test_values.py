@@ -119,7 +119,7 @@ def test_word_that_is_not_bcd(word: str, text: str) -> None:
 
 
 @for_all(('kind', 'values', 'error'), [
-    (ValueType.INT16, [1], '1 values, the mapping has 2'),
+    (ValueType.INT16, [1], '1 value, the mapping has 2'),
     (ValueType.INT16, [1, 2, 3], '3 values, the mapping has 2'),
     (ValueType.INT16, [], '0 values, the mapping has 2'),
     (ValueType.INT16, [0, 32768], 'value 32768 at index 1 is not a valid int16'),

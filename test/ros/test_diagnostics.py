@@ -312,7 +312,7 @@ def test_counters_begin_again_after_a_reset(bench: Bench) -> None:
     bench.diagnostics.counters.reset()
     assert set(details(bench.status('counters')).values()) == {'0'}
     counters.commands_sent += 1
-    assert bench.says('counters') == (OK, 'OK: 1 commands sent, 0 replies received')
+    assert bench.says('counters') == (OK, 'OK: 1 command sent, 0 replies received')
     values = details(bench.status('counters'))
     assert (values['CNT_CMD_MSGS_SENT'], values['CNT_CRC_ERRORS']) == ('1', '0')
 

@@ -114,6 +114,7 @@ def test_lines_are_chosen_by_name() -> None:
     assert chosen([PRESS, PAINT], []) == [PRESS, PAINT]
     assert chosen([PRESS, PAINT], ['paint_plc']) == [PAINT]
     assert chosen([PRESS, PAINT], ['/press/press_plc', 'paint_plc']) == [PRESS, PAINT]
+    assert chosen([PRESS, PAINT], ['paint']) == [PAINT]  # a part of its name
 
 
 def test_line_that_is_not_there_is_named() -> None:

@@ -495,11 +495,16 @@ def test_faulty_parameter_is_told_in_one_line(
      "Failed to parse ROS arguments: Couldn't parse remap rule: '-r __node:=a-b'."),
     (['--ros-args', '-p', 'net_file=net.csv'], 'a parameter is NAME:=VALUE, with a colon; '),
     (['--ros-args', 'net_file:=x'], "-p is missing before ['net_file:=x']"),
+    (['--ros-args', '-p', 'net.share:=[pty:/tmp/a]'],
+     'a text with [ or : stands in quotes of its own; '),
+    (['--ros-args', '--help'], "before --ros-args belongs ['--help']"),
+    (['--ros-args', '-r', '__ns:=cell'], 'a namespace begins with "/"; '),
     (['--ros-args', '__ns:=/cell'], "-r is missing before ['__ns:=/cell']"),
     (['--ros-args', '-p'], "Couldn't parse trailing -p flag."),
     (['--ros-args', '--bogus'], '--bogus'),
     (['--ros-args', '-r', f'__ns:=/{240 * "n"}'], "length should not exceed '255U - 8U'")],
-    ids=['remap', 'colon', 'bare', 'bare_name', 'parameter', 'unknown', 'long'])
+    ids=['remap', 'colon', 'bare', 'list', 'help', 'namespace', 'bare_name', 'parameter',
+         'unknown', 'long'])
 def test_unusable_arguments_are_told_in_one_line(
         refusal: Callable[..., list[str]], arguments: list[str], expected: str) -> None:
     lines = refusal(*arguments)

@@ -222,8 +222,8 @@ def test_own_parameter_has_the_value_and_type_that_was_given(
      'socket://plc:4001'),
     ('net.station', 255,
      '2552 CRT_BAD_STATION_ID: Invalid station number (255) must be less than 255'),
-    ('net.station', 5.0, '2552 CRT_BAD_STATION_ID: Station = "5.0" should be a whole number from 0 '
-                         'to 254'),
+    ('net.station', 5.0,
+     '2552 CRT_BAD_STATION_ID: Station = "5.0" should be a whole number from 0 to 254'),
     ('net.mode', 'Client',
      '2553 CRT_BAD_DRIVER_MODE: Invalid Driver Mode (Client), should be one of Master, Slave, '
      'Peer, or Radio'),
@@ -298,11 +298,9 @@ def test_mappings_are_in_their_file_alone(make_node: Nodes, files: dict[str, str
 def test_overrides_of_the_map_are_ignored_unless_they_repeat_it(
         make_node: Nodes, files: dict[str, str], is_exposed: bool) -> None:
     given = {'map.line.door.address': 'I:017/12', 'map.line.door.station': 1,  # of a dump
-             'map.line.door.length': 2, 'map.recipe.maximum': '999', 'map.gate.max': '',
-             'map.': 1, 'mapper.rate': 3}
+             'map.line.door.length': 2, 'map.gate.max': '', 'mapper.rate': 3}
     node = make_node({**files, **given, 'expose_map_parameters': is_exposed})
-    assert configure(node).ignored == [
-        'map.', 'map.gate.max', 'map.line.door.length', 'map.recipe.maximum']
+    assert configure(node).ignored == ['map.gate.max', 'map.line.door.length']
 
 
 def test_parameter_file_sets_parameters_of_node_and_net(
@@ -322,7 +320,11 @@ def test_parameter_file_sets_parameters_of_node_and_net(
 
 
 @pytest.mark.parametrize(('name', 'right'), [
-    ('net.buad', 'did you mean net.baud?'), ('net.speed', 'net.* are its columns'),
+    ('net.buad', 'did you mean net.baud?'), ('baud', 'did you mean net.baud?'),
+    ('Com_Port', 'did you mean net.com_port?'),
+    ('map.recipe.addres', 'map.* repeats the columns of the map file, which alone counts'),
+    ('qos_overrides./parameters/read/door.publisher.depth', 'the QoS of our topics follows'),
+    ('net.speed', 'net.* are its columns'),
     ('prot', 'did you mean port?'), ('map_fil', 'did you mean map_file?')])
 def test_misspelt_parameter_is_an_error(
         make_node: Nodes, files: dict[str, str], name: str, right: str) -> None:
@@ -338,6 +340,9 @@ def test_misspelt_parameter_is_an_error(
     ('parameters', 'low_letancy', '3:5: low_letancy: there is no such parameter; did you mean '
                                   'low_latency?'),
     ('/parameters', 'gain', '3:5: gain: there is no such parameter; another version may have it'),
+    ('parameters', 'baud', '3:5: baud: there is no such parameter; did you mean net.baud?'),
+    ('parameters', 'qos_overrides.x', '3:5: qos_overrides.x: there is no such parameter; the QoS '
+                                      'of our topics follows from the files'),
     ('"/**"', 'gain', None), ('camera', 'low_letancy', None),
     ('parameters', 'use_sim_time', None), ('parameters', 'map.door.max', None)])
 def test_section_that_names_the_node_has_no_unknown_parameter(
@@ -354,6 +359,34 @@ def test_section_that_names_the_node_has_no_unknown_parameter(
     assert [str(problem) for problem in caught.value.problems] == [f'{path}:{expected}']
 
 
+@pytest.mark.parametrize(('section', 'is_told'), [
+    ('parameters', True), ('"/**"', True), ('camera', False)])
+def test_number_that_yaml_takes_for_octal_is_told(
+        make_node: Nodes, files: dict[str, str], tmp_path: Path, section: str,
+        is_told: bool) -> None:
+    path = tmp_path / 'shared.yaml'
+    path.write_text(f'{section}:\n  ros__parameters:\n    net:\n      station: 010\n'
+                    '      baud: 9600\n      timeout: "0500"\n', encoding='utf-8')
+    node = make_node(files)
+    if not is_told:
+        assert configure(node, [str(path)]).mappings
+        return
+    with pytest.raises(ConfigurationError) as caught:
+        configure(node, [str(path)])
+    assert str(caught.value) == \
+        f'{path}:4:7: net.station: 010 is octal in YAML; write 10 or 8'
+
+
+def test_port_in_the_home_directory_and_a_substitution_of_launch_files(
+        make_node: Nodes, files: dict[str, str], monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv('HOME', '/home/me')
+    assert configure(make_node({**files, 'port': '~/plc'})).port == '/home/me/plc'
+    assert problems_of(make_node({**files, 'map_file': '$(find-pkg-share x)/map.csv'})) == [
+        'parameter map_file: $(find-pkg-share x)/map.csv: $(...) is for launch files; write the '
+        'path']
+
+
 def test_parameter_of_another_node_is_none_of_our_business(
         make_node: Nodes, files: dict[str, str]) -> None:
-    assert configure(make_node({**files, 'camera.gain': 3})).mappings
+    other = 'qos_overrides./camera/image.publisher.depth'
+    assert configure(make_node({**files, 'camera.gain': 3, other: 2})).mappings

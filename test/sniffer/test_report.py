@@ -87,7 +87,7 @@ def test_summary_counts_what_was_seen_and_what_was_wrong(summary: Summary) -> No
     head, seen, faults, latency, _, one, sixteen = summary_lines(summary, HALF)
     assert head == ('summary: 2.0 s, 960 bytes (600 >, 360 <), half duplex, CRC, '
                     'line load 50.0% at 9600 baud')
-    assert seen == '  seen: 1 commands, 2 replies, 1 of them with an error, 1 polls'
+    assert seen == '  seen: 1 command, 2 replies, 1 of them with an error, 1 poll'
     assert faults == ('  faults: 1 damaged, 2 bytes of noise, 1 retransmissions, '
                       '1 polls and messages without answer')
     assert latency == '  replies after: mean 750.0 ms, max 750.0 ms'

@@ -16,9 +16,10 @@
 
 from __future__ import annotations
 
-from abdf1_ros.pccc.notation import CommandCode, count_of, Effect, KnownCommand, words_text
+from abdf1_ros.pccc.notation import CommandCode, Effect, KnownCommand, words_text
 from abdf1_ros.pccc.plc2 import commands as plc2
 from abdf1_ros.pccc.plc2.address import show_word
+from abdf1_ros.text import counted
 
 
 def _byte_address(address: int) -> str:
@@ -27,7 +28,7 @@ def _byte_address(address: int) -> str:
 
 
 def _read(request: plc2.BasicRead) -> str:
-    return f'{_byte_address(request.address)}, {count_of(request.size, "byte")}'
+    return f'{_byte_address(request.address)}, {counted(request.size, "byte")}'
 
 
 def _write(request: plc2.BasicWrite) -> str:

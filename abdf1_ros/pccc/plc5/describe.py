@@ -23,6 +23,7 @@ from abdf1_ros.pccc.notation import CommandCode, Effect, KnownCommand
 from abdf1_ros.pccc.plc5 import commands as plc5
 from abdf1_ros.pccc.plc5.address import ADDRESSING
 from abdf1_ros.pccc.typed_data import TypedData
+from abdf1_ros.text import counted
 
 _BY_FILE = {
     kind.default_file: kind for kind in FileType
@@ -64,7 +65,7 @@ def _values(address: plc5.SystemAddress, values: TypedData) -> str:
 
 
 def _typed_read(request: plc5.TypedRead) -> str:
-    return (f'{system_address(request.address)}, {notation.count_of(request.size, "element")}'
+    return (f'{system_address(request.address)}, {counted(request.size, "element")}'
             f'{notation.part_of(request.offset, request.size, request.total)}')
 
 

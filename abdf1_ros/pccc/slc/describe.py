@@ -23,6 +23,7 @@ from abdf1_ros.pccc.notation import CommandCode, Effect, KnownCommand
 from abdf1_ros.pccc.slc import commands as slc
 from abdf1_ros.pccc.slc.address import ADDRESSING, BY_CODE
 from abdf1_ros.pccc.slc.commands import LogicalRead, LogicalWrite
+from abdf1_ros.text import counted
 
 
 def logical_address(address: slc.LogicalAddress) -> str:
@@ -39,8 +40,8 @@ def _size(address: slc.LogicalAddress, size: int) -> str:
     kind = BY_CODE.get(address.type_code)
     words = ADDRESSING.files[kind].words if kind else 1
     if words > 1 and size and size % (2 * words) == 0 and not address.sub_element:
-        return notation.count_of(size // 2 // words, 'element')
-    return notation.count_of(size, 'byte') if size % 2 else notation.count_of(size // 2, 'word')
+        return counted(size // 2 // words, 'element')
+    return counted(size, 'byte') if size % 2 else counted(size // 2, 'word')
 
 
 def _values(address: slc.LogicalAddress, data: bytes) -> str:

@@ -20,7 +20,7 @@ from collections.abc import Sequence
 
 from abdf1_ros.ros.diagnostics.status import ERROR, Judgement, OK, WARN
 from abdf1_ros.share.guest_line import GuestLine
-from abdf1_ros.text import milliseconds
+from abdf1_ros.text import counted, milliseconds
 
 
 class GuestsStatus:
@@ -35,9 +35,9 @@ class GuestsStatus:
     def judge(self, now: float) -> Judgement:
         guests = [line.guest for line in self._lines]
         connected = sum(guest.is_connected for guest in guests)
-        notes = [f'{count} {what}' for count, what in (
-            (sum(guest.refused for guest in guests), 'commands not allowed'),
-            (sum(guest.collisions for guest in guests), 'writes to words of ours')) if count]
+        notes = [f'{counted(count, what)} {why}' for count, what, why in (
+            (sum(guest.refused for guest in guests), 'command', 'not allowed'),
+            (sum(guest.collisions for guest in guests), 'write', 'to words of ours')) if count]
         text = f'{connected} of {len(guests)} places are open'
         faults = [f'{line.guest.name}: {line.fault}' for line in self._lines if line.fault]
         if faults:
@@ -46,6 +46,7 @@ class GuestsStatus:
 
     def values(self, now: float) -> dict[str, str]:
         return {line.guest.name: (
-            f'{line.state}; {line.guest.commands} commands, {line.guest.refused} not '
-            f'allowed, {line.guest.unanswered} without reply, {len(line.guest.waiting)} waiting, '
+            f'{line.state}; {counted(line.guest.commands, "command")}, '
+            f'{line.guest.refused} not allowed, {line.guest.unanswered} without reply, '
+            f'{len(line.guest.waiting)} waiting, '
             f'slowest {milliseconds(line.guest.slowest or None)}') for line in self._lines}

@@ -29,7 +29,7 @@ from abdf1_ros.ros.diagnostics.line import (
 )
 from abdf1_ros.ros.diagnostics.status import ERROR, Judgement, OK, Seen, WARN, with_age
 from abdf1_ros.settings.network import Network
-from abdf1_ros.text import milliseconds
+from abdf1_ros.text import counted, milliseconds
 
 # After so many seconds without a poll of the master there is a warning.
 _LONGEST_UNPOLLED = 5.0
@@ -122,7 +122,7 @@ class CountersStatus:
         counters, before = self._counters, self._baseline
         sent = counters.commands_sent - before['CNT_CMD_MSGS_SENT']
         received = counters.replies_received - before['CNT_REPLY_MSGS_RCVD']
-        return OK, f'{sent} commands sent, {received} replies received'
+        return OK, f'{counted(sent, "command")} sent, {counted(received, "reply")} received'
 
     def values(self, now: float) -> dict[str, str]:
         counts = self._counters.by_mnemonic()

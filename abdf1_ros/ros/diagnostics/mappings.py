@@ -22,6 +22,7 @@ from abdf1_ros.driver.driver import Driver
 from abdf1_ros.driver.reads.point import Freshness, ReadPoint
 from abdf1_ros.problems import Problem
 from abdf1_ros.ros.diagnostics.status import ERROR, Judgement, OK, WARN
+from abdf1_ros.text import counted
 
 # So many faults of rows that were left out are repeated with every status; check has them all.
 _MOST_LEFT_OUT = 20
@@ -46,7 +47,7 @@ class MappingsStatus:
         if not self._left_out:
             return level, text
         rows = len({(problem.place.file, problem.place.line) for problem in self._left_out})
-        return max(level, WARN), (f'{text}; {rows} {"row" if rows == 1 else "rows"} left out of '
+        return max(level, WARN), (f'{text}; {counted(rows, "row")} left out of '
                                   f'the map, the first at {self._left_out[0].place}')
 
     def _judge_reads(self, now: float) -> Judgement:

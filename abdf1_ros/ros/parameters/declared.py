@@ -23,6 +23,7 @@ import difflib
 import os
 from pathlib import Path
 import random
+import re
 from typing import Any
 
 from abdf1_ros.df1.packet import BROADCAST
@@ -32,8 +33,9 @@ from abdf1_ros.paths import config_file
 from abdf1_ros.plan.usable_rows import usable_rows
 from abdf1_ros.problems import ConfigurationError, Problem
 from abdf1_ros.ros.bridge.files import FileWatch
-from abdf1_ros.ros.parameters.files import names_in_sections_of
+from abdf1_ros.ros.parameters.files import parameters_in
 from abdf1_ros.ros.parameters.shown import descriptor_of, map_cells, MOST_SHOWN_ROWS, text_of
+from abdf1_ros.settings.columns import COLUMNS
 from abdf1_ros.settings.map_file import load_mappings
 from abdf1_ros.settings.map_row import MAX_PERIOD
 from abdf1_ros.settings.mapping import Mapping
@@ -110,6 +112,9 @@ _OF_RCLPY = 'use_sim_time', 'start_type_description_service'
 
 _KINDS = {bool: 'true or false', int: 'a whole number', float: 'a number', str: 'text'}
 
+
+_MAP_NAMES = {column.lower() for column in COLUMNS}
+_OCTAL = re.compile('0[0-7]+')
 
 _STATION_LISTS = 'poll_list', 'priority_poll_list'
 
@@ -230,7 +235,8 @@ def _from_files(given: Given, parameters: Parameters, problems: list[Problem], *
     port = network.port
     if parameters.port:
         try:
-            other = make_network({'com_port': (parameters.port, 'parameter port')}, network)
+            other = make_network({'com_port': (
+                os.path.expanduser(parameters.port), 'parameter port')}, network)
             port, network = other.port, replace(network, remarks=other.remarks)
         except ConfigurationError as error:
             problems += error.problems
@@ -252,6 +258,9 @@ def _overridden(given: Given, network: Network) -> Network:
 
 def _needed(name: str, path: str, problems: list[Problem]) -> str:
     """Return the path of a file; raises ConfigurationError that tells how to start."""
+    if '$(' in path:
+        raise ConfigurationError([Problem(
+            f'parameter {name}', f'{path}: $(...) is for launch files; write the path')])
     if path:
         return path
     if any(problem.place.file == f'parameter {name}' for problem in problems):
@@ -273,24 +282,41 @@ def unknown_names(node: Node, given: Given, files: Sequence[str], known: Collect
 
     In a section of a parameter file that names the node, all are meant for it. Others may belong
     to other nodes, so only those are found whose names look like ours, or begin so. ``map.*`` may
-    come back from a dump of our parameters, see ``_ignored``.
+    come back from a dump of our parameters, see ``_ignored``. Of YAML a number with a leading
+    zero is octal, which nobody means.
     """
+    full_name = node.get_fully_qualified_name()
     problems, found = [], set(_OF_RCLPY)
-    for name, place in names_in_sections_of(node.get_fully_qualified_name(), files):
-        found.add(name)
-        if not (name in known or name in _OF_RCLPY or name.startswith('map.')):
+    for section, name, place, number in parameters_in(files):
+        if section == full_name:
+            found.add(name)
+            if not (name in known or name in _OF_RCLPY or _is_of_map(name)):
+                problems.append(Problem(place, (
+                    f'{name}: there is no such parameter; {_nearest(name, known, begins, 0.5)}')))
+        is_ours = name in known and (section == full_name or '*' in section)
+        if is_ours and _OCTAL.fullmatch(number):
             problems.append(Problem(place, (
-                f'{name}: there is no such parameter; {_nearest(name, known, begins, 0.5)}')))
+                f'{name}: {number} is octal in YAML; write {int(number)} or {int(number, 8)}')))
     for name in given:
-        if name in found or name in known:
+        is_other = name.startswith('qos_overrides.') and f'.{full_name}/' not in name
+        if name in found or name in known or _is_of_map(name) or is_other:
             continue
         if hint := _nearest(name, known, begins, 0.75):
             problems.append(Problem(f'parameter {name}', f'there is no such parameter; {hint}'))
     return problems
 
 
+def _is_of_map(name: str) -> bool:
+    return name.startswith('map.') and name.rpartition('.')[2] in _MAP_NAMES
+
+
 def _nearest(name: str, known: Collection[str], begins: str, likeness: float) -> str:
-    close = difflib.get_close_matches(name, known, 1, likeness)
+    if name.startswith('qos_overrides.'):
+        return 'the QoS of our topics follows from the files'
+    if name.startswith('map.'):
+        return 'map.* repeats the columns of the map file, which alone counts'
+    in_net = f'net.{name.lower()}'
+    close = [in_net] if in_net in known else difflib.get_close_matches(name, known, 1, likeness)
     if close:
         return f'did you mean {close[0]}?'
     if name.startswith(begins):

@@ -100,28 +100,30 @@ def node_sections(tree: yaml.Node | None, above: str = '', line: int = 1,
     """
     Yield the sections of a parameter file: full name of the node, line, and its parameters.
 
-    Those with wildcards are no nodes.
+    Those with wildcards in their names are for several nodes.
     """
     for key, below in tree.value if isinstance(tree, yaml.MappingNode) else ():
         name, number = str(key.value).strip('/'), key.start_mark.line + 1
         if name != _PARAMETERS:
             yield from node_sections(below, f'{above}/{name}', number)
-        elif '*' not in above:
+        else:
             yield above, line, below
 
 
-def names_in_sections_of(node: str, files: Iterable[str]) -> Iterator[tuple[str, Place]]:
-    """Yield the parameters in sections that name a node, by its full name; where each stands."""
+def parameters_in(files: Iterable[str]) -> Iterator[tuple[str, str, Place, str]]:
+    """Yield each parameter: section, name, where it stands, and a number as it is written."""
     for path in files:
-        for name, _, parameters in node_sections(parameter_tree(path)):
-            if name == node:
-                for parameter, mark in _parameter_names(parameters):
-                    yield parameter, Place(path, mark.line + 1, mark.column + 1)
+        for section, _, parameters in node_sections(parameter_tree(path)):
+            for name, key, value in _parameters(parameters):
+                mark = key.start_mark
+                is_number = value.tag == 'tag:yaml.org,2002:int'
+                yield (section, name, Place(path, mark.line + 1, mark.column + 1),
+                       str(value.value) if is_number else '')
 
 
-def _parameter_names(tree: yaml.Node, above: str = '') -> Iterator[tuple[str, Any]]:
+def _parameters(tree: yaml.Node, above: str = '') -> Iterator[tuple[str, yaml.Node, yaml.Node]]:
     for key, below in tree.value if isinstance(tree, yaml.MappingNode) else ():
         if isinstance(below, yaml.MappingNode):
-            yield from _parameter_names(below, f'{above}{key.value}.')
+            yield from _parameters(below, f'{above}{key.value}.')
         else:
-            yield f'{above}{key.value}', key.start_mark
+            yield f'{above}{key.value}', key, below

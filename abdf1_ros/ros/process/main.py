@@ -76,6 +76,9 @@ _ADVICE = (
     (r"^\['(?:__|~|/)[^']*:=", '-r is missing before '),
     (r"^\['[^']*:=", '-p is missing before '),
     (r"parameter override rule: '-p \w+=", 'a parameter is NAME:=VALUE, with a colon; '),
+    (r"override rule: '-p [\w.]+:=\[", 'a text with [ or : stands in quotes of its own; '),
+    (r"^\['--?[hv]", 'before --ros-args belongs '),
+    (r'remap rule: .*__ns:=', 'a namespace begins with "/"; '),
     (r'remap rule: .*__(?:node|name):=', 'a node name has letters, digits and underscores; '))
 
 
