@@ -21,7 +21,7 @@ from ipaddress import ip_address, IPv6Address
 from pathlib import Path
 import stat
 
-from abdf1_ros.numbers import whole_number
+from abdf1_ros.numbers import is_digits, whole_number
 
 LOOPBACK = '127.0.0.1'
 
@@ -44,7 +44,7 @@ def link_of(path: str) -> str:
 def host_and_port(text: str, default: str = LOOPBACK) -> tuple[str, int]:
     """Return what "HOST:PORT" says, a host in [] too, the default for none; ValueError else."""
     host, colon, port = text.rpartition(':')
-    number = whole_number(port)
+    number = whole_number(port) if is_digits(port) else None
     with suppress(UnicodeError):
         host = host.removeprefix('[').removesuffix(']').encode('idna').decode()
         if colon and number is not None and 0 <= number <= 65535:

@@ -73,7 +73,6 @@ class Kind(Generic[_T]):
     right: str = ''
     low: int | None = None
     high: int | None = None
-    unit: str = ''
     choices: tuple[str, ...] = ()
 
 
@@ -85,7 +84,7 @@ def whole(low: int, high: int, unit: str = '') -> Kind[int]:
     def read(text: str) -> int | None:
         value = whole_number(text)
         return value if value is not None and low <= value <= high else None
-    return Kind(read, f'a whole number from {low} to {high} {unit}'.rstrip(), low, high, unit)
+    return Kind(read, f'a whole number from {low} to {high} {unit}'.rstrip(), low, high)
 
 
 def one_of(known: Mapping[str, _T], spelled: Callable[[str], Any] = str.lower) -> Kind[_T]:

@@ -49,7 +49,7 @@ class Problem(Abdf1Error):
 
     ``place`` is where it stands, ``text`` what is wrong and what would be right, ``message`` its
     numbered entry, or None where the specification has none. Without ``args`` the words of the
-    entry would be false, so only its number is told; without ``text`` they say all. What it shows
+    entry would be false, so only its number is shown; without ``text`` they say all. What it shows
     is one visible line, whatever stands in the file.
     """
 

@@ -100,7 +100,7 @@ def net_fields() -> str:
     """Return the columns of the net CSV."""
     return table(
         ('column', 'default', 'values', 'meaning', 'error'),
-        ((FIELDS[name].column, str(value), _values(FIELDS[name].kind), FIELDS[name].meaning,
+        ((FIELDS[name].column, str(value), _values(FIELDS[name].kind), FIELDS[name].description,
           _linked(str(message.number)) if (message := FIELDS[name].message) else '')
          for name, value in Network().cells().items()))
 
@@ -268,12 +268,12 @@ def bounds() -> str:
                            nak_retries=retries, enq_retries=retries)
         message, standard = (make_report(replace(settings, polling=polling), mappings, 0.1)
                              for polling in ('Message', 'Standard'))
-        presets, = {bound.presets for bound in message.bounds if bound.presets}
+        presets, = {bound.presets for bound in message.times.bounds() if bound.presets}
         longest, usual, polled = (max(filter(None, times)) for times in (
-            [bound.seconds for bound in message.bounds if bound.mapping.fallback],
-            [bound.usual for bound in message.bounds],
-            [bound.seconds for bound in standard.bounds if bound.mapping.fallback]))
-        return [f'{timeout}, {cmd_timeout}, {retries}', f'{message.longest_transaction:.2f} s',
+            [bound.seconds for bound in message.times.bounds() if bound.mapping.fallback],
+            [bound.usual for bound in message.times.bounds()],
+            [bound.seconds for bound in standard.times.bounds() if bound.mapping.fallback]))
+        return [f'{timeout}, {cmd_timeout}, {retries}', f'{message.times.longest:.2f} s',
                 f'{presets[0]}, {presets[1]}', f'{longest:.1f} s', f'{polled:.1f} s',
                 f'{usual:.1f} s']
 

@@ -332,12 +332,12 @@ def _entry(report: Report, block: Block) -> dict[str, Any]:
 
 
 def _times_text(report: Report) -> str:
-    response = report.response_time * 1000
+    response, times = report.response_time * 1000, report.times
     return (f'expected poll cycle: {report.poll_cycle * 1000:.1f} ms for everything once, with '
             f'{response:g} ms for each answer of a PLC\n'
             f'load of the line: {report.load:.0%} of the time is needed to keep the periods\n'
-            f'longest transaction: {report.longest_transaction * 1000:.0f} ms with all repetitions'
-            + ''.join(f'\n{printable(str(line))}' for line in (*report.bounds, *report.advice)))
+            f'longest transaction: {times.longest * 1000:.0f} ms with all repetitions'
+            + ''.join(f'\n{printable(str(line))}' for line in (*times.bounds(), *times.advice())))
 
 
 def _content(found: Findings, report: Report | None) -> dict[str, Any]:
@@ -355,9 +355,9 @@ def _content(found: Findings, report: Report | None) -> dict[str, Any]:
             'warnings': [*map(_remark, report.remarks())], 'notes': report.notes(),
             'blocks': [_entry(report, block) for block in report.blocks],
             'scan_time_ms': in_ms(report.poll_cycle), 'load': round(report.load, 4),
-            'longest_transaction_ms': in_ms(report.longest_transaction),
+            'longest_transaction_ms': in_ms(report.times.longest),
             'needed_baud': report.needed_baud(),
-            'bounds': [_bound(bound) for bound in report.bounds],
+            'bounds': [_bound(bound) for bound in report.times.bounds()],
             'response_time_ms': in_ms(report.response_time)}
     return content
 

@@ -31,6 +31,7 @@ from abdf1_ros.pccc.values import ValueType
 from abdf1_ros.plan import forecast
 from abdf1_ros.plan.planner import Block, Planner
 from abdf1_ros.settings.heartbeats import READS_IN_TIME, STABLE, TIME_BASE
+from abdf1_ros.settings.map_row import CellFault
 from abdf1_ros.settings.mapping import Mapping
 from abdf1_ros.settings.network import Network
 from abdf1_ros.text import milliseconds
@@ -293,7 +294,8 @@ def conditions(network: Network, mappings: Iterable[Mapping]) -> Iterator[str]:
                'no bound holds after a lost packet')
 
 
-def guard_faults(mappings: Sequence[Mapping], planner: Planner) -> Iterator[tuple[Mapping, str]]:
+def guard_faults(mappings: Sequence[Mapping],
+                 planner: Planner) -> Iterator[tuple[Mapping, CellFault]]:
     """Yield the guarded rows whose counter is not read often enough (rule 14), and why."""
     counters = {mapping: (condition.text, condition.timeout) for mapping in mappings
                 if (condition := mapping.publish_while) and condition.timeout is not None}
@@ -303,6 +305,6 @@ def guard_faults(mappings: Sequence[Mapping], planner: Planner) -> Iterator[tupl
     for mapping, (tag, timeout) in counters.items():
         needed = READS_IN_TIME * found.get(tag, 0.0)
         if timeout / 1000 < needed:
-            yield mapping, (
-                f'Heartbeat_Timeout {timeout} ms is shorter than {READS_IN_TIME} reads of {tag} '
-                f'on this line; {needed * 1000:.0f} ms would do')
+            yield mapping, CellFault(
+                'Heartbeat_Timeout', f'Heartbeat_Timeout {timeout} ms is shorter than '
+                f'{READS_IN_TIME} reads of {tag} on this line; {needed * 1000:.0f} ms would do')

@@ -32,7 +32,7 @@ from abdf1_ros.pccc.address import Address
 from abdf1_ros.pccc.file_types import FileType, PlcType
 from abdf1_ros.pccc.values import ValueType
 from abdf1_ros.plan import bounds, forecast
-from abdf1_ros.plan.bounds import Bound, OURS_BESIDE_GUESTS, Times
+from abdf1_ros.plan.bounds import OURS_BESIDE_GUESTS, Times
 from abdf1_ros.plan.line_model import ReadRequest
 from abdf1_ros.plan.planner import Block, Planner, StationArea
 from abdf1_ros.settings import BAUD_RATES
@@ -101,23 +101,9 @@ class Report:
         return forecast.answer_time(self.network, self.blocks, self.response_time)
 
     @property
-    def longest_transaction(self) -> float:
-        """Return T: the seconds of the longest transaction, with every repetition."""
-        return self._times.longest
-
-    @property
-    def bounds(self) -> list[Bound]:
-        """Return the bounds of heartbeats and fallbacks."""
-        return list(self._times.bounds())
-
-    @property
-    def _times(self) -> Times:
+    def times(self) -> Times:
+        """Return what heartbeats and fallbacks can promise, and the longest transaction."""
         return Times(self.network, self.mappings, self.blocks, self.response_time)
-
-    @property
-    def advice(self) -> list[str]:
-        """Return what would shorten the bounds, empty for nothing."""
-        return list(self._times.advice())
 
     def promises(self, stale_after: float) -> dict[Mapping, float]:
         """Return the stale time (s) of each row that we read and that promises to publish."""

@@ -65,19 +65,14 @@ def usable_rows(mappings: Sequence[Mapping], network: Network,
     problems = [problem for _, problem in found]
     left = [mapping for mapping in mappings if mapping not in dict(found)]
     planner = Planner(line_model(network), default_period)
-    faults = [(mapping, 'Heartbeat_Timeout', text)
-              for mapping, text in guard_faults(left, planner)] or _broken(left)
+    faults = [*guard_faults(left, planner)] or [*broken_links(left)]
     while faults:
-        for mapping, column, text in faults:
-            where = replace(mapping.place, column=column)
-            problems.append(Problem(where, f'Item: {mapping.item}, {text}'))
+        for mapping, fault in faults:
+            where = replace(mapping.place, column=fault.column)
+            problems.append(Problem(where, f'Item: {mapping.item}, {fault.text}'))
             left = [other for other in left if other is not mapping]
-        faults = _broken(left)
+        faults = [*broken_links(left)]
     return left, problems
-
-
-def _broken(mappings: Sequence[Mapping]) -> list[tuple[Mapping, str, str]]:
-    return [(mapping, fault.column, fault.text) for mapping, fault in broken_links(mappings)]
 
 
 def _fault(mapping: Mapping, network: Network, table: DataTable) -> str | None:

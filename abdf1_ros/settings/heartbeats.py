@@ -23,7 +23,6 @@ are those of docs/heartbeats.md.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 from abdf1_ros.pccc.values import ValueType
@@ -92,8 +91,3 @@ class PublishWhile:
 def counts(kind: ValueType, length: int) -> bool:
     """Tell whether Publish_While may name this mapping: one integer word (rule 13)."""
     return kind in _COUNTING and length == 1
-
-
-def values_text(values: Sequence[float]) -> str:
-    """Return values as they stand in a cell."""
-    return ' '.join(f'{value:.15g}' for value in values)

@@ -52,6 +52,7 @@ from abdf1_ros.text import shown
 
 MAX_PERIOD = 86_400_000  # ms
 _PLC_TYPE_NAMES = tuple(entry.value for entry in FAMILIES)
+_DECIMAL = Kind(lambda text: decimal_number(text.replace(',', '.')), 'a number')
 
 _T = TypeVar('_T')
 
@@ -103,7 +104,7 @@ class RowReader:
                 self._fault(column, f'{column} is missing')
         if self.faults:
             return None
-        cells = self._dependent() | self._independent()
+        cells = self._cells()
         if self.faults:
             return None
         mapping = Mapping(item=self._row.item, place=self._row.where(), **cells)
@@ -114,22 +115,8 @@ class RowReader:
         remarks = tuple(row_remarks(self._row, mapping))
         return replace(mapping, remarks=remarks) if remarks else mapping
 
-    def _independent(self) -> dict[str, Any]:
-        """Return by attribute what stands in a cell and depends on no other cell."""
-        return {
-            'tag': self._row.get('Tag'),
-            'length': self._value('Length', whole(1, 65535), 1),
-            'period': self._value('Period', whole(0, MAX_PERIOD, 'ms')),
-            'publish': self._value('Publish', member_of(Publish), Publish.ALWAYS),
-            'minimum': self._decimal('Min', -math.inf),
-            'maximum': self._decimal('Max', math.inf),
-            'word_order': self._value('Word_Order', member_of(WordOrder), WordOrder.LOW),
-            'scaling': self._scaling(),
-            'confirms': self._row.get('Confirms'),
-            'description': self._row.get('Description')}
-
-    def _dependent(self) -> dict[str, Any]:
-        """Return by attribute what depends on other cells as well."""
+    def _cells(self) -> dict[str, Any]:
+        """Return by attribute what the cells say."""
         name = self._name('Tag', self._row.get('Tag'))
         topic = self._name('Topic', self._row.get('Topic')) if self._row.get('Topic') else name
         command = self._value('Command', member_of(Command))
@@ -147,7 +134,14 @@ class RowReader:
             'name': name, 'topic': topic, 'command': command, 'station': station, 'via': via,
             'type': kind or (address and _natural_type(address)), 'plc_type': plc_type,
             'access': access, 'is_read_only': self._is_read_only(command), 'address': address,
-            'processor': processor}
+            'processor': processor, 'tag': self._row.get('Tag'),
+            'length': self._value('Length', whole(1, 65535), 1),
+            'period': self._value('Period', whole(0, MAX_PERIOD, 'ms')),
+            'publish': self._value('Publish', member_of(Publish), Publish.ALWAYS),
+            'minimum': self._decimal('Min', -math.inf), 'maximum': self._decimal('Max', math.inf),
+            'word_order': self._value('Word_Order', member_of(WordOrder), WordOrder.LOW),
+            'scaling': self._scaling(), 'confirms': self._row.get('Confirms'),
+            'description': self._row.get('Description')}
 
     def _fault(self, column: str, text: str, message: Message | None = None,
                *args: object, is_superfluous: bool = False) -> None:
@@ -177,14 +171,9 @@ class RowReader:
         return value
 
     def _decimal(self, column: str, default: float) -> float:
-        text = self._row.get(column)
-        if not text:
-            return default
-        value = decimal_number(text.replace(',', '.'))
-        if right := two_readings(text):
+        if right := two_readings(self._row.get(column)):
             self._bad_value(column, f'could be two numbers; write {shown(right)}')
-        elif value is None:
-            self._bad_value(column, 'should be a number')
+        value = self._value(column, _DECIMAL, default)
         return default if value is None else value
 
     def _scaling(self) -> Scaling | None:

@@ -16,7 +16,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, field
 from enum import Enum
 import math
@@ -32,7 +31,7 @@ from abdf1_ros.pccc.file_types import FileType, PlcType
 from abdf1_ros.pccc.processor import Processor
 from abdf1_ros.pccc.values import Codec, ValueType, WordOrder
 from abdf1_ros.problems import Place, Problem
-from abdf1_ros.settings.heartbeats import Fallback, Heartbeat, PublishWhile, values_text
+from abdf1_ros.settings.heartbeats import Fallback, Heartbeat, PublishWhile
 from abdf1_ros.settings.scaling import Scaling
 
 # Access of a Serve row whose words the other end may only read.
@@ -192,23 +191,23 @@ class Mapping:
 
     def cell(self, column: str) -> str:
         """Return a column's value as text, defaults filled in."""
-        value = _CELLS[column](self) if column in _CELLS else getattr(self, column.lower())
-        if isinstance(value, float):
-            return '' if math.isinf(value) else f'{value:.15g}'
-        return '' if value is None else str(value.value if isinstance(value, Enum) else value)
+        if column == 'Access' and self.is_read_only:
+            return READ_ONLY
+        value: Any = self
+        for name in _CELLS.get(column, column.lower()).split('.'):
+            value = getattr(value, name, None)
+        return ' '.join(map(_text, value)) if isinstance(value, tuple) else _text(value)
 
 
-# What stands in the cells of columns that are no attribute of the same name.
-_CELLS: dict[str, Callable[[Mapping], Any]] = {
-    'Min': lambda mapping: mapping.minimum,
-    'Max': lambda mapping: mapping.maximum,
-    'Scale': lambda mapping: mapping.scaling and mapping.scaling.scale,
-    'Offset': lambda mapping: mapping.scaling and mapping.scaling.offset,
-    'Access': lambda mapping: READ_ONLY if mapping.is_read_only else mapping.access,
-    'Requires': lambda mapping: mapping.heartbeat and ' '.join(mapping.heartbeat.requires),
-    'Requires_Timeout': lambda mapping: mapping.heartbeat and mapping.heartbeat.requires_timeout,
-    'Fallback': lambda mapping: mapping.fallback and values_text(mapping.fallback.values),
-    'Fallback_After': lambda mapping: mapping.fallback and mapping.fallback.after,
-    'Publish_While': lambda mapping: mapping.publish_while and mapping.publish_while.text,
-    'Heartbeat_Timeout': lambda mapping: mapping.publish_while and mapping.publish_while.timeout,
-}
+def _text(value: Any) -> str:
+    if isinstance(value, float):
+        return '' if math.isinf(value) else f'{value:.15g}'
+    return '' if value is None else str(value.value if isinstance(value, Enum) else value)
+
+
+# Where the cells of columns come from that are no attribute of the same name.
+_CELLS = {
+    'Min': 'minimum', 'Max': 'maximum', 'Scale': 'scaling.scale', 'Offset': 'scaling.offset',
+    'Requires': 'heartbeat.requires', 'Requires_Timeout': 'heartbeat.requires_timeout',
+    'Fallback': 'fallback.values', 'Fallback_After': 'fallback.after',
+    'Publish_While': 'publish_while.text', 'Heartbeat_Timeout': 'publish_while.timeout'}

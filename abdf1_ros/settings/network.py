@@ -71,11 +71,6 @@ class NetField:
     other_words: MappingType[str, str] = field(default_factory=dict)
 
     @property
-    def meaning(self) -> str:
-        """Return what a value says, with its unit."""
-        return f'{self.kind.unit} {self.description}'.lstrip()
-
-    @property
     def parameter(self) -> str:
         """Return the name of the node's parameter."""
         return f'net.{self.column.lower()}'
@@ -134,7 +129,7 @@ class Network:
         'ENQ_Retries', 3, 'repetitions of a poll that is not answered', whole(0, 10),
         message=Message.CRT_BAD_ENQ_RETRIES, message_args=(10,))
     cmd_timeout: int = _net(
-        'Cmd_Timeout', 1000, 'until a reply is no longer polled for', whole(500, 5000, 'ms'),
+        'Cmd_Timeout', 1000, 'ms until a reply is no longer polled for', whole(500, 5000, 'ms'),
         message=Message.CRT_BAD_CMD_TIMEOUT, message_args=(500, 5000))
     com_port: str = _net('Com_Port', '1', f'n for /dev/ttyS(n-1), a device path, {URLS}')
     baud: int = _net('Baud', 9600, 'bits per second', one_of(
@@ -143,9 +138,9 @@ class Network:
     stop_bits: int = _net('Stop_Bits', 1, 'stop bits per character', whole(1, 2))
     parity: str = _net('Parity', 'None', 'parity bit per character', _PARITY)
     timeout: int = _net(
-        'Timeout', 1000, 'to wait for each answer of a station', whole(0, 360000, 'ms'))
+        'Timeout', 1000, 'ms to wait for each answer of a station', whole(0, 360000, 'ms'))
     tx_delay: int = _net(
-        'TX_Delay', 0, 'to wait before each transmission', whole(0, 65535, 'ms'))
+        'TX_Delay', 0, 'ms to wait before each transmission', whole(0, 65535, 'ms'))
     handshake: bool = _net('Handshake', False, 'hardware handshake RTS/CTS', _YES)
     polling: str = _net('Polling', 'Message', 'how a master polls', _named(*POLLING_MODES))
     share: str = _net(
@@ -272,17 +267,16 @@ def make_network(values: MappingType[str, tuple[str, Place | str]],
         else:
             if fault := _FAULTS[name](checked[name]) if name in _FAULTS else '':
                 problems.append(Problem(where, fault))
+    share = values.get('share', ('', 'Share'))[1]
     why_unshared = mode_of(checked['mode'], checked['polling']).why_unshared
     if checked['share'] and why_unshared:
-        where = values.get('share', ('', 'Share'))[1]
-        problems.append(Problem(where, f'Share needs Mode Master or Peer: {why_unshared}'))
+        problems.append(Problem(share, f'Share needs Mode Master or Peer: {why_unshared}'))
     if problems:
         raise ConfigurationError(problems)
     port = Network(com_port=checked['com_port']).port
     for place in share_places(checked['share']):
         if place.is_port(port):
-            where = values.get('share', ('', 'Share'))[1]
-            raise ConfigurationError([Problem(where, (
+            raise ConfigurationError([Problem(share, (
                 f'Share: "{shown(place.text)}" is the port of the line, {shown(port)}; a guest '
                 'needs another'))])
     given = {FIELDS[name].column for name in values}

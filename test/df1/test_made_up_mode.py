@@ -88,8 +88,8 @@ def main() -> None:
         found = examine(str(net), str(plan))
     assert found.network is not None
     report = make_report(found.network, found.mappings, 0.1)
-    assert report.longest_transaction == LONGEST
-    bound, = report.bounds
+    assert report.times.longest == LONGEST
+    bound, = report.times.bounds()
     assert bound.seconds == 0.5 + 3 * LONGEST
 
     bench = DriverBench(found.mappings, network=found.network, start=False)

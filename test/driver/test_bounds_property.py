@@ -381,7 +381,7 @@ class World:
     def late(self) -> dict[str, tuple[float, float]]:
         """Return bound, and the time it took, of each row that took longer, by its tag."""
         times = self.run()
-        times['T'] = make_report(self.plant.network, self.rows, 0.1).longest_transaction, \
+        times['T'] = make_report(self.plant.network, self.rows, 0.1).times.longest, \
             self.longest
         return {tag: (round(limit, 3), round(took, 3))
                 for tag, (limit, took) in times.items() if took > limit + 1e-6}
@@ -415,7 +415,7 @@ class World:
             plc.faults.delay = plant.delay
         report = make_report(plant.network, self.rows, 0.1)
         limits = {bound.mapping.tag: bound.usual if is_usual else bound.seconds
-                  for bound in report.bounds if bound.mapping.fallback}
+                  for bound in report.times.bounds() if bound.mapping.fallback}
         judged = [mapping.tag for mapping in self.rows
                   if mapping.fallback and mapping.station not in plant.silent | plant.alive]
         end = died + max(limit for limit in limits.values() if limit) + 2 * AFTER
@@ -427,7 +427,7 @@ class World:
                  for tag in judged}
         if plant.network.mode == 'Radio':
             found |= {bound.mapping.tag: (bound.seconds or 0.0, self.gaps[bound.mapping.tag])
-                      for bound in report.bounds if bound.mapping.heartbeat
+                      for bound in report.times.bounds() if bound.mapping.heartbeat
                       and bound.mapping.station not in plant.silent}
         return found
 

@@ -190,10 +190,11 @@ def test_rule_14_timeout_is_three_planned_intervals() -> None:
     counter = make_mapping('N11:3', tag='alive', period=100)
     guarded = make_mapping('N7:0', tag='level', period=1000,
                            publish_while=PublishWhile('alive', 250))
-    (mapping, text), = guard_faults([counter, guarded], Planner(line_model(QUICK), 0.1))
+    (mapping, fault), = guard_faults([counter, guarded], Planner(line_model(QUICK), 0.1))
     assert mapping is guarded
-    assert text == ('Heartbeat_Timeout 250 ms is shorter than 3 reads of alive on this line; '
-                    '300 ms would do')
+    assert (fault.column, fault.text) == (
+        'Heartbeat_Timeout', 'Heartbeat_Timeout 250 ms is shorter than 3 reads of alive on this '
+        'line; 300 ms would do')
 
 
 def test_heartbeats_and_questions_for_run_are_counted_in_the_load() -> None:

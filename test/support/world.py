@@ -248,8 +248,8 @@ class World(DriverBench):
         self.answered: list[Packet] = []
         self.came: dict[str, float] = {}  # when a message of a row came last
         self.report = make_report(plant.network, rows, settings.default_period)
-        self.bounds = {bound.mapping.tag: bound.seconds for bound in self.report.bounds}
-        self.longest = self.report.longest_transaction  # s
+        self.bounds = {bound.mapping.tag: bound.seconds for bound in self.report.times.bounds()}
+        self.longest = self.report.times.longest  # s
         self.is_alive = True  # the executor
         self.away = 0.0  # until when the process stands still
         self.ill: dict[int, float] = dict.fromkeys(range(plant.stations + 1), 0.0)

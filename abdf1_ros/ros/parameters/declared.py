@@ -283,7 +283,7 @@ def unknown_names(node: Node, given: Given, files: Sequence[str], known: Collect
     In a section of a parameter file that names the node, all are meant for it. Others may belong
     to other nodes, so only those are found whose names look like ours, or begin so. ``map.*`` may
     come back from a dump of our parameters, see ``_ignored``. Of YAML a number with a leading
-    zero is octal, which nobody means.
+    zero is octal, which is never meant.
     """
     full_name = node.get_fully_qualified_name()
     problems, found = [], set(_OF_RCLPY)

@@ -73,7 +73,7 @@ def _net_cells(network: Network) -> Iterator[_Cell]:
         entry, kind = FIELDS[name], FIELDS[name].kind
         choices = f' ({", ".join(kind.choices)})' if kind.choices else ''
         yield entry.parameter, value, descriptor_of(
-            value, entry.meaning + choices, kind.low, kind.high)
+            value, entry.description + choices, kind.low, kind.high)
 
 
 class ShownFiles:
