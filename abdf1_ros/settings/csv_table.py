@@ -36,7 +36,7 @@ from pathlib import Path
 import re
 
 from abdf1_ros.problems import ConfigurationError, Place, Problem
-from abdf1_ros.settings.hints import hint, is_spreadsheet_error
+from abdf1_ros.settings.hints import export_fault, hint, is_spreadsheet_error, row_hint
 from abdf1_ros.text import shown
 
 _DELIMITERS = {',': 'comma', ';': 'semicolon', '\t': 'tab'}
@@ -51,7 +51,6 @@ _LONGEST_LINE = 131_072
 _ALIKE = 0.7
 # The first bytes of other files that were renamed to .csv: zip archives, old Excel files.
 _WORKBOOKS = (b'PK\x03\x04', bytes.fromhex('D0CF11E0A1B11AE1'))
-_LIKE_AN_ADDRESS = re.compile(r'[A-Z]{1,3}\d*:\d+\S*', re.ASCII)
 
 
 @dataclass(frozen=True, slots=True)
@@ -95,16 +94,6 @@ class Table:
         return not self.faults and len(self.row_faults) <= len(self.rows)
 
 
-def looks_like_address(text: str) -> bool:
-    """Tell whether a cell has the form of most addresses, such as N7:0."""
-    return _LIKE_AN_ADDRESS.fullmatch(text.upper()) is not None
-
-
-def is_export_of_kepserver(names: Sequence[str]) -> bool:
-    """Tell whether a first row is that of an export of tags from KEPServerEX."""
-    return {'tag name', 'address', 'data type'} <= {name.lower() for name in names}
-
-
 def read_rows(path: str, known: Sequence[str]) -> list[Row]:
     """
     Read all data rows of a file whose header uses ``known`` column names.
@@ -129,9 +118,8 @@ def read_table(path: str, known: Sequence[str], needed: Collection[str] = ()) ->
         _check_text(Place(path, first), header)
         delimiter = max(_DELIMITERS, key=header.count)
         names = _cells(Place(path, first), header, delimiter)
-        if is_export_of_kepserver(names):
-            raise Problem(path, f'is an export of KEPServerEX; "plc import {path}" makes a map '
-                                'of it')
+        if fault := export_fault(path, names):
+            raise Problem(path, fault)
         _check_direction(Place(path, first), names, others, known)
     except Problem as problem:
         raise ConfigurationError([problem]) from None
@@ -242,7 +230,7 @@ def _columns(place: Place, names: list[str], known: Sequence[str],
     meant = [spelling.get(name.lower()) for name in names]
     if not any(meant):
         raise ConfigurationError([Problem(
-            place, f'no column is named here{_kind(names)}; the first row names them, with '
+            place, f'no column is named here{row_hint(names)}; the first row names them, with '
                    f'comma, semicolon or tab between: {", ".join(known)}')])
     free = [name for name in known if name not in meant]
     listing = f'; known: {", ".join(known)}'
@@ -286,16 +274,6 @@ def _close(name: str, free: Sequence[str]) -> str | None:
 
 def _squeezed(name: str) -> str:
     return re.sub(r'[\W_]', '', name).lower()
-
-
-def _kind(names: list[str]) -> str:
-    """Return what a first row seems to be that names no column."""
-    if names[0].startswith('//'):
-        return ', and a comment begins with #'
-    if any(map(looks_like_address, names)):
-        return (', it has an address, as in an export of symbols from RSLogix ("plc import" makes '
-                'a map of it) or a map without its first row')
-    return ''
 
 
 def _check_cells(place: Place, cells: list[str], names: list[str], columns: dict[str, int],

@@ -12,10 +12,11 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""What may be wrong with a cell that cannot be used: look-alikes, and what spreadsheets do."""
+"""What a cell or a first row may be that cannot be used: look-alikes, and of which programs."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 import re
 import unicodedata
 
@@ -33,6 +34,7 @@ _TIME = re.compile(
 _WRAPPED = re.compile(r'="?(?P<formula>[^"]+)"?|\'(?P<text>.+)')
 _ERROR = re.compile(r'#(?:(?:N/A|NV|NAME\?|NOM\?)'
                     r'|(?:DIV/0|REF|VALUE|NULL|NUM|BEZUG|WERT|ZAHL|VALEUR|VALOR)!)')
+_LIKE_AN_ADDRESS = re.compile(r'[A-Z]{1,3}\d*:\d+\S*', re.ASCII)
 
 
 def is_spreadsheet_error(text: str) -> bool:
@@ -60,3 +62,29 @@ def _name(character: str) -> str:
     name = f'U+{ord(character):04X} {unicodedata.name(character, "")}'.rstrip()
     plain = unicodedata.normalize('NFKC', character).translate(_ALIKE)
     return f'{name}, not "{plain}"' if plain.isascii() and plain.isprintable() else name
+
+
+def looks_like_address(text: str) -> bool:
+    """Tell whether a cell has the form of most addresses, such as N7:0."""
+    return _LIKE_AN_ADDRESS.fullmatch(text.upper()) is not None
+
+
+def is_export_of_kepserver(names: Sequence[str]) -> bool:
+    """Tell whether a first row is that of an export of tags from KEPServerEX."""
+    return {'tag name', 'address', 'data type'} <= {name.lower() for name in names}
+
+
+def export_fault(path: str, names: Sequence[str]) -> str:
+    """Return what a file is where its first row is one that other programs write."""
+    return f'is an export of KEPServerEX; "plc import {path}" makes a map of it' \
+        if is_export_of_kepserver(names) else ''
+
+
+def row_hint(names: Sequence[str]) -> str:
+    """Return what a first row seems to be that names no column."""
+    if names[0].startswith('//'):
+        return ', and a comment begins with #'
+    if any(map(looks_like_address, names)):
+        return (', it has an address, as in an export of symbols from RSLogix ("plc import" makes '
+                'a map of it) or a map without its first row')
+    return ''

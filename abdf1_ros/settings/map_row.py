@@ -173,6 +173,7 @@ class RowReader:
     def _decimal(self, column: str, default: float) -> float:
         if right := two_readings(self._row.get(column)):
             self._bad_value(column, f'could be two numbers; write {shown(right)}')
+            return default
         value = self._value(column, _DECIMAL, default)
         return default if value is None else value
 

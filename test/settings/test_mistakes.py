@@ -216,6 +216,8 @@ PORT = ('should be a number from 1, a device path such as /dev/ttyUSB0, socket:/
     ('Com_Port\nsocket://192.168.0.9\n', [
         f'!2:1 (Com_Port): Com_Port = "socket://192.168.0.9" {PORT}; the port is missing, as in '
         'socket://192.168.0.9:4001']),
+    ('Com_Port\ntcp:4001\n', [
+        f'!2:1 (Com_Port): Com_Port = "tcp:4001" {PORT}; "plc ports" lists the devices']),
     ('Com_Port,Share\n1,tcp:+4501\n', [
         '!2:2 (Share): Share: "tcp:+4501" should be tcp:PORT (for this machine only) or '
         'tcp:ADDRESS:PORT, with the address of an interface']),

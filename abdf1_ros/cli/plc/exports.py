@@ -35,7 +35,8 @@ from abdf1_ros.pccc.families import parse_address
 from abdf1_ros.pccc.file_types import PlcType
 from abdf1_ros.problems import ConfigurationError, Place, Problem
 from abdf1_ros.settings.columns import NEEDED
-from abdf1_ros.settings.csv_table import is_export_of_kepserver, looks_like_address, Row
+from abdf1_ros.settings.csv_table import Row
+from abdf1_ros.settings.hints import is_export_of_kepserver, looks_like_address
 from abdf1_ros.settings.map_row import RowReader
 from abdf1_ros.text import printable, shown
 
