@@ -129,7 +129,7 @@ class Words:
     def ended(self, claim: Claim) -> None:
         """Take note how a claim of these words ended."""
         if claim.has_changed:
-            self._may_land(claim.source, claim.lands_until)
+            self.may_land(claim.source, claim.lands_until)
             if claim.source == (_Writer.GUEST,):
                 self._guest_done = claim.done
         if claim.write is not None and claim.outcome is Outcome.WRITTEN:
@@ -157,11 +157,8 @@ class Words:
         """Take note that it was not the end."""
         self._latest = math.inf
 
-    def opened(self, until: float) -> None:
-        """Take note that something of the time before may land up to then (clock value, s)."""
-        self._may_land((_Writer.BEFORE,), until)
-
-    def _may_land(self, source: _Source, until: float) -> None:
+    def may_land(self, source: _Source, until: float) -> None:
+        """Take note that something of a writer may land up to then (clock value in s)."""
         self._lands_until[source] = max(until, self._lands_until.get(source, -math.inf))
 
     @property
@@ -208,7 +205,7 @@ class WriteRecord:
         """Take note that the port is open: gateways may hold what was written before."""
         for words in self._words.values():
             if words.row.via is not None:
-                words.opened(self.line.now + self._settle_time)
+                words.may_land((_Writer.BEFORE,), self.line.now + self._settle_time)
 
     def may_begin(self, row: Mapping) -> bool:
         """Tell whether no write of these words is under way: packets of two must not mix."""

@@ -49,7 +49,8 @@ class MessageJob(WriteJob):
 
     def ended(self, error: Exception | None) -> None:
         """Report the result."""
-        self._queue.ended(self)
+        self._writing.report(self, self._queue.report)
+        self._writing.ended(self)
 
 
 class WriteQueue:
@@ -67,7 +68,7 @@ class WriteQueue:
         self._stations = stations
         self._writing = writing
         self._patience = patience
-        self._report = report
+        self.report = report
         # It does not count as waiting: it comes before a probe, and before the command.
         self._slack = 2 * tx_delay
         self.waiting: deque[Write] = deque()
@@ -97,7 +98,7 @@ class WriteQueue:
             map(write.overlaps, itertools.islice(self.waiting, at + 1, None)))
         if len(older) > 1 or not is_overlapped:
             self.waiting.remove(older[-1])
-            self._report(older[-1].result(Outcome.SUPERSEDED, '', now))
+            self.report(older[-1].result(Outcome.SUPERSEDED, '', now))
         self.waiting.insert(len(self.waiting) if is_overlapped else at, write)
 
     def next(self, now: float, busy: Container[int] = ()) -> MessageJob | None:  # noqa: A003
@@ -113,11 +114,6 @@ class WriteQueue:
             return None
         self.waiting.remove(write)
         return MessageJob(write, self._writing, self, self._slack)
-
-    def ended(self, job: MessageJob) -> None:
-        """Take note that a write that had the line has ended."""
-        self._writing.report(job, self._report)
-        self._writing.ended(job)
 
     def _first_free(self, busy: Container[int]) -> Write | None:
         """Return the first write that does not have to wait."""
@@ -147,7 +143,7 @@ class WriteQueue:
             reason = self._reject_reason(write, now)
             if reason:
                 self.waiting.remove(write)
-                self._report(write.result(Outcome.NOT_SENT, reason, now))
+                self.report(write.result(Outcome.NOT_SENT, reason, now))
                 self._writing.record.expired(write)
             else:
                 self.next_expiry = min(self.next_expiry, self._expiry(write))
@@ -162,7 +158,7 @@ class WriteQueue:
         dropped = [write for write in self.waiting if mapping in (None, write.mapping)]
         for write in dropped:
             self.waiting.remove(write)
-            self._report(write.result(Outcome.NOT_SENT, reason, now))
+            self.report(write.result(Outcome.NOT_SENT, reason, now))
 
     def _expiry(self, write: Write) -> float:
         """Return the clock value (s) from which a write is too old."""

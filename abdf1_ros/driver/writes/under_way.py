@@ -36,14 +36,12 @@ class WriteJob(Job):
         self.write = write
         self.station = write.mapping.station
         self.result: WriteResult | None = None
-        self.begun = write.requested
         self.goes_on = False  # also after a packet that is not confirmed
         self._writing = writing
         self.claim = writing.begin(write)
 
     def steps(self, now: float) -> Steps[None]:
         """Send every packet."""
-        self.begun = now
         self.result = yield from self._writing.carry_out(self.write, self.goes_on)
 
 
@@ -72,7 +70,7 @@ class WritesUnderWay:
         """Take note of the end of a write."""
         write, result, station = job.write, job.result, job.station
         if station != BROADCAST:
-            self.stations.tried(station, job.begun, self.line.now, was_silent=write.is_probe,
+            self.stations.tried(station, job.claim.begun, self.line.now, was_silent=write.is_probe,
                                 is_message=True)
         if result is None:  # a bug
             self.record.ended(job.claim, Outcome.UNKNOWN, may_land=True)
