@@ -88,7 +88,7 @@ def test_job_that_begins_when_it_is_given_up_is_not_lost() -> None:
         if not request:
             state[:] = [5, 5]
 
-    status, lines, _ = run(begin_late, [4, 4], '--begin-within', '2')
+    status, lines, _ = run(begin_late, [4, 4], '--begin-within', '0.5')
     assert (status, lines[-1]) == (0, 'job 5: done')
 
 
@@ -107,7 +107,7 @@ def test_nothing_is_asked_for_while_another_job_is_under_way() -> None:
 
 def test_nothing_is_asked_for_while_ros_is_not_in_control() -> None:
     status, lines, requests = run(
-        lambda request, state: None, [4, 4], '--control', 'control', '--begin-within', '2',
+        lambda request, state: None, [4, 4], '--control', 'control', '--begin-within', '0.5',
         control=[0])
     assert (status, requests) == (1, [])
     assert lines == ['not begun: ROS is not in control of the PLC; a person has to press reset '

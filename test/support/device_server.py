@@ -68,7 +68,7 @@ class DeviceServer:
 
     def write(self, data: bytes) -> None:
         """Send to the client; what ``PortManager`` answers comes this way too."""
-        with self._lock:
+        with self._lock, suppress(OSError):  # it has gone, and the next turn finds that out
             self.connection.sendall(data)
 
     def _serve(self) -> None:
