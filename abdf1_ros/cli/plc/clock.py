@@ -53,7 +53,7 @@ class Clock:
         try:
             found = datetime(*values)
         except ValueError:
-            raise FormatError(f'has no time: {self.address} holds {" ".join(map(str, values))}'
+            raise FormatError(f'holds no date and time: {" ".join(map(str, values))}'
                               + ('' if any(values) else '; is its clock off?')) from None
         return found, found - (begun + (ended - begun) / 2)
 

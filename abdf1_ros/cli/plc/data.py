@@ -50,6 +50,7 @@ _VALUES_IN_ROW = 10
 _BITS_IN_ROW = 16
 _BETWEEN = '  '
 
+_UNSIGNED = {ValueType.INT16: ValueType.UINT16, ValueType.INT32: ValueType.UINT32}
 _BITS = {ValueType.INT16: 16, ValueType.UINT16: 16, ValueType.INT32: 32, ValueType.UINT32: 32}
 
 
@@ -104,6 +105,8 @@ def _in_arguments(fault: CellFault, row: Row) -> Problem:
     if fault.column == 'Length':
         if fault.message is not None:  # the numbered text does not name the argument
             text = f'{row.get("Length")} elements do not fit at {row.get("Address")}; {text}'
+        elif fault.value is None:
+            argument += f' of {row.get("Address")}'
         if row.get('Command') != Command.READ.value:  # there it is how many values are given
             argument = 'VALUE'
     elif fault.column == 'Address':
@@ -193,7 +196,10 @@ def _number(mapping: Mapping, text: str) -> float:
         value = decimal_number(text.replace(',', '.'))
         right = 'a number such as -1.5 or 2e3'
     if value is None or not low <= value <= high:
-        raise FormatError(f'"{text}" is not a valid {kind.value}, {right}')
+        unsigned = _UNSIGNED.get(kind)
+        hint = f'; with --type {unsigned.value} it is one' if unsigned and value is not None and (
+            high < value <= unsigned.range[1]) else ''
+        raise FormatError(f'"{text}" is not a valid {kind.value}, {right}{hint}')
     return value
 
 

@@ -30,6 +30,7 @@ from abdf1_ros.errors import Abdf1Error, LinkError, PortLost, RemoteError, Stati
 from abdf1_ros.pccc.access import Access
 from abdf1_ros.pccc.families import dialect_of, FAMILIES, parse_address
 from abdf1_ros.pccc.file_search import is_there
+from abdf1_ros.pccc.file_types import PlcType
 from abdf1_ros.pccc.identity import Identity
 from abdf1_ros.pccc.steps import echo, identify
 from abdf1_ros.settings.network import Network
@@ -129,6 +130,18 @@ def ping(session: Session, station: int) -> float:
     started = time.monotonic()
     session.ask(station, echo(_ECHO))
     return time.monotonic() - started
+
+
+def said_by_both(session: Session, *stations: int) -> Identity | None:
+    """Return what stations say of themselves where that is the same; raises PortLost."""
+    first, *others = (look_at(session, station).identity for station in stations)
+    return first if all(other == first for other in others) else None
+
+
+def type_to_say(there: Presence) -> str:
+    """Return the option that commands need for a PLC of an unknown family: SLC as a guess."""
+    is_known = there.identity is not None and there.identity.plc_type is not None
+    return '' if is_known else f' --plc-type {PlcType.SLC.value}'
 
 
 def describe(presence: Presence) -> list[str]:

@@ -17,8 +17,8 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Callable, Sequence
-from contextlib import suppress
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager, suppress
 from dataclasses import replace
 import errno
 from functools import partial
@@ -117,6 +117,17 @@ def _line(options: argparse.Namespace) -> Network:
     return replace(network, station=free_station(network.station, [options.station]))
 
 
+@contextmanager
+def _opened(options: argparse.Namespace, network: Network | None = None) -> Iterator[Session]:
+    """Open the line of a command for one station; warn of a gateway that may be none."""
+    with Session(network or _line(options), via=options.via) as session:
+        if options.via is not None and (
+                who := presence.said_by_both(session, options.station, options.via)):
+            _complain(f'stations {options.station} and {options.via} are both "{who}": if '
+                      f'{options.via} is no gateway, it answers itself')
+        yield session
+
+
 def _failed(options: argparse.Namespace, session: Session, error: Abdf1Error, place: str = '',
             plc_type: str | None = None) -> int:
     """Tell why a request to a station, about ``place``, has failed; return the exit status."""
@@ -138,7 +149,7 @@ def _failed(options: argparse.Namespace, session: Session, error: Abdf1Error, pl
 def _read(options: argparse.Namespace) -> int:
     status = 0
     network, cells = _line(options), _cells_to_read(options)
-    with Session(network, via=options.via) as session:
+    with _opened(options, network) as session:
         try:
             mappings = _mappings(options, session, cells, options.addresses)
         except Abdf1Error as error:
@@ -179,7 +190,7 @@ def _write(options: argparse.Namespace) -> int:
     except FormatError as error:
         _complain(f'{options.address}: {error}')
         return EXIT_USAGE
-    with Session(network, via=options.via) as session:
+    with _opened(options, network) as session:
         try:
             mapping, = _mappings(options, session, cells, [options.address])
         except Abdf1Error as error:
@@ -244,7 +255,7 @@ def _carry_out(session: Session, writing: data.Writing) -> int:
 
 def _watch(options: argparse.Namespace) -> int:
     network, cells = _line(options), _cells_to_read(options)
-    with Session(network, via=options.via) as session:
+    with _opened(options, network) as session:
         try:
             mappings = _mappings(options, session, cells, options.addresses)
         except Abdf1Error as error:
@@ -255,7 +266,7 @@ def _watch(options: argparse.Namespace) -> int:
 
 
 def _status(options: argparse.Namespace) -> int:
-    with Session(_line(options), via=options.via) as session:
+    with _opened(options) as session:
         there = presence.look_at(session, options.station)
         if there.identity is None:
             assert there.error is not None
@@ -267,7 +278,7 @@ def _status(options: argparse.Namespace) -> int:
 def _ping(options: argparse.Namespace) -> int:
     times: list[float] = []
     failures = 0
-    with Session(_line(options), via=options.via) as session:
+    with _opened(options) as session:
         try:
             for _ in range(options.count):
                 try:
@@ -318,7 +329,7 @@ def _detect(options: argparse.Namespace) -> int:
         if ways := presence.io_access(session, there):
             print(f'inputs and outputs: Access {" or ".join(ways)}')
     whom = {MODES['full']: '--peer', MODES['half']: f'--station {there.station}'}.get(
-        settings.mode, f'--radio --station {there.station}')
+        settings.mode, f'--radio --station {there.station}') + presence.type_to_say(there)
     parity = '' if network.parity == 'None' else f' --parity {network.parity}'
     print(f'next: {called("plc")} read N7:0 {whom} --port {network.port} --baud {settings.baud} '
           f'--check {settings.check}{parity}')
@@ -374,7 +385,8 @@ def _init(options: argparse.Namespace) -> int:
     net, map_file = (shlex.quote(str(path)) for path in target.paths)
     print(f'written: {", ".join(map(str, target.paths))}\n'
           'how to go on: write the addresses that you need into map.csv, then\n'
-          f'  {called("plc")} watch S:0 --station {there[0].station} --net {net}\n'
+          f'  {called("plc")} watch S:0 --station {there[0].station}'
+          f'{presence.type_to_say(there[0])} --net {net}\n'
           f'  {called("check")} {net} {map_file}\n'
           f'  {called("node")} --ros-args -p net_file:={net} -p map_file:={map_file}')
     return 0
@@ -432,7 +444,7 @@ def _ports(options: argparse.Namespace) -> int:
 
 def _clock(options: argparse.Namespace) -> int:
     place = ''
-    with Session(_line(options), via=options.via) as session:
+    with _opened(options) as session:
         try:
             clock = Clock(session, options.station, _family(options, session)[0])
             place = clock.address
@@ -459,7 +471,7 @@ def _files(options: argparse.Namespace) -> int:
     mappings, problems = load_mappings(options.map) if options.map else ([], [])
     for problem in problems:
         _complain(str(problem))
-    with Session(_line(options), via=options.via) as session:
+    with _opened(options) as session:
         try:
             family, processor = _family(options, session)
             progress = Progress()

@@ -78,8 +78,7 @@ def test_clock_is_set_when_that_is_wanted(port: str, plcs: tuple[SimulatedPlc, .
 def test_clock_that_holds_no_time(port: str, capsys: Output) -> None:
     said = call(main, capsys, 'clock', '1', '--port', port)
     assert (said.status, said.err) == (
-        1, 'plc: S2:37 of station 1: has no time: S2:37 holds 0 0 0 0 0 0; is its clock '
-           'off?\n')
+        1, 'plc: S2:37 of station 1: holds no date and time: 0 0 0 0 0 0; is its clock off?\n')
 
 
 def test_family_without_a_known_clock(port: str, capsys: Output) -> None:

@@ -252,6 +252,8 @@ def test_write_of_what_cannot_be_written(plc: Plc, args: tuple[str, ...], text: 
 @for_all(('args', 'text'), [
     (('read', 'N7:0', '--length', 'x'), '--length: "x" should be a whole number from 1 to 65535'),
     (('watch', 'N7:0', '--length', '0'), '--length: "0" should be a whole number from 1 to 65535'),
+    (('read', 'N7:0', 'ST9:0', '--length', '3'),
+     '--length of ST9:0: a string mapping has Length 1'),
     (('read', 'N7:0', 'B3:O'), 'ADDRESS "B3:O": that is the letter O where a digit should be; '
                                'write B3:0'),
     (('write', 'N7:0', '99999'), 'N7:0: "99999" is not a valid int16, a whole number from -32768 '

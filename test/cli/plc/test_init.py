@@ -198,7 +198,8 @@ def test_plc_behind_a_gateway(tmp_path: Path, capsys: Output) -> None:
     with plc_line(tmp_path / 'plc', plc) as name:
         line = ('--port', name, '--via', '10')
         assert main(['read', 'N7:1', '--station', '2', *line]) == 0
-        assert '42' in capsys.readouterr().out
+        said = capsys.readouterr()
+        assert '42' in said.out and said.err == ''
         assert main(['write', 'N7:1', '43', '--station', '2', '--yes', *line]) == 0
         assert stored(plc, 'N7:1') == b'\x2B\0'
         capsys.readouterr()
@@ -208,6 +209,12 @@ def test_plc_behind_a_gateway(tmp_path: Path, capsys: Output) -> None:
     mappings, problems = load_mappings(str(path))
     assert problems == []
     assert {(mapping.station, mapping.via) for mapping in mappings} == {(2, 10)}
+
+
+def test_plc_that_answers_for_a_gateway_it_is_not(port: str, capsys: Output) -> None:
+    assert main(['read', 'N7:0', '--station', '3', '--via', '2', '--port', port, *PATIENT]) == 0
+    assert 'plc: stations 3 and 2 are both "SLC 5/03 series A revision 1, REM RUN": if 2 is no ' \
+           'gateway, it answers itself' in capsys.readouterr().err
 
 
 def test_station_without_files_is_an_error(port: str, capsys: Output) -> None:

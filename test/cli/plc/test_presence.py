@@ -18,7 +18,7 @@ from pathlib import Path
 import threading
 import time
 
-from abdf1_ros.cli.plc.presence import describe, hint, look_at, Presence, scan
+from abdf1_ros.cli.plc.presence import describe, hint, look_at, Presence, scan, type_to_say
 from abdf1_ros.cli.plc.session import Session
 from abdf1_ros.errors import FormatError, StationInactive
 from abdf1_ros.pccc.identity import Identity, Mode
@@ -45,6 +45,14 @@ def test_everything_a_station_has_said() -> None:
 def test_station_that_does_not_say_what_it_is() -> None:
     presence = Presence(2, 0.1, None, FormatError('too short'), True, True)
     assert describe(presence) == ['station 2 answers, but not who it is: too short']
+
+
+@pytest.mark.parametrize('identity, option', [
+    (IDENTITY, ''), (Identity(None, 'unknown processor (01)'), ' --plc-type SLC'),
+    (None, ' --plc-type SLC')])
+def test_next_step_for_a_plc_of_an_unknown_family_names_one(
+        identity: Identity | None, option: str) -> None:
+    assert type_to_say(Presence(2, 0.1, identity, None, True, True)) == option
 
 
 @pytest.mark.parametrize('mode', ['Master', 'Peer'])
