@@ -25,6 +25,7 @@ from functools import partial
 from pathlib import Path
 import shlex
 import sys
+from typing import Any
 
 from abdf1_ros.cli.plc import data, detect, exports, files, init, presence
 from abdf1_ros.cli.plc.clock import Clock, TAKEN, told
@@ -69,10 +70,13 @@ _ALL_TRIED_IN_VAIN = (
 _ONE_PLC_ANSWERS_TO_ALL = (
     'full duplex tells no addresses apart: most PLCs answer to every station, so these may be one')
 
+Cells = dict[str, str]
+"""What the options say of the columns of a map CSV."""
+
 _UNCERTAIN = (Outcome.UNKNOWN, Outcome.PARTLY)
 
 
-def _cells(options: argparse.Namespace, command: Command, length: int | str) -> dict[str, str]:
+def _cells(options: argparse.Namespace, command: Command, length: int | str) -> Cells:
     """Return what the options say of the columns of a map CSV."""
     given = {'Command': command.value, 'Station': str(options.station), 'Length': str(length),
              'Type': options.type, 'Word_Order': options.word_order, 'Access': options.access,
@@ -81,7 +85,7 @@ def _cells(options: argparse.Namespace, command: Command, length: int | str) -> 
     return {column: text for column, text in given.items() if text}
 
 
-def _mappings(options: argparse.Namespace, session: Session, cells: dict[str, str],
+def _mappings(options: argparse.Namespace, session: Session, cells: Cells,
               addresses: Sequence[str]) -> list[Mapping]:
     """Return the mappings of addresses; where needed, ask the PLC for its type first."""
     plc_type, processor = _family(options, session)
@@ -117,15 +121,26 @@ def _line(options: argparse.Namespace) -> Network:
     return replace(network, station=free_station(network.station, [options.station]))
 
 
-@contextmanager
-def _opened(options: argparse.Namespace, network: Network | None = None) -> Iterator[Session]:
-    """Open the line of a command for one station; warn of a gateway that may be none."""
-    with Session(network or _line(options), via=options.via) as session:
-        if options.via is not None and (
-                who := presence.said_by_both(session, options.station, options.via)):
-            _complain(f'stations {options.station} and {options.via} are both "{who}": if '
-                      f'{options.via} is no gateway, it answers itself')
-        yield session
+def _asking(work: Callable[[argparse.Namespace, Session, Any], int],
+            prepare: Callable[[argparse.Namespace], Any] = lambda options: None,
+            ) -> Callable[[argparse.Namespace], int]:
+    """
+    Return a command that asks one station; it warns of a gateway that may be none.
+
+    ``work`` gets what ``prepare`` returns, which tells what is wrong before the port is opened.
+    """
+    def command(options: argparse.Namespace) -> int:
+        network, prepared = _line(options), prepare(options)
+        with Session(network, via=options.via) as session:
+            if options.via is not None and (
+                    who := presence.said_by_both(session, options.station, options.via)):
+                _complain(f'stations {options.station} and {options.via} are both "{who}": if '
+                          f'{options.via} is not a gateway, it answers itself')
+            try:
+                return work(options, session, prepared)
+            except Abdf1Error as error:
+                return _failed(options, session, error)
+    return command
 
 
 def _failed(options: argparse.Namespace, session: Session, error: Abdf1Error, place: str = '',
@@ -146,27 +161,20 @@ def _failed(options: argparse.Namespace, session: Session, error: Abdf1Error, pl
     return EXIT_FAILED
 
 
-def _read(options: argparse.Namespace) -> int:
-    status = 0
-    network, cells = _line(options), _cells_to_read(options)
-    with _opened(options, network) as session:
+def _read(options: argparse.Namespace, session: Session, cells: Cells) -> int:
+    status, plc_type = 0, options.plc_type
+    for mapping in _mappings(options, session, cells, options.addresses):
         try:
-            mappings = _mappings(options, session, cells, options.addresses)
+            values = data.read(session, mapping)
         except Abdf1Error as error:
-            return _failed(options, session, error)
-        plc_type = options.plc_type
-        for mapping in mappings:
-            try:
-                values = data.read(session, mapping)
-            except Abdf1Error as error:
-                status = _failed(options, session, error, str(mapping.address), plc_type)
-                plc_type = None  # once is enough
-            else:
-                _print_values(mapping, values, RADIXES[options.radix])
+            status = _failed(options, session, error, str(mapping.address), plc_type)
+            plc_type = None  # once is enough
+        else:
+            _print_values(mapping, values, RADIXES[options.radix])
     return status
 
 
-def _cells_to_read(options: argparse.Namespace) -> dict[str, str]:
+def _cells_to_read(options: argparse.Namespace) -> Cells:
     """Return the cells of a read; raises ConfigurationError where no PLC could have them."""
     cells = _cells(options, Command.READ, options.length)
     data.check_for_some_family(options.addresses, cells)
@@ -181,31 +189,34 @@ def _print_values(mapping: Mapping, values: Values,
         print(f'{address:{width}}  {printable(text)}')
 
 
-def _write(options: argparse.Namespace) -> int:
-    network = _line(options)
+def _cells_to_write(options: argparse.Namespace) -> Cells:
+    """Return the cells of a write; raises ConfigurationError where no PLC could take it."""
     cells = _cells(options, Command.READ_WRITE,
                    data.length_of(options.address, options.type, options.values))
-    try:
+    with _no_value(options.address):
         data.check_for_some_family([options.address], cells, options.values)
+    return cells
+
+
+@contextmanager
+def _no_value(address: str) -> Iterator[None]:
+    """Turn a FormatError, about values that are none, into a ConfigurationError."""
+    try:
+        yield
     except FormatError as error:
-        _complain(f'{options.address}: {error}')
+        raise ConfigurationError([Problem(address, str(error))]) from None
+
+
+def _write(options: argparse.Namespace, session: Session, cells: Cells) -> int:
+    mapping, = _mappings(options, session, cells, [options.address])
+    with _no_value(options.address):
+        writing = data.Writing(mapping, options.values)
+    for remark in mapping.remarks:
+        _complain(remark.text)
+    if not options.yes and not _is_confirmed(options, session, writing):
+        _complain('nothing was written; --yes writes')
         return EXIT_USAGE
-    with _opened(options, network) as session:
-        try:
-            mapping, = _mappings(options, session, cells, [options.address])
-        except Abdf1Error as error:
-            return _failed(options, session, error)
-        try:
-            writing = data.Writing(mapping, options.values)
-        except Abdf1Error as error:
-            _complain(f'{options.address}: {error}')
-            return EXIT_USAGE
-        for remark in mapping.remarks:
-            _complain(remark.text)
-        if not options.yes and not _is_confirmed(options, session, writing):
-            _complain('nothing was written; --yes writes')
-            return EXIT_USAGE
-        return _carry_out(session, writing)
+    return _carry_out(session, writing)
 
 
 def _is_confirmed(options: argparse.Namespace, session: Session, writing: data.Writing) -> bool:
@@ -253,43 +264,36 @@ def _carry_out(session: Session, writing: data.Writing) -> int:
     return 0
 
 
-def _watch(options: argparse.Namespace) -> int:
-    network, cells = _line(options), _cells_to_read(options)
-    with _opened(options, network) as session:
-        try:
-            mappings = _mappings(options, session, cells, options.addresses)
-        except Abdf1Error as error:
-            return _failed(options, session, error)
-    failed = Watch(network, mappings, options.period, RADIXES[options.radix],
+def _watch(options: argparse.Namespace, session: Session, cells: Cells) -> int:
+    mappings = _mappings(options, session, cells, options.addresses)
+    session.close()  # the driver opens the port itself
+    failed = Watch(session.network, mappings, options.period, RADIXES[options.radix],
                    options.csv).run(options.count)
     return EXIT_FAILED if failed else 0
 
 
-def _status(options: argparse.Namespace) -> int:
-    with _opened(options) as session:
-        there = presence.look_at(session, options.station)
-        if there.identity is None:
-            assert there.error is not None
-            return _failed(options, session, there.error)
+def _status(options: argparse.Namespace, session: Session, prepared: None) -> int:
+    there = presence.look_at(session, options.station)
+    if there.error is not None:
+        raise there.error
     print('\n'.join(presence.describe(there)))
     return 0
 
 
-def _ping(options: argparse.Namespace) -> int:
+def _ping(options: argparse.Namespace, session: Session, prepared: None) -> int:
     times: list[float] = []
     failures = 0
-    with _opened(options) as session:
-        try:
-            for _ in range(options.count):
-                try:
-                    times.append(presence.ping(session, options.station))
-                except Abdf1Error as error:
-                    failures += 1
-                    _failed(options, session, error)
-                else:
-                    print(f'station {options.station}: {times[-1] * 1000:.1f} ms', flush=True)
-        except KeyboardInterrupt:
-            pass  # the one under way does not count
+    try:
+        for _ in range(options.count):
+            try:
+                times.append(presence.ping(session, options.station))
+            except Abdf1Error as error:
+                failures += 1
+                _failed(options, session, error)
+            else:
+                print(f'station {options.station}: {times[-1] * 1000:.1f} ms', flush=True)
+    except KeyboardInterrupt:
+        pass  # the one under way does not count
     text = f'{failures + len(times)} sent, {len(times)} answered'
     if times:
         text += (f'; shortest {min(times) * 1000:.1f}, mean '
@@ -442,23 +446,20 @@ def _ports(options: argparse.Namespace) -> int:
     return 0
 
 
-def _clock(options: argparse.Namespace) -> int:
-    place = ''
-    with _opened(options) as session:
-        try:
-            clock = Clock(session, options.station, _family(options, session)[0])
-            place = clock.address
-            if not options.set:
-                print(f'station {options.station}: {told(*clock.read())}')
-                return 0
-            if not options.yes and not _is_wanted(
-                    f'set the clock of station {options.station} ({clock.address})'):
-                _complain('nothing was written; --yes writes')
-                return EXIT_USAGE
-            clock.write()
-            time, ahead = clock.read()
-        except Abdf1Error as error:
-            return _failed(options, session, error, place)
+def _clock(options: argparse.Namespace, session: Session, prepared: None) -> int:
+    clock = Clock(session, options.station, _family(options, session)[0])
+    try:
+        if not options.set:
+            print(f'station {options.station}: {told(*clock.read())}')
+            return 0
+        if not options.yes and not _is_wanted(
+                f'set the clock of station {options.station} ({clock.address})'):
+            _complain('nothing was written; --yes writes')
+            return EXIT_USAGE
+        clock.write()
+        time, ahead = clock.read()
+    except Abdf1Error as error:
+        return _failed(options, session, error, clock.address)
     print(f'station {options.station}: {told(time, ahead)}')
     if abs(ahead) <= TAKEN:
         return 0
@@ -467,24 +468,24 @@ def _clock(options: argparse.Namespace) -> int:
     return EXIT_FAILED
 
 
-def _files(options: argparse.Namespace) -> int:
+def _rows_to_compare(options: argparse.Namespace) -> list[Mapping]:
     mappings, problems = load_mappings(options.map) if options.map else ([], [])
     for problem in problems:
         _complain(str(problem))
-    with _opened(options) as session:
-        try:
-            family, processor = _family(options, session)
-            progress = Progress()
-            found = []
-            for entry in files.find_files(session, options.station, family, processor,
-                                          options.files, progress.show, _complain):
-                found.append(entry)
-                if options.map is None:
-                    progress.clear()
-                    print(f'{str(entry):6} {_extent(entry)}', flush=True)
+    return mappings
+
+
+def _files(options: argparse.Namespace, session: Session, mappings: Sequence[Mapping]) -> int:
+    family, processor = _family(options, session)
+    progress = Progress()
+    found = []
+    for entry in files.find_files(session, options.station, family, processor, options.files,
+                                  progress.show, _complain):
+        found.append(entry)
+        if options.map is None:
             progress.clear()
-        except Abdf1Error as error:
-            return _failed(options, session, error)
+            print(f'{str(entry):6} {_extent(entry)}', flush=True)
+    progress.clear()
     if options.map:
         faults = [*files.outside(found, mappings, options.station)]
         print('\n'.join(map(str, faults)) or f'all rows of station {options.station} lie inside')
@@ -512,8 +513,9 @@ def _extent(entry: DataFile) -> str:
 
 
 COMMANDS: dict[str, Callable[[argparse.Namespace], int]] = {
-    'read': _read, 'write': _write, 'watch': _watch, 'status': _status, 'ping': _ping,
-    'scan': _scan, 'detect': _detect, 'init': _init, 'ports': _ports, 'files': _files,
-    'clock': _clock, 'import': _import}
+    'read': _asking(_read, _cells_to_read), 'write': _asking(_write, _cells_to_write),
+    'watch': _asking(_watch, _cells_to_read), 'status': _asking(_status), 'ping': _asking(_ping),
+    'scan': _scan, 'detect': _detect, 'init': _init, 'ports': _ports,
+    'files': _asking(_files, _rows_to_compare), 'clock': _asking(_clock), 'import': _import}
 
 _complain = partial(tell, 'plc', code=RED)

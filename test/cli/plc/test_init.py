@@ -213,8 +213,8 @@ def test_plc_behind_a_gateway(tmp_path: Path, capsys: Output) -> None:
 
 def test_plc_that_answers_for_a_gateway_it_is_not(port: str, capsys: Output) -> None:
     assert main(['read', 'N7:0', '--station', '3', '--via', '2', '--port', port, *PATIENT]) == 0
-    assert 'plc: stations 3 and 2 are both "SLC 5/03 series A revision 1, REM RUN": if 2 is no ' \
-           'gateway, it answers itself' in capsys.readouterr().err
+    assert 'plc: stations 3 and 2 are both "SLC 5/03 series A revision 1, REM RUN": if 2 is ' \
+           'not a gateway, it answers itself' in capsys.readouterr().err
 
 
 def test_station_without_files_is_an_error(port: str, capsys: Output) -> None:
