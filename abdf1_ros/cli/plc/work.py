@@ -29,6 +29,7 @@ from typing import Any
 
 from abdf1_ros.cli.plc import data, detect, exports, files, init, presence
 from abdf1_ros.cli.plc.clock import Clock, TAKEN, told
+from abdf1_ros.cli.plc.exports import Cells
 from abdf1_ros.cli.plc.line import free_station, MODES, network_of
 from abdf1_ros.cli.plc.options import DEFAULT_STATION, RADIXES
 from abdf1_ros.cli.plc.session import Session
@@ -69,9 +70,6 @@ _ALL_TRIED_IN_VAIN = (
     'PLC-5 shows its own in octal)')
 _ONE_PLC_ANSWERS_TO_ALL = (
     'full duplex tells no addresses apart: most PLCs answer to every station, so these may be one')
-
-Cells = dict[str, str]
-"""What the options say of the columns of a map CSV."""
 
 _UNCERTAIN = (Outcome.UNKNOWN, Outcome.PARTLY)
 
