@@ -234,9 +234,14 @@ def test_help_has_examples_and_exit_status(capsys: Output) -> None:
     assert 'exit status: 0' in text
 
 
-def _split(sniff: Process, stream: str) -> list[str]:
-    """Return what it has said on one of its streams; all else than traffic is on errors."""
-    return [line for line in sniff.lines if line.startswith('sniff: ') is (stream == 'errors')]
+def _printed(sniff: Process) -> list[str]:
+    """Return the lines of its standard output."""
+    return [line for line in sniff.lines if not line.startswith('sniff: ')]
+
+
+def _told(sniff: Process) -> list[str]:
+    """Return the lines of its standard error."""
+    return [line for line in sniff.lines if line.startswith('sniff: ')]
 
 
 def test_tap_between_the_simulator_and_a_master(tmp_path: Path, capsys: Output) -> None:
@@ -251,15 +256,15 @@ def test_tap_between_the_simulator_and_a_master(tmp_path: Path, capsys: Output) 
         reply = frames.message_frame(COMMAND.reply(bytes(4)).encode(), Checksum.CRC)
         heard = read_exactly(line, len(reply))
         os.write(line, frames.ACK)
-        wait_until(lambda: len(_split(sniff, 'output')) == 5)
+        wait_until(lambda: len(_printed(sniff)) == 5)
         os.close(line)
         sniff.end()
-    said = _split(sniff, 'output')
+    said = _printed(sniff)
     assert [entry.split()[1:4] for entry in said[:5]] == [
         ['>', '2', 'command'], ['<', '2', 'ACK'], ['>', '2', 'poll'], ['<', '2', 'reply'],
         ['>', '2', 'ACK']]
     assert heard[:2] == frames.STX
-    assert _split(sniff, 'errors') == [f'sniff: listening on {tap} and {plc}; Ctrl-C ends']
+    assert _told(sniff) == [f'sniff: listening on {tap} and {plc}; Ctrl-C ends']
     assert '  seen: 1 command, 1 reply, 1 poll, 2 ACK' in said
     assert not os.path.lexists(tap)
     assert lines_of(capsys, saved, '--pcapng', f'{packets}2')[:5] == said[:5]
@@ -275,9 +280,9 @@ def test_port_until_a_signal(tmp_path: Path) -> None:
         wait_until(lambda: len(sniff.lines) == 6)
         sniff.end(signal.SIGTERM)
     pty.close()
-    assert [json.loads(line)['kind'] for line in _split(sniff, 'output')] == [
+    assert [json.loads(line)['kind'] for line in _printed(sniff)] == [
         'command', 'ACK', 'poll', 'reply', 'ACK', 'summary']
-    assert len(_split(sniff, 'errors')) == 1
+    assert len(_told(sniff)) == 1
 
 
 def test_pipe_into_which_nobody_writes_until_a_signal(tmp_path: Path) -> None:
@@ -296,8 +301,8 @@ def test_lost_port_ends_with_the_summary(tmp_path: Path) -> None:
         sniff.wait_for('sniff: ')
         pty.close()
         assert sniff.result() == 1
-    assert _split(sniff, 'errors')[1].startswith('sniff: a port was lost: ')
-    assert _split(sniff, 'output')[0].startswith('summary: ')
+    assert _told(sniff)[1].startswith('sniff: a port was lost: ')
+    assert _printed(sniff)[0].startswith('summary: ')
 
 
 def test_reader_that_has_seen_enough(capture: str) -> None:
