@@ -34,6 +34,7 @@ from abdf1_ros.problems import ConfigurationError, Place, Problem
 from abdf1_ros.ros.bridge.node import BridgeNode
 from abdf1_ros.ros.diagnostics.graph import Graph
 from abdf1_ros.ros.diagnostics.log import bug_text
+from abdf1_ros.ros.diagnostics.status import ERROR, message_of, OK
 from abdf1_ros.ros.parameters.declared import take_given, unknown_names
 from abdf1_ros.ros.parameters.files import node_sections, parameter_files, parameter_tree
 from abdf1_ros.ros.process.main import EXIT_CONFIGURATION, make_parser, Program, REFUSALS, run_ros
@@ -41,7 +42,7 @@ from abdf1_ros.ros.process.port_owners import PortOwners
 from abdf1_ros.ros.process.runner import Line, LinkFailed, Runner
 from abdf1_ros.signals import EndRequest
 from abdf1_ros.text import printable
-from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
+from diagnostic_msgs.msg import DiagnosticArray
 from rcl_interfaces.msg import ParameterDescriptor
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.logging import get_logger
@@ -193,17 +194,13 @@ class LinesNode(Node):
     def publish(self, lines: Sequence[RestartedLine]) -> None:
         """Publish which lines run, and why others do not."""
         faulty = [line for line in lines if line.node is None]
-        level, text = DiagnosticStatus.OK, f'OK: {len(lines)} of {len(lines)} lines run'
-        if faulty:
-            level = DiagnosticStatus.ERROR
-            text = f'ERROR: {len(faulty)} of {len(lines)} lines do not run'
+        level, text = (ERROR, f'ERROR: {len(faulty)} of {len(lines)} lines do not run') \
+            if faulty else (OK, f'OK: {len(lines)} of {len(lines)} lines run')
         values = {'lines': str(len(lines)), 'running': str(len(lines) - len(faulty)),
                   'restarts': str(sum(line.restarts for line in lines))}
         values |= {str(line.name): '; '.join(line.faults) or 'begins again' for line in faulty}
-        message = DiagnosticArray(status=[DiagnosticStatus(
-            level=level, name=f'{self.get_fully_qualified_name().lstrip("/")}: lines',
-            message=text, values=[KeyValue(key=key, value=printable(value))
-                                  for key, value in values.items()])])
+        name = f'{self.get_fully_qualified_name().lstrip("/")}: lines'
+        message = DiagnosticArray(status=[message_of(name, level, text, '', values)])
         message.header.stamp = self.get_clock().now().to_msg()
         self._publisher.publish(message)
 

@@ -25,16 +25,14 @@ from abdf1_ros.messages import Event, Message, Severity
 from abdf1_ros.pccc.values import Values
 from abdf1_ros.ports.clock import line_time
 from abdf1_ros.ros.diagnostics.log import EventLog, LimitedLog, UnreadableRows, where
-from abdf1_ros.ros.diagnostics.status import Seen
+from abdf1_ros.ros.diagnostics.status import ERROR, message_of, OK, Seen, WARN
 from abdf1_ros.ros.diagnostics.writes import is_usual_fallback, WriteLog
 from abdf1_ros.settings.mapping import Mapping
-from abdf1_ros.text import printable
-from diagnostic_msgs.msg import DiagnosticStatus, KeyValue
 from rclpy.impl.rcutils_logger import RcutilsLogger
 
 _RESULT_LEVELS = {
-    Outcome.WRITTEN: DiagnosticStatus.OK, Outcome.BROADCAST: DiagnosticStatus.WARN,
-    Outcome.SUPERSEDED: DiagnosticStatus.WARN, Outcome.FALLBACK: DiagnosticStatus.WARN}
+    Outcome.WRITTEN: OK, Outcome.BROADCAST: WARN, Outcome.SUPERSEDED: WARN,
+    Outcome.FALLBACK: WARN}
 
 
 class LineEvents:
@@ -83,17 +81,14 @@ class LineEvents:
         self.writes.add(result, now)
         if result.outcome is Outcome.FALLBACK:
             self._seen.last_fallbacks[mapping.station] = f'{mapping.tag}: {result.detail}', now
-        level = _RESULT_LEVELS.get(result.outcome, DiagnosticStatus.ERROR)
-        if level == DiagnosticStatus.ERROR or result.outcome is Outcome.FALLBACK:
+        level = _RESULT_LEVELS.get(result.outcome, ERROR)
+        if level == ERROR or result.outcome is Outcome.FALLBACK:
             tell = self.notes.info if is_usual_fallback(result) else self.notes.warning
             tell(f'writes to {mapping.tag}', f'write to {mapping.tag} {result.value}: {result}')
         values = {'address': str(mapping.address), 'station': str(mapping.station),
                   'value': result.value, 'latency_ms': f'{result.latency * 1000:.1f}',
                   'request': result.request}
-        self._results.publish(DiagnosticStatus(
-            level=level, name=printable(mapping.tag), message=printable(str(result)),
-            hardware_id=printable(self._port),
-            values=[KeyValue(key=key, value=value) for key, value in values.items()]))
+        self._results.publish(message_of(mapping.tag, level, str(result), self._port, values))
 
     def unreadable(self, mapping: Mapping, reason: str) -> None:
         """Have it logged why a read of a station that answers has no value."""

@@ -12,27 +12,22 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""How fast a line works, in figures."""
+"""What is wrong on a line: an echo, our number, stations that take no commands, other PLCs."""
 
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Iterable, Sequence
-from statistics import fmean
+from collections.abc import Iterable
 
 from abdf1_ros.df1.echo import COMES_BACK
 from abdf1_ros.df1.frames import Duplex
 from abdf1_ros.df1.stations import Station
 from abdf1_ros.driver.driver import Driver
-from abdf1_ros.driver.reads.point import ReadPoint
 from abdf1_ros.pccc.file_types import PlcType
-from abdf1_ros.pccc.link_counters import NO_MEMORY, UNSENT
-from abdf1_ros.ports.clock import line_time
 from abdf1_ros.ports.link_thread import LinkThread
 from abdf1_ros.ports.trace import PortOpener
 from abdf1_ros.ros.diagnostics.stations import wrong_type
 from abdf1_ros.settings.mapping import Mapping
-from abdf1_ros.text import milliseconds
 
 # For so long (s) another node with our number is reported after its last packet.
 _SAME_NUMBER_TOLD = 60.0
@@ -112,54 +107,3 @@ def takes_in_silence(station: Station) -> bool:
 def deaf_text(station: int) -> str:
     """Return what is wrong with a station that is heard, but not with replies to commands."""
     return f'station {station} answers polls, but no command: is Error_Code right?'
-
-
-class LoadMeter:
-    """Transactions a second and line load since the last look."""
-
-    def __init__(self) -> None:
-        self.transactions = 0.0
-        self.load = 0.0
-        self._seen = (line_time(), 0, 0)
-
-    def update(self, driver: Driver, now: float) -> None:
-        """Measure since the last call, at the clock value ``now`` (s)."""
-        before, transactions, characters = self._seen
-        total = driver.counters.chars_sent + driver.counters.chars_received
-        if now > before:
-            self.transactions = (driver.tasks.transactions - transactions) / (now - before)
-            on_line = (total - characters) * driver.network.timing.char_time
-            self.load = min(100.0, 100 * on_line / (now - before))
-            self._seen = now, driver.tasks.transactions, total
-
-
-def paces(points: Iterable[ReadPoint]) -> dict[str, str]:
-    """Return how late the reads of each period are; Serve rows do not count."""
-    found: defaultdict[float, list[float]] = defaultdict(list)
-    for point in points:
-        if point.mapping.polls:
-            found[point.period] += [] if point.interval is None else [point.interval]
-    return {f'period {milliseconds(period)}': _pace(period, found[period])
-            for period in sorted(found)}
-
-
-def _pace(period: float, intervals: Sequence[float]) -> str:
-    wanted = f'wanted {milliseconds(period)}' if period else 'as often as the line allows'
-    if not intervals:
-        return f'{wanted}, not yet read twice'
-    return f'{wanted}, reads every {milliseconds(fmean(intervals))}'
-
-
-def unnumbered_counts(driver: Driver) -> dict[str, str]:
-    """Return what a radio modem node counts besides the numbered counters, by its name."""
-    counters = driver.counters
-    return {} if driver.network.duplex is not Duplex.RADIO else {
-        UNSENT: str(counters.unsent_messages), NO_MEMORY: str(counters.refused_for_memory)}
-
-
-def poll_scans(driver: Driver) -> dict[str, str]:
-    """Return last and longest poll cycles of the poll lists, where there are any."""
-    return {
-        f'{name} poll scan': f'last {milliseconds(times.last)}, '
-                             f'longest {milliseconds(times.longest)}'
-        for name, times in driver.link.status().scans.items() if times.last is not None}

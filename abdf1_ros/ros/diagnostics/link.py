@@ -12,21 +12,21 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The statuses ``link`` and ``counters``."""
+"""The statuses ``link``, how fast the line works in figures, and ``counters``."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections import defaultdict
+from collections.abc import Iterable, Sequence
+from statistics import fmean
 
+from abdf1_ros.df1.frames import Duplex
+from abdf1_ros.driver.driver import Driver
+from abdf1_ros.driver.reads.point import ReadPoint
+from abdf1_ros.pccc.link_counters import NO_MEMORY, UNSENT
+from abdf1_ros.ports.clock import line_time
 from abdf1_ros.ports.link_thread import RELEASED
-from abdf1_ros.ros.diagnostics.line import (
-    LineView,
-    LoadMeter,
-    paces,
-    poll_scans,
-    takes_in_silence,
-    unnumbered_counts,
-)
+from abdf1_ros.ros.diagnostics.line import LineView, takes_in_silence
 from abdf1_ros.ros.diagnostics.status import ERROR, Judgement, OK, Seen, WARN, with_age
 from abdf1_ros.settings.network import Network
 from abdf1_ros.text import counted, milliseconds
@@ -44,7 +44,7 @@ class LinkStatus:
         self.hardware_id = port
         self._line = line
         self._seen = seen
-        self._rate = LoadMeter()
+        self._rate = _LoadMeter()
 
     def judge(self, now: float) -> Judgement:
         level, text = self._judge_line(now)
@@ -93,9 +93,9 @@ class LinkStatus:
             'poll cycle': milliseconds(driver.readings.reads.poll_cycle),
             'longest poll cycle': milliseconds(driver.readings.reads.longest_poll_cycle),
             'expected poll cycle': milliseconds(driver.readings.expected_poll_cycle),
-            **paces(driver.points.values()),
-            **poll_scans(driver),
-            **unnumbered_counts(driver),
+            **_paces(driver.points.values()),
+            **_poll_scans(driver),
+            **_unnumbered_counts(driver),
             **{name: str(count) for name, count in (opener.errors() if opener else {}).items()},
             'files': changed_text(self._seen.changed_files) or 'as read',
             'last error': with_age(self._seen.last_error, now),
@@ -137,3 +137,54 @@ def _settings(network: Network) -> str:
 def changed_text(names: Sequence[str]) -> str:
     """Return a text about files that have changed, empty where none has."""
     return f'{", ".join(names)} changed since read; ~/reload takes it' if names else ''
+
+
+class _LoadMeter:
+    """Transactions a second and line load since the last look."""
+
+    def __init__(self) -> None:
+        self.transactions = 0.0
+        self.load = 0.0
+        self._seen = (line_time(), 0, 0)
+
+    def update(self, driver: Driver, now: float) -> None:
+        """Measure since the last call, at the clock value ``now`` (s)."""
+        before, transactions, characters = self._seen
+        total = driver.counters.chars_sent + driver.counters.chars_received
+        if now > before:
+            self.transactions = (driver.tasks.transactions - transactions) / (now - before)
+            on_line = (total - characters) * driver.network.timing.char_time
+            self.load = min(100.0, 100 * on_line / (now - before))
+            self._seen = now, driver.tasks.transactions, total
+
+
+def _paces(points: Iterable[ReadPoint]) -> dict[str, str]:
+    """Return how late the reads of each period are; Serve rows do not count."""
+    found: defaultdict[float, list[float]] = defaultdict(list)
+    for point in points:
+        if point.mapping.polls:
+            found[point.period] += [] if point.interval is None else [point.interval]
+    return {f'period {milliseconds(period)}': _pace(period, found[period])
+            for period in sorted(found)}
+
+
+def _pace(period: float, intervals: Sequence[float]) -> str:
+    wanted = f'wanted {milliseconds(period)}' if period else 'as often as the line allows'
+    if not intervals:
+        return f'{wanted}, not yet read twice'
+    return f'{wanted}, reads every {milliseconds(fmean(intervals))}'
+
+
+def _unnumbered_counts(driver: Driver) -> dict[str, str]:
+    """Return what a radio modem node counts besides the numbered counters, by its name."""
+    counters = driver.counters
+    return {} if driver.network.duplex is not Duplex.RADIO else {
+        UNSENT: str(counters.unsent_messages), NO_MEMORY: str(counters.refused_for_memory)}
+
+
+def _poll_scans(driver: Driver) -> dict[str, str]:
+    """Return last and longest poll cycles of the poll lists, where there are any."""
+    return {
+        f'{name} poll scan': f'last {milliseconds(times.last)}, '
+                             f'longest {milliseconds(times.longest)}'
+        for name, times in driver.link.status().scans.items() if times.last is not None}

@@ -66,6 +66,16 @@ _ROUTINE = (
 
 INFO, WARN, ERROR = LoggingSeverity.INFO, LoggingSeverity.WARN, LoggingSeverity.ERROR
 
+_SEVERITIES = {Severity.CRITICAL: LoggingSeverity.FATAL, Severity.ERROR: ERROR,
+               Severity.NOTICE: INFO}
+
+# rclpy raises ValueError when one place in the code logs at two levels.
+_WRITE: dict[LoggingSeverity, Callable[[RcutilsLogger, str], object]] = {
+    INFO: lambda logger, text: logger.info(text),
+    WARN: lambda logger, text: logger.warning(text),
+    ERROR: lambda logger, text: logger.error(text),
+    LoggingSeverity.FATAL: lambda logger, text: logger.fatal(text)}
+
 
 class News(NamedTuple):
     """Something to be logged: how bad it is, what it is about, and what to say."""
@@ -139,7 +149,7 @@ class EventLog:
         again = f' ({cause.left_out} more like it were not logged)' if cause.left_out else ''
         cause.left_out, cause.is_news = 0, False
         cause.written.append(now)
-        self._write(event.message.severity, str(event) + again)
+        _WRITE[_SEVERITIES[event.message.severity]](self._logger, str(event) + again)
 
     def _has_room(self, now: float) -> bool:
         """Tell whether one more cause can be remembered; quiet ones make room."""
@@ -147,15 +157,6 @@ class EventLog:
             self._causes = {key: cause for key, cause in self._causes.items()
                             if now - cause.last < _QUIET}
         return len(self._causes) < MOST_CAUSES
-
-    def _write(self, severity: Severity, text: str) -> None:
-        # rclpy raises ValueError when one place in the code logs at two levels.
-        if severity is Severity.CRITICAL:
-            self._logger.fatal(text)
-        elif severity is Severity.ERROR:
-            self._logger.error(text)
-        else:
-            self._logger.info(text)
 
     def forget(self, station: int) -> None:
         """Log the next events of a station again: its state has changed."""
@@ -177,37 +178,24 @@ class LimitedLog:
         self._clock = clock
         self._subjects: dict[str, _Subject] = {}
 
-    def tell(self, news: News) -> None:
-        # rclpy raises ValueError when one place in the code logs at two levels.
-        write = {INFO: self.info, WARN: self.warning, ERROR: self.error}[news.severity]
-        write(news.about, news.text)
-
     def info(self, about: str, text: str) -> None:
-        if self._take_entry(about):
-            self._logger.info(self._line(about, text))
+        self.tell(News(INFO, about, text))
 
     def warning(self, about: str, text: str) -> None:
-        if self._take_entry(about):
-            self._logger.warning(self._line(about, text))
+        self.tell(News(WARN, about, text))
 
     def error(self, about: str, text: str) -> None:
-        if self._take_entry(about):
-            self._logger.error(self._line(about, text))
+        self.tell(News(ERROR, about, text))
 
-    def _take_entry(self, about: str) -> bool:
-        subject = self._subjects.setdefault(about, _Subject())
-        now = self._clock()
+    def tell(self, news: News) -> None:
+        subject, now = self._subjects.setdefault(news.about, _Subject()), self._clock()
         if subject.has_enough(now):
             subject.left_out += 1
-            return False
+            return
         subject.written.append(now)
-        return True
-
-    def _line(self, about: str, text: str) -> str:
-        subject = self._subjects[about]
         count, subject.left_out = subject.left_out, 0
-        return printable(text) + (f' ({count} more about {printable(about)} were not logged)'
-                                  if count else '')
+        more = f' ({count} more about {printable(news.about)} were not logged)' if count else ''
+        _WRITE[news.severity](self._logger, printable(news.text) + more)
 
 
 class UnreadableRows:

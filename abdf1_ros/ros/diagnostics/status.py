@@ -22,7 +22,8 @@ from typing import Protocol
 
 from abdf1_ros.messages import Event
 from abdf1_ros.pccc.values import Values
-from diagnostic_msgs.msg import DiagnosticStatus
+from abdf1_ros.text import printable
+from diagnostic_msgs.msg import DiagnosticStatus, KeyValue
 
 OK, WARN, ERROR = DiagnosticStatus.OK, DiagnosticStatus.WARN, DiagnosticStatus.ERROR
 WORDS = {OK: 'OK', WARN: 'WARN', ERROR: 'ERROR', DiagnosticStatus.STALE: 'STALE'}
@@ -66,6 +67,15 @@ class Seen:
     """The last thing unusual at each station."""
     last_fallbacks: dict[int, Moment] = field(default_factory=dict)
     """The last fallback value of each station."""
+
+
+def message_of(name: str, level: bytes, text: str, place: str,
+               values: Mapping[str, str]) -> DiagnosticStatus:
+    """Return a status as a message, in which all characters are visible."""
+    return DiagnosticStatus(
+        level=level, name=printable(name), message=printable(text), hardware_id=printable(place),
+        values=[KeyValue(key=printable(key), value=printable(value))
+                for key, value in values.items()])
 
 
 def with_age(moment: Moment | None, now: float) -> str:

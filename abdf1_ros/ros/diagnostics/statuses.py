@@ -26,11 +26,10 @@ from abdf1_ros.ros.diagnostics.line import LineView
 from abdf1_ros.ros.diagnostics.link import CountersStatus, LinkStatus
 from abdf1_ros.ros.diagnostics.mappings import MappingsStatus
 from abdf1_ros.ros.diagnostics.station import StationStatus
-from abdf1_ros.ros.diagnostics.status import Seen, Status, WORDS
+from abdf1_ros.ros.diagnostics.status import message_of, Seen, Status, WORDS
 from abdf1_ros.ros.diagnostics.writes import WriteLog
 from abdf1_ros.share.guest_line import GuestLine
-from abdf1_ros.text import printable
-from diagnostic_msgs.msg import DiagnosticStatus, KeyValue
+from diagnostic_msgs.msg import DiagnosticStatus
 
 
 class Diagnostics:
@@ -67,9 +66,5 @@ class Diagnostics:
 
     def _message(self, status: Status, now: float) -> DiagnosticStatus:
         level, text = status.judge(now)
-        return DiagnosticStatus(
-            level=level, name=f'{self._node_name}: {status.name}',
-            message=f'{WORDS[level]}: {printable(text)}',
-            hardware_id=printable(status.hardware_id),
-            values=[KeyValue(key=printable(key), value=printable(value))
-                    for key, value in status.values(now).items()])
+        return message_of(f'{self._node_name}: {status.name}', level, f'{WORDS[level]}: {text}',
+                          status.hardware_id, status.values(now))
