@@ -89,7 +89,7 @@ class Bench:
         self.node = BridgeNode(context=observer.context, use_global_arguments=False,
                                cli_args=arguments)
         observer.run(self.node)
-        observer.until(lambda: self.node.driver.is_online, 'the port')
+        observer.until(lambda: self.node.session.driver.is_online, 'the port')
 
     def publisher(self, kind: Any, topic: str) -> Callable[..., None]:
         """Return what publishes values, once they cannot get lost any more."""
@@ -236,7 +236,7 @@ def test_station_with_another_error_code_is_told_once(
         make_bench: Benches, capfd: pytest.CaptureFixture[str]) -> None:
     bench = make_bench(SPEED, parameters=('net.error_code:=BCC',))
     until_status(bench.diagnostics, 'station 1', WARN)
-    stations = bench.node.driver.stations
+    stations = bench.node.session.driver.stations
     # It goes on to come and go.
     bench.observer.until(lambda: stations[1].returns >= 5, 'more returns')
     lines = [line.partition('[abdf1]: ')[2] for line in ''.join(capfd.readouterr()).splitlines()]
@@ -321,7 +321,7 @@ def test_every_value_of_a_long_block_is_published(
     words = [f'w{number},Read,N7:{number},1,PLC5,1' for number in range(9)]
     bench = make_bench(*words)
     inboxes = [observer.listen(Int16MultiArray, f'/abdf1/read/w{number}') for number in range(9)]
-    assert len(bench.node.driver.readings.blocks) == 1
+    assert len(bench.node.session.driver.readings.blocks) == 1
     plcs[1].table.write(parse_address('N7:0', PlcType.PLC5), bytes(range(18)))
     for number, inbox in enumerate(inboxes):
         inbox.values([0x202 * number + 0x100])
@@ -356,7 +356,7 @@ def test_end_is_not_taken_back_by_a_request(make_bench: Benches, observer: Obser
     assert (polling.success, polling.message) == (False, 'this node ends')
     reload = observer.call(Trigger, '/abdf1/reload', Trigger.Request())
     assert (reload.success, reload.message) == (False, 'this node ends')
-    assert bench.node.driver.interlocks.is_ending
+    assert bench.node.session.driver.interlocks.is_ending
 
 
 def test_internal_errors_are_told_and_the_third_is_the_end(
@@ -421,7 +421,7 @@ def test_other_node_of_our_name_is_told_before_the_first_write_is_taken(
                  start_parameter_services=False)
     bench = make_bench(RECIPE)
     bench.publisher(Int16MultiArray, 'recipe')(1, 2)
-    observer.until(lambda: bench.node.writes_taken, 'the write')
+    observer.until(lambda: bench.node.writes.taken, 'the write')
     assert '[abdf1]: another node is called /abdf1 too' in ''.join(capfd.readouterr())
     assert bench.until_results(1)[0].message == 'written'
     other.destroy_node()

@@ -70,7 +70,7 @@ class Bench:
         self.node = BridgeNode(context=observer.context, use_global_arguments=False,
                                cli_args=arguments)
         observer.run(self.node)
-        observer.until(lambda: self.node.driver.is_online, 'the port')
+        observer.until(lambda: self.node.session.driver.is_online, 'the port')
 
     def write_net(self, timeout: int, baud: int = 115200) -> None:
         """Write the net file."""
@@ -103,7 +103,7 @@ class Bench:
 
 @pytest.fixture
 def bench(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Bench]:
-    monkeypatch.setattr('abdf1_ros.ros.diagnostics.watches._FILE_PERIOD', 0.3)
+    monkeypatch.setattr('abdf1_ros.ros.bridge.files._PERIOD', 0.3)
     rows = ['1,PLC5,N7:0,16,7 8', '1,PLC5,F8:0,4,1.5']
     data = write_csv(tmp_path / 'plc.csv', 'Station,PLC_Type,Address,Length,Values', rows)
     with Observer() as observer, Plcs(data) as plcs:
@@ -141,7 +141,7 @@ def test_writes_go_to_the_new_map(bench: Bench) -> None:
     assert results.next().message == 'written'
     bench.write_map(SPEED, 'recipe,Write,N7:8,1,PLC5,2')
     assert bench.reload()[0]
-    bench.observer.until(lambda: bench.node.driver.is_online, 'the port')
+    bench.observer.until(lambda: bench.node.session.driver.is_online, 'the port')
     publisher.publish(Int16MultiArray(data=[3, 4]))
     result = results.next()
     assert (result.message, details(result)['address']) == ('written', 'N7:8')
@@ -170,11 +170,11 @@ def test_row_of_another_address_has_a_new_topic(bench: Bench) -> None:
 def test_faulty_files_change_nothing(bench: Bench, capfd: pytest.CaptureFixture[str]) -> None:
     bench.write_map(SPEED)
     bench.write_net(100, 9601)
-    driver = bench.node.driver
+    driver = bench.node.session.driver
     success, message = bench.reload()
     assert not success
     assert message.startswith(f'goes on as before: {bench.net}:2:1 (Baud): Baud = "9601" should')
-    assert bench.node.driver is driver
+    assert bench.node.session.driver is driver
     assert bench.parameter('net.baud') == 115200
     assert bench.parameter('map.recipe.address') == 'N7:4'
     speeds = bench.observer.listen(Int16MultiArray, '/abdf1/read/speed', EVERYTHING)
@@ -278,7 +278,7 @@ def test_parameters_tell_what_is_in_the_files_now(bench: Bench) -> None:
     assert bench.parameter('net.timeout') == 250
     assert bench.parameter('map.level.address') == 'F8:0'
     assert bench.parameter('map.speed.address') is None
-    assert bench.node.driver.network.timeout == 250
+    assert bench.node.session.driver.network.timeout == 250
 
 
 def test_other_speed_opens_the_port_anew(bench: Bench, capfd: pytest.CaptureFixture[str]) -> None:
@@ -375,6 +375,6 @@ def _replaced(path: Path) -> None:
 @pytest.mark.parametrize('change', [_written, _replaced, Path.unlink])
 def test_change_is_seen(file: Path, change: Callable[[Path], None]) -> None:
     watch = FileWatch([str(file), '/nowhere'])
-    assert watch.changed() == []
+    assert watch.changed(0.0) == []
     change(file)
-    assert watch.changed() == ['map.csv']
+    assert watch.changed(10.0) == ['map.csv']

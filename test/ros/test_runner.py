@@ -33,8 +33,8 @@ class Recorder:
     def __init__(self, calls: list[str], fails: str = '') -> None:
         self._calls = calls
         self._fails = fails
-        self.writes_taken = 0
-        self.session = self.link = self
+        self.taken = 0
+        self.session = self.link = self.writes = self
 
     def _record(self, name: str) -> None:
         self._calls.append(name)

@@ -21,16 +21,24 @@ from pathlib import Path
 
 _Stamp = tuple[int, int, int]
 
+_PERIOD = 2.0  # s, from one look to the next
+
 
 class FileWatch:
     """Files as they are now; to be made before they are read."""
 
     def __init__(self, paths: Iterable[str] = ()) -> None:
         self._stamps = {path: _stamp(path) for path in paths}
+        self._changed: list[str] = []
+        self._next_look = 0.0
 
-    def changed(self) -> list[str]:
-        """Return the names of the files that are different by now, or gone."""
-        return [Path(path).name for path, stamp in self._stamps.items() if _stamp(path) != stamp]
+    def changed(self, now: float) -> list[str]:
+        """Look now and then; return the names of the files that are different by then, or gone."""
+        if now >= self._next_look:
+            self._next_look = now + _PERIOD
+            self._changed = [Path(path).name for path, stamp in self._stamps.items()
+                             if _stamp(path) != stamp]
+        return self._changed
 
 
 def _stamp(path: str) -> _Stamp | None:

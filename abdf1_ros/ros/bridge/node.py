@@ -25,7 +25,7 @@ from functools import partial
 import time
 from typing import Any
 
-from abdf1_ros.driver.driver import Driver, ENDS
+from abdf1_ros.driver.driver import ENDS
 from abdf1_ros.driver.writes.queue import MAX_WAITING_WRITES
 from abdf1_ros.ports.clock import line_time
 from abdf1_ros.ports.link_thread import LinkThread, PortState
@@ -91,7 +91,7 @@ class BridgeNode(Node):
 
     def _set_up(self, configuration: Configuration, graph: Graph) -> None:
         self._opener = self._make_opener(configuration)
-        self._writes = WriteTopics(self, self._take)
+        self.writes = WriteTopics(self)
         self._surroundings = Surroundings(
             self, graph, NameWatch(self.get_fully_qualified_name(), lambda now: graph.nodes(
                 self.get_name(), self.get_namespace(), now), line_time() + DISCOVERY),
@@ -100,10 +100,10 @@ class BridgeNode(Node):
             self.create_publisher(DiagnosticStatus, '~/write_results', MAX_WAITING_WRITES),
             self.create_publisher(UInt16MultiArray, '~/active_stations', latched_qos()),
             self.create_publisher(DiagnosticArray, '/diagnostics', 10),
-            self.create_publisher(DiagnosticArray, '~/snapshot', 1), self._writes)
+            self.create_publisher(DiagnosticArray, '~/snapshot', 1), self.writes)
         self.session = Session(self._surroundings, configuration)
         self.link = self._surroundings.link = LinkThread(
-            self.driver.machine, self._opener.open,
+            self.session.driver.machine, self._opener.open,
             on_state=self._port_changed, on_fault=self._fault,
             while_sending=self.session.reads.publish_later_values)
         self.session.begin()
@@ -113,7 +113,7 @@ class BridgeNode(Node):
         parameters, network = configuration.parameters, configuration.network
         opener = PortOpener(
             _port_settings(configuration),
-            lambda text: self.get_logger().debug(f'{printable(self.port)}: {text}'))
+            lambda text: self.get_logger().debug(f'{printable(self.session.port)}: {text}'))
         if parameters.trace_file:
             opener.trace(
                 parameters.trace_file, parameters.trace_limit * 1e6,
@@ -129,19 +129,6 @@ class BridgeNode(Node):
                             callback_group=MutuallyExclusiveCallbackGroup())
 
     @property
-    def driver(self) -> Driver:
-        return self.session.driver
-
-    @property
-    def port(self) -> str:
-        return self.session.port
-
-    @property
-    def writes_taken(self) -> int:
-        """Return how many messages to write topics have come."""
-        return self._writes.taken
-
-    @property
     def has_failed(self) -> bool:
         """Tell whether the node has to end: its link is broken."""
         return self._is_stuck or self.link.has_failed
@@ -154,7 +141,7 @@ class BridgeNode(Node):
     def begin_end(self) -> None:
         """Begin the end, as ``Session`` does; no request takes it back."""
         self._is_ending = True
-        self._writes.begin()
+        self.writes.begin()
         self.session.begin_end()
 
     def stop(self, patience: float = _LAST_WORDS) -> None:
@@ -178,10 +165,7 @@ class BridgeNode(Node):
         """Publish what is due; take writes after the first look for a node of our name."""
         self.session.check()
         if self._surroundings.names.has_looked:
-            self._writes.begin()
-
-    def _take(self, topic: str, message: Any, info: Any) -> None:
-        self.session.write(topic, message, info)
+            self.writes.begin()
 
     def _port_changed(self, state: PortState) -> None:
         self.session.port_changed(state)
@@ -221,8 +205,9 @@ class BridgeNode(Node):
         guests come and the old port be taken by others.
         """
         tell_plcs([self.session], 'goes on with new files')
-        before, self.session = self.session, Session(self._surroundings, configuration)
-        if not self.link.exchange(self.driver.machine, self.session.reads.publish_later_values,
+        before, session = self.session, Session(self._surroundings, configuration)
+        self.session = session
+        if not self.link.exchange(session.driver.machine, session.reads.publish_later_values,
                                   self._opener.use(_port_settings(configuration))):
             return False
         before.end()
@@ -240,15 +225,15 @@ class BridgeNode(Node):
         if self._is_ending:
             response.message = ENDS
         elif request.data:
-            self.driver.interlocks.resume()
+            self.session.driver.interlocks.resume()
             if self._is_ending:  # since then
                 self.session.begin_end()
             self.link.take()
-            response.success, response.message = True, f'{self.port} is being opened'
+            response.success, response.message = True, f'{self.session.port} is being opened'
         else:
             tell_plcs([self.session], 'the port is left')
             response.success = self.link.release()
-            response.message = f'{self.port}: {self.link.state.text}'
+            response.message = f'{self.session.port}: {self.link.state.text}'
         return response
 
     def _reset_counters(self, request: Trigger.Request,
@@ -285,7 +270,7 @@ def end_together(nodes: Sequence[BridgeNode], patience: float = _LAST_WORDS) -> 
         node.link.ask_to_stop()
     for node in nodes:
         node.link.stop()
-    take_last_writes(time.sleep, lambda: sum(node.writes_taken for node in nodes),
+    take_last_writes(time.sleep, lambda: sum(node.writes.taken for node in nodes),
                      min(time.monotonic() + LAST_WRITES, begun + _LATEST_WRITES))
     give_up = time.monotonic() + patience
     for node in nodes:

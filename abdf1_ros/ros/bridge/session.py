@@ -42,7 +42,7 @@ from abdf1_ros.ros.diagnostics.status import Seen
 from abdf1_ros.ros.diagnostics.statuses import Diagnostics
 from abdf1_ros.ros.diagnostics.watches import Watch, watches_of
 from abdf1_ros.ros.parameters.declared import Configuration
-from abdf1_ros.ros.topics.interlocks import END_LIMIT, InterlockWatch, wait_for_end
+from abdf1_ros.ros.topics.interlocks import InterlockWatch
 from abdf1_ros.ros.topics.messages import ACTIVE_LAYOUT
 from abdf1_ros.ros.topics.reads import ReadTopic, ReadTopics
 from abdf1_ros.ros.topics.snapshot import Snapshot
@@ -56,6 +56,11 @@ from rclpy.node import Node
 from std_msgs.msg import UInt16MultiArray
 
 _MOST_REMARKS = 20  # about both files, in the log
+
+# How long (s) an orderly end may take until all is confirmed (rule 5 of docs/heartbeats.md), and
+# how often that is looked at.
+_END_LIMIT = 2.0
+_GLANCE = 0.005
 
 
 @dataclass(slots=True)
@@ -107,7 +112,7 @@ class Session:
             results=surroundings.results, table_changed=self._publish_active)
         self.driver = Driver(network, mappings, configuration.driver_settings(), self._events)
         # Subscriptions first: where there are thousands of publishers, each takes DDS 5 ms.
-        self._writers = surroundings.writes.open(
+        surroundings.writes.open(
             self.driver, parameters.write_timeout, self._events.lost, self._wake_link)
         self.reads.open(self.driver.points)
         self.guests = GuestPlaces(configuration, self.driver, surroundings.opener,
@@ -157,21 +162,16 @@ class Session:
 
     def wait_for_plcs(self, give_up: float, what: str) -> None:
         """Wait until the PLCs know, up to a monotonic clock value; name what is not confirmed."""
-        tags = wait_for_end(self.driver, self._surroundings.link, give_up)
-        if tags:
+        interlocks, link = self.driver.interlocks, self._surroundings.link
+        while link.state.is_open and link.is_alive() and not interlocks.is_over \
+                and time.monotonic() < give_up:
+            time.sleep(_GLANCE)
+        if tags := interlocks.unconfirmed():
             self._surroundings.node.get_logger().error(
                 f'{what} before the PLC has confirmed: {first(tags)}')
 
     def _wake_link(self) -> None:
         self._surroundings.link.wake()
-
-    # Writes
-
-    def write(self, topic: str, message: Any, info: Any) -> None:
-        """Take a message of a write topic."""
-        self._writers[topic].take(message, info)
-
-    # The line
 
     def _publish_active(self) -> None:
         """Publish the Active Node Table if it changes; with a closed port no station is active."""
@@ -239,7 +239,7 @@ def tell_plcs(sessions: Sequence[Session], what: str) -> None:
 
     ``what`` says in the log what goes on then.
     """
-    give_up = time.monotonic() + END_LIMIT
+    give_up = time.monotonic() + _END_LIMIT
     for session in sessions:
         session.begin_end()
     for session in sessions:

@@ -26,9 +26,6 @@ from abdf1_ros.ros.diagnostics.status import Seen
 from abdf1_ros.share.guest_line import GuestLine
 from rclpy.impl.logging_severity import LoggingSeverity
 
-# How often (s) it is looked whether the files have changed.
-_FILE_PERIOD = 2.0
-
 
 class Watch(Protocol):
     """Something that is looked at."""
@@ -74,26 +71,14 @@ class DeafStations:
               if station.number in before and station.number not in deaf and station.active)]
 
 
-class ChangedFiles:
-    """Files that have changed since they were read, as ``changed`` returns them."""
-
-    def __init__(self, changed: Callable[[], Sequence[str]], seen: Seen) -> None:
-        self._changed = changed
-        self._seen = seen
-        self._next_look = 0.0
-
-    def texts(self, now: float) -> list[str]:
-        """Look every now and then; return what is to be reported of all of them."""
-        if now >= self._next_look:
-            self._next_look = now + _FILE_PERIOD
-            self._seen.changed_files = self._changed()
-        return [changed_text(self._seen.changed_files)] if self._seen.changed_files else []
-
-
 def watches_of(line: LineView, port: str, seen: Seen, guests: Sequence[GuestLine],
-               files_changed: Callable[[], Sequence[str]],
+               changed_files: Callable[[float], Sequence[str]],
                crowded_topics: Callable[[float], Sequence[str]]) -> list[Watch]:
     """Return the watches of a session; ``seen`` gets what statuses need of it."""
+    def changed(now: float) -> list[str]:
+        seen.changed_files = changed_files(now)
+        return [changed_text(seen.changed_files)] if seen.changed_files else []
+
     def crowded(now: float) -> list[str]:
         seen.crowded = crowded_topics(now)
         return [f'~/write/{topic} has more than one publisher: its fallback value is not written '
@@ -105,7 +90,7 @@ def watches_of(line: LineView, port: str, seen: Seen, guests: Sequence[GuestLine
         return [f'{port}: {text}'] if text else []
 
     return [
-        Standing(WARN, 'the files', ChangedFiles(files_changed, seen).texts),
+        Standing(WARN, 'the files', changed),
         Standing(WARN, 'publishers', crowded),
         Standing(ERROR, 'guests', lambda now: [
             f'guest {guest.guest.name}: {guest.fault}' for guest in guests if guest.fault]),

@@ -13,32 +13,24 @@
 # limitations under the License.
 
 """
-What the node adds to heartbeats and fallback values: the executor, other publishers, the end.
+What the node adds to heartbeats and fallback values: the executor, and other publishers.
 
 The numbers of rules are those of docs/heartbeats.md.
 """
 
 from __future__ import annotations
 
-import time
-
 from abdf1_ros.driver.driver import Driver
 from abdf1_ros.ports.clock import line_time
-from abdf1_ros.ports.link_thread import LinkThread
 from rclpy.clock import Clock, ClockType
 from rclpy.node import Node
 from rclpy.timer import Timer
-
-END_LIMIT = 2.0
-"""How long (s) an orderly end may take until all is confirmed (rule 5)."""
 
 # How often (s) the executor tells that it runs: well within the shortest period of a heartbeat.
 _LIFE_SIGN = 0.1
 
 # How often (s) publishers to topics with a Fallback are counted.
 _LOOK = 2.0
-
-_GLANCE = 0.005
 
 
 class InterlockWatch:
@@ -81,16 +73,3 @@ class InterlockWatch:
             self._crowded = tuple(
                 topic for topic in topics if self._node.count_publishers(f'~/write/{topic}') > 1)
         return self._crowded
-
-
-def wait_for_end(driver: Driver, link: LinkThread, give_up: float) -> list[str]:
-    """
-    Wait until all is confirmed, or until the monotonic clock value ``give_up``.
-
-    Returns the tags of what was not confirmed.
-    """
-    interlocks = driver.interlocks
-    while link.state.is_open and link.is_alive() and not interlocks.is_over \
-            and time.monotonic() < give_up:
-        time.sleep(_GLANCE)
-    return interlocks.unconfirmed()

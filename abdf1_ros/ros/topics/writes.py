@@ -149,14 +149,15 @@ class WriteTopics:
     """
     The subscriptions of a node; ``open`` may be called again, in the thread of the executor.
 
-    ``take`` is called with the topic and what came, from ``begin`` on; ``taken`` counts that.
+    Messages are taken from ``begin`` on, and written by the driver that was opened last; ``taken``
+    counts them.
     """
 
-    def __init__(self, node: Node, take: Callable[[str, Any, Any], None]) -> None:
+    def __init__(self, node: Node) -> None:
         self._node = node
-        self._take = take
         self._gate = _Gate()
         self._subscriptions: dict[str, tuple[Any, Any]] = {}
+        self._topics: dict[str, WriteTopic] = {}
         self.taken = 0
 
     def begin(self) -> None:
@@ -167,8 +168,7 @@ class WriteTopics:
                 self._node.executor.wake()
 
     def open(self, driver: Driver, patience: float,  # noqa: A003
-             on_loss: Callable[[str, int], None], wake: Callable[[], None],
-             ) -> dict[str, WriteTopic]:
+             on_loss: Callable[[str, int], None], wake: Callable[[], None]) -> None:
         """Subscribe to each topic of a driver; subscriptions that there are stay."""
         wanted: defaultdict[str, list[Mapping]] = defaultdict(list)
         for mapping in driver.mappings:
@@ -182,7 +182,7 @@ class WriteTopics:
         for topic, kind in kinds.items():
             if topic not in self._subscriptions:
                 self._subscriptions[topic] = kind, self._subscription(topic, kind)
-        return {topic: WriteTopic(
+        self._topics = {topic: WriteTopic(
             topic, mappings, driver, patience, on_loss=on_loss, wake=wake,
             losses=LossCounter(partial(self._node.count_publishers, _name(topic))))
             for topic, mappings in wanted.items()}
@@ -190,7 +190,7 @@ class WriteTopics:
     def _subscription(self, topic: str, kind: Any) -> Any:
         def take(message: Any, info: Any) -> None:
             self.taken += 1
-            self._take(topic, message, info)
+            self._topics[topic].take(message, info)
 
         callback: Any = take
         return self._node.create_subscription(
