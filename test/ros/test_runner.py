@@ -22,6 +22,7 @@ from abdf1_ros.ros.bridge.node import end_together
 from abdf1_ros.ros.process.runner import _Callbacks
 from abdf1_ros.testing import PATIENCE
 import pytest
+from rclpy.executors import SingleThreadedExecutor
 from rclpy.logging import get_logger
 from rclpy.node import Node
 from support.ros import Observer
@@ -82,6 +83,20 @@ def test_bridge_that_fails_at_its_end_keeps_no_other_from_it(
     end_together(nodes)
     assert calls[-2:] == ['last words', 'last words']
     assert "its end fails: KeyError('a bug')" in capfd.readouterr().err
+
+
+def test_executor_is_shut_down_when_its_thread_has_ended(monkeypatch: pytest.MonkeyPatch) -> None:
+    ended: list[bool] = []
+    with Observer() as observer:
+        node = Node('ends', context=observer.context)
+        callbacks = _Callbacks(node)
+        monkeypatch.setattr(SingleThreadedExecutor, 'shutdown',
+                            lambda executor, **options: ended.append(not callbacks.is_alive()))
+        callbacks.start()
+        callbacks.end(time.monotonic() + PATIENCE)
+        assert ended == [True]
+        monkeypatch.undo()
+        node.destroy_node()
 
 
 def test_thread_of_callbacks_turns_when_it_is_woken_unless_a_callback_hangs() -> None:
