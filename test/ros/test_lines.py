@@ -302,7 +302,7 @@ def test_new_files_do_not_make_a_line_the_second_master_on_the_port_of_another(
     assert plant.observer.call(Trigger, '/hall/b/reload', Trigger.Request()).success
     plant.write_net('a', plant.plcs['b'].port)
     assert plant.observer.call(Trigger, '/hall/a/reload', Trigger.Request()).success
-    assert [plant.nodes[name].port for name in 'ab'] == [plant.plcs['b'].port, free]
+    assert [plant.nodes[name].session.port for name in 'ab'] == [plant.plcs['b'].port, free]
     assert [plant.speeds(name) for name in 'ab'] == [[7, ord('b')], [7, ord('c')]]
 
 
