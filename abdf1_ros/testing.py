@@ -42,6 +42,7 @@ from abdf1_ros.pccc.families import parse_address
 from abdf1_ros.ports.endpoints import PtyEndpoint
 from abdf1_ros.ports.link_thread import LinkThread
 from abdf1_ros.problems import ConfigurationError
+from abdf1_ros.ros import observer
 from abdf1_ros.ros.topics.messages import latched_qos
 from abdf1_ros.simulator.commands import execute
 from abdf1_ros.simulator.ladder import Ladder
@@ -50,8 +51,6 @@ import pytest
 from rcl_interfaces.srv import GetParameters
 import rclpy
 from rclpy.context import Context
-from rclpy.executors import SingleThreadedExecutor
-from rclpy.node import Node
 from rclpy.qos import HistoryPolicy, QoSProfile
 from rclpy.signals import SignalHandlerOptions
 
@@ -132,7 +131,7 @@ class Bridge:
         return '; its last words:\n' + '\n'.join(lines[-10:]) if lines else ''
 
 
-class Observer:
+class Observer(observer.Observer):
     """
     A ROS node that looks at others from outside; also runs nodes that are added to it.
 
@@ -141,44 +140,21 @@ class Observer:
 
     def __init__(self, name: str = 'observer', context: Context | None = None,
                  bridge: Bridge | None = None) -> None:
+        super().__init__(name, context)
         self._bridge = bridge
-        self._owns_context = context is None
-        self.context = context or Context()
-        if self._owns_context:
-            self.context.init(args=[])
-        self.node = Node(name, context=self.context)
-        self.executor = SingleThreadedExecutor(context=self.context)
-        self.executor.add_node(self.node)
-
-    def __enter__(self) -> Observer:
-        return self
-
-    def __exit__(self, *exception: object) -> None:
-        """
-        End what spins, then the node, then the context, whatever fails on the way.
-
-        rclpy crashes where a node goes that something still waits for: the executor keeps a wait
-        set with what its nodes have until it is shut down.
-        """
-        with ExitStack() as stack:
-            if self._owns_context:
-                stack.callback(self.context.try_shutdown)
-            stack.callback(self.node.destroy_node)
-            stack.callback(self.executor.shutdown)
-            for node in self.executor.get_nodes():
-                self.executor.remove_node(node)
 
     def until(self, condition: Callable[[], _Result | None],
               what: str | Callable[[], str]) -> _Result:
         """Spin until ``condition`` gives something true; return that."""
-        end = time.monotonic() + PATIENCE
-        while not (result := condition()):
-            if self._bridge is not None:
+        def is_over() -> _Result | None:
+            result = condition()
+            if not result and self._bridge is not None:
                 self._bridge.check()
-            if time.monotonic() > end:
-                raise AssertionError(f'waited for {what() if callable(what) else what}'
-                                     + (self._bridge.last_words() if self._bridge else ''))
-            self.executor.spin_once(timeout_sec=0.05)
+            return result
+
+        if not (result := self.wait(is_over, PATIENCE)):
+            raise AssertionError(f'waited for {what() if callable(what) else what}'
+                                 + (self._bridge.last_words() if self._bridge else ''))
         return result
 
     def listen(self, message_type: Any, topic: str, qos: QoSProfile | None = None) -> Messages:

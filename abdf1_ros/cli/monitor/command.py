@@ -249,8 +249,8 @@ def _run_all(options: argparse.Namespace, words: list[str], has_ended: _Ending) 
 
 
 def _print_all(plant: PlantWatch, options: argparse.Namespace, has_ended: _Ending) -> int:
-    _spin(plant, options.wait, lambda: has_ended() or bool(plant.lines()))
-    _spin(plant, _COMPLETION, has_ended)  # diagnostics come every second
+    plant.wait(lambda: has_ended() or bool(plant.lines()), options.wait)
+    plant.wait(has_ended, _COMPLETION)  # diagnostics come every second
     _print_pictures(plant, lambda width: render_plant(plant.lines(), time.monotonic(), width),
                     options, has_ended)
     return 0 if plant.lines() else EXIT_NOT_FOUND
@@ -260,7 +260,7 @@ def _draw_all(window: curses.window, plant: PlantWatch, has_ended: _Ending, mark
     screen = _Screen(window, _PLANT_KEYS, marked)
     while not has_ended() and not screen.wants_other_list():
         screen.show_list(render_plant(plant.lines(), time.monotonic(), screen.width))
-        plant.spin(_RENEWAL)
+        plant.wait(has_ended, _RENEWAL)
     return screen.chosen
 
 
@@ -285,7 +285,7 @@ def _find(watch: NodeWatch, seconds: float, has_ended: _Ending) -> bool:
     end = time.monotonic() + seconds
     said = time.monotonic()
     while not watch.is_there and not has_ended() and time.monotonic() < end:
-        watch.spin(0.1)
+        watch.wait(has_ended, 0.1)
         if time.monotonic() - said >= _PROGRESS_PERIOD:
             said = time.monotonic()
             _say(f'looking for {watch.name}, {max(0.0, end - said):.0f} s more')
@@ -309,7 +309,7 @@ def _show(watch: NodeWatch, options: argparse.Namespace, has_ended: _Ending) -> 
         curses.wrapper(_draw, watch, has_ended)
         return
     # Some time for the values that topics have promised.
-    _spin(watch, _COMPLETION, lambda: has_ended() or watch.is_complete)
+    watch.wait(lambda: has_ended() or watch.is_complete, _COMPLETION)
     _print_pictures(watch, lambda width: render(watch.snapshot(), time.monotonic(), width),
                     options, has_ended)
 
@@ -330,13 +330,7 @@ def _draw(window: curses.window, watch: NodeWatch, has_ended: _Ending) -> None:
     screen = _Screen(window)
     while not has_ended() and not screen.wants_end():
         screen.show(render(watch.snapshot(), time.monotonic(), screen.width))
-        watch.spin(_RENEWAL)
-
-
-def _spin(watch: NodeWatch | PlantWatch, seconds: float, is_enough: Callable[[], bool]) -> None:
-    end = time.monotonic() + seconds
-    while not is_enough() and (left := end - time.monotonic()) > 0:
-        watch.spin(min(left, 0.1))
+        watch.wait(has_ended, _RENEWAL)
 
 
 def _print_pictures(watch: NodeWatch | PlantWatch, picture: Callable[[int], list[TextLine]],
@@ -344,7 +338,7 @@ def _print_pictures(watch: NodeWatch | PlantWatch, picture: Callable[[int], list
     """Print a picture, and another after each period until the end."""
     _print(picture)
     while not options.once and not has_ended():
-        _spin(watch, options.period, has_ended)
+        watch.wait(has_ended, options.period)
         if not has_ended():
             _print(picture)
 

@@ -19,19 +19,17 @@ from __future__ import annotations
 from collections import deque
 from dataclasses import dataclass, replace
 import time
-from typing import Any, Self
+from typing import Any
 
 from abdf1_ros.cli.monitor.view import Reading, Snapshot, Status, Style
 from abdf1_ros.errors import FormatError
+from abdf1_ros.ros.observer import Observer
 from abdf1_ros.ros.topics.messages import latched_qos, MESSAGES
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
-import rclpy
 from rclpy.duration import Infinite
 from rclpy.event_handler import SubscriptionEventCallbacks
 from rclpy.exceptions import InvalidTopicNameException
-from rclpy.executors import SingleThreadedExecutor
-from rclpy.node import Node, NodeNameNonExistentError
-from rclpy.signals import SignalHandlerOptions
+from rclpy.node import NodeNameNonExistentError
 from rclpy.validate_full_topic_name import validate_full_topic_name
 from std_msgs.msg import String, UInt16MultiArray  # noqa: I101
 
@@ -67,38 +65,17 @@ class _Subscription:
     reading: Reading
 
 
-class Listening:
+class Listening(Observer):
     """A node that subscribes, in a ROS context of its own; to be used in a with statement."""
 
     def __init__(self, ros_arguments: list[str]) -> None:
-        # The caller handles signals; rclpy's handlers would end this node too early.
-        rclpy.init(args=ros_arguments, signal_handler_options=SignalHandlerOptions.NO)
-        self._node = Node('abdf1_monitor', start_parameter_services=False, enable_rosout=False)
-        self._executor = SingleThreadedExecutor()
-        self._executor.add_node(self._node)
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(self, *exception: object) -> None:
-        self._executor.shutdown()
-        self._node.destroy_node()
-        rclpy.try_shutdown()
+        super().__init__('abdf1_monitor', args=ros_arguments, start_parameter_services=False,
+                         enable_rosout=False)
 
     def subscribe(self, message_type: Any, topic: str, callback: Any, qos: Any) -> Any:
         """Have ``callback`` called with each message."""
-        return self._node.create_subscription(
+        return self.node.create_subscription(
             message_type, topic, callback, qos, event_callbacks=_QUIET)
-
-    def spin(self, seconds: float) -> None:
-        """Listen for so many seconds."""
-        end = time.monotonic() + seconds
-        while (left := end - time.monotonic()) > 0:
-            self.spin_once(left)
-
-    def spin_once(self, seconds: float) -> None:
-        """Take one message, or wait so long."""
-        self._executor.spin_once(timeout_sec=seconds)
 
 
 class NodeWatch(Listening):
@@ -147,8 +124,8 @@ class NodeWatch(Listening):
         """Return the full names of the bridges that can be seen."""
         ending = '/active_stations'
         return sorted(topic.removesuffix(ending)
-                      for topic, types in self._node.get_topic_names_and_types()
-                      if topic.endswith(ending) and self._node.count_publishers(topic))
+                      for topic, types in self.node.get_topic_names_and_types()
+                      if topic.endswith(ending) and self.node.count_publishers(topic))
 
     def snapshot(self) -> Snapshot:
         """Return what is known now."""
@@ -161,7 +138,7 @@ class NodeWatch(Listening):
         """Subscribe to the read topics that the node publishes now."""
         namespace, _, base = self.name.rpartition('/')
         try:
-            topics = self._node.get_publisher_names_and_types_by_node(base, namespace or '/')
+            topics = self.node.get_publisher_names_and_types_by_node(base, namespace or '/')
         except NodeNameNonExistentError:
             self.is_there = False
             return
@@ -170,7 +147,7 @@ class NodeWatch(Listening):
                  if topic != f'{self.name}/active_stations' and types[0] in _TYPES}
         for topic, known in list(self._subscriptions.items()):
             if reads.get(topic) != known.type_name:  # the node came back with another map
-                self._node.destroy_subscription(known.handle)
+                self.node.destroy_subscription(known.handle)
                 del self._subscriptions[topic]
         for topic, type_name in reads.items():
             self._listen(topic, type_name)
@@ -186,7 +163,7 @@ class NodeWatch(Listening):
 
     def _promised(self, topic: str) -> float | None:
         deadlines = [endpoint.qos_profile.deadline
-                     for endpoint in self._node.get_publishers_info_by_topic(topic)
+                     for endpoint in self.node.get_publishers_info_by_topic(topic)
                      if f'{endpoint.node_namespace.rstrip("/")}/{endpoint.node_name}' == self.name]
         if not deadlines or deadlines[0] == Infinite:
             return None

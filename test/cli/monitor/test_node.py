@@ -83,7 +83,7 @@ def until(watch: NodeWatch, condition: Callable[[Snapshot], object]) -> Snapshot
     end = time.monotonic() + PATIENCE
     while not condition(watch.snapshot()):
         assert time.monotonic() < end, watch.snapshot()
-        watch.spin(0.05)
+        watch.spin_once(0.05)
     return watch.snapshot()
 
 

@@ -84,7 +84,7 @@ def publish() -> Iterator[Publish]:
             def look() -> bool:
                 for message in arrays:
                     publisher.publish(message)
-                watch.spin(0.05)
+                watch.spin_once(0.05)
                 return condition({line.name: line for line in watch.lines()})
 
             observer.until(look, lambda: str(watch.lines()))
