@@ -13,7 +13,7 @@
 # limitations under the License.
 
 """
-The demo: simulator and node as processes, and what a robot cell sees of them, step by step.
+The demo: simulated PLCs, the node as a process, and what a robot cell sees of it, step by step.
 
 It needs no hardware. Everything stays on this machine: discovery is limited to localhost, and
 the domain is one of our own unless ROS_DOMAIN_ID is set.
@@ -22,7 +22,7 @@ the domain is one of our own unless ROS_DOMAIN_ID is set.
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 import math
@@ -36,6 +36,7 @@ import tempfile
 import time
 from typing import Any
 
+from abdf1_ros.cli.simulator import Cast, parse_options
 from abdf1_ros.cli.terminal import (
     called,
     command_parser,
@@ -44,15 +45,15 @@ from abdf1_ros.cli.terminal import (
     number_option,
 )
 from abdf1_ros.paths import config_file
+from abdf1_ros.ros.observer import Observer
 from abdf1_ros.ros.topics.messages import latched_qos, MESSAGES
 from abdf1_ros.settings.map_file import load_mappings
 from abdf1_ros.settings.mapping import Mapping
+from abdf1_ros.simulator.ladder import Lamp
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
-import rclpy
 from rclpy.event_handler import SubscriptionEventCallbacks
 from rclpy.node import Node
 from rclpy.qos import QoSProfile
-from rclpy.signals import SignalHandlerOptions
 
 _EPILOG = """\
 exit status: 0 when all was seen as it should be, or after Ctrl-C; 1 otherwise
@@ -69,7 +70,6 @@ _OK = DiagnosticStatus.OK
 _LOG_HEAD = re.compile(r'^\[(\w+)\] \[[\d.]+\] \[\w+\]: ')
 _WRITTEN = (211, 222, 233, 244)
 _TOO_LARGE = (1, 2, 3, 5000)
-_ALIVE, _IN_CONTROL = 'simulator: station 2: ROS alive', 'simulator: station 2: ROS in control'
 
 
 @dataclass(frozen=True, slots=True)
@@ -106,17 +106,16 @@ class Missed(Exception):
     """What the demo promises has not happened; the text says what."""
 
 
-class Child:
-    """A process of ours; what it says is printed between the lines of the story."""
+class Bridge:
+    """The node as a process; what it says is printed between the lines of the story."""
 
-    def __init__(self, name: str, *args: str) -> None:
-        self._name = name
+    def __init__(self, *args: str) -> None:
         self._rest = b''
         # By its executable, which a signal during the imports ends quietly. A session of its own:
-        # Ctrl-C is for us, who then end both cleanly.
-        code = f'import sys; from abdf1_ros.cli.main import {name}; sys.exit({name}())'
+        # Ctrl-C is for us, who then end it cleanly.
+        code = 'import sys; from abdf1_ros.cli.main import node; sys.exit(node())'
         self.process = subprocess.Popen(
-            [sys.executable, '-c', code, *args], stdin=subprocess.PIPE, stdout=subprocess.PIPE,
+            [sys.executable, '-c', code, *args], stdout=subprocess.PIPE,
             stderr=subprocess.STDOUT, start_new_session=True)
         os.set_blocking(self._out, False)
 
@@ -125,24 +124,23 @@ class Child:
         assert self.process.stdout is not None
         return self.process.stdout.fileno()
 
-    def lines(self) -> Iterator[str]:
-        """Print what it has said since the last call, and yield it line by line."""
+    def relay(self) -> None:
+        """Print what it has said since the last call."""
         with suppress(BlockingIOError):
             while data := os.read(self._out, 65536):
                 *lines, self._rest = (self._rest + data).split(b'\n')
                 for line in lines:
-                    text = _LOG_HEAD.sub(rf'{self._name}: \1 ', line.decode(errors='replace'))
-                    print(text, flush=True)
-                    yield text
+                    print(_LOG_HEAD.sub(r'node: \1 ', line.decode(errors='replace')), flush=True)
 
-    def command(self, line: str) -> None:
-        """Write a line to its standard input."""
-        assert self.process.stdin is not None
-        self.process.stdin.write(f'{line}\n'.encode())
-        self.process.stdin.flush()
+    def end(self) -> None:
+        """End it, and print its last words."""
+        if self.process.poll() is None:
+            self.process.send_signal(signal.SIGINT)
+        self.process.wait(_PATIENCE)
+        self.relay()
 
 
-class Watcher(Node):
+class Watcher(Observer):
     """The robot cell's side: subscribes to everything and remembers the last of each."""
 
     def __init__(self, mappings: Sequence[Mapping], port: str) -> None:
@@ -154,21 +152,21 @@ class Watcher(Node):
         self.missed: Counter[str] = Counter()
         for mapping in mappings:
             if mapping.reads:
-                self.create_subscription(
+                self.node.create_subscription(
                     MESSAGES[mapping.message_type], f'/abdf1/read/{mapping.topic}',
                     self._taker(mapping), latched_qos())
-        self.create_subscription(DiagnosticStatus, '/abdf1/write_results', self._result, 10)
-        self.create_subscription(DiagnosticArray, '/diagnostics', self._diagnostics, 10)
+        self.node.create_subscription(DiagnosticStatus, '/abdf1/write_results', self._result, 10)
+        self.node.create_subscription(DiagnosticArray, '/diagnostics', self._diagnostics, 10)
 
     def expect(self, mapping: Mapping) -> float:
         """Ask for an event when values stop as long as the bridge promises; return that (s)."""
         topic = f'/abdf1/read/{mapping.topic}'
-        deadline = self.get_publishers_info_by_topic(topic)[0].qos_profile.deadline
+        deadline = self.node.get_publishers_info_by_topic(topic)[0].qos_profile.deadline
 
         def missed(event: Any) -> None:
             self.missed[mapping.tag] += event.total_count_change
 
-        self.create_subscription(
+        self.node.create_subscription(
             MESSAGES[mapping.message_type], topic, lambda message: None,
             QoSProfile(depth=1, deadline=deadline),
             event_callbacks=SubscriptionEventCallbacks(deadline=missed))
@@ -215,7 +213,7 @@ class Speed:
 
 
 class Stage:
-    """Both processes, who looks at them, and how the story is printed line by line."""
+    """PLCs and bridge, who looks at them, and how the story is printed line by line."""
 
     def __init__(self, scene: Scene, link: Path) -> None:
         net_file, map_file = config_file(scene.net_file), config_file(scene.map_file)
@@ -225,39 +223,30 @@ class Stage:
         self._begin = time.monotonic()
         self._bridge_args = ('--ros-args', '-p', f'port:={link}', '-p', f'net_file:={net_file}',
                              '-p', f'map_file:={map_file}')
-        self._simulator_args = ('--pty', str(link), *scene.simulator)
-        self._children: list[Child] = []
-        self._simulator: Child
-        self._lamps: dict[str, float] = {}  # those that are on, and since when
+        self._bridge: Bridge | None = None
+        self._lamps: dict[Lamp, float] = {}  # those that are on, and since when
         self.step = 0  # the number of the one that is shown
         self.last_step = 0
         self.is_told = False
-        rclpy.init(args=[], signal_handler_options=SignalHandlerOptions.NO)
+        self._plcs = Cast(parse_options(['--pty', str(link), *scene.simulator]), self._lamp)
         self._watcher = Watcher(mappings, str(link))
-        self._speed = Speed(self._watcher, self._mappings['speed']) if scene.guarded else None
+        self._speed = Speed(self._watcher.node, self._mappings['speed']) if scene.guarded else None
 
     def close(self) -> None:
-        """End both processes, the bridge first."""
-        for child in reversed(self._children):
-            if child.process.poll() is None:
-                child.process.send_signal(signal.SIGINT)
-            child.process.wait(_PATIENCE)
-        self._relay()
-        self._watcher.destroy_node()
-        rclpy.try_shutdown()
+        """End all, the bridge first."""
+        if self._bridge is not None:
+            self._bridge.end()
+        self._plcs.close()
+        self._watcher.__exit__()
 
-    def _start(self, name: str, *args: str) -> Child:
-        self._children.append(Child(name, *args))
-        return self._children[-1]
+    def _start_bridge(self) -> None:
+        self._bridge = Bridge(*self._bridge_args)
 
-    def _relay(self) -> None:
-        """Print what both say, and remember which lamps of the simulated PLC are on."""
-        for child in self._children:
-            for line in child.lines():
-                lamp, _, state = line.rpartition(' ')
-                self._lamps.pop(lamp, None)
-                if state == 'on':
-                    self._lamps[lamp] = time.monotonic()
+    def _lamp(self, station: str, lamp: Lamp, is_on: bool) -> None:
+        """Remember which lamps of the simulated PLC are on; the thread of the PLCs tells it."""
+        self._lamps.pop(lamp, None)
+        if is_on:
+            self._lamps[lamp] = time.monotonic()
 
     def _print_values(self) -> None:
         for tag, mapping in self._mappings.items():
@@ -289,7 +278,7 @@ class Stage:
         deadline = self._watcher.expect(self._mappings[tag])
         self._pause(1.0)
         self._watcher.missed.clear()
-        self._simulator.command(command)
+        self._plcs.carry_out(command)
         self._wait(what, lambda: self._watcher.missed[tag] > 0)
         return deadline
 
@@ -298,13 +287,18 @@ class Stage:
         while time.monotonic() < end:
             if condition():
                 return True
-            if any(child.process.poll() is not None for child in self._children):
+            if self._plcs.has_failed or self._bridge and self._bridge.process.poll() is not None:
                 raise Missed('the node or the simulator has ended; see above')
             self._relay()
+            self._plcs.advance()
             if self._speed:
                 self._speed.run()
-            rclpy.spin_once(self._watcher, timeout_sec=0.05)
+            self._watcher.spin_once(0.05)
         return condition()
+
+    def _relay(self) -> None:
+        if self._bridge is not None:
+            self._bridge.relay()
 
     def _title(self, text: str) -> None:
         self._relay()
@@ -319,8 +313,7 @@ class Demo(Stage):
 
     def run(self, seconds: float) -> None:
         """Run for ``seconds`` (0: until interrupted), at least until the story is over."""
-        self._simulator = self._start('simulator', *self._simulator_args)
-        self._bridge = self._start('node', *self._bridge_args)
+        self._start_bridge()
         print(f'\n{self._scene.title}', flush=True)
         domain = os.environ['ROS_DOMAIN_ID']
         self._say(f'look on from another terminal with ROS_DOMAIN_ID={domain} {called("monitor")}')
@@ -369,7 +362,7 @@ class Demo(Stage):
 
     def _write(self, tag: str, values: Sequence[int], expected: str) -> None:
         mapping = self._mappings[tag]
-        publisher = self._watcher.create_publisher(
+        publisher = self._watcher.node.create_publisher(
             MESSAGES[mapping.message_type], f'/abdf1/write/{mapping.topic}', 10)
         self._wait('the bridge to listen', lambda: publisher.get_subscription_count() > 0)
         self._watcher.results.clear()
@@ -388,7 +381,7 @@ class Demo(Stage):
     def _show_push(self) -> None:
         self._title('Serve: the PLC writes to words of ours, without being asked')
         tag = next(tag for tag, mapping in self._mappings.items() if mapping.serves)
-        self._simulator.command(self._scene.push or '')
+        self._plcs.carry_out(self._scene.push or '')
         self._wait('the values', lambda: tag in self._watcher.values)
         self._say(f'/abdf1/read/{tag} shows {_shown(self._watcher.values[tag])}')
 
@@ -405,7 +398,7 @@ class Demo(Stage):
         if self._scene.surviving:
             self._show_survivor(self._scene.surviving)
         print('\n   ... and gets it back', flush=True)
-        self._simulator.command(f'normal {self._scene.failing_station}')
+        self._plcs.carry_out(f'normal {self._scene.failing_station}')
         self._wait('the station to answer', lambda: self._level('mappings') == _OK)
         self._print_statuses('link', station, 'mappings')
 
@@ -421,9 +414,9 @@ class Demo(Stage):
         self._speed.live()
         for _ in range(_RESETS):
             self._wait('a steady heartbeat', lambda: time.monotonic() > 4.5 + self._lamps.get(
-                _ALIVE, math.inf))
-            self._simulator.command('reset 2')
-            if self._spin_until(lambda: _IN_CONTROL in self._lamps, 1.0):
+                Lamp.ALIVE, math.inf))
+            self._plcs.carry_out('reset 2')
+            if self._spin_until(lambda: Lamp.IN_CONTROL in self._lamps, 1.0):
                 break
         else:
             raise Missed('a reset of the PLC has not given ROS control')
@@ -459,29 +452,30 @@ class Demo(Stage):
                   f'{deadline:.1f} s is notified: no more values')
         self._wait('the diagnostics', lambda: self._level('mappings') != _OK)
         self._print_statuses('mappings')
-        self._simulator.command('run 2')
+        self._plcs.carry_out('run 2')
         self._wait('values', lambda: self._level('mappings') == _OK)
         self._print_statuses('mappings')
 
     def _show_death_of_bridge(self) -> None:
         self._title('The bridge dies (kill -9); first another reset, as control is gone')
         self._take_control()
-        self._children.remove(self._bridge)
+        assert self._bridge is not None
         self._bridge.process.kill()
         self._bridge.process.wait()
+        self._bridge = None
         died = time.monotonic()
-        self._wait('the watchdog', lambda: _IN_CONTROL not in self._lamps)
+        self._wait('the watchdog', lambda: Lamp.IN_CONTROL not in self._lamps)
         self._say(f'{time.monotonic() - died:.1f} s later the watchdog of the PLC has taken the '
                   'speed away')
         print('\n   ... and comes back, but without a reset it gets no control', flush=True)
         self._watcher.values.clear()
         self._watcher.statuses.clear()
-        self._bridge = self._start('node', *self._bridge_args)
-        self._wait('a heartbeat', lambda: _ALIVE in self._lamps)
+        self._start_bridge()
+        self._wait('a heartbeat', lambda: Lamp.ALIVE in self._lamps)
         self._wait('values', lambda: {'used_speed', 'doors'} <= self._watcher.values.keys())
         self._wait('the diagnostics', lambda: self._level('mappings') == _OK)
         self._say(f'800 is still published, and the program uses [{self._used()}]')
-        if self._used() or _IN_CONTROL in self._lamps:
+        if self._used() or Lamp.IN_CONTROL in self._lamps:
             raise Missed('without a reset ROS should have no control')
 
     def _show_diagnostics(self) -> None:

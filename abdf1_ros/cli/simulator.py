@@ -139,7 +139,7 @@ def main(args: Sequence[str] | None = None) -> int:
     The exit statuses are those of --help, and 1 after internal errors.
     """
     prepare_output()
-    options = _parse(args)
+    options = parse_options(args)
     return run_command('simulator', lambda: _run(options))
 
 
@@ -148,30 +148,57 @@ def _run(options: argparse.Namespace) -> int:
         script = sorted(map(_scheduled, options.at), key=itemgetter(0))
         if script:
             _try_out(script, options)
-        plcs = _load(options)
-        line = _make_line(options)
+        cast = Cast(options)
     except (CommandError, ValueError) as error:
         tell('simulator', str(error))
         return EXIT_USAGE
     try:
-        return _play(plcs, line, script, options)
-    finally:
-        line.close()
-
-
-def _play(plcs: Sequence[SimulatedPlc], line: Endpoint, script: TimedCommands,
-          options: argparse.Namespace) -> int:
-    """Let the PLCs answer on a line until it is time to end; return the exit status."""
-    link = _make_thread(plcs, line, options)
-    names = ', '.join(f'{plc.station} ({plc.table.plc_type.value})' for plc in plcs)
-    _say(f'stations {names} on {line.name}, {options.check}')
-    try:
-        link.start()
         with EndRequest((signal.SIGINT, signal.SIGTERM)) as ended:
-            _converse(plcs, script, link, options, ended)
+            _converse(cast, script, options, ended)
     finally:  # the thread would keep the process alive
-        link.stop()
-    return EXIT_FAILED if link.has_failed else 0
+        cast.close()
+    return EXIT_FAILED if cast.has_failed else 0
+
+
+class Cast:
+    """
+    PLCs that answer on a line until ``close``, as options of the simulator say.
+
+    ``on_lamp`` gets station, lamp and state of what their ladders report.
+    """
+
+    def __init__(self, options: argparse.Namespace,
+                 on_lamp: Callable[[str, Lamp, bool], None] = lambda *lamp: None) -> None:
+        self._plcs = _load(options, on_lamp)
+        self._line = _make_line(options)
+        self._is_full_duplex = options.full_duplex is not None
+        self._link = _make_thread(self._plcs, self._line, options)
+        names = ', '.join(f'{plc.station} ({plc.table.plc_type.value})' for plc in self._plcs)
+        _say(f'stations {names} on {self._line.name}, {options.check}')
+        self._link.start()
+
+    @property
+    def has_failed(self) -> bool:
+        """Tell whether the thread has ended by internal errors."""
+        return self._link.has_failed
+
+    def carry_out(self, line: str) -> None:
+        """Carry out a command, and say what came of it."""
+        try:
+            _say(execute(line, self._plcs, self._is_full_duplex, _say))
+        except CommandError as error:
+            _say(str(error))
+        self._link.wake()
+
+    def advance(self) -> None:
+        """Let the programs go on, also while nothing is asked of their PLCs."""
+        for plc in self._plcs:
+            plc.advance()
+
+    def close(self) -> None:
+        """End the thread and the line."""
+        self._link.stop()
+        self._line.close()
 
 
 def _try_out(script: TimedCommands, options: argparse.Namespace) -> None:
@@ -185,12 +212,13 @@ def _try_out(script: TimedCommands, options: argparse.Namespace) -> None:
             raise CommandError(f'--at: {error}') from None
 
 
-def _load(options: argparse.Namespace) -> list[SimulatedPlc]:
+def _load(options: argparse.Namespace, on_lamp: Callable[[str, Lamp, bool], None]
+          = lambda *lamp: None) -> list[SimulatedPlc]:
     """Return the PLCs of the data file, or the one that has a line for itself."""
     plcs = load_plcs(options.data or str(config_file('simulator.csv')),
                      Checksum(options.check), time.monotonic, threading.Lock)
     for station in options.ladder:
-        _run_ladder(station, plcs)
+        _run_ladder(station, plcs, on_lamp)
     return plcs if options.full_duplex is None else [
         _plc('--full-duplex', options.full_duplex, plcs)]
 
@@ -204,13 +232,15 @@ def _plc(option: str, station: str, plcs: Sequence[SimulatedPlc]) -> SimulatedPl
     raise ValueError(f'{option}: name a station ({known})')
 
 
-def _run_ladder(station: str, plcs: Sequence[SimulatedPlc]) -> None:
+def _run_ladder(station: str, plcs: Sequence[SimulatedPlc],
+                on_lamp: Callable[[str, Lamp, bool], None]) -> None:
     """Run the ladder program of a station; changes of its lamps are printed."""
     plc = _plc('--ladder', station, plcs)
 
     def tell(at: float, lamp: Lamp, is_on: bool) -> None:
         if lamp in _LAMPS:
             _say(f'station {station}: {_LAMPS[lamp]} {"on" if is_on else "off"}')
+            on_lamp(station, lamp, is_on)
 
     try:
         plc.run_ladder(Ladder(plc.table, on_lamp=tell))
@@ -253,7 +283,8 @@ def _announcer() -> Callable[[PortState], None]:
     return announce
 
 
-def _parse(args: Sequence[str] | None) -> argparse.Namespace:
+def parse_options(args: Sequence[str] | None) -> argparse.Namespace:
+    """Return the options of the simulator."""
     parser = command_parser('simulator', __doc__, _EPILOG)
     parser.add_argument('--data', help='CSV of the data tables (default: config/simulator.csv)')
     line = parser.add_mutually_exclusive_group()
@@ -350,18 +381,14 @@ def _radio(plcs: Sequence[SimulatedPlc], checksum: Checksum, timing: LineTiming)
         checksum=checksum, duplex=Duplex.RADIO, timing=timing, counters=first.counters)
 
 
-def _converse(plcs: Sequence[SimulatedPlc], script: TimedCommands, link: LinkThread,
-              options: argparse.Namespace, ended: EndRequest) -> None:
+def _converse(cast: Cast, script: TimedCommands, options: argparse.Namespace,
+              ended: EndRequest) -> None:
     """Carry out commands as they come, until it is time to end."""
     def carry_out(line: str) -> None:
         if line.strip() == 'quit':
             ended.set()
         elif line.strip():
-            try:
-                _say(execute(line, plcs, options.full_duplex is not None, _say))
-            except CommandError as error:
-                _say(str(error))
-            link.wake()
+            cast.carry_out(line)
 
     signal.signal(signal.SIGTTIN, signal.SIG_IGN)  # or a background process is stopped
     begin = time.monotonic()
@@ -370,8 +397,7 @@ def _converse(plcs: Sequence[SimulatedPlc], script: TimedCommands, link: LinkThr
     while not ended.is_set() and (passed := time.monotonic() - begin) < options.seconds:
         while script and script[0][0] <= passed:
             carry_out(script.pop(0)[1])
-        for plc in plcs:
-            plc.advance()
+        cast.advance()
         if select.select(inputs, [], [], 0.05)[0]:
             data = _input(inputs[0])
             *lines, rest = (rest + data).split(b'\n')
