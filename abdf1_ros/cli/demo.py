@@ -313,6 +313,7 @@ class Demo(Stage):
 
     def run(self, seconds: float) -> None:
         """Run for ``seconds`` (0: until interrupted), at least until the story is over."""
+        self._plcs.start()
         self._start_bridge()
         print(f'\n{self._scene.title}', flush=True)
         domain = os.environ['ROS_DOMAIN_ID']

@@ -153,6 +153,7 @@ def _run(options: argparse.Namespace) -> int:
         tell('simulator', str(error))
         return EXIT_USAGE
     try:
+        cast.start()
         with EndRequest((signal.SIGINT, signal.SIGTERM)) as ended:
             _converse(cast, script, options, ended)
     finally:  # the thread would keep the process alive
@@ -162,7 +163,7 @@ def _run(options: argparse.Namespace) -> int:
 
 class Cast:
     """
-    PLCs that answer on a line until ``close``, as options of the simulator say.
+    PLCs that answer on a line from ``start`` to ``close``, as options of the simulator say.
 
     ``on_lamp`` gets station, lamp and state of what their ladders report.
     """
@@ -173,8 +174,12 @@ class Cast:
         self._line = _make_line(options)
         self._is_full_duplex = options.full_duplex is not None
         self._link = _make_thread(self._plcs, self._line, options)
+        self._check = options.check
+
+    def start(self) -> None:
+        """Say who plays, and begin."""
         names = ', '.join(f'{plc.station} ({plc.table.plc_type.value})' for plc in self._plcs)
-        _say(f'stations {names} on {self._line.name}, {options.check}')
+        _say(f'stations {names} on {self._line.name}, {self._check}')
         self._link.start()
 
     @property
