@@ -23,7 +23,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from contextlib import suppress
-from dataclasses import dataclass
 from functools import partial
 import resource
 import threading
@@ -79,27 +78,15 @@ _STATUS_PERIOD = 1.0
 _NO_TYPE_DESCRIPTIONS = Parameter('start_type_description_service', value=False)
 
 
-@dataclass(frozen=True, slots=True, order=True)
-class LineName:
-    """Namespace and name of a node; the namespace begins with "/"."""
-
-    namespace: str
-    name: str
-
-    def __str__(self) -> str:
-        """Return the full name."""
-        return f'{self.namespace.rstrip("/")}/{self.name}'
-
-
 class RestartedLine(Line):
     """
     A line that begins again after an internal error, while the others go on.
 
     ``faults`` say why it does not run; ``restarts`` counts internal errors that ended it.
-    ``make`` makes its node.
+    ``name`` is the full one, ``make`` makes its node.
     """
 
-    def __init__(self, name: LineName, make: Callable[[], BridgeNode]) -> None:
+    def __init__(self, name: str, make: Callable[[], BridgeNode]) -> None:
         super().__init__()
         self.name = name
         self.faults: tuple[str, ...] = ()
@@ -107,7 +94,7 @@ class RestartedLine(Line):
         self._make = make
         self._closing: threading.Thread | None = None
         self._again: float | None = None
-        self._logger = get_logger(str(name).strip('/').replace('/', '.'))
+        self._logger = get_logger(name.strip('/').replace('/', '.'))
 
     def start(self) -> None:
         """Make the node and run it."""
@@ -198,7 +185,7 @@ class LinesNode(Node):
             if faulty else (OK, f'OK: {len(lines)} of {len(lines)} lines run')
         values = {'lines': str(len(lines)), 'running': str(len(lines) - len(faulty)),
                   'restarts': str(sum(line.restarts for line in lines))}
-        values |= {str(line.name): '; '.join(line.faults) or 'begins again' for line in faulty}
+        values |= {line.name: '; '.join(line.faults) or 'begins again' for line in faulty}
         name = f'{self.get_fully_qualified_name().lstrip("/")}: lines'
         message = DiagnosticArray(status=[message_of(name, level, text, '', values)])
         message.header.stamp = self.get_clock().now().to_msg()
@@ -208,11 +195,12 @@ class LinesNode(Node):
 class Lines:
     """All lines, from their start to their end."""
 
-    def __init__(self, names: Sequence[LineName], node: LinesNode, files: Sequence[str]) -> None:
+    def __init__(self, names: Sequence[str], node: LinesNode, files: Sequence[str]) -> None:
         port_owners, graph = PortOwners(), Graph(node)
         self._lines = [RestartedLine(name, partial(
-            BridgeNode, name.name, namespace=name.namespace, graph=graph, port_owners=port_owners,
-            files=files, parameter_overrides=[_NO_TYPE_DESCRIPTIONS])) for name in names]
+            BridgeNode, _short(name), namespace=name.rpartition('/')[0] or '/', graph=graph,
+            port_owners=port_owners, files=files, parameter_overrides=[_NO_TYPE_DESCRIPTIONS]))
+            for name in names]
         self._runner = Runner(self._lines, self._look)
         self._node = node
         self._executor = SingleThreadedExecutor(context=node.context)
@@ -249,31 +237,30 @@ class Lines:
         self._runner.destroy()
 
 
-def sections(path: str) -> list[LineName]:
+def sections(path: str) -> list[str]:
     """
-    Return the nodes that a parameter file has a section for; those with wildcards are not nodes.
+    Return the full names of the nodes that a parameter file has a section for.
 
+    Those with wildcards are no nodes.
     Raises ConfigurationError where there is none that can be read, and where one comes twice:
     only one of them would run.
     """
-    found: dict[LineName, int] = {}
+    found: dict[str, int] = {}
     problems = []
-    for full_name, line, _ in node_sections(parameter_tree(path)):
-        namespace, _, node_name = full_name.rpartition('/')
-        if node_name == NODE_NAME or '*' in full_name:
+    for name, line, _ in node_sections(parameter_tree(path)):
+        if _short(name) == NODE_NAME or '*' in name:
             continue
-        name = LineName(namespace or '/', node_name)
         first = found.setdefault(name, line)
         if first != line:
             problems.append(Problem(Place(path, line), (
-                f'{printable(str(name))} has a section in line {first} already; '
+                f'{printable(name)} has a section in line {first} already; '
                 'each line needs a name of its own')))
     if problems:
         raise ConfigurationError(problems)
     return [*found]
 
 
-def chosen(names: Sequence[LineName], wanted: Sequence[str]) -> list[LineName]:
+def chosen(names: Sequence[str], wanted: Sequence[str]) -> list[str]:
     """
     Return the lines that are wanted, by name or full name; all where nothing is.
 
@@ -285,13 +272,17 @@ def chosen(names: Sequence[LineName], wanted: Sequence[str]) -> list[LineName]:
             '--ros-args --params-file lines.yaml; config/three_lines.yaml is an example')])
     if not wanted:
         return list(names)
-    meant = {text: [name for name in names if text in (name.name, str(name))]
-             or [name for name in names if text in str(name).split('/')] for text in wanted}
+    meant = {text: [name for name in names if text in (name, _short(name))]
+             or [name for name in names if text in name.split('/')] for text in wanted}
     if missing := [text for text, found in meant.items() if not found]:
         raise ConfigurationError([Problem(
             'parameter lines', f'no section is called {printable(", ".join(missing))}; there are '
-            + printable(', '.join(map(str, names))))])
+            + printable(', '.join(names)))])
     return [name for name in names if any(name in found for found in meant.values())]
+
+
+def _short(name: str) -> str:
+    return name.rpartition('/')[2]
 
 
 def main(args: Sequence[str] | None = None) -> int:
@@ -317,8 +308,7 @@ def _make(given: Sequence[str]) -> Program:
             'the sections of the parameter file name the nodes; __node and __ns would give all '
             'of them one name'))])
     files = parameter_files(given)
-    names = dict.fromkeys(name for path in files for name in sections(path))
+    names = [*dict.fromkeys(name for path in files for name in sections(path))]
     _allow_files()
     node = LinesNode(files)
-    lines = Lines(chosen([*names], node.wanted), node, files)
-    return Program(lines.run, lines.destroy)
+    return Lines(chosen(names, node.wanted), node, files)

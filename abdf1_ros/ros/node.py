@@ -53,5 +53,4 @@ def main(args: Sequence[str] | None = None) -> int:
 
 
 def _make(given: Sequence[str]) -> Program:
-    runner = Runner([Line(BridgeNode(files=parameter_files(given)))])
-    return Program(runner.run, runner.destroy)
+    return Runner([Line(BridgeNode(files=parameter_files(given)))])

@@ -15,6 +15,7 @@
 """Nodes of our name, and topics that somebody uses with another message type."""
 
 from collections.abc import Iterable
+from typing import Any
 
 from abdf1_ros.ros.diagnostics import graph as graph_module
 from abdf1_ros.ros.diagnostics.graph import Graph, NameWatch, TypeWatch
@@ -49,7 +50,8 @@ def domain() -> Domain:
 
 @pytest.fixture
 def graph(domain: Domain) -> Graph:
-    return Graph(domain)
+    source: Any = domain
+    return Graph(source)
 
 
 def texts(news: Iterable[News]) -> list[str]:

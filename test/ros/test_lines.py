@@ -28,7 +28,7 @@ from typing import Any
 from abdf1_ros.problems import ConfigurationError
 from abdf1_ros.ros import lines as module
 from abdf1_ros.ros.bridge.node import BridgeNode
-from abdf1_ros.ros.lines import chosen, LineName, main, sections
+from abdf1_ros.ros.lines import chosen, main, sections
 from abdf1_ros.ros.parameters.files import parameter_files, usable_files
 from abdf1_ros.ros.process import main as process
 from abdf1_ros.signals import EndRequest
@@ -51,7 +51,7 @@ from support.ros import (
     write_csv,
 )
 
-PRESS, PAINT = LineName('/press', 'press_plc'), LineName('/paint', 'paint_plc')
+PRESS, PAINT = '/press/press_plc', '/paint/paint_plc'
 
 
 def yaml_file(folder: Path, text: str) -> str:
@@ -72,7 +72,7 @@ def yaml_file(folder: Path, text: str) -> str:
     ('lines:\n  ros__parameters: {lines: [x]}\nx:\n  ros__parameters: {}', ['/x']),
     ('', []), ('5', [])])
 def test_nodes_of_a_parameter_file(tmp_path: Path, text: str, expected: list[str]) -> None:
-    assert [str(name) for name in sections(yaml_file(tmp_path, text))] == expected
+    assert sections(yaml_file(tmp_path, text)) == expected
 
 
 def test_two_sections_of_one_name_are_a_fault(tmp_path: Path) -> None:

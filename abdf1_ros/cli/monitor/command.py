@@ -32,6 +32,7 @@ import argparse
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
 import curses
+from functools import partial
 import locale
 import math
 import os
@@ -44,13 +45,19 @@ from types import FrameType
 from abdf1_ros.cli.monitor.node import full_name, NodeWatch
 from abdf1_ros.cli.monitor.plant import PlantWatch, render_plant
 from abdf1_ros.cli.monitor.view import render, Style, TextLine
-from abdf1_ros.cli.terminal import command_parser, has_reader_left, prepare_output, seconds_option
+from abdf1_ros.cli.terminal import (
+    command_parser,
+    EXIT_FAILED,
+    EXIT_USAGE,
+    has_reader_left,
+    prepare_output,
+    seconds_option,
+    tell,
+)
 from abdf1_ros.errors import FormatError
-from abdf1_ros.text import printable
 from rclpy.utilities import remove_ros_args
 
-EXIT_NOT_FOUND = 1
-EXIT_USAGE = 2
+_say = partial(tell, 'monitor')
 
 # How often (s) the picture is renewed where a terminal shows it in place.
 _RENEWAL = 0.25
@@ -229,7 +236,7 @@ def _run(options: argparse.Namespace, words: list[str]) -> int:
             _show(watch, options, has_ended)
         elif not has_ended():
             _say(_not_found(watch, options.wait))
-            return EXIT_NOT_FOUND
+            return EXIT_FAILED
     return 0
 
 
@@ -253,7 +260,7 @@ def _print_all(plant: PlantWatch, options: argparse.Namespace, has_ended: _Endin
     plant.wait(has_ended, _COMPLETION)  # diagnostics come every second
     _print_pictures(plant, lambda width: render_plant(plant.lines(), time.monotonic(), width),
                     options, has_ended)
-    return 0 if plant.lines() else EXIT_NOT_FOUND
+    return 0 if plant.lines() else EXIT_FAILED
 
 
 def _draw_all(window: curses.window, plant: PlantWatch, has_ended: _Ending, marked: str) -> str:
@@ -351,7 +358,3 @@ def _print(picture: Callable[[int], list[TextLine]]) -> None:
         number = _COLOURS.get(line.style)
         print(f'\x1b[3{number}m{line.text}\x1b[0m' if colours and number else line.text)
     print(flush=True)
-
-
-def _say(text: str) -> None:
-    print(f'monitor: {printable(text)}', file=sys.stderr, flush=True)

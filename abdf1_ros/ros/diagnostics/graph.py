@@ -26,10 +26,10 @@ from collections import Counter
 from collections.abc import Callable, Iterable, Iterator
 from collections.abc import Mapping as MappingType
 from time import thread_time
-from typing import Protocol
 
 from abdf1_ros.ros.diagnostics.log import INFO, News, WARN
 from abdf1_ros.settings.mapping import Mapping
+from rclpy.node import Node
 
 # s; a node of our name is to be reported before it has taken many of our messages.
 _NAMES_PERIOD = 0.25
@@ -46,20 +46,10 @@ _MULTIPLE = 2000
 _KILLED_IS_SEEN = 30.0
 
 
-class GraphSource(Protocol):
-    """What is used of the node that looks."""
-
-    def get_node_names_and_namespaces(self) -> list[tuple[str, str]]:
-        """Return every node of the domain."""
-
-    def get_topic_names_and_types(self) -> list[tuple[str, list[str]]]:
-        """Return every topic of the domain with all its types."""
-
-
 class Graph:
     """The nodes and topics of the domain, as ``source`` sees them; used by one thread."""
 
-    def __init__(self, source: GraphSource) -> None:
+    def __init__(self, source: Node) -> None:
         self._source = source
         self._nodes: Counter[tuple[str, str]] = Counter()
         self._clashes: dict[str, list[str]] = {}

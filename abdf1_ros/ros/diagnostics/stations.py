@@ -89,6 +89,7 @@ class LinkCounterService:
     def __init__(self, driver: Driver, wake_link: Callable[[], None],
                  wake_executor: Callable[[], None] = lambda: None) -> None:
         self._driver = driver
+        self._checks = driver.checks
         self._wake_link = wake_link
         self._wake_executor = wake_executor
         self._asked: list[int] = []
@@ -104,18 +105,20 @@ class LinkCounterService:
             response.success, response.message = False, f'no station to ask: {what}'
             return response
         for station in self._asked:
-            self._driver.checks.request_counters(station)
+            self._checks.request_counters(station)
         self._wake_link()
         self._give_up = line_time() + _PATIENCE
         self._done = Future()
         await self._done
-        response.success = all(self._has_told(station) for station in self._asked)
+        response.success = self._checks.counters_wanted.isdisjoint(self._asked) and all(
+            self._checks.known(station).counters for station in self._asked)
         response.message = '; '.join(map(self._text, self._asked))
         return response
 
     def check(self, now: float) -> None:
         """End the waiting when there is nothing more to wait for."""
-        if now >= self._give_up or not any(map(self._is_waited_for, self._asked)):
+        if now >= self._give_up or not self._driver.is_online \
+                or self._checks.counters_wanted.isdisjoint(self._asked):
             self.end()
 
     def end(self) -> None:
@@ -124,18 +127,9 @@ class LinkCounterService:
             self._done.set_result(None)
             self._wake_executor()
 
-    def _is_waited_for(self, station: int) -> bool:
-        return self._driver.is_online and station in self._driver.checks.counters_wanted
-
-    def _has_told(self, station: int) -> bool:
-        health = self._driver.checks
-        return station not in health.counters_wanted and bool(health.known(station).counters)
-
     def _text(self, station: int) -> str:
-        health = self._driver.checks.known(station)
-        if station in self._driver.checks.counters_wanted:
-            text = 'no answer yet'
-        else:
-            text = health.no_counters or ', '.join(
-                f'{name} {value}' for name, value in health.counters.items()) or 'no answer'
+        health = self._checks.known(station)
+        text = 'no answer yet' if station in self._checks.counters_wanted else (
+            health.no_counters or ', '.join(
+                f'{name} {value}' for name, value in health.counters.items()) or 'no answer')
         return f'station {station}: {text}'

@@ -20,7 +20,7 @@ from collections import Counter
 
 from abdf1_ros.driver.interlocks.fallback import FallbackCause
 from abdf1_ros.driver.write import Outcome, WriteResult
-from abdf1_ros.ros.diagnostics.status import Judgement, OK, WARN, with_age
+from abdf1_ros.ros.diagnostics.status import Judgement, Moment, OK, WARN, with_age
 
 # How long a failed write keeps its status at WARN, in seconds.
 _WRITE_MEMORY = 10.0
@@ -48,15 +48,15 @@ class WriteLog:
         self.hardware_id = port
         self._counts: Counter[Outcome] = Counter()
         self._lost = 0
-        self._last_loss: tuple[str, float] | None = None
-        self._last_failure: tuple[WriteResult, float] | None = None
+        self._last_loss: Moment | None = None
+        self._last_failure: Moment | None = None
 
     def add(self, result: WriteResult, now: float) -> None:
         """Count a result."""
         self._counts[result.outcome] += 1
         is_good = result.outcome in (Outcome.WRITTEN, Outcome.BROADCAST, Outcome.SUPERSEDED)
         if not is_good and not is_usual_fallback(result):
-            self._last_failure = result, now
+            self._last_failure = f'{result.mapping.tag} {result}', now
 
     def lost(self, topic: str, count: int, now: float) -> None:
         """Count messages that never came."""
@@ -72,8 +72,7 @@ class WriteLog:
         total = self._messages()
         summary = f'{self._counts[Outcome.WRITTEN]} of {total} writes confirmed'
         if self._last_failure and now - self._last_failure[1] < _WRITE_MEMORY:
-            result = self._last_failure[0]
-            return WARN, f'{summary}; {result.mapping.tag} {result}'
+            return WARN, f'{summary}; {self._last_failure[0]}'
         if self._last_loss and now - self._last_loss[1] < _WRITE_MEMORY:
             return WARN, f'{summary}; {self._lost} messages were lost on their way here'
         return OK, summary
@@ -81,20 +80,13 @@ class WriteLog:
     def values(self, now: float) -> dict[str, str]:
         """Return the counts and the last failure."""
         counts = self._counts
-        failed = sum(counts[outcome] for outcome in _FAILURES)
-        last = None
-        if self._last_failure is not None:
-            result, when = self._last_failure
-            last = f'{result.mapping.tag} {result}', when
-        return {
-            'accepted': str(self._messages() - counts[Outcome.REFUSED]),
-            'confirmed': str(counts[Outcome.WRITTEN]),
-            'failed': str(failed),
-            'unknown': str(counts[Outcome.UNKNOWN]),
-            'superseded': str(counts[Outcome.SUPERSEDED]),
-            'refused': str(counts[Outcome.REFUSED]),
-            'fallback values': str(counts[Outcome.FALLBACK]),
-            'lost on their way': str(self._lost),
-            'last loss': with_age(self._last_loss, now),
-            'last failure': with_age(last, now),
-        }
+        numbers = {
+            'accepted': self._messages() - counts[Outcome.REFUSED],
+            'confirmed': counts[Outcome.WRITTEN],
+            'failed': sum(counts[outcome] for outcome in _FAILURES),
+            **{outcome.name.lower(): counts[outcome]
+               for outcome in (Outcome.UNKNOWN, Outcome.SUPERSEDED, Outcome.REFUSED)},
+            'fallback values': counts[Outcome.FALLBACK], 'lost on their way': self._lost}
+        return {**{name: str(number) for name, number in numbers.items()},
+                'last loss': with_age(self._last_loss, now),
+                'last failure': with_age(self._last_failure, now)}

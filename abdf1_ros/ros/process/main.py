@@ -29,7 +29,7 @@ import signal
 import sys
 import threading
 import time
-from typing import NamedTuple
+from typing import Protocol
 
 from abdf1_ros.paths import ShowVersion
 from abdf1_ros.problems import ConfigurationError, Problem
@@ -91,17 +91,18 @@ def make_parser(usage: str, description: str) -> argparse.ArgumentParser:
     return parser
 
 
-class Program(NamedTuple):
-    """
-    What a process runs, once it is made.
+class Program(Protocol):
+    """What a process runs, once it is made."""
 
-    ``run`` returns the exit status soon after its argument has been set, when PLCs and the results
-    of writes are done; it sets it itself where it ends for another reason. ``destroy`` does what
-    may be left to the end of the process.
-    """
+    def run(self, ended: EndRequest) -> int:
+        """
+        Return the exit status soon after ``ended``, when PLCs and the results of writes are done.
 
-    run: Callable[[EndRequest], int]
-    destroy: Callable[[], None]
+        It sets that itself where it ends for another reason.
+        """
+
+    def destroy(self) -> None:
+        """Do what may be left to the end of the process."""
 
 
 def run_ros(name: str, parser: argparse.ArgumentParser,
