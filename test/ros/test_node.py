@@ -16,6 +16,7 @@
 
 from collections import Counter
 from collections.abc import Callable, Iterator
+import math
 import os
 from pathlib import Path
 import re
@@ -51,6 +52,7 @@ from support.ros import (
     details,
     ERROR,
     EXAMPLE_FILES,
+    get_parameters,
     Inbox,
     Observer,
     OK,
@@ -425,6 +427,18 @@ def test_other_node_of_our_name_is_told_before_the_first_write_is_taken(
     assert '[abdf1]: another node is called /abdf1 too' in ''.join(capfd.readouterr())
     assert bench.until_results(1)[0].message == 'written'
     other.destroy_node()
+
+
+def test_messages_wait_for_the_first_look_and_have_a_result_at_an_end_before_it(
+        make_bench: Benches, observer: Observer, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(node_module, 'DISCOVERY', math.inf)
+    bench = make_bench(RECIPE)
+    bench.publisher(Int16MultiArray, 'recipe')(1, 2)
+    for _ in range(3):
+        assert get_parameters(observer, 'port') == [bench.plcs.port]
+    assert not bench.node.writes.taken
+    bench.node.begin_end()
+    assert bench.until_results(1)[0].message.startswith('not written: ')
 
 
 def test_end_of_another_type_on_a_topic_is_told(
