@@ -34,7 +34,7 @@ from typing import Any
 
 from abdf1_ros import testing
 from abdf1_ros.paths import config_file
-from abdf1_ros.ros.bridge.node import BridgeNode
+from abdf1_ros.ros.bridge.node import BridgeNode, end_together
 from abdf1_ros.ros.topics.messages import latched_qos
 from abdf1_ros.testing import EVERYTHING, PATIENCE
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
@@ -263,7 +263,7 @@ class Observer(testing.Observer):
         if bridge in self.executor.get_nodes():
             self.executor.remove_node(bridge)
             try:
-                bridge.stop()
+                end_together([bridge])
             finally:
                 bridge.destroy_node()
 

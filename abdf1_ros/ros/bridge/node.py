@@ -144,14 +144,6 @@ class BridgeNode(Node):
         self.writes.begin()
         self.session.begin_end()
 
-    def stop(self, patience: float = _LAST_WORDS) -> None:
-        """
-        End cleanly; the node may be destroyed after it.
-
-        ``patience`` (s) is for a subscriber that is stuck.
-        """
-        end_together([self], patience)
-
     def say_last_words(self, give_up: float) -> None:
         """Let guests go and tell the last state, up to a monotonic clock value."""
         self.session.guests.stop()

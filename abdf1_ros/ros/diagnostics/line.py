@@ -18,15 +18,17 @@ from __future__ import annotations
 
 from collections import defaultdict
 from collections.abc import Iterable
+from pathlib import Path
 
 from abdf1_ros.df1.echo import COMES_BACK
 from abdf1_ros.df1.frames import Duplex
 from abdf1_ros.df1.stations import Station
 from abdf1_ros.driver.driver import Driver
+from abdf1_ros.pccc.families import FAMILIES
 from abdf1_ros.pccc.file_types import PlcType
+from abdf1_ros.pccc.identity import Identity
 from abdf1_ros.ports.link_thread import LinkThread
 from abdf1_ros.ports.trace import PortOpener
-from abdf1_ros.ros.diagnostics.stations import wrong_type
 from abdf1_ros.settings.mapping import Mapping
 
 # For so long (s) another node with our number is reported after its last packet.
@@ -88,6 +90,28 @@ class LineView:
     def wrong_type(self, station: int) -> str | None:
         identity = self.driver.checks.known(station).identity
         return wrong_type(station, identity, self._rows_by_type[station].values())
+
+
+def wrong_type(station: int, identity: Identity | None, rows: Iterable[Mapping]) -> str | None:
+    """
+    Return that a PLC is not what a row of the map says, None when it is.
+
+    That is of another PLC_Type, or another Processor. Rows of type PLC2 are right for any PLC: all
+    families know these commands.
+    """
+    if identity is None or identity.plc_type is None:
+        return None
+    for row in rows:
+        if row.plc_type != identity.plc_type and not FAMILIES[row.plc_type].is_spoken_by_all:
+            said = row.plc_type.value
+        elif row.processor not in (identity.processor, None) and identity.processor is not None:
+            said = f'{row.processor.value} in the column Processor'
+        else:
+            continue
+        article = 'an' if identity.model.startswith('SLC') else 'a'
+        return (f'station {station} is {article} {identity.model}, '
+                f'{Path(row.place.file).name}:{row.place.line} says {said}')
+    return None
 
 
 def _rows_by_type(mappings: Iterable[Mapping]) -> dict[int, dict[PlcType, Mapping]]:

@@ -12,19 +12,20 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Mode, faults and counters of the PLCs, for /diagnostics and ~/read_link_counters."""
+"""The status of each station: mode, faults and counters of its PLC; ~/read_link_counters."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
-from pathlib import Path
+from collections.abc import Callable
 
+from abdf1_ros.df1.stations import Station
 from abdf1_ros.driver.checks import StationHealth
 from abdf1_ros.driver.driver import Driver
-from abdf1_ros.pccc.families import FAMILIES
 from abdf1_ros.pccc.identity import Identity
+from abdf1_ros.pccc.status import status_text
 from abdf1_ros.ports.clock import line_time
-from abdf1_ros.settings.mapping import Mapping
+from abdf1_ros.ros.diagnostics.line import deaf_text, LineView, takes_in_silence
+from abdf1_ros.ros.diagnostics.status import ERROR, Judgement, OK, Seen, WARN, with_age
 from rclpy.task import Future
 from std_srvs.srv import Trigger
 
@@ -43,28 +44,6 @@ def processor_fault(identity: Identity | None) -> str | None:
     return f'in {identity.mode.words} mode ({identity.mode_text})'
 
 
-def wrong_type(station: int, identity: Identity | None, rows: Iterable[Mapping]) -> str | None:
-    """
-    Return that a PLC is not what a row of the map says, None when it is.
-
-    That is of another PLC_Type, or another Processor. Rows of type PLC2 are right for any PLC: all
-    families know these commands.
-    """
-    if identity is None or identity.plc_type is None:
-        return None
-    for row in rows:
-        if row.plc_type != identity.plc_type and not FAMILIES[row.plc_type].is_spoken_by_all:
-            said = row.plc_type.value
-        elif row.processor not in (identity.processor, None) and identity.processor is not None:
-            said = f'{row.processor.value} in the column Processor'
-        else:
-            continue
-        article = 'an' if identity.model.startswith('SLC') else 'a'
-        return (f'station {station} is {article} {identity.model}, '
-                f'{Path(row.place.file).name}:{row.place.line} says {said}')
-    return None
-
-
 def health_values(health: StationHealth, now: float) -> dict[str, str]:
     """Return what is shown of a station at the clock value ``now`` (s)."""
     values = {'processor': health.processor, 'mode': 'unknown', 'faults': 'unknown'}
@@ -75,6 +54,55 @@ def health_values(health: StationHealth, now: float) -> dict[str, str]:
     if health.no_counters:
         values['link counters'] = health.no_counters
     return values | {f'link counter {name}': value for name, value in health.counters.items()}
+
+
+class StationStatus:
+    """Whether a station answers, and what it has reported of itself."""
+
+    def __init__(self, line: LineView, station: Station, port: str, seen: Seen) -> None:
+        self.name = f'station {station.number}'
+        self.hardware_id = f'{port} {self.name}'
+        self._line = line
+        self._station = station
+        self._seen = seen
+
+    def judge(self, now: float) -> Judgement:
+        station, line = self._station, self._line
+        if not line.is_open:
+            return ERROR, f'station {station.number} unknown: the port is not open'
+        if line.is_deaf(station, now):
+            return WARN, deaf_text(station.number)
+        if not station.active:
+            since = now - (station.silent_since or now)
+            return ERROR, f'station {station.number} inactive since {since:.1f} s'
+        if station.local_status:
+            return WARN, f'commands do not get to station {station.number}: ' \
+                         f'{status_text(station.local_status)}'
+        if takes_in_silence(station):
+            return WARN, f'station {station.number} takes commands, but does not reply in time'
+        if station.last_heard is None:
+            return OK, f'station {station.number} not heard yet'
+        why = processor_fault(line.driver.checks.known(station.number).identity)
+        if why is not None:
+            return WARN, f'station {station.number} active, but {why}'
+        if (wrong := line.wrong_type(station.number)) is not None:
+            return WARN, wrong
+        return OK, f'station {station.number} active'
+
+    def values(self, now: float) -> dict[str, str]:
+        station, driver = self._station, self._line.driver
+        heard, via = station.last_heard, driver.stations.via(station.number)
+        return {
+            **({} if via == station.number else {'gateway': str(via)}),
+            'active': 'yes' if station.active else 'no',
+            'last answer': 'none yet' if heard is None else f'{now - heard:.1f} s ago',
+            'last TNS': 'none yet' if station.last_tns is None else f'0x{station.last_tns:04X}',
+            'replies': str(station.replies),
+            'transactions without reply': str(station.failures),
+            'error replies': str(station.remote_errors),
+            'last event': with_age(self._seen.last_events.get(station.number), now),
+            **health_values(driver.checks.known(station.number), now),
+        }
 
 
 class LinkCounterService:

@@ -25,7 +25,7 @@ from abdf1_ros.ros.diagnostics.interlocks import InterlockStatus
 from abdf1_ros.ros.diagnostics.line import LineView
 from abdf1_ros.ros.diagnostics.link import CountersStatus, LinkStatus
 from abdf1_ros.ros.diagnostics.mappings import MappingsStatus
-from abdf1_ros.ros.diagnostics.station import StationStatus
+from abdf1_ros.ros.diagnostics.stations import StationStatus
 from abdf1_ros.ros.diagnostics.status import message_of, Seen, Status, WORDS
 from abdf1_ros.ros.diagnostics.writes import WriteLog
 from abdf1_ros.share.guest_line import GuestLine
