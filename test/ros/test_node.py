@@ -31,7 +31,7 @@ from abdf1_ros.pccc.families import parse_address
 from abdf1_ros.pccc.file_types import PlcType
 from abdf1_ros.ports.link_thread import PortState
 from abdf1_ros.ros.bridge import node as node_module
-from abdf1_ros.ros.bridge.node import BridgeNode
+from abdf1_ros.ros.bridge.node import BridgeNode, end_together
 from abdf1_ros.ros.node import main
 from abdf1_ros.testing import Plcs
 from diagnostic_msgs.msg import DiagnosticStatus
@@ -261,7 +261,7 @@ def test_end_waits_until_results_and_diagnostics_have_arrived(
         return False
 
     monkeypatch.setattr(Publisher, 'wait_for_all_acked', wait)
-    bench.node.stop(0.3)
+    end_together([bench.node], 0.3)
     (first, patience), (second, rest) = waits
     assert (first, second) == ('/abdf1/write_results', '/diagnostics')
     assert patience <= 0.3 and 0.0 <= rest <= 0.2  # of a subscriber that is stuck, for both

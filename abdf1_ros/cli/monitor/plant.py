@@ -101,7 +101,8 @@ def render_plant(lines: Iterable[LineState], now: float, width: int) -> list[Tex
         return cut(f'  {name:<{name_width}}  {cells}  {printable(text)}'.rstrip(), width)
 
     titles = {key: title for title, _, key in _COLUMNS}
-    return [TextLine(cut(f'{len(found)} lines: {told}' if found else 'no line is heard', width),
+    number = f'{len(found)} line{"s" if len(found) > 1 else ""}'
+    return [TextLine(cut(f'{number}: {told}' if found else 'no line is heard', width),
                      Style.TITLE),
             TextLine(row('line', titles, ''), Style.TITLE),
             *(TextLine(row(name, {**line.values(), 'state': _WORDS[status.style]},

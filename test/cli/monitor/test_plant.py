@@ -49,7 +49,9 @@ def test_worst_come_first_and_say_why() -> None:
 
 
 def test_line_that_is_not_heard_any_more_is_bad() -> None:
-    assert texts(line('/a', told=NOW - 5.0))[2] == '/a ERROR 93 % 34 ms no diagnostics for 5 s'
+    told = texts(line('/a', told=NOW - 5.0))
+    assert told[0] == '1 line: 1 ERROR'
+    assert told[2] == '/a ERROR 93 % 34 ms no diagnostics for 5 s'
 
 
 def test_no_line_at_all() -> None:
