@@ -421,7 +421,7 @@ def test_other_node_of_our_name_is_told_before_the_first_write_is_taken(
     monkeypatch.setattr(node_module, 'DISCOVERY', 2.0)
     other = Node('abdf1', context=observer.context, use_global_arguments=False,
                  start_parameter_services=False)
-    bench = make_bench(RECIPE)
+    bench = make_bench(RECIPE, parameters=('write_timeout:=30.0',))
     bench.publisher(Int16MultiArray, 'recipe')(1, 2)
     observer.until(lambda: bench.node.writes.taken, 'the write')
     assert '[abdf1]: another node is called /abdf1 too' in ''.join(capfd.readouterr())
@@ -432,7 +432,7 @@ def test_other_node_of_our_name_is_told_before_the_first_write_is_taken(
 def test_messages_wait_for_the_first_look_and_have_a_result_at_an_end_before_it(
         make_bench: Benches, observer: Observer, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(node_module, 'DISCOVERY', math.inf)
-    bench = make_bench(RECIPE)
+    bench = make_bench(RECIPE, parameters=('write_timeout:=30.0',))
     bench.publisher(Int16MultiArray, 'recipe')(1, 2)
     for _ in range(3):
         assert get_parameters(observer, 'port') == [bench.plcs.port]
