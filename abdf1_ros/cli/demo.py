@@ -234,10 +234,12 @@ class Stage:
 
     def close(self) -> None:
         """End all, the bridge first."""
-        if self._bridge is not None:
-            self._bridge.end()
-        self._plcs.close()
-        self._watcher.__exit__()
+        try:
+            if self._bridge is not None:
+                self._bridge.end()
+        finally:  # the thread of the PLCs would keep this process alive
+            self._plcs.close()
+            self._watcher.__exit__()
 
     def _start_bridge(self) -> None:
         self._bridge = Bridge(*self._bridge_args)
