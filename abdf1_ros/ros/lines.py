@@ -264,6 +264,8 @@ def chosen(names: Sequence[str], wanted: Sequence[str]) -> list[str]:
     """
     Return the lines that are wanted, by name or full name; all where nothing is.
 
+    A part of a full name will do where only one line has it.
+
     Raises ConfigurationError for a name that no section has, and where there is no line at all.
     """
     if not names:
@@ -272,8 +274,10 @@ def chosen(names: Sequence[str], wanted: Sequence[str]) -> list[str]:
             '--ros-args --params-file lines.yaml; config/three_lines.yaml is an example')])
     if not wanted:
         return list(names)
-    meant = {text: [name for name in names if text in (name, _short(name))]
-             or [name for name in names if text in name.split('/')] for text in wanted}
+    meant = {text: [name for name in names if text in (name, _short(name))] for text in wanted}
+    for text in [text for text, found in meant.items() if not found]:
+        parts = [name for name in names if text in name.split('/')]
+        meant[text] = parts if len(parts) == 1 else []
     if missing := [text for text, found in meant.items() if not found]:
         raise ConfigurationError([Problem(
             'parameter lines', f'no section is called {printable(", ".join(missing))}; there are '

@@ -46,7 +46,12 @@ def parse_stations(text: str, most: int = MAX_STATION) -> tuple[tuple[int, ...],
 def octal_remarks(row: Row) -> Iterator[Problem]:
     """Yield a remark on a Station with a leading zero: here decimal, on PLC-5 panels octal."""
     text = row.get('Station')
-    if _LEADING_ZERO.fullmatch(text) and int(text, 8) != int(text):
+    if octal := octal_of(text):
         yield Problem(row.where('Station'), (
-            f'Station = "{text}" is {int(text)}, decimal; an octal {text} would be '
-            f'{int(text, 8)}'))
+            f'Station = "{text}" is {int(text)}, decimal; an octal {text} would be {octal}'))
+
+
+def octal_of(text: str) -> int | None:
+    """Return what a number with a leading zero is in octal, None where that is the same."""
+    octal = int(text, 8) if _LEADING_ZERO.fullmatch(text) else None
+    return None if octal is None or octal == int(text) else octal

@@ -114,7 +114,9 @@ def test_lines_are_chosen_by_name() -> None:
     assert chosen([PRESS, PAINT], []) == [PRESS, PAINT]
     assert chosen([PRESS, PAINT], ['paint_plc']) == [PAINT]
     assert chosen([PRESS, PAINT], ['/press/press_plc', 'paint_plc']) == [PRESS, PAINT]
-    assert chosen([PRESS, PAINT], ['paint']) == [PAINT]  # a part of its name
+    assert chosen([PRESS, PAINT], ['paint']) == [PAINT]  # a part of its name, and of no other
+    with pytest.raises(ConfigurationError, match='no section is called hall'):
+        chosen(['/hall/a/plc_a', '/hall/b/plc_b'], ['hall'])
 
 
 def test_line_that_is_not_there_is_named() -> None:

@@ -360,13 +360,14 @@ def test_section_that_names_the_node_has_no_unknown_parameter(
 
 
 @pytest.mark.parametrize(('section', 'is_told'), [
-    ('parameters', True), ('"/**"', True), ('camera', False)])
+    ('parameters', True), ('"/**"', True), ('camera', False), ('"/camera/*"', False)])
 def test_number_that_yaml_takes_for_octal_is_told(
         make_node: Nodes, files: dict[str, str], tmp_path: Path, section: str,
         is_told: bool) -> None:
     path = tmp_path / 'shared.yaml'
     path.write_text(f'{section}:\n  ros__parameters:\n    net:\n      station: 010\n'
-                    '      baud: 9600\n      timeout: "0500"\n', encoding='utf-8')
+                    '      baud: 9600\n      timeout: "0500"\n      nak_retries: 03\n',
+                    encoding='utf-8')
     node = make_node(files)
     if not is_told:
         assert configure(node, [str(path)]).mappings

@@ -20,10 +20,10 @@ from collections.abc import Collection, Sequence
 from collections.abc import Mapping as MappingType
 from dataclasses import dataclass, field, fields, replace
 import difflib
+from fnmatch import fnmatchcase
 import os
 from pathlib import Path
 import random
-import re
 from typing import Any
 
 from abdf1_ros.df1.packet import BROADCAST
@@ -40,7 +40,7 @@ from abdf1_ros.settings.map_file import load_mappings
 from abdf1_ros.settings.map_row import MAX_PERIOD
 from abdf1_ros.settings.mapping import Mapping
 from abdf1_ros.settings.network import FIELDS, load_network, make_network, Network, URLS
-from abdf1_ros.settings.station_lists import parse_stations
+from abdf1_ros.settings.station_lists import octal_of, parse_stations
 from rcl_interfaces.msg import ParameterDescriptor
 from rclpy.exceptions import ParameterException
 from rclpy.node import Node
@@ -114,7 +114,6 @@ _KINDS = {bool: 'true or false', int: 'a whole number', float: 'a number', str: 
 
 
 _MAP_NAMES = {column.lower() for column in COLUMNS}
-_OCTAL = re.compile('0[0-7]+')
 
 _STATION_LISTS = 'poll_list', 'priority_poll_list'
 
@@ -293,10 +292,10 @@ def unknown_names(node: Node, given: Given, files: Sequence[str], known: Collect
             if not (name in known or name in _OF_RCLPY or _is_of_map(name)):
                 problems.append(Problem(place, (
                     f'{name}: there is no such parameter; {_nearest(name, known, begins, 0.5)}')))
-        is_ours = name in known and (section == full_name or '*' in section)
-        if is_ours and _OCTAL.fullmatch(number):
+        octal = octal_of(number)
+        if octal and name in known and fnmatchcase(full_name, section):
             problems.append(Problem(place, (
-                f'{name}: {number} is octal in YAML; write {int(number)} or {int(number, 8)}')))
+                f'{name}: {number} is octal in YAML; write {int(number)} or {octal}')))
     for name in given:
         is_other = name.startswith('qos_overrides.') and f'.{full_name}/' not in name
         if name in found or name in known or _is_of_map(name) or is_other:

@@ -115,10 +115,8 @@ def parameters_in(files: Iterable[str]) -> Iterator[tuple[str, str, Place, str]]
     for path in files:
         for section, _, parameters in node_sections(parameter_tree(path)):
             for name, key, value in _parameters(parameters):
-                mark = key.start_mark
-                is_number = value.tag == 'tag:yaml.org,2002:int'
-                yield (section, name, Place(path, mark.line + 1, mark.column + 1),
-                       str(value.value) if is_number else '')
+                mark, number = key.start_mark, value.value if value.tag.endswith(':int') else ''
+                yield section, name, Place(path, mark.line + 1, mark.column + 1), number
 
 
 def _parameters(tree: yaml.Node, above: str = '') -> Iterator[tuple[str, yaml.Node, yaml.Node]]:
