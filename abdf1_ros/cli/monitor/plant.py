@@ -27,7 +27,7 @@ import time
 
 from abdf1_ros.cli.monitor.node import Listening, shown_statuses
 from abdf1_ros.cli.monitor.view import SILENCE, Status, Style, TextLine
-from abdf1_ros.text import by_number, cut, printable
+from abdf1_ros.text import by_number, counted, cut, printable
 from diagnostic_msgs.msg import DiagnosticArray
 
 _WORDS = {Style.GOOD: 'OK', Style.WARNING: 'WARN', Style.BAD: 'ERROR'}
@@ -101,9 +101,8 @@ def render_plant(lines: Iterable[LineState], now: float, width: int) -> list[Tex
         return cut(f'  {name:<{name_width}}  {cells}  {printable(text)}'.rstrip(), width)
 
     titles = {key: title for title, _, key in _COLUMNS}
-    number = f'{len(found)} line{"s" if len(found) > 1 else ""}'
-    return [TextLine(cut(f'{number}: {told}' if found else 'no line is heard', width),
-                     Style.TITLE),
+    title = f'{counted(len(found), "line")}: {told}' if found else 'no line is heard'
+    return [TextLine(cut(title, width), Style.TITLE),
             TextLine(row('line', titles, ''), Style.TITLE),
             *(TextLine(row(name, {**line.values(), 'state': _WORDS[status.style]},
                            _text(status)), status.style, line.name)
