@@ -207,10 +207,10 @@ def _add_addresses(parser: argparse.ArgumentParser) -> None:
                         help='how whole numbers are written (default: %(default)s)')
 
 
-def _stations(text: str) -> tuple[int, ...]:
+def _stations(text: str, right: str = '') -> tuple[int, ...]:
     stations, faults = parse_stations(text)
     if faults or not stations:
-        raise argparse.ArgumentTypeError('; '.join(faults) or 'name a station')
+        raise argparse.ArgumentTypeError(right or '; '.join(faults) or 'name a station')
     return stations
 
 
@@ -222,11 +222,7 @@ def _station(text: str) -> int:
 
 
 def _numbers(text: str) -> tuple[int, ...]:
-    numbers, faults = parse_stations(text)
-    if faults or not numbers:
-        raise argparse.ArgumentTypeError(
-            f'"{text}" should be numbers of files from 0 to 254, as in 7,9-12')
-    return numbers
+    return _stations(text, f'"{text}" should be numbers of files from 0 to 254, as in 7,9-12')
 
 
 def _on_line(add: _Adder, defaults: LineDefaults = _LINE_DEFAULTS) -> _Adder:

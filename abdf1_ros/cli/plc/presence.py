@@ -145,10 +145,9 @@ def type_to_say(there: Presence) -> str:
 
 
 def describe(presence: Presence) -> list[str]:
-    """Return all about a station, line by line."""
+    """Return all about a station that has said what it is, line by line."""
     identity = presence.identity
-    if identity is None:
-        return [f'station {presence.station} {presence}']
+    assert identity is not None
     is_running = identity.mode is not None and identity.mode.is_running
     lines = [('mode', identity.mode_text, GREEN if is_running else YELLOW),
              ('faults', ', '.join(identity.faults) or 'none', RED if identity.faults else GREEN),

@@ -44,7 +44,7 @@ def test_everything_a_station_has_said() -> None:
 
 def test_station_that_does_not_say_what_it_is() -> None:
     presence = Presence(2, 0.1, None, FormatError('too short'), True, True)
-    assert describe(presence) == ['station 2 answers, but not who it is: too short']
+    assert str(presence) == 'answers, but not who it is: too short'
 
 
 @pytest.mark.parametrize('identity, option', [
