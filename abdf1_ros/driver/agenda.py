@@ -22,7 +22,7 @@ its turn. Then there are three queues:
   its turn.
 - ``checks``, such as the question for a station's mode, go before the reads. After a check, all
   reads that were due when it began go before the next check.
-- ``reads`` go in the order of ``read_queue``.
+- ``reads`` go in the order of ``reads.queue``.
 
 ``guests`` share what heartbeats, fallbacks and writes leave: a quarter of that time. After a
 command of theirs, checks and reads that are due have the line for three times as long as it had,

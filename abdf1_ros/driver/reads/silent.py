@@ -13,7 +13,7 @@
 # limitations under the License.
 
 """
-All reads of a line: those that wait in the order of ``read_queue``, and those set aside.
+All reads of a line: those that wait in the order of ``queue``, and those set aside.
 
 The reads of a station are set aside while it is inactive, or while it acknowledges commands
 without replying in time. Now and then one of them is sent as a probe.
