@@ -244,12 +244,12 @@ class LinkThread(threading.Thread):
                 self._set_state(False, RELEASED)
                 self._is_free.set()
                 self._wait()
-            elif not self._is_done_with_port() and not self.has_failed:
+            elif not self._use_port() and not self.has_failed:
                 self._pause(self._retry_period)
         if self.state.is_open:
             self.state = PortState(False, 'closed')
 
-    def _is_done_with_port(self) -> bool:
+    def _use_port(self) -> bool:
         """Open the port and run on it; return False where it cannot be opened, or was lost."""
         asked = self._clock()
         try:
