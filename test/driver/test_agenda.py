@@ -180,38 +180,6 @@ def test_period_counts_from_the_due_time_and_not_from_the_end() -> None:
     assert job.due == 0.1
 
 
-def test_reads_that_were_missed_are_not_made_up_for() -> None:
-    job = make_job(period=100)
-    bench = Bench(job)
-    bench.read(5.0, took=0.2)
-    assert job.due == 5.0
-    bench.read(5.2)
-    assert job.due == 5.2
-
-
-def test_saturated_line_is_shared_by_all_in_turn() -> None:
-    jobs = [make_job(f'N{file}:0', period=0) for file in (7, 9, 10)]
-    bench = Bench(*jobs)
-    now, done = 0.0, []
-    for _ in range(9):
-        done.append(bench.read(now, took=0.05))
-        now += 0.05
-    assert done == jobs * 3
-
-
-def test_nothing_is_ever_due_without_reads() -> None:
-    bench = Bench()
-    assert (bench.agenda.next_due(), bench.next(1e9), bench.reads.poll_cycle) == (None, None, None)
-
-
-def test_write_goes_before_a_read_that_is_due() -> None:
-    job = make_job()
-    bench = Bench(job)
-    write = bench.write(WORD, 1, 0.0)
-    assert bench.next(0.0) is write
-    assert bench.next(0.0) is job
-
-
 def test_four_writes_in_a_row_and_then_a_read_that_is_due() -> None:
     job = make_job(period=0)
     bench = Bench(job)
@@ -267,13 +235,6 @@ def test_new_writes_and_packets_of_a_long_one_take_turns() -> None:
                                    writes[3], task.job])
 
 
-def test_writes_go_on_when_no_read_is_due() -> None:
-    bench = Bench(make_job(period=1000))
-    bench.read(0.0)
-    writes = [bench.write(BIT, n % 2, 0.5) for n in range(10)]
-    assert [bench.next(0.5) for _ in range(11)] == [*writes, None]
-
-
 def test_probe_of_an_inactive_station_has_its_turn_among_writes() -> None:
     bench = Bench(make_job(station=9))
     bench.stations.lost(9, 0.0)
@@ -322,36 +283,6 @@ def test_topics_of_the_same_words_that_never_rest_share_the_line() -> None:
     assert len(sent) == len({(mapping.tag, mapping.length) for mapping in (WORD, both, OTHER)})
 
 
-def test_topics_that_never_rest_share_the_line() -> None:
-    bench = Bench()
-    mappings = [make_mapping(f'N7:{number}', 'Write') for number in range(3)]
-    sent = Counter[str]()
-    for turn in range(300):
-        for mapping in mappings[turn % 2:]:  # the first of them half as often
-            bench.write(mapping, turn, turn / 10)
-        write = bench.next_write(turn / 10)
-        assert write is not None
-        sent[str(write.mapping.address)] += 1
-    assert len(sent) == len(mappings)
-    assert max(sent.values()) - min(sent.values()) <= 1
-
-
-def test_write_that_is_on_its_way_is_not_superseded() -> None:
-    bench = Bench()
-    first = bench.write(WORD, 1, 0.0)
-    assert bench.next(0.0) is first
-    second = bench.write(WORD, 2, 0.0)
-    assert bench.next(0.0) is second
-    assert bench.results == []
-
-
-def test_writes_of_bits_are_all_sent_in_their_order() -> None:
-    bench = Bench()
-    writes = [bench.write(BIT, value, 0.0) for value in (1, 0, 1, 0)]
-    assert [bench.next(0.0) for _ in range(4)] == writes
-    assert bench.results == []
-
-
 def test_writes_of_the_same_words_are_never_under_way_together() -> None:
     bench, elsewhere = Bench(), make_mapping('N7:0', 'Write', station=2)
     first, second = bench.write(BIT, 1, 0.0), bench.write(BIT, 0, 0.0)
@@ -383,12 +314,6 @@ def test_write_that_was_old_when_it_came_is_not_sent_late_behind_a_younger_one()
     assert bench.next(2.5) is None
     assert [str(result.mapping.address) for result in bench.results] == ['N7:6']
     assert bench.outcomes() == [Outcome.NOT_SENT]
-
-
-def test_write_is_sent_up_to_its_last_moment() -> None:
-    bench = Bench(write_timeout=2.0)
-    write = bench.write(WORD, 1, 0.0)
-    assert bench.next(1.999) is write
 
 
 def test_writes_that_were_too_old_do_not_use_up_the_turn_of_writes() -> None:
@@ -464,26 +389,6 @@ def test_dead_stations_take_no_more_than_an_eighth_of_a_busy_line(silence: float
     assert max(probes) - min(probes) <= 1
 
 
-def test_stations_that_reply_late_take_no_more_than_an_eighth_of_a_busy_line() -> None:
-    late = [make_job(f'N{file}:0', station=station, period=0) for station in (1, 2)
-            for file in (7, 9, 10)]
-    living = make_job(station=99, period=0)
-    bench = Bench(*late, living)
-    now, lost = 0.0, 0.0
-    reads = Counter[int]()
-    while now < 400:
-        job = bench.next_read(now)
-        assert job is not None
-        started = now
-        now += 0.02 if job is living else 1.0
-        bench.stations[job.station].overdue += job is not living
-        bench.finish(job, started, now)
-        reads[job.station] += 1
-    lost = reads[1] + reads[2]
-    assert 0.9 / 8 < lost / 400 < 1.1 / 8
-    assert abs(reads[1] - reads[2]) <= 1
-
-
 def test_writes_and_reads_take_turns_at_a_silent_station() -> None:
     silent, living = make_job(station=2, period=0), make_job(period=0)
     bench = Bench(silent, living)
@@ -525,13 +430,6 @@ def test_all_reads_are_due_when_the_line_is_back_and_none_of_them_twice() -> Non
     assert bench.read(5.03) is None
 
 
-def test_order_of_the_plan_is_kept_when_the_line_comes_up() -> None:
-    jobs = [make_job(f'N{file}:0') for file in range(7, 27)]
-    bench = Bench(*jobs)
-    bench.reads.begin(5.0)
-    assert [bench.next_read(5.0) for _ in jobs] == jobs
-
-
 def test_station_that_is_back_is_not_read_twice_for_what_it_has_missed() -> None:
     job = make_job()
     bench = Bench(job)
@@ -541,23 +439,6 @@ def test_station_that_is_back_is_not_read_twice_for_what_it_has_missed() -> None
     bench.stations.heard(1, 8.01)
     bench.finish(job, 8.0, 8.02)
     assert bench.agenda.next_due() == 8.1
-
-
-def test_line_that_has_nobody_else_probes_every_period() -> None:
-    reads = _simulate([make_job(station=1, period=1000)], [], 60.0, PROBE_TIME)
-    assert 38 <= reads[1] <= 41  # a period and a time-out each
-
-
-def test_station_that_answers_again_has_all_its_reads_at_once() -> None:
-    jobs = [make_job(f'N{file}:0', station=1) for file in (7, 9, 10, 11)]
-    bench = Bench(*jobs)
-    bench.stations.lost(1, 0.0)
-    assert bench.next_read(0.0) is None
-    probe = bench.next_read(0.0)
-    assert probe is not None
-    bench.stations.heard(1, 0.1)
-    bench.finish(probe, 0.0, 0.1)
-    assert {bench.read(0.1) for _ in range(4)} == set(jobs)
 
 
 def test_station_that_a_write_has_brought_back_has_its_reads_at_once() -> None:
@@ -611,15 +492,6 @@ def test_reads_of_a_busy_station_are_passed_over_and_stay_due() -> None:
     assert bench.next_read(0.0, busy={1}) is other
     assert bench.next_read(0.0, busy={1}) is None
     assert bench.next_read(0.0) is one
-
-
-def test_writes_to_a_busy_station_wait_and_the_others_go() -> None:
-    bench = Bench()
-    first = bench.write(WORD, 1, 0.0)
-    second = bench.write(make_mapping('N7:5', 'Write', station=2), 1, 0.0)
-    assert bench.begin_write(0.0, busy={1}) is second
-    assert bench.begin_write(0.0, busy={1}) is None
-    assert bench.begin_write(0.0) is first
 
 
 def test_parts_replace_a_job() -> None:

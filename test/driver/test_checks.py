@@ -113,11 +113,6 @@ def test_status_at_the_start_and_every_period(network: Network, plc: str, proces
     assert bench.driver.stations[1].remote_errors == 0
 
 
-def test_period_0_is_never() -> None:
-    bench, _, (ears,) = make_bench(word(), period=0, run=20.0)
-    assert {cmd for _, cmd, _ in ears.heard} == {0x0F}
-
-
 @pytest.mark.parametrize('network', NETWORKS, ids=['message', 'standard'])
 def test_program_mode_and_fault_are_seen(network: Network) -> None:
     bench, (plc,), _ = make_bench(word(), network=network, run=1.0)
@@ -162,16 +157,6 @@ def test_station_that_comes_back_is_asked_at_once(network: Network) -> None:
     bench.run(0.2)
     assert len(ears.times(STATUS)) == 2
     assert bench.driver.checks.known(1).processor == 'SLC 5/03 series A revision 1, RUN'
-
-
-def test_all_are_asked_anew_when_the_port_comes_back() -> None:
-    bench, _, (ears,) = make_bench(word(), period=1000.0, run=1.0)
-    bench.lose_port()
-    assert bench.driver.checks.known(1).identity is None
-    bench.run(1.0)
-    bench.open(run=0.2)
-    assert len(ears.times(STATUS)) == 2
-    assert bench.driver.checks.known(1).identity is not None
 
 
 def test_refusal_is_remembered_and_no_fault_of_the_station() -> None:
@@ -296,35 +281,11 @@ def test_station_that_is_heard_needs_no_echo() -> None:
     assert len(ears.times(ECHO)) in (3, 4)
 
 
-def test_standard_polling_needs_no_echo() -> None:
-    bench, _, (ears,) = make_bench(word(1, 'Write'), network=NETWORKS[1], period=0, run=10.0)
-    assert len(ears.times(ECHO)) <= 1
-    assert bench.driver.stations[1].last_heard == pytest.approx(bench.clock(), abs=0.1)
-
-
 def test_broadcast_is_no_station_to_be_watched() -> None:
     bench = DriverBench([word(255, 'Write')], settings=DriverSettings(processor_period=1.0))
     bench.run(10.0)
     assert bench.driver.counters.commands_sent == 0
     assert bench.driver.next_due() is None
-
-
-def test_dead_stations_take_turns_and_no_more_than_an_eighth_of_the_line() -> None:
-    alive = word(1, period=0)
-    dead = [word(2), word(3, 'Write'), word(4, 'Write')]
-    bench, plcs, _ = make_bench(alive, *dead, network=SLOW, period=10.0)
-    for plc in plcs[1:]:
-        plc.faults = InjectedFaults(silent=True)
-    bench.run_until(lambda: len(bench.listener.changes) == 3)
-    reads = len(bench.listener.times(alive))
-    bench.run(20.0)
-    cost = 20.0 / (len(bench.listener.times(alive)) - reads)
-    other, _, _ = make_bench(alive, network=SLOW, period=0, run=20.0)
-    assert cost < 1.18 * 20.0 / len(other.listener.times(alive))
-    for plc in plcs[1:]:
-        plc.faults = InjectedFaults()
-    bench.run(15.0)
-    assert sorted(bench.listener.changes[3:]) == [(2, True), (3, True), (4, True)]
 
 
 def test_dead_station_with_reads_is_not_forgotten_for_those_without() -> None:
@@ -385,13 +346,6 @@ def test_packets_are_those_of_the_processor_that_a_station_says_to_be(network: N
     assert bench.driver.readings.blocks == planned  # once, not at each answer
 
 
-def test_longer_packets_than_the_map_allows_are_not_sent() -> None:
-    row = make_mapping('N7:0', plc='SLC', length=100, processor='ML1000')
-    bench, _, _ = make_bench(row)  # it says that it is a 5/03
-    bench.run(2 * PERIOD)
-    assert [request.words for request in bench.driver.readings.blocks[0].requests] == [41, 41, 18]
-
-
 # link counters
 
 
@@ -413,14 +367,6 @@ def test_counters_are_read_once_for_each_request_and_never_else(network: Network
     assert bench.driver.checks.known(1).counters == counters
 
 
-def test_two_requests_at_once_are_one() -> None:
-    bench, _, (ears,) = make_bench(word(), run=1.0)
-    for _ in range(3):
-        bench.driver.checks.request_counters(1)
-    bench.run(1.0)
-    assert len(ears.times(COUNTERS)) == 1
-
-
 def test_counters_that_a_station_refuses_are_told_as_refused() -> None:
     bench, _, (ears,) = make_bench(word())
     ears.answer_diagnostics(lambda command: command.reply(sts=0x10))
@@ -439,25 +385,6 @@ def test_absent_station_is_not_asked_for_counters() -> None:
     bench.driver.checks.request_counters(1)
     bench.run(1.0)
     assert bench.driver.checks.known(1).no_counters == 'the station does not answer'
-    assert bench.driver.checks.counters_wanted == set()
-
-
-def test_station_that_falls_silent_ends_the_request() -> None:
-    bench, (plc,), _ = make_bench(word(), run=1.0)
-    plc.faults = InjectedFaults(silent=True)
-    bench.driver.checks.request_counters(1)
-    bench.run(5.0)
-    assert bench.driver.checks.known(1).no_counters
-    assert bench.driver.checks.counters_wanted == set()
-
-
-def test_lost_port_ends_the_request() -> None:
-    bench, _, _ = make_bench(word(), run=1.0)
-    bench.driver.checks.request_counters(1)
-    bench.lose_port()
-    assert bench.driver.checks.known(1).no_counters == 'port lost: unplugged'
-    assert bench.driver.checks.counters_wanted == set()
-    bench.driver.checks.request_counters(1)
     assert bench.driver.checks.counters_wanted == set()
 
 

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The driver against stations of the families that are not spoken to with typed commands."""
+"""The driver against stations of every family."""
 
 from abdf1_ros.driver.write import Outcome
 from abdf1_ros.settings.mapping import Mapping
@@ -20,7 +20,7 @@ from abdf1_ros.settings.network import Network
 from abdf1_ros.simulator.simulated_plc import SimulatedPlc
 import pytest
 from support.cases import for_all
-from support.driver_bench import DriverBench, store, stored
+from support.driver_bench import DriverBench, stored
 from support.mappings import make_mapping
 
 PLC2_WORDS = (('000', 512),)
@@ -28,6 +28,8 @@ PLC3_FILES = (('B10:0', 512), ('N10:0', 16), ('I:0', 16), ('O:0', 16), ('T:0.CTL
               ('C:0.CTL', 30), ('D1:0', 8), ('A1:0', 8), ('S:0', 16))
 PLC5_FILES = (('N7:0', 512), ('F8:0', 64), ('B3:0', 16), ('T4:0', 30), ('ST9:0', 84),
               ('PD10:0', 164))
+SLC_FILES = (('N7:0', 16), ('F8:0', 8), ('B3:0', 16), ('T4:0', 30), ('O:2.0', 4), ('ST12:0', 84),
+             ('L13:0', 20))
 
 # Family, access, address, length, type, values.
 VALUES: list[tuple[str, str | None, str, int, str | None, list[float] | str]] = [
@@ -47,8 +49,15 @@ VALUES: list[tuple[str, str | None, str, int, str | None, list[float] | str]] = 
     ('PLC5', 'WordRange', 'T4:2.ACC', 1, None, [77]),
     ('PLC5', 'WordRange', 'ST9:1', 1, None, 'word range'),
     ('PLC5', 'WordRange', 'PD10:1.SP', 1, None, [12.5]),
-    ('PLC5', 'WordRange', 'N7:0', 300, None, list(range(-150, 150)))]
-FILES = {'PLC2': PLC2_WORDS, 'PLC3': PLC3_FILES, 'PLC5': PLC5_FILES}
+    ('PLC5', 'WordRange', 'N7:0', 300, None, list(range(-150, 150))),
+    ('PLC5', None, 'N7:3', 2, None, [-5, 32767]), ('PLC5', None, 'F8:1', 2, None, [1.5, -0.25]),
+    ('PLC5', None, 'B3:2/14', 4, None, [1, 0, 1, 1]), ('PLC5', None, 'T4:1.PRE', 1, None, [5]),
+    ('PLC5', None, 'ST9:1', 1, None, 'Größe 7'), ('PLC5', None, 'PD10:1.KP', 2, None, [1.5, -2.0]),
+    ('SLC', None, 'N7:3', 2, None, [-5, 32767]), ('SLC', None, 'F8:1', 2, None, [1.5, -0.25]),
+    ('SLC', None, 'B3:2/14', 4, None, [1, 0, 1, 1]), ('SLC', None, 'O:2.0', 1, None, [3]),
+    ('SLC', None, 'T4:1.ACC', 1, None, [77]), ('SLC', None, 'ST12:1', 1, None, 'odd'),
+    ('SLC', None, 'L13:2', 2, None, [-70000, 2**31 - 1])]
+FILES = {'PLC2': PLC2_WORDS, 'PLC3': PLC3_FILES, 'PLC5': PLC5_FILES, 'SLC': SLC_FILES}
 
 
 @for_all('check', ['CRC', 'BCC'])
@@ -71,16 +80,6 @@ def decoded(station: SimulatedPlc, mapping: Mapping) -> list[float] | str:
     start = mapping.address.at_offset(mapping.address.offset)
     values = mapping.codec.decode(station.table.read(start, mapping.codec.words))
     return values if isinstance(values, str) else list(values)
-
-
-def test_bits_beside_those_written_stay() -> None:
-    mapping = make_mapping('020/07', 'Write', plc='PLC2', length=4)
-    bench = DriverBench([mapping])
-    station = bench.plc(1, 'PLC2', *PLC2_WORDS)
-    store(station, '020', [0xFFFF, 0xFFFF])
-    bench.run(0.1)
-    bench.write(mapping, [0, 1, 0, 1], run=0.3)
-    assert stored(station, '020', 2) == bytes.fromhex('7F FD FF FF')
 
 
 def test_common_interface_file_of_an_slc() -> None:
@@ -129,22 +128,3 @@ def test_address_that_is_not_there_fails_alone(plc: str, text: str) -> None:
     assert bench.listener.values(bad) == []
     assert bench.listener.values(good)
     assert (text if plc == 'PLC2' else str(bad.address), REFUSALS[plc]) in bench.listener.reasons
-
-
-@pytest.mark.parametrize(('plc', 'text'), [('PLC2', '1000'), ('PLC3', 'B11:0')])
-def test_write_to_an_address_that_is_not_there_is_refused(plc: str, text: str) -> None:
-    mapping = make_mapping(text, 'Write', plc=plc)
-    bench = DriverBench([mapping])
-    bench.plc(1, plc, *FILES[plc])
-    bench.write(mapping, [1], run=0.5)
-    result, = bench.listener.results
-    assert (result.outcome, result.detail) == (Outcome.FAILED, REFUSALS[plc])
-
-
-def test_each_access_speaks_in_its_own_way() -> None:
-    typed = make_mapping('N7:0')
-    words = make_mapping('N7:1', access='WordRange')
-    bench = DriverBench([typed, words])
-    store(bench.plc(1, 'PLC5', *PLC5_FILES), 'N7:0', [5, 6])
-    bench.run(0.3)
-    assert (bench.listener.values(typed)[-1], bench.listener.values(words)[-1]) == ([5], [6])

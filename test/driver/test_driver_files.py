@@ -18,63 +18,13 @@ from collections.abc import Callable
 
 from abdf1_ros.df1.packet import Packet
 from abdf1_ros.driver.write import Outcome
-from abdf1_ros.driver.writes.packets import REWRITTEN
 from abdf1_ros.pccc.data_table import DataTable
 from abdf1_ros.pccc.file_types import PlcType
 from abdf1_ros.pccc.slc import commands as slc
 from abdf1_ros.settings.mapping import Mapping
 from abdf1_ros.simulator.simulated_plc import SimulatedPlc
-import pytest
-from support.cases import for_all
-from support.driver_bench import DriverBench, simulated_plc, store, stored
+from support.driver_bench import DriverBench, store, stored
 from support.mappings import make_mapping
-
-FILES = {
-    'PLC5': (('PD10:0', 3 * 82), ('MG11:0', 2 * 56), ('BT12:0', 12), ('SC13:0', 6),
-             ('ST14:0', 84), ('A15:0', 8), ('D16:0', 8)),
-    'SLC': (('PD10:0', 69), ('MG11:0', 50), ('ST14:0', 84), ('L17:0', 8))}
-
-WRITABLE = [
-    ('PLC5', 'PD10:2.SP', 1, [42.5]), ('PLC5', 'PD10:1.KP', 3, [1.5, -2.0, 0.25]),
-    ('PLC5', 'PD10:0/MO', 1, [1]), ('PLC5', 'PD10:0.MINI', 1, [-0.5]),
-    ('PLC5', 'MG11:1/TO', 1, [1]), ('PLC5', 'BT12:1/CO', 1, [1]),
-    ('PLC5', 'SC13:1.PRE', 1, [250]), ('PLC5', 'ST14:1', 1, 'odd'),
-    ('PLC5', 'A15:1', 2, [0x4142, 0x4344]), ('PLC5', 'D16:3', 1, [0x1234]),
-    ('SLC', 'PD10:1.SPS', 3, [500, -1, 7]), ('SLC', 'PD10:2/AM', 1, [1]),
-    ('SLC', 'ST14:0', 1, 'even'), ('SLC', 'L17:1', 2, [-1, 2**31 - 1])]
-READ_ONLY = [
-    ('PLC5', 'PD10:1.PV', 3, [1.0, 2.0, 3.0]), ('PLC5', 'PD10:1.50', 4, [1, 2, 3, 4]),
-    ('PLC5', 'PD10:0/INI', 1, [1]), ('PLC5', 'MG11:1.ERR', 3, [-1, 2, 3]),
-    ('PLC5', 'MG11:0', 112, list(range(112))), ('PLC5', 'BT12:1.RLEN', 5, [1, 2, 3, 4, 5]),
-    ('PLC5', 'SC13:1.TIM', 1, [9]), ('PLC5', 'SC13:0/FS', 1, [1]),
-    ('SLC', 'PD10:1.SPV', 1, [77]), ('SLC', 'PD10:0', 69, list(range(69))),
-    ('SLC', 'MG11:1/DN', 1, [1]), ('SLC', 'MG11:1.ERR', 1, [23])]
-
-
-@for_all(('plc', 'text', 'length', 'values'), WRITABLE + READ_ONLY)
-def test_value_of_each_file_type_is_read(
-        plc: str, text: str, length: int, values: list[float] | str) -> None:
-    mapping = make_mapping(text, plc=plc, length=length)
-    bench = DriverBench([mapping])
-    store(bench.plc(1, plc, *FILES[plc]), text, values)
-    bench.run_until(lambda: bool(bench.listener.reads))
-    assert bench.listener.values(mapping) == [values]
-
-
-@pytest.mark.parametrize('plc, text, length, values', WRITABLE)
-def test_value_is_written_and_nothing_else(plc: str, text: str, length: int,
-                                           values: list[float] | str) -> None:
-    mapping = make_mapping(text, 'ReadWrite', plc=plc, length=length)
-    bench = DriverBench([mapping])
-    made = bench.plc(1, plc, *FILES[plc])
-    expected = simulated_plc(1, plc, bench.clock, *FILES[plc])
-    store(expected, text, values)
-    bench.run(0.05)
-    bench.write(mapping, values, run=0.5)
-    assert bench.listener.outcomes() == [Outcome.WRITTEN]
-    assert bench.listener.values(mapping)[-1] == values
-    for area, words in FILES[plc]:
-        assert stored(made, area, words) == stored(expected, area, words)
 
 
 def test_members_of_one_pid_come_together_and_right() -> None:
@@ -82,7 +32,7 @@ def test_members_of_one_pid_come_together_and_right() -> None:
     mappings = [make_mapping(f'PD10:1.{name}') for name in names]
     mappings.append(make_mapping('PD10:1/SPOR'))
     bench = DriverBench(mappings)
-    plc = bench.plc(1, 'PLC5', *FILES['PLC5'])
+    plc = bench.plc(1, 'PLC5', ('PD10:0', 3 * 82))
     for number, name in enumerate(names):
         store(plc, f'PD10:1.{name}', [number + 0.5])
     store(plc, 'PD10:1/SPOR', [1])
@@ -143,19 +93,6 @@ def test_packets_of_a_5_03_are_too_long_for_an_old_slc_and_become_shorter() -> N
     assert bench.driver.stations[1].remote_errors == 2  # 100 words, then 50
 
 
-def test_bit_of_an_old_slc_is_written_back_in_its_word() -> None:
-    mapping = make_mapping('B3:1/4', 'ReadWrite', plc='SLC', processor='5/01')
-    bench, plc = old_bench(mapping)
-    store(plc, 'B3:1', [0x8001])
-    bench.write(mapping, [1], run=0.5)
-    result, = bench.listener.results
-    assert str(result) == f'written: {REWRITTEN}'
-    assert stored(plc, 'B3:1') == bytes.fromhex('11 80')
-    bench.write(mapping, [0], run=0.5)
-    assert stored(plc, 'B3:1') == bytes.fromhex('01 80')
-    assert bench.listener.values(mapping)[-1] == [0]
-
-
 def test_change_between_reading_and_writing_back_is_lost_as_the_result_says() -> None:
     mapping = make_mapping('B3:1/4', 'Write', plc='SLC', processor='5/01')
     bench, plc = old_bench(mapping)
@@ -168,31 +105,6 @@ def test_change_between_reading_and_writing_back_is_lost_as_the_result_says() ->
     bench.write(mapping, [1], run=0.5)
     assert str(bench.listener.results[0]).endswith('a change that the PLC made in between is lost')
     assert stored(plc, 'B3:1') == bytes.fromhex('10 00')
-
-
-@pytest.mark.parametrize(('lost', 'outcome', 'words'), [
-    (slc.LOGICAL_READ, Outcome.NOT_SENT, '00 00'),
-    (slc.LOGICAL_WRITE, Outcome.UNKNOWN, '10 00')])  # it was written, in this case
-def test_reply_lost_while_reading_is_not_written_and_while_writing_back_unknown(
-        lost: int, outcome: Outcome, words: str) -> None:
-    mapping = make_mapping('B3:1/4', 'Write', plc='SLC', processor='ML1000')
-    bench, plc = old_bench(mapping)
-
-    def fall_silent(function: int) -> None:
-        plc.faults.silent = function == lost
-
-    plc.meanwhile = fall_silent
-    bench.write(mapping, [1], run=5.0)
-    assert bench.listener.outcomes() == [outcome]
-    assert stored(plc, 'B3:1') == bytes.fromhex(words)
-
-
-def test_bit_refused_by_a_processor_that_has_masked_writes_is_a_failure() -> None:
-    mapping = make_mapping('B3:1/4', 'Write', plc='SLC', processor='5/03')
-    bench, plc = old_bench(mapping)
-    bench.write(mapping, [1], run=0.5)
-    assert bench.listener.outcomes() == [Outcome.FAILED]
-    assert stored(plc, 'B3:1') == bytes(2)
 
 
 def test_flat_io_is_read_and_written_through_the_slots() -> None:
@@ -211,12 +123,3 @@ def test_flat_io_is_read_and_written_through_the_slots() -> None:
     assert stored(plc, 'O:4.0') == bytes.fromhex('20 00')
     # What is flat is never read with what is a slot's.
     assert len(bench.driver.readings.blocks) == 3
-
-
-def test_flat_io_is_never_tried_the_other_way() -> None:
-    mapping = make_mapping('I:9', plc='SLC', access='Flat')
-    bench = DriverBench([mapping])
-    bench.plc(1, 'SLC', ('I:9.0', 1))
-    bench.run(1.0)
-    assert bench.listener.values(mapping) == []
-    assert bench.listener.reasons == [('I:9', 'STS 50: address not there, or memory protected')]

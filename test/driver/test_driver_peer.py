@@ -32,7 +32,6 @@ from abdf1_ros.pccc.file_types import PlcType
 from abdf1_ros.pccc.identity import Mode
 from abdf1_ros.settings.mapping import Mapping
 from abdf1_ros.settings.network import Network
-from abdf1_ros.settings.scaling import Scaling
 import pytest
 from support.driver_bench import Recorder, simulated_plc, store, stored
 from support.mappings import make_mapping
@@ -164,15 +163,6 @@ def test_writes_to_a_peer_are_confirmed_and_stored(family: str, outstanding: int
     assert bench.listener.values(words)[-1] == [1, -2, 16, 0x1010]
 
 
-def test_write_that_the_plc_refuses() -> None:
-    mapping = make_mapping('N20:0', 'Write')
-    bench = Bench([mapping])
-    bench.start()
-    bench.write(mapping, [1], run=1.0)
-    assert bench.listener.outcomes() == [Outcome.FAILED]
-    assert bench.driver.counters.error_messages_received == 1
-
-
 @pytest.mark.parametrize('family', ['PLC3', 'PLC5', 'SLC'])
 @pytest.mark.parametrize('check', ['CRC', 'BCC'])
 def test_message_of_the_plc_appears_at_once(family: str, check: str) -> None:
@@ -224,32 +214,6 @@ def test_what_ros_writes_is_read_by_the_plc(family: str) -> None:
     assert bench.plc_reads('N7:54', 1)[0] != 0
 
 
-def test_values_for_served_words_are_checked() -> None:
-    mapping = serve_row('N7:50', length=2, minimum=0, maximum=9)
-    bench = Bench([mapping])
-    bench.start()
-    for values in ([1], [1, 10], [-1, 1], [1, 2, 3]):
-        bench.write(mapping, values)
-    assert bench.listener.outcomes() == [Outcome.REFUSED] * 4
-    bench.write(mapping, [0, 9], run=0.1)
-    assert bench.listener.outcomes()[-1] is Outcome.WRITTEN
-    assert bench.plc_reads('N7:50', 2) == (0, b'\0\0\x09\0')
-
-
-@pytest.mark.parametrize('family', ['PLC3', 'PLC5', 'SLC'])
-def test_served_values_are_scaled_both_ways_and_keep_their_limits(family: str) -> None:
-    mapping = serve_row('N7:50', family, 2, scaling=Scaling(0.5, -10.0), maximum=100.0)
-    bench = Bench([mapping], family=family)
-    bench.start()
-    bench.message('N7:50', 1, -1)
-    bench.run(0.5)
-    assert bench.listener.values(mapping) == [[-9.5, -10.5]]
-    bench.write(mapping, [100.0, -10.2])
-    assert bench.plc_reads('N7:50', 2) == (0, b'\xdc\0\0\0')
-    bench.write(mapping, [100.5, 0.0])
-    assert bench.listener.outcomes() == [Outcome.WRITTEN, Outcome.REFUSED]
-
-
 @pytest.mark.parametrize('family', ['PLC5', 'SLC'])
 @pytest.mark.parametrize('outstanding', [1, 3])
 def test_nothing_is_lost_or_mixed_up_when_everything_happens_at_once(
@@ -284,18 +248,6 @@ def test_nothing_is_lost_or_mixed_up_when_everything_happens_at_once(
     assert counters.enq_retries == counters.nak_retries == counters.command_timeouts == 0
 
 
-def test_more_outstanding_commands_do_not_mix_up_blocks() -> None:
-    rows = [make_mapping(f'N7:{20 * n}', length=2, period=0) for n in range(12)]
-    bench = Bench(rows, outstanding=3, first_tns=0xFFF0)
-    for number in range(12):
-        store(bench.plc, f'N7:{20 * number}', [number, 100 + number])
-    bench.start(run=5.0)
-    for number, mapping in enumerate(rows):
-        values = bench.listener.values(mapping)
-        assert len(values) > 5
-        assert {tuple(entry) for entry in values} == {(number, 100 + number)}
-
-
 def test_dead_line_fails_reads_and_writes_and_all_goes_on_when_it_is_back() -> None:
     read, write = make_mapping(), make_mapping('N7:5', 'Write')
     pushed = serve_row('N7:50')
@@ -316,18 +268,6 @@ def test_dead_line_fails_reads_and_writes_and_all_goes_on_when_it_is_back() -> N
     bench.message('N7:50', 9)
     bench.run(1.0)
     assert bench.listener.values(pushed) == [[9]]
-
-
-def test_served_words_survive_a_lost_port() -> None:
-    words = serve_row('N7:50', length=2)
-    bench = Bench([words])
-    bench.start()
-    bench.write(words, [1, 2], run=0.1)
-    bench.driver.machine.stop()
-    bench.write(words, [3, 4])
-    assert bench.listener.outcomes() == [Outcome.WRITTEN, Outcome.REFUSED]
-    bench.start(run=0.1)
-    assert bench.plc_reads('N7:50', 2) == (0, b'\1\0\2\0')
 
 
 def test_our_own_station_is_no_station_of_the_line() -> None:
@@ -389,15 +329,3 @@ def test_processor_and_counters_of_the_other_end(outstanding: int) -> None:
     assert identity.mode is Mode.REMOTE_PROGRAM
     assert int(health.known(PLC).counters['messages sent']) > 0
     assert health.counters_wanted == set()
-
-
-def test_peer_that_is_only_written_to_is_watched() -> None:
-    bench = Bench([make_mapping('N7:1', 'Write')])
-    bench.start(run=9.0)
-    assert bench.driver.counters.commands_sent == 5
-    bench.line.noise = Noise(lost=1.0)
-    bench.run(6.0)
-    assert bench.listener.changes == [(PLC, False)]
-    bench.line.noise = QUIET
-    bench.run(6.0)
-    assert bench.listener.changes == [(PLC, False), (PLC, True)]

@@ -92,17 +92,6 @@ def test_read_of_several_commands_is_put_together_in_order_and_others_are_read_b
     assert len(bench.listener.values(other)) > 5
 
 
-def test_write_is_confirmed_in_standard_polling() -> None:
-    words = make_mapping('N7:0', 'ReadWrite', length=2)
-    bench = DriverBench([words], network=STANDARD)
-    plc = bench.plc(1, 'PLC5', ('N7:0', 2))
-    bench.run(0.5)
-    bench.write(words, [7, 8], run=0.5)
-    assert bench.listener.outcomes() == [Outcome.WRITTEN]
-    assert stored(plc, 'N7:0', 2) == b'\7\0\x08\0'
-    assert bench.listener.values(words)[-1] == [7, 8]
-
-
 def test_station_that_goes_and_comes_again_has_its_reads_released_at_once() -> None:
     mappings = [make_mapping(f'N{number}:0', station=station)
                 for station in (1, 2) for number in (7, 9)]
@@ -123,14 +112,6 @@ def test_station_that_goes_and_comes_again_has_its_reads_released_at_once() -> N
         assert back <= bench.listener.times(mapping)[-1]
 
 
-def test_write_to_a_dead_station_is_not_sent() -> None:
-    words = make_mapping('N7:0', 'ReadWrite')
-    bench = DriverBench([words], network=STANDARD)
-    bench.run(2.0)
-    bench.write(words, [7], run=1.0)
-    assert bench.listener.outcomes() == [Outcome.NOT_SENT]
-
-
 def test_mapped_station_that_is_in_no_list_is_polled_all_the_same() -> None:
     read = make_mapping('N7:0', station=2, period=0)
     settings = DriverSettings(polling=PollingSettings((1,), priority=(3,)))
@@ -139,21 +120,6 @@ def test_mapped_station_that_is_in_no_list_is_polled_all_the_same() -> None:
         bench.plc(station, 'PLC5', *FILES)
     bench.run(2.0)
     assert len(bench.listener.values(read)) > 20
-
-
-@BOTH
-def test_lost_port_leaves_nothing_without_a_result(polling: str) -> None:
-    words = make_mapping('N7:0', 'ReadWrite')
-    bench = DriverBench([words], network=network(polling))
-    plc = bench.plc(1, 'PLC5', *FILES)
-    plc.faults.delay = 0.3
-    bench.run(0.5)
-    bench.write(words, [7], run=0.2)
-    bench.lose_port()
-    assert len(bench.listener.results) == 1
-    plc.faults = InjectedFaults()
-    bench.open(run=1.0)
-    assert bench.driver.points[words].error is None
 
 
 @BOTH
@@ -171,17 +137,6 @@ def test_broadcast_row_is_written_to_every_station(polling: str) -> None:
     assert bench.listener.values(read)[-1] == [7]
     assert [station.number for station in bench.driver.stations] == [1]
     assert bench.listener.numbers() == {2523}
-
-
-@BOTH
-def test_broadcast_is_written_where_nobody_is_polled(polling: str) -> None:
-    everybody = make_mapping('N7:0', 'Write', station=BROADCAST)
-    bench = DriverBench([everybody], network=network(polling))
-    plc = bench.plc(1, 'PLC5', *FILES)
-    bench.run(0.5)
-    bench.write(everybody, [7], run=0.5)
-    assert bench.listener.outcomes() == [Outcome.BROADCAST]
-    assert stored(plc, 'N7:0') == b'\7\0'
 
 
 @pytest.mark.parametrize(('command', 'good'), [

@@ -19,7 +19,6 @@ from __future__ import annotations
 from dataclasses import replace
 from random import Random
 
-from abdf1_ros.driver.write import Outcome
 from abdf1_ros.plan.bounds import Times
 from abdf1_ros.plan.report import make_report
 from abdf1_ros.settings.heartbeats import Fallback, Heartbeat, PublishWhile
@@ -57,18 +56,6 @@ class RadioBench(DriverBench):
         return b'' if random.random() < self.loss else data
 
 
-@pytest.mark.parametrize('loss', [0.0, 0.2])
-def test_values_come_over_the_air(loss: float) -> None:
-    bench = RadioBench()
-    bench.loss = loss
-    for number, value in ((FIRST, 11), (SECOND, 22)):
-        store(bench.plcs[number], 'N7:0', [value])
-    bench.run(60.0)
-    for row, value in zip(bench.read, (11, 22), strict=True):
-        assert len(bench.listener.values(row)) >= 20
-        assert {tuple(values) for values in bench.listener.values(row)} == {(value,)}
-
-
 def test_radios_that_avoid_collisions_carry_several_commands_as_forecast() -> None:
     cycles = []
     for several in (False, True):
@@ -103,15 +90,6 @@ def test_guarded_value_ends_with_the_program_of_its_plc(several: bool, loss: flo
     assert published >= 10
     longest = network.line_mode.longest_transaction(network.line, 0.0)
     assert bench.listener.times(level)[-1] <= stopped + 3.0 + longest
-
-
-def test_write_is_confirmed_by_its_reply() -> None:
-    bench = RadioBench()
-    bench.run(5.0)
-    bench.write(bench.speed, [5])
-    bench.run(0.9)
-    assert bench.listener.outcomes()[-1] is Outcome.WRITTEN
-    assert stored(bench.plcs[FIRST], 'N10:1') == b'\5\0'
 
 
 def test_fallback_comes_within_the_bound_that_is_printed() -> None:

@@ -17,7 +17,7 @@
 from collections.abc import Sequence
 
 from abdf1_ros.df1.machine import LineTiming, Machine
-from abdf1_ros.df1.packet import BROADCAST, Packet
+from abdf1_ros.df1.packet import Packet
 from abdf1_ros.df1.settings import LinkSettings, PollingSettings
 from abdf1_ros.df1.slave import HalfDuplexSlave, multidrop
 from abdf1_ros.driver.driver import Driver
@@ -112,15 +112,6 @@ def test_words_are_served_in_both_directions(check: str) -> None:
     assert [station.number for station in bench.driver.stations] == []
 
 
-def test_served_words_are_stored_although_the_line_is_never_still() -> None:
-    words = serve_row('N7:50')
-    bench = Bench([words], polled=(PLC,))
-    bench.run(1.0)
-    bench.driver.write([words], [5], bench.clock())  # nobody wakes the machine
-    bench.run(0.5)
-    assert bench.listener.outcomes() == [Outcome.WRITTEN]
-
-
 def test_reads_and_writes_go_by_way_of_the_master() -> None:
     read = make_mapping('N7:0', station=PLC, plc='SLC', length=4)
     write = make_mapping('N7:10', 'Write', station=PLC, plc='SLC', length=2)
@@ -137,24 +128,6 @@ def test_reads_and_writes_go_by_way_of_the_master() -> None:
     counters = bench.driver.counters
     assert 0 <= counters.commands_sent - counters.replies_received <= 1
     assert counters.nak_retries == counters.stale_messages == 0
-
-
-def test_word_written_to_the_master_itself() -> None:
-    write = make_mapping('N7:10', 'Write', station=MASTER, plc='SLC')
-    bench = Bench([write])
-    bench.write(write, [7], run=0.5)
-    assert bench.listener.outcomes() == [Outcome.WRITTEN]
-    assert [packet.src for packet in bench.master.served] == [US]
-
-
-def test_broadcast_of_ours_reaches_everybody_and_ourselves() -> None:
-    write = make_mapping('N7:10', 'Write', station=BROADCAST, plc='SLC')
-    words = serve_row('N7:10')
-    bench = Bench([write, words])
-    bench.write(write, [7], run=0.5)
-    assert bench.listener.outcomes() == [Outcome.BROADCAST]
-    assert stored(bench.plc, 'N7:10') == b'\7\0'
-    assert bench.listener.values(words) == [[7]]  # we hear it like everybody else
 
 
 def test_write_that_is_never_polled_for_expires() -> None:
@@ -202,19 +175,6 @@ def test_settings_reach_the_slave() -> None:
     assert bench.driver.counters.polls_received > 0
     assert bench.driver.counters.eots_sent == 0
     assert bench.master.changes == [(US, False)]
-
-
-def test_processor_of_a_station_behind_the_master() -> None:
-    bench = Bench([make_mapping('N7:0', station=PLC, plc='SLC')],
-                  DriverSettings(processor_period=2.0))
-    bench.run(1.0)
-    assert bench.driver.checks.known(PLC).processor == 'SLC 5/03 series A revision 1, REM RUN'
-    bench.plc.processor.setting = Setting.TEST
-    bench.driver.checks.request_counters(PLC)
-    bench.run(3.0)
-    known = bench.driver.checks.known(PLC)
-    assert known.processor == 'SLC 5/03 series A revision 1, REM TEST'
-    assert int(known.counters['polls received']) > 0
 
 
 def test_master_reads_and_resets_the_counters_that_we_show() -> None:
@@ -311,17 +271,6 @@ def test_rules_3_and_9_nothing_old_goes_out_when_the_master_polls_again() -> Non
     assert told == [('beat', 0), ('speed', 7)]  # the executor does not run
     bench.is_alive = True
     assert bench.told(1.0)[:2] == [('beat', 1), ('beat', 2)]
-
-
-def test_rule_5_as_a_slave() -> None:
-    bench = Interlocked()
-    bench.told(1.0)
-    bench.write(bench.speed, [5])
-    bench.told(0.3)
-    bench.driver.interlocks.wind_down()
-    bench.line.wake(bench.driver.machine)
-    assert bench.told(1.0) == [('beat', 0), ('speed', 7)]
-    assert bench.driver.interlocks.is_over
 
 
 def test_rule_8_change_to_run_is_seen_by_a_slave() -> None:

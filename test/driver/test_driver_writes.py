@@ -21,7 +21,6 @@ import math
 import sys
 import threading
 
-from abdf1_ros.df1 import frames
 from abdf1_ros.df1.packet import Packet
 from abdf1_ros.df1.settings import LinkSettings
 from abdf1_ros.df1.slave import HalfDuplexSlave
@@ -58,74 +57,6 @@ class Executed:
         if command.cmd == 0x0F and not reply.data:
             self.writes.append(command)
         return reply
-
-
-class FirstAckLost:
-    """A line that loses one DLE ACK."""
-
-    def __init__(self) -> None:
-        self.is_lost = False
-
-    def __call__(self, data: bytes) -> bytes:
-        """Return what comes through."""
-        if data != frames.ACK or self.is_lost:
-            return data
-        self.is_lost = True
-        return b''
-
-
-@pytest.mark.parametrize(('is_watchful', 'times'), [(True, 1), (False, 2)])
-def test_repeated_write_is_executed_once_by_a_slave_that_detects_duplicates(
-        is_watchful: bool, times: int) -> None:
-    mapping = make_mapping('N7:0', 'Write')
-    bench, plc = bench_of(mapping)
-    executed = Executed(plc, is_watchful)
-    bench.far.say = FirstAckLost()
-    bench.write(mapping, [7], run=2.0)
-    assert [result.outcome for result in bench.listener.results] == [Outcome.WRITTEN]
-    assert len(executed.writes) == times
-    assert len(set(executed.writes)) == 1  # the same TNS and the same values
-    assert stored(plc, 'N7:0') == b'\7\0'
-
-
-@pytest.mark.parametrize(('text', 'outcomes'), [
-    ('N7:0', [Outcome.SUPERSEDED, Outcome.WRITTEN, Outcome.WRITTEN]),
-    ('B3:0/0', [Outcome.WRITTEN] * 3)])  # each bit is a command
-def test_of_two_writers_the_last_wins_and_both_get_results(
-        text: str, outcomes: list[Outcome]) -> None:
-    mapping = make_mapping(text, 'ReadWrite', period=60_000)
-    bench, plc = bench_of(mapping)
-    for value in (1, 0, 1):  # the first has gone out when the others come
-        bench.write(mapping, [value])
-    bench.run(2.0)
-    assert sorted(bench.listener.outcomes(), key=str) == sorted(outcomes, key=str)
-    assert [result.value for result in bench.listener.results
-            if result.outcome is Outcome.WRITTEN][-1] == '[1]'
-    assert stored(plc, text) == b'\1\0'
-    assert bench.listener.values(mapping)[-1] == [1]
-
-
-def test_packets_of_two_long_writes_do_not_mix() -> None:
-    mapping = make_mapping('N10:0', 'ReadWrite', length=250, period=60_000)
-    bench = DriverBench([mapping])
-    plc = bench.plc(1, 'PLC5', ('N10:0', 250))
-    bench.run(1.0)
-    executed = Executed(plc)
-    bench.write(mapping, [1] * 250)
-    bench.write(mapping, [2] * 250, run=2.0)
-    assert bench.listener.outcomes() == [Outcome.WRITTEN] * 2
-    assert [packet.data[-2] for packet in executed.writes] == [1, 1, 1, 2, 2, 2]
-    assert stored(plc, 'N10:0', 250) == b'\2\0' * 250
-
-
-def test_two_rows_that_write_the_same_words_both_write() -> None:
-    one, other = make_mapping('N7:0', 'Write', tag='a'), make_mapping('N7:0', 'Write', tag='b')
-    bench, plc = bench_of(one, other)
-    bench.write(one, [1])
-    bench.write(other, [2], run=2.0)
-    assert [(result.mapping.tag, result.outcome) for result in bench.listener.results] == [
-        ('a', Outcome.WRITTEN), ('b', Outcome.WRITTEN)]
-    assert stored(plc, 'N7:0') == b'\2\0'
 
 
 REFUSED: list[tuple[str, Sequence[float], str]] = [
@@ -202,35 +133,6 @@ def test_every_write_has_one_result_while_the_port_comes_and_goes() -> None:
     bench.run(10.0)
     assert Counter(result.mapping for result in bench.listener.results) == dict.fromkeys(
         rows, count)
-
-
-def test_read_only_refuses_before_the_line() -> None:
-    mapping = make_mapping('N7:0', 'ReadWrite')
-    bench, plc = bench_of(mapping, read_only=True)
-    executed = Executed(plc)
-    bench.write(mapping, [1], run=2.0)
-    assert [str(result) for result in bench.listener.results] == [
-        'not written: refused: this node is read_only']
-    assert executed.writes == []
-
-
-def test_nothing_that_waited_survives_an_outage() -> None:
-    words, bits = make_mapping('N7:0', 'ReadWrite'), make_mapping('B3:0/0', 'ReadWrite')
-    bench, plc = bench_of(words, bits)
-    executed = Executed(plc)
-    plc.faults.silent = True
-    for value in (1, 2, 3):
-        bench.write(words, [value])
-        bench.write(bits, [value % 2])
-    bench.run(30.0)
-    assert len(bench.listener.results) == 6
-    assert set(bench.listener.outcomes()) <= {
-        Outcome.UNKNOWN, Outcome.NOT_SENT, Outcome.SUPERSEDED}
-    plc.faults.silent = False
-    bench.run(30.0)
-    assert bench.driver.stations[1].active
-    assert executed.writes == []
-    assert len(bench.listener.results) == 6
 
 
 @pytest.mark.parametrize('polling', POLLING_MODES)

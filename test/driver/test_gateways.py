@@ -16,14 +16,12 @@
 
 from collections.abc import Callable
 from functools import partial
-from random import Random
 
 from abdf1_ros.df1 import frames
 from abdf1_ros.df1.checksum import Checksum
 from abdf1_ros.df1.frames import Duplex, Frame, FrameDecoder, Poll, Symbol
 from abdf1_ros.df1.packet import Packet
 from abdf1_ros.driver.settings import DriverSettings
-from abdf1_ros.driver.write import Outcome
 from abdf1_ros.settings.heartbeats import Fallback, Heartbeat
 from abdf1_ros.settings.network import Network
 from abdf1_ros.simulator.gateway import SimulatedGateway
@@ -67,35 +65,6 @@ class Bench(DriverBench):
             elif isinstance(symbol, Frame):
                 self.asked.append((symbol.station, Packet.decode(symbol.data).dst))
         return data
-
-
-@pytest.mark.parametrize('polling', POLLING)
-def test_both_are_read_and_told_apart(polling: str) -> None:
-    bench = Bench(polling)
-    bench.run(1.0)
-    values = bench.listener.values
-    assert len(values(bench.first)) >= 8
-    assert {tuple(entry) for entry in values(bench.first)} == {(11, 0)}
-    assert {tuple(entry) for entry in values(bench.second)} == {(22,)}
-    assert {tuple(entry) for entry in values(bench.third)} == {(33,)}
-    assert set(bench.polled) == {GATEWAY, DIRECT}
-    assert set(bench.asked) >= {(GATEWAY, FIRST), (GATEWAY, SECOND), (DIRECT, DIRECT)}
-    assert all(link == (GATEWAY if dst in (FIRST, SECOND) else dst) for link, dst in bench.asked)
-    assert bench.listener.numbers() == {2523}
-    assert [station.number for station in bench.driver.stations] == [
-        FIRST, SECOND, DIRECT, GATEWAY]
-    assert bench.driver.stations[FIRST].replies >= 8
-
-
-@pytest.mark.parametrize('polling', POLLING)
-def test_write_reaches_the_one_it_is_for(polling: str) -> None:
-    bench = Bench(polling)
-    bench.run(0.2)
-    bench.write(bench.second, [77], run=0.5)
-    assert bench.listener.outcomes() == [Outcome.WRITTEN]
-    assert stored(bench.plcs[1], 'N7:0') == b'\x4D\0'
-    assert stored(bench.plcs[0], 'N7:0') == b'\x0B\0'
-    assert bench.listener.values(bench.second)[-1] == [77]
 
 
 @pytest.mark.parametrize('polling', POLLING)
@@ -166,30 +135,6 @@ def test_gateway_that_takes_long_to_say_so_does_not_take_the_line(polling: str) 
     bench.gateway.handle = answer  # type: ignore[method-assign]
     bench.run(10.0)
     assert bench.listener.values(bench.second)
-
-
-@pytest.mark.parametrize('polling', POLLING)
-@pytest.mark.parametrize('sts', [0x01, 0x0F])
-def test_gateway_that_says_no_to_every_second_command_loses_half_of_them(
-        polling: str, sts: int) -> None:
-    bench = Bench(polling)
-    for plc in bench.plcs:
-        plc.serve = partial(_refuse_half, Random(plc.station), sts,  # type: ignore[method-assign]
-                            plc.serve)
-    bench.run(2.0)
-    bench.listener.reads.clear()
-    for number in range(100):
-        bench.write(bench.second, [number], run=0.3)
-    assert len(bench.listener.values(bench.first)) > 0.4 * 300
-    assert len(bench.listener.values(bench.second)) > 0.4 * 300
-    assert len(bench.listener.values(bench.third)) > 0.95 * 300
-    assert bench.listener.outcomes().count(Outcome.WRITTEN) > 40
-    assert bench.listener.outcomes().count(Outcome.NOT_SENT) <= 10
-
-
-def _refuse_half(dice: Random, sts: int, serve: Callable[[Packet], Packet],
-                 command: Packet) -> Packet:
-    return command.reply(sts=sts) if dice.random() < 0.5 else serve(command)
 
 
 class OneByOne(DriverBench):

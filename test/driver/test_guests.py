@@ -17,7 +17,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from itertools import pairwise
 
 from abdf1_ros.df1.packet import Packet
 from abdf1_ros.driver.guest_words import written_extents
@@ -61,14 +60,6 @@ def test_reply_of_the_plc_comes_back_with_the_numbers_of_the_guest() -> None:
     (_, reply), = program.replies
     assert reply == command.reply(b'\x10\x10')
     assert program.guest.slowest < 0.3
-
-
-def test_error_of_the_plc_is_handed_on() -> None:
-    bench = bench_of()
-    program = Program(bench)
-    program.ask(bytes.fromhex('A2 02 63 89 00 00'))
-    bench.run(1.0)
-    assert program.statuses == [0x10]
 
 
 @for_all('entry', [
@@ -118,22 +109,6 @@ def test_a_write_of_a_guest_is_read_again_at_once(kind: str, address: str, write
     assert stored(plc, address) == b'\x34\x12'
     assert bench.listener.values(mapping)[-1] == [0x1234]
     assert wrote == [(1, [mapping.extent])]
-
-
-@pytest.mark.parametrize(('kind', 'address', 'write', 'read', 'expected'), [
-    ('SLC', 'N7:0', WRITE_N7, READ_N7, '34 12'),
-    ('PLC5', 'N20:0', WRITE_N20, bytes.fromhex('68 00 00 01 00 06 14 00 01 00'),
-     '93 09 42 34 12')])
-def test_guest_reads_back_what_it_has_written(
-        kind: str, address: str, write: bytes, read: bytes, expected: str) -> None:
-    bench = DriverBench([make_mapping(address, station=1, plc=kind, period=10000)])
-    bench.plc(1, kind, (address, 20))
-    program = Program(bench, ShareAccess.WRITE)
-    program.ask(write)
-    bench.run(0.5)
-    program.ask(read)
-    bench.run(0.5)
-    assert program.replies[-1][1].data.hex(' ') == expected
 
 
 @for_all('entry', [
@@ -216,35 +191,6 @@ def test_guests_of_polled_stations_get_no_more_than_a_quarter() -> None:
     run(bench, 10.0)
     total = bench.driver.tasks.transactions - before
     assert 0.1 * total < sum(len(program.replies) for program in guests) < 0.26 * total
-
-
-def test_heartbeats_go_before_guests() -> None:
-    beat = make_mapping('N10:0', 'Heartbeat', plc='SLC', period=200, heartbeat=Heartbeat())
-    rows = [make_mapping(f'N{20 + row}:0', plc='SLC', period=1) for row in range(6)]
-    bench = DriverBench([beat, *rows], network=Network(baud=19200, timeout=200))
-    plc = bench.plc(1, 'SLC', ('N10:0', 4), *((f'N{20 + row}:0', 4) for row in range(6)))
-    for number in range(10):
-        Program(bench, src=20 + number).keep_asking(READ_N7)
-    flood = Program(bench)
-    changes, last = [], b''
-    for _ in range(2000):
-        bench.driver.interlocks.executor_ran(bench.clock())
-        flood.ask(READ_N7)
-        bench.run(0.005)
-        if (now := stored(plc, 'N10:0')) != last:
-            changes.append(bench.clock())
-            last = now
-    # The first 0 stands for half a second.
-    assert max(later - before for before, later in pairwise(changes[2:])) < 0.35
-    assert len(changes) > 40
-
-
-def test_idle_line_is_the_guests() -> None:
-    bench = bench_of(rows=1, period=10000)
-    program = Program(bench)
-    program.keep_asking(READ_N7)
-    run(bench, 5.0)
-    assert len(program.replies) > 50
 
 
 @pytest.mark.parametrize('how_many', [18, 50])

@@ -258,17 +258,6 @@ def test_rule_2_station_that_is_back_begins_with_0() -> None:
     assert cell.written('N10:0', since)[:3] == [0, 1, 2]
 
 
-def test_rule_2_port_that_is_back_begins_with_0() -> None:
-    cell = Cell(beat_row(), speed_row(), run=2.0)
-    cell.bench.lose_port()
-    cell.run(1.0)
-    since = cell.now
-    cell.bench.open()
-    cell.run(1.0)
-    assert cell.written('N10:0', since)[:3] == [0, 1, 2]
-    assert cell.results() == [START, RETURN]
-
-
 @pytest.mark.parametrize('period', [200, 700])
 def test_rule_2_the_0_of_a_first_contact_stands_for_a_period_and_half_a_second(
         period: int) -> None:
@@ -474,11 +463,6 @@ def test_rule_4_inactive_station_is_not_probed_with_heartbeats() -> None:
     sent = cell.bench.driver.counters.commands_sent
     cell.run(30.0)
     assert cell.bench.driver.counters.commands_sent == sent
-
-
-def test_rule_4_heartbeats_give_no_results() -> None:
-    cell = Cell(beat_row(), run=3.0)
-    assert cell.results() == []
 
 
 def test_rule_5_orderly_end_is_0_then_the_fallbacks() -> None:
@@ -813,15 +797,6 @@ def test_rule_7_message_refreshes_from_its_own_time_when_it_is_confirmed() -> No
     assert cell.results() == [START, 'written', TIMEOUT]
 
 
-def test_rule_7_refused_messages_do_not_keep_an_output_alive() -> None:
-    speed = make_mapping('N7:0', 'Write', tag='speed', fallback=FALLBACK, maximum=10.0)
-    cell = Cell(speed, run=1.0)
-    cell.publish(speed, 3, run=0.1)
-    cell.publish(speed, 99, times=20, run=2.0)
-    assert cell.word('N7:0') == 7
-    assert TIMEOUT in cell.results()
-
-
 @pytest.mark.parametrize('gap', [0.1, 0.002])  # s; slower, and faster, than transactions are
 def test_rule_7_messages_that_the_plc_refuses_do_not_keep_an_output_alive(gap: float) -> None:
     cell, speed = speed_cell()
@@ -868,17 +843,6 @@ def test_rule_8_change_to_run_is_a_first_contact() -> None:
     after = [(name, value) for when, name, value in cell.writes if when >= since]
     at = after.index(('N10:0', 0))
     assert after[at:at + 3] == [('N10:0', 0), ('N7:0', 7), ('N10:0', 1)]
-    assert cell.results()[-1] == RUN
-
-
-def test_rule_8_cleared_fault_is_a_change_to_run() -> None:
-    speed = speed_row(Fallback((7,), 60_000))
-    cell = Cell(beat_row(), speed, run=1.0)
-    cell.publish(speed, 3, run=1.0)
-    running = Identity('SLC', 'SLC 5/03', mode=Mode.RUN, mode_text='RUN')
-    for identity in (running, replace(running, faults=('bad RAM',)), running):
-        cell.bench.driver._station_told(1, identity, cell.now)
-    cell.run(1.0)
     assert cell.results()[-1] == RUN
 
 
@@ -939,20 +903,6 @@ def test_rule_8_message_that_is_lost_with_the_port_is_not_waited_for() -> None:
     assert cell.word('N7:0') == 7
 
 
-def test_rule_8_message_that_stands_is_not_written_over() -> None:
-    cell, speed = speed_cell()
-    cell.publish(speed, 3, times=200, run=19.0)
-    assert cell.written('N7:0').count(7) == 1
-    cell.run(2.0)
-    cell.refused = {'N7:0'}
-    cell.spared = 7
-    cell.publish(speed, 99, times=5000, gap=0.004)  # one waits at any time, and none is taken
-    since = cell.now
-    cell.run(19.0)
-    assert len(cell.written('N7:0', since)) in (3, 4)
-    assert cell.results().count(TIMEOUT) == 1
-
-
 def test_rule_9_messages_that_wait_end_when_the_fallback_goes_out() -> None:
     speed = speed_row(Fallback((7,), 60_000))
     cell = Cell(speed, start=False)
@@ -979,17 +929,6 @@ def test_rule_9_write_of_another_row_to_the_same_words_holds_up_for_its_own_time
     cell.run(0.5)
     assert cell.results()[-1] == TIMEOUT
     assert cell.word('N7:0') == 7
-
-
-def test_rule_10_fallback_is_tried_until_it_is_confirmed() -> None:
-    cell = Cell(speed_row())
-    cell.refused = {'N7:0'}
-    cell.run(20.0)
-    assert cell.results() == []
-    cell.refused = set()
-    cell.run(2.0)
-    assert cell.written('N7:0') == [7]
-    assert cell.results() == [START]
 
 
 def test_rule_10_fallback_of_two_packets_does_not_wait_for_itself() -> None:
@@ -1039,27 +978,6 @@ class Line(DriverBench):
         if plc.station in self.mute:
             reply = reply._replace(tns=reply.tns ^ 0x8000)  # which nobody waits for
         return reply
-
-
-def test_rule_10_plc_that_answers_has_its_fallback_before_those_that_do_not() -> None:
-    stations = range(11, 19)
-    rows = [make_mapping('N10:0', 'Heartbeat', station=number, tag=f'beat{number}', period=500,
-                         heartbeat=Heartbeat()) for number in stations]
-    speeds = [make_mapping('N7:0', 'Write', station=number, tag=f'speed{number}',
-                           fallback=Fallback((7,), 8000)) for number in stations]
-    line = Line([*rows, *speeds], stations)
-    line.run(2.0)
-    for speed in speeds:
-        line.write(speed, [3])
-    begun = line.clock()
-    line.run(0.4)
-    line.mute = {*stations[:-1]}
-    line.run(7.5)
-    line.asked.clear()
-    line.run(30.0)
-    when, first = line.asked[0][:2]
-    assert (first, {station for _, station, _ in line.asked}) == (18, {*stations})
-    assert when - begun < 8.0 + 1.3  # what was under way
 
 
 def test_rule_10_first_try_of_each_row_goes_before_the_second_of_any() -> None:
@@ -1190,14 +1108,6 @@ def test_rule_11_flood_of_bits_does_not_delay_beats_nor_starve_reads() -> None:
     assert len([when for when in cell.bench.listener.times(read) if when >= since]) > 20
 
 
-def test_rule_11_every_eighth_turn_is_a_reads() -> None:
-    beats = [make_mapping(f'N10:{number}', 'Heartbeat', tag=f'b{number}', period=100,
-                          heartbeat=Heartbeat()) for number in range(19)]
-    read = make_mapping('N11:0', period=0)
-    cell = Cell(*beats, read, run=5.0)
-    assert len(cell.bench.listener.times(read)) > 10
-
-
 def test_rule_11_plc_is_not_left_alone_any_more_once_it_answers_a_write_of_anybody() -> None:
     speed = speed_row()
     cell = GuestCell(speed, start=False)
@@ -1264,14 +1174,6 @@ def test_rule_13_run_guards_a_row() -> None:
     assert point.freshness(cell.now) is Freshness.FRESH
 
 
-def test_rule_13_initially_run_is_not_believed() -> None:
-    read = make_mapping('N11:0', period=100, publish_while=PublishWhile(None, None))
-    cell = Cell(read)
-    cell.plc.processor.setting = Setting.PROGRAM
-    cell.run(5.0)
-    assert cell.bench.listener.reads == []
-
-
 def test_rule_13_answer_about_the_mode_is_no_older_than_the_stale_time() -> None:
     row = make_mapping('N11:0', publish_while=PublishWhile(None, None))
     guard = RunGuard()
@@ -1334,15 +1236,6 @@ def test_rule_14_late_change_ends_what_two_in_time_have_permitted() -> None:
         'alive has begun to change during this read', '']
 
 
-def test_rule_14_one_change_is_no_life() -> None:
-    cell, read = counter_cell()
-    cell.run(1.0)
-    for _ in range(5):
-        store(cell.plc, 'N11:3', [int(cell.now * 10)])
-        cell.run(2.0)
-    assert cell.bench.listener.times(read) == []
-
-
 def withheld(cell: Cell) -> list[str]:
     """Return what was told of withheld rows."""
     return [reason for _, reason in cell.bench.listener.reasons if reason.startswith('withheld')]
@@ -1356,22 +1249,6 @@ def test_rule_15_withholding_is_counted_and_told_once_a_cause() -> None:
     assert cell.bench.driver.points[read].withholdings == len(withheld(cell)) == 3
     assert [tag for tag, _ in cell.bench.listener.ends] == 2 * [read.tag]
     assert all(2.0 < seconds < 3.0 for _, seconds in cell.bench.listener.ends)
-
-
-def test_rule_15_rows_of_one_cause_are_told_together() -> None:
-    counter = make_mapping('N11:3', tag='alive', period=100)
-    reads = [make_mapping(text, period=period, publish_while=PublishWhile('alive', 500))
-             for text, period in (('N7:0', 100), ('N7:5', 150), ('B3:0', 300))]
-    cell = Cell(counter, *reads)
-    for _ in range(2):
-        count(cell, 10)
-        cell.run(3.0)
-    assert withheld(cell) == 2 * [
-        'withheld: alive has not changed twice within 0.5 s; so are all 3 rows that depend on it']
-    points = [cell.bench.driver.points[read] for read in reads]
-    assert [point.freshness(cell.now) for point in points] == 3 * [Freshness.WITHHELD]
-    assert [point.withholdings for point in points] == [2, 2, 2]
-    assert len(cell.bench.listener.ends) == 1
 
 
 def test_rule_15_start_is_told_when_the_program_has_had_its_time_to_count() -> None:
@@ -1449,21 +1326,6 @@ def test_rule_19_two_bridges_end_with_0_and_say_who(
     assert cell.value == 0
 
 
-def test_rule_19_first_foreign_value_is_a_download_and_a_first_contact() -> None:
-    cell = Bridges(500)
-    cell.run(3.0)
-    for _ in range(2):
-        cell.store(888)
-        cell.run(0.6)
-        assert cell.value == 0
-        cell.run(5.4)
-        assert 0 < cell.value < 12
-        assert cell.states() == [BeatState.COUNTS]
-        cell.run(61.0)
-    assert cell.told() == [False, False]
-    cell.run(1.0)
-
-
 def test_rule_19_second_foreign_value_stays_until_the_port_is_opened_again() -> None:
     cell = Bridges(500)
     cell.run(3.0)
@@ -1500,18 +1362,6 @@ def test_rule_19_own_values_are_never_taken_for_those_of_another(polling: str) -
     cell.run(30.0)
     assert cell.bench.listener.foreign == []
     assert cell.word('N10:0') > 3  # after each 0 it stands for half a second
-
-
-def test_rule_17_fallback_that_is_due_during_a_refresh_is_written_after_it() -> None:
-    cell = Cell(speed_row(), run=1.0)
-    row, = cell.bench.driver.interlocks.fallbacks
-    cell.bench.run_until(lambda: row.is_under_way)
-    since = cell.now
-    cell.run(0.001)
-    row.make_due(FallbackCause.RUN, cell.now)
-    cell.run(1.0)
-    assert cell.written('N7:0', since) == [7, 7]
-    assert cell.results() == [START, RUN]
 
 
 def test_rule_17_fallback_has_one_result_and_its_retries_have_none() -> None:

@@ -148,13 +148,6 @@ def test_job_that_the_garbage_collector_has_ended_is_left_alone() -> None:
     assert job.errors == []
 
 
-def test_job_that_nobody_has_asked_for_does_not_expire() -> None:
-    tasks = JobTasks(OURS, 0)
-    task = tasks.start(TwoRequests(), NOW)
-    task.reply(task.command.reply())
-    assert (task.expires, tasks.next_expiry) == (math.inf, math.inf)
-
-
 def test_command_expires_by_the_request_or_by_the_command_before() -> None:
     tasks = JobTasks(OURS, 0, char_time=0.01)
     task = tasks.start(TwoRequests(expires=NOW + 1.5, patience=2.0), NOW)

@@ -26,7 +26,7 @@ from abdf1_ros.settings.scaling import Scaling
 from hypothesis import given
 from hypothesis import strategies as st
 import pytest
-from support.driver_bench import simulated_plc, stored
+from support.driver_bench import simulated_plc
 from support.mappings import make_mapping
 
 
@@ -82,12 +82,6 @@ def test_failure_outweighs_age_and_ends_with_the_next_good_read() -> None:
     assert (failing.failures, failing.error, failing.age(1.5)) == (2, 'again', 0.5)
 
 
-def test_every_read_is_published() -> None:
-    always = point()
-    assert [always.update(words, 0.0) for words in (b'\1\0', b'\1\0', b'\2\0')] == [
-        array('h', [1]), array('h', [1]), array('h', [2])]
-
-
 def test_only_changes_are_published() -> None:
     changing = point('Change')
     assert changing.update(b'\1\0', 0.0) == array('h', [1])
@@ -119,11 +113,6 @@ def test_bits_that_are_not_ours_are_not_a_change_of_value() -> None:
     bits = point('Change', text='B3:0/4')
     assert bits.update(b'\x10\0', 0.0) == array('B', [1])
     assert bits.update(b'\x11\xff', 1.0) is None
-
-
-def test_engineering_values_are_published() -> None:
-    level = ReadPoint(make_mapping(length=2, scaling=Scaling(0.5, -10.0)), 0.1, 0.6)
-    assert level.update(b'\x03\0\xff\xff', 0.0) == array('f', [-8.5, -10.5])
 
 
 def test_change_is_one_of_the_raw_value() -> None:
@@ -197,14 +186,6 @@ def test_bits_of_an_slc_are_a_masked_write(
     assert commands(text, values, 'SLC', length) == expected
 
 
-def test_members_of_a_structure_are_written_one_by_one() -> None:
-    assert commands('T4:2.PRE', [5, 6], 'SLC', 2) == [
-        'aa 02 04 86 02 01 05 00', 'aa 02 04 86 02 02 06 00']
-    first, second = commands('T4:2.PRE', [5, 6], 'PLC5', 2)
-    assert first == '67 00 00 01 00 0e 04 02 01 93 09 42 05 00'
-    assert second == '67 00 00 01 00 0e 04 02 02 93 09 42 06 00'
-
-
 @pytest.mark.parametrize('plc, limit', [('PLC5', 110), ('SLC', 117)])
 def test_long_write_is_divided_at_the_limit_of_a_packet(plc: str, limit: int) -> None:
     assert len(commands('N7:0', [0] * limit, plc, limit)) == 1
@@ -243,14 +224,6 @@ def _serve_all(table: DataTable, write: Write) -> None:
         assert Server(table).serve(Packet(1, 5, cmd, 0, number, data)).sts == 0
 
 
-def test_string_is_written_whole() -> None:
-    machine = simulated_plc(1, 'SLC', lambda: 0.0, ('ST9:0', 84))
-    mapping = make_mapping('ST9:1', 'Write', plc='SLC')
-    _serve_all(machine.table, Write(mapping, 'Hello', 0.0))
-    assert stored(machine, 'ST9:1', 4) == b'\5\0eHll\0o'
-    assert not any(stored(machine, 'ST9:0', 42))
-
-
 @given(st.sampled_from((PlcType.PLC5, PlcType.SLC)), st.integers(0, 15), st.integers(1, 40),
        st.data())
 def test_bit_writes_touch_only_their_bits(
@@ -284,47 +257,11 @@ def test_limits_hold_for_every_element(values: list[float], error: str | None) -
     assert str(caught.value) == error
 
 
-def test_min_without_max_limits_one_side_only() -> None:
-    low = make_mapping(command='Write', minimum=0)
-    Write(low, [32767], 0.0)
-    with pytest.raises(FormatError, match='^value -1 at index 0 is outside Min 0, Max inf$'):
-        Write(low, [-1], 0.0)
-
-
 def test_limit_in_the_message_is_the_limit_of_the_file() -> None:
     mapping = make_mapping('L10:0', 'Write', plc='SLC', maximum=1234567)
     with pytest.raises(FormatError,
                        match='^value 1234568 at index 0 is outside Min -inf, Max 1234567$'):
         Write(mapping, [1234568], 0.0)
-
-
-@pytest.mark.parametrize('plc, kind, expected', [
-    ('SLC', 'int32', 'aa 04 07 89 00 00 01 00 02 00'),
-    ('SLC', 'float32', 'aa 04 07 89 00 00 80 47 00 01'),
-    ('PLC5', 'uint32', '67 00 00 02 00 06 07 00 95 09 42 01 00 02 00')])
-def test_bytes_of_a_write_with_the_high_word_first(plc: str, kind: str, expected: str) -> None:
-    mapping = make_mapping(command='Write', plc=plc, kind=kind, word_order='High')
-    (_, command), = Write(mapping, [0x10002], 0.0).commands
-    assert command.hex(' ') == expected
-
-
-@pytest.mark.parametrize('plc, expected', [
-    ('SLC', 'aa 06 0a 8e 02 00 44 4f 00 44 00 00'),
-    ('PLC5', '67 00 00 06 00 06 0a 02 97 09 31 44 4f 00 44 00 00')])
-def test_bytes_of_a_string_over_words(plc: str, expected: str) -> None:
-    mapping = make_mapping('A10:2', 'Write', plc=plc, length=3, kind='string')
-    (_, command), = Write(mapping, 'ODD', 0.0).commands
-    assert command.hex(' ') == expected
-
-
-@pytest.mark.parametrize('values, raw, command', [
-    ([-10.0, 12.75], [0, 46], 'aa 04 07 89 00 00 00 00 2e 00'),  # 45.5 becomes the even 46
-    ([-10.5, 12.7], [-1, 45], 'aa 04 07 89 00 00 ff ff 2d 00')])
-def test_nearest_raw_values_are_written(values: list[float], raw: list[int], command: str) -> None:
-    mapping = make_mapping(command='Write', plc='SLC', length=2, scaling=Scaling(0.5, -10.0))
-    write = Write(mapping, array('f', values), 0.0)
-    assert (write.raw, write.value) == (raw, show(values))
-    assert [data.hex(' ') for _, data in write.commands] == [command]
 
 
 @given(st.sampled_from(['int16', 'uint16']), st.integers(0, 65535),
@@ -359,16 +296,6 @@ def test_limits_of_engineering_values(values: list[float] | str, error: str | No
     with pytest.raises(FormatError) as caught:
         Write(mapping, written, 0.0)
     assert str(caught.value) == error
-
-
-@pytest.mark.parametrize('plc', ['PLC5', 'SLC'])
-@pytest.mark.parametrize('kind, value', [('int32', 70000), ('float32', 0.5)])
-def test_no_packet_ends_within_a_value(plc: str, kind: str, value: float) -> None:
-    mapping = make_mapping('N7:1', 'Write', plc=plc, length=120, kind=kind)
-    write = Write(mapping, [value] * 120, 0.0)
-    assert len(write.commands) == 3
-    one = make_mapping('N7:1', 'Write', plc=plc, kind=kind).codec.encode([value])
-    assert all(data.endswith(one) for _, data in write.commands)
 
 
 @pytest.mark.parametrize('text, pulse', [

@@ -17,7 +17,7 @@
 from collections.abc import Callable
 import math
 
-from abdf1_ros.df1.frames import EOT, STX
+from abdf1_ros.df1.frames import STX
 from abdf1_ros.driver.reads.read_backs import ReadBacks
 from abdf1_ros.driver.record import Claim
 from abdf1_ros.driver.settings import DriverSettings
@@ -132,13 +132,6 @@ def test_newer_write_ends_the_wait_for_the_same_words(text: str, is_overtaken: b
     assert unconfirmed.details == ([OVERTAKEN] if is_overtaken else [])
 
 
-def test_end_of_the_line() -> None:
-    mapping = make_mapping('N7:0', 'ReadWrite')
-    unconfirmed = Unconfirmed(mapping, mapping, [5])
-    unconfirmed.backs.end(EARLY)
-    assert unconfirmed.details == ['lost; not read back before the line went down']
-
-
 def bench_of(text: str = 'N7:0', **cells: int) -> tuple[DriverBench, Mapping]:
     """Return a driver that reads and writes one address of a PLC-5, slowly."""
     mapping = make_mapping(text, 'ReadWrite', period=60_000, **cells)  # type: ignore[arg-type]
@@ -151,11 +144,6 @@ def bench_of(text: str = 'N7:0', **cells: int) -> tuple[DriverBench, Mapping]:
 def no_replies(data: bytes) -> bytes:
     """Let no message through."""
     return b'' if data.startswith(STX) else data
-
-
-def not_yet(data: bytes) -> bytes:
-    """Make EOT of each message."""
-    return EOT if data.startswith(STX) else data
 
 
 def nothing(data: bytes) -> bytes:
@@ -181,28 +169,6 @@ def test_lost_reply_and_lost_command_are_told_apart(
     assert plc_value == [int.from_bytes(held, 'little')]
 
 
-def test_late_answer_of_a_station_that_is_still_there() -> None:
-    bench, mapping = bench_of('B3:0/1')
-    bench.far.say = not_yet
-    bench.write(mapping, [1])
-    bench.at(bench.clock() + 1.0, lambda: setattr(bench.far, 'say', bytes))
-    bench.run(3.0)
-    result, = bench.listener.results
-    assert str(result) == ('unknown whether written: 2508 ERR_COMMAND_TIMEOUT: Command Timed '
-                           'Out; read back: the PLC holds the value')
-
-
-def test_station_that_stays_away_is_not_waited_for_longer_than_a_write_waits() -> None:
-    bench, mapping = bench_of()
-    bench.far.say = nothing
-    bench.write(mapping, [7], run=0.9)
-    assert bench.listener.results == []
-    bench.run(2.2)
-    result, = bench.listener.results
-    assert result.detail.endswith('; not read back within 2 s')
-    assert 2.7 < result.latency < 3.1
-
-
 def test_lost_port_leaves_no_write_without_a_result() -> None:
     bench, mapping = bench_of()
     bench.far.say = nothing
@@ -213,17 +179,3 @@ def test_lost_port_leaves_no_write_without_a_result() -> None:
     bench.far.say = bytes
     bench.open(run=5.0)
     assert len(bench.listener.results) == 1
-
-
-def test_second_writer_does_not_make_the_first_one_wrong() -> None:
-    bench, mapping = bench_of()
-    bench.far.say = not_yet
-    bench.write(mapping, [7])
-    bench.at(bench.clock() + 0.5, lambda: bench.write(mapping, [8]))
-    bench.at(bench.clock() + 1.02, lambda: setattr(bench.far, 'say', bytes))
-    bench.run(3.0)
-    assert [result.outcome for result in bench.listener.results] == [
-        Outcome.UNKNOWN, Outcome.WRITTEN]
-    assert bench.listener.results[0].detail.endswith(
-        '; not read back: a newer write of these words has gone out')
-    assert bench.listener.values(mapping)[-1] == [8]

@@ -21,7 +21,7 @@ from abdf1_ros.df1.machine import Machine
 from abdf1_ros.df1.peer import PEER
 from abdf1_ros.df1.slave import multidrop
 from abdf1_ros.driver.requests import Requests
-from abdf1_ros.errors import CommandTimeout, LinkError, PortLost, StationInactive
+from abdf1_ros.errors import LinkError, PortLost, StationInactive
 from abdf1_ros.pccc import diagnostics
 from abdf1_ros.pccc.dialect import Steps
 from abdf1_ros.pccc.steps import echo, identify
@@ -126,16 +126,6 @@ def test_present_station_gets_every_retry_and_an_absent_one_a_single_poll() -> N
     assert not bench.requests.stations[9].active
 
 
-def test_no_nak_is_sent_when_a_reply_does_not_come() -> None:
-    bench = Bench()
-    bench.plc.faults.slow = 100_000
-    bench.add(1, identify())
-    bench.run()
-    error, = bench.ends.errors
-    assert isinstance(error, CommandTimeout)
-    assert bench.requests.counters.naks_sent == 0
-
-
 def test_lost_port_ends_all_requests() -> None:
     bench = Bench()
     bench.add(9, identify())
@@ -157,12 +147,6 @@ def test_lost_port_ends_all_requests() -> None:
     bench.requests.close()
     bench.add(1, identify())
     assert str(bench.ends.errors[3]) == 'port lost: closed by this program'
-
-
-def test_nothing_is_due_by_itself() -> None:
-    bench = Bench()
-    assert bench.requests.next_due() is None
-    assert bench.requests.machine.deadline is None
 
 
 def test_other_modes_are_served_by_the_same_requests() -> None:

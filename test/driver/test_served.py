@@ -16,7 +16,6 @@
 
 from collections.abc import Sequence
 from dataclasses import replace
-import tracemalloc
 
 from abdf1_ros.df1.packet import Packet
 from abdf1_ros.driver.served import Served
@@ -31,7 +30,6 @@ from hypothesis import strategies as st
 import pytest
 from support.cases import for_all
 from support.mappings import load_rows, make_mapping
-from support.vectors import commands
 
 STATION = 5
 FAMILIES = ('PLC5', 'SLC')
@@ -117,14 +115,6 @@ def test_part_of_a_mapping_publishes_all_of_it(plc: str) -> None:
 
 
 @pytest.mark.parametrize('plc', FAMILIES)
-def test_unchanged_values_are_published_too(plc: str) -> None:
-    bench = Bench(plc, row('N7:50', plc))
-    bench.write('N7:50', 0)
-    bench.write('N7:50', 0)
-    assert len(bench.heard()) == 2
-
-
-@pytest.mark.parametrize('plc', FAMILIES)
 @pytest.mark.parametrize(('start', 'words', 'names'), [
     (10, 1, ['a']), (10, 4, ['a', 'b']), (12, 2, ['b']), (13, 3, ['b', 'c']), (14, 2, ['c']),
     (14, 1, []), (10, 6, ['a', 'b', 'c']), (16, 1, [])])
@@ -156,14 +146,6 @@ def test_words_between_and_beside_the_mappings_are_not_there(plc: str) -> None:
 
 
 @pytest.mark.parametrize('plc', FAMILIES)
-def test_neighbouring_mappings_are_read_and_written_together(plc: str) -> None:
-    bench = Bench(plc, row('N7:4', plc, 2), row('N7:2', plc, 2))
-    assert bench.write('N7:2', 1, 2, 3, 4) == (0, b'')
-    assert bench.heard() == [('N7:4_5_Serve_2', [3, 4]), ('N7:2_5_Serve_2', [1, 2])]
-    assert bench.read('N7:2', 4) == b'\1\0\2\0\3\0\4\0'
-
-
-@pytest.mark.parametrize('plc', FAMILIES)
 @pytest.mark.parametrize('text', ['N9:0', 'B3:0', 'T4:0', 'F8:0', 'S:0'])
 def test_files_without_a_mapping_are_not_there(plc: str, text: str) -> None:
     bench = Bench(plc, row('N7:0', plc, 2))
@@ -192,18 +174,6 @@ def test_other_commands_are_illegal(plc: str, cmd: int, data: bytes) -> None:
     assert bench.published == []
 
 
-def test_each_family_refuses_the_commands_of_the_other() -> None:
-    for ours, theirs in (FAMILIES, reversed(FAMILIES)):
-        place = parse_address('N7:0', PlcType(theirs))
-        bench = Bench(ours, row('N7:0', ours, 2))
-        dialect = dialect_of(PlcType(theirs))
-        assert bench.ask(*dialect.write_bits(place, 1, 1)) == ILLEGAL
-        if ours == 'PLC5':  # an SLC has the typed commands too
-            assert bench.ask(*dialect.read(place, 1)) == ILLEGAL
-            assert bench.ask(*dialect.write(place, b'\1\0')) == ILLEGAL
-        assert bench.published == []
-
-
 @pytest.mark.parametrize(('plc', 'text', 'next_text', 'beyond'), [
     ('PLC2', '050', '052', '054'), ('PLC3', 'N7:50', 'N7:52', 'N7:54'),
     ('PLC3', 'E3.1.8.10.0.5', 'B10:7', 'B10:9')])
@@ -222,13 +192,6 @@ def test_words_of_a_plc2_and_a_plc3(plc: str, text: str, next_text: str, beyond:
     assert bench.write(next_text, 1, 2, 3) == past_end
 
 
-@pytest.mark.parametrize(('plc', 'text', 'codes'), [
-    ('PLC2', '020', (0x50, b'')), ('PLC3', 'N7:0', (0xF0, b'\x06'))])
-def test_without_rows_a_plc2_or_plc3_has_no_words(plc: str, text: str,
-                                                  codes: tuple[int, bytes]) -> None:
-    assert Bench(plc).refused_read(text) == codes
-
-
 def test_bits_of_a_plc2() -> None:
     mapping = row('050/07', 'PLC2', 4)
     bench = Bench('PLC2', mapping)
@@ -236,17 +199,6 @@ def test_bits_of_a_plc2() -> None:
     assert bench.read('050') == b'\x80\x06'
     assert bench.write_bits('050', 0x0100, 0x0100) == (0, b'')
     assert bench.heard() == [(mapping.name, [1, 1, 1, 1])]
-
-
-def test_word_range_of_several_words_is_published_once_and_all_or_nothing() -> None:
-    mapping = row('N7:0', length=4)
-    bench = Bench('PLC5', mapping)
-    words = dialect_of(PlcType.PLC5, Access.WORD_RANGE)
-    place = parse_address('N7:0', PlcType.PLC5)
-    assert bench.ask(*words.write(place, b'\1\0\2\0\3\0')) == (0, b'')
-    assert bench.heard() == [(mapping.name, [1, 2, 3, 0])]
-    assert bench.ask(*words.write(place, bytes(10))) == (0xF0, b'\x0A')
-    assert bench.heard() == []
 
 
 @pytest.mark.parametrize(('plc', 'file', 'place'), [
@@ -269,64 +221,6 @@ def test_what_ros_stores_is_read(plc: str) -> None:
     assert bench.read('F8:0', 4) == b'\0\0\xc0\x3f\0\0\0\xc0'
     assert bench.served.words_of(integers) == b'\xff\xff\x02\x10\3\0'
     assert bench.published == []  # what we have said ourselves is no news
-
-
-@pytest.mark.parametrize('plc', FAMILIES)
-def test_own_values_are_not_published_with_the_next_command(plc: str) -> None:
-    ours, theirs = row('N7:0', plc), row('N7:9', plc)
-    bench = Bench(plc, ours, theirs)
-    bench.served.store(ours, [7])
-    bench.write('N7:9', 1)
-    assert bench.heard() == [('N7:9_5_Serve_1', [1])]
-
-
-def test_storing_for_a_long_time_takes_no_memory() -> None:
-    mapping, bits = row('N7:0', length=10), row('B3:0/3', length=8)
-    bench = Bench('PLC5', mapping, bits)
-
-    def store(times: int) -> int:
-        for number in range(times):
-            bench.served.store(mapping, [number % 100] * 10)
-            bench.served.store(bits, [number % 2] * 8)
-        return tracemalloc.get_traced_memory()[0]
-
-    tracemalloc.start()
-    try:
-        before = store(100)
-        assert store(2000) - before < 20_000
-    finally:
-        tracemalloc.stop()
-
-
-@pytest.mark.parametrize('plc', FAMILIES)
-def test_string_is_served_and_read_in_whole_elements(plc: str) -> None:
-    mapping = row('ST9:1', plc)
-    bench = Bench(plc, mapping)
-    bench.served.store(mapping, 'Tank 4')
-    words = bench.read('ST9:1', 42)
-    assert mapping.codec.decode(words) == 'Tank 4'
-    assert bench.refused_read('ST9:0', 42) == BAD_WORDS[plc]
-
-
-@pytest.mark.parametrize('plc', FAMILIES)
-def test_string_over_words_is_served_byte_by_byte(plc: str) -> None:
-    mapping = row('A10:1', plc, 3, 'string')
-    bench = Bench(plc, mapping)
-    bench.served.store(mapping, 'abc')
-    assert bench.read('A10:1', 3) == b'ba\0c\0\0'
-    assert bench.write('A10:2', 0x7879) == (0, b'')
-    assert bench.published == [(mapping, b'bayx\0\0')]
-    assert mapping.codec.decode(b'bayx\0\0') == 'abxy'
-
-
-@pytest.mark.parametrize('plc', FAMILIES)
-def test_high_word_is_served_first_where_the_row_says_so(plc: str) -> None:
-    mapping = row('N7:50', plc, kind='int32', word_order='High')
-    bench = Bench(plc, mapping)
-    bench.served.store(mapping, [0x10002])
-    assert bench.read('N7:50', 2) == b'\1\0\2\0'
-    assert bench.write('N7:51', 7) == (0, b'')
-    assert bench.heard() == [(mapping.name, [0x10007])]
 
 
 @pytest.mark.parametrize('plc', FAMILIES)
@@ -361,17 +255,6 @@ def test_whole_element_of_which_a_word_is_served(plc: str, access: str) -> None:
         assert element() == b'\0\x20\5\0\6\0'
     assert bench.ask(*dialect.read(parse_address('T4:0', PlcType(plc)), 6))[0] != 0
     assert bench.ask(*dialect.read(parse_address('T4:2', PlcType(plc)), 3))[0] != 0
-
-
-@pytest.mark.parametrize(('plc', 'text', 'other'), [
-    ('SLC', 'O:2.1', 'O:3.1'), ('SLC', 'I:1.0', 'I:1.1'), ('PLC5', 'O:017', 'O:016')])
-def test_inputs_and_outputs_are_served_where_they_are_mapped(
-        plc: str, text: str, other: str) -> None:
-    mapping = row(text, plc)
-    bench = Bench(plc, mapping)
-    assert bench.write(text, 0xF00F) == (0, b'')
-    assert bench.heard() == [(mapping.name, [0xF00F])]
-    assert bench.refused_read(other)[0] != 0
 
 
 @pytest.mark.parametrize('plc', FAMILIES)
@@ -424,14 +307,6 @@ def test_rows_of_the_same_words_are_all_published() -> None:
     assert bench.heard() == [(word.name, [0x10]), (bits.name, [1, 0])]
 
 
-@pytest.mark.parametrize('plc', FAMILIES)
-def test_any_command_is_answered(plc: str) -> None:
-    bench = Bench(plc, row('N7:0', plc, 20), row('F8:0', plc, 4))
-    for entry in commands(0x00, 0x01, 0x26, 0x67, 0x68, 0xA1, 0xA2, 0xA9, 0xAA, 0xAB):
-        reply = bench.served.serve(entry.packet)
-        assert (reply.dst, reply.src) == (entry.packet.src, entry.packet.dst)
-
-
 @given(cmd=st.sampled_from((0x0F, 0x06, 0x2F, 0x01)), data=st.binary(max_size=60),
        plc=st.sampled_from(FAMILIES))
 def test_any_bytes_are_answered(cmd: int, data: bytes, plc: str) -> None:
@@ -460,14 +335,6 @@ def test_row_that_the_other_end_may_only_read(plc: str) -> None:
     assert bench.heard() == [(row(second, plc).name, [7])]
     bench.served.store(mine, [6])
     assert bench.read(first, 2) == b'\6\0\7\0'
-
-
-@pytest.mark.parametrize('plc', ['PLC5', 'SLC', 'PLC3'])
-def test_write_that_ends_in_a_protected_row_changes_nothing(plc: str) -> None:
-    bench = Bench(plc, row('N7:0', plc), replace(row('N7:1', plc), is_read_only=True))
-    assert bench.write('N7:0', 9, 9) == PROTECTED[plc]
-    assert bench.read('N7:0', 2) == bytes(4)
-    assert bench.heard() == []
 
 
 def test_access_of_a_serve_row() -> None:
@@ -506,8 +373,3 @@ def test_topic_of_a_serve_row_has_no_other_reader_and_writers_of_its_length_only
         '(line 2, tag "a")']
     _, problems = loaded('a,Serve,N7:50,5,PLC5,4,,x,,,,', 'b,Write,N7:0,1,PLC5,4,,x,,,,')
     assert problems == []
-
-
-def test_serve_row_is_checked_like_a_write() -> None:
-    _, problems = loaded('a,Serve,T4:0,5,PLC5,,,,,,,', 'b,Serve,N7:0,5,PLC5,,,,,,5,1')
-    assert len(problems) == 1

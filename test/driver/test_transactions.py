@@ -19,13 +19,13 @@ from collections.abc import Sequence
 from abdf1_ros.df1.packet import Packet
 from abdf1_ros.driver.write import Outcome, Write, WriteResult
 from abdf1_ros.driver.writes.packets import carry_out, REWRITTEN
-from abdf1_ros.errors import CommandTimeout, FormatError, LinkError, RemoteError, StationInactive
+from abdf1_ros.errors import CommandTimeout, LinkError, RemoteError, StationInactive
 from abdf1_ros.pccc.dialect import Request, Steps
 from abdf1_ros.pccc.families import parse_address
 from abdf1_ros.pccc.file_types import PlcType
 from abdf1_ros.pccc.identity import Identity
 from abdf1_ros.pccc.slc.dialect import SlcDialect
-from abdf1_ros.pccc.steps import echo, identify, words_in
+from abdf1_ros.pccc.steps import identify, words_in
 import pytest
 from support.mappings import make_mapping
 
@@ -128,24 +128,11 @@ def test_refused_bits_are_written_by_reading_their_word_and_writing_it_back() ->
     assert 'a change that the PLC made in between is lost' in REWRITTEN
 
 
-def test_masked_write_that_is_taken_is_all() -> None:
-    write = bit_write()
-    assert converse(carry_out(write, clock), [reply()]) == (
-        write.commands, write.result(Outcome.WRITTEN, '', LATER, 1))
-
-
 @pytest.mark.parametrize('processor, sts', [(None, 0x10), ('5/03', 0x10), ('5/01', 0x50)])
 def test_other_refusals_of_bits_stay_failures(processor: str | None, sts: int) -> None:
     requests, result = converse(carry_out(bit_write(processor), clock), [reply(sts=sts)])
     assert isinstance(result, WriteResult)
     assert (len(requests), result.outcome, result.packets_done) == (1, Outcome.FAILED, 0)
-
-
-def test_words_are_never_read_and_written_back() -> None:
-    mapping = make_mapping('B3:4', 'Write', plc='SLC', processor='5/01')
-    requests, result = converse(carry_out(Write(mapping, [3], 0.0), clock), [REFUSED])
-    assert isinstance(result, WriteResult)
-    assert (len(requests), result.outcome) == (1, Outcome.FAILED)
 
 
 @pytest.mark.parametrize('answers, outcome', [
@@ -201,15 +188,6 @@ def test_plc5_with_a_fault_is_asked_which(answer: Packet, fault: str) -> None:
     assert requests == [(0x06, b'\x03'), FAULT_WORDS]
     assert isinstance(identity, Identity)
     assert identity.faults == (fault,)
-
-
-def test_echo_is_answered_by_the_same_bytes() -> None:
-    assert converse(echo(b'\1\2'), [reply(b'\1\2')]) == ([(0x06, b'\x00\1\2')], None)
-
-
-def test_echo_of_something_else() -> None:
-    with pytest.raises(FormatError, match='01 02 came back as 01'):
-        converse(echo(b'\1\2'), [reply(b'\1')])
 
 
 def test_refusal_of_a_long_read_names_the_column_that_makes_it_shorter() -> None:
