@@ -980,6 +980,27 @@ class Line(DriverBench):
         return reply
 
 
+def test_rule_10_plc_that_answers_has_its_fallback_before_those_that_do_not() -> None:
+    stations = range(11, 19)
+    rows = [make_mapping('N10:0', 'Heartbeat', station=number, tag=f'beat{number}', period=500,
+                         heartbeat=Heartbeat()) for number in stations]
+    speeds = [make_mapping('N7:0', 'Write', station=number, tag=f'speed{number}',
+                           fallback=Fallback((7,), 8000)) for number in stations]
+    line = Line([*rows, *speeds], stations)
+    line.run(2.0)
+    for speed in speeds:
+        line.write(speed, [3])
+    begun = line.clock()
+    line.run(0.4)
+    line.mute = {*stations[:-1]}
+    line.run(7.5)
+    line.asked.clear()
+    line.run(30.0)
+    when, first = line.asked[0][:2]
+    assert (first, {station for _, station, _ in line.asked}) == (18, {*stations})
+    assert when - begun < 8.0 + 1.3  # what was under way
+
+
 def test_rule_10_first_try_of_each_row_goes_before_the_second_of_any() -> None:
     rows = [make_mapping(f'N7:{number}', 'Write', tag=f'speed{number}',
                          fallback=Fallback((7,), 1000)) for number in range(8)]
