@@ -229,16 +229,31 @@ class Beats(Rule):
 
 
 class BeatsAfterFallbacks(Rule):
-    text = 'no heartbeat counts while a fallback of its station is due (3 b)'
+    text = 'no heartbeat counts while a fallback of its station is due or written over (3 b)'
+
+    def __init__(self, world: World) -> None:
+        super().__init__(world)
+        self._over: dict[tuple[int, str], float] = {}  # since when a guest's value stands
 
     def executed(self, entry: Executed) -> None:
-        if not entry.tag.startswith('beat') or not entry.value or entry.is_late \
-                or entry.value in GUESTS:
+        if entry.is_late:
+            return
+        key = entry.station, entry.tag
+        if entry.tag[0] == 'w':
+            if entry.value not in GUESTS:
+                self._over.pop(key, None)
+            elif entry.before == SAFE:
+                self._over[key] = entry.when
+        if not entry.tag.startswith('beat') or entry.value in (0, *GUESTS):
             return
         for row in self.world.driver.interlocks.fallbacks:
             if row.mapping.station == entry.station:
                 is_due = row.cause is not None and row._due_since < entry.when - self.flight
                 self.demand(not is_due, entry, row.mapping.tag, row.cause)
+        over = [tag for (station, tag), when in self._over.items()
+                if station == entry.station and when < max(entry.sent, self.world.opened)
+                - self.flight]
+        self.demand(not over, entry, over, 'has the value of a guest')
 
 
 class Outputs(Rule):
@@ -368,7 +383,7 @@ class View(Rule):
         world, now = self.world, self.world.line.now
         for number, since in self._well_since.items():
             is_known = world.driver.stations[number].replies_in_time
-            is_well = now > max(world.ill[number], world.ill[0]) + 1.5 * STEP
+            is_well = now > max(world.ill[number], world.ill[0]) + 1.5 * STEP and not world.holds
             self.demand(is_known or not is_well or now < since + _SETTLED + self.flight,
                         world.driver.stations[number])
             if not is_well or not is_known:
