@@ -28,7 +28,7 @@ _WAITING = (
     'ros/test_process.py', 'faults/', 'cli/monitor/test_command.py', 'examples/', 'ros/',
     'test_docs', 'test_', 'cli/')
 _COMPUTING = (
-    'lab/noise/', 'driver/test_interlocks_property.py', 'df1/test_multidrop_line.py', 'lab/soak/',
+    'lab/simulate/', 'lab/noise/', 'df1/test_multidrop_line.py', 'lab/soak/',
     'driver/', 'df1/', 'lab/fuzz/', '')
 
 _HERE = Path(__file__).parent
