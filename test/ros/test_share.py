@@ -113,8 +113,16 @@ def test_what_comes_while_the_node_stands_still_is_not_sent(tmp_path: Path) -> N
         observer.until(place.is_symlink, 'the place')
         with Client(str(place), plc_type='SLC', station=2, timeout=3.0, cmd_timeout=9.0) as hmi:
             assert patient_read(hmi, 'F8:4') == 21.5
+            sent = hmi.counters.commands_sent
             node.stop()
-            threading.Timer(1.5, node.go_on).start()
+
+            def go_on_late() -> None:
+                while hmi.counters.commands_sent == sent:
+                    time.sleep(0.01)
+                time.sleep(1.5)
+                node.go_on()
+
+            threading.Thread(target=go_on_late, daemon=True).start()
             with pytest.raises(RemoteError) as refusal:
                 hmi.write('F8:4', 99.0)
             assert refusal.value.sts == 0x01

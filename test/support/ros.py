@@ -154,9 +154,12 @@ class Process:
             self._process.send_signal(number)
 
     def stop(self) -> None:
-        """Let it stand still until ``go_on``, whoever else lets it continue."""
+        """Let it stand still, all of it, until ``go_on``, whoever else lets it continue."""
         self._goes_on.clear()
         self.send(signal.SIGSTOP)
+        threads = Path(f'/proc/{self.number}/task')
+        while any(' T ' not in status.read_text() for status in threads.glob('*/stat')):
+            time.sleep(0.001)
         self._keeper = threading.Thread(target=self._keep_stopped, daemon=True)
         self._keeper.start()
 
