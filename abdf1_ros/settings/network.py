@@ -45,7 +45,7 @@ from abdf1_ros.text import shown
 
 MODE_NAMES = tuple(dict.fromkeys(mode.name for mode in MODES))
 POLLING_MODES = tuple(mode.polling for mode in MODES if mode.polling)
-_HOST = re.compile(r'(?P<scheme>\w+://)?(?P<host>(?!tcp:)[\w.-]+?)(?P<port>:[1-5]?\d{3,4})?')
+_HOST = re.compile(r'(?P<scheme>\w+://)?(?P<host>(?!tcp:)[\w.-]+?)(?P<port>:\d{2,5})?')
 PLC_TYPES = tuple(entry.value for entry in FAMILIES)
 # Schemes of the URLs of device servers; each has a module in ``ports``.
 DEVICE_SERVERS = ('socket', 'rfc2217')

@@ -39,7 +39,6 @@ _ACK_SIZE = 2
 _SHORT_PERIOD = 10  # ms; what is less was meant as seconds
 _LONG_TIMEOUT = 10_000  # ms
 
-
 # What comes of a write; of timers and counters to a bit.
 _WRITTEN = {
     FileType.INPUT: 'is an input: the PLC overwrites what is written there with its next scan',

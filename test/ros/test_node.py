@@ -436,9 +436,15 @@ def test_messages_wait_for_the_first_look_and_have_a_result_at_an_end_before_it(
     monkeypatch.setattr(node_module, 'DISCOVERY', math.inf)
     bench = make_bench(RECIPE, parameters=('write_timeout:=30.0',))
     bench.publisher(Int16MultiArray, 'recipe')(1, 2)
-    for _ in range(3):
-        assert get_parameters(observer, 'port') == [bench.plcs.port]
-    assert not bench.node.writes.taken
+    refuse = bench.node.session.begin_end
+
+    def refuse_after_a_while() -> None:
+        for _ in range(3):
+            assert get_parameters(observer, 'port') == [bench.plcs.port]
+        assert not bench.node.writes.taken
+        refuse()
+
+    monkeypatch.setattr(bench.node.session, 'begin_end', refuse_after_a_while)
     bench.node.begin_end()
     assert bench.until_results(1)[0].message.startswith('not written: ')
 

@@ -102,6 +102,7 @@ class BridgeNode(Node):
             self.create_publisher(DiagnosticArray, '/diagnostics', 10),
             self.create_publisher(DiagnosticArray, '~/snapshot', 1), self.writes)
         self.session = Session(self._surroundings, configuration)
+        self.writes.give_to(self.session.writers)
         self.link = self._surroundings.link = LinkThread(
             self.session.driver.machine, self._opener.open,
             on_state=self._port_changed, on_fault=self._fault,
@@ -141,8 +142,8 @@ class BridgeNode(Node):
     def begin_end(self) -> None:
         """Begin the end, as ``Session`` does; no request takes it back."""
         self._is_ending = True
+        self.session.begin_end()  # before messages are taken that have waited, to refuse them
         self.writes.begin()
-        self.session.begin_end()
 
     def say_last_words(self, give_up: float) -> None:
         """Let guests go and tell the last state, up to a monotonic clock value."""
@@ -199,6 +200,7 @@ class BridgeNode(Node):
         tell_plcs([self.session], 'goes on with new files')
         before, session = self.session, Session(self._surroundings, configuration)
         self.session = session
+        self.writes.give_to(session.writers)
         if not self.link.exchange(session.driver.machine, session.reads.publish_later_values,
                                   self._opener.use(_port_settings(configuration))):
             return False

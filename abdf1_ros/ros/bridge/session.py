@@ -112,7 +112,7 @@ class Session:
             results=surroundings.results, table_changed=self._publish_active)
         self.driver = Driver(network, mappings, configuration.driver_settings(), self._events)
         # Subscriptions first: where there are thousands of publishers, each takes DDS 5 ms.
-        surroundings.writes.open(
+        self.writers = surroundings.writes.open(
             self.driver, parameters.write_timeout, self._events.lost, self._wake_link)
         self.reads.open(self.driver.points)
         self.guests = GuestPlaces(configuration, self.driver, surroundings.opener,

@@ -131,7 +131,7 @@ class WriteTopic:
         if age > self._patience:
             raise FormatError(
                 f'it came {age:.1f} s after it was published, write_timeout is '
-                f'{self._patience:g} s; or the clocks of the two hosts differ')
+                f'{self._patience:g} s; or this node had just begun, or the clocks differ')
 
 
 class _Gate(ReentrantCallbackGroup):
@@ -149,8 +149,7 @@ class WriteTopics:
     """
     The subscriptions of a node; ``open`` may be called again, in the thread of the executor.
 
-    Messages are taken from ``begin`` on, and written by the driver that was opened last; ``taken``
-    counts them.
+    Messages are taken from ``begin`` on, and go where ``give_to`` says; ``taken`` counts them.
     """
 
     def __init__(self, node: Node) -> None:
@@ -168,8 +167,9 @@ class WriteTopics:
                 self._node.executor.wake()
 
     def open(self, driver: Driver, patience: float,  # noqa: A003
-             on_loss: Callable[[str, int], None], wake: Callable[[], None]) -> None:
-        """Subscribe to each topic of a driver; subscriptions that there are stay."""
+             on_loss: Callable[[str, int], None], wake: Callable[[], None],
+             ) -> dict[str, WriteTopic]:
+        """Subscribe to the topics of a driver, and return them; subscriptions that are, stay."""
         wanted: defaultdict[str, list[Mapping]] = defaultdict(list)
         for mapping in driver.mappings:
             if mapping.writes:
@@ -182,10 +182,14 @@ class WriteTopics:
         for topic, kind in kinds.items():
             if topic not in self._subscriptions:
                 self._subscriptions[topic] = kind, self._subscription(topic, kind)
-        self._topics = {topic: WriteTopic(
+        return {topic: WriteTopic(
             topic, mappings, driver, patience, on_loss=on_loss, wake=wake,
             losses=LossCounter(partial(self._node.count_publishers, _name(topic))))
             for topic, mappings in wanted.items()}
+
+    def give_to(self, topics: dict[str, WriteTopic]) -> None:
+        """Give messages to these from now on."""
+        self._topics = topics
 
     def _subscription(self, topic: str, kind: Any) -> Any:
         def take(message: Any, info: Any) -> None:
