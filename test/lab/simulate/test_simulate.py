@@ -22,7 +22,7 @@ from simulate.mistakes import MISTAKES
 from simulate.run import simulate, Story
 from support.world import MODES
 
-SECONDS = 6.0  # of processor time
+SECONDS = 3.0  # of processor time, and the rest of a plant
 
 
 @pytest.mark.parametrize('mode', MODES)
