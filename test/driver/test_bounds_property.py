@@ -470,7 +470,7 @@ def plants(draw: st.DrawFn, mode: str, mute_share: float) -> Plant:
 def assert_bounded(mode: str, mute_share: float) -> None:
     """Check plants by chance; not ones that are alike, as a search for the simplest would."""
     # Standard polls all the time, and by radio bounds are long.
-    examples = 4 if mode == 'Standard' else 6 if 'Radio' in mode else 10
+    examples = 3 if mode == 'Standard' else 4 if 'Radio' in mode else 7
 
     @settings(max_examples=examples, phases=[Phase.generate], derandomize=True, deadline=None)
     @given(plant=plants(mode, mute_share))
