@@ -53,6 +53,7 @@ from support.virtual_line import Noise, QUIET
 STEP = 0.05  # s
 SAFE = 32_000  # the fallback of every row
 GUESTS = range(33_000, 33_600)  # what only guests write: more than a heartbeat counts to
+OTHERS = 34_000  # what comes into a word from another network
 LARGEST = 31_000  # of what is published
 _ALL = 255  # stations
 _WRITES = (b'\x67', b'\xAA')  # functions of a typed write
@@ -253,6 +254,7 @@ class World(DriverBench):
         self.is_alive = True  # the executor
         self.away = 0.0  # until when the process stands still
         self.ill: dict[int, float] = dict.fromkeys(range(plant.stations + 1), 0.0)
+        self.overwritten: dict[str, float] = {}  # when another network has written to an output
         self.holds = 0.0  # how often the gateway keeps a write for a while
         self.wire = hashlib.sha256()
         self._values = dict.fromkeys(self.rows, 0)
@@ -431,6 +433,11 @@ class World(DriverBench):
         watched = self.plcs[station]
         watched.other = watched.other % 30_000 + 7
         watched.set(BEAT, watched.other)
+
+    def overwrite(self, station: int) -> None:
+        """Let another network write to the first output."""
+        self.overwritten[f'w0_{station}'] = self.line.now
+        self.plcs[station].set(OUTPUTS, OTHERS)
 
     def download(self, station: int) -> None:
         """Bring old words back; the PLC is in PROGRAM from now on."""

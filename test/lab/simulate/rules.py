@@ -26,7 +26,7 @@ import math
 
 from abdf1_ros.driver.write import Outcome, WriteResult
 from abdf1_ros.plan.bounds import MODE_PERIOD
-from support.world import Executed, GUESTS, SAFE, STEP, World
+from support.world import Executed, GUESTS, OTHERS, SAFE, STEP, World
 
 _LEAST_ZERO = 0.5  # s
 _LEAST_LIFE_SIGN = 1.0  # s
@@ -293,6 +293,10 @@ class Outputs(Rule):
             if now < calm + limit + MODE_PERIOD + _REWRITTEN:
                 continue
             value = watched.word(watched.places[tag])
+            if value == OTHERS:  # it is seen by nobody, until the fallback is written again (8)
+                after = world.plant.after / 1000
+                limit += max(after, _REWRITTEN) + after
+                self._stood[tag] = max(self._stood[tag], world.overwritten[tag])
             self.demand(value in (SAFE, 0) or now - self._stood[tag] < limit,
                         tag, value, 'since', self._stood[tag])
 

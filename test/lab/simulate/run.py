@@ -255,6 +255,12 @@ def _guest(story: Story, station: int) -> None:
         world.at(world.line.now + 0.3 * number, partial(world.ask, station, place))
 
 
+def _overwritten(story: Story, station: int) -> None:
+    story.be_quiet()  # for the fallback to stand
+    story.wait(story.world.plant.after / 1000 + 1.0)
+    story.world.overwrite(station)
+
+
 def _gateway_holds(story: Story, station: int) -> None:
     story.world.holds = 0.3 if story.world.plant.gateway else 0.0
 
@@ -274,13 +280,14 @@ def _other_writer(story: Story, station: int) -> None:
 
 
 _NO_EXCUSE = 'messages refused'
-_OF_OTHERS = ('guest', 'gateway holds')  # which excuse nothing
+_OF_OTHERS = ('guest', 'gateway holds', 'another network')  # which excuse nothing
 _TROUBLES: dict[str, Callable[[Story, int], None]] = {
     'noise': _noise, 'silence': _silence, 'refusal': _refusal,
     _NO_EXCUSE: _refused_messages, 'replies lost': _lost_replies,
     'port lost': _lost_port, 'process stands still': _pause, 'executor hangs': _hung_executor,
     'PROGRAM': _program, 'download': _download, 'killed': _kill, 'slow PLC': _slowness,
-    'other writer': _other_writer, 'guest': _guest, 'gateway holds': _gateway_holds}
+    'other writer': _other_writer, 'guest': _guest, 'gateway holds': _gateway_holds,
+    'another network': _overwritten}
 
 
 @dataclass(slots=True)
