@@ -16,12 +16,14 @@
 
 from __future__ import annotations
 
+from collections import defaultdict
 from collections.abc import Iterator, Sequence
 from collections.abc import Mapping as MappingType
 from concurrent.futures import Future
 from enum import Enum
 import re
 import time
+from typing import TypeAlias
 
 from abdf1_ros.cli.plc.session import Session
 from abdf1_ros.driver.write import Outcome, Write, WriteResult
@@ -38,7 +40,7 @@ from abdf1_ros.problems import ConfigurationError, Problem
 from abdf1_ros.settings.csv_table import Row
 from abdf1_ros.settings.map_row import CellFault, RowReader
 from abdf1_ros.settings.mapping import Command, Mapping
-from abdf1_ros.text import value_text
+from abdf1_ros.text import printable, value_text
 
 # The argument of the command line for each column of a map CSV.
 _ARGUMENTS = {'Address': 'ADDRESS', 'Length': '--length', 'Type': '--type',
@@ -49,6 +51,9 @@ _WITH_BASE = re.compile('0(?:x[0-9a-f]+|b[01]+|o[0-7]+)', re.IGNORECASE)
 _VALUES_IN_ROW = 10
 _BITS_IN_ROW = 16
 _BETWEEN = '  '
+
+# Tags of a map, by address.
+Tags: TypeAlias = MappingType[str, str]
 
 _UNSIGNED = {ValueType.INT16: ValueType.UINT16, ValueType.INT32: ValueType.UINT32}
 _BITS = {ValueType.INT16: 16, ValueType.UINT16: 16, ValueType.INT32: 32, ValueType.UINT32: 32}
@@ -203,20 +208,45 @@ def _number(mapping: Mapping, text: str) -> float:
     return value
 
 
-def rows(mapping: Mapping, values: Values, radix: Radix = Radix.DECIMAL,
+def tags_of(mappings: Sequence[Mapping], station: int) -> Tags:
+    """Return the tags of a station's rows, with a number where a row has several values."""
+    tags: dict[str, list[str]] = defaultdict(list)
+    for row in mappings:
+        if row.station != station or row.serves:
+            continue
+        count = 1 if row.type is ValueType.STRING else row.length
+        for number in range(count):
+            tag = row.tag if count == 1 else f'{row.tag}[{number}]'
+            if tag not in (names := tags[str(row.place_of(number))]):
+                names.append(tag)
+    return {place: printable(', '.join(names)) for place, names in tags.items()}
+
+
+def labels(mapping: Mapping, tags: Tags | None) -> list[str]:
+    """Return the address of each value, and its tags beside it."""
+    places = [str(mapping.place_of(number)) for number in range(mapping.length)]
+    return [f'{place} {(tags or {}).get(place, "")}'.rstrip() for place in places]
+
+
+def rows(mapping: Mapping, values: Values, names: Sequence[str], radix: Radix = Radix.DECIMAL,
          room: int | None = None) -> Iterator[tuple[str, str]]:
-    """Yield values in rows of up to ``room`` characters, each with the address of its first."""
+    """
+    Yield values in rows of up to ``room`` characters, each with the name of its first.
+
+    ``names`` are the ``labels`` of all values; where one has a tag each value has a row.
+    """
     if isinstance(values, str):
-        yield str(mapping.address), repr(values)
+        yield names[0], repr(values)
         return
     texts = value_texts(mapping, values, radix)
     width = max(map(len, texts))
-    step = _BITS_IN_ROW if mapping.type is ValueType.BOOL else _VALUES_IN_ROW
+    step = 1 if any(' ' in name for name in names) else \
+        _BITS_IN_ROW if mapping.type is ValueType.BOOL else _VALUES_IN_ROW
     if room is not None:
         step = min(step, max(1, (room + len(_BETWEEN)) // (width + len(_BETWEEN))))
     for first in range(0, len(texts), step):
         shown = (text.rjust(width) for text in texts[first:first + step])
-        yield str(mapping.place_of(first)), _BETWEEN.join(shown)
+        yield names[first], _BETWEEN.join(shown)
 
 
 def value_texts(mapping: Mapping, values: Sequence[float], radix: Radix) -> list[str]:

@@ -203,6 +203,8 @@ def _add_addresses(parser: argparse.ArgumentParser) -> None:
                         help='such as N7:0, B3:0/5, T4:0.ACC, ST9:1')
     parser.add_argument('--length', metavar='N', default='1',
                         help='elements of each address (default: %(default)s)')
+    parser.add_argument('--map', metavar='FILE',
+                        help='a map CSV, whose tags are shown beside the addresses')
     parser.add_argument('--radix', type=str.lower, choices=tuple(RADIXES), default='dec',
                         help='how whole numbers are written (default: %(default)s)')
 

@@ -16,8 +16,8 @@
 
 from __future__ import annotations
 
-from collections import Counter, deque
-from collections.abc import Sequence
+from collections import Counter, defaultdict, deque
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass
 from datetime import datetime
 import math
@@ -27,7 +27,7 @@ import sys
 import textwrap
 import threading
 
-from abdf1_ros.cli.plc.data import Radix, rows, value_texts
+from abdf1_ros.cli.plc.data import labels, Radix, rows, Tags, value_texts
 from abdf1_ros.cli.plc.session import opened
 from abdf1_ros.cli.terminal import is_terminal, table
 from abdf1_ros.df1.stations import Station
@@ -51,6 +51,11 @@ _MARKED = 1.0
 # Characters of a row of values, however narrow the window is.
 _LEAST_ROOM = 16
 
+# Reads that a curve shows, and its bars.
+_CURVE = 24
+_BARS = '▁▂▃▄▅▆▇█'
+_VALUE_AND_CURVE = f'value, and its last {_CURVE} reads'
+
 
 @dataclass(frozen=True, slots=True)
 class _NoValue:
@@ -63,17 +68,22 @@ class Watch:
     """
     The driver without ROS: read ``mappings`` every ``period`` seconds and show them.
 
-    With ``csv`` each read is a line for each value, also where nothing has changed.
+    With ``csv`` each read is a line for each value, also where nothing has changed. ``tags``
+    stand beside the addresses.
 
     It is the driver's ``Listener``. Raises OSError when the port cannot be opened.
     """
 
     def __init__(self, network: Network, mappings: Sequence[Mapping], period: float,
-                 radix: Radix = Radix.DECIMAL, csv: bool = False) -> None:
+                 radix: Radix = Radix.DECIMAL, csv: bool = False,
+                 tags: Tags | None = None) -> None:
         self._csv = csv
         self._mappings = mappings
         self._radix = radix
+        self._tags = tags
+        self._names = {mapping: labels(mapping, tags) for mapping in mappings}
         self._changed: dict[Mapping, float] = {}
+        self._past: dict[Mapping, deque[float]] = defaultdict(lambda: deque(maxlen=_CURVE))
         settings = DriverSettings(
             default_period=period, read_only=True, first_tns=random.randrange(0x10000))
         self._driver = Driver(network, mappings, settings, self)
@@ -91,7 +101,7 @@ class Watch:
         A failed read counts too. Returns how many addresses have no value at the end.
         """
         if self._csv:
-            print('time,station,address,value', flush=True)
+            print(f'time,station,address,{"" if self._tags is None else "tag,"}value', flush=True)
         try:
             self._link.start()  # inside, as the thread would keep the process alive
             while not self._link.has_failed and not self._is_done(count):
@@ -163,51 +173,75 @@ class Watch:
                 continue  # once is enough
             self._shown[mapping] = what
             texts = [''] if isinstance(what, _NoValue) else \
-                ['"' + printable(what).replace('"', '""') + '"'] if isinstance(what, str) else \
+                [_quoted(printable(what))] if isinstance(what, str) else \
                 value_texts(mapping, what, self._radix)
             for number, text in enumerate(texts):
-                print(f'{time},{mapping.station},{mapping.place_of(number)},{text}', flush=True)
+                place = str(mapping.place_of(number))
+                tag = [] if self._tags is None else [_quoted(self._tags.get(place, ''))]
+                print(time, mapping.station, place, *tag, text, sep=',', flush=True)
 
     def _note_changes(self, news: Sequence[tuple[Mapping, Values | _NoValue]]) -> None:
         """Keep what to show, and the time of its last change."""
         for mapping, what in news:
-            if mapping in self._shown and self._shown[mapping] != what:
+            before = self._shown.get(mapping)
+            if before is not None and before != what:
                 self._changed[mapping] = self._driver.machine.now
             self._shown[mapping] = what
+            if isinstance(what, _NoValue):
+                if before != what:  # one gap: a long silence keeps what was before it
+                    self._past[mapping].append(math.nan)
+            elif mapping.length == 1 and not isinstance(what, str):
+                self._past[mapping].append(what[0])
 
     def _rows(self, mapping: Mapping, room: int | None = None) -> list[tuple[str, str]]:
         """Return what is known of an address, in rows of up to ``room`` characters."""
-        what = self._shown.get(mapping)
+        what, names = self._shown.get(mapping), self._names[mapping]
         if what is None:
-            return [(str(mapping.address), '')]
+            return [(names[0], '')]
         if isinstance(what, _NoValue):
             text = f'no value: {printable(what.error)}'
             lines = textwrap.wrap(text, room) if room else [text]
-            return [(str(mapping.address) if line is lines[0] else '', line) for line in lines]
-        return [(address, printable(text))
-                for address, text in rows(mapping, what, self._radix, room)]
+            return [(names[0] if line is lines[0] else '', line) for line in lines]
+        return [(name, printable(text))
+                for name, text in rows(mapping, what, names, self._radix, room)]
 
     def _head(self, mapping: Mapping) -> tuple[str, ...]:
-        """Return what stands before the values of an address."""
+        """Return what stands between an address and its values."""
         now = self._driver.machine.now
         age = self._driver.points[mapping].age(now)
         is_new = now - self._changed.get(mapping, -math.inf) < _MARKED
-        return (str(mapping.address), str(mapping.station), mapping.type.value,
+        return (str(mapping.station), mapping.type.value,
                 '' if age is None else f'{max(age, 0.0):.1f}', '*' if is_new else '')
+
+    def _curve(self, mapping: Mapping) -> str:
+        """Return the curve of a number; empty where the output cannot show it."""
+        try:
+            _BARS.encode(sys.stdout.encoding or 'ascii')
+        except UnicodeError:
+            return ''
+        return curve_of(self._past[mapping], lambda number: value_texts(
+            mapping, [number], self._radix)[0])
 
     def _redraw(self) -> None:
         """Draw the table over the one before."""
         width, height = shutil.get_terminal_size()
         heads = [self._head(mapping) for mapping in self._mappings]
         # Other columns keep their widths: the values get what is left of the line.
-        names = ('address', 'station', 'type', 'age s', '')
-        taken = sum(max(map(len, column)) + 2 for column in zip(names, *heads, strict=True))
-        cells = []
+        titles = ('station', 'type', 'age s', '')
+        names = ['address', *(name for names in self._names.values() for name in names)]
+        taken = sum(max(map(len, column)) + 2
+                    for column in (names, *zip(titles, *heads, strict=True)))
+        room = max(width - 1 - taken, _LEAST_ROOM)
+        cells, value = [], 'value'
         for mapping, head in zip(self._mappings, heads, strict=True):
-            (_, text), *more = self._rows(mapping, max(width - 1 - taken, _LEAST_ROOM))
-            cells.append((*head, text))
-            cells += [(address, *[''] * (len(head) - 1), text) for address, text in more]
-        lines = table((*names, 'value'), cells, right=(1, 3)).split('\n')
+            (name, text), *more = self._rows(mapping, room)
+            curve = self._curve(mapping)
+            with_curve = f'{text:8}  {curve}'
+            if curve and len(with_curve) <= room:  # never a part of one
+                text, value = with_curve, _VALUE_AND_CURVE
+            cells.append((name, *head, text))
+            cells += [(name, *[''] * len(head), text) for name, text in more]
+        lines = table(('address', *titles, value), cells, right=(1, 3)).split('\n')
         if len(lines) > height - 1:
             hidden = len(lines) - (height - 2)
             lines = [*lines[:height - 2], f'+{hidden} more; a higher window shows them']
@@ -215,3 +249,24 @@ class Watch:
         up = f'\x1b[{self._height}A' if self._height else ''
         print(up + '\n'.join(f'\x1b[K{line}' for line in picture), flush=True)
         self._height = len(picture)
+
+
+def _quoted(text: str) -> str:
+    """Return a text as a cell of CSV."""
+    return '"' + text.replace('"', '""') + '"'
+
+
+def curve_of(numbers: Collection[float], text: Callable[[float], str]) -> str:
+    """
+    Return a bar for each number, between the lowest and the highest as ``text`` has them.
+
+    NaN and infinity are gaps. Where the two do not differ there is no curve.
+    """
+    known = [number for number in numbers if math.isfinite(number)]
+    low, high = min(known, default=0), max(known, default=0)
+    if text(low) == text(high):
+        return ''
+    top = len(_BARS) - 1
+    bars = [_BARS[round((number - low) / (high - low) * top)] if math.isfinite(number) else ' '
+            for number in numbers]
+    return f'{text(low)} {"".join(bars)} {text(high)}'

@@ -25,7 +25,7 @@ from functools import partial
 from pathlib import Path
 import shlex
 import sys
-from typing import Any
+from typing import Any, TypeAlias
 
 from abdf1_ros.cli.plc import data, detect, exports, files, init, presence
 from abdf1_ros.cli.plc.clock import Clock, TAKEN, told
@@ -70,6 +70,8 @@ _ALL_TRIED_IN_VAIN = (
     'PLC-5 shows its own in octal)')
 _ONE_PLC_ANSWERS_TO_ALL = (
     'full duplex tells no addresses apart: most PLCs answer to every station, so these may be one')
+
+_Wanted: TypeAlias = tuple[Cells, data.Tags | None]
 
 _UNCERTAIN = (Outcome.UNKNOWN, Outcome.PARTLY)
 
@@ -159,8 +161,9 @@ def _failed(options: argparse.Namespace, session: Session, error: Abdf1Error, pl
     return EXIT_FAILED
 
 
-def _read(options: argparse.Namespace, session: Session, cells: Cells) -> int:
+def _read(options: argparse.Namespace, session: Session, wanted: _Wanted) -> int:
     status, plc_type = 0, options.plc_type
+    cells, tags = wanted
     for mapping in _mappings(options, session, cells, options.addresses):
         try:
             values = data.read(session, mapping)
@@ -168,20 +171,24 @@ def _read(options: argparse.Namespace, session: Session, cells: Cells) -> int:
             status = _failed(options, session, error, str(mapping.address), plc_type)
             plc_type = None  # once is enough
         else:
-            _print_values(mapping, values, RADIXES[options.radix])
+            _print_values(mapping, values, RADIXES[options.radix], tags)
     return status
 
 
-def _cells_to_read(options: argparse.Namespace) -> Cells:
-    """Return the cells of a read; raises ConfigurationError where no PLC could have them."""
+def _wanted(options: argparse.Namespace) -> _Wanted:
+    """
+    Return the cells of a read, and the tags of --map.
+
+    Raises ConfigurationError where no PLC could have the addresses.
+    """
     cells = _cells(options, Command.READ, options.length)
     data.check_for_some_family(options.addresses, cells)
-    return cells
+    return cells, data.tags_of(_rows_of_map(options), options.station) if options.map else None
 
 
-def _print_values(mapping: Mapping, values: Values,
-                  radix: data.Radix = data.Radix.DECIMAL) -> None:
-    rows = list(data.rows(mapping, values, radix))
+def _print_values(mapping: Mapping, values: Values, radix: data.Radix = data.Radix.DECIMAL,
+                  tags: data.Tags | None = None) -> None:
+    rows = list(data.rows(mapping, values, data.labels(mapping, tags), radix))
     width = max(len(address) for address, _ in rows)
     for address, text in rows:
         print(f'{address:{width}}  {printable(text)}')
@@ -262,11 +269,12 @@ def _carry_out(session: Session, writing: data.Writing) -> int:
     return 0
 
 
-def _watch(options: argparse.Namespace, session: Session, cells: Cells) -> int:
+def _watch(options: argparse.Namespace, session: Session, wanted: _Wanted) -> int:
+    cells, tags = wanted
     mappings = _mappings(options, session, cells, options.addresses)
     session.close()  # the driver opens the port itself
     failed = Watch(session.network, mappings, options.period, RADIXES[options.radix],
-                   options.csv).run(options.count)
+                   options.csv, tags).run(options.count)
     return EXIT_FAILED if failed else 0
 
 
@@ -466,7 +474,7 @@ def _clock(options: argparse.Namespace, session: Session, prepared: None) -> int
     return EXIT_FAILED
 
 
-def _rows_to_compare(options: argparse.Namespace) -> list[Mapping]:
+def _rows_of_map(options: argparse.Namespace) -> list[Mapping]:
     mappings, problems = load_mappings(options.map) if options.map else ([], [])
     for problem in problems:
         _complain(str(problem))
@@ -511,9 +519,9 @@ def _extent(entry: DataFile) -> str:
 
 
 COMMANDS: dict[str, Callable[[argparse.Namespace], int]] = {
-    'read': _asking(_read, _cells_to_read), 'write': _asking(_write, _cells_to_write),
-    'watch': _asking(_watch, _cells_to_read), 'status': _asking(_status), 'ping': _asking(_ping),
+    'read': _asking(_read, _wanted), 'write': _asking(_write, _cells_to_write),
+    'watch': _asking(_watch, _wanted), 'status': _asking(_status), 'ping': _asking(_ping),
     'scan': _scan, 'detect': _detect, 'init': _init, 'ports': _ports,
-    'files': _asking(_files, _rows_to_compare), 'clock': _asking(_clock), 'import': _import}
+    'files': _asking(_files, _rows_of_map), 'clock': _asking(_clock), 'import': _import}
 
 _complain = partial(tell, 'plc', code=RED)

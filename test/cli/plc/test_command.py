@@ -98,6 +98,17 @@ def test_read_shows_rows_with_their_addresses(plc: Plc) -> None:
     assert said.lines[0] == 'N7:10 101 102 103 104 0 0 0 0 0 0'
 
 
+def test_tags_of_a_map_stand_beside_addresses(plc: Plc, tmp_path: Path) -> None:
+    path = write_csv(tmp_path / 'map.csv', 'Tag,Command,Address,Station,PLC_Type',
+                     ['speed,Read,N7:0,1,PLC5', 'wrong,Read,N7:999999,1,PLC5'])
+    said = plc('read', 'N7:0', '--map', str(path))
+    assert (said.status, said.lines) == (0, ['N7:0 speed 1200'])
+    assert said.err.startswith(f'plc: {path}:3:3 (Address): ')
+    said = plc('watch', 'N7:0', '--count', '1', '--map', str(path))
+    assert said.lines[-1].split()[1:] == ['N7:0', 'speed', '1200']
+    assert plc('read', 'N7:0', '--map', str(tmp_path / 'none.csv')).status == 2
+
+
 def test_read_with_the_family_given_asks_nothing_else(plc: Plc) -> None:
     assert plc('read', 'N7:0', '--plc-type', 'plc5').lines == ['N7:0 1200']
 

@@ -19,12 +19,14 @@ from concurrent.futures import Future
 from typing import cast
 
 from abdf1_ros.cli.plc.data import (
+    labels,
     length_of,
     mapping_of,
     parse_values,
     processor_cell,
     Radix,
     rows,
+    tags_of,
     value_texts,
     Writing,
 )
@@ -84,11 +86,26 @@ def test_address_of_an_element(address: str, kind: str, number: int, expected: s
 
 def test_rows_of_values() -> None:
     mapping = make('N7:3', Length='12')
-    assert list(rows(mapping, array('h', [*range(11), -100]))) == [
+    assert list(rows(mapping, array('h', [*range(11), -100]), labels(mapping, None))) == [
         ('N7:3', '   0     1     2     3     4     5     6     7     8     9'),
         ('N7:13', '  10  -100')]
-    assert list(rows(make('F8:0'), array('f', [0.1]))) == [('F8:0', '0.1')]
-    assert list(rows(make('ST9:0'), 'a\nb')) == [('ST9:0', r"'a\nb'")]
+    assert list(rows(make('F8:0'), array('f', [0.1]), ['F8:0'])) == [('F8:0', '0.1')]
+    assert list(rows(make('ST9:0'), 'a\nb', ['ST9:0'])) == [('ST9:0', r"'a\nb'")]
+
+
+def test_values_have_the_tags_of_their_own_addresses() -> None:
+    tags = tags_of([
+        make_mapping('N7:1', tag='speed'), make_mapping('N7:1', tag='speed'),
+        make_mapping('N7:1', tag='a\nb'), make_mapping('N7:2', length=2, tag='words'),
+        make_mapping('N7:4', length=2, kind='string', tag='text'),
+        make_mapping('N7:0', station=2, tag='other'), make_mapping('N7:0/3', tag='bit'),
+        make_mapping('N7:0', command='Serve', tag='ours')], 1)
+    mapping = make('N7:0', Length='6')
+    assert list(rows(mapping, array('h', range(6)), labels(mapping, tags))) == [
+        ('N7:0', '0'), (r'N7:1 speed, a\nb', '1'), ('N7:2 words[0]', '2'),
+        ('N7:3 words[1]', '3'), ('N7:4 text', '4'), ('N7:5', '5')]
+    bits = make('N7:0/2', Length='2')
+    assert labels(bits, tags) == ['N7:0/2', 'N7:0/3 bit']
 
 
 @pytest.mark.parametrize('address, kind, texts, values', [

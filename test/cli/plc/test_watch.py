@@ -15,13 +15,15 @@
 """Values live, against PLCs on a pseudo-terminal."""
 
 from array import array
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
 import io
+from math import inf, nan
 import os
 from pathlib import Path
 
-from abdf1_ros.cli.plc.watch import Watch
+from abdf1_ros.cli.plc.data import Tags
+from abdf1_ros.cli.plc.watch import _NoValue, curve_of, Watch
 from abdf1_ros.pccc.values import Values
 from abdf1_ros.ports.link_thread import LinkThread
 from abdf1_ros.settings.mapping import Mapping
@@ -85,12 +87,14 @@ def test_each_read_is_a_line_of_csv_for_each_value(
         plcs: Plcs, capsys: pytest.CaptureFixture[str]) -> None:
     store(plcs[1], 'ST9:0', 'a,"b"')
     words = make_mapping('N7:0', length=2, item=1)
-    assert Watch(network_on(plcs), [words, NAME], 0.01, csv=True).run(2) == 0
-    head, *lines = capsys.readouterr().out.splitlines()
-    assert head == 'time,station,address,value'
-    told = [line.partition(',')[2] for line in lines]
-    assert told.count('1,N7:0,0') == told.count('1,N7:1,0') >= 2
-    assert '1,ST9:0,"a,""b"""' in told
+    for tags, title, first, other in (
+            (None, '', '', ''), ({'N7:0': 'a, b'}, 'tag,', '"a, b",', '"",')):
+        assert Watch(network_on(plcs), [words, NAME], 0.01, csv=True, tags=tags).run(2) == 0
+        head, *lines = capsys.readouterr().out.splitlines()
+        assert head == f'time,station,address,{title}value'
+        told = [line.partition(',')[2] for line in lines]
+        assert told.count(f'1,N7:0,{first}0') == told.count(f'1,N7:1,{other}0') >= 2
+        assert f'1,ST9:0,{other}"a,""b"""' in told
     plcs.say('silent 1')
     assert Watch(network_on(plcs, 100), [SPEED], 0.01, csv=True).run(2) == 1
     assert [line.partition(',')[2] for line in capsys.readouterr().out.splitlines()[1:]] == [
@@ -134,28 +138,70 @@ def test_interrupt_of_the_start_leaves_no_thread(
     assert not watch._link.is_alive()
 
 
-class Terminal(io.StringIO):
-    """An output that people look at."""
-
-    def isatty(self) -> bool:
-        return True
+Draw = Callable[..., list[str]]
 
 
-def test_table_marks_changes_and_says_what_does_not_fit(
-        plcs: Plcs, monkeypatch: pytest.MonkeyPatch) -> None:
-    screen = Terminal()
-    monkeypatch.setattr('sys.stdout', screen)
-    monkeypatch.setenv('TERM', 'xterm')
-    monkeypatch.setattr('shutil.get_terminal_size', lambda: os.terminal_size((52, 5)))
+@pytest.fixture
+def draw(monkeypatch: pytest.MonkeyPatch) -> Draw:
+    """Return what gives the lines of the table of a watch after some news."""
+    def lines_of(mappings: Sequence[Mapping], *news: tuple[Mapping, Values | _NoValue],
+                 size: tuple[int, int] = (100, 9), encoding: str = 'utf-8',
+                 tags: Tags | None = None) -> list[str]:
+        screen = io.TextIOWrapper(io.BytesIO(), encoding, errors='backslashreplace')
+        with monkeypatch.context() as patch:
+            patch.setattr('abdf1_ros.cli.plc.watch.opened', lambda network: None)
+            watch = Watch(Network(), mappings, 0.01, tags=tags)
+            patch.setattr('sys.stdout', screen)
+            patch.setattr('shutil.get_terminal_size', lambda: os.terminal_size(size))
+            for each in news:
+                watch._note_changes([each])
+            watch._redraw()
+            screen.flush()
+        text = screen.buffer.getvalue().decode(encoding)  # type: ignore[attr-defined]
+        return text.replace('\x1b[K', '').splitlines()
+    return lines_of
+
+
+def test_table_marks_changes_and_says_what_does_not_fit(draw: Draw) -> None:
     words = make_mapping('N7:0', length=4), make_mapping('N7:9', item=2), SPEED
-    table = Watch(network_on(plcs), words, 0.01)
-    table._note_changes([(words[0], array('h', [1, 2, 3, 4]))])
-    table._note_changes([(words[0], array('h', [-20000, 2, 3, 4])), (words[1], array('h', [5]))])
-    table._redraw()
-    lines = screen.getvalue().replace('\x1b[K', '').splitlines()
+    lines = draw(words, (words[0], array('h', [1, 2, 3, 4])),
+                 (words[0], array('h', [-20000, 2, 3, 4])), (words[1], array('h', [5])),
+                 size=(52, 5))
     assert [line.split() for line in lines[1:-1]] == [
         ['N7:0', '1', 'int16', '*', '-20000', '2'], ['N7:2', '3', '4']]
     assert lines[-1].startswith('+2 more')
+
+
+def test_table_has_tags_beside_addresses(draw: Draw) -> None:
+    words = make_mapping('N7:8', length=3)
+    lines = draw([words, SPEED], (words, array('h', [1, 2, 3])), size=(52, 9),
+                 tags={'N7:0': 'speed', 'N7:10': 'a_long_tag'})
+    assert [(line[:16], line[18:].split()[-1:]) for line in lines] == [
+        ('address         ', ['value']), ('N7:8            ', ['1']), ('N7:9            ', ['2']),
+        ('N7:10 a_long_tag', ['3']), ('N7:0 speed      ', ['int16'])]
+
+
+def test_number_has_a_curve_where_it_fits_and_can_be_shown(draw: Draw) -> None:
+    news = [(SPEED, array('h', [value])) for value in (9, *range(1, 25), 12)]
+    silence = (SPEED, _NoValue('silent'))
+    news = [*news[:-1], silence, silence, news[-1]]
+    head, line = draw([SPEED], *news, size=(75, 9))
+    assert head.endswith('value, and its last 24 reads')
+    assert line.endswith('*  12        3 ▁▁▂▂▂▃▃▃▄▄▄▅▅▅▆▆▆▇▇▇██ ▄ 24')
+    for other in ({'size': (74, 9)}, {'encoding': 'latin-1'}):
+        head, line = draw([SPEED], *news, **other)
+        assert (head.split()[-1], line.split()[-1]) == ('value', '12')
+
+
+@pytest.mark.parametrize('numbers, curve', [
+    ([], ''), ([5], ''), ([5, 5.0, 5], ''), ([nan, inf, -inf], ''), ([nan, 5, inf, 5], ''),
+    ([1.0, 1.00000001], ''),  # the same as far as it is shown
+    ([0, 7, 1], '0 ▁█▂ 7'), ([-32768, 32767, 0], '-32768 ▁█▅ 32767'),
+    ([1, nan, 2, inf, -inf, 1], '1 ▁ █  ▁ 2'), ([True, False], '0 █▁ 1'),
+    ([-3.4e38, 3.4e38], '-3.4e+38 ▁█ 3.4e+38')])
+def test_curve_lies_between_its_lowest_and_highest_number(
+        numbers: list[float], curve: str) -> None:
+    assert curve_of(numbers, lambda number: f'{number:.7g}') == curve
 
 
 def test_port_that_is_not_there() -> None:
