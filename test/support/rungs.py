@@ -30,7 +30,6 @@ from functools import partial
 from pathlib import Path
 import re
 
-from abdf1_ros.pccc.address import Address
 from abdf1_ros.pccc.data_table import DataTable
 from abdf1_ros.pccc.families import parse_address
 from abdf1_ros.simulator.ladder import Ladder, Lamp, USUAL_PRESET
@@ -42,6 +41,8 @@ _OPERANDS = {'XIC': 1, 'XIO': 1, 'EQU': 2, 'NEQ': 2, 'GRT': 2, 'GEQ': 2, 'OSR': 
 _COMPARISONS: dict[str, Callable[[int, int], bool]] = {
     'EQU': int.__eq__, 'NEQ': int.__ne__, 'GRT': int.__gt__, 'GEQ': int.__ge__}
 _BUTTON = 'reset-button'
+
+_Place = tuple[bytearray, int, int | None]  # the words of a file, the first byte there, the bit
 
 
 @dataclass(frozen=True, slots=True)
@@ -123,7 +124,7 @@ class PageLadder(Ladder):
         self.before_rung: Callable[[int], None] = lambda number: None
         self._names = {'preset': preset} | dict(names or {})
         self._rungs = [parse(line) for line in lines or rungs_of()]
-        self._places: dict[str, Address] = {}
+        self._places: dict[str, _Place] = {}
         self._times: dict[str, float] = {}  # s that each TON has counted
 
     def enter_run(self, now: float) -> None:
@@ -199,32 +200,35 @@ class PageLadder(Ladder):
         self._store(f'{name}.PRE', limit)
         self._store(f'{name}.ACC', count)
 
-    def _place(self, text: str) -> Address:
+    def _place(self, text: str) -> _Place:
         if text not in self._places:
-            self._places[text] = parse_address(text, self._table.plc_type)
+            address = parse_address(text, self._table.plc_type)
+            self._places[text] = (*self._table.find(address, 1), address.bit)
         return self._places[text]
 
     def _word(self, text: str) -> int:
-        return int.from_bytes(self._table.read(self._place(text), 1), 'little')
+        store, at, _ = self._place(text)
+        return store[at] | store[at + 1] << 8
 
     def _value(self, text: str) -> int:
         """Return a constant, or a word with its sign."""
+        if text not in self._names and re.fullmatch(r'-?\d+', text):
+            self._names[text] = int(text)
         if text in self._names:
             return self._names[text]
-        if re.fullmatch(r'-?\d+', text):
-            return int(text)
         word = self._word(text)
         return word - 0x10000 if word & 0x8000 else word
 
     def _bit(self, text: str) -> bool:
-        bit = self._place(text).bit
+        bit = self._place(text)[2]
         assert bit is not None, text
         return bool(self._word(text) >> bit & 1)
 
     def _set_bit(self, text: str, is_set: bool) -> None:
-        place = self._place(text)
-        assert place.bit is not None, text
-        self._table.write_bits(place, 1 << place.bit, is_set << place.bit)
+        bit = self._place(text)[2]
+        assert bit is not None, text
+        self._store(text, self._word(text) & ~(1 << bit) | is_set << bit)
 
     def _store(self, text: str, value: int) -> None:
-        self._table.write(self._place(text), value.to_bytes(2, 'little'))
+        store, at, _ = self._place(text)
+        store[at:at + 2] = value.to_bytes(2, 'little')
