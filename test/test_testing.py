@@ -108,6 +108,8 @@ def test_node_of_the_test_needs_no_context(abdf1_cell: Cells) -> None:  # noqa: 
     node.create_subscription(Int16MultiArray, '/abdf1/read/p', heard.append, latched_qos())
     cell.ros.executor.add_node(node)
     cell.ros.until(lambda: heard, 'a value in our own node')
+    assert cell.end() == 0
+    assert 'abdf1' not in node.get_node_names()  # no publisher goes while a subscription does
     node.destroy_node()
 
 

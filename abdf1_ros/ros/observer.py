@@ -53,7 +53,9 @@ class Observer:
         End what spins, then the node, then the context, whatever fails on the way.
 
         The executor keeps a wait set with what its nodes have until it is shut down; rclpy should
-        not have to take away what something still waits for.
+        not have to take away what something still waits for. What is left is a race of Fast DDS
+        2.14 with its own thread of discovery, which finds the listener of a reader gone (issue
+        3303 there).
         """
         with ExitStack() as stack:
             if self._owns_context:
