@@ -45,12 +45,12 @@ from rclpy.parameter import parameter_value_to_python
 from rclpy.qos import QoSProfile
 from support.forked import Forked
 
-# Read when the first context is made, here and in every child process. Shared memory is left out:
-# all sessions of a host have it in common, and processes that are killed leave locks in it.
+# Read when the first context is made, here and in every child process. The profile keeps all on
+# 127.0.0.1, without shared memory, which rmw_fastrtps adds wherever the range is LOCALHOST.
 _LOGS = tempfile.TemporaryDirectory(prefix='abdf1_log_')  # goes away with this process
 os.environ |= {
     'ROS_LOG_DIR': _LOGS.name, 'RCUTILS_COLORIZED_OUTPUT': '0',
-    'FASTDDS_BUILTIN_TRANSPORTS': 'UDPv4',
+    'RMW_IMPLEMENTATION': 'rmw_fastrtps_cpp', 'ROS_AUTOMATIC_DISCOVERY_RANGE': 'SYSTEM_DEFAULT',
     'FASTRTPS_DEFAULT_PROFILES_FILE': str(Path(__file__).with_name('dds.xml'))}
 
 OK, WARN, ERROR = DiagnosticStatus.OK, DiagnosticStatus.WARN, DiagnosticStatus.ERROR
