@@ -87,6 +87,7 @@ local COMMANDS = {
   [0x0F5E] = 'modify compatibility file',
   [0x0F67] = 'typed write',
   [0x0F68] = 'typed read',
+  [0x0F79] = 'read-modify-write N',
   [0x0F80] = 'change mode',
   [0x0F81] = 'open file',
   [0x0F82] = 'close file',

@@ -25,7 +25,7 @@ from abdf1_ros.df1.packet import Packet, PRIORITY_BIT, REPLY_BIT
 from abdf1_ros.errors import FormatError, RemoteError
 from abdf1_ros.pccc import diagnostics, notation
 from abdf1_ros.pccc.address import Address, AddressRefusal
-from abdf1_ros.pccc.families import decode_identity, known_commands
+from abdf1_ros.pccc.families import decode_identity, FAMILIES
 from abdf1_ros.pccc.fields import Reader
 from abdf1_ros.pccc.notation import CommandCode, Effect, KnownCommand
 from abdf1_ros.pccc.plc3 import commands as plc3
@@ -57,8 +57,8 @@ def describe(packet: Packet, command: Packet | None = None) -> str:
         return str(error)
     if not data:
         return 'done'
-    entry = _known().get(_code(command)) if command else None
-    if command is not None and entry is not None:
+    if command is not None:
+        entry = _entry(command)
         try:
             return entry.values(entry.read(Reader(_parameters(command))), data)
         except FormatError:
@@ -66,17 +66,15 @@ def describe(packet: Packet, command: Packet | None = None) -> str:
     return notation.hexadecimal(data)
 
 
-def command_codes() -> dict[tuple[int, int | None], str]:
+def command_codes() -> dict[CommandCode, str]:
     """Return the name of every command that we know, by CMD and FNC (None: it has none)."""
-    named = {code: entry.name for code, entry in _known().items()}
-    return dict(sorted((named | _NAMES).items(), key=lambda item: (item[0][0], item[0][1] or 0)))
+    return {code: entry.name for code, entry in sorted(
+        _known().items(), key=lambda item: (item[0][0], item[0][1] or 0))}
 
 
 def effect_of(packet: Packet) -> Effect:
     """Return what a command does, as far as we know."""
-    code = _code(packet)
-    entry = _known().get(code)
-    return _EFFECTS.get(code, Effect.OTHER) if entry is None else entry.effect
+    return _entry(packet).effect
 
 
 def command_name(packet: Packet) -> str:
@@ -88,17 +86,19 @@ def command_name(packet: Packet) -> str:
 
 
 def _known() -> dict[CommandCode, KnownCommand]:
-    return known_commands() | _SHARED
+    own = {code: command for family in FAMILIES.values()
+           for code, command in family.described.items()}
+    return _NAMED | own | _SHARED
+
+
+def _entry(packet: Packet) -> KnownCommand:
+    return _known().get(_code(packet)) or KnownCommand(f'command {command_name(packet)}')
 
 
 def _describe_command(packet: Packet) -> str:
-    code, parameters = _code(packet), _parameters(packet)
-    entry = _known().get(code)
-    if entry is None:
-        name = _NAMES.get(code) or f'command {command_name(packet)}'
-        return f'{name} {notation.hexadecimal(parameters)}'.rstrip()
+    entry = _entry(packet)
     try:
-        return f'{entry.name} {entry.words(entry.read(Reader(parameters)))}'.rstrip()
+        return f'{entry.name} {entry.words(entry.read(Reader(_parameters(packet))))}'.rstrip()
     except FormatError as error:
         # An address of program files or the like is whole, though our servers have not such.
         is_elsewhere = isinstance(error, AddressRefusal) and error.ext_sts == EXT_BAD_ADDRESS
@@ -142,22 +142,14 @@ def _range_address(reader: Reader) -> _Range:
 def _named(reader: Reader) -> SystemAddress | _SymbolicName:
     """Take what is written in ASCII: an address of a PLC-5 after "$", or a symbol, "$" or not."""
     ahead = copy(reader)
+    ahead.byte()
     try:
         return SystemAddress.read(reader)
     except AddressRefusal as error:
-        name = _text(ahead).removeprefix('$')
+        name = printable(ahead.text().decode('latin-1')).removeprefix('$')
         if error.ext_sts not in (EXT_NO_SUCH_SYMBOL, EXT_BAD_SYMBOL) or not name:
             raise
         return _SymbolicName(name)
-
-
-def _text(reader: Reader) -> str:
-    """Take 00, characters, and 00."""
-    reader.byte()
-    text = bytearray()
-    while byte := reader.byte():
-        text.append(byte)
-    return printable(text.decode('latin-1'))
 
 
 def _range_text(address: _Range) -> str:
@@ -231,36 +223,36 @@ _SHARED: dict[CommandCode, KnownCommand] = {
         _ranged(word_range.WordRangeRead.read), _range_read, _words_reply),
 }
 
-# What those of the other commands do that do not change how the PLC works.
-_EFFECTS: dict[CommandCode, Effect] = {
-    (0x06, 0x00): Effect.READS, (0x0F, 0x29): Effect.READS, (0x0F, 0x94): Effect.READS,
-    (0x0F, 0xA3): Effect.READS, (0x0F, 0x03): Effect.WRITES, (0x0F, 0x79): Effect.WRITES}
-
 # All other commands (M 7-2, 7-3; 0F/94 is from practice); their parameters are given as bytes.
-_NAMES: dict[CommandCode, str] = {
+_NAMED: dict[CommandCode, KnownCommand] = {
+    (0x06, 0x00): KnownCommand('echo', Effect.READS),
+    (0x0F, 0x03): KnownCommand('file write', Effect.WRITES),
+    (0x0F, 0x29): KnownCommand('read section size', Effect.READS),
+    (0x0F, 0x79): KnownCommand('read-modify-write N', Effect.WRITES),
+    (0x0F, 0x94): KnownCommand('read file information', Effect.READS),
+    # In no manual; recorded of a MicroLogix 1400, each item is FF and an address.
+    (0x0F, 0xA3): KnownCommand('read of words by physical address', Effect.READS),
+} | {code: KnownCommand(name) for code, name in {
     (0x03, None): 'physical write', (0x04, None): 'physical read',
     # CIP of a Logix controller on its serial port (1756-PM020F p. 75).
     (0x0A, None): 'connected CIP message', (0x0B, None): 'unconnected CIP message',
-    (0x06, 0x00): 'echo', (0x06, 0x02): 'set variables',
-    (0x06, 0x04): 'set timeout', (0x06, 0x05): 'set NAKs', (0x06, 0x06): 'set ENQs',
+    (0x06, 0x02): 'set variables', (0x06, 0x04): 'set timeout', (0x06, 0x05): 'set NAKs',
+    (0x06, 0x06): 'set ENQs',
     (0x06, 0x07): 'reset diagnostic counters', (0x06, 0x08): 'set data table size',
     (0x06, 0x09): 'read link parameters', (0x06, 0x0A): 'set link parameters',
     (0x07, 0x00): 'disable outputs', (0x07, 0x01): 'enable outputs',
     (0x07, 0x03): 'enable scan', (0x07, 0x04): 'enter download mode',
     (0x07, 0x05): 'exit download or upload mode', (0x07, 0x06): 'enter upload mode',
-    (0x0F, 0x03): 'file write', (0x0F, 0x05): 'download request', (0x0F, 0x06): 'upload request',
+    (0x0F, 0x05): 'download request', (0x0F, 0x06): 'upload request',
     (0x0F, 0x07): 'shut down', (0x0F, 0x08): 'physical write', (0x0F, 0x09): 'physical read',
     (0x0F, 0x0A): 'restart', (0x0F, 0x11): 'get edit resource',
     (0x0F, 0x12): 'return edit resource', (0x0F, 0x17): 'read bytes physical',
-    (0x0F, 0x18): 'write bytes physical', (0x0F, 0x29): 'read section size',
-    (0x0F, 0x3A): 'set CPU mode', (0x0F, 0x41): 'disable forces', (0x0F, 0x50): 'download all',
+    (0x0F, 0x18): 'write bytes physical', (0x0F, 0x3A): 'set CPU mode',
+    (0x0F, 0x41): 'disable forces', (0x0F, 0x50): 'download all',
     (0x0F, 0x52): 'download completed', (0x0F, 0x53): 'upload all',
     (0x0F, 0x55): 'upload completed', (0x0F, 0x57): 'initialize memory',
     (0x0F, 0x5E): 'modify compatibility file', (0x0F, 0x80): 'change mode',
     (0x0F, 0x81): 'open file', (0x0F, 0x82): 'close file',
     (0x0F, 0x88): 'execute command list', (0x0F, 0x8F): 'apply port configuration',
-    (0x0F, 0x94): 'read file information', (0x0F, 0xA7): 'protected typed file read',
-    (0x0F, 0xAF): 'protected typed file write',
-    # In no manual; recorded of a MicroLogix 1400, each item is FF and an address.
-    (0x0F, 0xA3): 'read of words by physical address',
-}
+    (0x0F, 0xA7): 'protected typed file read', (0x0F, 0xAF): 'protected typed file write',
+}.items()}

@@ -26,7 +26,6 @@ from abdf1_ros.pccc.family import Family
 from abdf1_ros.pccc.file_types import PlcType
 from abdf1_ros.pccc.identity import Identity
 from abdf1_ros.pccc.link_counters import ServedCounters
-from abdf1_ros.pccc.notation import CommandCode, KnownCommand
 from abdf1_ros.pccc.plc2 import FAMILY as PLC2
 from abdf1_ros.pccc.plc3 import FAMILY as PLC3
 from abdf1_ros.pccc.plc5 import FAMILY as PLC5
@@ -50,12 +49,6 @@ def decode_identity(data: bytes) -> Identity:
         if identity is not None:
             return identity
     return Identity(None, f'unknown processor ({data[:8].hex(" ").upper()})')
-
-
-def known_commands() -> dict[CommandCode, KnownCommand]:
-    """Return how the commands of all families are put into words."""
-    return {code: command for family in FAMILIES.values()
-            for code, command in family.described.items()}
 
 
 def served_counters(counters: Counters, plc_type: PlcType, mode: str) -> ServedCounters | None:

@@ -66,6 +66,12 @@ class Reader:
         value = self.byte()
         return self.word() if value == _ESCAPE else value
 
+    def text(self) -> bytes:
+        """Return the characters up to a 00, which is taken too."""
+        text = self._data[self._position:].partition(b'\0')[0]
+        self.take(len(text) + 1)
+        return text
+
     def rest(self) -> bytes:
         """Return all that is left."""
         return self.take(len(self._data) - self._position)

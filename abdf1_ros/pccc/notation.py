@@ -40,25 +40,25 @@ class Effect(Enum):
     OTHER = ''
 
 
+def hexadecimal(data: bytes) -> str:
+    """Return bytes as they stand on the line."""
+    return data.hex(' ').upper()
+
+
 @dataclass(frozen=True, slots=True)
 class KnownCommand:
     """A command: what it does, how it is read, what it says, and what its reply's data are."""
 
     name: str
-    effect: Effect
-    read: Callable[[Reader], Any]
-    words: Callable[[Any], str]
+    effect: Effect = Effect.OTHER
+    read: Callable[[Reader], Any] = Reader.rest
+    words: Callable[[Any], str] = hexadecimal
     values: Callable[[Any, bytes], str] = lambda request, data: hexadecimal(data)
 
 
 def part_of(offset: int, size: int, total: int) -> str:
     """Return where in a transaction of several packets this is, or nothing if it is all."""
     return '' if (offset, size) == (0, total) else f' (from {offset} of {total})'
-
-
-def hexadecimal(data: bytes) -> str:
-    """Return bytes as they stand on the line."""
-    return data.hex(' ').upper()
 
 
 def place_text(addressing: Addressing, kind: FileType, file: int, element: int, word: int) -> str:

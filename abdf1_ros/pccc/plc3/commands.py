@@ -78,9 +78,7 @@ class ExtendedAddress:
 
 def _no_symbol(reader: Reader) -> AddressRefusal:
     """Return why the symbol that follows is refused: its length, or no symbols here."""
-    length = 0
-    while reader.byte():
-        length += 1
+    length = len(reader.text())
     if not 0 < length <= _LONGEST_SYMBOL:
         return AddressRefusal(status.EXT_BAD_SYMBOL, f'a symbol of {length} characters')
     return AddressRefusal(status.EXT_NO_SUCH_SYMBOL, 'symbols cannot be looked up here')

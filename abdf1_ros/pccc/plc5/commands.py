@@ -119,9 +119,7 @@ class SystemAddress:
 
     @classmethod
     def _read_ascii(cls, reader: Reader) -> SystemAddress:
-        text = bytearray()
-        while (byte := reader.byte()) != 0:
-            text.append(byte)
+        text = reader.text()
         if text[:1] != b'$':
             raise AddressRefusal(status.EXT_NO_SUCH_SYMBOL,
                                  'a symbol; an address in ASCII begins with "$"')
