@@ -112,8 +112,8 @@ class Served:
             self._table.create(_first_word(mapping), mapping.codec.words)
             if mapping.is_read_only:
                 self._table.protect(_first_word(mapping), mapping.codec.words)
-        processor = EmulatedProcessor(plc_type, is_full_duplex=is_full_duplex)
-        self._server = Server(self._table, processor, counters)
+        self._server = Server(
+            self._table, EmulatedProcessor(is_full_duplex=is_full_duplex), counters)
 
     def serve(self, command: Packet) -> Packet:
         """Execute a command from outside and return its reply."""

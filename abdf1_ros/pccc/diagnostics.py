@@ -27,31 +27,15 @@ from dataclasses import dataclass
 from abdf1_ros.pccc.fields import Reader, word
 
 CMD = 0x06
-ECHO = 0x00
+ECHO = 0x00  # the reply has the same data (M 7-8)
 READ_COUNTERS = 0x01
 STATUS = 0x03
 RESET_COUNTERS = 0x07
 
-MAX_ECHO = 243  # bytes (M 7-8)
+MAX_ECHO = 243  # bytes (M 7-8); a family may have less
 MAX_COUNTERS = 244  # bytes in a reply to 06/01
 
 STATUS_REQUEST = bytes((STATUS,))
-
-
-@dataclass(frozen=True, slots=True)
-class Echo:
-    """Echo, 06/00 (M 7-8): the reply has the same data; a family has a limit."""
-
-    data: bytes = b''
-
-    def encode(self) -> bytes:
-        """Return FNC and parameters."""
-        return bytes((ECHO,)) + self.data
-
-    @classmethod
-    def read(cls, reader: Reader) -> Echo:
-        """Take the data off ``reader``."""
-        return cls(reader.rest())
 
 
 @dataclass(frozen=True, slots=True)

@@ -19,8 +19,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 from enum import Enum
 
-from abdf1_ros.pccc.families import FAMILIES
-from abdf1_ros.pccc.file_types import PlcType
 from abdf1_ros.pccc.identity import Mode
 from abdf1_ros.pccc.processor import Processor
 
@@ -44,22 +42,15 @@ _MODES = {
 @dataclass(slots=True)
 class EmulatedProcessor:
     """
-    A processor of a family, and what it is set to at the moment.
+    The processor of an emulated PLC, and what it is set to at the moment.
 
     It is an SLC 5/03 (or another ``processor``), a PLC-5/40, a PLC-3 behind the RS-232 port of a
-    1775-KA, or a PLC-2 behind a 1771-KG. Fields for memory and programs, which it does not
-    have, are 0.
+    1775-KA, or a PLC-2 behind a 1771-KG. ``identity`` in the folder of the family has its reply.
     """
 
-    plc_type: PlcType
     setting: Setting = Setting.REMOTE
     is_full_duplex: bool = False
     processor: Processor | None = None
-
-    def encode(self) -> bytes:
-        """Return the data of the reply to 06/03: SLC 24 bytes, PLC-5 36, PLC-3 18, PLC-2 10."""
-        return FAMILIES[self.plc_type].encode_identity(
-            self.mode, self.is_faulted, self.is_full_duplex, self.processor)
 
     @property
     def mode(self) -> Mode:

@@ -24,9 +24,10 @@ from abdf1_ros.pccc.address import Addressing
 from abdf1_ros.pccc.data_table import DataTable
 from abdf1_ros.pccc.diagnostics import MAX_ECHO
 from abdf1_ros.pccc.dialect import Dialect
+from abdf1_ros.pccc.emulated import EmulatedProcessor
 from abdf1_ros.pccc.file_search import FileSearch
 from abdf1_ros.pccc.file_types import FileType, Layout, PlcType
-from abdf1_ros.pccc.identity import Identity, Mode
+from abdf1_ros.pccc.identity import Identity
 from abdf1_ros.pccc.link_counters import CounterLayout
 from abdf1_ros.pccc.notation import CommandCode, KnownCommand
 from abdf1_ros.pccc.processor import Processor
@@ -40,8 +41,7 @@ class Family:
     A PLC family: its addresses, its commands for us as a client, and its emulation as a server.
 
     ``dialects`` has the usual access first. ``decode_identity`` returns None for the reply of
-    another family to 06/03; ``encode_identity`` makes one for a mode, a fault, full duplex, and
-    a processor, None for the usual.
+    another family to 06/03; ``encode_identity`` makes that of an emulated processor.
     ``described`` has its commands in words. ``meanings`` are those of its own error codes.
     ``by_processor`` is for a family whose processors take packets of different lengths.
     ``served_counters`` returns the layout of a port in a mode (Master, Slave, Peer, Radio), None
@@ -55,7 +55,7 @@ class Family:
     dialects: Mapping[Access, Dialect]
     commands: Callable[[DataTable], ServedFamily]
     decode_identity: Callable[[bytes], Identity | None]
-    encode_identity: Callable[[Mode, bool, bool, Processor | None], bytes]
+    encode_identity: Callable[[EmulatedProcessor], bytes]
     described: Mapping[CommandCode, KnownCommand]
     meanings: Meanings = USUAL_MEANINGS
     by_processor: Mapping[Processor, Dialect] = field(default_factory=dict)

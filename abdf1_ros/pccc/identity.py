@@ -111,7 +111,7 @@ class Identity:
     def counters(self) -> ReadCounters:
         """Return the command that reads the counters of the port that was asked."""
         if self.counter_layout is not None:
-            return ReadCounters(0, self.counter_layout.size)
+            return ReadCounters(0, 2 * len(self.counter_layout))
         return ReadCounters(self.counter_address, self.counter_size)
 
     @property

@@ -21,8 +21,6 @@ port; the reply does not tell the order. A counter of 16 bits begins again at 0 
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 from abdf1_ros.counters import Counters
 from abdf1_ros.errors import FormatError
 
@@ -40,16 +38,8 @@ DCD, LOST = 'carrier recovered', 'modem lost'
 UNUSED = ''
 
 
-@dataclass(frozen=True, slots=True)
-class CounterLayout:
-    """What each word counts; '' for a word that is not used."""
-
-    names: tuple[str, ...]
-
-    @property
-    def size(self) -> int:
-        """Return the bytes of the whole block."""
-        return 2 * len(self.names)
+CounterLayout = tuple[str, ...]
+"""What each word counts; '' for a word that is not used."""
 
 
 def decode_counters(data: bytes, layout: CounterLayout | None) -> dict[str, str]:
@@ -66,7 +56,7 @@ def decode_counters(data: bytes, layout: CounterLayout | None) -> dict[str, str]
     if len(data) % 2:
         raise FormatError(f'counters of {len(data)} bytes; they are words')
     values = [int.from_bytes(data[at:at + 2], 'little') for at in range(0, len(data), 2)]
-    names = [*layout.names, *(f'word {n}' for n in range(len(layout.names), len(values)))]
+    names = [*layout, *(f'word {n}' for n in range(len(layout), len(values)))]
     return {name: _lines(value) if name == MODEM_LINES else str(value)
             for name, value in zip(names, values, strict=False) if name}
 
@@ -95,7 +85,7 @@ class ServedCounters:
         counts = self._counts()
         return b''.join(
             ((counts.get(name, 0) - self._origin.get(name, 0)) & 0xFFFF).to_bytes(2, 'little')
-            for name in self._layout.names)
+            for name in self._layout)
 
     def reset(self) -> bytes:
         """Begin again at 0; return the reply's data, which are none."""

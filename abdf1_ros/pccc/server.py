@@ -44,9 +44,8 @@ class Server:
                  counters: ServedCounters | None = None) -> None:
         family = FAMILIES[table.plc_type]
         self._family = family.commands(table)
-        processor = processor or EmulatedProcessor(table.plc_type)
         self._commands: Commands = self._family.commands | _diagnostics(
-            family, processor, counters)
+            family, processor or EmulatedProcessor(), counters)
 
     def serve(self, command: Packet) -> Packet:
         """Return the reply to ``command``; every command has one."""
@@ -91,7 +90,8 @@ def _diagnostics(family: Family, processor: EmulatedProcessor,
     """
     cmd = diagnostics.CMD
     commands: Commands = {(cmd, diagnostics.ECHO): partial(_echo, family.max_echo),
-                          (cmd, diagnostics.STATUS): partial(_reply, processor.encode)}
+                          (cmd, diagnostics.STATUS): partial(
+                              _reply, partial(family.encode_identity, processor))}
     if counters is not None:
         commands[cmd, diagnostics.READ_COUNTERS] = partial(_counters, family, counters)
         commands[cmd, diagnostics.RESET_COUNTERS] = partial(_reply, counters.reset)
@@ -99,7 +99,7 @@ def _diagnostics(family: Family, processor: EmulatedProcessor,
 
 
 def _echo(limit: int, reader: Reader) -> bytes:
-    data = diagnostics.Echo.read(reader).data
+    data = reader.rest()
     if len(data) > limit:
         raise FormatError(f'an echo of {len(data)} bytes, at most {limit}')
     return data

@@ -175,6 +175,6 @@ def identify() -> Steps[Identity]:
 
 def echo(data: bytes) -> Steps[None]:
     """Have a station send ``data`` back; FormatError when the reply differs."""
-    reply = check_status((yield diagnostics.CMD, diagnostics.Echo(data).encode()))
+    reply = check_status((yield diagnostics.CMD, bytes((diagnostics.ECHO,)) + data))
     if reply != data:
         raise FormatError(f'the echo of {data.hex(" ")} came back as {reply.hex(" ")}')

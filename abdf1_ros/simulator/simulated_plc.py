@@ -150,7 +150,7 @@ class SimulatedPlc(TaskSource):
         self.via = via
         self.table = table
         self.faults = InjectedFaults()
-        self.processor = EmulatedProcessor(table.plc_type)
+        self.processor = EmulatedProcessor()
         self.slave = HalfDuplexSlave(LinkSettings(station=station, checksum=checksum), self.serve)
         self.counters = self.slave.counters  # of our port
         self.outbox: deque[Sending] = deque()
@@ -177,7 +177,7 @@ class SimulatedPlc(TaskSource):
 
     def _make_server(self, mode: str) -> Server:
         return Server(self.table, self.processor, served_counters(
-            self.counters, self.processor.plc_type, mode))
+            self.counters, self.table.plc_type, mode))
 
     def handle(self, symbol: Symbol) -> bytes:
         """Answer a symbol, with the effects of the faults."""

@@ -81,7 +81,7 @@ def test_request_of_several_commands_is_not_interrupted() -> None:
 
     def twice(name: str) -> Steps[None]:
         for number in range(2):
-            yield diagnostics.CMD, diagnostics.Echo(b'').encode()
+            yield diagnostics.CMD, bytes((diagnostics.ECHO,))
             log.append(f'{name}{number}')
 
     bench = Bench()
@@ -94,7 +94,7 @@ def test_request_of_several_commands_is_not_interrupted() -> None:
 def test_errors_end_only_their_own_request() -> None:
     def broken(at: int) -> Steps[None]:
         for _ in range(at):
-            yield diagnostics.CMD, diagnostics.Echo(b'').encode()
+            yield diagnostics.CMD, bytes((diagnostics.ECHO,))
         raise TypeError('a bug')
 
     bench = Bench()

@@ -19,6 +19,7 @@ from dataclasses import replace
 
 from abdf1_ros.df1.packet import Packet
 from abdf1_ros.driver.served import Served
+from abdf1_ros.pccc import families
 from abdf1_ros.pccc.access import Access
 from abdf1_ros.pccc.address import Address
 from abdf1_ros.pccc.emulated import EmulatedProcessor
@@ -160,7 +161,8 @@ def test_without_rows_only_diagnostics_are_served(plc: str) -> None:
     bench = Bench(plc)
     assert bench.refused_read('N7:0') == BAD_FILE[plc]
     assert bench.ask(0x06, b'\0hello') == (0, b'hello')
-    assert bench.ask(0x06, b'\3') == (0, EmulatedProcessor(PlcType(plc)).encode())
+    assert bench.ask(0x06, b'\3') == (0, families.FAMILIES[PlcType(plc)].encode_identity(
+        EmulatedProcessor()))
 
 
 @for_all('plc', FAMILIES)

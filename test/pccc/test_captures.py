@@ -50,7 +50,7 @@ _DIAGNOSTICS = 0x06  # what a processor says of itself depends on its state
 def server_of(capture: Capture) -> Server:
     """Return a server that has the words of the capture's server."""
     return Server(
-        capture.table(), EmulatedProcessor(capture.family, is_full_duplex=True),
+        capture.table(), EmulatedProcessor(is_full_duplex=True),
         served_counters(Counters(), capture.family, 'Peer'))
 
 

@@ -15,14 +15,19 @@
 """The processor that an emulated PLC claims to be."""
 
 from abdf1_ros.pccc.emulated import EmulatedProcessor, Setting
-from abdf1_ros.pccc.families import decode_identity
+from abdf1_ros.pccc.families import decode_identity, FAMILIES
 from abdf1_ros.pccc.file_types import PlcType
 import pytest
 from support.vectors import pair
 
 
+def encoded(plc_type: PlcType, setting: Setting = Setting.REMOTE,
+            is_full_duplex: bool = False) -> bytes:
+    return FAMILIES[plc_type].encode_identity(EmulatedProcessor(setting, is_full_duplex))
+
+
 def test_slc_has_the_layout_of_the_vectors() -> None:
-    ours = EmulatedProcessor(PlcType.SLC, is_full_duplex=True).encode()
+    ours = encoded(PlcType.SLC, is_full_duplex=True)
     theirs = pair('diag_status_slc504')[1].data
     assert len(ours) == len(theirs) == 24
     assert ours[:3] == theirs[:3]  # mode, type extender, full duplex
@@ -30,11 +35,11 @@ def test_slc_has_the_layout_of_the_vectors() -> None:
     assert ours[5:16] == b'5/03       '
     assert ours[16:20] == b'\0\0\x06\0'  # no major error, remote run
     assert ours[23] == theirs[23] == 0xFC  # no owner of the program
-    assert EmulatedProcessor(PlcType.SLC).encode()[2] == 0x36  # half duplex
+    assert encoded(PlcType.SLC)[2] == 0x36  # half duplex
 
 
 def test_plc5_has_the_layout_of_the_vectors() -> None:
-    ours = EmulatedProcessor(PlcType.PLC5).encode()
+    ours = encoded(PlcType.PLC5)
     theirs = pair('diag_status_plc5_40')[1].data
     assert len(ours) == len(theirs) == 36
     assert ours[:3] == theirs[:3]  # remote run, PLC-5, 5/40
@@ -44,7 +49,7 @@ def test_plc5_has_the_layout_of_the_vectors() -> None:
     (PlcType.PLC3, 18, b'\x02\x47'), (PlcType.PLC2, 10, b'\x02\x14')])
 def test_older_families_tell_of_themselves_in_their_own_layout(
         plc_type: PlcType, size: int, first: bytes) -> None:
-    data = EmulatedProcessor(plc_type).encode()
+    data = encoded(plc_type)
     assert (len(data), data[:2]) == (size, first)
 
 
@@ -55,7 +60,7 @@ def test_older_families_tell_of_themselves_in_their_own_layout(
     (PlcType.PLC2, ('RUN', 'REM PROG', 'RUN', 'REM TEST'))])
 def test_every_setting_is_read_back(plc_type: PlcType, texts: tuple[str, ...]) -> None:
     settings = (Setting.RUN, Setting.PROGRAM, Setting.REMOTE, Setting.TEST)
-    identities = [decode_identity(EmulatedProcessor(plc_type, setting).encode())
+    identities = [decode_identity(encoded(plc_type, setting))
                   for setting in settings]
     assert tuple(identity.mode_text for identity in identities) == texts
     assert [identity.is_running for identity in identities] == [True, False, True, False]
@@ -68,5 +73,5 @@ def test_every_setting_is_read_back(plc_type: PlcType, texts: tuple[str, ...]) -
     (PlcType.PLC3, 'major processor fault'),
     (PlcType.PLC2, 'no communication between module and processor')])
 def test_fault_is_read_back(plc_type: PlcType, fault: str) -> None:
-    identity = decode_identity(EmulatedProcessor(plc_type, Setting.FAULT).encode())
+    identity = decode_identity(encoded(plc_type, Setting.FAULT))
     assert (identity.faults, identity.is_running) == ((fault,), False)

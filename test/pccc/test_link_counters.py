@@ -72,7 +72,7 @@ def words(count: int) -> bytes:
         'carrier recovered': '111', 'modem lost': '112'})])
 def test_words_have_the_names_of_their_layout(
         layout: CounterLayout, expected: dict[str, str]) -> None:
-    block = (1).to_bytes(2, 'little') + words(layout.size // 2)[2:]
+    block = (1).to_bytes(2, 'little') + words(len(layout))[2:]
     assert decode_counters(block, layout) == expected
 
 

@@ -32,19 +32,19 @@ from abdf1_ros.pccc.access import Access
 from abdf1_ros.pccc.address import Address, Addressing, AddressSyntaxError
 from abdf1_ros.pccc.data_table import DataTable
 from abdf1_ros.pccc.dialect import Dialect, Request, Transfer
+from abdf1_ros.pccc.emulated import EmulatedProcessor
 from abdf1_ros.pccc.families import FAMILIES
 from abdf1_ros.pccc.family import Family
 from abdf1_ros.pccc.fields import Reader, word
 from abdf1_ros.pccc.file_types import FileType, Layout, PlcType
 from abdf1_ros.pccc.identity import Identity, Mode
-from abdf1_ros.pccc.link_counters import CounterLayout, RECEIVED, SENT
+from abdf1_ros.pccc.link_counters import RECEIVED, SENT
 from abdf1_ros.pccc.notation import Effect, KnownCommand
-from abdf1_ros.pccc.processor import Processor
 from abdf1_ros.pccc.serving import BasicCommands, Codes, Commands
 
 TOY = PlcType('TOY')
 CMD, READ, WRITE, BITS = 0x0F, 0xE0, 0xE1, 0xE2
-COUNTERS = CounterLayout((SENT, RECEIVED))
+COUNTERS = (SENT, RECEIVED)
 
 
 class ToyAddressing(Addressing):
@@ -125,9 +125,8 @@ def decode(data: bytes) -> Identity | None:
     return Identity(TOY, 'Toy', mode=mode, mode_text=mode.value, counter_layout=COUNTERS)
 
 
-def encode(mode: Mode, is_faulted: bool, is_full_duplex: bool,
-           processor: Processor | None = None) -> bytes:
-    return bytes((mode.is_running, 0x77))
+def encode(emulated: EmulatedProcessor) -> bytes:
+    return bytes((emulated.mode.is_running, 0x77))
 
 
 FAMILY = Family(

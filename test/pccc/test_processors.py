@@ -21,7 +21,7 @@ from abdf1_ros.pccc.address import Address
 from abdf1_ros.pccc.data_table import DataTable
 from abdf1_ros.pccc.describe import describe
 from abdf1_ros.pccc.emulated import EmulatedProcessor, Setting
-from abdf1_ros.pccc.families import decode_identity, dialect_of, parse_address
+from abdf1_ros.pccc.families import decode_identity, dialect_of, FAMILIES, parse_address
 from abdf1_ros.pccc.fields import Reader
 from abdf1_ros.pccc.file_types import PlcType
 from abdf1_ros.pccc.identity import Mode
@@ -111,8 +111,8 @@ def test_mode_that_a_change_of_mode_leads_to() -> None:
 
 def simulated(setting: Setting) -> bytes:
     """Return the reply of a simulated MicroLogix 1400 to 06/03."""
-    return EmulatedProcessor(
-        PlcType.SLC, setting, is_full_duplex=True, processor=Processor.ML1400).encode()
+    return FAMILIES[PlcType.SLC].encode_identity(EmulatedProcessor(
+        setting, is_full_duplex=True, processor=Processor.ML1400))
 
 
 @pytest.mark.parametrize(('setting', 'mode'), [(Setting.REMOTE, 0x26), (Setting.PROGRAM, 0x21)])
@@ -134,7 +134,7 @@ def test_simulated_data_files_answer_the_same() -> None:
             else place
         table.create(start, words)
         table.write(start, exchange.reply.data)
-    server = Server(table, EmulatedProcessor(PlcType.SLC, processor=Processor.ML1400))
+    server = Server(table, EmulatedProcessor(processor=Processor.ML1400))
     for _, _, exchange in data_files:
         assert server.serve(exchange.command) == exchange.reply, exchange.meaning
 

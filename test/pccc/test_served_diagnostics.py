@@ -35,7 +35,7 @@ REFUSED = 0x10
 def answer(plc_type: PlcType, data: bytes, counters: ServedCounters | None = None,
            cmd: int = 0x06) -> Packet:
     """Return what a PLC with an empty table answers."""
-    server = Server(DataTable(plc_type), EmulatedProcessor(plc_type), counters)
+    server = Server(DataTable(plc_type), EmulatedProcessor(), counters)
     return server.serve(Packet(1, 9, cmd, 0, 0x1234, data))
 
 
@@ -59,10 +59,11 @@ def test_echo_up_to_the_limit_of_the_family(plc_type: PlcType) -> None:
 
 @pytest.mark.parametrize('plc_type', FAMILIES)
 def test_status_is_that_of_the_processor_at_the_moment(plc_type: PlcType) -> None:
-    processor = EmulatedProcessor(plc_type)
+    processor = EmulatedProcessor()
     server = Server(DataTable(plc_type), processor)
     command = Packet(1, 9, 0x06, 0, 0x1234, STATUS_REQUEST)
-    assert server.serve(command) == reply(processor.encode())
+    assert server.serve(command) == reply(
+        FAMILIES[plc_type].encode_identity(processor))
     processor.setting = Setting.RUN
     assert decode_identity(server.serve(command).data).mode is Mode.RUN
 
@@ -107,8 +108,8 @@ def test_what_there_is_not_is_refused(plc_type: PlcType, data: bytes) -> None:
     (0x0F, b'\x3A\0'), (0x0F, b'\x3A\x02'), (0x0F, b'\x80\x01'), (0x0F, b'\x80\x06'),
     (0x0F, b'\x41'), (0x0F, b'\x11'), (0x0F, b'\x07'), (0x07, b'\0'), (0x07, b'\x03')])
 def test_nobody_changes_the_mode(plc_type: PlcType, cmd: int, data: bytes) -> None:
-    processor = EmulatedProcessor(plc_type)
+    processor = EmulatedProcessor()
     server = Server(DataTable(plc_type), processor)
     refusal = server.serve(Packet(1, 9, cmd, 0, 0x1234, data))
     assert refusal.sts
-    assert processor == EmulatedProcessor(plc_type)
+    assert processor == EmulatedProcessor()

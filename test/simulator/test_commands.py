@@ -18,7 +18,7 @@ from abdf1_ros.df1.packet import Packet
 from abdf1_ros.errors import LinkError
 from abdf1_ros.pccc.diagnostics import STATUS_REQUEST
 from abdf1_ros.pccc.emulated import EmulatedProcessor, Setting
-from abdf1_ros.pccc.families import decode_identity
+from abdf1_ros.pccc.families import decode_identity, FAMILIES
 from abdf1_ros.pccc.file_types import PlcType
 from abdf1_ros.simulator.commands import CommandError, execute
 from abdf1_ros.simulator.ladder import Ladder
@@ -103,7 +103,7 @@ def test_mode_is_told_by_the_diagnostic_status(plcs: list[SimulatedPlc], setting
     assert plcs[1].faults is before  # a mode is no fault of the line
     status = plcs[1].serve(Packet(12, 5, 0x06, 0, 1, STATUS_REQUEST)).data
     assert decode_identity(status) == decode_identity(
-        EmulatedProcessor(PlcType.SLC, setting).encode())
+        FAMILIES[PlcType.SLC].encode_identity(EmulatedProcessor(setting)))
 
 
 def test_message_is_queued_and_its_end_reported(plcs: list[SimulatedPlc]) -> None:

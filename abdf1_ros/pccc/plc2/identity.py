@@ -16,9 +16,9 @@
 
 from __future__ import annotations
 
+from abdf1_ros.pccc.emulated import EmulatedProcessor
 from abdf1_ros.pccc.file_types import PlcType
 from abdf1_ros.pccc.identity import code_of, Identity, letters, Mode, mode_of, named, word_at
-from abdf1_ros.pccc.processor import Processor
 
 KG = 0x14  # byte 2: a 1771-KG (4) of a PLC-2 (1)
 MODULE_ALONE = 0x08  # byte 1
@@ -69,13 +69,12 @@ def _processor(data: bytes) -> str | None:
     return _KA3_EXPANSION.get(data[2], f'PLC-2 of type 0x{data[2]:02X}') if data[2:] else None
 
 
-def encode(mode: Mode, is_faulted: bool, is_full_duplex: bool,
-           processor: Processor | None = None) -> bytes:
+def encode(emulated: EmulatedProcessor) -> bytes:
     """
     Return the data of the reply of a PLC-2 behind a 1771-KG to 06/03.
 
     Fields for memory and programs, which it does not have, are 0.
     """
     # There is no remote run; a PLC-2 that has faulted does not talk to its module.
-    state = code_of(MODES, Mode.RUN if mode is Mode.REMOTE_RUN else mode)
-    return bytes((state | MODULE_ALONE * is_faulted, KG)).ljust(SIZE, b'\0')
+    state = code_of(MODES, Mode.RUN if emulated.mode is Mode.REMOTE_RUN else emulated.mode)
+    return bytes((state | MODULE_ALONE * emulated.is_faulted, KG)).ljust(SIZE, b'\0')

@@ -16,9 +16,9 @@
 
 from __future__ import annotations
 
+from abdf1_ros.pccc.emulated import EmulatedProcessor
 from abdf1_ros.pccc.file_types import PlcType
 from abdf1_ros.pccc.identity import code_of, Identity, letters, Mode, mode_of, named, word_at
-from abdf1_ros.pccc.processor import Processor
 
 PORT = 0x47  # byte 2: a 1775-KA's RS-232 port (7) of a PLC-3 (4)
 MAJOR_FAULT = 0x08  # byte 1
@@ -38,8 +38,7 @@ def decode(data: bytes) -> Identity | None:
                     interface=data[1], counter_address=word_at(data, 6))
 
 
-def encode(mode: Mode, is_faulted: bool, is_full_duplex: bool,
-           processor: Processor | None = None) -> bytes:
+def encode(emulated: EmulatedProcessor) -> bytes:
     """
     Return the data of the reply of a PLC-3, asked at the RS-232 port of a 1775-KA, to 06/03.
 
@@ -48,5 +47,6 @@ def encode(mode: Mode, is_faulted: bool, is_full_duplex: bool,
     # A PLC-3 has neither remote modes nor a remote run.
     local = {Mode.REMOTE_RUN: Mode.RUN, Mode.REMOTE_PROGRAM: Mode.PROGRAM,
              Mode.REMOTE_TEST: Mode.TEST}
-    state = code_of(MODES, local.get(mode, mode)) | MAJOR_FAULT * is_faulted
+    state = code_of(MODES, local.get(emulated.mode, emulated.mode))
+    state |= MAJOR_FAULT * emulated.is_faulted
     return bytes((state, PORT)).ljust(SIZE, b'\0')

@@ -27,6 +27,7 @@ from functools import partial
 from abdf1_ros.errors import FormatError
 from abdf1_ros.pccc import link_counters as names
 from abdf1_ros.pccc.address import Address
+from abdf1_ros.pccc.emulated import EmulatedProcessor
 from abdf1_ros.pccc.file_types import FileType, PlcType
 from abdf1_ros.pccc.identity import (
     code_of,
@@ -38,10 +39,8 @@ from abdf1_ros.pccc.identity import (
     named,
     word_at,
 )
-from abdf1_ros.pccc.link_counters import CounterLayout
 from abdf1_ros.pccc.plc5.address import ADDRESSING
 from abdf1_ros.pccc.plc5.dialect import Plc5Dialect
-from abdf1_ros.pccc.processor import Processor
 
 EXTENDED = 0xEB  # byte 2: an expansion byte tells the model
 PLC_5_40 = 0x15
@@ -62,10 +61,10 @@ _MODELS = {
 MODES = {0: Mode.PROGRAM, 2: Mode.RUN, 4: Mode.REMOTE_PROGRAM, 5: Mode.REMOTE_TEST,
          6: Mode.REMOTE_RUN}
 
-COUNTERS = CounterLayout((
+COUNTERS = (
     names.MODEM_LINES, names.SENT, names.RECEIVED, names.UNDELIVERED, names.ENQ_OR_SENT_AGAIN,
     names.NAK_RECEIVED, names.ENQ_RECEIVED, names.BAD, names.NAK_SENT, names.DUPLICATES,
-    'receive errors', names.DCD, names.LOST))
+    'receive errors', names.DCD, names.LOST)
 
 _UNNAMED_FAULT = 'major processor fault (word S:11 says which)'
 _FAULT_WORDS = Address(ADDRESSING, FileType.STATUS, 2, 11)
@@ -130,12 +129,11 @@ def _with_fault(identity: Identity, reply: bytes) -> Identity:
         fault if text == _UNNAMED_FAULT else text for text in identity.faults))
 
 
-def encode(mode: Mode, is_faulted: bool, is_full_duplex: bool,
-           processor: Processor | None = None) -> bytes:
+def encode(emulated: EmulatedProcessor) -> bytes:
     """
     Return the data of the reply of a PLC-5/40 to 06/03.
 
     Fields for memory and programs, which it does not have, are 0.
     """
-    state = code_of(MODES, mode) | MAJOR_FAULT * is_faulted
+    state = code_of(MODES, emulated.mode) | MAJOR_FAULT * emulated.is_faulted
     return bytes((state, EXTENDED, PLC_5_40)).ljust(SIZE, b'\0')

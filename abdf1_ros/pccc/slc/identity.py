@@ -23,6 +23,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from abdf1_ros.pccc import link_counters as names
+from abdf1_ros.pccc.emulated import EmulatedProcessor
 from abdf1_ros.pccc.file_types import PlcType
 from abdf1_ros.pccc.identity import (
     code_of,
@@ -78,28 +79,28 @@ MODES = {
     0x1E: Mode.RUN}
 
 # The counters of a port by its role (M 9-6, 9-7, 9-31).
-FULL_DUPLEX_COUNTERS = CounterLayout((
+FULL_DUPLEX_COUNTERS = (
     names.MODEM_LINES, names.SENT, names.RECEIVED, names.UNDELIVERED, names.ENQ_SENT,
     names.NAK_RECEIVED, names.ENQ_RECEIVED, names.BAD, names.NO_MEMORY, names.DUPLICATES,
-    names.UNUSED, names.DCD, names.LOST))
-MASTER_COUNTERS = CounterLayout((
+    names.UNUSED, names.DCD, names.LOST)
+MASTER_COUNTERS = (
     names.MODEM_LINES, names.SENT, names.RECEIVED, names.UNDELIVERED, names.RETRIES,
     'last normal scan (100 ms)', 'longest normal scan (100 ms)', names.BAD, names.UNUSED,
     names.DUPLICATES, 'last priority scan (100 ms)', names.DCD, names.LOST,
-    'longest priority scan (100 ms)'))
-SLAVE_COUNTERS = CounterLayout((
+    'longest priority scan (100 ms)')
+SLAVE_COUNTERS = (
     names.MODEM_LINES, names.SENT, names.RECEIVED, names.UNDELIVERED, names.RETRIES,
     names.UNUSED, names.POLLS, names.BAD, names.NO_MEMORY, names.DUPLICATES, names.UNUSED,
-    names.DCD, names.LOST))
+    names.DCD, names.LOST)
 # No source shows this reply by radio. The words are where the status CSx of a radio modem port has
 # them (1763-RM001C 522: CSx:9 to CSx:18), and where the other DF1 ports have those of the names.
-RADIO_COUNTERS = CounterLayout((
+RADIO_COUNTERS = (
     names.MODEM_LINES, names.SENT, names.RECEIVED, names.UNSENT, *3 * [names.UNUSED], names.BAD,
-    names.NO_MEMORY, names.DUPLICATES))
-ML1000_COUNTERS = CounterLayout((
+    names.NO_MEMORY, names.DUPLICATES)
+ML1000_COUNTERS = (
     names.UNUSED, names.SENT, names.RECEIVED, names.UNDELIVERED, names.ENQ_SENT,
     names.NAK_RECEIVED, names.ENQ_RECEIVED, names.BAD, names.NO_MEMORY, names.DUPLICATES,
-    'framing errors'))
+    'framing errors')
 
 MAJOR_ERROR_HALTED = 0x20  # byte 20
 _ALWAYS_SET = 0x20  # byte 19 of a MicroLogix
@@ -162,19 +163,19 @@ def _model(code: int, name: str) -> tuple[str, Processor | None, tuple[str, ...]
     return (name, None, remarks) if name.startswith(_ANY_SLC) else ('', None, ())
 
 
-def encode(mode: Mode, is_faulted: bool, is_full_duplex: bool,
-           processor: Processor | None = None) -> bytes:
+def encode(emulated: EmulatedProcessor) -> bytes:
     """
-    Return the data of the reply of an SLC 5/03, or of ``processor``, to 06/03.
+    Return the data of the reply of an SLC 5/03, or of another processor, to 06/03.
 
     Fields for memory and programs, which it does not have, are 0.
     """
-    known = next(known for known in _MODELS if known.processor is (processor or USUAL))
+    processor = emulated.processor or USUAL
+    known = next(known for known in _MODELS if known.processor is processor)
     is_micrologix = known.model.startswith('MicroLogix')
-    port = FULL_DUPLEX_PORT if is_full_duplex else HALF_DUPLEX_PORT
-    error = _MINOR_ERROR_LEFT if is_faulted else 0
-    state = code_of(MODES, mode) | _ALWAYS_SET * is_micrologix
+    port = FULL_DUPLEX_PORT if emulated.is_full_duplex else HALF_DUPLEX_PORT
+    error = _MINOR_ERROR_LEFT if emulated.is_faulted else 0
+    state = code_of(MODES, emulated.mode) | _ALWAYS_SET * is_micrologix
     return (bytes((0, EXTENDED, port, known.code, 0))
             + (known.start + '-LEC' * is_micrologix).encode().ljust(11)
             + error.to_bytes(2, 'little')
-            + bytes((state, MAJOR_ERROR_HALTED * is_faulted, 0, 0, 0, _NO_OWNER)))
+            + bytes((state, MAJOR_ERROR_HALTED * emulated.is_faulted, 0, 0, 0, _NO_OWNER)))
