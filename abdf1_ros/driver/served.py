@@ -16,11 +16,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
-from itertools import islice
+from collections import defaultdict
+from collections.abc import Callable, Sequence
 
 from abdf1_ros.df1.packet import Packet
-from abdf1_ros.pccc.address import Address
+from abdf1_ros.pccc.address import Address, Area
 from abdf1_ros.pccc.data_table import DataTable, OutOfRange, Protected
 from abdf1_ros.pccc.emulated import EmulatedProcessor
 from abdf1_ros.pccc.extent import Extent
@@ -35,24 +35,24 @@ class _MappedTable(DataTable):
     A data table that has only the mapped words, and remembers what was written.
 
     ``changed`` has the address and the old data of each write. With ``is_guarded`` the words that
-    are ``read_only`` cannot be written.
+    are protected cannot be written.
     """
 
     def __init__(self, plc_type: PlcType) -> None:
         super().__init__(plc_type)
         self.changed: list[tuple[Address, bytes]] = []
-        self.read_only: set[Address] = set()
         self.is_guarded = False
-        self._mapped: set[Address] = set()
+        self._mapped: defaultdict[Area, set[int]] = defaultdict(set)  # offsets of words
+        self._read_only: defaultdict[Area, set[int]] = defaultdict(set)
 
     def create(self, address: Address, words: int) -> None:
         """Map these words."""
         super().create(address, words)
-        self._mapped.update(_words(address, words))
+        self._mapped[address.area].update(_offsets(address, words))
 
     def protect(self, address: Address, words: int) -> None:
         """Keep these words from being written while the table is guarded."""
-        self.read_only.update(_words(address, words))
+        self._read_only[address.area].update(_offsets(address, words))
 
     def find(self, address: Address, words: int) -> tuple[bytearray, int]:
         """Return where the words are, if all of them are mapped."""
@@ -68,16 +68,18 @@ class _MappedTable(DataTable):
         A command that moves whole elements of a structure cannot leave out single words. There one
         mapped word of each element is enough; the others hold what the other end wrote, or 0.
         """
-        mapped = (place in self._mapped for place in _words(address, words))
+        known = self._mapped[address.area]
+        mapped = [offset in known for offset in _offsets(address, words)]
         size = address.layout.words
         if not address.file_type.is_structure or address.word or words % size:
             return all(mapped)
-        return all(any(list(islice(mapped, size))) for _ in range(words // size))
+        return all(any(mapped[at:at + size]) for at in range(0, words, size))
 
     def write(self, address: Address, data: bytes) -> None:
         """Store whole words and remember what was there; Protected where that is forbidden."""
         words = len(data) // 2
-        if self.is_guarded and not self.read_only.isdisjoint(_words(address, words)):
+        if self.is_guarded and not self._read_only[address.area].isdisjoint(
+                _offsets(address, words)):
             raise Protected(f'{words} words at {address} may only be read')
         before = self.read(address, words)
         super().write(address, data)
@@ -90,8 +92,9 @@ class _MappedTable(DataTable):
         self.changed.clear()
 
 
-def _words(address: Address, words: int) -> Iterable[Address]:
-    return (address.at_offset(address.offset + n) for n in range(words))
+def _offsets(address: Address, words: int) -> range:
+    first = address.offset
+    return range(first, first + words)
 
 
 class Served:
