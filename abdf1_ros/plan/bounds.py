@@ -29,6 +29,7 @@ from abdf1_ros.df1.frames import Duplex, MAX_LINK_DATA
 from abdf1_ros.pccc.steps import write_requests
 from abdf1_ros.pccc.values import ValueType
 from abdf1_ros.plan import forecast
+from abdf1_ros.plan.line_model import LineModel
 from abdf1_ros.plan.planner import Block, Planner
 from abdf1_ros.settings.heartbeats import READS_IN_TIME, STABLE, TIME_BASE
 from abdf1_ros.settings.map_row import CellFault
@@ -116,11 +117,12 @@ class Times:
         self._stations = {mapping.station for mapping in mappings if not mapping.serves}
         model = forecast.line_model(network)
         reads = [forecast.longest_wait([block], 0.0) for block in blocks]
-        written = [max(_packets(network, mapping)) for mapping in mappings
-                   if (mapping.writes or mapping.heartbeat) and not mapping.serves]
+        self._written = {mapping: _packets(model, mapping) for mapping in mappings
+                         if (mapping.writes or mapping.heartbeat) and not mapping.serves}
         # A guest may have the longest command there is under way.
         guest = model.transaction_time(MAX_LINK_DATA, MAX_LINK_DATA) if network.share else 0.0
-        self._any_frames = max(*reads, *written, guest, _question_time(network, 0.0))
+        written = map(max, self._written.values())
+        self._any_frames = max(*reads, *written, guest, _question_time(model, 0.0))
         served = [2 * mapping.codec.words for mapping in mappings if mapping.serves]
         self._serves = bool(served)
         self._reply = model.transaction_time(0, min(max(served, default=0), MAX_LINK_DATA))
@@ -146,7 +148,7 @@ class Times:
     def _preset(self, mapping: Mapping) -> float:
         assert mapping.period is not None
         period = mapping.period / 1000
-        beats = sum(write_time(self._network, other, self._response_time)
+        beats = sum(_with_answers(self._written[other], self._response_time)
                     for other in self._own if other.heartbeat)
         # The response time stands for the scan of the PLC.
         return max(3 * period, period + 2 * self.longest + beats + self._response_time)
@@ -160,7 +162,7 @@ class Times:
         # In standard polling the others have the line meanwhile; that is in each scan.
         own = [other for other in self._own
                if not self._mode.takes_turns or other.station == mapping.station]
-        writes = [frames for other in own for frames in _packets(self._network, other)]
+        writes = [frames for other in own for frames in self._written[other]]
         reads = 1 + (len(writes) - 1) // OWN_IN_A_ROW
         if self._mode.most_under_way(self._line) > 1 or len(own) < len(self._own):
             reads = len(writes)  # others may have had the writes between two reads
@@ -223,16 +225,13 @@ def remarks(network: Network, mappings: Sequence[Mapping],
                    'fallback')
 
 
-def write_time(network: Network, mapping: Mapping,
-               response_time: float = forecast.USUAL_RESPONSE_TIME) -> float:
-    """Return the seconds that a write of a row takes, answers included."""
-    packets = _packets(network, mapping)
+def _with_answers(packets: Sequence[float], response_time: float) -> float:
+    """Return the seconds that transactions take, answers included."""
     return sum(packets) + len(packets) * forecast.ANSWERS * response_time
 
 
-def _packets(network: Network, mapping: Mapping) -> list[float]:
+def _packets(model: LineModel, mapping: Mapping) -> list[float]:
     """Return the line time (s) of each transaction of a write of a row."""
-    model = forecast.line_model(network)
     zeros = '' if mapping.type is ValueType.STRING else [0] * mapping.length
     return [model.transaction_time(len(body), 0) for _, body in write_requests(
         mapping.address, mapping.codec, zeros, mapping.dialect)]
@@ -241,10 +240,10 @@ def _packets(network: Network, mapping: Mapping) -> list[float]:
 def own_load(network: Network, mappings: Iterable[Mapping], default_period: float,
              response_time: float = forecast.USUAL_RESPONSE_TIME) -> float:
     """Return the part of the line's time for heartbeats and for questions for the mode."""
-    mappings = list(mappings)
-    beats = sum(write_time(network, mapping, response_time) / (mapping.period / 1000)
+    mappings, model = list(mappings), forecast.line_model(network)
+    beats = sum(_with_answers(_packets(model, mapping), response_time) / (mapping.period / 1000)
                 for mapping in mappings if mapping.heartbeat is not None and mapping.period)
-    return beats + sum(_question_time(network, response_time) / period
+    return beats + sum(_question_time(model, response_time) / period
                        for period in _asked(mappings, default_period).values())
 
 
@@ -263,10 +262,9 @@ def _asked(mappings: Iterable[Mapping], default_period: float) -> dict[int, floa
     return asked
 
 
-def _question_time(network: Network, response_time: float) -> float:
+def _question_time(model: LineModel, response_time: float) -> float:
     """Return the seconds that it takes to ask a station for its mode."""
-    return forecast.line_model(network).transaction_time(*_STATUS_BYTES) \
-        + forecast.ANSWERS * response_time
+    return _with_answers([model.transaction_time(*_STATUS_BYTES)], response_time)
 
 
 def costs(network: Network, mappings: Sequence[Mapping], default_period: float,
@@ -275,7 +273,7 @@ def costs(network: Network, mappings: Sequence[Mapping], default_period: float,
     guarded = {mapping.station for mapping in mappings if mapping.needs_run}
     for station, period in sorted(_asked(mappings, default_period).items()):
         if station in guarded:
-            part = _question_time(network, response_time) / period
+            part = _question_time(forecast.line_model(network), response_time) / period
             yield (f'Publish_While RUN: asking station {station} for its mode about every '
                    f'{milliseconds(period)} takes {part:.0%} of the time')
 

@@ -47,8 +47,6 @@ from abdf1_ros.settings.mapping import Mapping
 from abdf1_ros.settings.network import Network
 from abdf1_ros.simulator.gateway import SimulatedGateway
 from abdf1_ros.simulator.simulated_plc import SimulatedPlc
-from hypothesis import given, Phase, settings
-from hypothesis import strategies as st
 import pytest
 from support.driver_bench import DriverBench, simulated_plc
 from support.guests import Program
@@ -71,10 +69,10 @@ class Plant:
     ``lost`` is the share of all frames that get lost, as long as the settings repeat them;
     ``lose_replies`` and ``lose_commands`` say which. ``delay`` is after how many seconds a PLC has
     its reply, ``travel`` how long each frame travels; then a poll is lost only when the reply is
-    there. Frames get lost from ``early`` seconds before the last message on. ``mute`` PLCs execute
-    and do not reply, ``silent`` ones do neither; the last ``behind`` stand behind a gateway. A row
-    has ``length`` words. The publishers of the stations ``alive`` do not die. The driver hears
-    ``chunk`` bytes at a time: of whole frames a long one may come after Timeout.
+    there. ``mute`` PLCs execute and do not reply, ``silent`` ones do neither; the last ``behind``
+    stand behind a gateway. A row has ``length`` words. The publishers of the stations ``alive`` do
+    not die. The driver hears ``chunk`` bytes at a time: of whole frames a long one may come after
+    Timeout.
     Of ``guests`` each has a long read for the first PLC all the time.
     In Mode Peer the PLC has a message for us every ``asks`` seconds, which we refuse.
     By radio the longest packets come from others every ``others`` seconds, to be sent on;
@@ -88,14 +86,12 @@ class Plant:
     timeout: int = 100
     nak_retries: int = 1
     enq_retries: int = 1
-    has_beats: bool = True
     has_reads: bool = True
     lost: float = 0.0
     lose_commands: bool = True
     lose_replies: bool = True
     delay: float = 0.0
     travel: float = 0.0
-    early: float = 0.0
     mute: frozenset[int] = frozenset()
     silent: frozenset[int] = frozenset()
     behind: int = 0
@@ -124,9 +120,8 @@ class Plant:
         for station in range(1, self.stations + 1):
             via = GATEWAY if station > self.stations - self.behind else None
             common = {'station': station, 'plc': 'SLC', 'via': via}
-            if self.has_beats:
-                found.append(make_mapping('N10:0', 'Heartbeat', heartbeat=Heartbeat(), period=1000,
-                                          tag=f'beat_{station}', **common))  # type: ignore
+            found.append(make_mapping('N10:0', 'Heartbeat', heartbeat=Heartbeat(), period=1000,
+                                      tag=f'beat_{station}', **common))  # type: ignore[arg-type]
             fallback = Fallback(self.length * (SAFE,), int(AFTER * 1000))
             found += [make_mapping(f'N7:{number * self.length}', 'Write', fallback=fallback,
                                    tag=f'w_{station}_{number}', length=self.length,
@@ -403,9 +398,6 @@ class World:
         self.losses.is_due = True
         bench.line.propagation = plant.travel
         bench.run(plant.phase)
-        for _ in range(int(4 * plant.early)):
-            self.publish()
-            bench.run(0.25)
         died = bench.clock()
         self.publish()
         if plant.alive:
@@ -432,63 +424,29 @@ class World:
         return found
 
 
-SIZES = [(1, 1), (1, 2), (1, 30), (2, 2), (3, 5), (8, 1), (8, 8), (30, 1), (30, 3)]
+LATE = {'timeout': 50, 'nak_retries': 3, 'lost': 0.75, 'delay': 0.45, 'travel': 0.0175}
+PLANTS = [
+    Plant('Message', 3, 5, **LATE, alive=frozenset((1, 2)), behind=3),  # type: ignore[arg-type]
+    Plant('Message', 8, 8, baud=115200, timeout=200, enq_retries=2, lost=0.5, travel=0.07,
+          mute=frozenset((1, 3, 6)), silent=frozenset((5,)), behind=2),
+    Plant('Message', 8, 1, timeout=200, nak_retries=2, lost=0.75, lose_commands=False, length=200,
+          mute=frozenset((2, 3, 6)), silent=frozenset((4,)), alive=frozenset((1, 7)), phase=0.7),
+    Plant('Standard', 3, 5, lost=0.5, length=2, mute=frozenset((1,)), alive=frozenset((2,))),
+    Plant('Standard', 8, 1, **LATE, mute=frozenset((3, 4, 5, 7, 8)),  # type: ignore[arg-type]
+          silent=frozenset((6,)), alive=frozenset((1, 2)), baud=115200),
+    Plant('Peer', 1, 5, **LATE, length=2),  # type: ignore[arg-type]
+    Plant('Peer', 1, 30, nak_retries=0, enq_retries=3, lost=0.5, lose_commands=False,
+          mute=frozenset((1,))),
+    *(plant for mode in ('Radio', 'Radio, several') for plant in (
+        Plant(mode, 8, 1, **LATE, silent=frozenset((3, 4)),  # type: ignore[arg-type]
+              alive=frozenset((1, 5))),
+        Plant(mode, 3, 5, lost=0.5, length=2, lose_replies=False, drops=True, others=1.0,
+              alive=frozenset((1, 2)))))]
 
 
-@st.composite
-def plants(draw: st.DrawFn, mode: str, mute_share: float) -> Plant:
-    """Draw a plant."""
-    stations, rows = draw(st.sampled_from(SIZES))
-    if mode == 'Peer':
-        stations = 1
-    numbers = range(1, stations + 1)
-    silent_share = draw(st.sampled_from([0.0, 0.0, 0.2, 0.5]))
-    dice = Random(draw(st.integers(0, 2**32)))
-    mute = frozenset(number for number in numbers if dice.random() < mute_share)
-    silent = frozenset(number for number in numbers
-                       if number not in mute and dice.random() < silent_share)
-    behind = draw(st.integers(0, min(stations, 3))) if mode == 'Message' else 0
-    alive_share = draw(st.sampled_from([0.0, 0.5, 0.9])) if stations * rows < 20 else 0.0
-    alive = frozenset(number for number in numbers[:-1] if dice.random() < alive_share)
-    timeout = draw(st.sampled_from([50, 100, 200]))
-    lose_replies = draw(st.booleans())
-    return Plant(
-        mode, stations, rows, baud=draw(st.sampled_from([19200, 115200])),
-        timeout=timeout, travel=draw(st.sampled_from([0.0, 0.0, 0.35 * timeout / 1000])),
-        nak_retries=draw(st.integers(0, 3)), enq_retries=draw(st.integers(0, 3)),
-        has_beats=draw(st.booleans()), has_reads=draw(st.booleans()),
-        lost=draw(st.sampled_from([0.0, 0.5, 0.75, 1.0])),
-        lose_commands=draw(st.booleans()), lose_replies=lose_replies,
-        delay=draw(st.sampled_from([0.0, 0.0, 0.1, 0.45])), mute=mute, silent=silent,
-        behind=behind, alive=alive, length=draw(st.sampled_from([1, 1, 200 if rows == 1 else 2])),
-        phase=draw(st.floats(0.0, 2.0)),
-        drops='Radio' in mode and not lose_replies,
-        others=draw(st.sampled_from([math.inf, 0.3, 1.0])) if 'Radio' in mode else math.inf,
-        seed=draw(st.integers(0, 2**32)), chunk=draw(st.sampled_from([1, 8, 16])))
-
-
-def assert_bounded(mode: str, mute_share: float) -> None:
-    """Check plants by chance; not ones that are alike, as a search for the simplest would."""
-    # Standard polls all the time, and by radio bounds are long.
-    examples = 3 if mode == 'Standard' else 4 if 'Radio' in mode else 7
-
-    @settings(max_examples=examples, phases=[Phase.generate], derandomize=True, deadline=None)
-    @given(plant=plants(mode, mute_share))
-    def holds(plant: Plant) -> None:
-        assert World(plant).late() == {}, plant
-
-    holds()
-
-
-@pytest.mark.parametrize('mode', MODES)
-def test_rule_16_no_fallback_comes_later_than_printed(mode: str) -> None:
-    assert_bounded(mode, 0.0)
-
-
-# By radio such a PLC is one that is off: no ACK tells of it.
-@pytest.mark.parametrize('mode', [mode for mode in MODES if 'Radio' not in mode])
-def test_rule_16_nor_in_a_plc_that_executes_and_does_not_reply(mode: str) -> None:
-    assert_bounded(mode, 0.6)
+@pytest.mark.parametrize('plant', PLANTS, ids=range(len(PLANTS)))
+def test_rule_16_no_fallback_comes_later_than_printed(plant: Plant) -> None:
+    assert World(plant).late() == {}
 
 
 def test_rule_16_rest_of_a_long_fallback_does_not_wait_for_heartbeats_that_are_always_due(
@@ -521,7 +479,7 @@ def worst_time(plant: Plant) -> float:
                World(replace(plant, phase=number / 4)).run().values())
 
 
-@pytest.mark.parametrize('seed', range(4))
+@pytest.mark.parametrize('seed', range(2))
 def test_rule_16_bound_holds_where_nearly_all_tries_take_their_whole_time(seed: int) -> None:
     assert World(replace(WORST, seed=seed, phase=seed / 4)).late() == {}
 
@@ -563,23 +521,20 @@ def test_rule_16_another_order_breaks_the_bound(
 
 
 @pytest.mark.parametrize('mode', MODES)
-@pytest.mark.parametrize(('stations', 'rows', 'length'), [
-    (1, 8, 1), (1, 50, 1), (4, 5, 1), (8, 1, 200)])
+@pytest.mark.parametrize(('stations', 'rows', 'length'), [(1, 30, 1), (4, 5, 1), (8, 1, 200)])
 def test_rule_16_nor_where_no_frame_gets_lost_than_is_told_for_that(
         mode: str, stations: int, rows: int, length: int) -> None:
     if mode == 'Peer':
         stations, rows = 1, stations * rows if length == 1 else rows
-    for phase in (0.0, 0.07, 0.13):
-        plant = Plant(mode, stations, rows, length=length, phase=phase, chunk=1)
-        assert late_of(World(plant).run(is_usual=True)) == {}
+    plant = Plant(mode, stations, rows, length=length, phase=0.07, chunk=1)
+    assert late_of(World(plant).run(is_usual=True)) == {}
 
 
 @pytest.mark.parametrize('mode', ['Message', 'Standard', 'Peer'])
 @pytest.mark.parametrize('lost', [0.0, 1.0])
 def test_rule_16_guests_that_ask_all_the_time_break_no_bound(mode: str, lost: float) -> None:
-    for number in range(3):
-        plant = Plant(mode, 1, 8, guests=3, lost=lost, phase=0.07 * number, seed=number)
-        assert late_of(World(plant).run(is_usual=not lost)) == {}
+    plant = Plant(mode, 1, 8, guests=3, lost=lost, phase=0.07, seed=1)
+    assert late_of(World(plant).run(is_usual=not lost)) == {}
 
 
 def late_of(times: dict[str, tuple[float, float]]) -> dict[str, tuple[float, float]]:

@@ -105,7 +105,7 @@ class Bench(DriverBench):
 
 
 @pytest.mark.parametrize('polling', ['Message', 'Standard'])
-@settings(max_examples=8)
+@settings(max_examples=4)
 @given(timeout=st.integers(0, 360_000) | st.integers(0, 50), tx_delay=st.integers(0, 65_535),
        nak_retries=st.integers(0, 10), enq_retries=st.integers(0, 10),
        gone=st.integers(1, 251), is_deaf=st.booleans())
@@ -180,10 +180,7 @@ class LateBench(DriverBench):
 
 
 @pytest.mark.parametrize('via', [None, GATEWAY])
-@settings(max_examples=3)
-@given(late=st.integers(1, 6), cmd_timeout=st.integers(300, 3000))
-@example(late=1, cmd_timeout=3000)
-@example(late=4, cmd_timeout=500)
+@pytest.mark.parametrize(('late', 'cmd_timeout'), [(1, 3000), (4, 500)])
 def test_heartbeats_fallbacks_and_checks_of_late_stations_get_an_eighth_of_the_line(
         via: int | None, late: int, cmd_timeout: int) -> None:
     bench = LateBench(late, cmd_timeout, via)

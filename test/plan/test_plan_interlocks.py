@@ -23,7 +23,6 @@ from abdf1_ros.plan.bounds import (
     own_load,
     remarks,
     Times,
-    write_time,
 )
 from abdf1_ros.plan.forecast import line_model
 from abdf1_ros.plan.planner import Planner
@@ -66,13 +65,13 @@ def test_longest_transaction_is_that_of_the_settings(network: Network, seconds: 
     assert longest == pytest.approx(seconds, rel=1e-4)
 
 
-def test_write_of_a_word_is_counted_by_its_frames() -> None:
+def write_time(network: Network, mapping: Mapping, response_time: float = 0.01) -> float:
+    """Return the seconds that a write of a word takes, with its two answers."""
     # DLE SOH STN DLE STX, 6 of the header, the body, DLE ETX CRC; ACK; poll; the reply, which is
-    # its header only; ACK. Two answers of 10 ms.
-    mapping = beat()
+    # its header only; ACK.
     size = len(mapping.dialect.write(mapping.address, bytes(2))[1])
     characters = 5 + 6 + size + 4 + 2 + 4 + 2 + 6 + 4 + 2
-    assert write_time(QUICK, mapping, 0.01) == pytest.approx(characters * 10 / 19200 + 0.02)
+    return characters * 10 / network.baud + 2 * response_time
 
 
 def at_most(line_time: float) -> float:
