@@ -156,8 +156,8 @@ class Report:
             text = 'the map has no usable row: nothing is read or written'
             return [*found, Remark(RemarkKind.MAP, text)]
         times = bounds.remarks(self.network, self.mappings, self.response_time)
-        return [*found, *_station_remarks(self), *_load_remarks(self), *_period_remarks(self),
-                *_gap_remarks(self), *(Remark(RemarkKind.INTERLOCK, text) for text in times)]
+        return [*found, *_load_remarks(self), *_period_remarks(self), *_gap_remarks(self),
+                *(Remark(RemarkKind.INTERLOCK, text) for text in times)]
 
 
 def _unprotected(mappings: Sequence[Mapping]) -> Iterator[str]:
@@ -195,7 +195,7 @@ def make_report(network: Network, mappings: Iterable[Mapping], default_period: f
 
 
 def setting_remarks(network: Network, mappings: Sequence[Mapping]) -> Iterator[Remark]:
-    """Find valid, but unusual settings in both files."""
+    """Find valid, but unusual settings in both files, also stations that clash."""
     for text in network_remarks(network):
         yield Remark(RemarkKind.SETTING, text)
     for mapping in mappings:
@@ -203,6 +203,7 @@ def setting_remarks(network: Network, mappings: Sequence[Mapping]) -> Iterator[R
             yield Remark(RemarkKind.SETTING, str(problem), mapping.station)
     yield from _overlap_remarks(mappings)
     yield from _case_remarks(mappings)
+    yield from _station_remarks(network, mappings)
 
 
 def _overlap_remarks(mappings: Sequence[Mapping]) -> Iterator[Remark]:
@@ -252,11 +253,10 @@ def _row_order(block: Block) -> tuple[int, int]:
     return block.station, min(mapping.item for mapping in block.mappings)
 
 
-def _station_remarks(report: Report) -> Iterator[Remark]:
+def _station_remarks(network: Network, rows: Sequence[Mapping]) -> Iterator[Remark]:
     """Find stations whose numbers or types clash."""
-    network = report.network
     stations: defaultdict[int, list[Mapping]] = defaultdict(list)
-    for mapping in report.mappings:
+    for mapping in rows:
         if not mapping.serves and mapping.station != BROADCAST:
             stations[mapping.station].append(mapping)
     for station, mappings in sorted(stations.items()):

@@ -16,7 +16,7 @@
 
 from dataclasses import replace
 
-from abdf1_ros.plan.report import make_report, Remark, RemarkKind, Report
+from abdf1_ros.plan.report import make_report, Remark, RemarkKind, Report, setting_remarks
 from abdf1_ros.settings.heartbeats import Fallback, Heartbeat, PublishWhile
 from abdf1_ros.settings.mapping import Mapping
 from abdf1_ros.settings.network import Network
@@ -200,7 +200,8 @@ def test_two_plc_types_at_one_station() -> None:
 def test_file_of_a_plc_has_one_type() -> None:
     rows = [make_mapping(f'{kind}10:{number}', station=station, plc='SLC', tag=f'{kind}{station}')
             for number, kind in enumerate('NBF') for station in (1, 2)][:-1]
-    assert texts(report_of(*rows), RemarkKind.STATION) == [
+    told = setting_remarks(Network(), rows)  # as the node logs them
+    assert [remark.text for remark in told] == [
         'station 1: file 10 cannot be N10 (N1), B10 (B1), F10 (F1) at the same time; a file of a '
         'PLC has one type',
         'station 2: file 10 cannot be N10 (N2), B10 (B2) at the same time; a file of a PLC has '
