@@ -504,7 +504,8 @@ def test_map_without_a_row_is_told(make_bench: Benches, capfd: pytest.CaptureFix
     ('net_file:=/nowhere/net.csv', '/nowhere/net.csv: cannot be read: No such file or directory'),
     ('diagnostics_period:=abc',
      "parameter diagnostics_period: diagnostics_period = 'abc' should be a number from 0.1 "
-     'to 60')])
+     'to 60'),
+    ('gain:=3', 'parameter gain: there is no such parameter; another version may have it')])
 def test_faulty_parameter_is_told_in_one_line(
         refusal: Callable[..., list[str]], assignment: str, expected: str) -> None:
     (line,) = refusal(*ros_args(*EXAMPLE_FILES, assignment))

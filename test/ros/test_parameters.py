@@ -22,6 +22,7 @@ from typing import Any
 from abdf1_ros.paths import config_file
 from abdf1_ros.problems import ConfigurationError
 from abdf1_ros.ros.parameters.declared import Configuration, configure, Parameters
+from abdf1_ros.ros.parameters.files import typed_parameters
 from abdf1_ros.ros.parameters.shown import map_cells, ShownFiles
 from abdf1_ros.settings.columns import COLUMNS, MAP_COLUMNS
 from abdf1_ros.settings.network import Network
@@ -376,6 +377,24 @@ def test_number_that_yaml_takes_for_octal_is_told(
         configure(node, [str(path)])
     assert str(caught.value) == \
         f'{path}:4:7: net.station: 010 is octal in YAML; write 10 or 8'
+
+
+@pytest.mark.parametrize(('rule', 'expected'), [
+    ('net.station:=010', 'net.station: 010 is octal in YAML; write 10 or 8'),
+    ('parameters:net.station:=010', 'net.station: 010 is octal in YAML; write 10 or 8'),
+    ('net.station:="010"', None), ('net.station:=07', None), ('camera:net.station:=010', None),
+    ('gain:=3', 'gain: there is no such parameter; another version may have it'),
+    ('camera:gain:=3', None), ('use_sim_time:=true', None), ('map.door.max:=7', None)])
+def test_parameter_of_the_command_line_is_for_this_node(
+        make_node: Nodes, files: dict[str, str], rule: str, expected: str | None) -> None:
+    args = ['node', '--ros-args', '-p', rule]
+    node = make_node(files, cli_args=args[1:])
+    if expected is None:
+        assert configure(node, (), typed_parameters(args)).mappings
+        return
+    with pytest.raises(ConfigurationError) as caught:
+        configure(node, (), typed_parameters(args))
+    assert str(caught.value) == f'parameter {expected}'
 
 
 def test_port_in_the_home_directory_and_a_substitution_of_launch_files(

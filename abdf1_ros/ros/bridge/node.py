@@ -20,7 +20,7 @@ Everything is created before the link's thread starts and destroyed after it has
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from functools import partial
 import time
 from typing import Any
@@ -65,18 +65,19 @@ class BridgeNode(Node):
     The bridge; raises ConfigurationError when parameters or files are not fit to run with.
 
     ``check`` is to be called every 0.1 s, in any one thread. ``graph`` and ``port_owners`` are
-    those of all lines of the process, ``files`` its parameter files.
+    those of all lines of the process, ``files`` its parameter files. ``typed`` are parameters of
+    its arguments that are for no other node.
     """
 
     def __init__(self, name: str = NODE_NAME, *, graph: Graph | None = None,
                  port_owners: PortOwners | None = None, files: Sequence[str] = (),
-                 **kwargs: Any) -> None:
+                 typed: Mapping[str, str] | None = None, **kwargs: Any) -> None:
         super().__init__(name, automatically_declare_parameters_from_overrides=True, **kwargs)
         self._is_stuck = self._is_ending = False
         self._hold_ports = partial(
             (port_owners or PortOwners()).hold, self.get_fully_qualified_name())
         try:
-            configuration = configure(self, files)
+            configuration = configure(self, files, typed or {})
             self._shown = ShownFiles(self)
             self._shown.show(configuration.network, configuration.shown_rows())
             self._hold_ports(*configuration.held)

@@ -31,7 +31,7 @@ from abdf1_ros.df1.settings import PollingSettings
 from abdf1_ros.driver.settings import DriverSettings
 from abdf1_ros.paths import config_file
 from abdf1_ros.plan.usable_rows import usable_rows
-from abdf1_ros.problems import ConfigurationError, Problem
+from abdf1_ros.problems import ConfigurationError, Place, Problem
 from abdf1_ros.ros.bridge.files import FileWatch
 from abdf1_ros.ros.parameters.files import parameters_in
 from abdf1_ros.ros.parameters.shown import descriptor_of, map_cells, MOST_SHOWN_ROWS, text_of
@@ -106,6 +106,7 @@ class Parameters:
 
 
 Given = MappingType[str, Any]
+_NONE: Given = {}
 """What the user has set, by name of the parameter."""
 
 _OF_RCLPY = 'use_sim_time', 'start_type_description_service'
@@ -185,17 +186,19 @@ def take_given(node: Node) -> Given:
     return given
 
 
-def configure(node: Node, files: Sequence[str] = ()) -> Configuration:
+def configure(node: Node, files: Sequence[str] = (),
+              typed: Given = _NONE) -> Configuration:
     """
     Declare the node's own parameters and read both files; ``ShownFiles`` shows what is in these.
 
-    ``files`` are the parameter files of the process. Raises ConfigurationError with every fault
-    that keeps the node from running.
+    ``files`` are the parameter files of the process, ``typed`` parameters of its arguments that
+    are for no other node. Raises ConfigurationError with every fault that keeps the node from
+    running.
     """
     given = take_given(node)
     known = [entry.name for entry in fields(Parameters)]
     known += [entry.parameter for entry in FIELDS.values()]
-    problems = unknown_names(node, given, files, known, 'net.')
+    problems = unknown_names(node, given, files, known, 'net.', typed)
     parameters = _declare_own(node, given, problems)
     return _from_files(given, parameters, problems, is_strict=parameters.strict_map)
 
@@ -275,14 +278,14 @@ def _resolved(path: str) -> str:
 
 
 def unknown_names(node: Node, given: Given, files: Sequence[str], known: Collection[str],
-                  begins: str = ' ') -> list[Problem]:
+                  begins: str = ' ', typed: Given = _NONE) -> list[Problem]:
     """
     Return the parameters that a user has given and that do not exist.
 
-    In a section of a parameter file that names the node, all are meant for it. Others may belong
-    to other nodes, so only those are found whose names look like ours, or begin so. ``map.*`` may
-    come back from a dump of our parameters, see ``_ignored``. Of YAML a number with a leading
-    zero is octal, which is never meant.
+    In a section of a parameter file that names the node, all are meant for it, and those that are
+    ``typed``. Others may belong to other nodes, so only those are found whose names look like
+    ours, or begin so. ``map.*`` may come back from a dump of our parameters, see ``_ignored``. Of
+    YAML a number with a leading zero is octal, which is never meant.
     """
     full_name = node.get_fully_qualified_name()
     problems, found = [], set(_OF_RCLPY)
@@ -292,17 +295,23 @@ def unknown_names(node: Node, given: Given, files: Sequence[str], known: Collect
             if not (name in known or name in _OF_RCLPY or _is_of_map(name)):
                 problems.append(Problem(place, (
                     f'{name}: there is no such parameter; {_nearest(name, known, begins, 0.5)}')))
-        octal = octal_of(number)
-        if octal and name in known and fnmatchcase(full_name, section):
-            problems.append(Problem(place, (
-                f'{name}: {number} is octal in YAML; write {int(number)} or {octal}')))
+        if name in known and fnmatchcase(full_name, section):
+            problems += _octal(place, f'{name}: ', number)
     for name in given:
         is_other = name.startswith('qos_overrides.') and f'.{full_name}/' not in name
         if name in found or name in known or _is_of_map(name) or is_other:
             continue
-        if hint := _nearest(name, known, begins, 0.75):
+        if hint := _nearest(name, known, begins, 0.5 if name in typed else 0.75):
             problems.append(Problem(f'parameter {name}', f'there is no such parameter; {hint}'))
+    for name in given.keys() & typed.keys() & {*known}:
+        problems += _octal(f'parameter {name}', '', typed[name])
     return problems
+
+
+def _octal(place: Place | str, name: str, number: str) -> list[Problem]:
+    octal = octal_of(number)
+    return [] if octal is None else [Problem(
+        place, f'{name}{number} is octal in YAML; write {int(number)} or {octal}')]
 
 
 def _is_of_map(name: str) -> bool:
