@@ -149,11 +149,6 @@ def test_results_of_other_mappings_and_other_writers_are_not_taken(answered: Ans
     assert (status, lines) == (0, ['lamps: written (1.0 ms)'])
 
 
-def test_no_result_in_time_is_unknown(answered: Answered) -> None:
-    status, lines = answered(lambda data: [], '--timeout', '1.5')
-    assert (status, lines) == (3, ['unknown whether written: no result within 1.5 s'])
-
-
 def test_every_mapping_of_the_topic_has_to_be_written(answered: Answered) -> None:
     tags = ('--tags', 'north', 'south')
     assert answered(lambda data: [('north', 'written', OURS), ('south', 'written', OURS)],

@@ -21,7 +21,6 @@ from typing import Any
 from abdf1_ros.paths import config_file
 from abdf1_ros.settings.map_file import load_mappings
 import pytest
-from support.ros import EXAMPLE_FILES, Observer, Process, ros_args
 from support.ros_tools import SOURCE
 
 LAYOUT = json.loads((SOURCE / 'examples' / 'foxglove_layout.json').read_text('utf-8'))
@@ -47,20 +46,13 @@ def test_every_panel_has_its_place() -> None:
     assert sorted(panels(LAYOUT['layout'])) == sorted(LAYOUT['configById'])
 
 
-@pytest.fixture(scope='module')
+@pytest.fixture
 def topics() -> dict[str, int]:
     """Return what a bridge with the files of the demo publishes, with the length of its arrays."""
     mappings, _ = load_mappings(config_file('map.csv'))
-    lengths = {f'/abdf1/read/{mapping.topic}': mapping.length for mapping in mappings}
-    with Observer() as observer, \
-            Process('node', *ros_args(*EXAMPLE_FILES, 'port:=/dev/ttyS99')) as node:
-        def published() -> set[str]:
-            return {name for name, _ in observer.node.get_topic_names_and_types()}
-
-        wanted = {'/diagnostics', '/abdf1/write_results', '/abdf1/snapshot', *lengths}
-        observer.until(lambda: wanted <= published(), lambda: f'{wanted - published()}')
-        node.end()
-    return {name: lengths.get(name, 0) for name in wanted}
+    # That it has these topics is in test_bridge.py.
+    return {'/diagnostics': 0, '/abdf1/write_results': 0, '/abdf1/snapshot': 0,
+            **{f'/abdf1/read/{mapping.topic}': mapping.length for mapping in mappings}}
 
 
 @pytest.mark.parametrize('value', shown())

@@ -138,29 +138,15 @@ def test_loss_of_the_plc_takes_the_permit_until_a_person_resets(
         node.end()
 
 
-@pytest.mark.parametrize('number', [signal.SIGKILL, signal.SIGSTOP])
-def test_end_of_the_bridge_takes_the_permit(
-        files: Files, simulator: Process, number: signal.Signals) -> None:
-    with Observer() as observer, Process('node', *files.args(), '-r', '__node:=dying') as node, \
-            consumer('/dying/read/bits') as cell:
-        cell.wait_for(WAITING)
-        reset(observer)
-        cell.wait_for(PERMITTED)
-        after = len(cell.lines)
-        node.stop() if number is signal.SIGSTOP else node.send(number)
-        assert cell.wait_for('not permitted', after=after) == STOPPED
-        cell.end()
-    assert cell.lines[after:] == [STOPPED]
-
-
-def test_restart_of_the_bridge_gives_no_permit_back(files: Files, simulator: Process) -> None:
+def test_kill_of_the_bridge_takes_the_permit_and_its_restart_does_not_give_it_back(
+        files: Files, simulator: Process) -> None:
     arguments = (*files.args(), '-r', '__node:=restarted')
     with Observer() as observer, consumer('/restarted/read/bits') as cell:
         with Process('node', *arguments) as node:
             cell.wait_for(WAITING)
             reset(observer)
             cell.wait_for(PERMITTED)
-            node.end()
+            node.send(signal.SIGKILL)
             cell.wait_for(STOPPED)
         after = len(cell.lines)
         with Process('node', *arguments) as node:

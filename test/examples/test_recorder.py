@@ -12,32 +12,21 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The recorder, and the rosbag2 commands that are shown beside it, against a real bridge."""
+"""The recorder against a real bridge, and the rosbag2 commands that are shown beside it."""
 
 from collections.abc import Iterator
 import csv
 from datetime import datetime, timedelta, UTC
-import importlib
 from pathlib import Path
 import re
 import shlex
 import signal
-import time
-from typing import Any
 
-from abdf1_ros.testing import latched_qos
+from abdf1_ros.paths import config_file
+from abdf1_ros.settings.map_file import load_mappings
 import pytest
-from rclpy.duration import Duration
-from rclpy.qos import (
-    DurabilityPolicy,
-    HistoryPolicy,
-    LivelinessPolicy,
-    QoSProfile,
-    ReliabilityPolicy,
-)
-from std_msgs.msg import Int16MultiArray
-from support.ros import EXAMPLE_FILES, Observer, Process, ros_args
-from support.ros_tools import needs, SOURCE
+from support.ros import Observer, Process
+from support.ros_tools import SOURCE
 from support.simulator_process import Files, make_files, READS
 
 EXAMPLE = SOURCE / 'examples' / 'recorder.py'
@@ -132,19 +121,16 @@ def topics_of(command: list[str]) -> list[str]:
 
 
 def test_topics_of_the_rosbag2_commands_exist() -> None:
+    # That a bridge has these topics is in test_bridge.py.
+    mappings, _ = load_mappings(config_file('map.csv'))
+    read = {f'/abdf1/read/{mapping.topic}' for mapping in mappings}
+    ours = {'/diagnostics', '/abdf1/write_results', '/abdf1/active_stations', '/abdf1/snapshot',
+            '/abdf1/write/any', *read}
     named = {topic for command in commands() for topic in topics_of(command)}
     patterns = [command[command.index('--regex') + 1]
                 for command in commands() if '--regex' in command]
-    assert named
+    assert named and named <= read
     assert patterns
-    arguments = ros_args(*EXAMPLE_FILES, 'port:=/dev/ttyS99')
-    with Observer() as observer, Process('node', *arguments) as node:
-        def topics() -> set[str]:
-            return {name for name, _ in observer.node.get_topic_names_and_types()}
-
-        observer.until(lambda: named <= topics(), lambda: f'{named - topics()}')
-        ours = {name for name in topics() if name.startswith('/abdf1/')} | {'/diagnostics'}
-        node.end()
     for pattern in patterns:
         assert {name for name in ours if re.fullmatch(pattern, name)} == ours
 
@@ -155,81 +141,3 @@ def test_nothing_that_would_be_executed_is_played_back() -> None:
     for command in played:
         assert topics_of(command)  # without names it would play everything
         assert not [topic for topic in topics_of(command) if '/write/' in topic]
-
-
-# What rosbag2 does with the quality of service, by another program for its files
-
-
-def as_recorded(offered: QoSProfile) -> Any:
-    """Return what a bag keeps of the quality of service that a publisher offers."""
-    types = importlib.import_module('rosbags.interfaces')
-
-    def time_of(duration: Duration) -> Any:
-        return types.QosTime(*divmod(duration.nanoseconds, 1_000_000_000))
-
-    return types.Qos(
-        types.QosHistory(int(offered.history)), offered.depth,
-        types.QosReliability(int(offered.reliability)),
-        types.QosDurability(int(offered.durability)), time_of(offered.deadline),
-        time_of(offered.lifespan), types.QosLiveliness(int(offered.liveliness)),
-        time_of(offered.liveliness_lease_duration), False)
-
-
-def as_played(recorded: Any) -> QoSProfile:
-    """Return what ``ros2 bag play`` offers for it: the same, with a history of 10."""
-    def duration(time: Any) -> Duration:
-        return Duration(seconds=time.sec, nanoseconds=time.nsec)
-
-    return QoSProfile(
-        history=HistoryPolicy.KEEP_LAST, depth=10,
-        reliability=ReliabilityPolicy(recorded.reliability.value),
-        durability=DurabilityPolicy(recorded.durability.value),
-        deadline=duration(recorded.deadline), lifespan=duration(recorded.lifespan),
-        liveliness=LivelinessPolicy(recorded.liveliness.value),
-        liveliness_lease_duration=duration(recorded.liveliness_lease_duration))
-
-
-def test_recorded_topic_plays_back_with_its_quality_of_service(tmp_path: Path) -> None:
-    rosbag2 = needs('rosbags.rosbag2')
-    typesys = importlib.import_module('rosbags.typesys')
-    store = typesys.get_typestore(typesys.Stores.ROS2_JAZZY)
-    topic, bag, files = '/played/abdf1/read/speeds', tmp_path / 'line', make_files(tmp_path)
-    with files.start_simulator(), Observer() as observer, \
-            Process('node', *files.args(), '-r', '__ns:=/played') as node, \
-            rosbag2.Writer(bag, version=9, storage_plugin=rosbag2.StoragePlugin.MCAP) as writer:
-        observer.until(lambda: observer.node.get_publishers_info_by_topic(topic), topic)
-        offered, = observer.node.get_publishers_info_by_topic(topic)
-        recorded = writer.add_connection(
-            topic, 'std_msgs/msg/Int16MultiArray', typestore=store,
-            offered_qos_profiles=[as_recorded(offered.qos_profile)])
-        # rosbag2 asks for what all publishers offer in reliability and durability, no more.
-        taken: list[bytes] = []
-        subscription = observer.node.create_subscription(
-            Int16MultiArray, topic, taken.append, latched_qos(), raw=True)
-        observer.until(lambda: len(taken) >= 3, 'three messages')
-        for data in taken:
-            writer.write(recorded, time.time_ns(), data)
-        observer.node.destroy_subscription(subscription)
-        node.end()
-    with rosbag2.Reader(bag) as reader, Observer() as observer:
-        (connection,) = reader.connections
-        (kept,) = connection.ext.offered_qos_profiles
-        played = as_played(kept)
-        stale = offered.qos_profile.deadline
-        assert played.deadline == played.lifespan == played.liveliness_lease_duration == stale
-        assert 0 < stale.nanoseconds < 10_000_000_000
-        publisher = observer.node.create_publisher(Int16MultiArray, topic, played)
-        inbox = observer.listen(Int16MultiArray, topic, QoSProfile(
-            depth=10, reliability=ReliabilityPolicy.RELIABLE,
-            durability=DurabilityPolicy.TRANSIENT_LOCAL, deadline=stale,
-            liveliness=LivelinessPolicy.MANUAL_BY_TOPIC, liveliness_lease_duration=stale))
-        messages = [data for _, _, data in reader.messages()]
-        assert messages == taken
-        for data in messages:
-            publisher.publish(data)
-        observer.until(lambda: len(inbox) == len(taken), 'what was recorded')
-        assert {tuple(message.data) for message in inbox} == {tuple(READS['speeds'][2])}
-        # The recording has ended: the consumer is told as it would be of a lost line.
-        observer.until(lambda: inbox.deadlines and inbox.liveliness[-1].alive_count == 0,
-                       'the end of the values')
-        assert not inbox.incompatible

@@ -27,7 +27,6 @@ from support.fault_box import FaultBox
 from support.fault_rig import (
     boxed,
     is_unanswered,
-    NO_ANSWER,
     NOT_SENT,
     Rig,
     SETPOINT,
@@ -99,20 +98,6 @@ def test_second_master_on_the_line(line: Boxed) -> None:
     assert rig.has_read_only(SETPOINT, 3.0, 4.0, 5.0, 6.0, 7.0)
     box.overhear = lambda data: b''
     rig.recovers()  # after two late replies in a row a station is tried less often
-
-
-def test_only_one_direction_works(line: Boxed) -> None:
-    rig, box = line
-    box.to_node = False
-    assert is_unanswered(rig.write(3.0))
-    rig.told('[ERROR]', NO_ANSWER)
-    rig.status('link', ERROR, 'port open, but none of 2 stations answers')
-    rig.status('mappings', ERROR, '25 failed')
-    rig.writes(4.0, NOT_SENT + NO_ANSWER)
-    box.mend()
-    rig.recovers()
-    rig.told('[INFO]', 'station 2 answers again')
-    assert rig.has_read_only(SETPOINT, 3.0)
 
 
 def test_plc_loses_power_in_the_middle_of_a_write(line: Boxed) -> None:

@@ -19,7 +19,6 @@ import os
 from pathlib import Path
 
 import pytest
-from support.device_server import LineServer
 from support.fault_rig import boxed, is_unanswered, NO_ANSWER, NOT_SENT, rigged, SETPOINT
 from support.ros import ERROR, Observer, Process
 from support.simulator_process import IMPATIENT_ROW, make_files
@@ -67,21 +66,3 @@ def test_process_at_the_far_end_of_tcp_is_frozen(observer: Observer, tmp_path: P
         rig.recovers()
         # Commands that the connection has kept are expired for the far end, and not answered.
         assert rig.has_read_only(SETPOINT, 3.0)
-
-
-def test_device_server_goes_away_and_returns(observer: Observer, tmp_path: Path) -> None:
-    files = make_files(tmp_path, IMPATIENT_ROW)
-    simulator = files.start_simulator()
-    with LineServer(files.port) as server, rigged(observer, files, server.url, simulator) as rig:
-        rig.until_well()
-        server.stop()
-        rig.node.wait_for('[ERROR]', f'{server.url}: the port was lost: ')
-        rig.node.wait_for('[ERROR]', f'{server.url}: cannot open the port: ', 'refused')
-        rig.status('link', ERROR, 'cannot open the port: ')
-        rig.writes(4.0, REFUSED)
-        lines = len(rig.node.lines)
-        server.start()
-        rig.recovers()
-        rig.node.wait_for('[INFO]', f'{server.url}: open', after=lines)
-        assert rig.node.text.count('cannot open the port') == 1  # not once for each attempt
-        assert rig.has_read_only(SETPOINT)

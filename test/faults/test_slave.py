@@ -15,14 +15,13 @@
 """What happens to a line of two nodes, a master and a slave; see docs/troubleshooting.md."""
 
 from collections.abc import Iterator
-import re
 import signal
 import time
 
 import pytest
 from support.fault_rig import is_unanswered, NOT_SENT, UNKNOWN
 from support.renewed import Renewed
-from support.ros import ERROR, Observer, until_status
+from support.ros import ERROR, Observer
 from support.slave_rig import Line, two_nodes
 
 NO_ANSWER = '2509 ERR_INACTIVE_STATION: Slave Station (9) Inactive'
@@ -68,34 +67,6 @@ def lose_slave(line: Line) -> int:
     line.observer.until(lambda: master.write(next(line.values)) == NOT_SENT + NO_ANSWER,
                         'a write that is not sent')
     return value
-
-
-def test_master_is_killed_and_returns(line: Line) -> None:
-    line.master.node.send(signal.SIGKILL)
-    line.master.node.result()
-    until_status(line.slave.diagnostics, 'mappings', ERROR, lambda status: re.search(
-        '1 (stale|failed)', status.message) is not None)  # a read may have been on its way
-    value = next(line.values)
-    assert line.slave.write(value).startswith(TOO_OLD)
-    line.master = line.start('Master')
-    line.master.node.wait_for('[INFO]', 'open')
-    line.recovers()
-    line.works()
-    assert not line.master.was_told(value)
-
-
-def test_slave_is_killed_and_returns(line: Line) -> None:
-    lines = len(line.master.node.lines)
-    line.slave.node.send(signal.SIGKILL)
-    line.slave.node.result()
-    value = lose_slave(line)
-    line.master.node.wait_for('[ERROR]', NO_ANSWER, after=lines)
-    line.slave = line.start('Slave', WRITE_TIMEOUT)
-    line.slave.node.wait_for('[INFO]', 'open')
-    line.recovers()
-    line.master.node.wait_for('[INFO]', 'station 9 answers again', after=lines)
-    line.works()
-    assert not line.slave.was_told(value)
 
 
 def test_slave_is_stopped_and_goes_on(line: Line) -> None:

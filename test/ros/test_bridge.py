@@ -25,8 +25,6 @@ from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticStatus
 import pytest
-from rcl_interfaces.msg import Parameter
-from rcl_interfaces.srv import GetParameters, ListParameters, SetParameters
 from rclpy.qos import DurabilityPolicy, LivelinessPolicy, QoSProfile
 from std_msgs.msg import String, UInt8MultiArray, UInt16MultiArray  # noqa: I101
 from std_srvs.srv import Trigger
@@ -144,17 +142,6 @@ def test_topics_are_those_of_the_map_and_no_others(bridge: Bridge) -> None:
     assert found['/abdf1/write/name'] == ['std_msgs/msg/String']
     assert found['/abdf1/write_results'] == ['diagnostic_msgs/msg/DiagnosticStatus']
     assert found['/abdf1/active_stations'] == ['std_msgs/msg/UInt16MultiArray']
-
-
-def test_values_are_a_heartbeat_unless_published_on_change(bridge: Bridge) -> None:
-    always, change = bridge.listen('parts'), bridge.listen('recipe')
-    change.first()
-    always.first()
-    bridge.observer.until(lambda: len(always) > 5, 'six values of a topic that never changes')
-    assert all(values_in(message) == [-17] for message in always)
-    assert len(change) < len(always)  # once more after each outage
-    bridge.observer.forget(always)
-    bridge.observer.forget(change)
 
 
 # Stations that fail
@@ -304,23 +291,3 @@ def test_link_counters_are_read_by_the_service(bridge: Bridge) -> None:
 
 
 # Parameters
-
-
-def test_no_parameter_can_be_set(bridge: Bridge) -> None:
-    listed = bridge.observer.call(
-        ListParameters, '/abdf1/list_parameters', ListParameters.Request())
-    names = [name for name in listed.result.names
-             if name != 'use_sim_time' and not name.startswith('qos_overrides')]
-    assert {'net_file', 'map_file', 'port', 'strict_map', 'read_only', 'default_period',
-            'diagnostics_period', 'stale_after', 'write_timeout', 'nak_on_command_timeout',
-            'expose_map_parameters', 'net.baud', 'map.recipe.max'} <= set(names)
-    response = bridge.observer.call(
-        GetParameters, '/abdf1/get_parameters', GetParameters.Request(names=names))
-    request = SetParameters.Request(parameters=[
-        Parameter(name=name, value=value)
-        for name, value in zip(names, response.values, strict=True)])
-    response = bridge.observer.call(SetParameters, '/abdf1/set_parameters', request)
-    assert len(response.results) == len(names)
-    for name, result in zip(names, response.results, strict=True):
-        assert not result.successful, name
-        assert 'read-only' in result.reason, name

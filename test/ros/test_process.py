@@ -18,7 +18,6 @@ from collections.abc import Iterator
 from pathlib import Path
 import re
 import signal
-import time
 
 from abdf1_ros.ros.process.main import LAST_WRITES, take_last_writes
 import pytest
@@ -87,16 +86,6 @@ def test_overrides_win_over_the_net_file(observer: Observer, files: Files) -> No
 
 
 INTERRUPTS = [(signal.SIGINT,), (signal.SIGTERM,), (signal.SIGINT, signal.SIGINT)]
-
-
-def test_ends_well_while_values_come_in(observer: Observer, files: Files) -> None:
-    speeds = observer.listen(Int16MultiArray, '/ending/read/speeds')
-    with files.start_simulator() as simulator, \
-            Process('node', *files.args(), '-r', '__node:=ending', is_forked=False) as node:
-        speeds.first()
-        node.end(signal.SIGTERM)
-        simulator.end()
-    observer.forget(speeds)
 
 
 def test_every_write_that_has_come_has_its_result_at_the_end(
@@ -219,17 +208,16 @@ def test_user_without_a_home_is_told_what_to_set(monkeypatch: pytest.MonkeyPatch
                            'set ROS_LOG_DIR to one that this user may write to')
 
 
-def test_second_node_waits_for_the_port_and_takes_over(observer: Observer, files: Files) -> None:
-    speeds = observer.listen(Int16MultiArray, '/second/read/speeds')
+def test_trace_that_cannot_be_written_is_an_error_and_no_stop(
+        observer: Observer, files: Files) -> None:
+    trace = files.folder / 'nowhere' / 'field.cap'
+    speeds = observer.listen(Int16MultiArray, '/traced/read/speeds')
     with files.start_simulator() as simulator, \
-            Process('node', *files.args(), '-r', '__node:=first') as first:
-        first.wait_for(f'{files.port}: open')
-        with Process('node', *files.args(), '-r', '__node:=second') as second:
-            second.wait_for('[ERROR]', 'cannot open the port: another program has it open')
-            assert not speeds
-            first.end(signal.SIGTERM)
-            assert values_in(speeds.first()) == [1200, -800]
-            second.end(signal.SIGTERM)
+            Process('node', *files.args(f'trace_file:={trace}'), '-r', '__node:=traced') as node:
+        node.wait_for('[ERROR] ', 'trace_file: [Errno 2] No such file or directory: '
+                                  f"'{trace}'; nothing is recorded")
+        speeds.values([1200, -800])
+        node.end()
         simulator.end()
     observer.forget(speeds)
 
@@ -256,34 +244,6 @@ def test_names_can_be_remapped(observer: Observer, files: Files) -> None:
         simulator.end()
     for inbox in (diagnostics, door, bits, active):
         observer.forget(inbox)
-
-
-def test_write_that_waited_in_a_paused_process_is_not_executed(
-        observer: Observer, files: Files) -> None:
-    results = observer.results('/paused')
-    with files.start_simulator() as simulator, \
-            Process('node', *files.args('write_timeout:=0.5'), '-r', '__node:=paused') as node:
-        setpoint = observer.listen(Float32MultiArray, '/paused/read/setpoint')
-        publisher = observer.publisher(Float32MultiArray, '/paused/write/setpoint')
-        setpoint.values([21.5])
-        node.stop()
-        setpoint.clear()
-        publisher.publish(Float32MultiArray(data=[3.0]))
-        published = time.monotonic()
-        observer.until(lambda: time.monotonic() - published > 1.0, 'the write to become old')
-        node.go_on()
-        result = results.first()
-        age = re.match(r'not written: refused: it came (\d+\.\d) s after it was published, '
-                       r'write_timeout is 0\.5 s', result.message)
-        assert age is not None and float(age[1]) >= 1.0
-        setpoint.next()
-        observer.until(lambda: len(setpoint) > 3, 'later values')
-        assert all(values_in(message) == [21.5] for message in setpoint)
-        node.end()
-        simulator.end()
-        observer.node.destroy_publisher(publisher)
-        observer.forget(setpoint)
-        observer.forget(results)
 
 
 def test_full_duplex_bridge_is_read_and_written_by_the_plc(

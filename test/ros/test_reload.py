@@ -150,21 +150,15 @@ def test_writes_go_to_the_new_map(bench: Bench) -> None:
     assert writes.message == 'OK: 1 of 1 writes confirmed'
 
 
-def test_row_of_another_message_type_has_a_new_topic(bench: Bench) -> None:
+def test_row_of_another_message_type_or_address_has_a_new_topic(bench: Bench) -> None:
     for address, kind, values in (
-            ('F8:0', Float32MultiArray, [1.5]), ('N7:1', Int16MultiArray, [8])):
+            ('F8:0', Float32MultiArray, [1.5]), ('N7:1', Int16MultiArray, [8]),
+            ('N7:0', Int16MultiArray, [7])):
         bench.write_map(f'speed,ReadWrite,{address},1,PLC5,1')
         assert bench.reload()[0]
         echo = bench.observer.listen(kind, '/abdf1/read/speed')
         assert echo.values(values)
         bench.observer.forget(echo)
-
-
-def test_row_of_another_address_has_a_new_topic(bench: Bench) -> None:
-    bench.observer.listen(Int16MultiArray, '/abdf1/read/speed').values([7, 8])
-    bench.write_map('speed,Read,N7:1,1,PLC5,1')
-    assert bench.reload()[0]
-    assert bench.observer.listen(Int16MultiArray, '/abdf1/read/speed').values([8])
 
 
 def test_faulty_files_change_nothing(bench: Bench, capfd: pytest.CaptureFixture[str]) -> None:

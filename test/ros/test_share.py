@@ -17,8 +17,6 @@
 from contextlib import suppress
 from pathlib import Path
 import socket
-import threading
-import time
 
 from abdf1_ros.cli.sniff import main as sniff
 from abdf1_ros.client import Client
@@ -90,41 +88,3 @@ def test_what_is_not_allowed_and_who_is_turned_away_is_told_once(tmp_path: Path)
                       ', was turned away; one at a time is at a place')
         node.end()
     assert node.text.count('is refused') == 1
-
-
-def patient_read(client: Client, address: str) -> object:
-    """Read a value; a busy host may stand still by itself."""
-    for _ in range(20):
-        try:
-            return client.read(address)
-        except RemoteError as error:
-            assert error.sts == 0x01
-            time.sleep(0.2)
-    raise AssertionError('it never runs')
-
-
-def test_what_comes_while_the_node_stands_still_is_not_sent(tmp_path: Path) -> None:
-    files, place = make_files(tmp_path), tmp_path / 'hmi'
-    with (files.start_simulator(), Observer() as observer,
-          Process('node', *files.args(OFTEN, f'net.share:="pty:{place}"', 'net.cmd_timeout:=500',
-                                      'net.share_access:=Write')) as node):
-        setpoints = observer.listen(Float32MultiArray, '/abdf1/read/setpoint')
-        setpoints.values([21.5])
-        observer.until(place.is_symlink, 'the place')
-        with Client(str(place), plc_type='SLC', station=2, timeout=3.0, cmd_timeout=9.0) as hmi:
-            assert patient_read(hmi, 'F8:4') == 21.5
-            sent = hmi.counters.commands_sent
-            node.stop()
-
-            def go_on_late() -> None:
-                while hmi.counters.commands_sent == sent:
-                    time.sleep(0.01)
-                time.sleep(1.5)
-                node.go_on()
-
-            threading.Thread(target=go_on_late, daemon=True).start()
-            with pytest.raises(RemoteError) as refusal:
-                hmi.write('F8:4', 99.0)
-            assert refusal.value.sts == 0x01
-            assert patient_read(hmi, 'F8:4') == 21.5
-        node.end()

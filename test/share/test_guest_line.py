@@ -16,7 +16,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 import socket
@@ -171,45 +171,6 @@ def test_place_is_a_peer_of_the_manual(
     said = capsys.readouterr().out
     assert status == 0, said
     assert '0 failed' in said
-
-
-def test_ten_guests_that_misbehave_harm_nobody(tmp_path: Path) -> None:
-    """They babble, dribble, break off, never acknowledge and flood, two of each kind."""
-    ports = [free_port() for _ in range(10)]
-    places = ' '.join(f'tcp:{OWN_HOST}:{port}' for port in ports)
-    command = bytes.fromhex('10 02 01 09 0F 00 01 00 A2 02 07 89 00 00 10 03')
-    whole = frames.message_frame(Packet(1, 9, 0x0F, 0, 1, command[8:-2]).encode(), Checksum.CRC)
-    with shared(tmp_path, f'pty:{tmp_path}/hmi {places}') as line:
-        ended = threading.Event()
-
-        def be_bad(port: int, said: Sequence[bytes], pause: float) -> None:
-            while not ended.is_set():
-                try:
-                    with socket.create_connection((OWN_HOST, port), timeout=1) as other:
-                        for data in said:
-                            other.sendall(data)
-                            time.sleep(pause)
-                except OSError:
-                    time.sleep(0.1)
-
-        kinds = [([bytes(range(256))] * 50, 0.005), ([bytes((byte,)) for byte in whole], 0.1),
-                 ([command[:9]], 0.05), ([whole] * 5, 0.2), ([whole] * 200, 0.001)]
-        bad = [threading.Thread(target=be_bad, args=(port, *kind), daemon=True)
-               for port, kind in zip(ports, kinds * 2, strict=True)]
-        for thread in bad:
-            thread.start()
-        with client_at(tmp_path / 'hmi') as client:
-            before = len(line.listener.reads)
-            beats: set[bytes] = set()
-            while len(beats) < 6 or len(line.listener.reads) < before + 20:
-                assert client.read('N7:1', 2) == [1, 2]
-                line.driver.interlocks.executor_ran(line_time())
-                beats.add(stored(line.plc, 'N10:10'))
-        ended.set()
-        for thread in bad:
-            thread.join(10)
-        # That they come in time is in test_guests.py, in virtual time.
-        assert all(isinstance(values, list) for _, _, values in line.listener.reads)
 
 
 def test_place_of_ipv6(tmp_path: Path) -> None:
