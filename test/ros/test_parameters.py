@@ -56,6 +56,7 @@ def make_node(context: Context) -> Iterator[Nodes]:
         overrides = [Parameter(name, value=value) for name, value in (values or {}).items()]
         nodes.append(Node('parameters', context=context, parameter_overrides=overrides,
                           cli_args=cli_args, use_global_arguments=False,
+                          start_parameter_services=False,
                           automatically_declare_parameters_from_overrides=True))
         return nodes[-1]
 

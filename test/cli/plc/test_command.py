@@ -38,7 +38,7 @@ from support.cases import for_all
 from support.commands import call, running_simulator, Said
 from support.driver_bench import Recorder
 from support.mappings import make_mapping
-from support.ptys import Pty, wait_until
+from support.ptys import PATIENCE, Pty, wait_until
 from support.ros import Process, write_csv
 from support.simulator_process import Files, make_files
 
@@ -237,7 +237,7 @@ def test_write_asks_who_sits_at_a_terminal(line: str, plc: Plc, answer: str, sta
          '--port', line, *PATIENT], stdin=theirs, stdout=subprocess.PIPE, stderr=subprocess.PIPE,
         text=True)
     os.write(ours, f'{answer}\n'.encode())
-    out, _ = process.communicate(timeout=20)
+    out, _ = process.communicate(timeout=PATIENCE)
     os.close(ours)
     os.close(theirs)
     assert process.returncode == status
