@@ -52,6 +52,7 @@ class Case:
     error_code: str
     kinds: tuple[Kind, ...]
     rate: float
+    trials: int = 10_000  # of the theory
     hours: float = 0.0
     sums: Counter[str] = field(default_factory=Counter)
     theory: Theory | None = None
@@ -67,7 +68,8 @@ class Case:
             rig.settle()
         ears, wire = rig.judge.ears, rig.wire
         self.theory = self.theory or Theory(
-            wire.samples, rig.network.checksum, rig.network.duplex, self.kinds, self.rate)
+            wire.samples, rig.network.checksum, rig.network.duplex, self.kinds, self.rate,
+            self.trials)
         self.hours += rig.clock() / _HOUR
         self.sums.update(rig.judge.counts)
         self.sums.update({

@@ -41,14 +41,12 @@ PROBES_SHARE = 8
 
 
 @pytest.mark.parametrize('error_code', ['CRC', 'BCC'])
-@pytest.mark.parametrize('rate', [1e-3, 2e-2])
 @pytest.mark.parametrize('mode', MODES)
 def test_noise_gives_no_wrong_value_that_a_check_could_see(
-        mode: str, rate: float, error_code: str) -> None:
-    rig = Rig(mode, error_code, seed=round(1 / rate))
-    for _ in range(2):
-        rig.disturb(rate, 300.0)
-        rig.settle()
+        mode: str, error_code: str) -> None:
+    rig = Rig(mode, error_code, seed=50)
+    rig.disturb(2e-2, 300.0)
+    rig.settle()
     counts = rig.judge.counts
     assert rig.judge.faults == 0, counts
     assert counts['values'] > 100
@@ -62,8 +60,8 @@ def test_noise_gives_no_wrong_value_that_a_check_could_see(
 
 @pytest.mark.parametrize('kind', Kind)
 def test_bcc_misses_as_many_as_theory_says(kind: Kind) -> None:
-    case = Case('Message', 'BCC', (kind,), 1e-2)
-    assert case.run(seed=5, hours=0.2) == 0
+    case = Case('Message', 'BCC', (kind,), 1e-2, trials=2000)
+    assert case.run(seed=5, hours=0.1) == 0
     assert case.theory is not None
     expected = case.theory.expected(
         case.sums['singles'], case.sums['several'], case.sums['refused'])

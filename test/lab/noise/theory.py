@@ -25,8 +25,6 @@ from abdf1_ros.df1.checksum import Checksum
 from abdf1_ros.df1.frames import Duplex, Frame, FrameDecoder, Symbol
 from noise.wire import Kind, strike
 
-_TRIALS = 10_000
-
 
 class Theory:
     """
@@ -34,13 +32,13 @@ class Theory:
 
     CRC: one in 65536 of those that come to be checked, and every frame without STN that gets
     a 00 in front of its first byte, which a CRC that begins at 0 cannot see. BCC: damage random
-    frames and count, for frames struck once and for those struck more often.
+    frames, so many ``trials``, and count, for frames struck once and for those struck more often.
     """
 
     def __init__(self, samples: Sequence[bytes], checksum: Checksum, duplex: Duplex,
-                 kinds: tuple[Kind, ...], rate: float) -> None:
+                 kinds: tuple[Kind, ...], rate: float, trials: int = 10_000) -> None:
         self._samples, self._checksum, self._duplex = samples, checksum, duplex
-        self._kinds, self._rate = kinds, rate
+        self._kinds, self._rate, self._trials = kinds, rate, trials
         self._random = Random(1)
         self._originals = {frame: self._decoded(frame) for frame in samples}
         is_bcc = checksum is Checksum.BCC
@@ -60,11 +58,11 @@ class Theory:
 
     def _share(self, is_several: bool) -> float:
         missed = 0
-        for _ in range(_TRIALS):
+        for _ in range(self._trials):
             frame = self._random.choice(self._samples)
             arrives = self._damage(frame, self._strikes(len(frame)) if is_several else 1)
             missed += self._is_missed(frame, arrives)
-        return missed / _TRIALS
+        return missed / self._trials
 
     def _strikes(self, length: int) -> int:
         """Return a random number of strikes, of those above one."""
