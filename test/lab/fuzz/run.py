@@ -20,13 +20,18 @@ Fuzz all targets, one after the other, from the stored corpus; status 1 when som
 """
 
 import argparse
+from collections import Counter
+from collections.abc import Callable
 from dataclasses import dataclass
 import hashlib
+import importlib
 from pathlib import Path
 import re
 import subprocess
 import sys
 import tempfile
+from types import FrameType
+from typing import Any
 
 _HERE = Path(__file__).resolve().parent
 sys.path[:0] = map(str, Path(__file__).resolve().parents[1:4])
@@ -39,8 +44,11 @@ _LONGEST = 20
 _MEMORY = 2048
 _LENGTH = 1000
 
-# A stored file stays smaller than this (characters).
-_MOST_STORED = 40_000
+# So many inputs are stored for a step from one line of the package to another, as many as there
+# are, beside those that are made for the target.
+_TIMES = 2
+_Step = tuple[str, int, int]  # a file, and two lines
+_PACKAGE = str(Path(__file__).resolve().parents[3] / 'abdf1_ros')
 
 
 @dataclass(frozen=True, slots=True)
@@ -110,21 +118,46 @@ def _fuzz(target: str, work: Path, seconds: int) -> Outcome:
 
 
 def _store(target: str, work: Path) -> None:
-    """Replace the stored corpus by as much of stored and new inputs as coverage needs."""
-    folder = _write_inputs(target, work)
-    with tempfile.TemporaryDirectory(prefix='abdf1_fuzz_') as merged:
-        said = _fuzzer(target, '-merge=1', f'-max_len={_LENGTH}', merged, str(folder))
-        if said.returncode:
-            sys.exit(said.stderr)
-        inputs = sorted((path.read_bytes() for path in Path(merged).iterdir()), key=len)
-    kept: list[bytes] = []
-    size = 0
-    for data in inputs:
-        size += 2 * len(data) + 1
-        if size <= _MOST_STORED:
+    """Replace the stored corpus by those of stored and new inputs that coverage needs."""
+    one_input = importlib.import_module(f'fuzz.{target}').one_input
+    seeds = {b'', *corpus.seeds(target)}
+    found = {path.read_bytes() for path in _write_inputs(target, work).iterdir()} - seeds
+    seen: Counter[_Step] = Counter()
+    for data in seeds:
+        seen.update(_steps(one_input, data))
+    kept = []
+    for data in sorted(found, key=lambda data: (len(data), data)):
+        steps = _steps(one_input, data)
+        if any(seen[step] < _TIMES for step in steps):
             kept.append(data)
+            seen.update(steps)
     corpus.store(target, kept)
-    print(f'{target}: {len(kept)} of {len(inputs)} inputs stored')
+    print(f'{target}: {len(kept)} of {len(found)} inputs stored')
+
+
+def _steps(one_input: Callable[[bytes], None], data: bytes) -> set[_Step]:
+    """Return the steps from line to line that the package takes with an input."""
+    steps: set[_Step] = set()
+
+    def trace(frame: FrameType, event: str, argument: object) -> Callable[..., Any] | None:
+        if not frame.f_code.co_filename.startswith(_PACKAGE):
+            return None
+        before = frame.f_lineno
+
+        def trace_lines(frame: FrameType, event: str, argument: object) -> Callable[..., Any]:
+            nonlocal before
+            steps.add((frame.f_code.co_filename, before, frame.f_lineno))
+            before = frame.f_lineno
+            return trace_lines
+
+        return trace_lines
+
+    sys.settrace(trace)
+    try:
+        one_input(data)
+    finally:
+        sys.settrace(None)
+    return steps
 
 
 def _write_inputs(target: str, work: Path) -> Path:
