@@ -49,8 +49,6 @@ MODES = ('Message', 'Standard', 'Peer', 'Slave', 'Radio')
 BAUD = 9600
 FLOOD = 1500  # to each mapping, which is more than are kept
 
-_LONGEST = 20.0  # s; so long a fault lasts at most
-
 
 class Sink:
     """A logger that counts its lines."""
@@ -116,11 +114,12 @@ class FaultyLine:
 
     Masters have two PLCs, a liar and a dead station, by radio two dead ones and no liar; a peer
     and a slave have another driver at the far end, as peer and as master. The line is quiet for
-    ``pause`` s at most from one fault to the next.
+    ``pause`` s at most from one fault to the next, and none lasts longer than ``longest`` s.
     """
 
-    def __init__(self, mode: str, seed: int = 1, pause: float = 20.0) -> None:
-        self._pause = pause
+    def __init__(self, mode: str, seed: int = 1, pause: float = 20.0,
+                 longest: float = 20.0) -> None:
+        self._pause, self._longest = pause, longest
         self.asked = 0
         self.faults: Counter[str] = Counter()
         self._random = Random(seed)
@@ -174,18 +173,21 @@ class FaultyLine:
 
     def settle(self) -> None:
         """Let all queues run empty; then every write has had its one result."""
-        self.run(60.0)
+        end = self.clock() + 60.0
+        while self.ear.results < self.asked and self.clock() < end:
+            self.run(5.0)
+        self.run(5.0)
         assert self.ear.results == self.asked
 
     def _for_a_while(self) -> Iterator[None]:
-        for _ in range(self._random.randrange(1, int(_LONGEST))):
+        for _ in range(self._random.randrange(1, int(self._longest))):
             yield
             self.run(1.0)
 
     def _noise(self) -> None:
         share = self._random.choice((0.001, 0.01, 0.1))
         self.line.noise = Noise(lost=share, flipped=share, doubled=share, inserted=share)
-        self.run(self._random.uniform(1.0, _LONGEST))
+        self.run(self._random.uniform(1.0, self._longest))
         self.line.noise = QUIET
 
     def _babble(self) -> None:
@@ -202,7 +204,7 @@ class FaultyLine:
 
     def _lie(self) -> None:
         self._liar.is_lying = True
-        self.run(self._random.uniform(1.0, _LONGEST))
+        self.run(self._random.uniform(1.0, self._longest))
         self._liar.is_lying = False
 
     def _flap(self) -> None:
