@@ -223,6 +223,7 @@ local PLC3_SECTIONS = {
 local VERSION = 1
 local DLE, STX, ETX, ENQ, SOH = 0x10, 0x02, 0x03, 0x05, 0x01
 local DIRECTIONS = {[0] = '?', [1] = '>', [2] = '<'}
+local OPPOSITE = {['>'] = '<', ['<'] = '>'}
 local CHECKS = {[1] = 'BCC', [2] = 'CRC'}
 
 local df1 = Proto('abdf1', 'Allen-Bradley DF1 and PCCC')
@@ -262,8 +263,27 @@ df1.experts = {bad_check, refused}
 local open, found = {}, {}
 -- By radio modem there are no symbols: messages by their bytes, and whether a symbol was seen.
 local heard, has_symbols = {}, false
-local MEMORY = 10  -- s after which the same message is another
-function df1.init() open, found, heard, has_symbols = {}, {}, {}, false end
+-- The last message of each path, and of each direction: one that comes again is a repetition.
+-- And the time of the packet before.
+local said, last, before = {}, {}, 0
+local MEMORY = 10  -- s after which a reply comes too late, and the same message is another
+function df1.init()
+  open, found, heard, has_symbols, said, last, before = {}, {}, {}, false, {}, {}, 0
+end
+
+-- How a message repeats the last of its path; it is that of its direction now.
+local function repetition(path, whole, from_master, direction)
+  local mine, other = path .. tostring(from_master), path .. tostring(not from_master)
+  local mark
+  if said[mine] and said[mine].whole == whole then
+    mark = said[mine].acknowledged and 'duplicate' or 'retransmission'
+  else
+    said[mine] = {whole = whole}
+    if said[other] and said[other].whole == whole then mark = 'relayed' end
+  end
+  last[direction] = said[mine]
+  return mark
+end
 
 -- Take the bytes of a message out of what stood on the line (from index at): STN, link data, the
 -- check bytes, and whether DLE ETX was there.
@@ -460,7 +480,7 @@ local function status_text(sts, ext)
 end
 
 -- Show DST to the end of a message; returns its kind and what it says.
-local function message(data, range, tree, pinfo, is_good)
+local function message(data, range, tree, pinfo, is_good, from_master, direction)
   local dst, src, cmd, sts = data[1], data[2], data[3], data[4]
   local tns = data[5] + 256 * data[6]
   tree:add(f.dst, range, dst)
@@ -498,6 +518,11 @@ local function message(data, range, tree, pinfo, is_good)
   if is_good then
     local whole = table.concat(data, ' ')
     local first = not has_symbols and heard[whole]
+    local mark
+    if not pinfo.visited then
+      local path = string.format('%d %d %s ', src, dst, is_reply)
+      mark = repetition(path, whole, from_master, direction)
+    end
     if not pinfo.visited and first and pinfo.abs_ts - first.time < MEMORY then
       found[pinfo.number] = {copy = first.number}
     elseif not pinfo.visited then
@@ -505,13 +530,13 @@ local function message(data, range, tree, pinfo, is_good)
       local key = is_reply and string.format('%d %d %d', dst, src, tns)
         or string.format('%d %d %d', src, dst, tns)
       local command = open[key]
+      if command and before - command.time > MEMORY then command = nil end
       if not is_reply then
-        local again = command and command.whole == whole and not command.answered
-          and pinfo.abs_ts - command.time < MEMORY
-        if not again then  -- a repeated command is timed from its first transmission
-          open[key] = {number = pinfo.number, time = pinfo.abs_ts, text = text, whole = whole}
+        local again = command and mark and not (mark == 'duplicate' and command.answered)
+        if not again and dst ~= 255 then  -- a repeated one is timed from its first transmission
+          open[key] = {number = pinfo.number, time = pinfo.abs_ts, text = text, cmd = plain}
         end
-      elseif command then  -- a repeated reply has no latency
+      elseif command and command.cmd == plain then  -- a repeated reply has no latency
         found[pinfo.number] = {request = command.number, text = command.text,
           seconds = not command.answered and pinfo.abs_ts - command.time or nil}
         found[command.number] = found[command.number] or {reply = pinfo.number}
@@ -563,7 +588,7 @@ function df1.dissector(tvb, pinfo, root)
     kind = 'damaged'
     if is_whole and #data >= 6 then
       local said
-      said, text = message(data, range, tree, pinfo, is_right)
+      said, text = message(data, range, tree, pinfo, is_right, bytes[2] == SOH, direction)
       if verdict == 1 then kind = said end
     end
   elseif bytes[1] == DLE and bytes[2] == ENQ and #bytes > 2 then
@@ -574,10 +599,13 @@ function df1.dissector(tvb, pinfo, root)
   elseif SYMBOLS[bytes[2]] then
     kind = SYMBOLS[bytes[2]]
     has_symbols = true
+    local taken = last[OPPOSITE[direction] or direction]
+    if bytes[2] == 0x06 and taken and not pinfo.visited then taken.acknowledged = true end
     if bytes[2] ~= ENQ and bytes[2] ~= 0x06 and bytes[2] ~= 0x15 and bytes[2] ~= 0x04 then
       kind = 'unknown'
     end
   end
+  if not pinfo.visited then before = pinfo.abs_ts end
   tree:add(f.kind, range, kind)
   pinfo.cols.protocol = 'DF1'
   pinfo.cols.info = direction .. ' ' .. kind .. (text == '' and '' or ' ' .. text)

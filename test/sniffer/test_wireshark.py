@@ -21,14 +21,16 @@ What stands on the line goes to tshark as it was heard, so both take it apart by
 from collections.abc import Iterable
 import json
 from pathlib import Path
+from random import Random
 import shutil
 import subprocess
 from typing import Any
 
 from abdf1_ros.df1.checksum import Checksum
 from abdf1_ros.df1.frames import message_frame
+from abdf1_ros.df1.packet import Packet
 from abdf1_ros.sniffer.capture import Chunk, Direction
-from abdf1_ros.sniffer.entries import Entry
+from abdf1_ros.sniffer.entries import Entry, Mark
 from abdf1_ros.sniffer.pcapng import PcapngWriter
 from abdf1_ros.sniffer.report import json_line
 from abdf1_ros.sniffer.traffic import TrafficDecoder
@@ -105,38 +107,59 @@ def assert_same(told: dict[str, str], entry: Entry) -> None:
         assert place.startswith(field['address']), (place, field['address'])
 
 
-def assert_all_same(path: Path, entries: Iterable[Entry]) -> list[dict[str, str]]:
-    """Compare all of them; return what tshark has said."""
+def assert_all_same(path: Path, entries: Iterable[Entry],
+                    is_one_line: bool = True) -> list[dict[str, str]]:
+    """Compare all of them, latencies where they are of one line; return what tshark has said."""
     on_line = [entry for entry in entries if entry.wire]
     told = dissected(path, on_line)
     assert len(told) == len(on_line)
     for fields, entry in zip(told, on_line):
         assert_same(fields, entry)
+        if is_one_line:
+            latency = fields['abdf1.latency']
+            assert (float(latency) if latency else None) == (
+                entry.latency and pytest.approx(entry.latency, abs=2e-5)), (fields, entry)
     return told
 
 
 def test_dissector_tells_every_capture_as_we_do(tmp_path: Path) -> None:
     entries = [entry for capture in CAPTURES for entry in capture.entries]
-    told = assert_all_same(tmp_path / 'line.pcapng', entries)
-    assert sum(bool(fields['abdf1.request']) for fields in told) >= sum(
-        entry.latency is not None for entry in entries)
+    assert_all_same(tmp_path / 'line.pcapng', entries)
 
 
 def test_by_radio_a_copy_is_that_of_the_first_and_a_reply_answers_that(tmp_path: Path) -> None:
     capture, = (entry for entry in CAPTURES if entry.name.startswith('radio'))
     entries = [entry for entry in capture.entries if entry.wire]
-    told = dissected(tmp_path / 'line.pcapng', entries)
+    told = assert_all_same(tmp_path / 'line.pcapng', entries)
     copies = [fields for fields in told if fields['abdf1.copy_of']]
     assert len(copies) == 43
     for fields, entry in zip(told, entries):
         assert bool(fields['abdf1.copy_of']) is bool(entry.marks)
-        assert bool(fields['abdf1.latency']) is (entry.latency is not None)
-        if entry.latency is not None:
-            assert float(fields['abdf1.latency']) == pytest.approx(entry.latency, abs=1e-5)
     for fields in copies:
         first = told[int(fields['abdf1.copy_of']) - 1]
         assert [fields[f'abdf1.{name}'] for name in ('dst', 'src', 'tns', 'data')] == [
             first[f'abdf1.{name}'] for name in ('dst', 'src', 'tns', 'data')]
+
+
+def test_repeated_late_and_wrong_messages_have_the_latency_that_we_tell(tmp_path: Path) -> None:
+    random, time = Random(42), 1.0
+    session, entries = TrafficDecoder(Checksum.BCC), list[Entry]()
+    for _ in range(400):
+        way = random.choice((Direction.OUT, Direction.IN))
+        cmd = 0x0F if way is Direction.OUT else random.choice((0x4F,) * 9 + (0x46,))
+        # A read of N7:0 or N7:1, or the two words that may be there.
+        data = bytes.fromhex('A202078900' + random.choice(('00', '01')) if cmd == 0x0F else '0100')
+        packet = Packet(way is Direction.OUT, way is Direction.IN, cmd, 0, random.randrange(3), data)
+        frame = message_frame(packet.encode(), Checksum.BCC)
+        for direction, said, chance in ((way, frame, 1.0), (way.opposite, b'\x10\x06', 0.8),
+                                        (way, frame, 0.3)):
+            if random.random() < chance:
+                time += random.choice((0.01,) * 20 + (0.5, 3.0, 11.0))
+                entries += session.feed(Chunk(time, direction, said))
+    assert_all_same(tmp_path / 'line.pcapng', entries)
+    assert sum(entry.latency is not None for entry in entries) > 50
+    assert {mark for entry in entries for mark in entry.marks} == {
+        Mark.RETRANSMISSION, Mark.DUPLICATE, Mark.STRAY, Mark.WRONG_COMMAND}
 
 
 def test_every_frame_of_the_vectors(tmp_path: Path) -> None:
@@ -145,7 +168,7 @@ def test_every_frame_of_the_vectors(tmp_path: Path) -> None:
         session = TrafficDecoder(vector.checksum, vector.duplex)
         entries += session.feed(Chunk(1.0, Direction.OUT, vector.frame))
         entries += (entry for entry in session.finish() if entry.wire)
-    assert_all_same(tmp_path / 'line.pcapng', entries)
+    assert_all_same(tmp_path / 'line.pcapng', entries, is_one_line=False)
 
 
 def test_dissector_tells_every_command_of_the_vectors_as_we_do(tmp_path: Path) -> None:
