@@ -21,18 +21,17 @@ import threading
 import time
 from typing import Any
 
-from abdf1_ros import testing
 from abdf1_ros.client import Client
 from abdf1_ros.df1.echo import COMES_BACK
 from abdf1_ros.df1.frames import Frame, NAK, Symbol
 from abdf1_ros.errors import RemoteError
 from abdf1_ros.pccc.file_types import PlcType
 from abdf1_ros.pccc.steps import AddressedValues, echo, write
-from abdf1_ros.ros.bridge.node import BridgeNode
 from abdf1_ros.simulator.ladder import Lamp
 import pytest
 from std_msgs.msg import Int16MultiArray
 from std_srvs.srv import SetBool, Trigger
+from support import cell as cell_module
 from support.commands import running_simulator
 from support.ros import (
     details,
@@ -67,28 +66,11 @@ MARK = b'GUEST'  # what is easily known in a command
 ATTEMPTS = 8  # to be seen by a host that is not busy
 
 
-class Cell(testing.SimulatedCell):
-    """A bridge with a heartbeat, in this process, a PLC, and who looks at both."""
-
-    observer = Observer
-    ros: Observer
+class Cell(cell_module.Cell):
+    """A bridge with a heartbeat."""
 
     def __init__(self, folder: Path, *assignments: str) -> None:
-        super().__init__(folder, SIMULATOR, MAP, NET, parameters=assignments)
-        self.map = folder / 'map.csv'
-
-    def start(self) -> None:
-        """Start the bridge."""
-        self.results = self.ros.results()
-        self.diagnostics = self.ros.diagnostics(self.plcs.port)
-        self.node = BridgeNode(context=self.ros.context, use_global_arguments=False,
-                               cli_args=ros_args(*self._assignments))
-        self.ros.run(self.node)
-
-    def end(self, number: signal.Signals = signal.SIGTERM) -> int:
-        """End the bridge in order, if it runs."""
-        self.ros.end(self.node)
-        return 0
+        super().__init__(folder, SIMULATOR, MAP, NET, *assignments)
 
     def word(self, address: str) -> int:
         """Return a word of the PLC."""
@@ -126,10 +108,6 @@ class Cell(testing.SimulatedCell):
             return self.word('N10:1') == value
 
         self.until(has_come, f'{value} in the PLC')
-
-    def call(self, kind: Any, name: str, request: Any) -> Any:
-        """Call a service of the bridge."""
-        return self.ros.call(kind, f'/abdf1/{name}', request)
 
 
 class ProcessCell(Cell):

@@ -24,53 +24,41 @@ from abdf1_ros.ports.opening import open_port
 from abdf1_ros.ports.settings import PortSettings
 from abdf1_ros.ros.bridge.files import FileWatch
 from abdf1_ros.ros.bridge.guests import GuestPlaces
-from abdf1_ros.ros.bridge.node import BridgeNode
 from abdf1_ros.ros.bridge.session import Session
 from abdf1_ros.ros.diagnostics.graph import Graph
 from abdf1_ros.ros.diagnostics.line import LineView
 from abdf1_ros.ros.parameters.shown import ShownFiles
-from abdf1_ros.testing import Plcs
 import pytest
 from rcl_interfaces.srv import GetParameters
 from rclpy.parameter import parameter_value_to_python
 from std_msgs.msg import Float32MultiArray, Int16MultiArray, UInt16MultiArray
 from std_srvs.srv import SetBool, Trigger
+from support.cell import Cell
 from support.ros import (
     details,
     EVERYTHING,
     find_status,
-    Observer,
     OK,
-    ros_args,
     until_status,
     values_in,
     WARN,
     write_csv,
 )
 
+DATA = 'Station,PLC_Type,Address,Length,Values\n1,PLC5,N7:0,16,7 8\n1,PLC5,F8:0,4,1.5\n'
 HEADER = 'Tag,Command,Address,Station,PLC_Type,Length'
 SPEED = 'speed,Read,N7:0,1,PLC5,2'
 LEVEL = 'level,ReadWrite,F8:0,1,PLC5,1'
 RECIPE = 'recipe,Write,N7:4,1,PLC5,2'
 
 
-class Bench:
+class Bench(Cell):
     """A bridge on simulated PLCs, whose files can be written anew."""
 
-    def __init__(self, folder: Path, observer: Observer, plcs: Plcs) -> None:
-        self.observer = observer
-        self.plcs = plcs
-        self.net, self.map = folder / 'net.csv', folder / 'map.csv'
-        self.write_net(100)
-        self.write_map(SPEED, RECIPE)
-        self.diagnostics = observer.diagnostics(plcs.port)
-        self.port = plcs.port
-        arguments = ros_args(
-            f'net_file:={self.net}', f'map_file:={self.map}', f'port:={plcs.port}')
-        self.node = BridgeNode(context=observer.context, use_global_arguments=False,
-                               cli_args=arguments)
-        observer.run(self.node)
-        observer.until(lambda: self.node.session.driver.is_online, 'the port')
+    def start(self) -> None:
+        """Start the bridge; wait for its port."""
+        super().start()
+        self.ros.until(lambda: self.node.session.driver.is_online, 'the port')
 
     def write_net(self, timeout: int, baud: int = 115200) -> None:
         """Write the net file."""
@@ -82,43 +70,36 @@ class Bench:
 
     def reload(self) -> tuple[bool, str]:
         """Ask for it; return what the service says."""
-        response = self.observer.call(Trigger, '/abdf1/reload', Trigger.Request())
+        response = self.call(Trigger, 'reload', Trigger.Request())
         return response.success, response.message
 
     def polling(self, wanted: bool) -> tuple[bool, str]:
         """Ask for it; return what the service says."""
-        response = self.observer.call(SetBool, '/abdf1/polling', SetBool.Request(data=wanted))
+        response = self.call(SetBool, 'polling', SetBool.Request(data=wanted))
         return response.success, response.message
 
     def parameter(self, name: str) -> Any:
         """Return the value of a parameter, None where there is none."""
-        values = self.observer.call(
-            GetParameters, '/abdf1/get_parameters', GetParameters.Request(names=[name])).values
+        values = self.call(
+            GetParameters, 'get_parameters', GetParameters.Request(names=[name])).values
         return parameter_value_to_python(values[0]) if values else None
-
-    def stop(self) -> None:
-        """End the bridge."""
-        self.observer.end(self.node)
 
 
 @pytest.fixture
 def bench(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Bench]:
     monkeypatch.setattr('abdf1_ros.ros.bridge.files._PERIOD', 0.3)
-    rows = ['1,PLC5,N7:0,16,7 8', '1,PLC5,F8:0,4,1.5']
-    data = write_csv(tmp_path / 'plc.csv', 'Station,PLC_Type,Address,Length,Values', rows)
-    with Observer() as observer, Plcs(data) as plcs:
-        bench = Bench(tmp_path, observer, plcs)
+    with Bench(tmp_path, DATA, '\n'.join((HEADER, SPEED, RECIPE)),
+               'Baud,Timeout\n115200,100') as bench:
         yield bench
-        bench.stop()
 
 
 def test_rows_come_and_go_and_those_that_stay_are_not_disturbed(bench: Bench) -> None:
-    speeds = bench.observer.listen(Int16MultiArray, '/abdf1/read/speed', EVERYTHING)
+    speeds = bench.ros.listen(Int16MultiArray, '/abdf1/read/speed', EVERYTHING)
     speeds.values([7, 8])
     publisher = bench.node.session.reads._topics['speed'].publisher
     bench.write_map(SPEED, LEVEL)
     assert bench.reload() == (True, str(bench.node.session.configuration))
-    levels = bench.observer.listen(Float32MultiArray, '/abdf1/read/level')
+    levels = bench.ros.listen(Float32MultiArray, '/abdf1/read/level')
     assert values_in(levels.first()) == [1.5]
     assert values_in(speeds.next()) == [7, 8]
     assert bench.node.session.reads._topics['speed'].publisher is publisher
@@ -129,19 +110,19 @@ def test_rows_come_and_go_and_those_that_stay_are_not_disturbed(bench: Bench) ->
     assert '/abdf1/write/recipe' not in written
     bench.write_map(LEVEL)
     assert bench.reload()[0]
-    bench.observer.until(
+    bench.ros.until(
         lambda: '/abdf1/read/speed' not in dict(
             bench.node.get_publisher_names_and_types_by_node('abdf1', '/')), 'the end of a topic')
 
 
 def test_writes_go_to_the_new_map(bench: Bench) -> None:
-    results = bench.observer.results()
-    publisher = bench.observer.publisher(Int16MultiArray, '/abdf1/write/recipe')
+    results = bench.results
+    publisher = bench.ros.publisher(Int16MultiArray, '/abdf1/write/recipe')
     publisher.publish(Int16MultiArray(data=[1, 2]))
     assert results.next().message == 'written'
     bench.write_map(SPEED, 'recipe,Write,N7:8,1,PLC5,2')
     assert bench.reload()[0]
-    bench.observer.until(lambda: bench.node.session.driver.is_online, 'the port')
+    bench.ros.until(lambda: bench.node.session.driver.is_online, 'the port')
     publisher.publish(Int16MultiArray(data=[3, 4]))
     result = results.next()
     assert (result.message, details(result)['address']) == ('written', 'N7:8')
@@ -156,9 +137,9 @@ def test_row_of_another_message_type_or_address_has_a_new_topic(bench: Bench) ->
             ('N7:0', Int16MultiArray, [7])):
         bench.write_map(f'speed,ReadWrite,{address},1,PLC5,1')
         assert bench.reload()[0]
-        echo = bench.observer.listen(kind, '/abdf1/read/speed')
+        echo = bench.ros.listen(kind, '/abdf1/read/speed')
         assert echo.values(values)
-        bench.observer.forget(echo)
+        bench.ros.forget(echo)
 
 
 def test_faulty_files_change_nothing(bench: Bench, capfd: pytest.CaptureFixture[str]) -> None:
@@ -171,7 +152,7 @@ def test_faulty_files_change_nothing(bench: Bench, capfd: pytest.CaptureFixture[
     assert bench.node.session.driver is driver
     assert bench.parameter('net.baud') == 115200
     assert bench.parameter('map.recipe.address') == 'N7:4'
-    speeds = bench.observer.listen(Int16MultiArray, '/abdf1/read/speed', EVERYTHING)
+    speeds = bench.ros.listen(Int16MultiArray, '/abdf1/read/speed', EVERYTHING)
     assert values_in(speeds.first()) == [7, 8]
     assert f'{bench.net}:2:1 (Baud): Baud = "9601"' in capfd.readouterr().err
 
@@ -182,7 +163,7 @@ def test_fault_in_one_row_changes_nothing(bench: Bench) -> None:
     assert not success
     assert message.startswith(f'goes on as before: {bench.map}:3:6 (Length): ')
     assert bench.parameter('map.level.address') is None
-    speeds = bench.observer.listen(Int16MultiArray, '/abdf1/read/speed', EVERYTHING)
+    speeds = bench.ros.listen(Int16MultiArray, '/abdf1/read/speed', EVERYTHING)
     assert values_in(speeds.first()) == [7, 8]
 
 
@@ -207,7 +188,7 @@ def test_second_publisher_is_found_again(bench: Bench, capfd: pytest.CaptureFixt
         assert bench.reload()[0]
         bench.diagnostics.clear()
         while len(publishers) < 2:
-            publishers.append(bench.observer.publisher(Int16MultiArray, '/abdf1/write/recipe'))
+            publishers.append(bench.ros.publisher(Int16MultiArray, '/abdf1/write/recipe'))
         until_status(bench.diagnostics, 'interlocks', WARN,
                      lambda status: 'recipe: more than one publisher' in status.message)
     assert capfd.readouterr().err.count(CROWD) == 2
@@ -278,7 +259,7 @@ def test_parameters_tell_what_is_in_the_files_now(bench: Bench) -> None:
 def test_other_speed_opens_the_port_anew(bench: Bench, capfd: pytest.CaptureFixture[str]) -> None:
     bench.write_net(100, 19200)
     assert bench.reload()[0]
-    speeds = bench.observer.listen(Int16MultiArray, '/abdf1/read/speed', EVERYTHING)
+    speeds = bench.ros.listen(Int16MultiArray, '/abdf1/read/speed', EVERYTHING)
     assert values_in(speeds.first()) == [7, 8]
     assert bench.node._opener._settings.baud == 19200
 
@@ -301,14 +282,14 @@ def test_file_that_has_changed_is_told_once(
 
 def test_whoever_waits_for_link_counters_is_told_of_the_new_files(bench: Bench) -> None:
     bench.plcs.say('silent 1')
-    client = bench.observer.node.create_client(Trigger, '/abdf1/read_link_counters')
-    bench.observer.until(client.service_is_ready, 'the service')
+    client = bench.ros.node.create_client(Trigger, '/abdf1/read_link_counters')
+    bench.ros.until(client.service_is_ready, 'the service')
     future = client.call_async(Trigger.Request())
-    bench.observer.until(lambda: bench.node.session.link_counters._done, 'the question')
-    active = bench.observer.listen(UInt16MultiArray, '/abdf1/active_stations')
+    bench.ros.until(lambda: bench.node.session.link_counters._done, 'the question')
+    active = bench.ros.listen(UInt16MultiArray, '/abdf1/active_stations')
     bench.write_map('speed,Read,N7:0,2,PLC5,2')
     assert bench.reload()[0]
-    bench.observer.until(future.done, 'an answer')
+    bench.ros.until(future.done, 'an answer')
     assert active.values([1 << 2] + [0] * 15)
     assert future.result() == Trigger.Response(
         success=False, message='station 1: port lost: the files have been read again')
@@ -319,27 +300,27 @@ def test_files_are_read_again_while_the_port_is_left_to_others(bench: Bench) -> 
     bench.write_map(SPEED, LEVEL)
     bench.write_net(100, 19200)
     assert bench.reload()[0]
-    open_port(PortSettings(bench.port)).close()
+    open_port(PortSettings(bench.plcs.port)).close()
     assert bench.polling(True)[0]
-    levels = bench.observer.listen(Float32MultiArray, '/abdf1/read/level')
+    levels = bench.ros.listen(Float32MultiArray, '/abdf1/read/level')
     assert values_in(levels.first()) == [1.5]
 
 
 def test_port_is_left_to_others_and_taken_again(bench: Bench) -> None:
     text = 'the port is left to others: polling is off'
     until_status(bench.diagnostics, 'link', OK)
-    assert bench.polling(False) == (True, f'{bench.port}: {text}')
-    open_port(PortSettings(bench.port)).close()  # which is exclusive
+    assert bench.polling(False) == (True, f'{bench.plcs.port}: {text}')
+    open_port(PortSettings(bench.plcs.port)).close()  # which is exclusive
     assert until_status(bench.diagnostics, 'link', WARN).message == f'WARN: {text}'
-    counters = bench.observer.call(Trigger, '/abdf1/read_link_counters', Trigger.Request())
+    counters = bench.call(Trigger, 'read_link_counters', Trigger.Request())
     assert (counters.success, counters.message) == (
         False, 'no station to ask: the port is not open')
-    results = bench.observer.results()
-    publisher = bench.observer.publisher(Int16MultiArray, '/abdf1/write/recipe')
+    results = bench.results
+    publisher = bench.ros.publisher(Int16MultiArray, '/abdf1/write/recipe')
     publisher.publish(Int16MultiArray(data=[1, 2]))
     assert results.next().message == 'not written: refused: the port is not open'
-    assert bench.polling(True) == (True, f'{bench.port} is being opened')
-    speeds = bench.observer.listen(Int16MultiArray, '/abdf1/read/speed', EVERYTHING)
+    assert bench.polling(True) == (True, f'{bench.plcs.port} is being opened')
+    speeds = bench.ros.listen(Int16MultiArray, '/abdf1/read/speed', EVERYTHING)
     assert values_in(speeds.first()) == [7, 8]
     until_status(bench.diagnostics, 'link', OK)
 

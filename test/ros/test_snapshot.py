@@ -22,14 +22,13 @@ import time
 
 from abdf1_ros.driver.reads.point import ReadPoint
 from abdf1_ros.ports.clock import line_time
-from abdf1_ros.ros.bridge.node import BridgeNode
 from abdf1_ros.ros.topics.snapshot import Snapshot
 from abdf1_ros.settings.mapping import Mapping
-from abdf1_ros.testing import Plcs
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 import pytest
+from support.cell import Cell
 from support.mappings import make_mapping
-from support.ros import details, EVERYTHING, Inbox, Observer, ros_args, write_csv
+from support.ros import details, EVERYTHING, Inbox
 
 OK, STALE, ERROR = DiagnosticStatus.OK, DiagnosticStatus.STALE, DiagnosticStatus.ERROR
 
@@ -90,18 +89,11 @@ def test_value_that_is_not_fresh_says_so(
 
 @pytest.fixture
 def inbox(tmp_path: Path) -> Iterator[Inbox]:
-    data = write_csv(tmp_path / 'plc.csv', 'Station,PLC_Type,Address,Length,Values',
-                     ['1,PLC5,N7:0,4,7 8'])
-    net = write_csv(tmp_path / 'net.csv', 'Baud,Timeout', ['115200,100'])
-    table = write_csv(tmp_path / 'map.csv', 'Tag,Command,Address,Station,PLC_Type,Scale,Offset',
-                      ['speed,Read,N7:0,1,PLC5,0.5,1', 'order,Write,N7:2,1,PLC5'])
-    arguments = ros_args(f'net_file:={net}', f'map_file:={table}', 'snapshot_period:=0.2')
-    with Observer() as observer, Plcs(data) as plcs:
-        node = BridgeNode(context=observer.context, use_global_arguments=False,
-                          cli_args=[*arguments, '-p', f'port:={plcs.port}'])
-        observer.run(node)
-        yield observer.listen(DiagnosticArray, '/abdf1/snapshot', EVERYTHING)
-        observer.end(node)
+    rows = 'Tag,Command,Address,Station,PLC_Type,Scale,Offset\n' \
+        'speed,Read,N7:0,1,PLC5,0.5,1\norder,Write,N7:2,1,PLC5,,\n'
+    with Cell(tmp_path, 'Station,PLC_Type,Address,Length,Values\n1,PLC5,N7:0,4,7 8\n', rows,
+              'Baud,Timeout\n115200,100\n', 'snapshot_period:=0.2') as cell:
+        yield cell.ros.listen(DiagnosticArray, '/abdf1/snapshot', EVERYTHING)
 
 
 def test_snapshot_comes_to_who_subscribes(inbox: Inbox) -> None:
