@@ -16,10 +16,12 @@
 
 from collections import Counter
 from collections.abc import Callable, Iterator
+from contextlib import ExitStack
 import math
 import os
 from pathlib import Path
 import re
+import signal
 import threading
 import time
 from typing import Any
@@ -31,9 +33,8 @@ from abdf1_ros.pccc.families import parse_address
 from abdf1_ros.pccc.file_types import PlcType
 from abdf1_ros.ports.link_thread import PortState
 from abdf1_ros.ros.bridge import node as node_module
-from abdf1_ros.ros.bridge.node import BridgeNode, end_together
+from abdf1_ros.ros.bridge.node import end_together
 from abdf1_ros.ros.node import main
-from abdf1_ros.testing import Plcs
 from diagnostic_msgs.msg import DiagnosticStatus
 import pytest
 from rclpy.duration import Duration
@@ -48,6 +49,7 @@ from std_msgs.msg import (  # noqa: I101
     UInt8MultiArray,
 )
 from std_srvs.srv import SetBool, Trigger
+from support.cell import Cell
 from support.ros import (
     details,
     ERROR,
@@ -64,11 +66,16 @@ from support.ros import (
 )
 
 # On a busy host this process may stand still for longer than PLCs are usually given time.
-NET = ('NAK_Retries,ENQ_Retries,Cmd_Timeout,Baud,Timeout', ['1,1,5000,115200,3000'])
+NET = 'NAK_Retries,ENQ_Retries,Cmd_Timeout,Baud,Timeout\n1,1,5000,115200,3000\n'
 MAP_HEADER = 'Tag,Command,Address,Station,PLC_Type,Length,Topic'
-SIMULATOR = ('Station,PLC_Type,Address,Length,Values,Motion,Period', [
-    '1,PLC5,N7:0,16,,,', '1,PLC5,B3:0,4,,,', '1,PLC5,F8:0,4,,,', '2,SLC,B3:0,4,,,',
-    '2,SLC,N7:0,16,,,'])
+SIMULATOR = """\
+Station,PLC_Type,Address,Length,Values,Motion,Period
+1,PLC5,N7:0,16,,,
+1,PLC5,B3:0,4,,,
+1,PLC5,F8:0,4,,,
+2,SLC,B3:0,4,,,
+2,SLC,N7:0,16,,,
+"""
 
 SPEED = 'speed,Read,N7:0,1,PLC5,2,'
 LAMPS = ('lamp_a,Write,B3:0/1,1,PLC5,2,lamps', 'lamp_b,Write,B3:2/8,2,SLC,2,lamps')
@@ -76,33 +83,33 @@ PULSES = 'pulses,Write,B3:1/0,1,PLC5,8,'
 RECIPE = 'recipe,Write,N7:4,1,PLC5,2,'
 
 
-class Bench:
-    """A bridge, the PLCs it talks to, and who looks at both; all in one executor."""
+class Bench(Cell):
+    """A bridge that has a port, with a map that may have faults."""
 
-    def __init__(self, folder: Path, observer: Observer, plcs: Plcs, rows: tuple[str, ...],
-                 *assignments: str) -> None:
-        self.observer = observer
-        self.plcs = plcs
-        self.results = observer.results()
-        self.diagnostics = observer.diagnostics(plcs.port)
-        net = write_csv(folder / 'net.csv', *NET)
-        map_file = write_csv(folder / 'map.csv', MAP_HEADER, rows)
-        arguments = ros_args(
-            f'net_file:={net}', f'map_file:={map_file}', f'port:={plcs.port}',
-            'write_timeout:=30.0', *assignments)
-        self.node = BridgeNode(context=observer.context, use_global_arguments=False,
-                               cli_args=arguments)
-        observer.run(self.node)
-        observer.until(lambda: self.node.session.driver.is_online, 'the port')
+    def __init__(self, folder: Path, rows: tuple[str, ...], *assignments: str) -> None:
+        super().__init__(folder, SIMULATOR, f'{MAP_HEADER}\n{SPEED}\n', NET,
+                         'write_timeout:=30.0', *assignments)
+        write_csv(self.map, MAP_HEADER, rows)
+
+    def start(self) -> None:
+        """Start the bridge; wait for its port."""
+        super().start()
+        self.ros.until(lambda: self.node.session.driver.is_online, 'the port')
+
+    def end(self, number: signal.Signals = signal.SIGTERM) -> int:
+        """End the bridge, unless it has ended."""
+        status = super().end(number)
+        assert not self.node.link.is_alive()
+        return status
 
     def publisher(self, kind: Any, topic: str) -> Callable[..., None]:
         """Return what publishes values, once they cannot get lost any more."""
-        publisher = self.observer.publisher(kind, f'/abdf1/write/{topic}')
+        publisher = self.ros.publisher(kind, f'/abdf1/write/{topic}')
         return lambda *values: publisher.publish(kind(data=values))
 
     def until_results(self, count: int) -> Inbox:
         """Wait for so many results; there must not be more."""
-        self.observer.until(
+        self.ros.until(
             lambda: len(self.results) >= count,
             lambda: f'{count} results; got {len(self.results)}: {messages(self.results)}')
         assert len(self.results) == count
@@ -113,10 +120,6 @@ class Bench:
         table = self.plcs[station].table
         data = table.read(parse_address(address, table.plc_type), count)
         return [int.from_bytes(data[at:at + 2], 'little') for at in range(0, 2 * count, 2)]
-
-    def stop(self) -> None:
-        """End the bridge, unless it has ended."""
-        self.observer.end(self.node)
 
 
 def messages(results: list[DiagnosticStatus]) -> Counter[str]:
@@ -134,29 +137,9 @@ def times_open(path: str) -> int:
 
 
 @pytest.fixture
-def observer() -> Iterator[Observer]:
-    with Observer() as observer:
-        yield observer
-
-
-@pytest.fixture
-def plcs(tmp_path: Path) -> Iterator[Plcs]:
-    with Plcs(write_csv(tmp_path / 'simulator.csv', *SIMULATOR)) as plcs:
-        yield plcs
-
-
-@pytest.fixture
-def make_bench(tmp_path: Path, observer: Observer, plcs: Plcs) -> Iterator[Callable[..., Bench]]:
-    benches = []
-
-    def make(*rows: str, parameters: tuple[str, ...] = ()) -> Bench:
-        benches.append(Bench(tmp_path, observer, plcs, rows, *parameters))
-        return benches[-1]
-
-    yield make
-    for bench in benches:
-        bench.stop()
-    assert not any(bench.node.link.is_alive() for bench in benches)
+def make_bench(tmp_path: Path) -> Iterator[Callable[..., Bench]]:
+    with ExitStack() as stack:
+        yield lambda *rows, parameters=(): stack.enter_context(Bench(tmp_path, rows, *parameters))
 
 
 Benches = Callable[..., Bench]
@@ -182,7 +165,7 @@ def test_each_mapping_of_a_topic_has_a_result_of_its_own(make_bench: Benches) ->
 
 def test_every_pulse_of_a_burst_is_sent_in_order(make_bench: Benches) -> None:
     bench = make_bench(PULSES, SPEED)
-    speed = bench.observer.listen(Int16MultiArray, '/abdf1/read/speed')
+    speed = bench.ros.listen(Int16MultiArray, '/abdf1/read/speed')
     publish = bench.publisher(UInt8MultiArray, 'pulses')
     speed.first()
     patterns = [tuple(number >> bit & 1 for bit in range(8)) for number in range(200)]
@@ -242,7 +225,7 @@ def test_station_with_another_error_code_is_told_once(
     until_status(bench.diagnostics, 'station 1', WARN)
     stations = bench.node.session.driver.stations
     # It goes on to come and go.
-    bench.observer.until(lambda: stations[1].returns >= 5, 'more returns')
+    bench.ros.until(lambda: stations[1].returns >= 5, 'more returns')
     lines = [line.partition('[abdf1]: ')[2] for line in ''.join(capfd.readouterr()).splitlines()]
     told = Counter(re.split(r'[:,]', line)[0] for line in lines
                    if line.startswith(('25', 'station')))
@@ -276,7 +259,7 @@ def test_bad_row_is_told_and_left_out_and_the_rest_runs(
         make_bench: Benches, capfd: pytest.CaptureFixture[str]) -> None:
     bench = make_bench('bad_station,Read,N7:0,255,SLC,1,', 'bad_type,Read,N7:0,2,PLC9,1,',
                        'missing,Read,N99:0,1,PLC5,1,', SPEED)
-    speed = bench.observer.listen(Int16MultiArray, '/abdf1/read/speed')
+    speed = bench.ros.listen(Int16MultiArray, '/abdf1/read/speed')
     assert values_in(speed.first()) == [0, 0]
     # What only the PLC can know shows in the diagnostics, mapping by mapping, and in the log.
     status = until_status(bench.diagnostics, 'mappings', ERROR, lambda status: (
@@ -291,7 +274,7 @@ def test_bad_row_is_told_and_left_out_and_the_rest_runs(
                       if '[ERROR]' in line)
         return len(errors) >= 3
 
-    bench.observer.until(are_all_told, lambda: f'three errors; got {errors}')
+    bench.ros.until(are_all_told, lambda: f'three errors; got {errors}')
     *lines, told = errors
     assert told.endswith(f'missing (N99:0 at station 1): {reason}')
     assert ':2:4 (Station): 2501 ERR_BAD_STATION: Item: 1, ' in lines[0]
@@ -320,13 +303,12 @@ def test_tag_cannot_forge_lines_or_statuses(
 # Reads
 
 
-def test_every_value_of_a_long_block_is_published(
-        make_bench: Benches, observer: Observer, plcs: Plcs) -> None:
+def test_every_value_of_a_long_block_is_published(make_bench: Benches) -> None:
     words = [f'w{number},Read,N7:{number},1,PLC5,1' for number in range(9)]
     bench = make_bench(*words)
-    inboxes = [observer.listen(Int16MultiArray, f'/abdf1/read/w{number}') for number in range(9)]
+    inboxes = [bench.ros.listen(Int16MultiArray, f'/abdf1/read/w{number}') for number in range(9)]
     assert len(bench.node.session.driver.readings.blocks) == 1
-    plcs[1].table.write(parse_address('N7:0', PlcType.PLC5), bytes(range(18)))
+    bench.plcs[1].table.write(parse_address('N7:0', PlcType.PLC5), bytes(range(18)))
     for number, inbox in enumerate(inboxes):
         inbox.values([0x202 * number + 0x100])
     bench.node.link.stop()
@@ -336,29 +318,28 @@ def test_every_value_of_a_long_block_is_published(
 # Ends
 
 
-def test_stop_ends_all_threads_and_gives_the_port_back(
-        make_bench: Benches, observer: Observer, plcs: Plcs) -> None:
+def test_stop_ends_all_threads_and_gives_the_port_back(make_bench: Benches) -> None:
     bench = make_bench(SPEED)
     link = bench.node.link
-    speed = observer.listen(Int16MultiArray, '/abdf1/read/speed')
+    speed = bench.ros.listen(Int16MultiArray, '/abdf1/read/speed')
     speed.first()
-    assert (len(link_threads()), times_open(plcs.port)) == (2, 2)
-    bench.stop()
+    assert (len(link_threads()), times_open(bench.plcs.port)) == (2, 2)
+    bench.end()
     assert not link.is_alive()
-    assert (len(link_threads()), times_open(plcs.port)) == (1, 1)  # those of the PLCs
+    assert (len(link_threads()), times_open(bench.plcs.port)) == (1, 1)  # those of the PLCs
     assert link.state == PortState(False, 'closed')
     until_status(bench.diagnostics, 'link', ERROR,
                  lambda status: status.message == 'ERROR: closed')
-    make_bench(SPEED)  # the port is free for another one
+    bench.start()  # the port is free for another one
     speed.next()
 
 
-def test_end_is_not_taken_back_by_a_request(make_bench: Benches, observer: Observer) -> None:
+def test_end_is_not_taken_back_by_a_request(make_bench: Benches) -> None:
     bench = make_bench(SPEED)
     bench.node.begin_end()
-    polling = observer.call(SetBool, '/abdf1/polling', SetBool.Request(data=True))
+    polling = bench.call(SetBool, 'polling', SetBool.Request(data=True))
     assert (polling.success, polling.message) == (False, 'this node ends')
-    reload = observer.call(Trigger, '/abdf1/reload', Trigger.Request())
+    reload = bench.call(Trigger, 'reload', Trigger.Request())
     assert (reload.success, reload.message) == (False, 'this node ends')
     assert bench.node.session.driver.interlocks.is_ending
 
@@ -367,7 +348,7 @@ def test_internal_errors_are_told_and_the_third_is_the_end(
         make_bench: Benches, capfd: pytest.CaptureFixture[str]) -> None:
     bench = make_bench(SPEED)
     bench.node.session.reads.latest = None  # a bug
-    bench.observer.until(lambda: bench.node.link.has_failed, 'the third fault')
+    bench.ros.until(lambda: bench.node.link.has_failed, 'the third fault')
     bench.node.link.join()
     until_status(bench.diagnostics, 'link', ERROR, lambda status: status.message.startswith(
         'ERROR: internal error: TypeError('))
@@ -389,24 +370,23 @@ def test_argument_outside_of_ros_arguments(
 
 
 def test_third_internal_error_ends_the_node_with_status_1(
-        tmp_path: Path, plcs: Plcs, refusal: Callable[..., list[str]],
+        tmp_path: Path, refusal: Callable[..., list[str]],
         monkeypatch: pytest.MonkeyPatch) -> None:
     def fail(driver: Driver, now: float) -> None:
         raise KeyError('a bug')
 
     monkeypatch.setattr(Driver, 'next_task', fail)
-    net = write_csv(tmp_path / 'net.csv', *NET)
-    map_file = write_csv(tmp_path / 'map.csv', MAP_HEADER, [SPEED])
-    told = refusal(*ros_args(f'net_file:={net}', f'map_file:={map_file}', f'port:={plcs.port}'),
-                   status=1)  # systemd starts it again
+    bench = Bench(tmp_path, (SPEED,))
+    with bench.ros, bench.plcs:
+        told = refusal(*ros_args(*bench._assignments), status=1)  # systemd starts it again
     assert sum("internal error: KeyError('a bug'); please report it" in line for line in told) == 3
 
 
 def test_duplicate_name_is_told_and_forgotten(
-        make_bench: Benches, observer: Observer, capfd: pytest.CaptureFixture[str]) -> None:
+        make_bench: Benches, capfd: pytest.CaptureFixture[str]) -> None:
     bench = make_bench(SPEED)
     until_status(bench.diagnostics, 'link', OK)
-    other = Node('abdf1', context=observer.context, use_global_arguments=False)
+    other = Node('abdf1', context=bench.ros.context, use_global_arguments=False)
     status = until_status(bench.diagnostics, 'link', WARN)
     assert '; another node is called /abdf1 too' in status.message
     other.destroy_node()
@@ -418,29 +398,30 @@ def test_duplicate_name_is_told_and_forgotten(
 
 
 def test_other_node_of_our_name_is_told_before_the_first_write_is_taken(
-        make_bench: Benches, observer: Observer, monkeypatch: pytest.MonkeyPatch,
+        tmp_path: Path, monkeypatch: pytest.MonkeyPatch,
         capfd: pytest.CaptureFixture[str]) -> None:
     monkeypatch.setattr(node_module, 'DISCOVERY', 2.0)
-    other = Node('abdf1', context=observer.context, use_global_arguments=False,
+    bench = Bench(tmp_path, (RECIPE,))
+    other = Node('abdf1', context=bench.ros.context, use_global_arguments=False,
                  start_parameter_services=False)
-    bench = make_bench(RECIPE, parameters=('write_timeout:=30.0',))
-    bench.publisher(Int16MultiArray, 'recipe')(1, 2)
-    observer.until(lambda: bench.node.writes.taken, 'the write')
-    assert '[abdf1]: another node is called /abdf1 too' in ''.join(capfd.readouterr())
-    assert bench.until_results(1)[0].message == 'written'
-    other.destroy_node()
+    with bench:
+        bench.publisher(Int16MultiArray, 'recipe')(1, 2)
+        bench.ros.until(lambda: bench.node.writes.taken, 'the write')
+        assert '[abdf1]: another node is called /abdf1 too' in ''.join(capfd.readouterr())
+        assert bench.until_results(1)[0].message == 'written'
+        other.destroy_node()
 
 
 def test_messages_wait_for_the_first_look_and_have_a_result_at_an_end_before_it(
-        make_bench: Benches, observer: Observer, monkeypatch: pytest.MonkeyPatch) -> None:
+        make_bench: Benches, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(node_module, 'DISCOVERY', math.inf)
-    bench = make_bench(RECIPE, parameters=('write_timeout:=30.0',))
+    bench = make_bench(RECIPE)
     bench.publisher(Int16MultiArray, 'recipe')(1, 2)
     refuse = bench.node.session.begin_end
 
     def refuse_after_a_while() -> None:
         for _ in range(3):
-            assert get_parameters(observer, 'port') == [bench.plcs.port]
+            assert get_parameters(bench.ros, 'port') == [bench.plcs.port]
         assert not bench.node.writes.taken
         refuse()
 
@@ -450,8 +431,8 @@ def test_messages_wait_for_the_first_look_and_have_a_result_at_an_end_before_it(
 
 
 def test_end_of_another_type_on_a_topic_is_told(
-        make_bench: Benches, observer: Observer, capfd: pytest.CaptureFixture[str]) -> None:
-    make_bench(SPEED)
+        make_bench: Benches, capfd: pytest.CaptureFixture[str]) -> None:
+    bench = make_bench(SPEED)
     said = ['']
 
     def is_told() -> bool:
@@ -460,7 +441,7 @@ def test_end_of_another_type_on_a_topic_is_told(
 
     with Observer() as other:  # a participant of its own, as one has no topic with two types
         other.node.create_subscription(Bool, '/abdf1/read/speed', print, 10)
-        observer.until(is_told, 'a line of the log')
+        bench.ros.until(is_told, 'a line of the log')
     (line,) = [line for line in said[0].splitlines() if 'std_msgs/msg/Bool' in line]
     assert line.startswith('[WARN] ')
     assert '/abdf1/read/speed is std_msgs/msg/Int16MultiArray; a node uses it as' in line
@@ -468,7 +449,7 @@ def test_end_of_another_type_on_a_topic_is_told(
 
 def test_two_writers_of_a_topic_can_tell_their_results_apart(make_bench: Benches) -> None:
     bench = make_bench(RECIPE)
-    publisher = bench.observer.publisher(Int16MultiArray, '/abdf1/write/recipe')
+    publisher = bench.ros.publisher(Int16MultiArray, '/abdf1/write/recipe')
     for label, values in (('robot_1 7', [1, 2]), ('robot_2\x07', [1])):
         layout = MultiArrayLayout(dim=[MultiArrayDimension(label=label)])
         publisher.publish(Int16MultiArray(layout=layout, data=values))
