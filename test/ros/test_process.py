@@ -31,12 +31,10 @@ from std_msgs.msg import (  # noqa: I101
 from support.ros import (
     details,
     ERROR,
-    find_status,
     get_parameters,
     Observer,
     OK,
     Process,
-    ros_args,
     until_status,
     values_in,
     write_csv,
@@ -62,30 +60,7 @@ def observer() -> Iterator[Observer]:
         yield observer
 
 
-def test_overrides_win_over_the_net_file(observer: Observer, files: Files) -> None:
-    diagnostics = observer.diagnostics('/dev/ttyS98')
-    arguments = ros_args(
-        f'net_file:={files.net}', f'map_file:={files.map}', 'net.baud:=19200',
-        'net.handshake:=Yes', 'net.com_port:=99', 'stale_after:=5', 'diagnostics_period:=2',
-        'map.recipe.max:=5')
-    with Process('node', *arguments, '-r', '__node:=overrides') as node:
-        node.wait_for('[ERROR] ', '/dev/ttyS98: cannot open the port: No such file or directory')
-        baud, period, stale_after, limit = get_parameters(
-            observer, 'net.baud', 'diagnostics_period', 'stale_after', 'map.recipe.max',
-            node='/overrides')
-        assert (baud, period, stale_after) == (19200, 2, 5)
-        assert limit == '999'  # the map is in its file alone
-        node.wait_for('[WARN] ', 'without effect', ': map.recipe.max')
-        link = find_status(diagnostics.first(), 'link')
-        assert details(link)['settings'].startswith('19200 baud, ')
-        node.end()
-    observer.forget(diagnostics)
-
-
 # Ends
-
-
-INTERRUPTS = [(signal.SIGINT,), (signal.SIGTERM,), (signal.SIGINT, signal.SIGINT)]
 
 
 def test_every_write_that_has_come_has_its_result_at_the_end(
@@ -140,14 +115,6 @@ def test_ends_with_its_terminal(files: Files) -> None:
     with Process('node', *files.args(), is_forked=False) as node:
         node.wait_for('cannot open the port')
         node.end(signal.SIGHUP)
-
-
-def test_ends_well_while_the_port_is_missing(files: Files) -> None:
-    with Process('node', *files.args()) as one, Process('node', *files.args()) as two, \
-            Process('node', *files.args()) as three:
-        for node, signals in zip((one, two, three), INTERRUPTS, strict=True):
-            node.wait_for('cannot open the port')
-            node.end(*signals)
 
 
 def test_silent_station_is_told_at_once_and_does_not_delay_the_end(
@@ -229,7 +196,9 @@ def test_names_can_be_remapped(observer: Observer, files: Files) -> None:
     active = observer.listen(UInt16MultiArray, '/cell/line_a/active_stations')
     remaps = ('-r', '__ns:=/cell', '-r', '__node:=line_a', '-r', '~/read/door:=/cell/door_closed')
     with files.start_simulator() as simulator, \
-            Process('node', *files.args('use_sim_time:=true'), *remaps) as node:
+            Process('node', *files.args('use_sim_time:=true', 'map.recipe.max:=5'),
+                    *remaps) as node:
+        node.wait_for('[WARN] ', 'without effect', ': map.recipe.max')
         assert values_in(door.first()) == [1]
         assert values_in(bits.first()) == [1, 0, 0, 1, 1, 0]
         assert active.first().data[0] == 0b110
