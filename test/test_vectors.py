@@ -85,6 +85,18 @@ def test_wrong_exchange_is_found(copy: Path, field: str, value: str) -> None:
     assert any(text.startswith('exchanges.json: plc2_read: ') for text in faults(copy))
 
 
+@pytest.mark.parametrize(('number', 'change_of_line', 'fault'), [
+    (1, {'says': 'reply'}, 'at 0 is command, not reply'), (2, {'at': 2000}, '0 comes too late'),
+    (1, {'we': '10 05 11 EE'}, 'at 0 is damaged poll, not command'),
+    (0, {'asks': '11 05 0F 00 03 01 A2'}, 'at 0 is no reply to a command'),
+    (0, {'shouts': '10 06'}, 'shouts is not known')])
+def test_wrong_conversation_is_found(copy: Path, number: int, change_of_line: dict[str, Any],
+                                     fault: str) -> None:
+    change(copy / 'conversations.json', lambda content: content['conversations'][0]['lines'][
+        number].update(change_of_line))
+    assert any('master_transaction' in text and fault in text for text in faults(copy))
+
+
 def test_file_that_is_missing_or_more_is_found(copy: Path) -> None:
     (copy / 'captures/pydf1_client_crc_slc.cap').unlink()
     (copy / 'captures/new.cap').write_text('')

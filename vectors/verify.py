@@ -27,7 +27,8 @@ from pathlib import Path
 import re
 import sys
 
-TYPES = {'object': dict, 'array': list, 'string': str, 'integer': int}
+TYPES = {'object': dict, 'array': list, 'string': str, 'integer': int, 'number': int | float}
+SYMBOLS = {'DLE ACK': 0x06, 'DLE NAK': 0x15, 'DLE ENQ': 0x05, 'DLE EOT': 0x04}
 
 
 def check_schema(value, rule, rules, where):
@@ -115,8 +116,7 @@ def check_frame(entry):
     """Yield what is wrong with a frame."""
     frame, decoded = bytes.fromhex(entry['bytes']), entry['decoded']
     if entry['kind'] == 'symbol':
-        names = {'DLE ACK': 0x06, 'DLE NAK': 0x15, 'DLE ENQ': 0x05, 'DLE EOT': 0x04}
-        if frame != bytes((0x10, names[decoded['symbol']])):
+        if frame != bytes((0x10, SYMBOLS[decoded['symbol']])):
             yield 'is not that symbol'
         return
     station, data, check = parse(frame)
@@ -164,6 +164,44 @@ def check_processor(entry):
             yield f'{exchange["command"]} is no command'
 
 
+def meaning(frame, kind):
+    """Return what a whole frame says."""
+    if len(frame) == 2:
+        return next((name for name, code in SYMBOLS.items() if frame[1] == code), 'noise')
+    station, data, check = parse(frame)
+    if frame[1] == 0x05:
+        return 'poll' if check == bcc(bytes((station,))) else 'damaged poll'
+    if check != right_check(kind, station, data):
+        return 'damaged'
+    if not 6 <= len(data) <= 261:
+        return 'too short' if len(data) < 6 else 'too long'
+    return 'reply' if data[2] & 0x40 else 'command'
+
+
+def check_conversation(entry):
+    """Yield what is wrong with a conversation; frames in several lines are left out."""
+    last, asked, begun = 0, [], {}
+    for line in entry['lines']:
+        if line['at'] < last or line.get('by', line['at']) < line['at']:
+            yield f'{line["at"]} comes too late'
+        last = line['at']
+        says, side = line.get('says', '').removesuffix(' again'), 'we' if 'we' in line else 'they'
+        is_whole = not begun.get(side) and ' + ' not in says
+        if says:
+            begun[side] = 'part of a message' in says
+        if says and is_whole and says not in ('noise', 'part of a message'):
+            found = meaning(bytes.fromhex(line[side]), entry['check'])
+            if found != says:
+                yield f'at {last} is {found}, not {says}'
+        if 'asks' in line:
+            asked.append(bytes.fromhex(line['asks']))
+        reply = bytes.fromhex(line.get('gets', ''))
+        if reply and not any(
+                reply[:3] == bytes((command[1], command[0], command[2] | 0x40))
+                and reply[4:6] == command[4:6] for command in asked):
+            yield f'at {last} is no reply to a command'
+
+
 def hashes(folder):
     """Return the SHA-256 of every file of the data set by its name."""
     files = [*folder.glob('*.json'), *folder.glob('*.md'), *folder.glob('captures/*.*')]
@@ -177,7 +215,8 @@ def faults(folder):
         return json.loads((folder / name).read_text(encoding='utf-8'))
 
     rules, manifest, wrong = load('schema.json')['$defs'], load('manifest.json'), False
-    for name in ('frames.json', 'exchanges.json', 'processors.json', 'captures/index.json'):
+    for name in ('frames.json', 'exchanges.json', 'conversations.json', 'processors.json',
+                 'captures/index.json'):
         for text in check_schema(load(name), rules[name], rules, name):
             wrong = True
             yield text
@@ -190,7 +229,7 @@ def faults(folder):
     if wrong:
         return
     for name, check in (('frames', check_frame), ('exchanges', check_exchange),
-                        ('processors', check_processor)):
+                        ('conversations', check_conversation), ('processors', check_processor)):
         content = load(f'{name}.json')
         entries = content[name]
         if content['version'] != manifest['version']:

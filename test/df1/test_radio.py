@@ -112,32 +112,6 @@ class Bench(Node):
         return said
 
 
-def test_command_is_answered_by_its_reply_without_any_symbol() -> None:
-    bench = Bench()
-    task = bench.begin(COMMAND)
-    assert bench.wait(0.3) == [framed(COMMAND)]
-    bench.hear(framed(COMMAND.reply(b'\x07')))
-    assert task.result == COMMAND.reply(b'\x07')
-    assert bench.wait(60.0) == []
-    assert (bench.numbers(), bench.stations[PLC].replies) == ([2523], 1)
-
-
-@pytest.mark.parametrize('retries', [0, 1, 3])
-def test_command_without_reply_is_repeated_as_it_is_until_the_limit(retries: int) -> None:
-    bench = Bench(nak_retries=retries)
-    task = bench.begin(COMMAND)
-    assert bench.wait(30.0) == [framed(COMMAND)] * (retries + 1)
-    assert isinstance(task.result, StationInactive)
-    assert not bench.stations[PLC].active
-    assert bench.numbers() == [*[2521] * retries, 2508, 2519, 2509]
-    again = bench.begin(COMMAND._replace(tns=7))
-    assert len(bench.wait(30.0)) == 1  # one try for a silent station
-    assert isinstance(again.result, StationInactive)
-    counters = bench.machine.counters
-    # S0, counters 2541 and 2542: "message retries ... due to ... other communications error".
-    assert (counters.nak_retries, counters.nak_limit_exceeded) == (retries, 1)
-
-
 def test_command_of_a_guest_without_reply_says_nothing_about_the_station() -> None:
     bench = Bench(nak_retries=1)
     task = bench.begin(COMMAND)
@@ -146,28 +120,6 @@ def test_command_of_a_guest_without_reply_says_nothing_about_the_station() -> No
     assert isinstance(task.result, StationInactive)
     assert (bench.stations[PLC].active, bench.stations[PLC].unanswered) == (True, 0)
     assert bench.numbers() == [2521, 2508, 2519]
-
-
-def test_commands_to_other_stations_go_out_meanwhile_where_radios_avoid_collisions() -> None:
-    bench = Bench(avoids_collisions=True)
-    first, again = (bench.add(COMMAND._replace(tns=tns)) for tns in (1, 2))
-    others = [bench.add(COMMAND._replace(dst=dst, tns=1)) for dst in range(2, 7)]
-    bench.machine.wake(bench.now)
-    assert bench.wait(0.5) == [framed(task.command) for task in (first, *others[:3])]
-    bench.hear(framed(first.command.reply()._replace(src=6)))  # not of that station
-    bench.hear(framed(others[0].command.reply(b'\x08')))
-    assert (first.result, others[0].result) == (None, others[0].command.reply(b'\x08'))
-    assert bench.wait(0.3) == [framed(others[3].command)]
-    bench.hear(framed(first.command.reply()))
-    assert bench.wait(0.1) == [framed(again.command)]
-    assert bench.wait(0.5) == [framed(task.command) for task in others[1:3]]  # once more
-
-
-def test_radios_that_avoid_collisions_take_a_command_while_others_send() -> None:
-    bench = Bench(avoids_collisions=True)
-    bench.hear(framed(THEIRS)[:5])
-    bench.begin(COMMAND)
-    assert bench.wait(0.001) == [framed(COMMAND)]
 
 
 def test_command_is_not_repeated_that_has_its_reply_before_the_line_is_quiet() -> None:
@@ -184,59 +136,6 @@ def test_command_is_not_repeated_that_has_its_reply_before_the_line_is_quiet() -
     assert bench.machine.counters.nak_retries == 0
 
 
-def test_node_with_our_number_is_told() -> None:
-    bench = Bench()
-    sent = bench.begin(COMMAND)
-    bench.wait(10.5)
-    bench.hear(framed(sent.command))  # sent on by another node
-    assert (bench.link.status().same_number, 2510 in bench.numbers()) == (None, False)
-    bench.hear(framed(COMMAND._replace(dst=OTHER, tns=9)))
-    assert bench.link.status().same_number == bench.now
-    assert (bench.numbers()[-1], bench.machine.counters.invalid_messages) == (2510, 1)
-
-
-def test_packet_of_ours_from_before_the_start_is_nobody_elses() -> None:
-    bench = Bench()
-    bench.wait(9.0)
-    bench.hear(framed(COMMAND))
-    assert (bench.link.status().same_number, bench.numbers()) == (None, [])
-
-
-@pytest.mark.parametrize(('other', 'is_taken'), [
-    (COMMAND._replace(data=b'\x67\x01'), False), (COMMAND._replace(tns=1), True),
-    (COMMAND._replace(dst=OTHER), True)])
-def test_reply_that_may_be_for_another_node_with_our_number_is_not_taken(
-        other: Packet, is_taken: bool) -> None:
-    bench = Bench()
-    bench.wait(11.0)
-    task = bench.begin(COMMAND)
-    bench.wait(0.5)
-    bench.hear(framed(other), framed(COMMAND.reply()))
-    bench.wait(30.0)
-    assert isinstance(task.result, Packet) == is_taken
-
-
-def test_reply_that_comes_before_the_command_has_left_is_not_its_reply() -> None:
-    bench = Bench()
-    task = bench.begin(COMMAND)
-    bench.hear(framed(COMMAND.reply()))  # while we wait for a quiet line
-    assert task.result is None
-    assert bench.wait(0.5) == [framed(COMMAND)]
-    bench.hear(framed(COMMAND.reply(b'\x01')))
-    assert task.result == COMMAND.reply(b'\x01')
-
-
-def test_reply_to_an_earlier_try_ends_the_command() -> None:
-    bench = Bench()
-    task = bench.begin(COMMAND)
-    assert len(bench.wait(1.0 + 0.5)) == 2
-    bench.hear(framed(COMMAND.reply()), framed(COMMAND.reply()))
-    assert task.result == COMMAND.reply()
-    assert bench.wait(60.0) == []
-    assert bench.machine.counters.duplicate_messages == 1
-    assert bench.numbers() == [2521, 2523]
-
-
 def test_command_that_has_become_too_old_is_not_repeated() -> None:
     bench = Bench()
     task = bench.begin(COMMAND)
@@ -248,26 +147,6 @@ def test_command_that_has_become_too_old_is_not_repeated() -> None:
     bench.machine.wake(bench.now)
     assert bench.wait(30.0) == []
     assert isinstance(old.result, CommandExpired) and not old.result.sent
-
-
-def test_broadcast_goes_out_once_and_has_no_reply() -> None:
-    bench = Bench()
-    task = bench.begin(COMMAND._replace(dst=BROADCAST))
-    assert bench.wait(30.0) == [framed(COMMAND._replace(dst=BROADCAST))]
-    assert isinstance(task.result, Packet)
-
-
-def test_command_for_us_is_executed_once_and_its_repetition_answered_again() -> None:
-    bench = Bench()
-    reply = framed(THEIRS.reply(bytes((US,)) + THEIRS.data))
-    bench.hear(framed(THEIRS))
-    assert bench.wait(1.0) == [reply]
-    bench.hear(framed(THEIRS))
-    assert bench.wait(1.0) == [reply]
-    assert bench.executed == {(PLC, THEIRS.tns): 1}
-    bench.hear(framed(THEIRS), framed(THEIRS))  # the second is what a node has sent on
-    assert bench.wait(1.0) == [reply]
-    assert bench.executed == {(PLC, THEIRS.tns): 1}
 
 
 def test_repetition_is_known_whatever_many_others_have_sent_since() -> None:
@@ -315,24 +194,6 @@ def test_line_that_is_not_quiet_is_waited_for_but_not_for_ever() -> None:
             break
         bench.hear(b'\x55' * 20)
     assert 2.0 <= bench.now - 100.0 <= 2.2
-
-
-def test_packets_between_nodes_of_the_table_are_sent_on_once() -> None:
-    bench = Bench(store_forward={PLC, OTHER, US})
-    packet = THEIRS._replace(dst=OTHER)
-    bench.hear(framed(packet), framed(packet))
-    assert bench.wait(1.0) == [framed(packet)]
-    bench.hear(framed(packet))  # by another one that sends on
-    bench.hear(framed(packet._replace(dst=3)), framed(packet._replace(src=US)),
-               framed(packet._replace(dst=BROADCAST)))
-    assert bench.wait(1.0) == []
-
-
-def test_broadcast_is_sent_on_where_the_table_has_255() -> None:
-    bench = Bench(store_forward={PLC, BROADCAST})
-    bench.hear(framed(THEIRS._replace(dst=BROADCAST)))
-    assert bench.wait(1.0) == [framed(THEIRS._replace(dst=BROADCAST))]
-    assert bench.executed == {(PLC, THEIRS.tns): 1}
 
 
 @pytest.mark.parametrize('entry', [

@@ -1,0 +1,57 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Every rule of vectors/conversations.json, played with a link of its mode."""
+
+import pytest
+from support.conversations import Conversation, CONVERSATIONS, expected, played, Player
+
+
+@pytest.mark.parametrize('conversation', CONVERSATIONS, ids=lambda entry: entry.name)
+def test_node_does_exactly_what_the_conversation_says(conversation: Conversation) -> None:
+    player = Player(conversation)
+    player.play()
+    assert player.story() == expected(conversation)
+    assert player.numbers() == [tuple(message) for message in conversation.entry['messages']]
+    assert player.counts() == conversation.entry['counters']
+    counters = player.machine.counters
+    assert (counters.chars_sent, counters.chars_received) == (
+        conversation.size_of('we'), conversation.size_of('they'))
+
+
+def test_station_keeps_what_was_heard_of_it() -> None:
+    station = played('master_transaction').stations[17]
+    assert (station.replies, station.last_tns, station.last_heard) == (1, 0x0102, 100.0)
+    station = played('peer_transaction_2').stations[1]
+    assert (station.replies, station.last_tns, station.last_heard) == (1, 0x1034, 100.3)
+    station = played('slave_asks').stations[8]
+    assert (station.replies, station.last_heard) == (1, 101.0)
+
+
+def test_station_keeps_since_when_it_is_silent() -> None:
+    player = played('master_command_limit_2')
+    assert player.stations[17].silent_since == pytest.approx(102.0)
+
+
+def test_replies_that_are_late_in_a_row_are_counted_until_one_is_not() -> None:
+    assert played('master_timeout_1').stations[17].overdue == 1
+    assert played('master_timeouts').stations[17].overdue == 0
+
+
+def test_gateway_and_the_station_behind_it_are_two() -> None:
+    stations = played('master_gateway').stations
+    assert (stations[99].replies, stations[17].replies) == (1, 0)
+    stations = played('master_gateway_status').stations
+    assert stations[17].last_heard is not None
+    assert stations[99].last_heard is None

@@ -1,0 +1,237 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The conversations of vectors/conversations.json, and the node that plays one of them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from itertools import zip_longest
+from typing import Any
+
+from abdf1_ros.counters import Counters
+from abdf1_ros.df1.checksum import Checksum
+from abdf1_ros.df1.machine import LineTiming
+from abdf1_ros.df1.mode import LineMode
+from abdf1_ros.df1.modes import mode_of
+from abdf1_ros.df1.packet import BROADCAST, Packet
+from abdf1_ros.df1.settings import LinkSettings, PollingSettings
+from abdf1_ros.df1.stations import ActiveStationList, Station
+from abdf1_ros.errors import LinkError
+from support.multidrop import CommandTasks
+from support.peers import CommandTask
+from support.vectors import load_json
+
+Line = dict[str, Any]
+
+_MS = ('timeout', 'cmd_timeout', 'poll_pause', 'poll_timeout')
+_OF_THE_RUN = ('char_time', 'tx_delay', 'inactive', 'routes', 'running')
+_BEGIN = 100.0  # s on the clock
+_PRECISION = 1e-6  # s
+_MOST_STEPS = 10_000
+
+
+@dataclass(frozen=True, slots=True)
+class Conversation:
+    """One conversation, as vectors/README.md explains it; ``settings`` with those of its mode."""
+
+    entry: dict[str, Any]
+    mode: LineMode
+    settings: dict[str, Any]
+
+    @property
+    def name(self) -> str:
+        """Return its name."""
+        return str(self.entry['name'])
+
+    @property
+    def lines(self) -> list[Line]:
+        """Return what is said and done, in the order of the times."""
+        lines: list[Line] = self.entry['lines']
+        return lines
+
+    @property
+    def checksum(self) -> Checksum:
+        """Return the check of its messages."""
+        return Checksum(self.entry['check'])
+
+    def said(self) -> Iterator[tuple[Line, bytes]]:
+        """Yield the lines that are on the wire, each with its bytes."""
+        for line in self.lines:
+            for side in line.keys() & {'we', 'they'}:
+                yield line, bytes.fromhex(line[side])
+
+    def size_of(self, side: str) -> int:
+        """Return how many bytes are said by ``we`` or ``they``."""
+        return sum(len(data) for line, data in self.said() if side in line)
+
+    def link_settings(self) -> LinkSettings:
+        """Return the settings of the link."""
+        given = {name: value / 1000 if name in _MS else value
+                 for name, value in self.settings.items() if name not in _OF_THE_RUN}
+        polling = given.pop('polling', None)
+        if polling is not None:
+            polling = PollingSettings(**{name: tuple(value) if isinstance(value, list) else value
+                                         for name, value in polling.items()})
+        return LinkSettings(
+            **given, polling=polling, checksum=self.checksum,
+            timing=LineTiming(self.settings.get('char_time', 0.0) / 1000,
+                              self.settings.get('tx_delay', 0.0) / 1000))
+
+
+def make_conversation(entry: dict[str, Any], defaults: dict[str, Any]) -> Conversation:
+    """Return a conversation; ``defaults`` are the settings by mode."""
+    mode = entry['mode']
+    names = ('Master', 'Standard') if mode == 'Standard polling' else (mode, 'Message')
+    return Conversation(entry, mode_of(*names), defaults[mode] | entry.get('settings', {}))
+
+
+def _load() -> tuple[Conversation, ...]:
+    content = load_json('conversations.json')
+    return tuple(make_conversation(entry, content['settings'])
+                 for entry in content['conversations'])
+
+
+CONVERSATIONS = _load()
+
+
+class Player(CommandTasks):
+    """
+    A node of any mode that has its part in a conversation.
+
+    ``done`` becomes the lines of what is done to it, and of all that it does.
+    """
+
+    def __init__(self, conversation: Conversation) -> None:
+        self._now = _BEGIN - conversation.settings.get('running', 0) / 1000
+        super().__init__(lambda: self._now)
+        self.done: list[Line] = []
+        self._conversation = conversation
+        settings, options = conversation.link_settings(), conversation.settings
+        self.stations = ActiveStationList(
+            on_change=self._changed,
+            routes={int(number): by for number, by in options.get('routes', {}).items()})
+        for number in options.get('inactive', ()):
+            self.stations.lost(number, self._now)
+        self.done.clear()
+        self.machine = conversation.mode.make_machine(
+            settings, lambda: self._link.run(self), Counters())
+        self._link = conversation.mode.make_link(
+            self.machine, settings, self.stations, self._serve, self.events.append)
+
+    def play(self) -> None:
+        """Do what is done to the node, each at its time, and let it act until the end."""
+        self.machine.start(self._now, self)
+        self._take()
+        entry, lines = self._conversation.entry, self._conversation.lines
+        for line in lines:
+            if not line.keys().isdisjoint(('asks', 'they', 'port')):
+                self._pass_time(line['at'])
+                self.done.append(line)
+                self._do(line)
+                self._take()
+        self._pass_time(entry.get('until', lines[-1].get('by', lines[-1]['at'])))
+
+    def _do(self, line: Line) -> None:
+        if 'they' in line:
+            self.machine.receive_data(bytes.fromhex(line['they']), self._now)
+            self.machine.handle_timeout(self._now)
+        elif 'asks' in line:
+            command = Packet.decode(bytes.fromhex(line['asks']))
+            self.stations.add((command.dst,))
+            self._watch(self.add(command))
+            self.machine.wake(self._now)
+        else:
+            self.machine.start(self._now, self)
+
+    def _watch(self, task: CommandTask) -> None:
+        """Note the end of a command when it comes."""
+        reply, fail = task.reply, task.fail
+
+        def replied(packet: Packet) -> None:
+            if task.command.dst == BROADCAST:
+                self._note(ends=task.command.tns)
+            else:
+                self._note(gets=_hex(packet.encode()))
+            reply(packet)
+
+        def failed(error: LinkError) -> None:
+            self._note(fails=error.message.number, tns=task.command.tns, sent=task.sent)
+            fail(error)
+
+        task.reply, task.fail = replied, failed  # type: ignore[method-assign]
+
+    def _pass_time(self, at: float) -> None:
+        end = _BEGIN + at / 1000
+        for _ in range(_MOST_STEPS):
+            call = self.machine.next_call
+            if call is None or call > end + _PRECISION:
+                self._now = max(self._now, end)
+                return
+            self._now = max(self._now, call)
+            self.machine.handle_timeout(self._now)
+            self._take()
+        raise AssertionError('it runs in circles')
+
+    def _take(self) -> None:
+        if data := self.machine.data_to_send():
+            self.write(data)
+
+    def write(self, data: bytes) -> None:
+        """Take what leaves at once, as a port does."""
+        self._note(we=_hex(data))
+
+    def unsent(self) -> int:
+        """Return 0: what is written has left."""
+        return 0
+
+    def _serve(self, command: Packet) -> Packet:
+        self._note(executes=_hex(command.encode()))
+        return command.reply()
+
+    def _changed(self, station: Station) -> None:
+        self._note(station=station.number, active=station.active)
+
+    def _note(self, **what: Any) -> None:
+        self.done.append({'at': round((self._now - _BEGIN) * 1000, 3), **what})
+
+    def story(self) -> list[Line]:
+        """Return what was done and is to be compared, with the times of the conversation."""
+        return [self._compared(done, line) for done, line in zip_longest(
+            self.done, expected(self._conversation), fillvalue={}) if done]
+
+    @staticmethod
+    def _compared(done: Line, line: Line) -> Line:
+        at, by = done['at'], line.get('by', line.get('at'))
+        if line and line['at'] - _PRECISION <= at <= by + _PRECISION:
+            done = {**done, **{name: line[name] for name in ('at', 'by') if name in line}}
+        return {name: value for name, value in done.items() if name != 'says'}
+
+
+def played(name: str) -> Player:
+    """Play the conversation of that name; return the node that has played it."""
+    player = Player(next(entry for entry in CONVERSATIONS if entry.name == name))
+    player.play()
+    return player
+
+
+def expected(conversation: Conversation) -> list[Line]:
+    """Return the lines of a conversation, without what explains them."""
+    return [{name: value for name, value in line.items() if name != 'says'}
+            for line in conversation.lines]
+
+
+def _hex(data: bytes) -> str:
+    return data.hex(' ').upper()
