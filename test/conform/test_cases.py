@@ -15,6 +15,7 @@
 """Every case passes against our own link, and fails against one that breaks its rule."""
 
 from collections.abc import Callable
+from functools import cache
 
 from abdf1_ros.conform import codec
 from abdf1_ros.conform.case import Permission, run_cases, Target, Verdict
@@ -34,12 +35,15 @@ from abdf1_ros.driver.driver import Driver
 from abdf1_ros.driver.settings import DriverSettings
 from abdf1_ros.settings.network import Network
 import pytest
+from support.cases import for_all
 from support.conformance import failures, results_of
+from support.conversations import Conversation, CONVERSATIONS
 from support.driver_bench import Recorder, simulated_plc
 from support.mappings import make_mapping
 from support.scripted_line import ScriptedLine
 
 CHECKS = ['BCC', 'CRC']
+ASKING = {Target.MASTER: 'Master', Target.CLIENT: 'Peer', Target.RADIO_CLIENT: 'Radio'}
 
 
 class SpoiledLine(ScriptedLine):
@@ -93,12 +97,25 @@ def test_simulated_plc_conforms(target: Target, family: str, check: str) -> None
 
 
 @pytest.mark.parametrize('check', CHECKS)
-@pytest.mark.parametrize(('target', 'mode'), [(Target.MASTER, 'Master'), (Target.CLIENT, 'Peer'),
-                                              (Target.RADIO_CLIENT, 'Radio')])
+@pytest.mark.parametrize(('target', 'mode'), ASKING.items())
 def test_our_driver_passes_every_case(target: Target, mode: str, check: str) -> None:
     results = results_of(asking(check, mode), target, check)
     assert failures(results) == []
     assert {result.verdict for result in results} == {Verdict.PASS}
+
+
+@cache
+def passed(target: Target) -> dict[str, str]:
+    """Return the cases that our link passes, with their sources."""
+    line = asking('CRC', ASKING[target]) if target in ASKING else answering('SLC', 'CRC', target)
+    return {result.case.name: result.case.source for result in results_of(line, target, 'CRC')
+            if result.verdict is Verdict.PASS}
+
+
+@for_all('conversation', [entry for entry in CONVERSATIONS if 'case' in entry.entry])
+def test_case_of_a_conversation_is_there_and_passes(conversation: Conversation) -> None:
+    target, _, name = conversation.entry['case'].partition(' ')
+    assert passed(Target(target))[name] == conversation.entry['source']
 
 
 def _nothing(raw: bytes) -> bytes:

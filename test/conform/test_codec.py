@@ -17,6 +17,9 @@
 from abdf1_ros.conform import codec
 from abdf1_ros.conform.codec import BlockCheck, Symbol, SymbolKind
 import pytest
+from support.cases import for_all
+from support.conversations import Conversation, CONVERSATIONS
+from support.listeners import said_by_codec
 
 # M 5-4 and 5-5: DST 08 ... with a byte 10, which is doubled; to station 20 (hex) as a master.
 LINK_DATA = bytes.fromhex('08 09 06 00 10 04 03')
@@ -63,3 +66,9 @@ def test_frames_are_those_of_the_manual(frame: bytes, printed: str) -> None:
 ])
 def test_bytes_become_symbols(raw: str, is_half_duplex: bool, symbol: Symbol | None) -> None:
     assert codec.next_symbol(bytes.fromhex(raw), BlockCheck.BCC, is_half_duplex) == symbol
+
+
+@for_all('conversation', CONVERSATIONS)
+def test_conversations_are_read_as_they_say(conversation: Conversation) -> None:
+    for line, words in said_by_codec(conversation):
+        assert ' + '.join(words) == line['says'].replace(' again', '')

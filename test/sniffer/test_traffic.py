@@ -28,6 +28,8 @@ from abdf1_ros.sniffer.traffic import TrafficDecoder
 from hypothesis import given, strategies
 import pytest
 from support.cases import for_all
+from support.conversations import Conversation, CONVERSATIONS
+from support.listeners import heard_by_sniffer, said_by_sniffer
 from support.multidrop import MasterBench
 from support.vectors import Vector, VECTORS
 from support.virtual_line import Noise, QUIET
@@ -305,3 +307,22 @@ def test_check_is_found_though_silence_follows_each_message(
     assert [entry.packet for entry in entries if entry.kind is Kind.COMMAND] == commands
     assert session.kind.checksum is checksum
     assert Kind.NOISE not in kinds(entries)
+
+
+@for_all('conversation', CONVERSATIONS)
+def test_conversations_are_heard_as_they_say(conversation: Conversation) -> None:
+    """What breaks off is damaged to the sniffer, with or without what follows it."""
+    said = [('we' if 'we' in line else 'they', word)
+            for line, _ in conversation.said() for word in line['says'].split(' + ')]
+    kinds = {word for _, word in said}
+    passed_over = {'noise', 'part of a message'}
+    if kinds & passed_over:
+        passed_over |= {'damaged', 'too short'}
+    as_damaged = {'too short': 'damaged', 'too long': 'damaged'}
+    heard = [entry for entry in said_by_sniffer(conversation) if entry[1] not in passed_over]
+    assert heard == [(side, as_damaged.get(word, word)) for side, word in said
+                     if word not in passed_over]
+    replies = {entry.packet.encode() for _, entry in heard_by_sniffer(conversation)
+               if entry.kind is Kind.REPLY and entry.packet and Mark.STRAY not in entry.marks}
+    assert replies >= {bytes.fromhex(line['gets'])
+                       for line in conversation.lines if 'gets' in line}
