@@ -28,7 +28,7 @@ import sys
 
 from abdf1_ros.messages import Severity
 
-from tools import dissector, drawing, tables
+from tools import conversations, dissector, drawing, tables
 
 ROOT = Path(__file__).resolve().parent.parent
 REFERENCE = 'docs/reference'
@@ -39,6 +39,17 @@ PARTS: dict[tuple[str, str], Callable[[], str]] = {
     ('wireshark/abdf1.lua', 'tables'): dissector.lua,
     ('docs/heartbeats.md', 'bounds'): tables.bounds,
     ('docs/protocol/framing.md', 'symbols'): tables.symbols,
+    ('docs/protocol/full_duplex.md', 'message'): partial(
+        conversations.dialogue, 'peer_transaction_2'),
+    ('docs/protocol/full_duplex.md', 'enquiry'): partial(conversations.dialogue, 'peer_enquired'),
+    ('docs/protocol/full_duplex.md', 'rules'): partial(conversations.rules, 'Peer'),
+    ('docs/protocol/full_duplex.md', 'radio'): partial(conversations.rules, 'Radio'),
+    ('docs/protocol/half_duplex.md', 'command'): partial(
+        conversations.dialogue, 'master_slow_slave'),
+    ('docs/protocol/half_duplex.md', 'repetition'): partial(
+        conversations.dialogue, 'master_ack_lost'),
+    ('docs/protocol/half_duplex.md', 'rules'): partial(
+        conversations.rules, 'Master', 'Standard polling', 'Slave'),
     ('docs/protocol/addresses.md', 'file-codes'): tables.file_codes,
     ('docs/protocol/statuses.md', 'statuses'): tables.statuses,
     ('docs/protocol/commands.md', 'commands'): tables.commands,
