@@ -15,14 +15,17 @@
 """The blocks of the documentation that are marked to run do what they show."""
 
 from collections.abc import Iterator
+from importlib import import_module
 import os
 from pathlib import Path
 import re
+import shlex
 import subprocess
-import sys
 
+from abdf1_ros.cli.main import COMMANDS
 import pytest
 from support import documents
+from support.commands import call
 from support.ros import Process
 
 PORT = '/tmp/plc'
@@ -36,19 +39,6 @@ def port(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
     with Process('simulator', '--pty', str(name)) as simulator:
         simulator.wait_for('stations 1 (PLC5), 2 (SLC) on')
         yield name
-
-
-@pytest.fixture
-def environment(tmp_path: Path) -> dict[str, str]:
-    """Return an environment in which the commands have their short names."""
-    folder = tmp_path / 'bin'
-    folder.mkdir()
-    for command in ('plc', 'check', 'sniff', 'simulator'):
-        script = folder / command
-        script.write_text(f'#!/bin/sh\nexec "{sys.executable}" -m abdf1_ros {command} "$@"\n')
-        script.chmod(0o755)
-    paths = {'PATH': f'{folder}:{os.environ["PATH"]}', 'PYTHONPATH': str(documents.ROOT)}
-    return os.environ | paths
 
 
 def plain(line: str) -> str:
@@ -65,16 +55,25 @@ def expect(shown: list[str], said: list[str]) -> None:
 
 
 @pytest.mark.parametrize('name', PAGES)
-def test_marked_blocks_do_what_they_show(name: str, port: Path, environment: dict[str, str],
-                                         tmp_path: Path) -> None:
+def test_marked_blocks_do_what_they_show(
+        name: str, port: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch,
+        capsys: pytest.CaptureFixture[str]) -> None:
+    monkeypatch.chdir(tmp_path)
+    script = tmp_path / 'plc'  # where the command has its short name
+    script.write_text('#!/bin/sh\n# of abdf1_ros\n')
+    script.chmod(0o755)
+    monkeypatch.setenv('PATH', str(tmp_path), prepend=os.pathsep)
     for block in documents.blocks(documents.text(name), only_run=True):
         for part in block.replace(PORT, str(port)).split('$ ')[1:]:
-            command, *shown = part.splitlines()
-            done = subprocess.run(
-                ['bash', '-c', command], cwd=tmp_path, env=environment, text=True,
-                stdout=subprocess.PIPE, stderr=subprocess.STDOUT, timeout=60, check=False)
-            assert done.returncode == 0, f'{command}: {done.stdout}'
-            expect(shown, done.stdout.splitlines())
+            line, *shown = part.splitlines()
+            command, *args = shlex.split(line)
+            if command in COMMANDS:
+                said = call(import_module(COMMANDS[command]).main, capsys, *args)
+                assert said.status == 0, f'{line}: {said}'
+                expect(shown, [*said.err.splitlines(), *said.out.splitlines()])
+            else:
+                subprocess.run(['bash', '-c', line], timeout=60, check=True)
+                assert shown == []
 
 
 def test_both_tutorials_at_the_line_are_run() -> None:

@@ -18,14 +18,13 @@ from collections.abc import Iterator
 import os
 from pathlib import Path
 import socket
-import subprocess
-import sys
 
 from abdf1_ros.ports.opening import open_port
 from abdf1_ros.ports.ownership import line_of
 from abdf1_ros.ports.settings import PortSettings
 import pytest
 from support.cases import for_all
+from support.forked import Forked
 from support.ptys import Pty
 
 
@@ -77,15 +76,11 @@ def test_port_of_a_device_server_has_one_owner_until_he_leaves_it(server: int) -
 
 
 def test_port_of_a_device_server_is_refused_to_another_process(server: int) -> None:
-    said = [sys.executable, '-m', 'abdf1_ros', 'plc', 'status', '1', '--port',
-            f'socket://127.0.0.1:{server}', '--timeout', '50']
     port = open_port(PortSettings(f'socket://localhost:{server}'))
-    refused = subprocess.run(said, capture_output=True, text=True, timeout=60, check=False)
+    other = Forked('plc', ('status', '1', '--port', f'socket://127.0.0.1:{server}'))
+    assert 'another program has it open' in other.stderr.read()
+    assert other.wait(60) == 1
     port.close()
-    assert 'another program has it open' in refused.stderr
-    free = subprocess.run(said, capture_output=True, text=True, timeout=60, check=False)
-    assert free.returncode == 1
-    assert 'another program' not in free.stderr and 'Traceback' not in free.stderr
 
 
 def test_connection_that_fails_leaves_the_port_to_others() -> None:

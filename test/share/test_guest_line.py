@@ -53,7 +53,7 @@ from support.driver_bench import Recorder, simulated_plc, store, stored
 from support.mappings import make_mapping
 
 # The rules themselves are those of a peer, played in test/conform; here that a place is one.
-QUICK = ('bad-check-refused', 'duplicate-discarded', 'tns-returned', 'masked-write')
+QUICK = ('bad-check-refused', 'masked-write')
 
 
 class Shared:
