@@ -20,7 +20,6 @@ from itertools import pairwise
 from pathlib import Path
 import re
 import signal
-import time
 from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticStatus
@@ -41,11 +40,10 @@ from support.ros import (
     WARN,
     write_csv,
 )
-from support.simulator_process import make_files, NET_HEADER, READS, STATUSES, WRITES
+from support.simulator_process import make_files, NET_HEADER, READS, WRITES
 from support.vectors import load_tables
 
 COUNTERS = [name for _, name in load_tables()['counters']]
-WORDS = {OK: 'OK: ', WARN: 'WARN: ', ERROR: 'ERROR: '}
 
 
 def _kind(tag: str) -> Any:
@@ -246,16 +244,6 @@ def test_what_is_written_is_confirmed_and_comes_back(
 # Diagnostics
 
 
-def test_statuses_have_names_order_and_words(bridge: Bridge) -> None:
-    bridge.diagnostics.clear()
-    array = bridge.diagnostics.first()
-    assert [status.name for status in array.status] == [f'abdf1: {name}' for name in STATUSES]
-    assert array.header.stamp.sec == pytest.approx(time.time(), abs=10)
-    for status in array.status:
-        assert status.message.startswith(WORDS[status.level]), status.message
-        assert str(bridge.port) in status.hardware_id
-
-
 def test_all_counters_are_there_by_mnemonic_in_order_and_start_afresh(bridge: Bridge) -> None:
     before = details(find_status(bridge.diagnostics.fresh(), 'counters'))
     assert list(before) == COUNTERS
@@ -279,15 +267,6 @@ def test_processor_that_runs_no_program_is_a_warning(bridge: Bridge) -> None:
             'WARN: station 2 active, but in program mode (REM PROG)')
         assert details(status)['processor'] == 'SLC 5/03 series A revision 1, REM PROG'
         bridge.simulator.say('mode 2 run')
-
-
-def test_link_counters_are_read_by_the_service(bridge: Bridge) -> None:
-    response = bridge.observer.call(Trigger, '/abdf1/read_link_counters', Trigger.Request())
-    assert response.success, response.message
-    first, second = response.message.split('; ')
-    assert first.startswith('station 1: modem lines none on, messages sent ')
-    values = details(find_status(bridge.diagnostics.fresh(), 'station 2'))
-    assert f'messages sent {values["link counter messages sent"]},' in second
 
 
 # Parameters

@@ -328,8 +328,9 @@ def test_internal_error_at_the_start_of_a_line(
     assert "begins again: AttributeError('a bug')" in capfd.readouterr().err
 
 
-def test_line_that_ends_slowly_does_not_hold_up_the_others(
-        plant: Plant, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_internal_error_restarts_its_line_only_and_its_slow_end_holds_up_no_other(
+        plant: Plant, monkeypatch: pytest.MonkeyPatch,
+        capfd: pytest.CaptureFixture[str]) -> None:
     monkeypatch.setattr(module, '_RESTART_AFTER', 0.1)
     slow, ended = threading.Event(), threading.Event()
 
@@ -338,6 +339,7 @@ def test_line_that_ends_slowly_does_not_hold_up_the_others(
         assert ended.wait(PATIENCE)
 
     plant.start(reads='abc')
+    before = {**plant.nodes}
     monkeypatch.setattr(BridgeNode, 'say_last_words', say_last_words)
     plant.fail('b')
     plant.observer.until(slow.is_set, 'the end of a line')
@@ -345,34 +347,11 @@ def test_line_that_ends_slowly_does_not_hold_up_the_others(
     assert line_status(plant, ERROR)['/hall/b'] == 'begins again'
     ended.set()
     assert plant.speeds('b') == [7, ord('b')]
-
-
-def test_internal_error_restarts_its_line_only(
-        plant: Plant, monkeypatch: pytest.MonkeyPatch,
-        capfd: pytest.CaptureFixture[str]) -> None:
-    monkeypatch.setattr(module, '_RESTART_AFTER', 0.1)
-    plant.start(reads='abc')
-    before = {**plant.nodes}
-    plant.fail('b')
-    plant.observer.until(lambda: plant.nodes['b'] is not before['b'], 'another node')
-    assert plant.speeds('b') == [7, ord('b')]
     assert {name for name in 'abc' if not before[name].link.is_alive()} == {'b'}
     assert line_status(plant, OK)['restarts'] == '1'
     said = capfd.readouterr().err
     assert 'ends by an internal error and begins again' in said
     assert 'Traceback' in said
-
-
-def test_end_of_a_line_that_fails_is_told(
-        plant: Plant, monkeypatch: pytest.MonkeyPatch,
-        capfd: pytest.CaptureFixture[str]) -> None:
-    def say_last_words(node: BridgeNode, give_up: float) -> None:
-        raise KeyError('a bug')
-
-    plant.start('-p', 'lines:=[a]', reads='a')
-    monkeypatch.setattr(BridgeNode, 'say_last_words', say_last_words)
-    assert plant.end() == 0
-    assert "its end fails: KeyError('a bug')" in capfd.readouterr().err
 
 
 def test_status_of_all_lines_comes_once_a_second(plant: Plant) -> None:
