@@ -21,7 +21,6 @@ from abdf1_ros.messages import Event, Message, Severity
 from abdf1_ros.ros.diagnostics.log import (
     EventLog,
     LimitedLog,
-    MOST_CAUSES,
     MOST_ENTRIES,
     UnreadableRows,
 )
@@ -184,10 +183,12 @@ def test_routine_is_for_debugging_only(
 
 
 def test_forged_senders_neither_fill_the_memory_nor_the_log(
-        log: EventLog, clock: Clock, logged: Callable[[], Lines]) -> None:
-    for number in range(MOST_CAUSES + 500):
+        log: EventLog, clock: Clock, logged: Callable[[], Lines],
+        monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr('abdf1_ros.ros.diagnostics.log.MOST_CAUSES', 50)
+    for number in range(70):
         log.add(event(Message.ERR_WRONG_MESSAGE, number))
-    assert len(logged()) == MOST_CAUSES
+    assert len(logged()) == 50
     clock.now += 59.0
     log.add(event(Message.ERR_WRONG_MESSAGE, 3))
     log.add(event(Message.ERR_BAD_CRC, 3))

@@ -168,35 +168,37 @@ def test_every_pulse_of_a_burst_is_sent_in_order(make_bench: Benches) -> None:
     speed = bench.ros.listen(Int16MultiArray, '/abdf1/read/speed')
     publish = bench.publisher(UInt8MultiArray, 'pulses')
     speed.first()
-    patterns = [tuple(number >> bit & 1 for bit in range(8)) for number in range(200)]
+    patterns = [tuple(number >> bit & 1 for bit in range(8)) for number in range(60)]
     speed.clear()
     for pattern in patterns:
         publish(*pattern)
-    results = bench.until_results(200)
-    assert messages(results) == {'written': 200}
+    results = bench.until_results(60)
+    assert messages(results) == {'written': 60}
     assert [details(result)['value'] for result in results] == [
         str(list(pattern)) for pattern in patterns]
-    assert bench.words('B3:1') == [199]
-    assert speed, 'no read went between 200 writes'
+    assert bench.words('B3:1') == [59]
+    assert speed, 'no read went between 60 writes'
     status = until_status(bench.diagnostics, 'writes', OK,
-                          lambda status: details(status)['confirmed'] == '200')
-    assert status.message == 'OK: 200 of 200 writes confirmed'
-    assert details(status)['accepted'] == '200'
+                          lambda status: details(status)['confirmed'] == '60')
+    assert status.message == 'OK: 60 of 60 writes confirmed'
+    assert details(status)['accepted'] == '60'
 
 
 def test_messages_that_dds_drops_are_counted(
-        make_bench: Benches, capfd: pytest.CaptureFixture[str]) -> None:
+        make_bench: Benches, monkeypatch: pytest.MonkeyPatch,
+        capfd: pytest.CaptureFixture[str]) -> None:
+    monkeypatch.setattr('abdf1_ros.ros.topics.messages._WRITE_DEPTH', 50)
     bench = make_bench(RECIPE)
     publish = bench.publisher(Int16MultiArray, 'recipe')
     publish(0, 0)
     bench.until_results(1)
-    for number in range(1200):  # while nobody takes them; 1000 are kept
+    for number in range(70):  # while nobody takes them
         publish(number, number)
-    bench.until_results(1001)
+    bench.until_results(51)
     writes = until_status(bench.diagnostics, 'writes', WARN,
-                          lambda status: details(status)['lost on their way'] == '200')
-    assert writes.message.endswith('; 200 messages were lost on their way here')
-    assert '~/write/recipe: 200 messages were lost on their way here' in capfd.readouterr().err
+                          lambda status: details(status)['lost on their way'] == '20')
+    assert writes.message.endswith('; 20 messages were lost on their way here')
+    assert '~/write/recipe: 20 messages were lost on their way here' in capfd.readouterr().err
 
 
 # Writes that do not go well
