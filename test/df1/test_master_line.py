@@ -12,20 +12,17 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""What both kinds of master share: messages of slaves served, passed on, dropped; broadcasts."""
+"""What both kinds of master share beside the rules, which are conversations (vectors/)."""
 
 from dataclasses import replace
 import itertools
 
-from abdf1_ros.df1.checksum import Checksum
-from abdf1_ros.df1.frames import master_frame
-from abdf1_ros.df1.master_line import BROADCAST_PAUSE, MAX_FORWARDS
-from abdf1_ros.df1.packet import BROADCAST, Packet
+from abdf1_ros.df1.master_line import MAX_FORWARDS
+from abdf1_ros.df1.packet import Packet
 from abdf1_ros.df1.settings import LinkSettings, PollingSettings
 from abdf1_ros.df1.slave import multidrop
 import pytest
 from support.multidrop import MasterBench, Slave
-from support.vectors import vector
 
 MASTER = 5
 SETTINGS = LinkSettings(
@@ -49,56 +46,6 @@ def poll(rig: MasterBench, *numbers: int, times: int = 1) -> None:
 
 
 @BOTH
-def test_command_for_us_is_served_and_its_reply_delivered(standard: bool) -> None:
-    rig = bench(standard, 7, 8)
-    command = rig.message(7, MASTER)
-    rig.start()
-    poll(rig, 7, 8)
-    assert rig.master.served == [command]
-    assert rig[7].heard == [command.reply()]
-    assert rig.master.said.count('R7') == 1
-    assert 'C8' in rig.master.said and 'R8' not in rig.master.said
-    assert rig[7].slave.counters.acks_received == 2
-    counts = rig.master.counts()
-    assert (counts['commands_received'], counts['replies_sent']) == (1, 1)
-    assert not {'stale_messages', 'invalid_messages', 'enq_retries'} & counts.keys()
-    assert all(isinstance(task.result, Packet) for task in rig.master.all)
-
-
-@BOTH
-def test_repeated_command_for_us_is_acknowledged_and_served_once(standard: bool) -> None:
-    rig = bench(standard, 7)
-    command = rig.message(7, MASTER)
-    rig[7].outbox.append(command)  # as when it has not heard our ACK
-    rig[7].slave._next_packet = rig[7].next_command  # type: ignore[method-assign]
-    rig.start()
-    rig.ask(7, run=0.2)
-    del rig[7].slave._next_packet
-    rig.run(0.4)
-    assert rig.master.served == [command]
-    assert rig[7].heard == [command.reply()]
-    assert rig.master.counts()['duplicate_messages'] == 1
-    assert (2524, 7) in rig.master.numbers()
-    assert rig[7].failed == []
-
-
-@BOTH
-@pytest.mark.parametrize('dst', [MASTER, 8, BROADCAST])
-def test_what_is_not_accepted_is_acknowledged_dropped_and_counted(
-        standard: bool, dst: int) -> None:
-    rig = bench(standard, 7, 8, settings=replace(SETTINGS, accept_slave_messages=False))
-    command = rig.message(7, dst)
-    rig.start()
-    poll(rig, 7, 8)
-    assert rig[7].slave.counters.nak_retries == 0  # it has its ACK
-    assert rig.master.served == rig[7].heard == []
-    assert [packet.src for packet in rig[8].served] == [MASTER]
-    assert rig.master.numbers().count((2510, 7, dst, command.tns)) == 1
-    assert rig.master.counts()['commands_received'] == 1
-    assert rig.master.counts().get('invalid_messages', 0) == (dst != MASTER)
-
-
-@BOTH
 def test_command_for_us_is_dropped_when_there_is_nobody_to_serve_it(standard: bool) -> None:
     rig = bench(standard, 7, serves=False)
     command = rig.message(7, MASTER)
@@ -106,35 +53,6 @@ def test_command_for_us_is_dropped_when_there_is_nobody_to_serve_it(standard: bo
     poll(rig, 7)
     assert rig[7].heard == []
     assert (2510, 7, MASTER, command.tns) in rig.master.numbers()
-
-
-@BOTH
-def test_command_for_us_with_anothers_src_is_not_served(standard: bool) -> None:
-    rig = bench(standard, 7, 8)
-    rig[7].outbox.append(Packet(MASTER, 9, 0x0F, 0, 1, b'\x67'))
-    rig.start()
-    poll(rig, 7)
-    assert rig.master.served == []
-    assert rig.master.counts()['invalid_messages'] == 1
-
-
-@BOTH
-def test_message_for_another_station_is_passed_on_unchanged(standard: bool) -> None:
-    passed_on = vector('hd_s2s_relayed_to_7')
-    # There, station 5 asks station 7; the master has another number.
-    rig = bench(standard, 5, 7, settings=replace(SETTINGS, station=0))
-    rig[5].outbox.append(passed_on.packet)
-    rig.start()
-    rig.ask(5, master=0, run=0.3)
-    assert passed_on.frame in b''.join(rig.master.machine.sent)
-    assert rig[7].served == [passed_on.packet]
-    assert rig[5].heard == [passed_on.packet.reply()]
-    assert master_frame(5, passed_on.packet.reply().encode(), Checksum.CRC) in b''.join(
-        rig.master.machine.sent)
-    assert rig.master.served == []
-    counts = rig.master.counts()
-    assert (counts['commands_sent'], counts['replies_sent']) == (2, 1)
-    assert not {'stale_messages', 'invalid_messages'} & counts.keys()
 
 
 def test_message_based_master_gives_up_a_slow_reply_in_silence() -> None:
@@ -152,21 +70,6 @@ def test_message_based_master_gives_up_a_slow_reply_in_silence() -> None:
 
 
 @BOTH
-@pytest.mark.parametrize('known', [False, True])
-def test_originator_learns_that_the_destination_is_dead(standard: bool, known: bool) -> None:
-    rig = bench(standard, 7, 8, dead=(8,))
-    command = rig.message(7, 8)
-    rig.start(*[8] * known)
-    rig.ask(7, run=1.0)
-    assert rig[7].heard == [Packet(7, 8, 0x4F, 2, command.tns)]
-    # A station that the standard polling knows as dead is polled in its turn only.
-    assert ((2509, 8) in rig.master.numbers()) is not (standard and known)
-    assert not rig.master.stations[8].active
-    assert rig.master.counts()['error_messages_sent'] == 1
-    assert len(rig.master.times('C8')) == (0 if known else 2)
-
-
-@BOTH
 def test_reply_that_cannot_be_passed_on_is_dropped(standard: bool) -> None:
     rig = bench(standard, 7, 8)
     rig.message(7, 8)
@@ -179,40 +82,6 @@ def test_reply_that_cannot_be_passed_on_is_dropped(standard: bool) -> None:
     assert 'R8' not in rig.master.said
     poll(rig, 8)
     assert isinstance(rig.master.all[-1].result, Packet)
-
-
-@BOTH
-def test_broadcast_of_a_slave_is_acknowledged_and_sent_to_all(standard: bool) -> None:
-    rig = bench(standard, 7, 8)
-    command = rig.message(7, BROADCAST)
-    rig.start()
-    poll(rig, 7)
-    assert rig.master.served == []
-    for number in (7, 8):
-        assert rig[number].served.count(command) == 1
-    assert rig[7].slave.counters.acks_received == 2
-    assert rig.master.said.count('C255') == 1
-    frame = master_frame(BROADCAST, command.encode(), Checksum.CRC)
-    assert b''.join(rig.master.machine.sent).count(frame) == 1
-
-
-@BOTH
-def test_broadcast_of_ours_goes_once_and_is_left_to_the_slaves(standard: bool) -> None:
-    rig = bench(standard, 7, 8)
-    task = rig.ask(BROADCAST)
-    other = rig.ask(8)
-    rig.start(run=0.2)
-    assert task.result == task.command.reply()
-    assert other.result == other.command.reply()
-    assert [packet.dst for packet in rig[7].served] == [BROADCAST]
-    log = rig.master.machine.log
-    assert log[0][1] == 'C255'
-    leaves = len(master_frame(BROADCAST, task.command.encode(), Checksum.CRC)) * 10 / 19200
-    assert log[1][0] == pytest.approx(leaves + BROADCAST_PAUSE)
-    assert 'P255' not in rig.master.said
-    counts = rig.master.counts()
-    assert counts['commands_sent'] == counts['messages_sent'] == 2
-    assert 'nak_retries' not in counts
 
 
 @pytest.mark.parametrize('dst', [8, MASTER])
@@ -321,18 +190,6 @@ def test_station_that_a_message_names_is_no_station_of_ours(
     assert [station.number for station in rig.master.stations] == [7]
     assert rig.master.stations.words() == [1 << 7, *[0] * 15]
     assert rig.master.changes == []
-
-
-@BOTH
-def test_reply_for_a_node_that_has_asked_nothing_is_not_passed_on(standard: bool) -> None:
-    rig = bench(standard, 7, 8)
-    reply = Packet(8, 7, 0x4F, 0, 0x0102)  # S0, counter 2550: incorrect addressing
-    rig[7].outbox.append(reply)
-    rig.start()
-    poll(rig, 7, 8)
-    assert rig[8].heard == []
-    assert rig.master.counts()['invalid_messages'] == 1
-    assert (2510, 7, 8, 0x0102) in rig.master.numbers()
 
 
 @BOTH

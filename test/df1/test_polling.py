@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Standard polling, rule by rule (1766-RM001 and the manuals of the PLC-5 and Logix masters)."""
+"""Standard polling beside its rules, which are conversations (vectors/): shares of time, losses."""
 
 from collections.abc import Collection
 from dataclasses import replace
@@ -23,12 +23,11 @@ from typing import Any
 
 from abdf1_ros.df1.checksum import Checksum
 from abdf1_ros.df1.frames import message_frame
-from abdf1_ros.df1.master_line import BROADCAST_PAUSE, MOST_QUEUED
 from abdf1_ros.df1.packet import BROADCAST, Packet
 from abdf1_ros.df1.polling import COMMANDS_BETWEEN_POLLS
 from abdf1_ros.df1.settings import LinkSettings, PollingSettings
 from abdf1_ros.df1.slave import multidrop
-from abdf1_ros.errors import CommandTimeout, PortLost, StationInactive, WrongCommandCode
+from abdf1_ros.errors import CommandTimeout, PortLost, StationInactive
 import hypothesis
 from hypothesis import given, strategies
 import pytest
@@ -67,55 +66,10 @@ def polls(rig: MasterBench, count: int) -> list[int]:
     return polled()[:count]
 
 
-def test_all_active_stations_are_polled_in_the_order_of_the_list() -> None:
-    rig = bench(PollingSettings((3, 1, 2)))
-    rig.start()
-    assert polls(rig, 9) == [3, 1, 2] * 3
-    assert rig.master.said.startswith('P3 P1 P2 P3')
-
-
-def test_priority_list_comes_first_in_every_scan() -> None:
-    rig = bench(PollingSettings((1, 2, 3), priority=(9, 8)))
-    rig.start()
-    assert polls(rig, 10) == [9, 8, 1, 2, 3] * 2
-
-
-@pytest.mark.parametrize(('size', 'expected'), [
-    (1, [9, 1, 9, 2, 9, 3, 9, 4, 9, 1]), (2, [9, 1, 2, 9, 3, 4, 9, 1, 2]),
-    (3, [9, 1, 2, 3, 9, 4, 9, 1, 2, 3]), (0, [9, 1, 2, 3, 4, 9, 1]),
-    (200, [9, 1, 2, 3, 4, 9, 1])])
-def test_group_goes_on_where_it_stopped(size: int, expected: list[int]) -> None:
-    rig = bench(PollingSettings((1, 2, 3, 4), priority=(9,), group_size=size))
-    rig.start()
-    assert polls(rig, len(expected)) == expected
-
-
-def test_one_inactive_station_of_each_list_in_a_scan() -> None:
-    rig = bench(PollingSettings((1, 2, 3), priority=(9, 8, 7)))
-    rig.start(1, 2, 3, 8, 7)
-    # Those that answer are active from then on, and answers cost next to nothing of the time.
-    assert polls(rig, 2) == [9, 8]
-    polls(rig, 100)
-    assert rig.master.changes == [(8, True), (1, True), (7, True), (2, True), (3, True)]
-    rig.forget()
-    scan = polls(rig, 12)
-    at = scan.index(9)
-    assert scan[at:at + 6] == [9, 8, 7, 1, 2, 3]
-
-
 def test_inactive_normal_station_is_polled_when_all_active_ones_had_their_turn() -> None:
     rig = bench(PollingSettings((1, 2, 3), priority=(9,), group_size=1), dead=(3,))
     rig.start(3)
     assert polls(rig, 6) == [9, 1, 9, 2, 9, 3]
-
-
-def test_nobody_lives_and_each_list_has_its_turn() -> None:
-    rig = bench(PollingSettings((1, 2, 3), priority=(9, 8)), dead=(1, 2, 3, 8, 9))
-    rig.start(1, 2, 3, 8, 9)
-    assert polls(rig, 10) == [9, 1, 8, 2, 9, 3, 8, 1, 9, 2]
-    # One after the other without any pause: there is nobody to spare the time for.
-    times = [when for when, _ in rig.master.machine.log]
-    assert all(after - before < SETTINGS.timeout + 0.01 for before, after in pairwise(times))
 
 
 def share_of(rig: MasterBench, names: Collection[str], count: int) -> float:
@@ -165,127 +119,6 @@ def test_dead_priority_station_does_not_keep_normal_ones_from_coming_back() -> N
     assert rig.master.times('P8')
 
 
-@pytest.mark.parametrize(('multiple', 'expected'), [
-    (False, [1, 2, 1, 2, 1, 2, 1, 2]), (True, [1, 1, 1, 1, 2, 1, 2, 1])])
-def test_single_and_multiple_messages_per_scan(multiple: bool, expected: list[int]) -> None:
-    rig = bench(PollingSettings((1, 2), multiple=multiple))
-    for _ in range(3):
-        rig.message(1, 5)
-    rig.start()
-    assert polls(rig, 8) == expected
-    assert len(rig.master.served) == 3
-
-
-def test_commands_leave_between_polls_and_complete_in_the_order_of_the_list() -> None:
-    rig = bench(PollingSettings((1, 2, 3)))
-    order: list[int] = []
-    tasks = [rig.ask(number) for number in (3, 2, 1)]
-    for task in tasks:
-        reply = task.reply
-        task.reply = lambda packet, reply=reply: (  # type: ignore[method-assign]
-            order.append(packet.src), reply(packet))[1]
-    rig.start(run=0.2)
-    assert rig.master.said.startswith('C3 C2 C1 P1 P2 P3 P1')
-    assert order == [1, 2, 3]
-    assert [task.result for task in tasks] == [task.command.reply() for task in tasks]
-    assert rig.master.numbers() == [(2523, 1), (2523, 2), (2523, 3)]
-
-
-def test_command_that_comes_in_the_middle_of_a_scan_leaves_before_the_next_poll() -> None:
-    rig = bench(PollingSettings((1, 2, 3)))
-    rig.start()
-    polls(rig, 2)
-    task = rig.ask(1)
-    rig.line.run(lambda: ended(task), 1.0)
-    assert rig.master.said == 'P1 P2 C1 P3 P1 P2'
-
-
-def test_at_most_four_commands_between_two_polls() -> None:
-    rig = bench(PollingSettings(tuple(range(10, 20))))
-    tasks = [rig.ask(number) for number in range(10, 20)]
-    rig.start()
-    rig.line.run(lambda: all(map(ended, tasks)), 5.0)
-    assert COMMANDS_BETWEEN_POLLS == 4
-    assert rig.master.said.startswith('C10 C11 C12 C13 P10 C14 C15 C16 C17 P11 C18 C19 P12 P13')
-
-
-@pytest.mark.parametrize(('normal', 'expected'), [
-    ((1, 5, 2), 'P1 C1 C2 P2 P1 P2'), ((5, 1, 2), 'C1 C2 P1 P2'), ((1, 2), 'P1 P2 C1 C2 P1 P2')])
-def test_in_sequence_commands_leave_at_our_own_place(normal: tuple[int, ...],
-                                                     expected: str) -> None:
-    rig = bench(PollingSettings(normal, in_sequence=True))
-    tasks = [rig.ask(1), rig.ask(2)]
-    rig.start()
-    rig.line.run(lambda: all(map(ended, tasks)), 1.0)
-    assert rig.master.said.startswith(expected)
-
-
-def test_our_own_place_is_no_station_of_the_line() -> None:
-    rig = bench(PollingSettings((1, 5), priority=(5,)), dead=(1,))
-    rig.start(1, run=2.0)
-    assert [station.number for station in rig.master.stations] == [1]
-    assert rig.master.stations.words() == [0] * 16
-    # It is not among the living either, for whom the dead would have to wait.
-    assert len(rig.master.times('P1')) > 15
-    assert not rig.master.times('P5')
-
-
-def test_dead_station_becomes_inactive_after_its_retries_and_its_command_fails() -> None:
-    rig = bench(PollingSettings((1, 2)))
-    task = rig.ask(1)
-    rig.start()
-    rig.line.run(lambda: bool(rig[1].served), 1.0)
-    rig.run(0.002)
-    rig[1].silent = True
-    rig.line.run(lambda: ended(task), 5.0)
-    assert isinstance(task.result, StationInactive)
-    assert task.sent
-    assert rig.master.changes == [(1, False)]
-    assert rig.master.said == 'C1 P1 P1 P1 P2'
-    assert rig.master.counts()['enq_retries'] == SETTINGS.enq_retries
-    assert rig.master.counts()['enq_limit_exceeded'] == 1
-    assert [entry for entry in rig.master.numbers() if entry[0] in (2520, 2509)] == [
-        (2520, 2), (2509, 1)]
-
-
-def test_station_that_does_not_take_its_command_becomes_inactive() -> None:
-    rig = bench(PollingSettings((1, 2)), dead=(1,))
-    task = rig.ask(1)
-    rig.start()
-    rig.line.run(lambda: ended(task), 5.0)
-    assert isinstance(task.result, StationInactive)
-    assert rig.master.said == 'C1 C1 P2'
-    assert rig.master.counts()['nak_retries'] == 1
-    rig.forget()
-    assert polls(rig, 2) == [1, 2]
-
-
-def test_command_to_an_inactive_station_fails_at_once_and_was_never_sent() -> None:
-    rig = bench(PollingSettings((1, 2)), dead=(1,))
-    rig.start(1)
-    polls(rig, 2)
-    rig.forget()
-    task = rig.ask(1)
-    polls(rig, 1)
-    assert isinstance(task.result, StationInactive)
-    assert not task.sent
-    assert 'C1' not in rig.master.said
-
-
-@pytest.mark.parametrize('answer', ['EOT', 'message'])
-def test_any_answer_makes_a_station_active(answer: str) -> None:
-    rig = bench(PollingSettings((1, 2)))
-    if answer == 'message':
-        rig.message(1, 5)
-    rig.start(1)
-    polls(rig, 3)
-    assert rig.master.changes == [(1, True)]
-    assert len(rig.master.served) == (answer == 'message')
-    task = rig.ask(1)
-    rig.line.run(lambda: ended(task), 1.0)
-    assert isinstance(task.result, Packet)
-
-
 class Losses:
     """A line that loses a share of its frames, commands as well as replies and ACKs."""
 
@@ -322,20 +155,6 @@ def test_value_is_never_older_than_its_transaction(
     assert count
 
 
-def test_command_timeout_is_noticed_at_the_stations_own_poll() -> None:
-    rig = bench(PollingSettings((1, 2)))
-    rig[1].delay = 1.0
-    task = rig.ask(1)
-    rig.start()
-    rig.line.run(lambda: ended(task), 2.0)
-    assert isinstance(task.result, CommandTimeout)
-    assert SETTINGS.cmd_timeout <= task.seconds < SETTINGS.cmd_timeout + 0.05
-    assert rig.master.counts()['command_timeouts'] == 1
-    assert rig.master.numbers() == [(2508,)]
-    assert rig.master.stations[1].active
-    assert 'NAK' not in rig.master.said
-
-
 def test_each_reply_is_not_found_behind_the_one_before_it_for_ever() -> None:
     rig = bench(PollingSettings((1, 2)), settings=replace(SETTINGS, cmd_timeout=0.001))
     rig[1].delay = 0.1  # the first reply comes late, on a line too slow for Cmd_Timeout
@@ -347,18 +166,6 @@ def test_each_reply_is_not_found_behind_the_one_before_it_for_ever() -> None:
     rig.run(1.0)
     assert [task.result for task in tasks[1:]] == [task.command.reply() for task in tasks[1:]]
     assert rig.master.counts()['stale_messages'] == 1
-
-
-def test_station_that_never_stops_sending_does_not_hold_off_the_command_timeout() -> None:
-    rig = bench(PollingSettings((1,)), settings=replace(SETTINGS, cmd_timeout=0.001))
-    setattr(rig[1], '_execute', lambda command: command.reply()._replace(tns=0))
-    task = rig.ask(1)
-    for _ in range(3 * MOST_QUEUED):
-        rig.message(1, 5)
-    rig.start(run=2.0)
-    assert isinstance(task.result, CommandTimeout)
-    polled = [when for when in rig.master.times('P1') if when <= (task.ended or 0.0)]
-    assert len(polled) == MOST_QUEUED + 1
 
 
 def test_nak_is_never_sent_to_a_station_that_never_replies() -> None:
@@ -373,40 +180,6 @@ def test_nak_is_never_sent_to_a_station_that_never_replies() -> None:
     station = rig.master.stations[1]
     # The others are polled meanwhile: it is asked on as before, but its silence is told.
     assert station.has_no_replies and station.replies_in_time
-
-
-def test_reply_with_a_wrong_command_code() -> None:
-    rig = bench(PollingSettings((1,)))
-    rig[1].slave._serve = lambda command: command.reply()._replace(cmd=0x46)
-    task = rig.ask(1)
-    rig.start(run=0.2)
-    assert isinstance(task.result, WrongCommandCode)
-    assert rig.master.numbers() == [(2505, 1, 0x46, 0x4F)]
-    assert rig.master.counts()['invalid_messages'] == 1
-
-
-def test_broadcast_goes_once_and_nobody_is_polled_for_it() -> None:
-    rig = bench(PollingSettings((1, 2)))
-    task = rig.ask(BROADCAST)
-    rig.start(run=0.2)
-    log = rig.master.machine.log
-    assert [text for _, text in log[:2]] == ['C255', 'P1']
-    assert log[1][0] - log[0][0] >= BROADCAST_PAUSE
-    assert task.result == task.command.reply()
-    assert task.sent
-    assert [len(slave.served) for slave in rig.slaves.values()] == [1, 1]
-    assert rig.master.said.count('C255') == 1
-    assert [station.number for station in rig.master.stations] == [1, 2]
-
-
-@pytest.mark.parametrize('in_sequence', [True, False])
-def test_broadcast_without_any_station_to_poll(in_sequence: bool) -> None:
-    rig = bench(PollingSettings((), in_sequence=in_sequence))
-    rig.start(run=1.0)
-    assert rig.master.said == ''
-    task = rig.ask(BROADCAST, run=0.2)
-    assert task.result == task.command.reply()
-    assert rig.master.said == 'C255'
 
 
 def test_commands_wait_no_longer_for_the_dead_when_nobody_is_polled() -> None:
@@ -511,14 +284,6 @@ def test_fault_heard_while_probing_is_counted_and_told() -> None:
     assert rig.master.counts()['crc_errors'] == 1
     assert [number for number, *_ in rig.master.numbers()] == [2506]
     assert not rig.master.stations[1].active
-
-
-def test_one_visit_takes_no_more_messages_than_may_be_queued_before_a_reply() -> None:
-    rig = bench(PollingSettings((1, 2), multiple=True))
-    for _ in range(MOST_QUEUED + 3):
-        rig.message(1, 5)
-    rig.start()
-    assert polls(rig, MOST_QUEUED + 6) == [*[1] * MOST_QUEUED, 2, 1, 1, 1, 1, 2]
 
 
 def test_command_ends_when_its_station_is_lost_over_a_message_of_another() -> None:
