@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Standard polling beside its rules, which are conversations (vectors/): shares of time, losses."""
+"""Standard polling beside its rules, which are conversations (vectors/)."""
 
 from collections.abc import Collection
 from dataclasses import replace
