@@ -144,10 +144,20 @@ def test_import_along_the_arrows_is_let_through(module: str, source: str) -> Non
     assert violations(module, source) == []
 
 
+def loaded_with(modules: str) -> list[str]:
+    program = f'import sys, {modules}; print(*sys.modules)'
+    return subprocess.run([sys.executable, '-c', program], capture_output=True, text=True,
+                          check=True, timeout=60).stdout.split()
+
+
+def test_commands_at_the_line_need_no_ros() -> None:
+    loaded = loaded_with(', '.join(f'abdf1_ros.cli.{name}' for name in (
+        'check', 'conform', 'plc.command', 'simulator', 'sniff')))
+    assert not [name for name in loaded if _is_ros(name) or name.startswith('abdf1_ros.ros')]
+
+
 def test_library_has_neither_ros_nor_files() -> None:
-    program = 'import sys, abdf1_ros.client; print(*sys.modules)'
-    loaded = subprocess.run([sys.executable, '-c', program], capture_output=True, text=True,
-                            check=True, timeout=60).stdout.split()
+    loaded = loaded_with('abdf1_ros.client')
     assert 'abdf1_ros.driver.requests' in loaded
     unwanted = ('abdf1_ros.settings', 'abdf1_ros.plan', 'abdf1_ros.ros', 'abdf1_ros.cli.',
                 'abdf1_ros.simulator', 'abdf1_ros.sniffer', 'yaml', 'rclpy', 'std_msgs')

@@ -80,19 +80,13 @@ def test_descriptions_are_shown_where_there_are_any(
 
 
 @pytest.mark.parametrize('prefix', ['', 'peer_', 'heartbeat_'])
-def test_files_of_the_package_are_good(prefix: str, capsys: pytest.CaptureFixture[str]) -> None:
+def test_files_of_the_package_are_good_and_follow_our_own_advice(
+        prefix: str, capsys: pytest.CaptureFixture[str]) -> None:
     names = [str(config_file(f'{prefix}{kind}.csv')) for kind in ('net', 'map')]
     assert main([*names, '--json']) == 0
     content = parsed(capsys)
     assert content['errors'] == content['warnings'] == []
     assert {block['station'] for block in content['blocks']} <= {1, 2}
-
-
-@pytest.mark.parametrize('name', ['', 'heartbeat_', 'peer_'])
-def test_examples_follow_our_own_advice(name: str, capsys: pytest.CaptureFixture[str]) -> None:
-    main([str(config_file(f'{name}net.csv')), str(config_file(f'{name}map.csv')), '--json'])
-    content = parsed(capsys)
-    assert content['errors'] == content['warnings'] == []
     assert not [note for note in content['notes'] if 'without Publish_While' in note]
 
 
@@ -269,20 +263,6 @@ def test_output_that_cannot_take_it_is_no_traceback(files: tuple[Path, Path]) ->
     full = subprocess.run(f'{command} >/dev/full', shell=True, text=True, capture_output=True,
                           timeout=30, check=False)
     assert (full.returncode, full.stderr) == (2, 'check: cannot print: No space left on device\n')
-
-
-def test_process_needs_no_ros_and_tells_its_statuses(files: tuple[Path, Path]) -> None:
-    write_csv(files[0], NET_HEADER, ['5,Mastr,9600,500'])
-    write_csv(files[1], MAP_HEADER, [GOOD_ROW])
-    program = ('import sys; sys.modules["rclpy"] = None; '
-               'from abdf1_ros.cli.check import main; sys.exit(main())')
-    bad = subprocess.run([sys.executable, '-c', program, *map(str, files)], text=True,
-                         capture_output=True, timeout=30, check=False)
-    assert (bad.returncode, bad.stderr) == (2, '')
-    usage = subprocess.run([sys.executable, '-m', 'abdf1_ros', 'check', '--help'], text=True,
-                           capture_output=True, timeout=30, check=True)
-    assert 'exit status: 0' in usage.stdout
-    assert 'examples:' in usage.stdout
 
 
 # A folder

@@ -34,6 +34,9 @@ NAMES = {'node': ('rclpy', 0), 'lines': ('yaml', 0), 'monitor': ('rclpy', 0), 'd
          'simulator': ('serial', 0), 'sniff': ('serial', 0), 'check': ('difflib', 130),
          'plc': ('serial', 130)}
 
+# What --help of all others has.
+NOT_IN_HELP = {'lines': 'examples:', 'plc': 'exit status: 0'}
+
 # Of a command that imports what it needs when it knows what is wanted.
 ARGUMENTS = {'plc': ['status', '--port', 'x']}
 
@@ -100,13 +103,16 @@ def test_module_that_is_missing_is_named(tmp_path: Path, name: str) -> None:
 
 
 @pytest.mark.parametrize('name', sorted(COMMANDS))
-def test_every_command_tells_its_version(
+def test_every_command_tells_its_version_and_what_it_takes(
         name: str, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
-    monkeypatch.setattr(sys, 'argv', [name, '--version'])
-    with pytest.raises(SystemExit) as end:
-        import_module(COMMANDS[name]).main()
-    assert end.value.code == 0
-    assert capsys.readouterr().out.startswith('abdf1_ros ')
+    helps = {'examples:', 'exit status: 0'} - {NOT_IN_HELP.get(name)}
+    for option, texts in (('--version', {'abdf1_ros '}), ('--help', helps)):
+        monkeypatch.setattr(sys, 'argv', [name, option])
+        with pytest.raises(SystemExit) as end:
+            import_module(COMMANDS[name]).main()
+        assert end.value.code == 0
+        said = capsys.readouterr().out
+        assert [text for text in texts if text not in said] == []
 
 
 @pytest.mark.parametrize(('name', 'args', 'status'), [

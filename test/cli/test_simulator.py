@@ -173,22 +173,29 @@ def _refused(capsys: pytest.CaptureFixture[str], *options: str, status: int = 2)
     return said.err
 
 
-@pytest.mark.parametrize('at', [
-    'soon silent 1', 'silent 1', '', 'x', '-1 silent 1', 'nan silent 1', 'inf silent 1',
-    '1_0 silent 1', '\u0661 silent 1', '5', '5 '])
-def test_time_of_a_command_that_is_wrong_is_told(
-        capsys: pytest.CaptureFixture[str], data: Path, at: str) -> None:
-    assert _refused(capsys, '--data', str(data), '--at', at) == \
-        f'simulator: --at "{at}" should be seconds from 0 and a command, as in "5 silent 1"\n'
-
-
-@pytest.mark.parametrize('command, text', [
-    ('hush 1', '--at: "hush 1" is not a command'), ('silent 3', '--at: name a station (1, 2)'),
-    ('msg 1 N7:0 5', '--at: "msg 1 N7:0 5" is not a command'),
-    ('slow 1 x', '--at: slow 1 x: "x" should be')])
-def test_command_for_later_is_looked_at_before(
-        capsys: pytest.CaptureFixture[str], data: Path, command: str, text: str) -> None:
-    assert text in _refused(capsys, '--data', str(data), '--at', f'5 {command}')
+@pytest.mark.parametrize(('options', 'status', 'text'), [
+    *(((f'--at={at}',), 2, f'--at "{at}" should be seconds from 0 and a command, as in "5 silent '
+       '1"') for at in ('soon silent 1', 'silent 1', '', 'x', '-1 silent 1', 'nan silent 1',
+                        'inf silent 1', '1_0 silent 1', '\u0661 silent 1', '5', '5 ')),
+    *(((f'--tcp={where}',), 2, f'--tcp "{where}" should be HOST:PORT') for where in (
+        '127.0.0.1', 'x', ':', '127.0.0.1:99999', ':-1', 'a:b', 'é..b:80')),
+    (('--at', '5 hush 1'), 2, '--at: "hush 1" is not a command'),
+    (('--at', '5 silent 3'), 2, '--at: name a station (1, 2)'),
+    (('--at', '5 msg 1 N7:0 5'), 2, '--at: "msg 1 N7:0 5" is not a command'),
+    (('--at', '5 slow 1 x'), 2, '--at: slow 1 x: "x" should be'),
+    (('--full-duplex', '7'), 2, '--full-duplex: name a station (1, 2)'),
+    (('--data', '/nowhere'), 2, '/nowhere: cannot be read: No such file or directory'),
+    (('--pty', '/nowhere/plc'), 1, '/nowhere/plc cannot be made: No such file or directory'),
+    (('--pty', '/dev/null'), 1, '/dev/null is there already, and no link that a simulator has '
+     'left; give another name'),
+    (('--port', '/nowhere/tty'), 1, '/nowhere/tty: No such file or directory'),
+    (('--port', '/dev/null'), 1, '/dev/null: this is not a serial port'),
+    (('--port', 'socket://127.0.0.1:1'), 1, 'socket://127.0.0.1:1: Connection refused')])
+def test_what_cannot_be_had_is_told_at_once(
+        capsys: pytest.CaptureFixture[str], data: Path, options: tuple[str, ...], status: int,
+        text: str) -> None:
+    said = _refused(capsys, '--data', str(data), *options, status=status)
+    assert said.startswith(f'simulator: {text}') and len(said.splitlines()) == 1
 
 
 def test_faults_of_a_data_file_are_told_with_their_cells(
@@ -202,47 +209,11 @@ def test_faults_of_a_data_file_are_told_with_their_cells(
         'N, F, ST, A, D, L, PD, MG, HSC, PTO, PWM, STI, EII']
 
 
-def test_station_of_a_full_duplex_line_is_named(
-        capsys: pytest.CaptureFixture[str], data: Path) -> None:
-    assert _refused(capsys, '--data', str(data), '--full-duplex', '7') == \
-        'simulator: --full-duplex: name a station (1, 2)\n'
-
-
-def test_data_file_that_is_missing_is_named(capsys: pytest.CaptureFixture[str]) -> None:
-    assert _refused(capsys, '--data', '/nowhere') == \
-        'simulator: /nowhere: cannot be read: No such file or directory\n'
-
-
 def test_tcp_port_in_use(capsys: pytest.CaptureFixture[str], data: Path) -> None:
     with socket.create_server(('127.0.0.1', 0)) as server:
         where = f'127.0.0.1:{server.getsockname()[1]}'
         said = _refused(capsys, '--data', str(data), '--tcp', where, status=1)
     assert said.startswith(f'simulator: --tcp "{where}": Address already in use')
-
-
-@pytest.mark.parametrize('where', [
-    '127.0.0.1', 'x', ':', '127.0.0.1:99999', ':-1', 'a:b', 'é..b:80'])
-def test_tcp_that_is_not_host_and_port_is_refused(
-        capsys: pytest.CaptureFixture[str], data: Path, where: str) -> None:
-    assert _refused(capsys, '--data', str(data), '--tcp', where) == \
-        f'simulator: --tcp "{where}" should be HOST:PORT\n'
-
-
-def test_name_of_a_pty_that_is_a_file_already(
-        capsys: pytest.CaptureFixture[str], data: Path) -> None:
-    assert _refused(capsys, '--data', str(data), '--pty', str(data), status=1) == (
-        f'simulator: {data} is there already, and no link that a simulator has left; give another '
-        'name\n')
-    assert data.read_text(encoding='utf-8') == DATA
-
-
-def test_link_of_somebody_else_is_left_alone(
-        capsys: pytest.CaptureFixture[str], data: Path, tmp_path: Path) -> None:
-    name = tmp_path / 'adapter'
-    name.symlink_to('/dev/ttyUSB0')
-    assert 'is there already' in _refused(
-        capsys, '--data', str(data), '--pty', str(name), status=1)
-    assert os.readlink(name) == '/dev/ttyUSB0'
 
 
 def test_name_is_not_shared_and_what_a_killed_simulator_left_is_taken_by_the_next_and_removed(
@@ -266,20 +237,6 @@ def test_name_is_not_shared_and_what_a_killed_simulator_left_is_taken_by_the_nex
     assert not os.path.lexists(name)
 
 
-def test_folder_of_a_pty_that_is_missing(capsys: pytest.CaptureFixture[str], data: Path) -> None:
-    assert _refused(capsys, '--data', str(data), '--pty', '/nowhere/plc', status=1) == \
-        'simulator: /nowhere/plc cannot be made: No such file or directory\n'
-
-
-@pytest.mark.parametrize('name', ['/nowhere/tty', '/dev/null', 'socket://127.0.0.1:1'])
-def test_port_that_is_not_there_is_an_error_at_once(
-        capsys: pytest.CaptureFixture[str], data: Path, name: str) -> None:
-    said = call(main, capsys, '--data', str(data), '--port', name)
-    assert (said.status, said.out) == (1, '')
-    assert said.err.startswith('simulator: ')
-    assert name in said.err
-
-
 @pytest.mark.parametrize('option', [
     '--check=XOR', '--baud=9601', '--baud=9_600', '--seconds=x', '--seconds=-1', '--what',
     '--pty=', '--port='])
@@ -288,15 +245,6 @@ def test_option_that_is_wrong_is_told_with_status_2(
     said = call(main, capsys, option)
     assert said.status == 2
     assert said.err.startswith('simulator: error: ')
-
-
-def test_help_names_every_option_and_command(capsys: pytest.CaptureFixture[str]) -> None:
-    with pytest.raises(SystemExit) as caught:
-        main(['--help'])
-    assert caught.value.code == 0
-    text = capsys.readouterr().out
-    assert all(word in text for word in (
-        '--pty', '--tcp', '--port', '--data', '--check', '--at', '--seconds', 'silent STATION'))
 
 
 def _awaken(descriptor: int) -> None:

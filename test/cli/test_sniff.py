@@ -225,15 +225,6 @@ def test_option_that_is_wrong_is_told_with_status_2(capsys: Output, args: list[s
     assert 'sniff: error: ' in capsys.readouterr().err
 
 
-def test_help_has_examples_and_exit_status(capsys: Output) -> None:
-    with pytest.raises(SystemExit) as caught:
-        main(['--help'])
-    assert caught.value.code == 0
-    text = capsys.readouterr().out
-    assert 'examples:' in text
-    assert 'exit status: 0' in text
-
-
 def _printed(sniff: Process) -> list[str]:
     """Return the lines of its standard output."""
     return [line for line in sniff.lines if not line.startswith('sniff: ')]
@@ -305,16 +296,6 @@ def test_lost_port_ends_with_the_summary(tmp_path: Path) -> None:
     assert _printed(sniff)[0].startswith('summary: ')
 
 
-def test_reader_that_has_seen_enough(capture: str) -> None:
-    reader, writer = os.pipe()
-    os.close(reader)
-    result = subprocess.run(
-        [sys.executable, '-m', 'abdf1_ros', 'sniff', capture], stdout=writer,
-        stderr=subprocess.PIPE, timeout=PATIENCE, check=False)
-    os.close(writer)
-    assert (result.returncode, result.stderr) == (0, b'')
-
-
 def test_colour_is_for_terminals_only(
         capsys: Output, capture: str, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.delenv('NO_COLOR', raising=False)
@@ -371,11 +352,3 @@ def test_reader_that_leaves_does_not_cut_a_tap(tmp_path: Path, way: str, goes_on
     else:
         os.write(near, SAID[0] + SAID[1])
     assert sniff.wait(PATIENCE) == 0
-
-
-def test_it_needs_no_ros(capture: str) -> None:
-    code = ('import sys; sys.modules["rclpy"] = None; from abdf1_ros.cli.sniff import main; '
-            f'sys.exit(main([{capture!r}]))')
-    result = subprocess.run([sys.executable, '-c', code], capture_output=True, text=True,
-                            timeout=PATIENCE, check=True)
-    assert result.stdout.splitlines()[:5] == LINES

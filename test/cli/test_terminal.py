@@ -30,14 +30,18 @@ from abdf1_ros.cli.terminal import (
     command_parser,
     interruptible,
     is_terminal,
+    NoPort,
     prepare_output,
     Progress,
     reason_of,
     RED,
+    run_command,
     seconds_option,
     table,
     whole_option,
 )
+from abdf1_ros.errors import PortLost
+from abdf1_ros.problems import ConfigurationError, Problem
 import pytest
 
 
@@ -157,6 +161,30 @@ def test_no_signal_interrupts_what_comes_after_the_block() -> None:
         pass
     assert not _interrupts(signal.SIGINT)
     assert not _interrupts(signal.SIGTERM)
+
+
+@pytest.mark.usefixtures('handlers')
+@pytest.mark.parametrize(('end', 'status', 'told'), [
+    (None, 3, ''), (KeyboardInterrupt(), 130, ''),
+    (ConfigurationError([Problem('a.csv', 'is wrong'), Problem('b.csv', 'too')]), 2,
+     'tool: a.csv: is wrong\ntool: b.csv: too\n'),
+    (NoPort('/tmp/x', OSError(2, 'No such file')), 1, 'tool: /tmp/x: No such file\n'),
+    (PortLost('the cable is gone'), 1, 'tool: port lost: the cable is gone\n'),
+    (BrokenPipeError(), 7, ''),
+    (OSError(28, 'No space left on device'), 2, 'tool: cannot print: No space left on device\n')])
+def test_end_of_a_command_is_told_and_is_its_status(
+        end: BaseException | None, status: int, told: str, monkeypatch: pytest.MonkeyPatch,
+        capsys: pytest.CaptureFixture[str]) -> None:
+    def work() -> int:
+        if end:
+            raise end
+        return 3
+
+    dropped = []
+    monkeypatch.setattr(terminal, 'drop_output', lambda: dropped.append(True))
+    assert run_command('tool', work, interrupted=130, unread=7) == status
+    assert capsys.readouterr().err == told
+    assert bool(dropped) is (type(end) in (OSError, BrokenPipeError))
 
 
 def test_seconds_of_an_option_are_above_0() -> None:

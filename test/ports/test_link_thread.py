@@ -48,7 +48,6 @@ from abdf1_ros.ports.wake import Wake
 import pytest
 import serial
 from support.counting import open_files
-from support.device_server import DeviceServer
 from support.ptys import PATIENCE, Pty, wait_until
 
 READY = b'ready'
@@ -361,6 +360,7 @@ def test_stop_ends_what_runs_with_an_error(pty: Pty, link: Link, step: Step) -> 
     assert script.end() == repr(PortLost('the driver is stopping'))
     assert not thread.state.is_open
     assert script.machine.counters.read_errors == 0
+    open_port(PortSettings(str(pty.name))).close()
 
 
 def test_stop_while_the_port_is_not_there(tmp_path: Path) -> None:
@@ -377,13 +377,6 @@ def test_stop_while_the_port_is_not_there(tmp_path: Path) -> None:
     thread.stop()
     assert not thread.is_alive()
     assert time.monotonic() - began < PATIENCE / 2
-
-
-def test_port_is_given_back_after_stop(pty: Pty, link: Link) -> None:
-    thread = link.start(Script(Listen(None)).machine, pty.name)
-    assert link.state().is_open
-    thread.stop()
-    open_port(PortSettings(str(pty.name))).close()
 
 
 class Diary(_NoLine):
@@ -654,16 +647,6 @@ def test_full_pty_is_a_lost_port(pty: Pty, link: Link, monkeypatch: pytest.Monke
     assert script.end().startswith('PortLost(')
 
 
-def test_machine_runs_on_an_rfc2217_device_server(link: Link) -> None:
-    script = Script(Send(ACK, PATIENCE), Rest())
-    with DeviceServer() as server:  # its line gives back what is sent
-        thread = link.start(script.machine, f'rfc2217://127.0.0.1:{server.port}')
-        assert link.state().is_open
-        assert script.next() == Control(Code.ACK)
-        assert server.baud == 9600
-        thread.stop()
-
-
 def test_machine_runs_on_a_socket_url(link: Link) -> None:
     script = Script(Listen(None))
     with socket.create_server(('127.0.0.1', 0)) as server:
@@ -682,14 +665,6 @@ def test_machine_runs_on_a_socket_url(link: Link) -> None:
         assert link.state().text == 'the port was lost: the other end has closed the connection'
         again, _ = server.accept()
         again.close()
-
-
-def test_state_is_closed_after_the_end(pty: Pty, link: Link) -> None:
-    thread = link.start(Script().machine, pty.name)
-    assert link.state().is_open
-    wait_until(lambda: thread.state.is_open)
-    thread.stop()
-    assert not thread.state.is_open
 
 
 class Stuck(_NoLine):

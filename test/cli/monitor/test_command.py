@@ -22,8 +22,6 @@ import pty
 import re
 import select
 import signal
-import subprocess
-import sys
 import termios
 import time
 
@@ -101,19 +99,6 @@ def test_it_ends_after_the_time_it_is_given(
     said = call(main, capsys, '--node', NODE, '--seconds', '1', '--period', '0.1')
     assert said.status == 0
     assert time.monotonic() - began > 0.9
-
-
-def test_reader_that_has_seen_enough_ends_it_quietly(simulator: Process) -> None:
-    read, write = os.pipe()
-    with subprocess.Popen(
-            [sys.executable, '-m', 'abdf1_ros', 'monitor', '--node', NODE, '--period', '0.1'],
-            stdout=write, stderr=subprocess.PIPE, text=True) as process:
-        os.close(write)
-        assert os.read(read, 5)
-        os.close(read)
-        _, said = process.communicate(timeout=PATIENCE)
-        assert all('looking for' in line for line in said.splitlines()), said
-    assert process.returncode == 0
 
 
 # On a terminal
@@ -294,10 +279,3 @@ def test_topics_without_a_node_that_is_heard_point_to_another_user(refused: Refu
 def test_bad_options_are_refused_in_one_line(
         args: tuple[str, ...], text: str, refused: Refused) -> None:
     assert text in refused(2, *args)[0]
-
-
-def test_help_has_examples_and_exit_statuses(capsys: pytest.CaptureFixture[str]) -> None:
-    said = call(main, capsys, '--help')
-    assert said.status == 0
-    assert 'exit status: 0' in said.out
-    assert '  monitor --node /cell/line_1' in said.out.splitlines()
