@@ -149,7 +149,8 @@ def test_repeated_late_and_wrong_messages_have_the_latency_that_we_tell(tmp_path
         cmd = 0x0F if way is Direction.OUT else random.choice((0x4F,) * 9 + (0x46,))
         # A read of N7:0 or N7:1, or the two words that may be there.
         data = bytes.fromhex('A202078900' + random.choice(('00', '01')) if cmd == 0x0F else '0100')
-        packet = Packet(way is Direction.OUT, way is Direction.IN, cmd, 0, random.randrange(3), data)
+        packet = Packet(way is Direction.OUT, way is Direction.IN, cmd, 0, random.randrange(3),
+                        data)
         frame = message_frame(packet.encode(), Checksum.BCC)
         for direction, said, chance in ((way, frame, 1.0), (way.opposite, b'\x10\x06', 0.8),
                                         (way, frame, 0.3)):
