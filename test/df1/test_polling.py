@@ -55,23 +55,6 @@ def ended(task: CommandTask) -> bool:
     return task.result is not None
 
 
-def polls(rig: MasterBench, count: int) -> list[int]:
-    """Let the master poll so often; return whom."""
-    machine = rig.master.machine
-
-    def polled() -> list[int]:
-        return [int(text[1:]) for _, text in machine.log if text[0] == 'P']
-
-    rig.line.run(lambda: len(polled()) >= count, 60.0)
-    return polled()[:count]
-
-
-def test_inactive_normal_station_is_polled_when_all_active_ones_had_their_turn() -> None:
-    rig = bench(PollingSettings((1, 2, 3), priority=(9,), group_size=1), dead=(3,))
-    rig.start(3)
-    assert polls(rig, 6) == [9, 1, 9, 2, 9, 3]
-
-
 def share_of(rig: MasterBench, names: Collection[str], count: int) -> float:
     """Return the share of the line's time that these frames take until there are so many."""
     log = rig.master.machine.log

@@ -155,7 +155,6 @@ class Slave:
         self.outbox: deque[Packet] = deque()
         self.served: list[Packet] = []
         self.heard: list[Packet] = []
-        self.failed: list[Packet] = []
         self.polls = 0
         self._clock = clock
         self._execute = serve
@@ -191,8 +190,7 @@ class Slave:
         """Do nothing."""
 
     def undelivered(self, command: Packet, error: LinkError) -> None:
-        """Keep what the master did not take."""
-        self.failed.append(command)
+        """Do nothing."""
 
     def replied(self, reply: Packet) -> None:
         """Keep a reply."""

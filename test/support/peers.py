@@ -99,14 +99,12 @@ class PeerNode(Recorded):
         super().__init__()
         self.settings = settings
         self.served: list[Packet] = []
-        self.under_way: list[CommandTask] = []
         self.tasks: deque[CommandTask] = deque()
         self.stations = ActiveStationList(on_change=self.change)
         self.machine = Machine(
             self._run, checksum=settings.checksum, duplex=Duplex.FULL, timing=timing)
         self.peer = FullDuplexPeer(
             self.machine, settings, self.stations, self._serve, self.events.append)
-        self.most_outstanding = 0
         self.clock = clock
         self._execute = serve
 
@@ -130,9 +128,6 @@ class PeerNode(Recorded):
             return None
         task = self.tasks.popleft()
         task.begun = now
-        self.under_way = [other for other in self.under_way if other.result is None]
-        self.under_way.append(task)
-        self.most_outstanding = max(self.most_outstanding, len(self.under_way))
         return task
 
     def next_due(self) -> float | None:
@@ -200,10 +195,6 @@ class PeerBench(PeerNode):
             if data := self.said():
                 yield round(self.now - start, _PRECISION), data
         raise AssertionError('it runs in circles')
-
-    def only(self, *numbers: int) -> list[tuple[int, ...]]:
-        """Return the events of these numbers."""
-        return [entry for entry in self.numbers() if entry[0] in numbers]
 
 
 def single_bytes(data: bytes) -> Iterable[bytes]:
