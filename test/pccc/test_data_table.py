@@ -12,15 +12,18 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The data table of an emulated PLC."""
+"""The data table of an emulated PLC, and places that have words in common."""
 
 from collections.abc import Callable
-
 from abdf1_ros.pccc.address import Address
 from abdf1_ros.pccc.data_table import DataTable, NoSuchFile, OutOfRange
 from abdf1_ros.pccc.families import parse_address
 from abdf1_ros.pccc.file_types import FileType, PlcType
 import pytest
+from abdf1_ros.pccc.extent import Extent
+from abdf1_ros.settings.mapping import Mapping
+from support.mappings import make_mapping
+
 
 SLC, PLC5 = PlcType.SLC, PlcType.PLC5
 
@@ -117,3 +120,23 @@ def test_file_number_has_one_type() -> None:
         words.create(at('B7:0'), 1)
     with pytest.raises(NoSuchFile):
         words.file_type(8)
+
+
+def extent(text: str, length: int = 1, station: int = 1) -> Extent:
+    """Return the words of a mapping."""
+    row: Mapping = make_mapping(text, 'Write', plc='SLC', length=length, station=station)
+    return row.extent
+
+
+@pytest.mark.parametrize(('text', 'length', 'meets', 'holds'), [
+    ('N7:5', 2, True, True), ('N7:4', 1, False, False), ('N7:7', 1, False, False),
+    ('N7:4', 2, True, False), ('N7:6', 2, True, False), ('N7:4', 9, True, False),
+    ('N7:6', 1, True, True), ('N7:5/3', 1, True, True), ('N7:4/15', 2, True, False),
+    ('N7:4/14', 2, False, False), ('N9:5', 2, False, False)])
+def test_extents_are_by_words(text: str, length: int, meets: bool, holds: bool) -> None:
+    here, other = extent('N7:5', 2), extent(text, length)
+    assert here.meets(other) is other.meets(here) is meets
+    assert here.holds(other) is holds
+    elsewhere = extent(text, length, station=2)
+    assert not here.meets(elsewhere)
+    assert not here.holds(elsewhere)

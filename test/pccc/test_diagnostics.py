@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The bytes of the diagnostic commands (M 7-6..7-27)."""
+"""Diagnostic commands (M 7-6..7-27): status of emulated processors, counters (M 9-6..9-31)."""
 
 from abdf1_ros.errors import FormatError
 from abdf1_ros.pccc import diagnostics
@@ -23,6 +23,28 @@ from abdf1_ros.pccc.file_types import PlcType
 from hypothesis import given
 from hypothesis import strategies as st
 import pytest
+from abdf1_ros.counters import Counters
+from abdf1_ros.df1.packet import Packet
+from abdf1_ros.pccc.data_table import DataTable
+from abdf1_ros.pccc.diagnostics import ReadCounters, STATUS_REQUEST
+from abdf1_ros.pccc.emulated import EmulatedProcessor, Setting
+from abdf1_ros.pccc.families import decode_identity, FAMILIES
+from abdf1_ros.pccc.identity import Mode
+from abdf1_ros.pccc.link_counters import ServedCounters
+from abdf1_ros.pccc.plc5.identity import COUNTERS
+from abdf1_ros.pccc.server import Server
+from abdf1_ros.pccc.slc.identity import SLAVE_COUNTERS
+from support.cases import for_all
+from support.vectors import pair
+import struct
+from abdf1_ros.pccc.families import served_counters
+from abdf1_ros.pccc.link_counters import CounterLayout, decode_counters, ServedCounters
+from abdf1_ros.pccc.slc.identity import (
+    FULL_DUPLEX_COUNTERS,
+    MASTER_COUNTERS,
+    ML1000_COUNTERS,
+    SLAVE_COUNTERS,
+)
 
 
 def parameters(data: bytes, fnc: int) -> Reader:
@@ -50,3 +72,267 @@ def test_read_counters_of_another_length_is_refused(data: bytes) -> None:
 
 def test_slc_echoes_less() -> None:
     assert [FAMILIES[kind].max_echo for kind in (PlcType.SLC, PlcType.PLC5)] == [236, 243]
+
+
+REFUSED = 0x10
+
+
+def answer(plc_type: PlcType, data: bytes, counters: ServedCounters | None = None,
+           cmd: int = 0x06) -> Packet:
+    """Return what a PLC with an empty table answers."""
+    server = Server(DataTable(plc_type), EmulatedProcessor(), counters)
+    return server.serve(Packet(1, 9, cmd, 0, 0x1234, data))
+
+
+def reply(data: bytes = b'', sts: int = 0, cmd: int = 0x46) -> Packet:
+    """Return the reply to the commands of these tests."""
+    return Packet(9, 1, cmd, sts, 0x1234, data)
+
+
+@pytest.fixture
+def counters() -> Counters:
+    return Counters(messages_sent=300, messages_received=2, polls_received=70_000)
+
+
+@pytest.mark.parametrize('plc_type', FAMILIES)
+def test_echo_up_to_the_limit_of_the_family(plc_type: PlcType) -> None:
+    limit = FAMILIES[plc_type].max_echo
+    for data in (b'', b'\0', b'\x10\x10\x02\x03', bytes(limit)):
+        assert answer(plc_type, b'\0' + data) == reply(data)
+    assert answer(plc_type, bytes(limit + 2)) == reply(sts=REFUSED)
+
+
+@pytest.mark.parametrize('plc_type', FAMILIES)
+def test_status_is_that_of_the_processor_at_the_moment(plc_type: PlcType) -> None:
+    processor = EmulatedProcessor()
+    server = Server(DataTable(plc_type), processor)
+    command = Packet(1, 9, 0x06, 0, 0x1234, STATUS_REQUEST)
+    assert server.serve(command) == reply(
+        FAMILIES[plc_type].encode_identity(processor))
+    processor.setting = Setting.RUN
+    assert decode_identity(server.serve(command).data).mode is Mode.RUN
+
+
+def test_slc_counters_are_at_address_0(counters: Counters) -> None:
+    served = ServedCounters(counters, SLAVE_COUNTERS)
+    block = answer(PlcType.SLC, ReadCounters(0, 26).encode(), served)
+    assert block == reply(served.encode())
+    assert block.data[2:6] == b'\x2C\x01\x02\x00'
+    assert answer(PlcType.SLC, ReadCounters(0, 4).encode(), served) == reply(block.data[:4])
+    assert answer(PlcType.SLC, ReadCounters(2, 4).encode(), served) == reply(sts=REFUSED)
+
+
+def test_plc5_ignores_the_address_of_counters(counters: Counters) -> None:
+    served = ServedCounters(counters, COUNTERS)
+    assert answer(PlcType.PLC5, ReadCounters(0x1234, 244).encode(), served) == reply(
+        served.encode())
+    assert answer(PlcType.PLC5, ReadCounters(0, 245).encode(), served) == reply(sts=REFUSED)
+
+
+def test_reset_concerns_only_what_the_other_end_sees(counters: Counters) -> None:
+    served = ServedCounters(counters, SLAVE_COUNTERS)
+    before = answer(PlcType.SLC, ReadCounters(0, 26).encode(), served)
+    assert answer(PlcType.SLC, b'\7' + b'\1', served) == reply(sts=REFUSED)
+    assert answer(PlcType.SLC, ReadCounters(0, 26).encode(), served) == before != reply(bytes(26))
+    assert answer(PlcType.SLC, b'\7', served) == reply()
+    assert answer(PlcType.SLC, ReadCounters(0, 26).encode(), served) == reply(bytes(26))
+    assert counters.messages_sent == 300
+    counters.messages_sent += 5
+    assert answer(PlcType.SLC, ReadCounters(0, 4).encode(), served) == reply(b'\0\0\5\0')
+
+
+@for_all('plc_type', FAMILIES)
+@for_all('data', [
+    b'', b'\x01\0\0\x10', b'\x03\x01', b'\x07', b'\x08\x80\0', b'\x09\0\0\x01', b'\xFF'])
+def test_what_there_is_not_is_refused(plc_type: PlcType, data: bytes) -> None:
+    assert answer(plc_type, data) == reply(sts=REFUSED)
+
+
+@for_all('plc_type', FAMILIES)
+@for_all(('cmd', 'data'), [
+    (0x0F, b'\x3A\0'), (0x0F, b'\x3A\x02'), (0x0F, b'\x80\x01'), (0x0F, b'\x80\x06'),
+    (0x0F, b'\x41'), (0x0F, b'\x11'), (0x0F, b'\x07'), (0x07, b'\0'), (0x07, b'\x03')])
+def test_nobody_changes_the_mode(plc_type: PlcType, cmd: int, data: bytes) -> None:
+    processor = EmulatedProcessor()
+    server = Server(DataTable(plc_type), processor)
+    refusal = server.serve(Packet(1, 9, cmd, 0, 0x1234, data))
+    assert refusal.sts
+    assert processor == EmulatedProcessor()
+
+
+def encoded(plc_type: PlcType, setting: Setting = Setting.REMOTE,
+            is_full_duplex: bool = False) -> bytes:
+    return FAMILIES[plc_type].encode_identity(EmulatedProcessor(setting, is_full_duplex))
+
+
+def test_slc_has_the_layout_of_the_vectors() -> None:
+    ours = encoded(PlcType.SLC, is_full_duplex=True)
+    theirs = pair('diag_status_slc504')[1].data
+    assert len(ours) == len(theirs) == 24
+    assert ours[:3] == theirs[:3]  # mode, type extender, full duplex
+    assert ours[3] == 0x49  # a 5/03
+    assert ours[5:16] == b'5/03       '
+    assert ours[16:20] == b'\0\0\x06\0'  # no major error, remote run
+    assert ours[23] == theirs[23] == 0xFC  # no owner of the program
+    assert encoded(PlcType.SLC)[2] == 0x36  # half duplex
+
+
+def test_plc5_has_the_layout_of_the_vectors() -> None:
+    ours = encoded(PlcType.PLC5)
+    theirs = pair('diag_status_plc5_40')[1].data
+    assert len(ours) == len(theirs) == 36
+    assert ours[:3] == theirs[:3]  # remote run, PLC-5, 5/40
+
+
+@pytest.mark.parametrize(('plc_type', 'size', 'first'), [
+    (PlcType.PLC3, 18, b'\x02\x47'), (PlcType.PLC2, 10, b'\x02\x14')])
+def test_older_families_tell_of_themselves_in_their_own_layout(
+        plc_type: PlcType, size: int, first: bytes) -> None:
+    data = encoded(plc_type)
+    assert (len(data), data[:2]) == (size, first)
+
+
+@pytest.mark.parametrize(('plc_type', 'texts'), [
+    (PlcType.SLC, ('RUN', 'REM PROG', 'REM RUN', 'REM TEST')),
+    (PlcType.PLC5, ('RUN', 'REM PROG', 'REM RUN', 'REM TEST')),
+    (PlcType.PLC3, ('RUN', 'PROG', 'RUN', 'TEST')),
+    (PlcType.PLC2, ('RUN', 'REM PROG', 'RUN', 'REM TEST'))])
+def test_every_setting_is_read_back(plc_type: PlcType, texts: tuple[str, ...]) -> None:
+    settings = (Setting.RUN, Setting.PROGRAM, Setting.REMOTE, Setting.TEST)
+    identities = [decode_identity(encoded(plc_type, setting))
+                  for setting in settings]
+    assert tuple(identity.mode_text for identity in identities) == texts
+    assert [identity.is_running for identity in identities] == [True, False, True, False]
+    assert not any(identity.faults for identity in identities)
+
+
+@pytest.mark.parametrize(('plc_type', 'fault'), [
+    (PlcType.SLC, 'major error 0x0020 (minor error at the end of a scan), processor halted'),
+    (PlcType.PLC5, 'major processor fault (word S:11 says which)'),
+    (PlcType.PLC3, 'major processor fault'),
+    (PlcType.PLC2, 'no communication between module and processor')])
+def test_fault_is_read_back(plc_type: PlcType, fault: str) -> None:
+    identity = decode_identity(encoded(plc_type, Setting.FAULT))
+    assert (identity.faults, identity.is_running) == ((fault,), False)
+
+
+LAYOUTS = (COUNTERS, FULL_DUPLEX_COUNTERS, MASTER_COUNTERS, SLAVE_COUNTERS, ML1000_COUNTERS)
+
+
+def words(count: int) -> bytes:
+    """Return that many words whose value is their place plus 100."""
+    return b''.join((100 + n).to_bytes(2, 'little') for n in range(count))
+
+
+@pytest.mark.parametrize(('layout', 'expected'), [
+    (FULL_DUPLEX_COUNTERS, {
+        'modem lines': 'CTS', 'messages sent': '101', 'messages received': '102',
+        'messages undelivered': '103', 'ENQ sent': '104', 'NAK received': '105',
+        'ENQ received': '106', 'bad messages received': '107',
+        'messages refused for lack of memory': '108', 'duplicate messages received': '109',
+        'carrier recovered': '111', 'modem lost': '112'}),
+    (MASTER_COUNTERS, {
+        'modem lines': 'CTS', 'messages sent': '101', 'messages received': '102',
+        'messages undelivered': '103', 'messages sent again': '104',
+        'last normal scan (100 ms)': '105', 'longest normal scan (100 ms)': '106',
+        'bad messages received': '107', 'duplicate messages received': '109',
+        'last priority scan (100 ms)': '110', 'carrier recovered': '111', 'modem lost': '112',
+        'longest priority scan (100 ms)': '113'}),
+    (SLAVE_COUNTERS, {
+        'modem lines': 'CTS', 'messages sent': '101', 'messages received': '102',
+        'messages undelivered': '103', 'messages sent again': '104', 'polls received': '106',
+        'bad messages received': '107', 'messages refused for lack of memory': '108',
+        'duplicate messages received': '109', 'carrier recovered': '111', 'modem lost': '112'}),
+    (ML1000_COUNTERS, {
+        'messages sent': '101', 'messages received': '102', 'messages undelivered': '103',
+        'ENQ sent': '104', 'NAK received': '105', 'ENQ received': '106',
+        'bad messages received': '107', 'messages refused for lack of memory': '108',
+        'duplicate messages received': '109', 'framing errors': '110'}),
+    (COUNTERS, {
+        'modem lines': 'CTS', 'messages sent': '101', 'messages received': '102',
+        'messages undelivered': '103', 'ENQ sent, or messages sent again': '104',
+        'NAK received': '105', 'ENQ received': '106', 'bad messages received': '107',
+        'NAK sent': '108', 'duplicate messages received': '109', 'receive errors': '110',
+        'carrier recovered': '111', 'modem lost': '112'})])
+def test_words_have_the_names_of_their_layout(
+        layout: CounterLayout, expected: dict[str, str]) -> None:
+    block = (1).to_bytes(2, 'little') + words(len(layout))[2:]
+    assert decode_counters(block, layout) == expected
+
+
+def test_modem_lines_that_are_on_are_named() -> None:
+    assert decode_counters(b'\x1F\0', COUNTERS) == {'modem lines': 'CTS RTS DSR DCD DTR'}
+    assert decode_counters(b'\0\0', COUNTERS) == {'modem lines': 'none on'}
+    for bit, name in enumerate(('CTS', 'RTS', 'DSR', 'DCD', 'DTR')):
+        assert decode_counters(bytes((1 << bit, 0)), COUNTERS) == {'modem lines': name}
+
+
+@pytest.mark.parametrize('data', [b'', b'\0', bytes(25)])
+def test_half_a_word_is_no_counter(data: bytes) -> None:
+    with pytest.raises(FormatError):
+        decode_counters(data, SLAVE_COUNTERS)
+
+
+@given(data=st.binary(max_size=60), layout=st.sampled_from([None, *LAYOUTS]))
+def test_any_bytes_are_counters_or_a_format_error(data: bytes,
+                                                  layout: CounterLayout | None) -> None:
+    try:
+        counters = decode_counters(data, layout)
+    except FormatError:
+        assert not data or layout is not None and len(data) % 2
+        return
+    assert counters or layout is ML1000_COUNTERS  # whose first word has no name
+    assert all(name and value for name, value in counters.items())
+
+
+@pytest.mark.parametrize(('layout', 'expected'), [
+    (COUNTERS, {'ENQ sent, or messages sent again': '11', 'NAK received': '16',
+                'ENQ received': '14', 'NAK sent': '12'}),
+    (FULL_DUPLEX_COUNTERS, {'ENQ sent': '5', 'NAK received': '16', 'ENQ received': '14',
+                            'messages refused for lack of memory': '15'}),
+    (MASTER_COUNTERS, {'messages sent again': '6'}),
+    (SLAVE_COUNTERS, {'messages sent again': '6', 'polls received': '8',
+                      'messages refused for lack of memory': '15'}),
+    (ML1000_COUNTERS, {'ENQ sent': '5', 'NAK received': '16', 'ENQ received': '14',
+                       'messages refused for lack of memory': '15'})])
+def test_own_counters_under_the_names_of_the_layout(
+        layout: CounterLayout, expected: dict[str, str]) -> None:
+    counters = Counters(
+        messages_sent=1, messages_received=2, nak_limit_exceeded=3, enq_limit_exceeded=4,
+        enq_retries=5, nak_retries=6, naks_received=16, polls_received=8, bcc_errors=9,
+        crc_errors=10, invalid_messages=11, naks_sent=12, duplicate_messages=13,
+        enqs_received=14, refused_for_memory=15)
+    shown = decode_counters(ServedCounters(counters, layout).encode(), layout)
+    assert {name: count for name, count in shown.items() if count not in ('0', 'none on')} == {
+        'messages sent': '1', 'messages received': '2', 'messages undelivered': '7',
+        'bad messages received': '30', 'duplicate messages received': '13'} | expected
+
+
+def test_own_counters_begin_again_behind_16_bits() -> None:
+    counters = Counters(messages_sent=0x1_0003)
+    served = ServedCounters(counters, COUNTERS)
+    assert decode_counters(served.encode(), COUNTERS)['messages sent'] == '3'
+    served.reset()
+    counters.messages_sent += 0x1_0001
+    assert decode_counters(served.encode(), COUNTERS)['messages sent'] == '1'
+
+
+@pytest.mark.parametrize(('plc_type', 'mode', 'size', 'expected'), [
+    (PlcType.PLC5, 'Master', 26, 3), (PlcType.SLC, 'Peer', 26, 1), (PlcType.SLC, 'Slave', 26, 2),
+    (PlcType.SLC, 'Master', 28, 2), (PlcType.SLC, 'Radio', 20, 0)])
+def test_block_by_family_and_mode(plc_type: PlcType, mode: str, size: int, expected: int) -> None:
+    served = served_counters(Counters(enq_retries=1, nak_retries=2), plc_type, mode)
+    assert served is not None
+    block = served.encode()
+    assert len(block) == size
+    assert block[8:10] == bytes((expected, 0))
+
+
+def test_words_of_a_radio_modem_port_are_where_its_channel_status_has_them() -> None:
+    counters = Counters(messages_sent=10, messages_received=11, unsent_messages=12, bcc_errors=16,
+                        refused_for_memory=17, duplicate_messages=18, nak_retries=1,
+                        nak_limit_exceeded=1)
+    served = served_counters(counters, PlcType.SLC, 'Radio')
+    assert served is not None
+    status = struct.unpack('<10H', served.encode())  # from CSx:9 on
+    assert status == (0, 10, 11, 12, 0, 0, 0, 16, 17, 18)

@@ -12,15 +12,16 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Numbers of PCCC and the reader of fields."""
+"""Numbers of PCCC, the reader of fields, and the type/data parameter of typed commands."""
 
 from collections.abc import Callable
-
 from abdf1_ros.errors import FormatError
 from abdf1_ros.pccc.fields import number, Reader
 from hypothesis import given
 from hypothesis import strategies as st
 import pytest
+from abdf1_ros.pccc.typed_data import TypedData
+from support.cases import for_all
 
 
 @pytest.mark.parametrize(('value', 'encoded'), [
@@ -61,3 +62,61 @@ def test_end_names_what_is_too_much() -> None:
     reader.byte()
     with pytest.raises(FormatError, match='^2 bytes too many'):
         reader.end()
+
+
+@pytest.mark.parametrize(('type_id', 'size', 'data', 'encoded'), [
+    (4, 2, 'D2 04', '93 09 42 D2 04'),
+    (4, 2, '01 00 02 00', '95 09 42 01 00 02 00'),
+    (4, 2, '00 00 FE FF FF 00', '97 09 42 00 00 FE FF FF 00'),
+    (4, 2, '01 00 02 00 03 00 04 00', '99 09 09 42 01 00 02 00 03 00 04 00'),
+    (8, 4, '00 00 2A 42', '96 09 94 08 00 00 2A 42'),
+    (8, 4, '00 00 7A 44 00 00 C0 BF', '99 09 0A 94 08 00 00 7A 44 00 00 C0 BF'),
+    (5, 10, '00 C2 0A 00 09 00 00 00 00 00',
+     '99 09 0C 59 0A 00 C2 0A 00 09 00 00 00 00 00'),
+    (6, 6, '01 02 03 04 05 06', '97 09 66 01 02 03 04 05 06'),
+    (7, 6, '01 02 03 04 05 06', '97 09 76 01 02 03 04 05 06'),
+])
+def test_encode_and_decode(type_id: int, size: int, data: str, encoded: str) -> None:
+    values = TypedData(type_id, size, bytes.fromhex(data))
+    assert values.encode() == bytes.fromhex(encoded)
+    assert TypedData.decode(bytes.fromhex(encoded)) == values
+
+
+def test_long_array_has_a_two_byte_size() -> None:
+    values = TypedData(4, 2, bytes(300))
+    assert values.encode()[:5] == bytes.fromhex('9A 09 2D 01 42')
+    assert TypedData.decode(values.encode()) == values
+    assert values.count == 150
+
+
+def test_padding_behind_an_array_is_passed_over() -> None:
+    assert TypedData.decode(bytes.fromhex('93 09 42 D2 04 00 00')) == TypedData(4, 2, b'\xD2\x04')
+
+
+@for_all('encoded', [
+    '', '93', '93 09', '93 09 42 D2', '99 09', '99 09 05 42 D2 04', '9A 09 03', '42 D2',
+    '42 D2 04 00', '40 D2', '90 09 42', '94 09 42 D2 04 00', '91 09 40', '9F 09 01', 'FF',
+    '93 09 40 D2 04', '93 09 42 D2 04 00 01', '93 09 42 D2 04 FF'])
+def test_what_does_not_add_up_is_a_format_error(encoded: str) -> None:
+    with pytest.raises(FormatError):
+        TypedData.decode(bytes.fromhex(encoded))
+
+
+@given(st.integers(1, 0x20).filter(lambda value: value != 9), st.integers(1, 300),
+       st.integers(0, 5))
+def test_any_elements_are_read_back(type_id: int, size: int, count: int) -> None:
+    values = TypedData(type_id, size, bytes(size * count))
+    assert TypedData.decode(values.encode()) == values
+    assert values.count == count
+
+
+@given(st.one_of(st.binary(max_size=40), st.builds(
+    bytes.__add__, st.sampled_from([b'\x99\x09', b'\x9A\x09', b'\x93\x09', b'\x42']),
+    st.binary(max_size=20))))
+def test_any_bytes_are_elements_or_a_format_error(parameter: bytes) -> None:
+    try:
+        values = TypedData.decode(parameter)
+    except FormatError:
+        return
+    assert values.element_size > 0
+    assert values.count * values.element_size == len(values.data)

@@ -12,13 +12,25 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""A mapping as the rest of the program sees it."""
+"""A mapping as the rest of the program sees it, its columns, and names for ROS."""
 
 from dataclasses import replace
-
 from abdf1_ros.settings.columns import COLUMNS
 import pytest
 from support.mappings import make_mapping, one
+from enum import Enum
+import re
+from abdf1_ros.pccc.access import Access
+from abdf1_ros.pccc.families import FAMILIES
+from abdf1_ros.pccc.file_types import PlcType
+from abdf1_ros.pccc.processor import Processor, USUAL
+from abdf1_ros.pccc.values import ValueType, WordOrder
+from abdf1_ros.settings.columns import COLUMNS, MAP_COLUMNS
+from abdf1_ros.settings.mapping import Command, Publish
+from abdf1_ros.settings.names import MAX_LENGTH, sanitise
+from hypothesis import given
+from hypothesis import strategies as st
+from support.cases import for_all
 
 
 @pytest.mark.parametrize('cells, scale, offset', [
@@ -60,3 +72,89 @@ def test_function_file_of_a_micrologix_is_no_file_of_that_number() -> None:
     assert function.address.file == binary.address.file
     assert not binary.shares_words(function) and not function.shares_words(binary)
     assert function.shares_words(make_mapping('STI:0.PFN', 'Write', plc='SLC'))
+
+
+BY_NAME = {column.name: column for column in MAP_COLUMNS}
+
+
+def test_columns_are_those_of_the_interface() -> None:
+    assert COLUMNS == ('Tag', 'Command', 'Address', 'Station', 'PLC_Type', 'Length', 'Type',
+                       'Topic', 'Period', 'Publish', 'Min', 'Max', 'Word_Order', 'Scale',
+                       'Offset', 'Access', 'Processor', 'Fallback', 'Fallback_After',
+                       'Requires', 'Requires_Timeout', 'Publish_While', 'Heartbeat_Timeout',
+                       'Confirms', 'Via', 'Description')
+
+
+def test_every_column_is_there_once_and_described() -> None:
+    assert len(BY_NAME) == len(MAP_COLUMNS)
+    assert [name for name, column in BY_NAME.items() if not column.description] == []
+
+
+@pytest.mark.parametrize(('name', 'choices'), [
+    ('Command', Command), ('Publish', Publish), ('Type', ValueType), ('Word_Order', WordOrder),
+    ('PLC_Type', FAMILIES), ('Access', Access), ('Processor', Processor)])
+def test_every_choice_is_named(name: str, choices: type[Enum]) -> None:
+    words = set(re.findall(r'[\w/]+', BY_NAME[name].description))
+    named = {choice.value for choice in choices}
+    assert named <= words
+
+
+@pytest.mark.parametrize('plc_type', [PlcType.PLC2, PlcType.PLC5, PlcType.SLC])
+def test_accesses_stand_in_their_order(plc_type: PlcType) -> None:
+    ways = ', '.join(way.value for way in FAMILIES[plc_type].accesses)
+    assert f'{plc_type.value}: {ways}' in BY_NAME['Access'].description
+
+
+def test_the_usual_processor_is_the_default() -> None:
+    assert BY_NAME['Processor'].default == USUAL.value
+
+
+# What rcl accepts as a relative name (ROS.md 4.4).
+_LEGAL = re.compile(r'[A-Za-z][A-Za-z0-9_]*(/[A-Za-z][A-Za-z0-9_]*)*')
+
+
+@for_all(('text', 'name'), [
+    ('line_speed', 'line_speed'),
+    ('N7:0', 'N7_0'),
+    ('B3/12', 'B3/t12'),
+    ('7seg', 't7seg'),
+    ('a-b', 'a_b'),
+    ('a b', 'a_b'),
+    ('Tank.Level', 'Tank_Level'),
+    ('Füllstand', 'F_llstand'),
+    ('cell/2/guard', 'cell/t2/guard'),
+    ('a//b', 'a/b'),
+    ('/a/', 'a'),
+    ('a / b', 'a/b'),
+    ('__a__b__', 'a_b'),
+    ('_hidden', 'hidden'),
+    ('~private', 'private'),
+    ('{node}', 'node'),
+    ('a:::b', 'a_b'),
+    ('a/_/b', 'a/b'),
+    ('0', 't0'),
+    ('CamelCase', 'CamelCase'),
+])
+def test_name_of_a_text(text: str, name: str) -> None:
+    assert sanitise(text) == name
+
+
+@pytest.mark.parametrize('text', ['', '_', '__', '/', '///', ':', 'ü', '日本', ' - / - '])
+def test_nothing_is_left_of_text_without_letter_or_digit(text: str) -> None:
+    assert sanitise(text) == ''
+
+
+@given(st.text())
+def test_any_text_becomes_a_legal_name_or_nothing(text: str) -> None:
+    name = sanitise(text)
+    assert name == '' or _LEGAL.fullmatch(name)
+    assert '__' not in name and not name.endswith('_')
+
+
+@given(st.text())
+def test_a_name_stays_as_it_is(text: str) -> None:
+    assert sanitise(sanitise(text)) == sanitise(text)
+
+
+def test_longest_name_fits_with_namespace_and_node_into_what_dds_takes() -> None:
+    assert MAX_LENGTH + len('/write/') < 247

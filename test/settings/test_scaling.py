@@ -12,17 +12,19 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Engineering values: there and back, the rounding, and what cannot be scaled."""
+"""Engineering values: there and back, rounding, limits, and what cannot be scaled."""
 
 from array import array
 import math
-
 from abdf1_ros.errors import FormatError
 from abdf1_ros.pccc.values import ValueType
 from abdf1_ros.settings.scaling import Scaling
 from hypothesis import assume, given
 from hypothesis import strategies as st
 import pytest
+from abdf1_ros.settings.limits import raw_values
+from support.mappings import make_mapping
+
 
 _WHOLE = (ValueType.INT16, ValueType.UINT16, ValueType.BCD16)
 _SCALES = st.floats(allow_nan=False, allow_infinity=False) | st.floats(0.001, 1000.0)
@@ -146,3 +148,20 @@ def test_values_that_can_be_scaled(kind: ValueType, scaling: Scaling) -> None:
 
 def test_what_a_float32_cannot_hold_is_published_as_infinite() -> None:
     assert Scaling(2.0).publish([3e38, math.inf, 1.0]) == array('f', [math.inf, math.inf, 2.0])
+
+
+def test_limit_of_floats_is_as_near_as_a_float32_can_come_to_it() -> None:
+    mapping = make_mapping('F8:0', 'Write', minimum=-0.1, maximum=0.1)
+    (tenth,) = array('f', [0.1])
+    assert tenth > 0.1
+    assert raw_values(mapping, [tenth]) == [tenth]
+    assert raw_values(mapping, [-tenth]) == [-tenth]
+    with pytest.raises(FormatError, match=r'value 0.1001 at index 0 is outside Min -0.1, Max 0.1'):
+        raw_values(mapping, [0.1001])
+
+
+def test_limit_of_long_words_is_not_that_of_a_float32() -> None:
+    mapping = make_mapping('L10:0', 'Write', plc='SLC', maximum=16_777_217)
+    assert raw_values(mapping, [16_777_217]) == [16_777_217]
+    with pytest.raises(FormatError, match='outside Min -inf, Max 16777217'):
+        raw_values(mapping, [16_777_218])

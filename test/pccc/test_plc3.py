@@ -12,10 +12,9 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Addresses of a PLC-3."""
+"""A PLC-3: its addresses, as text and on the line, and what an emulated one answers."""
 
 from dataclasses import replace
-
 from abdf1_ros.pccc.address import Address, AddressRangeError, AddressSyntaxError
 from abdf1_ros.pccc.families import parse_address
 from abdf1_ros.pccc.file_types import FileType, PlcType
@@ -23,6 +22,12 @@ from abdf1_ros.pccc.plc3.address import ADDRESSING, SECTIONS
 from hypothesis import given
 from hypothesis import strategies as st
 import pytest
+from abdf1_ros.errors import FormatError
+from abdf1_ros.pccc.fields import Reader
+from abdf1_ros.pccc.plc3.commands import ExtendedAddress
+from abdf1_ros.pccc.file_types import PlcType
+from support.tables import ask, counting, table, words_at
+
 
 PLC3 = PlcType.PLC3
 
@@ -91,3 +96,79 @@ def test_out_of_range(text: str, right: str) -> None:
     with pytest.raises(AddressRangeError) as fault:
         parse_address(text, PLC3)
     assert right in str(fault.value)
+
+
+levels = st.integers(0, 0xFFFF)
+
+
+@pytest.mark.parametrize(('address', 'encoded'), [
+    (ExtendedAddress(8, 10), '2C 08 0A 00'), (ExtendedAddress(8, 260), '2C 08 FF 04 01 00'),
+    (ExtendedAddress(3, 0, 9, 2), '3C 03 00 09 02'), (ExtendedAddress(5, 7, 0, 255),
+                                                      '2C 05 07 FF FF 00')])
+def test_extended_address_is_encoded_and_read_back(address: ExtendedAddress, encoded: str) -> None:
+    assert address.encode() == bytes.fromhex(encoded)
+    assert ExtendedAddress.read(Reader(bytes.fromhex(encoded))) == address
+
+
+@given(st.builds(ExtendedAddress, levels, levels, levels, levels))
+def test_every_address_is_read_back(address: ExtendedAddress) -> None:
+    reader = Reader(address.encode())
+    assert ExtendedAddress.read(reader) == address
+    assert reader.is_empty
+
+
+@pytest.mark.parametrize('encoded', [
+    '', '00 41 42 00', '6C 08 0A 00', 'AC 08 0A 00', '2C 08 0A', '2D 02 08 0A 00',
+    '2E 02 08 0A 00'])
+def test_what_is_no_place_in_the_data_table(encoded: str) -> None:
+    with pytest.raises(FormatError):
+        ExtendedAddress.read(Reader(bytes.fromhex(encoded)))
+
+
+PLC3 = PlcType.PLC3
+
+
+def test_file_read_begins_at_the_first_word() -> None:
+    assert ask(table(PLC3, B10_0=counting(4)), '04 00 00 01 00 2C 08 0A 01 02') == (0xF0, '06')
+
+
+def test_files_are_numbered_in_each_section() -> None:
+    memory = table(PLC3, B10_0='01 00', N10_0='02 00', O_0='03 00', I_0='04 00')
+    assert [ask(memory, f'01 00 00 01 00 0C {section} 02') for section in (
+        '08 0A', '05 0A', '01 00', '02 00')] == [
+        (0, '01 00'), (0, '02 00'), (0, '03 00'), (0, '04 00')]
+
+
+def test_timer_is_three_words_of_a_structure() -> None:
+    memory = table(PLC3, **{'T_2_CTL': '00 E0 64 00 2A 00'})
+    assert ask(memory, '01 00 00 03 00 3C 03 00 02 00 06') == (0, '00 E0 64 00 2A 00')
+    assert ask(memory, '01 00 00 01 00 3C 03 00 02 02 02') == (0, '2A 00')
+    assert ask(memory, '00 00 00 01 00 3C 03 00 02 01 77 00') == (0, '')
+    assert words_at(memory, 'T:2.PRE') == '77 00'
+
+
+@pytest.mark.parametrize(('data', 'ext_sts'), [
+    ('01 00 00 01 00 2C 10 0A 00 02', '01'), ('01 00 00 01 00 04 08 02', '02'),
+    ('01 00 00 01 00 6C 08 0A 00 00 02', '03'), ('01 00 00 01 00 00 41 42 00 02', '04'),
+    ('01 00 00 01 00 00 00 02', '05'), ('01 00 00 01 00 00 414243444546474849 00 02', '05'),
+    ('01 00 00 01 00 2C 08 0B 00 02', '06'), ('01 00 00 01 00 2C 08 0A 04 02', '06'),
+    ('01 00 00 01 00 2C 06 0A 00 02', '06'), ('01 00 00 01 00 2D 02 08 0A 00 02', '06'),
+    ('02 2C 08 0A 04 01 00 00 00', '06'), ('00 00 00 02 00 2C 08 0A 03 01 00 02 00', '07'),
+    ('00 00 00 01 00 2C 08 0A 04 01 00', '06'), ('01 00 00 05 00 2C 08 0A 00 02', '09')])
+def test_addresses_that_lead_nowhere(data: str, ext_sts: str) -> None:
+    """The codes of M 8-8 (writes), 8-9 (reads) and 8-10 (bit write)."""
+    memory = table(PLC3, B10_0=counting(4))
+    assert ask(memory, data) == (0xF0, ext_sts)
+    assert words_at(memory, 'B10:0', 4) == '00 00 01 00 02 00 03 00'
+
+
+@pytest.mark.parametrize('data', [
+    '01 00 00 01 00 2C 08 0A 00 00', '01 00 00 01 00 2C 08 0A 00 01',
+    '01 00 00 01 00 2C 08 0A 00 04', '01 01 00 01 00 2C 08 0A 00 02',
+    '01 00 00 00 00 2C 08 0A 00 02', '00 00 00 01 00 2C 08 0A 00',
+    '02 2C 08 0A 00 01 00 01 00', '68 00 00 01 00 07 00 07 00 01 00',
+    '26 2C 08 0A 00 FF FF 01 00', '03 00 00 01 00 0C 08 0A 01 00'])
+def test_what_is_malformed_or_unknown(data: str) -> None:
+    memory = table(PLC3, B10_0=counting(4))
+    assert ask(memory, data) == (0x10, '')
+    assert words_at(memory, 'B10:0', 4) == '00 00 01 00 02 00 03 00'

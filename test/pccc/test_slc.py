@@ -1,0 +1,304 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""An SLC or MicroLogix: commands, byte for byte, requests, files, and an emulated one."""
+
+from collections.abc import Callable
+from functools import partial
+from abdf1_ros.errors import FormatError
+from abdf1_ros.pccc.fields import Reader
+from abdf1_ros.pccc.slc.commands import (
+    LogicalAddress,
+    LogicalRead,
+    LogicalWrite,
+    MaskedWrite,
+    MAX_READ,
+    MAX_WRITE,
+)
+import pytest
+from support.cases import for_all
+from support.vectors import commands, Vector
+from abdf1_ros.pccc.access import Access
+from abdf1_ros.pccc.address import Address
+from abdf1_ros.pccc.data_table import DataTable
+from abdf1_ros.pccc.families import parse_address
+from abdf1_ros.pccc.file_types import FileType, PlcType
+from abdf1_ros.pccc.processor import Processor
+from abdf1_ros.pccc.slc import commands as slc
+from abdf1_ros.pccc.slc.dialect import SlcDialect
+from support.tables import replied
+from abdf1_ros.df1.packet import Packet
+from abdf1_ros.errors import FormatError, RemoteError
+from abdf1_ros.pccc.dialect import Steps
+from abdf1_ros.pccc.file_search import DataFile
+from abdf1_ros.pccc.file_types import PlcType
+from abdf1_ros.pccc.server import Server
+from abdf1_ros.pccc.slc.file_search import SlcFileSearch
+from hypothesis import given
+from hypothesis import strategies as st
+from support.processors import ML1400
+from support.tables import ask, counting, table, words_at
+
+
+Command = LogicalRead | LogicalWrite | MaskedWrite
+
+READERS: dict[int, Callable[[Reader], Command]] = {
+    0xA1: partial(LogicalRead.read, is_short=True), 0xA2: LogicalRead.read,
+    0xA9: partial(LogicalWrite.read, is_short=True), 0xAA: LogicalWrite.read,
+    0xAB: MaskedWrite.read}
+
+
+@pytest.mark.parametrize(('command', 'encoded'), [
+    (LogicalRead(LogicalAddress(7, 0x89, 0, 0), 20), 'A2 14 07 89 00 00'),
+    (LogicalRead(LogicalAddress(10, 0x89, 300, 0), 2), 'A2 02 0A 89 FF 2C 01 00'),
+    (LogicalRead(LogicalAddress(255, 0x89, 254, 255), 255), 'A2 FF FF FF 00 89 FE FF FF 00'),
+    (LogicalRead(LogicalAddress(7, 0x89, 1, None), 2), 'A1 02 07 89 01'),
+    (LogicalWrite(LogicalAddress(7, 0x89, 300, None), b'\x09\x00'),
+     'A9 02 07 89 FF 2C 01 09 00'),
+    (LogicalWrite(LogicalAddress(4, 0x86, 0, 1), b'\x2C\x01'), 'AA 02 04 86 00 01 2C 01'),
+    (MaskedWrite(LogicalAddress(3, 0x85, 4, 0), 0x0108, b'\x00\x01'),
+     'AB 02 03 85 04 00 08 01 00 01'),
+])
+def test_encode_and_read(command: Command, encoded: str) -> None:
+    data = bytes.fromhex(encoded)
+    assert command.encode() == data
+    reader = Reader(data[1:])
+    assert READERS[data[0]](reader) == command
+    assert reader.is_empty
+
+
+@for_all('entry', commands(*READERS))
+def test_command_of_every_vector(entry: Vector) -> None:
+    data = entry.packet.data
+    reader = Reader(data[1:])
+    command = READERS[data[0]](reader)
+    assert reader.is_empty
+    assert command.encode() == data
+
+
+@pytest.mark.parametrize(('fnc', 'encoded'), [
+    (0xA1, '02 07 89'), (0xA1, '02 07 89 00 01'), (0xA9, '02 07 89 00 01'),
+    (0xA9, '02 07 89 00 01 02 03'), (0xA2, ''), (0xA2, '02 07 89 00'),
+    (0xA2, '02 07 89 00 00 01'), (0xA2, '02 07 89 FF 2C'),
+    (0xAA, '02 07 89 00 00'), (0xAA, '02 07 89 00 00 01'), (0xAA, '02 07 89 00 00 01 02 03'),
+    (0xAB, '02 07 89 00 00 08 00 08'), (0xAB, '04 07 89 00 00 08 00 08 00'),
+    (0xAB, '02 07 89 00 00 08')])
+def test_sizes_that_do_not_add_up(fnc: int, encoded: str) -> None:
+    with pytest.raises(FormatError):
+        READERS[fnc](Reader(bytes.fromhex(encoded)))
+
+
+@pytest.mark.parametrize(('fnc', 'encoded'), [
+    (0xA2, '02 07 89 00 00'), (0xAA, '02 07 89 00 00 01 02'),
+    (0xAB, '02 07 89 00 00 08 00 08 00')])
+def test_padding_behind_the_declared_size_is_passed_over(fnc: int, encoded: str) -> None:
+    padded = READERS[fnc](Reader(bytes.fromhex(encoded + ' 00 00')))
+    assert padded == READERS[fnc](Reader(bytes.fromhex(encoded)))
+
+
+def test_limits_of_the_manual() -> None:
+    assert (MAX_READ, MAX_WRITE) == (236, 234)
+
+
+SLC = PlcType.SLC
+DIALECT = SlcDialect()
+
+
+def at(text: str) -> Address:
+    """Return an address."""
+    return parse_address(text, SLC)
+
+
+@pytest.mark.parametrize(('letters', 'read', 'write'), [
+    ('N', 118, 117), ('B', 118, 117), ('F', 118, 116), ('T', 117, 117), ('C', 117, 117),
+    ('ST', 84, 84), ('PD', 115, 115), ('MG', 100, 100)])
+def test_limits_are_whole_elements(letters: str, read: int, write: int) -> None:
+    kind = FileType(letters)
+    assert (DIALECT.max_read(kind), DIALECT.max_write(kind)) == (read, write)
+
+
+@pytest.mark.parametrize('text', [
+    'N7:0', 'F8:0', 'T4:0', 'C5:0', 'ST9:0', 'L10:0', 'I:1.0', 'S:1', 'PD9:0', 'MG9:0'])
+def test_largest_transfers_of_an_slc(text: str) -> None:
+    address, dialect = at(text), DIALECT
+    table = DataTable(SLC)
+    table.create(address, 200)
+    words = dialect.max_write(address.file_type)
+    data = bytes(range(1, 250))[:2 * words]
+    assert replied(table, *dialect.write(address, data)) == b''
+    assert table.read(address, words) == data
+    words = dialect.max_read(address.file_type)
+    reply = replied(table, *dialect.read(address, words))
+    assert len(reply) == dialect.reply_size(address, words) == 2 * words <= slc.MAX_READ
+    assert dialect.read_data(address, words, reply)[:len(data)] == data[:2 * words]
+
+
+@pytest.mark.parametrize(('name', 'read', 'write'), [
+    ('5/01', 82, 82), ('5/02', 82, 82), ('ML1000', 82, 82), ('5/03', 236, 234),
+    ('5/04', 236, 234), ('5/05', 236, 234), ('ML1100', 206, 206), ('ML1200', 206, 206),
+    ('ML1400', 206, 206), ('ML1500', 206, 206)])
+def test_packets_are_as_long_as_the_processor_takes_them(name: str, read: int, write: int) -> None:
+    dialect = SlcDialect(Processor(name))
+    assert 2 * dialect.max_read(FileType.INTEGER) == read
+    assert 2 * dialect.max_write(FileType.INTEGER) == write
+    assert dialect.max_read(FileType.TIMER) == read // 6 * 3
+    assert dialect.max_write(FileType.PID) == write // 46 * 23
+
+
+def test_flat_io_of_the_whole_image() -> None:
+    address = parse_address('I:300', SLC, Access.FLAT)
+    assert DIALECT.read(address, 2) == (0x0F, bytes.fromhex('A2 04 01 83 FF 2C 01 00'))
+    assert DIALECT.write(address, b'\1\2') == (
+        0x0F, bytes.fromhex('AA 02 01 83 FF 2C 01 00 01 02'))
+    assert DIALECT.write_bits(address, 0x0008, 0x0008) == (
+        0x0F, bytes.fromhex('AB 02 01 83 FF 2C 01 00 08 00 08 00'))
+
+
+ALL_SLC = ('O:2.0', 2), ('I:1.0', 1), ('I:3.0', 4), ('S:0', 33), ('N7:0', 90), ('ST20:0', 84)
+
+
+def steps_of(processor: Processor) -> Steps[list[DataFile]]:
+    steps = SlcFileSearch().directory(processor)
+    assert steps is not None
+    return steps
+
+
+def carried_out(steps: Steps[list[DataFile]], replies: dict[bytes, Packet]) -> list[DataFile]:
+    """Answer each command with what was recorded for it."""
+    asked = 0
+    request = next(steps)
+    while True:
+        asked += 1
+        assert asked <= 10
+        try:
+            request = steps.send(replies[request[1]])
+        except StopIteration as done:
+            files: list[DataFile] = done.value
+            return files
+
+
+def served(steps: Steps[list[DataFile]], server: Server) -> list[DataFile]:
+    request = next(steps)
+    while True:
+        try:
+            request = steps.send(server.serve(Packet(1, 0, request[0], 0, 7, request[1])))
+        except StopIteration as done:
+            files: list[DataFile] = done.value
+            return files
+
+
+def test_files_of_a_recorded_micrologix_1400() -> None:
+    replies = {exchange.command.data: exchange.reply for exchange in ML1400}
+    files = carried_out(steps_of(Processor.ML1400), replies)
+    assert {str(entry): entry.elements for entry in files} == {
+        'O0': 6, 'I1': 8, 'S2': 66, 'B3': 1, 'T4': 1, 'C5': 1, 'R6': 1, 'N7': 1, 'F8': 1,
+        'HSC': 6, 'PTO': 3, 'PWM': 3, 'STI': 1, 'EII': 8}
+
+
+def test_files_of_an_emulated_slc() -> None:
+    table = DataTable(PlcType.SLC)
+    for text, words in ALL_SLC:
+        table.create(parse_address(text, PlcType.SLC), words)
+    files = served(steps_of(Processor.SLC_5_03), Server(table))
+    assert {str(entry): entry.elements for entry in files} == {
+        'O0': 2, 'I1': 5, 'S2': 33, 'N7': 90, 'ST20': 2}
+
+
+@pytest.mark.parametrize('processor', [None, *(
+    Processor(name) for name in ('5/01', '5/02', 'ML1000'))])
+def test_processors_without_a_known_directory(processor: Processor | None) -> None:
+    assert SlcFileSearch().directory(processor) is None
+
+
+@given(st.sampled_from([Processor.ML1400, Processor.SLC_5_05, Processor.ML1100]),
+       st.lists(st.binary(max_size=90), min_size=1, max_size=8))
+def test_strange_replies_are_files_or_a_format_error(processor: Processor,
+                                                     parts: list[bytes]) -> None:
+    steps = steps_of(processor)
+    request = next(steps)
+    for data in parts:
+        size = request[1][1]
+        try:
+            request = steps.send(Packet(0, 1, 0x4F, 0, 7, data.ljust(size, b'\3')[:size]))
+        except FormatError:
+            return
+        except StopIteration as done:
+            assert all(isinstance(entry, DataFile) for entry in done.value)
+            return
+
+
+def test_refused_directory_is_a_remote_error() -> None:
+    steps = steps_of(Processor.ML1200)
+    next(steps)
+    with pytest.raises(RemoteError):
+        steps.send(Packet(0, 1, 0x4F, 0x10, 7, b''))
+
+
+SLC = PlcType.SLC
+
+
+@for_all(('data', 'sts'), [
+    ('A2 02 09 89 00 00', 0x10), ('A2 02 07 85 00 00', 0x10), ('A2 02 07 7F 00 00', 0x10),
+    ('A2 02 07 89 04 00', 0x50), ('A2 0A 07 89 00 00', 0x50), ('A2 00 07 89 00 00', 0x10),
+    ('A2 03 07 89 00 00', 0x10), ('A2 EE 07 89 00 00', 0x10), ('AA 00 07 89 00 00', 0x10),
+    ('AA 01 07 89 00 00 01', 0x10), ('AA 04 07 89 03 00 01 00 02 00', 0x50),
+    ('AA EC 07 89 00 00' + ' 00' * 236, 0x10), ('AB 00 07 89 00 00 FF FF', 0x10),
+    ('AB 04 07 89 03 00 FF FF 01 00 02 00', 0x50), ('AB 02 09 89 00 00 FF FF 01 00', 0x10),
+    ('A1 02 09 89 00', 0x10), ('A1 02 07 89 04', 0x50), ('A1 02 07 89 00 01', 0x10),
+    ('A9 02 07 89 04 01 00', 0x50), ('A9 04 07 89 03 01 00 02 00', 0x50),
+    ('A2 02 00 82 00 00', 0x50), ('A2 02 01 82 00 00', 0x10), ('A2 02 07 83 00 00', 0x10)])
+def test_command_that_an_slc_refuses_changes_nothing(data: str, sts: int) -> None:
+    words = table(SLC, N7_0='00 00' * 4)
+    assert ask(words, data) == (sts, '')
+    assert words_at(words, 'N7:0', 4) == '00 00 ' * 3 + '00 00'
+
+
+def test_commands_of_two_fields_begin_at_the_first_word() -> None:
+    words = table(SLC, T4_0=counting(9))
+    assert ask(words, 'A1 06 04 86 01') == (0, '03 00 04 00 05 00')
+    assert ask(words, 'A9 02 04 86 02 FF 00') == (0, '')
+    assert words_at(words, 'T4:2', 3) == 'FF 00 07 00 08 00'
+
+
+def test_flat_image_is_slot_after_slot() -> None:
+    words = table(SLC, I_3_0='31 00', I_1_0='11 00 12 00', O_2_0='22 00', I_10_0='A1 00')
+    assert ask(words, 'A2 08 01 83 00 00') == (0, '11 00 12 00 31 00 A1 00')
+    assert ask(words, 'A2 02 01 83 02 00') == (0, '31 00')
+    assert ask(words, 'A2 02 01 83 01 01') == (0, '31 00')
+    assert ask(words, 'A1 02 00 82 00') == (0, '22 00')
+    assert ask(words, 'A2 04 01 83 03 00') == (0x50, '')
+
+
+def test_flat_image_is_written_across_slots_or_not_at_all() -> None:
+    words = table(SLC, O_0_0='00 00', O_5_0='00 00')
+    assert ask(words, 'AA 04 00 82 00 00 01 00 02 00') == (0, '')
+    assert (words_at(words, 'O:0'), words_at(words, 'O:5')) == ('01 00', '02 00')
+    assert ask(words, 'AB 04 00 82 00 00 0F 00 FF 00 F0 00') == (0, '')
+    assert (words_at(words, 'O:0'), words_at(words, 'O:5')) == ('0F 00', '00 00')
+    assert ask(words, 'AA 04 00 82 01 00 07 00 07 00') == (0x50, '')
+    assert words_at(words, 'O:5') == '00 00'
+
+
+def test_slc_takes_typed_commands_on_files_that_a_plc5_has_too() -> None:
+    """From operating system 303 on; the codes are those of a PLC-5."""
+    words = table(SLC, N7_0='01 00 02 00', T4_0='00 20 0A 00 05 00', F8_0='00 00 7A 44',
+                  L10_0='01 00 00 00', I_1_0='05 00')
+    assert ask(words, '68 00 00 02 00 06 07 00 02 00') == (0, '95 09 42 01 00 02 00')
+    assert ask(words, '68 00 00 01 00 0E 04 00 02 01 00') == (0, '93 09 42 05 00')
+    assert ask(words, '68 00 00 01 00 06 08 00 01 00') == (0, '96 09 94 08 00 00 7A 44')
+    assert ask(words, '67 00 00 01 00 06 07 01 93 09 42 07 00') == (0, '')
+    assert words_at(words, 'N7:1') == '07 00'
+    for data, ext_sts in (('06 0A 00', '06'), ('06 01 00', '06'), ('06 63 00', '06'),
+                          ('06 07 02', '07')):
+        assert ask(words, f'68 00 00 01 00 {data} 01 00') == (0xF0, ext_sts)
