@@ -17,17 +17,13 @@
 from abdf1_ros.errors import FormatError
 from abdf1_ros.pccc.access import Access
 from abdf1_ros.pccc.address import Address, AddressRangeError, AddressSyntaxError, Area
+from abdf1_ros.pccc.address_advice import advice
 from abdf1_ros.pccc.families import FAMILIES, parse_address
 from abdf1_ros.pccc.file_types import FileType, PlcType
 from hypothesis import given
 from hypothesis import strategies as st
 import pytest
 from support.cases import for_all
-from abdf1_ros.pccc.address import AddressSyntaxError
-from abdf1_ros.pccc.address_advice import advice
-from abdf1_ros.pccc.families import parse_address
-from abdf1_ros.pccc.file_types import PlcType
-
 
 PLC5, SLC = PlcType.PLC5, PlcType.SLC
 BOTH = (PLC5, SLC)

@@ -15,15 +15,15 @@
 """The data table of an emulated PLC, and places that have words in common."""
 
 from collections.abc import Callable
+
 from abdf1_ros.pccc.address import Address
 from abdf1_ros.pccc.data_table import DataTable, NoSuchFile, OutOfRange
+from abdf1_ros.pccc.extent import Extent
 from abdf1_ros.pccc.families import parse_address
 from abdf1_ros.pccc.file_types import FileType, PlcType
-import pytest
-from abdf1_ros.pccc.extent import Extent
 from abdf1_ros.settings.mapping import Mapping
+import pytest
 from support.mappings import make_mapping
-
 
 SLC, PLC5 = PlcType.SLC, PlcType.PLC5
 

@@ -14,54 +14,32 @@
 
 """Diagnostic commands (M 7-6..7-27): status of emulated processors, counters (M 9-6..9-31)."""
 
-from abdf1_ros.errors import FormatError
-from abdf1_ros.pccc import diagnostics
-from abdf1_ros.pccc.diagnostics import ReadCounters
-from abdf1_ros.pccc.families import FAMILIES
-from abdf1_ros.pccc.fields import Reader
-from abdf1_ros.pccc.file_types import PlcType
-from hypothesis import given
-from hypothesis import strategies as st
-import pytest
+import struct
+
 from abdf1_ros.counters import Counters
 from abdf1_ros.df1.packet import Packet
+from abdf1_ros.errors import FormatError
 from abdf1_ros.pccc.data_table import DataTable
 from abdf1_ros.pccc.diagnostics import ReadCounters, STATUS_REQUEST
 from abdf1_ros.pccc.emulated import EmulatedProcessor, Setting
-from abdf1_ros.pccc.families import decode_identity, FAMILIES
+from abdf1_ros.pccc.families import decode_identity, FAMILIES, served_counters
+from abdf1_ros.pccc.fields import Reader
+from abdf1_ros.pccc.file_types import PlcType
 from abdf1_ros.pccc.identity import Mode
-from abdf1_ros.pccc.link_counters import ServedCounters
+from abdf1_ros.pccc.link_counters import CounterLayout, decode_counters, ServedCounters
 from abdf1_ros.pccc.plc5.identity import COUNTERS
 from abdf1_ros.pccc.server import Server
-from abdf1_ros.pccc.slc.identity import SLAVE_COUNTERS
-from support.cases import for_all
-from support.vectors import pair
-import struct
-from abdf1_ros.pccc.families import served_counters
-from abdf1_ros.pccc.link_counters import CounterLayout, decode_counters, ServedCounters
 from abdf1_ros.pccc.slc.identity import (
     FULL_DUPLEX_COUNTERS,
     MASTER_COUNTERS,
     ML1000_COUNTERS,
     SLAVE_COUNTERS,
 )
-
-
-def parameters(data: bytes, fnc: int) -> Reader:
-    """Return a reader after the FNC."""
-    reader = Reader(data)
-    assert reader.byte() == fnc
-    return reader
-
-
-def test_counters_are_asked_for_by_address_and_size() -> None:
-    assert ReadCounters(0x4144, 26).encode() == b'\x01\x44\x41\x1A'
-
-
-@given(address=st.integers(0, 0xFFFF), size=st.integers(0, 255))
-def test_read_counters_is_read_as_it_was_made(address: int, size: int) -> None:
-    request = ReadCounters(address, size)
-    assert ReadCounters.read(parameters(request.encode(), diagnostics.READ_COUNTERS)) == request
+from hypothesis import given
+from hypothesis import strategies as st
+import pytest
+from support.cases import for_all
+from support.vectors import pair
 
 
 @pytest.mark.parametrize('data', [b'', b'\0', b'\0\0', b'\0\0\x1A\x01'])

@@ -15,12 +15,13 @@
 """Numbers of PCCC, the reader of fields, and the type/data parameter of typed commands."""
 
 from collections.abc import Callable
+
 from abdf1_ros.errors import FormatError
 from abdf1_ros.pccc.fields import number, Reader
+from abdf1_ros.pccc.typed_data import TypedData
 from hypothesis import given
 from hypothesis import strategies as st
 import pytest
-from abdf1_ros.pccc.typed_data import TypedData
 from support.cases import for_all
 
 

@@ -14,17 +14,14 @@
 
 """File types, their members, and what processors and families have of them."""
 
-from abdf1_ros.pccc.families import FAMILIES
+from abdf1_ros.pccc import members
+from abdf1_ros.pccc.access import Access
+from abdf1_ros.pccc.families import dialect_of, FAMILIES
 from abdf1_ros.pccc.file_types import FileType, PlcType
+from abdf1_ros.pccc.members import Members
+from abdf1_ros.pccc.processor import Processor, USUAL
 from abdf1_ros.pccc.slc.address import BY_CODE
 import pytest
-from abdf1_ros.pccc import members
-from abdf1_ros.pccc.members import Members
-from abdf1_ros.pccc.families import dialect_of, FAMILIES
-from abdf1_ros.pccc.processor import Processor, USUAL
-from abdf1_ros.pccc.access import Access
-from abdf1_ros.pccc.file_types import PlcType
-
 
 PLC5, SLC = PlcType.PLC5, PlcType.SLC
 FUNCTION = ('HSC', 'PTO', 'PWM', 'STI', 'EII')

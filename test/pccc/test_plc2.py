@@ -14,22 +14,18 @@
 
 """A PLC-2: its addresses, its commands, and what emulated PLCs answer to them."""
 
-from abdf1_ros.pccc.address import AddressRangeError, AddressSyntaxError
-from abdf1_ros.pccc.families import parse_address
-from abdf1_ros.pccc.file_types import PlcType
-import pytest
 from abdf1_ros.errors import FormatError
-from abdf1_ros.pccc.fields import Reader
-from abdf1_ros.pccc.plc2.commands import BasicBitWrite, BasicRead, BasicWrite, ByteChange
-from support.vectors import vector
 from abdf1_ros.pccc.access import Access
-from abdf1_ros.pccc.address import Address
-from abdf1_ros.pccc.file_types import FileType, PlcType
-from abdf1_ros.pccc.plc2.dialect import Plc2Dialect
+from abdf1_ros.pccc.address import Address, AddressRangeError, AddressSyntaxError
 from abdf1_ros.pccc.data_table import DataTable
+from abdf1_ros.pccc.families import parse_address
+from abdf1_ros.pccc.fields import Reader
+from abdf1_ros.pccc.file_types import FileType, PlcType
+from abdf1_ros.pccc.plc2.commands import BasicBitWrite, ByteChange
+from abdf1_ros.pccc.plc2.dialect import Plc2Dialect
+import pytest
 from support.cases import for_all
 from support.tables import ask, counting, table, words_at
-
 
 PLC2 = PlcType.PLC2
 
@@ -58,35 +54,11 @@ def test_out_of_range(text: str, right: str) -> None:
         parse_address(text, PLC2)
 
 
-@pytest.mark.parametrize(('name', 'cmd', 'request_'), [
-    ('516_fd_plc2_read_cmd', 0x01, BasicRead(0x11, 2)),
-    ('plc2_write_unprot_req_fd_crc', 0x08, BasicWrite(0o11 * 2, b'\xFF\xFF')),
-    ('cif_read_word_req_fd_crc', 0x01, BasicRead(9, 2))])
-def test_request_is_the_bytes_of_its_vector_and_back(
-        name: str, cmd: int, request_: BasicRead | BasicWrite) -> None:
-    packet = vector(name).packet
-    assert packet.cmd == cmd
-    assert packet.data == request_.encode()
-    assert type(request_).read(Reader(packet.data)) == request_
-
-
-@pytest.mark.parametrize('data', ['', '20 00', '20 00 01', '20 00 01 00 21', '20 00 03 01'])
-def test_what_is_no_bit_write(data: str) -> None:
-    with pytest.raises(FormatError):
-        BasicBitWrite.read(Reader(bytes.fromhex(data)))
-
-
 def test_more_than_60_bytes_are_no_bit_write() -> None:
     one = ByteChange(0, 1, 0).encode()
     assert len(BasicBitWrite.read(Reader(one * 60)).changes) == 60
     with pytest.raises(FormatError, match='^61 bytes to modify, 60 are allowed$'):
         BasicBitWrite.read(Reader(one * 61))
-
-
-@pytest.mark.parametrize('data', ['', '20', '20 00', '20 00 02 01'])
-def test_what_is_no_read(data: str) -> None:
-    with pytest.raises(FormatError):
-        BasicRead.read(Reader(bytes.fromhex(data)))
 
 
 UNPROTECTED = Plc2Dialect(Access.UNPROTECTED)
@@ -140,8 +112,9 @@ def test_largest_packets_are_served_and_larger_ones_refused() -> None:
 @for_all(('cmd', 'data', 'sts'), [
     (0x01, '00 00 00', 0x10), (0x01, '00 00 03', 0x10), (0x01, '00 00 F6', 0x10),
     (0x01, '01 00 02', 0x10), (0x01, '20 00 02', 0x50), (0x01, '1E 00 04', 0x50),
-    (0x01, '00 00', 0x10), (0x08, '00 00', 0x10), (0x08, '00 00 01', 0x10),
-    (0x08, '1E 00 01 00 02 00', 0x50), (0x08, '00 00' + ' 00' * 246, 0x10),
+    (0x01, '00 00', 0x10), (0x01, '20 00 02 01', 0x10), (0x08, '00 00', 0x10),
+    (0x08, '00 00 01', 0x10), (0x08, '1E 00 01 00 02 00', 0x50),
+    (0x08, '00 00' + ' 00' * 246, 0x10),
     (0x00, '20 00 01 00', 0x50), (0x05, '00 00 01 01', 0x10), (0x05, '', 0x10),
     (0x05, '20 00 01 00', 0x50), (0x05, '00 00 FF 00 20 00 01 00', 0x50),
     (0x02, '00 00 01', 0x10), (0x0F, '01 00 00 01 00 2C 08 0A 00 02', 0x10), (0x03, '', 0x10)])

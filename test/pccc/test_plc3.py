@@ -15,19 +15,17 @@
 """A PLC-3: its addresses, as text and on the line, and what an emulated one answers."""
 
 from dataclasses import replace
+
 from abdf1_ros.pccc.address import Address, AddressRangeError, AddressSyntaxError
 from abdf1_ros.pccc.families import parse_address
+from abdf1_ros.pccc.fields import Reader
 from abdf1_ros.pccc.file_types import FileType, PlcType
 from abdf1_ros.pccc.plc3.address import ADDRESSING, SECTIONS
+from abdf1_ros.pccc.plc3.commands import ExtendedAddress
 from hypothesis import given
 from hypothesis import strategies as st
 import pytest
-from abdf1_ros.errors import FormatError
-from abdf1_ros.pccc.fields import Reader
-from abdf1_ros.pccc.plc3.commands import ExtendedAddress
-from abdf1_ros.pccc.file_types import PlcType
 from support.tables import ask, counting, table, words_at
-
 
 PLC3 = PlcType.PLC3
 
@@ -115,14 +113,6 @@ def test_every_address_is_read_back(address: ExtendedAddress) -> None:
     reader = Reader(address.encode())
     assert ExtendedAddress.read(reader) == address
     assert reader.is_empty
-
-
-@pytest.mark.parametrize('encoded', [
-    '', '00 41 42 00', '6C 08 0A 00', 'AC 08 0A 00', '2C 08 0A', '2D 02 08 0A 00',
-    '2E 02 08 0A 00'])
-def test_what_is_no_place_in_the_data_table(encoded: str) -> None:
-    with pytest.raises(FormatError):
-        ExtendedAddress.read(Reader(bytes.fromhex(encoded)))
 
 
 PLC3 = PlcType.PLC3

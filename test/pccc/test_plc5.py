@@ -16,8 +16,9 @@
 
 from abdf1_ros.errors import FormatError
 from abdf1_ros.pccc.address import Address
+from abdf1_ros.pccc.families import FAMILIES, parse_address
 from abdf1_ros.pccc.fields import Reader
-from abdf1_ros.pccc.file_types import FileType
+from abdf1_ros.pccc.file_types import FileType, PlcType
 from abdf1_ros.pccc.plc5.address import ADDRESSING
 from abdf1_ros.pccc.plc5.commands import (
     BitSet,
@@ -25,23 +26,12 @@ from abdf1_ros.pccc.plc5.commands import (
     ReadModifyWrite,
     SystemAddress,
     TypedRead,
-    TypedWrite,
 )
-import pytest
-from support.cases import for_all
-from support.vectors import commands, Vector, without_area
-from abdf1_ros.pccc.data_table import DataTable
-from abdf1_ros.pccc.families import FAMILIES, parse_address
-from abdf1_ros.pccc.file_types import FileType, PlcType
 from abdf1_ros.pccc.plc5.dialect import Plc5Dialect
 from abdf1_ros.pccc.typed_data import TypedData
-from support.tables import replied
-from abdf1_ros.pccc.file_types import PlcType
+import pytest
+from support.cases import for_all
 from support.tables import ask, counting, table, words_at
-
-
-COMMANDS: dict[int, type[TypedRead | TypedWrite | ReadModifyWrite]] = {
-    0x68: TypedRead, 0x67: TypedWrite, 0x26: ReadModifyWrite}
 
 
 def parameters(data: str | bytes) -> Reader:
@@ -121,18 +111,6 @@ def test_read_modify_write_takes_243_bytes() -> None:
         ReadModifyWrite.read(Reader(body + b'\0' * 3))
 
 
-@pytest.mark.parametrize('entry', commands(*COMMANDS), ids=lambda entry: entry.name)
-def test_command_of_every_vector(entry: Vector) -> None:
-    data = entry.packet.data
-    reader = Reader(data[1:])
-    command = COMMANDS[data[0]].read(reader)
-    assert reader.is_empty
-    # Logical ASCII and the memory area are read, and written as logical binary without it.
-    again = command.encode()
-    assert COMMANDS[data[0]].read(Reader(again[1:])) == command
-    assert again == without_area(data) or b'\0$' in data
-
-
 def test_bytes_behind_a_typed_read_are_a_format_error() -> None:
     with pytest.raises(FormatError, match='too many'):
         TypedRead.read(parameters('00 00 01 00 07 00 07 00 01 00 01'))
@@ -165,35 +143,6 @@ def test_limits_in_elements(letters: str, read: int, written: int) -> None:
     words = FAMILIES[PLC5].layout(kind).words
     assert DIALECT.max_read(kind) == read * words
     assert DIALECT.max_write(kind) == written * words
-
-
-FILES = ['N7:0', 'N900:900', 'B3:0', 'F8:0', 'F900:800', 'T4:0', 'C5:0', 'R6:0', 'ST9:0', 'S:0',
-         'I:000', 'O:000', 'A10:0', 'D11:0', 'PD9:300', 'MG9:300', 'BT999:900', 'SC900:900']
-
-
-@for_all('text', FILES)
-def test_largest_read_of_a_plc5_fits_its_packets(text: str) -> None:
-    address = at(text)
-    words = DIALECT.max_read(address.file_type)
-    assert words % address.layout.words == 0
-    assert DIALECT.reply_size(address, words) <= 240
-    table = DataTable(PLC5)
-    table.create(address, words)
-    reply = replied(table, *DIALECT.read(address, words))
-    assert len(reply) == DIALECT.reply_size(address, words)
-    assert DIALECT.read_data(address, words, reply) == bytes(2 * words)
-
-
-@pytest.mark.parametrize('text', [text for text in FILES if text[0] != 'T'])
-def test_largest_write_to_a_plc5_fits_its_packets(text: str) -> None:
-    address = at(text)
-    data = bytes(range(1, 250))[:2 * DIALECT.max_write(address.file_type)]
-    cmd, command = DIALECT.write(address, data)
-    assert len(command) - 5 <= 240
-    table = DataTable(PLC5)
-    table.create(address, len(data) // 2)
-    assert replied(table, cmd, command) == b''
-    assert table.read(address, len(data) // 2) == data
 
 
 def test_internal_words_of_a_timer_are_left_out() -> None:

@@ -16,8 +16,19 @@
 
 from collections.abc import Callable
 from functools import partial
-from abdf1_ros.errors import FormatError
+
+from abdf1_ros.df1.packet import Packet
+from abdf1_ros.errors import FormatError, RemoteError
+from abdf1_ros.pccc.access import Access
+from abdf1_ros.pccc.address import Address
+from abdf1_ros.pccc.data_table import DataTable
+from abdf1_ros.pccc.dialect import Steps
+from abdf1_ros.pccc.families import parse_address
 from abdf1_ros.pccc.fields import Reader
+from abdf1_ros.pccc.file_search import DataFile
+from abdf1_ros.pccc.file_types import FileType, PlcType
+from abdf1_ros.pccc.processor import Processor
+from abdf1_ros.pccc.server import Server
 from abdf1_ros.pccc.slc.commands import (
     LogicalAddress,
     LogicalRead,
@@ -26,30 +37,14 @@ from abdf1_ros.pccc.slc.commands import (
     MAX_READ,
     MAX_WRITE,
 )
-import pytest
-from support.cases import for_all
-from support.vectors import commands, Vector
-from abdf1_ros.pccc.access import Access
-from abdf1_ros.pccc.address import Address
-from abdf1_ros.pccc.data_table import DataTable
-from abdf1_ros.pccc.families import parse_address
-from abdf1_ros.pccc.file_types import FileType, PlcType
-from abdf1_ros.pccc.processor import Processor
-from abdf1_ros.pccc.slc import commands as slc
 from abdf1_ros.pccc.slc.dialect import SlcDialect
-from support.tables import replied
-from abdf1_ros.df1.packet import Packet
-from abdf1_ros.errors import FormatError, RemoteError
-from abdf1_ros.pccc.dialect import Steps
-from abdf1_ros.pccc.file_search import DataFile
-from abdf1_ros.pccc.file_types import PlcType
-from abdf1_ros.pccc.server import Server
 from abdf1_ros.pccc.slc.file_search import SlcFileSearch
 from hypothesis import given
 from hypothesis import strategies as st
+import pytest
+from support.cases import for_all
 from support.processors import ML1400
 from support.tables import ask, counting, table, words_at
-
 
 Command = LogicalRead | LogicalWrite | MaskedWrite
 
@@ -76,15 +71,6 @@ def test_encode_and_read(command: Command, encoded: str) -> None:
     reader = Reader(data[1:])
     assert READERS[data[0]](reader) == command
     assert reader.is_empty
-
-
-@for_all('entry', commands(*READERS))
-def test_command_of_every_vector(entry: Vector) -> None:
-    data = entry.packet.data
-    reader = Reader(data[1:])
-    command = READERS[data[0]](reader)
-    assert reader.is_empty
-    assert command.encode() == data
 
 
 @pytest.mark.parametrize(('fnc', 'encoded'), [
@@ -126,22 +112,6 @@ def at(text: str) -> Address:
 def test_limits_are_whole_elements(letters: str, read: int, write: int) -> None:
     kind = FileType(letters)
     assert (DIALECT.max_read(kind), DIALECT.max_write(kind)) == (read, write)
-
-
-@pytest.mark.parametrize('text', [
-    'N7:0', 'F8:0', 'T4:0', 'C5:0', 'ST9:0', 'L10:0', 'I:1.0', 'S:1', 'PD9:0', 'MG9:0'])
-def test_largest_transfers_of_an_slc(text: str) -> None:
-    address, dialect = at(text), DIALECT
-    table = DataTable(SLC)
-    table.create(address, 200)
-    words = dialect.max_write(address.file_type)
-    data = bytes(range(1, 250))[:2 * words]
-    assert replied(table, *dialect.write(address, data)) == b''
-    assert table.read(address, words) == data
-    words = dialect.max_read(address.file_type)
-    reply = replied(table, *dialect.read(address, words))
-    assert len(reply) == dialect.reply_size(address, words) == 2 * words <= slc.MAX_READ
-    assert dialect.read_data(address, words, reply)[:len(data)] == data[:2 * words]
 
 
 @pytest.mark.parametrize(('name', 'read', 'write'), [

@@ -17,28 +17,24 @@
 from array import array
 import math
 from typing import Any
+
 from abdf1_ros.errors import FormatError
+from abdf1_ros.pccc.address import Address
 from abdf1_ros.pccc.families import parse_address
 from abdf1_ros.pccc.file_types import PlcType
+from abdf1_ros.pccc.strings import (
+    decode_counted,
+    encode_counted,
+    encode_packed,
+)
+from abdf1_ros.pccc.structures import type_fault, write_fault
 from abdf1_ros.pccc.values import Codec, types_of, ValueType, WordOrder
 from hypothesis import given
 from hypothesis import strategies as st
 import pytest
 from support.cases import for_all
-from abdf1_ros.pccc.strings import (
-    COUNTED_WORDS,
-    decode_counted,
-    decode_packed,
-    encode_counted,
-    encode_packed,
-)
-from abdf1_ros.pccc.address import Address
-from abdf1_ros.pccc.structures import type_fault, write_fault
-from abdf1_ros.pccc.values import ValueType
-
 
 _NUMBERS: dict[ValueType, st.SearchStrategy[Any]] = {
-    ValueType.BOOL: st.integers(0, 1),
     ValueType.INT16: st.integers(-32768, 32767),
     ValueType.UINT16: st.integers(0, 65535),
     ValueType.INT32: st.integers(-2**31, 2**31 - 1),
@@ -46,23 +42,24 @@ _NUMBERS: dict[ValueType, st.SearchStrategy[Any]] = {
     ValueType.FLOAT32: st.floats(width=32, allow_nan=False, allow_infinity=False),
     ValueType.BCD16: st.integers(0, 9999),
 }
-_WORD_TYPES = [kind for kind in _NUMBERS if kind is not ValueType.BOOL]
 
 
-@pytest.mark.parametrize('kind', _WORD_TYPES)
-def test_values_survive_a_round_trip(kind: ValueType) -> None:
-    orders = list(WordOrder) if kind.words == 2 else [WordOrder.LOW]
+_LISTS = st.one_of(*(
+    st.tuples(st.just(kind), st.lists(numbers, min_size=1, max_size=20))
+    for kind, numbers in _NUMBERS.items()))
 
-    @given(st.lists(_NUMBERS[kind], min_size=1, max_size=20), st.sampled_from(orders))
-    def check(values: list[float], order: WordOrder) -> None:
-        codec = Codec(kind, len(values), word_order=order)
-        codec.check(values)
-        words = codec.encode(values)
-        assert len(words) == 2 * codec.words
-        decoded = codec.decode(words)
-        assert decoded == array(kind.array_code, values)
-        assert decoded.typecode == kind.array_code
-    check()
+
+@given(_LISTS, st.sampled_from(WordOrder))
+def test_values_survive_a_round_trip(case: tuple[ValueType, list[float]],
+                                     order: WordOrder) -> None:
+    kind, values = case
+    codec = Codec(kind, len(values), word_order=order if kind.words == 2 else WordOrder.LOW)
+    codec.check(values)
+    words = codec.encode(values)
+    assert len(words) == 2 * codec.words
+    decoded = codec.decode(words)
+    assert decoded == array(kind.array_code, values)
+    assert decoded.typecode == kind.array_code
 
 
 @given(st.lists(st.integers(0, 1), min_size=1, max_size=50), st.integers(0, 15),
@@ -94,27 +91,19 @@ def test_strings_survive_a_round_trip(text: str) -> None:
         assert codec.decode(words) == (text.rstrip('\0') if codec.packed else text)
 
 
-@pytest.mark.parametrize('kind, words, values', [
-    (ValueType.INT16, '01 00 ff ff 00 80', [1, -1, -32768]),
-    (ValueType.UINT16, '01 00 ff ff 34 12', [1, 65535, 0x1234]),
-    (ValueType.BCD16, '34 12 99 99', [1234, 9999]),
-    (ValueType.INT32, '02 00 01 00 ff ff ff ff', [0x10002, -1]),  # low word first
-    (ValueType.UINT32, '02 00 01 00 ff ff ff ff', [0x10002, 2**32 - 1]),
-    (ValueType.FLOAT32, '00 00 c0 3f 00 00 20 c1', [1.5, -10.0]),
-])
-def test_order_of_bytes_and_words(kind: ValueType, words: str, values: list[float]) -> None:
-    codec = Codec(kind, len(values))
-    for decode in codec.decode, codec.decoder():
-        assert decode(bytes.fromhex(words)) == array(kind.array_code, values)
-    assert codec.encode(values) == bytes.fromhex(words)
-
-
-@pytest.mark.parametrize('kind, words, values', [
-    (ValueType.INT32, '01 00 02 00 ff ff fe ff', [0x10002, -2]),
-    (ValueType.UINT32, '01 00 02 00 ff ff fe ff', [0x10002, 2**32 - 2]),
-    (ValueType.FLOAT32, 'c0 3f 00 00 7a 44 00 00', [1.5, 1000.0])])
-def test_high_word_first(kind: ValueType, words: str, values: list[float]) -> None:
-    codec = Codec(kind, len(values), word_order=WordOrder.HIGH)
+@for_all(('kind', 'order', 'words', 'values'), [
+    (ValueType.INT16, 'Low', '01 00 ff ff 00 80', [1, -1, -32768]),
+    (ValueType.UINT16, 'Low', '01 00 ff ff 34 12', [1, 65535, 0x1234]),
+    (ValueType.BCD16, 'Low', '34 12 99 99', [1234, 9999]),
+    (ValueType.INT32, 'Low', '02 00 01 00 ff ff ff ff', [0x10002, -1]),
+    (ValueType.UINT32, 'Low', '02 00 01 00 ff ff ff ff', [0x10002, 2**32 - 1]),
+    (ValueType.FLOAT32, 'Low', '00 00 c0 3f 00 00 20 c1', [1.5, -10.0]),
+    (ValueType.INT32, 'High', '01 00 02 00 ff ff fe ff', [0x10002, -2]),
+    (ValueType.UINT32, 'High', '01 00 02 00 ff ff fe ff', [0x10002, 2**32 - 2]),
+    (ValueType.FLOAT32, 'High', 'c0 3f 00 00 7a 44 00 00', [1.5, 1000.0])])
+def test_order_of_bytes_and_words(kind: ValueType, order: str, words: str,
+                                  values: list[float]) -> None:
+    codec = Codec(kind, len(values), word_order=WordOrder(order))
     for decode in codec.decode, codec.decoder():
         assert decode(bytes.fromhex(words)) == array(kind.array_code, values)
     assert codec.encode(values) == bytes.fromhex(words)
@@ -197,22 +186,6 @@ def test_bits_are_bool_only(text: str) -> None:
 
 
 _TEXTS = st.text(st.characters(max_codepoint=255), max_size=82)
-
-
-@given(_TEXTS)
-def test_counted_strings_survive_a_round_trip(text: str) -> None:
-    words = encode_counted(text)
-    assert len(words) == 2 * COUNTED_WORDS == 84
-    assert decode_counted(words) == text
-
-
-@given(_TEXTS, st.integers(0, 5))
-def test_packed_strings_survive_a_round_trip_but_for_nuls_behind_them(
-        text: str, more: int) -> None:
-    count = (len(text) + 1) // 2 + more
-    words = encode_packed(text, count)
-    assert len(words) == 2 * count
-    assert decode_packed(words) == text.rstrip('\0')
 
 
 @pytest.mark.parametrize('words, text', [

@@ -14,65 +14,18 @@
 
 """Word range commands of PLC-3 and PLC-5: bytes, order of words, requests, and answers."""
 
-from abdf1_ros.errors import FormatError
-from abdf1_ros.pccc.fields import Reader
-from abdf1_ros.pccc.plc3.commands import ExtendedAddress
-from abdf1_ros.pccc.plc5.commands import SystemAddress
-from abdf1_ros.pccc.word_range.commands import (
-    WordBitWrite,
-    WordRangeRead,
-    WordRangeWrite,
-)
-import pytest
-from support.vectors import vector, without_area
 from abdf1_ros.pccc.address import Address
 from abdf1_ros.pccc.families import parse_address
 from abdf1_ros.pccc.file_types import FileType, PlcType
 from abdf1_ros.pccc.plc3.dialect import PLC3
 from abdf1_ros.pccc.plc5.dialect import PLC5_WORD_RANGE
+from abdf1_ros.pccc.word_range.commands import (
+    in_line_order,
+    word_on_line,
+)
 from abdf1_ros.pccc.word_range.dialect import WordRangeDialect
-from abdf1_ros.pccc.file_types import PlcType
-from abdf1_ros.pccc.word_range.commands import in_line_order, word_on_line
+import pytest
 from support.tables import ask, counting, table, words_at
-
-
-@pytest.mark.parametrize(('name', 'request_'), [
-    ('516_fd_plc3_wrr_cmd1', WordRangeRead(ExtendedAddress(8, 10), 228, 0, 342)),
-    ('516_fd_plc3_wrr_cmd2', WordRangeRead(ExtendedAddress(8, 10), 228, 114, 342)),
-    ('516_fd_plc3_wrr_cmd3', WordRangeRead(ExtendedAddress(8, 10), 228, 228, 342)),
-    ('plc5_wrr_F8_req_fd_crc', WordRangeRead(SystemAddress(8, 0), 4, 0, 2)),
-    ('plc5_wrr_max_req_fd_crc', WordRangeRead(SystemAddress(7, 0), 244, 0, 122))])
-def test_read_is_the_bytes_of_its_vector_and_back(
-        name: str, request_: WordRangeRead[ExtendedAddress | SystemAddress]) -> None:
-    data = vector(name).packet.data
-    assert request_.encode() == without_area(data)
-    reader = Reader(data)
-    assert reader.byte() == 0x01
-    assert WordRangeRead.read(reader, type(request_.address).read) == request_
-
-
-def test_write_is_the_bytes_of_its_vector_and_back() -> None:
-    data = vector('plc5_wrw_N7_req_fd_crc').packet.data
-    request = WordRangeWrite(SystemAddress(7, 10), b'\x10\x10\x07\0', 0, 2)
-    assert request.encode() == without_area(data)
-    reader = Reader(data)
-    assert reader.byte() == 0x00
-    assert WordRangeWrite.read(reader, SystemAddress.read) == request
-
-
-def test_file_read_has_the_parameters_of_a_word_range_read() -> None:
-    reader = Reader(vector('plc3_file_read_req_fd_crc').packet.data)
-    assert reader.byte() == 0x04
-    assert WordRangeRead.read(reader, ExtendedAddress.read) == WordRangeRead(
-        ExtendedAddress(8, 10), 8, 0, 4)
-
-
-@pytest.mark.parametrize('data', ['', '2C 08 0A 05', '2C 08 0A 05 01 00 00', '2C 08 0A 05 01 00'
-                                  ' 01 00', '2C 08 0A 05 01 00 02 00 07'])
-def test_what_is_no_bit_write(data: str) -> None:
-    with pytest.raises(FormatError):
-        WordBitWrite.read(Reader(bytes.fromhex(data)), ExtendedAddress.read)
-
 
 FAMILIES = {PlcType.PLC3: PLC3, PlcType.PLC5: PLC5_WORD_RANGE}
 
@@ -100,15 +53,6 @@ def test_address_is_encoded_for_its_family(text: str, family: str, encoded: str)
 def test_limits_are_whole_elements(family: str, letters: str, read: int, write: int) -> None:
     dialect, kind = FAMILIES[PlcType(family)], FileType(letters)
     assert (dialect.max_read(kind), dialect.max_write(kind)) == (read, write)
-
-
-@pytest.mark.parametrize(('text', 'family'), [
-    ('N999:9000', 'PLC3'), ('I999:7000', 'PLC3'), ('T:9000.CTL', 'PLC3'), ('N999:900', 'PLC5'),
-    ('F999:900', 'PLC5'), ('T999:900', 'PLC5')])
-def test_largest_write_fits_with_the_longest_address(text: str, family: str) -> None:
-    dialect, address = FAMILIES[PlcType(family)], at(text, family)
-    _, data = dialect.write(address, bytes(2 * dialect.max_write(address.file_type)))
-    assert len(data) - 5 <= 240  # FNC, offset and total do not count
 
 
 @pytest.mark.parametrize('text', ['N7:0', 'T4:0', 'B3:0', 'ST9:0', 'MG9:0'])

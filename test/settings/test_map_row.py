@@ -64,26 +64,6 @@ def test_command_says_whether_a_row_reads_and_writes(text: str, reads: bool, wri
     assert (mapping.reads, mapping.writes) == (reads, writes)
 
 
-@for_all(('address', 'plc', 'kind'), [
-    ('N7:0', 'PLC5', 'int16'), ('B3:0', 'PLC5', 'uint16'), ('I:001', 'PLC5', 'uint16'),
-    ('O:000', 'PLC5', 'uint16'), ('S:1', 'PLC5', 'uint16'), ('D9:0', 'PLC5', 'uint16'),
-    ('A9:0', 'SLC', 'uint16'), ('F8:0', 'PLC5', 'float32'), ('L10:0', 'SLC', 'int32'),
-    ('T4:0.ACC', 'PLC5', 'int16'), ('C5:0.PRE', 'SLC', 'int16'), ('R6:0.LEN', 'PLC5', 'int16'),
-    ('ST9:0', 'PLC5', 'string'), ('B3:0/5', 'PLC5', 'bool'), ('T4:0/DN', 'SLC', 'bool'),
-    ('I:017/12', 'PLC5', 'bool'), ('I:1.0/3', 'SLC', 'bool'), ('N7:0/1', 'SLC', 'bool')])
-def test_type_that_is_left_out_is_that_of_the_address(address: str, plc: str, kind: str) -> None:
-    assert one(Address=address, PLC_Type=plc, Command='Read').type.value == kind
-
-
-@pytest.mark.parametrize('address, kind', [
-    ('N7:0', 'uint16'), ('N7:0', 'int32'), ('N7:0', 'uint32'), ('N7:0', 'float32'),
-    ('N7:0', 'bcd16'), ('B3:0', 'int16'), ('D9:0', 'bcd16'), ('T4:0.ACC', 'uint16'),
-    ('N7:0', 'string'), ('A9:0', 'string'), ('A9:0', 'int32'), ('S:0', 'uint32'),
-    ('I:001', 'float32'), ('O:001', 'bcd16')])
-def test_other_type_that_fits(address: str, kind: str) -> None:
-    assert one(Address=address, Type=kind).type.value == kind
-
-
 @pytest.mark.parametrize('address, kind, right', [
     ('F8:0', 'int16', 'F8:0 can be float32'),
     ('ST9:0', 'int16', 'ST9:0 can be string'),
@@ -184,10 +164,6 @@ def test_both_ends_of_a_range(column: str, texts: tuple[str, ...]) -> None:
         assert (len(mappings), problems) == (1, [])
 
 
-def test_decimal_comma_of_a_limit() -> None:
-    assert one(Min='"-2,5"').minimum == -2.5
-
-
 def test_string_has_no_limits() -> None:
     assert fault(Address='ST9:0', Type='string', Length='1', Max='4') == (
         '2:12 (Max): Item: 1, a string has no Max; leave the cell empty')
@@ -198,48 +174,12 @@ def test_minimum_above_the_maximum() -> None:
     assert one(Min='5', Max='5').maximum == 5
 
 
-def test_every_fault_of_a_row_is_reported() -> None:
-    texts = faults(row(Station='999', Length='0', Address='??', Period='x', Command='z'))
-    assert sorted(text.split(': ')[0] for text in texts) == [
-        '2:2 (Command)', '2:3 (Address)', '2:4 (Station)', '2:6 (Length)', '2:9 (Period)']
-
-
 def test_numbered_faults_are_errors() -> None:
     _, problems = load_rows(row(Station='999', Address='??'), row(PLC_Type='S7'))
     assert sorted(problem.message.number for problem in problems if problem.message) == [
         2501, 2502, 2503]
     assert all(problem.message and problem.message.severity is Severity.ERROR
                for problem in problems)
-
-
-@pytest.mark.parametrize('cells', [
-    {'Address': 'T4:0'}, {'Address': 'T4:0', 'Length': '3'}, {'Address': 'C5:7'},
-    {'Address': 'R6:0', 'PLC_Type': 'SLC'}, {'Address': 'T4:0.ACC', 'Length': '2'},
-    {'Address': 'T4:0.PRE', 'Length': '4'}])
-def test_control_word_of_a_structure_is_not_writable(cells: dict[str, str]) -> None:
-    text = fault(Command='Write', **cells)
-    assert text.startswith('2:3 (Address): Item: 1, ')
-    assert ' belongs to the processor; of such an element can be written: ' in text
-    assert one(**cells | {'Command': 'Read'})
-
-
-@pytest.mark.parametrize('cells', [
-    {'Address': 'T4:0.PRE'}, {'Address': 'T4:0.PRE', 'Length': '2'}, {'Address': 'C5:0.ACC'},
-    {'Address': 'T4:0/DN'}, {'Address': 'T4:0/DN', 'Length': '3'}, {'Address': 'R6:0/FD'},
-    {'Address': 'C5:0/UA'}, {'Address': 'N7:0/0', 'Length': '16'},
-    {'Address': 'T4:0.ACC/3'}])
-def test_members_and_named_bits_are_writable(cells: dict[str, str]) -> None:
-    assert one(Command='Write', **cells).writes
-
-
-@pytest.mark.parametrize('cells, shown', [
-    ({'Address': 'T4:0.0/0'}, 'T4:0.0/0'), ({'Address': 'T4:0.0/12'}, 'T4:0.0/12'),
-    ({'Address': 'T4:0.0/12', 'Length': '2'}, 'T4:0.0/12'), ({'Address': 'C5:0.0/9'}, 'C5:0.0/9'),
-    ({'Address': 'R6:0.0/7', 'Length': '2'}, 'R6:0.0/7')])
-def test_internal_bits_are_not_writable(cells: dict[str, str], shown: str) -> None:
-    assert fault(Command='Write', **cells).startswith(
-        f'2:3 (Address): Item: 1, {shown} belongs to the processor; of such an element ')
-    assert one(**cells | {'Command': 'Read'})
 
 
 @pytest.mark.parametrize('cells', [
@@ -332,11 +272,6 @@ def test_scale_or_offset_make_the_message_float32(
     assert mapping.message_type is (ValueType.FLOAT32 if scaling else ValueType.INT16)
 
 
-@pytest.mark.parametrize('kind', ['int16', 'uint16', 'bcd16', 'int32', 'uint32', 'float32'])
-def test_numbers_can_be_scaled(kind: str) -> None:
-    assert one(Type=kind, Scale='0.5', Offset='1').message_type is ValueType.FLOAT32
-
-
 @pytest.mark.parametrize('cells, expected', [
     ({'Scale': '0'}, '14 (Scale): Item: 1, Scale should not be 0'),
     ({'Scale': '-0.0', 'Offset': '2'}, '14 (Scale): Item: 1, Scale should not be 0'),
@@ -357,20 +292,6 @@ def test_scale_and_offset_that_do_not_go(cells: dict[str, str], expected: str) -
 
 
 # Families and access
-
-@pytest.mark.parametrize(('plc', 'address', 'kind', 'shown'), [
-    ('PLC2', '020', 'uint16', '020'), ('plc2', '110/17', 'bool', '110/17'),
-    ('PLC3', 'E3.1.8.10.0.5', 'uint16', 'B10:5'), ('PLC3', 'N7:0', 'int16', 'N7:0'),
-    ('PLC3', 'T:4.ACC', 'int16', 'T:4.ACC'), ('PLC3', 'I:17/7', 'bool', 'I:0017/07')])
-def test_addresses_of_a_plc2_and_a_plc3_have_their_types(
-        plc: str, address: str, kind: str, shown: str) -> None:
-    mapping = one(PLC_Type=plc, Address=address, Command='Read')
-    assert (mapping.type.value, str(mapping.address)) == (kind, shown)
-
-
-def test_types_and_length_over_the_words_of_a_plc2() -> None:
-    mapping = one(PLC_Type='PLC2', Address='020', Type='bcd16', Length='3', Command='Write')
-    assert (mapping.type, mapping.codec.words) == (ValueType.BCD16, 3)
 
 
 @pytest.mark.parametrize(('plc', 'text', 'access'), [
@@ -397,24 +318,6 @@ def test_access_that_does_not_fit(cells: dict[str, str], text: str) -> None:
     assert fault(**cells) == f'2:{COLUMNS.index("Access") + 1} (Access): Item: 1, {text}'
 
 
-@pytest.mark.parametrize(('plc', 'address', 'number', 'right'), [
-    ('PLC2', '018', 2503, 'are octal, as in 020 or 110/17'),
-    ('PLC2', 'N7:0', 2503, 'write the octal number of a word'),
-    ('PLC2', '100000', 2504, 'words run from 0 to 77777 (octal)'),
-    ('PLC3', 'F8:0', 2503, 'F is not a file type of a PLC-3'),
-    ('PLC3', 'E2.1.8.10.0.0', 2504, 'only the data table, E3.1, can be read')])
-def test_addresses_of_plc2_and_plc3_that_are_none(plc: str, address: str, number: int,
-                                                  right: str) -> None:
-    text = fault(PLC_Type=plc, Address=address)
-    assert text.startswith(f'2:3 (Address): {number} ')
-    assert right in text
-
-
-def test_mapping_ends_with_the_last_word_of_a_plc2() -> None:
-    assert 'the last word there can be is 077777' in fault(
-        PLC_Type='PLC2', Address='077777', Length='2')
-
-
 @pytest.mark.parametrize('command', ['Write', 'ReadWrite'])
 def test_bits_of_a_common_interface_file_are_not_written(command: str) -> None:
     cells = {'PLC_Type': 'PLC2', 'Address': '020/05', 'Access': 'CIF'}
@@ -424,23 +327,7 @@ def test_bits_of_a_common_interface_file_are_not_written(command: str) -> None:
     assert one(**cells, Command='Read').type is ValueType.BOOL
 
 
-@pytest.mark.parametrize('address', ['T:4.CTL', 'T:4/DN', 'C:4.CTL/17'])
-def test_control_bits_of_a_plc3_belong_to_its_program(address: str) -> None:
-    assert fault(PLC_Type='PLC3', Address=address, Command='Write').startswith('2:3 (Address): ')
-
-
 # Structures, flat I/O and processors
-
-@pytest.mark.parametrize(('plc', 'address', 'length', 'kind'), [
-    ('PLC5', 'PD10:0.SP', '1', 'float32'), ('PLC5', 'PD10:0.SP', '24', 'float32'),
-    ('PLC5', 'PD10:398/INI', '1', 'bool'), ('PLC5', 'MG9:0.ERR', '3', 'int16'),
-    ('PLC5', 'BT9:0', '12', 'int16'), ('PLC5', 'SC9:0/SA', '1', 'bool'),
-    ('SLC', 'PD10:0.SPV', '1', 'int16'), ('SLC', 'MG9:0/DN', '1', 'bool'),
-    ('SLC', 'PD10:0', '23', 'int16')])
-def test_part_of_a_structure_has_its_own_type(
-        plc: str, address: str, length: str, kind: str) -> None:
-    mapping = one(PLC_Type=plc, Address=address, Length=length, Command='Read')
-    assert (mapping.type.value, mapping.cell('Address')) == (kind, address)
 
 
 @pytest.mark.parametrize(('cells', 'text'), [

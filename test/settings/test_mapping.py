@@ -15,11 +15,9 @@
 """A mapping as the rest of the program sees it, its columns, and names for ROS."""
 
 from dataclasses import replace
-from abdf1_ros.settings.columns import COLUMNS
-import pytest
-from support.mappings import make_mapping, one
 from enum import Enum
 import re
+
 from abdf1_ros.pccc.access import Access
 from abdf1_ros.pccc.families import FAMILIES
 from abdf1_ros.pccc.file_types import PlcType
@@ -30,7 +28,9 @@ from abdf1_ros.settings.mapping import Command, Publish
 from abdf1_ros.settings.names import MAX_LENGTH, sanitise
 from hypothesis import given
 from hypothesis import strategies as st
+import pytest
 from support.cases import for_all
+from support.mappings import make_mapping, one
 
 
 @pytest.mark.parametrize('cells, scale, offset', [

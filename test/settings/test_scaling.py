@@ -16,15 +16,15 @@
 
 from array import array
 import math
+
 from abdf1_ros.errors import FormatError
 from abdf1_ros.pccc.values import ValueType
+from abdf1_ros.settings.limits import raw_values
 from abdf1_ros.settings.scaling import Scaling
 from hypothesis import assume, given
 from hypothesis import strategies as st
 import pytest
-from abdf1_ros.settings.limits import raw_values
 from support.mappings import make_mapping
-
 
 _WHOLE = (ValueType.INT16, ValueType.UINT16, ValueType.BCD16)
 _SCALES = st.floats(allow_nan=False, allow_infinity=False) | st.floats(0.001, 1000.0)

@@ -16,6 +16,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from typing import Any
+
+from abdf1_ros.counters import Counters
 from abdf1_ros.df1.checksum import Checksum
 from abdf1_ros.df1.frames import Control, Duplex, Frame, FrameDecoder
 from abdf1_ros.df1.packet import Packet
@@ -23,25 +27,27 @@ from abdf1_ros.pccc.address import Address
 from abdf1_ros.pccc.data_table import DataTable
 from abdf1_ros.pccc.describe import describe
 from abdf1_ros.pccc.emulated import EmulatedProcessor, Setting
-from abdf1_ros.pccc.families import decode_identity, dialect_of, FAMILIES, parse_address
+from abdf1_ros.pccc.families import (
+    decode_identity,
+    dialect_of,
+    FAMILIES,
+    parse_address,
+    served_counters,
+)
 from abdf1_ros.pccc.fields import Reader
 from abdf1_ros.pccc.file_types import PlcType
 from abdf1_ros.pccc.identity import Mode
+from abdf1_ros.pccc.plc5 import commands as plc5
 from abdf1_ros.pccc.processor import Processor
 from abdf1_ros.pccc.server import Server
 from abdf1_ros.pccc.slc import commands as slc
 from abdf1_ros.pccc.slc.address import ADDRESSING, BY_CODE
-import pytest
-from support.processors import Exchange, exchanges, ML1400, PROCESSORS
-from collections.abc import Callable
-from typing import Any
-from abdf1_ros.counters import Counters
-from abdf1_ros.pccc.emulated import EmulatedProcessor
-from abdf1_ros.pccc.families import served_counters
-from abdf1_ros.pccc.plc5 import commands as plc5
 from abdf1_ros.pccc.word_range import commands as word_range
+import pytest
 from support.captures import Capture, CAPTURES
 from support.cases import for_all
+from support.processors import Exchange, exchanges, ML1400, PROCESSORS
+from support.vectors import commands, Vector, without_area
 
 
 def place_of(command: Packet) -> tuple[Address, int] | None:
@@ -240,3 +246,13 @@ def test_what_they_have_accepted_of_ours_is_what_we_would_send(capture: Capture)
 def test_every_command_has_words(capture: Capture) -> None:
     for exchange in capture.exchanges():
         assert 'unknown' not in describe(exchange.command), exchange.command
+
+
+# Logical ASCII and the memory area are read, and written as logical binary without it.
+@for_all('entry', commands(*(fnc for _, fnc in _READ if fnc > word_range.FILE_READ)))
+def test_command_of_every_vector_is_read_and_made_again(entry: Vector) -> None:
+    data = entry.packet.data
+    command = _READ[entry.packet.cmd, data[0]](Reader(data[1:]))
+    again = command.encode()
+    assert _READ[entry.packet.cmd, data[0]](Reader(again[1:])) == command
+    assert again == without_area(data) or b'\0$' in data
