@@ -22,6 +22,7 @@ from abdf1_ros.settings.csv_table import read_rows, read_table, Row
 from hypothesis import given
 from hypothesis import strategies as st
 import pytest
+from support.cases import for_all
 
 KNOWN = ('Tag', 'Address', 'Length')
 
@@ -76,20 +77,10 @@ def test_same_table_in_any_form(path: Path, content: str) -> None:
     assert cells_of(path, content) == [['a', 'N7:0', '2'], ['b', 'N7:1', '3']]
 
 
-def test_quoted_cell_holds_delimiter_and_quotes(path: Path) -> None:
-    content = 'Tag,Address\n"a, ""b""",N7:0\nd,N7:1\n'
-    assert cells_of(path, content) == [['a, "b"', 'N7:0', ''], ['d', 'N7:1', '']]
-
-
 def test_lines_and_items_are_counted_across_comments_and_blanks(path: Path) -> None:
     content = 'sep=,\n# c\nTag,Address\n\n# c\na,1\n"",""\nb,2\n\nc,3\n# c\nd,4\n'
     assert [(row.item, row.line) for row in rows_of(path, content)] == [
         (1, 6), (2, 8), (3, 10), (4, 12)]
-
-
-def test_only_the_first_line_tells_the_separator(path: Path) -> None:
-    assert cells_of(path, 'Tag,Address\nsep=,1\n') == [['sep=', '1', '']]
-    assert cells_of(path, 'Tag;Address\nsep=;\n') == [['sep=', '', '']]
 
 
 def test_lines_are_counted_with_any_line_ends(path: Path) -> None:
@@ -111,85 +102,6 @@ def test_where_names_file_line_cell_and_column(path: Path) -> None:
     assert row.where('Address') == Place(str(path), 3, None, 'Address')
 
 
-def test_cells_that_are_missing_are_empty(path: Path) -> None:
-    assert cells_of(path, 'Tag,Length\na\n') == [['a', '', '']]
-
-
-def test_unknown_column_comes_with_a_suggestion(path: Path) -> None:
-    assert problems_of(path, '# c\nTag,Adress\na,1\n') == [
-        'FILE:2:2: unknown column "Adress"; did you mean Address?']
-
-
-def test_unknown_column_that_resembles_none_comes_with_all_names(path: Path) -> None:
-    assert problems_of(path, 'Zq9,Tag\n1,a\n') == [
-        'FILE:1:1: unknown column "Zq9"; known: Tag, Address, Length']
-
-
-def test_all_names_are_told_once(path: Path) -> None:
-    assert problems_of(path, 'Adress,Zq9,,Tag,Lenght,Wx8\n') == [
-        'FILE:1:1: unknown column "Adress"; did you mean Address?',
-        'FILE:1:2: unknown column "Zq9"; known: Tag, Address, Length',
-        'FILE:1:5: unknown column "Lenght"; did you mean Length?',
-        'FILE:1:6: unknown column "Wx8"']
-
-
-def test_file_of_another_kind_is_one_problem(path: Path) -> None:
-    assert problems_of(path, 'Station,Mode,Address,Baud,Com_Port\n') == [
-        'FILE:1: 4 of 5 columns are not known here, such as "Station": is this the right file? '
-        'Known: Tag, Address, Length']
-
-
-@pytest.mark.parametrize('name', ['Lengths', 'Note'])
-def test_column_that_is_there_is_not_suggested(path: Path, name: str) -> None:
-    assert problems_of(path, f'Tag,Length,{name}\n') == [
-        f'FILE:1:3: unknown column "{name}"; known: Tag, Address, Length']
-
-
-def test_every_fault_of_the_header_is_reported(path: Path) -> None:
-    assert problems_of(path, 'Tag,tag,Lenght,TAG\na,b,c,d\n') == [
-        'FILE:1:2: column Tag stands twice, first in cell 1',
-        'FILE:1:3: unknown column "Lenght"; did you mean Length?',
-        'FILE:1:4: column Tag stands twice, first in cell 1']
-
-
-@pytest.mark.parametrize('content', [
-    'a,b,2\nb,c,3\n', 'Tag|Address\na|N7:0\n', '"Tag,Address"\n"a,N7:0"\n',
-    '<!DOCTYPE html>\n<html>\n', 'Tag Address Length\na N7:0 2\n'])
-def test_file_without_a_header_is_one_fault(path: Path, content: str) -> None:
-    assert problems_of(path, content) == [
-        'FILE:1: no column is named here; the first row names them, with comma, semicolon or tab '
-        'between: Tag, Address, Length']
-
-
-@pytest.mark.parametrize('content', [
-    'N7:0,"SPEED","Line speed"\n', 'a,n7:0/3,2\n', 'I:1.0/3,Global\n'])
-def test_export_of_symbols_is_told_from_a_map(path: Path, content: str) -> None:
-    problem, = problems_of(path, content)
-    assert problem.startswith(
-        'FILE:1: no column is named here, it has an address, as in an export of symbols from '
-        'RSLogix ("plc import" makes a map of it) or a map without its first row; the first row')
-
-
-@pytest.mark.parametrize('head', [b'PK\x03\x04\x14\0', b'\xd0\xcf\x11\xe0\xa1\xb1\x1a\xe1\0'])
-def test_workbook_that_is_called_csv(path: Path, head: bytes) -> None:
-    assert problems_of(path, head + bytes(100)) == [
-        'FILE: is a workbook or a project of some program, not text; save what is in it as "CSV '
-        'UTF-8"']
-
-
-def test_comment_of_another_language_is_told(path: Path) -> None:
-    assert problems_of(path, 'Tag,Address\na,N7:0\n// pumps, all of them\n') == [
-        'FILE:3: a comment begins with #']
-    problem, = problems_of(path, '// made by hand\nTag,Address\na,N7:0\n')
-    assert problem.startswith('FILE:1: no column is named here, and a comment begins with #; ')
-
-
-def test_header_that_stands_there_twice(path: Path) -> None:
-    assert problems_of(path, 'Tag,Address\na,1\ntag,ADDRESS\nb,2\n') == [
-        'FILE:3: the names of the columns stand here again; once is enough']
-    assert cells_of(path, 'Tag\nTag\n') == [['Tag', '', '']]
-
-
 def test_row_that_cannot_be_read_leaves_the_others_as_they_are(path: Path) -> None:
     path.write_bytes(b'# f\xfcr alle\nTag,Address\na,1\nb\xe4,2\nc,"3\nd,4,5\ne,5\nf,6\n')
     table = read_table(str(path), KNOWN)
@@ -206,111 +118,12 @@ def test_file_of_which_most_rows_are_shifted_cannot_be_used(path: Path) -> None:
     assert read_table(str(path), KNOWN).is_usable
 
 
-@pytest.mark.parametrize('content, places', [
-    ('Tag,Address\na,N7:0,5\n', ['2:3']),
-    ('Tag,,Address\na,5,N7:0\n', ['2:2']),
-    ('Tag,Address\nb,N7:1\n# c\na,N7:0,,5,6\nc,N7:2,5\n', ['4:4', '5:3']),
-])
-def test_cell_outside_the_columns(path: Path, content: str, places: list[str]) -> None:
-    assert problems_of(path, content) == [
-        f'FILE:{place}: "5" has no column; quote a cell that contains the delimiter'
-        for place in places]
-
-
-@pytest.mark.parametrize('header, row, name', [
-    ('Tag,Address', 'a;N7:0', 'comma'), ('Tag,Address', '"a,N7:0"', 'comma'),
-    ('Tag;Address', 'a,N7:0', 'semicolon'), ('Tag\tAddress', 'a,N7:0', 'tab')])
-def test_row_that_is_not_divided_as_the_header(
-        path: Path, header: str, row: str, name: str) -> None:
-    text = f'this row is one cell; its cells need a {name} between them, outside of quotes'
-    assert problems_of(path, f'{header}\n{row}\n\n{row}\n') == [
-        f'FILE:2: {text}', f'FILE:4: {text}']
-
-
-def test_only_cell_of_a_row_and_of_a_file(path: Path) -> None:
-    assert cells_of(path, 'Tag,Address\na\n') == [['a', '', '']]
-    assert cells_of(path, 'Tag\na;b\n') == [['a;b', '', '']]
-
-
-def test_file_that_is_missing_is_named(path: Path) -> None:
-    with pytest.raises(ConfigurationError) as caught:
-        read_rows(str(path), KNOWN)
-    assert str(caught.value) == f'{path}: cannot be read: No such file or directory'
-
-
-def test_folder_in_place_of_a_file(tmp_path: Path) -> None:
-    with pytest.raises(ConfigurationError) as caught:
-        read_rows(str(tmp_path), KNOWN)
-    assert str(caught.value) == f'{tmp_path}: cannot be read: Is a directory'
-
-
-@pytest.mark.parametrize('content, where, byte', [
-    (b'Tag,Address\na\xe4,N7:0\n', '2:2', 'E4'),
-    (b'\xff\n', '1:1', 'FF'),
-    (b'Tag\r\n\r\nab\x80\r\n', '3:3', '80'),
-    (b'Tag\r\rab\x80\r', '3:3', '80'),
-    (b'\xef\xbb\xbfTag,Address\na,b\xfc\n', '2:4', 'FC'),
-    (b'\xef\xbb\xbfT\xe4g\n', '1:2', 'E4'),
-    (b'Tag\nab\0\n', '2:3', '00'),
-    ('Tag,Address\na,N7:0\n'.encode('utf-16-le'), '1:2', '00'),
-    ('Tag,Address\na,N7:0\n'.encode('utf-16-be'), '1:1', '00'),
-    (b'\xff\xfe' + 'Tag,Address\na,N7:0\n'.encode('utf-16-le'), '1:1', 'FF'),
-])
-def test_byte_that_is_no_text(path: Path, content: bytes, where: str, byte: str) -> None:
-    line, number = where.split(':')
-    assert problems_of(path, content) == [
-        f'FILE:{line}: byte {number} of this line, 0x{byte}, is not text in UTF-8; save the file '
-        'as "CSV UTF-8"']
-
-
-@pytest.mark.parametrize('content', [
-    b'', b'\n\n', b'\xef\xbb\xbf', b'# only\n# comments\n', b',,,\n;\n\t\n', b'  \r\n'])
-def test_file_without_a_header_is_told_which_columns_there_are(path: Path, content: bytes) -> None:
-    assert problems_of(path, content) == [
-        'FILE:1: the file is empty; its first row names columns: Tag, Address, Length']
-
-
-def test_header_only_is_a_table_without_rows(path: Path) -> None:
-    assert rows_of(path, 'Tag,Address\n\n# nothing yet\n') == []
-
-
-@pytest.mark.parametrize('content, places', [
-    ('Tag,Address\na,1\n"b,2\nc,3\n', ['3:1']),
-    ('"Tag,Address\na,1\n', ['1:1']),
-    ('Tag,Address\na,"1', ['2:2']),
-    ('Tag,Address\na,"', ['2:2']),
-    ('Tag,Address\r\na,"1\r\n# c\r\n', ['2:2']),
-    ('Tag,Address\na, "1""\n', ['2:2']),
-    ('Tag,Address\n"a,1\nb,2\n"c,3\nd,4\n', ['2:1', '4:1']),
-    ('Tag,Address\n"a\nb",1\n', ['2:1']),
-])
-def test_quote_that_is_not_closed_does_not_swallow_the_rows_behind_it(
-        path: Path, content: str, places: list[str]) -> None:
-    assert problems_of(path, content) == [
-        f'FILE:{place}: the quote that opens this cell is not closed on this line'
-        for place in places]
-
-
 def test_line_that_is_much_too_long_is_refused(path: Path) -> None:
     longest = 'x' * (131_072 - 1)
     assert cells_of(path, f'Tag\n{longest}\n') == [[longest, '', '']]
     assert problems_of(path, f'Tag\na\nx{longest}\n"x{longest}\n') == [
         'FILE:3: this line has 131073 characters, at most 131072 go',
         'FILE:4: this line has 131074 characters, at most 131072 go']
-
-
-def test_long_cell_is_shown_without_its_end(path: Path) -> None:
-    cell = 'x' * 101
-    assert problems_of(path, f'Tag\na,{cell}\nb,{cell[1:]}\n') == [
-        f'FILE:2:2: "{cell[1:]}..." has no column; quote a cell that contains the delimiter',
-        f'FILE:3:2: "{cell[1:]}" has no column; quote a cell that contains the delimiter']
-    assert problems_of(path, f'Tag,{cell}\n') == [
-        f'FILE:1:2: unknown column "{cell[1:]}..."; known: Tag, Address, Length']
-
-
-def test_endless_file_is_refused() -> None:
-    with pytest.raises(ConfigurationError, match='larger than 10 MB; is it a CSV file'):
-        read_rows('/dev/zero', KNOWN)
 
 
 @given(content=st.one_of(
@@ -330,8 +143,110 @@ def test_any_bytes_give_rows_or_a_configuration_error(
         assert all(before.line < after.line for before, after in zip(rows, rows[1:]))
 
 
-def test_pipe_is_no_file(tmp_path: Path) -> None:
-    path = tmp_path / 'pipe'
-    os.mkfifo(path)
-    with pytest.raises(ConfigurationError, match='is a pipe, not a file'):
-        read_rows(str(path), KNOWN)
+@for_all(('content', 'cells'), [
+    ('Tag,Address\n"a, ""b""",N7:0\nd,N7:1\n', [['a, "b"', 'N7:0', ''], ['d', 'N7:1', '']]),
+    ('Tag,Address\nsep=,1\n', [['sep=', '1', '']]), ('Tag;Address\nsep=;\n', [['sep=', '', '']]),
+    ('Tag,Length\na\n', [['a', '', '']]), ('Tag,Address\na\n', [['a', '', '']]),
+    ('Tag\na;b\n', [['a;b', '', '']]), ('Tag\nTag\n', [['Tag', '', '']]),
+    ('Tag,Address\n\n# nothing yet\n', [])])
+def test_cells_are_those_of_the_columns(path: Path, content: str, cells: list[list[str]]) -> None:
+    assert cells_of(path, content) == cells
+
+
+NO_COLUMN = 'FILE:1: no column is named here'
+BETWEEN = ('; the first row names them, with comma, semicolon or tab between: Tag, Address, '
+           'Length')
+RSLOGIX = (', it has an address, as in an export of symbols from RSLogix ("plc import" makes a '
+           'map of it) or a map without its first row')
+OUTSIDE = '"5" has no column; quote a cell that contains the delimiter'
+ONE_CELL = 'this row is one cell; its cells need a {} between them, outside of quotes'
+OPEN = 'the quote that opens this cell is not closed on this line'
+EMPTY = 'FILE:1: the file is empty; its first row names columns: Tag, Address, Length'
+LONG = 'x' * 100
+
+
+@for_all(('content', 'problems'), [
+    # The header.
+    ('# c\nTag,Adress\na,1\n', ['FILE:2:2: unknown column "Adress"; did you mean Address?']),
+    ('Zq9,Tag\n1,a\n', ['FILE:1:1: unknown column "Zq9"; known: Tag, Address, Length']),
+    ('Adress,Zq9,,Tag,Lenght,Wx8\n', [
+        'FILE:1:1: unknown column "Adress"; did you mean Address?',
+        'FILE:1:2: unknown column "Zq9"; known: Tag, Address, Length',
+        'FILE:1:5: unknown column "Lenght"; did you mean Length?',
+        'FILE:1:6: unknown column "Wx8"']),
+    ('Tag,Length,Lengths\n', [
+        'FILE:1:3: unknown column "Lengths"; known: Tag, Address, Length']),
+    ('Tag,Length,Note\n', ['FILE:1:3: unknown column "Note"; known: Tag, Address, Length']),
+    ('Tag,tag,Lenght,TAG\na,b,c,d\n', [
+        'FILE:1:2: column Tag stands twice, first in cell 1',
+        'FILE:1:3: unknown column "Lenght"; did you mean Length?',
+        'FILE:1:4: column Tag stands twice, first in cell 1']),
+    ('Station,Mode,Address,Baud,Com_Port\n', [
+        'FILE:1: 4 of 5 columns are not known here, such as "Station": is this the right file? '
+        'Known: Tag, Address, Length']),
+    (f'Tag,{LONG}x\n', [f'FILE:1:2: unknown column "{LONG}..."; known: Tag, Address, Length']),
+    *((content, [NO_COLUMN + BETWEEN]) for content in (
+        'a,b,2\nb,c,3\n', 'Tag|Address\na|N7:0\n', '"Tag,Address"\n"a,N7:0"\n',
+        '<!DOCTYPE html>\n<html>\n', 'Tag Address Length\na N7:0 2\n')),
+    *((content, [NO_COLUMN + RSLOGIX + BETWEEN]) for content in (
+        'N7:0,"SPEED","Line speed"\n', 'a,n7:0/3,2\n', 'I:1.0/3,Global\n')),
+    ('// made by hand\nTag,Address\na,N7:0\n', [
+        f'{NO_COLUMN}, and a comment begins with #{BETWEEN}']),
+    *((content, [EMPTY]) for content in (
+        '', '\n\n', '\ufeff', '# only\n# comments\n', ',,,\n;\n\t\n', '  \r\n')),
+    # Rows.
+    ('Tag,Address\na,N7:0\n// pumps, all of them\n', ['FILE:3: a comment begins with #']),
+    ('Tag,Address\na,1\ntag,ADDRESS\nb,2\n', [
+        'FILE:3: the names of the columns stand here again; once is enough']),
+    ('Tag,Address\na,N7:0,5\n', [f'FILE:2:3: {OUTSIDE}']),
+    ('Tag,,Address\na,5,N7:0\n', [f'FILE:2:2: {OUTSIDE}']),
+    ('Tag,Address\nb,N7:1\n# c\na,N7:0,,5,6\nc,N7:2,5\n', [
+        f'FILE:4:4: {OUTSIDE}', f'FILE:5:3: {OUTSIDE}']),
+    (f'Tag\na,{LONG}x\n', [
+        f'FILE:2:2: "{LONG}..." has no column; quote a cell that contains the delimiter']),
+    (f'Tag\na,{LONG}\n', [
+        f'FILE:2:2: "{LONG}" has no column; quote a cell that contains the delimiter']),
+    *((f'{header}\n{row}\n\n{row}\n', [
+        f'FILE:2: {ONE_CELL.format(name)}', f'FILE:4: {ONE_CELL.format(name)}'])
+      for header, row, name in (
+          ('Tag,Address', 'a;N7:0', 'comma'), ('Tag,Address', '"a,N7:0"', 'comma'),
+          ('Tag;Address', 'a,N7:0', 'semicolon'), ('Tag\tAddress', 'a,N7:0', 'tab'))),
+    # A quote that is not closed does not swallow the rows after it.
+    ('Tag,Address\na,1\n"b,2\nc,3\n', [f'FILE:3:1: {OPEN}']),
+    ('"Tag,Address\na,1\n', [f'FILE:1:1: {OPEN}']), ('Tag,Address\na,"1', [f'FILE:2:2: {OPEN}']),
+    ('Tag,Address\na,"', [f'FILE:2:2: {OPEN}']),
+    ('Tag,Address\r\na,"1\r\n# c\r\n', [f'FILE:2:2: {OPEN}']),
+    ('Tag,Address\na, "1""\n', [f'FILE:2:2: {OPEN}']),
+    ('Tag,Address\n"a,1\nb,2\n"c,3\nd,4\n', [f'FILE:2:1: {OPEN}', f'FILE:4:1: {OPEN}']),
+    ('Tag,Address\n"a\nb",1\n', [f'FILE:2:1: {OPEN}'])])
+def test_problems_of_a_file(path: Path, content: str, problems: list[str]) -> None:
+    assert problems_of(path, content) == problems
+
+
+@for_all(('content', 'line', 'number', 'byte'), [
+    (b'Tag,Address\na\xe4,N7:0\n', 2, 2, 'E4'), (b'\xff\n', 1, 1, 'FF'),
+    (b'Tag\r\n\r\nab\x80\r\n', 3, 3, '80'), (b'Tag\r\rab\x80\r', 3, 3, '80'),
+    (b'\xef\xbb\xbfTag,Address\na,b\xfc\n', 2, 4, 'FC'), (b'\xef\xbb\xbfT\xe4g\n', 1, 2, 'E4'),
+    (b'Tag\nab\0\n', 2, 3, '00'), ('Tag,Address\na,N7:0\n'.encode('utf-16-le'), 1, 2, '00'),
+    ('Tag,Address\na,N7:0\n'.encode('utf-16-be'), 1, 1, '00')])
+def test_byte_that_is_no_text(path: Path, content: bytes, line: int, number: int,
+                              byte: str) -> None:
+    assert problems_of(path, content) == [
+        f'FILE:{line}: byte {number} of this line, 0x{byte}, is not text in UTF-8; save the file '
+        'as "CSV UTF-8"']
+
+
+def test_what_is_no_file_of_text(path: Path, tmp_path: Path) -> None:
+    os.mkfifo(tmp_path / 'pipe')
+    workbook = 'is a workbook or a project of some program, not text; save what is in it as ' \
+        '"CSV UTF-8"'
+    for head in (b'PK\x03\x04\x14\0', b'\xd0\xcf\x11\xe0\xa1\xb1\x1a\xe1\0'):
+        assert problems_of(path, head + bytes(100)) == [f'FILE: {workbook}']
+    for name, right in (
+            (tmp_path / 'missing', 'cannot be read: No such file or directory'),
+            (tmp_path, 'cannot be read: Is a directory'),
+            (tmp_path / 'pipe', 'is a pipe, not a file'),
+            ('/dev/zero', 'larger than 10 MB; is it a CSV file?')):
+        with pytest.raises(ConfigurationError) as caught:
+            read_rows(str(name), KNOWN)
+        assert str(caught.value) == f'{name}: {right}'

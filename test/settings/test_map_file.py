@@ -20,7 +20,8 @@ from abdf1_ros.pccc.values import ValueType
 from abdf1_ros.problems import ConfigurationError
 from abdf1_ros.settings.map_file import load_mappings
 import pytest
-from support.mappings import fault, faults, load_rows, load_text, row, slc
+from support.cases import for_all
+from support.mappings import fault, faults, load_rows, load_text, row
 
 
 def test_needed_column_that_the_file_does_not_have() -> None:
@@ -46,62 +47,10 @@ def test_bad_file_as_a_whole() -> None:
         load_text('Tag,Adress\na,N7:0\n')
 
 
-def test_tags_that_become_one_name_are_refused() -> None:
-    assert faults(row(Tag='Tank.Level'), row(Tag='Tank Level', Topic='other')) == [
-        '3:1 (Tag): Item: 2, tag "Tank Level" becomes "Tank_Level", the name of item 1 (line 2,'
-        ' tag "Tank.Level")']
-
-
-def test_very_same_tag_is_one_fault_that_names_both_lines() -> None:
-    for command in ('Read', 'ReadWrite', 'Write'):
-        assert faults(row(Tag='a', Command=command),
-                      row(Tag='a', Command=command, Length='2')) == [
-            '3:1 (Tag): Item: 2, tag "a" is already the tag of item 1 (line 2, tag "a")']
-
-
-def test_same_tag_and_same_topic_are_two_faults() -> None:
-    assert len(faults(row(Tag='a', Topic='t'), row(Tag='a', Topic='t'))) == 2
-
-
-def test_two_readers_of_one_topic() -> None:
-    assert faults(row(Tag='a', Topic='x.y', Command='Read'), '# c',
-                  row(Tag='b', Topic='x:y', Command='Read')) == [
-        '4:8 (Topic): Item: 2, read topic "x_y" is the topic of item 1 (line 2, tag "a")']
-
-
-def test_read_topic_that_is_the_topic_of_another_row_by_its_tag_is_refused() -> None:
-    assert faults(row(Tag='a'), row(Tag='b', Topic='a', Command='Read')) == [
-        '3:8 (Topic): Item: 2, read topic "a" is the topic of item 1 (line 2, tag "a")']
-
-
 def test_row_that_clashes_counts_for_nothing() -> None:
     mappings, problems = load_rows(row(Tag='a'), row(Tag='b', Topic='a'), row(Tag='b', Topic='c'))
     assert [(mapping.tag, mapping.topic) for mapping in mappings] == [('a', 'a'), ('b', 'c')]
     assert len(problems) == 1
-
-
-def test_one_topic_may_be_read_and_written_by_different_rows() -> None:
-    mappings, problems = load_rows(
-        row(Tag='a', Topic='t', Command='Read'),
-        row(Tag='b', Topic='t', Command='Write', Address='N7:9', Type='uint16'))
-    assert (len(mappings), problems) == (2, [])
-
-
-def test_write_topic_fans_out_to_addresses_of_several_stations() -> None:
-    mappings, problems = load_rows(
-        row(Tag='a', Topic='t', Command='Write'),
-        row(Tag='b', Topic='t', Command='Write', Station='2'),
-        row(Tag='c', Topic='t', Command='ReadWrite', Address='N7:50', PLC_Type='SLC'))
-    assert ([mapping.topic for mapping in mappings], problems) == (['t'] * 3, [])
-
-
-@pytest.mark.parametrize('cells', [
-    {'Length': '2'}, {'Type': 'uint16'}, {'Scale': '0.1'}, {'Offset': '0'}])
-def test_write_topic_has_one_message_type_and_length(cells: dict[str, str]) -> None:
-    assert faults(row(Tag='a', Topic='t', Command='Write'),
-                  row(Tag='b', Topic='t', Command='Write', **cells)) == [
-        '3:8 (Topic): Item: 2, write topic "t" needs the message type (int16) and Length (1) of '
-        'item 1 (line 2, tag "a")']
 
 
 def test_write_topic_of_engineering_values_fans_out_to_different_raw_types() -> None:
@@ -113,31 +62,10 @@ def test_write_topic_of_engineering_values_fans_out_to_different_raw_types() -> 
         [ValueType.FLOAT32] * 3, [])
 
 
-def test_one_address_may_be_read_into_several_topics() -> None:
-    mappings, problems = load_rows(row(Tag='a'), row(Tag='b'))
-    assert (len(mappings), problems) == (2, [])
-
-
 def test_shipped_file_is_good() -> None:
     path = Path(__file__).resolve().parent.parent.parent / 'config' / 'map.csv'
     mappings, problems = load_mappings(str(path))
     assert (len(mappings), problems) == (10, [])
-
-
-def test_rows_of_one_station_name_one_processor() -> None:
-    assert faults(slc(Processor='5/01', Tag='a'), slc(Processor='ML1000', Tag='b')) == [
-        '3:17 (Processor): Item: 2, Processor of station 1 is ML1000 here, but 5/01 in the '
-        'row of item 1 (line 2, tag "a")']
-    assert faults(slc(Tag='a'), slc(Processor='5/01', Tag='b')) == [
-        '3:17 (Processor): Item: 2, Processor of station 1 is 5/01 here, but 5/03 (an '
-        'empty cell) in the row of item 1 (line 2, tag "a")']
-
-
-def test_rows_of_several_stations_and_an_empty_cell_for_the_usual_one() -> None:
-    assert faults(slc(Tag='a'), slc(Tag='b', Processor='5/03'), row(Tag='c'),
-                  slc(Tag='d', Station='2', Processor='5/01'),
-                  slc(Tag='e', Station='255', Command='Write'),
-                  slc(Tag='f', Station='255', Command='Write', Processor='5/01')) == []
 
 
 def test_two_stations_behind_one_gateway() -> None:
@@ -148,19 +76,6 @@ def test_two_stations_behind_one_gateway() -> None:
     assert [mapping.via for mapping in mappings] == [10, 10, None, None]
 
 
-@pytest.mark.parametrize(('first', 'second', 'text'), [
-    ({'Via': '10'}, {'Via': '11'}, 'station 1 has Via 11 here, but Via 10 in the row'),
-    ({'Via': '10'}, {}, 'station 1 has no Via here, but Via 10 in the row'),
-    ({}, {'Via': '10'}, 'station 1 has Via 10 here, but no Via in the row'),
-    ({'Via': '2'}, {'Station': '2', 'Via': '3'}, 'station 2 is itself the gateway in the row'),
-    ({'Via': '2'}, {'Station': '3', 'Via': '1'},
-     'station 1 is itself behind the gateway 2 in the row')])
-def test_station_is_reached_in_one_way(first: dict[str, str], second: dict[str, str],
-                                       text: str) -> None:
-    found, = faults(row(**first), row(**{'Tag': 'b', 'Topic': 'b'} | second))
-    assert f'{text} of item 1 (line 2, tag "a")' in found
-
-
 @pytest.mark.parametrize(('cells', 'text'), [
     ({'Via': '255'}, 'Via = "255" should be a whole number from 0 to 254'),
     ({'Via': 'KF3'}, 'Via = "KF3" should be a whole number from 0 to 254'),
@@ -169,3 +84,53 @@ def test_station_is_reached_in_one_way(first: dict[str, str], second: dict[str, 
      'what is written to station 255 goes to the stations of this line only')])
 def test_via_that_cannot_be(cells: dict[str, str], text: str) -> None:
     assert text in fault(**cells)
+
+
+T = {'Topic': 't', 'Command': 'Write'}
+SLC = {'PLC_Type': 'SLC', 'Command': 'Read'}
+OF_A = ' of item 1 (line 2, tag "a")'
+NEEDS = 'Item: 2, write topic "t" needs the message type (int16) and Length (1)' + OF_A
+
+
+@for_all(('first', 'second', 'text'), [
+    ({'Tag': 'a.b'}, {'Tag': 'a b', 'Topic': 'other'}, '3:1 (Tag): Item: 2, tag "a b" becomes '
+     '"a_b", the name of item 1 (line 2, tag "a.b")'),
+    *(({'Command': command}, {'Tag': 'a', 'Command': command, 'Length': '2'},
+       f'3:1 (Tag): Item: 2, tag "a" is already the tag{OF_A}')
+      for command in ('Read', 'ReadWrite', 'Write')),
+    ({'Topic': 'x.y', 'Command': 'Read'}, {'Topic': 'x:y', 'Command': 'Read'},
+     f'3:8 (Topic): Item: 2, read topic "x_y" is the topic{OF_A}'),
+    ({}, {'Topic': 'a', 'Command': 'Read'},
+     f'3:8 (Topic): Item: 2, read topic "a" is the topic{OF_A}'),
+    (T, T | {'Length': '2'}, f'3:8 (Topic): {NEEDS}'),
+    (T, T | {'Type': 'uint16'}, f'3:8 (Topic): {NEEDS}'),
+    (T, T | {'Scale': '0.1'}, f'3:8 (Topic): {NEEDS}'),
+    (T, T | {'Offset': '0'}, f'3:8 (Topic): {NEEDS}'),
+    (SLC | {'Processor': '5/01'}, SLC | {'Processor': 'ML1000'}, '3:17 (Processor): Item: 2, '
+     f'Processor of station 1 is ML1000 here, but 5/01 in the row{OF_A}'),
+    (SLC, SLC | {'Processor': '5/01'}, '3:17 (Processor): Item: 2, Processor of station 1 is 5/01 '
+     f'here, but 5/03 (an empty cell) in the row{OF_A}'),
+    ({'Via': '10'}, {'Via': '11'}, '3:25 (Via): Item: 2, station 1 has Via 11 here, but Via 10 in '
+     f'the row{OF_A}'),
+    ({'Via': '10'}, {}, '3:25 (Via): Item: 2, station 1 has no Via here, but Via 10 in the row'),
+    ({}, {'Via': '10'}, 'station 1 has Via 10 here, but no Via in the row'),
+    ({'Via': '2'}, {'Station': '2', 'Via': '3'}, 'station 2 is itself the gateway in the row'),
+    ({'Via': '2'}, {'Station': '3', 'Via': '1'},
+     'station 1 is itself behind the gateway 2 in the row')])
+def test_rows_that_clash(first: dict[str, str], second: dict[str, str], text: str) -> None:
+    found, = faults(row(**first), row(**{'Tag': 'b', 'Topic': 'b'} | second))
+    assert text in found
+
+
+@for_all('rows', [
+    [{'Topic': 't', 'Command': 'Read'}, T | {'Address': 'N7:9', 'Type': 'uint16'}],
+    [T, T | {'Station': '2'}, T | {'Command': 'ReadWrite', 'Address': 'N7:50', 'PLC_Type': 'SLC'}],
+    [{}, {}],
+    [SLC, SLC | {'Processor': '5/03'}, {}, SLC | {'Station': '2', 'Processor': '5/01'},
+     SLC | {'Station': '255', 'Command': 'Write'},
+     SLC | {'Station': '255', 'Command': 'Write', 'Processor': '5/01'}]])
+def test_rows_that_do_not_clash(rows: list[dict[str, str]]) -> None:
+    mappings, problems = load_rows(*(
+        row(**{'Tag': f'tag{number}'} | cells) for number, cells in enumerate(rows)))
+    assert (len(mappings), problems) == (len(rows), [])
+    assert len(faults(row(Topic='t'), row(Topic='t'))) == 2  # one tag and one topic

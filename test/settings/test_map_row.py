@@ -28,7 +28,7 @@ from abdf1_ros.settings.mapping import Command, Publish
 from abdf1_ros.settings.scaling import Scaling
 import pytest
 from support.cases import for_all
-from support.mappings import fault, faults, load_rows, one, row, slc
+from support.mappings import fault, load_rows, one, row
 
 
 def test_row_with_every_column() -> None:
@@ -64,66 +64,119 @@ def test_command_says_whether_a_row_reads_and_writes(text: str, reads: bool, wri
     assert (mapping.reads, mapping.writes) == (reads, writes)
 
 
-@pytest.mark.parametrize('address, kind, right', [
-    ('F8:0', 'int16', 'F8:0 can be float32'),
-    ('ST9:0', 'int16', 'ST9:0 can be string'),
-    ('T4:0.ACC', 'int32', 'T4:0.ACC can be int16, uint16'),
-    ('B3:0', 'string', 'B3:0 can be uint16, int16, bcd16, int32, uint32, float32'),
-    ('N7:0', 'bool', 'N7:0 can be int16, uint16, bcd16, int32, uint32, float32, string; '
-                     'a bool needs a bit address such as B3:0/5'),
-    ('B3:0/5', 'int16', 'B3:0/5 can be bool: it is a bit; its word is B3:0'),
-    ('T4:0.DN', 'int16', 'T4:0/DN can be bool: it is a bit; the values of this element are '
-                         'T4:0.PRE, T4:0.ACC')])
-def test_type_that_does_not_fit(address: str, kind: str, right: str) -> None:
-    assert fault(Address=address, Type=kind) == f'2:7 (Type): Item: 1, {right}'
-
-
-@for_all(('column', 'text', 'expected'), [
-    ('Station', '255',
-     '2:4 (Station): 2501 ERR_BAD_STATION: Item: 1, Invalid station number (255) must be less '
-     'than 255'),
-    ('Station', 'PLC', '2:4 (Station): 2501 ERR_BAD_STATION: Item: 1, Station = "PLC" should be a '
+@for_all(('cells', 'expected'), [
+    ({'Station': '255'},
+     '4 (Station): 2501 ERR_BAD_STATION: Item: 1, Invalid station number (255) must be less than '
+     '255'),
+    ({'Station': 'PLC'}, '4 (Station): 2501 ERR_BAD_STATION: Item: 1, Station = "PLC" should be a '
      'whole number from 0 to 254'),
-    ('PLC_Type', 'S7',
-     '2:5 (PLC_Type): 2502 ERR_BAD_PLC_TYPE: Item: 1, Invalid or Unsupported PLC Type (S7) '
-     'should be one of PLC2, PLC3, PLC5, SLC; a MicroLogix is SLC'),
-    ('Address', 'N7',
-     '2:3 (Address): 2503 ERR_ADDRESS_SYNTAX: Item: 1, Invalid Address Syntax (N7); an element '
-     'is missing, as in N7:0'),
-    ('Address', 'L10:0',
-     '2:3 (Address): 2503 ERR_ADDRESS_SYNTAX: Item: 1, Invalid Address Syntax (L10:0); PLC-5 '
-     'has no L files; file types: O, I, S, B, T, C, R, N, F, ST, A, D, PD, MG, BT, SC'),
-    ('Address', 'N7:1000',
-     '2:3 (Address): 2504 ERR_ADDRESS_RANGE: Item: 1, Address is out of range (N7:1000, len=1);'
-     ' elements of N run from 0 to 999'),
-    ('Command', 'Poll',
-     '2:2 (Command): Item: 1, Command = "Poll" should be one of '
+    ({'PLC_Type': 'S7'},
+     '5 (PLC_Type): 2502 ERR_BAD_PLC_TYPE: Item: 1, Invalid or Unsupported PLC Type (S7) should '
+     'be one of PLC2, PLC3, PLC5, SLC; a MicroLogix is SLC'),
+    ({'Address': 'N7'}, '3 (Address): 2503 ERR_ADDRESS_SYNTAX: Item: 1, Invalid Address Syntax '
+     '(N7); an element is missing, as in N7:0'),
+    ({'Address': 'N7:1000'}, '3 (Address): 2504 ERR_ADDRESS_RANGE: Item: 1, Address is out of '
+     'range (N7:1000, len=1); elements of N run from 0 to 999'),
+    ({'Address': '018', 'PLC_Type': 'PLC2'}, '3 (Address): 2503 ERR_ADDRESS_SYNTAX: Item: 1, '
+     'Invalid Address Syntax (018); PLC-2 words and bits are octal, as in 020 or 110/17'),
+    ({'Command': 'Poll'}, '2 (Command): Item: 1, Command = "Poll" should be one of '
      + ', '.join(command.value for command in Command)),
-    ('Publish', 'Never',
-     '2:10 (Publish): Item: 1, Publish = "Never" should be one of Always, Change'),
-    ('Type', 'int8', '2:7 (Type): Item: 1, Type = "int8" should be one of bool, int16, uint16, '
+    ({'Publish': 'Never'}, '10 (Publish): Item: 1, Publish = "Never" should be one of Always, '
+     'Change'),
+    ({'Type': 'int8'}, '7 (Type): Item: 1, Type = "int8" should be one of bool, int16, uint16, '
      'int32, uint32, float32, bcd16, string'),
-    ('Length', '0', '2:6 (Length): Item: 1, Length = "0" should be a whole number from 1 to '
+    ({'Length': '0'}, '6 (Length): Item: 1, Length = "0" should be a whole number from 1 to '
      '65535'),
-    ('Length', '1.5', '2:6 (Length): Item: 1, Length = "1.5" should be a whole number from 1 '
-     'to 65535'),
-    ('Period', '-1', '2:9 (Period): Item: 1, Period = "-1" should be a whole number from 0 to '
-     '86400000 ms'),
-    ('Period', '86400001', '2:9 (Period): Item: 1, Period = "86400001" should be a whole number'
-     ' from 0 to 86400000 ms'),
-    ('Min', 'low', '2:11 (Min): Item: 1, Min = "low" should be a number'),
-    ('Min', 'nan', '2:11 (Min): Item: 1, Min = "nan" should be a number'),
-    ('Min', '1_000', '2:11 (Min): Item: 1, Min = "1_000" should be a number'),
-    ('Min', '\u0661', '2:11 (Min): Item: 1, Min = "\u0661" should be a number; '
+    ({'Period': '86400001'}, '9 (Period): Item: 1, Period = "86400001" should be a whole number '
+     'from 0 to 86400000 ms'),
+    ({'Min': 'low'}, '11 (Min): Item: 1, Min = "low" should be a number'),
+    ({'Min': '1_000'}, '11 (Min): Item: 1, Min = "1_000" should be a number'),
+    ({'Min': '\u0661'}, '11 (Min): Item: 1, Min = "\u0661" should be a number; '
      'character 1 is U+0661 ARABIC-INDIC DIGIT ONE'),
-    ('Max', 'inf', '2:12 (Max): Item: 1, Max = "inf" should be a number'),
-    ('Max', '1e999', '2:12 (Max): Item: 1, Max = "1e999" should be a number'),
-    ('Tag', '--', '2:1 (Tag): Item: 1, Tag = "--" has no letter, digit or underscore'),
-    ('Topic', '/', '2:8 (Topic): Item: 1, Topic = "/" has no letter, digit or underscore'),
-    ('Topic', 'x' * 151, '2:8 (Topic): Item: 1, Topic has 151 characters, at most 150 go'),
-])
-def test_fault_of_a_cell_is_told_word_for_word(column: str, text: str, expected: str) -> None:
-    assert fault(**{column: text}) == expected
+    ({'Max': 'inf'}, '12 (Max): Item: 1, Max = "inf" should be a number'),
+    ({'Max': '1e999'}, '12 (Max): Item: 1, Max = "1e999" should be a number'),
+    ({'Tag': '--'}, '1 (Tag): Item: 1, Tag = "--" has no letter, digit or underscore'),
+    ({'Topic': '/'}, '8 (Topic): Item: 1, Topic = "/" has no letter, digit or underscore'),
+    ({'Topic': 'x' * 151}, '8 (Topic): Item: 1, Topic has 151 characters, at most 150 go'),
+    *(({column: ''}, f'{COLUMNS.index(column) + 1} ({column}): Item: 1, {column} is missing')
+      for column in ('Tag', 'Command', 'Address', 'Station', 'PLC_Type')),
+    # Cells that do not fit each other.
+    ({'Address': 'F8:0', 'Type': 'int16'}, '7 (Type): Item: 1, F8:0 can be float32'),
+    ({'Address': 'B3:0', 'Type': 'string'},
+     '7 (Type): Item: 1, B3:0 can be uint16, int16, bcd16, int32, uint32, float32'),
+    ({'Type': 'bool'}, '7 (Type): Item: 1, N7:0 can be int16, uint16, bcd16, int32, uint32, '
+     'float32, string; a bool needs a bit address such as B3:0/5'),
+    ({'Address': 'B3:0/5', 'Type': 'int16'},
+     '7 (Type): Item: 1, B3:0/5 can be bool: it is a bit; its word is B3:0'),
+    ({'Address': 'T4:0.DN', 'Type': 'int16'}, '7 (Type): Item: 1, T4:0/DN can be bool: it is a '
+     'bit; the values of this element are T4:0.PRE, T4:0.ACC'),
+    ({'Address': 'ST9:0', 'Max': '4'},
+     '12 (Max): Item: 1, a string has no Max; leave the cell empty'),
+    ({'Address': 'ST9:0', 'Length': '2'}, '6 (Length): Item: 1, a string mapping has Length 1'),
+    ({'Min': '5', 'Max': '4'}, '11 (Min): Item: 1, Min is greater than Max'),
+    ({'Address': 'T4:0/13', 'Length': '4', 'Command': 'Read'},
+     '6 (Length): 2504 ERR_ADDRESS_RANGE: Item: 1, Address is out of range (T4:0/13, len=4); bits '
+     'of a structure end with their word'),
+    ({'Address': 'PD9:0.SP', 'Length': '25', 'Command': 'Read'},
+     '6 (Length): Item: 1, 25 float32 from PD9:0.SP reach to PD9:0.50, where words of 16 bits '
+     'are'),
+    ({'Address': 'MG9:0/EN', 'Command': 'Write'}, '3 (Address): Item: 1, MG9:0/EN belongs to the '
+     'processor; of such an element can be written: TO, CO'),
+    ({'Address': 'F8:0', 'Word_Order': 'High'}, '13 (Word_Order): Item: 1, Word_Order High is for '
+     'int32, uint32 and float32 over words of 16 bits such as N7:0, not for float32 at F8:0'),
+    ({'Word_Order': 'High'}, '13 (Word_Order): Item: 1, Word_Order High is for int32, uint32 and '
+     'float32 over words of 16 bits such as N7:0, not for int16 at N7:0'),
+    ({'Scale': '-0.0', 'Offset': '2'}, '14 (Scale): Item: 1, Scale should not be 0'),
+    ({'Scale': 'x'}, '14 (Scale): Item: 1, Scale = "x" should be a number'),
+    ({'Offset': '"1,000"'},
+     '15 (Offset): Item: 1, Offset = "1,000" could be two numbers; write 1000 or 1.000'),
+    ({'Address': 'B3:0/4', 'Scale': '2'},
+     '14 (Scale): Item: 1, Scale and Offset are for numbers, not for bool'),
+    ({'Offset': '1e9'},
+     '15 (Offset): Item: 1, a float32 has too few digits to tell the values apart in 999967232 '
+     'to 1000032767, the range of int16 with Scale 1, Offset 1000000000'),
+    ({'Access': 'CIF'},
+     '16 (Access): Item: 1, Access = "CIF" of a PLC5 should be one of Typed, WordRange'),
+    ({'Access': 'Typed', 'Command': 'Serve'}, '16 (Access): Item: 1, Access = "Typed" of a Serve '
+     'row should be Read, for words that the other end cannot write, or empty'),
+    ({'PLC_Type': 'PLC2', 'Address': '020/05', 'Access': 'CIF'}, '3 (Address): Item: 1, Access '
+     'CIF has no command that changes single bits; write the whole word, or only read'),
+    ({'PLC_Type': 'SLC', 'Processor': '5/06'}, '17 (Processor): Item: 1, Processor = "5/06" '
+     'should be one of 5/01, 5/02, 5/03, 5/04, 5/05, ML1000, ML1100, ML1200, ML1400, ML1500'),
+    ({'Processor': '5/03'}, '17 (Processor): Item: 1, Processor is for PLCs of type SLC that we '
+     'read or write; leave the cell empty'),
+    ({'PLC_Type': 'SLC', 'Processor': '5/03', 'Command': 'Serve'}, '17 (Processor): Item: 1, '
+     'Processor is for PLCs of type SLC that we read or write; leave the cell empty'),
+    ({'PLC_Type': 'SLC', 'Processor': '5/05', 'Address': 'L10:0'}, '3 (Address): Item: 1, 5/05 '
+     'has no file L10; ML1100, ML1200, ML1400, ML1500 may have it'),
+    ({'PLC_Type': 'SLC', 'Processor': 'ML1000', 'Address': 'N10:0'}, '3 (Address): Item: 1, '
+     'ML1000 has no file N10; 5/01, 5/02, 5/03, 5/04, 5/05, ML1100, ML1200, ML1400, ML1500 may '
+     'have it')])
+def test_fault_is_told_word_for_word(cells: dict[str, str], expected: str) -> None:
+    assert fault(**cells) == f'2:{expected}'
+
+
+@for_all(('cells', 'length', 'last'), [
+    ({'Address': 'N7:990'}, 10, 'N7:999'), ({'Address': 'F8:999'}, 1, 'F8:999'),
+    ({'Address': 'N7:250', 'PLC_Type': 'SLC'}, 6, 'N7:255'),
+    ({'Address': 'T4:999', 'Command': 'Read'}, 3, 'T4:999.ACC'),
+    ({'Address': 'B3:998/1'}, 31, 'B3:999'), ({'Address': 'S:127'}, 1, 'S2:127'),
+    ({'Address': 'I:277', 'Command': 'Read'}, 1, 'I:277'),
+    ({'Address': 'I:30.255', 'PLC_Type': 'SLC'}, 1, 'I:30.255'),
+    ({'Address': '077777', 'PLC_Type': 'PLC2'}, 1, '077777')])
+def test_mapping_ends_with_its_file(cells: dict[str, str], length: int, last: str) -> None:
+    assert one(**cells, Length=str(length))
+    assert fault(**cells, Length=str(length + 1)) == (
+        '2:6 (Length): 2504 ERR_ADDRESS_RANGE: Item: 1, Address is out of range '
+        f'({cells["Address"]}, len={length + 1}); the last word there can be is {last}')
+
+
+def test_cells_that_just_fit() -> None:
+    assert one(Min='5', Max='5').maximum == 5
+    assert one(Address='T4:0/13', Length='3', Command='Read')
+    assert one(Address='F8:0', Word_Order='Low').word_order is WordOrder.LOW
+    assert one(PLC_Type='PLC2', Address='020/05', Access='CIF', Command='Read')
+    assert one(Address='N7:998', Type='int32')
 
 
 @pytest.mark.parametrize('column, texts', [
@@ -149,12 +202,6 @@ def test_remark_on_a_long_cell_is_without_its_end() -> None:
     assert len(str(remark)) < 500
 
 
-@pytest.mark.parametrize('column', ['Tag', 'Command', 'Address', 'Station', 'PLC_Type'])
-def test_needed_cell_that_is_empty_is_told_as_missing(column: str) -> None:
-    assert fault(**{column: ''}) == \
-        f'2:{COLUMNS.index(column) + 1} ({column}): Item: 1, {column} is missing'
-
-
 @pytest.mark.parametrize('column, texts', [
     ('Station', ('0', '254')), ('Length', ('1', '1000')), ('Period', ('0', '86400000')),
     ('Min', ('0', '-3.5', '1e3', '-2,5')), ('Max', ('0', '1e300')), ('Topic', ('x' * 150,))])
@@ -164,64 +211,12 @@ def test_both_ends_of_a_range(column: str, texts: tuple[str, ...]) -> None:
         assert (len(mappings), problems) == (1, [])
 
 
-def test_string_has_no_limits() -> None:
-    assert fault(Address='ST9:0', Type='string', Length='1', Max='4') == (
-        '2:12 (Max): Item: 1, a string has no Max; leave the cell empty')
-
-
-def test_minimum_above_the_maximum() -> None:
-    assert fault(Min='5', Max='4') == '2:11 (Min): Item: 1, Min is greater than Max'
-    assert one(Min='5', Max='5').maximum == 5
-
-
 def test_numbered_faults_are_errors() -> None:
     _, problems = load_rows(row(Station='999', Address='??'), row(PLC_Type='S7'))
     assert sorted(problem.message.number for problem in problems if problem.message) == [
         2501, 2502, 2503]
     assert all(problem.message and problem.message.severity is Severity.ERROR
                for problem in problems)
-
-
-@pytest.mark.parametrize('cells', [
-    {'Address': 'N7:999'}, {'Address': 'N7:990', 'Length': '10'},
-    {'Address': 'N7:998', 'Type': 'int32'}, {'Address': 'F8:999'},
-    {'Address': 'N7:255', 'PLC_Type': 'SLC'}, {'Address': 'T4:999.ACC', 'Command': 'Read'},
-    {'Address': 'T4:998', 'Length': '6', 'Command': 'Read'},
-    {'Address': 'B3:999/15'}, {'Address': 'B3:998/1', 'Length': '31'},
-    {'Address': 'I:277', 'Command': 'Read'}, {'Address': 'S:127'}, {'Address': 'ST9:779'},
-    {'Address': 'I:30.255', 'PLC_Type': 'SLC'}])
-def test_mapping_at_the_end_of_a_file(cells: dict[str, str]) -> None:
-    assert one(**cells)
-
-
-@pytest.mark.parametrize('cells, length, last', [
-    ({'Address': 'N7:990', 'Length': '11'}, 11, 'N7:999'),
-    ({'Address': 'F8:999', 'Length': '2'}, 2, 'F8:999'),
-    ({'Address': 'N7:250', 'Length': '7', 'PLC_Type': 'SLC'}, 7, 'N7:255'),
-    ({'Address': 'T4:999', 'Length': '4', 'Command': 'Read'}, 4, 'T4:999.ACC'),
-    ({'Address': 'B3:998/1', 'Length': '32'}, 32, 'B3:999'),
-    ({'Address': 'I:277', 'Length': '2', 'Command': 'Read'}, 2, 'I:277'),
-    ({'Address': 'S:127', 'Length': '2'}, 2, 'S2:127'),
-    ({'Address': 'I:30.255', 'Length': '2', 'PLC_Type': 'SLC'}, 2, 'I:30.255')])
-def test_mapping_over_the_end_of_a_file_is_out_of_range(
-        cells: dict[str, str], length: int, last: str) -> None:
-    text = fault(**cells)
-    assert text.startswith(
-        '2:6 (Length): 2504 ERR_ADDRESS_RANGE: Item: 1, Address is out of range '
-        f'({cells["Address"]}, len={length}); the last word there can be is ')
-    assert text.endswith(last)
-
-
-def test_bits_of_a_structure_end_with_their_word() -> None:
-    assert fault(Address='T4:0/13', Length='4', Command='Read') == (
-        '2:6 (Length): 2504 ERR_ADDRESS_RANGE: Item: 1, Address is out of range (T4:0/13, '
-        'len=4); bits of a structure end with their word')
-    assert one(Address='T4:0/13', Length='3', Command='Read')
-
-
-def test_string_mapping_is_one_string() -> None:
-    assert fault(Address='ST9:0', Length='2') == \
-        '2:6 (Length): Item: 1, a string mapping has Length 1'
 
 
 @pytest.mark.parametrize('plc', ['PLC5', 'SLC'])
@@ -248,17 +243,6 @@ def test_word_order_is_high_where_the_cell_says_so_and_low_without_it(
     assert mapping != low
 
 
-@pytest.mark.parametrize('cells, kind', [
-    ({'Address': 'F8:0'}, 'float32 at F8:0'), ({'Address': 'N7:0'}, 'int16 at N7:0'),
-    ({'Address': 'L10:0', 'PLC_Type': 'SLC', 'Type': 'uint32'}, 'uint32 at L10:0'),
-    ({'Address': 'ST9:0'}, 'string at ST9:0'), ({'Address': 'B3:0/4'}, 'bool at B3:0/4')])
-def test_word_order_of_what_has_none(cells: dict[str, str], kind: str) -> None:
-    assert fault(Word_Order='High', **cells) == (
-        '2:13 (Word_Order): Item: 1, Word_Order High is for int32, uint32 and float32 over words '
-        f'of 16 bits such as N7:0, not for {kind}')
-    assert one(Word_Order='Low', **cells).word_order is WordOrder.LOW
-
-
 @pytest.mark.parametrize('cells, scaling', [
     ({'Scale': '0.1'}, Scaling(0.1, 0.0)), ({'Offset': '-40'}, Scaling(1.0, -40.0)),
     ({'Scale': '-2', 'Offset': '1e3'}, Scaling(-2.0, 1000.0)),
@@ -270,25 +254,6 @@ def test_scale_or_offset_make_the_message_float32(
     assert mapping.scaling == scaling
     assert mapping.type is ValueType.INT16
     assert mapping.message_type is (ValueType.FLOAT32 if scaling else ValueType.INT16)
-
-
-@pytest.mark.parametrize('cells, expected', [
-    ({'Scale': '0'}, '14 (Scale): Item: 1, Scale should not be 0'),
-    ({'Scale': '-0.0', 'Offset': '2'}, '14 (Scale): Item: 1, Scale should not be 0'),
-    ({'Scale': 'x'}, '14 (Scale): Item: 1, Scale = "x" should be a number'),
-    ({'Scale': 'inf'}, '14 (Scale): Item: 1, Scale = "inf" should be a number'),
-    ({'Offset': 'nan'}, '15 (Offset): Item: 1, Offset = "nan" should be a number'),
-    ({'Offset': '"1,000"'},
-     '15 (Offset): Item: 1, Offset = "1,000" could be two numbers; write 1000 or 1.000'),
-    ({'Address': 'B3:0/4', 'Scale': '2'},
-     '14 (Scale): Item: 1, Scale and Offset are for numbers, not for bool'),
-    ({'Address': 'ST9:0', 'Offset': '2'},
-     '15 (Offset): Item: 1, Scale and Offset are for numbers, not for string'),
-    ({'Offset': '1e9'},
-     '15 (Offset): Item: 1, a float32 has too few digits to tell the values apart in 999967232 '
-     'to 1000032767, the range of int16 with Scale 1, Offset 1000000000')])
-def test_scale_and_offset_that_do_not_go(cells: dict[str, str], expected: str) -> None:
-    assert fault(**cells) == f'2:{expected}'
 
 
 # Families and access
@@ -305,47 +270,7 @@ def test_access_chooses_the_dialect(plc: str, text: str, access: str) -> None:
     assert mapping.dialect is dialect_of(PlcType(plc), Access(access))
 
 
-@pytest.mark.parametrize(('cells', 'text'), [
-    ({'Access': 'CIF'}, 'Access = "CIF" of a PLC5 should be one of Typed, WordRange'),
-    ({'Access': 'Typed', 'PLC_Type': 'PLC3'},
-     'Access = "Typed" of a PLC3 should be one of WordRange'),
-    ({'Access': 'x', 'PLC_Type': 'PLC2', 'Address': '020'},
-     'Access = "x" of a PLC2 should be one of Unprotected, Protected, CIF'),
-    ({'Access': 'Typed', 'Command': 'Serve', 'Station': '5'},
-     'Access = "Typed" of a Serve row should be Read, for words that the other end cannot write, '
-     'or empty')])
-def test_access_that_does_not_fit(cells: dict[str, str], text: str) -> None:
-    assert fault(**cells) == f'2:{COLUMNS.index("Access") + 1} (Access): Item: 1, {text}'
-
-
-@pytest.mark.parametrize('command', ['Write', 'ReadWrite'])
-def test_bits_of_a_common_interface_file_are_not_written(command: str) -> None:
-    cells = {'PLC_Type': 'PLC2', 'Address': '020/05', 'Access': 'CIF'}
-    assert fault(**cells, Command=command) == (
-        '2:3 (Address): Item: 1, Access CIF has no command that changes single bits; write the '
-        'whole word, or only read')
-    assert one(**cells, Command='Read').type is ValueType.BOOL
-
-
 # Structures, flat I/O and processors
-
-
-@pytest.mark.parametrize(('cells', 'text'), [
-    ({'Address': 'PD9:0.SP', 'Length': '25'},
-     '2:6 (Length): Item: 1, 25 float32 from PD9:0.SP reach to PD9:0.50, where words of 16 bits '
-     'are'),
-    ({'Address': 'PD9:0.SP', 'Type': 'int16'},
-     '2:7 (Type): Item: 1, PD9:0.SP can be float32'),
-    ({'Address': 'PD9:0.50', 'Type': 'float32'},
-     '2:7 (Type): Item: 1, PD9:0.50 can be int16, uint16'),
-    ({'Address': 'PD9:0.3'},
-     '2:3 (Address): 2503 ERR_ADDRESS_SYNTAX: Item: 1, Invalid Address Syntax (PD9:0.3); word 3 '
-     'is the second half of a float32; write the first, 2'),
-    ({'Address': 'MG9:0/EN', 'Command': 'Write'},
-     '2:3 (Address): Item: 1, MG9:0/EN belongs to the processor; of such an element can be '
-     'written: TO, CO')])
-def test_parts_of_structures_that_do_not_go(cells: dict[str, str], text: str) -> None:
-    assert fault(**{'Command': 'Read'} | cells) == text
 
 
 def test_io_by_the_word_of_the_image() -> None:
@@ -366,28 +291,6 @@ def test_slc_without_a_processor_is_taken_for_a_5_03() -> None:
     mapping = one(PLC_Type='SLC', Address='L10:0', Command='Read')  # or for a MicroLogix
     assert (mapping.processor, mapping.cell('Processor')) == (None, '')
     assert mapping.dialect is dialect_of(PlcType.SLC, None, Processor.SLC_5_03)
-
-
-@pytest.mark.parametrize(('cells', 'text'), [
-    ({'Processor': '5/06'}, '(Processor): Item: 1, Processor = "5/06" should be one of 5/01, '
-                            '5/02, 5/03, 5/04, 5/05, ML1000, ML1100, ML1200, ML1400, ML1500'),
-    ({'Processor': '5/03', 'PLC_Type': 'PLC5'}, '(Processor): Item: 1, Processor is for PLCs of '
-     'type SLC that we read or write; leave the cell empty'),
-    ({'Processor': '5/03', 'Command': 'Serve'}, '(Processor): Item: 1, Processor is for PLCs of '
-     'type SLC that we read or write; leave the cell empty'),
-    ({'Processor': '5/05', 'Address': 'L10:0'}, '(Address): Item: 1, 5/05 has no file L10; '
-     'ML1100, ML1200, ML1400, ML1500 may have it'),
-    ({'Processor': '5/02', 'Address': 'F8:0'}, '(Address): Item: 1, 5/02 has no file F8; '
-     '5/03, 5/04, 5/05, ML1100, ML1200, ML1400, ML1500 may have it'),
-    ({'Processor': '5/01', 'Address': 'A10:0'}, '(Address): Item: 1, 5/01 has no file A10; '
-     '5/03, 5/04, 5/05, ML1100, ML1200, ML1400, ML1500 may have it'),
-    ({'Processor': '5/02', 'Address': 'D11:0'}, '(Address): Item: 1, 5/02 has no file D11; '
-     '5/03, 5/04, 5/05, ML1100, ML1200, ML1400, ML1500 may have it'),
-    ({'Processor': 'ML1000', 'Address': 'N10:0'}, '(Address): Item: 1, ML1000 has no file N10; '
-     '5/01, 5/02, 5/03, 5/04, 5/05, ML1100, ML1200, ML1400, ML1500 may have it')])
-def test_processor_that_does_not_fit(cells: dict[str, str], text: str) -> None:
-    found, = faults(slc(**cells))
-    assert found.endswith(text)
 
 
 @pytest.mark.parametrize('place', ['T4:1', 'C5:1', 'R6:1', 'MG9:0/EN'])

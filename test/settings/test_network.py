@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The net CSV: ranges, defaults and the numbered texts of its errors."""
+"""The net CSV: ranges, defaults, numbered texts, places of Share, and lists of stations."""
 
 from pathlib import Path
 
@@ -28,6 +28,9 @@ from abdf1_ros.settings.network import (
     MODE_NAMES,
     Network,
 )
+from abdf1_ros.settings.remarks import network_remarks
+from abdf1_ros.settings.share import share_places, SharePlace
+from abdf1_ros.settings.station_lists import parse_stations
 from hypothesis import given
 from hypothesis import strategies as st
 import pytest
@@ -302,3 +305,101 @@ def test_radio_modem_and_what_it_sends_on(path: Path) -> None:
     assert not load(path, 'Mode,Collision_Avoidance', 'Peer,Yes').line.avoids_collisions
     with pytest.raises(ConfigurationError, match='Store_Forward = "256" should be a station from'):
         load(path, 'Mode,Store_Forward', 'Radio,"1,256"')
+
+
+@pytest.mark.parametrize(('text', 'place'), [
+    ('pty:/tmp/hmi', SharePlace('pty:/tmp/hmi', 'pty', '/tmp/hmi')),
+    ('tcp:4501', SharePlace('tcp:4501', 'tcp', '4501', '127.0.0.1', 4501)),
+    ('tcp:0.0.0.0:4501?check=BCC', SharePlace(
+        'tcp:0.0.0.0:4501?check=BCC', 'tcp', '0.0.0.0:4501', '0.0.0.0', 4501,
+        check=Checksum.BCC)),
+    ('tcp:[::1]:4501', SharePlace('tcp:[::1]:4501', 'tcp', '[::1]:4501', '::1', 4501)),
+    ('/dev/ttyUSB1?baud=19200&check=CRC&parity=Even', SharePlace(
+        '/dev/ttyUSB1?baud=19200&check=CRC&parity=Even', 'serial', '/dev/ttyUSB1', baud=19200,
+        check=Checksum.CRC, parity='Even'))])
+def test_place_is_a_link_a_port_or_a_device(text: str, place: SharePlace) -> None:
+    assert share_places(f' {text} ') == [place]
+
+
+@pytest.mark.parametrize(('text', 'words'), [
+    ('hmi', '"hmi" should be pty:/a/name, tcp:PORT'), ('pty:hmi', 'pty:/a/name'),
+    ('tcp:', 'tcp:PORT (for this machine only)'), ('tcp:70000', 'tcp:PORT'),
+    ('tcp:plant.example:4501', 'the address of an interface'),
+    ('pty:/tmp/a?baud=9600', 'only a serial device has baud'),
+    ('/dev/ttyS1?speed=9600', 'after "?" may come baud=1200|'),
+    ('/dev/ttyS1?check=LRC', 'check=BCC|CRC'),
+    ('pty:/tmp/a pty:/tmp/a?check=BCC', 'there twice'),
+    (' '.join(f'tcp:{port}' for port in range(4000, 4017)), 'the most are 16')])
+def test_fault_says_what_would_be_right(text: str, words: str) -> None:
+    with pytest.raises(ConfigurationError) as error:
+        make_network({'share': (text, 'net.csv:2')})
+    problem, = error.value.problems
+    assert words in str(problem)
+    assert str(problem).startswith('net.csv:2: Share: ')
+
+
+def test_place_is_one_however_it_is_written(tmp_path: Path) -> None:
+    (tmp_path / 'tty').touch()
+    (tmp_path / 'link').symlink_to('tty')
+    (tmp_path / 'same').symlink_to('.')
+    for one, other in [(f'pty:{tmp_path}/a', f'pty:{tmp_path}//a'),
+                       (f'pty:{tmp_path}/a', f'pty:{tmp_path}/same/a'),
+                       (f'{tmp_path}/tty', f'{tmp_path}/link?baud=9600'),
+                       ('tcp:4501', 'tcp:127.0.0.1:4501'), ('tcp:4501', 'tcp:0.0.0.0:4501'),
+                       ('tcp:4501', 'tcp:[::1]:4501')]:
+        with pytest.raises(ValueError, match='there twice, also as'):
+            share_places(f'{one} tcp:99 {other}')
+    assert len(share_places('tcp:4501 tcp:4502 tcp:10.0.0.1:4501')) == 3
+
+
+@pytest.mark.parametrize(('port', 'place'), [
+    ('{0}/tty', '{0}/link?baud=9600'), ('{0}/link', '{0}/tty'), ('{0}/new', 'pty:{0}//new'),
+    ('socket://127.0.0.1:4501', 'tcp:4501'), ('1', '/dev/ttyS0')])
+def test_port_of_the_line_is_no_place(port: str, place: str, tmp_path: Path) -> None:
+    (tmp_path / 'tty').touch()
+    (tmp_path / 'link').symlink_to('tty')
+    port, place = port.format(tmp_path), place.format(tmp_path)
+    file = tmp_path / 'net.csv'
+    file.write_text(f'Com_Port,Share\n{port},tcp:4502 {place}\n')
+    with pytest.raises(ConfigurationError) as error:
+        load_network(str(file))
+    problem, = error.value.problems
+    assert str(problem.place).startswith(f'{file}:2')
+    assert problem.place.column == 'Share'
+    assert f'"{place}" is the port of the line' in str(problem)
+
+
+def test_slave_has_nothing_to_share() -> None:
+    with pytest.raises(ConfigurationError) as error:
+        make_network({'mode': ('Slave', 'x'), 'share': ('tcp:4501', 'x')})
+    assert 'Share needs Mode Master or Peer' in str(error.value)
+
+
+def test_place_that_is_open_to_other_machines_is_told() -> None:
+    remarks = [*network_remarks(Network(share='pty:/tmp/a tcp:0.0.0.0:4501'))]
+    assert remarks == [
+        'Share tcp:0.0.0.0:4501: whoever reaches 0.0.0.0:4501 over the network can send commands '
+        'to the PLC; nothing asks who it is']
+    assert [*network_remarks(Network())] == []
+
+
+@pytest.mark.parametrize('text, stations', [
+    ('', ()), ('7', (7,)), ('0-3', (0, 1, 2, 3)), ('5, 1 - 3', (5, 1, 2, 3)),
+    ('1-3,2,1', (1, 2, 3)), ('254', (254,)), (',1,,', (1,))])
+def test_list_may_have_single_stations_and_ranges(text: str, stations: tuple[int, ...]) -> None:
+    assert parse_stations(text) == (stations, [])
+
+
+@pytest.mark.parametrize('text, part', [
+    ('255', '255'), ('1 2', '1 2'), ('1 2-3', '1 2-3'), ('1-', '1-'), ('5,1- ,2', '1-'),
+    ('1,x', 'x'), ('3-1', '3-1'), ('-1', '-1'), ('1-2-3', '1-2-3')])
+def test_part_of_a_list_that_is_no_station_is_named(text: str, part: str) -> None:
+    assert parse_stations(text)[1] == [
+        f'"{part}" should be a station from 0 to 254, or a range such as 3-5; '
+        'put commas between them']
+
+
+def test_every_fault_is_told() -> None:
+    stations, faults = parse_stations('a,1,b')
+    assert stations == (1,)
+    assert len(faults) == 2
