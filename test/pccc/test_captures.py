@@ -118,14 +118,6 @@ def test_identity_of_a_micrologix_1400(mode: int, known: Mode, remarks: tuple[st
     assert len(reply.data) == 25
 
 
-def test_mode_that_a_change_of_mode_leads_to() -> None:
-    after = {exchange.command.data[1]: ML1400[number + 1].reply.data[18]
-             for number, exchange in enumerate(ML1400) if exchange.command.data[:1] == b'\x80'
-             and ML1400[number + 1].command.cmd == 6}
-    assert after == {1: 0x21}
-    assert decode_identity(simulated(Setting.PROGRAM)).mode is Mode.REMOTE_PROGRAM
-
-
 def simulated(setting: Setting) -> bytes:
     """Return the reply of a simulated MicroLogix 1400 to 06/03."""
     return FAMILIES[PlcType.SLC].encode_identity(EmulatedProcessor(

@@ -59,12 +59,6 @@ def test_offset_leads_back_to_its_word(kind: FileType, data: st.DataObject,
     assert address.at_offset(address.offset) == replace(address, bit=None)
 
 
-def test_last_word_of_each_file_is_the_last_of_its_area() -> None:
-    for text in ('O:7777', 'N7:9999', 'T:9999.ACC'):
-        address = parse_address(text, PLC3)
-        assert address.offset + 1 == address.area_size
-
-
 @pytest.mark.parametrize(('text', 'right'), [
     ('N7', 'as in N7:0'), ('020', 'as in N7:0'), ('N:0', 'give the file number, as in N7:0'),
     ('F8:0', 'F is not a file type of a PLC-3'), ('ST9:0', 'ST is not a file type of a PLC-3'),

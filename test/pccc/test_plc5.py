@@ -25,7 +25,6 @@ from abdf1_ros.pccc.plc5.commands import (
     element_of,
     ReadModifyWrite,
     SystemAddress,
-    TypedRead,
 )
 from abdf1_ros.pccc.plc5.dialect import Plc5Dialect
 from abdf1_ros.pccc.typed_data import TypedData
@@ -60,7 +59,10 @@ def test_address_in_logical_binary(address: SystemAddress, encoded: str) -> None
     (b'\0$PD12:10.50\0', SystemAddress(12, 10, 50)), (b'\0$BT9:3.RGS\0', SystemAddress(9, 3, 5)),
     (b'\0$MG9:3.DLEN\0', SystemAddress(9, 3, 3)), (b'\0$SC9:3.TIM\0', SystemAddress(9, 3, 2)),
     (b'\0$ST9:3\0', SystemAddress(9, 3)), (b'\0$R6:3.POS\0', SystemAddress(6, 3, 2)),
-    (b'\0$D9:3\0', SystemAddress(9, 3)), (b'\0$#N7:3\0', SystemAddress(7, 3))])
+    (b'\0$D9:3\0', SystemAddress(9, 3)), (b'\0$#N7:3\0', SystemAddress(7, 3)),
+    # File 1 is meant where none is named (M 13-10..13-15); other drivers take it for 0.
+    ('04 1E', SystemAddress(1, 30)), ('05 00 1E', SystemAddress(1, 30)),
+    ('0D 00 02 01', SystemAddress(1, 2, 1)), ('01 00', SystemAddress(1, 0))])
 def test_address_in_other_forms(encoded: str, address: SystemAddress) -> None:
     reader = parameters(encoded)
     assert SystemAddress.read(reader) == address
@@ -74,14 +76,6 @@ def test_address_in_other_forms(encoded: str, address: SystemAddress) -> None:
 def test_what_is_no_address(encoded: str) -> None:
     with pytest.raises(FormatError):
         SystemAddress.read(parameters(encoded))
-
-
-@pytest.mark.parametrize(('encoded', 'address'), [
-    ('04 1E', SystemAddress(1, 30)), ('05 00 1E', SystemAddress(1, 30)),
-    ('0D 00 02 01', SystemAddress(1, 2, 1)), ('01 00', SystemAddress(1, 0))])
-def test_file_that_is_left_out_is_file_1(encoded: str, address: SystemAddress) -> None:
-    """M 13-10..13-15; other drivers take it for 0."""
-    assert SystemAddress.read(parameters(encoded)) == address
 
 
 @pytest.mark.parametrize(('letters', 'descriptor', 'words', 'size'), [
@@ -109,21 +103,6 @@ def test_read_modify_write_takes_243_bytes() -> None:
     assert ReadModifyWrite.read(Reader(body)).sets == fits
     with pytest.raises(FormatError, match='^244 bytes of words to modify, 243 are allowed$'):
         ReadModifyWrite.read(Reader(body + b'\0' * 3))
-
-
-def test_bytes_behind_a_typed_read_are_a_format_error() -> None:
-    with pytest.raises(FormatError, match='too many'):
-        TypedRead.read(parameters('00 00 01 00 07 00 07 00 01 00 01'))
-
-
-def test_padding_behind_a_typed_read_is_passed_over() -> None:
-    padded = TypedRead.read(parameters('00 00 01 00 07 00 07 00 01 00 00 00'))
-    assert padded == TypedRead.read(parameters('00 00 01 00 07 00 07 00 01 00'))
-
-
-def test_read_modify_write_of_nothing_is_a_format_error() -> None:
-    with pytest.raises(FormatError):
-        ReadModifyWrite.read(Reader(b''))
 
 
 PLC5 = PlcType.PLC5
@@ -212,14 +191,6 @@ def test_plc5_structures_as_a_whole(name: str, words: int, number: int, descript
     assert words_at(empty, name.replace('_', ':'), words * number) == data
 
 
-def test_plc5_takes_members_in_logical_ascii() -> None:
-    words = table(PLC5, PD12_10='00 00' * 82, BT9_0=counting(6))
-    sp, rgs = b'\0$PD12:10.SP\0'.hex(), b'\0$BT9:0.RGS\0'.hex()
-    assert ask(words, f'67 00 00 01 00 {sp} 96 09 94 08 00 00 2A 42') == (0, '')
-    assert ask(words, f'68 00 00 01 00 {sp} 01 00') == (0, '96 09 94 08 00 00 2A 42')
-    assert ask(words, f'68 00 00 01 00 {rgs} 01 00') == (0, '93 09 42 05 00')
-
-
 @for_all(('data', 'ext_sts'), [
     ('68 00 00 01 00 07 00 09 00 01 00', '06'), ('68 00 00 01 00 07 00 07 04 01 00', '07'),
     ('68 00 00 05 00 07 00 07 00 05 00', '07'), ('68 00 00 01 00 07 00 07 00 02 00', '01'),
@@ -243,6 +214,13 @@ def test_command_that_a_plc5_refuses_changes_nothing(data: str, ext_sts: str) ->
     words = table(PLC5, N7_0='00 00' * 4, T4_0='00 00' * 3)
     assert ask(words, data) == (0xF0, ext_sts)
     assert words_at(words, 'N7:0', 4) == '00 00 ' * 3 + '00 00'
+
+
+def test_bytes_after_a_command_are_padding_if_they_are_0() -> None:
+    words = table(PLC5, N7_0='01 00')
+    assert ask(words, '68 00 00 01 00 06 07 00 01 00 00 00') == (0, '93 09 42 01 00')
+    assert ask(words, '68 00 00 01 00 06 07 00 01 00 01') == (0x10, '')
+    assert ask(words, '26') == (0x10, '')
 
 
 def test_plc5_reply_beyond_240_bytes_is_refused() -> None:
