@@ -197,45 +197,29 @@ def test_fault_is_read_back(plc_type: PlcType, fault: str) -> None:
 LAYOUTS = (COUNTERS, FULL_DUPLEX_COUNTERS, MASTER_COUNTERS, SLAVE_COUNTERS, ML1000_COUNTERS)
 
 
-def words(count: int) -> bytes:
-    """Return that many words whose value is their place plus 100."""
-    return b''.join((100 + n).to_bytes(2, 'little') for n in range(count))
-
-
-@pytest.mark.parametrize(('layout', 'expected'), [
-    (FULL_DUPLEX_COUNTERS, {
-        'modem lines': 'CTS', 'messages sent': '101', 'messages received': '102',
-        'messages undelivered': '103', 'ENQ sent': '104', 'NAK received': '105',
-        'ENQ received': '106', 'bad messages received': '107',
-        'messages refused for lack of memory': '108', 'duplicate messages received': '109',
-        'carrier recovered': '111', 'modem lost': '112'}),
-    (MASTER_COUNTERS, {
-        'modem lines': 'CTS', 'messages sent': '101', 'messages received': '102',
-        'messages undelivered': '103', 'messages sent again': '104',
-        'last normal scan (100 ms)': '105', 'longest normal scan (100 ms)': '106',
-        'bad messages received': '107', 'duplicate messages received': '109',
-        'last priority scan (100 ms)': '110', 'carrier recovered': '111', 'modem lost': '112',
-        'longest priority scan (100 ms)': '113'}),
-    (SLAVE_COUNTERS, {
-        'modem lines': 'CTS', 'messages sent': '101', 'messages received': '102',
-        'messages undelivered': '103', 'messages sent again': '104', 'polls received': '106',
-        'bad messages received': '107', 'messages refused for lack of memory': '108',
-        'duplicate messages received': '109', 'carrier recovered': '111', 'modem lost': '112'}),
-    (ML1000_COUNTERS, {
-        'messages sent': '101', 'messages received': '102', 'messages undelivered': '103',
-        'ENQ sent': '104', 'NAK received': '105', 'ENQ received': '106',
-        'bad messages received': '107', 'messages refused for lack of memory': '108',
-        'duplicate messages received': '109', 'framing errors': '110'}),
-    (COUNTERS, {
-        'modem lines': 'CTS', 'messages sent': '101', 'messages received': '102',
-        'messages undelivered': '103', 'ENQ sent, or messages sent again': '104',
-        'NAK received': '105', 'ENQ received': '106', 'bad messages received': '107',
-        'NAK sent': '108', 'duplicate messages received': '109', 'receive errors': '110',
-        'carrier recovered': '111', 'modem lost': '112'})])
-def test_words_have_the_names_of_their_layout(
-        layout: CounterLayout, expected: dict[str, str]) -> None:
-    block = (1).to_bytes(2, 'little') + words(len(layout))[2:]
-    assert decode_counters(block, layout) == expected
+@for_all(('layout', 'names'), [
+    (FULL_DUPLEX_COUNTERS, 'messages sent, messages received, messages undelivered, ENQ sent, NAK '
+     'received, ENQ received, bad messages received, messages refused for lack of memory, '
+     'duplicate messages received, , carrier recovered, modem lost'),
+    (MASTER_COUNTERS, 'messages sent, messages received, messages undelivered, messages sent '
+     'again, last normal scan (100 ms), longest normal scan (100 ms), bad messages received, , '
+     'duplicate messages received, last priority scan (100 ms), carrier recovered, modem lost, '
+     'longest priority scan (100 ms)'),
+    (SLAVE_COUNTERS, 'messages sent, messages received, messages undelivered, messages sent '
+     'again, , polls received, bad messages received, messages refused for lack of memory, '
+     'duplicate messages received, , carrier recovered, modem lost'),
+    (ML1000_COUNTERS, 'messages sent, messages received, messages undelivered, ENQ sent, NAK '
+     'received, ENQ received, bad messages received, messages refused for lack of memory, '
+     'duplicate messages received, framing errors'),
+    (COUNTERS, 'messages sent, messages received, messages undelivered, ENQ sent; or messages '
+     'sent again, NAK received, ENQ received, bad messages received, NAK sent, duplicate messages '
+     'received, receive errors, carrier recovered, modem lost')])
+def test_words_have_the_names_of_their_layout(layout: CounterLayout, names: str) -> None:
+    parts = ['' if layout is ML1000_COUNTERS else 'modem lines', *names.split(', ')]
+    values = {name.replace(';', ','): str(n) for n, name in enumerate(parts) if name}
+    block = b''.join(n.to_bytes(2, 'little') for n in range(len(layout)))
+    assert decode_counters(block, layout) == values | (
+        {'modem lines': 'none on'} if parts[0] else {})
 
 
 def test_modem_lines_that_are_on_are_named() -> None:

@@ -27,6 +27,7 @@ from abdf1_ros.pccc.slc.identity import FULL_DUPLEX_COUNTERS, ML1000_COUNTERS, S
 from hypothesis import given
 from hypothesis import strategies as st
 import pytest
+from support.cases import for_all
 from support.vectors import pair
 
 SLC = bytes.fromhex('00 EE 34 49 22') + b'5/03'.ljust(11) + bytes.fromhex('0000 06 00 3412 20 FC')
@@ -60,25 +61,33 @@ def test_plc5_of_the_vectors() -> None:
     assert (identity.faults, identity.remarks) == ((), ())
 
 
-@pytest.mark.parametrize(('code', 'text', 'is_running'), [
-    (0x00, 'REM DOWNLOAD', False), (0x01, 'REM PROG', False), (0x03, 'REM SUSPEND', False),
-    (0x06, 'REM RUN', True), (0x07, 'REM TEST', False), (0x08, 'REM TEST, single scan', False),
-    (0x09, 'REM TEST, step', False), (0x10, 'DOWNLOAD', False), (0x11, 'PROG', False),
-    (0x1B, 'SUSPEND', False), (0x1E, 'RUN', True), (0x05, 'mode 0x05', None)])
-def test_mode_of_an_slc_is_read_from_its_code(
-        code: int, text: str, is_running: bool | None) -> None:
-    identity = changed(SLC, byte19=code | 0x80)  # communication active says nothing new
-    assert (identity.mode_text, identity.is_running) == (text, is_running)
-    assert str(identity).endswith(f', {text}')
+@for_all(('data', 'at', 'codes'), [
+    # Communication active (80) says nothing new.
+    (SLC, 19, {0x80: 'REM DOWNLOAD', 0x01: 'REM PROG', 0x03: 'REM SUSPEND', 0x86: 'REM RUN',
+               0x07: 'REM TEST', 0x08: 'REM TEST, single scan', 0x09: 'REM TEST, step',
+               0x10: 'DOWNLOAD', 0x11: 'PROG', 0x1B: 'SUSPEND', 0x1E: 'RUN', 0x85: 'mode 0x05'}),
+    (PLC5, 1, {0: 'PROG', 2: 'RUN', 4: 'REM PROG', 5: 'REM TEST', 6: 'REM RUN', 1: 'mode 0x01'})])
+def test_mode_is_read_from_its_code(data: bytes, at: int, codes: dict[int, str]) -> None:
+    for code, text in codes.items():
+        identity = changed(data, **{f'byte{at}': code})
+        assert str(identity).endswith(f', {text}')
+        assert identity.is_running is (None if text.startswith('mode') else text.endswith('RUN'))
 
 
-@pytest.mark.parametrize(('code', 'text', 'is_running'), [
-    (0, 'PROG', False), (2, 'RUN', True), (4, 'REM PROG', False), (5, 'REM TEST', False),
-    (6, 'REM RUN', True), (1, 'mode 0x01', None)])
-def test_mode_of_a_plc5_is_read_from_its_code(
-        code: int, text: str, is_running: bool | None) -> None:
-    identity = changed(PLC5, byte1=code)
-    assert (identity.mode_text, identity.is_running) == (text, is_running)
+# M 10-20; 0x55 as its L80B.
+@for_all(('data', 'at', 'start', 'models'), [
+    (SLC[:5] + bytes(11) + SLC[16:], 4, '', {  # without a name
+        0x1A: 'SLC 500 fixed', 0x18: 'SLC 5/01', 0x25: 'SLC 5/02', 0x49: 'SLC 5/03',
+        0x5B: 'SLC 5/04', 0x78: 'SLC 5/05', 0x58: 'MicroLogix 1000', 0x88: 'MicroLogix 1200',
+        0x89: 'MicroLogix 1500 LSP', 0x8C: 'MicroLogix 1500 LRP', 0x9C: 'MicroLogix 1100'}),
+    (PLC5, 3, 'PLC-5/', {
+        0x15: '40', 0x22: '10', 0x23: '60', 0x28: '40L', 0x29: '60L', 0x31: '11', 0x32: '20',
+        0x33: '30', 0x4A: '20E', 0x4B: '40E', 0x55: '80', 0x59: '80E', 0x13: '12', 0x14: '25'}),
+    (PLC5, 3, 'PLC-5 of type ', {0x77: '0x77'})])
+def test_model_is_read_from_its_code(data: bytes, at: int, start: str,
+                                     models: dict[int, str]) -> None:
+    for code, model in models.items():
+        assert changed(data, **{f'byte{at}': code}).model == start + model
 
 
 @pytest.mark.parametrize(('mode', 'words'), [
@@ -86,41 +95,6 @@ def test_mode_of_a_plc5_is_read_from_its_code(
     (Mode.SUSPEND, 'suspend'), (Mode.REMOTE_DOWNLOAD, 'download'), (Mode.RUN, 'run')])
 def test_modes_in_a_sentence(mode: Mode, words: str) -> None:
     assert mode.words == words
-
-
-def test_other_bits_of_byte_20_do_not_halt_an_slc() -> None:
-    identity = changed(SLC, byte17=0x34, byte20=0xDF)
-    assert identity.faults == ()
-    assert identity.remarks == ('last major error 0x0034 (negative timer preset or accumulator)',)
-
-
-def test_slc_remarks_are_no_faults() -> None:
-    identity = changed(SLC, byte1=0xC0, byte17=0x20, byte19=0x66, byte24=0xFD)
-    assert identity.faults == ()
-    assert identity.remarks == (
-        'last major error 0x0020 (minor error at the end of a scan)',
-        'forces active', 'forces installed', 'testing edits',
-        'edits in the processor', 'program directory corrupted')
-
-
-def test_plc5_faults_and_remarks() -> None:
-    identity = changed(PLC5, byte1=0xDE, byte16=0x11, byte17=1, byte18=1)
-    assert identity.faults == ('major processor fault (word S:11 says which)', 'bad RAM')
-    assert identity.remarks == (
-        'download in progress', 'testing edits', 'edits in the processor', 'forces active',
-        'forces installed', 'memory protected')
-
-
-@pytest.mark.parametrize(('code', 'model', 'processor'), [
-    (0x1A, 'SLC 500 fixed', '5/01'), (0x18, 'SLC 5/01', '5/01'), (0x25, 'SLC 5/02', '5/02'),
-    (0x49, 'SLC 5/03', '5/03'), (0x5B, 'SLC 5/04', '5/04'), (0x78, 'SLC 5/05', '5/05'),
-    (0x58, 'MicroLogix 1000', 'ML1000'), (0x88, 'MicroLogix 1200', 'ML1200'),
-    (0x89, 'MicroLogix 1500 LSP', 'ML1500'), (0x8C, 'MicroLogix 1500 LRP', 'ML1500'),
-    (0x9C, 'MicroLogix 1100', 'ML1100')])
-def test_model_of_an_slc_is_read_from_its_code(code: int, model: str, processor: str) -> None:
-    identity = changed(SLC, byte4=code, byte6=0)  # without a name
-    assert str(identity) == f'{model} series B revision 3, REM RUN'
-    assert identity.processor is Processor(processor)
 
 
 @pytest.mark.parametrize(('code', 'name', 'model', 'processor', 'remarks'), [
@@ -155,6 +129,61 @@ def test_major_error_has_its_text(code: int, text: str) -> None:
     assert major_error(code) == text
 
 
+PLC3 = bytes((0x02, 0x47, 0x10, 0, 0, 0, 0x34, 0x12, 0x41)) + bytes(9)
+PLC2 = bytes((0x05, 0x74, 0, 0, 0, 0, 0x44, 0x41, 0x20, 0))
+
+
+@for_all(('identity', 'faults', 'remarks'), [
+    (changed(SLC, byte17=0x34, byte20=0xDF), (),
+     ('last major error 0x0034 (negative timer preset or accumulator)',)),
+    (changed(SLC, byte1=0xC0, byte17=0x20, byte19=0x66, byte24=0xFD), (), (
+        'last major error 0x0020 (minor error at the end of a scan)', 'forces active',
+        'forces installed', 'testing edits', 'edits in the processor',
+        'program directory corrupted')),
+    (changed(PLC5, byte1=0xDE, byte16=0x11, byte17=1, byte18=1),
+     ('major processor fault (word S:11 says which)', 'bad RAM'), (
+         'download in progress', 'testing edits', 'edits in the processor', 'forces active',
+         'forces installed', 'memory protected')),
+    (changed(PLC3, byte1=0x38), ('major processor fault', 'shutdown in effect'),
+     ('shutdown requested',)),
+    (changed(PLC2, byte1=0x38), (
+        'no communication between module and processor',
+        'communication zone of the program has a wrong format'),
+     ('download or upload in progress',))])
+def test_faults_and_remarks(identity: Identity, faults: tuple[str, ...],
+                            remarks: tuple[str, ...]) -> None:
+    assert (identity.faults, identity.remarks) == (faults, remarks)
+
+
+@for_all(('data', 'family', 'text', 'address', 'size'), [
+    (PLC3, PlcType.PLC3, 'PLC-3 series C revision B, RUN', 0x1234, 55),
+    (PLC2, PlcType.PLC2, 'PLC-2/30 at 1771-KG series B revision A, REM TEST', 0x4144, 55),
+    # A 1785-KA3 may have an expansion byte (M 10-17, 10-18).
+    *((bytes.fromhex(data), PlcType.PLC2, f'{model} at 1785-KA3 series B revision B, RUN',
+       0x2000, 55) for data, model in (
+          ('02 1D 00 00 00 00 00 20 21 00', 'PLC-2'),
+          ('02 6D 00 00 00 00 00 20 21 00', 'PLC-2/15'),
+          ('02 ED 1F 00 00 00 00 00 20 21 00', 'PLC-2/16'),
+          ('02 ED 77 00 00 00 00 00 20 21 00', 'PLC-2 of type 0x77'))),
+    # Gateways (M 10-15..10-19), those with a name last.
+    *((bytes.fromhex(data), None, text, address, 55) for data, text, address in (
+        ('01 EE 10 10 34 12 00 20 21 00 00 30', '1785-KA series B revision B', 0x2000),
+        ('00 EE 30 2F 34 12 00 20 21 00 30', '1785-KA5 series B revision B', 0x2000),
+        ('00 FE 19 00 00 30 00 20 21 00', '1785-KE series B revision B', 0x2000),
+        ('00 FE 1B 00 00 00 44 41 03 00' + '20' * 8, '1784-KT or 1784-KT2 series A revision D',
+         0x4144))),
+    *((bytes((0, 0xFE, kind, 0, 0)) + name.ljust(9, b'\0') + b'xx' + bytes(8), None,
+       f'{name.decode()} series A revision 1', 0, size)
+      for kind, name, size in ((0x2C, b'1770-KF3', 20), (0x24, b'1784-KR', 55))),
+    (bytes.fromhex('00 99 12 34'), None, 'unknown processor (00 99 12 34)', 0, 55)])
+def test_modules_and_where_their_counters_are(
+        data: bytes, family: PlcType | None, text: str, address: int, size: int) -> None:
+    identity = decode_identity(data)
+    assert (identity.plc_type, str(identity)) == (family, text)
+    assert identity.counters == ReadCounters(address, size)
+    assert identity.is_running is {'RUN': True, 'TEST': False}.get(text.rpartition(' ')[2])
+
+
 def test_unknown_processor_is_named_and_not_interpreted() -> None:
     data = bytearray(SLC)
     data[3], data[5:16] = 0x95, b'1769-L35E  '
@@ -163,15 +192,6 @@ def test_unknown_processor_is_named_and_not_interpreted() -> None:
         '1769-L35E series B revision 3', None, ())
     data[5:16] = bytes(11)
     assert str(decode_identity(bytes(data))) == 'processor 0x95 series B revision 3'
-
-
-@pytest.mark.parametrize(('byte3', 'model'), [  # M 10-20; 0x55 as its L80B
-    (0x15, 'PLC-5/40'), (0x22, 'PLC-5/10'), (0x23, 'PLC-5/60'), (0x28, 'PLC-5/40L'),
-    (0x29, 'PLC-5/60L'), (0x31, 'PLC-5/11'), (0x32, 'PLC-5/20'), (0x33, 'PLC-5/30'),
-    (0x4A, 'PLC-5/20E'), (0x4B, 'PLC-5/40E'), (0x55, 'PLC-5/80'), (0x59, 'PLC-5/80E'),
-    (0x13, 'PLC-5/12'), (0x14, 'PLC-5/25'), (0x77, 'PLC-5 of type 0x77')])
-def test_model_of_a_plc5_is_read_from_its_code(byte3: int, model: str) -> None:
-    assert changed(PLC5, byte3=byte3).model == model
 
 
 # M 10-20 and 10-21: the same fields, with and without the expansion byte in front of them.
@@ -204,62 +224,6 @@ def test_fault_of_a_plc5_is_asked_for_and_named() -> None:
     assert known.inquiry is None
     assert inquiry.answered(bytes.fromhex('95 09 42 00 00 00 00')).faults[0] == \
         'major processor fault: S:11 is 0; fault code 0 (S:12)'
-
-
-def test_plc3_tells_series_mode_faults_and_remarks() -> None:
-    data = bytes((0x02, 0x47, 0x10, 0, 0, 0, 0x34, 0x12, 0x41)) + bytes(9)
-    identity = decode_identity(data)
-    assert str(identity) == 'PLC-3 series C revision B, RUN'
-    assert (identity.plc_type, identity.counter_address) == (PlcType.PLC3, 0x1234)
-    assert changed(data, byte1=0x38).faults == ('major processor fault', 'shutdown in effect')
-    assert changed(data, byte1=0x38).remarks == ('shutdown requested',)
-
-
-def test_module_of_a_plc2() -> None:
-    data = bytes((0x05, 0x74, 0, 0, 0, 0, 0x44, 0x41, 0x20, 0))
-    identity = decode_identity(data)
-    assert str(identity) == 'PLC-2/30 at 1771-KG series B revision A, REM TEST'
-    assert (identity.plc_type, identity.counter_address) == (PlcType.PLC2, 0x4144)
-    bad = changed(data, byte1=0x38)
-    assert bad.faults == ('no communication between module and processor',
-                          'communication zone of the program has a wrong format')
-    assert bad.remarks == ('download or upload in progress',)
-
-
-@pytest.mark.parametrize(('data', 'text', 'counters'), [
-    ('01 EE 10 10 34 12 00 20 21 00 00 30', '1785-KA series B revision B', 0x2000),  # M 10-16
-    ('00 EE 30 2F 34 12 00 20 21 00 30', '1785-KA5 series B revision B', 0x2000),  # M 10-17
-    ('00 FE 19 00 00 30 00 20 21 00', '1785-KE series B revision B', 0x2000),  # M 10-19
-    ('00 FE 1B 00 00 00 44 41 03 00' + '20' * 8, '1784-KT or 1784-KT2 series A revision D',
-     0x4144)])  # M 10-15
-def test_gateway_without_a_name(data: str, text: str, counters: int) -> None:
-    identity = decode_identity(bytes.fromhex(data))
-    assert (identity.plc_type, str(identity)) == (None, text)
-    assert identity.counters == ReadCounters(counters, 55)
-
-
-@pytest.mark.parametrize(('data', 'model', 'counters'), [
-    ('02 1D 00 00 00 00 00 20 21 00', 'PLC-2 at 1785-KA3', 0x2000),  # M 10-17, 10-18
-    ('02 6D 00 00 00 00 00 20 21 00', 'PLC-2/15 at 1785-KA3', 0x2000),
-    ('02 ED 1F 00 00 00 00 00 20 21 00', 'PLC-2/16 at 1785-KA3', 0x2000),
-    ('02 ED 77 00 00 00 00 00 20 21 00', 'PLC-2 of type 0x77 at 1785-KA3', 0x2000)])
-def test_1785_ka3_may_have_an_expansion_byte(data: str, model: str, counters: int) -> None:
-    identity = decode_identity(bytes.fromhex(data))
-    assert str(identity) == f'{model} series B revision B, RUN'
-    assert (identity.plc_type, identity.counter_address) == (PlcType.PLC2, counters)
-
-
-@pytest.mark.parametrize(('kind', 'name', 'counters'), [
-    (0x2C, '1770-KF3', ReadCounters(0, 20)), (0x24, '1784-KR', ReadCounters(0, 55))])
-def test_gateway_with_a_name(kind: int, name: str, counters: ReadCounters) -> None:
-    data = bytes((0, 0xFE, kind, 0, 0)) + name.encode().ljust(9, b'\0') + b'xx' + bytes(8)
-    identity = decode_identity(data)
-    assert (str(identity), identity.is_running) == (f'{name} series A revision 1', None)
-    assert identity.counters == counters
-
-
-def test_unknown_layout_is_shown_in_hexadecimal() -> None:
-    assert str(decode_identity(bytes.fromhex('00 99 12 34'))) == 'unknown processor (00 99 12 34)'
 
 
 @pytest.mark.parametrize('data', [b'', b'\0', PLC5[:17], PLC5[:2]])

@@ -114,27 +114,11 @@ _LEGAL = re.compile(r'[A-Za-z][A-Za-z0-9_]*(/[A-Za-z][A-Za-z0-9_]*)*')
 
 
 @for_all(('text', 'name'), [
-    ('line_speed', 'line_speed'),
-    ('N7:0', 'N7_0'),
-    ('B3/12', 'B3/t12'),
-    ('7seg', 't7seg'),
-    ('a-b', 'a_b'),
-    ('a b', 'a_b'),
-    ('Tank.Level', 'Tank_Level'),
-    ('Füllstand', 'F_llstand'),
-    ('cell/2/guard', 'cell/t2/guard'),
-    ('a//b', 'a/b'),
-    ('/a/', 'a'),
-    ('a / b', 'a/b'),
-    ('__a__b__', 'a_b'),
-    ('_hidden', 'hidden'),
-    ('~private', 'private'),
-    ('{node}', 'node'),
-    ('a:::b', 'a_b'),
-    ('a/_/b', 'a/b'),
-    ('0', 't0'),
-    ('CamelCase', 'CamelCase'),
-])
+    ('line_speed', 'line_speed'), ('N7:0', 'N7_0'), ('B3/12', 'B3/t12'), ('7seg', 't7seg'),
+    ('a-b', 'a_b'), ('a b', 'a_b'), ('Tank.Level', 'Tank_Level'), ('Füllstand', 'F_llstand'),
+    ('cell/2/guard', 'cell/t2/guard'), ('a//b', 'a/b'), ('/a/', 'a'), ('a / b', 'a/b'),
+    ('__a__b__', 'a_b'), ('_hidden', 'hidden'), ('~private', 'private'), ('{node}', 'node'),
+    ('a:::b', 'a_b'), ('a/_/b', 'a/b'), ('0', 't0'), ('CamelCase', 'CamelCase')])
 def test_name_of_a_text(text: str, name: str) -> None:
     assert sanitise(text) == name
 
@@ -149,11 +133,7 @@ def test_any_text_becomes_a_legal_name_or_nothing(text: str) -> None:
     name = sanitise(text)
     assert name == '' or _LEGAL.fullmatch(name)
     assert '__' not in name and not name.endswith('_')
-
-
-@given(st.text())
-def test_a_name_stays_as_it_is(text: str) -> None:
-    assert sanitise(sanitise(text)) == sanitise(text)
+    assert sanitise(name) == name
 
 
 def test_longest_name_fits_with_namespace_and_node_into_what_dds_takes() -> None:
