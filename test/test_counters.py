@@ -21,22 +21,6 @@ from support.vectors import load_tables
 SPECIFIED = [(number, name) for number, name in load_tables()['counters']]
 
 
-def test_exactly_the_specified_counters_exist_in_their_order() -> None:
-    assert SPECIFIED == [
-        (entry.metadata['number'], entry.metadata['mnemonic']) for entry in numbered()]
-    assert len(SPECIFIED) == 29
-
-
-def test_every_counter_has_a_description() -> None:
-    descriptions = {entry.metadata['description'] for entry in numbered()}
-    assert '' not in descriptions
-    assert len(descriptions) == len(SPECIFIED)
-
-
-def test_counters_start_at_zero() -> None:
-    assert set(Counters().by_mnemonic().values()) == {0}
-
-
 def test_by_mnemonic_shows_each_counter_under_its_own_name() -> None:
     counters = Counters()
     for entry in numbered():
@@ -44,6 +28,12 @@ def test_by_mnemonic_shows_each_counter_under_its_own_name() -> None:
     assert list(counters.by_mnemonic().items()) == [(name, number) for number, name in SPECIFIED]
 
 
-def test_misspelt_counter_is_an_error() -> None:
+def test_counters_are_those_of_the_specification_each_described() -> None:
+    assert SPECIFIED == [
+        (entry.metadata['number'], entry.metadata['mnemonic']) for entry in numbered()]
+    descriptions = {entry.metadata['description'] for entry in numbered()}
+    assert '' not in descriptions
+    assert len(descriptions) == len(SPECIFIED) == 29
+    assert set(Counters().by_mnemonic().values()) == {0}
     with pytest.raises(AttributeError):
         setattr(Counters(), 'polls', 1)

@@ -29,20 +29,14 @@ from abdf1_ros.problems import ConfigurationError, Place, Problem
 import pytest
 
 
-@pytest.mark.parametrize('error', [CommandTimeout, StationInactive, WrongCommandCode, PortLost])
-def test_failed_transactions_are_link_errors(error: type[LinkError]) -> None:
-    assert issubclass(error, LinkError)
-    assert issubclass(error, Abdf1Error)
-
-
-@pytest.mark.parametrize('error', [FormatError, RemoteError, Problem, ConfigurationError])
-def test_other_errors_are_no_link_errors(error: type[Abdf1Error]) -> None:
-    assert issubclass(error, Abdf1Error)
-    assert not issubclass(error, LinkError)
-
-
-def test_format_error_is_a_value_error() -> None:
+def test_what_callers_can_catch() -> None:
+    links = (CommandTimeout, StationInactive, WrongCommandCode, PortLost)
+    others = (FormatError, RemoteError, Problem, ConfigurationError)
+    assert all(issubclass(error, Abdf1Error) for error in links + others)
+    assert [issubclass(error, LinkError) for error in links + others] == 4 * [True] + 4 * [False]
     assert issubclass(FormatError, ValueError)
+    error = RemoteError(0xF0, 0x06, 'no such place')
+    assert (error.sts, error.ext_sts, str(error)) == (0xF0, 0x06, 'no such place')
 
 
 @pytest.mark.parametrize(('error', 'text'), [
@@ -57,11 +51,6 @@ def test_link_error_reads_as_its_numbered_text(error: LinkError, text: str) -> N
     assert str(error) == text
 
 
-def test_remote_error_keeps_the_codes() -> None:
-    error = RemoteError(0xF0, 0x06, 'no such place')
-    assert (error.sts, error.ext_sts, str(error)) == (0xF0, 0x06, 'no such place')
-
-
 @pytest.mark.parametrize(('place', 'text'), [
     (Place('net.csv', 2, 1, 'Station'), 'net.csv:2:1 (Station)'),
     (Place('net.csv', 2, None, 'Station'), 'net.csv:2 (Station)'),
@@ -70,6 +59,7 @@ def test_remote_error_keeps_the_codes() -> None:
 def test_place_in_words(place: Place, text: str) -> None:
     assert str(place) == text
     assert str(Problem(place, 'this')) == f'{text}: this'
+    assert Problem(text, 'this').place == Place(text)
 
 
 def test_problem_shows_place_number_and_advice() -> None:
@@ -80,12 +70,6 @@ def test_problem_shows_place_number_and_advice() -> None:
         '255; write 0 to 254')
     assert (problem.place, problem.text) == (place, 'write 0 to 254')
     assert problem.message is Message.CRT_BAD_STATION_ID
-
-
-def test_problem_without_number_shows_place_and_advice() -> None:
-    problem = Problem('parameter net.baud', 'write 9600')
-    assert str(problem) == 'parameter net.baud: write 9600'
-    assert problem.place == Place('parameter net.baud')
 
 
 def test_problem_is_one_line_whatever_the_file_holds() -> None:

@@ -49,32 +49,19 @@ def test_text_takes_as_many_arguments_as_it_has_places(message: Message) -> None
         message.text(*args, 1)
 
 
-def test_text_fills_hexadecimal_places() -> None:
-    assert Message.ERR_BAD_CRC.text(0x0A, 0xFF, 0, 1) == (
-        'Response with wrong CRC (actual=0x0aff, expected=0x0001)')
-    assert Message.ERR_WRONG_MESSAGE.text(1, 0x20, 0x2A) == (
-        'Wrong Message Received Src:0x01, Dst:0x20, Tns:0x002a')
-
-
-def test_number_place_shows_what_a_user_typed() -> None:
-    assert Message.CRT_BAD_STATION_ID.text('abc', 255) == (
-        'Invalid station number (abc) must be less than 255')
-
-
-def test_line_carries_number_and_mnemonic() -> None:
-    assert Message.ERR_COMMAND_TIMEOUT.entry() == '2508 ERR_COMMAND_TIMEOUT: Command Timed Out'
-
-
-def test_event_names_its_station() -> None:
-    event = Event(Message.NTC_ACK_EXPECTED, (0x15,), 7)
-    assert str(event) == (
-        '2515 NTC_ACK_EXPECTED: ACK Expected (last symbol received was 0x15) [station 7]')
-
-
-def test_event_of_station_zero_names_it_too() -> None:
-    assert str(Event(Message.ERR_COMMAND_TIMEOUT, (), 0)).endswith(' [station 0]')
-
-
-def test_event_without_station_is_the_bare_line() -> None:
-    event = Event(Message.NTC_NAK_RETRY, (2, 2515))
-    assert str(event) == '2521 NTC_NAK_RETRY: NAK Retry #2, due to error 2515'
+@for_all(('shown', 'text'), [
+    (Message.ERR_BAD_CRC.text(0x0A, 0xFF, 0, 1),
+     'Response with wrong CRC (actual=0x0aff, expected=0x0001)'),
+    (Message.ERR_WRONG_MESSAGE.text(1, 0x20, 0x2A),
+     'Wrong Message Received Src:0x01, Dst:0x20, Tns:0x002a'),
+    (Message.CRT_BAD_STATION_ID.text('abc', 255),  # as a user typed it
+     'Invalid station number (abc) must be less than 255'),
+    (Message.ERR_COMMAND_TIMEOUT.entry(), '2508 ERR_COMMAND_TIMEOUT: Command Timed Out'),
+    (Event(Message.NTC_ACK_EXPECTED, (0x15,), 7),
+     '2515 NTC_ACK_EXPECTED: ACK Expected (last symbol received was 0x15) [station 7]'),
+    (Event(Message.ERR_COMMAND_TIMEOUT, (), 0),
+     '2508 ERR_COMMAND_TIMEOUT: Command Timed Out [station 0]'),
+    (Event(Message.NTC_NAK_RETRY, (2, 2515)),
+     '2521 NTC_NAK_RETRY: NAK Retry #2, due to error 2515')])
+def test_entries_and_events(shown: str | Event, text: str) -> None:
+    assert str(shown) == text

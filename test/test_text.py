@@ -17,6 +17,7 @@
 from abdf1_ros.text import by_number, first, printable
 from hypothesis import given, strategies
 import pytest
+from support.cases import ANY_CHARACTER
 
 
 @pytest.mark.parametrize('text', ['', 'N7:0', 'Größe 5 °C', 'скорость', '速度', 'a "b" \\n'])
@@ -39,7 +40,7 @@ def test_what_cannot_be_seen_is_escaped(text: str, shown: str) -> None:
     assert printable(text) == shown
 
 
-@given(strategies.text())
+@given(strategies.text(ANY_CHARACTER))
 def test_any_text_is_one_visible_line(text: str) -> None:
     shown = printable(text)
     assert shown.isprintable() and len(shown.splitlines()) <= 1

@@ -23,7 +23,7 @@ from abdf1_ros.pccc.file_types import FileType, PlcType
 from hypothesis import given
 from hypothesis import strategies as st
 import pytest
-from support.cases import for_all
+from support.cases import ANY_CHARACTER, for_all
 
 PLC5, SLC = PlcType.PLC5, PlcType.SLC
 BOTH = (PLC5, SLC)
@@ -233,7 +233,7 @@ def test_flat_io_has_no_words_of_slots() -> None:
 
 
 @given(st.one_of(
-    st.text(max_size=20), st.text('NBTSIOPMG0123456789:;./#$ACDN \u0663', max_size=14)), KINDS)
+    st.text(ANY_CHARACTER, max_size=20), st.text('NBTSIOPMG0123456789:;./#$ACDN \u0663', max_size=14)), KINDS)
 def test_any_text_is_an_address_or_a_format_error(text: str, family: PlcType) -> None:
     try:
         address = parse_address(text, family)

@@ -14,7 +14,9 @@
 
 """The net CSV: ranges, defaults, numbered texts, places of Share, and lists of stations."""
 
+from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 from abdf1_ros.df1.checksum import Checksum
 from abdf1_ros.df1.frames import Duplex
@@ -34,6 +36,7 @@ from abdf1_ros.settings.station_lists import parse_stations
 from hypothesis import given
 from hypothesis import strategies as st
 import pytest
+from support.cases import ANY_CHARACTER, for_all
 
 # Column, field, default, good values, bad values (S0, network table).
 NUMBERS = [
@@ -54,7 +57,6 @@ CHOICES = [
     ('Parity', 'parity', 'None', ('None', 'Even', 'Odd')),
     ('Handshake', 'handshake', 'No', ('Yes', 'No')),
 ]
-COLUMNS = [entry[0] for entry in NUMBERS + CHOICES] + ['Com_Port']
 
 
 @pytest.fixture
@@ -81,49 +83,37 @@ def test_columns_are_those_of_the_specification_polling_and_radio() -> None:
         'Collision_Avoidance']
 
 
-def test_columns_that_are_left_out_have_defaults() -> None:
-    network = Network()
-    for _, field, default, *_ in NUMBERS + CHOICES:
-        assert network.cells()[field] == default, field
-    assert network.com_port == '1'
+@for_all(('column', 'field', 'default', 'good', 'bad'), NUMBERS)
+def test_number_and_its_range(path: Path, column: str, field: str, default: int,
+                              good: tuple[str, ...], bad: tuple[str, ...]) -> None:
+    assert getattr(load(path, f'{column},Handshake', ',Yes'), field) == default
+    for text in good:
+        assert getattr(load(path, column, text), field) == int(text)
+    for text in bad:
+        fault, = faults(path, f'Handshake,{column}', f'No,{text}')
+        assert fault.startswith(f'FILE:2:2 ({column}): ')
+        assert fault.count(' should be ') + fault.count(' must be ') == 1  # said once
+        assert f'"{text}"' in fault or f'({text})' in fault
 
 
-@pytest.mark.parametrize('column', COLUMNS)
-def test_empty_cell_and_missing_column_take_the_default(path: Path, column: str) -> None:
-    other = 'Baud' if column == 'Station' else 'Station'
-    value = {'Station': '7', 'Baud': '1200'}[other]
-    expected = make_network({other.lower(): (value, '')})
-    assert load(path, f'{column},{other}', f',{value}') == expected
-    assert load(path, other, value) == expected
+@for_all(('column', 'field', 'default', 'good'), CHOICES)
+def test_choice_in_any_letter_case(path: Path, column: str, field: str, default: str,
+                                   good: tuple[str, ...]) -> None:
+    assert FIELDS[field].parameter == f'net.{column.lower()}'
+    assert load(path, f'{column},Station', ',7').cells()[field] == default
+    for text in good:
+        for written in (text, text.lower(), text.upper()):
+            assert load(path, column, written).cells()[field] == text
 
 
-def test_dash_that_the_specification_prints_is_no_parity(path: Path) -> None:
-    assert load(path, 'Parity', '-').parity == 'None'
+def test_left_out_is_as_empty(path: Path) -> None:
+    assert load(path, 'Com_Port,Station', ',7') == load(path, 'Station', '7') == replace(
+        Network(), station=7)
+    assert Network().com_port == '1'
+    assert load(path, 'Parity', '-').parity == 'None'  # as the specification prints it
 
 
-@pytest.mark.parametrize('column, field, text', [
-    (column, field, text) for column, field, _, good, _ in NUMBERS for text in good])
-def test_number_in_its_range(path: Path, column: str, field: str, text: str) -> None:
-    assert getattr(load(path, column, text), field) == int(text)
-
-
-@pytest.mark.parametrize('column, text', [
-    (column, text) for column, _, _, _, bad in NUMBERS for text in bad])
-def test_number_out_of_its_range(path: Path, column: str, text: str) -> None:
-    fault, = faults(path, f'Handshake,{column}', f'No,{text}')
-    assert fault.startswith(f'FILE:2:2 ({column}): ')
-    assert fault.count(' should be ') + fault.count(' must be ') == 1  # said once
-    assert f'"{text}"' in fault or f'({text})' in fault
-
-
-@pytest.mark.parametrize('column, field, text', [
-    (column, field, text) for column, field, _, good in CHOICES for text in good])
-def test_choice_in_any_letter_case(path: Path, column: str, field: str, text: str) -> None:
-    for written in (text, text.lower(), text.upper()):
-        assert load(path, column, written).cells()[field] == text
-
-
-@pytest.mark.parametrize('column, text, expected', [
+@for_all(('column', 'text', 'expected'), [
     ('Station', '255',
      '2552 CRT_BAD_STATION_ID: Invalid station number (255) must be less than 255'),
     ('Station', 'abc', '2552 CRT_BAD_STATION_ID: '
@@ -154,34 +144,23 @@ def test_choice_in_any_letter_case(path: Path, column: str, field: str, text: st
 ])
 def test_fault_of_a_cell_is_told_word_for_word(
         path: Path, column: str, text: str, expected: str) -> None:
-    assert faults(path, column, text) == [f'FILE:2:1 ({column}): {expected}']
-
-
-@pytest.mark.parametrize('column', ['Station', 'Mode', 'Com_Port', 'Baud'])
-def test_long_cell_is_shown_without_its_end(path: Path, column: str) -> None:
-    fault, = faults(path, column, 'x' * 5000)
-    assert 'x' * 100 + '...' in fault
-    assert len(fault) < 500
-
-
-@pytest.mark.parametrize(('column', 'text'), [
-    ('Share', 'x' * 5000), ('Share', f'tcp:{"1" * 5000}'), ('Share', f'pty:/{"x" * 5000}?x=1'),
-    ('Share', f'pty:/{"x" * 5000}?baud=9600'), ('Share', ' '.join(2 * [f'pty:/{"x" * 5000}'])),
-    ('Store_Forward', '1' * 5000), ('Baud', f"'{'9' * 5000}")])
-def test_fault_of_a_long_cell_is_short(path: Path, column: str, text: str) -> None:
-    fault, = faults(path, column, text)
-    assert len(fault) < 500
-
-
-def test_every_numbered_fault_is_critical(path: Path) -> None:
-    row = ','.join(['300', 'Boss', 'PLC4', 'XOR', '11', '11', '1'])
-    header = 'Station,Mode,PLC_Type,Error_Code,NAK_Retries,ENQ_Retries,Cmd_Timeout'
     with pytest.raises(ConfigurationError) as caught:
-        load(path, header, row)
-    messages = [problem.message for problem in caught.value.problems]
-    assert all(message and message.severity is Severity.CRITICAL for message in messages)
-    assert [message and message.number for message in messages] == [
-        2552, 2553, 2555, 2556, 2557, 2558, 2559]
+        load(path, column, text)
+    problem, = caught.value.problems
+    assert str(problem) == f'{path}:2:1 ({column}): {expected}'
+    assert problem.message is None or problem.message.severity is Severity.CRITICAL
+
+
+@for_all(('column', 'text'), [
+    ('Station', 'x' * 5000), ('Mode', 'x' * 5000), ('Com_Port', 'x' * 5000),
+    ('Baud', 'x' * 5000), ('Share', 'x' * 5000), ('Share', f'tcp:{"1" * 5000}'),
+    ('Share', f'pty:/{"x" * 5000}?x=1'), ('Share', f'pty:/{"x" * 5000}?baud=9600'),
+    ('Share', ' '.join(2 * [f'pty:/{"x" * 5000}'])), ('Store_Forward', '1' * 5000),
+    ('Baud', f"'{'9' * 5000}")])
+def test_long_cell_is_shown_without_its_end(path: Path, column: str, text: str) -> None:
+    fault, = faults(path, column, text)
+    assert (text[:90] in fault or text[:1] == "'") and '...' in fault
+    assert len(fault) < 500
 
 
 @pytest.mark.parametrize('mode, meant', [
@@ -202,12 +181,6 @@ def test_all_faults_are_reported_at_once_each_in_its_place(path: Path) -> None:
         load_network(str(path))
     assert sorted(str(problem.place) for problem in caught.value.problems) == [
         f'{path}:5:{cell} ({column})' for cell, column in enumerate(header.split(','), 1)]
-
-
-@pytest.mark.parametrize('column, field, default, good', CHOICES)
-def test_parameter_name_is_the_column_in_lower_case(
-        column: str, field: str, default: str, good: tuple[str, ...]) -> None:
-    assert FIELDS[field].parameter == f'net.{column.lower()}'
 
 
 @pytest.mark.parametrize('text, port', [
@@ -232,24 +205,14 @@ def test_com_port_that_is_no_port_is_refused(path: Path, text: str) -> None:
     assert fault.startswith(f'FILE:2:1 (Com_Port): Com_Port = "{text}" should be a number')
 
 
-def test_checksum_is_that_of_error_code() -> None:
-    assert Network().checksum is Checksum.CRC
-    assert Network(error_code='BCC').checksum is Checksum.BCC
-
-
-@pytest.mark.parametrize('options, bits', [
+@for_all(('options', 'bits'), [
     ({}, 10), ({'parity': 'Even'}, 11), ({'parity': 'Odd', 'stop_bits': 2}, 12),
     ({'data_bits': 7}, 9), ({'data_bits': 5, 'stop_bits': 2}, 8)])
-def test_character_time_counts_start_parity_and_stop_bits(
-        options: dict[str, int | str], bits: int) -> None:
-    network = make_network({name: (str(value), name) for name, value in options.items()})
-    assert network.timing.char_time == pytest.approx(bits / 9600)
-
-
-def test_character_time_and_delay_are_in_seconds() -> None:
-    timing = Network(baud=19200, tx_delay=40).timing
-    assert timing.char_time == pytest.approx(10 / 19200)
-    assert timing.tx_delay == pytest.approx(0.04)
+def test_times_are_in_seconds(options: dict[str, Any], bits: int) -> None:
+    timing = Network(baud=19200, tx_delay=40, **options).timing
+    assert (timing.char_time, timing.tx_delay) == pytest.approx((bits / 19200, 0.04))
+    assert Network().checksum is Checksum.CRC
+    assert Network(error_code='BCC').checksum is Checksum.BCC
 
 
 @pytest.mark.parametrize('content, text', [
@@ -281,7 +244,7 @@ def test_fault_of_an_override_names_the_parameter() -> None:
         '254']
 
 
-@given(st.sampled_from(sorted(FIELDS)), st.text(max_size=8))
+@given(st.sampled_from(sorted(FIELDS)), st.text(ANY_CHARACTER, max_size=8))
 def test_any_text_gives_a_network_or_a_configuration_error(name: str, text: str) -> None:
     try:
         network = make_network({name: (text, 'here')})

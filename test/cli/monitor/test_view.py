@@ -26,6 +26,7 @@ from abdf1_ros.cli.monitor.view import (
 from hypothesis import given
 from hypothesis import strategies as st
 import pytest
+from support.cases import ANY_CHARACTER
 
 NOW = 1000.0
 WIDTH = 120
@@ -184,7 +185,7 @@ def test_values_are_cut_to_what_fits(values: list[float], width: int, text: str)
     assert show(values, width) == text
 
 
-@given(st.lists(st.integers() | st.floats(), max_size=50) | st.text(),
+@given(st.lists(st.integers() | st.floats(), max_size=50) | st.text(ANY_CHARACTER),
        st.integers(min_value=3, max_value=60))
 def test_values_never_take_more_than_their_width(values: list[float] | str, width: int) -> None:
     text = show(values, width)
@@ -192,7 +193,8 @@ def test_values_never_take_more_than_their_width(values: list[float] | str, widt
     assert text.isprintable()
 
 
-@given(st.integers(min_value=10, max_value=250), st.text(max_size=60), st.text(max_size=400))
+@given(st.integers(min_value=10, max_value=250), st.text(ANY_CHARACTER, max_size=60),
+       st.text(ANY_CHARACTER, max_size=400))
 def test_no_line_is_wider_than_the_terminal(width: int, name: str, text: str) -> None:
     picture = snapshot(
         readings=[Reading(name, text, name, NOW, 1.0)],
