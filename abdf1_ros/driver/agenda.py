@@ -124,7 +124,7 @@ class Agenda:
             return write
         guests = self._guests
         # A guest could write over a fallback that the end has confirmed already.
-        has_guests = (guests.has_news or guests.waiting) and not self._interlocks.is_ending
+        has_guests = (guests.inbox.items or guests.waiting) and not self._interlocks.is_ending
         is_held = has_guests and now < self._guests_from
         self._held_until = self._guests_from if is_held else math.inf
         has_guests = has_guests and not is_held
@@ -135,7 +135,7 @@ class Agenda:
         job = self._checks.find_due(now) and self._check(now, busy) \
             or self._has_own and self._refresh(now, busy) or self._read(now, busy)
         if job and self._owed > 0:
-            task = self._tasks.start(job, now)
+            task = JobTask(self._tasks, job, now)
             self._counted.append(task)
             return task
         return job or has_writes and self._write(now, busy) \
@@ -147,7 +147,7 @@ class Agenda:
         if job is None:
             return None
         self._writes_in_a_row = 0
-        task = self._tasks.start(job, now)
+        task = JobTask(self._tasks, job, now)
         self._counted.append(task)
         guest = job.command.guest
         guest.listener.sends(guest, task.command)

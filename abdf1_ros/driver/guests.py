@@ -160,8 +160,7 @@ class GuestQueue:
         self._station_of = station_of
         self._words = words
         self._record = record
-        self._inbox: Inbox[GuestCommand] = Inbox(is_open=False)
-        self.has_news = False  # the inbox has something
+        self.inbox: Inbox[GuestCommand] = Inbox(is_open=False)  # what has come since
         self.waiting: deque[Guest] = deque()  # who has commands, the next one first
         self.next_expiry = math.inf  # when ``expire`` has something to do (clock value in s)
 
@@ -173,17 +172,16 @@ class GuestQueue:
             guest.refused += 1
             guest.listener.was_refused(guest, command.packet)
             _refuse(command, _NOT_ALLOWED)
-        elif not self._inbox.put(command):
+        elif not self.inbox.put(command):
             self._give_up(command, _NOT_CONNECTED)
-        self.has_news = True
 
     def begin(self) -> None:
         """Take commands: the port is open."""
-        self._inbox.open()
+        self.inbox.open()
 
     def end(self) -> None:
         """Refuse all that waits, and all that comes: the port is lost."""
-        for command in self._inbox.close():
+        for command in self.inbox.close():
             self._give_up(command, _NOT_CONNECTED)
         for guest in self.waiting:
             while guest.waiting:
@@ -268,10 +266,9 @@ class GuestQueue:
 
     def _sort(self) -> None:
         """Put what has come with the others of its guest."""
-        if not self.has_news:
+        if not self.inbox.items:
             return
-        self.has_news = False
-        for command in self._inbox.take():
+        for command in self.inbox.take():
             guest = command.guest
             if len(guest.waiting) >= _MOST_WAITING:
                 self._give_up(command, _NO_BUFFER)

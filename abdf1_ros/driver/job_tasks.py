@@ -95,10 +95,6 @@ class JobTasks:
         self.waiting: deque[JobTask] = deque()
         self.next_expiry = math.inf
 
-    def start(self, job: Job, now: float) -> JobTask:
-        """Return the task of a new job with its first command."""
-        return JobTask(self, job, now)
-
     def first(self, busy: Container[int], is_own: bool = False) -> JobTask | None:
         """Return the first that waits, but not for a ``busy`` station; only our own if asked."""
         return next((task for task in self.waiting if task.station not in busy

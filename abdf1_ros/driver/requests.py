@@ -32,7 +32,7 @@ from abdf1_ros.df1.settings import LinkSettings
 from abdf1_ros.df1.stations import ActiveStationList
 from abdf1_ros.df1.tasks import Task, TaskSource
 from abdf1_ros.driver.inbox import Inbox
-from abdf1_ros.driver.job_tasks import Job, JobTasks
+from abdf1_ros.driver.job_tasks import Job, JobTask, JobTasks
 from abdf1_ros.errors import LinkError, PortLost
 from abdf1_ros.pccc.data_table import DataTable
 from abdf1_ros.pccc.dialect import Steps
@@ -112,7 +112,7 @@ class Requests(TaskSource):
             return self._tasks.take(under_way, now)
         for request in self._waiting.take():
             with suppress(StopIteration):  # it has ended before its first command
-                return self._tasks.start(request, now)
+                return JobTask(self._tasks, request, now)
         return None
 
     def _run(self) -> Procedure:

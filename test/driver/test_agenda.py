@@ -28,7 +28,7 @@ from abdf1_ros.driver.agenda import Agenda, MAX_WRITES_IN_A_ROW
 from abdf1_ros.driver.checks import Checks
 from abdf1_ros.driver.guests import GuestQueue
 from abdf1_ros.driver.interlocks.queue import Interlocks
-from abdf1_ros.driver.job_tasks import Job, JobTasks
+from abdf1_ros.driver.job_tasks import Job, JobTask, JobTasks
 from abdf1_ros.driver.reads.job import ReadJob
 from abdf1_ros.driver.reads.point import ReadPoint
 from abdf1_ros.driver.reads.readings import Readings
@@ -210,7 +210,7 @@ def test_packets_of_a_long_write_use_up_the_turn_of_writes() -> None:
     bench = Bench(job)
     write = bench.write(WORD, 1, 0.0)
     assert bench.next(0.0) is write
-    task = bench.tasks.start(NinePackets(), 0.0)
+    task = JobTask(bench.tasks, NinePackets(), 0.0)
     for _ in range(MAX_WRITES_IN_A_ROW - 1):
         task.reply(task.command.reply())
         assert bench.next(0.0) is task.job
@@ -221,7 +221,7 @@ def test_packets_of_a_long_write_use_up_the_turn_of_writes() -> None:
 
 def test_new_writes_and_packets_of_a_long_one_take_turns() -> None:
     bench = Bench()
-    task = bench.tasks.start(NinePackets(), 0.0)
+    task = JobTask(bench.tasks, NinePackets(), 0.0)
     task.reply(task.command.reply())
     writes = [bench.write(make_mapping(f'N7:{20 + n}', 'Write'), n, 0.0) for n in range(4)]
     order = []

@@ -274,7 +274,7 @@ class World:
                 behind.append(plc)
         if behind:
             self.bench.connect(SimulatedGateway(GATEWAY, behind, plant.network.checksum))
-        self._live()
+        self.bench.breathe()
         self.bench.open()
         if plant.asks < math.inf:
             self.bench.at(3.0, self._ask)
@@ -358,10 +358,6 @@ class World:
         data = table.read(parse_address('N7:0', table.plc_type), self.plant.rows * length)
         words = [int.from_bytes(data[at:at + 2], 'little') for at in range(0, len(data), 2)]
         return [set(words[at:at + length]) for at in range(0, len(words), length)]
-
-    def _live(self) -> None:
-        self.bench.driver.interlocks.executor_ran(self.bench.clock())
-        self.bench.at(self.bench.clock() + 0.1, self._live)
 
     def publish(self, stations: Iterable[int] | None = None) -> None:
         """Publish one message for each row, or for each of some stations."""

@@ -80,14 +80,14 @@ def test_no_value_is_older_than_it_looks_and_no_array_mixes_ages(
         polling: str, length: int) -> None:
     read = make_mapping('N7:0', length=length)
     bench, _ = bench_of(read, polling=polling)
-    for number in range(25):
-        bench.run(1.0 + number * STEP)
+    for number in range(12):
+        bench.run(1.0 + 2 * number * STEP)
         bench.line.pause(bench.driver.machine, PAUSE)
         bench.run(PAUSE)
     for when, _, values in bench.listener.reads:
         ages = [(milliseconds(when) - value) % 65536 / 1000 for value in values]  # type: ignore
         assert max(ages) < USUAL_AGE + 0.5 * (length > 1), when
-    assert len(bench.listener.reads) > 50
+    assert len(bench.listener.reads) > 25
     assert bench.driver.points[read].error is None
 
 
@@ -99,7 +99,7 @@ def test_no_command_of_a_write_goes_out_after_it_has_become_too_old(
     read = make_mapping('N7:0')
     bench, plc = bench_of(read, write, polling=polling)
     asked = []
-    for number in range(20 if length > 1 else 8):  # until a write has come to its end
+    for number in range(0, 20 if length > 1 else 8, 2):  # until a write has come to its end
         bench.run(1.0)
         asked.append(bench.clock())
         bench.write(write, [number] * length)

@@ -17,12 +17,7 @@
 from collections.abc import Sequence
 
 from abdf1_ros.df1.frames import ACK, Code, Control, Duplex, Frame, FrameDecoder, message_frame
-from abdf1_ros.df1.machine import Machine, Procedure
 from abdf1_ros.df1.packet import Packet
-from abdf1_ros.df1.peer import FullDuplexPeer
-from abdf1_ros.df1.settings import LinkSettings
-from abdf1_ros.df1.stations import ActiveStationList
-from abdf1_ros.driver.driver import Driver
 from abdf1_ros.driver.reads.point import Freshness
 from abdf1_ros.driver.settings import DriverSettings
 from abdf1_ros.driver.write import Outcome
@@ -33,67 +28,36 @@ from abdf1_ros.pccc.identity import Mode
 from abdf1_ros.settings.mapping import Mapping
 from abdf1_ros.settings.network import Network
 import pytest
-from support.driver_bench import Recorder, simulated_plc, store, stored
+from support.driver_bench import DriverBench, store, stored
 from support.mappings import make_mapping
 from support.peers import CommandTask
-from support.virtual_line import Noise, QUIET, VirtualLine
+from support.virtual_line import Noise, QUIET
 
 US, PLC = 5, 1
 FILES = (('N7:0', 256), ('B3:0', 16), ('N9:0', 20))
 FLOATS = (('F8:0', 64),)
 
 
-class Bench:
-    """The driver at one end, a simulated PLC at the other."""
+class Bench(DriverBench):
+    """The driver at one end, a simulated PLC at the other, both with programs of their own."""
 
     def __init__(self, mappings: Sequence[Mapping], *, family: str = 'PLC5', check: str = 'CRC',
-                 outstanding: int = 1, chunk: int = 1, first_tns: int = 0,
-                 processor_period: float = 0.0) -> None:
-        self.network = Network(mode='Peer', plc_type=family, error_code=check, baud=19200,
-                               timeout=300, cmd_timeout=500)
-        self.listener = Recorder(self.clock)
-        self.driver = Driver(
-            self.network, mappings,
-            DriverSettings(max_outstanding=outstanding, first_tns=first_tns,
-                           processor_period=processor_period), self.listener)
-        files = FILES if family == 'PLC3' else FILES + FLOATS
-        self.plc = simulated_plc(PLC, family, self.clock, *files, checksum=check)
-        self.plc.be_full_duplex()
-        self.far = Machine(self._far_end, checksum=self.network.checksum, duplex=Duplex.FULL,
-                           counters=self.plc.counters)
-        self.line = VirtualLine(self.driver.machine, self.far, baud=19200, chunk=chunk)
+                 outstanding: int = 1, chunk: int = 1, processor_period: float = 0.0) -> None:
+        super().__init__(mappings, network=Network(
+            mode='Peer', plc_type=family, error_code=check, baud=19200, timeout=300,
+            cmd_timeout=500), settings=DriverSettings(
+                max_outstanding=outstanding, processor_period=processor_period),
+            start=False, chunk=chunk)
+        self.other = self.plc(PLC, family, *(FILES if family == 'PLC3' else FILES + FLOATS))
+        self.other.counters = self.far.counters
+        self.other.be_full_duplex()
         self.said: list[str] = []
         self._family = PlcType(family)
         self._tns = 0x4000
 
-    def _far_end(self, machine: Machine) -> Procedure:
-        settings = LinkSettings(station=None, checksum=self.network.checksum)
-        return FullDuplexPeer(machine, settings, ActiveStationList(), self.plc.serve).run(self.plc)
-
-    def clock(self) -> float:
-        """Return the time."""
-        return self.line.now
-
-    def start(self, run: float = 0.0) -> None:
-        """Connect both ends; let so many seconds pass."""
-        self.line.start()
-        if run:
-            self.run(run)
-
-    def run(self, seconds: float) -> None:
-        """Let time pass."""
-        self.line.run_for(seconds)
-
-    def write(self, mapping: Mapping, values: Sequence[float] | str, run: float = 0.0) -> None:
-        """Ask for a write, as the node does; let so many seconds pass."""
-        self.driver.write([mapping], values, self.line.now)
-        self.line.wake(self.driver.machine)
-        if run:
-            self.run(run)
-
     def message(self, text: str, *values: float) -> None:
         """Let the PLC's own program write to us."""
-        self.plc.send(parse_address(text, self._family), list(values), US, self.said.append)
+        self.other.send(parse_address(text, self._family), list(values), US, self.said.append)
         self.line.wake(self.far)
 
     def plc_reads(self, text: str, words: int) -> tuple[int, bytes]:
@@ -103,7 +67,7 @@ class Bench:
         self._tns += 1
         cmd, body = dialect.read(place, words)
         task = CommandTask(Packet(US, PLC, cmd, 0, self._tns, body), self.clock)
-        self.plc.outbox.append(task)  # type: ignore[arg-type]
+        self.other.outbox.append(task)  # type: ignore[arg-type]
         self.line.wake(self.far)
         self.line.run(lambda: task.result is not None, 5.0)
         reply = task.result
@@ -128,11 +92,11 @@ def test_reads_of_a_peer_come_in_time_and_true(
     long = make_mapping('N7:10', plc=family, length=200)
     bench = Bench([integers, floats, bits, long], family=family, check=check,
                   outstanding=outstanding, chunk=chunk)
-    store(bench.plc, 'N7:0', [0x1003, -2, 16])
-    store(bench.plc, 'F8:2', [1.5, -0.25])
-    store(bench.plc, 'B3:1/4', [1, 0, 0, 1, 1, 1])
-    store(bench.plc, 'N7:10', list(range(200)))
-    bench.start(run=3.0)
+    store(bench.other, 'N7:0', [0x1003, -2, 16])
+    store(bench.other, 'F8:2', [1.5, -0.25])
+    store(bench.other, 'B3:1/4', [1, 0, 0, 1, 1, 1])
+    store(bench.other, 'N7:10', list(range(200)))
+    bench.open(run=3.0)
     assert bench.listener.values(integers)[-1] == [0x1003, -2, 16]
     assert bench.listener.values(floats)[-1] == [1.5, -0.25]
     assert bench.listener.values(bits)[-1] == [1, 0, 0, 1, 1, 1]
@@ -151,15 +115,15 @@ def test_writes_to_a_peer_are_confirmed_and_stored(family: str, outstanding: int
     floats = make_mapping('F8:0', 'Write', plc=family)
     bits = make_mapping('B3:2/3', 'Write', plc=family, length=3)
     bench = Bench([words, floats, bits], family=family, outstanding=outstanding)
-    store(bench.plc, 'B3:2', [0xFFFF])
-    bench.start(run=0.5)
+    store(bench.other, 'B3:2', [0xFFFF])
+    bench.open(run=0.5)
     bench.write(words, [1, -2, 16, 0x1010])
     bench.write(floats, [2.5])
     bench.write(bits, [0, 1, 0], run=1.0)
     assert bench.listener.outcomes() == [Outcome.WRITTEN] * 3
-    assert stored(bench.plc, 'N7:10', 4) == b'\1\0\xfe\xff\x10\0\x10\x10'
-    assert stored(bench.plc, 'F8:0', 2) == b'\0\0\x20\x40'
-    assert stored(bench.plc, 'B3:2') == b'\xd7\xff'
+    assert stored(bench.other, 'N7:10', 4) == b'\1\0\xfe\xff\x10\0\x10\x10'
+    assert stored(bench.other, 'F8:0', 2) == b'\0\0\x20\x40'
+    assert stored(bench.other, 'B3:2') == b'\xd7\xff'
     assert bench.listener.values(words)[-1] == [1, -2, 16, 0x1010]
 
 
@@ -169,7 +133,7 @@ def test_message_of_the_plc_appears_at_once(family: str, check: str) -> None:
     pushed = serve_row('N7:50', family, 4)
     bits = serve_row('B3:5/0', family, 8)
     bench = Bench([pushed, bits, make_mapping(plc=family)], family=family, check=check)
-    bench.start(run=1.0)
+    bench.open(run=1.0)
     began = bench.clock()
     bench.message('N7:50', 11, 22)
     bench.run(0.5)
@@ -188,7 +152,7 @@ def test_message_of_the_plc_appears_at_once(family: str, check: str) -> None:
 def test_message_to_what_is_not_served_is_refused() -> None:
     pushed = serve_row('N7:50', length=4)
     bench = Bench([pushed])
-    bench.start()
+    bench.open()
     bench.message('N7:54', 1)
     bench.message('N7:0', 1)
     bench.message('N10:0', 1)
@@ -203,7 +167,7 @@ def test_message_to_what_is_not_served_is_refused() -> None:
 def test_what_ros_writes_is_read_by_the_plc(family: str) -> None:
     words, bits = serve_row('N7:50', family, 4), serve_row('B3:5/4', family, 4)
     bench = Bench([words, bits, make_mapping(plc=family)], family=family)
-    bench.start(run=0.3)
+    bench.open(run=0.3)
     assert bench.plc_reads('N7:50', 4) == (0, bytes(8))
     bench.write(words, [-1, 0x1010, 3, 4])
     bench.write(bits, [1, 0, 1, 1], run=0.3)
@@ -224,14 +188,14 @@ def test_nothing_is_lost_or_mixed_up_when_everything_happens_at_once(
     pushed = serve_row('N7:50', family, 2)
     pulled = serve_row('N9:10', family, 2)
     bench = Bench([read, *others, write, pushed, pulled], family=family, outstanding=outstanding)
-    bench.start()
+    bench.open()
     for number in range(1, 41):
-        store(bench.plc, 'N7:0', [number] * 10)
+        store(bench.other, 'N7:0', [number] * 10)
         bench.write(write, [number, -number])
         bench.write(pulled, [number, 2 * number])
         bench.message('N7:50', number, 3 * number)
         bench.run(0.15)
-        assert stored(bench.plc, 'N9:0', 2) == b''.join(
+        assert stored(bench.other, 'N9:0', 2) == b''.join(
             value.to_bytes(2, 'little', signed=True) for value in (number, -number))
         assert bench.listener.values(pushed)[-1] == [number, 3 * number]
         assert bench.plc_reads('N9:10', 2) == (0, bytes((number, 0, 2 * number, 0)))
@@ -252,7 +216,7 @@ def test_dead_line_fails_reads_and_writes_and_all_goes_on_when_it_is_back() -> N
     read, write = make_mapping(), make_mapping('N7:5', 'Write')
     pushed = serve_row('N7:50')
     bench = Bench([read, write, pushed])
-    bench.start(run=0.5)
+    bench.open(run=0.5)
     bench.line.noise = Noise(lost=1.0)
     bench.write(write, [5], run=10.0)
     assert bench.listener.changes == [(PLC, False)]
@@ -279,7 +243,7 @@ def test_our_own_station_is_no_station_of_the_line() -> None:
 def test_served_word_that_nobody_has_to_write_is_not_late() -> None:
     free, expected = serve_row('N7:50'), serve_row('N7:60', period=200)
     bench = Bench([free, expected])
-    bench.start(run=5.0)
+    bench.open(run=5.0)
     now = bench.clock()
     assert bench.driver.points[free].freshness(now) is Freshness.FRESH
     assert bench.driver.points[expected].freshness(now) is Freshness.WAITING
@@ -318,10 +282,10 @@ def test_plc_reads_the_newest_value_while_a_command_of_ours_waits() -> None:
 def test_processor_and_counters_of_the_other_end(outstanding: int) -> None:
     word, lamp = make_mapping('N7:0', plc='SLC'), make_mapping('N7:1', 'Write', plc='SLC')
     bench = Bench([word, lamp], family='SLC', outstanding=outstanding, processor_period=2.0)
-    bench.start(run=1.0)
+    bench.open(run=1.0)
     health = bench.driver.checks
     assert health.known(PLC).processor == 'SLC 5/03 series A revision 1, REM RUN'
-    bench.plc.processor.setting = Setting.PROGRAM
+    bench.other.processor.setting = Setting.PROGRAM
     bench.driver.checks.request_counters(PLC)
     bench.run(2.0)
     identity = health.known(PLC).identity

@@ -156,7 +156,7 @@ class LateBench(DriverBench):
             for plc in plcs:
                 plc.serve = self._lose_reply  # type: ignore[method-assign]
             self.connect(SimulatedGateway(via, plcs, Checksum.CRC))
-        self._tick()
+        self.breathe()
         self.open()
 
     def _rows(self, number: int, via: int | None) -> list[Mapping]:
@@ -172,11 +172,6 @@ class LateBench(DriverBench):
         self.asked.append(command.dst)
         reply = command.reply()
         return reply._replace(tns=reply.tns ^ 0x8000)  # which nobody waits for
-
-    def _tick(self) -> None:
-        """Let the executor run."""
-        self.driver.interlocks.executor_ran(self.clock())
-        self.at(self.clock() + 0.1, self._tick)
 
 
 @pytest.mark.parametrize('via', [None, GATEWAY])

@@ -241,13 +241,8 @@ class Interlocked(DriverBench):
         self.seen: list[list[tuple[float, int]]] = [[], []]
         for number, plc in enumerate(self.plcs):
             plc.serve = partial(self._serve, number, plc.serve)  # type: ignore[method-assign]
-        self._tick()
+        self.breathe()
         self.open()
-
-    def _tick(self) -> None:
-        """Let the executor run."""
-        self.driver.interlocks.executor_ran(self.clock())
-        self.at(self.clock() + 0.1, self._tick)
 
     def _serve(self, number: int, serve: Callable[[Packet], Packet], command: Packet) -> Packet:
         """Keep how a heartbeat changes."""

@@ -249,12 +249,7 @@ def beating_bench(mode: str, polling: str = 'Message') -> DriverBench:
     bench.plc(1, 'SLC', ('N7:0', 20), ('N10:0', 4))
     if mode == 'Peer':
         bench.open()
-
-    def executor_runs() -> None:
-        bench.driver.interlocks.executor_ran(bench.clock())
-        bench.at(bench.clock() + 0.1, executor_runs)
-
-    executor_runs()
+    bench.breathe()
     bench.run(3.0)
     return bench
 
@@ -281,20 +276,20 @@ def test_failure_of_a_guest_says_nothing_about_the_station(
     setattr(bench.far, where, filtered)
     program = Program(bench)
     beats, reads = set(), len(bench.listener.reads)
-    for _ in range(10):
+    for _ in range(4):
         program.ask(b'\0' + MARK, cmd=0x06)
         for _ in range(20):
             bench.run(0.1)
             beats.add(bench.driver.interlocks.heartbeats[0].state)
     station = bench.driver.stations[1]
     assert program.statuses[0] in (0x02, 0x05)
-    assert set(program.statuses) <= {0x01, 0x02, 0x05} and len(program.statuses) >= 9
+    assert set(program.statuses) <= {0x01, 0x02, 0x05} and len(program.statuses) >= 3
     assert bench.listener.changes == []
     assert (station.active, station.overdue, station.unanswered, station.returns) == (
         True, 0, 0, 0)
     assert beats == {BeatState.COUNTS}
     assert not bench.listener.numbers() & {Message.ERR_INACTIVE_STATION.number}
-    assert len(bench.listener.reads) - reads > 40
+    assert len(bench.listener.reads) - reads > 16
 
 
 def test_lost_port_is_told_and_what_waits_is_not_sent_later() -> None:

@@ -199,6 +199,7 @@ class DriverBench:
         self._actions: list[tuple[float, int, Callable[[], None]]] = []
         self._count = itertools.count()
         self._mappings, self._settings = mappings, settings or DriverSettings()
+        self.is_alive = True
         if self.network.duplex is Duplex.HALF:
             self.far.start(0.0)
         if start:
@@ -237,6 +238,12 @@ class DriverBench:
         self.line.exchange(self.driver.machine, driver.machine)
         self.driver = driver
         self.open()
+
+    def breathe(self) -> None:
+        """Let the executor run ten times a second from now on, while it ``is_alive``."""
+        if self.is_alive:
+            self.driver.interlocks.executor_ran(self.line.now)
+        self.at(self.line.now + 0.1, self.breathe)
 
     def lose_port(self, reason: str = 'unplugged') -> None:
         """Lose the port."""
