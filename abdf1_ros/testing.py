@@ -111,13 +111,18 @@ class Bridge:
                 [sys.executable, '-m', 'abdf1_ros', 'node', '--ros-args', *self._words],
                 stdout=log, stderr=log)
 
+    @property
+    def is_running(self) -> bool:
+        """Tell whether it has been started and not ended."""
+        return self._process is not None and self._process.poll() is None
+
     def end(self, number: signal.Signals) -> int:
         """End it by a signal, if it runs; return its exit status."""
-        process, self._process = self._process, None
-        if process is None:
+        if self._process is None:
             return 0
-        if process.poll() is None:
-            process.send_signal(number)
+        if self.is_running:
+            self._process.send_signal(number)
+        process, self._process = self._process, None
         return process.wait(PATIENCE)
 
     def check(self) -> None:
@@ -301,9 +306,11 @@ class SimulatedCell:
         It leaves the graph before that, unless it is killed: Fast DDS 2.14 may crash where a
         subscription ends while another process takes its publishers away (its issue 3303).
         """
+        takes_leave = (self._bridge.is_running and number != signal.SIGKILL
+                       and self.ros.context.ok())
         status = self._bridge.end(number)
-        give_up = time.monotonic() + (0.0 if number == signal.SIGKILL else 1.0)
-        while 'abdf1' in self.ros.node.get_node_names() and time.monotonic() < give_up:
+        give_up = time.monotonic() + (1.0 if takes_leave else 0.0)
+        while time.monotonic() < give_up and 'abdf1' in self.ros.node.get_node_names():
             time.sleep(0.005)
         return status
 
