@@ -27,7 +27,6 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cache, partial
 import hashlib
-import math
 from random import Random
 
 from abdf1_ros.df1.frames import stuff
@@ -55,8 +54,10 @@ SAFE = 32_000  # the fallback of every row
 GUESTS = range(33_000, 33_600)  # what only guests write: more than a heartbeat counts to
 OTHERS = 34_000  # what comes into a word from another network
 LARGEST = 31_000  # of what is published
+_LEAST_COMMAND = 10  # bytes: no poll
 _ALL = 255  # stations
 _WRITES = (b'\x67', b'\xAA')  # functions of a typed write
+_TICKS = 30_000
 _FAR = 1  # what a VirtualLine calls the far end
 SMALL = Noise(lost=0.0005, flipped=0.001, inserted=0.0005)
 MODES: dict[str, dict[str, str]] = {
@@ -172,12 +173,13 @@ class WatchedPlc:
     refuses_messages: bool = False  # but takes fallbacks
     swallows_replies: bool = False  # to messages, which are executed
     other: int = 0  # what another writer has put into the word of the heartbeat
-    ran: float = 0.0  # when its program ran last
-    stopped: float = 0.0  # when it stopped last
+    stopped: float = 0.0  # when its program stopped last
     ran_again: float = 0.0  # and when it ran after that
-    # What its program showed last, and from when on.
-    shown: deque[tuple[float, int]] = field(default_factory=lambda: deque(maxlen=200))
     saved: dict[str, int] = field(default_factory=dict)
+    tags: dict[str, str] = field(init=False)  # by address
+
+    def __post_init__(self) -> None:
+        self.tags = {place: tag for tag, place in self.places.items()}
 
     def word(self, text: str) -> int:
         """Return a word of its table."""
@@ -193,21 +195,28 @@ class WatchedPlc:
     def run_program(self, now: float) -> None:
         """Let the program tell the time, so that each value that is read tells when it was."""
         if self.plc.is_running:
-            if now - self.ran > 1.5 * STEP:
-                self.stopped, self.ran_again = self.ran, now
-            self.ran = now
-            tick = ticks(now)
-            self.set(CLOCK, tick, tick, tick, tick, tick)
-            self.shown.append((now, tick))
+            self.set(CLOCK, *5 * (ticks(now),))
+
+    def set_mode(self, setting: Setting, now: float) -> None:
+        """Turn the key."""
+        self.run_program(now)
+        was_running = self.plc.is_running
+        self.plc.set_mode(setting)
+        if was_running and not self.plc.is_running:
+            self.stopped = now
+        elif self.plc.is_running and not was_running:
+            self.ran_again = now
+
+    def ran(self, now: float) -> float:
+        """Return when its program ran last."""
+        return now if self.plc.is_running else self.stopped
 
     def last_showed(self, tick: int, now: float) -> float:
-        """Return until when its program showed a tick, minus infinity for never."""
-        until = now
-        for since, shown in reversed(self.shown):
-            if shown == tick:
-                return until
-            until = since
-        return -math.inf
+        """Return until when its program showed a tick, a time long ago for never."""
+        if tick == ticks(self.stopped):  # it stood so until it ran again
+            return self.ran_again if self.plc.is_running else now
+        age = (ticks(now) - tick) % _TICKS
+        return min(now, (now // STEP - age + 1) * STEP)
 
 
 place_of = cache(parse_address)
@@ -215,7 +224,7 @@ place_of = cache(parse_address)
 
 def ticks(now: float) -> int:
     """Return what the program of a PLC tells of a time."""
-    return int(now / STEP) % 30_000
+    return int(now // STEP) % _TICKS
 
 
 class World(DriverBench):
@@ -265,9 +274,14 @@ class World(DriverBench):
         self._send, self.line._send = self.line._send, self._note_sent  # type: ignore[method-assign]
         self.line._random = Random(seed)
         self.executor_ran = 0.0
-        self._run_programs()
         self._breathe()
         self.open()
+
+    @property
+    def longest_patience(self) -> float:
+        """Return after how long (s) at most all guarded values of a stopped PLC are withheld."""
+        return max(point.patience for mapping, point in self.driver.points.items()
+                   if mapping.publish_while) + 2 * self.longest
 
     @property
     def results(self) -> list[WriteResult]:
@@ -311,10 +325,13 @@ class World(DriverBench):
     def _execute(self, watched: WatchedPlc, command: Packet,
                  serve: Callable[[Packet], Packet], is_late: bool) -> Packet:
         """Execute a command, unless it is refused; keep what it has written."""
+        watched.run_program(self.line.now)
+        if command.data[:1] not in _WRITES:
+            return serve(command)
         station = watched.plc.station
         written: list[tuple[str, int]] = []
         table = watched.plc.table
-        write, by_address = table.write, {place: tag for tag, place in watched.places.items()}
+        write, by_address = table.write, watched.tags
         saved = {place: watched.word(place) for place in by_address}
 
         def note(address: object, data: bytes) -> None:
@@ -340,7 +357,7 @@ class World(DriverBench):
         return reply
 
     def _note_sent(self, data: bytes, start: float, receiver: int) -> None:
-        if receiver == _FAR:
+        if receiver == _FAR and len(data) >= _LEAST_COMMAND:
             self._sent.append((start, data))
         self._send(data, start, receiver)
 
@@ -358,11 +375,6 @@ class World(DriverBench):
     def _say(self, data: bytes) -> bytes:
         self.wire.update(b'%f<' % self.line.now + data)
         return b'' if self.is_silent else data
-
-    def _run_programs(self) -> None:
-        for watched in self.plcs.values():
-            watched.run_program(self.line.now)
-        self.at(self.line.now + STEP, self._run_programs)
 
     def _breathe(self) -> None:
         """Let the executor run, as it does while nothing holds it up."""
@@ -442,7 +454,7 @@ class World(DriverBench):
     def download(self, station: int) -> None:
         """Bring old words back; the PLC is in PROGRAM from now on."""
         watched = self.plcs[station]
-        watched.plc.set_mode(Setting.PROGRAM)
+        watched.set_mode(Setting.PROGRAM, self.line.now)
         for place, value in watched.saved.items():
             watched.set(place, value)
 
@@ -456,7 +468,7 @@ class World(DriverBench):
         for station, watched in self.plcs.items():
             self.fall_silent(station, False)
             watched.refuses = watched.refuses_messages = watched.swallows_replies = False
-            watched.plc.processor.setting = Setting.RUN
+            watched.set_mode(Setting.RUN, self.line.now)
         self.is_alive = True
         self.line.noise = QUIET
         self.holds = 0.0

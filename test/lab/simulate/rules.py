@@ -89,12 +89,15 @@ class Results(Rule):
         self._waits: dict[tuple[str, int], float] = {}
         self._outcomes: dict[tuple[str, int], Outcome] = {}
         self._by: set[tuple[str, int]] = set()
+        self._safe: defaultdict[str, float] = defaultdict(lambda: -math.inf)
         self._seen = self._driver = 0
         # To wait, to be sent and polled for, to be read back, and while the process stood still.
         self._limit = 3 * world.plant.write_timeout + 4 * world.longest + 8.0
 
     def executed(self, entry: Executed) -> None:
         key = entry.tag, entry.value
+        if entry.value == SAFE:
+            self._safe[entry.tag] = entry.when
         if entry.tag[0] not in 'wf' or entry.value == SAFE or entry.value in GUESTS:
             return
         self.demand(key in self.world.published, key, 'was never published')
@@ -104,6 +107,9 @@ class Results(Rule):
 
     def told(self, result: WriteResult) -> None:
         if result.outcome is Outcome.FALLBACK:
+            came = self._safe[result.mapping.tag]
+            self.demand(came > self.world.line.now - self.flight - self.held, result.mapping.tag,
+                        'got its fallback', came)
             return
         key = result.mapping.tag, int(result.value.strip('[]'))
         self.demand(key not in self._outcomes, key, 'has two results')
@@ -182,7 +188,8 @@ class Guards(Rule):
             world = self.world
             # The counter was read an interval after its last change at most, and so was this row.
             limit = self._patience[tag] + 2 * self.flight + self.held + 0.5
-            self.demand(when - world.plcs[station].ran <= limit, tag, world.plcs[station].ran)
+            ran = world.plcs[station].ran(when)
+            self.demand(when - ran <= limit, tag, ran)
 
 
 class Beats(Rule):
@@ -426,25 +433,29 @@ class Judge:
         self._world = world
         self.owner = OneOwner(world)
         self._rules = [*(rule(world) for rule in RULES), self.owner]
+        # Only those that judge it: this is done at each step.
+        self._judges = {name: [getattr(rule, name) for rule in self._rules
+                               if getattr(type(rule), name) is not getattr(Rule, name)]
+                        for name in ('executed', 'told', 'read', 'stand')}
         self._executed = self._results = self._reads = 0
 
     def look(self) -> None:
         """Look at what is new; raise Broken."""
-        world, rules = self._world, self._rules
+        world, judges = self._world, self._judges
         for entry in world.executed[self._executed:]:
-            for rule in rules:
-                rule.executed(entry)
+            for executed in judges['executed']:
+                executed(entry)
         for result in world.results[self._results:]:
-            for rule in rules:
-                rule.told(result)
+            for told in judges['told']:
+                told(result)
         for when, mapping, values in world.reads[self._reads:]:
             assert not isinstance(values, str)
-            for rule in rules:
-                rule.read(when, mapping.tag, mapping.station, [int(value) for value in values])
+            for read in judges['read']:
+                read(when, mapping.tag, mapping.station, [int(value) for value in values])
         self._executed, self._results = len(world.executed), len(world.results)
         self._reads = len(world.reads)
-        for rule in rules:
-            rule.stand()
+        for stand in judges['stand']:
+            stand()
 
     def over(self) -> None:
         """Look at what is left after an orderly end; raise Broken."""

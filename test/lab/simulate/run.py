@@ -230,7 +230,9 @@ def _hung_executor(story: Story, station: int) -> None:
 
 
 def _program(story: Story, station: int) -> None:
-    story.world.plcs[station].plc.set_mode(Setting.PROGRAM)
+    story.world.plcs[station].set_mode(Setting.PROGRAM, story.world.line.now)
+    if story.dice.random() < 0.5:  # for guarded values to be withheld
+        story.wait(story.world.longest_patience + 1.0)
 
 
 def _download(story: Story, station: int) -> None:
