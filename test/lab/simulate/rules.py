@@ -91,6 +91,7 @@ class Results(Rule):
         self._by: set[tuple[str, int]] = set()
         self._safe: defaultdict[str, float] = defaultdict(lambda: -math.inf)
         self._seen = self._driver = 0
+        self._looked = 0.0
         # To wait, to be sent and polled for, to be read back, and while the process stood still.
         self._limit = 3 * world.plant.write_timeout + 4 * world.longest + 8.0
 
@@ -108,7 +109,7 @@ class Results(Rule):
     def told(self, result: WriteResult) -> None:
         if result.outcome is Outcome.FALLBACK:
             came = self._safe[result.mapping.tag]
-            self.demand(came > self.world.line.now - self.flight - self.held, result.mapping.tag,
+            self.demand(came > self._looked - self.flight - self.held, result.mapping.tag,
                         'got its fallback', came)
             return
         key = result.mapping.tag, int(result.value.strip('[]'))
@@ -124,7 +125,7 @@ class Results(Rule):
         self.demand(not self._waits, [*self._waits], 'have no result')
 
     def stand(self) -> None:
-        now = self.world.line.now
+        now = self._looked = self.world.line.now
         new = self.world.keys[self._seen:]
         self._seen += len(new)
         if self._driver != self.world.drivers:  # what the killed one knew is gone
