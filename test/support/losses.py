@@ -1,0 +1,119 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Lines that lose frames, never more in a row than the settings repeat."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Callable
+import math
+from random import Random
+from typing import Protocol
+
+from abdf1_ros.df1.frames import ACK, Code
+
+
+class Losing(Protocol):
+    """
+    What gets lost: a share ``lost`` of all frames, of commands, of replies, or of both.
+
+    ``travel`` is how long (s) each frame travels; then a poll is lost only when there is a reply.
+    """
+
+    mode: str
+    nak_retries: int
+    enq_retries: int
+    lost: float
+    lose_commands: bool
+    lose_replies: bool
+    travel: float
+    seed: int
+
+
+class Losses:
+    """
+    The line: it loses a frame of the driver, or the answer to it, but never too often in a row.
+
+    ``is_due`` says whether what goes wrong has begun.
+    """
+
+    def __init__(self, plant: Losing, clock: Callable[[], float]) -> None:
+        self._plant = plant
+        self.clock = clock
+        self.ready = -math.inf  # from when (clock, s) there is a reply
+        self._dice = Random(plant.seed)
+        self._lost = {False: 0, True: 0}  # in a row: of messages, of polls
+        self._takes_answer = False
+        self.is_due = False
+
+    def hear(self, data: bytes) -> bytes:
+        """Return what the stations hear of a frame, which may follow an ACK at once."""
+        if data[:2] == ACK and len(data) > 2:
+            return ACK + self.hear(data[2:])
+        is_poll = data[:2] == bytes((Code.DLE, Code.ENQ))
+        is_message = data[:2] in (bytes((Code.DLE, Code.SOH)), bytes((Code.DLE, Code.STX)))
+        if not self.is_due or not (is_poll or is_message):
+            return data
+        plant = self._plant
+        limit = plant.enq_retries if is_poll else plant.nak_retries
+        if is_poll and plant.travel and self.clock() < self.ready:
+            return data
+        is_peer = plant.mode == 'Peer'
+        if is_peer:  # a lost message costs an ENQ and a NAK, and an ENQ proves nothing
+            limit = min(plant.enq_retries, plant.nak_retries)
+        is_lost = self._lost[is_poll and not is_peer] < limit and self._dice.random() < plant.lost
+        if is_lost or not (is_peer and is_poll):
+            count = self._lost[is_poll and not is_peer]
+            self._lost[is_poll and not is_peer] = count + 1 if is_lost else 0
+        both = plant.lose_commands and plant.lose_replies
+        is_command = plant.lose_commands and (not both or self._dice.random() < 0.5)
+        self._takes_answer = is_lost and not is_command
+        if not is_lost or not is_command:
+            return data
+        # A full-duplex message that leaves no trace gets the ACK of the one before.
+        return data[:-1] + bytes((data[-1] ^ 1,)) if is_peer and is_message else b''
+
+    def say(self, data: bytes) -> bytes:
+        """Return what the driver hears."""
+        is_taken, self._takes_answer = self._takes_answer, False
+        return b'' if is_taken else data
+
+
+class AirLosses(Losses):
+    """A radio network: it loses the commands of each station, or replies, but not too often."""
+
+    def __init__(self, plant: Losing, clock: Callable[[], float]) -> None:
+        super().__init__(plant, clock)
+        self._lost_of: Counter[int] = Counter()
+        self._loses_reply: set[int] = set()
+
+    def hear(self, data: bytes) -> bytes:
+        """Return what the stations hear of a frame."""
+        plant, station = self._plant, data[2]
+        self._loses_reply.discard(station)
+        is_lost = self.is_due and self._lost_of[station] < plant.nak_retries \
+            and self._dice.random() < plant.lost and (plant.lose_commands or plant.lose_replies)
+        self._lost_of[station] = self._lost_of[station] + 1 if is_lost else 0
+        both = plant.lose_commands and plant.lose_replies
+        if is_lost and (self._dice.random() < 0.5 if both else plant.lose_replies):
+            self._loses_reply.add(station)
+            return data
+        return b'' if is_lost else data
+
+    def say(self, data: bytes) -> bytes:
+        """Return what the driver hears."""
+        is_lost = data[3] in self._loses_reply
+        self._loses_reply.discard(data[3])
+        return b'' if is_lost else data
