@@ -13,11 +13,25 @@
 # limitations under the License.
 
 """
-A plant on a virtual clock: a driver, its PLCs, publishers, and all that goes wrong between them.
+A plant on a virtual clock: drivers, their PLCs, publishers, and all that goes wrong between them.
 
 Everything but ROS itself; a seed and a commit replay a run to the byte. What is done goes through
 the ``World``, and what came of it is in its lists, with the time it came. Each value that is
-published is another one, so what a PLC executes tells who asked for it, and when.
+published is another one, so what a PLC executes tells who asked for it, and when::
+
+    world = World(Plant('Message', stations=2), seed=1)
+    speed = world.rows['w0_1']                  # the first output of station 1
+    world.run(2.0)
+    world.publish(speed)
+    world.run(0.5)
+    assert world.results[-1].outcome is Outcome.WRITTEN
+    world.fall_silent(1)                        # or kill, unplug, download, ask (a guest), ...
+    world.run(10.0)
+    world.mend()
+    print([entry for entry in world.executed if entry.tag == 'w0_1'], world.reads[-1])
+
+In Mode Slave a master polls us and the PLCs, which are nodes of one wire. A ladder of the page
+about heartbeats runs in each PLC where the plant has a ``scan``.
 """
 
 from __future__ import annotations
@@ -29,9 +43,9 @@ from functools import cache, partial
 import hashlib
 from random import Random
 
-from abdf1_ros.df1.frames import stuff
+from abdf1_ros.df1.frames import Code, Duplex, stuff
 from abdf1_ros.df1.packet import Packet
-from abdf1_ros.df1.settings import LinkSettings
+from abdf1_ros.df1.settings import LinkSettings, PollingSettings
 from abdf1_ros.df1.slave import HalfDuplexSlave
 from abdf1_ros.driver.guests import Guest, GuestCommand, ShareAccess
 from abdf1_ros.driver.settings import DriverSettings
@@ -41,13 +55,16 @@ from abdf1_ros.pccc.emulated import Setting
 from abdf1_ros.pccc.families import dialect_of, parse_address
 from abdf1_ros.pccc.values import Values
 from abdf1_ros.plan.report import make_report
-from abdf1_ros.settings.heartbeats import Fallback, Heartbeat, PublishWhile
+from abdf1_ros.settings.heartbeats import Fallback, Heartbeat, PublishWhile, TIME_BASE
 from abdf1_ros.settings.mapping import Mapping
 from abdf1_ros.settings.network import Network
+from abdf1_ros.simulator.ladder import Ladder, Lamp
 from abdf1_ros.simulator.simulated_plc import SimulatedPlc
 from support.driver_bench import DriverBench
+from support.losses import AirLosses, Losses
 from support.mappings import make_mapping
-from support.virtual_line import Noise, QUIET
+from support.multidrop import MasterNode
+from support.virtual_line import Noise, QUIET, VirtualLine
 
 STEP = 0.05  # s
 SAFE = 32_000  # the fallback of every row
@@ -55,6 +72,9 @@ GUESTS = range(33_000, 33_600)  # what only guests write: more than a heartbeat 
 OTHERS = 34_000  # what comes into a word from another network
 LARGEST = 31_000  # of what is published
 _LEAST_COMMAND = 10  # bytes: no poll
+_STX = bytes((Code.DLE, Code.STX))
+_PRESSED_EVERY = 1.0  # s
+SLAVE_PRESET = 1000  # of a watchdog where none is printed, in units of 10 ms
 _ALL = 255  # stations
 _WRITES = (b'\x67', b'\xAA')  # functions of a typed write
 _TICKS = 30_000
@@ -62,12 +82,16 @@ _FAR = 1  # what a VirtualLine calls the far end
 SMALL = Noise(lost=0.0005, flipped=0.001, inserted=0.0005)
 MODES: dict[str, dict[str, str]] = {
     'Message': {}, 'Standard': {'polling': 'Standard'}, 'Peer': {'mode': 'Peer'},
-    'Radio': {'mode': 'Radio'}, 'Gateway': {}, 'Standard gateway': {'polling': 'Standard'}}
+    'Radio': {'mode': 'Radio'}, 'Gateway': {}, 'Standard gateway': {'polling': 'Standard'},
+    'Slave': {'mode': 'Slave', 'plc_type': 'SLC'}}
+POLLED = ('Standard', 'Standard gateway', 'Slave')  # polls go on all the time
+OURS, OTHER_BRIDGE, MASTER = 200, 201, 9  # stations
 GATEWAY = 5  # the station on the line, behind which the PLC is
 DAMAGED = b'ZZZZ'  # what the line does not carry: only guests send it
 
 # The words of each PLC: outputs, a row without Fallback after them, its program's own, heartbeat.
 OUTPUTS, FREE, CLOCK, COUNTER, BEAT = 'N7:0', 'N7:20', 'N9:0', 'N9:4', 'N10:0'
+SERVED = 'N7:50'  # of our own table, for the master
 
 
 @dataclass(frozen=True, slots=True)
@@ -89,24 +113,27 @@ class Plant:
     retries: int = 1
     write_timeout: float = 2.0
     is_read_only: bool = False
+    scan: int = 0  # ms of the ladder, 0 for none
 
     @classmethod
     def drawn(cls, dice: Random, mode: str = '') -> Plant:
         """Return any plant."""
-        common = [name for name in MODES if 'Standard' not in name]
+        common = [name for name in MODES if name not in POLLED]
         mode = mode or dice.choice([*MODES, *3 * common])
         stations = 1 if mode == 'Peer' or 'ateway' in mode else dice.choice([1, 1, 1, 2, 3])
         return cls(
             mode, stations, dice.choice([1, 2, 2, 3]), dice.choice(['PLC5', 'SLC']),
             dice.choice([600, 1000, 2000]), dice.choice([500, 1000, 2000]),
-            dice.choice([None, None, 800, 1500]), dice.choice([9600, 19200, 38400]),
-            dice.choice([1, 2]), dice.choice([0.5, 2.0]), dice.random() < 0.04)
+            dice.choice([None, None, 800, 1500]),
+            dice.choice([4800, 4800, 9600, 19200] if mode in POLLED else [9600, 19200, 38400]),
+            dice.choice([1, 2]), dice.choice([0.5, 2.0]), dice.random() < 0.04,
+            dice.choice([0, 0, 50, 100]))
 
     @property
     def network(self) -> Network:
         """Return the settings of its line."""
         return Network(
-            station=200, baud=self.baud, timeout=100, cmd_timeout=500, nak_retries=self.retries,
+            station=OURS, baud=self.baud, timeout=100, cmd_timeout=500, nak_retries=self.retries,
             enq_retries=self.retries, **MODES[self.mode])  # type: ignore[arg-type]
 
     @property
@@ -141,7 +168,24 @@ class Plant:
             add(COUNTER, 'Read', 'counter', period=1000)
             add('N9:3', 'Read', 'counted', period=1000,
                 publish_while=PublishWhile(f'counter_{station}', self.counts_within))
+        if self.mode == 'Slave':
+            found.append(make_mapping(SERVED, 'Serve', station=OURS, plc='SLC', tag='served',
+                                      fallback=Fallback((SAFE,), self.after)))
         return found
+
+
+@dataclass(frozen=True, slots=True)
+class Lost:
+    """Frames that get lost, as often as the settings repeat them: see ``Losing``."""
+
+    mode: str
+    nak_retries: int
+    enq_retries: int
+    lost: float
+    lose_commands: bool
+    lose_replies: bool
+    seed: int
+    travel: float = 0.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -176,6 +220,9 @@ class WatchedPlc:
     stopped: float = 0.0  # when its program stopped last
     ran_again: float = 0.0  # and when it ran after that
     saved: dict[str, int] = field(default_factory=dict)
+    preset: float = 0.0  # s, of the watchdog of its ladder, 0 where it has none
+    # What the lamps of its ladder showed, with the time, and which of them are on.
+    lamps: list[tuple[float, Lamp, bool]] = field(default_factory=list)
     tags: dict[str, str] = field(init=False)  # by address
 
     def __post_init__(self) -> None:
@@ -241,6 +288,7 @@ class World(DriverBench):
         self.dice = Random(seed)
         self.drivers = 0  # killed so far
         self.killed_at = 0.0
+        self.others: dict[int, OtherBridge] = {}  # by the station of the PLC
         self.opened = 0.0  # when the port was last
         rows = plant.mappings()
         settings = DriverSettings(
@@ -248,7 +296,7 @@ class World(DriverBench):
             first_tns=self.dice.randrange(0x10000))
         super().__init__(rows, network=plant.network, settings=settings, start=False, chunk=64)
         self.rows = {row.tag: row for row in rows}
-        self.messages = [row for row in rows if row.tag[0] in 'wf']
+        self.messages = [row for row in rows if row.tag[0] in 'wfs']
         self.executed: list[Executed] = []
         self.published: dict[tuple[str, int], float] = {}
         self.keys: list[tuple[str, int]] = []  # of all messages, in their order
@@ -257,7 +305,8 @@ class World(DriverBench):
         self.asked: list[Packet] = []  # by the guest
         self.answered: list[Packet] = []
         self.came: dict[str, float] = {}  # when a message of a row came last
-        self.report = make_report(plant.network, rows, settings.default_period)
+        self.report = make_report(plant.network, rows, settings.default_period,
+                                  max(0.01, plant.scan / 1000))
         self.bounds = {bound.mapping.tag: bound.seconds for bound in self.report.times.bounds()}
         self.longest = self.report.times.longest  # s
         self.is_alive = True  # the executor
@@ -265,12 +314,21 @@ class World(DriverBench):
         self.ill: dict[int, float] = dict.fromkeys(range(plant.stations + 1), 0.0)
         self.overwritten: dict[str, float] = {}  # when another network has written to an output
         self.holds = 0.0  # how often the gateway keeps a write for a while
+        self.losses: Losses | None = None
+        self.lossy_until = 0.0
         self.wire = hashlib.sha256()
         self._values = dict.fromkeys(self.rows, 0)
         self.is_silent = False
         self.plcs = {station: self._watch(station) for station in range(1, plant.stations + 1)}
         self.far.hear, self.far.say = self._hear, self._say
+        self.master: MasterNode | None = None
+        self.served: list[tuple[float, int]] = []  # what it read of our own table, and when
+        if plant.mode == 'Slave':
+            self._put_a_master()
         self._sent: deque[tuple[float, bytes]] = deque()  # what the driver has put on the line
+        self.beats_sent = dict.fromkeys(self.plcs, 0.0)  # when a heartbeat was, by station
+        beat = place_of(BEAT, self.rows['clock_1'].plc_type)
+        self._beat = stuff(dialect_of(beat.plc_type).write(beat, b'\0\0')[1][:-2])
         self._send, self.line._send = self.line._send, self._note_sent  # type: ignore[method-assign]
         self.line._random = Random(seed)
         self.executor_ran = 0.0
@@ -298,6 +356,8 @@ class World(DriverBench):
         places = {row.tag: str(row.address) for row in self.rows.values()
                   if row.station == station and (row.writes or row.heartbeat)}
         watched = WatchedPlc(plc, places)
+        if self.plant.scan:
+            self._run_ladder(watched)
         serve = plc.serve
 
         def execute(command: Packet, *, is_late: bool = False) -> Packet:
@@ -308,6 +368,54 @@ class World(DriverBench):
             LinkSettings(station=self.plant.gateway or station, checksum=self.network.checksum),
             partial(self._pass_on, execute))
         return watched
+
+    def _run_ladder(self, watched: WatchedPlc) -> None:
+        """Let its ladder run, and somebody who presses its button all the time."""
+        beat = self.rows[f'beat_{watched.plc.station}']
+        bound = next(bound for bound in self.report.times.bounds() if bound.mapping is beat)
+        preset = bound.presets[0] if bound.presets else SLAVE_PRESET
+        ladder = Ladder(watched.plc.table, preset, lambda *lamp: watched.lamps.append(lamp),
+                        self.plant.scan / 1000)
+        watched.plc.run_ladder(ladder)
+        watched.preset = preset * TIME_BASE
+
+        def press() -> None:
+            watched.plc.advance()
+            if not ladder.is_on(Lamp.IN_CONTROL):
+                ladder.press_reset()
+            self.at(self.line.now + _PRESSED_EVERY, press)
+
+        press()
+
+    def _put_a_master(self) -> None:
+        """Let a master poll us and the PLCs, pass on what we send, and read what we serve."""
+        network = self.network
+        stations = OURS, *range(1, self.plant.stations + 1)
+        self.master = master = MasterNode(
+            replace(network.line, station=MASTER), self.clock, PollingSettings(stations),
+            numbers=stations, timing=network.timing)
+        self.line = VirtualLine(self.driver.machine, self.far, master.machine,
+                                baud=network.baud, chunk=64)
+        master.machine.start(self.line.now, self.line.outlet(master.machine))
+        place = place_of(SERVED, self.rows['served'].plc_type)
+        dialect = dialect_of(self.rows['served'].plc_type)
+
+        def ask() -> None:
+            if not master.waiting:
+                cmd, data = dialect.read(place, 1)
+                task = master.add(Packet(OURS, MASTER, cmd, 0, len(master.all), data))
+                told = task.reply
+
+                def take(reply: Packet) -> None:
+                    told(reply)
+                    if not reply.sts:
+                        word = dialect.read_data(place, 1, reply.data)
+                        self.served.append((self.line.now, int.from_bytes(word, 'little')))
+
+                task.reply = take  # type: ignore[method-assign]
+            self.at(self.line.now + 0.5, ask)
+
+        ask()
 
     def _pass_on(self, execute: Callable[..., Packet], command: Packet) -> Packet:
         """Let the gateway keep a write for a while, and say that it has not delivered it."""
@@ -326,6 +434,7 @@ class World(DriverBench):
                  serve: Callable[[Packet], Packet], is_late: bool) -> Packet:
         """Execute a command, unless it is refused; keep what it has written."""
         watched.run_program(self.line.now)
+        now = watched.plc._clock()
         if command.data[:1] not in _WRITES:
             return serve(command)
         station = watched.plc.station
@@ -349,7 +458,7 @@ class World(DriverBench):
                 watched.set(watched.places[tag], saved[watched.places[tag]])
             return command.reply(sts=0x10)
         sent = self._first_sent(command)
-        self.executed += [Executed(self.line.now, sent, station, tag, value, self.drivers,
+        self.executed += [Executed(now, min(sent, now), station, tag, value, self.drivers,
                                    saved[watched.places[tag]], is_late)
                           for tag, value in written]
         if is_message and watched.swallows_replies:
@@ -359,6 +468,9 @@ class World(DriverBench):
     def _note_sent(self, data: bytes, start: float, receiver: int) -> None:
         if receiver == _FAR and len(data) >= _LEAST_COMMAND:
             self._sent.append((start, data))
+            if self._beat in data:
+                station = data[data.index(_STX) + len(_STX)]
+                self.beats_sent[station] = max(start, self.beats_sent.get(station, 0.0))
         self._send(data, start, receiver)
 
     def _first_sent(self, command: Packet) -> float:
@@ -370,10 +482,12 @@ class World(DriverBench):
 
     def _hear(self, data: bytes) -> bytes:
         self.wire.update(b'%f>' % self.line.now + data)
+        data = self.losses.hear(data) if self.losses else data
         return b'' if self.is_silent else data.replace(DAMAGED, b'ZYZZ')
 
     def _say(self, data: bytes) -> bytes:
         self.wire.update(b'%f<' % self.line.now + data)
+        data = self.losses.say(data) if self.losses else data
         return b'' if self.is_silent else data
 
     def _breathe(self) -> None:
@@ -415,7 +529,7 @@ class World(DriverBench):
 
     def fall_silent(self, station: int, is_silent: bool = True) -> None:
         """Let a PLC answer nothing; of a full-duplex line or a modem all of them."""
-        if self.network.mode == 'Master':
+        if self.network.duplex is Duplex.HALF:
             self.plcs[station].plc.faults.silent = is_silent
         else:
             self.is_silent = is_silent
@@ -434,11 +548,24 @@ class World(DriverBench):
         self.line.pause(self.driver.machine, seconds)
         self.away = self.line.now + seconds
 
+    def lose_frames(self) -> None:
+        """Let the line lose frames, but never more in a row than the settings repeat."""
+        dice, network = self.dice, self.network
+        what = dice.choice([(True, True), (True, False), (False, True)])
+        lost = Lost(network.mode, network.nak_retries, network.enq_retries,
+                    dice.choice([0.2, 0.5, 1.0]), *what, dice.randrange(1 << 30))
+        self.losses = (AirLosses if network.mode == 'Radio' else Losses)(lost, self.clock)
+        self.losses.is_due = True
+
     def unplug(self) -> None:
         """Lose the port for a moment."""
         self.lose_port()
         self.open()
         self.opened = self.line.now
+
+    def add_bridge(self, station: int) -> None:
+        """Put another bridge on a port of its own of a PLC; it counts in the same word."""
+        self.others[station] = OtherBridge(self, station)
 
     def write_heartbeat(self, station: int) -> None:
         """Let another writer count in the word of the heartbeat."""
@@ -463,6 +590,21 @@ class World(DriverBench):
         watched = self.plcs[station]
         watched.saved = {place: watched.word(place) for place in watched.places.values()}
 
+    def run(self, seconds: float) -> None:
+        """Let time pass; each line has a clock of its own, and none is far ahead."""
+        end = self.line.now + seconds
+        while self.others and self.line.now < end - STEP:
+            self._run_all(STEP)
+        self._run_all(end - self.line.now)
+        for watched in self.plcs.values():
+            if watched.preset:
+                watched.plc.advance()
+
+    def _run_all(self, seconds: float) -> None:
+        super().run(seconds)
+        for other in self.others.values():
+            other.run(self.line.now - other.line.now)
+
     def mend(self) -> None:
         """End all that is wrong."""
         for station, watched in self.plcs.items():
@@ -471,6 +613,8 @@ class World(DriverBench):
             watched.set_mode(Setting.RUN, self.line.now)
         self.is_alive = True
         self.line.noise = QUIET
+        if self.losses:
+            self.losses, self.lossy_until = None, self.line.now
         self.holds = 0.0
 
     def end(self) -> None:
@@ -494,3 +638,42 @@ class World(DriverBench):
         """Return rows of a PLC whose tags begin so."""
         return [row for row in self.rows.values()
                 if row.station == station and row.tag.startswith(tuple(tags))]
+
+
+class OtherBridge(DriverBench):
+    """
+    Another bridge, at another port of a PLC of a world: two on one line have one master.
+
+    It has a Heartbeat row for the same word, and lives. Its tag begins with ``other``.
+    """
+
+    def __init__(self, world: World, station: int) -> None:
+        plant, first = world.plant, world.plcs[station]
+        row = make_mapping(BEAT, 'Heartbeat', station=station, plc=plant.kind,
+                           tag=f'other_{station}', period=world.dice.choice([plant.period, 700]),
+                           heartbeat=Heartbeat())
+        super().__init__(
+            [row], network=Network(station=OTHER_BRIDGE, baud=19200, timeout=100, cmd_timeout=500),
+            settings=DriverSettings(processor_period=0.0,
+                                    first_tns=world.dice.randrange(0x10000)),
+            start=False, chunk=64)
+        self.line.now = world.line.now
+        plc = SimulatedPlc(station, first.plc.table, self.network.checksum, self.clock)
+        plc.processor = first.plc.processor
+        plc._server = plc._make_server('Slave')
+        watched = WatchedPlc(plc, {row.tag: BEAT})
+        serve = plc.serve
+
+        def execute(command: Packet) -> Packet:
+            return world._execute(watched, command, serve, is_late=False)
+
+        plc.serve = execute  # type: ignore[method-assign]
+        plc.slave = HalfDuplexSlave(
+            LinkSettings(station=station, checksum=self.network.checksum), execute)
+        self.connect(plc)
+        self._breathe()
+        self.open()
+
+    def _breathe(self) -> None:
+        self.driver.interlocks.executor_ran(self.clock())
+        self.at(self.clock() + STEP, self._breathe)

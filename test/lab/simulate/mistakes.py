@@ -36,17 +36,20 @@ from unittest import mock
 if __name__ == '__main__':  # pytest has its own paths
     sys.path[:0] = [str(Path(__file__).parents[number]) for number in (1, 2, 3)]
 
+from abdf1_ros.driver.agenda import Agenda
 from abdf1_ros.driver.driver import Driver
 from abdf1_ros.driver.guests import GuestJob
-from abdf1_ros.driver.interlocks.fallback import FallbackRow
+from abdf1_ros.driver.interlocks.fallback import FallbackCause, FallbackRow
 from abdf1_ros.driver.interlocks.heartbeat import BeatState, HeartbeatRow
 from abdf1_ros.driver.interlocks.plc import Plc
-from abdf1_ros.driver.interlocks.queue import Interlocks
+from abdf1_ros.driver.interlocks.queue import Interlocks, OwnWrite
 from abdf1_ros.driver.reads.guards import CounterGuard, RunGuard
+from abdf1_ros.driver.reads.point import ReadPoint
 from abdf1_ros.driver.record import Claim, Words
 from abdf1_ros.driver.write import Outcome, Write
-from abdf1_ros.driver.writes.queue import WriteQueue
+from abdf1_ros.driver.writes.queue import MessageJob, WriteQueue
 from abdf1_ros.pccc.values import Codec
+from abdf1_ros.plan.bounds import Times
 from simulate.rules import Broken
 from simulate.run import Story
 
@@ -167,6 +170,71 @@ def _meets_one_station(meets: Any) -> Any:
     return lambda self, extent: self.station == extent.station and meets(self, extent)
 
 
+def _beats_are_told(ended: Any) -> Any:
+    def end_wrongly(self: Interlocks, own: OwnWrite) -> None:
+        ended(self, own)
+        if own.result is not None and own.row in self.heartbeats:
+            self._listener.written(own.result)
+
+    return end_wrongly
+
+
+def _told_each_time(ended: Any) -> Any:
+    def end_wrongly(self: Interlocks, row: FallbackRow, *arguments: Any) -> None:
+        row.cause = row.cause or FallbackCause.TIMEOUT
+        ended(self, row, *arguments)
+
+    return end_wrongly
+
+
+def _never_too_old(init: Any) -> Any:
+    def init_wrongly(self: MessageJob, *arguments: Any) -> None:
+        init(self, *arguments)
+        self.expires = math.inf
+
+    return init_wrongly
+
+
+def _messages_first(first: Any) -> Any:
+    def take_wrongly(self: Agenda, now: float, busy: Any) -> Any:
+        return self._writes.waiting and self._usual(now, busy) or first(self, now, busy)
+
+    return take_wrongly
+
+
+def _fallbacks_first(rank: Any) -> Any:
+    def rank_wrongly(self: Plc, row: Any, now: float) -> Any:
+        found = rank(self, row, now)
+        return found if not found or found[0] else (0, found[1], isinstance(row, HeartbeatRow))
+
+    return rank_wrongly
+
+
+def _stores_nothing(init: Any) -> Any:
+    def init_wrongly(self: Interlocks, mappings: Any, writes: Any, writing: Any, store: Any,
+                     *arguments: Any) -> None:
+        init(self, mappings, writes, writing, lambda write: None, *arguments)
+
+    return init_wrongly
+
+
+def _told_twice(init: Any) -> Any:
+    def init_wrongly(self: WriteQueue, stations: Any, writing: Any, patience: Any, report: Any,
+                     *arguments: Any) -> None:
+        init(self, stations, writing, patience, lambda result: (report(result), report(result)),
+             *arguments)
+
+    return init_wrongly
+
+
+def _undisturbed(at_most: Any) -> Any:
+    return lambda self, frames: self._undisturbed(frames)
+
+
+def _preset_of_a_period(preset: Any) -> Any:
+    return lambda self, mapping: mapping.period / 1000
+
+
 def _always(value: Any) -> Callable[[Any], Any]:
     return lambda before: lambda *arguments, **named: value
 
@@ -183,6 +251,23 @@ MISTAKES = (
             _always(math.inf)),
     Mistake('3 d', 'it counts without the topics that it requires', HeartbeatRow, '__init__',
             _requires_nothing),
+    Mistake('4', 'heartbeats have results', Interlocks, 'ended', _beats_are_told),
+    Mistake('4', 'a silent station is probed with heartbeats', Plc, 'is_active',
+            lambda before: property(lambda self: True)),
+    Mistake('6', 'a message is not too old when it is sent', MessageJob, '__init__',
+            _never_too_old),
+    Mistake('11', 'messages go before heartbeats and fallbacks', Agenda, '_own_first',
+            _messages_first),
+    Mistake('11', 'fallbacks go before the 0', Plc, 'rank', _fallbacks_first),
+    Mistake('12', 'the fallback of a Serve row is not stored', Interlocks, '__init__',
+            _stores_nothing),
+    Mistake('15', 'rows are withheld in silence', ReadPoint, 'withhold', _always(False)),
+    Mistake('16', 'the bound is Fallback_After alone', Times, '_wait', _always(0.0)),
+    Mistake('16', 'the bound counts no repetitions', Times, '_at_most', _undisturbed),
+    Mistake('16', 'the preset is a Period', Times, '_preset', _preset_of_a_period),
+    Mistake('17', 'each writing of a fallback has a result', Interlocks, '_fallback_ended',
+            _told_each_time),
+    Mistake('results', 'a result comes twice', WriteQueue, '__init__', _told_twice),
     Mistake('5', 'no fallbacks at the end', FallbackRow, 'end', _always(None)),
     Mistake('7', 'a refused message refreshes its row', FallbackRow, 'message_ended',
             _refused_refreshes),

@@ -26,6 +26,7 @@ import math
 
 from abdf1_ros.driver.write import Outcome, WriteResult
 from abdf1_ros.plan.bounds import MODE_PERIOD
+from abdf1_ros.simulator.ladder import Lamp
 from support.world import Executed, GUESTS, OTHERS, SAFE, STEP, World
 
 _LEAST_ZERO = 0.5  # s
@@ -108,11 +109,15 @@ class Results(Rule):
 
     def told(self, result: WriteResult) -> None:
         if result.outcome is Outcome.FALLBACK:
+            if result.mapping.serves:
+                return
             came = self._safe[result.mapping.tag]
             self.demand(came > self._looked - self.flight - self.held, result.mapping.tag,
                         'got its fallback', came)
             return
         key = result.mapping.tag, int(result.value.strip('[]'))
+        if result.mapping.serves and result.outcome is Outcome.WRITTEN:
+            self._by.add(key)
         self.demand(key not in self._outcomes, key, 'has two results')
         self._outcomes[key] = result.outcome
         self._waits.pop(key, None)
@@ -193,6 +198,29 @@ class Guards(Rule):
             self.demand(when - ran <= limit, tag, ran)
 
 
+class Withheld(Rule):
+    text = 'a row whose values are withheld is told to be so (15)'
+
+    def __init__(self, world: World) -> None:
+        super().__init__(world)
+        self._rows = [row for row in world.rows.values() if row.publish_while]
+        self._read = dict.fromkeys(world.plcs, 0.0)  # when a word without a guard was read last
+
+    def read(self, when: float, tag: str, station: int, values: list[int]) -> None:
+        if tag.startswith('clock'):
+            self._read[station] = when
+
+    def stand(self) -> None:
+        world = self.world
+        for row in self._rows:
+            watched, point = world.plcs[row.station], world.driver.points[row]
+            begun = max(watched.stopped, world.opened, world.ill[0])
+            limit = 2 * point.patience + 2 * self.flight + _SETTLED  # also at a start
+            is_asked = self._read[row.station] > begun + limit
+            self.demand(watched.plc.is_running or not is_asked or point.is_withheld, row.tag,
+                        'stopped at', watched.stopped)
+
+
 class Beats(Rule):
     text = 'a heartbeat is 0 first, for its time, and counts one by one for the living (1 to 3)'
 
@@ -204,15 +232,16 @@ class Beats(Rule):
         self._stood = max(_LEAST_ZERO, world.plant.period / 1000)
 
     def executed(self, entry: Executed) -> None:
-        if not entry.tag.startswith('beat') or entry.is_late or entry.value in GUESTS:
+        if not entry.tag.startswith(('beat', 'other')) or entry.is_late or entry.value in GUESTS:
             return
         tag, value = entry.tag, entry.value
         last = self._last.get(tag)
-        if self._driver.get(tag, -1) != entry.driver:
+        is_ours = tag.startswith('beat')
+        if self._driver.get(tag, -1) != (entry.driver if is_ours else 0):
             if value and entry.when < self.world.killed_at + _ON_THE_WIRE:
                 return  # what the killed one has sent
             self.demand(value == 0, entry, 'is the first of a driver')
-            self._driver[tag] = entry.driver
+            self._driver[tag] = entry.driver if is_ours else 0
             self._zero[tag] = entry.when
         elif value == 0:
             if last:
@@ -220,9 +249,11 @@ class Beats(Rule):
         else:
             self.demand(not last or value in (last, last % 32_767 + 1), entry, 'after', last)
             if not last:
-                self.demand(entry.when - self._zero[tag] >= self._stood - 1e-6, entry,
+                stood = self._stood if is_ours else _LEAST_ZERO
+                self.demand(entry.when - self._zero[tag] >= stood - 1e-6, entry,
                             '0 stood since', self._zero[tag])
-            self._judge_count(entry)
+            if is_ours:
+                self._judge_count(entry)
         self._last[tag] = value
 
     def _judge_count(self, entry: Executed) -> None:
@@ -264,6 +295,31 @@ class BeatsAfterFallbacks(Rule):
         self.demand(not over, entry, over, 'has the value of a guest')
 
 
+class Order(Rule):
+    text = 'at first contact come 0, the fallbacks, and then all else (2, 11)'
+
+    def __init__(self, world: World) -> None:
+        super().__init__(world)
+        self._left: dict[int, set[str]] = {}  # what has not come yet, by station
+        self._driver = -1
+
+    def executed(self, entry: Executed) -> None:
+        world, station = self.world, entry.station
+        if self._driver != entry.driver:
+            self._driver = entry.driver
+            self._left = {number: {row.tag for row in world.rows_of(number, ('w', 'beat'))}
+                          for number in world.plcs}
+        is_own = entry.value in (0, SAFE) and entry.tag[0] in 'wb'
+        left = self._left[station]
+        is_well = max(world.ill[station], world.ill[0]) <= world.opened
+        if not left or not is_well or entry.value in GUESTS or entry.is_late \
+                or entry.tag.startswith('other'):
+            return
+        self.demand(is_own, entry, 'before', left)
+        self.demand(entry.tag.startswith('beat') or f'beat_{station}' not in left, entry, 'first')
+        left.discard(entry.tag)
+
+
 class Outputs(Rule):
     text = 'no output stands longer than printed without a message (7, 8, 16)'
 
@@ -271,7 +327,7 @@ class Outputs(Rule):
         super().__init__(world)
         self._stood = dict.fromkeys((row.tag for row in world.messages), 0.0)
         self._rows = [(station, watched, row.tag) for station, watched in world.plcs.items()
-                      for row in world.rows_of(station)]
+                      for row in world.rows_of(station) if world.bounds[row.tag] is not None]
 
     def told(self, result: WriteResult) -> None:
         tag = result.mapping.tag
@@ -309,6 +365,43 @@ class Outputs(Rule):
                         tag, value, 'since', self._stood[tag])
 
 
+class OneResult(Rule):
+    text = 'a fallback gives one result, its repetitions give none (17)'
+
+    def __init__(self, world: World) -> None:
+        super().__init__(world)
+        self._told: defaultdict[str, float] = defaultdict(lambda: -math.inf)
+        # What is published may be written and told so much later, and wait for its fallback.
+        self._spared = world.plant.write_timeout + world.plant.after / 1000 + 2 * self.flight
+
+    def told(self, result: WriteResult) -> None:
+        if result.outcome is not Outcome.FALLBACK or result.mapping.serves:
+            return
+        world, tag, station = self.world, result.mapping.tag, result.mapping.station
+        reason = max(world.came.get(tag, 0.0), world.ill[station], world.ill[0], world.opened,
+                     world.line.now if world.losses else world.lossy_until,
+                     world.plcs[station].ran_again + MODE_PERIOD)
+        before, self._told[tag] = self._told[tag], world.line.now
+        self.demand(before - self._spared - self.held <= reason, tag, 'was told at', before)
+
+
+class Probes(Rule):
+    text = 'a station that is known to be silent gets no heartbeats (4)'
+
+    def __init__(self, world: World) -> None:
+        super().__init__(world)
+        self._since = dict.fromkeys(world.plcs, math.inf)  # when it was known to be silent
+
+    def stand(self) -> None:
+        world = self.world
+        for number, sent in world.beats_sent.items():
+            if world.driver.stations[number].active:
+                self._since[number] = math.inf
+                continue
+            since = self._since[number] = min(self._since[number], world.line.now)
+            self.demand(sent < since + self.flight, number, 'silent since', since, 'beat', sent)
+
+
 class AfterRun(Rule):
     text = 'after a change to RUN that was seen come 0 and all fallbacks (2, 8)'
 
@@ -316,8 +409,10 @@ class AfterRun(Rule):
         world = self.world
         now = world.line.now
         for station, watched in world.plcs.items():
-            limit = (world.bounds[f'w0_{station}'] or 0.0) - world.plant.after / 1000 \
-                + MODE_PERIOD + self.flight
+            bound = world.bounds[f'w0_{station}']
+            if bound is None:
+                continue
+            limit = bound - world.plant.after / 1000 + MODE_PERIOD + self.flight
             ran = watched.ran_again
             if not ran + limit <= now < ran + limit + 2 * STEP or world.plant.is_read_only:
                 continue
@@ -341,18 +436,61 @@ class Held(Rule):
         for station, watched in world.plcs.items():
             beat = f'beat_{station}'
             wait = world.bounds[f'w0_{station}']
-            assert wait is not None
+            if wait is None:
+                continue
             limit = plant.requires / 1000 + wait - plant.after / 1000 + STEP
             since = max(world.ill[station], world.ill[0], world.came.get(f'w0_{station}', 0.0))
-            if world.line.now > since + limit + MODE_PERIOD and not watched.other:
+            is_ours = not watched.other and station not in world.others
+            if world.line.now > since + limit + MODE_PERIOD and is_ours:
                 self.demand(watched.word(watched.places[beat]) == 0, beat, 'counts since', since)
+
+
+class Rungs(Rule):
+    text = 'the rungs trip when the bridge fails, within the preset that is printed, and not else'
+
+    def __init__(self, world: World) -> None:
+        super().__init__(world)
+        self._rows = [(f'beat_{station}', station, watched)
+                      for station, watched in world.plcs.items() if watched.preset]
+        self._changed = {tag: 0.0 for tag, *_ in self._rows}  # when a heartbeat came last
+        self._counts: dict[str, int] = {}
+        self._seen = dict.fromkeys(self._changed, 0)
+
+    def executed(self, entry: Executed) -> None:
+        tag = f'beat_{entry.station}'
+        if entry.tag in (tag, f'other_{entry.station}') and tag in self._changed:
+            if entry.value != entry.before:
+                self._changed[tag] = entry.when
+            self._counts[tag] = entry.value
+
+    def stand(self) -> None:
+        world, now = self.world, self.world.line.now
+        scans = 3 * world.plant.scan / 1000 + STEP
+        for tag, station, watched in self._rows:
+            new, self._seen[tag] = watched.lamps[self._seen[tag]:], len(watched.lamps)
+            ladder = watched.plc.ladder
+            assert ladder is not None
+            if ladder.is_on(Lamp.IN_CONTROL) and watched.plc.is_running and not watched.other:
+                silent = now - self._changed[tag]
+                self.demand(silent < watched.preset + scans, 'in control', silent)
+                executor = max(_LEAST_LIFE_SIGN, world.plant.period / 1000)
+                self.demand(now - world.executor_ran < executor + watched.preset + self.flight
+                            + self.held + scans, 'the executor ran at', world.executor_ran)
+            for when, lamp, is_on in new:
+                calm = max(world.ill[station], world.ill[0], world.opened, watched.ran_again)
+                if lamp is not Lamp.ALIVE or is_on or watched.other or not self._counts.get(tag) \
+                        or when < calm + 2 * watched.preset or station in world.others:
+                    continue
+                self.demand(False, tag, 'was taken for dead at', when, 'changed at',
+                            self._changed[tag])
 
 
 class ReadOnly(Rule):
     text = 'with read_only nothing is written (18)'
 
     def executed(self, entry: Executed) -> None:
-        self.demand(not self.world.plant.is_read_only or entry.value in GUESTS, entry)
+        is_ours = entry.value not in GUESTS and not entry.tag.startswith('other')
+        self.demand(not self.world.plant.is_read_only or not is_ours, entry)
 
 
 class Guests(Rule):
@@ -395,11 +533,32 @@ class View(Rule):
         world, now = self.world, self.world.line.now
         for number, since in self._well_since.items():
             is_known = world.driver.stations[number].replies_in_time
-            is_well = now > max(world.ill[number], world.ill[0]) + 1.5 * STEP and not world.holds
+            is_well = now > max(world.ill[number], world.ill[0]) + 1.5 * STEP \
+                and not world.holds and not world.losses
             self.demand(is_known or not is_well or now < since + _SETTLED + self.flight,
                         world.driver.stations[number])
             if not is_well or not is_known:
                 self._well_since[number] = now
+
+
+class Served(Rule):
+    text = 'what we serve is a message that is young enough, or the fallback (12)'
+
+    def __init__(self, world: World) -> None:
+        super().__init__(world)
+        self._seen = 0
+
+    def stand(self) -> None:
+        world = self.world
+        for when, value in world.served[self._seen:]:
+            published = world.published.get(('served', value), -math.inf)
+            is_young = when - published < world.plant.after / 1000 + self.flight + self.held
+            # Each driver begins with its own table: zeros, then the fallback.
+            is_new = value == 0 and when - world.opened < self.flight + self.held
+            is_written = not world.plant.is_read_only
+            self.demand(value == SAFE or is_new or is_young or not is_written, value,
+                        'was published at', published)
+        self._seen = len(world.served)
 
 
 class OneOwner(Rule):
@@ -412,7 +571,8 @@ class OneOwner(Rule):
     def executed(self, entry: Executed) -> None:
         world = self.world
         is_radio = world.plant.mode == 'Radio'  # whose reads may take longer than many Periods
-        is_counted = entry.tag.startswith('beat') and entry.value not in (0, *GUESTS)
+        is_counted = entry.tag.startswith(('beat', 'other')) \
+            and entry.value not in (0, *GUESTS)
         if not is_counted or entry.is_late or is_radio or entry.station not in self.since:
             return
         # Each opening of the port and each change to RUN begins anew, and what is ill is not read.
@@ -423,8 +583,8 @@ class OneOwner(Rule):
 
 
 RULES: tuple[type[Rule], ...] = (
-    Results, Ages, Values, Guards, Beats, BeatsAfterFallbacks, Outputs, AfterRun, Held, ReadOnly,
-    Guests, View)
+    Results, Ages, Values, Guards, Withheld, Beats, BeatsAfterFallbacks, Order, Outputs, OneResult,
+    Probes, AfterRun, Held, ReadOnly, Guests, View, Served, Rungs)
 
 
 class Judge:

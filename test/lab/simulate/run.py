@@ -45,16 +45,16 @@ from support.virtual_line import QUIET
 from support.world import BEAT, FREE, MODES, OUTPUTS, Plant, SAFE, SMALL, STEP, World
 
 TURNS = 8  # troubles of a plant, with a calm after each
-FEW_TURNS = 2  # where polls go on all the time, which takes as long as all the rest
 RATES = (0.0, 0.0, 0.01, 0.05, 0.2)  # messages a step and row
 RECOVERY = 40.0  # s at most; an inactive station is probed every few seconds
 
 
 class Story:
-    """What happens to one plant."""
+    """What happens to one plant: so many ``turns`` of trouble and calm, and the end."""
 
-    def __init__(self, seed: int, mode: str = '') -> None:
+    def __init__(self, seed: int, mode: str = '', turns: int = TURNS) -> None:
         self.dice = Random(seed)
+        self._turns = turns
         self.world = World(Plant.drawn(self.dice, mode), seed)
         self.judge = Judge(self.world)
         self.troubles: Counter[str] = Counter()
@@ -63,15 +63,15 @@ class Story:
     def run(self) -> None:
         """Let it happen; raise Broken where a rule does not hold."""
         self.wait(2.0)
-        for _ in range(FEW_TURNS if self.world.network.polling == 'Standard' else TURNS):
+        for _ in range(self._turns):
             self._publish_anew()
             station = self.dice.randrange(1, self.world.plant.stations + 1)
             name = self.dice.choice([*_TROUBLES])
             self.troubles[name] += 1
             _TROUBLES[name](self, station)
             if name == _NO_EXCUSE:  # for an output that stands
-                self.wait(self._longest_bound() + 2.0)
-            self._ail(station, self.dice.uniform(0.5, 4.0), is_ill=name not in _OF_OTHERS)
+                self.wait(self.longest_bound() + 2.0)
+            self._ail(station, self.dice.uniform(0.5, 4.0), is_ill=name not in _EXPECTED)
             self._calm_down()
         self._recover()
         self._end()
@@ -106,14 +106,14 @@ class Story:
         """Let nobody publish until the next trouble."""
         self._rates.clear()
 
-    def _longest_bound(self) -> float:
+    def longest_bound(self) -> float:
         """Return the longest bound that is printed, or 21 s where that is longer."""
         return min(21.0, max(limit or 0.0 for limit in self.world.bounds.values()))
 
     def _calm_down(self) -> None:
         """Let things be well until the bounds hold again, most often with fewer messages."""
         world = self.world
-        end = world.line.now + self._longest_bound() + 9.0
+        end = world.line.now + self.longest_bound() + 9.0
         half = world.line.now + self.dice.uniform(0.0, 4.0)
         while world.line.now < end:
             if world.line.now >= half:
@@ -257,6 +257,15 @@ def _guest(story: Story, station: int) -> None:
         world.at(world.line.now + 0.3 * number, partial(world.ask, station, place))
 
 
+def _lost_frames(story: Story, station: int) -> None:
+    """Lose frames, while nobody publishes: no bound is excused by that."""
+    if story.world.network.mode != 'Slave':
+        story.world.lose_frames()
+        story.wait(story.dice.uniform(2.0, 5.0))
+        story.be_quiet()
+        story.wait(story.longest_bound() + 2.0)
+
+
 def _overwritten(story: Story, station: int) -> None:
     story.be_quiet()  # for the fallback to stand
     story.wait(story.world.plant.after / 1000 + 1.0)
@@ -281,15 +290,24 @@ def _other_writer(story: Story, station: int) -> None:
     count()
 
 
+def _other_bridge(story: Story, station: int) -> None:
+    """Put another bridge on the heartbeat of a PLC, for so long that both know of each other."""
+    world = story.world
+    if station not in story.judge.owner.since:
+        story.judge.owner.since[station] = world.line.now
+        world.add_bridge(station)
+
+
 _NO_EXCUSE = 'messages refused'
-_OF_OTHERS = ('guest', 'gateway holds', 'another network')  # which excuse nothing
+# Which excuse nothing.
+_EXPECTED = ('guest', 'gateway holds', 'another network', 'frames lost')
 _TROUBLES: dict[str, Callable[[Story, int], None]] = {
     'noise': _noise, 'silence': _silence, 'refusal': _refusal,
     _NO_EXCUSE: _refused_messages, 'replies lost': _lost_replies,
     'port lost': _lost_port, 'process stands still': _pause, 'executor hangs': _hung_executor,
     'PROGRAM': _program, 'download': _download, 'killed': _kill, 'slow PLC': _slowness,
-    'other writer': _other_writer, 'guest': _guest, 'gateway holds': _gateway_holds,
-    'another network': _overwritten}
+    'other writer': _other_writer, 'other bridge': _other_bridge, 'guest': _guest,
+    'gateway holds': _gateway_holds, 'frames lost': _lost_frames, 'another network': _overwritten}
 
 
 @dataclass(slots=True)
@@ -316,11 +334,12 @@ class Totals:
         self.modes[world.plant.mode] += 1
 
 
-def simulate(seed: int, is_enough: Callable[[Totals], bool], mode: str = '') -> Totals:
+def simulate(seed: int, is_enough: Callable[[Totals], bool], mode: str = '',
+             turns: int = TURNS) -> Totals:
     """Simulate plants of any or one mode, ``seed`` first and then the next; raise Broken."""
     totals = Totals()
     while not is_enough(totals):
-        story = Story(seed + totals.plants, mode)
+        story = Story(seed + totals.plants, mode, turns)
         story.run()
         totals.add(story)
     return totals
@@ -333,6 +352,7 @@ def main() -> int:
     parser.add_argument('--seconds', type=float, default=math.inf, help='of processor time')
     parser.add_argument('--plants', type=int, default=math.inf)
     parser.add_argument('--mode', choices=MODES, default='', help='of all plants')
+    parser.add_argument('--turns', type=int, default=TURNS, help='of trouble in each plant')
     parser.add_argument('--seed', type=int, default=secrets.randbelow(10**9))
     wanted = parser.parse_args()
     if math.inf == wanted.hours == wanted.seconds == wanted.plants:
@@ -345,7 +365,7 @@ def main() -> int:
             or time.process_time() - begun >= wanted.seconds
 
     try:
-        totals = simulate(wanted.seed, is_enough, wanted.mode)
+        totals = simulate(wanted.seed, is_enough, wanted.mode, wanted.turns)
     except Broken as broken:
         print(f'FAILED {broken}')
         return 1
