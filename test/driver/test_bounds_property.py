@@ -28,7 +28,6 @@ from collections.abc import Callable, Container, Iterable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 import math
-from random import Random
 from typing import Any
 
 from abdf1_ros.df1.checksum import Checksum

@@ -461,7 +461,7 @@ class Rungs(Rule):
         if entry.tag in (tag, f'other_{entry.station}') and tag in self._changed:
             if entry.value != entry.before:
                 self._changed[tag] = entry.when
-            self._counts[tag] = entry.value
+            self._counts[tag] = 0 if entry.value in GUESTS else entry.value
 
     def stand(self) -> None:
         world, now = self.world, self.world.line.now
@@ -473,9 +473,10 @@ class Rungs(Rule):
             if ladder.is_on(Lamp.IN_CONTROL) and watched.plc.is_running and not watched.other:
                 silent = now - self._changed[tag]
                 self.demand(silent < watched.preset + scans, 'in control', silent)
-                executor = max(_LEAST_LIFE_SIGN, world.plant.period / 1000)
-                self.demand(now - world.executor_ran < executor + watched.preset + self.flight
-                            + self.held + scans, 'the executor ran at', world.executor_ran)
+                limit = max(_LEAST_LIFE_SIGN, world.plant.period / 1000) + watched.preset \
+                    + self.flight + self.held + scans
+                self.demand(now - world.executor_ran < limit or station in world.others,
+                            'the executor ran at', world.executor_ran)
             for when, lamp, is_on in new:
                 calm = max(world.ill[station], world.ill[0], world.opened, watched.ran_again)
                 if lamp is not Lamp.ALIVE or is_on or watched.other or not self._counts.get(tag) \
