@@ -41,6 +41,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cache, partial
 import hashlib
+import math
 from random import Random
 
 from abdf1_ros.df1.frames import Code, Duplex, stuff
@@ -290,6 +291,7 @@ class World(DriverBench):
         self.killed_at = 0.0
         self.others: dict[int, OtherBridge] = {}  # by the station of the PLC
         self.opened = 0.0  # when the port was last
+        self.ended = -math.inf  # when an orderly end began last
         rows = plant.mappings()
         settings = DriverSettings(
             write_timeout=plant.write_timeout, read_only=plant.is_read_only, processor_period=0.0,
@@ -620,6 +622,7 @@ class World(DriverBench):
     def end(self) -> None:
         """End in order (rule 5), within 2 s, and stay ended for as long as a gateway keeps."""
         interlocks = self.driver.interlocks
+        self.ended = self.line.now
         interlocks.wind_down()
         self.line.wake(self.driver.machine)
         limit = self.line.now + 2.0

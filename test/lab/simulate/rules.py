@@ -379,7 +379,7 @@ class OneResult(Rule):
             return
         world, tag, station = self.world, result.mapping.tag, result.mapping.station
         reason = max(world.came.get(tag, 0.0), world.ill[station], world.ill[0], world.opened,
-                     world.line.now if world.losses else world.lossy_until,
+                     world.ended, world.line.now if world.losses else world.lossy_until,
                      world.plcs[station].ran_again + MODE_PERIOD)
         before, self._told[tag] = self._told[tag], world.line.now
         self.demand(before - self._spared - self.held <= reason, tag, 'was told at', before)
@@ -568,17 +568,24 @@ class OneOwner(Rule):
     def __init__(self, world: World) -> None:
         super().__init__(world)
         self.since: dict[int, float] = {}  # when another one began, by station
+        self._held: dict[int, float] = {}  # when ours did not count for want of messages
 
     def executed(self, entry: Executed) -> None:
         world = self.world
+        needed, station = world.plant.requires, entry.station
+        came = world.came.get(f'w0_{station}', -math.inf)
+        if needed and not entry.value and entry.tag.startswith('beat') \
+                and entry.when >= came + needed / 1000:
+            self._held[station] = entry.when
         is_radio = world.plant.mode == 'Radio'  # whose reads may take longer than many Periods
         is_counted = entry.tag.startswith(('beat', 'other')) \
             and entry.value not in (0, *GUESTS)
         if not is_counted or entry.is_late or is_radio or entry.station not in self.since:
             return
-        # Each opening of the port and each change to RUN begins anew, and what is ill is not read.
-        began = max(self.since[entry.station], world.opened, world.ill[entry.station],
-                    world.ill[0], world.plcs[entry.station].ran_again + MODE_PERIOD)
+        # Each opening of the port and each change to RUN begins anew. What is ill is not read, and
+        # a value is compared while it stands: not one that is 0 again at once.
+        began = max(self.since[station], world.opened, world.ill[station], world.ill[0],
+                    world.plcs[station].ran_again + MODE_PERIOD, self._held.get(station, 0.0))
         limit = max(20 * world.plant.period / 1000, 3.0) + self.flight
         self.demand(entry.when < began + limit, entry, 'other since', began)
 
