@@ -126,7 +126,7 @@ class Plant:
             mode, stations, dice.choice([1, 2, 2, 3]), dice.choice(['PLC5', 'SLC']),
             dice.choice([600, 1000, 2000]), dice.choice([500, 1000, 2000]),
             dice.choice([None, None, 800, 1500]),
-            dice.choice([4800, 4800, 9600, 19200] if mode in POLLED else [9600, 19200, 38400]),
+            dice.choice([4800, 4800, 9600, 19200] if 'Standard' in mode else [9600, 19200, 38400]),
             dice.choice([1, 2]), dice.choice([0.5, 2.0]), dice.random() < 0.04,
             dice.choice([0, 0, 50, 100]))
 
@@ -144,8 +144,8 @@ class Plant:
 
     @property
     def counts_within(self) -> int:
-        """Return the Heartbeat_Timeout of the counter; by radio reads take longer."""
-        return 20_000 if self.mode == 'Radio' else 3500
+        """Return the Heartbeat_Timeout of the counter; where others have the line it is longer."""
+        return 20_000 if self.mode in ('Radio', 'Slave') else 3500
 
     def mappings(self) -> list[Mapping]:
         """Return its rows; their tags end with the number of the station."""

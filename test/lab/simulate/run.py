@@ -144,7 +144,7 @@ class Story:
         results, executed, reads = len(world.results), len(world.executed), len(world.reads)
         end = world.line.now + limit
         wanted = {row.tag for row in world.messages} if not world.plant.is_read_only else set()
-        wanted |= {row.tag for row in world.rows.values() if row.reads
+        wanted |= {row.tag for row in world.rows.values() if row.reads and not row.serves
                    and not (world.plant.mode == 'Radio' and row.publish_while)}
         if not world.plant.is_read_only:
             wanted |= {f'beat_{number}' for number in world.plcs
