@@ -44,6 +44,7 @@ from abdf1_ros.cli.terminal import (
     interruptible,
     number_option,
 )
+from abdf1_ros.driver.write import show
 from abdf1_ros.paths import config_file
 from abdf1_ros.ros.observer import Observer
 from abdf1_ros.ros.topics.messages import latched_qos, MESSAGES
@@ -255,7 +256,7 @@ class Stage:
             if tag in self._watcher.values:
                 place = f'station {mapping.station}  {mapping.address!s:<9}'
                 print(f'    {place} -> /abdf1/read/{mapping.topic:<16}'
-                      f' {_shown(self._watcher.values[tag])}', flush=True)
+                      f' {show(self._watcher.values[tag])}', flush=True)
 
     def _level(self, section: str) -> bytes | None:
         """Return the level of a status, None before it has come."""
@@ -327,8 +328,8 @@ class Demo(Stage):
             self._speed.live()
         steps = self._steps()
         self.last_step = len(steps)
-        for self.step, show in enumerate(steps, 1):
-            show()
+        for self.step, tell in enumerate(steps, 1):
+            tell()
         self.is_told = True
         while not seconds or time.monotonic() - self._begin < seconds:
             self._pause(5.0)
@@ -360,7 +361,7 @@ class Demo(Stage):
         self._write('recipe', _WRITTEN, 'written')
         self._wait('the value to come back',
                    lambda: tuple(self._watcher.values['recipe']) == _WRITTEN)
-        self._say(f'and /abdf1/read/recipe now shows {_shown(self._watcher.values["recipe"])}')
+        self._say(f'and /abdf1/read/recipe now shows {show(self._watcher.values["recipe"])}')
         self._write('recipe', _TOO_LARGE, 'not written: refused')
 
     def _write(self, tag: str, values: Sequence[int], expected: str) -> None:
@@ -386,7 +387,7 @@ class Demo(Stage):
         tag = next(tag for tag, mapping in self._mappings.items() if mapping.serves)
         self._plcs.carry_out(self._scene.push or '')
         self._wait('the values', lambda: tag in self._watcher.values)
-        self._say(f'/abdf1/read/{tag} shows {_shown(self._watcher.values[tag])}')
+        self._say(f'/abdf1/read/{tag} shows {show(self._watcher.values[tag])}')
 
     def _show_failure(self) -> None:
         station = f'station {self._scene.failing_station}'
@@ -409,7 +410,7 @@ class Demo(Stage):
         before = list(self._watcher.values[tag])
         self._wait('new values', lambda: list(self._watcher.values[tag]) != before)
         self._say(f'station 2 goes on: /abdf1/read/{tag} {before} -> '
-                  f'{_shown(self._watcher.values[tag])}')
+                  f'{show(self._watcher.values[tag])}')
 
     def _take_control(self) -> Speed:
         """Let a person press reset, and the publisher command a speed."""
@@ -496,12 +497,6 @@ class Demo(Stage):
         for pair in self._watcher.statuses['counters'].values:
             if pair.value != '0':
                 print(f'    {pair.key:<24} {pair.value:>7}', flush=True)
-
-
-def _shown(values: Any) -> str:
-    if isinstance(values, str):
-        return values
-    return '[' + ', '.join(f'{value:g}' for value in values) + ']'
 
 
 def main(args: Sequence[str] | None = None) -> int:

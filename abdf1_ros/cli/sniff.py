@@ -127,8 +127,6 @@ class _Output:
         if self._packets:
             self._packets.begin(settings.get('begun', ''))
         self._summary.take(chunk)
-        if note := settings.pop('guest', ''):
-            session.note_guest(note)
         for entry in session.feed(chunk):
             self._print(entry)
 

@@ -79,20 +79,15 @@ class ReportBundle:
     conformance: Sequence[str] = ()
     is_anonymous: bool = False
     _entries: list[Entry] = field(default_factory=list)
-    _asked: set[tuple[int, int, int]] = field(default_factory=set)
     _processors: dict[int, str] = field(default_factory=dict)
 
     def add(self, entry: Entry) -> None:
         """Take note of an entry."""
         if len(self._entries) < _MOST_ENTRIES:
             self._entries.append(entry)
-        packet = entry.packet
-        if packet is None or entry.valid is False:
-            return
-        if entry.kind is Kind.COMMAND and (packet.cmd, packet.data) == _STATUS_REQUEST:
-            self._asked.add((packet.dst, packet.src, packet.tns))
-        elif entry.kind is Kind.REPLY and (packet.src, packet.dst, packet.tns) in self._asked:
-            self._take_status(packet)
+        reply, request = entry.packet, entry.request
+        if reply and request and (request.cmd, request.data) == _STATUS_REQUEST:
+            self._take_status(reply)
 
     def _take_status(self, reply: Packet) -> None:
         if reply.sts:

@@ -70,13 +70,15 @@ class Chunk(NamedTuple):
     """
     Bytes as they were read or written; ``time`` in seconds, None where not recorded.
 
-    With ``is_message`` they are the link data of one message, which had no frame.
+    With ``is_message`` they are the link data of one message, which had no frame. ``guest`` is
+    "TNS place" where a guest's command follows, in this chunk or a later one.
     """
 
     time: float | None
     direction: Direction
     data: bytes
     is_message: bool = False
+    guest: str = ''
 
     def __str__(self) -> str:
         """Return the line of a capture."""
@@ -160,16 +162,20 @@ def read_capture(name: str, lines: Iterable[str], settings: dict[str, str]) -> I
 
     ``name`` names the file in the Problem that is raised for a line that is not one of a capture.
     """
+    guest = ''
     for number, text in enumerate(lines, 1):
         line = text.strip()
         if number == 1 and line != _FIRST_LINE:
             raise Problem(f'{name}:1', f'"{line[:_SHOWN]}" should be "{_FIRST_LINE}"')
         if line.startswith('#'):
             key, colon, value = line[1:].partition(':')
-            if colon:
+            if key.strip() == 'guest':
+                guest = value.strip()
+            elif colon:
                 settings[key.strip()] = value.strip()
         elif line:
-            yield _chunk(line, f'{name}:{number}')
+            yield _chunk(line, f'{name}:{number}')._replace(guest=guest)
+            guest = ''
 
 
 def _chunk(line: str, where: str) -> Chunk:

@@ -69,7 +69,8 @@ class Entry:
     verdict of the check of kind ``checksum``, None where there is no check. ``latency`` is the
     seconds from a command to its reply. ``size`` counts the bytes of noise. ``wire`` has the bytes
     on the line; it is empty for silence, for a missing reply and for noise. ``guest`` is the place
-    of the guest (column Share) whose command the recording node has sent.
+    of the guest (column Share) whose command the recording node has sent, ``request`` the command
+    that a reply is to.
     """
 
     time: float | None
@@ -85,3 +86,4 @@ class Entry:
     size: int = 0
     wire: bytes = b''
     guest: str = ''
+    request: Packet | None = None

@@ -80,7 +80,6 @@ class TrafficDecoder:
         self.kind = LineKind(checksum, duplex, is_certain and checksum is not None)
         self._wires: dict[Direction, _OneDirection] = {}
         self._conversation = Conversation()
-        self.note_guest = self._conversation.note_guest
         self._station: int | None = None  # the last one that the master sent something to
         self._awaited: tuple[Direction, str] | None = None  # asker, and question
         self._last_asker = Direction.OUT
@@ -89,6 +88,8 @@ class TrafficDecoder:
 
     def feed(self, chunk: Chunk) -> Iterator[Entry]:
         """Yield the entries that these bytes complete."""
+        if chunk.guest:
+            self._conversation.note_guest(chunk.guest)
         if chunk.is_message:
             yield self._message(Packet.decode(chunk.data), chunk.time, chunk.direction)
         else:
@@ -235,7 +236,7 @@ class TrafficDecoder:
         return Entry(
             time, direction, kind, f'{_route(packet)}{by}: {describe(packet, facts.command)}',
             self._node(station, packet), packet=packet, latency=facts.latency, marks=facts.marks,
-            guest=facts.guest)
+            guest=facts.guest, request=facts.command)
 
     def _damaged(self, frame: Frame, time: float | None, direction: Direction,
                  checksum: Checksum) -> Entry:

@@ -63,11 +63,17 @@ def test_capture_is_text_that_is_there_before_it_is_closed(tmp_path: Path) -> No
 @given(strategies.builds(
     Chunk, strategies.integers(0, 10**12).map(lambda micros: micros / 1e6),
     strategies.sampled_from(Direction), strategies.binary(min_size=1, max_size=50),
-    strategies.just(False)))
+    strategies.just(False), strategies.just('')))
 def test_chunk_that_was_written_reads_back_the_same(chunk: Chunk) -> None:
     (again,) = read_capture('x', ['# abdf1_ros capture 1', str(chunk)], {})
     assert again.time == pytest.approx(chunk.time, abs=1e-6)
     assert again[1:] == chunk[1:]
+
+
+def test_guest_is_told_with_the_next_chunk() -> None:
+    text = ['# abdf1_ros capture 1', '# guest: 0001 tcp:a', '# guest: A40E pty:/tmp/hmi',
+            '0.0 > 10', '0.1 > 05']
+    assert [chunk.guest for chunk in read_capture('x', text, {})] == ['A40E pty:/tmp/hmi', '']
 
 
 def test_blank_lines_remarks_and_a_second_head_may_stand_anywhere() -> None:

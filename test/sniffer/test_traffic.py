@@ -326,3 +326,13 @@ def test_conversations_are_heard_as_they_say(conversation: Conversation) -> None
                if entry.kind is Kind.REPLY and entry.packet and Mark.STRAY not in entry.marks}
     assert replies >= {bytes.fromhex(line['gets'])
                        for line in conversation.lines if 'gets' in line}
+
+
+def test_command_of_a_guest_and_its_reply_name_him() -> None:
+    session = TrafficDecoder()
+    note = f'{COMMAND.tns:04X} pty:/tmp/hmi'
+    found = [entry for chunk in (
+        Chunk(0.0, OUT, master(COMMAND), guest=note), Chunk(0.1, IN, message(REPLY)))
+        for entry in session.feed(chunk)]
+    assert [(entry.guest, entry.request) for entry in found] == [
+        ('pty:/tmp/hmi', None), ('pty:/tmp/hmi', COMMAND)]
