@@ -75,6 +75,7 @@ from abdf1_ros.settings.network import Network
 
 _NOT_OPEN = 'the port is not open'
 ENDS = 'this node ends'
+TOO_MANY = 'too many writes are waiting'
 
 
 class Listener(ValueListener, Protocol):
@@ -185,7 +186,7 @@ class Driver:
         if self.interlocks.is_ending:
             return ENDS
         waiting = len(self._inbox) + len(self._writes)
-        return 'too many writes are waiting' if waiting + count > MAX_WAITING_WRITES else ''
+        return TOO_MANY if waiting + count > MAX_WAITING_WRITES else ''
 
     def refuse(self, mappings: Iterable[Mapping], reason: str,
                values: Sequence[float] | str, request: str = '') -> None:

@@ -175,6 +175,21 @@ def test_link_that_does_not_take_the_files_is_the_end(
     assert bench.node.has_failed
 
 
+def test_files_that_cannot_be_taken_leave_messages_to_the_old_driver(
+        bench: Bench, monkeypatch: pytest.MonkeyPatch) -> None:
+    results = bench.observer.results()
+    publisher = bench.observer.publisher(Int16MultiArray, '/abdf1/write/recipe')
+
+    def fail(*arguments: object) -> None:
+        raise KeyError('a bug')
+
+    monkeypatch.setattr('abdf1_ros.ros.bridge.session.LinkCounterService', fail)
+    with pytest.raises(KeyError):
+        bench.node._hand_over(bench.node.session.configuration)
+    publisher.publish(Int16MultiArray(data=[5, 6]))
+    assert results.next().message == 'not written: refused: this node ends'
+
+
 # What a reload leaves: what is found and told then is what a fresh start would find and tell
 
 

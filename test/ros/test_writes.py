@@ -12,12 +12,19 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""What of the messages to write topics has been dropped on its way."""
+"""What becomes of messages to write topics: dropped on the way, waiting, given to a driver."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+import time
+from typing import Any, cast
 
-from abdf1_ros.ros.topics.writes import LossCounter
+from abdf1_ros.driver.driver import Driver
+from abdf1_ros.ros.topics.writes import LossCounter, WriteTopics
+from abdf1_ros.settings.mapping import Mapping
 import pytest
+from rclpy.node import Node
+from std_msgs.msg import Int16MultiArray
+from support.mappings import make_mapping
 
 
 def losses(numbers: Sequence[int | None], publishers: int = 1) -> list[int]:
@@ -60,3 +67,94 @@ def test_numbers_of_a_few_publishers_only_are_kept(publishers: int) -> None:
     for number in range(10_000, 0, -3):
         assert counter.lost_before(number) == 0
     assert len(counter._latest) == 16
+
+
+class Taker:
+    """A node and a driver in one, which remembers what it is asked to write or refuse."""
+
+    def __init__(self, *tags: str) -> None:
+        self.mappings = [make_mapping('N7:0', 'Write', tag=tag) for tag in tags]
+        self.executor, self.tasks, self.said = self, list[Callable[[], None]](), list[str]()
+        self.callbacks: dict[str, Callable[[Any, Any], None]] = {}
+
+    def create_subscription(self, kind: Any, name: str, callback: Any, qos: Any) -> None:
+        self.callbacks[name.rpartition('/')[2]] = callback
+
+    def destroy_subscription(self, subscription: object) -> None:
+        """Take a topic away."""
+
+    def count_publishers(self, name: str) -> int:
+        return 1
+
+    def create_task(self, task: Callable[[], None]) -> None:
+        self.tasks.append(task)
+
+    def write(self, mappings: Sequence[Mapping], values: Any, *times: object) -> None:
+        self.said.append(f'{mappings[0].tag} {values[0]}')
+
+    def refuse(self, mappings: Sequence[Mapping], reason: str, values: Any, *why: object) -> None:
+        self.said.append(f'{mappings[0].tag} {values[0]}: {reason}')
+
+    def publish(self, topic: str, number: int, age: float = 0.0) -> None:
+        stamp = time.time_ns() - int(age * 1e9)
+        self.callbacks[topic](Int16MultiArray(data=[number]), {
+            'publication_sequence_number': number, 'source_timestamp': stamp,
+            'received_timestamp': stamp})
+
+    def open(self, topics: WriteTopics, patience: float = 2.0) -> Any:
+        return topics.open(cast(Driver, self), patience, lambda topic, count: self.said.append(
+            f'{topic}: {count} lost'), lambda: None)
+
+
+@pytest.fixture
+def node() -> Taker:
+    return Taker('a', 'b')
+
+
+@pytest.fixture
+def topics(node: Taker) -> WriteTopics:
+    """Return the topics of a node that has not begun."""
+    topics = WriteTopics(cast(Node, node))
+    topics.give_to(node.open(topics))
+    return topics
+
+
+def test_messages_wait_in_their_order_until_the_node_has_begun(
+        node: Taker, topics: WriteTopics) -> None:
+    node.publish('a', 1)
+    node.publish('b', 2, age=3.0)
+    for _ in range(2):
+        topics.begin()
+    node.publish('a', 3)  # the executor has not come to it yet
+    assert (node.said, topics.taken) == (['a: 1 lost'], 0)
+    task, = node.tasks
+    task()
+    node.publish('a', 4)
+    node.publish('b', 3, age=7.4)
+    assert node.said == [
+        'a: 1 lost', 'a 1',
+        'b 2: it was taken 3.0 s after it was published, write_timeout is 2 s; this node had '
+        'just begun, and looks for another of its name first', 'a 3', 'a 4',
+        'b 3: it came 7.4 s after it was published, write_timeout is 2 s; or the clocks differ']
+    assert topics.taken == 5
+
+
+def test_messages_that_are_too_many_to_wait_are_refused(node: Taker, topics: WriteTopics) -> None:
+    for number in range(1, 1003):
+        node.publish('a', number)
+    assert node.said == [f'a {number}: too many writes are waiting' for number in (1001, 1002)]
+    topics.begin()
+    node.tasks[0]()
+    assert node.said[2:] == [f'a {number}' for number in range(1, 1001)]
+
+
+def test_messages_go_to_the_old_driver_until_the_new_one_has_the_line(
+        node: Taker, topics: WriteTopics) -> None:
+    topics.begin()
+    node.tasks[0]()
+    new = Taker('a', 'c')
+    opened = new.open(topics)
+    node.publish('a', 1)
+    topics.give_to(opened)
+    node.publish('a', 2)
+    assert (node.said, new.said) == (['a 1'], ['a 2'])

@@ -28,17 +28,21 @@ from functools import partial
 import time
 from typing import Any
 
-from abdf1_ros.driver.driver import Driver
+from abdf1_ros.driver.driver import Driver, TOO_MANY
+from abdf1_ros.driver.writes.queue import MAX_WAITING_WRITES
 from abdf1_ros.errors import FormatError
 from abdf1_ros.ports.clock import line_time
 from abdf1_ros.ros.topics.messages import MESSAGES, values_of, write_qos
 from abdf1_ros.settings.mapping import Mapping
 from abdf1_ros.text import printable
-from rclpy.callback_groups import ReentrantCallbackGroup
 from rclpy.node import Node
 from std_msgs.msg import String
 
 _LONGEST_LABEL = 100
+
+# Why a message may be too old: one that was taken at once, and one that has waited for ``begin``.
+_CLOCKS = 'or the clocks differ'
+_BEGUN = 'this node had just begun, and looks for another of its name first'
 
 # Publishers of one topic whose numbers are followed at a time.
 _MOST_PUBLISHERS = 16
@@ -108,10 +112,18 @@ class WriteTopic:
         self._on_loss = on_loss
         self._wake = wake
 
-    def take(self, message: Any, info: Any) -> None:
-        """Write a message to every mapping of the topic."""
+    def arrived(self, info: Any) -> None:
+        """Tell what was lost before a message that has come."""
         if lost := self._losses.lost_before(info['publication_sequence_number']):
             self._on_loss(self._topic, lost)
+
+    def take(self, message: Any, info: Any, has_waited: bool = False,
+             reject_reason: str = '') -> None:
+        """
+        Write a message to every mapping of the topic, or refuse it for a ``reject_reason``.
+
+        One that ``has_waited`` came before the node took messages.
+        """
         # It may have waited while this process was paused or the network was down.
         now = time.time_ns()
         stamps = filter(None, (info['source_timestamp'], info['received_timestamp']))
@@ -119,7 +131,12 @@ class WriteTopic:
         requested = line_time() - waited
         request = _request(message, info)
         try:
-            self._check_age(waited)
+            if reject_reason:
+                raise FormatError(reject_reason)
+            if waited > self._patience:
+                what, cause = ('was taken', _BEGUN) if has_waited else ('came', _CLOCKS)
+                raise FormatError(f'it {what} {waited:.1f} s after it was published, '
+                                  f'write_timeout is {self._patience:g} s; {cause}')
             values = values_of(message)
         except FormatError as error:
             self._driver.refuse(self._mappings, str(error), message.data, request)
@@ -127,44 +144,34 @@ class WriteTopic:
             self._driver.write(self._mappings, values, requested, request)
             self._wake()
 
-    def _check_age(self, age: float) -> None:
-        if age > self._patience:
-            raise FormatError(
-                f'it came {age:.1f} s after it was published, write_timeout is '
-                f'{self._patience:g} s; or this node had just begun, or the clocks differ')
-
-
-class _Gate(ReentrantCallbackGroup):
-    """Subscriptions whose messages wait in DDS until it is open."""
-
-    def __init__(self) -> None:
-        super().__init__()
-        self.is_open = False
-
-    def can_execute(self, entity: Any) -> bool:
-        return self.is_open
-
 
 class WriteTopics:
     """
     The subscriptions of a node; ``open`` may be called again, in the thread of the executor.
 
-    Messages are taken from ``begin`` on, and go where ``give_to`` says; ``taken`` counts them.
+    Messages wait here until ``begin``, and go where ``give_to`` says; ``taken`` counts those.
     """
 
     def __init__(self, node: Node) -> None:
         self._node = node
-        self._gate = _Gate()
+        self._waiting: list[tuple[str, Any, Any]] = []
+        self._has_begun = self._is_open = False
         self._subscriptions: dict[str, tuple[Any, Any]] = {}
         self._topics: dict[str, WriteTopic] = {}
         self.taken = 0
 
     def begin(self) -> None:
-        """Begin to take messages, those that wait first."""
-        if not self._gate.is_open:
-            self._gate.is_open = True
-            if self._node.executor is not None:
-                self._node.executor.wake()
+        """Have messages taken from now on, those that wait first; may be called in any thread."""
+        if not self._has_begun and self._node.executor is not None:
+            self._has_begun = True
+            self._node.executor.create_task(self._take_waiting)
+
+    def _take_waiting(self) -> None:
+        for topic, message, info in self._waiting:
+            self.taken += 1
+            self._topics[topic].take(message, info, has_waited=True)
+        self._waiting.clear()
+        self._is_open = True
 
     def open(self, driver: Driver, patience: float,  # noqa: A003
              on_loss: Callable[[str, int], None], wake: Callable[[], None],
@@ -193,12 +200,16 @@ class WriteTopics:
 
     def _subscription(self, topic: str, kind: Any) -> Any:
         def take(message: Any, info: Any) -> None:
+            self._topics[topic].arrived(info)
+            reject_reason = '' if self._is_open else TOO_MANY
+            if reject_reason and len(self._waiting) < MAX_WAITING_WRITES:
+                self._waiting.append((topic, message, info))
+                return
             self.taken += 1
-            self._topics[topic].take(message, info)
+            self._topics[topic].take(message, info, reject_reason=reject_reason)
 
         callback: Any = take
-        return self._node.create_subscription(
-            kind, _name(topic), callback, write_qos(), callback_group=self._gate)
+        return self._node.create_subscription(kind, _name(topic), callback, write_qos())
 
 
 def _name(topic: str) -> str:
