@@ -16,7 +16,7 @@
 
 from pathlib import Path
 import sys
-from types import ModuleType
+from types import SimpleNamespace
 
 from abdf1_ros import paths
 import pytest
@@ -36,36 +36,18 @@ def installed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return tmp_path
 
 
-def _ament_index(monkeypatch: pytest.MonkeyPatch, share: Path | Exception) -> None:
-    module = ModuleType('ament_index_python.packages')
-
+@pytest.mark.parametrize('share', ['share', LookupError(), OSError('no AMENT_PREFIX_PATH'), None])
+def test_file_of_the_installed_package(
+        installed: Path, monkeypatch: pytest.MonkeyPatch, share: str | Exception | None) -> None:
+    """Ament has an index that knows the package or not, or there is none."""
     def get_package_share_directory(package: str) -> str:
         assert package == 'abdf1_ros'
         if isinstance(share, Exception):
             raise share
-        return str(share)
+        return str(installed / 'share')
 
-    module.get_package_share_directory = (  # type: ignore[attr-defined]
-        get_package_share_directory)
-    monkeypatch.setitem(sys.modules, 'ament_index_python', ModuleType('ament_index_python'))
-    monkeypatch.setitem(sys.modules, 'ament_index_python.packages', module)
-
-
-def test_file_of_the_installed_package(installed: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    _ament_index(monkeypatch, installed / 'share')
-    assert paths.config_file('net.csv') == installed / 'share' / 'config' / 'net.csv'
-
-
-@pytest.mark.parametrize('error', [LookupError(), OSError('AMENT_PREFIX_PATH is not set')])
-def test_file_of_a_package_that_no_index_knows(
-        installed: Path, monkeypatch: pytest.MonkeyPatch, error: Exception) -> None:
-    _ament_index(monkeypatch, error)
-    assert paths.config_file('net.csv') == \
-        Path(sys.prefix) / 'share' / 'abdf1_ros' / 'config' / 'net.csv'
-
-
-def test_installed_file_is_found_without_ros(
-        installed: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setitem(sys.modules, 'ament_index_python', None)
-    monkeypatch.setitem(sys.modules, 'ament_index_python.packages', None)
-    assert paths.config_file('map.csv').parts[-4:] == ('share', 'abdf1_ros', 'config', 'map.csv')
+    module = SimpleNamespace(get_package_share_directory=get_package_share_directory)
+    for name in ('ament_index_python', 'ament_index_python.packages'):
+        monkeypatch.setitem(sys.modules, name, module if share else None)
+    place = installed / 'share' if share == 'share' else Path(sys.prefix) / 'share' / 'abdf1_ros'
+    assert paths.config_file('net.csv') == place / 'config' / 'net.csv'

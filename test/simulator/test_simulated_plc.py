@@ -190,16 +190,6 @@ def test_fault_of_the_data_file(path: Path, row: str, text: str) -> None:
     assert faults(path, row) == [text]
 
 
-def test_station_of_two_families(path: Path) -> None:
-    assert faults(path, '1,PLC5,N7:0,,,,', '1,SLC,N7:0,,,,') == [
-        '3:2 (PLC_Type): station 1 is a PLC5 already']
-
-
-def test_file_of_two_types(path: Path) -> None:
-    assert faults(path, '1,PLC5,N7:0,,,,', '1,PLC5,F7:0,,,,') == [
-        '3:3 (Address): file 7 is of type N already']
-
-
 def test_ramp_counts_up_each_period_and_begins_again(path: Path, clock: Clock) -> None:
     plc, = load(path, clock, '1,PLC5,N7:0,2,10 998,Ramp,250')
     master = Master(plc)
@@ -386,18 +376,22 @@ def test_plcs_behind_a_gateway_are_one_station_of_the_line(tmp_path: Path) -> No
         gateway.handle(ACKNOWLEDGED)
 
 
-@pytest.mark.parametrize(('row', 'text'), [
-    ('1,PLC5,F8:0,,,,,11', '3:8 (Via): station 1 is behind gateway 10 already'),
-    ('1,PLC5,F8:0,,,,,', '3:8 (Via): station 1 is behind gateway 10 already'),
-    ('10,PLC5,F8:0,,,,,', '3:8 (Via): station 10 is a PLC, it cannot be a gateway too'),
-    ('2,PLC5,F8:0,,,,,0', '3:8 (Via): Via = "0" should be a whole number from 1 to 254')])
-def test_gateways_that_cannot_be(tmp_path: Path, row: str, text: str) -> None:
-    assert faults(tmp_path / 'simulator.csv', '1,PLC5,N7:0,,,,,10', row) == [text]
+@pytest.mark.parametrize(('first', 'second', 'text'), [
+    ('1,PLC5,N7:0,,,,', '1,SLC,N7:0,,,,', '3:2 (PLC_Type): station 1 is a PLC5 already'),
+    ('1,PLC5,N7:0,,,,', '1,PLC5,F7:0,,,,', '3:3 (Address): file 7 is of type N already'),
+    *(('1,PLC5,N7:0,,,,,10', second, f'3:8 (Via): {text}') for second, text in (
+        ('1,PLC5,F8:0,,,,,11', 'station 1 is behind gateway 10 already'),
+        ('1,PLC5,F8:0,,,,,', 'station 1 is behind gateway 10 already'),
+        ('10,PLC5,F8:0,,,,,', 'station 10 is a PLC, it cannot be a gateway too'),
+        ('2,PLC5,F8:0,,,,,0', 'Via = "0" should be a whole number from 1 to 254')))])
+def test_rows_that_contradict_each_other(path: Path, first: str, second: str, text: str) -> None:
+    assert faults(path, first, second) == [text]
 
 
 def test_simulated_slc_may_be_another_processor(path: Path, clock: Clock) -> None:
     plc, = load(path, clock, '1,SLC,N7:0,,,,,,ML1400', '1,SLC,B3:0,,,,,,')
-    assert decode_identity(plc.processor.encode()).processor is Processor.ML1400
+    status = plc.serve(Packet(1, 5, 0x06, 0, 1, b'\x03')).data
+    assert decode_identity(status).processor is Processor.ML1400
     fault, = faults(path, '1,SLC,N7:0,,,,,,5/99')
     assert fault.startswith('2:9 (Processor): Processor = "5/99" should be one of 5/01, 5/02')
     fault, = faults(path, '1,PLC5,N7:0,,,,,,5/03')
