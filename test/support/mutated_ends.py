@@ -17,7 +17,8 @@ Ends of a line with habits that can be switched on: slave, peer, master, client,
 
 Without a habit each keeps the rules of the manual. A habit is a fault, or something that the
 manual allows. Bytes are made and read by a codec that is neither that of the package nor that of
-``conform``: a receiver takes them one at a time. Time is virtual.
+``conform``: a receiver takes them one at a time; the checks are those of the vectors' verifier.
+Time is virtual.
 """
 
 from collections import deque
@@ -25,9 +26,14 @@ from collections.abc import Callable, Generator
 from enum import auto, Enum
 import heapq
 from itertools import count
+import runpy
 
 from abdf1_ros.df1.packet import Packet
 from support.driver_bench import simulated_plc
+from support.vectors import VECTOR_FOLDER
+
+_VERIFY = runpy.run_path(str(VECTOR_FOLDER / 'verify.py'))
+_right_check = _VERIFY['right_check']
 
 _DLE, _SOH, _STX, _ETX, _EOT, _ENQ, _ACK, _NAK = 0x10, 1, 2, 3, 4, 5, 6, 0x15
 _LIMIT = 3  # of repetitions, and of enquiries
@@ -128,26 +134,6 @@ Symbol = tuple[object, ...]
 """(kind, ...): a code; 'poll', station, is_good; 'message', station, data, is_good; 'broken'."""
 
 
-def _checked(covered: bytes, kind: str) -> bytes:
-    """Return the check: a sum, or a CRC that is shifted the other way round than usual."""
-    if kind == 'BCC':
-        return bytes(((0x100 - sum(covered)) % 0x100,))
-    value = 0
-    for byte in covered:
-        for bit in range(8):
-            top = (value >> 15 ^ byte >> bit) & 1
-            value = value << 1 & 0xFFFF ^ (0x8005 if top else 0)
-    backwards = int(f'{value:016b}'[::-1], 2)
-    return bytes((backwards & 0xFF, backwards >> 8))
-
-
-def _message_check(data: bytes, kind: str, station: int | None) -> bytes:
-    if kind == 'BCC':
-        return _checked((b'' if station is None else bytes((station,))) + data, kind)
-    head = b'' if station is None else bytes((station, _STX))
-    return _checked(head + data + bytes((_ETX,)), kind)
-
-
 class Wire:
     """
     One end of a line in virtual time, as ``conform`` uses it.
@@ -211,11 +197,11 @@ class Wire:
 
     def frame(self, data: bytes, station: int | None = None) -> bytes:
         """Return a message as it stands on the line."""
-        check = _message_check(data, self.check, station)
+        check = _right_check(self.check, station, data)
         if self.has(Habit.BAD_CHECK_OF_HIGH_BYTES) and max(data) >= 0xC0:
             check = bytes(byte ^ 0xFF for byte in check)
         if self.has(Habit.CRC_WITHOUT_STATION):
-            check = _message_check(data, self.check, None)
+            check = _right_check(self.check, None, data)
         body = data if self.has(Habit.UNSTUFFED) else data.replace(b'\x10', b'\x10\x10')
         body, self._embedded = self._embedded + body, b''
         head = b'' if station is None else bytes((_DLE, _SOH)) + self.number(station)
@@ -244,7 +230,7 @@ class Wire:
             station = yield
             if station == _DLE and not self.has(Habit.POLL_NOT_DOUBLED):
                 yield
-            self.take(('poll', station, (yield) == _checked(bytes((station,)), 'BCC')[0]))
+            self.take(('poll', station, (yield) == _VERIFY['bcc'](bytes((station,)))[0]))
         elif code == _SOH and self.is_half_duplex:
             station = yield
             if station == _DLE:
@@ -284,7 +270,7 @@ class Wire:
                 return
         check = bytes([(yield)]) if self.check == 'BCC' else bytes([(yield), (yield)])
         of_station = None if self.has(Habit.CRC_WITHOUT_STATION) else station
-        is_good = check == _message_check(bytes(data), self.check, of_station)
+        is_good = check == _right_check(self.check, of_station, bytes(data))
         self.take(('message', station, bytes(data), is_good))
 
 
@@ -783,8 +769,8 @@ class MutatedMaster(Wire):
         self.after(seconds, expire)
 
     def _poll(self, station: int = 1) -> None:
-        check = 'CRC' if self.has(Habit.POLL_WITH_CRC) else 'BCC'
-        self.say(bytes((_DLE, _ENQ)) + self.number(station) + _checked(bytes((station,)), check))
+        check = _VERIFY['crc' if self.has(Habit.POLL_WITH_CRC) else 'bcc']
+        self.say(bytes((_DLE, _ENQ)) + self.number(station) + check(bytes((station,))))
 
     def _transactions(self) -> Generator[float, Symbol | None, None]:
         while True:
