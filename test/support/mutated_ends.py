@@ -146,6 +146,7 @@ class Wire:
         self.now = 0.0
         self._due: list[tuple[float, int, Callable[[], None]]] = []
         self._count = count()
+        self._next = 0
         self._said = self._embedded = b''
         self._receiver = self._receive()
         next(self._receiver)
@@ -180,6 +181,17 @@ class Wire:
     def after(self, delay: float, action: Callable[[], None]) -> None:
         """Do something later."""
         heapq.heappush(self._due, (self.now + delay, next(self._count), action))
+
+    def then(self, seconds: float, action: Callable[[], None]) -> None:
+        """Do something later, unless something else is to be done before."""
+        self._next += 1
+        mine = self._next
+        self.after(seconds, lambda: action() if mine == self._next else None)
+
+    @property
+    def reply_time(self) -> float:
+        """Return the seconds from a command to its reply."""
+        return 1.5 if self.has(Habit.VERY_LATE_REPLY) else self.has(Habit.LATE_REPLY) * 0.3
 
     def say(self, data: bytes, delay: float = 0.0) -> None:
         """Send bytes; those of a slow end are late."""
@@ -395,11 +407,10 @@ class MutatedSlave(Wire):
     def _execute(self, data: bytes, wants_reply: bool) -> None:
         reply = self._plc.serve(data)
         if wants_reply:
-            late = 1.5 if self.has(Habit.VERY_LATE_REPLY) else self.has(Habit.LATE_REPLY) * 0.3
             if self.has(Habit.REPLIES_UNASKED):
                 self.say(self.frame(reply), 0.1)
                 return
-            ready = self.now + late, reply
+            ready = self.now + self.reply_time, reply
             self._queue.insert(0 if self.has(Habit.LAST_REPLY_FIRST) else len(self._queue), ready)
 
     def _polled(self) -> None:
@@ -546,8 +557,7 @@ class MutatedPeer(_FullDuplex):
     def execute(self, data: bytes) -> None:
         """Send the reply."""
         reply = self._plc.serve(data)
-        late = 1.5 if self.has(Habit.VERY_LATE_REPLY) else self.has(Habit.LATE_REPLY) * 0.3
-        self.after(late, lambda: self.send(reply))
+        self.after(self.reply_time, lambda: self.send(reply))
 
 
 class _Asker:
@@ -583,17 +593,10 @@ class MutatedClient(_FullDuplex):
         super().__init__(check, frozenset(habits))
         self._asker = _Asker(self)
         self._last = b''
-        self._round = 0
-        self.after(0.1, self._ask)
+        self.then(0.1, self._ask)
 
     def _ask(self) -> None:
-        self._round += 1
-        mine = self._round
-
-        def expire() -> None:
-            if mine == self._round:
-                self._ask()
-        self.after(_COMMAND_TIMEOUT, expire)
+        self.then(_COMMAND_TIMEOUT, self._ask)
         self._outgoing.clear()
         self.send(self._asker.next_command())
 
@@ -604,19 +607,10 @@ class MutatedClient(_FullDuplex):
 
     def execute(self, data: bytes) -> None:
         """Go on after a reply."""
-        self._go_on()
+        self.then(0.15, self._ask)
 
     def failed(self) -> None:
-        self._go_on()
-
-    def _go_on(self) -> None:
-        self._round += 1
-        mine = self._round
-
-        def go_on() -> None:
-            if mine == self._round:
-                self._ask()
-        self.after(0.15, go_on)
+        self.then(0.15, self._ask)
 
 
 class _Radio(Wire):
@@ -692,10 +686,9 @@ class MutatedRadioNode(_Radio):
         self._replies[data] = reply
         if is_ours or self.has(Habit.REPLIES_FOR_OTHERS) and not is_broadcast or \
                 is_broadcast and self.has(Habit.REPLIES_TO_BROADCAST):
-            late = 1.5 if self.has(Habit.VERY_LATE_REPLY) else self.has(Habit.LATE_REPLY) * 0.3
-            self.say(self.frame(reply), late)
+            self.say(self.frame(reply), self.reply_time)
             if self.has(Habit.ENQUIRES_ALWAYS):
-                self.say(bytes((_DLE, _ENQ)), late + 1.0)
+                self.say(bytes((_DLE, _ENQ)), self.reply_time + 1.0)
 
 
 class MutatedRadioClient(_Radio):
@@ -707,8 +700,8 @@ class MutatedRadioClient(_Radio):
         super().__init__(check, frozenset(habits))
         self._asker = _Asker(self)
         self._command = b''
-        self._tries = self._round = 0
-        self.after(0.1, self._ask)
+        self._tries = 0
+        self.then(0.1, self._ask)
 
     def _ask(self) -> None:
         self._command, self._tries = self._asker.next_command(), 0
@@ -722,17 +715,7 @@ class MutatedRadioClient(_Radio):
         self.say(self.frame(self._command))
         if self.has(Habit.SILENCE_REPEATED):
             self.say(bytes((_DLE, _ENQ)), 1.0)
-        self._then(_COMMAND_TIMEOUT, self._try)
-
-    def _then(self, seconds: float, action: Callable[[], None]) -> None:
-        """Do something later, unless something else is to be done before."""
-        self._round += 1
-        mine = self._round
-
-        def act() -> None:
-            if mine == self._round:
-                action()
-        self.after(seconds, act)
+        self.then(_COMMAND_TIMEOUT, self._try)
 
     def taken(self, data: bytes, is_ours: bool) -> None:
         """Go on after a reply."""
@@ -740,7 +723,7 @@ class MutatedRadioClient(_Radio):
         is_reply = is_ours and data[1] == mine[0] and data[4:6] == mine[4:6]
         if is_reply or self.has(Habit.TAKES_ANY_REPLY):
             self._command = bytes(6)  # nothing is waited for
-            self._then(0.15, self._ask)
+            self.then(0.15, self._ask)
 
 
 class MutatedMaster(Wire):
@@ -750,23 +733,15 @@ class MutatedMaster(Wire):
         super().__init__(check, frozenset(habits), is_half_duplex=True)
         self._asker = _Asker(self)
         self._steps = self._transactions()
-        self._waiting = 0
-        self.after(0.1, lambda: self._go_on(None))
+        self.then(0.1, self._go_on)
 
     def take(self, symbol: Symbol) -> None:
         """Hand a symbol to the transaction."""
         self._go_on(symbol)
 
-    def _go_on(self, symbol: Symbol | None) -> None:
+    def _go_on(self, symbol: Symbol | None = None) -> None:
         """Let the transaction take a symbol (None: silence), and wait for the next."""
-        self._waiting += 1
-        mine = self._waiting
-        seconds = next(self._steps) if symbol is None and mine == 1 else self._steps.send(symbol)
-
-        def expire() -> None:
-            if mine == self._waiting:
-                self._go_on(None)
-        self.after(seconds, expire)
+        self.then(self._steps.send(symbol), self._go_on)
 
     def _poll(self, station: int = 1) -> None:
         check = _VERIFY['crc' if self.has(Habit.POLL_WITH_CRC) else 'bcc']
