@@ -243,16 +243,6 @@ def test_any_text_is_an_address_or_a_format_error(text: str, family: PlcType) ->
         assert address.offset < address.area_size
 
 
-@given(st.sampled_from(['N7:5', 'T4:5', 'F8:5', 'ST9:5', 'I:5', 'R6:0.POS', 'PD9:3', 'MG9:1']),
-       KINDS, st.integers(0, 255))
-def test_offset_and_at_offset_are_inverse(text: str, family: PlcType, offset: int) -> None:
-    address = parse_address(text, family)
-    assert address.at_offset(address.offset) == address
-    moved = address.at_offset(offset)
-    assert moved.offset == offset
-    assert moved.area == address.area
-
-
 @pytest.mark.parametrize(('text', 'family', 'offset', 'size'), [
     ('N7:5', SLC, 5, 256), ('N7:5', PLC5, 5, 1000), ('T4:2.ACC', SLC, 8, 768),
     ('F8:3', PLC5, 6, 2000), ('ST9:1', SLC, 42, 256 * 42), ('I:3.2', SLC, 2, 256),

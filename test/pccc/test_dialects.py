@@ -22,7 +22,7 @@ from abdf1_ros.pccc.dialect import Dialect, Transfer
 from abdf1_ros.pccc.families import dialect_of, FAMILIES, parse_address
 from abdf1_ros.pccc.file_types import PlcType
 from abdf1_ros.pccc.processor import Processor
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 import pytest
 from support.cases import for_all
@@ -70,6 +70,7 @@ def test_access_of_another_family(family: PlcType, access: Access, right: str) -
         dialect_of(family, access)
 
 
+@settings(max_examples=40)
 @given(st.sampled_from(WORDS), st.integers(0, 0xFFFF), st.integers(0, 0xFFFF),
        st.integers(0, 0xFFFF))
 def test_write_read_and_write_bits_come_back(place: tuple[PlcType, Access, str], value: int,
@@ -152,6 +153,7 @@ def test_processor_is_for_an_slc_only() -> None:
         dialect_of(PlcType.PLC5, None, Processor.SLC_5_03)
 
 
+@settings(max_examples=40)
 @given(st.sampled_from([place for place in WORDS if '.' not in place[2]]),
        st.integers(1, 40), st.integers(1, 15))
 def test_parts_of_a_transfer_make_the_whole(place: tuple[PlcType, Access, str], words: int,

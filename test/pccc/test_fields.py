@@ -33,13 +33,6 @@ def test_number_is_short_up_to_254(value: int, encoded: str) -> None:
     assert Reader(bytes.fromhex(encoded)).number() == value
 
 
-@given(st.lists(st.integers(0, 0xFFFF), max_size=8))
-def test_numbers_are_read_back(values: list[int]) -> None:
-    reader = Reader(b''.join(map(number, values)))
-    assert [reader.number() for _ in values] == values
-    assert reader.is_empty
-
-
 def test_reader_takes_fields_in_order() -> None:
     reader = Reader(bytes(range(8)))
     assert (reader.byte(), reader.word(), reader.take(2)) == (0, 0x0201, b'\x03\x04')
@@ -101,14 +94,6 @@ def test_padding_behind_an_array_is_passed_over() -> None:
 def test_what_does_not_add_up_is_a_format_error(encoded: str) -> None:
     with pytest.raises(FormatError):
         TypedData.decode(bytes.fromhex(encoded))
-
-
-@given(st.integers(1, 0x20).filter(lambda value: value != 9), st.integers(1, 300),
-       st.integers(0, 5))
-def test_any_elements_are_read_back(type_id: int, size: int, count: int) -> None:
-    values = TypedData(type_id, size, bytes(size * count))
-    assert TypedData.decode(values.encode()) == values
-    assert values.count == count
 
 
 @given(st.one_of(st.binary(max_size=40), st.builds(

@@ -90,9 +90,6 @@ def test_out_of_range(text: str, right: str) -> None:
     assert right in str(fault.value)
 
 
-levels = st.integers(0, 0xFFFF)
-
-
 @pytest.mark.parametrize(('address', 'encoded'), [
     (ExtendedAddress(8, 10), '2C 08 0A 00'), (ExtendedAddress(8, 260), '2C 08 FF 04 01 00'),
     (ExtendedAddress(3, 0, 9, 2), '3C 03 00 09 02'), (ExtendedAddress(5, 7, 0, 255),
@@ -100,13 +97,6 @@ levels = st.integers(0, 0xFFFF)
 def test_extended_address_is_encoded_and_read_back(address: ExtendedAddress, encoded: str) -> None:
     assert address.encode() == bytes.fromhex(encoded)
     assert ExtendedAddress.read(Reader(bytes.fromhex(encoded))) == address
-
-
-@given(st.builds(ExtendedAddress, levels, levels, levels, levels))
-def test_every_address_is_read_back(address: ExtendedAddress) -> None:
-    reader = Reader(address.encode())
-    assert ExtendedAddress.read(reader) == address
-    assert reader.is_empty
 
 
 PLC3 = PlcType.PLC3

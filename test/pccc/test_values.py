@@ -29,7 +29,7 @@ from abdf1_ros.pccc.strings import (
 )
 from abdf1_ros.pccc.structures import type_fault, write_fault
 from abdf1_ros.pccc.values import Codec, types_of, ValueType, WordOrder
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 import pytest
 from support.cases import for_all
@@ -62,6 +62,7 @@ def test_values_survive_a_round_trip(case: tuple[ValueType, list[float]],
     assert decoded.typecode == kind.array_code
 
 
+@settings(max_examples=40)
 @given(st.lists(st.integers(0, 1), min_size=1, max_size=50), st.integers(0, 15),
        st.binary(min_size=8, max_size=8))
 def test_bits_survive_a_round_trip_and_leave_their_neighbours_alone(
@@ -82,6 +83,7 @@ def test_bits_survive_a_round_trip_and_leave_their_neighbours_alone(
     assert decoded == array('B', values)
 
 
+@settings(max_examples=40)
 @given(st.text(st.characters(max_codepoint=255), max_size=82))
 def test_strings_survive_a_round_trip(text: str) -> None:
     for codec in (Codec(ValueType.STRING, 1), Codec(ValueType.STRING, 41, packed=True)):

@@ -21,7 +21,7 @@ from abdf1_ros.errors import FormatError
 from abdf1_ros.pccc.values import ValueType
 from abdf1_ros.settings.limits import raw_values
 from abdf1_ros.settings.scaling import Scaling
-from hypothesis import assume, given
+from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 import pytest
 from support.mappings import make_mapping
@@ -30,6 +30,7 @@ _WHOLE = (ValueType.INT16, ValueType.UINT16, ValueType.BCD16)
 _SCALES = st.floats(allow_nan=False, allow_infinity=False) | st.floats(0.001, 1000.0)
 
 
+@settings(max_examples=40)
 @given(st.sampled_from(_WHOLE), st.floats(-1e6, 1e6), _SCALES, st.data())
 def test_value_just_published_gives_the_same_raw_value_back(
         kind: ValueType, offset: float, scale: float, data: st.DataObject) -> None:
@@ -43,6 +44,7 @@ def test_value_just_published_gives_the_same_raw_value_back(
     assert scaling.raw(published, kind) == raw
 
 
+@settings(max_examples=40)
 @given(st.sampled_from(_WHOLE), st.integers(-30, 30), st.integers(0, 25), st.booleans())
 def test_finest_scale_beside_a_large_offset(
         kind: ValueType, exponent: int, ratio: int, down: bool) -> None:
@@ -56,6 +58,7 @@ def test_finest_scale_beside_a_large_offset(
         assert scaling.fault(kind)
 
 
+@settings(max_examples=40)
 @given(st.floats(-2.0**99, 2.0**99, width=32), st.floats(0.001, 1000), st.floats(-1000, 1000))
 def test_floats_come_back_as_near_as_their_digits_allow(
         raw: float, scale: float, offset: float) -> None:
