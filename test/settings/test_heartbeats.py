@@ -147,7 +147,8 @@ def test_rule_3_requires_topics_with_a_time() -> None:
 
 @pytest.mark.parametrize(('cells', 'text'), [
     ({'Requires': 'speed'}, 'Requires_Timeout is missing: ms from 100 to 3600000'),
-    ({'Requires_Timeout': '500'}, 'Requires_Timeout is for a row with Requires'),
+    ({'Requires_Timeout': '500'}, 'Requires_Timeout is for a row with Requires; '
+     'leave the cell empty'),
     ({'Requires': 'nobody', 'Requires_Timeout': '500'},
      'no good Write, ReadWrite or Serve row has the topic "nobody"')])
 def test_rule_3_requires_without_what_it_needs(cells: dict[str, str], text: str) -> None:
@@ -155,7 +156,7 @@ def test_rule_3_requires_without_what_it_needs(cells: dict[str, str], text: str)
 
 
 def test_rule_3_only_a_heartbeat_vouches() -> None:
-    assert 'Requires is for Heartbeat rows' in fault(Requires='a')
+    assert 'Requires is for Heartbeat rows; leave the cell empty' in fault(Requires='a')
 
 
 @pytest.mark.parametrize('period', ['99', '60001', 'x'])
@@ -190,9 +191,13 @@ def test_rule_12_write_and_serve_rows_take_a_fallback(
     ({'Address': 'B3:0/1', 'Fallback': '1', 'Fallback_After': '500'}, 'a bool falls back to 0'),
     ({'Command': 'ReadWrite', 'Fallback': '0', 'Fallback_After': '500'},
      'write a Write row and a Read row'),
-    ({'Command': 'Read', 'Fallback': '0', 'Fallback_After': '500'}, 'a Read row has no Fallback'),
+    ({'Command': 'Read', 'Fallback': '0', 'Fallback_After': '500'}, 'a Read row has no '
+     'Fallback: it is for Write and Serve rows; leave the cell empty'),
     ({'Address': 'ST9:0', 'Fallback': '0', 'Fallback_After': '500'}, 'a string has no Fallback'),
-    ({'Station': '255', 'Fallback': '0', 'Fallback_After': '500'}, 'no station confirms')])
+    ({'Fallback': '1.5', 'Fallback_After': '500'},
+     'Fallback cannot be written: value 1.5 at index 0 is not a valid int16'),
+    ({'Station': '255', 'Fallback': '0', 'Fallback_After': '500'},
+     'no station confirms what is written to 255; leave the cell empty')])
 def test_rule_12_what_a_fallback_cannot_be(cells: dict[str, str], text: str) -> None:
     assert text in fault(**WRITE | cells)
 
@@ -322,11 +327,6 @@ def test_map_of_the_tutorial_is_that_of_the_demo() -> None:
         encoding='utf-8').splitlines()[2:]
     told = '\n'.join([head, *rows[-7:]])
     assert told in (root / 'docs/tutorials/heartbeats.md').read_text(encoding='utf-8')
-
-
-def test_rule_12_fallback_is_a_value_that_can_be_written() -> None:
-    assert 'Fallback cannot be written: value 1.5 at index 0 is not a valid int16' in fault(
-        **WRITE, Fallback='1.5', Fallback_After='500')
 
 
 def test_rule_12_fallback_of_bits_of_an_old_slc_is_warned_of() -> None:
