@@ -24,7 +24,7 @@ from typing import TypeVar
 from abdf1_ros.df1.packet import Packet
 from abdf1_ros.errors import FormatError
 from abdf1_ros.pccc.address import Address
-from abdf1_ros.pccc.file_types import FileType
+from abdf1_ros.pccc.file_types import FileType, Layout
 
 Request = tuple[int, bytes]
 """CMD, and what follows TNS."""
@@ -52,6 +52,11 @@ def exactly(words: int, data: bytes) -> bytes:
     if len(data) != words * 2:
         raise FormatError(f'the reply holds {len(data)} bytes, asked were {words * 2}')
     return data
+
+
+def whole_elements(layout: Layout, size: int) -> int:
+    """Return the words of as many whole elements as fit into ``size`` bytes."""
+    return size // 2 // layout.words * layout.words
 
 
 class Dialect(ABC):

@@ -17,7 +17,7 @@
 from __future__ import annotations
 
 from abdf1_ros.pccc.address import Address
-from abdf1_ros.pccc.dialect import Dialect, Request, Transfer
+from abdf1_ros.pccc.dialect import Dialect, Request, Transfer, whole_elements
 from abdf1_ros.pccc.fields import word
 from abdf1_ros.pccc.file_types import FileType
 from abdf1_ros.pccc.processor import Processor, USUAL
@@ -36,14 +36,14 @@ class SlcDialect(Dialect):
         self._processor = processor
 
     def max_read(self, file_type: FileType) -> int:
-        return _whole_elements(file_type, self._processor.max_read)
+        return whole_elements(FILES[file_type], self._processor.max_read)
 
     def sure_read(self, file_type: FileType) -> int:
         """Return what the oldest processor brings."""
-        return _whole_elements(file_type, Processor.SLC_5_01.max_read)
+        return whole_elements(FILES[file_type], Processor.SLC_5_01.max_read)
 
     def max_write(self, file_type: FileType) -> int:
-        return _whole_elements(file_type, self._processor.max_write)
+        return whole_elements(FILES[file_type], self._processor.max_write)
 
     def read(self, address: Address, words: int, transfer: Transfer | None = None) -> Request:
         return slc.CMD, slc.LogicalRead(_logical_address(address), words * 2).encode()
@@ -55,12 +55,6 @@ class SlcDialect(Dialect):
         """Return a masked write of one word."""
         return slc.CMD, slc.MaskedWrite(
             _logical_address(address), mask, word(bits & mask)).encode()
-
-
-def _whole_elements(file_type: FileType, size: int) -> int:
-    """Return the words of as many whole elements as fit into ``size`` bytes."""
-    words = FILES[file_type].words
-    return size // 2 // words * words
 
 
 def _logical_address(address: Address) -> slc.LogicalAddress:

@@ -20,7 +20,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 from abdf1_ros.pccc.address import Address
-from abdf1_ros.pccc.dialect import Dialect, exactly, Request, Transfer
+from abdf1_ros.pccc.dialect import Dialect, exactly, Request, Transfer, whole_elements
 from abdf1_ros.pccc.file_types import FileType, Layout
 from abdf1_ros.pccc.word_range import commands as word_range
 from abdf1_ros.pccc.word_range.commands import (
@@ -48,12 +48,11 @@ class WordRangeDialect(Dialect):
     bit_write: Callable[[Address, int, int], bytes]
 
     def max_read(self, file_type: FileType) -> int:
-        words = self.files[file_type].words
-        return word_range.MAX_READ // 2 // words * words
+        return whole_elements(self.files[file_type], word_range.MAX_READ)
 
     def max_write(self, file_type: FileType) -> int:
-        words = self.files[file_type].words
-        return (word_range.MAX_WRITE - self.address_size) // 2 // words * words
+        return whole_elements(
+            self.files[file_type], word_range.MAX_WRITE - self.address_size)
 
     def read(self, address: Address, words: int, transfer: Transfer | None = None) -> Request:
         whole = transfer or Transfer(address, words)
