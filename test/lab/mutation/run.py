@@ -116,8 +116,10 @@ def _room(mutant: Mutant) -> str:
 
 def _tests_of_module(copy: Path, mutant: Mutant) -> list[str]:
     folder = copy.joinpath('test', *mutant.module.parts[1:-1])
-    return sorted(str(test.relative_to(copy))
-                  for test in folder.glob(f'test_{mutant.module.stem}*.py'))
+    # A family of pccc has one file for its folder.
+    found = [*folder.glob(f'test_{mutant.module.stem}*.py'),
+             *folder.parent.glob(f'test_{folder.name}.py')]
+    return sorted(str(test.relative_to(copy)) for test in found)
 
 
 def _tests_of_room(copy: Path, mutant: Mutant) -> list[str]:
