@@ -81,8 +81,8 @@ MESSAGES: dict[Message, Cause] = {
         'a second master, a station number that two devices have, or, in Mode Peer, a gateway '
         'that puts its own number into Dst: give Station that number.'),
     Message.ERR_RCVD_NAK_SYMBOL: Cause(
-        'A station answered a message with DLE NAK, which slaves of Allen-Bradley never do; in '
-        'Mode Peer it arrived damaged, or the PLC has no room.',
+        'A station answered a message or a poll with DLE NAK, which slaves of Allen-Bradley never '
+        'do; in Mode Peer it arrived damaged, or the PLC has no room.',
         'Slaves: set to full duplex, or of another make? The message is repeated.'),
     Message.NTC_RCVD_MSG_TOO_LONG: Cause(
         'More bytes than a message can have came without an end: noise, or a lost DLE ETX.',
@@ -109,11 +109,12 @@ MESSAGES: dict[Message, Cause] = {
         'A message broke off before its DLE ETX.',
         'As for 2506; also an RS-485 transmitter that switches off too early.'),
     Message.NTC_NAK_LIMIT_EXCEEDED: Cause(
-        'A command was repeated NAK_Retries times without an answer; 2509 follows.',
+        'A message was repeated NAK_Retries times without an answer; after a command of ours 2509 '
+        'follows.',
         'See 2509.'),
     Message.NTC_ENQ_LIMIT_EXCEEDED: Cause(
         'A poll (in full duplex: the question for the last answer) was repeated ENQ_Retries times '
-        'without an answer; 2509 follows.',
+        'without an answer; 2509 follows, but not after a reply of ours.',
         'See 2509.'),
     Message.NTC_NAK_RETRY: Cause(
         'A command is sent again; the number in the text says why.',

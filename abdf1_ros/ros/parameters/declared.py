@@ -41,6 +41,7 @@ from abdf1_ros.settings.map_row import MAX_PERIOD
 from abdf1_ros.settings.mapping import Mapping
 from abdf1_ros.settings.network import FIELDS, load_network, make_network, Network, URLS
 from abdf1_ros.settings.station_lists import octal_of, parse_stations
+from abdf1_ros.text import counted
 from rcl_interfaces.msg import ParameterDescriptor
 from rclpy.exceptions import ParameterException
 from rclpy.node import Node
@@ -167,8 +168,8 @@ class Configuration:
         written = len({mapping.topic for mapping in self.mappings if mapping.writes})
         return (f'{_resolved(parameters.net_file)} and {_resolved(parameters.map_file)}: '
                 f'port {self.port}, Mode {network.mode}, {network.baud} baud, '
-                f'{network.error_code}; {len(self.mappings)} rows, topics: {read} to read, '
-                f'{written} to write')
+                f'{network.error_code}; {counted(len(self.mappings), "row")}, topics: '
+                f'{read} to read, {written} to write')
 
 
 def take_given(node: Node) -> Given:
