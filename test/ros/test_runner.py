@@ -13,6 +13,7 @@
 # limitations under the License.
 """The threads of callbacks, and the one sequence of an end, for one bridge or many."""
 
+from collections.abc import Callable
 from itertools import groupby
 import threading
 import time
@@ -68,11 +69,20 @@ def order(calls: list[str]) -> list[str]:
     return [name for name, _ in groupby(calls)]
 
 
-def test_all_plcs_are_told_before_a_link_stops_and_results_come_before_the_last_words() -> None:
+def test_all_plcs_are_told_before_a_link_stops_and_results_come_before_the_last_words(
+        monkeypatch: pytest.MonkeyPatch) -> None:
     calls: list[str] = []
     nodes: Any = [Recorder(calls) for _ in range(3)]
+
+    def take(look: object, taken: Callable[[], int], give_up: float) -> None:
+        assert time.monotonic() < give_up
+        nodes[0].taken, nodes[2].taken = 1, 2
+        calls.append(f'{taken()} last writes')
+
+    monkeypatch.setattr('abdf1_ros.ros.bridge.node.take_last_writes', take)
     end_together(nodes)
-    assert order(calls) == ['begin', 'PLCs: ends', 'ask link', 'stop link', 'last words']
+    assert order(calls) == [
+        'begin', 'PLCs: ends', 'ask link', 'stop link', '3 last writes', 'last words']
     assert calls.count('stop link') == calls.count('last words') == 3
 
 
