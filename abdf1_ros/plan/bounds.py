@@ -21,8 +21,10 @@ settings allow, with all repetitions. Times are in seconds.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections import defaultdict
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 import math
 
 from abdf1_ros.df1.frames import Duplex, MAX_LINK_DATA
@@ -142,8 +144,8 @@ class Times:
             return Bound(mapping, after)
         if self._mode.is_polled:
             return Bound(mapping, None)
-        return Bound(mapping, after + self._wait(mapping, self._at_most),
-                     after + self._wait(mapping, self._undisturbed))
+        at_most, undisturbed = self._waits[self._turn(mapping)]
+        return Bound(mapping, after + at_most, after + undisturbed)
 
     def _preset(self, mapping: Mapping) -> float:
         assert mapping.period is not None
@@ -153,21 +155,27 @@ class Times:
         # The response time stands for the scan of the PLC.
         return max(3 * period, period + 2 * self.longest + beats + self._response_time)
 
-    def _wait(self, mapping: Mapping, time: Callable[[float], float]) -> float:
-        """
-        Return how long a fallback that is due may have to wait, and take, at most (s).
+    def _turn(self, mapping: Mapping) -> int:
+        """Return with whom a row takes turns: its station, or all where these have no turns."""
+        return mapping.station if self._mode.takes_turns else 0
 
-        ``time`` gives the seconds of a transaction whose frames take so long (s) on the line.
-        """
+    @cached_property
+    def _waits(self) -> dict[int, tuple[float, float]]:
+        """Return how long (s) a fallback that is due may wait, and take: at most, and usually."""
         # In standard polling the others have the line meanwhile; that is in each scan.
-        own = [other for other in self._own
-               if not self._mode.takes_turns or other.station == mapping.station]
-        writes = [frames for other in own for frames in self._written[other]]
-        reads = 1 + (len(writes) - 1) // OWN_IN_A_ROW
-        if self._mode.most_under_way(self._line) > 1 or len(own) < len(self._own):
-            reads = len(writes)  # others may have had the writes between two reads
-        # What is under way, the reads that have a turn in between, and all of ours.
-        return (1 + reads) * time(self._any_frames) + sum(map(time, writes))
+        turns: defaultdict[int, list[float]] = defaultdict(list)
+        for own in self._own:
+            turns[self._turn(own)] += self._written[own]
+        # Where others have turns, too, they may have had the writes between two reads.
+        is_apart = self._mode.most_under_way(self._line) > 1 or len(turns) > 1
+        found = {}
+        for turn, writes in turns.items():
+            reads = len(writes) if is_apart else 1 + (len(writes) - 1) // OWN_IN_A_ROW
+            # What is under way, the reads that have a turn in between, and all of ours.
+            at_most, usual = ((1 + reads) * time(self._any_frames) + sum(map(time, writes))
+                              for time in (self._at_most, self._undisturbed))
+            found[turn] = at_most, usual
+        return found
 
     def _at_most(self, frames: float) -> float:
         """Return the seconds of a transaction, with a reply of ours that takes turns with it."""

@@ -31,6 +31,7 @@ from abdf1_ros.settings.heartbeats import Fallback, Heartbeat, PublishWhile
 from abdf1_ros.settings.mapping import Mapping
 from abdf1_ros.settings.network import Network
 import pytest
+from support.counting import lines_run
 from support.mappings import make_mapping
 
 QUICK = Network(timeout=200, cmd_timeout=500, nak_retries=1, enq_retries=1, baud=19200)
@@ -124,6 +125,15 @@ def test_rule_16_what_plcs_ask_of_us_takes_turns_with_our_commands() -> None:
     assert shared.seconds and shared.seconds - alone.seconds > 2 * 2 * 400 * 10 / 19200
     assert alone.usual and shared.usual and shared.usual - alone.usual > 2 * 400 * 10 / 19200
     assert beside.usual and beside.usual > alone.usual
+
+
+def test_rule_16_bounds_of_twice_the_rows_take_twice_the_work() -> None:
+    def work(count: int) -> int:
+        rows = [make_mapping(f'N7:{number}', 'Write', fallback=Fallback((0,), 500))
+                for number in range(count)]
+        return lines_run(lambda: [*Times(QUICK, rows).bounds()], 'plan')
+
+    assert work(100) < 2.2 * work(50)
 
 
 def test_rule_16_fallback_of_our_own_table_needs_no_line() -> None:
