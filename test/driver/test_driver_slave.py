@@ -24,7 +24,6 @@ from abdf1_ros.driver.driver import Driver
 from abdf1_ros.driver.settings import DriverSettings
 from abdf1_ros.driver.write import Outcome
 from abdf1_ros.pccc.dialect import Request
-from abdf1_ros.pccc.emulated import Setting
 from abdf1_ros.pccc.families import dialect_of, parse_address
 from abdf1_ros.pccc.file_types import PlcType
 from abdf1_ros.settings.heartbeats import Fallback, Heartbeat
@@ -271,15 +270,3 @@ def test_rules_3_and_9_nothing_old_goes_out_when_the_master_polls_again() -> Non
     assert told == [('beat', 0), ('speed', 7)]  # the executor does not run
     bench.is_alive = True
     assert bench.told(1.0)[:2] == [('beat', 1), ('beat', 2)]
-
-
-def test_rule_8_change_to_run_is_seen_by_a_slave() -> None:
-    bench = Interlocked()
-    bench.told(3.0)
-    bench.plc.processor.setting = Setting.PROGRAM
-    bench.told(3.0)
-    store(bench.plc, 'N7:10', [800])
-    bench.plc.processor.setting = Setting.RUN
-    told = bench.told(3.0)
-    at = told.index(('beat', 0))
-    assert told[at:at + 3] == [('beat', 0), ('speed', 7), ('beat', 1)]

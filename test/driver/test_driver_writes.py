@@ -15,9 +15,7 @@
 """What holds for every write: one result that is true, and no command executed late or twice."""
 
 from collections import Counter
-from collections.abc import Sequence
 import itertools
-import math
 import sys
 import threading
 
@@ -57,27 +55,6 @@ class Executed:
         if command.cmd == 0x0F and not reply.data:
             self.writes.append(command)
         return reply
-
-
-REFUSED: list[tuple[str, Sequence[float], str]] = [
-    ('N7:0', [1, 2], 'the mapping has 1'), ('N7:0', [], 'the mapping has 1'),
-    ('N7:0', [32768], '32768'),
-    ('N7:0', [11], 'Max 10'), ('N7:0', [-11], 'Min -10'),
-    ('F8:0', [math.nan], 'nan'), ('F8:0', [math.inf], 'inf'), ('F8:0', [1e39], '1e+39'),
-    ('B3:0/0', [2], '2')]
-
-
-@pytest.mark.parametrize(('text', 'values', 'reason'), REFUSED)
-def test_refused_before_the_line(text: str, values: list[float], reason: str) -> None:
-    limit = math.inf if text == 'B3:0/0' else 10.0
-    mapping = make_mapping(text, 'Write', minimum=-limit, maximum=limit)
-    bench, plc = bench_of(mapping)
-    executed = Executed(plc)
-    bench.write(mapping, values, run=2.0)
-    result, = bench.listener.results
-    assert result.outcome is Outcome.REFUSED
-    assert reason.lower() in result.detail.lower()
-    assert executed.writes == []
 
 
 def test_one_message_for_several_rows_is_written_to_all_or_none() -> None:

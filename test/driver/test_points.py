@@ -15,6 +15,8 @@
 """Points and writes: what is published, how fresh it is, and the bytes of a write."""
 
 from array import array
+import math
+import re
 
 from abdf1_ros.driver.reads.point import Freshness, ReadPoint
 from abdf1_ros.driver.write import Outcome, show, Write
@@ -255,6 +257,17 @@ def test_limits_hold_for_every_element(values: list[float], error: str | None) -
     with pytest.raises(FormatError) as caught:
         Write(mapping, values, 0.0)
     assert str(caught.value) == error
+
+
+@pytest.mark.parametrize(('text', 'values', 'reason'), [
+    ('N7:0', [1, 2], 'the mapping has 1'), ('N7:0', [], 'the mapping has 1'),
+    ('N7:0', [32768], '32768'), ('N7:0', [11], 'Max 10'), ('N7:0', [-11], 'Min -10'),
+    ('F8:0', [math.nan], 'nan'), ('F8:0', [math.inf], 'inf'), ('F8:0', [1e39], '1e+39'),
+    ('B3:0/0', [2], '2')])
+def test_what_does_not_fit_is_refused(text: str, values: list[float], reason: str) -> None:
+    limit = math.inf if text == 'B3:0/0' else 10.0
+    with pytest.raises(FormatError, match=re.escape(reason)):
+        Write(make_mapping(text, 'Write', minimum=-limit, maximum=limit), values, 0.0)
 
 
 def test_limit_in_the_message_is_the_limit_of_the_file() -> None:
