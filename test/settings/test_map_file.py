@@ -100,6 +100,8 @@ NEEDS = 'Item: 2, write topic "t" needs the message type (int16) and Length (1)'
       for command in ('Read', 'ReadWrite', 'Write')),
     ({'Topic': 'x.y', 'Command': 'Read'}, {'Topic': 'x:y', 'Command': 'Read'},
      f'3:8 (Topic): Item: 2, read topic "x_y" is the topic{OF_A}'),
+    ({'Topic': 'b', 'Command': 'Read'}, {'Command': 'Read'},
+     f'3:8 (Topic): Item: 2, read topic "b" is the topic{OF_A}'),
     ({}, {'Topic': 'a', 'Command': 'Read'},
      f'3:8 (Topic): Item: 2, read topic "a" is the topic{OF_A}'),
     (T, T | {'Length': '2'}, f'3:8 (Topic): {NEEDS}'),

@@ -135,6 +135,7 @@ def test_left_out_is_as_empty(path: Path) -> None:
     ('Baud', '9601',
      'Baud = "9601" should be one of 1200, 2400, 4800, 9600, 19200, 38400, 57600, 115200'),
     ('Data_Bits', '9', 'Data_Bits = "9" should be a whole number from 5 to 8'),
+    ('Data_Bits', '9 ~', 'Data_Bits = "9 ~" should be a whole number from 5 to 8'),
     ('Parity', 'Mark', 'Parity = "Mark" should be one of None, Even, Odd'),
     ('Handshake', 'Mars', 'Handshake = "Mars" should be one of Yes, No'),
     ('Polling', 'Mars', 'Polling = "Mars" should be one of Message, Standard'),
