@@ -404,6 +404,20 @@ def test_slow_row_that_is_read_with_a_fast_one_keeps_its_own_stale_time() -> Non
     assert bench.driver.points[slow].stale_time == pytest.approx(1.2 + block_time(block))
 
 
+def test_long_read_that_a_lost_port_has_broken_off_begins_anew() -> None:
+    fast, long = make_mapping('N9:0', period=20), make_mapping('N7:0', length=250, period=1000)
+    bench, plc = make_bench(fast, long, network=Network(baud=115200, timeout=200))
+    job, = (job for job in bench.driver.readings.reads.jobs if job.block.mappings == (long,))
+    bench.run_until(lambda: job.is_unfinished)  # while the fast one has the line
+    bench.lose_port()
+    store(plc, 'N7:0', [1] * 250)
+    bench.run(60.0)
+    bench.open(run=0.5)
+    values = bench.listener.values(long)
+    assert values and all(entry == [1] * 250 for entry in values)
+    assert (bench.driver.readings.reads.longest_poll_cycle or 0) < 1
+
+
 @pytest.mark.parametrize('baud', [1200, 9600, 38400])
 def test_poll_cycle_is_close_to_the_expected_one_on_a_saturated_line(baud: int) -> None:
     mappings = [make_mapping(f'{text}', length=length, period=0) for text, length in (
