@@ -246,6 +246,16 @@ def test_address_that_comes_into_being_is_read_with_its_neighbours_again() -> No
     assert all(point.error is None for point in bench.driver.points.values())
 
 
+def test_slow_mapping_that_is_read_with_fast_ones_is_published_at_its_own_pace() -> None:
+    fast, slow = make_mapping('N7:0', period=100), make_mapping('N7:1', 'ReadWrite', period=1000)
+    bench, _ = make_bench(fast, slow, run=5.05)
+    assert len(bench.driver.readings.blocks) == 1
+    assert len(bench.listener.values(fast)) == 51
+    assert len(bench.listener.values(slow)) == 6
+    bench.write(slow, [5], run=0.1)
+    assert bench.listener.values(slow)[6:] == [[5]]
+
+
 def test_plc_in_trouble_fails_the_points_and_divides_nothing() -> None:
     mappings = [make_mapping('N7:0'), make_mapping('N7:1')]
     bench, plc = make_bench(*mappings)

@@ -208,6 +208,15 @@ def test_gateway_that_fills_in_its_own_node(polling: str) -> None:
     assert bench.listener.numbers() == {2523}
 
 
+def test_processors_behind_a_gateway_tell_what_they_are() -> None:
+    bench = Bench(processor_period=5.0)
+    bench.run(2.0)
+    known = bench.driver.checks.known
+    assert 'PLC-5' in known(FIRST).processor
+    assert '5/03' in known(SECOND).processor
+    assert '1770-KF3' in known(GATEWAY).processor
+
+
 # heartbeats and fallbacks; the rules have the numbers of docs/heartbeats.md
 
 
