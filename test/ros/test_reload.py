@@ -177,8 +177,8 @@ def test_link_that_does_not_take_the_files_is_the_end(
 
 def test_files_that_cannot_be_taken_leave_messages_to_the_old_driver(
         bench: Bench, monkeypatch: pytest.MonkeyPatch) -> None:
-    results = bench.observer.results()
-    publisher = bench.observer.publisher(Int16MultiArray, '/abdf1/write/recipe')
+    results = bench.results
+    publisher = bench.ros.publisher(Int16MultiArray, '/abdf1/write/recipe')
 
     def fail(*arguments: object) -> None:
         raise KeyError('a bug')
