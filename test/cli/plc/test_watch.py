@@ -174,7 +174,7 @@ def test_table_marks_changes_and_says_what_does_not_fit(draw: Draw) -> None:
 
 def test_table_has_tags_beside_addresses(draw: Draw) -> None:
     words = make_mapping('N7:8', length=3)
-    lines = draw([words, SPEED], (words, array('h', [1, 2, 3])), size=(52, 9),
+    lines = draw([words, SPEED], (words, array('h', [9, 2, 3])), (words, array('h', [1, 2, 3])),
                  tags={'N7:0': 'speed', 'N7:10': 'a_long_tag'})
     assert [(line[:16], line[18:].split()[-1:]) for line in lines] == [
         ('address         ', ['value']), ('N7:8            ', ['1']), ('N7:9            ', ['2']),
