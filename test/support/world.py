@@ -81,6 +81,7 @@ _WRITES = (b'\x67', b'\xAA')  # functions of a typed write
 _TICKS = 30_000
 _FAR = 1  # what a VirtualLine calls the far end
 SMALL = Noise(lost=0.0005, flipped=0.001, inserted=0.0005)
+GREAT = Noise(lost=0.005, flipped=0.01, inserted=0.005)  # of which some is more than all retries
 MODES: dict[str, dict[str, str]] = {
     'Message': {}, 'Standard': {'polling': 'Standard'}, 'Peer': {'mode': 'Peer'},
     'Radio': {'mode': 'Radio'}, 'Gateway': {}, 'Standard gateway': {'polling': 'Standard'},
@@ -195,7 +196,8 @@ class Executed:
     A word that a PLC has taken from the line.
 
     ``sent`` is when its command was put on the line first; ``driver`` counts the drivers there
-    were. ``before`` was in the word. ``is_late`` tells that a gateway had kept it.
+    were. ``before`` was in the word. ``is_late`` tells that a gateway had kept it, ``is_told``
+    that the PLC has replied.
     """
 
     when: float
@@ -206,6 +208,7 @@ class Executed:
     driver: int
     before: int
     is_late: bool = False
+    is_told: bool = True
 
 
 @dataclass(slots=True)
@@ -216,7 +219,7 @@ class WatchedPlc:
     places: dict[str, str]  # address by tag
     refuses: bool = False  # everything but heartbeats
     refuses_messages: bool = False  # but takes fallbacks
-    swallows_replies: bool = False  # to messages, which are executed
+    swallows_replies: bool = False  # to messages, which are executed, and to some heartbeats
     other: int = 0  # what another writer has put into the word of the heartbeat
     stopped: float = 0.0  # when its program stopped last
     ran_again: float = 0.0  # and when it ran after that
@@ -459,11 +462,13 @@ class World(DriverBench):
             for tag, _ in written:
                 watched.set(watched.places[tag], saved[watched.places[tag]])
             return command.reply(sts=0x10)
+        is_told = not watched.swallows_replies or not is_message and (
+            bool(values) or self.dice.random() < 0.5)
         sent = self._first_sent(command)
         self.executed += [Executed(now, min(sent, now), station, tag, value, self.drivers,
-                                   saved[watched.places[tag]], is_late)
+                                   saved[watched.places[tag]], is_late, is_told)
                           for tag, value in written]
-        if is_message and watched.swallows_replies:
+        if not is_told:
             return reply._replace(tns=reply.tns ^ 0x8000)  # which nobody waits for
         return reply
 

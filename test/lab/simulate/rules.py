@@ -228,6 +228,7 @@ class Beats(Rule):
         super().__init__(world)
         self._last: dict[str, int] = {}
         self._zero: dict[str, float] = {}  # since when it is 0
+        self._untold: set[str] = set()  # those whose last value was not confirmed
         self._driver: dict[str, int] = {}
         self._stood = max(_LEAST_ZERO, world.plant.period / 1000)
 
@@ -247,13 +248,18 @@ class Beats(Rule):
             if last:
                 self._zero[tag] = entry.when
         else:
-            self.demand(not last or value in (last, last % 32_767 + 1), entry, 'after', last)
+            following = () if tag in self._untold else (last and last % 32_767 + 1,)
+            self.demand(not last or value in (last, *following), entry, 'after', last)
             if not last:
                 stood = self._stood if is_ours else _LEAST_ZERO
                 self.demand(entry.when - self._zero[tag] >= stood - 1e-6, entry,
                             '0 stood since', self._zero[tag])
             if is_ours:
                 self._judge_count(entry)
+        if entry.is_told:
+            self._untold.discard(tag)
+        else:
+            self._untold.add(tag)
         self._last[tag] = value
 
     def _judge_count(self, entry: Executed) -> None:

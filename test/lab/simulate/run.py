@@ -42,7 +42,7 @@ from abdf1_ros.driver.write import Outcome
 from abdf1_ros.pccc.emulated import Setting
 from simulate.rules import Broken, Judge
 from support.virtual_line import QUIET
-from support.world import BEAT, FREE, MODES, OUTPUTS, Plant, SAFE, SMALL, STEP, World
+from support.world import BEAT, FREE, GREAT, MODES, OUTPUTS, Plant, SAFE, SMALL, STEP, World
 
 TURNS = 8  # troubles of a plant, with a calm after each
 RATES = (0.0, 0.0, 0.01, 0.05, 0.2)  # messages a step and row
@@ -194,7 +194,7 @@ class Story:
 
 
 def _noise(story: Story, station: int) -> None:
-    story.world.line.noise = SMALL
+    story.world.line.noise = story.dice.choice([SMALL, GREAT])
 
 
 def _silence(story: Story, station: int) -> None:
