@@ -262,7 +262,7 @@ MISTAKES = (
     Mistake('12', 'the fallback of a Serve row is not stored', Interlocks, '__init__',
             _stores_nothing),
     Mistake('15', 'rows are withheld in silence', ReadPoint, 'withhold', _always(False)),
-    Mistake('16', 'the bound is Fallback_After alone', Times, '_wait', _always(0.0)),
+    Mistake('16', 'the bound is Fallback_After alone', Times, '_at_most', _always(0.0)),
     Mistake('16', 'the bound counts no repetitions', Times, '_at_most', _undisturbed),
     Mistake('16', 'the preset is a Period', Times, '_preset', _preset_of_a_period),
     Mistake('17', 'each writing of a fallback has a result', Interlocks, '_fallback_ended',
