@@ -4,6 +4,7 @@ PYTHON ?= python3
 DEMO_SECONDS ?= 30
 FUZZ_SECONDS ?= 60
 MUTANTS ?= 200
+PART ?= df1
 LONG_HOURS ?= 1
 HOURS ?= 1
 LONG_ARGS ?=
@@ -47,7 +48,7 @@ help: ## List the targets
 	@echo
 	@echo 'Variables: PYTHON (of setup), DEMO_SECONDS (of demo), PYTEST_ARGS (of test),'
 	@echo 'TEST_WORKERS (5: processes of test, more than processors, as many tests wait),'
-	@echo 'MUTANTS (of mutate), HOURS (of simulate), FUZZ_SECONDS (of fuzz), LONG_HOURS and LONG_ARGS (of long; LONG_ARGS=--help).'
+	@echo 'PART and MUTANTS (of mutate), HOURS (of simulate), FUZZ_SECONDS (of fuzz), LONG_HOURS and LONG_ARGS (of long; LONG_ARGS=--help).'
 
 .PHONY: setup
 setup: $(INSTALLED) ## Make .venv with all that the other targets need
@@ -160,15 +161,16 @@ simulate: $(INSTALLED) ## Simulate plants with every kind of fault for HOURS (1)
 	$(PY) test/lab/simulate/run.py --hours $(HOURS)
 
 .PHONY: mutate
-mutate: $(INSTALLED) ## Make MUTANTS (200) small mistakes, tell which no test finds (hours)
-	$(PY) test/lab/mutation/run.py --count $(MUTANTS)
+mutate: $(INSTALLED) ## Make MUTANTS (200) small mistakes in PART (df1), tell which no test finds
+	@$(PY) -c 'import mutmut' 2>/dev/null || $(PY) -m pip install --quiet -r requirements/mutation.txt
+	$(PY) test/lab/mutate.py $(PART) --count $(MUTANTS)
 
 .PHONY: audit
 audit: ## Look up known vulnerabilities of the pinned packages (asks a server on the Internet)
 	@test -d $(VENV)/audit || $(PYTHON) -m venv $(VENV)/audit
 	$(VENV)/audit/bin/python -m pip install --quiet -r requirements/audit.txt
 	@# Each file for itself, as they do not go together; the sources of ros_tools.txt are in no index.
-	set -e; for name in test tools fuzz audit noble ros_tools_needs ros; do \
+	set -e; for name in test tools fuzz mutation audit noble ros_tools_needs ros; do \
 	    $(VENV)/audit/bin/pip-audit --strict -r requirements/$$name.txt; \
 	done
 

@@ -28,7 +28,7 @@ KEYS = dict(line.split() for line in
             (ROOT / 'requirements' / 'rosdep.txt').read_text(encoding='utf-8').splitlines()
             if line and not line.startswith('#'))
 PINNED = ('ros.in', 'ros_tools.txt', 'ros_tools_needs.txt', 'test.txt', 'tools.txt', 'fuzz.txt',
-          'audit.txt', 'noble.txt')
+          'mutation.txt', 'audit.txt', 'noble.txt')
 
 # The key that brings a module which has another name.
 BRINGS = {'serial': 'python3-serial', 'yaml': 'python3-yaml'}
