@@ -317,7 +317,8 @@ class Order(Rule):
                           for number in world.plcs}
         is_own = entry.value in (0, SAFE) and entry.tag[0] in 'wb'
         left = self._left[station]
-        is_well = max(world.ill[station], world.ill[0]) <= world.opened
+        # Not after a port that was lost and opened again: a fresh row needs no fallback then.
+        is_well = max(world.ill[station], world.ill[0], world.opened) <= world.killed_at
         if not left or not is_well or entry.value in GUESTS or entry.is_late \
                 or entry.tag.startswith('other'):
             return
@@ -484,7 +485,11 @@ class Rungs(Rule):
                 self.demand(now - world.executor_ran < limit or station in world.others,
                             'the executor ran at', world.executor_ran)
             for when, lamp, is_on in new:
-                calm = max(world.ill[station], world.ill[0], world.opened, watched.ran_again)
+                # A peer repeats no reply in time, so its heartbeat may have to come again (3 a).
+                lossy = (when if world.losses else world.lossy_until) \
+                    if world.plant.mode == 'Peer' else 0.0
+                calm = max(world.ill[station], world.ill[0], world.opened, watched.ran_again,
+                           lossy)
                 if lamp is not Lamp.ALIVE or is_on or watched.other or not self._counts.get(tag) \
                         or when < calm + 2 * watched.preset or station in world.others:
                     continue
