@@ -123,8 +123,12 @@ class Plant:
         common = [name for name in MODES if name not in POLLED]
         mode = mode or dice.choice([*MODES, *3 * common])
         stations = 1 if mode == 'Peer' or 'ateway' in mode else dice.choice([1, 1, 1, 2, 3])
+        rows = dice.choice([1, 2, 2, 3])
+        if mode == 'Slave':  # the polls of its master leave room for three outputs in all
+            stations = min(stations, 2)
+            rows = min(rows, 3 // stations)
         return cls(
-            mode, stations, dice.choice([1, 2, 2, 3]), dice.choice(['PLC5', 'SLC']),
+            mode, stations, rows, dice.choice(['PLC5', 'SLC']),
             dice.choice([600, 1000, 2000]), dice.choice([500, 1000, 2000]),
             dice.choice([None, None, 800, 1500]),
             dice.choice([4800, 4800, 9600, 19200] if 'Standard' in mode else [9600, 19200, 38400]),
