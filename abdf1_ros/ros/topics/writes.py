@@ -41,8 +41,8 @@ from std_msgs.msg import String
 _LONGEST_LABEL = 100
 
 # Why a message may be too old: one that was taken at once, and one that has waited for ``begin``.
-_CLOCKS = 'or the clocks differ'
-_BEGUN = 'this node had just begun, and looks for another of its name first'
+_CLOCKS = 'the network is slow, this node stood still, or the clocks differ'
+_BEGUN = 'this node had just begun and looked for another of its name, or the clocks differ'
 
 # Publishers of one topic whose numbers are followed at a time.
 _MOST_PUBLISHERS = 16
