@@ -178,7 +178,7 @@ def test_reflexes_change_nothing_on_the_line(mode: str, monkeypatch: pytest.Monk
     for react in Sender.react, lambda sender, reflex, symbol: None:
         monkeypatch.setattr(Sender, 'react', react)
         rig = Rig(mode, noise=noise_of(0.004), seed=3, chunk=8)
-        rig.run(25)
+        rig.run(12)
         seen.append((rig.master.machine.sent, rig.master.counts(), rig.line.now))
     assert seen[0] == seen[1]
 
@@ -187,7 +187,7 @@ def test_reflexes_change_nothing_on_the_line(mode: str, monkeypatch: pytest.Monk
 @pytest.mark.parametrize('mode', MODES)
 def test_counters_of_all_ends_agree_on_a_clean_line(mode: str, chunk: int) -> None:
     rig = Rig(mode, chunk=chunk)
-    rig.run(25)
+    rig.run(10)
     rig.line.run_for(2.0)
     assert_exact(rig)
     for src, node in rig.nodes.items():
@@ -219,7 +219,7 @@ def test_counters_of_all_ends_agree_on_a_clean_line(mode: str, chunk: int) -> No
 @pytest.mark.parametrize('mode', MODES)
 def test_noise_costs_time_but_no_result_is_wrong(mode: str) -> None:
     rig = Rig(mode, noise=noise_of(1e-2), seed=101)
-    rig.run(30)
+    rig.run(15)
     assert_exact(rig)
     for src in (MASTER, *ASKING):
         assert len(rig.results(src)) >= 0.25 * len(rig.nodes[src].all)

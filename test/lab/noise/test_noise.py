@@ -45,7 +45,7 @@ PROBES_SHARE = 8
 def test_noise_gives_no_wrong_value_that_a_check_could_see(
         mode: str, error_code: str) -> None:
     rig = Rig(mode, error_code, seed=50)
-    rig.disturb(2e-2, 300.0)
+    rig.disturb(2e-2, 150.0)
     rig.settle()
     counts = rig.judge.counts
     assert rig.judge.faults == 0, counts
