@@ -159,3 +159,14 @@ def test_messages_go_to_the_old_driver_until_the_new_one_has_the_line(
     topics.give_to(opened)
     node.publish('a', 2)
     assert (node.said, new.said) == (['a 1'], ['a 2'])
+
+
+def test_message_that_waits_for_rows_which_a_reload_takes_away_ends_nothing(
+        node: Taker, topics: WriteTopics) -> None:
+    node.publish('a', 1)
+    node.publish('b', 1)
+    del node.mappings[0]
+    topics.give_to(node.open(topics))
+    topics.begin()
+    node.tasks[0]()
+    assert node.said == ['b 1']

@@ -107,8 +107,9 @@ class Parameters:
 
 
 Given = MappingType[str, Any]
-_NONE: Given = {}
 """What the user has set, by name of the parameter."""
+
+_NONE: Given = {}
 
 _OF_RCLPY = 'use_sim_time', 'start_type_description_service'
 

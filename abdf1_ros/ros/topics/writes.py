@@ -169,7 +169,8 @@ class WriteTopics:
     def _take_waiting(self) -> None:
         for topic, message, info in self._waiting:
             self.taken += 1
-            self._topics[topic].take(message, info, has_waited=True)
+            if topic in self._topics:  # a reload may have taken its rows away
+                self._topics[topic].take(message, info, has_waited=True)
         self._waiting.clear()
         self._is_open = True
 
