@@ -79,7 +79,7 @@ def test_clock_of_the_host_that_steps_changes_no_age(observer: Observer, tmp_pat
         rig.node.wait_for('the clock has stepped')
         rig.recovers()
         # Here the publisher's clock has not stepped, as if it were another host.
-        assert re.match(r'not written: refused: it (came|was taken) 36\d\d\.', rig.write(3.0))
+        assert re.match(r'not written: refused: it came 36\d\d\.', rig.write(3.0))
         for _ in range(2):  # an hour back, and then behind the publisher
             after = len(rig.node.lines)
             rig.node.send(signal.SIGUSR2)

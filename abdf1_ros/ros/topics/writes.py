@@ -40,10 +40,6 @@ from std_msgs.msg import String
 
 _LONGEST_LABEL = 100
 
-# Why a message may be too old: one that was taken at once, and one that has waited for ``begin``.
-_CLOCKS = 'the network is slow, this node stood still, or the clocks differ'
-_BEGUN = 'this node had just begun and looked for another of its name, or the clocks differ'
-
 # Publishers of one topic whose numbers are followed at a time.
 _MOST_PUBLISHERS = 16
 
@@ -117,13 +113,8 @@ class WriteTopic:
         if lost := self._losses.lost_before(info['publication_sequence_number']):
             self._on_loss(self._topic, lost)
 
-    def take(self, message: Any, info: Any, has_waited: bool = False,
-             reject_reason: str = '') -> None:
-        """
-        Write a message to every mapping of the topic, or refuse it for a ``reject_reason``.
-
-        One that ``has_waited`` came before the node took messages.
-        """
+    def take(self, message: Any, info: Any, reject_reason: str = '') -> None:
+        """Write a message to every mapping of the topic, or refuse it for a ``reject_reason``."""
         # It may have waited while this process was paused or the network was down.
         now = time.time_ns()
         stamps = filter(None, (info['source_timestamp'], info['received_timestamp']))
@@ -134,9 +125,10 @@ class WriteTopic:
             if reject_reason:
                 raise FormatError(reject_reason)
             if waited > self._patience:
-                what, cause = ('was taken', _BEGUN) if has_waited else ('came', _CLOCKS)
-                raise FormatError(f'it {what} {waited:.1f} s after it was published, '
-                                  f'write_timeout is {self._patience:g} s; {cause}')
+                raise FormatError(
+                    f'it came {waited:.1f} s after it was published, write_timeout is '
+                    f'{self._patience:g} s; the network is slow, this node stood still or had '
+                    'just begun, or the clocks differ')
             values = values_of(message)
         except FormatError as error:
             self._driver.refuse(self._mappings, str(error), message.data, request)
@@ -170,7 +162,7 @@ class WriteTopics:
         for topic, message, info in self._waiting:
             self.taken += 1
             if topic in self._topics:  # a reload may have taken its rows away
-                self._topics[topic].take(message, info, has_waited=True)
+                self._topics[topic].take(message, info)
         self._waiting.clear()
         self._is_open = True
 
@@ -207,7 +199,7 @@ class WriteTopics:
                 self._waiting.append((topic, message, info))
                 return
             self.taken += 1
-            self._topics[topic].take(message, info, reject_reason=reject_reason)
+            self._topics[topic].take(message, info, reject_reason)
 
         callback: Any = take
         return self._node.create_subscription(kind, _name(topic), callback, write_qos())
