@@ -21,7 +21,8 @@ its turn. Then there are three queues:
 - ``writes`` go first, but after four of their commands in a row a check or read that is due has
   its turn.
 - ``checks``, such as the question for a station's mode, go before the reads. After a check, all
-  reads that were due when it began go before the next check.
+  reads that were due when it began go before the next check. Where rows depend on the modes of
+  several stations, one read goes between two questions, and all of them before the same question.
 - ``reads`` go in the order of ``reads.queue``.
 
 ``guests`` share what heartbeats, fallbacks and writes leave: a quarter of that time. After a
@@ -74,6 +75,7 @@ class Agenda:
         self._writes_in_a_row = 0
         self._has_begun_write = False
         self._last_check = self._last_refresh = -math.inf
+        self._has_read_since = True  # the last check
         self._last_probe_was_check = False
 
     def next(self, now: float, busy: Container[int] = ()) -> JobTask | None:  # noqa: A003
@@ -168,12 +170,16 @@ class Agenda:
 
     def _check(self, now: float, busy: Container[int]) -> Job | None:
         """Return a check that is due; the turn of the reads comes after it."""
-        if self._reads.find_due(self._last_check):
+        find_read = self._reads.find_due
+        is_reads_turn = find_read(self._last_check)
+        if is_reads_turn and not self._has_read_since:
             return None
-        check = self._checks.next(now, busy, self._probe_from(now))
+        check = self._checks.next(
+            now, busy, self._probe_from(now),
+            lambda check: not is_reads_turn or check.is_planned and not find_read(check.begun))
         if check is None:
             return None
-        self._last_check = now
+        self._last_check, self._has_read_since = now, False
         self._last_probe_was_check |= check.is_probe
         if self._writes.waiting:
             self._writes_in_a_row = MAX_WRITES_IN_A_ROW
@@ -203,6 +209,7 @@ class Agenda:
         job = self._reads.next(now, busy)
         if job is not None:
             self._last_probe_was_check &= not job.is_probe
+            self._has_read_since = True
             self._writes_in_a_row = self._own_in_a_row = 0
         return job
 

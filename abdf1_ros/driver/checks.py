@@ -29,6 +29,7 @@ from collections.abc import Callable, Container, Mapping
 from dataclasses import dataclass, field, replace
 from enum import Enum
 import math
+from operator import attrgetter
 
 from abdf1_ros.df1.stations import ActiveStationList
 from abdf1_ros.driver.inbox import Inbox
@@ -63,14 +64,16 @@ class Check(Job):
     One slow job: ``due`` is the clock value (s) from which it wants the line.
 
     It is infinite while the job is under way, which has ``begun`` then, and while there is no
-    station to ask. ``period`` is in seconds, infinite for a job that is done once.
+    station to ask. ``period`` is in seconds, infinite for a job that is done once. What rows
+    depend on is ``planned``: the forecast of the line counts it.
     """
 
     def __init__(self, checks: Checks, station: int, kind: CheckKind, period: float,
-                 due: float = 0.0) -> None:
+                 due: float = 0.0, *, is_planned: bool = False) -> None:
         self.station, self.kind = station, kind
         self.period, self.due = period, due
-        self.begun = 0.0
+        self.is_planned = is_planned
+        self.begun = -math.inf
         self._checks = checks
 
     def steps(self, now: float) -> Steps[None]:
@@ -126,7 +129,8 @@ class Checks:
         self._wanted = wanted or {}
         periods = {station.number: min(self._wanted.get(station.number, math.inf),
                                        period or math.inf) for station in stations}
-        self._checks = [Check(self, number, CheckKind.STATUS, often)
+        self._checks = [Check(self, number, CheckKind.STATUS, often,
+                              is_planned=number in self._wanted)
                         for number, often in periods.items() if not math.isinf(often)]
         self._asked = {check.station for check in self._checks}
         self._checks += [Check(self, station.number, CheckKind.ECHO, ECHO_PERIOD)
@@ -189,23 +193,26 @@ class Checks:
                 self._add_request(station, now)
         return now >= self._next_due
 
-    def next(self, now: float, busy: Container[int], probe_from: float  # noqa: A003
-             ) -> Check | None:
+    def next(self, now: float, busy: Container[int], probe_from: float,  # noqa: A003
+             may_go: Callable[[Check], bool]) -> Check | None:
         """
-        Return the next check that is due, None for none or while its station is busy.
+        Return the next check that is due and may go, None for none or while its station is busy.
 
         It may be a probe from the clock value ``probe_from`` (s) on.
         """
-        for check in sorted(self._checks, key=lambda check: check.due):
-            if check.due <= now and check.station in busy:
+        for check in sorted(self._checks, key=attrgetter('due')):
+            if check.due > now or check.is_planned and not may_go(check):
+                break
+            if not may_go(check):
+                continue
+            if check.station in busy:
                 return None  # no other check instead: after each of them the reads have their turn
+            check.due = self._wanted_from(check, probe_from)
             if check.due <= now:
-                check.due = self._wanted_from(check, probe_from)
-                if check.due <= now:
-                    check.due = math.inf
-                    check.is_probe = not self._stations[check.station].replies_in_time
-                    self._plan()
-                    return check
+                check.due = math.inf
+                check.is_probe = not self._stations[check.station].replies_in_time
+                self._plan()
+                return check
         self._plan()
         return None
 
@@ -232,7 +239,7 @@ class Checks:
             self._link_failed(check.station, error)
             if check.kind is CheckKind.COUNTERS or self.known(check.station).identity is None:
                 self._take_refusal(check, str(error))
-                if check.station not in self._wanted:
+                if not check.is_planned:
                     next_due += check.period * _UNANSWERED
         self._finish(check, next_due)
         self._stations.tried(

@@ -245,14 +245,14 @@ def _packets(model: LineModel, mapping: Mapping) -> list[float]:
         mapping.address, mapping.codec, zeros, mapping.dialect)]
 
 
-def own_load(network: Network, mappings: Iterable[Mapping], default_period: float,
-             response_time: float = forecast.USUAL_RESPONSE_TIME) -> float:
-    """Return the part of the line's time for heartbeats and for questions for the mode."""
-    mappings, model = list(mappings), forecast.line_model(network)
-    beats = sum(_with_answers(_packets(model, mapping), response_time) / (mapping.period / 1000)
-                for mapping in mappings if mapping.heartbeat is not None and mapping.period)
-    return beats + sum(_question_time(model, response_time) / period
-                       for period in _asked(mappings, default_period).values())
+def own_work(model: LineModel, mappings: Iterable[Mapping], default_period: float,
+             response_time: float = forecast.USUAL_RESPONSE_TIME) -> list[tuple[float, float]]:
+    """Return the seconds and the period (s) of each heartbeat and each question for a mode."""
+    mappings = list(mappings)
+    question = _question_time(model, response_time)
+    return [*((_with_answers(_packets(model, mapping), response_time), mapping.period / 1000)
+              for mapping in mappings if mapping.heartbeat is not None and mapping.period),
+            *((question, period) for period in _asked(mappings, default_period).values())]
 
 
 def _asked(mappings: Iterable[Mapping], default_period: float) -> dict[int, float]:
@@ -300,13 +300,13 @@ def conditions(network: Network, mappings: Iterable[Mapping]) -> Iterator[str]:
                'no bound holds after a lost packet')
 
 
-def guard_faults(mappings: Sequence[Mapping],
-                 planner: Planner) -> Iterator[tuple[Mapping, CellFault]]:
+def guard_faults(model: LineModel, mappings: Sequence[Mapping],
+                 default_period: float) -> Iterator[tuple[Mapping, CellFault]]:
     """Yield the guarded rows whose counter is not read often enough (rule 14), and why."""
     counters = {mapping: (condition.text, condition.timeout) for mapping in mappings
                 if (condition := mapping.publish_while) and condition.timeout is not None}
-    blocks = planner.plan(mappings) if counters else []
-    expected = forecast.intervals(blocks, forecast.USUAL_RESPONSE_TIME)
+    blocks = Planner(model, default_period).plan(mappings) if counters else []
+    expected = forecast.intervals(blocks, own=own_work(model, mappings, default_period))
     found = {mapping.tag: expected[block.period] for block in blocks for mapping in block.mappings}
     for mapping, (tag, timeout) in counters.items():
         needed = READS_IN_TIME * found.get(tag, 0.0)

@@ -76,22 +76,24 @@ def load(blocks: Iterable[Block], response_time: float = USUAL_RESPONSE_TIME) ->
 
 
 def intervals(blocks: Iterable[Block], response_time: float = USUAL_RESPONSE_TIME,
-              own_load: float = 0.0) -> dict[float, float]:
+              own: Iterable[tuple[float, float]] = ()) -> dict[float, float]:
     """
     Return the expected seconds between two reads of a block, by its period (s).
 
     That is the period, as far as the line allows. Otherwise all periods become longer by the
-    factor of the load, but none by more than a poll cycle, as in ``ReadQueue``. ``own_load`` is
-    the part of the line's time that heartbeats need.
+    factor of the load, but none by more than a poll cycle, as in ``ReadQueue``. ``own`` has what
+    goes in between: the seconds and the period of each heartbeat and question for a mode.
     """
-    blocks = list(blocks)
-    once, needed = poll_cycle(blocks, response_time), load(blocks, response_time) + own_load
+    blocks, own = list(blocks), list(own)
+    once = poll_cycle(blocks, response_time)
+    needed = load(blocks, response_time) + sum(seconds / period for seconds, period in own)
     unlimited = poll_cycle((block for block in blocks if not block.period), response_time)
     wanted = {block.period: block.period or PATIENCE * once for block in blocks}
     if unlimited and needed < 1:
         wanted[0.0] = min(wanted[0.0], unlimited / (1 - needed))
     stretch = max(1.0, needed + unlimited / wanted[0.0] if unlimited else needed)
-    return {period: min(stretch * time, time + once) for period, time in wanted.items()}
+    cycle = once + sum(seconds for seconds, _ in own)
+    return {period: min(stretch * time, time + cycle) for period, time in wanted.items()}
 
 
 def longest_wait(blocks: Iterable[Block], response_time: float = USUAL_RESPONSE_TIME) -> float:
@@ -101,15 +103,15 @@ def longest_wait(blocks: Iterable[Block], response_time: float = USUAL_RESPONSE_
 
 
 def stale_times(blocks: Iterable[Block], default_period: float, stale_after: float,
-                own_load: float = 0.0) -> dict[Mapping, float]:
+                own: Iterable[tuple[float, float]] = ()) -> dict[Mapping, float]:
     """
     Return after how many seconds a value of each mapping that is read counts as lost.
 
     That is what topics promise: ``stale_after`` times the interval that can be expected, and the
-    longest wait for the line. ``default_period`` is in seconds.
+    longest wait for the line. ``default_period`` is in seconds, ``own`` that of ``intervals``.
     """
     blocks = list(blocks)
-    expected, wait = intervals(blocks, own_load=own_load), longest_wait(blocks)
+    expected, wait = intervals(blocks, own=own), longest_wait(blocks)
     return {mapping: stale_after * max(period_of(mapping, default_period),
                                        expected[block.period]) + wait
             for block in blocks for mapping in block.mappings if mapping.polls}

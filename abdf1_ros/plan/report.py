@@ -93,8 +93,10 @@ class Report:
     @property
     def load(self) -> float:
         """Return the part of the line's time that the periods need."""
-        return forecast.load(self.blocks, self._answer_time) + bounds.own_load(
-            self.network, self.mappings, self.default_period, self._answer_time)
+        own = bounds.own_work(forecast.line_model(self.network), self.mappings,
+                              self.default_period, self._answer_time)
+        return forecast.load(self.blocks, self._answer_time) + sum(
+            seconds / period for seconds, period in own)
 
     @property
     def _answer_time(self) -> float:
@@ -110,7 +112,7 @@ class Report:
         # As the node forecasts it, whatever a PLC really takes to answer.
         stale = forecast.stale_times(
             self.blocks, self.default_period, stale_after,
-            bounds.own_load(self.network, self.mappings, self.default_period))
+            bounds.own_work(forecast.line_model(self.network), self.mappings, self.default_period))
         return {mapping: time for mapping, time in stale.items()
                 if mapping.publish is Publish.ALWAYS}
 

@@ -24,7 +24,6 @@ from abdf1_ros.pccc.data_table import DataTable, NoSuchFile
 from abdf1_ros.pccc.file_types import PlcType
 from abdf1_ros.plan.bounds import guard_faults
 from abdf1_ros.plan.forecast import line_model
-from abdf1_ros.plan.planner import Planner
 from abdf1_ros.problems import Problem
 from abdf1_ros.settings.map_file import broken_links
 from abdf1_ros.settings.mapping import Mapping
@@ -64,8 +63,7 @@ def usable_rows(mappings: Sequence[Mapping], network: Network,
     found = line_problems(mappings, network)
     problems = [problem for _, problem in found]
     left = [mapping for mapping in mappings if mapping not in dict(found)]
-    planner = Planner(line_model(network), default_period)
-    faults = [*guard_faults(left, planner)] or [*broken_links(left)]
+    faults = [*guard_faults(line_model(network), left, default_period)] or [*broken_links(left)]
     while faults:
         for mapping, fault in faults:
             where = replace(mapping.place, column=fault.column)

@@ -1174,6 +1174,23 @@ def test_rule_13_answer_about_the_mode_is_no_older_than_the_stale_time() -> None
     assert why_not(14.5, 14.5) == 'not in RUN: it is in RUN, bad RAM'
 
 
+def test_rule_13_questions_for_the_modes_of_many_plcs_have_their_share_of_a_full_line() -> None:
+    stations = range(11, 23)
+    rows = [make_mapping('N11:0', period=300, station=station, publish_while=condition,
+                         tag=f'row_{station}_{number}')
+            for station in stations
+            for number, condition in enumerate((None, PublishWhile(None, None)))]
+    bench = DriverBench(rows, network=Network(baud=9600))
+    for station in stations:
+        bench.plc(station, 'PLC5', ('N11:0', 1))
+    bench.run(120.0)
+    assert bench.listener.reasons == []
+    points = bench.driver.points
+    planned = points[rows[0]].stale_time / DriverSettings().stale_after
+    counts = {mapping: len(bench.listener.values(mapping)) for mapping in rows}
+    assert min(counts.values()) > 120.0 / planned > 0.6 * max(counts.values())
+
+
 def counter_cell() -> tuple[Cell, Mapping]:
     """Return a cell whose rows depend on a counter, which stands still."""
     counter = make_mapping('N11:3', tag='alive', period=100)

@@ -20,12 +20,12 @@ import math
 from abdf1_ros.plan.bounds import (
     conditions,
     guard_faults,
-    own_load,
+    MODE_PERIOD,
+    own_work,
     remarks,
     Times,
 )
 from abdf1_ros.plan.forecast import line_model
-from abdf1_ros.plan.planner import Planner
 from abdf1_ros.plan.report import make_report
 from abdf1_ros.settings.heartbeats import Fallback, Heartbeat, PublishWhile
 from abdf1_ros.settings.mapping import Mapping
@@ -199,7 +199,7 @@ def test_rule_14_timeout_is_three_planned_intervals() -> None:
     counter = make_mapping('N11:3', tag='alive', period=100)
     guarded = make_mapping('N7:0', tag='level', period=1000,
                            publish_while=PublishWhile('alive', 250))
-    (mapping, fault), = guard_faults([counter, guarded], Planner(line_model(QUICK), 0.1))
+    (mapping, fault), = guard_faults(line_model(QUICK), [counter, guarded], 0.1)
     assert mapping is guarded
     assert (fault.column, fault.text) == (
         'Heartbeat_Timeout', 'Heartbeat_Timeout 250 ms is shorter than 3 reads of alive on this '
@@ -209,8 +209,10 @@ def test_rule_14_timeout_is_three_planned_intervals() -> None:
 def test_heartbeats_and_questions_for_run_are_counted_in_the_load() -> None:
     plain = make_mapping('N7:0', period=1000)
     guarded = make_mapping('N7:0', period=1000, publish_while=PublishWhile(None, None))
-    assert own_load(QUICK, [plain], 0.1) == 0
-    often, seldom = own_load(QUICK, [beat(100)], 0.1), own_load(QUICK, [beat(1000)], 0.1)
-    assert often - seldom == pytest.approx(9 * write_time(QUICK, beat()))
-    assert 0.02 < own_load(QUICK, [guarded], 0.1) < 0.1
+    model = line_model(QUICK)
+    assert own_work(model, [plain], 0.1) == []
+    (seconds, period), (_, asked) = own_work(model, [beat(100)], 0.1)
+    assert (seconds, period, asked) == (pytest.approx(write_time(QUICK, beat())), 0.1, MODE_PERIOD)
+    (question, asked), = own_work(model, [guarded], 0.1)
+    assert (0.02 < question < 0.1, asked) == (True, 1.0)
     assert make_report(QUICK, [guarded], 0.1).load > make_report(QUICK, [plain], 0.1).load

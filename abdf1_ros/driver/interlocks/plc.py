@@ -103,9 +103,8 @@ class Plc:
     def look_again(self, *rows: OwnRow) -> None:
         """Look at these rows at once."""
         for row in rows:
-            row.due = -math.inf
-        if rows:
-            self.plan()
+            row.due = self.due = -math.inf
+            self.first_due = min(self.first_due, row.first_due)
 
     # What happens
 

@@ -34,7 +34,7 @@ from abdf1_ros.errors import FormatError, LinkError, RemoteError
 from abdf1_ros.pccc.identity import Identity
 from abdf1_ros.pccc.status import is_address_fault
 from abdf1_ros.pccc.values import Values
-from abdf1_ros.plan.bounds import own_load
+from abdf1_ros.plan.bounds import own_work
 from abdf1_ros.plan.forecast import (
     answer_time,
     block_time,
@@ -238,7 +238,7 @@ def _points(network: Network, mappings: Sequence[Mapping], blocks: Sequence[Bloc
     """Return the points of all mappings that read, in their order."""
     default = settings.default_period
     stale = stale_times(blocks, default, settings.stale_after,
-                        own_load(network, mappings, default))
+                        own_work(line_model(network), mappings, default))
     return {mapping: _served_point(mapping, settings) if mapping.serves
             else ReadPoint(mapping, period_of(mapping, default), stale[mapping],
                            guards.of(mapping))
