@@ -137,20 +137,14 @@ class Story:
             self.judge.look()
 
     def _recover(self) -> None:
-        """
-        See that all is as at first when nothing is wrong any more: values, writes, beats.
-
-        Where one packet goes at a time, by radio or when a master polls us, a full line may look
-        at modes too seldom for guarded rows.
-        """
+        """See that all is as at first when nothing is wrong any more: values, writes, beats."""
         world = self.world
         self._rates.clear()
         limit = max(RECOVERY, 6 * world.longest)
         results, executed, reads = len(world.results), len(world.executed), len(world.reads)
         end = world.line.now + limit
         wanted = {row.tag for row in world.messages} if not world.plant.is_read_only else set()
-        wanted |= {row.tag for row in world.rows.values() if row.reads and not row.serves
-                   and not (world.plant.mode in ('Radio', 'Slave') and row.publish_while)}
+        wanted |= {row.tag for row in world.rows.values() if row.reads and not row.serves}
         if not world.plant.is_read_only:
             wanted |= {f'beat_{number}' for number in world.plcs
                        if number not in self.judge.owner.since}
