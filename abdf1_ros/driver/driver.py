@@ -189,7 +189,7 @@ class Driver:
         return TOO_MANY if waiting + count > MAX_WAITING_WRITES else ''
 
     def refuse(self, mappings: Iterable[Mapping], reason: str,
-               values: Sequence[float] | str, request: str = '') -> None:
+               values: Sequence[float] | str, request: str) -> None:
         """Report that values were not taken for any of ``mappings``."""
         for mapping in mappings:
             self._listener.written(

@@ -23,6 +23,7 @@ from dataclasses import replace
 from functools import partial
 import gc
 import math
+from random import Random
 
 from abdf1_ros.df1.checksum import Checksum
 from abdf1_ros.df1.packet import Packet
@@ -30,7 +31,7 @@ from abdf1_ros.df1.settings import LinkSettings
 from abdf1_ros.df1.slave import HalfDuplexSlave
 from abdf1_ros.driver.guests import Guest, GuestCommand, ShareAccess
 from abdf1_ros.driver.interlocks.fallback import FallbackCause, FallbackRow, FallbackState
-from abdf1_ros.driver.interlocks.heartbeat import BeatState, LARGEST
+from abdf1_ros.driver.interlocks.heartbeat import _OtherWriter, BeatState, LARGEST
 from abdf1_ros.driver.reads.guards import CounterGuard, RunGuard
 from abdf1_ros.driver.reads.point import Freshness, ReadPoint
 from abdf1_ros.driver.record import Claim, WriteRecord
@@ -255,11 +256,13 @@ def test_rule_3a_value_that_is_not_confirmed_is_repeated() -> None:
     cell.refused = {'N10:0'}
     cell.run(1.0)
     last = cell.written('N10:0')[-1]
+    beat, = cell.bench.driver.interlocks.heartbeats
+    assert beat.why_not(cell.now).startswith('not confirmed for 1.1 s: STS 10: ')
     cell.refused = set()
     since = cell.now
     cell.run(0.5)
     assert cell.written('N10:0', since)[0] == last + 1
-    assert cell.bench.driver.interlocks.heartbeats[0].value > last + 1
+    assert beat.value > last + 1
 
 
 def test_rule_3b_no_beat_while_a_fallback_is_not_confirmed() -> None:
@@ -674,6 +677,7 @@ def test_rule_11_only_the_first_try_over_a_guest_is_not_held_up_by_a_pause() -> 
     one = OneRow()
     row = one.row
     row.make_due(FallbackCause.START, 0.0)
+    assert row.first_due == 0.0
     one.fallback(row.take(0.0), 0.1)
     guest = Claim(1, [one.mapping.extent])
     guest.done = guest.lands_until = 1.0
@@ -1151,7 +1155,7 @@ def test_rule_13_run_guards_a_row() -> None:
     assert [when for when in cell.bench.listener.times(read) if when >= since] == []
     assert point.freshness(cell.now) is Freshness.WITHHELD
     assert point.withheld.startswith('not in RUN: it is in ')
-    assert cell.bench.listener.reasons[-1][1].startswith('withheld: not in RUN')
+    assert cell.bench.listener.reasons[-1][1] == 'withheld: not in RUN: it is in REM PROG'
     cell.plc.processor.setting = Setting.RUN
     cell.run(2.0)
     assert point.freshness(cell.now) is Freshness.FRESH
@@ -1170,8 +1174,10 @@ def test_rule_13_answer_about_the_mode_is_no_older_than_the_stale_time() -> None
     assert why_not(13.0, 13.5) == 'it has not reported its mode for 3.5 s'
     guard.told(running, 13.5)  # nobody knows what it did in between
     assert [why_not(13.5, 13.6), why_not(13.6, 13.6)] == [begun, '']
-    guard.told(replace(running, faults=('bad RAM',)), 14.0)
-    assert why_not(14.5, 14.5) == 'not in RUN: it is in RUN, bad RAM'
+    guard.told(replace(running, faults=('bad RAM', 'low battery')), 14.0)
+    assert why_not(14.5, 14.5) == 'not in RUN: it is in RUN, bad RAM; low battery'
+    guard.told(None, 15.0)
+    assert why_not(15.5, 15.5) == 'not in RUN: its mode is not known'
 
 
 def test_rule_13_questions_for_the_modes_of_many_plcs_have_their_share_of_a_full_line() -> None:
@@ -1326,26 +1332,44 @@ def test_rule_19_two_bridges_end_with_0_and_say_who(
     assert cell.value == 0
 
 
-def test_rule_19_second_foreign_value_stays_until_the_port_is_opened_again() -> None:
+@pytest.mark.parametrize('event', ['port', 'RUN'])
+def test_rule_19_second_foreign_value_stays_until_a_new_start(event: str) -> None:
     cell = Bridges(500)
+    bench, = cell.benches
     cell.run(3.0)
     for value in (888, 889):
         cell.store(value)
         cell.run(5.0)
     assert (cell.told(), cell.value, cell.states()) == ([False, True], 0, [BeatState.CONFLICT])
-    text = cell.benches[0].listener.foreign[-1][1]
-    assert text.startswith('another program writes this word: 889 was read where ')
-    cell.store(890)
+    text = bench.listener.foreign[-1][1]
+    assert text == (
+        'another program writes this word: 889 was read where 2 was written; 0 stays until the '
+        'PLC goes from PROGRAM to RUN, ~/reload, or the port is opened again')
     cell.run(100.0)
-    assert cell.value == 0
-    cell.benches[0].driver.interlocks.contact(1, cell.benches[0].clock())
+    cell.store(890)
+    cell.run(5.0)
+    bench.driver.interlocks.contact(1, bench.clock())
     cell.run(2.0)
     assert cell.value == 0
-    cell.benches[0].lose_port()
-    cell.benches[0].open()
+    if event == 'port':
+        bench.lose_port()
+        bench.open()
+    else:
+        for is_running in (False, True):
+            bench.driver.interlocks.mode_seen(1, is_running, bench.clock())
     cell.run(3.0)
     assert cell.value > 1
     assert cell.told() == [False, True]
+    cell.store(891)
+    cell.run(5.0)
+    assert cell.told() == [False, True, event == 'port']  # after RUN it is a download again
+
+
+def test_rule_19_second_foreign_value_is_one_within_a_minute_or_20_periods() -> None:
+    for period, time in ((0.5, 60.0), (10.0, 200.0)):
+        other = _OtherWriter(period, Random(0))
+        told = [other.note_value(now) for now in (0.0, time - 1.0, 2 * time)]
+        assert told == [False, True, False]
 
 
 @pytest.mark.parametrize('polling', POLLING_MODES)

@@ -300,6 +300,9 @@ def test_command_for_several_words_is_published_once_and_all_or_nothing() -> Non
     beyond = bytes.fromhex('26' + sets.format(1) + sets.format(2))
     assert plc5.ask(0x0F, beyond) == BAD_WORDS['PLC5']
     assert plc5.heard() == []
+    guarded = Bench('PLC5', row('B3:0'), replace(row('B3:1'), is_read_only=True))
+    assert guarded.ask(0x0F, both) == PROTECTED['PLC5']
+    assert (guarded.read('B3:0', 2), guarded.heard()) == (bytes(4), [])
 
 
 def test_rows_of_the_same_words_are_all_published() -> None:
