@@ -534,11 +534,16 @@ def test_writes_before_the_first(bench: Bench) -> None:
     (FallbackCause.START, OK), (FallbackCause.END, OK), (FallbackCause.TIMEOUT, WARN),
     (FallbackCause.RETURN, WARN), (FallbackCause.RUN, WARN)])
 def test_fallback_value_is_no_message_and_usual_at_start_and_end(
-        bench: Bench, cause: FallbackCause, level: bytes) -> None:
+        bench: Bench, cause: FallbackCause, level: bytes,
+        capfd: pytest.CaptureFixture[str]) -> None:
     bench.written(result(bench, Outcome.FALLBACK, cause.value), NOW)
     told, text = bench.says('writes')
     assert told == level
     assert '0 of 0 writes confirmed' in text
+    bench.written(result(bench, Outcome.WRITTEN), NOW)
+    logged, = ''.join(capfd.readouterr()).splitlines()
+    assert logged.startswith('[INFO] ' if level == OK else '[WARN] ')
+    assert logged.endswith(f': fallback value written: {cause.value}')
 
 
 def test_heartbeat_that_the_plc_does_not_confirm_does_not_count(

@@ -19,6 +19,7 @@ import math
 from pathlib import Path
 from typing import Any
 
+from abdf1_ros.df1.settings import PollingSettings
 from abdf1_ros.paths import config_file
 from abdf1_ros.problems import ConfigurationError
 from abdf1_ros.ros.parameters.declared import Configuration, configure, Parameters
@@ -199,6 +200,18 @@ def test_own_parameter_has_the_value_and_type_that_was_given(
     found = getattr(configured(**{name: value}).parameters, name)
     assert found == expected
     assert type(found) is type(expected)
+
+
+@pytest.mark.parametrize(('values', 'expected'), [
+    ({}, PollingSettings((1, 2))),  # the stations of the map
+    ({'priority_poll_list': '2'}, PollingSettings((1,), (2,))),
+    ({'poll_list': '7,1-2', 'priority_poll_list': '9', 'poll_group_size': 2,
+      'poll_multiple': True}, PollingSettings((7, 1, 2), (9,), 2, multiple=True)),
+    ({'send_in_sequence': True}, PollingSettings((1, 2), in_sequence=True))])
+def test_parameters_tell_how_stations_are_polled(
+        configured: Callable[..., Configuration], values: dict[str, Any],
+        expected: PollingSettings) -> None:
+    assert configured(**values).driver_settings().polling == expected
 
 
 @pytest.mark.parametrize(('name', 'value', 'expected'), [
