@@ -32,6 +32,10 @@ from support.vectors import pair
 
 SLC = bytes.fromhex('00 EE 34 49 22') + b'5/03'.ljust(11) + bytes.fromhex('0000 06 00 3412 20 FC')
 PLC5 = pair('diag_status_plc5_40')[1].data
+PLC3 = bytes((0x02, 0x47, 0x10, 0, 0, 0, 0x34, 0x12, 0x41)) + bytes(9)
+PLC2 = bytes((0x05, 0x74, 0, 0, 0, 0, 0x44, 0x41, 0x20, 0))
+# An expansion byte (M 10-17, 10-18).
+PLC2_KA3 = bytes.fromhex('02 ED 1F 00 00 00 00 00 20 21 00')
 
 
 def changed(data: bytes, **bytes_from_1: int) -> Identity:
@@ -83,7 +87,14 @@ def test_mode_is_read_from_its_code(data: bytes, at: int, codes: dict[int, str])
     (PLC5, 3, 'PLC-5/', {
         0x15: '40', 0x22: '10', 0x23: '60', 0x28: '40L', 0x29: '60L', 0x31: '11', 0x32: '20',
         0x33: '30', 0x4A: '20E', 0x4B: '40E', 0x55: '80', 0x59: '80E', 0x13: '12', 0x14: '25'}),
-    (PLC5, 3, 'PLC-5 of type ', {0x77: '0x77'})])
+    (PLC5, 3, 'PLC-5 of type ', {0x77: '0x77'}),
+    (PLC2, 2, '', {
+        0x00: 'PLC at 1771-KC/KD', 0x11: 'PLC-2 at 1771-KA2', 0x22: 'PLC-2/20 (LP1) at 1771-KA4',
+        0x33: 'Mini-PLC-2 at 1771-KE/KF or 1770-KF2', 0x54: 'PLC-2/20 (LP2) at 1771-KG',
+        0x65: 'PLC-2/02 to 2/17 at 1771-KGM', 0x7D: 'PLC-2/30 at 1785-KA3', 0xF4: '1771-KG'}),
+    (PLC2_KA3, 3, 'PLC-2', {
+        0x1D: '/02 at 1785-KA3', 0x1E: '/05 at 1785-KA3', 0x1F: '/16 at 1785-KA3',
+        0x20: '/17 at 1785-KA3', 0x77: ' of type 0x77 at 1785-KA3'})])
 def test_model_is_read_from_its_code(data: bytes, at: int, start: str,
                                      models: dict[int, str]) -> None:
     for code, model in models.items():
@@ -98,6 +109,13 @@ def test_modes_in_a_sentence(mode: Mode, words: str) -> None:
 
 
 @pytest.mark.parametrize(('code', 'name', 'model', 'processor', 'remarks'), [
+    (0xB9, b'5/01       ', 'SLC 5/01', Processor.SLC_5_01, ()),
+    (0xB9, b'5/02       ', 'SLC 5/02', Processor.SLC_5_02, ()),
+    (0xB9, b'5/03       ', 'SLC 5/03', Processor.SLC_5_03, ()),
+    (0xB9, b'5/05       ', 'SLC 5/05', Processor.SLC_5_05, ()),
+    (0xB9, b'1761-LEC   ', 'MicroLogix 1000', Processor.ML1000, ()),
+    (0xB9, b'1763-LEC   ', 'MicroLogix 1100', Processor.ML1100, ()),
+    (0xB9, b'1764-LRP   ', 'MicroLogix 1500', Processor.ML1500, ()),
     (0xB9, b'1766-LEC   ', 'MicroLogix 1400', Processor.ML1400, ()),
     (0x77, b'1747-L542B ', '1747-L542B', None, ()),
     (0x89, b'1764-LSP   ', 'MicroLogix 1500 LSP', Processor.ML1500, ()),
@@ -129,8 +147,23 @@ def test_major_error_has_its_text(code: int, text: str) -> None:
     assert major_error(code) == text
 
 
-PLC3 = bytes((0x02, 0x47, 0x10, 0, 0, 0, 0x34, 0x12, 0x41)) + bytes(9)
-PLC2 = bytes((0x05, 0x74, 0, 0, 0, 0, 0x44, 0x41, 0x20, 0))
+def test_words_of_the_texts_of_faults() -> None:
+    slc = {0x01: 'NVRAM', 0x02: 'hardware watchdog', 0x03: 'module', 0x04: 'while running',
+           0x10: 'revision', 0x11: 'file 2', 0x12: 'ladder', 0x14: 'internal', 0x15: 'configurat',
+           0x16: 'power loss', 0x18: 'operating system', 0x20: 'minor', 0x21: 'power failure',
+           0x23: 'file missing', 0x24: 'interval', 0x28: 'fault routine file', 0x29: 'indexed',
+           0x30: 'nested', 0x31: 'unsupported', 0x32: 'sequencer', 0x33: 'shift', 0x34: 'timer',
+           0x35: 'not allowed', 0x38: 'RET', 0x151: 'stuck', 0x153: 'unused', 0x157: 'respond',
+           0x158: 'reports an error'}
+    assert [code for code, word in slc.items() if word not in major_error(code)] == []
+    plc5 = ('corrupted', 'bad address', 'programming', 'SFC', 'assembled', 'start-up',
+            'peripheral', 'jumped', 'watchdog', 'configured', 'hardware', 'main control',
+            'processor input', 'timed', 'fault routine is', 'faulted program file')
+    inquiry = changed(PLC5, byte1=0x0A).inquiry
+    assert inquiry is not None
+    told = [inquiry.answered(bytes.fromhex('95 09 42') + (1 << bit).to_bytes(2, 'little')
+                             + bytes(2)).faults[0] for bit in range(16)]
+    assert [word for word, text in zip(plc5, told, strict=True) if word not in text] == []
 
 
 @for_all(('identity', 'faults', 'remarks'), [
@@ -158,13 +191,11 @@ def test_faults_and_remarks(identity: Identity, faults: tuple[str, ...],
 @for_all(('data', 'family', 'text', 'address', 'size'), [
     (PLC3, PlcType.PLC3, 'PLC-3 series C revision B, RUN', 0x1234, 55),
     (PLC2, PlcType.PLC2, 'PLC-2/30 at 1771-KG series B revision A, REM TEST', 0x4144, 55),
-    # A 1785-KA3 may have an expansion byte (M 10-17, 10-18).
     *((bytes.fromhex(data), PlcType.PLC2, f'{model} at 1785-KA3 series B revision B, RUN',
        0x2000, 55) for data, model in (
           ('02 1D 00 00 00 00 00 20 21 00', 'PLC-2'),
           ('02 6D 00 00 00 00 00 20 21 00', 'PLC-2/15'),
-          ('02 ED 1F 00 00 00 00 00 20 21 00', 'PLC-2/16'),
-          ('02 ED 77 00 00 00 00 00 20 21 00', 'PLC-2 of type 0x77'))),
+          (PLC2_KA3.hex(), 'PLC-2/16'))),
     # Gateways (M 10-15..10-19), those with a name last.
     *((bytes.fromhex(data), None, text, address, 55) for data, text, address in (
         ('01 EE 10 10 34 12 00 20 21 00 00 30', '1785-KA series B revision B', 0x2000),
