@@ -49,7 +49,7 @@ from abdf1_ros.simulator.simulated_plc import SimulatedPlc
 import pytest
 from support.driver_bench import DriverBench, simulated_plc
 from support.guests import Program
-from support.losses import AirLosses, Losses
+from support.losses import AirLosses, Losses, Lost
 from support.mappings import make_mapping
 
 AFTER = 2.0
@@ -62,36 +62,26 @@ MODES = {'Message': {}, 'Standard': {'polling': 'Standard'}, 'Peer': {'mode': 'P
 
 
 @dataclass(frozen=True, slots=True)
-class Plant:
+class Plant(Lost):
     """
-    What is on the line, and what goes wrong.
+    What is on the line, and what goes wrong beside what gets lost.
 
-    ``lost`` is the share of all frames that get lost, as long as the settings repeat them;
-    ``lose_replies`` and ``lose_commands`` say which. ``delay`` is after how many seconds a PLC has
-    its reply, ``travel`` how long each frame travels; then a poll is lost only when the reply is
-    there. ``mute`` PLCs execute and do not reply, ``silent`` ones do neither; the last ``behind``
-    stand behind a gateway. A row has ``length`` words. The publishers of the stations ``alive`` do
-    not die. The driver hears ``chunk`` bytes at a time: of whole frames a long one may come after
-    Timeout.
+    ``delay`` is after how many seconds a PLC has its reply. ``mute`` PLCs execute and do not
+    reply, ``silent`` ones do neither; the last ``behind`` stand behind a gateway. A row has
+    ``length`` words. The publishers of the stations ``alive`` do not die. The driver hears
+    ``chunk`` bytes at a time: of whole frames a long one may come after Timeout.
     Of ``guests`` each has a long read for the first PLC all the time.
     In Mode Peer the PLC has a message for us every ``asks`` seconds, which we refuse.
     By radio the longest packets come from others every ``others`` seconds, to be sent on;
     ``drops`` has PLCs drop repetitions in silence.
     """
 
-    mode: str
     stations: int
     rows: int
     baud: int = 19200
     timeout: int = 100
-    nak_retries: int = 1
-    enq_retries: int = 1
     has_reads: bool = True
-    lost: float = 0.0
-    lose_commands: bool = True
-    lose_replies: bool = True
     delay: float = 0.0
-    travel: float = 0.0
     mute: frozenset[int] = frozenset()
     silent: frozenset[int] = frozenset()
     behind: int = 0
@@ -100,7 +90,6 @@ class Plant:
     phase: float = 0.0
     others: float = math.inf
     drops: bool = False
-    seed: int = 0
     chunk: int = 8
     tx_delay: int = 0
     asks: float = math.inf

@@ -18,14 +18,15 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Callable
+from dataclasses import dataclass, KW_ONLY
 import math
 from random import Random
-from typing import Protocol
 
 from abdf1_ros.df1.frames import ACK, Code
 
 
-class Losing(Protocol):
+@dataclass(frozen=True, slots=True)
+class Lost:
     """
     What gets lost: a share ``lost`` of all frames, of commands, of replies, or of both.
 
@@ -33,13 +34,14 @@ class Losing(Protocol):
     """
 
     mode: str
-    nak_retries: int
-    enq_retries: int
-    lost: float
-    lose_commands: bool
-    lose_replies: bool
-    travel: float
-    seed: int
+    _: KW_ONLY
+    nak_retries: int = 1
+    enq_retries: int = 1
+    lost: float = 0.0
+    lose_commands: bool = True
+    lose_replies: bool = True
+    travel: float = 0.0
+    seed: int = 0
 
 
 class Losses:
@@ -49,7 +51,7 @@ class Losses:
     ``is_due`` says whether what goes wrong has begun.
     """
 
-    def __init__(self, plant: Losing, clock: Callable[[], float]) -> None:
+    def __init__(self, plant: Lost, clock: Callable[[], float]) -> None:
         self._plant = plant
         self.clock = clock
         self.ready = -math.inf  # from when (clock, s) there is a reply
@@ -94,7 +96,7 @@ class Losses:
 class AirLosses(Losses):
     """A radio network: it loses the commands of each station, or replies, but not too often."""
 
-    def __init__(self, plant: Losing, clock: Callable[[], float]) -> None:
+    def __init__(self, plant: Lost, clock: Callable[[], float]) -> None:
         super().__init__(plant, clock)
         self._lost_of: Counter[int] = Counter()
         self._loses_reply: set[int] = set()

@@ -36,15 +36,15 @@ about heartbeats runs in each PLC where the plant has a ``scan``.
 
 from __future__ import annotations
 
-from collections import deque
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cache, partial
 import hashlib
 import math
 from random import Random
+from typing import NamedTuple
 
-from abdf1_ros.df1.frames import Code, Duplex, stuff
+from abdf1_ros.df1.frames import ACK, DLE, Duplex, SOH, stuff, STX
 from abdf1_ros.df1.packet import Packet
 from abdf1_ros.df1.settings import LinkSettings, PollingSettings
 from abdf1_ros.df1.slave import HalfDuplexSlave
@@ -52,6 +52,7 @@ from abdf1_ros.driver.guests import Guest, GuestCommand, ShareAccess
 from abdf1_ros.driver.settings import DriverSettings
 from abdf1_ros.driver.write import WriteResult
 from abdf1_ros.errors import PortLost
+from abdf1_ros.pccc.address import Address
 from abdf1_ros.pccc.emulated import Setting
 from abdf1_ros.pccc.families import dialect_of, parse_address
 from abdf1_ros.pccc.values import Values
@@ -62,7 +63,7 @@ from abdf1_ros.settings.network import Network
 from abdf1_ros.simulator.ladder import Ladder, Lamp
 from abdf1_ros.simulator.simulated_plc import SimulatedPlc
 from support.driver_bench import DriverBench
-from support.losses import AirLosses, Losses
+from support.losses import AirLosses, Losses, Lost
 from support.mappings import make_mapping
 from support.multidrop import MasterNode
 from support.virtual_line import Noise, QUIET, VirtualLine
@@ -73,8 +74,8 @@ GUESTS = range(33_000, 33_600)  # what only guests write: more than a heartbeat 
 OTHERS = 34_000  # what comes into a word from another network
 LARGEST = 31_000  # of what is published
 _LEAST_COMMAND = 10  # bytes: no poll
-_STX = bytes((Code.DLE, Code.STX))
 _PRESSED_EVERY = 1.0  # s
+_MASTER_RESTS = 0.005  # s, of one that polls us, before all that it sends
 SLAVE_PRESET = 1000  # of a watchdog where none is printed, in units of 10 ms
 _ALL = 255  # stations
 _WRITES = (b'\x67', b'\xAA')  # functions of a typed write
@@ -131,7 +132,7 @@ class Plant:
             mode, stations, rows, dice.choice(['PLC5', 'SLC']),
             dice.choice([600, 1000, 2000]), dice.choice([500, 1000, 2000]),
             dice.choice([None, None, 800, 1500]),
-            dice.choice([4800, 4800, 9600, 19200] if 'Standard' in mode else [9600, 19200, 38400]),
+            dice.choice([4800, 4800, 9600] if 'Standard' in mode else [9600, 19200, 38400]),
             dice.choice([1, 2]), dice.choice([0.5, 2.0]), dice.random() < 0.04,
             dice.choice([0, 0, 50, 100]))
 
@@ -180,18 +181,18 @@ class Plant:
         return found
 
 
-@dataclass(frozen=True, slots=True)
-class Lost:
-    """Frames that get lost, as often as the settings repeat them: see ``Losing``."""
+class Sent(NamedTuple):
+    """
+    A word that the driver has put on the line for a PLC.
 
-    mode: str
-    nak_retries: int
-    enq_retries: int
-    lost: float
-    lose_commands: bool
-    lose_replies: bool
-    seed: int
-    travel: float = 0.0
+    ``is_again`` tells that it is the same command once more.
+    """
+
+    when: float
+    station: int
+    tag: str
+    value: int
+    is_again: bool
 
 
 @dataclass(frozen=True, slots=True)
@@ -199,13 +200,11 @@ class Executed:
     """
     A word that a PLC has taken from the line.
 
-    ``sent`` is when its command was put on the line first; ``driver`` counts the drivers there
-    were. ``before`` was in the word. ``is_late`` tells that a gateway had kept it, ``is_told``
-    that the PLC has replied.
+    ``driver`` counts the drivers there were. ``before`` was in the word. ``is_late`` tells that a
+    gateway had kept it, ``is_told`` that the PLC has replied.
     """
 
     when: float
-    sent: float
     station: int
     tag: str
     value: int
@@ -232,20 +231,20 @@ class WatchedPlc:
     # What the lamps of its ladder showed, with the time, and which of them are on.
     lamps: list[tuple[float, Lamp, bool]] = field(default_factory=list)
     tags: dict[str, str] = field(init=False)  # by address
+    place_of: Callable[[str], Address] = field(init=False)
 
     def __post_init__(self) -> None:
         self.tags = {place: tag for tag, place in self.places.items()}
+        self.place_of = cache(partial(parse_address, plc_type=self.plc.table.plc_type))
 
     def word(self, text: str) -> int:
         """Return a word of its table."""
-        table = self.plc.table
-        return int.from_bytes(table.read(place_of(text, table.plc_type), 1), 'little')
+        return int.from_bytes(self.plc.table.read(self.place_of(text), 1), 'little')
 
     def set(self, text: str, *words: int) -> None:  # noqa: A003
         """Change words of its table."""
-        table = self.plc.table
-        table.write(place_of(text, table.plc_type),
-                    b''.join(word.to_bytes(2, 'little') for word in words))
+        self.plc.table.write(self.place_of(text),
+                             b''.join(word.to_bytes(2, 'little') for word in words))
 
     def run_program(self, now: float) -> None:
         """Let the program tell the time, so that each value that is read tells when it was."""
@@ -274,9 +273,6 @@ class WatchedPlc:
         return min(now, (now // STEP - age + 1) * STEP)
 
 
-place_of = cache(parse_address)
-
-
 def ticks(now: float) -> int:
     """Return what the program of a PLC tells of a time."""
     return int(now // STEP) % _TICKS
@@ -286,8 +282,8 @@ class World(DriverBench):
     """
     A plant, and all that may happen to it.
 
-    ``executed``, ``results`` and ``reads`` only grow. ``published`` tells when each message was,
-    by tag and value; a message may be older than the moment in which it comes.
+    ``sent``, ``executed``, ``results`` and ``reads`` only grow. ``published`` tells when each
+    message was, by tag and value; a message may be older than the moment in which it comes.
     """
 
     def __init__(self, plant: Plant, seed: int) -> None:
@@ -314,6 +310,8 @@ class World(DriverBench):
         self.asked: list[Packet] = []  # by the guest
         self.answered: list[Packet] = []
         self.came: dict[str, float] = {}  # when a message of a row came last
+        self.youngest: dict[str, float] = {}  # when the last of a row was published
+        self.gaps: dict[str, float] = {}  # from when the topic was missing last that is required
         self.report = make_report(plant.network, rows, settings.default_period,
                                   max(0.01, plant.scan / 1000))
         self.bounds = {bound.mapping.tag: bound.seconds for bound in self.report.times.bounds()}
@@ -334,14 +332,14 @@ class World(DriverBench):
         self.served: list[tuple[float, int]] = []  # what it read of our own table, and when
         if plant.mode == 'Slave':
             self._put_a_master()
-        self._sent: deque[tuple[float, bytes]] = deque()  # what the driver has put on the line
-        self.beats_sent = dict.fromkeys(self.plcs, 0.0)  # when a heartbeat was, by station
-        beat = place_of(BEAT, self.rows['clock_1'].plc_type)
-        self._beat = stuff(dialect_of(beat.plc_type).write(beat, b'\0\0')[1][:-2])
+        self.sent: list[Sent] = []
+        self._last_sent: dict[int, bytes] = {}  # by station
+        self._begins = {  # how each write begins on the line, by tag without the station
+            row.tag[:-2]: stuff(row.dialect.write(row.address, b'\0\0')[1][:-2])
+            for row in self.rows_of(1, ('w', 'free', 'beat'))}
         self._send, self.line._send = self.line._send, self._note_sent  # type: ignore[method-assign]
         self.line._random = Random(seed)
         self.executor_ran = 0.0
-        self._breathe()
         self.open()
 
     @property
@@ -402,12 +400,12 @@ class World(DriverBench):
         stations = OURS, *range(1, self.plant.stations + 1)
         self.master = master = MasterNode(
             replace(network.line, station=MASTER), self.clock, PollingSettings(stations),
-            numbers=stations, timing=network.timing)
+            numbers=stations, timing=replace(network.timing, tx_delay=_MASTER_RESTS))
         self.line = VirtualLine(self.driver.machine, self.far, master.machine,
                                 baud=network.baud, chunk=64)
         master.machine.start(self.line.now, self.line.outlet(master.machine))
-        place = place_of(SERVED, self.rows['served'].plc_type)
-        dialect = dialect_of(self.rows['served'].plc_type)
+        place = self.rows['served'].address
+        dialect = self.rows['served'].dialect
 
         def ask() -> None:
             if not master.waiting:
@@ -447,49 +445,50 @@ class World(DriverBench):
         if command.data[:1] not in _WRITES:
             return serve(command)
         station = watched.plc.station
-        written: list[tuple[str, int]] = []
+        written: list[tuple[str, int, int]] = []
         table = watched.plc.table
         write, by_address = table.write, watched.tags
-        saved = {place: watched.word(place) for place in by_address}
 
-        def note(address: object, data: bytes) -> None:
-            if str(address) in by_address:
-                written.append((by_address[str(address)], int.from_bytes(data, 'little')))
-            write(address, data)  # type: ignore[arg-type]
+        def note(address: Address, data: bytes) -> None:
+            place = str(address)
+            if place in by_address:
+                written.append((by_address[place], int.from_bytes(data, 'little'),
+                                watched.word(place)))
+            write(address, data)
 
         table.write = note  # type: ignore[method-assign]
         reply = serve(command)
         del table.write  # type: ignore[attr-defined]
-        values = {value for tag, value in written if not tag.startswith('beat')}
-        is_message = bool(values - {SAFE, *GUESTS})
+        values = {value for tag, value, _ in written if not tag.startswith('beat')}
+        is_message = any(value != SAFE and value not in GUESTS for value in values)
         if values and (watched.refuses or watched.refuses_messages and is_message):
-            for tag, _ in written:
-                watched.set(watched.places[tag], saved[watched.places[tag]])
+            for tag, _, before in written:
+                watched.set(watched.places[tag], before)
             return command.reply(sts=0x10)
         is_told = not watched.swallows_replies or not is_message and (
             bool(values) or self.dice.random() < 0.5)
-        sent = self._first_sent(command)
-        self.executed += [Executed(now, min(sent, now), station, tag, value, self.drivers,
-                                   saved[watched.places[tag]], is_late, is_told)
-                          for tag, value in written]
+        self.executed += [
+            Executed(now, station, tag, value, self.drivers, before, is_late, is_told)
+            for tag, value, before in written]
         if not is_told:
             return reply._replace(tns=reply.tns ^ 0x8000)  # which nobody waits for
         return reply
 
     def _note_sent(self, data: bytes, start: float, receiver: int) -> None:
-        if receiver == _FAR and len(data) >= _LEAST_COMMAND:
-            self._sent.append((start, data))
-            if self._beat in data:
-                station = data[data.index(_STX) + len(_STX)]
-                self.beats_sent[station] = max(start, self.beats_sent.get(station, 0.0))
         self._send(data, start, receiver)
-
-    def _first_sent(self, command: Packet) -> float:
-        """Return when the driver has put a command on the line first, as far as it is known."""
-        while self._sent[0][0] < self.line.now - 2 * self.longest:
-            self._sent.popleft()
-        wanted = stuff(command.tns.to_bytes(2, 'little') + command.data)
-        return next((when for when, data in self._sent if wanted in data), self.line.now)
+        if receiver != _FAR or len(data) < _LEAST_COMMAND or \
+                self.master and data.removeprefix(ACK).startswith(SOH):
+            return  # a master that polls us passes on what we have sent
+        begun = data.index(STX) + len(STX)
+        station, tail = data[begun], data[begun:]
+        for name, begin in self._begins.items():
+            at = tail.find(begin)
+            if at >= 0:
+                word = tail[at + len(begin):][:4].replace(stuff(DLE), DLE)[:2]
+                is_again = tail == self._last_sent.get(station)
+                self._last_sent[station] = tail
+                self.sent.append(Sent(start, station, f'{name}_{station}',
+                                      int.from_bytes(word, 'little'), is_again))
 
     def _hear(self, data: bytes) -> bytes:
         self.wire.update(b'%f>' % self.line.now + data)
@@ -506,7 +505,6 @@ class World(DriverBench):
         if self.is_alive and self.line.now >= self.away:
             self.executor_ran = self.line.now
             self.driver.interlocks.executor_ran(self.line.now)
-        self.at(self.line.now + STEP, self._breathe)
 
     # What people and programs do
 
@@ -517,6 +515,10 @@ class World(DriverBench):
         self.published[row.tag, value] = now - late
         self.keys.append((row.tag, value))
         self.came[row.tag] = now
+        missing = self.youngest.get(row.tag, 0.0) + (self.plant.requires or 0) / 1000
+        if now - late > missing:
+            self.gaps[row.tag] = missing
+        self.youngest[row.tag] = max(now - late, self.youngest.get(row.tag, -math.inf))
         self.driver.write([row], [value], now - late)
         if now >= self.away:
             self.line.wake(self.driver.machine)
@@ -524,7 +526,7 @@ class World(DriverBench):
     def ask(self, station: int, text: str) -> None:
         """Let a guest write a value of its own to a word, of all stations, or what none knows."""
         dice, value = self.dice, GUESTS[len(self.asked) % len(GUESTS)]
-        address = place_of(text, self.plcs[station].plc.table.plc_type)
+        address = self.plcs[station].place_of(text)
         cmd, data = dialect_of(address.plc_type).write(address, value.to_bytes(2, 'little'))
         if dice.random() < 0.2:
             cmd, data = dice.choice([(0x06, DAMAGED * 50), (0x0F, b'\x68\0\0'), (0x0F, b'\x3A')])
@@ -563,8 +565,9 @@ class World(DriverBench):
         """Let the line lose frames, but never more in a row than the settings repeat."""
         dice, network = self.dice, self.network
         what = dice.choice([(True, True), (True, False), (False, True)])
-        lost = Lost(network.mode, network.nak_retries, network.enq_retries,
-                    dice.choice([0.2, 0.5, 1.0]), *what, dice.randrange(1 << 30))
+        lost = Lost(network.mode, nak_retries=network.nak_retries,
+                    enq_retries=network.enq_retries, lost=dice.choice([0.2, 0.5, 1.0]),
+                    lose_commands=what[0], lose_replies=what[1], seed=dice.randrange(1 << 30))
         self.losses = (AirLosses if network.mode == 'Radio' else Losses)(lost, self.clock)
         self.losses.is_due = True
 
@@ -604,17 +607,14 @@ class World(DriverBench):
     def run(self, seconds: float) -> None:
         """Let time pass; each line has a clock of its own, and none is far ahead."""
         end = self.line.now + seconds
-        while self.others and self.line.now < end - STEP:
-            self._run_all(STEP)
-        self._run_all(end - self.line.now)
+        while (left := end - self.line.now) > 0.0:
+            self._breathe()
+            super().run(min(left, STEP) if left > 1.5 * STEP else left)
+            for other in self.others.values():
+                other.run(self.line.now - other.line.now)
         for watched in self.plcs.values():
             if watched.preset:
                 watched.plc.advance()
-
-    def _run_all(self, seconds: float) -> None:
-        super().run(seconds)
-        for other in self.others.values():
-            other.run(self.line.now - other.line.now)
 
     def mend(self) -> None:
         """End all that is wrong."""

@@ -23,16 +23,18 @@ from __future__ import annotations
 
 from collections import defaultdict
 import math
+from operator import attrgetter
 
+from abdf1_ros.df1.radio import LONGEST_WAIT
 from abdf1_ros.driver.write import Outcome, WriteResult
 from abdf1_ros.plan.bounds import MODE_PERIOD
 from abdf1_ros.simulator.ladder import Lamp
-from support.world import Executed, GUESTS, OTHERS, SAFE, STEP, World
+from support.world import Executed, GUESTS, OTHERS, SAFE, Sent, STEP, World
 
 _LEAST_ZERO = 0.5  # s
 _LEAST_LIFE_SIGN = 1.0  # s
 _ON_THE_WIRE = 0.3  # s
-_SETTLED = 1.0  # s after something wrong, in which a station is known to answer
+_MOMENT = 0.02  # s, for what goes out before it
 _REWRITTEN = 5.0  # s after which a fallback is written again
 _NEVER_EXECUTED = {Outcome.NOT_SENT, Outcome.REFUSED, Outcome.SUPERSEDED, Outcome.FAILED}
 
@@ -55,6 +57,11 @@ class Rule:
         self.world = world
         # From the decision to send to its execution: all repetitions, and a step of the world.
         self.flight = world.longest + 2 * STEP
+        # From the decision what is sent to the sending: by radio it waits for a quiet line.
+        self.lag = _MOMENT + (LONGEST_WAIT if world.plant.mode == 'Radio' else 0.0)
+
+    def sent(self, entry: Sent) -> None:
+        """Judge what was put on the line."""
 
     def executed(self, entry: Executed) -> None:
         """Judge what a PLC has executed."""
@@ -143,29 +150,64 @@ class Results(Rule):
 
 
 class Ages(Rule):
-    text = 'no message older than write_timeout or a fallback is sent (7, 9)'
+    text = 'no message older than write_timeout or a fallback is sent (6, 7, 9)'
 
     def __init__(self, world: World) -> None:
         super().__init__(world)
         self._fallbacks: defaultdict[str, float] = defaultdict(lambda: -math.inf)
+        self._stand: set[str] = set()  # what is written again then, goes before no message (8)
 
-    def executed(self, entry: Executed) -> None:
-        world = self.world
-        if entry.tag[0] not in 'wf' or entry.value in GUESTS or entry.is_late:
+    def told(self, result: WriteResult) -> None:
+        if result.outcome is Outcome.FALLBACK:
+            self._stand.add(result.mapping.tag)
+
+    def sent(self, entry: Sent) -> None:
+        world, tag = self.world, entry.tag
+        if tag[0] not in 'wf' or entry.value in GUESTS:
             return
         if entry.value == SAFE:
-            # One that stood and is written again (8) does not go before a message that waits.
-            spared = self.flight if entry.before == SAFE else 0.0
-            self._fallbacks[entry.tag] = max(self._fallbacks[entry.tag], entry.sent - spared)
+            if tag not in self._stand and not entry.is_again:
+                self._fallbacks[tag] = entry.when
             return
-        published = world.published[entry.tag, entry.value]
+        published = world.published[tag, entry.value]
         limit = world.plant.write_timeout
-        if entry.tag[0] == 'w':
+        if tag[0] == 'w':
             limit = min(limit, world.plant.after / 1000)
-        self.demand(entry.sent - published < limit + _ON_THE_WIRE, entry, published)
-        fallback = self._fallbacks[entry.tag]
-        self.demand(entry.sent < fallback or published > fallback - _ON_THE_WIRE, entry, published,
+        self.demand(entry.when - published < limit + _MOMENT, entry, published)
+        fallback = self._fallbacks[tag]
+        self.demand(published > fallback - self.lag, entry, published,
                     'was published before the fallback of', fallback)
+
+    def executed(self, entry: Executed) -> None:
+        if entry.value not in GUESTS and entry.value != SAFE:
+            self._stand.discard(entry.tag)
+
+
+class Turns(Rule):
+    text = 'no message goes before a fallback of its station that is due (11)'
+
+    def __init__(self, world: World) -> None:
+        super().__init__(world)
+        self._holds: dict[str, int] = {}  # the last value of ours
+        self._tried: dict[str, float] = {}  # when the fallback was sent last
+
+    def executed(self, entry: Executed) -> None:
+        if entry.value not in GUESTS:
+            self._holds[entry.tag] = entry.value
+
+    def sent(self, entry: Sent) -> None:
+        world = self.world
+        if entry.tag[0] in 'wf' and entry.value != SAFE and entry.value not in GUESTS \
+                and not entry.is_again and entry.when > self.flight + max(
+                    world.ill[entry.station], world.ill[0]):  # no probe, and no try of before
+            limit = entry.when - world.plant.after / 1000 - self.lag
+            due = [row.tag for row in world.rows_of(entry.station)
+                   if self._holds.get(row.tag, SAFE) != SAFE and row.tag != entry.tag
+                   and self._tried.get(row.tag, 0.0) - world.plant.after / 1000
+                   < world.youngest.get(row.tag, math.inf) < limit]
+            self.demand(not due, entry, 'before', due)
+        elif entry.value == SAFE:
+            self._tried[entry.tag] = entry.when
 
 
 class Values(Rule):
@@ -199,26 +241,31 @@ class Guards(Rule):
 
 
 class Withheld(Rule):
-    text = 'a row whose values are withheld is told to be so (15)'
+    text = 'a row that is read is published, or told to be withheld (15)'
 
     def __init__(self, world: World) -> None:
         super().__init__(world)
         self._rows = [row for row in world.rows.values() if row.publish_while]
-        self._read = dict.fromkeys(world.plcs, 0.0)  # when a word without a guard was read last
+        self._read = dict.fromkeys(world.rows, 0.0)  # when each was published last
+        self._begun: dict[tuple[int, int], float] = {}  # when a driver read of a station first
+        self._new: set[int] = set()  # stations that were read since the last look
 
     def read(self, when: float, tag: str, station: int, values: list[int]) -> None:
-        if tag.startswith('clock'):
-            self._read[station] = when
+        self._read[tag] = when
+        if tag.startswith('clock'):  # with which the others are read, always
+            self._begun.setdefault((station, self.world.drivers), when)
+            self._new.add(station)
 
     def stand(self) -> None:
         world = self.world
-        for row in self._rows:
-            watched, point = world.plcs[row.station], world.driver.points[row]
-            begun = max(watched.stopped, world.opened, world.ill[0])
-            limit = 2 * point.patience + 2 * self.flight + _SETTLED  # also at a start
-            is_asked = self._read[row.station] > begun + limit
-            self.demand(watched.plc.is_running or not is_asked or point.is_withheld, row.tag,
-                        'stopped at', watched.stopped)
+        for row in self._rows if self._new else ():
+            if row.station in self._new:
+                point, asked = world.driver.points[row], self._read[f'clock_{row.station}']
+                # At a start that is told when it has had its time to begin.
+                begun = self._begun[row.station, world.drivers]
+                self.demand(self._read[row.tag] >= asked or point.is_withheld or asked < max(
+                    begun + point.patience, world.ended), row.tag, 'was read at', asked)
+        self._new.clear()
 
 
 class Beats(Rule):
@@ -231,6 +278,29 @@ class Beats(Rule):
         self._untold: set[str] = set()  # those whose last value was not confirmed
         self._driver: dict[str, int] = {}
         self._stood = max(_LEAST_ZERO, world.plant.period / 1000)
+        self._sent: dict[str, Sent] = {}
+
+    def sent(self, entry: Sent) -> None:
+        """Judge what a heartbeat vouches for when it is sent (3 c, d)."""
+        world, plant = self.world, self.world.plant
+        if not entry.tag.startswith('beat') or entry.value in GUESTS:
+            return
+        before = self._sent.get(entry.tag)
+        self._sent[entry.tag] = entry
+        if not entry.value:
+            return
+        limit = max(_LEAST_LIFE_SIGN, plant.period / 1000) + _MOMENT
+        self.demand(entry.when - world.executor_ran < limit, entry,
+                    'while the executor stands still since', world.executor_ran)
+        if plant.requires:
+            topic = f'w0_{entry.station}'
+            came = world.youngest.get(topic, -math.inf)
+            self.demand(entry.when - came < plant.requires / 1000 + _MOMENT, entry,
+                        'without a message since', came)
+            gap = world.gaps.get(topic, math.inf)
+            self.demand(not before or not before.value
+                        or not before.when + _MOMENT < gap < entry.when - _MOMENT,
+                        entry, 'without 0 although nothing came at', gap)
 
     def executed(self, entry: Executed) -> None:
         if not entry.tag.startswith(('beat', 'other')) or entry.is_late or entry.value in GUESTS:
@@ -254,23 +324,11 @@ class Beats(Rule):
                 stood = self._stood if is_ours else _LEAST_ZERO
                 self.demand(entry.when - self._zero[tag] >= stood - 1e-6, entry,
                             '0 stood since', self._zero[tag])
-            if is_ours:
-                self._judge_count(entry)
         if entry.is_told:
             self._untold.discard(tag)
         else:
             self._untold.add(tag)
         self._last[tag] = value
-
-    def _judge_count(self, entry: Executed) -> None:
-        world, plant = self.world, self.world.plant
-        limit = max(_LEAST_LIFE_SIGN, plant.period / 1000) + self.flight
-        self.demand(entry.when - world.executor_ran < limit + self.held, entry,
-                    'while the executor stands still since', world.executor_ran)
-        if plant.requires:
-            came = world.came.get(f'w0_{entry.station}', -math.inf)
-            self.demand(entry.when - came < plant.requires / 1000 + self.flight + self.held,
-                        entry, 'without a message since', came)
 
 
 class BeatsAfterFallbacks(Rule):
@@ -278,27 +336,32 @@ class BeatsAfterFallbacks(Rule):
 
     def __init__(self, world: World) -> None:
         super().__init__(world)
-        self._over: dict[tuple[int, str], float] = {}  # since when a guest's value stands
+        self._over: dict[str, float] = {}  # since when a guest's value stands over a fallback
+        self._holds: dict[str, Executed] = {}  # what came last of ours
 
     def executed(self, entry: Executed) -> None:
-        if entry.is_late:
+        if entry.is_late or entry.tag[0] != 'w':
             return
-        key = entry.station, entry.tag
-        if entry.tag[0] == 'w':
-            if entry.value not in GUESTS:
-                self._over.pop(key, None)
-            elif entry.before == SAFE:
-                self._over[key] = entry.when
+        if entry.value not in GUESTS:
+            self._over.pop(entry.tag, None)
+            self._holds[entry.tag] = entry
+        elif entry.before == SAFE:
+            self._over[entry.tag] = entry.when
+
+    def sent(self, entry: Sent) -> None:
         if not entry.tag.startswith('beat') or entry.value in (0, *GUESTS):
             return
-        for row in self.world.driver.interlocks.fallbacks:
-            if row.mapping.station == entry.station:
-                is_due = row.cause is not None and row._due_since < entry.when - self.flight
-                self.demand(not is_due, entry, row.mapping.tag, row.cause)
-        over = [tag for (station, tag), when in self._over.items()
-                if station == entry.station and when < max(entry.sent, self.world.opened)
-                - self.flight]
-        self.demand(not over, entry, over, 'has the value of a guest')
+        world = self.world
+        for tag in [row.tag for row in world.rows_of(entry.station)]:
+            holds, youngest = self._holds.get(tag), world.youngest.get(tag, -math.inf)
+            self.demand(holds is not None and holds.driver == world.drivers,
+                        entry, tag, 'has had no fallback', holds)
+            assert holds is not None
+            is_due = entry.when > youngest + world.plant.after / 1000 + _MOMENT
+            self.demand(holds.value == SAFE or not is_due, entry, holds, 'is due', youngest)
+            over = self._over.get(tag, math.inf)
+            self.demand(max(entry.when, world.opened) - self.flight < over, entry, tag,
+                        'has the value of a guest since', over)
 
 
 class Order(Rule):
@@ -397,16 +460,21 @@ class Probes(Rule):
 
     def __init__(self, world: World) -> None:
         super().__init__(world)
-        self._since = dict.fromkeys(world.plcs, math.inf)  # when it was known to be silent
+        self._sent: dict[int, Sent] = {}
+        self._silent: set[int] = set()  # at the last look
+
+    def sent(self, entry: Sent) -> None:
+        if entry.tag.startswith('beat') and entry.station in self._silent \
+                and entry.value not in GUESTS:
+            self._sent[entry.station] = entry
 
     def stand(self) -> None:
-        world = self.world
-        for number, sent in world.beats_sent.items():
-            if world.driver.stations[number].active:
-                self._since[number] = math.inf
-                continue
-            since = self._since[number] = min(self._since[number], world.line.now)
-            self.demand(sent < since + self.flight, number, 'silent since', since, 'beat', sent)
+        # One that is active again since has got what it needs.
+        self._silent = {number for number in self.world.plcs
+                        if not self.world.driver.stations[number].active}
+        sent = [entry for number, entry in self._sent.items() if number in self._silent]
+        self.demand(not sent, sent)
+        self._sent.clear()
 
 
 class AfterRun(Rule):
@@ -539,18 +607,20 @@ class View(Rule):
 
     def __init__(self, world: World) -> None:
         super().__init__(world)
-        self._well_since = dict.fromkeys(world.plcs, math.inf)
+        self._known: set[int] = set()  # that were well at the last look, and known to be
 
     def stand(self) -> None:
         world, now = self.world, self.world.line.now
-        for number, since in self._well_since.items():
+        for number in world.plcs:
             is_known = world.driver.stations[number].replies_in_time
-            is_well = now > max(world.ill[number], world.ill[0]) + 1.5 * STEP \
+            is_well = now > max(world.ill[number], world.ill[0]) + self.flight \
                 and not world.holds and not world.losses
-            self.demand(is_known or not is_well or now < since + _SETTLED + self.flight,
+            self.demand(is_known or not is_well or number not in self._known,
                         world.driver.stations[number])
-            if not is_well or not is_known:
-                self._well_since[number] = now
+            if is_known and is_well:
+                self._known.add(number)
+            else:
+                self._known.discard(number)
 
 
 class Served(Rule):
@@ -579,31 +649,36 @@ class OneOwner(Rule):
     def __init__(self, world: World) -> None:
         super().__init__(world)
         self.since: dict[int, float] = {}  # when another one began, by station
-        self._held: dict[int, float] = {}  # when ours did not count for want of messages
+        self._last: dict[str, Executed] = {}
+        self._counted: defaultdict[str, float] = defaultdict(float)  # s, beside the other
 
     def executed(self, entry: Executed) -> None:
-        world = self.world
-        needed, station = world.plant.requires, entry.station
-        came = world.came.get(f'w0_{station}', -math.inf)
-        if needed and not entry.value and entry.tag.startswith('beat') \
-                and entry.when >= came + needed / 1000:
-            self._held[station] = entry.when
-        is_radio = world.plant.mode == 'Radio'  # whose reads may take longer than many Periods
-        is_counted = entry.tag.startswith(('beat', 'other')) \
-            and entry.value not in (0, *GUESTS)
-        if not is_counted or entry.is_late or is_radio or entry.station not in self.since:
+        world, station, tag = self.world, entry.station, entry.tag
+        if not tag.startswith(('beat', 'other')) or entry.is_late or entry.value in GUESTS:
             return
-        # Each opening of the port and each change to RUN begins anew. What is ill is not read, and
-        # a value is compared while it stands: not one that is 0 again at once.
-        began = max(self.since[station], world.opened, world.ill[station], world.ill[0],
-                    world.plcs[station].ran_again + MODE_PERIOD, self._held.get(station, 0.0))
-        limit = max(20 * world.plant.period / 1000, 3.0) + self.flight
-        self.demand(entry.when < began + limit, entry, 'other since', began)
+        last, self._last[tag] = self._last.get(tag), entry
+        # Each opening of the port and each change to RUN begins anew; what is ill is not read.
+        began = max(self.since.get(station, math.inf), world.opened, world.ill[station],
+                    world.ill[0], world.plcs[station].ran_again + MODE_PERIOD)
+        if last is None or last.when < began:
+            self._counted[tag] = 0.0
+        elif last.value:
+            self._counted[tag] += min(entry.when - last.when, self._period(station, tag))
+            longer = max(self._period(station, name) for name in ('beat', 'other'))
+            self.demand(self._counted[tag] <= max(20 * longer, 3.0), entry, 'counted',
+                        self._counted[tag], 'since', began)
+
+    def _period(self, station: int, tag: str) -> float:
+        """Return the Period (s) of a heartbeat of ours, or of the other bridge if there is one."""
+        other = self.world.others.get(station)
+        if other is None or tag.startswith('beat'):
+            return self.world.plant.period / 1000
+        return (other.driver.mappings[0].period or 0) / 1000
 
 
 RULES: tuple[type[Rule], ...] = (
-    Results, Ages, Values, Guards, Withheld, Beats, BeatsAfterFallbacks, Order, Outputs, OneResult,
-    Probes, AfterRun, Held, ReadOnly, Guests, View, Served, Rungs)
+    Results, Ages, Turns, Values, Guards, Withheld, Beats, BeatsAfterFallbacks, Order, Outputs,
+    OneResult, Probes, AfterRun, Held, ReadOnly, Guests, View, Served, Rungs)
 
 
 class Judge:
@@ -616,15 +691,17 @@ class Judge:
         # Only those that judge it: this is done at each step.
         self._judges = {name: [getattr(rule, name) for rule in self._rules
                                if getattr(type(rule), name) is not getattr(Rule, name)]
-                        for name in ('executed', 'told', 'read', 'stand')}
-        self._executed = self._results = self._reads = 0
+                        for name in ('sent', 'executed', 'told', 'read', 'stand')}
+        self._sent = self._executed = self._results = self._reads = 0
 
     def look(self) -> None:
         """Look at what is new; raise Broken."""
         world, judges = self._world, self._judges
-        for entry in world.executed[self._executed:]:
-            for executed in judges['executed']:
-                executed(entry)
+        events: list[Sent | Executed] = [
+            *world.sent[self._sent:], *world.executed[self._executed:]]
+        for event in sorted(events, key=attrgetter('when')):
+            for judge in judges['sent' if isinstance(event, Sent) else 'executed']:
+                judge(event)
         for result in world.results[self._results:]:
             for told in judges['told']:
                 told(result)
@@ -632,8 +709,8 @@ class Judge:
             assert not isinstance(values, str)
             for read in judges['read']:
                 read(when, mapping.tag, mapping.station, [int(value) for value in values])
-        self._executed, self._results = len(world.executed), len(world.results)
-        self._reads = len(world.reads)
+        self._sent, self._executed = len(world.sent), len(world.executed)
+        self._results, self._reads = len(world.results), len(world.reads)
         for stand in judges['stand']:
             stand()
 

@@ -95,12 +95,14 @@ class Story:
     def _mark(self, station: int) -> None:
         """Keep that something was wrong, with a PLC or (0) with the line."""
         world = self.world
-        silent = [number for number in world.plcs if not world.driver.stations[number].active]
-        for number in (station, *silent):
-            world.ill[number] = world.line.now
+        world.ill[station] = world.line.now
         if world.line.noise is not QUIET or world.line.now < world.away or not world.is_alive \
                 or not world.driver.is_online or world.is_silent:
             world.ill[0] = max(world.line.now, world.away)
+
+    def publish_much(self) -> None:
+        """Let all publish often until the next trouble."""
+        self._rates = dict.fromkeys(self._rates, max(RATES))
 
     def be_quiet(self) -> None:
         """Let nobody publish until the next trouble."""
@@ -119,9 +121,6 @@ class Story:
             if world.line.now >= half:
                 half = math.inf
                 self._publish_anew()
-            for number in world.plcs:
-                if not world.driver.stations[number].active:
-                    world.ill[number] = world.line.now
             self.wait(STEP)
 
     def wait(self, seconds: float) -> None:
@@ -134,6 +133,10 @@ class Story:
                     late = self.dice.uniform(0.0, 1.2) if self.dice.random() < 0.1 else 0.0
                     world.publish(row, late)
             world.run(STEP)
+            for number, ill in world.ill.items():  # until it is known to answer again
+                if number and not world.driver.stations[number].replies_in_time \
+                        and max(ill, world.ill[0]) > world.line.now - world.longest - 2 * STEP:
+                    world.ill[number] = world.line.now
             self.judge.look()
 
     def _recover(self) -> None:
@@ -205,6 +208,9 @@ def _refusal(story: Story, station: int) -> None:
 
 
 def _refused_messages(story: Story, station: int) -> None:
+    """Refuse what keeps coming, over an output that stands."""
+    story.publish_much()
+    story.wait(1.0)
     story.world.plcs[station].refuses_messages = True
 
 
@@ -251,7 +257,7 @@ def _slowness(story: Story, station: int) -> None:
 
 def _guest(story: Story, station: int) -> None:
     world = story.world
-    for number in range(story.dice.randrange(1, 6)):
+    for number in range(story.dice.randrange(1, 12)):
         place = story.dice.choice([OUTPUTS, FREE])
         world.at(world.line.now + 0.3 * number, partial(world.ask, station, place))
 
