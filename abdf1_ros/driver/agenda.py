@@ -23,7 +23,8 @@ its turn. Then there are three queues:
 - ``checks``, such as the question for a station's mode, go before the reads. After a check, all
   reads that were due when it began go before the next check. Where rows depend on the modes of
   several stations, one read goes between two questions, and all of them before the same question.
-- ``reads`` go in the order of ``reads.queue``.
+- ``reads`` go in the order of ``reads.queue``. Fallbacks that are written again take turns with
+  them.
 
 ``guests`` share what heartbeats, fallbacks and writes leave: a quarter of that time. After a
 command of theirs, checks and reads that are due have the line for three times as long as it had,
@@ -74,8 +75,8 @@ class Agenda:
         self._own_in_a_row = 0
         self._writes_in_a_row = 0
         self._has_begun_write = False
-        self._last_check = self._last_refresh = -math.inf
-        self._has_read_since = True  # the last check
+        self._last_check = -math.inf
+        self._is_reads_turn = False  # after a check, or a fallback that was written again
         self._last_probe_was_check = False
 
     def next(self, now: float, busy: Container[int] = ()) -> JobTask | None:  # noqa: A003
@@ -171,27 +172,26 @@ class Agenda:
     def _check(self, now: float, busy: Container[int]) -> Job | None:
         """Return a check that is due; the turn of the reads comes after it."""
         find_read = self._reads.find_due
-        is_reads_turn = find_read(self._last_check)
-        if is_reads_turn and not self._has_read_since:
+        are_due = find_read(self._last_check)
+        if are_due and self._is_reads_turn:
             return None
         check = self._checks.next(
             now, busy, self._probe_from(now),
-            lambda check: not is_reads_turn or check.is_planned and not find_read(check.begun))
+            lambda check: not are_due or check.is_planned and not find_read(check.begun))
         if check is None:
             return None
-        self._last_check, self._has_read_since = now, False
+        self._last_check, self._is_reads_turn = now, True
         self._last_probe_was_check |= check.is_probe
         if self._writes.waiting:
             self._writes_in_a_row = MAX_WRITES_IN_A_ROW
         return check
 
     def _refresh(self, now: float, busy: Container[int]) -> Job | None:
-        """Return a fallback that stands (rule 8); the turn of the reads comes after it."""
-        if self._reads.find_due(self._last_refresh):
+        """Return a fallback that stands (rule 8); a read has its turn after it."""
+        if self._is_reads_turn and self._reads.find_due(now):
             return None
         own = self._interlocks.refresh(now, busy)
-        if own is not None:
-            self._last_refresh = now
+        self._is_reads_turn |= own is not None
         return own
 
     def _probe_from(self, now: float) -> float:
@@ -209,7 +209,7 @@ class Agenda:
         job = self._reads.next(now, busy)
         if job is not None:
             self._last_probe_was_check &= not job.is_probe
-            self._has_read_since = True
+            self._is_reads_turn = False
             self._writes_in_a_row = self._own_in_a_row = 0
         return job
 

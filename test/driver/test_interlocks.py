@@ -18,6 +18,7 @@ Heartbeats, fallback values and guarded reads on a virtual line.
 The numbers in the names are those of the rules in docs/heartbeats.md.
 """
 
+from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import partial
@@ -37,6 +38,7 @@ from abdf1_ros.driver.reads.point import Freshness, ReadPoint
 from abdf1_ros.driver.record import Claim, WriteRecord
 from abdf1_ros.driver.settings import DriverSettings
 from abdf1_ros.driver.write import Outcome, Write
+from abdf1_ros.pccc.address import Address
 from abdf1_ros.pccc.data_table import DataTable
 from abdf1_ros.pccc.emulated import Setting
 from abdf1_ros.pccc.families import parse_address
@@ -1015,6 +1017,27 @@ def test_rule_10_why_the_plc_refuses_is_told_once() -> None:
     cell.refused = set()
     cell.run(2.0)
     assert [interlocks.fallbacks[0].refusal, interlocks.heartbeats[0].refusal] == ['', '']
+
+
+def test_rule_8_fallbacks_that_stand_and_reads_take_turns_on_a_full_line() -> None:
+    reads = [make_mapping(f'N{file}:0', period=100, tag=f'read_{file}') for file in range(20, 30)]
+    outputs = [make_mapping(f'N7:{number}', 'Write', fallback=FALLBACK, tag=f'w_{number}')
+               for number in range(60)]
+    bench = DriverBench([*reads, *outputs], network=Network(baud=9600))
+    plc = bench.plc(1, 'PLC5', ('N7:0', 60), *((f'N{file}:0', 1) for file in range(20, 30)))
+    bench.run(20.0)
+    before, written = len(bench.listener.reads), []
+    write = plc.table.write
+
+    def note(address: Address, data: bytes) -> None:
+        written.append(str(address))
+        write(address, data)
+
+    plc.table.write = note  # type: ignore[method-assign]
+    bench.run(30.0)
+    times = Counter(written)
+    assert len(times) == 60 and min(times.values()) >= 3
+    assert len(written) == pytest.approx(len(bench.listener.reads) - before, abs=5)
 
 
 @pytest.mark.parametrize(('outcome', 'next_refresh'), [
