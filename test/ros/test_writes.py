@@ -96,10 +96,10 @@ class Taker:
         self.said.append(f'{mappings[0].tag} {values[0]}: {reason}')
 
     def publish(self, topic: str, number: int, age: float = 0.0) -> None:
-        stamp = time.time_ns() - int(age * 1e9)
+        now = time.time_ns()
         self.callbacks[topic](Int16MultiArray(data=[number]), {
-            'publication_sequence_number': number, 'source_timestamp': stamp,
-            'received_timestamp': stamp})
+            'publication_sequence_number': number, 'source_timestamp': now - int(age * 1e9),
+            'received_timestamp': now})
 
     def open(self, topics: WriteTopics, patience: float = 2.0) -> Any:
         return topics.open(cast(Driver, self), patience, lambda topic, count: self.said.append(
@@ -131,11 +131,15 @@ def test_messages_wait_in_their_order_until_the_node_has_begun(
     task()
     node.publish('a', 4)
     node.publish('b', 3, age=7.4)
+    node.publish('b', 4, age=-1.5)
+    node.publish('b', 5, age=-2.6)
     too_old = ('s after it was published, write_timeout is 2 s; the network is slow, this node '
                'stood still or had just begun, or the clocks differ')
     assert node.said == ['a: 1 lost', 'a 1', f'b 2: it came 3.0 {too_old}', 'a 3', 'a 4',
-                         f'b 3: it came 7.4 {too_old}']
-    assert topics.taken == 5
+                         f'b 3: it came 7.4 {too_old}', 'b 4',
+                         'b 5: its time stamp is 2.6 s ahead of the clock here, write_timeout is 2 '
+                         's; the clocks differ, so nobody knows how old it is']
+    assert topics.taken == 7
 
 
 def test_messages_that_are_too_many_to_wait_are_refused(node: Taker, topics: WriteTopics) -> None:

@@ -117,8 +117,9 @@ class WriteTopic:
         """Write a message to every mapping of the topic, or refuse it for a ``reject_reason``."""
         # It may have waited while this process was paused or the network was down.
         now = time.time_ns()
-        stamps = filter(None, (info['source_timestamp'], info['received_timestamp']))
-        waited = max(0.0, (now - min(stamps, default=now)) / 1e9)
+        ages = [(now - stamp) / 1e9 for stamp in (
+            info['source_timestamp'], info['received_timestamp']) if stamp]
+        waited = max([0.0, *ages])
         requested = line_time() - waited
         request = _request(message, info)
         try:
@@ -129,6 +130,11 @@ class WriteTopic:
                     f'it came {waited:.1f} s after it was published, write_timeout is '
                     f'{self._patience:g} s; the network is slow, this node stood still or had '
                     'just begun, or the clocks differ')
+            # A clock that is ahead, or was set back meanwhile, makes an old message look new.
+            if (ahead := -min([0.0, *ages])) > self._patience:
+                raise FormatError(
+                    f'its time stamp is {ahead:.1f} s ahead of the clock here, write_timeout is '
+                    f'{self._patience:g} s; the clocks differ, so nobody knows how old it is')
             values = values_of(message)
         except FormatError as error:
             self._driver.refuse(self._mappings, str(error), message.data, request)
