@@ -306,7 +306,7 @@ def guard_faults(model: LineModel, mappings: Sequence[Mapping],
     counters = {mapping: (condition.text, condition.timeout) for mapping in mappings
                 if (condition := mapping.publish_while) and condition.timeout is not None}
     blocks = Planner(model, default_period).plan(mappings) if counters else []
-    expected = forecast.intervals(blocks, own=own_work(model, mappings, default_period))
+    expected = forecast.intervals(blocks, own_work(model, mappings, default_period))
     found = {mapping.tag: expected[block.period] for block in blocks for mapping in block.mappings}
     for mapping, (tag, timeout) in counters.items():
         needed = READS_IN_TIME * found.get(tag, 0.0)

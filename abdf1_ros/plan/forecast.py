@@ -75,7 +75,7 @@ def load(blocks: Iterable[Block], response_time: float = USUAL_RESPONSE_TIME) ->
     return sum(block_time(block, response_time) / block.period for block in blocks if block.period)
 
 
-def intervals(blocks: Iterable[Block], response_time: float = USUAL_RESPONSE_TIME,
+def intervals(blocks: Iterable[Block],
               own: Iterable[tuple[float, float]] = ()) -> dict[float, float]:
     """
     Return the expected seconds between two reads of a block, by its period (s).
@@ -85,9 +85,9 @@ def intervals(blocks: Iterable[Block], response_time: float = USUAL_RESPONSE_TIM
     goes in between: the seconds and the period of each heartbeat and question for a mode.
     """
     blocks, own = list(blocks), list(own)
-    once = poll_cycle(blocks, response_time)
-    needed = load(blocks, response_time) + sum(seconds / period for seconds, period in own)
-    unlimited = poll_cycle((block for block in blocks if not block.period), response_time)
+    once = poll_cycle(blocks)
+    needed = load(blocks) + sum(seconds / period for seconds, period in own)
+    unlimited = poll_cycle(block for block in blocks if not block.period)
     wanted = {block.period: block.period or PATIENCE * once for block in blocks}
     if unlimited and needed < 1:
         wanted[0.0] = min(wanted[0.0], unlimited / (1 - needed))
@@ -111,7 +111,7 @@ def stale_times(blocks: Iterable[Block], default_period: float, stale_after: flo
     longest wait for the line. ``default_period`` is in seconds, ``own`` that of ``intervals``.
     """
     blocks = list(blocks)
-    expected, wait = intervals(blocks, own=own), longest_wait(blocks)
+    expected, wait = intervals(blocks, own), longest_wait(blocks)
     return {mapping: stale_after * max(period_of(mapping, default_period),
                                        expected[block.period]) + wait
             for block in blocks for mapping in block.mappings if mapping.polls}

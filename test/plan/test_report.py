@@ -78,6 +78,8 @@ def test_times_of_one_read(plc: str, settings: dict[str, object], line_time: flo
     assert report.time(block) == report.poll_cycle == pytest.approx(line_time + ANSWERS)
     assert report.load == pytest.approx(line_time + ANSWERS)  # of one second
     assert report.remarks() == []
+    slow = report_of(make_mapping('N7:0', plc=plc, length=2), response=0.1, **settings)
+    assert slow.time(block) == slow.poll_cycle == pytest.approx(line_time + 10 * ANSWERS)
 
 
 def test_map_without_a_row_is_odd() -> None:
@@ -92,12 +94,13 @@ def test_map_without_a_row_is_odd() -> None:
 def test_station_0_on_a_full_duplex_line_is_odd(mode: str, own: int, station: int,
                                                 begin: str | None) -> None:
     report = report_of(make_mapping('N7:0', station=station), mode=mode, station=own)
-    found = texts(report, RemarkKind.STATION)
+    found = report.remarks()
     if mode == 'Master' or begin is None:
         assert found == []
     else:
-        text, = found
-        assert text.startswith(f'{begin}: a message to station 0 begins with 00')
+        remark, = found
+        assert (remark.kind, remark.station) == (RemarkKind.STATION, 0)
+        assert remark.text.startswith(f'{begin}: a message to station 0 begins with 00')
 
 
 @pytest.mark.parametrize(('station', 'octal'), [
@@ -130,6 +133,8 @@ def test_period_that_another_baud_rate_can_keep() -> None:
     report = report_of(make_mapping('N7:0', length=2, period=50, tag='speed'))
     assert report.load == pytest.approx((TWO_WORDS + ANSWERS) / 0.05)  # 148.3 %
     assert report.needed_baud() == 19200  # 27.1 ms and 20 ms of 50 ms
+    slow = report_of(make_mapping('N7:0', length=2, period=50), response=0.02)
+    assert slow.needed_baud() == 57600  # 9.0 ms and 40 ms
     assert texts(report, RemarkKind.LOAD) == [
         'the periods need 148% of the time there is at 9600 baud, so reads come late; '
         '19200 baud would do; or Period 100 in place of shorter ones']
@@ -176,9 +181,9 @@ def test_guests_are_part_of_the_load() -> None:
 
 def test_our_own_station_is_mapped() -> None:
     mapping = make_mapping('N7:0', station=5, tag='speed')
-    assert texts(report_of(mapping), RemarkKind.STATION) == [
+    assert report_of(mapping).remarks() == [Remark(RemarkKind.STATION, (
         'station 5 of speed is our own Station in the net file; '
-        'two nodes of one address cannot communicate']
+        'two nodes of one address cannot communicate'), 5)]
     assert texts(report_of(mapping, station=6), RemarkKind.STATION) == []
 
 

@@ -341,7 +341,7 @@ def test_section_that_names_the_node_has_no_unknown_parameter(
         expected: str | None) -> None:
     path = tmp_path / 'shared.yaml'
     path.write_text(f'{section}:\n  ros__parameters:\n    {name}: true\n', encoding='utf-8')
-    node = make_node(files)
+    node = make_node(files if section == 'camera' else {**files, name: True})
     if expected is None:
         assert configure(node, [str(path)]).mappings
         return
