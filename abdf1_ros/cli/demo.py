@@ -56,6 +56,20 @@ from rclpy.event_handler import SubscriptionEventCallbacks
 from rclpy.node import Node
 from rclpy.qos import QoSProfile
 
+# By its executable, which a signal during the imports ends quietly. When we die, which closes its
+# standard input, it ends as with any other signal.
+_NODE = """
+import os, signal, sys, threading
+from abdf1_ros.cli.main import node
+
+def end_with_the_demo():
+    os.read(0, 1)
+    os.kill(os.getpid(), signal.SIGTERM)
+
+threading.Thread(target=end_with_the_demo, daemon=True).start()
+sys.exit(node())
+"""
+
 _EPILOG = """\
 exit status: 0 when all was seen as it should be, or after Ctrl-C; 1 otherwise
 
@@ -112,11 +126,9 @@ class Bridge:
 
     def __init__(self, *args: str) -> None:
         self._rest = b''
-        # By its executable, which a signal during the imports ends quietly. A session of its own:
-        # Ctrl-C is for us, who then end it cleanly.
-        code = 'import sys; from abdf1_ros.cli.main import node; sys.exit(node())'
+        # A session of its own: Ctrl-C is for us, who then end it cleanly.
         self.process = subprocess.Popen(
-            [sys.executable, '-c', code, *args], stdout=subprocess.PIPE,
+            [sys.executable, '-c', _NODE, *args], stdin=subprocess.PIPE, stdout=subprocess.PIPE,
             stderr=subprocess.STDOUT, start_new_session=True)
         os.set_blocking(self._out, False)
 

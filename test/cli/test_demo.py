@@ -14,6 +14,7 @@
 
 """The demo beside others on the network, and what it says at its end."""
 
+import signal
 from typing import Any
 
 from abdf1_ros.cli import demo
@@ -42,6 +43,13 @@ def test_others_on_the_network_are_not_taken_for_the_bridge() -> None:
     refused = told.index(next(line for line in told if '5000] to' in line)) + 1
     assert 'result: not written: refused' in told[refused]
     assert 'pump' not in story.text
+
+
+def test_bridge_ends_with_a_demo_that_is_killed() -> None:
+    with Observer() as observer, Process('demo', '--peer', '--seconds', '60') as story:
+        observer.until(lambda: 'abdf1' in observer.node.get_node_names(), lambda: story.text)
+        story.send(signal.SIGKILL)
+        observer.until(lambda: 'abdf1' not in observer.node.get_node_names(), 'its end')
 
 
 class Told:
