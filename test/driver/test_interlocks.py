@@ -32,7 +32,12 @@ from abdf1_ros.df1.settings import LinkSettings
 from abdf1_ros.df1.slave import HalfDuplexSlave
 from abdf1_ros.driver.guests import Guest, GuestCommand, ShareAccess
 from abdf1_ros.driver.interlocks.fallback import FallbackCause, FallbackRow, FallbackState
-from abdf1_ros.driver.interlocks.heartbeat import _OtherWriter, BeatState, LARGEST
+from abdf1_ros.driver.interlocks.heartbeat import (
+    _OtherWriter,
+    BeatState,
+    HeartbeatRow,
+    LARGEST,
+)
 from abdf1_ros.driver.reads.guards import CounterGuard, RunGuard
 from abdf1_ros.driver.reads.point import Freshness, ReadPoint
 from abdf1_ros.driver.record import Claim, WriteRecord
@@ -799,6 +804,17 @@ def test_rule_7_messages_that_the_plc_refuses_do_not_keep_an_output_alive(gap: f
     assert cell.results().count(TIMEOUT) == 1  # it stands, whatever is refused after it
 
 
+def test_rule_7_fallback_waits_for_a_message_that_waits() -> None:
+    cell, speed = speed_cell()
+    cell.publish(speed, 3, run=0.1)
+    plc, (row,) = cell.bench.driver.interlocks._plcs[1], cell.bench.driver.interlocks.fallbacks
+    row.due = due = row.refreshed + AFTER
+    assert plc.ready({speed: due - 0.1}, due) == []
+    assert row.due == due - 0.1 + AFTER
+    row.due = due
+    assert plc.ready({}, due) == [row]
+
+
 def test_rule_7_message_that_is_older_than_fallback_after_is_not_sent() -> None:
     cell, speed = speed_cell()
     cell.bench.driver.write([speed], [3], cell.now - 0.6)
@@ -1003,6 +1019,19 @@ def test_rule_10_once_more_after_a_message_that_may_have_been_written(
     assert row.judge(2.8, -math.inf) is False
     assert row.judge(2.9, -math.inf) is again  # 2 x Cmd_Timeout after the message ended
     assert row.judge(60.0, -math.inf) is again
+
+
+def test_rule_10_heartbeat_counts_after_a_0_that_is_written_once_more() -> None:
+    beat = HeartbeatRow(OneRow().record.words_of(beat_row()), 1, Random(0))
+    beat.begin(0.0, is_new=True)
+    for now in (0.0, 0.3):
+        assert beat.judge(now, '', now, {})
+        assert beat.take(now).value == '[0]'
+        beat.ended(Outcome.WRITTEN, now + 0.1)
+        beat.words.try_again(0.3 if now < 0.3 else math.inf, now + 0.1)
+    assert not beat.judge(0.8, '', 0.8, {})  # the 0 stands for half a second
+    assert beat.judge(0.95, '', 0.95, {})
+    assert beat.take(0.95).value == '[1]'
 
 
 def test_rule_10_why_the_plc_refuses_is_told_once() -> None:

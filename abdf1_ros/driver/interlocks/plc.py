@@ -192,7 +192,7 @@ class Plc:
         if row.is_first_try and not is_beat:
             return 0, is_ill, not is_zero
         if not is_ill:
-            return (2, 0, 0, row.tried) if is_beat else (1, 0, not is_zero, row.tried)
+            return (2, row.tried) if is_beat else (1, not is_zero, row.tried)
         if now < self._free_from:
             return None
         return 3, self.pause_end, is_beat, not is_zero, row.tried
