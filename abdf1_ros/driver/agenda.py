@@ -15,8 +15,8 @@
 """
 Who has the line next: one place decides.
 
-Heartbeats and fallbacks (``interlocks``) go first, but after seven of them in a row a read has
-its turn. Then there are three queues:
+Heartbeats and fallbacks (``interlocks``) go first, but after seven of them in a row a check or
+read has its turn. Then there are three queues:
 
 - ``writes`` go first, but after four of their commands in a row a check or read that is due has
   its turn.
@@ -108,8 +108,9 @@ class Agenda:
         is_reads_turn = self._own_in_a_row >= OWN_IN_A_ROW
         if is_reads_turn:
             self._own_in_a_row = 0
-            if read := self._read(now, busy):
-                return read
+            if job := self._checks.find_due(now) and self._check(now, busy) \
+                    or self._read(now, busy):
+                return job
         # The rest of a long fallback first: heartbeats that are always due would keep it waiting.
         if under_way := self._tasks.first(busy, is_own=True):
             self._own_in_a_row += 1

@@ -1232,6 +1232,18 @@ def test_rule_13_answer_about_the_mode_is_no_older_than_the_stale_time() -> None
     assert why_not(15.5, 15.5) == 'not in RUN: its mode is not known'
 
 
+def test_rule_11_mode_is_asked_for_though_heartbeats_take_the_whole_line() -> None:
+    read = make_mapping('N11:0', period=1000)
+    beats = [beat_row(100, address=f'N10:{number}') for number in range(6)]
+    bench = DriverBench([read, *beats], network=Network(baud=2400, timeout=200))
+    bench.plc(1, 'PLC5', ('N10:0', 6), ('N11:0', 1))
+    bench.breathe()
+    bench.run(30.0)
+    told = bench.driver.checks.known(1).told
+    assert told is not None and told > bench.clock() - 10.0
+    assert len(bench.listener.times(read)) == 3
+
+
 def test_rule_13_questions_for_the_modes_of_many_plcs_have_their_share_of_a_full_line() -> None:
     stations = range(11, 23)
     rows = [make_mapping('N11:0', period=300, station=station, publish_while=condition,

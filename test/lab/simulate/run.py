@@ -140,7 +140,11 @@ class Story:
             self.judge.look()
 
     def _recover(self) -> None:
-        """See that all is as at first when nothing is wrong any more: values, writes, beats."""
+        """
+        See that all is as at first when nothing is wrong any more: values, writes, beats.
+
+        On a line so full that reads are stale guarded rows may stay withheld: so are modes (13).
+        """
         world = self.world
         self._rates.clear()
         limit = max(RECOVERY, 6 * world.longest)
@@ -161,6 +165,10 @@ class Story:
             wanted -= {entry.tag for entry in world.executed[executed:]
                        if entry.tag.startswith('beat') and entry.value}
             wanted -= {mapping.tag for _, mapping, _ in world.reads[reads:]}
+        readings = world.driver.readings
+        if (readings.reads.poll_cycle or 0.0) > min(
+                point.stale_time for point in readings.points.values()):
+            wanted -= {row.tag for row in world.rows.values() if row.publish_while}
         if wanted:
             raise Broken('Recovery', f'{sorted(wanted)} not back after {limit} s', world)
 
