@@ -613,7 +613,8 @@ class View(Rule):
         world, now = self.world, self.world.line.now
         for number in world.plcs:
             is_known = world.driver.stations[number].replies_in_time
-            is_well = now > max(world.ill[number], world.ill[0]) + self.flight \
+            is_well = now > self.flight + max(
+                world.ill[number], world.ill[0], world.lossy_until) \
                 and not world.holds and not world.losses
             self.demand(is_known or not is_well or number not in self._known,
                         world.driver.stations[number])
