@@ -150,8 +150,8 @@ class Plant:
 
     @property
     def counts_within(self) -> int:
-        """Return the Heartbeat_Timeout of the counter; where others have the line it is longer."""
-        return 20_000 if self.mode in ('Radio', 'Slave') else 3500
+        """Return the Heartbeat_Timeout of the counter; where polls have the line it is longer."""
+        return 20_000 if self.mode in ('Radio', *POLLED) else 3500
 
     def mappings(self) -> list[Mapping]:
         """Return its rows; their tags end with the number of the station."""
@@ -227,6 +227,7 @@ class WatchedPlc:
     stopped: float = 0.0  # when its program stopped last
     ran_again: float = 0.0  # and when it ran after that
     saved: dict[str, int] = field(default_factory=dict)
+    brought: float = -math.inf  # when a download has brought them back last
     preset: float = 0.0  # s, of the watchdog of its ladder, 0 where it has none
     # What the lamps of its ladder showed, with the time, and which of them are on.
     lamps: list[tuple[float, Lamp, bool]] = field(default_factory=list)
@@ -322,7 +323,6 @@ class World(DriverBench):
         self.overwritten: dict[str, float] = {}  # when another network has written to an output
         self.holds = 0.0  # how often the gateway keeps a write for a while
         self.losses: Losses | None = None
-        self.lossy_until = 0.0
         self.wire = hashlib.sha256()
         self._values = dict.fromkeys(self.rows, 0)
         self.is_silent = False
@@ -596,6 +596,7 @@ class World(DriverBench):
         """Bring old words back; the PLC is in PROGRAM from now on."""
         watched = self.plcs[station]
         watched.set_mode(Setting.PROGRAM, self.line.now)
+        watched.brought = self.line.now
         for place, value in watched.saved.items():
             watched.set(place, value)
 
@@ -624,8 +625,7 @@ class World(DriverBench):
             watched.set_mode(Setting.RUN, self.line.now)
         self.is_alive = True
         self.line.noise = QUIET
-        if self.losses:
-            self.losses, self.lossy_until = None, self.line.now
+        self.losses = None
         self.holds = 0.0
 
     def end(self) -> None:

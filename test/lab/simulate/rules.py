@@ -424,7 +424,8 @@ class Outputs(Rule):
         for station, watched, tag in self._rows:
             limit = (world.bounds[tag] or 0.0) + STEP
             calm = max(world.ill[station], world.ill[0])
-            if now < calm + limit + MODE_PERIOD + _REWRITTEN:
+            brought = watched.brought  # by a download, and seen when it runs or is written again
+            if now < max(calm, brought + MODE_PERIOD + _REWRITTEN) + limit:
                 continue
             value = watched.word(watched.places[tag])
             if value == OTHERS:  # it is seen by nobody, until the fallback is written again (8)
@@ -449,8 +450,7 @@ class OneResult(Rule):
             return
         world, tag, station = self.world, result.mapping.tag, result.mapping.station
         reason = max(world.came.get(tag, 0.0), world.ill[station], world.ill[0], world.opened,
-                     world.ended, world.line.now if world.losses else world.lossy_until,
-                     world.plcs[station].ran_again + MODE_PERIOD)
+                     world.ended, world.plcs[station].ran_again + MODE_PERIOD)
         before, self._told[tag] = self._told[tag], world.line.now
         self.demand(before - self._spared - self.held <= reason, tag, 'was told at', before)
 
@@ -553,11 +553,7 @@ class Rungs(Rule):
                 self.demand(now - world.executor_ran < limit or station in world.others,
                             'the executor ran at', world.executor_ran)
             for when, lamp, is_on in new:
-                # A peer repeats no reply in time, so its heartbeat may have to come again (3 a).
-                lossy = (when if world.losses else world.lossy_until) \
-                    if world.plant.mode == 'Peer' else 0.0
-                calm = max(world.ill[station], world.ill[0], world.opened, watched.ran_again,
-                           lossy)
+                calm = max(world.ill[station], world.ill[0], world.opened, watched.ran_again)
                 if lamp is not Lamp.ALIVE or is_on or watched.other or not self._counts.get(tag) \
                         or when < calm + 2 * watched.preset or station in world.others:
                     continue
@@ -613,9 +609,8 @@ class View(Rule):
         world, now = self.world, self.world.line.now
         for number in world.plcs:
             is_known = world.driver.stations[number].replies_in_time
-            is_well = now > self.flight + max(
-                world.ill[number], world.ill[0], world.lossy_until) \
-                and not world.holds and not world.losses
+            is_well = now > max(world.ill[number], world.ill[0]) + self.flight \
+                and not world.holds
             self.demand(is_known or not is_well or number not in self._known,
                         world.driver.stations[number])
             if is_known and is_well:
