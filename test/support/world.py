@@ -132,8 +132,9 @@ class Plant:
             mode, stations, rows, dice.choice(['PLC5', 'SLC']),
             dice.choice([600, 1000, 2000]), dice.choice([500, 1000, 2000]),
             dice.choice([None, None, 800, 1500]),
-            dice.choice([4800, 4800, 9600] if 'Standard' in mode else [9600, 19200, 38400]),
-            dice.choice([1, 2]), dice.choice([0.5, 2.0]), dice.random() < 0.04,
+            dice.choice([4800, 4800, 9600] if 'Standard' in mode else
+                        [19200, 38400] if mode == 'Slave' else [9600, 19200, 38400]),
+            dice.choice([1, 2]), dice.choice([0.5, 2.0]), dice.random() < 0.06,
             dice.choice([0, 0, 50, 100]))
 
     @property
