@@ -604,11 +604,15 @@ class View(Rule):
     def __init__(self, world: World) -> None:
         super().__init__(world)
         self._known: set[int] = set()  # that were well at the last look, and known to be
+        self._changes = 0
 
     def stand(self) -> None:
         world, now = self.world, self.world.line.now
+        changes = world.listener.changes[self._changes:]
+        self._changes += len(changes)
         for number in world.plcs:
-            is_known = world.driver.stations[number].replies_in_time
+            is_known = world.driver.stations[number].replies_in_time \
+                and (number, False) not in changes  # and back at once
             is_well = now > max(world.ill[number], world.ill[0]) + self.flight \
                 and not world.holds
             self.demand(is_known or not is_well or number not in self._known,
