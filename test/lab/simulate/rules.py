@@ -662,7 +662,7 @@ class OneOwner(Rule):
                     world.ill[0], world.plcs[station].ran_again + MODE_PERIOD)
         if last is None or last.when < began:
             self._counted[tag] = 0.0
-        elif last.value:
+        elif last.value and world.plant.mode != 'Radio':  # where reads may wait for many Periods
             self._counted[tag] += min(entry.when - last.when, self._period(station, tag))
             longer = max(self._period(station, name) for name in ('beat', 'other'))
             self.demand(self._counted[tag] <= max(20 * longer, 3.0), entry, 'counted',
