@@ -138,7 +138,7 @@ def test_messages_wait_in_their_order_until_the_node_has_begun(
     assert node.said == ['a: 1 lost', 'a 1', f'b 2: it came 3.0 {too_old}', 'a 3', 'a 4',
                          f'b 3: it came 7.4 {too_old}', 'b 4',
                          'b 5: its time stamp is 2.6 s ahead of the clock here, write_timeout is '
-                         '2 s; the clocks differ, so nobody knows how old it is']
+                         '2 s; the clocks differ, so its age is unknown']
     assert topics.taken == 7
 
 

@@ -134,7 +134,7 @@ class WriteTopic:
             if (ahead := -min([0.0, *ages])) > self._patience:
                 raise FormatError(
                     f'its time stamp is {ahead:.1f} s ahead of the clock here, write_timeout is '
-                    f'{self._patience:g} s; the clocks differ, so nobody knows how old it is')
+                    f'{self._patience:g} s; the clocks differ, so its age is unknown')
             values = values_of(message)
         except FormatError as error:
             self._driver.refuse(self._mappings, str(error), message.data, request)
