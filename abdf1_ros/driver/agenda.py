@@ -105,8 +105,7 @@ class Agenda:
 
     def _own_first(self, now: float, busy: Container[int]) -> Job | JobTask | None:
         """Return a heartbeat or fallback if there is one: no write in a row (rule 11)."""
-        is_reads_turn = self._own_in_a_row >= OWN_IN_A_ROW
-        if is_reads_turn:
+        if self._own_in_a_row >= OWN_IN_A_ROW:
             self._own_in_a_row = 0
             if job := self._checks.find_due(now) and self._check(now, busy) \
                     or self._read(now, busy):

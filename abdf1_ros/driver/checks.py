@@ -64,8 +64,8 @@ class Check(Job):
     One slow job: ``due`` is the clock value (s) from which it wants the line.
 
     It is infinite while the job is under way, which has ``begun`` then, and while there is no
-    station to ask. ``period`` is in seconds, infinite for a job that is done once. What rows
-    depend on is ``planned``: the forecast of the line counts it.
+    station to ask. ``period`` is in seconds, infinite for a job that is done once. A check
+    that rows depend on ``is_planned``: the forecast of the line counts it.
     """
 
     def __init__(self, checks: Checks, station: int, kind: CheckKind, period: float,
@@ -200,11 +200,8 @@ class Checks:
 
         It may be a probe from the clock value ``probe_from`` (s) on.
         """
-        for check in sorted(self._checks, key=attrgetter('due')):
-            if check.due > now or check.is_planned and not may_go(check):
-                break
-            if not may_go(check):
-                continue
+        due = [check for check in self._checks if check.due <= now]
+        for check in filter(may_go, sorted(due, key=attrgetter('due'))):
             if check.station in busy:
                 return None  # no other check instead: after each of them the reads have their turn
             check.due = self._wanted_from(check, probe_from)
