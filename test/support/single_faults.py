@@ -168,8 +168,10 @@ class Bench:
             for station, (name, polling) in zip((NEAR, FAR), MODES[mode], strict=True))
         self.network = near
         self.period = 0.4 if mode == 'Radio' else 0.12
-        # What comes late is here then, and all repetitions of a guest's command are over.
-        self.pause = _LATE + 0.05 if self.is_read or mode in ('Standard', 'Slave') else 3.0
+        # What comes late is here then, all repetitions of a guest's command are over, and guests
+        # have their turn again after one that failed.
+        is_quick = self.is_read or mode in ('Standard', 'Slave') and kind != 'guest'
+        self.pause = _LATE + 0.05 if is_quick else 3.0
         length = 120 if kind == 'two packets' else 1
         bit = kind == 'bit'
         self.served = make_mapping('N7:0', 'Serve', station=FAR, plc='SLC', length=length)
