@@ -289,7 +289,8 @@ class Machine:
         if self._forget_on_send and (self.sender.waiting or not self._is_listening):
             return  # it was said before what it would have to answer
         is_idle = self.deadline is None or isinstance(self._step, Rest)
-        if is_idle and self._is_listening and now - self._last_heard > self._pause_limit:
+        if self._is_listening and now - self._last_heard > self._pause_limit \
+                and (is_idle or not self.decoder.in_message):
             self.decoder.reset()  # what broke off must not swallow what begins now
         self._last_heard = now
         self.decoder.feed(data)

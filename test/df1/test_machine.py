@@ -124,7 +124,7 @@ def test_response_proves_nothing_while_bytes_have_still_to_leave() -> None:
 
 def test_symbol_ends_a_step() -> None:
     bench = Bench(Send(FRAME, 1.0), Send(FRAME, 1.0))
-    bench.machine.receive_data(ACK[:1], 0.25)
+    bench.machine.receive_data(ACK[:1], 0.45)
     assert bench.got == []
     bench.machine.receive_data(ACK[1:], 0.5)
     assert bench.got == [SAID_ACK]
@@ -386,11 +386,13 @@ def test_pause_ends_an_answer_that_has_begun() -> None:
     assert bench.got == [None]
 
 
-@pytest.mark.parametrize('broken', [b'\x10', b'\x10\x01', b'\x10\x05\x10', MESSAGE[:-1]])
+@pytest.mark.parametrize(('broken', 'limit'), [
+    *((broken, limit) for broken in (b'\x10', b'\x10\x01', b'\x10\x05\x10')
+      for limit in (None, 9.0)), (MESSAGE[:-1], None)])  # with a limit a message is heard out
 @pytest.mark.parametrize(('pause', 'forgotten'), [(0.05, False), (0.31, True)])
-def test_pause_ends_what_broke_off_where_there_is_no_time_limit(broken: bytes, pause: float,
-                                                                forgotten: bool) -> None:
-    bench = Bench(*[Listen(None)] * 3, timing=LineTiming(char_time=0.01))
+def test_pause_ends_what_broke_off(broken: bytes, limit: float | None, pause: float,
+                                   forgotten: bool) -> None:
+    bench = Bench(*[Listen(limit)] * 3, timing=LineTiming(char_time=0.01))
     bench.machine.receive_data(broken, 1.0)
     bench.machine.receive_data(EOT, 1.0 + pause)
     assert (bench.got == [SAID_EOT]) is (forgotten or broken == b'\x10\x01')
