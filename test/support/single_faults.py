@@ -97,11 +97,13 @@ class FaultyLine(VirtualLine):
         """Begin to count bytes, and do this to them."""
         self._faults = {(fault.side, fault.at): fault.what for fault in faults}
         self.said, self.heard = [bytearray(), bytearray()], [bytearray(), bytearray()]
+        self.frames: list[tuple[int, int, bytes]] = []  # who hears it, from which byte on
         self._latest = [self.now, self.now]
 
     def _send(self, data: bytes, start: float, receiver: int) -> None:
         begun, at = len(self.said[receiver]), 0
         self.said[receiver] += data
+        self.frames.append((receiver, begun, data))
         piece = b''
         for hit in [hit for hit in range(len(data)) if (receiver, begun + hit) in self._faults]:
             what = self._faults[receiver, begun + hit]
@@ -198,10 +200,13 @@ class Bench:
             Times(near, rows, blocks).longest + near.line_mode.longest_reply(
                 near.line, (2 * length + _FRAME) * self.line.char_time))
         self.line.run_for(0.5)
-        self.said = [0, 0]
         if (why := self.carry_out(())) or (why := self.carry_out(())):
             raise AssertionError(f'{mode} {check} {kind}, no fault at all: {why}')
-        self.said = [len(said) for said in self.line.said]  # of one transaction
+        frames = self.line.frames  # of one transaction
+        # Of polls of an idle line that follow each other one is enough.
+        self._places = [(side, begun + at) for number, (side, begun, data) in enumerate(frames)
+                        if number < 2 or frames[number - 2][::2] != (side, data)
+                        for at in range(len(data))]
 
     def _end(self, network: Network, rows: tuple[Mapping, ...]) -> End:
         listener = Recorder(lambda: self.line.now)
@@ -216,8 +221,8 @@ class Bench:
         return self.kind in ('read', 'two packets')
 
     def places(self) -> list[tuple[int, int]]:
-        """Return each byte of a transaction, by who hears it."""
-        return [(side, at) for side in (0, 1) for at in range(self.said[side])]
+        """Return each byte of a transaction that may suffer, by who hears it."""
+        return self._places
 
     def case(self, *faults: Fault) -> str:
         """Carry out a transaction with faults, and one without; return what is wrong."""
