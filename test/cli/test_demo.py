@@ -14,6 +14,8 @@
 
 """The demo beside others on the network, and what it says at its end."""
 
+from contextlib import suppress
+from pathlib import Path
 import signal
 from typing import Any
 
@@ -48,8 +50,16 @@ def test_others_on_the_network_are_not_taken_for_the_bridge() -> None:
 def test_bridge_ends_with_a_demo_that_is_killed() -> None:
     with Observer() as observer, Process('demo', '--peer', '--seconds', '60') as story:
         observer.until(lambda: 'abdf1' in observer.node.get_node_names(), lambda: story.text)
+        children = Path(f'/proc/{story.number}/task/{story.number}/children')
+        bridge = Path('/proc', children.read_text(encoding='ascii').split()[0], 'stat')
+
+        def has_ended() -> bool:
+            with suppress(OSError):
+                return ') Z ' in bridge.read_text(encoding='utf-8')
+            return True
+
         story.send(signal.SIGKILL)
-        observer.until(lambda: 'abdf1' not in observer.node.get_node_names(), 'its end')
+        observer.until(has_ended, 'its end')
 
 
 class Told:
