@@ -203,8 +203,9 @@ class Bench:
         if (why := self.carry_out(())) or (why := self.carry_out(())):
             raise AssertionError(f'{mode} {check} {kind}, no fault at all: {why}')
         frames = self.line.frames  # of one transaction
-        # Of polls of an idle line that follow each other one is enough.
-        self._places = [(side, begun + at) for number, (side, begun, data) in enumerate(frames)
+        # Each byte that may suffer, by who hears it. Of polls of an idle line that follow each
+        # other one is enough.
+        self.places = [(side, begun + at) for number, (side, begun, data) in enumerate(frames)
                         if number < 2 or frames[number - 2][::2] != (side, data)
                         for at in range(len(data))]
 
@@ -219,10 +220,6 @@ class Bench:
     def is_read(self) -> bool:
         """Tell whether the transaction is a read."""
         return self.kind in ('read', 'two packets')
-
-    def places(self) -> list[tuple[int, int]]:
-        """Return each byte of a transaction that may suffer, by who hears it."""
-        return self._places
 
     def case(self, *faults: Fault) -> str:
         """Carry out a transaction with faults, and one without; return what is wrong."""
@@ -324,12 +321,12 @@ class Tally:
 
     def all_singles(self) -> list[Fault]:
         """Return every single fault."""
-        return [Fault(*place, what) for place in self._bench.places() for what in FAULTS]
+        return [Fault(*place, what) for place in self._bench.places for what in FAULTS]
 
     def pair(self, random: Random) -> list[Fault]:
         """Return faults at two places."""
         return [Fault(*place, random.choice(FAULTS))
-                for place in random.sample(self._bench.places(), 2)]
+                for place in random.sample(self._bench.places, 2)]
 
     def carry_out(self, *faults: Fault) -> None:
         """Carry out a case."""
