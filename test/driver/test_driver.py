@@ -290,6 +290,7 @@ def test_all_points_of_a_station_fail_as_soon_as_it_is_inactive() -> None:
     bench.run_until(lambda: bool(bench.listener.changes))
     assert all(bench.driver.points[mapping].freshness(bench.clock()) is Freshness.FAILED
                for mapping in dead)
+    assert bench.driver.stations[2].failures == 1
     assert bench.driver.points[living].error is None
 
 

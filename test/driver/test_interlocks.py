@@ -925,6 +925,29 @@ def test_rule_9_write_of_another_row_to_the_same_words_holds_up_for_its_own_time
     assert cell.word('N7:0') == 7
 
 
+def test_rule_11_eighth_turn_is_a_read_where_fallbacks_have_several_packets() -> None:
+    rows = [speed_row(Fallback((7,) * 200, 2000), f'N2{number}:0', f'w{number}', 200)
+            for number in range(5)]
+    bench = DriverBench([*rows, make_mapping('N9:0', period=1)], start=False,
+                        network=Network(baud=115200, timeout=200))
+    plc = bench.plc(1, 'PLC5', ('N9:0', 1), *((f'N2{number}:0', 200) for number in range(5)))
+    said = ''
+
+    def serve(command: Packet) -> Packet:
+        nonlocal said
+        said += {b'\x67': 'w', b'\x68': 'r'}.get(command.data[:1], '')
+        return plc.serve(command)
+
+    plc.slave = HalfDuplexSlave(LinkSettings(station=1), serve)
+    bench.open(run=1.0)
+    for row in rows:
+        bench.write(row, [3] * 200)
+    bench.run(1.5)
+    said = ''
+    bench.run(1.0)  # all fallbacks are due
+    assert said.strip('r') == 7 * 'w' + 'r' + 3 * 'w'
+
+
 def test_rule_10_fallback_of_two_packets_does_not_wait_for_itself() -> None:
     cell = Cell(speed_row(Fallback((7,) * 200, int(AFTER * 1000)), length=200), run=1.0)
     cell.bench.lose_port()

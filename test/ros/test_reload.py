@@ -327,6 +327,8 @@ def test_port_is_left_to_others_and_taken_again(bench: Bench) -> None:
     assert bench.polling(False) == (True, f'{bench.plcs.port}: {text}')
     open_port(PortSettings(bench.plcs.port)).close()  # which is exclusive
     assert until_status(bench.diagnostics, 'link', WARN).message == f'WARN: {text}'
+    active = bench.ros.listen(UInt16MultiArray, '/abdf1/active_stations')
+    assert values_in(active.first()) == 16 * [0]
     counters = bench.call(Trigger, 'read_link_counters', Trigger.Request())
     assert (counters.success, counters.message) == (
         False, 'no station to ask: the port is not open')

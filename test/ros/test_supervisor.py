@@ -63,10 +63,16 @@ def test_no_sign_while_a_link_stands_still(
     assert systemd.recv(99) == b'WATCHDOG=1'
 
 
-def test_nothing_is_sent_without_a_watchdog(systemd: socket.socket) -> None:
-    supervisor = Supervisor()
-    supervisor.look([Link()])
-    assert systemd.recv(99) == b'READY=1'
+@pytest.mark.parametrize(('period', 'signs'), [('', []), ('3000000000', [b'WATCHDOG=1'])])
+def test_a_sign_comes_once_in_the_period_of_the_watchdog_if_there_is_one(
+        systemd: socket.socket, monkeypatch: pytest.MonkeyPatch, period: str,
+        signs: list[bytes]) -> None:
+    monkeypatch.setenv('WATCHDOG_USEC', period or '0')
+    supervisor, link = Supervisor(), Link()
+    for _ in range(2):
+        link.has_turned = True
+        supervisor.look([link])
+    assert [systemd.recv(99) for _ in ('ready', *signs)] == [b'READY=1', *signs]
     systemd.setblocking(False)
     with pytest.raises(BlockingIOError):
         systemd.recv(99)
