@@ -38,10 +38,9 @@ _HERE = Path(__file__).parent
 os.environ['OPENBLAS_NUM_THREADS'] = '1'
 
 # The same examples each time, but for "make long", which is after new ones and keeps what fails.
-_EXAMPLES = {'max_examples': 150, 'deadline': None,
-             'suppress_health_check': [HealthCheck.too_slow]}
-settings.register_profile('same', derandomize=True, database=None, **_EXAMPLES)
-settings.register_profile('new', **_EXAMPLES)
+_COMMON = {'deadline': None, 'suppress_health_check': [HealthCheck.too_slow]}
+settings.register_profile('same', max_examples=60, derandomize=True, database=None, **_COMMON)
+settings.register_profile('new', max_examples=150, **_COMMON)
 settings.load_profile(os.environ.get('ABDF1_ROS_EXAMPLES', 'same'))
 
 
@@ -52,12 +51,14 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     Several workers, which take one file after the other, then have something to compute while
     others wait, and leave those enough of the processors to keep their times.
     """
-    files = dict.fromkeys(item.path.relative_to(_HERE).as_posix() for item in items)
+    names = {path: path.relative_to(_HERE).as_posix()
+             for path in dict.fromkeys(item.path for item in items)}
+    files = names.values()
     waiting = _sorted([file for file in files if file.startswith(_WAITING)], _WAITING)
     computing = _sorted([file for file in files if not file.startswith(_WAITING)], _COMPUTING)
     place = {file: float(at) for at, file in enumerate(waiting)}
     place.update((file, 3 * at + 2.5) for at, file in enumerate(computing))
-    items.sort(key=lambda item: place[item.path.relative_to(_HERE).as_posix()])
+    items.sort(key=lambda item: place[names[item.path]])
 
 
 def pytest_collection_finish() -> None:

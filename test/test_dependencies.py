@@ -15,6 +15,7 @@
 """What the package depends on: keys that rosdep knows, and exact versions for tests and tools."""
 
 import ast
+from functools import cache
 from pathlib import Path
 import re
 import sys
@@ -39,6 +40,7 @@ def keys(kind: str) -> set[str]:
     return {entry.text or '' for entry in MANIFEST.iter(kind)}
 
 
+@cache
 def imported(folder: str) -> set[str]:
     """Return the modules that the files of a folder import, without those of Python itself."""
     found = set()

@@ -16,11 +16,14 @@
 
 from __future__ import annotations
 
+from functools import cache
+
 from tools.rooms import imports, MODULES, PACKAGE, Room, room_of, ROOMS
 
 Arrows = dict[Room, set[Room]]
 
 
+@cache
 def arrows() -> Arrows:
     """Return the rooms that each room imports."""
     found: Arrows = {room: set() for room in ROOMS}

@@ -39,6 +39,7 @@ from abdf1_ros.driver.interlocks.plc import Plc
 from abdf1_ros.driver.job_tasks import JobTask
 from abdf1_ros.driver.settings import DriverSettings
 from abdf1_ros.pccc.families import parse_address
+from abdf1_ros.pccc.file_types import PlcType
 from abdf1_ros.plan.bounds import Times
 from abdf1_ros.plan.report import make_report
 from abdf1_ros.settings.heartbeats import Fallback, Heartbeat
@@ -55,6 +56,7 @@ from support.mappings import make_mapping
 AFTER = 2.0
 SAFE = 32_000
 GATEWAY = 99
+OUTPUTS, BEAT = (parse_address(text, PlcType.SLC) for text in ('N7:0', 'N10:0'))
 LONG_READ = bytes.fromhex('A2 50 09 89 00 00')  # 40 words from N9:0 on
 RADIO = {'mode': 'Radio', 'store_forward': '60,61'}
 MODES = {'Message': {}, 'Standard': {'polling': 'Standard'}, 'Peer': {'mode': 'Peer'},
@@ -246,7 +248,7 @@ class World:
         """Have the PLC of a full-duplex line send a message to us."""
         plc = self.plcs[1]
         if not plc.outbox:
-            plc.send(parse_address('N7:0', plc.table.plc_type), [0.0], 200, str)
+            plc.send(OUTPUTS, [0.0], 200, str)
             self.bench.line.wake(self.bench.far)
         self.bench.at(self.bench.clock() + self.plant.asks, self._ask)
 
@@ -261,13 +263,12 @@ class World:
 
     def beat(self, station: int) -> bytes:
         """Return the word of the heartbeat in a PLC."""
-        table = self.plcs[station].table
-        return table.read(parse_address('N10:0', table.plc_type), 1)
+        return self.plcs[station].table.read(BEAT, 1)
 
     def words(self, station: int) -> list[set[int]]:
         """Return the values in the outputs of each row of a PLC."""
-        table, length = self.plcs[station].table, self.plant.length
-        data = table.read(parse_address('N7:0', table.plc_type), self.plant.rows * length)
+        length = self.plant.length
+        data = self.plcs[station].table.read(OUTPUTS, self.plant.rows * length)
         words = [int.from_bytes(data[at:at + 2], 'little') for at in range(0, len(data), 2)]
         return [set(words[at:at + length]) for at in range(0, len(words), length)]
 
@@ -434,7 +435,7 @@ def test_rule_16_nor_where_no_frame_gets_lost_than_is_told_for_that(
         mode: str, stations: int, rows: int, length: int) -> None:
     if mode == 'Peer':
         stations, rows = 1, stations * rows if length == 1 else rows
-    plant = Plant(mode, stations, rows, length=length, phase=0.07, chunk=1)
+    plant = Plant(mode, stations, rows, length=length, phase=0.07)
     assert late_of(World(plant).run(is_usual=True)) == {}
 
 

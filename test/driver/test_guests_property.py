@@ -30,7 +30,7 @@ from support.driver_bench import DriverBench
 from support.guests import Program, READ_N7
 from support.mappings import make_mapping
 
-SECONDS = 20.0
+SECONDS = 10.0
 MARKS = b'NoAck', b'NoRep', b'NakIt'  # what becomes of the commands that have them
 
 

@@ -108,11 +108,11 @@ def test_rule_2_every_plc_sees_a_restart_that_is_quicker_than_its_timer(
 def test_rule_8_commands_of_a_short_download_do_not_stay_where_fallbacks_stand(
         mode: str, stop: float) -> None:
     cell = Cell(mode, 0.06)
-    for number in range(3):
+    for number in range(2):
         cell.publishes = True
         cell.take_control()
         cell.publishes = False
-        cell.bench.run(2.5 + 0.8 * number)
+        cell.bench.run(2.5 + 1.3 * number)
         cell.plc.download()
         for word in ('N10:1', 'N10:2'):
             store(cell.plc, word, [888])

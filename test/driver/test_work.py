@@ -75,13 +75,13 @@ def work_of_a_transaction(fallback: Fallback | None) -> float:
     for station in STATIONS:
         bench.plc(station, 'PLC5', ('N7:0', COMMANDS), ('N9:0', 1))
     bench.run(12.0)  # each fallback has been written
-    for number in range(100):
+    for number in range(30):
         bench.at(12.0 + 0.02 * number, lambda number=number: bench.write(  # type: ignore[misc]
             writes[7 * number % len(writes)], [number]))
     before = bench.driver.tasks.transactions
-    work = lines_run(lambda: bench.run(2.5), 'driver')
-    assert bench.listener.outcomes().count(Outcome.WRITTEN) == 100
-    assert bench.driver.tasks.transactions - before > 250
+    work = lines_run(lambda: bench.run(0.8), 'driver')
+    assert bench.listener.outcomes().count(Outcome.WRITTEN) == 30
+    assert bench.driver.tasks.transactions - before > 80
     return work / (bench.driver.tasks.transactions - before)
 
 
