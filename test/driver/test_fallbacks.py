@@ -1,0 +1,519 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Fallback values on a virtual line; the numbers are those of the rules in docs/heartbeats.md."""
+
+from collections import Counter
+import math
+from random import Random
+
+from abdf1_ros.df1.packet import Packet
+from abdf1_ros.df1.settings import LinkSettings
+from abdf1_ros.df1.slave import HalfDuplexSlave
+from abdf1_ros.driver.interlocks.fallback import FallbackCause, FallbackRow
+from abdf1_ros.driver.interlocks.heartbeat import HeartbeatRow
+from abdf1_ros.driver.record import Claim, WriteRecord
+from abdf1_ros.driver.write import Outcome, Write
+from abdf1_ros.pccc.address import Address
+from abdf1_ros.pccc.emulated import Setting
+from abdf1_ros.plan.bounds import MODE_PERIOD
+from abdf1_ros.settings.heartbeats import Fallback, Heartbeat
+from abdf1_ros.settings.network import Network
+import pytest
+from support.driver_bench import DriverBench, store
+from support.interlocks import (
+    AFTER,
+    beat_row,
+    Cell,
+    FALLBACK,
+    Line,
+    RETURN,
+    RUN,
+    speed_cell,
+    speed_row,
+    START,
+    TIMEOUT,
+)
+from support.mappings import make_mapping
+
+
+class OneRow:
+    """A row with Fallback by itself, and writes of it that end as they are told."""
+
+    now = late = 0.0
+
+    def __init__(self, cmd_timeout: float = 0.5) -> None:
+        self.mapping = speed_row()
+        self.record = WriteRecord(self, 2 * cmd_timeout)
+        self.row = FallbackRow(self.record.words_of(self.mapping))
+
+    def took(self, begun: float, now: float) -> float:
+        """Return the time between two clock values."""
+        return now - begun
+
+    def message(self, begun: float, done: float, outcome: Outcome) -> None:
+        """Let a message end that was published when it began."""
+        self._write(Write(self.mapping, [3], begun), done, outcome)
+        self.row.message_ended(begun, outcome)
+
+    def fallback(self, write: Write, done: float, outcome: Outcome = Outcome.WRITTEN
+                 ) -> float | None:
+        """Let a write of the fallback end."""
+        write.is_own = True
+        self._write(write, done, outcome)
+        return self.row.ended(outcome, done)
+
+    def _write(self, write: Write, done: float, outcome: Outcome) -> None:
+        self.now = write.requested
+        claim = self.record.begin(1, [self.mapping.extent], write)
+        self.now = done
+        self.record.ended(claim, outcome,
+                          may_land=outcome in (Outcome.UNKNOWN, Outcome.PARTLY))
+
+
+def test_rule_11_only_the_first_try_over_a_guest_is_not_held_up_by_a_pause() -> None:
+    one = OneRow()
+    row = one.row
+    row.make_due(FallbackCause.START, 0.0)
+    assert row.first_due == 0.0
+    one.fallback(row.take(0.0), 0.1)
+    guest = Claim(1, [one.mapping.extent])
+    guest.done = guest.lands_until = 1.0
+    row.write_ended(guest, 1.0)
+    assert row.judge(1.0, -math.inf)
+    assert row.first_due == 1.0
+    one.fallback(row.refresh(1.0), 1.2, Outcome.UNKNOWN)
+    assert row.judge(1.2, -math.inf)
+    assert row.first_due == math.inf
+
+
+def test_rule_7_message_refreshes_from_its_own_time_when_it_is_confirmed() -> None:
+    cell, speed = speed_cell()
+    cell.bench.driver.write([speed], [3], cell.now - 0.3)
+    cell.bench.line.wake(cell.bench.driver.machine)
+    begun = cell.now
+    cell.run(1.0)
+    assert cell.written('N7:0') == [7, 3, 7]
+    when = cell.writes[-1][0]
+    assert begun - 0.3 + AFTER <= when < begun - 0.3 + AFTER + 0.05
+    assert cell.results() == [START, 'written', TIMEOUT]
+
+
+@pytest.mark.parametrize('gap', [0.1, 0.002])  # s; slower, and faster, than transactions are
+def test_rule_7_messages_that_the_plc_refuses_do_not_keep_an_output_alive(gap: float) -> None:
+    cell, speed = speed_cell()
+    cell.publish(speed, 3, run=0.1)
+    cell.refused, cell.spared = {'N7:0'}, 7
+    cell.publish(speed, 99, times=round(2.0 / gap), gap=gap)
+    cell.run(AFTER + 0.1)
+    assert cell.word('N7:0') == 7
+    assert cell.results().count(TIMEOUT) == 1
+    cell.run(1.0)
+    assert cell.results().count(TIMEOUT) == 1  # it stands, whatever is refused after it
+
+
+def test_rule_7_fallback_waits_for_a_message_that_waits() -> None:
+    cell, speed = speed_cell()
+    cell.publish(speed, 3, run=0.1)
+    plc, (row,) = cell.bench.driver.interlocks._plcs[1], cell.bench.driver.interlocks.fallbacks
+    row.due = due = row.refreshed + AFTER
+    assert plc.ready({speed: due - 0.1}, due) == []
+    assert row.due == due - 0.1 + AFTER
+    row.due = due
+    assert plc.ready({}, due) == [row]
+
+
+def test_rule_7_message_that_is_older_than_fallback_after_is_not_sent() -> None:
+    cell, speed = speed_cell()
+    cell.bench.driver.write([speed], [3], cell.now - 0.6)
+    cell.bench.line.wake(cell.bench.driver.machine)
+    cell.run(1.0)
+    assert cell.written('N7:0') == [7]
+    assert cell.results() == [
+        START, 'not written: not sent: waited longer than 0.5 s for the line']
+
+
+def test_rule_8_change_to_run_is_a_first_contact() -> None:
+    speed = speed_row(Fallback((7,), 60_000))
+    cell = Cell(beat_row(), speed, run=1.0)
+    cell.publish(speed, 3, run=1.0)
+    cell.plc.processor.setting = Setting.PROGRAM
+    cell.run(2 * MODE_PERIOD)
+    since = cell.now
+    cell.plc.processor.setting = Setting.RUN
+    cell.run(2 * MODE_PERIOD)
+    after = [(name, value) for when, name, value in cell.writes if when >= since]
+    at = after.index(('N10:0', 0))
+    assert after[at:at + 3] == [('N10:0', 0), ('N7:0', 7), ('N10:0', 1)]
+    assert cell.results()[-1] == RUN
+
+
+def test_rule_8_row_is_fresh_by_a_confirmed_message_only() -> None:
+    one = OneRow()
+    row = one.row
+    row.make_due(FallbackCause.START, 0.0)
+    one.fallback(row.take(0.0), 0.1)
+    one.message(1.0, 1.0, Outcome.UNKNOWN)  # counts once for the time that it stands (rule 7)
+    assert row.deadline(-math.inf) == 1.0 + AFTER
+    assert not row.is_fresh(1.1)
+    one.message(1.2, 1.2, Outcome.WRITTEN)
+    assert row.is_fresh(1.2 + 0.9 * AFTER)
+
+
+def test_rule_8_fallback_that_stands_is_written_again_without_a_result() -> None:
+    cell = Cell(speed_row(), speed_row(address='N7:1', tag='slow', fallback=Fallback((5,), 7000)))
+    cell.run(1.0)
+    store(cell.plc, 'N7:0', [888, 888])  # a download in a short time of PROGRAM
+    cell.run(4.5)
+    assert (cell.word('N7:0'), cell.word('N7:1')) == (7, 888)
+    cell.run(2.0)
+    assert (cell.word('N7:0'), cell.word('N7:1')) == (7, 5)
+    cell.run(20.0)
+    assert len(cell.written('N7:0')) == 6 + 4  # of both: every 5 s, every 7 s
+    assert cell.results() == [START, START]
+
+
+def test_rule_8_fallback_that_stands_does_not_wait_for_one_of_a_busy_station() -> None:
+    speeds = [make_mapping('N7:0', 'Write', station=number, fallback=FALLBACK)
+              for number in (1, 2)]
+    line = Line(speeds, (1, 2))
+    line.run(4.0)
+    interlocks = line.driver.interlocks
+    first, second = (interlocks.refresh(9.0, busy) for busy in ({1}, set()))
+    assert first is not None and first.row.mapping is speeds[1]
+    assert second is not None and second.row.mapping is speeds[0]
+
+
+def test_rule_8_message_that_is_lost_with_the_port_is_not_waited_for() -> None:
+    speed = speed_row(Fallback((7,), 5000))
+    recipe = make_mapping('N7:1', 'Write', length=150)
+    cell = Cell(speed, recipe, run=1.0)
+    cell.publish(speed, 3, run=0.5)
+    row, = cell.bench.driver.interlocks.fallbacks
+    cell.run(3.0)
+    hear, cell.bench.far.hear = cell.bench.far.hear, lambda data: b''
+    cell.bench.write(recipe, [1] * 150)
+    cell.bench.write(speed, [4])  # waits
+    cell.run(0.1)
+    assert row.judge(cell.now, cell.now) is False  # it is waited for
+    cell.bench.lose_port()
+    cell.bench.far.hear = hear
+    cell.bench.open()
+    cell.run(row.refreshed + 5.0 - cell.now - 0.05)
+    assert cell.word('N7:0') == 3
+    cell.run(0.1)
+    assert cell.word('N7:0') == 7
+
+
+def test_rule_9_messages_that_wait_end_when_the_fallback_goes_out() -> None:
+    speed = speed_row(Fallback((7,), 60_000))
+    cell = Cell(speed, start=False)
+    cell.bench.driver.is_online = True
+    cell.bench.driver._inbox.open()
+    cell.bench.driver.write([speed], [3], 0.0)
+    cell.bench.open()
+    cell.run(1.0)
+    assert cell.written('N7:0') == [7]
+    assert cell.results() == ['not written: not sent: fallback', START]
+
+
+def test_rule_9_write_of_another_row_to_the_same_words_holds_up_for_its_own_time_only() -> None:
+    recipe = speed_row(None, length=200, tag='recipe')  # of several packets
+    speed = speed_row()
+    cell = Cell(recipe, speed, run=1.0)
+    cell.bench.write(speed, [3])
+    cell.run(AFTER - 0.01)
+    assert cell.word('N7:0') == 3
+    cell.bench.write(recipe, [4] * 200)  # under way when the fallback is due
+    row, = cell.bench.driver.interlocks.fallbacks
+    record = cell.bench.driver._record
+    cell.bench.run_until(lambda: row.cause is not None and not record.may_begin(speed))
+    cell.run(0.5)
+    assert cell.results()[-1] == TIMEOUT
+    assert cell.word('N7:0') == 7
+
+
+def test_rule_11_eighth_turn_is_a_read_where_fallbacks_have_several_packets() -> None:
+    rows = [speed_row(Fallback((7,) * 200, 2000), f'N2{number}:0', f'w{number}', 200)
+            for number in range(5)]
+    bench = DriverBench([*rows, make_mapping('N9:0', period=1)], start=False,
+                        network=Network(baud=115200, timeout=200))
+    plc = bench.plc(1, 'PLC5', ('N9:0', 1), *((f'N2{number}:0', 200) for number in range(5)))
+    said = ''
+
+    def serve(command: Packet) -> Packet:
+        nonlocal said
+        said += {b'\x67': 'w', b'\x68': 'r'}.get(command.data[:1], '')
+        return plc.serve(command)
+
+    plc.slave = HalfDuplexSlave(LinkSettings(station=1), serve)
+    bench.open(run=1.0)
+    for row in rows:
+        bench.write(row, [3] * 200)
+    bench.run(1.5)
+    said = ''
+    bench.run(1.0)  # all fallbacks are due
+    assert said.strip('r') == 7 * 'w' + 'r' + 3 * 'w'
+
+
+def test_rule_10_fallback_of_two_packets_does_not_wait_for_itself() -> None:
+    cell = Cell(speed_row(Fallback((7,) * 200, int(AFTER * 1000)), length=200), run=1.0)
+    cell.bench.lose_port()
+    cell.run(1.0)
+    cell.bench.open()
+    cell.run(1.0)
+    assert cell.results() == [START, RETURN]
+
+
+def test_rule_10_after_an_unknown_write_it_is_written_once_more() -> None:
+    cell, speed = speed_cell()
+    say, cell.bench.far.say = cell.bench.far.say, lambda data: b''
+    cell.publish(speed, 3, run=0.05)
+    cell.run(0.5)
+    cell.bench.far.say = say
+    cell.run(15.0)
+    assert cell.written('N7:0')[:4] == [7, 3, 7, 7]
+    unknown, _, second = [when for when, name, value in cell.writes if name == 'N7:0'][1:4]
+    # The message ended when station 1 had not answered its two frames of 0.2 s each.
+    assert second == pytest.approx(unknown + 2 * 0.2 + 2 * 0.5, abs=0.05)
+    assert len([result for result in cell.results() if result.startswith('fallback')]) == 2
+
+
+def test_rule_10_plc_that_answers_has_its_fallback_before_those_that_do_not() -> None:
+    stations = range(11, 19)
+    rows = [make_mapping('N10:0', 'Heartbeat', station=number, tag=f'beat{number}', period=500,
+                         heartbeat=Heartbeat()) for number in stations]
+    speeds = [make_mapping('N7:0', 'Write', station=number, tag=f'speed{number}',
+                           fallback=Fallback((7,), 8000)) for number in stations]
+    line = Line([*rows, *speeds], stations)
+    line.run(2.0)
+    for speed in speeds:
+        line.write(speed, [3])
+    begun = line.clock()
+    line.run(0.4)
+    line.mute = {*stations[:-1]}
+    line.run(7.5)
+    line.asked.clear()
+    line.run(30.0)
+    when, first = line.asked[0][:2]
+    assert (first, {station for _, station, _ in line.asked}) == (18, {*stations})
+    assert when - begun < 8.0 + 1.3  # what was under way
+
+
+def test_rule_10_first_try_of_each_row_goes_before_the_second_of_any() -> None:
+    rows = [make_mapping(f'N7:{number}', 'Write', tag=f'speed{number}',
+                         fallback=Fallback((7,), 1000)) for number in range(8)]
+    line = Line(rows, [1])
+    line.run(1.0)
+    for row in rows:
+        line.write(row, [3])
+    line.run(0.3)
+    line.mute, begun = {1}, line.clock()
+    line.asked.clear()
+    line.run(30.0)
+    assert {element for _, _, element in line.asked[:8]} == {*range(8)}
+    assert line.asked[7][0] - begun < 1.0 + 8 * (0.5 + 0.1)
+
+
+@pytest.mark.parametrize(('outcome', 'done', 'again'), [
+    (Outcome.PARTLY, 1.9, True), (Outcome.UNKNOWN, 1.9, True), (Outcome.FAILED, 1.9, False),
+    (Outcome.UNKNOWN, 1.0, False)])  # nothing can land any more
+def test_rule_10_once_more_after_a_message_that_may_have_been_written(
+        outcome: Outcome, done: float, again: bool) -> None:
+    one = OneRow()
+    row = one.row
+    one.message(1.0, done, outcome)
+    assert row.judge(2.0, -math.inf)
+    assert one.fallback(row.take(2.0), 2.1) is not None
+    assert row.judge(2.8, -math.inf) is False
+    assert row.judge(2.9, -math.inf) is again  # 2 x Cmd_Timeout after the message ended
+    assert row.judge(60.0, -math.inf) is again
+
+
+def test_rule_10_heartbeat_counts_after_a_0_that_is_written_once_more() -> None:
+    beat = HeartbeatRow(OneRow().record.words_of(beat_row()), 1, Random(0))
+    beat.begin(0.0, is_new=True)
+    for now in (0.0, 0.3):
+        assert beat.judge(now, '', now, {})
+        assert beat.take(now).value == '[0]'
+        beat.ended(Outcome.WRITTEN, now + 0.1)
+        beat.words.try_again(0.3 if now < 0.3 else math.inf, now + 0.1)
+    assert not beat.judge(0.8, '', 0.8, {})  # the 0 stands for half a second
+    assert beat.judge(0.95, '', 0.95, {})
+    assert beat.take(0.95).value == '[1]'
+
+
+def test_rule_10_why_the_plc_refuses_is_told_once() -> None:
+    cell = Cell(beat_row(), speed_row())
+    cell.refused = {'N7:0', 'N10:0'}
+    cell.run(5.0)
+    reasons = cell.bench.listener.reasons
+    assert sorted(address for address, _ in reasons) == ['N10:0', 'N7:0']
+    assert all(reason.startswith('not written: STS 10: ') for _, reason in reasons)
+    interlocks = cell.bench.driver.interlocks
+    assert interlocks.fallbacks[0].refusal.startswith('STS 10: ')
+    cell.refused = set()
+    cell.run(2.0)
+    assert [interlocks.fallbacks[0].refusal, interlocks.heartbeats[0].refusal] == ['', '']
+
+
+def test_rule_8_fallbacks_that_stand_and_reads_take_turns_on_a_full_line() -> None:
+    reads = [make_mapping(f'N{file}:0', period=100, tag=f'read_{file}') for file in range(20, 30)]
+    outputs = [make_mapping(f'N7:{number}', 'Write', fallback=FALLBACK, tag=f'w_{number}')
+               for number in range(60)]
+    bench = DriverBench([*reads, *outputs], network=Network(baud=9600))
+    plc = bench.plc(1, 'PLC5', ('N7:0', 60), *((f'N{file}:0', 1) for file in range(20, 30)))
+    bench.run(20.0)
+    before, written = len(bench.listener.reads), []
+    write = plc.table.write
+
+    def note(address: Address, data: bytes) -> None:
+        written.append(str(address))
+        write(address, data)
+
+    plc.table.write = note  # type: ignore[method-assign]
+    bench.run(30.0)
+    times = Counter(written)
+    assert len(times) == 60 and min(times.values()) >= 3
+    assert len(written) == pytest.approx(len(bench.listener.reads) - before, abs=5)
+
+
+@pytest.mark.parametrize(('outcome', 'next_refresh'), [
+    (Outcome.WRITTEN, 12.0), (Outcome.UNKNOWN, 8.0), (Outcome.FAILED, 8.0)])
+def test_rule_10_refresh_is_not_the_second_write(outcome: Outcome, next_refresh: float) -> None:
+    one = OneRow(cmd_timeout=4.0)
+    row = one.row
+    one.message(1.0, 2.0, Outcome.UNKNOWN)
+    assert row.judge(2.0, -math.inf)
+    one.fallback(row.take(2.0), 2.0)
+    one.fallback(row.refresh(7.0), 7.0, outcome)
+    assert not row.judge(7.0, -math.inf)
+    assert row.due == 10.0
+    assert row.refresh_at == next_refresh
+
+
+def test_rule_10_first_try_is_not_held_up_by_the_pause_of_another_row() -> None:
+    speeds = [make_mapping(f'N7:{2 * number}', 'Write', tag=f'speed{number}', via=7,
+                           fallback=Fallback((7,), 500 + 100 * number)) for number in range(2)]
+    for offset in range(10):  # the pauses begin with the retries, a second before they end
+        cell = Cell(*speeds, start=False)
+        cell.put_behind_gateway()
+        cell.run(7.0 + 0.1 * offset)
+        for speed in speeds:
+            cell.bench.write(speed, [5])
+            cell.run(0.1)
+        _, second = cell.bench.driver.interlocks.fallbacks
+        cell.is_undelivered = lambda command: command.data[7:8] == b'\0'
+        cell.bench.run_until(lambda row=second: row.sent > row.refreshed)
+        assert second.sent < second.refreshed + second.after + 0.15
+
+
+def test_rule_10_pause_of_this_process_is_no_pause_of_a_gateway() -> None:
+    speed = make_mapping('N7:0', 'Write', tag='speed', fallback=FALLBACK, via=7)
+    cell = Cell(speed, start=False)
+    cell.put_behind_gateway()
+    cell.run(6.0)
+    cell.publish(speed, 42, run=0.1)
+    row, = cell.bench.driver.interlocks.fallbacks
+    cell.is_undelivered = lambda command: True
+    cell.bench.run_until(lambda: not row.stands and row.tried > row.refreshed
+                         and not row.is_under_way)
+    cell.bench.run_until(lambda: row.is_under_way)  # the second try
+    cell.bench.line.pause(cell.bench.driver.machine, 600.0)
+    cell.run(601.0)
+    cell.is_undelivered = lambda command: False
+    cell.run(1.5)
+    assert cell.word('N7:0') == 7
+
+
+def test_rule_10_pause_of_this_process_does_not_put_off_a_silent_plc() -> None:
+    rows = [make_mapping('N7:1', station=number, period=500) for number in (1, 2)]
+    speed = make_mapping('N7:0', 'Write', station=2, fallback=FALLBACK)
+    line = Line([*rows, speed], (1, 2))
+    line.run(2.0)
+    line.write(speed, [42])
+    line.run(0.1)
+    line._stations[1].faults.silent = True
+    line.run(4.0)
+    line.run_until(lambda: any(task.station == 2 for task in line.driver.tasks.under_way))
+    line.line.pause(line.driver.machine, 600.0)
+    line._stations[1].faults.silent = False
+    asked = len(line.asked)
+    line.run(603.0)
+    assert (2, 0) in [(station, word) for _, station, word in line.asked[asked:]]
+    assert line.driver.stations[2].active
+
+
+def test_rule_11_flood_of_bits_does_not_delay_beats_nor_starve_reads() -> None:
+    bit, read = make_mapping('B3:0/0', 'Write'), make_mapping('N11:0', period=100)
+    cell = Cell(beat_row(period=200), bit, read, run=1.0)
+    for number in range(400):
+        cell.bench.write(bit, [number % 2])
+    since = cell.now
+    cell.run(3.0)
+    beats = [when for when, name, _ in cell.writes if name == 'N10:0' and when >= since]
+    assert max(after - before for before, after in zip(beats, beats[1:], strict=False)) < 0.25
+    assert len([when for when in cell.bench.listener.times(read) if when >= since]) > 20
+
+
+def test_rule_11_first_try_of_a_fallback_does_not_wait_for_the_turn_of_late_plcs() -> None:
+    speed = speed_row(Fallback((7,), 3000))
+    cell = Cell(beat_row(), speed, run=2.0)
+    cell.publish(speed, 3, run=0.1)
+    cell.is_late, begun = True, cell.now
+    cell.run(6.0)
+    assert not cell.bench.driver.stations[1].replies_in_time
+    tried, = (when - begun for when, _, value in cell.writes if value == 7 and when > begun)
+    assert 2.8 < tried < 2.9 + 0.5 + 1.0 + 0.1  # a heartbeat has the line, and a pause follows it
+
+
+def test_rule_7_old_message_of_a_serve_row_is_not_stored() -> None:
+    row = make_mapping('N7:0', 'Serve', station=0, fallback=FALLBACK)
+    bench = DriverBench([row])
+    bench.run(3.0)
+    bench.driver.write([row], [42], bench.clock() - 2 * AFTER)
+    bench.driver._sort_inbox(bench.clock())
+    assert bench.driver._served.words_of(row) == b'\7\0'
+    assert bench.listener.results[-1].outcome is Outcome.NOT_SENT
+
+
+def test_rule_12_fallback_of_a_serve_row_goes_into_our_own_table() -> None:
+    served = make_mapping('N9:0', 'Serve', station=5, fallback=FALLBACK)
+    cell = Cell(served, run=0.1)
+    words = cell.bench.driver._served.words_of
+    assert words(served) == b'\7\0'
+    cell.publish(served, 3, run=0.3)
+    assert words(served) == b'\3\0'
+    cell.run(0.3)
+    assert words(served) == b'\7\0'
+    assert cell.results() == [START, 'written', TIMEOUT]
+
+
+def test_rule_17_fallback_has_one_result_and_its_retries_have_none() -> None:
+    cell, speed = speed_cell()
+    cell.publish(speed, 3, run=0.1)
+    cell.refused = {'N7:0'}
+    cell.run(4.0)
+    cell.refused = set()
+    cell.run(3.0)
+    assert cell.results().count(TIMEOUT) == 1
+    result = cell.bench.listener.results[-1]
+    assert (result.outcome, result.value) == (Outcome.FALLBACK, '[7]')
+    assert result.latency > 3.0
+
+
+def test_rule_18_read_only_writes_nothing() -> None:
+    cell = Cell(beat_row(), speed_row(), read_only=True, run=3.0)
+    assert cell.writes == []
+    assert cell.bench.driver.interlocks.is_over

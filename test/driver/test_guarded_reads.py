@@ -1,0 +1,168 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Guarded reads on a virtual line; the numbers are those of the rules in docs/heartbeats.md."""
+
+from dataclasses import replace
+from functools import partial
+
+from abdf1_ros.driver.reads.guards import CounterGuard, RunGuard
+from abdf1_ros.driver.reads.point import Freshness, ReadPoint
+from abdf1_ros.driver.settings import DriverSettings
+from abdf1_ros.pccc.emulated import Setting
+from abdf1_ros.pccc.file_types import PlcType
+from abdf1_ros.pccc.identity import Identity, Mode
+from abdf1_ros.settings.heartbeats import PublishWhile
+from abdf1_ros.settings.mapping import Mapping
+from abdf1_ros.settings.network import Network
+from support.driver_bench import DriverBench, store
+from support.interlocks import beat_row, Cell
+from support.mappings import make_mapping
+
+
+def test_rule_13_run_guards_a_row() -> None:
+    read = make_mapping('N11:0', period=100, publish_while=PublishWhile(None, None))
+    cell = Cell(read, run=3.0)
+    assert len(cell.bench.listener.reads) > 20
+    cell.plc.processor.setting = Setting.PROGRAM
+    cell.run(1.0)
+    since = cell.now
+    point = cell.bench.driver.points[read]
+    cell.run(2.0)
+    assert [when for when in cell.bench.listener.times(read) if when >= since] == []
+    assert point.freshness(cell.now) is Freshness.WITHHELD
+    assert point.withheld.startswith('not in RUN: it is in ')
+    assert cell.bench.listener.reasons[-1][1] == 'withheld: not in RUN: it is in REM PROG'
+    cell.plc.processor.setting = Setting.RUN
+    cell.run(2.0)
+    assert point.freshness(cell.now) is Freshness.FRESH
+
+
+def test_rule_13_answer_about_the_mode_is_no_older_than_the_stale_time() -> None:
+    row = make_mapping('N11:0', publish_while=PublishWhile(None, None))
+    guard = RunGuard()
+    point = ReadPoint(row, 1.0, 3.0, guard)
+    why_not = partial(guard.why_not, point)
+    running = Identity(PlcType.SLC, 'SLC 5/03', mode=Mode.RUN, mode_text='RUN')
+    assert why_not(9.0, 9.0) == 'not in RUN: its mode is not known'
+    guard.told(running, 10.0)
+    begun = 'it has begun to run during this read'
+    assert [why_not(10.0, 10.5), why_not(10.5, 13.0)] == [begun, '']
+    assert why_not(13.0, 13.5) == 'it has not reported its mode for 3.5 s'
+    guard.told(running, 13.5)  # nobody knows what it did in between
+    assert [why_not(13.5, 13.6), why_not(13.6, 13.6)] == [begun, '']
+    guard.told(replace(running, faults=('bad RAM', 'low battery')), 14.0)
+    assert why_not(14.5, 14.5) == 'not in RUN: it is in RUN, bad RAM; low battery'
+    guard.told(None, 15.0)
+    assert why_not(15.5, 15.5) == 'not in RUN: its mode is not known'
+
+
+def test_rule_11_mode_is_asked_for_though_heartbeats_take_the_whole_line() -> None:
+    read = make_mapping('N11:0', period=1000)
+    beats = [beat_row(100, address=f'N10:{number}') for number in range(6)]
+    bench = DriverBench([read, *beats], network=Network(baud=2400, timeout=200))
+    bench.plc(1, 'PLC5', ('N10:0', 6), ('N11:0', 1))
+    bench.breathe()
+    bench.run(30.0)
+    told = bench.driver.checks.known(1).told
+    assert told is not None and told > bench.clock() - 10.0
+    assert len(bench.listener.times(read)) == 3
+
+
+def test_rule_13_questions_for_the_modes_of_many_plcs_have_their_share_of_a_full_line() -> None:
+    stations = range(11, 23)
+    rows = [make_mapping('N11:0', period=300, station=station, publish_while=condition,
+                         tag=f'row_{station}_{number}')
+            for station in stations
+            for number, condition in enumerate((None, PublishWhile(None, None)))]
+    bench = DriverBench(rows, network=Network(baud=9600))
+    for station in stations:
+        bench.plc(station, 'PLC5', ('N11:0', 1))
+    bench.run(120.0)
+    assert bench.listener.reasons == []
+    points = bench.driver.points
+    planned = points[rows[0]].stale_time / DriverSettings().stale_after
+    counts = {mapping: len(bench.listener.values(mapping)) for mapping in rows}
+    assert min(counts.values()) > 120.0 / planned > 0.6 * max(counts.values())
+
+
+def counter_cell() -> tuple[Cell, Mapping]:
+    """Return a cell whose rows depend on a counter, which stands still."""
+    counter = make_mapping('N11:3', tag='alive', period=100)
+    read = make_mapping('N7:0', period=100, publish_while=PublishWhile('alive', 500))
+    return Cell(counter, read), read
+
+
+def count(cell: Cell, times: int, gap: float = 0.15) -> None:
+    """Let the PLC's program count."""
+    for number in range(times):
+        cell.bench.at(cell.now + number * gap,
+                      lambda number=number: store(cell.plc, 'N11:3', [number + 1]))  # type: ignore
+
+
+def test_rule_14_counter_has_to_change_twice_before_anything_is_published() -> None:
+    cell, read = counter_cell()
+    cell.run(3.0)
+    assert cell.bench.listener.times(read) == []
+    begun = cell.now
+    count(cell, 20)
+    cell.run(3.0)
+    times = cell.bench.listener.times(read)
+    assert times[0] > begun + 0.15
+    assert cell.bench.driver.points[read].freshness(cell.now) is Freshness.FRESH
+    ended = cell.now
+    cell.run(3.0)
+    times = cell.bench.listener.times(read)
+    assert ended < times[-1] < ended + 0.65
+    assert cell.bench.driver.points[read].withheld == 'alive has not changed twice within 0.5 s'
+
+
+def test_rule_14_late_change_ends_what_two_in_time_have_permitted() -> None:
+    row = make_mapping('N7:0', publish_while=PublishWhile('alive', 500))
+    guard = CounterGuard('alive')
+    point = ReadPoint(row, 0.1, 3.0, guard)
+    for number, now in enumerate((0.0, 0.3, 0.6)):
+        guard.read(bytes((number,)), now)
+    assert guard.why_not(point, 0.7, 0.7) == ''
+    guard.read(b'x', 5.0)  # late, and nobody has asked meanwhile
+    assert guard.why_not(point, 5.1, 5.1) == 'alive has not changed twice within 0.5 s'
+    guard.read(b'y', 5.2)
+    assert [guard.why_not(point, 5.2, 5.3), guard.why_not(point, 5.3, 5.3)] == [
+        'alive has begun to change during this read', '']
+
+
+def withheld(cell: Cell) -> list[str]:
+    """Return what was told of withheld rows."""
+    return [reason for _, reason in cell.bench.listener.reasons if reason.startswith('withheld')]
+
+
+def test_rule_15_withholding_is_counted_and_told_once_a_cause() -> None:
+    cell, read = counter_cell()
+    for _ in range(3):
+        count(cell, 5)
+        cell.run(3.0)
+    assert cell.bench.driver.points[read].withholdings == len(withheld(cell)) == 3
+    assert [tag for tag, _ in cell.bench.listener.ends] == 2 * [read.tag]
+    assert all(2.0 < seconds < 3.0 for _, seconds in cell.bench.listener.ends)
+
+
+def test_rule_15_start_is_told_when_the_program_has_had_its_time_to_count() -> None:
+    cell, read = counter_cell()
+    cell.run(0.4)
+    point = cell.bench.driver.points[read]
+    assert (withheld(cell), point.withholdings) == ([], 0)
+    assert point.freshness(cell.now) is Freshness.WAITING
+    cell.run(0.4)
+    assert (len(withheld(cell)), point.withholdings) == (1, 1)
+    assert point.freshness(cell.now) is Freshness.WITHHELD

@@ -1,0 +1,164 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The orderly end of a bridge on a virtual line: rule 5 of docs/heartbeats.md."""
+
+from abdf1_ros.df1.packet import Packet
+from abdf1_ros.settings.heartbeats import Fallback
+import pytest
+from support.interlocks import beat_row, Cell, END, end, FALLBACK, speed_row
+from support.mappings import make_mapping
+
+
+@pytest.mark.parametrize('is_end', [True, False])
+def test_rules_3_and_5_a_0_that_is_refused_is_written_again_before_a_long_period_is_over(
+        is_end: bool) -> None:
+    speed = speed_row(None)
+    cell = Cell(beat_row(5000, requires=(speed.topic,), timeout=2000), speed)
+    cell.publish(speed, 3, times=100, run=11.5 if is_end else 11.85)
+    assert cell.word('N10:0') > 0
+    cell.refused = {'N10:0'}
+    cell.bench.at(cell.now + 0.3, cell.refused.clear)
+    if is_end:
+        end(cell)
+    cell.run(1.3)
+    assert cell.refusals == 1
+    assert cell.word('N10:0') == 0
+
+
+def test_rule_5_orderly_end_is_0_then_the_fallbacks() -> None:
+    speed = speed_row()
+    cell = Cell(beat_row(), speed)
+    cell.publish(speed, 3, times=20, run=1.95)
+    since = cell.now
+    driver = cell.bench.driver
+    assert not driver.interlocks.is_over
+    driver.interlocks.wind_down()
+    cell.bench.line.wake(driver.machine)
+    cell.bench.write(speed, [4])
+    cell.run(0.3)
+    assert [(name, value) for when, name, value in cell.writes if when >= since] == [
+        ('N10:0', 0), ('N7:0', 7)]
+    assert driver.interlocks.is_over
+    assert driver.interlocks.unconfirmed() == []
+    assert cell.results()[-2:] == ['not written: refused: this node ends', END]
+
+
+@pytest.mark.parametrize('moment', [
+    'waits', 'on the line', 'executed', 'after a fallback under way', 'after a refresh under way'])
+def test_rule_5_message_does_not_outlive_the_end(moment: str) -> None:
+    speed = speed_row()
+    cell = Cell(beat_row(), speed, run=1.95)
+    driver = cell.bench.driver
+    row, = driver.interlocks.fallbacks
+    if moment == 'after a fallback under way':
+        cell.publish(speed, 3, run=0.1)
+    if 'under way' in moment:
+        cell.bench.run_until(lambda: row.is_under_way)
+        assert row.stands is ('refresh' in moment)
+        cell.run(0.001)
+    cell.bench.write(speed, [42])
+    if 'under way' in moment:
+        driver._sort_inbox(cell.now)
+    if moment == 'executed':
+        cell.bench.run_until(lambda: cell.word('N7:0') == 42)
+    elif moment == 'on the line':
+        cell.bench.run_until(lambda: bool(driver.interlocks._writes.youngest()))
+        assert cell.word('N7:0') == 7
+    end(cell, 0.3)
+    assert (cell.word('N10:0'), cell.word('N7:0')) == (0, 7)
+    assert driver.interlocks.unconfirmed() == []
+
+
+@pytest.mark.parametrize('event', ['end', 'RUN', 'port'])
+def test_rules_5_and_8_message_over_a_fallback_that_is_due_puts_none_off(event: str) -> None:
+    speed = speed_row(Fallback((7,), 20_000))
+    cell = Cell(beat_row(), speed, start=False)
+    cell.refused, cell.spared = {'N7:0'}, 42
+    cell.bench.open()
+    cell.run(0.3)  # refused once
+    cell.is_late = True
+    cell.bench.write(speed, [42])  # carried out, and nobody knows
+    cell.bench.run_until(lambda: cell.bench.driver.interlocks.fallbacks[0].has_failed)
+    cell.is_late, cell.refused = False, set()
+    assert cell.word('N7:0') == 42
+    if event == 'end':
+        end(cell)
+    elif event == 'RUN':
+        for is_running in (False, True):
+            cell.bench.driver.interlocks.mode_seen(1, is_running, cell.now)
+    else:
+        cell.bench.lose_port()
+        cell.bench.open()
+    cell.run(0.2)
+    assert cell.word('N7:0') == 7
+
+
+@pytest.mark.parametrize('is_followed', [False, True])
+def test_rule_5_end_waits_for_the_second_write_of_rule_10(is_followed: bool) -> None:
+    """A gateway delivers 0.9 s later what it has called undelivered."""
+    speed = make_mapping('N7:0', 'Write', tag='speed', fallback=FALLBACK, via=7)
+    cell = Cell(speed, start=False)
+    cell.put_behind_gateway()
+    cell.run(6.0)
+
+    def is_held(command: Packet) -> bool:
+        if command.data[-2:] != b'\x2a\x00':
+            return False
+        cell.bench.at(cell.now + 0.9, lambda: cell.plc.serve(command))
+        return True
+
+    cell.is_undelivered = is_held
+    cell.publish(speed, 42, run=0.05)
+    if is_followed:
+        cell.publish(speed, 5, run=0.05)
+        assert cell.results()[-1] == 'written'
+    end(cell)
+    assert cell.word('N7:0') == 7
+
+
+def test_rule_5_end_waits_for_a_plc_that_does_not_answer_for_a_moment() -> None:
+    speed = speed_row()
+    cell = Cell(beat_row(), speed)
+    cell.publish(speed, 42, times=20, run=1.95)
+    hear, since = cell.bench.far.hear, cell.now
+    cell.bench.far.hear = lambda data: hear(data) if cell.now > since + 0.7 else b''
+    end(cell)
+    assert (cell.word('N10:0'), cell.word('N7:0')) == (0, 7)
+
+
+def test_rule_5_end_asks_a_silent_plc_at_once_where_another_answers() -> None:
+    speed = speed_row(Fallback((7,), 5000))
+    cell = Cell(beat_row(), speed, make_mapping('N7:9', station=2, period=100),
+                polling='Standard', start=False)
+    cell.bench.plc(2, 'PLC5', ('N7:0', 20))
+    cell.bench.open()
+    cell.run(1.0)
+    cell.publish(speed, 42, times=20, run=1.95)
+    cell.plc.faults.silent = True
+    cell.bench.at(cell.now + 1.0, lambda: setattr(cell.plc.faults, 'silent', False))
+    cell.bench.driver.interlocks.wind_down()
+    cell.bench.line.wake(cell.bench.driver.machine)
+    cell.run(1.5)
+    assert (cell.word('N10:0'), cell.word('N7:0')) == (0, 7)
+
+
+def test_rule_5_what_was_not_confirmed_at_the_end_is_named() -> None:
+    cell = Cell(beat_row(), speed_row(), run=1.0)
+    cell.refused = {'N10:0'}
+    cell.bench.driver.interlocks.wind_down()
+    cell.bench.line.wake(cell.bench.driver.machine)
+    cell.run(2.0)
+    assert not cell.bench.driver.interlocks.is_over
+    assert cell.bench.driver.interlocks.unconfirmed() == ['beat']

@@ -1,0 +1,207 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Guests and gateways that hold commands, beside heartbeats and fallback values."""
+
+from collections.abc import Callable
+from functools import partial
+
+from abdf1_ros.df1.packet import Packet
+from abdf1_ros.driver.guests import Guest, GuestCommand, ShareAccess
+from abdf1_ros.driver.interlocks.fallback import FallbackState
+from abdf1_ros.settings.heartbeats import Heartbeat
+from abdf1_ros.settings.mapping import Mapping
+from abdf1_ros.settings.network import POLLING_MODES
+import pytest
+from support.driver_bench import store
+from support.interlocks import beat_row, Cell, end, FALLBACK, speed_row, START, WORDS
+from support.mappings import make_mapping
+
+
+def hold(cell: Cell, seconds: float, is_meant: Callable[[Packet], bool]) -> None:
+    """Let a gateway say that a command was not delivered, and deliver it later."""
+    serve = cell.plc.serve
+
+    def keep(command: Packet) -> Packet:
+        if not is_meant(command):
+            return serve(command)
+        cell.bench.at(cell.now + seconds, lambda: serve(command))
+        return command.reply(sts=0x02)
+
+    cell.plc.serve = keep  # type: ignore[method-assign]
+
+
+class GuestCell(Cell):
+    """A cell with a guest who writes there."""
+
+    def __init__(self, *rows: Mapping, start: bool = True, run: float = 1.0,
+                 polling: str = 'Message') -> None:
+        super().__init__(*rows, start=False, polling=polling)
+        self.replies: list[int] = []
+        if start:
+            self.bench.open()
+            self.run(run)
+
+    def ask(self, text: str, value: int, dst: int = 1) -> None:
+        """Let the guest write a word."""
+        row = make_mapping(text, 'Write')
+        cmd, data = row.dialect.write(row.address, value.to_bytes(2, 'little'))
+        self.bench.driver.guests.put(GuestCommand(
+            Guest('pty:hmi', ShareAccess.ALL), Packet(dst, 9, cmd, 0, 1, data), self.now,
+            lambda reply: self.replies.append(reply.sts)))
+        self.bench.line.wake(self.bench.driver.machine)
+
+    def hold_guests(self, seconds: float) -> None:
+        """Let a gateway keep the guest's 99."""
+        hold(self, seconds, lambda command: command.data.endswith(b'\x63\0'))
+
+
+@pytest.mark.parametrize('dst', [1, 255])
+@pytest.mark.parametrize('polling', POLLING_MODES)
+@pytest.mark.parametrize('text', WORDS)
+def test_rule_5_write_of_a_guest_on_the_line_when_the_end_begins_does_not_stay(
+        text: str, polling: str, dst: int) -> None:
+    # Alone: nothing else keeps the end waiting.
+    row = speed_row() if text == 'N7:0' else beat_row(requires=('speed',), timeout=300)
+    cell = GuestCell(row, polling=polling)
+    cell.ask(text, 99, dst)
+    cell.bench.run_until(lambda: cell.word(text) == 99)  # its reply is not here yet
+    end(cell)
+    assert cell.word(text) == (7 if text == 'N7:0' else 0)
+
+
+@pytest.mark.parametrize('text', WORDS)
+@pytest.mark.parametrize('held', [0.3, 0.9])
+def test_rule_5_write_of_a_guest_that_a_gateway_holds_does_not_stay(
+        text: str, held: float) -> None:
+    speed = make_mapping('N7:0', 'Write', tag='speed', fallback=FALLBACK, via=7)
+    beat = make_mapping('N10:0', 'Heartbeat', tag='beat', period=200, heartbeat=Heartbeat(), via=7)
+    cell = GuestCell(beat, speed, start=False)
+    cell.put_behind_gateway()
+    cell.run(4.0)
+    cell.hold_guests(held)
+    cell.ask(text, 99)
+    cell.run(0.02)
+    assert cell.replies == [0x02]
+    end(cell)
+    assert [cell.word(name) for name in WORDS] == [7, 0]
+
+
+def test_rule_5_what_may_still_land_after_the_end_is_named() -> None:
+    speed = make_mapping('N7:0', 'Write', tag='speed', fallback=FALLBACK, via=7)
+    cell = GuestCell(speed, start=False)
+    cell.bench.driver._record._settle_time = 20.0  # as with a Cmd_Timeout of 10 s
+    cell.put_behind_gateway()
+    cell.run(30.0)
+    cell.hold_guests(1.9)
+    cell.ask('N7:0', 99)
+    cell.run(0.02)
+    end(cell)
+    unconfirmed, = cell.bench.driver.interlocks.unconfirmed()
+    assert unconfirmed.startswith('speed (a gateway may hold a write to it for ')
+
+
+@pytest.mark.parametrize('dst', [1, 255])
+def test_rule_8_guests_write_over_a_fallback_is_written_over_at_once(dst: int) -> None:
+    cell = GuestCell(beat_row(), speed_row())
+    row, = cell.bench.driver.interlocks.fallbacks
+    cell.run(1.0)
+    since = cell.now
+    cell.ask('N7:0', 99, dst)
+    cell.bench.run_until(lambda: cell.word('N7:0') == 99)
+    cell.bench.run_until(lambda: not row.stands)
+    assert row.state is FallbackState.OVERWRITTEN
+    cell.run(0.1)
+    assert row.stands
+    assert cell.written('N7:0', since)[-1:] == [7]
+    assert cell.written('N10:0', since)[-1:] == [0]  # rule 3 b
+    cell.run(2.0)
+    assert cell.word('N10:0') > 0
+    assert cell.results() == [START]
+
+
+@pytest.mark.parametrize('held', [0.5, 0.7, 0.9])
+@pytest.mark.parametrize('count', [1, 2, 3])
+def test_rule_19_own_heartbeats_that_a_gateway_holds_are_no_other_program(
+        held: float, count: int) -> None:
+    beat = make_mapping('N10:0', 'Heartbeat', tag='beat', period=200, heartbeat=Heartbeat(), via=7)
+    cell = Cell(beat, start=False)
+    cell.put_behind_gateway()
+    cell.run(5.0)
+    left = [count]
+
+    def is_meant(command: Packet) -> bool:
+        left[0] -= command.data[-2:] != b'\0\0' and 'N10:0' in cell._named(command)
+        return 0 <= left[0] < count
+
+    hold(cell, held, is_meant)
+    cell.run(5.0)
+    assert left[0] < 0
+    assert cell.bench.listener.foreign == []
+    assert cell.bench.driver.interlocks.heartbeats[0].why_not(cell.now) == ''
+
+
+def test_rule_8_guests_write_over_a_0_is_written_over_at_once() -> None:
+    cell = GuestCell(beat_row(2000, requires=('speed',), timeout=300))
+    cell.ask('N10:0', 99)
+    cell.bench.run_until(lambda: cell.word('N10:0') == 99)
+    cell.run(0.1)
+    assert cell.word('N10:0') == 0
+    assert cell.bench.listener.foreign == []
+
+
+def test_rule_8_command_that_nobody_knows_refreshes_and_holds_no_heartbeat() -> None:
+    cell = GuestCell(beat_row(), speed_row())
+    cell.run(1.0)
+    since = cell.now
+    store(cell.plc, 'N7:0', [99])
+    cell.bench.driver.guests.put(GuestCommand(
+        Guest('pty:hmi', ShareAccess.ALL), Packet(1, 9, 0x0F, 0, 1, b'\x3A'), cell.now,
+        lambda reply: None))
+    cell.plc.serve = partial(_confirm_3a, cell.plc.serve)  # type: ignore[method-assign]
+    cell.run(0.3)
+    assert cell.word('N7:0') == 7
+    assert 0 not in cell.written('N10:0', since)
+
+
+def _confirm_3a(serve: Callable[[Packet], Packet], command: Packet) -> Packet:
+    return command.reply() if command.data == b'\x3A' else serve(command)
+
+
+def test_rule_5_commands_of_guests_are_not_sent_while_the_bridge_ends() -> None:
+    cell = Cell(speed_row(), run=1.0)
+    driver, sts = cell.bench.driver, []
+    cell.refused = {'N7:0'}  # so that the end lasts
+    driver.interlocks.wind_down()
+    command = Packet(1, 9, 0x0F, 0, 1, bytes.fromhex('67 00 00 01 00 07 00 07 00 42 2A 00'))
+    driver.guests.put(GuestCommand(Guest('pty:hmi', ShareAccess.ALL), command, cell.now,
+                                   lambda reply: sts.append(reply.sts)))
+    cell.bench.line.wake(driver.machine)
+    cell.run(1.0)
+    assert sts == [0x01]  # no room; the PLC would have answered 10
+
+
+def test_rule_11_plc_is_not_left_alone_any_more_once_it_answers_a_write_of_anybody() -> None:
+    speed = speed_row()
+    cell = GuestCell(speed, start=False)
+    cell.is_undelivered = lambda command: command.data.endswith(b'\7\0')
+    cell.bench.open()
+    plc = cell.bench.driver.interlocks._plcs[1]
+    cell.bench.run_until(lambda: plc.is_lost)
+    cell.is_undelivered = lambda command: False
+    assert cell.now < 0.2 < plc.pause_end
+    cell.ask('N7:0', 99)
+    cell.bench.run_until(lambda: cell.word('N7:0') == 99)
+    cell.run(0.1)
+    assert cell.word('N7:0') == 7

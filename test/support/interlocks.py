@@ -1,0 +1,181 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Heartbeats and fallback values on a virtual line, for the tests of their rules."""
+
+from collections.abc import Callable, Sequence
+from functools import partial
+
+from abdf1_ros.df1.packet import Packet
+from abdf1_ros.df1.settings import LinkSettings
+from abdf1_ros.df1.slave import HalfDuplexSlave
+from abdf1_ros.driver.settings import DriverSettings
+from abdf1_ros.pccc.families import parse_address
+from abdf1_ros.settings.heartbeats import Fallback, Heartbeat
+from abdf1_ros.settings.mapping import Mapping
+from abdf1_ros.settings.network import Network
+from abdf1_ros.simulator.simulated_plc import SimulatedPlc
+from support.driver_bench import DriverBench
+from support.mappings import make_mapping
+
+WORDS = ('N7:0', 'N10:0')  # of the PLC: a fallback, and a heartbeat
+AFTER = 0.5
+FALLBACK = Fallback((7,), int(AFTER * 1000))
+START, TIMEOUT, RETURN, RUN, END = (
+    f'fallback value written: {cause}' for cause in ('start', 'timeout', 'return', 'run', 'end'))
+
+
+def beat_row(period: int = 200, requires: Sequence[str] = (), timeout: int | None = None,
+             address: str = 'N10:0') -> Mapping:
+    """Return a Heartbeat row."""
+    return make_mapping(address, 'Heartbeat', tag='beat', period=period,
+                        heartbeat=Heartbeat(tuple(requires), timeout))
+
+
+def speed_row(fallback: Fallback | None = FALLBACK, address: str = 'N7:0', tag: str = 'speed',
+              length: int = 1) -> Mapping:
+    """Return a Write row with Fallback."""
+    return make_mapping(address, 'Write', tag=tag, fallback=fallback, length=length)
+
+
+class Cell:
+    """A driver, a PLC whose writes are kept, and a ROS executor that can stand still."""
+
+    def __init__(self, *rows: Mapping, polling: str = 'Message', start: bool = True,
+                 run: float = 0.0, **settings: object) -> None:
+        self.bench = DriverBench(rows, network=Network(
+            # Polled without a pause, a slow line shows the same with fewer polls.
+            baud=115200 if polling == 'Message' else 19200, timeout=200, cmd_timeout=500,
+            nak_retries=1, enq_retries=1, polling=polling),
+            settings=DriverSettings(**settings), start=False)  # type: ignore
+        self.plc = self.bench.plc(1, 'PLC5', ('N7:0', 200), ('N10:0', 20), ('N11:0', 20),
+                                  ('B3:0', 4))
+        self.plc.slave = HalfDuplexSlave(LinkSettings(station=1), self._serve)
+        self.refused: set[str] = set()
+        self.refusals = 0
+        self.spared: int | None = None  # this value is taken all the same
+        self.is_late = False  # commands are carried out, and no reply comes in time
+        self.is_undelivered: Callable[[Packet], bool] = lambda command: False  # by a gateway
+        self.writes: list[tuple[float, str, int]] = []
+        self.bench.breathe()
+        if start:
+            self.bench.open()
+            self.run(run)
+
+    @property
+    def now(self) -> float:
+        """Return the clock."""
+        return self.bench.clock()
+
+    def put_behind_gateway(self) -> None:
+        """Let station 7 answer for the PLC, and open the port."""
+        self.plc.slave, self.plc.station = HalfDuplexSlave(LinkSettings(station=7), self._serve), 7
+        self.bench.open()
+
+    def _serve(self, command: Packet) -> Packet:
+        if self.is_undelivered(command):
+            return command.reply(sts=0x02)
+        before = self._words()
+        is_spared = int.from_bytes(command.data[-2:], 'little') == self.spared
+        if command.cmd == 0x0F and command.data[0] == 0x67 and not is_spared \
+                and self.refused & self._named(command):
+            self.refusals += 1
+            return command.reply(sts=0x10)
+        reply = self.plc.serve(command)
+        if self.is_late:  # nobody waits for this one
+            reply = reply._replace(tns=reply.tns ^ 0x8000)
+        after = self._words()
+        if command.cmd == 0x0F and command.data[0] == 0x67:
+            for name in self._named(command):
+                self.writes.append((self.now, name, after[name]))
+        elif before != after:
+            for name in after:
+                if before[name] != after[name]:
+                    self.writes.append((self.now, name, after[name]))
+        return reply
+
+    def _named(self, command: Packet) -> set[str]:
+        """Return the word that a typed write goes to."""
+        files = {7: 'N7:0', 10: 'N10:0'}
+        return {files[number] for number in files if bytes((6, number)) in command.data[:9]
+                or bytes((7, 0, number)) in command.data[:10]}
+
+    def _words(self) -> dict[str, int]:
+        return {name: self.word(name) for name in WORDS}
+
+    def word(self, text: str) -> int:
+        """Return a word of the PLC."""
+        return int.from_bytes(
+            self.plc.table.read(parse_address(text, self.plc.table.plc_type), 1), 'little')
+
+    def written(self, text: str, since: float = 0.0) -> list[int]:
+        """Return what was written to a word."""
+        return [value for when, name, value in self.writes if name == text and when >= since]
+
+    def results(self) -> list[str]:
+        """Return the results of writes."""
+        return [str(result) for result in self.bench.listener.results]
+
+    def run(self, seconds: float) -> None:
+        """Let time pass."""
+        self.bench.run(seconds)
+
+    def publish(self, row: Mapping, value: int, times: int = 1, gap: float = 0.1,
+                run: float = 0.0) -> None:
+        """Publish a value, so many times, while so many seconds pass."""
+        for number in range(times):
+            self.bench.at(self.now + number * gap, lambda: self.bench.write(row, [value]))
+        if run:
+            self.run(run)
+
+
+def speed_cell() -> tuple[Cell, Mapping]:
+    """Return a cell with one Write row, whose first fallback has been written, and the row."""
+    speed = speed_row()
+    return Cell(speed, run=1.0), speed
+
+
+def end(cell: Cell, seconds: float = 2.0) -> None:
+    """End in order: within so many seconds all has to be confirmed, and then the port closes."""
+    driver = cell.bench.driver
+    driver.interlocks.wind_down()
+    cell.bench.line.wake(driver.machine)
+    give_up = cell.now + seconds
+    while not driver.interlocks.is_over:
+        assert cell.now < give_up
+        cell.run(0.005)
+    cell.bench.lose_port()
+    cell.run(2.0)
+
+
+class Line(DriverBench):
+    """PLCs of which some carry out what they are told and do not reply; who was asked for what."""
+
+    def __init__(self, rows: Sequence[Mapping], stations: Sequence[int]) -> None:
+        super().__init__(rows, network=Network(
+            baud=115200, timeout=100, cmd_timeout=500, nak_retries=1, enq_retries=1))
+        self.mute: set[int] = set()
+        self.asked: list[tuple[float, int, int]] = []
+        for number in stations:
+            plc = self.plc(number, 'PLC5', ('N7:0', 40), ('N10:0', 4))
+            plc.slave = HalfDuplexSlave(LinkSettings(station=number), partial(self._serve, plc))
+        self.breathe()
+
+    def _serve(self, plc: SimulatedPlc, command: Packet) -> Packet:
+        reply = plc.serve(command)
+        if command.cmd == 0x0F and command.data[0] == 0x67 and command.data[6] == 7:
+            self.asked.append((self.clock(), plc.station, command.data[7]))
+        if plc.station in self.mute:
+            reply = reply._replace(tns=reply.tns ^ 0x8000)  # which nobody waits for
+        return reply
