@@ -38,8 +38,10 @@ endif
 
 # Told to write no bytecode, each interpreter that the tests start would compile the package again;
 # so they keep it in .venv.
+COMPILED := $(VENV)/.compiled
 ifdef PYTHONDONTWRITEBYTECODE
-TEST_ENV := env -u PYTHONDONTWRITEBYTECODE PYTHONPYCACHEPREFIX='$(CURDIR)/$(VENV)/bytecode'
+COMPILED := $(VENV)/bytecode
+TEST_ENV := env -u PYTHONDONTWRITEBYTECODE PYTHONPYCACHEPREFIX='$(CURDIR)/$(COMPILED)'
 endif
 
 .PHONY: help
@@ -83,8 +85,11 @@ $(INSTALLED): requirements/test.txt requirements/tools.txt | $(RUNS)
 	    $(PY) -m pip install --quiet --disable-pip-version-check -r requirements/test.txt; \
 	fi; \
 	touch $@
-	@# Compiles all tests once; the workers of "make test" would do it at the same time, each alone.
+
+# Compiles all tests once; the workers of "make test" would do it at the same time, each alone.
+$(COMPILED): | $(INSTALLED)
 	@$(TEST_ENV) $(PY) -m pytest --collect-only -q >/dev/null || true
+	@mkdir -p $@
 
 .PHONY: demo
 demo: $(RUNS) ## Run bridge and simulated PLC for DEMO_SECONDS (30; 0: until Ctrl-C)
@@ -95,7 +100,7 @@ demo-peer: $(RUNS) ## The same on a full-duplex line
 	@$(PY) -m abdf1_ros demo --peer --seconds $(DEMO_SECONDS)
 
 .PHONY: test
-test: $(INSTALLED) ## Run the tests; PYTEST_ARGS='test/df1 -k poll' runs some
+test: $(INSTALLED) $(COMPILED) ## Run the tests; PYTEST_ARGS='test/df1 -k poll' runs some
 	$(TEST_ENV) $(PY) -m pytest -n $(TEST_WORKERS) --dist loadfile \
 	    --no-loadscope-reorder --max-worker-restart 0 $(PYTEST_ARGS)
 
