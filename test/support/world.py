@@ -201,8 +201,8 @@ class Executed:
     """
     A word that a PLC has taken from the line.
 
-    ``driver`` counts the drivers there were. ``before`` was in the word. ``is_late`` tells that a
-    gateway had kept it, ``is_told`` that the PLC has replied.
+    ``driver`` is the number of the driver that has sent it. ``before`` was in the word.
+    ``is_late`` tells that a gateway had kept it, ``is_told`` that the PLC has replied.
     """
 
     when: float
@@ -335,6 +335,7 @@ class World(DriverBench):
             self._put_a_master()
         self.sent: list[Sent] = []
         self._last_sent: dict[int, bytes] = {}  # by station
+        self._senders: dict[tuple[str, int], int] = {}  # which driver sent a value last, by tag
         self._begins = {  # how each write begins on the line, by tag without the station
             row.tag[:-2]: stuff(row.dialect.write(row.address, b'\0\0')[1][:-2])
             for row in self.rows_of(1, ('w', 'free', 'beat'))}
@@ -469,7 +470,8 @@ class World(DriverBench):
         is_told = not watched.swallows_replies or not is_message and (
             bool(values) or self.dice.random() < 0.5)
         self.executed += [
-            Executed(now, station, tag, value, self.drivers, before, is_late, is_told)
+            Executed(now, station, tag, value, self._senders.get((tag, value), self.drivers),
+                     before, is_late, is_told)
             for tag, value, before in written]
         if not is_told:
             return reply._replace(tns=reply.tns ^ 0x8000)  # which nobody waits for
@@ -488,8 +490,9 @@ class World(DriverBench):
                 word = tail[at + len(begin):][:4].replace(stuff(DLE), DLE)[:2]
                 is_again = tail == self._last_sent.get(station)
                 self._last_sent[station] = tail
-                self.sent.append(Sent(start, station, f'{name}_{station}',
-                                      int.from_bytes(word, 'little'), is_again))
+                key = f'{name}_{station}', int.from_bytes(word, 'little')
+                self._senders[key] = self.drivers
+                self.sent.append(Sent(start, station, *key, is_again))
 
     def _hear(self, data: bytes) -> bytes:
         self.wire.update(b'%f>' % self.line.now + data)

@@ -33,7 +33,6 @@ from support.world import Executed, GUESTS, OTHERS, SAFE, Sent, STEP, World
 
 _LEAST_ZERO = 0.5  # s
 _LEAST_LIFE_SIGN = 1.0  # s
-_ON_THE_WIRE = 0.3  # s
 _MOMENT = 0.02  # s, for what goes out before it
 _REWRITTEN = 5.0  # s after which a fallback is written again
 _NEVER_EXECUTED = {Outcome.NOT_SENT, Outcome.REFUSED, Outcome.SUPERSEDED, Outcome.FAILED}
@@ -309,8 +308,6 @@ class Beats(Rule):
         last = self._last.get(tag)
         is_ours = tag.startswith('beat')
         if self._driver.get(tag, -1) != (entry.driver if is_ours else 0):
-            if value and entry.when < self.world.killed_at + _ON_THE_WIRE:
-                return  # what the killed one has sent
             self.demand(value == 0, entry, 'is the first of a driver')
             self._driver[tag] = entry.driver if is_ours else 0
             self._zero[tag] = entry.when
