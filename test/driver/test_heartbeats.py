@@ -129,6 +129,21 @@ def test_rule_3c_hung_executor_stops_the_beat_where_it_is(polling: str) -> None:
     assert cell.word('N10:0') > last
 
 
+def test_rule_3d_topic_that_falls_silent_is_0_at_once_though_the_executor_stands_still() -> None:
+    speed = speed_row()
+    cell = Cell(beat_row(200, ['speed'], 2000), speed)
+    cell.run(2.0)
+    cell.publish(speed, 3, run=0.3)
+    lapses = cell.bench.driver.interlocks._conditions.messages['speed'] + 2.0
+    cell.bench.is_alive = False
+    cell.run(lapses - cell.now - 0.01)
+    beat, = cell.bench.driver.interlocks.heartbeats
+    assert cell.word('N10:0') and beat.reason == 'the executor of the node stands still'
+    assert beat.due <= beat.first_due == lapses  # or nothing would happen, again and again
+    cell.run(0.05)
+    assert cell.word('N10:0') == 0
+
+
 @pytest.mark.parametrize('polling', POLLING_MODES)
 def test_rule_3d_required_topic_that_falls_silent_is_0_at_once(polling: str) -> None:
     speed = speed_row(None)

@@ -243,11 +243,13 @@ class HeartbeatRow:
             self.due = min(self._next, self.words.again_at)
         elif self.state is not BeatState.COUNTS:
             self.due = self._next
-        elif now >= self.executor_until(executor):
-            self.reason = 'the executor of the node stands still'  # nothing is written then
-            self.due = max(self._next, now + _GLANCE)
         else:
-            self.due = min(self._next, self._holds_at) if self.value else self._next
+            self.due = self._next
+            if now >= self.executor_until(executor):
+                self.reason = 'the executor of the node stands still'  # nothing is written then
+                self.due = max(self._next, now + _GLANCE)
+            if self.value:
+                self.due = min(self.due, self._holds_at)
         return self.due <= now and self.state is not BeatState.SHOWN
 
     def hold(self) -> None:
