@@ -35,6 +35,7 @@ from abdf1_ros.df1.machine import Machine
 
 BITS_PER_CHARACTER = 10
 _A_BIT = 0.1  # of a character
+_MOST_CALLS = 1000  # of machines at one moment
 _BYTES = [bytes((byte,)) for byte in range(256)]
 
 
@@ -120,6 +121,7 @@ class VirtualLine:
         self._calls = [math.inf] * len(machines)  # when each wants to be called next
         self._arrivals: list[tuple[float, int, int, bytes]] = []
         self._count = 0
+        self._idle = 0  # calls in a row at one moment
 
     def start(self) -> None:
         """Start every machine."""
@@ -202,6 +204,8 @@ class VirtualLine:
             self._away[first] = self.now + machine.spare_time
         else:
             first = calls.index(deadline)
+            self._idle = self._idle + 1 if deadline <= self.now else 0
+            assert self._idle < _MOST_CALLS, f'called for nothing, again and again, at {self.now}'
             self.now = max(self.now, deadline)
             self._machines[first].handle_timeout(self.now)
         self._take(first)
