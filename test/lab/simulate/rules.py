@@ -659,11 +659,17 @@ class OneOwner(Rule):
                     world.ill[0], world.plcs[station].ran_again + MODE_PERIOD)
         if last is None or last.when < began:
             self._counted[tag] = 0.0
-        elif last.value and world.plant.mode != 'Radio':  # where reads may wait for many Periods
+        elif last.value and not self._is_read_rarely:
             self._counted[tag] += min(entry.when - last.when, self._period(station, tag))
             longer = max(self._period(station, name) for name in ('beat', 'other'))
             self.demand(self._counted[tag] <= max(20 * longer, 3.0), entry, 'counted',
                         self._counted[tag], 'since', began)
+
+    @property
+    def _is_read_rarely(self) -> bool:
+        """Tell whether reads wait for many Periods, as by radio and on a full line."""
+        plant, cycle = self.world.plant, self.world.driver.readings.reads.poll_cycle
+        return plant.mode == 'Radio' or (cycle or 0.0) > plant.period / 1000
 
     def _period(self, station: int, tag: str) -> float:
         """Return the Period (s) of a heartbeat of ours, or of the other bridge if there is one."""
