@@ -83,18 +83,25 @@ def test_what_stays_is_shown_once(plcs: Plcs, capsys: pytest.CaptureFixture[str]
     assert sorted(shown(capsys)) == ['N7:0  0', "ST9:0  'Tank'"]
 
 
+# Each on a line of its own: a watch may end with a command under way, and the next one would hear
+# its ACK or reply.
+@pytest.mark.parametrize(('tags', 'title', 'first', 'other'), [
+    (None, '', '', ''), ({'N7:0': 'a, b'}, 'tag,', '"a, b",', '"",')])
 def test_each_read_is_a_line_of_csv_for_each_value(
-        plcs: Plcs, capsys: pytest.CaptureFixture[str]) -> None:
+        plcs: Plcs, capsys: pytest.CaptureFixture[str], tags: Tags | None, title: str,
+        first: str, other: str) -> None:
     store(plcs[1], 'ST9:0', 'a,"b"')
     words = make_mapping('N7:0', length=2, item=1)
-    for tags, title, first, other in (
-            (None, '', '', ''), ({'N7:0': 'a, b'}, 'tag,', '"a, b",', '"",')):
-        assert Watch(network_on(plcs), [words, NAME], 0.01, csv=True, tags=tags).run(2) == 0
-        head, *lines = capsys.readouterr().out.splitlines()
-        assert head == f'time,station,address,{title}value'
-        told = [line.partition(',')[2] for line in lines]
-        assert told.count(f'1,N7:0,{first}0') == told.count(f'1,N7:1,{other}0') >= 2
-        assert f'1,ST9:0,{other}"a,""b"""' in told
+    assert Watch(network_on(plcs), [words, NAME], 0.01, csv=True, tags=tags).run(2) == 0
+    head, *lines = capsys.readouterr().out.splitlines()
+    assert head == f'time,station,address,{title}value'
+    told = [line.partition(',')[2] for line in lines]
+    assert told.count(f'1,N7:0,{first}0') == told.count(f'1,N7:1,{other}0') >= 2
+    assert f'1,ST9:0,{other}"a,""b"""' in told
+
+
+def test_read_that_fails_is_a_line_of_csv_without_a_value(
+        plcs: Plcs, capsys: pytest.CaptureFixture[str]) -> None:
     plcs.say('silent 1')
     assert Watch(network_on(plcs, 100), [SPEED], 0.01, csv=True).run(2) == 1
     assert [line.partition(',')[2] for line in capsys.readouterr().out.splitlines()[1:]] == [
