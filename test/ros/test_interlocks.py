@@ -31,7 +31,7 @@ from abdf1_ros.simulator.ladder import Lamp
 import pytest
 from std_msgs.msg import Int16MultiArray
 from std_srvs.srv import SetBool, Trigger
-from support import cell as cell_module
+from support.cell import BridgeCell
 from support.commands import running_simulator
 from support.ros import (
     details,
@@ -66,7 +66,7 @@ MARK = b'GUEST'  # what is easily known in a command
 ATTEMPTS = 8  # to be seen by a host that is not busy
 
 
-class Cell(cell_module.Cell):
+class Cell(BridgeCell):
     """A bridge with a heartbeat."""
 
     def __init__(self, folder: Path, *assignments: str) -> None:

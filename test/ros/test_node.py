@@ -49,7 +49,7 @@ from std_msgs.msg import (  # noqa: I101
     UInt8MultiArray,
 )
 from std_srvs.srv import SetBool, Trigger
-from support.cell import Cell
+from support.cell import BridgeCell
 from support.ros import (
     details,
     ERROR,
@@ -83,7 +83,7 @@ PULSES = 'pulses,Write,B3:1/0,1,PLC5,8,'
 RECIPE = 'recipe,Write,N7:4,1,PLC5,2,'
 
 
-class Bench(Cell):
+class Bench(BridgeCell):
     """A bridge that has a port, with a map that may have faults."""
 
     def __init__(self, folder: Path, rows: tuple[str, ...], *assignments: str) -> None:

@@ -33,7 +33,7 @@ from rcl_interfaces.srv import GetParameters
 from rclpy.parameter import parameter_value_to_python
 from std_msgs.msg import Float32MultiArray, Int16MultiArray, UInt16MultiArray
 from std_srvs.srv import SetBool, Trigger
-from support.cell import Cell
+from support.cell import BridgeCell
 from support.ros import (
     details,
     EVERYTHING,
@@ -52,7 +52,7 @@ LEVEL = 'level,ReadWrite,F8:0,1,PLC5,1'
 RECIPE = 'recipe,Write,N7:4,1,PLC5,2'
 
 
-class Bench(Cell):
+class Bench(BridgeCell):
     """A bridge on simulated PLCs, whose files can be written anew."""
 
     def start(self) -> None:

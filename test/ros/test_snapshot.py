@@ -26,7 +26,7 @@ from abdf1_ros.ros.topics.snapshot import Snapshot
 from abdf1_ros.settings.mapping import Mapping
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 import pytest
-from support.cell import Cell
+from support.cell import BridgeCell
 from support.mappings import make_mapping
 from support.ros import details, EVERYTHING, Inbox
 
@@ -91,8 +91,8 @@ def test_value_that_is_not_fresh_says_so(
 def inbox(tmp_path: Path) -> Iterator[Inbox]:
     rows = 'Tag,Command,Address,Station,PLC_Type,Scale,Offset\n' \
         'speed,Read,N7:0,1,PLC5,0.5,1\norder,Write,N7:2,1,PLC5,,\n'
-    with Cell(tmp_path, 'Station,PLC_Type,Address,Length,Values\n1,PLC5,N7:0,4,7 8\n', rows,
-              'Baud,Timeout\n115200,100\n', 'snapshot_period:=0.2') as cell:
+    with BridgeCell(tmp_path, 'Station,PLC_Type,Address,Length,Values\n1,PLC5,N7:0,4,7 8\n', rows,
+                    'Baud,Timeout\n115200,100\n', 'snapshot_period:=0.2') as cell:
         yield cell.ros.listen(DiagnosticArray, '/abdf1/snapshot', EVERYTHING)
 
 

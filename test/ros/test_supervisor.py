@@ -67,7 +67,8 @@ def test_no_sign_while_a_link_stands_still(
 def test_a_sign_comes_once_in_the_period_of_the_watchdog_if_there_is_one(
         systemd: socket.socket, monkeypatch: pytest.MonkeyPatch, period: str,
         signs: list[bytes]) -> None:
-    monkeypatch.setenv('WATCHDOG_USEC', period or '0')
+    if period:
+        monkeypatch.setenv('WATCHDOG_USEC', period)
     supervisor, link = Supervisor(), Link()
     for _ in range(2):
         link.has_turned = True

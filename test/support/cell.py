@@ -23,7 +23,7 @@ from abdf1_ros.ros.bridge.node import BridgeNode
 from support.ros import Observer, ros_args
 
 
-class Cell(testing.SimulatedCell):
+class BridgeCell(testing.SimulatedCell):
     """What ``abdf1_cell`` makes, with the bridge in the executor of ``ros``."""
 
     observer = Observer
