@@ -31,14 +31,15 @@ milliseconds). Errors are those of ``abdf1_ros.errors``.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from concurrent.futures import Future, wait
+from contextlib import suppress
 import math
 from numbers import Real
 import os
+from queue import Empty, SimpleQueue
 import random
 from traceback import print_exception
 from types import TracebackType
-from typing import Any, overload, Self, TYPE_CHECKING, TypeVar
+from typing import Any, Generic, overload, Self, TYPE_CHECKING, TypeVar
 
 from abdf1_ros.df1.checksum import Checksum
 from abdf1_ros.df1.machine import LineTiming
@@ -96,6 +97,54 @@ def opened(settings: PortSettings) -> Callable[[], Port]:
     return lambda: ports.pop() if ports else open_port(settings)
 
 
+class Pending(Generic[_Result]):
+    """
+    What a request comes to, made in the thread of the link.
+
+    Not a Future: its lock stays taken for ever when a KeyboardInterrupt comes between taking it
+    and the block that gives it back, and then the thread of the link never ends.
+    """
+
+    def __init__(self) -> None:
+        self._results: list[_Result] = []
+        self._failure: Exception | None = None
+        self._is_done = False
+        self._ended: SimpleQueue[None] = SimpleQueue()
+
+    def set_result(self, result: _Result) -> None:
+        """End the request well."""
+        self._results.append(result)
+        self._end()
+
+    def set_exception(self, failure: Exception) -> None:
+        """End the request with an error."""
+        self._failure = failure
+        self._end()
+
+    def _end(self) -> None:
+        self._is_done = True
+        self._ended.put(None)
+
+    def done(self) -> bool:
+        """Tell whether the request has ended."""
+        return self._is_done
+
+    def wait(self, seconds: float) -> None:
+        """Wait for the end, but not for longer."""
+        with suppress(Empty):
+            self._ended.get(timeout=seconds)
+
+    def exception(self) -> Exception | None:
+        """Return the error of a request that has ended with one."""
+        return self._failure
+
+    def result(self) -> _Result:
+        """Return the result of a request that has ended; raises its error."""
+        if self._failure is not None:
+            raise self._failure
+        return self._results[0]
+
+
 class OpenLine:
     """
     A line on which one request is carried out after the other, from here to the end of ``with``.
@@ -133,18 +182,17 @@ class OpenLine:
         return self.wait(self.start(station, work))
 
     def start(self, station: int, work: Steps[_Result],
-              future: Future[_Result] | None = None) -> Future[_Result]:
+              future: Pending[_Result] | None = None) -> Pending[_Result]:
         """Begin to carry out a request; ``future`` is where its result goes."""
-        future = future or Future()
-        future.set_running_or_notify_cancel()  # it can no longer be called off
+        future = future or Pending()
         self._requests.add(station, work, future.set_result, future.set_exception)
         self._link.wake()
         return future
 
-    def wait(self, future: Future[_Result]) -> _Result:
+    def wait(self, future: Pending[_Result]) -> _Result:
         """Return the result of a request; raises what it raises, PortLost at the latest."""
         while not future.done() and self._link.is_alive():
-            wait([future], _GLANCE)
+            future.wait(_GLANCE)
         if not future.done():
             raise PortLost(self._link.state.text)
         return future.result()

@@ -14,17 +14,19 @@
 
 """The blocking client on a line with simulated PLCs, and what it does without."""
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import ExitStack, suppress
 from inspect import signature
 import math
 from pathlib import Path
 import subprocess
 import sys
+from threading import Thread
 import time
+from types import FrameType
 from typing import Any
 
-from abdf1_ros.client import Client
+from abdf1_ros.client import Client, Pending
 from abdf1_ros.counters import Counters
 from abdf1_ros.df1.peer import PEER
 from abdf1_ros.df1.stations import ActiveStationList
@@ -303,6 +305,40 @@ def test_program_that_breaks_off_without_closing_ends(port: str) -> None:
 
 class Nothing(TaskSource):
     """A node that has nothing to ask."""
+
+
+def interrupt_after(lines: int) -> None:
+    """Let KeyboardInterrupt come after so many lines of the standard library."""
+    left = lines
+
+    def trace(frame: FrameType, event: str, arg: object) -> Callable[..., Any]:
+        nonlocal left
+        left -= event == 'line' and 'abdf1_ros' not in frame.f_code.co_filename
+        if left < 0:
+            sys.settrace(None)
+            raise KeyboardInterrupt
+        return trace
+
+    sys.settrace(trace)
+
+
+def test_interrupt_while_a_result_is_awaited_keeps_no_lock_from_the_link() -> None:
+    for lines in range(100):
+        pending = Pending[int]()
+        interrupt_after(lines)
+        try:
+            pending.wait(0.001)
+            break
+        except KeyboardInterrupt:
+            pass
+        finally:
+            sys.settrace(None)
+        link = Thread(target=pending.set_result, args=(lines,), daemon=True)
+        link.start()
+        link.join(PATIENCE)
+        assert pending.done() and pending.result() == lines
+    else:
+        raise AssertionError('was always interrupted')
 
 
 def test_our_address_is_that_of_a_net_file_that_names_none() -> None:

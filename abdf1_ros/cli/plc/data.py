@@ -19,13 +19,13 @@ from __future__ import annotations
 from collections import defaultdict
 from collections.abc import Iterator, Sequence
 from collections.abc import Mapping as MappingType
-from concurrent.futures import Future
 from enum import Enum
 import re
 import time
 from typing import TypeAlias
 
 from abdf1_ros.cli.plc.session import Session
+from abdf1_ros.client import Pending
 from abdf1_ros.driver.write import Outcome, Write, WriteResult
 from abdf1_ros.driver.writes.packets import carry_out
 from abdf1_ros.errors import Abdf1Error, FormatError, PortLost
@@ -164,7 +164,7 @@ class Writing:
 
     def carry_out(self, session: Session) -> WriteResult:
         """Write; also when interrupted by KeyboardInterrupt, return how far it got."""
-        future: Future[WriteResult] = Future()
+        future: Pending[WriteResult] = Pending()
         try:
             # Inside, as an interrupt may come while the command is on the line already.
             session.start(self.mapping.station, carry_out(self._write, time.monotonic), future)

@@ -15,7 +15,6 @@
 """Addresses and values of the command line."""
 
 from array import array
-from concurrent.futures import Future
 from typing import cast
 
 from abdf1_ros.cli.plc.data import (
@@ -31,6 +30,7 @@ from abdf1_ros.cli.plc.data import (
     Writing,
 )
 from abdf1_ros.cli.plc.session import Session
+from abdf1_ros.client import Pending
 from abdf1_ros.driver.write import Outcome, WriteResult
 from abdf1_ros.errors import FormatError, PortLost
 from abdf1_ros.pccc.processor import Processor
@@ -143,7 +143,7 @@ def test_value_that_is_none_says_what_would_be_right(address: str, text: str, ri
 class InterruptedSession:
     """A session that is interrupted when its command is on the line already."""
 
-    def start(self, station: int, steps: object, future: Future[WriteResult]) -> None:
+    def start(self, station: int, steps: object, future: Pending[WriteResult]) -> None:
         self._future = future
         raise KeyboardInterrupt
 
