@@ -84,7 +84,7 @@ def test_close_ends_what_is_under_way(line: Pty) -> None:
     line.read(5)
     session.close()
     for future in (under_way, waiting):
-        assert isinstance(future.exception(0), PortLost)
+        assert isinstance(future.exception(), PortLost)
     assert not any(thread.name == 'df1 link' for thread in threading.enumerate())
 
 
