@@ -106,42 +106,36 @@ class Pending(Generic[_Result]):
     """
 
     def __init__(self) -> None:
+        self.error: Exception | None = None
         self._results: list[_Result] = []
-        self._failure: Exception | None = None
-        self._is_done = False
         self._ended: SimpleQueue[None] = SimpleQueue()
 
-    def set_result(self, result: _Result) -> None:
-        """End the request well."""
+    @property
+    def is_done(self) -> bool:
+        """Tell whether the request has ended."""
+        return self.error is not None or bool(self._results)
+
+    def succeed(self, result: _Result) -> None:
+        """End the request with its result."""
         self._results.append(result)
-        self._end()
-
-    def set_exception(self, failure: Exception) -> None:
-        """End the request with an error."""
-        self._failure = failure
-        self._end()
-
-    def _end(self) -> None:
-        self._is_done = True
         self._ended.put(None)
 
-    def done(self) -> bool:
-        """Tell whether the request has ended."""
-        return self._is_done
+    def fail(self, error: Exception) -> None:
+        """End the request with an error."""
+        self.error = error
+        self._ended.put(None)
 
-    def wait(self, seconds: float) -> None:
-        """Wait for the end, but not for longer."""
-        with suppress(Empty):
-            self._ended.get(timeout=seconds)
-
-    def exception(self) -> Exception | None:
-        """Return the error of a request that has ended with one."""
-        return self._failure
+    def wait(self, seconds: float) -> bool:
+        """Wait for the end, but not for longer; return whether it has come."""
+        if not self.is_done:
+            with suppress(Empty):
+                self._ended.get(timeout=seconds)
+        return self.is_done
 
     def result(self) -> _Result:
         """Return the result of a request that has ended; raises its error."""
-        if self._failure is not None:
-            raise self._failure
+        if self.error is not None:
+            raise self.error
         return self._results[0]
 
 
@@ -182,20 +176,19 @@ class OpenLine:
         return self.wait(self.start(station, work))
 
     def start(self, station: int, work: Steps[_Result],
-              future: Pending[_Result] | None = None) -> Pending[_Result]:
-        """Begin to carry out a request; ``future`` is where its result goes."""
-        future = future or Pending()
-        self._requests.add(station, work, future.set_result, future.set_exception)
+              pending: Pending[_Result] | None = None) -> Pending[_Result]:
+        """Begin to carry out a request; ``pending`` is where its result goes."""
+        pending = pending or Pending()
+        self._requests.add(station, work, pending.succeed, pending.fail)
         self._link.wake()
-        return future
+        return pending
 
-    def wait(self, future: Pending[_Result]) -> _Result:
+    def wait(self, pending: Pending[_Result]) -> _Result:
         """Return the result of a request; raises what it raises, PortLost at the latest."""
-        while not future.done() and self._link.is_alive():
-            future.wait(_GLANCE)
-        if not future.done():
-            raise PortLost(self._link.state.text)
-        return future.result()
+        while not pending.wait(_GLANCE):
+            if not self._link.is_alive() and not pending.is_done:
+                raise PortLost(self._link.state.text)
+        return pending.result()
 
     def close(self) -> None:
         """End what is under way and close the port; every request has ended after this."""

@@ -333,10 +333,10 @@ def test_interrupt_while_a_result_is_awaited_keeps_no_lock_from_the_link() -> No
             pass
         finally:
             sys.settrace(None)
-        link = Thread(target=pending.set_result, args=(lines,), daemon=True)
+        link = Thread(target=pending.succeed, args=(lines,), daemon=True)
         link.start()
         link.join(PATIENCE)
-        assert pending.done() and pending.result() == lines
+        assert pending.is_done and pending.result() == lines
     else:
         raise AssertionError('was always interrupted')
 

@@ -164,16 +164,16 @@ class Writing:
 
     def carry_out(self, session: Session) -> WriteResult:
         """Write; also when interrupted by KeyboardInterrupt, return how far it got."""
-        future: Pending[WriteResult] = Pending()
+        pending = Pending[WriteResult]()
         try:
             # Inside, as an interrupt may come while the command is on the line already.
-            session.start(self.mapping.station, carry_out(self._write, time.monotonic), future)
-            return session.wait(future)
+            session.start(self.mapping.station, carry_out(self._write, time.monotonic), pending)
+            return session.wait(pending)
         except (KeyboardInterrupt, PortLost) as error:
             session.close()
-            failure = future.exception() if future.done() else error
-            if failure is None:
-                return future.result()
+            if pending.is_done and pending.error is None:
+                return pending.result()
+            failure = pending.error or error
             is_sent = getattr(failure, 'sent', True)
             outcome = Outcome.UNKNOWN if is_sent else Outcome.NOT_SENT
             return self._write.result(outcome, str(failure), time.monotonic())

@@ -25,7 +25,6 @@ import random
 import shutil
 import sys
 import textwrap
-import threading
 
 from abdf1_ros.cli.plc.data import labels, Radix, rows, Tags, value_texts
 from abdf1_ros.cli.plc.session import opened
@@ -35,12 +34,13 @@ from abdf1_ros.driver.driver import Driver
 from abdf1_ros.driver.settings import DriverSettings
 from abdf1_ros.pccc.values import Values
 from abdf1_ros.ports.link_thread import LinkThread
+from abdf1_ros.ports.wake import Wake
 from abdf1_ros.settings.mapping import Mapping
 from abdf1_ros.settings.network import Network
 from abdf1_ros.text import cut, printable
 
-# Ages and errors are shown again so often (s), also without new values.
-_GLANCE = 0.25
+# Ages and errors are shown again so often (ms), also without new values.
+_GLANCE = 250
 
 # Values that wait to be shown; when more come, the older ones are dropped.
 _MAX_NEWS = 1000
@@ -89,7 +89,7 @@ class Watch:
         self._driver = Driver(network, mappings, settings, self)
         self._link = LinkThread(self._driver.machine, opened(network))
         self._news: deque[tuple[Mapping, Values]] = deque(maxlen=_MAX_NEWS)
-        self._has_news = threading.Event()
+        self._has_news = Wake()  # an interrupt in an Event may leave its lock taken
         self._reads: Counter[Mapping] = Counter()
         self._shown: dict[Mapping, Values | _NoValue] = {}
         self._height = 0
@@ -106,7 +106,7 @@ class Watch:
             self._link.start()  # inside, as the thread would keep the process alive
             while not self._link.has_failed and not self._is_done(count):
                 self._has_news.wait(_GLANCE)
-                self._has_news.clear()
+                self._has_news.take()
                 self._show()
             self._show()
         except KeyboardInterrupt:
@@ -116,6 +116,7 @@ class Watch:
             failed = sum(self._driver.points[mapping].error is not None
                          for mapping in self._mappings)
             self._link.stop()
+            self._has_news.close()
         return failed
 
     def read(self, mapping: Mapping, values: Values) -> None:

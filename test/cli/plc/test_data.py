@@ -143,12 +143,12 @@ def test_value_that_is_none_says_what_would_be_right(address: str, text: str, ri
 class InterruptedSession:
     """A session that is interrupted when its command is on the line already."""
 
-    def start(self, station: int, steps: object, future: Pending[WriteResult]) -> None:
-        self._future = future
+    def start(self, station: int, steps: object, pending: Pending[WriteResult]) -> None:
+        self._pending = pending
         raise KeyboardInterrupt
 
     def close(self) -> None:
-        self._future.set_exception(PortLost('closed'))
+        self._pending.fail(PortLost('closed'))
 
 
 def test_write_that_is_interrupted_while_it_begins_is_unknown() -> None:

@@ -58,21 +58,21 @@ def test_port_is_held_from_the_beginning(line: Pty) -> None:
 
 def test_answer_to_an_echo_ends_the_request(line: Pty) -> None:
     with Session(network_on(line)) as session:
-        future = session.start(1, echo(b'\x05'))
+        pending = session.start(1, echo(b'\x05'))
         tns = line.read(13)[6:8]
         reply = b'\x05\x01\x46\x00' + tns + b'\x05'
         line.write(frames.ACK + frames.message_frame(reply, Checksum.BCC))
-        assert session.wait(future) is None
+        assert session.wait(pending) is None
         assert session.counters.replies_received == 1
 
 
 def test_lost_port_ends_the_order_and_those_after_it(line: Pty) -> None:
     with Session(network_on(line)) as session:
-        future = session.start(1, identify())
+        pending = session.start(1, identify())
         line.read(5)
         line.close()
         with pytest.raises(PortLost):
-            session.wait(future)
+            session.wait(pending)
         with pytest.raises(PortLost):
             session.ask(1, identify())
 
@@ -83,8 +83,8 @@ def test_close_ends_what_is_under_way(line: Pty) -> None:
     waiting = session.start(1, identify())
     line.read(5)
     session.close()
-    for future in (under_way, waiting):
-        assert isinstance(future.exception(), PortLost)
+    for pending in (under_way, waiting):
+        assert isinstance(pending.error, PortLost)
     assert not any(thread.name == 'df1 link' for thread in threading.enumerate())
 
 
