@@ -64,13 +64,14 @@ def test_one_message_for_several_rows_is_written_to_all_or_none() -> None:
     bench, plc = bench_of(wide, narrow, flag)
     executed = Executed(plc)
     bench.driver.write([wide, narrow, flag], [15], bench.clock())
-    bench.driver.write([wide, narrow], [5], bench.clock())
+    bench.driver.write([wide, narrow], [5], bench.clock(), 'r7')
     bench.run(2.0)
     assert [(result.mapping.tag, str(result)) for result in bench.listener.results] == [
         ('wide', 'not written: refused: narrow, upper cannot take it'),
         ('narrow', 'not written: refused: value 15 at index 0 is outside Min -inf, Max 10'),
         ('upper', 'not written: refused: value 15 at index 0 is outside Min 20, Max inf'),
         ('wide', 'written'), ('narrow', 'written')]
+    assert [result.request for result in bench.listener.results] == ['', '', '', 'r7', 'r7']
     assert len(executed.writes) == 2
     assert stored(plc, 'N7:0', 3) == b'\5\0\5\0\0\0'
 
@@ -84,6 +85,16 @@ def test_message_for_several_rows_waits_as_a_whole_or_not_at_all() -> None:
     bench.driver.write(rows, [1], bench.clock())
     assert [str(result) for result in bench.listener.results] == [
         'not written: refused: too many writes are waiting'] * 3
+
+
+def test_write_that_comes_just_when_the_port_is_lost_is_refused() -> None:
+    row = make_mapping('N7:0', 'Write')
+    bench, _ = bench_of(row)
+    bench.lose_port()
+    bench.driver.is_online = True  # as another thread saw it a moment ago
+    bench.driver.write([row], [1], bench.clock())
+    assert [str(result) for result in bench.listener.results] == [
+        'not written: refused: the port is not open']
 
 
 def test_every_write_has_one_result_while_the_port_comes_and_goes() -> None:

@@ -228,6 +228,17 @@ def test_rule_9_messages_that_wait_end_when_the_fallback_goes_out() -> None:
     assert cell.results() == ['not written: not sent: fallback', START]
 
 
+def test_rule_9_second_packet_of_a_message_is_not_sent_when_its_fallback_is_due() -> None:
+    speed = speed_row(Fallback((7,) * 200, int(AFTER * 1000)), length=200)
+    cell = Cell(speed, run=1.0)
+    cell.bench.driver.write([speed], [3] * 200, cell.now - AFTER + 0.01)
+    cell.bench.line.wake(cell.bench.driver.machine)
+    cell.run(1.0)
+    assert cell.written('N7:0') == [7, 7, 3, 7, 7]  # two packets each, but the message
+    assert cell.results()[1:] == [
+        'only partly written: too old to be sent (after 1 of 2 packets were written)', TIMEOUT]
+
+
 def test_rule_9_write_of_another_row_to_the_same_words_holds_up_for_its_own_time_only() -> None:
     recipe = speed_row(None, length=200, tag='recipe')  # of several packets
     speed = speed_row()
