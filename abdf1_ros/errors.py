@@ -82,6 +82,9 @@ class CommandExpired(LinkError):
         return 'too old to be sent once more' if self.sent else 'too old to be sent'
 
 
+INTERNAL_ERROR = 'internal error, see the log'  # where a bug ends the use of the port
+
+
 class PortLost(LinkError):
     """The port failed or was closed while the transaction ran; the argument says how."""
 

@@ -63,7 +63,7 @@ from abdf1_ros.driver.settings import DriverSettings
 from abdf1_ros.driver.write import Outcome, show, Write, WriteResult
 from abdf1_ros.driver.writes.queue import MAX_WAITING_WRITES, WriteQueue
 from abdf1_ros.driver.writes.under_way import WritesUnderWay
-from abdf1_ros.errors import FormatError, PortLost
+from abdf1_ros.errors import FormatError, INTERNAL_ERROR, PortLost
 from abdf1_ros.messages import Event
 from abdf1_ros.pccc.extent import Extent
 from abdf1_ros.pccc.families import served_counters
@@ -283,7 +283,7 @@ class Driver:
     def ended(self, error: Exception | None) -> None:
         """Give everything a result, as there is no port; no old command is to be sent later."""
         if not isinstance(error, PortLost):
-            error = PortLost('internal error, see the log')
+            error = PortLost(INTERNAL_ERROR)
         self.is_online = False
         self.tasks.fail(error)
         self.guests.end()

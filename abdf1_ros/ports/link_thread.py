@@ -25,7 +25,7 @@ import threading
 import time
 
 from abdf1_ros.df1.machine import Machine
-from abdf1_ros.errors import PortLost
+from abdf1_ros.errors import INTERNAL_ERROR, PortLost
 from abdf1_ros.ports.clock import line_time
 from abdf1_ros.ports.descriptor import NoClient, Port, READ_SIZE
 from abdf1_ros.ports.pace import Pace
@@ -305,7 +305,7 @@ class LinkThread(threading.Thread):
             end = _reason(error)
             self._set_state(False, f'the port was lost: {end}')
         except Exception as error:  # a bug must not end the bridge when it happens first
-            end = 'internal error, see the log'
+            end = INTERNAL_ERROR
             self._take_fault(error)
         finally:
             self._machine.stop(PortLost(end))

@@ -22,7 +22,9 @@ from abdf1_ros.df1.packet import Packet
 from abdf1_ros.driver.reads.point import Freshness
 from abdf1_ros.driver.settings import DriverSettings
 from abdf1_ros.driver.write import Outcome
+from abdf1_ros.driver.writes import packets
 from abdf1_ros.messages import Event
+from abdf1_ros.pccc.address import Address
 from abdf1_ros.pccc.families import parse_address
 from abdf1_ros.pccc.file_types import PlcType
 from abdf1_ros.pccc.values import Values
@@ -156,6 +158,24 @@ def test_unknown_when_the_driver_itself_fails_meanwhile() -> None:
         'unknown whether written: port lost: internal error, see the log; not read back: no row '
         'reads all of these words']
     assert not bench.driver.is_online
+
+
+def test_message_has_a_result_where_the_driver_fails_in_its_write(
+        monkeypatch: pytest.MonkeyPatch) -> None:
+    mapping = make_mapping('N7:0', 'Write')
+    bench, _ = make_bench(mapping, run=0.5)
+
+    def fail(reply: Packet, address: Address) -> bytes:
+        raise ZeroDivisionError
+
+    monkeypatch.setattr(packets, 'data_of', fail)
+    bench.write(mapping, [1])
+    with pytest.raises(ZeroDivisionError):
+        bench.run(1.0)
+    bench.lose_port('internal error, see the log')
+    assert write_results(bench) == [
+        'unknown whether written: port lost: internal error, see the log; not read back: no row '
+        'reads all of these words']
 
 
 def test_read_goes_on_after_the_driver_itself_has_failed() -> None:

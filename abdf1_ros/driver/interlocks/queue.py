@@ -297,8 +297,8 @@ class Interlocks(WriteListener):
     def ended(self, own: OwnWrite) -> None:
         """Take note how one of our writes ended."""
         row, result, now = own.row, own.result, self._writing.line.now
+        outcome = result.outcome
         plc = self._plc_of[row]
-        outcome = Outcome.NOT_SENT if result is None else result.outcome
         if isinstance(row, HeartbeatRow):
             row.ended(outcome, now)
         else:
@@ -306,7 +306,7 @@ class Interlocks(WriteListener):
         for beat in plc.heartbeats:  # they may depend on it (rule 3 b)
             beat.due = min(beat.due, now)
         plc.plan()
-        if result is not None and outcome is not Outcome.NOT_SENT:
+        if outcome is not Outcome.NOT_SENT:
             refusal = '' if outcome is Outcome.WRITTEN else str(result.error)
             if isinstance(result.error, RemoteError) and refusal != row.refusal:
                 self._listener.unreadable(row.mapping, f'not written: {refusal}')

@@ -25,23 +25,26 @@ from abdf1_ros.driver.reads.readings import Readings
 from abdf1_ros.driver.record import Claim, WriteRecord
 from abdf1_ros.driver.write import Outcome, Write, WriteResult
 from abdf1_ros.driver.writes.packets import carry_out
-from abdf1_ros.errors import CommandExpired, RemoteError
+from abdf1_ros.errors import CommandExpired, INTERNAL_ERROR, PortLost, RemoteError
 from abdf1_ros.pccc.dialect import Steps
 
 
 class WriteJob(Job):
-    """A write that has the line; ``result`` is None until it has ended, or where a bug ends it."""
+    """A write that has the line; ``result`` is there when it has ended."""
+
+    result: WriteResult
 
     def __init__(self, write: Write, writing: WritesUnderWay) -> None:
         self.write = write
         self.station = write.mapping.station
-        self.result: WriteResult | None = None
         self.goes_on = False  # also after a packet that is not confirmed
         self._writing = writing
         self.claim = writing.begin(write)
 
     def steps(self, now: float) -> Steps[None]:
         """Send every packet."""
+        bug = PortLost(INTERNAL_ERROR)  # where nothing else comes: it ends the use of the port
+        self.result = self.write.result(Outcome.UNKNOWN, str(bug), now, error=bug)
         self.result = yield from self._writing.carry_out(self.write, self.goes_on)
 
 
@@ -72,9 +75,6 @@ class WritesUnderWay:
         if station != BROADCAST:
             self.stations.tried(station, job.claim.begun, self.line.now, was_silent=write.is_probe,
                                 is_message=True)
-        if result is None:  # a bug
-            self.record.ended(job.claim, Outcome.UNKNOWN, may_land=True)
-            return
         if isinstance(result.error, RemoteError):
             self.stations[station].remote_errors += 1
         elif result.error is not None and not isinstance(result.error, CommandExpired):
@@ -83,8 +83,8 @@ class WritesUnderWay:
 
     def report(self, job: WriteJob, report: Callable[[WriteResult], None]) -> None:
         """Report the result of a message, after a read where it is unconfirmed."""
-        if job.result is not None and job.result.is_unconfirmed:
+        if job.result.is_unconfirmed:
             readings = self._readings
             readings.read_backs.add(job.write, job.result, readings.blocks, self.line.now)
-        elif job.result is not None:
+        else:
             report(job.result)
