@@ -93,6 +93,10 @@ def test_only_changes_are_published() -> None:
     assert changing.update(b'\1\0', 3.0) == array('h', [1])
 
 
+def test_first_text_is_published_though_it_is_empty() -> None:
+    assert point('Change', text='ST9:0').update(bytes(84), 0.0) == ''
+
+
 def test_first_good_read_after_an_outage_is_published_though_nothing_changed() -> None:
     changing = point('Change')
     changing.update(b'\1\0', 0.0)
