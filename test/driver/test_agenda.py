@@ -19,6 +19,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Container
 import itertools
+import math
 
 from abdf1_ros.df1.checksum import Checksum
 from abdf1_ros.df1.frames import Duplex
@@ -67,7 +68,7 @@ def make_job(text: str = 'N7:0', station: int = 1, period: int = 100) -> ReadJob
     mapping = make_mapping(text, station=station, period=period)
     block, = Planner(LINE, 0.1).plan([mapping])
     return ReadJob(block, [ReadPoint(mapping, period / 1000, 1.0)], StillClock(),
-                   lambda job, words, error: None)
+                   lambda job, words, error: None, math.inf)
 
 
 def written(write: Write, now: float) -> Claim:

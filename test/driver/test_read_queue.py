@@ -17,13 +17,14 @@
 from collections import defaultdict
 from functools import cache
 from itertools import pairwise
+import math
 from statistics import fmean
 
 from abdf1_ros.df1.checksum import Checksum
 from abdf1_ros.df1.frames import Duplex
 from abdf1_ros.df1.machine import LineTiming
 from abdf1_ros.df1.packet import Packet
-from abdf1_ros.driver.reads.job import ReadJob
+from abdf1_ros.driver.reads.job import ReadJob, ReadTooOld
 from abdf1_ros.driver.reads.point import ReadPoint
 from abdf1_ros.driver.reads.queue import ReadQueue
 from abdf1_ros.errors import RemoteError
@@ -58,7 +59,7 @@ class StillClock:
 def make_job(period: int = 100, text: str = 'N7:0', length: int = 1) -> ReadJob:
     block = make_block(period, text, length)
     return ReadJob(block, [ReadPoint(block.mappings[0], period / 1000, 1.0)], StillClock(),
-                   lambda job, words, error: None)
+                   lambda job, words, error: None, math.inf)
 
 
 TOOK = block_time(make_job().block)
@@ -204,6 +205,17 @@ def is_last_packet_read(job: ReadJob, now: float) -> bool:
         steps.send(Packet(0, 1, cmd | 0x40, 0, 1, bytes(2 * job.block.requests[0].words)))
     job.ended(None)
     return not job.is_unfinished
+
+
+def test_packets_that_took_too_long_together_are_no_value() -> None:
+    clock = StillClock()
+    job = ReadJob(make_block(100, 'N7:0', 236), [], clock, lambda job, words, error: None, 0.5)
+    assert not is_last_packet_read(job, 1.0)
+    clock.now = 1.6
+    steps = job.steps(1.6)
+    cmd, _ = next(steps)
+    with pytest.raises(ReadTooOld, match=r'its packets took 0\.6 s, more than 0\.5 s'):
+        steps.send(Packet(0, 1, cmd | 0x40, 0, 1, bytes(236)))
 
 
 def test_long_read_begins_anew_after_an_error() -> None:

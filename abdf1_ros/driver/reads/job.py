@@ -82,7 +82,7 @@ class ReadJob(Job):
 
     def __init__(self, block: Block, points: Sequence[ReadPoint], line: LineTime,
                  take: Callable[[ReadJob, bytes | None, Exception | None], None],
-                 longest_read: float = math.inf) -> None:
+                 longest_read: float) -> None:
         self.block = block
         self.station = block.station
         self.extent = block.extent
