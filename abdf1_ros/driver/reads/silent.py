@@ -155,7 +155,6 @@ class Reads(WriteListener):
         now = claim.done
         if not claim.has_changed or claim.write is not None and claim.write.mapping.heartbeat:
             return
-        self.release(claim.station, now)
         for job in self._due.jobs:
             if claim.meets(job.extent):
                 job.refreshed = now
