@@ -651,6 +651,8 @@ class OneOwner(Rule):
 
     def executed(self, entry: Executed) -> None:
         world, station, tag = self.world, entry.station, entry.tag
+        if world.plant.is_read_only:  # the other bridge is the only owner
+            return
         if not tag.startswith(('beat', 'other')) or entry.is_late or entry.value in GUESTS:
             return
         last, self._last[tag] = self._last.get(tag), entry
