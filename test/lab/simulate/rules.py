@@ -380,7 +380,7 @@ class Order(Rule):
         # Not after a port that was lost and opened again: a fresh row needs no fallback then.
         is_well = max(world.ill[station], world.ill[0], world.opened) <= world.killed_at
         if not left or not is_well or entry.value in GUESTS or entry.is_late \
-                or entry.tag.startswith('other'):
+                or entry.tag.startswith('other') or entry.driver != world.drivers:
             return
         self.demand(is_own, entry, 'before', left)
         self.demand(entry.tag.startswith('beat') or f'beat_{station}' not in left, entry, 'first')
