@@ -296,7 +296,7 @@ class World(DriverBench):
         self.killed_at = 0.0
         self.others: dict[int, OtherBridge] = {}  # by the station of the PLC
         self.opened = 0.0  # when the port was last
-        self.ended = -math.inf  # when an orderly end began or was over last
+        self.ended = -math.inf  # when an orderly end began last
         rows = plant.mappings()
         settings = DriverSettings(
             write_timeout=plant.write_timeout, read_only=plant.is_read_only, processor_period=0.0,
@@ -642,7 +642,6 @@ class World(DriverBench):
         while not interlocks.is_over and self.line.now < limit:
             self.run(STEP / 10)
         self.driver.machine.stop(PortLost('the end'))
-        self.ended = self.line.now  # all that was read up to now has failed
         self.run(self.held_for)
 
     def reload(self) -> None:

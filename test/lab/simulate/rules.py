@@ -262,8 +262,9 @@ class Withheld(Rule):
                 point, asked = world.driver.points[row], self._read[f'clock_{row.station}']
                 # At a start that is told when it has had its time to begin.
                 begun = self._begun[row.station, world.drivers]
-                self.demand(self._read[row.tag] >= asked or point.is_withheld or asked < max(
-                    begun + point.patience, world.ended), row.tag, 'was read at', asked)
+                has_failed_since = point.withheld and point.error is not None
+                self.demand(self._read[row.tag] >= asked or point.is_withheld or has_failed_since
+                            or asked < begun + point.patience, row.tag, 'was read at', asked)
         self._new.clear()
 
 
