@@ -22,6 +22,7 @@ from abdf1_ros.df1.checksum import Checksum
 from abdf1_ros.df1.frames import Duplex, Frame, FrameDecoder, FrameFault
 from abdf1_ros.df1.packet import Packet
 from abdf1_ros.df1.stations import ActiveStationList
+from abdf1_ros.messages import Event
 import pytest
 from support.peers import CommandTask
 from support.vectors import vector
@@ -79,3 +80,9 @@ def test_what_a_node_on_the_way_says_to_a_guest_says_nothing_about_the_station(
     task.blames = blames
     accounting.complete(task, task.command.reply(sts=0x02), keeps_others_waiting=True)
     assert (stations[1].local_status, stations[1].overdue) == ((2, 1) if blames else (0, 0))
+
+
+def test_what_is_told_of_a_nak_names_the_station() -> None:
+    told: list[Event] = []
+    Accounting(Counters(), ActiveStationList([7]), told.append, 5).nak_received(7)
+    assert [str(event).endswith('[station 7]') for event in told] == [True, True]

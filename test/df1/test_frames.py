@@ -168,6 +168,9 @@ def test_noise_between_symbols_is_skipped_and_its_last_byte_kept() -> None:
     assert decoder.last_byte == 0x77
     decoder.feed(b'')
     assert decoder.last_byte == 0x77
+    before = decoder.noise
+    decoder.feed(Damaged(b'\x66'))
+    assert (decoder.last_byte, decoder.noise) == (0x66, before + 1)
 
 
 @pytest.mark.parametrize('station', [0, 1, 0x0F, 0x10, 0x11, 0x20, 0xF0, 0xFE])

@@ -500,7 +500,7 @@ def test_command_that_expires_before_it_is_given_to_the_port_is_taken_back(embed
     def run(machine: Machine) -> Procedure:
         machine.sender.embeds = embeds
         try:
-            yield Send(MESSAGE, 1.0, expires=5.5)
+            yield Send(message_frame(bytes(200), Checksum.CRC), 1.0, expires=5.5)
         except CommandExpired:
             told.append('expired')
         yield Send(ACK, 1.0)

@@ -23,6 +23,7 @@ from abdf1_ros.df1.machine import LineTiming
 from abdf1_ros.df1.packet import Packet
 from abdf1_ros.df1.settings import LinkSettings
 from abdf1_ros.errors import CommandTimeout, StationInactive
+from abdf1_ros.messages import Message
 import pytest
 from support.cases import for_all
 from support.peers import CommandTask, PeerBench, single_bytes
@@ -182,6 +183,13 @@ def test_longest_message_is_served() -> None:
     peer = bench()
     command = THEIRS._replace(data=b'\x10' * (MAX_LINK_DATA - 6))
     assert peer.hear_packet(command) == ACK + peer.frame(command.reply())
+
+
+def test_command_with_a_status_is_told_and_not_accepted() -> None:
+    peer = bench()
+    assert (peer.hear_packet(THEIRS._replace(sts=1)), peer.served) == (NAK, [])
+    assert [(event.message.number, event.station) for event in peer.events] == [
+        (Message.ERR_WRONG_MESSAGE.number, THEIRS.src)]
 
 
 @pytest.mark.parametrize('byte', [0x00, 0x10, 0x55])

@@ -61,6 +61,13 @@ def test_write_over_what_another_row_reads_is_odd() -> None:
         assert report_of(bits, make_mapping(address, command, station=station)).remarks() == []
 
 
+def test_words_that_two_rows_write_are_odd() -> None:
+    first = make_mapping('N7:0', 'Write', tag='jog', length=2)
+    assert report_of(first, make_mapping('N7:1', 'Write', tag='rip', item=4)).remarks() == [
+        Remark(RemarkKind.SETTING, 'map.csv:5: rip writes N7:1, of which jog writes a part or all '
+                                   'too: each undoes what the other has written', 1)]
+
+
 def texts(report: Report, kind: RemarkKind) -> list[str]:
     return [remark.text for remark in report.remarks() if remark.kind is kind]
 
@@ -68,6 +75,7 @@ def texts(report: Report, kind: RemarkKind) -> list[str]:
 @pytest.mark.parametrize('plc, settings, line_time', [
     ('PLC5', {}, TWO_WORDS), ('SLC', {}, TWO_WORDS_SLC), ('PLC5', {'mode': 'Peer'}, FULL_DUPLEX),
     ('PLC5', {'baud': 19200}, TWO_WORDS / 2), ('PLC5', {'tx_delay': 5}, TWO_WORDS + 0.015),
+    ('PLC5', {'mode': 'Peer', 'tx_delay': 5}, FULL_DUPLEX + 0.010),
     ('PLC5', {'parity': 'Even'}, TWO_WORDS * 1.1),
     # BCC is one byte instead of two, in the command and in the reply.
     ('PLC5', {'error_code': 'BCC'}, TWO_WORDS - 2 * CHARACTER)])
@@ -106,7 +114,8 @@ def test_station_0_on_a_full_duplex_line_is_odd(mode: str, own: int, station: in
 @pytest.mark.parametrize(('station', 'octal'), [
     (10, 8), (17, 15), (77, 63), (7, None), (18, None)])
 def test_node_behind_a_gateway_may_be_octal_on_its_panel(station: int, octal: int | None) -> None:
-    found = texts(report_of(make_mapping('N7:0', station=station, via=3)), RemarkKind.STATION)
+    found = texts(report_of(make_mapping('N7:0'), make_mapping('N7:0', station=station, via=3)),
+                  RemarkKind.STATION)
     if octal is None:
         assert found == []
     else:
