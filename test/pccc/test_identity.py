@@ -196,6 +196,7 @@ def test_faults_and_remarks(identity: Identity, faults: tuple[str, ...],
           ('02 1D 00 00 00 00 00 20 21 00', 'PLC-2'),
           ('02 6D 00 00 00 00 00 20 21 00', 'PLC-2/15'),
           (PLC2_KA3.hex(), 'PLC-2/16'))),
+    (PLC2[:1] + b'\xF4' + PLC2[2:], None, '1771-KG series B revision A', 0x4144, 55),
     # Gateways (M 10-15..10-19), those with a name last.
     *((bytes.fromhex(data), None, text, address, 55) for data, text, address in (
         ('01 EE 10 10 34 12 00 20 21 00 00 30', '1785-KA series B revision B', 0x2000),
