@@ -191,7 +191,7 @@ class Turns(Rule):
         self._tried: dict[str, float] = {}  # when the fallback was sent last
 
     def executed(self, entry: Executed) -> None:
-        if entry.value not in GUESTS:
+        if entry.value not in GUESTS and not entry.is_late:  # that comes in its own time (10)
             self._holds[entry.tag] = entry.value
 
     def sent(self, entry: Sent) -> None:
