@@ -442,13 +442,18 @@ class OneResult(Rule):
         self._told: defaultdict[str, float] = defaultdict(lambda: -math.inf)
         # What is published may be written and told so much later, and wait for its fallback.
         self._spared = world.plant.write_timeout + world.plant.after / 1000 + 2 * self.flight
+        self._late: defaultdict[int, float] = defaultdict(lambda: -math.inf)  # by station
+
+    def executed(self, entry: Executed) -> None:
+        if entry.is_late:  # so it had no answer; after two of them comes a first contact (2)
+            self._late[entry.station] = entry.when
 
     def told(self, result: WriteResult) -> None:
         if result.outcome is not Outcome.FALLBACK or result.mapping.serves:
             return
         world, tag, station = self.world, result.mapping.tag, result.mapping.station
         reason = max(world.came.get(tag, 0.0), world.ill[station], world.ill[0], world.opened,
-                     world.ended, world.plcs[station].ran_again + MODE_PERIOD)
+                     world.ended, self._late[station], world.plcs[station].ran_again + MODE_PERIOD)
         before, self._told[tag] = self._told[tag], world.line.now
         self.demand(before - self._spared - self.held <= reason, tag, 'was told at', before)
 
