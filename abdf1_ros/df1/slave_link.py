@@ -104,8 +104,7 @@ class SlaveLink(Link, Initiator):
         # A command that is not repeated must not wait until a master comes back.
         entry.deadline = self.last_poll + self._settings.cmd_timeout
         if self.last_poll > entry.task.expires:
-            self._outstanding = None
-            self._slave.withdraw()
+            self._end()
             entry.task.fail(CommandExpired())
 
     def next_command(self) -> Packet | None:
@@ -144,7 +143,7 @@ class SlaveLink(Link, Initiator):
         if entry is None or not reply.answers(entry.task.command):
             self._accounting.unexpected(reply)
             return
-        self._outstanding = None
+        self._end()  # also where the master's ACK got lost: it has had the command
         if not is_local_status(reply.sts):
             self._stations.heard(reply.src, self._machine.now)
         self._accounting.complete(entry.task, reply, keeps_others_waiting=True)
@@ -157,7 +156,6 @@ class SlaveLink(Link, Initiator):
         is_overdue = entry is not None and now >= entry.deadline
         is_alone = 0 < self._settings.poll_timeout <= now - self.last_poll
         if is_overdue or is_alone:
-            self._slave.withdraw()
             self._fail()
         if not is_alone:
             return
@@ -167,8 +165,14 @@ class SlaveLink(Link, Initiator):
         for task in waiting:
             task.fail(CommandTimeout())
 
-    def _fail(self) -> None:
+    def _end(self) -> Outstanding | None:
+        """Return the command that is out; it is not sent again."""
         entry, self._outstanding = self._outstanding, None
+        self._slave.withdraw()
+        return entry
+
+    def _fail(self) -> None:
+        entry = self._end()
         if entry is not None:
             self._accounting.overdue(entry.task, keeps_others_waiting=entry.is_delivered)
 

@@ -56,6 +56,15 @@ def test_command_that_is_too_old_when_the_port_is_to_have_it_does_not_leave(
     assert bench.poll() == bench.own(FROM_MASTER.reply())
 
 
+def test_command_whose_reply_has_come_is_not_sent_again() -> None:
+    bench = SlaveBench(SETTINGS)
+    task = bench.add(own())
+    assert bench.poll() == bench.own(own())  # the master takes it, and its ACK gets lost
+    assert bench.hear(bench.frame(own().reply(sts=0x02))) == ACK
+    assert isinstance(task.result, Packet) and task.result.sts == 0x02
+    assert bench.poll() == EOT
+
+
 @pytest.mark.parametrize('busy', [False, True])
 def test_waiting_commands_expire_although_we_are_never_polled(busy: bool) -> None:
     bench = SlaveBench(SETTINGS, poll_timeout=60.0, patience=1.0)
