@@ -115,7 +115,7 @@ class InterlockConsumer(Node):
         return ''
 
     def _liveliness(self, event: Any) -> None:
-        if event.alive_count == 0:
+        if event.alive_count <= 0:  # -1 where Fast DDS has told the others only
             self._stopped()
 
     def _stopped(self) -> None:

@@ -18,6 +18,7 @@ from collections.abc import Iterator
 import importlib.util
 from pathlib import Path
 import signal
+from types import SimpleNamespace
 
 import pytest
 import rclpy
@@ -114,6 +115,8 @@ def test_permit_comes_back_by_itself_only_where_that_is_wanted(latches: bool) ->
         assert not cell.permitted
         cell._received(bits_of(1, 1))
         assert cell.permitted is not latches
+        cell._liveliness(SimpleNamespace(alive_count=-1))  # its change to 1 was told to others
+        assert not cell.permitted
         cell.destroy_node()
     finally:
         rclpy.shutdown()

@@ -154,17 +154,17 @@ def test_silent_station_is_seen_by_every_means(bridge: Bridge) -> None:
         depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL, deadline=stale_time,
         liveliness=LivelinessPolicy.MANUAL_BY_TOPIC, liveliness_lease_duration=stale_time))
     plain = bridge.listen('speeds')
+    # Fast DDS tells a change to all readers of that moment: one that matches then may not get it.
     careful.first()
-    bridge.observer.until(lambda: careful.liveliness and careful.liveliness[-1].alive_count == 1,
-                          'the publisher to be alive')
     careful.deadlines.clear()
     bridge.active.values([0b110] + 15 * [0])
     bridge.active.clear()
     with bridge.fault('silent 2'):
         # The subscriber that asked for it is told.
         bridge.observer.until(lambda: careful.deadlines, 'a missed deadline')
-        bridge.observer.until(lambda: not careful.liveliness[-1].alive_count, 'no liveliness')
-        assert careful.liveliness[-1].not_alive_count == 1
+        bridge.observer.until(
+            lambda: careful.liveliness and careful.liveliness[-1].not_alive_count == 1,
+            'no liveliness')
         # The Active Node Table and the diagnostics tell it to all.
         bridge.active.values([0b010] + 15 * [0])
         status = until_status(bridge.diagnostics, 'station 2', ERROR)
@@ -191,7 +191,7 @@ def test_silent_station_is_seen_by_every_means(bridge: Bridge) -> None:
     assert values_in(late.first()) == [-17]
     bridge.active.clear()
     assert values_in(careful.next()) == [-17]
-    bridge.observer.until(lambda: careful.liveliness[-1].alive_count == 1, 'liveliness again')
+    bridge.observer.until(lambda: not careful.liveliness[-1].not_alive_count, 'liveliness again')
     for inbox in (careful, plain, late, living):
         bridge.observer.forget(inbox)
     bridge.node.wait_for('[ERROR]', '2509 ERR_INACTIVE_STATION: Slave Station (2) Inactive')
