@@ -115,7 +115,7 @@ class InterlockConsumer(Node):
         return ''
 
     def _liveliness(self, event: Any) -> None:
-        if event.alive_count <= 0:  # -1 where Fast DDS has told the others only
+        if event.alive_count <= 0:  # -1 if Fast DDS did not report its beginning
             self._stopped()
 
     def _stopped(self) -> None:

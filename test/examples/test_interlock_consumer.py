@@ -115,7 +115,7 @@ def test_permit_comes_back_by_itself_only_where_that_is_wanted(latches: bool) ->
         assert not cell.permitted
         cell._received(bits_of(1, 1))
         assert cell.permitted is not latches
-        cell._liveliness(SimpleNamespace(alive_count=-1))  # its change to 1 was told to others
+        cell._liveliness(SimpleNamespace(alive_count=-1))  # its change to 1 went to others
         assert not cell.permitted
         cell.destroy_node()
     finally:
