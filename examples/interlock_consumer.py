@@ -115,7 +115,7 @@ class InterlockConsumer(Node):
         return ''
 
     def _liveliness(self, event: Any) -> None:
-        if event.alive_count <= 0:  # -1 if Fast DDS did not report its beginning
+        if event.alive_count <= 0:  # -1 if it joined late (Fast DDS)
             self._stopped()
 
     def _stopped(self) -> None:

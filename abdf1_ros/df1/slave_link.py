@@ -90,8 +90,8 @@ class SlaveLink(Link, Initiator):
 
     def _take_back(self, error: CommandExpired) -> None:
         """End a command that was too old when the port was to have it."""
-        entry, self._outstanding = self._outstanding, None
         was_sent = self._slave.take_back()
+        entry = self._end()
         if entry is not None:
             entry.task.sent = was_sent
             entry.task.fail(error)
@@ -133,7 +133,7 @@ class SlaveLink(Link, Initiator):
 
     def undelivered(self, command: Packet, error: LinkError) -> None:
         """Fail the command that the master did not take."""
-        entry, self._outstanding = self._outstanding, None
+        entry = self._end()
         if entry is not None:
             entry.task.fail(error)
 
