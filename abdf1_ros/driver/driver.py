@@ -117,7 +117,6 @@ class Driver:
         self._listener = listener
         self._inbox: Inbox[Write] = Inbox(is_open=False)
         self._make_queues()
-        self._served = self._make_served()
         self.link = network.line_mode.make_link(
             self.machine, network.link(settings), self.stations, self._serve, listener.happened)
 
@@ -125,26 +124,28 @@ class Driver:
         """Make the queues of jobs, and who decides between them."""
         network, settings, machine = self.network, self._settings, self.machine
         report = self._listener.written
-        self.readings = Readings(
-            network, self.mappings, settings, self.stations, machine, self._listener,
-            lambda *read: self.interlocks.read_back(*read))  # noqa: PLW0108
-        self.points = self.readings.points
         self._record = record = WriteRecord(machine, 2 * network.cmd_timeout / 1000)
-        writing = WritesUnderWay(self.stations, record, self.readings)
+        self.readings = Readings(
+            network, self.mappings, settings, self.stations, machine, self._listener, record)
+        self.points = self.readings.points
+        self._served = self._make_served()
+        writing = WritesUnderWay(
+            self.stations, record, self.readings, settings.write_timeout, report)
+        self._read_backs = writing.read_backs
         self._writes = WriteQueue(self.stations, writing, settings.write_timeout, report,
                                   network.timing.tx_delay)
         self.checks = Checks(
             self.stations, {block.station for block in self.readings.blocks},
-            settings.processor_period, machine,
-            lambda station, error: self.readings.link_failed(station, (), error),
+            settings.processor_period, machine, self.readings.link_failed,
             self._station_told, self._status_periods())
         self.interlocks = Interlocks(
-            () if settings.read_only else self.mappings, self._writes, writing,
-            lambda write: self._served.store(write.mapping, write.raw), self._listener,
-            self._foreign_value, settings.first_tns)
+            () if settings.read_only else self.mappings, self._writes, writing, self._served,
+            self._listener, self._foreign_value, settings.first_tns)
         self.guests = GuestQueue(self.stations, machine, network.cmd_timeout / 1000,
                                  self._station_of_guest, self._words_of_guest, record)
-        record.connect(self.readings.read_backs, self.readings.reads, self.interlocks)
+        compares = (self.interlocks,) if self.interlocks.heartbeats else ()
+        record.connect((self._read_backs, self.readings.reads, self.interlocks),
+                       (self._read_backs, *compares))
         self.tasks = JobTasks(network.station, settings.first_tns, network.timing.char_time)
         self._agenda = Agenda(self.stations, self.interlocks, self._writes, self.checks,
                               self.readings.reads, self.guests, self.tasks)
@@ -219,12 +220,12 @@ class Driver:
         self._writes.expire(now)
         self.tasks.expire(now)
         self.guests.expire(now)
-        self.readings.read_backs.expire(now)
+        self._read_backs.expire(now)
 
     def next_expiry(self) -> float:
         """Return when ``expire`` has something to do (clock value in s), infinite for never."""
         return min(self._writes.next_expiry, self.tasks.next_expiry, self.guests.next_expiry,
-                   self.interlocks.ours.due, self.readings.read_backs.next_expiry)
+                   self.interlocks.ours.due, self._read_backs.next_expiry)
 
     def _station_changed(self, station: Station) -> None:
         if station.active:
@@ -292,7 +293,7 @@ class Driver:
         for write in self._inbox.close():
             self._end_write(write, Outcome.NOT_SENT, str(error))
         self._writes.drop(str(error), self.machine.now)
-        self.readings.read_backs.end(self.machine.now)
+        self._read_backs.end(self.machine.now)
 
     def _foreign_value(self, mapping: Mapping, text: str, is_conflict: bool) -> None:
         """Tell it, and ask for the mode at once: that of a PLC with a download is not RUN."""

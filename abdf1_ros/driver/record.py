@@ -26,11 +26,13 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Sequence
 from enum import auto, Enum
 import math
+from typing import Protocol
 
 from abdf1_ros.df1.packet import BROADCAST
 from abdf1_ros.driver.job_tasks import LineTime
 from abdf1_ros.driver.write import Outcome, Write
 from abdf1_ros.pccc.extent import Extent
+from abdf1_ros.plan.planner import Block
 from abdf1_ros.settings.mapping import Mapping
 
 _CHANGED = (Outcome.WRITTEN, Outcome.PARTLY)
@@ -106,6 +108,13 @@ class WriteListener:
 
     def write_expired(self, write: Write) -> None:
         """Take note that a message was too old to have the line."""
+
+
+class WordsListener(Protocol):
+    """Gets the words of all good reads."""
+
+    def words_read(self, block: Block, data: bytes, started: float) -> None:
+        """Take the words of a block whose read ``started`` at that clock value (s)."""
 
 
 class Words:
@@ -184,6 +193,7 @@ class WriteRecord:
     All writes of a line.
 
     What ends without an answer may land for ``settle_time`` s more, as a gateway may hold it.
+    Good reads are shown to ``readers``.
     """
 
     def __init__(self, line: LineTime, settle_time: float) -> None:
@@ -192,10 +202,12 @@ class WriteRecord:
         self._under_way: list[Claim] = []
         self._words: dict[Mapping, Words] = {}
         self._listeners: tuple[WriteListener, ...] = ()
+        self.readers: tuple[WordsListener, ...] = ()
 
-    def connect(self, *listeners: WriteListener) -> None:
-        """Tell these of all writes from now on."""
-        self._listeners = listeners
+    def connect(self, listeners: tuple[WriteListener, ...],
+                readers: tuple[WordsListener, ...]) -> None:
+        """Tell ``listeners`` of all writes, and ``readers`` of all good reads, from now on."""
+        self._listeners, self.readers = listeners, readers
 
     def words_of(self, row: Mapping) -> Words:
         """Return the words of a row that we write by ourselves; they are watched from now on."""

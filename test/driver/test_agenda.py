@@ -34,11 +34,13 @@ from abdf1_ros.driver.reads.job import ReadJob
 from abdf1_ros.driver.reads.point import ReadPoint
 from abdf1_ros.driver.reads.readings import Readings
 from abdf1_ros.driver.record import Claim, WriteRecord
+from abdf1_ros.driver.served import Served
 from abdf1_ros.driver.settings import DriverSettings
 from abdf1_ros.driver.write import Outcome, Write, WriteResult
 from abdf1_ros.driver.writes.queue import MessageJob, WriteQueue
 from abdf1_ros.driver.writes.under_way import WritesUnderWay
 from abdf1_ros.pccc.dialect import Steps
+from abdf1_ros.pccc.families import PlcType
 from abdf1_ros.plan.line_model import LineModel
 from abdf1_ros.plan.planner import Planner
 from abdf1_ros.settings.mapping import Mapping
@@ -87,16 +89,18 @@ class Bench:
         self.stations = ActiveStationList([job.station for job in jobs], probe_time=PROBE_TIME)
         self.tasks, line = JobTasks(5, 0), StillClock()
         listener = Recorder(lambda: 0.0)
-        readings = Readings(Network(), (), DriverSettings(), self.stations, line, listener,
-                            lambda mapping, words, started: None)
         self.record = WriteRecord(line, 1.0)
-        writing = WritesUnderWay(self.stations, self.record, readings)
+        readings = Readings(Network(), (), DriverSettings(), self.stations, line, listener,
+                            self.record)
+        writing = WritesUnderWay(self.stations, self.record, readings, write_timeout,
+                                 self.results.append)
         self.reads = readings.reads
         self.writes = WriteQueue(self.stations, writing, write_timeout, self.results.append)
         checks = Checks(self.stations, {job.station for job in jobs}, 0.0, line,
-                        lambda station, error: None, lambda station, identity, asked: None)
+                        readings.link_failed, lambda station, identity, asked: None)
         checks.begin(0.0)
-        interlocks = Interlocks((), self.writes, writing, lambda write: None, listener,
+        served = Served(PlcType.PLC5, (), readings.served)
+        interlocks = Interlocks((), self.writes, writing, served, listener,
                                 lambda mapping, text, is_conflict: None)
         guests = GuestQueue(self.stations, line, 1.0, lambda dst: dst,
                             lambda command, station: [], self.record)

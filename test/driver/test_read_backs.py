@@ -18,10 +18,10 @@ from collections.abc import Callable
 import math
 
 from abdf1_ros.df1.frames import STX
-from abdf1_ros.driver.reads.read_backs import ReadBacks
 from abdf1_ros.driver.record import Claim
 from abdf1_ros.driver.settings import DriverSettings
 from abdf1_ros.driver.write import Outcome, Write, WriteResult
+from abdf1_ros.driver.writes.read_backs import ReadBacks
 from abdf1_ros.errors import CommandTimeout
 from abdf1_ros.plan.forecast import line_model
 from abdf1_ros.plan.planner import Block, Planner
@@ -41,20 +41,32 @@ def block_of(mapping: Mapping) -> Block:
     return block
 
 
+class StillLine:
+    """The time of a line, which the test sets."""
+
+    now, late = EARLY, 0.0
+
+    def took(self, begun: float, now: float) -> float:
+        """Return the seconds between two clock values."""
+        return now - begun
+
+
 class Unconfirmed:
     """One write without a reply, which some block reads."""
 
     def __init__(self, read: Mapping, mapping: Mapping, values: list[float] | str) -> None:
         self.block = block_of(read)
         self.results: list[WriteResult] = []
-        self.backs = ReadBacks(PATIENCE, self.results.append)
+        self.line = StillLine()
+        self.backs = ReadBacks(self.line, PATIENCE, self.results.append)
         write = Write(mapping, values, EARLY)
         lost = write.result(Outcome.UNKNOWN, 'lost', EARLY, 0, CommandTimeout())
         self.backs.add(write, lost, [self.block], EARLY)
 
     def read(self, data: bytes, started: float = EARLY) -> None:
         """Read the block."""
-        self.backs.read(self.block, data, started, EARLY + 1)
+        self.line.now = EARLY + 1
+        self.backs.words_read(self.block, data, started)
 
     @property
     def details(self) -> list[str]:

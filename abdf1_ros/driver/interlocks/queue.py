@@ -35,10 +35,12 @@ from abdf1_ros.driver.interlocks.heartbeat import BeatState, HeartbeatRow, LARGE
 from abdf1_ros.driver.interlocks.plc import Conditions, OwnRow, Plc, TurnRank
 from abdf1_ros.driver.reads.readings import ValueListener
 from abdf1_ros.driver.record import Claim, WriteListener
+from abdf1_ros.driver.served import Served
 from abdf1_ros.driver.write import Outcome, Write, WriteResult
 from abdf1_ros.driver.writes.queue import WriteQueue
 from abdf1_ros.driver.writes.under_way import WriteJob, WritesUnderWay
 from abdf1_ros.errors import RemoteError
+from abdf1_ros.plan.planner import Block
 from abdf1_ros.settings.mapping import Mapping
 
 _OURS = -1  # stands for our own table
@@ -74,8 +76,8 @@ class Interlocks(WriteListener):
     """
     All heartbeats and fallbacks of a line.
 
-    ``writes`` are the messages that wait or are under way. ``store`` puts the fallback of a Serve
-    row into our own table; ``listener`` gets the result of each fallback that was written, and why
+    ``writes`` are the messages that wait or are under way. ``served`` takes the fallback of a
+    Serve row; ``listener`` gets the result of each fallback that was written, and why
     a PLC does not take one, ``warn`` that a heartbeat is not ours. ``seed`` is another number in
     each bridge: two that began together would not see each other if both counted from 1.
     ``ours`` has the rows of our own table: ``expire`` has something to do when it is due.
@@ -83,7 +85,7 @@ class Interlocks(WriteListener):
     """
 
     def __init__(self, mappings: Sequence[Mapping], writes: WriteQueue, writing: WritesUnderWay,
-                 store: Callable[[Write], None], listener: ValueListener,
+                 served: Served, listener: ValueListener,
                  warn: Callable[[Mapping, str, bool], None], seed: int = 0) -> None:
         record, dice = writing.record, Random(seed)
         self.heartbeats = [HeartbeatRow(record.words_of(mapping), 1 + seed % LARGEST, dice)
@@ -102,7 +104,7 @@ class Interlocks(WriteListener):
         self._by_mapping = {row.mapping: row for row in self.fallbacks}
         self._writes = writes
         self._writing = writing
-        self._store = store
+        self._served = served
         self._listener, self._warn = listener, warn
         self._refreshes: list[tuple[float, int, FallbackRow]] = []
         self._tickets = itertools.count()
@@ -173,16 +175,15 @@ class Interlocks(WriteListener):
         if station in self._plcs:
             self._plcs[station].mode_seen(is_running, now)
 
-    def read_back(self, mapping: Mapping, words: bytes, started: float) -> None:
-        """Compare a heartbeat that was read from ``started`` on (clock value, s) (rule 19)."""
-        beat = next((beat for beat in self.heartbeats if beat.mapping is mapping), None)
-        if beat is None:
-            return
-        value = int(mapping.codec.decode(words)[0])
-        text = beat.read_back(value, started, self._writing.line.now)
-        if text:
-            self._warn(mapping, text, beat.state is BeatState.CONFLICT)
-        self._plc_of[beat].plan()
+    def words_read(self, block: Block, data: bytes, started: float) -> None:
+        """Compare the heartbeats of a block that was read from ``started`` on (rule 19)."""
+        for beat in self.heartbeats:
+            mapping = beat.mapping
+            if mapping in block.mappings:
+                value = int(mapping.codec.decode(data[block.slice_of(mapping)])[0])
+                if text := beat.read_back(value, started, self._writing.line.now):
+                    self._warn(mapping, text, beat.state is BeatState.CONFLICT)
+                self._plc_of[beat].plan()
 
     def message_came(self, write: Write) -> None:
         """Take note of a message that was accepted (rule 3 d)."""
@@ -334,7 +335,7 @@ class Interlocks(WriteListener):
         for row in self.ours.fallbacks:
             if row.due <= now and row.judge(now, youngest.get(row.mapping, -math.inf)):
                 write = row.take(now)
-                self._store(write)
+                self._served.store(write.mapping, write.raw)
                 self._fallback_ended(row, write, Outcome.WRITTEN, now)
                 row.judge(now, -math.inf)
         self.ours.plan()

@@ -87,8 +87,6 @@ class ReadJob(Job):
         self.station = block.station
         self.extent = block.extent
         self.points = {point: block.slice_of(point.mapping) for point in points}
-        self.heartbeats = [(mapping, block.slice_of(mapping)) for mapping in block.mappings
-                           if mapping.heartbeat]
         self.intervals = Intervals()
         self.due = self.started = self.asked = 0.0
         self.refreshed = -math.inf

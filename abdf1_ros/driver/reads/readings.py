@@ -16,7 +16,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Iterable, Sequence
 import math
 from typing import Protocol
 
@@ -26,8 +26,8 @@ from abdf1_ros.driver.job_tasks import LineTime
 from abdf1_ros.driver.reads.guards import Guards
 from abdf1_ros.driver.reads.job import ReadJob, ReadTooOld
 from abdf1_ros.driver.reads.point import Guard, ReadPoint
-from abdf1_ros.driver.reads.read_backs import ReadBacks
 from abdf1_ros.driver.reads.silent import Reads
+from abdf1_ros.driver.record import WriteRecord
 from abdf1_ros.driver.settings import DriverSettings
 from abdf1_ros.driver.write import WriteResult
 from abdf1_ros.errors import FormatError, LinkError, RemoteError
@@ -73,13 +73,13 @@ class Readings:
     """
     The ``points`` of all rows that are published, and the ``reads`` that serve them.
 
-    ``listener`` is notified. ``read_backs`` compares what was read with unconfirmed writes,
-    ``read_back`` with heartbeats. ``planner`` knows which packets each station takes.
+    ``listener`` is notified, and ``record`` of all words. ``planner`` knows which packets each
+    station takes.
     """
 
     def __init__(self, network: Network, mappings: Sequence[Mapping], settings: DriverSettings,
                  stations: ActiveStationList, line: LineTime, listener: ValueListener,
-                 read_back: Callable[[Mapping, bytes, float], None]) -> None:
+                 record: WriteRecord) -> None:
         self.planner = Planner(line_model(network), settings.default_period)
         blocks = self.planner.plan(mapping for mapping in mappings
                               if not (settings.read_only and mapping.heartbeat))
@@ -91,8 +91,7 @@ class Readings:
         self._stations = stations
         self._line = line
         self._listener = listener
-        self.read_backs = ReadBacks(settings.write_timeout, listener.written)
-        self._read_back = read_back
+        self._record = record
         self._refusals = Refusals(self.planner)
         self.reads.replace((), map(self._job, blocks), 0.0)
 
@@ -115,7 +114,7 @@ class Readings:
                 for point in job.points:
                     point.fail(f'read again: {error}')
             elif isinstance(error, LinkError):
-                self.link_failed(job.station, job.points, error)
+                self.link_failed(job.station, error, job.points)
             elif isinstance(error, RemoteError):
                 self._stations[job.station].remote_errors += 1
                 self._failed(job, str(error), is_address_fault(error))
@@ -127,12 +126,10 @@ class Readings:
     def _read(self, job: ReadJob, data: bytes) -> None:
         """Update the points for which this read was made."""
         now = self._line.now
-        if self.read_backs.next_expiry != math.inf:
-            self.read_backs.read(job.block, data, job.started, now)
+        for reader in self._record.readers:
+            reader.words_read(job.block, data, job.started)
         if self.guards.counters:
             self.guards.values_read(job.points, data, now)
-        for mapping, place in job.heartbeats:
-            self._read_back(mapping, data[place], job.started)
         has_recovered, period = False, job.block.period
         is_refresh = job.refreshed > -math.inf
         for point, place in job.points.items():
@@ -210,7 +207,8 @@ class Readings:
         if identity is not None:
             self._change(self._refusals.processor_told(station, identity.processor, self.blocks))
 
-    def link_failed(self, station: int, points: Iterable[ReadPoint], error: LinkError) -> None:
+    def link_failed(self, station: int, error: LinkError,
+                    points: Iterable[ReadPoint] = ()) -> None:
         """Fail the points of a transaction without a reply."""
         if station == BROADCAST:
             return

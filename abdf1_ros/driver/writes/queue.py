@@ -49,7 +49,7 @@ class MessageJob(WriteJob):
 
     def ended(self, error: Exception | None) -> None:
         """Report the result."""
-        self._writing.report(self, self._queue.report)
+        self._writing.report(self)
         self._writing.ended(self)
 
 

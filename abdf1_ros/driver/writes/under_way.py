@@ -25,6 +25,7 @@ from abdf1_ros.driver.reads.readings import Readings
 from abdf1_ros.driver.record import Claim, WriteRecord
 from abdf1_ros.driver.write import Outcome, Write, WriteResult
 from abdf1_ros.driver.writes.packets import carry_out
+from abdf1_ros.driver.writes.read_backs import ReadBacks
 from abdf1_ros.errors import CommandExpired, INTERNAL_ERROR, PortLost, RemoteError
 from abdf1_ros.pccc.dialect import Steps
 
@@ -51,8 +52,10 @@ class WriteJob(Job):
 class WritesUnderWay:
     """Carries out writes, and takes their ends: in ``record``, of stations, and of reads."""
 
-    def __init__(self, stations: ActiveStationList, record: WriteRecord,
-                 readings: Readings) -> None:
+    def __init__(self, stations: ActiveStationList, record: WriteRecord, readings: Readings,
+                 patience: float, report: Callable[[WriteResult], None]) -> None:
+        self.read_backs = ReadBacks(record.line, patience, report)
+        self._report = report
         self.record = record
         self.line = record.line
         self.stations = stations
@@ -78,13 +81,12 @@ class WritesUnderWay:
         if isinstance(result.error, RemoteError):
             self.stations[station].remote_errors += 1
         elif result.error is not None and not isinstance(result.error, CommandExpired):
-            self._readings.link_failed(station, (), result.error)
+            self._readings.link_failed(station, result.error)
         self.record.ended(job.claim, result.outcome, may_land=result.is_unconfirmed)
 
-    def report(self, job: WriteJob, report: Callable[[WriteResult], None]) -> None:
+    def report(self, job: WriteJob) -> None:
         """Report the result of a message, after a read where it is unconfirmed."""
         if job.result.is_unconfirmed:
-            readings = self._readings
-            readings.read_backs.add(job.write, job.result, readings.blocks, self.line.now)
+            self.read_backs.add(job.write, job.result, self._readings.blocks, self.line.now)
         else:
-            report(job.result)
+            self._report(job.result)

@@ -25,6 +25,7 @@ from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
 import math
 
+from abdf1_ros.driver.job_tasks import LineTime
 from abdf1_ros.driver.record import Claim, WriteListener
 from abdf1_ros.driver.write import Write, WriteResult
 from abdf1_ros.plan.planner import Block
@@ -43,11 +44,14 @@ class ReadBacks(WriteListener):
     """
     The writes that wait to be read back, for ``patience`` seconds at most.
 
-    ``report`` gets their results. ``next_expiry`` is when the first will have waited too long
-    (clock value in s), infinite for never. All of it belongs to the link thread.
+    ``report`` gets their results, ``line`` tells the time. ``next_expiry`` is when the first
+    will have waited too long (clock value in s), infinite for never. All of it belongs to the
+    link thread.
     """
 
-    def __init__(self, patience: float, report: Callable[[WriteResult], None]) -> None:
+    def __init__(self, line: LineTime, patience: float,
+                 report: Callable[[WriteResult], None]) -> None:
+        self._line = line
         self._patience = patience
         self._report = report
         self._waiting: list[_UnconfirmedWrite] = []
@@ -63,14 +67,14 @@ class ReadBacks(WriteListener):
         else:
             self._tell(entry, 'not read back: no row reads all of these words', now)
 
-    def read(self, block: Block, data: bytes, started: float, now: float) -> None:
+    def words_read(self, block: Block, data: bytes, started: float) -> None:
         """Compare the data of a block whose read ``started`` at that clock value (s)."""
         for entry in self._waiting[:]:
             mapping = entry.write.mapping
             if started >= entry.since and block.extent.holds(mapping.extent):
                 is_held = entry.write.is_held(data[block.slice_of(mapping)])
                 which = 'the value' if is_held else 'another value'
-                self._end(entry, f'read back: the PLC holds {which}', now)
+                self._end(entry, f'read back: the PLC holds {which}', self._line.now)
 
     def write_begins(self, claim: Claim) -> None:
         """End those whose words a newer write changes, which is sent now."""
