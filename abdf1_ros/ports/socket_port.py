@@ -12,10 +12,18 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Serial ports of device servers, over plain TCP: ``socket://host:port``."""
+"""
+Serial ports of device servers, over plain TCP: ``socket://host:port``.
+
+A network that is cut can leave a server with a connection whose end it never hears of. A server
+that takes one client then refuses all others, for ever where it has no timer. So a process
+connects again from the local port that it had: the server asks about its old connection, our host
+answers that there is none, and the server's port is free (RFC 9293, section 3.5.2).
+"""
 
 from __future__ import annotations
 
+import errno
 import socket
 from typing import Any
 from urllib.parse import urlsplit
@@ -24,11 +32,18 @@ from abdf1_ros.ports.descriptor import DescriptorPort
 from abdf1_ros.ports.ownership import OwnedConnection
 from abdf1_ros.ports.settings import PortSettings
 
-_CONNECT_TIMEOUT = 5.0
+# An attempt to connect ends after this many seconds, so a network that heals is seen soon.
+_CONNECT_TIMEOUT = 1.0
 
 # After so many seconds without an answer from the far host a TCP connection counts as lost. The
 # limit of the operating system is a quarter of an hour.
 _SILENCE_LIMIT = 5
+
+# The system does not give a local port again: another program has it, or it is not yet free.
+_LOCAL_PORT_TAKEN = (errno.EADDRINUSE, errno.EADDRNOTAVAIL)
+
+# Our port of the last connection to each far address.
+_local_ports: dict[tuple[Any, ...], int] = {}
 
 
 def open_port(settings: PortSettings) -> DescriptorPort:
@@ -54,8 +69,25 @@ def connected(url: str) -> socket.socket:
 
 
 def _connection(family: int, address: tuple[Any, ...]) -> socket.socket:
+    """Connect, from the local port of before where there is one."""
+    local = _local_ports.get(address, 0)
+    try:
+        connection = _connection_from(local, family, address)
+    except OSError as error:
+        if not local or error.errno not in _LOCAL_PORT_TAKEN:
+            raise
+        connection = _connection_from(0, family, address)
+    _local_ports[address] = connection.getsockname()[1]
+    return connection
+
+
+def _connection_from(local: int, family: int, address: tuple[Any, ...]) -> socket.socket:
+    """Connect from a local port; the system chooses one for 0."""
     connection = OwnedConnection(family, address)
     try:
+        if local:
+            connection.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+            connection.bind(('', local))
         connection.settimeout(_CONNECT_TIMEOUT)
         connection.connect(address)
         # Without the first option a short frame waits until the one before it has been

@@ -1,0 +1,111 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Connections to device servers: a server that did not hear of the end of the last one."""
+
+from collections.abc import Iterator
+import socket
+import threading
+import time
+
+from abdf1_ros.ports.opening import open_port
+from abdf1_ros.ports.settings import PortSettings
+import pytest
+from support.ptys import PATIENCE
+
+_TCP_REPAIR = 19  # of Linux: a socket that is closed in this state sends nothing (CRIU)
+_TRIES = 20
+
+
+class OneClientServer:
+    """A server that takes one client, and closes the connections of all others at once."""
+
+    def __init__(self) -> None:
+        self._listening = socket.create_server(('127.0.0.1', 0))
+        self.url = f'socket://127.0.0.1:{self._listening.getsockname()[1]}'
+        self._client: socket.socket | None = None
+        threading.Thread(target=self._accept, daemon=True).start()
+
+    def _accept(self) -> None:
+        while True:
+            try:
+                connection, _ = self._listening.accept()
+            except OSError:
+                return
+            if self._client is None:
+                self._client = connection
+                threading.Thread(target=self._serve, args=(connection,), daemon=True).start()
+            else:
+                connection.close()
+
+    def _serve(self, connection: socket.socket) -> None:
+        try:
+            while data := connection.recv(100):
+                connection.sendall(data)
+        except OSError:
+            pass
+        connection.close()
+        self._client = None
+
+    def close(self) -> None:
+        self._listening.close()
+        if self._client is not None:
+            self._client.close()
+
+
+@pytest.fixture
+def server() -> Iterator[OneClientServer]:
+    server = OneClientServer()
+    yield server
+    server.close()
+
+
+def answers(server: OneClientServer) -> bool:
+    """Connect; tell whether the server echoes, so the connection is its only one."""
+    port = open_port(PortSettings(server.url))
+    try:
+        port.write(b'?')
+        return bool(port.read(PATIENCE, port.fileno()))  # type: ignore[attr-defined]
+    except OSError:
+        return False
+    finally:
+        port.close()
+
+
+def cut(server: OneClientServer) -> None:
+    """Connect, and let the connection disappear without a packet, as a cut network does."""
+    port = open_port(PortSettings(server.url))
+    connection = socket.socket(fileno=port.fileno())  # type: ignore[attr-defined]
+    try:
+        connection.setsockopt(socket.IPPROTO_TCP, _TCP_REPAIR, 1)
+    except PermissionError:
+        pytest.skip('a connection can disappear only where CAP_NET_ADMIN is there')
+    finally:
+        connection.detach()
+        port.close()
+
+
+def test_connection_whose_end_the_server_did_not_hear_is_freed(server: OneClientServer) -> None:
+    cut(server)
+    with socket.create_connection(server._listening.getsockname()) as other:  # noqa: SLF001
+        assert not other.recv(1)  # a stranger has no place
+    # The server's thread may need a moment; more tries would hit the port of before by chance.
+    assert any(answers(server) or time.sleep(0.1) for _ in range(_TRIES))
+
+
+def test_local_port_that_is_not_free_yet_is_no_obstacle(server: OneClientServer) -> None:
+    for _ in range(3):  # we close first, so the system keeps the local port for a minute
+        give_up = time.monotonic() + PATIENCE
+        while not answers(server):  # until the server has seen the end of the one before
+            assert time.monotonic() < give_up
