@@ -19,12 +19,13 @@ import time
 from typing import Any, cast
 
 from abdf1_ros.driver.driver import Driver
-from abdf1_ros.ros.topics.writes import LossCounter, WriteTopics
+from abdf1_ros.ros.topics.writes import count_publishers, LossCounter, WriteTopics
 from abdf1_ros.settings.mapping import Mapping
 import pytest
 from rclpy.node import Node
 from std_msgs.msg import Int16MultiArray
 from support.mappings import make_mapping
+from support.ros import Observer
 
 
 def losses(numbers: Sequence[int | None], publishers: int = 1) -> list[int]:
@@ -85,6 +86,9 @@ class Taker:
 
     def count_publishers(self, name: str) -> int:
         return 1
+
+    def resolve_topic_name(self, name: str) -> str:
+        return name
 
     def create_task(self, task: Callable[[], None]) -> None:
         self.tasks.append(task)
@@ -172,3 +176,15 @@ def test_message_that_waits_for_rows_which_a_reload_takes_away_ends_nothing(
     topics.begin()
     node.tasks[0]()
     assert node.said == ['b 1']
+
+
+def test_remapped_topic_has_the_publishers_of_its_new_name() -> None:
+    """Else rule 17 warns of no second publisher, and its numbers are taken for losses."""
+    with Observer() as observer:
+        node = Node('line', context=observer.context, use_global_arguments=False, cli_args=[
+            '--ros-args', '-r', '~/write/a:=/cell/door', '-r', '__ns:=/cell'])
+        observer.executor.add_node(node)
+        for _ in range(2):
+            observer.node.create_publisher(Int16MultiArray, '/cell/door', 1)
+        observer.node.create_publisher(Int16MultiArray, '/cell/line/write/b', 1)
+        assert [count_publishers(node, topic) for topic in ('a', 'b')] == [2, 1]

@@ -22,6 +22,7 @@ from __future__ import annotations
 
 from abdf1_ros.driver.driver import Driver
 from abdf1_ros.ports.clock import line_time
+from abdf1_ros.ros.topics.writes import count_publishers
 from rclpy.clock import Clock, ClockType
 from rclpy.node import Node
 from rclpy.timer import Timer
@@ -71,5 +72,5 @@ class InterlockWatch:
             self._next_look = now + _LOOK
             topics = dict.fromkeys(row.mapping.topic for row in self._interlocks.fallbacks)
             self._crowded = tuple(
-                topic for topic in topics if self._node.count_publishers(f'~/write/{topic}') > 1)
+                topic for topic in topics if count_publishers(self._node, topic) > 1)
         return self._crowded

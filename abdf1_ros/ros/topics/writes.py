@@ -190,7 +190,7 @@ class WriteTopics:
                 self._subscriptions[topic] = kind, self._subscription(topic, kind)
         return {topic: WriteTopic(
             topic, mappings, driver, patience, on_loss=on_loss, wake=wake,
-            losses=LossCounter(partial(self._node.count_publishers, _name(topic))))
+            losses=LossCounter(partial(count_publishers, self._node, topic)))
             for topic, mappings in wanted.items()}
 
     def give_to(self, topics: dict[str, WriteTopic]) -> None:
@@ -209,6 +209,11 @@ class WriteTopics:
 
         callback: Any = take
         return self._node.create_subscription(kind, _name(topic), callback, write_qos())
+
+
+def count_publishers(node: Node, topic: str) -> int:
+    """Return how many publishers a write topic has; rclpy does not remap what it is asked."""
+    return node.count_publishers(node.resolve_topic_name(_name(topic)))
 
 
 def _name(topic: str) -> str:
