@@ -23,7 +23,7 @@ from typing import Any, Self, TypeVar
 
 from rclpy.context import Context
 from rclpy.executors import SingleThreadedExecutor
-from rclpy.node import Node
+from rclpy.node import Node, NodeNameNonExistentError
 
 _Result = TypeVar('_Result')
 
@@ -68,6 +68,14 @@ class Observer:
     def spin_once(self, seconds: float) -> None:
         """Take one message, or wait so long."""
         self.executor.spin_once(timeout_sec=seconds)
+
+    def published(self, name: str) -> list[tuple[str, list[str]]] | None:
+        """Return what the node ``name`` publishes, with types; None where it is not known yet."""
+        namespace, _, base = name.rpartition('/')
+        try:
+            return self.node.get_publisher_names_and_types_by_node(base, namespace or '/')
+        except NodeNameNonExistentError:
+            return None
 
     def wait(self, condition: Callable[[], _Result | None], seconds: float) -> _Result | None:
         """Spin until ``condition`` gives something true, or so long; return what it gives."""

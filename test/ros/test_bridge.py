@@ -133,6 +133,8 @@ def test_topics_are_those_of_the_map_and_no_others(bridge: Bridge) -> None:
     node = bridge.observer.node
     expected = {f'/abdf1/read/{tag}' for tag in READS} | {f'/abdf1/write/{tag}' for tag in WRITES}
     expected |= {'/abdf1/write_results', '/abdf1/active_stations', '/abdf1/snapshot'}
+    bridge.observer.until(
+        lambda: expected <= {name for name, _ in node.get_topic_names_and_types()}, 'all topics')
     found = dict(node.get_topic_names_and_types())
     assert {name for name in found if name.startswith('/abdf1/')} == expected
     for tag, (kind, _, _) in READS.items():

@@ -189,7 +189,8 @@ def test_names_can_be_remapped(observer: Observer, files: Files) -> None:
         assert [status.name for status in diagnostics[-1].status] == [
             f'cell/line_a: {name}' for name in STATUSES]
         assert not observer.node.count_publishers('/cell/line_a/read/door')
-        assert observer.node.count_subscribers('/cell/line_a/write/flags')
+        observer.until(
+            lambda: observer.node.count_subscribers('/cell/line_a/write/flags'), 'a subscriber')
         assert get_parameters(observer, 'net.baud', node='/cell/line_a') == [115200]
         node.end()
         simulator.end()
@@ -210,7 +211,9 @@ def test_full_duplex_bridge_is_read_and_written_by_the_plc(
         simulator.wait_for('stations 1 (PLC5) on')
         with Process('node', *files.args(), '-r', '__node:=peer') as node:
             assert values_in(speeds.first()) == [1200, -800]
-            (endpoint,) = observer.node.get_publishers_info_by_topic('/peer/read/orders')
+            (endpoint,) = observer.until(
+                lambda: observer.node.get_publishers_info_by_topic('/peer/read/orders'),
+                'the publisher')
             assert endpoint.qos_profile.deadline == Infinite  # the PLC writes when it likes
             assert not orders
             simulator.say('msg 1 N7:50 11 -22')

@@ -29,7 +29,6 @@ from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from rclpy.duration import Infinite
 from rclpy.event_handler import SubscriptionEventCallbacks
 from rclpy.exceptions import InvalidTopicNameException
-from rclpy.node import NodeNameNonExistentError
 from rclpy.validate_full_topic_name import validate_full_topic_name
 from std_msgs.msg import String, UInt16MultiArray  # noqa: I101
 
@@ -136,13 +135,10 @@ class NodeWatch(Listening):
 
     def _discover(self) -> None:
         """Subscribe to the read topics that the node publishes now."""
-        namespace, _, base = self.name.rpartition('/')
-        try:
-            topics = self.node.get_publisher_names_and_types_by_node(base, namespace or '/')
-        except NodeNameNonExistentError:
-            self.is_there = False
+        topics = self.published(self.name)
+        self.is_there = topics is not None
+        if topics is None:
             return
-        self.is_there = True
         reads = {topic: types[0] for topic, types in topics
                  if topic != f'{self.name}/active_stations' and types[0] in _TYPES}
         for topic, known in list(self._subscriptions.items()):

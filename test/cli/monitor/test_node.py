@@ -202,8 +202,15 @@ def test_node_of_the_same_name_in_another_namespace_is_another(
 def test_nothing_is_asked_of_the_publishers(bridge: Bridge, watch: NodeWatch) -> None:
     bridge.node.create_publisher(String, '~/read/label', 1)  # volatile: offers the least
     until(watch, lambda picture: picture.readings)
-    names = bridge.observer.node.get_publisher_names_and_types_by_node('abdf1_monitor', '/')
-    assert not [name for name, _ in names if name != '/parameter_events']
+    published = watch.published('/abdf1_monitor')  # its own graph, which lacks nothing
+    assert published is not None
+    assert not [name for name, _ in published if name != '/parameter_events']
+
+
+def test_node_that_is_not_known_yet_is_not_there(watch: NodeWatch) -> None:
+    assert watch.published(NAME) is None
+    watch.spin_once(0.0)
+    assert not watch.is_there
 
 
 @pytest.mark.parametrize(('text', 'name'), [
