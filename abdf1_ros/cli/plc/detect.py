@@ -129,14 +129,16 @@ class Search:
             for station in stations:
                 self._show(f'trying {settings}, station {station}')
                 presence = look_at(session, station)
-                self.echoes |= session.echoes
-                if session.echoes and settings.mode == MODES['full']:
-                    return
+                if session.echoes:
+                    self.echoes = True
+                    self.traces.clear()  # our own characters, which came back late
+                    if settings.mode == MODES['full']:
+                        return
                 if presence.takes_commands and not understands(session, station):
                     presence = replace(presence, takes_commands=False)
                 self._lacks_acks = not session.counters.acks_received
                 yield presence
-            if session.counters.chars_received and not session.echoes:
+            if session.counters.chars_received and not self.echoes:
                 self.traces.append(
                     f'{settings}: {session.counters.chars_received} characters came')
 

@@ -16,7 +16,9 @@
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+import os
 from pathlib import Path
+import select
 import threading
 
 from abdf1_ros import settings
@@ -196,6 +198,33 @@ def test_flood_of_acks_is_no_plc(tmp_path: Path) -> None:
         flooding.join()
         line.close()
     assert len(search.traces) == 1
+
+
+@pytest.mark.parametrize('is_first_at_once', [True, False])
+def test_own_characters_that_come_back_late_are_no_trace(
+        tmp_path: Path, is_first_at_once: bool) -> None:
+    line, over = Pty(tmp_path / 'line'), threading.Event()
+    search = Search(Network(com_port=str(line.name), timeout=300), [1, 2])
+
+    def give_back() -> None:
+        is_late = not is_first_at_once  # one of the two speeds is tried in time
+        while not over.is_set():
+            if select.select([line], [], [], 0.01)[0]:
+                sent = os.read(line.fileno(), 100)
+                over.wait(0.5 if is_late else 0)
+                line.write(sent)
+            is_late = search.echoes if is_first_at_once else not search.traces
+
+    echo = threading.Thread(target=give_back)
+    echo.start()
+    try:
+        assert search.run([9600, 19200]) is None
+    finally:
+        over.set()
+        echo.join()
+        line.close()
+    assert search.echoes
+    assert search.traces == []
 
 
 @pytest.mark.usefixtures('half_duplex_only')
