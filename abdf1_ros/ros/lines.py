@@ -34,7 +34,8 @@ from abdf1_ros.ros.bridge.node import BridgeNode
 from abdf1_ros.ros.diagnostics.graph import Graph
 from abdf1_ros.ros.diagnostics.log import bug_text
 from abdf1_ros.ros.diagnostics.status import ERROR, message_of, OK
-from abdf1_ros.ros.parameters.declared import take_given, unknown_names
+from abdf1_ros.ros.parameters.arguments import Arguments
+from abdf1_ros.ros.parameters.declared import take_given, wrong_names
 from abdf1_ros.ros.parameters.files import node_sections, parameter_files, parameter_tree
 from abdf1_ros.ros.process.main import EXIT_CONFIGURATION, make_parser, Program, REFUSALS, run_ros
 from abdf1_ros.ros.process.port_owners import PortOwners
@@ -146,9 +147,9 @@ class RestartedLine(Line):
         super().end_callbacks(give_up)
 
 
-def _options(node: Node, files: Sequence[str]) -> tuple[list[str], bool]:
+def _options(node: Node, arguments: Arguments) -> tuple[list[str], bool]:
     """Return which lines are wanted, and whether all have to run; raises ConfigurationError."""
-    problems = unknown_names(node, take_given(node), files, OPTIONS)
+    problems = wrong_names(node, take_given(node), arguments, OPTIONS, NODE_NAME)
     anything = ParameterDescriptor(dynamic_typing=True)
     wanted, is_strict = (node.declare_parameter(name, default, anything).value
                          for name, default in OPTIONS.items())
@@ -166,9 +167,9 @@ def _options(node: Node, files: Sequence[str]) -> tuple[list[str], bool]:
 class LinesNode(Node):
     """Tell of all lines on /diagnostics; ``~/reload`` tries those again that do not run."""
 
-    def __init__(self, files: Sequence[str]) -> None:
+    def __init__(self, arguments: Arguments) -> None:
         super().__init__(NODE_NAME, automatically_declare_parameters_from_overrides=True)
-        self.wanted, self.is_strict = _options(self, files)
+        self.wanted, self.is_strict = _options(self, arguments)
         self.is_asked_again = False
         self._publisher = self.create_publisher(DiagnosticArray, '/diagnostics', 10)
         self.create_service(Trigger, '~/reload', self._reload)
@@ -195,11 +196,12 @@ class LinesNode(Node):
 class Lines:
     """All lines, from their start to their end."""
 
-    def __init__(self, names: Sequence[str], node: LinesNode, files: Sequence[str]) -> None:
+    def __init__(self, names: Sequence[str], node: LinesNode, arguments: Arguments) -> None:
         port_owners, graph = PortOwners(), Graph(node)
         self._lines = [RestartedLine(name, partial(
             BridgeNode, _short(name), namespace=name.rpartition('/')[0] or '/', graph=graph,
-            port_owners=port_owners, files=files, parameter_overrides=[_NO_TYPE_DESCRIPTIONS]))
+            port_owners=port_owners, arguments=arguments,
+            parameter_overrides=[_NO_TYPE_DESCRIPTIONS]))
             for name in names]
         self._runner = Runner(self._lines, self._look)
         self._node = node
@@ -314,5 +316,6 @@ def _make(given: Sequence[str]) -> Program:
     files = parameter_files(given)
     names = [*dict.fromkeys(name for path in files for name in sections(path))]
     _allow_files()
-    node = LinesNode(files)
-    return Lines(chosen(names, node.wanted), node, files)
+    arguments = Arguments(files, others=names)
+    node = LinesNode(arguments)
+    return Lines(chosen(names, node.wanted), node, arguments)

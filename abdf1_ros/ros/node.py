@@ -18,8 +18,9 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from abdf1_ros.ros.bridge.node import BridgeNode, NODE_NAME
-from abdf1_ros.ros.parameters.files import parameter_files, typed_parameters
+from abdf1_ros.ros.bridge.node import BridgeNode
+from abdf1_ros.ros.parameters.arguments import Arguments
+from abdf1_ros.ros.parameters.declared import NODE_NAME
 from abdf1_ros.ros.process.main import make_parser, Program, run_ros
 from abdf1_ros.ros.process.runner import Line, Runner
 
@@ -53,4 +54,4 @@ def main(args: Sequence[str] | None = None) -> int:
 
 
 def _make(given: Sequence[str]) -> Program:
-    return Runner([Line(BridgeNode(files=parameter_files(given), typed=typed_parameters(given)))])
+    return Runner([Line(BridgeNode(arguments=Arguments.of(given)))])

@@ -406,3 +406,13 @@ def test_options_that_cannot_be_meant(
     path = yaml_file(tmp_path, 'a: {ros__parameters: {port: x}}')
     assert main(['lines', '--ros-args', '--params-file', path, '-p', option]) == 2
     assert text in capfd.readouterr().err
+
+
+def test_options_in_a_section_for_another_node_are_refused(
+        tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    path = yaml_file(tmp_path, 'cell:\n  a: {ros__parameters: {port: x}}\n'
+                               '  lines: {ros__parameters: {strict_lines: true}}')
+    assert main(['lines', '--ros-args', '--params-file', path]) == 2
+    told = capfd.readouterr().err
+    assert 'section /cell/lines is not for this node, /lines: write "/lines:", or "/**:"' in told
+    assert 'section /cell/a' not in told

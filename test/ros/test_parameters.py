@@ -22,8 +22,8 @@ from typing import Any
 from abdf1_ros.df1.settings import PollingSettings
 from abdf1_ros.paths import config_file
 from abdf1_ros.problems import ConfigurationError
+from abdf1_ros.ros.parameters.arguments import Arguments, is_for
 from abdf1_ros.ros.parameters.declared import Configuration, configure, Parameters
-from abdf1_ros.ros.parameters.files import typed_parameters
 from abdf1_ros.ros.parameters.shown import map_cells, ShownFiles
 from abdf1_ros.settings.columns import COLUMNS, MAP_COLUMNS
 from abdf1_ros.settings.network import Network
@@ -343,28 +343,23 @@ def test_section_that_names_the_node_has_no_unknown_parameter(
     path.write_text(f'{section}:\n  ros__parameters:\n    {name}: true\n', encoding='utf-8')
     node = make_node(files if section == 'camera' else {**files, name: True})
     if expected is None:
-        assert configure(node, [str(path)]).mappings
+        assert configure(node, Arguments([str(path)])).mappings
         return
     with pytest.raises(ConfigurationError) as caught:
-        configure(node, [str(path)])
+        configure(node, Arguments([str(path)]))
     assert [str(problem) for problem in caught.value.problems] == [f'{path}:{expected}']
 
 
-@pytest.mark.parametrize(('section', 'is_told'), [
-    ('parameters', True), ('"/**"', True), ('camera', False), ('"/camera/*"', False)])
+@pytest.mark.parametrize('section', ['parameters', '"/**"', '"/*"'])
 def test_number_that_yaml_takes_for_octal_is_told(
-        make_node: Nodes, files: dict[str, str], tmp_path: Path, section: str,
-        is_told: bool) -> None:
+        make_node: Nodes, files: dict[str, str], tmp_path: Path, section: str) -> None:
     path = tmp_path / 'shared.yaml'
     path.write_text(f'{section}:\n  ros__parameters:\n    net:\n      station: 010\n'
                     '      baud: 9600\n      timeout: "0500"\n      nak_retries: 03\n',
                     encoding='utf-8')
     node = make_node(files)
-    if not is_told:
-        assert configure(node, [str(path)]).mappings
-        return
     with pytest.raises(ConfigurationError) as caught:
-        configure(node, [str(path)])
+        configure(node, Arguments([str(path)]))
     assert str(caught.value) == \
         f'{path}:4:7: net.station: 010 is octal in YAML; write 10 or 8'
 
@@ -372,7 +367,8 @@ def test_number_that_yaml_takes_for_octal_is_told(
 @pytest.mark.parametrize(('rule', 'expected'), [
     ('net.station:=010', 'net.station: 010 is octal in YAML; write 10 or 8'),
     ('parameters:net.station:=010', 'net.station: 010 is octal in YAML; write 10 or 8'),
-    ('net.station:="010"', None), ('net.station:=07', None), ('camera:net.station:=010', None),
+    ('net.station:="010"', None), ('net.station:=07', None), ('camera:gain:=010', None),
+    ('camera:read_only:=true', 'camera:read_only: this node is /parameters; leave out "camera:"'),
     ('gain:=3', 'gain: there is no such parameter; another version may have it'),
     ('camera:gain:=3', None), ('use_sim_time:=true', None), ('map.door.max:=7', None)])
 def test_parameter_of_the_command_line_is_for_this_node(
@@ -380,10 +376,10 @@ def test_parameter_of_the_command_line_is_for_this_node(
     args = ['node', '--ros-args', '-p', rule]
     node = make_node(files, cli_args=args[1:])
     if expected is None:
-        assert configure(node, (), typed_parameters(args)).mappings
+        assert configure(node, Arguments.of(args)).mappings
         return
     with pytest.raises(ConfigurationError) as caught:
-        configure(node, (), typed_parameters(args))
+        configure(node, Arguments.of(args))
     assert str(caught.value) == f'parameter {expected}'
 
 
@@ -400,3 +396,65 @@ def test_parameter_of_another_node_is_none_of_our_business(
         make_node: Nodes, files: dict[str, str]) -> None:
     other = 'qos_overrides./camera/image.publisher.depth'
     assert configure(make_node({**files, 'camera.gain': 3, other: 2})).mappings
+
+
+def write_section(path: Path, *sections: str) -> Arguments:
+    """Write a parameter file of sections, each a name and parameters as YAML has them."""
+    path.write_text(''.join(f'{name}:\n  ros__parameters: {{{values}}}\n' for name, _, values in (
+        section.partition(' ') for section in sections)), encoding='utf-8')
+    return Arguments([str(path)])
+
+
+@pytest.mark.parametrize(('sections', 'section', 'without_effect'), [
+    (['robot_1/parameters read_only: true'], '/robot_1/parameters', 'read_only'),
+    (['abdf1 gain: 1'], '/abdf1', ''),
+    (['line_1 net.baud: 9600, gain: 1'], '/line_1', 'net.baud'),
+    (['"/**" default_period: 50', 'x/parameters gain: 1'], '/x/parameters', ''),
+    (['"/robot_1/**" read_only: true'], '/robot_1/**', 'read_only'),
+    (['"/*/*" read_only: true'], '/*/*', 'read_only'),
+    (['camera gain: 1', 'press strict_map: true', 'paint net_file: x'], '/press', 'strict_map')])
+def test_section_that_would_be_passed_over_is_an_error(
+        make_node: Nodes, files: dict[str, str], tmp_path: Path, sections: list[str],
+        section: str, without_effect: str) -> None:
+    arguments = write_section(tmp_path / 'site.yaml', *sections)
+    with pytest.raises(ConfigurationError) as caught:
+        configure(make_node(files), arguments)
+    (problem,) = caught.value.problems
+    line = 2 * [f'{text.split()[0].strip(chr(34)).strip("/")}' for text in sections].index(
+        section.strip('/')) + 1
+    effect = f'; {without_effect} would have no effect' if without_effect else ''
+    assert str(problem) == (
+        f'{tmp_path / "site.yaml"}:{line}: section {section} is not for this node, /parameters: '
+        f'write "/parameters:", or "/**:" for every node{effect}')
+
+
+@pytest.mark.parametrize('sections', [
+    ['parameters read_only: true', 'abdf1 read_only: false'],
+    ['"/**" read_only: true', 'camera port: /dev/ttyUSB3, write_timeout: 3'],
+    ['"/*" gain: 1', 'camera gain: 3'], ['camera port: /dev/ttyUSB3'],
+    ['parameters ', 'x/parameters read_only: true']])
+def test_sections_of_other_nodes_are_none_of_our_business(
+        make_node: Nodes, files: dict[str, str], tmp_path: Path, sections: list[str]) -> None:
+    arguments = write_section(tmp_path / 'site.yaml', *sections)
+    assert configure(make_node(files), arguments).mappings
+
+
+def test_sections_of_other_lines_of_the_process_are_theirs(
+        make_node: Nodes, files: dict[str, str], tmp_path: Path) -> None:
+    theirs = write_section(tmp_path / 'press.yaml', 'press/abdf1 read_only: true')
+    assert configure(make_node(files), Arguments(theirs.files, others=['/press/abdf1'])).mappings
+
+
+@pytest.mark.parametrize('section', [
+    '/**', '/*', '/robot_1/*', '/robot_1/**', '/**/abdf1', '/*/abdf1', '/abdf1', '/robot_1/abdf1',
+    '/robot_2/**', '/*/*/*', '/**/robot_1/*', '/robot_1'])
+@pytest.mark.parametrize('namespace', ['/', '/robot_1', '/robot_1/cell'])
+def test_ros_gives_a_node_the_same_sections_as_we_think(
+        context: Context, tmp_path: Path, section: str, namespace: str) -> None:
+    arguments = write_section(tmp_path / 'site.yaml', f'"{section}" gain: 1')
+    node = Node('abdf1', namespace=namespace, context=context, use_global_arguments=False,
+                cli_args=['--ros-args', '--params-file', arguments.files[0]],
+                start_parameter_services=False,
+                automatically_declare_parameters_from_overrides=True)
+    assert is_for(section, node.get_fully_qualified_name()) == node.has_parameter('gain')
+    node.destroy_node()

@@ -20,7 +20,7 @@ Everything is created before the link's thread starts and destroyed after it has
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from functools import partial
 import time
 from typing import Any
@@ -35,7 +35,14 @@ from abdf1_ros.problems import ConfigurationError
 from abdf1_ros.ros.bridge.session import Session, Surroundings, tell_plcs
 from abdf1_ros.ros.diagnostics.graph import DISCOVERY, Graph, NameWatch
 from abdf1_ros.ros.diagnostics.log import bug_text
-from abdf1_ros.ros.parameters.declared import Configuration, configure, read_again
+from abdf1_ros.ros.parameters.arguments import Arguments
+from abdf1_ros.ros.parameters.declared import (
+    Configuration,
+    configure,
+    NO_ARGUMENTS,
+    NODE_NAME,
+    read_again,
+)
 from abdf1_ros.ros.parameters.shown import ShownFiles
 from abdf1_ros.ros.process.main import LAST_WRITES, take_last_writes
 from abdf1_ros.ros.process.port_owners import PortOwners
@@ -48,8 +55,6 @@ from rclpy.duration import Duration
 from rclpy.node import Node
 from std_msgs.msg import UInt16MultiArray
 from std_srvs.srv import SetBool, Trigger
-
-NODE_NAME = 'abdf1'
 
 # Of the end (s): until when, counted from its beginning, writes that have come are waited for and
 # last diagnostics are begun; how long these may take, where a subscriber is stuck.
@@ -65,19 +70,18 @@ class BridgeNode(Node):
     The bridge; raises ConfigurationError when parameters or files are not fit to run with.
 
     ``check`` is to be called every 0.1 s, in any one thread. ``graph`` and ``port_owners`` are
-    those of all lines of the process, ``files`` its parameter files. ``typed`` are parameters of
-    its arguments that are for no other node.
+    those of all lines of the process, ``arguments`` what that was given.
     """
 
     def __init__(self, name: str = NODE_NAME, *, graph: Graph | None = None,
-                 port_owners: PortOwners | None = None, files: Sequence[str] = (),
-                 typed: Mapping[str, str] | None = None, **kwargs: Any) -> None:
+                 port_owners: PortOwners | None = None,
+                 arguments: Arguments = NO_ARGUMENTS, **kwargs: Any) -> None:
         super().__init__(name, automatically_declare_parameters_from_overrides=True, **kwargs)
         self._is_stuck = self._is_ending = False
         self._hold_ports = partial(
             (port_owners or PortOwners()).hold, self.get_fully_qualified_name())
         try:
-            configuration = configure(self, files, typed or {})
+            configuration = configure(self, arguments)
             self._shown = ShownFiles(self)
             self._shown.show(configuration.network, configuration.shown_rows())
             self._hold_ports(*configuration.held)

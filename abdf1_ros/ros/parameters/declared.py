@@ -20,7 +20,6 @@ from collections.abc import Collection, Sequence
 from collections.abc import Mapping as MappingType
 from dataclasses import dataclass, field, fields, replace
 import difflib
-from fnmatch import fnmatchcase
 import os
 from pathlib import Path
 import random
@@ -33,6 +32,7 @@ from abdf1_ros.paths import config_file
 from abdf1_ros.plan.usable_rows import usable_rows
 from abdf1_ros.problems import ConfigurationError, Place, Problem
 from abdf1_ros.ros.bridge.files import FileWatch
+from abdf1_ros.ros.parameters.arguments import Arguments, is_for
 from abdf1_ros.ros.parameters.files import parameters_in
 from abdf1_ros.ros.parameters.shown import descriptor_of, map_cells, MOST_SHOWN_ROWS, text_of
 from abdf1_ros.settings.columns import COLUMNS
@@ -109,7 +109,9 @@ class Parameters:
 Given = MappingType[str, Any]
 """What the user has set, by name of the parameter."""
 
-_NONE: Given = {}
+NO_ARGUMENTS = Arguments()
+
+NODE_NAME = 'abdf1'
 
 _OF_RCLPY = 'use_sim_time', 'start_type_description_service'
 
@@ -188,19 +190,17 @@ def take_given(node: Node) -> Given:
     return given
 
 
-def configure(node: Node, files: Sequence[str] = (),
-              typed: Given = _NONE) -> Configuration:
+def configure(node: Node, arguments: Arguments = NO_ARGUMENTS) -> Configuration:
     """
     Declare the node's own parameters and read both files; ``ShownFiles`` shows what is in these.
 
-    ``files`` are the parameter files of the process, ``typed`` parameters of its arguments that
-    are for no other node. Raises ConfigurationError with every fault that keeps the node from
-    running.
+    ``arguments`` are those of the process. Raises ConfigurationError with every fault that keeps
+    the node from running.
     """
     given = take_given(node)
     known = [entry.name for entry in fields(Parameters)]
     known += [entry.parameter for entry in FIELDS.values()]
-    problems = unknown_names(node, given, files, known, 'net.', typed)
+    problems = wrong_names(node, given, arguments, known, NODE_NAME, 'net.')
     parameters = _declare_own(node, given, problems)
     return _from_files(given, parameters, problems, is_strict=parameters.strict_map)
 
@@ -279,25 +279,27 @@ def _resolved(path: str) -> str:
     return str(Path(path).resolve()) if path else ''
 
 
-def unknown_names(node: Node, given: Given, files: Sequence[str], known: Collection[str],
-                  begins: str = ' ', typed: Given = _NONE) -> list[Problem]:
+def wrong_names(node: Node, given: Given, arguments: Arguments, known: Collection[str],
+                usual_name: str, begins: str = ' ') -> list[Problem]:
     """
-    Return the parameters that a user has given and that do not exist.
+    Return the parameters that a user has given and that do not exist, or are for another node.
 
     In a section of a parameter file that names the node, all are meant for it, and those that are
-    ``typed``. Others may belong to other nodes, so only those are found whose names look like
-    ours, or begin so. ``map.*`` may come back from a dump of our parameters, see ``_ignored``. Of
-    YAML a number with a leading zero is octal, which is never meant.
+    typed. Others may belong to other nodes, so only those are found whose names look like ours,
+    or begin so. ``map.*`` may come back from a dump of our parameters, see ``_ignored``. Of YAML
+    a number with a leading zero is octal, which is never meant.
     """
     full_name = node.get_fully_qualified_name()
-    problems, found = [], set(_OF_RCLPY)
-    for section, name, place, number in parameters_in(files):
+    problems = [*arguments.misdirected(full_name, usual_name, known)]
+    typed = arguments.typed_for(full_name)
+    found = set(_OF_RCLPY)
+    for section, name, place, number in parameters_in(arguments.files):
         if section == full_name:
             found.add(name)
             if not (name in known or name in _OF_RCLPY or _is_of_map(name)):
                 problems.append(Problem(place, (
                     f'{name}: there is no such parameter; {_nearest(name, known, begins, 0.5)}')))
-        if name in known and fnmatchcase(full_name, section):
+        if name in known and is_for(section, full_name):
             problems += _octal(place, f'{name}: ', number)
     for name in given:
         is_other = name.startswith('qos_overrides.') and f'.{full_name}/' not in name

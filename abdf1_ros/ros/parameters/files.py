@@ -52,13 +52,6 @@ def parameter_tree(path: str) -> yaml.Node | None:
         raise ConfigurationError([Problem(path, ' '.join(str(error).split()))]) from None
 
 
-def typed_parameters(args: Sequence[str]) -> dict[str, str]:
-    """Return the parameters among the arguments of a process, as they are written."""
-    rules = (rule.partition(':=') for option, rule in zip(args, args[1:], strict=False)
-             if option in ('-p', '--param'))
-    return {name.rpartition(':')[2]: value for name, _, value in rules}
-
-
 @contextmanager
 def usable_files(args: Sequence[str], leaves_out: bool) -> Iterator[list[str]]:
     """
@@ -132,3 +125,9 @@ def _parameters(tree: yaml.Node, above: str = '') -> Iterator[tuple[str, yaml.No
             yield from _parameters(below, f'{above}{key.value}.')
         else:
             yield f'{above}{key.value}', key, below
+
+
+def names_in(tree: yaml.Node) -> Iterator[str]:
+    """Yield the names of the parameters of a section."""
+    for name, _, _ in _parameters(tree):
+        yield name

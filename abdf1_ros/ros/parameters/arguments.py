@@ -1,0 +1,116 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The parameters that a process was given, and for which node each of them is."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterator, Sequence
+from dataclasses import dataclass
+import re
+
+from abdf1_ros.problems import Place, Problem
+from abdf1_ros.ros.parameters.files import names_in, node_sections, parameter_files, parameter_tree
+from abdf1_ros.text import first, printable
+
+# Parameters of ours that nodes of other packages have too.
+_USUAL_NAMES = frozenset((
+    'port', 'lines', 'low_latency', 'rs485', 'diagnostics_period', 'write_timeout', 'use_sim_time',
+    'start_type_description_service'))
+
+
+@dataclass(frozen=True, slots=True)
+class Typed:
+    """A parameter of the command line; ``node`` is the name before it, if there is one."""
+
+    node: str
+    name: str
+    value: str
+
+    def is_for(self, full_name: str) -> bool:
+        """Tell whether ROS gives it to a node."""
+        return self.node in ('', full_name.lstrip('/'))
+
+
+@dataclass(frozen=True, slots=True)
+class Arguments:
+    """
+    What a process was given, for any of its nodes.
+
+    ``files`` are paths of parameter files; ``others`` are full names of its other nodes.
+    """
+
+    files: Sequence[str] = ()
+    typed: Sequence[Typed] = ()
+    others: Collection[str] = ()
+
+    @classmethod
+    def of(cls, args: Sequence[str]) -> Arguments:
+        """Return what is in the arguments of a process with one node."""
+        rules = [rule.partition(':=') for option, rule in zip(args, args[1:], strict=False)
+                 if option in ('-p', '--param')]
+        typed = []
+        for left, _, value in rules:
+            node, _, name = left.rpartition(':')
+            typed.append(Typed(node.strip('/'), name, value))
+        return cls(parameter_files(args), typed)
+
+    def typed_for(self, full_name: str) -> dict[str, str]:
+        """Return the typed parameters of a node, as they are written."""
+        return {typed.name: typed.value for typed in self.typed if typed.is_for(full_name)}
+
+    def misdirected(self, full_name: str, usual_name: str,
+                    known: Collection[str]) -> Iterator[Problem]:
+        """
+        Yield what seems to be meant for a node, and what ROS gives to another one.
+
+        ``usual_name`` is the node's name without remapping, ``known`` are its parameters. In a
+        file with a section of the node's own, the other sections are for other nodes.
+        """
+        for path in self.files:
+            yield from self._of_others(path, full_name, usual_name, {*known} - _USUAL_NAMES)
+        for typed in self.typed:
+            if not typed.is_for(full_name) and typed.name in known:
+                yield Problem(f'parameter {typed.node}:{typed.name}', (
+                    f'this node is {full_name}; leave out "{printable(typed.node)}:"'))
+
+    def _of_others(self, path: str, full_name: str, usual_name: str,
+                   ours: Collection[str]) -> Iterator[Problem]:
+        """Yield the first section of a file that seems to be meant for the node and is not."""
+        sections = [*node_sections(parameter_tree(path))]
+        if any(name == full_name for name, _, _ in sections):
+            return
+        for name, line, tree in sections:
+            if is_for(name, full_name) or name in self.others:
+                continue
+            found = [parameter for parameter in names_in(tree) if parameter in ours]
+            if found or _base(name) in (_base(full_name), usual_name):
+                yield Problem(Place(path, line), _advice(name, full_name, found))
+                return
+
+
+def is_for(section: str, full_name: str) -> bool:
+    """Tell whether ROS gives the parameters of a section to a node, wildcards considered."""
+    pattern = re.escape(section).replace(r'/\*\*', r'(/\w+)*').replace(r'/\*', r'/\w+')
+    return re.fullmatch(pattern, full_name) is not None
+
+
+def _base(name: str) -> str:
+    return name.rpartition('/')[2]
+
+
+def _advice(section: str, full_name: str, found: Sequence[str]) -> str:
+    of_no_use = f'; {first(found)} would have no effect' if found else ''
+    return (f'section {printable(section)} is not for this node, {full_name}: write '
+            f'"{full_name}:", or "/**:" for every node{of_no_use}')
