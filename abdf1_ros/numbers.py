@@ -30,6 +30,7 @@ import re
 from typing import Any, Generic, TypeVar
 
 _T = TypeVar('_T')
+_Meaning_co = TypeVar('_Meaning_co', covariant=True)
 _Member = TypeVar('_Member', bound=Enum)
 
 _WHOLE = re.compile(r'[+-]?[0-9]{1,20}')
@@ -61,19 +62,24 @@ def two_readings(text: str) -> str:
 
 
 @dataclass(frozen=True, slots=True)
-class Kind(Generic[_T]):
+class Kind(Generic[_Meaning_co]):
     """
     What may stand in a cell, an option or an argument.
 
     ``read`` returns what a text means, None where it should be something else: ``right``. A
-    number lies from ``low`` to ``high``.
+    number lies from ``low`` to ``high``. ``why_not`` may know better what is wrong with a text.
     """
 
-    read: Callable[[str], _T | None]
+    read: Callable[[str], _Meaning_co | None]
     right: str = ''
     low: int | None = None
     high: int | None = None
     choices: tuple[str, ...] = ()
+    why_not: Callable[[str], str] | None = None
+
+    def fault(self, text: str) -> str:
+        """Return what to say after a text that was not read."""
+        return (self.why_not and self.why_not(text)) or f'should be {self.right}'
 
 
 TEXT = Kind(str)

@@ -52,8 +52,8 @@ from abdf1_ros.plan.report import last_address, make_report, Remark, Report
 from abdf1_ros.plan.usable_rows import usable_rows
 from abdf1_ros.ports.ownership import line_of
 from abdf1_ros.problems import ConfigurationError, Problem
+from abdf1_ros.settings.columns import MAX_PERIOD
 from abdf1_ros.settings.map_file import load_mappings
-from abdf1_ros.settings.map_row import MAX_PERIOD
 from abdf1_ros.settings.mapping import Mapping
 from abdf1_ros.settings.network import load_network, Network
 from abdf1_ros.settings.scaling import Scaling

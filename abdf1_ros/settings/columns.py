@@ -12,80 +12,183 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The columns of the map CSV and their contents."""
+"""The columns of the map CSV: their contents, where they lead, and the rows that they are for."""
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
+from enum import Enum
+import math
+from operator import attrgetter
+
+from abdf1_ros.numbers import decimal_number, Kind, member_of, TEXT, two_readings, whole
+from abdf1_ros.pccc.values import ValueType, WordOrder
+from abdf1_ros.settings.mapping import Command, Mapping, Publish
+from abdf1_ros.text import shown
+
+MAX_PERIOD = 86_400_000  # ms
+
+_PUBLISHED = (Command.READ, Command.READ_WRITE, Command.SERVE)
+_MESSAGES = (Command.WRITE, Command.READ_WRITE, Command.SERVE)
+_TOPICS = (Command.READ, *_MESSAGES)
 
 
-class Column(NamedTuple):
+def milliseconds_from(low: int, high: int) -> Kind[int]:
+    """Return the kind of times in a range."""
+    return replace(whole(low, high), right=f'ms from {low} to {high}')
+
+
+def _number(text: str) -> float | None:
+    return None if two_readings(text) else decimal_number(text.replace(',', '.'))
+
+
+def _clear_number(text: str) -> str:
+    """Return what to write instead of a number that can be read in two ways."""
+    right = two_readings(text)
+    return right and f'could be two numbers; write {shown(right)}'
+
+
+_WORDS = Kind(lambda text: tuple(text.split()))
+_NUMBER = Kind(_number, 'a number', why_not=_clear_number)
+
+
+@dataclass(frozen=True, slots=True)
+class Column:
     """
     One column of the map CSV.
 
-    ``default`` says what an empty cell means; it is None where the cell must not be empty.
+    ``default`` says what an empty cell means; it is None where the cell must not be empty. A
+    mapping has the value as ``attribute``, its own name in small letters unless told. With
+    ``kind`` the cell alone says the value; otherwise other cells decide, too. The column is for
+    rows with one of ``commands``. In rows with one of ``idle`` it has no effect, which is a
+    remark and no fault.
     """
 
     name: str
     default: str | None
     description: str
+    kind: Kind[object] | None = None
+    attribute: str = ''
+    commands: tuple[Command, ...] = tuple(Command)
+    idle: tuple[Command, ...] = ()
+
+    def __post_init__(self) -> None:
+        """Find the attribute."""
+        object.__setattr__(self, 'attribute', self.attribute or self.name.lower())
+
+    def text(self, mapping: Mapping) -> str:
+        """Return the value of a mapping as text, defaults filled in."""
+        value = _value_of(mapping, self.attribute)
+        return ' '.join(map(_text, value)) if isinstance(value, tuple) else _text(value)
+
+    def why_not(self, command: Command) -> str:
+        """Return why rows with this command have no such column, empty where they may."""
+        if command in self.commands or command in self.idle:
+            return ''
+        return f'a {command.value} row has no {self.name}: it is for {_rows(self.commands)} rows'
+
+
+def _rows(commands: Iterable[Command]) -> str:
+    *others, last = (command.value for command in commands)
+    return f'{", ".join(others)} and {last}' if others else last
+
+
+def _value_of(mapping: Mapping, attribute: str) -> object:
+    """Return the attribute of a mapping, None where a part on its way is not there."""
+    part, _, rest = attribute.partition('.')
+    value: object = getattr(mapping, part)
+    return value if value is None or not rest else attrgetter(rest)(value)
+
+
+def _text(value: object) -> str:
+    if isinstance(value, float):
+        return '' if math.isinf(value) else f'{value:.15g}'
+    return '' if value is None else str(value.value if isinstance(value, Enum) else value)
 
 
 MAP_COLUMNS = (
     Column('Tag', None, 'unique name'),
     Column('Command', None,
            'Read, Write, ReadWrite; Serve: words of ours that PLCs read and write; Heartbeat: a '
-           'word that counts while its conditions hold'),
+           'word that counts while its conditions hold',
+           kind=member_of(Command)),
     Column('Address', None, 'PLC address of the first element'),
     Column('Station', None,
            '0-254; of a Write also 255, all stations, none of which confirms; of a Serve our own'),
     Column('PLC_Type', None, 'PLC2, PLC3, PLC5 or SLC; a MicroLogix is SLC'),
     Column('Length', '1',
            'elements: bits, words, floats; of timers, counters and control their words; of a '
-           'string in N or A words the words'),
+           'string in N or A words the words',
+           kind=whole(1, 65535)),
     Column('Type', 'natural type of the file',
-           'bool, int16, uint16, int32, uint32, float32, bcd16 or string'),
-    Column('Topic', 'Tag', 'name below ~/read/ and ~/write/'),
+           'bool, int16, uint16, int32, uint32, float32, bcd16 or string',
+           kind=member_of(ValueType)),
+    Column('Topic', 'Tag', 'name below ~/read/ and ~/write/',
+           commands=_TOPICS),
     Column('Period', 'parameter default_period',
            'ms between reads; 0: as often as the line allows; of a Serve the longest time '
-           'between two writes of the PLC; of a Heartbeat 100-60000, default 1000'),
+           'between two writes of the PLC; of a Heartbeat 100-60000, default 1000',
+           kind=whole(0, MAX_PERIOD, 'ms'),
+           commands=(*_PUBLISHED, Command.HEARTBEAT), idle=(Command.WRITE,)),
     Column('Publish', 'Always',
            'Always: after every good read. Change: only new values, and the first after an '
-           'outage'),
-    Column('Min', 'none', 'least value that may be written, in the unit of the topic'),
-    Column('Max', 'none', 'greatest value that may be written, in the unit of the topic'),
+           'outage',
+           kind=member_of(Publish), commands=_PUBLISHED, idle=(Command.WRITE,)),
+    Column('Min', 'none', 'least value that may be written, in the unit of the topic',
+           kind=_NUMBER, attribute='minimum', commands=_MESSAGES, idle=(Command.READ,)),
+    Column('Max', 'none', 'greatest value that may be written, in the unit of the topic',
+           kind=_NUMBER, attribute='maximum', commands=_MESSAGES, idle=(Command.READ,)),
     Column('Word_Order', 'Low',
-           'Low or High: which word of an int32, uint32 or float32 over 16-bit words comes first'),
+           'Low or High: which word of an int32, uint32 or float32 over 16-bit words comes first',
+           kind=member_of(WordOrder)),
     Column('Scale', '1',
            'with Scale or Offset the topic is float32: raw value x Scale + Offset; not for bool '
-           'and string'),
-    Column('Offset', '0', 'see Scale'),
+           'and string',
+           kind=_NUMBER, attribute='scaling.scale', commands=_TOPICS),
+    Column('Offset', '0', 'see Scale',
+           kind=_NUMBER, attribute='scaling.offset', commands=_TOPICS),
     Column('Access', 'the first of them',
            'how words are reached. PLC5: Typed, WordRange. SLC: Slot, Flat. PLC2: Unprotected, '
-           'Protected, CIF. Serve: Read, so that the other end cannot write'),
+           'Protected, CIF. Serve: Read, so that the other end cannot write',
+           attribute='access_cell'),
     Column('Processor', '5/03',
            'of an SLC: 5/01, 5/02, 5/03, 5/04, 5/05, ML1000, ML1100, ML1200, ML1400 or ML1500; it '
-           'limits packets and files; the same in all rows of a station'),
+           'limits packets and files; the same in all rows of a station',
+           commands=(Command.READ, Command.WRITE, Command.READ_WRITE, Command.HEARTBEAT)),
     Column('Fallback', 'none',
            'of a Write or Serve: values, separated by spaces, that are written when no good '
-           'message has come for Fallback_After; of a bool 0'),
-    Column('Fallback_After', 'none', 'ms, 200-60000'),
+           'message has come for Fallback_After; of a bool 0',
+           kind=_WORDS, attribute='fallback.values', commands=(Command.WRITE, Command.SERVE)),
+    Column('Fallback_After', 'none', 'ms, 200-60000', kind=milliseconds_from(200, 60_000),
+           attribute='fallback.after', commands=(Command.WRITE, Command.SERVE)),
     Column('Requires', 'none',
-           'of a Heartbeat: write topics, separated by spaces, that must have messages'),
-    Column('Requires_Timeout', 'none', 'ms that the last good message of each may be old'),
+           'of a Heartbeat: write topics, separated by spaces, that must have messages',
+           kind=_WORDS, attribute='heartbeat.requires', commands=(Command.HEARTBEAT,)),
+    Column('Requires_Timeout', 'none', 'ms that the last good message of each may be old',
+           kind=milliseconds_from(100, 3_600_000),
+           attribute='heartbeat.requires_timeout', commands=(Command.HEARTBEAT,)),
     Column('Publish_While', 'none',
            'of a Read: RUN, or the tag of a counter that the program of the PLC runs; values are '
-           'published only while it holds'),
+           'published only while it holds',
+           kind=TEXT, attribute='publish_while.text', commands=(Command.READ,)),
     Column('Heartbeat_Timeout', 'none',
-           'ms that the counter of Publish_While may stay unchanged'),
+           'ms that the counter of Publish_While may stay unchanged',
+           kind=milliseconds_from(100, 3_600_000),
+           attribute='publish_while.timeout', commands=(Command.READ,)),
     Column('Confirms', 'none',
-           'of a Read of the one bit "ROS in control": the tag of the Heartbeat row it goes with'),
+           'of a Read of the one bit "ROS in control": the tag of the Heartbeat row it goes with',
+           kind=TEXT, commands=(Command.READ,)),
     Column('Via', 'Station',
            'with Mode Master: the station of a gateway on this line (KF2, KF3, KE) behind which '
-           'Station is'),
-    Column('Description', 'none', 'what it is in the plant, to be read'),
+           'Station is',
+           commands=(Command.READ, Command.WRITE, Command.READ_WRITE, Command.HEARTBEAT)),
+    Column('Description', 'none', 'what it is in the plant, to be read',
+           kind=TEXT),
 )
 
-COLUMNS = tuple(column.name for column in MAP_COLUMNS)
+BY_NAME = {column.name: column for column in MAP_COLUMNS}
+
+COLUMNS = tuple(BY_NAME)
 
 NEEDED = tuple(column.name for column in MAP_COLUMNS if column.default is None)

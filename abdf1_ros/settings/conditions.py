@@ -16,16 +16,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
+from collections.abc import Mapping as MappingType
 from dataclasses import replace
 import difflib
-from typing import Protocol
+from typing import Any, Protocol, TypeAlias
 
 from abdf1_ros.df1.packet import BROADCAST
 from abdf1_ros.errors import FormatError
-from abdf1_ros.numbers import decimal_number, Kind, whole
+from abdf1_ros.numbers import decimal_number
 from abdf1_ros.pccc.file_types import FileType
 from abdf1_ros.pccc.values import ValueType
+from abdf1_ros.settings.columns import BY_NAME, milliseconds_from
 from abdf1_ros.settings.csv_table import Row
 from abdf1_ros.settings.heartbeats import (
     counts,
@@ -39,14 +41,10 @@ from abdf1_ros.settings.limits import raw_values
 from abdf1_ros.settings.mapping import Command, Mapping, Publish
 from abdf1_ros.text import counted, shown
 
+# What was read of the cells of a row that are not empty, by column.
+Cells: TypeAlias = MappingType[str, Any]
 
-def _ms(low: int, high: int) -> Kind[int]:
-    return replace(whole(low, high), right=f'ms from {low} to {high}')
-
-
-_PERIODS = _ms(100, 60_000)
-_FALLBACK_AFTER = _ms(200, 60_000)
-_TIMEOUTS = _ms(100, 3_600_000)
+_PERIODS = milliseconds_from(100, 60_000)
 
 # The processor reads or writes their words itself.
 _NO_COUNTING = (FileType.STATUS, FileType.INPUT, FileType.OUTPUT)
@@ -58,41 +56,31 @@ class ReportFault(Protocol):
     def __call__(self, column: str, text: str, *, is_superfluous: bool = False) -> None: ...
 
 
-def with_conditions(row: Row, mapping: Mapping, fault: ReportFault) -> Mapping:
+def with_conditions(row: Row, values: Cells, mapping: Mapping, fault: ReportFault) -> Mapping:
     """Return a mapping with its heartbeat, fallback and condition for values."""
     heartbeat = None
     if mapping.command is Command.HEARTBEAT:
-        heartbeat = _heartbeat(row, mapping, fault)
+        heartbeat = _heartbeat(row, values, mapping, fault)
         mapping = replace(mapping, period=mapping.period or DEFAULT_PERIOD)
-    else:
-        for column in ('Requires', 'Requires_Timeout'):
-            if row.get(column):
-                fault(column, f'{column} is for Heartbeat rows', is_superfluous=True)
-    fallback = _fallback(row, mapping, fault)
-    publish_while = _publish_while(row, mapping, fault)
-    if mapping.confirms and (mapping.command, mapping.type, mapping.length) != (
-            Command.READ, ValueType.BOOL, 1):
+    fallback = _fallback(values, mapping, fault)
+    publish_while = _publish_while(values, mapping, fault)
+    if mapping.confirms and (mapping.type, mapping.length) != (ValueType.BOOL, 1):
         fault('Confirms', 'Confirms is for a Read row of one bit (bool, Length 1)')
     return replace(mapping, heartbeat=heartbeat, fallback=fallback, publish_while=publish_while)
 
 
-def _number_in(row: Row, column: str, kind: Kind[int], fault: ReportFault) -> int | None:
-    """Return a needed number; report a fault where it is none of this kind."""
-    text = row.get(column)
-    value = kind.read(text)
-    if value is None:
-        fault(column, f'{column} = "{shown(text)}" should be {kind.right}' if text
-              else f'{column} is missing: {kind.right}')
+def _needed(values: Cells, column: str, fault: ReportFault) -> int | None:
+    """Return a needed number; report a fault where it is missing."""
+    value: int | None = values.get(column)
+    if value is None and (kind := BY_NAME[column].kind):
+        fault(column, f'{column} is missing: {kind.right}')
     return value
 
 
-def _heartbeat(row: Row, mapping: Mapping, fault: ReportFault) -> Heartbeat:
+def _heartbeat(row: Row, values: Cells, mapping: Mapping, fault: ReportFault) -> Heartbeat:
     """Return what a row with Command Heartbeat asks for (rules 1, 3 and 4)."""
-    for column in ('Topic', 'Publish', 'Min', 'Max', 'Scale', 'Offset'):
-        if row.get(column):
-            fault(column, f'a Heartbeat row has no {column}', is_superfluous=True)
-    if row.get('Period'):
-        _number_in(row, 'Period', _PERIODS, fault)
+    if row.get('Period') and _PERIODS.read(row.get('Period')) is None:
+        fault('Period', f'Period = "{row.get("Period")}" should be {_PERIODS.right}')
     if row.get('Length') not in ('', '1'):
         fault('Length', 'a heartbeat is one word', is_superfluous=True)
     address = mapping.address
@@ -103,25 +91,25 @@ def _heartbeat(row: Row, mapping: Mapping, fault: ReportFault) -> Heartbeat:
         fault('Address', f'{address} has a meaning to the processor, and a heartbeat counts '
                          'through all values; take a word of its own in an N or B file, such as '
                          'N7:0')
-    topics = tuple(row.get('Requires').split())
+    topics = values.get('Requires', ())
     if not topics:
-        if row.get('Requires_Timeout'):
+        if 'Requires_Timeout' in values:
             fault('Requires_Timeout', 'Requires_Timeout is for a row with Requires',
                   is_superfluous=True)
         return Heartbeat()
-    return Heartbeat(topics, _number_in(row, 'Requires_Timeout', _TIMEOUTS, fault))
+    return Heartbeat(topics, _needed(values, 'Requires_Timeout', fault))
 
 
-def _fallback(row: Row, mapping: Mapping, fault: ReportFault) -> Fallback | None:
+def _fallback(cells: Cells, mapping: Mapping, fault: ReportFault) -> Fallback | None:
     """Return the fallback of a row, None where it has none (rule 12)."""
-    given = [column for column in ('Fallback', 'Fallback_After') if row.get(column)]
+    given = [column for column in ('Fallback', 'Fallback_After') if column in cells]
     if not given:
         return None
-    if reason := _without_fallback(mapping.command, mapping.type):
-        fault(given[0], reason, is_superfluous=True)
+    if mapping.type is ValueType.STRING:
+        fault(given[0], 'a string has no Fallback', is_superfluous=True)
         return None
-    after = _number_in(row, 'Fallback_After', _FALLBACK_AFTER, fault)
-    values = tuple(_fallback_values(row, mapping, fault))
+    after = _needed(cells, 'Fallback_After', fault)
+    values = tuple(_fallback_values(cells.get('Fallback', ()), mapping, fault))
     if after is None or len(values) != mapping.length:
         return None
     if mapping.station == BROADCAST:
@@ -133,17 +121,9 @@ def _fallback(row: Row, mapping: Mapping, fault: ReportFault) -> Fallback | None
     return Fallback(values, after)
 
 
-def _without_fallback(command: Command, kind: ValueType) -> str:
-    if command is Command.READ_WRITE:
-        return 'a ReadWrite row has no Fallback; write a Write row and a Read row'
-    if command not in (Command.WRITE, Command.SERVE):
-        return f'a {command.value} row has no Fallback: it is for Write and Serve rows'
-    return 'a string has no Fallback' if kind is ValueType.STRING else ''
-
-
-def _fallback_values(row: Row, mapping: Mapping, fault: ReportFault) -> Iterator[float]:
+def _fallback_values(texts: Sequence[str], mapping: Mapping,
+                     fault: ReportFault) -> Iterator[float]:
     length = mapping.length
-    texts = row.get('Fallback').split()
     if len(texts) != length:
         fault('Fallback', f'Fallback has {counted(len(texts), "value")}, Length is {length}; '
                           'separate them by spaces' if texts else
@@ -162,24 +142,22 @@ def _fallback_values(row: Row, mapping: Mapping, fault: ReportFault) -> Iterator
             yield value
 
 
-def _publish_while(row: Row, mapping: Mapping, fault: ReportFault) -> PublishWhile | None:
+def _publish_while(cells: Cells, mapping: Mapping, fault: ReportFault) -> PublishWhile | None:
     """Return the condition for a row's values, None for none (rules 13 and 14)."""
-    condition, timeout = row.get('Publish_While'), row.get('Heartbeat_Timeout')
+    condition, timeout = cells.get('Publish_While'), cells.get('Heartbeat_Timeout')
     if not condition:
         if timeout:
             fault('Heartbeat_Timeout', 'Heartbeat_Timeout is for a row with Publish_While',
                   is_superfluous=True)
         return None
-    if mapping.command is not Command.READ:
-        fault('Publish_While', 'Publish_While is for Read rows', is_superfluous=True)
-    elif mapping.publish is not Publish.ALWAYS:
+    if mapping.publish is not Publish.ALWAYS:
         fault('Publish_While', 'Publish_While needs Publish Always: with Change a silent topic '
                                'would look normal')
     if condition.upper() != RUN:
         if condition == mapping.tag:
             fault('Publish_While', 'a row cannot depend on itself; name the tag of a counter')
         if timeout:
-            return PublishWhile(condition, _number_in(row, 'Heartbeat_Timeout', _TIMEOUTS, fault))
+            return PublishWhile(condition, timeout)
         if difflib.get_close_matches(condition.upper(), [RUN]):
             fault('Publish_While', f'"{condition}" is not {RUN}: did you mean {RUN}? The tag of a '
                                    'counter needs a Heartbeat_Timeout')

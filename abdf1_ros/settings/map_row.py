@@ -17,21 +17,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-import math
 from typing import Any, TypeVar
 
 from abdf1_ros.df1.packet import BROADCAST
 from abdf1_ros.df1.stations import MAX_STATION
 from abdf1_ros.messages import Message
-from abdf1_ros.numbers import (
-    decimal_number,
-    is_digits,
-    Kind,
-    member_of,
-    one_of,
-    two_readings,
-    whole,
-)
+from abdf1_ros.numbers import is_digits, Kind, member_of, one_of, whole
 from abdf1_ros.pccc.access import Access
 from abdf1_ros.pccc.address import Address, AddressRangeError, AddressSyntaxError
 from abdf1_ros.pccc.families import FAMILIES, parse_address
@@ -40,19 +31,17 @@ from abdf1_ros.pccc.processor import Processor
 from abdf1_ros.pccc.structures import type_fault, write_fault, wrong_type
 from abdf1_ros.pccc.values import types_of, ValueType, WordOrder
 from abdf1_ros.problems import Problem
-from abdf1_ros.settings.columns import NEEDED
+from abdf1_ros.settings.columns import MAP_COLUMNS, NEEDED
 from abdf1_ros.settings.conditions import with_conditions
 from abdf1_ros.settings.csv_table import Row
 from abdf1_ros.settings.hints import hint
-from abdf1_ros.settings.mapping import Command, Mapping, Publish, READ_ONLY
+from abdf1_ros.settings.mapping import Command, Mapping, READ_ONLY
 from abdf1_ros.settings.names import MAX_LENGTH, sanitise
 from abdf1_ros.settings.remarks import having, row_remarks
 from abdf1_ros.settings.scaling import Scaling
 from abdf1_ros.text import shown
 
-MAX_PERIOD = 86_400_000  # ms
 _PLC_TYPE_NAMES = tuple(entry.value for entry in FAMILIES)
-_DECIMAL = Kind(lambda text: decimal_number(text.replace(',', '.')), 'a number')
 
 _T = TypeVar('_T')
 
@@ -99,49 +88,58 @@ class RowReader:
 
     def read(self) -> Mapping | None:
         """Return the mapping, or None when the row has faults."""
-        for column in NEEDED:
-            if not self._row.get(column):
-                self._fault(column, f'{column} is missing')
+        for name in NEEDED:
+            if not self._row.get(name):
+                self._fault(name, f'{name} is missing')
         if self.faults:
             return None
-        cells = self._cells()
-        if self.faults:
+        values = self._values()
+        mapping = self._mapping(values)
+        if mapping is None:
             return None
-        mapping = Mapping(item=self._row.item, place=self._row.where(), **cells)
         self._check(mapping)
-        mapping = with_conditions(self._row, mapping, self._fault)
+        for column in MAP_COLUMNS:
+            if self._row.get(column.name) and (fault := column.why_not(mapping.command)):
+                self._fault(column.name, fault, is_superfluous=True)
+        mapping = with_conditions(self._row, values, mapping, self._fault)
         if self.faults:
             return None
         remarks = tuple(row_remarks(self._row, mapping))
         return replace(mapping, remarks=remarks) if remarks else mapping
 
-    def _cells(self) -> dict[str, Any]:
-        """Return by attribute what the cells say."""
-        name = self._name('Tag', self._row.get('Tag'))
-        topic = self._name('Topic', self._row.get('Topic')) if self._row.get('Topic') else name
+    def _values(self) -> dict[str, Any]:
+        """Return by column what the cells say that are not empty."""
         command = self._value('Command', member_of(Command))
         # 255 is a broadcast: all stations take it, and none answers.
         last_station = BROADCAST if command is Command.WRITE else MAX_STATION
-        station = self._value('Station', whole(0, last_station), None,
+        station = self._value('Station', whole(0, last_station),
                               Message.ERR_BAD_STATION, MAX_STATION + 1)
-        via = self._via(command, station)
-        kind = self._value('Type', member_of(ValueType))
         plc_type = self._plc_type()
         access = self._access(plc_type, command) if plc_type else None
         address = self._address(plc_type, access) if plc_type else None
-        processor = self._processor(plc_type, command, address) if plc_type else None
-        return {
-            'name': name, 'topic': topic, 'command': command, 'station': station, 'via': via,
-            'type': kind or (address and _natural_type(address)), 'plc_type': plc_type,
-            'access': access, 'is_read_only': self._is_read_only(command), 'address': address,
-            'processor': processor, 'tag': self._row.get('Tag'),
-            'length': self._value('Length', whole(1, 65535), 1),
-            'period': self._value('Period', whole(0, MAX_PERIOD, 'ms')),
-            'publish': self._value('Publish', member_of(Publish), Publish.ALWAYS),
-            'minimum': self._decimal('Min', -math.inf), 'maximum': self._decimal('Max', math.inf),
-            'word_order': self._value('Word_Order', member_of(WordOrder), WordOrder.LOW),
-            'scaling': self._scaling(), 'confirms': self._row.get('Confirms'),
-            'description': self._row.get('Description')}
+        values = {
+            'Tag': self._row.get('Tag'), 'Command': command, 'Station': station,
+            'Via': self._via(station), 'PLC_Type': plc_type, 'Access': access,
+            'Address': address, 'Processor': self._processor(plc_type, address)}
+        for column in MAP_COLUMNS:
+            if column.kind and column.name not in values and (
+                    command is None or not column.why_not(command)):
+                values[column.name] = self._value(column.name, column.kind)
+        return {column: value for column, value in values.items() if value is not None}
+
+    def _mapping(self, values: dict[str, Any]) -> Mapping | None:
+        """Return the mapping without its conditions, None where a cell has a fault."""
+        name = self._name('Tag', self._row.get('Tag'))
+        topic = self._name('Topic', self._row.get('Topic')) if self._row.get('Topic') else name
+        scaling = self._scaling(values)
+        if self.faults:
+            return None
+        told = {'type': _natural_type(values['Address'])} | {
+            column.attribute: values[column.name] for column in MAP_COLUMNS
+            if column.name in values and column.attribute in Mapping.__slots__}
+        return Mapping(**told, item=self._row.item, place=self._row.where(), name=name,
+                       topic=topic, access=values['Access'], scaling=scaling,
+                       is_read_only=self._is_read_only(values['Command']))
 
     def _fault(self, column: str, text: str, message: Message | None = None,
                *args: object, is_superfluous: bool = False) -> None:
@@ -160,39 +158,28 @@ class RowReader:
             self._fault(column, f'{column} has {len(name)} characters, at most {MAX_LENGTH} go')
         return name
 
-    def _value(self, column: str, kind: Kind[_T], default: _T | None = None,
-               message: Message | None = None, *args: object) -> _T | None:
+    def _value(self, column: str, kind: Kind[_T], message: Message | None = None,
+               *args: object) -> _T | None:
         text = self._row.get(column)
-        if not text:
-            return default
-        value = kind.read(text)
-        if value is None:
-            self._bad_value(column, f'should be {kind.right}', message, shown(text), *args)
+        value = kind.read(text) if text else None
+        if text and value is None:
+            self._bad_value(column, kind.fault(text), message, shown(text), *args)
         return value
 
-    def _decimal(self, column: str, default: float) -> float:
-        if right := two_readings(self._row.get(column)):
-            self._bad_value(column, f'could be two numbers; write {shown(right)}')
-            return default
-        value = self._value(column, _DECIMAL, default)
-        return default if value is None else value
-
-    def _scaling(self) -> Scaling | None:
+    def _scaling(self, values: dict[str, Any]) -> Scaling | None:
         if not self._row.get('Scale') and not self._row.get('Offset'):
             return None
-        scaling = Scaling(self._decimal('Scale', 1.0), self._decimal('Offset', 0.0))
+        scaling = Scaling(values.get('Scale', 1.0), values.get('Offset', 0.0))
         if scaling.scale == 0:
             self._fault('Scale', 'Scale should not be 0')
         return scaling
 
-    def _via(self, command: Command | None, station: int | None) -> int | None:
+    def _via(self, station: int | None) -> int | None:
         """Return the gateway, None for a station that needs none."""
         via = self._value('Via', whole(0, MAX_STATION))
         if via is None or via == station:
             return None
-        if command is Command.SERVE:
-            self._fault('Via', 'a Serve row has words of ours', is_superfluous=True)
-        elif station == BROADCAST:
+        if station == BROADCAST:
             self._fault('Via', 'what is written to station 255 goes to the stations of this line '
                                'only', is_superfluous=True)
         return via
@@ -223,11 +210,8 @@ class RowReader:
         """Tell whether the other end may only read the words of a Serve row."""
         return command is Command.SERVE and self._row.get('Access').lower() == READ_ONLY.lower()
 
-    def _processor(self, plc_type: PlcType, command: Command | None,
-                   address: Address | None) -> Processor | None:
-        if not self._row.get('Processor'):
-            return None
-        if not FAMILIES[plc_type].by_processor or command is Command.SERVE:
+    def _processor(self, plc_type: PlcType | None, address: Address | None) -> Processor | None:
+        if plc_type and self._row.get('Processor') and not FAMILIES[plc_type].by_processor:
             self._fault('Processor', 'Processor is for PLCs of type SLC that we read or write',
                         is_superfluous=True)
             return None

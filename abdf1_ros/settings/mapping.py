@@ -19,7 +19,6 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from enum import Enum
 import math
-from typing import Any
 
 from abdf1_ros.df1.packet import BROADCAST
 from abdf1_ros.pccc.access import Access, CIF_FILES
@@ -79,7 +78,7 @@ class Mapping:
     address: Address
     station: int
     plc_type: PlcType
-    length: int
+    length: int = 1
     type: ValueType  # noqa: A003
     topic: str
     period: int | None = None
@@ -145,6 +144,11 @@ class Mapping:
         return self.command not in (Command.READ, Command.HEARTBEAT)
 
     @property
+    def access_cell(self) -> str | Access | None:
+        """Return what the column Access says."""
+        return READ_ONLY if self.is_read_only else self.access
+
+    @property
     def needs_run(self) -> bool:
         """Tell whether values are published only while the PLC says that it is in RUN."""
         return self.publish_while is not None and self.publish_while.tag is None
@@ -188,26 +192,3 @@ class Mapping:
             return address.at_offset(address.offset + number * self.codec.element_words)
         words, bit = divmod(address.bit + number, BITS)
         return address.at_offset(address.offset + words).with_bit(bit)
-
-    def cell(self, column: str) -> str:
-        """Return a column's value as text, defaults filled in."""
-        if column == 'Access' and self.is_read_only:
-            return READ_ONLY
-        value: Any = self
-        for name in _CELLS.get(column, column.lower()).split('.'):
-            value = getattr(value, name, None)
-        return ' '.join(map(_text, value)) if isinstance(value, tuple) else _text(value)
-
-
-def _text(value: Any) -> str:
-    if isinstance(value, float):
-        return '' if math.isinf(value) else f'{value:.15g}'
-    return '' if value is None else str(value.value if isinstance(value, Enum) else value)
-
-
-# Where the cells of columns come from that are no attribute of the same name.
-_CELLS = {
-    'Min': 'minimum', 'Max': 'maximum', 'Scale': 'scaling.scale', 'Offset': 'scaling.offset',
-    'Requires': 'heartbeat.requires', 'Requires_Timeout': 'heartbeat.requires_timeout',
-    'Fallback': 'fallback.values', 'Fallback_After': 'fallback.after',
-    'Publish_While': 'publish_while.text', 'Heartbeat_Timeout': 'publish_while.timeout'}

@@ -28,8 +28,9 @@ from abdf1_ros.pccc.processor import Processor, USUAL
 from abdf1_ros.pccc.structures import value_addresses
 from abdf1_ros.pccc.values import ValueType
 from abdf1_ros.problems import Problem
+from abdf1_ros.settings.columns import MAP_COLUMNS
 from abdf1_ros.settings.csv_table import Row
-from abdf1_ros.settings.mapping import Command, Mapping, Publish
+from abdf1_ros.settings.mapping import Mapping
 from abdf1_ros.settings.network import Network
 from abdf1_ros.settings.share import share_places, share_remarks
 from abdf1_ros.settings.station_lists import octal_remarks
@@ -134,11 +135,11 @@ def _name_remarks(row: Row, mapping: Mapping) -> Iterator[Problem]:
 
 def _useless_cells(row: Row, mapping: Mapping) -> Iterator[Problem]:
     """Yield cells that have no effect, or another one than a newcomer expects."""
-    for column, has_effect in (('Period', mapping.command is not Command.WRITE),
-                               ('Publish', mapping.reads or mapping.publish is Publish.ALWAYS),
-                               ('Min', mapping.writes), ('Max', mapping.writes)):
-        if row.get(column) and not has_effect:
-            yield _at(row, column, f'{column} has no effect in a {mapping.command.value} row')
+    for column in MAP_COLUMNS:
+        name = column.name
+        if row.get(name) and mapping.command in column.idle \
+                and column.text(mapping) != column.default:
+            yield _at(row, name, f'{name} has no effect in a {mapping.command.value} row')
     period = mapping.period or 0
     if 0 < period < _SHORT_PERIOD:
         yield _at(row, 'Period', f'Period {period} is in ms; {period} s would be {period * 1000}')

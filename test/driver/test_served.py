@@ -30,7 +30,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 import pytest
 from support.cases import for_all
-from support.mappings import load_rows, make_mapping
+from support.mappings import cell_of, load_rows, make_mapping
 
 STATION = 5
 FAMILIES = ('PLC5', 'SLC')
@@ -356,7 +356,7 @@ def test_access_of_a_serve_row() -> None:
         'a,Serve,N7:50,5,PLC5,4,,,,,,,,,,read', 'b,Serve,N7:60,5,PLC5,4,,,,,,',
         'c,Serve,N7:70,5,PLC5,4,,,,,,,,,,Typed', 'd,Read,N7:0,1,PLC5,4,,,,,,,,,,Read')
     assert [mapping.is_read_only for mapping in mappings] == [True, False]
-    assert [mapping.cell('Access') for mapping in mappings] == ['Read', 'Typed']
+    assert [cell_of(mapping, 'Access') for mapping in mappings] == ['Read', 'Typed']
     assert problems == [
         'Item: 3, Access = "Typed" of a Serve row should be Read, for words that the other end '
         'cannot write, or empty',
@@ -374,7 +374,8 @@ def test_serve_row_of_a_file() -> None:
     assert problems == []
     assert (mapping.serves, mapping.polls, mapping.reads, mapping.writes) == (
         True, False, True, True)
-    assert (mapping.topic, mapping.period, mapping.cell('Command')) == ('pushed', None, 'Serve')
+    assert (mapping.topic, mapping.period) == ('pushed', None)
+    assert cell_of(mapping, 'Command') == 'Serve'
 
 
 def test_topic_of_a_serve_row_has_no_other_reader_and_writers_of_its_length_only() -> None:

@@ -20,7 +20,7 @@ from abdf1_ros.settings.heartbeats import Fallback, Heartbeat, PublishWhile
 from abdf1_ros.settings.map_file import load_mappings
 from abdf1_ros.settings.mapping import Command
 import pytest
-from support.mappings import fault, faults, load_rows, one, row
+from support.mappings import cell_of, fault, faults, load_rows, one, row
 
 BEAT = {'Tag': 'beat', 'Command': 'Heartbeat', 'Address': 'N10:0'}
 WRITE = {'Tag': 'speed', 'Command': 'Write', 'Address': 'N10:1'}
@@ -47,10 +47,13 @@ def test_rule_1_heartbeat_is_one_word_without_a_topic() -> None:
     ({'Address': 'B3:0/1'}, 'a heartbeat is a word of type int16 or uint16'),
     ({'Type': 'int32'}, 'a heartbeat is a word of type int16 or uint16'),
     ({'Length': '2'}, 'a heartbeat is one word; leave the cell empty'),
-    ({'Topic': 'x'}, 'a Heartbeat row has no Topic; leave the cell empty'),
-    ({'Max': '9'}, 'a Heartbeat row has no Max; leave the cell empty'),
-    ({'Publish': 'Change'}, 'a Heartbeat row has no Publish; leave the cell empty'),
-    ({'Fallback': '0'}, 'a Heartbeat row has no Fallback'),
+    ({'Topic': 'x'}, 'a Heartbeat row has no Topic: it is for Read, Write, ReadWrite and '
+     'Serve rows; leave the cell empty'),
+    ({'Max': '9'}, 'a Heartbeat row has no Max: it is for Write, ReadWrite and Serve '
+     'rows; leave the cell empty'),
+    ({'Publish': 'Change'}, 'a Heartbeat row has no Publish: it is for Read, '
+     'ReadWrite and Serve rows; leave the cell empty'),
+    ({'Fallback': '0'}, 'a Heartbeat row has no Fallback: it is for Write and Serve rows'),
     ({'Station': '255'}, 'must be less than 255')])
 def test_rule_1_what_a_heartbeat_cannot_be(cells: dict[str, str], text: str) -> None:
     assert text in fault(**BEAT | cells)
@@ -142,7 +145,8 @@ def test_rule_3_requires_topics_with_a_time() -> None:
     mappings, problems = load_rows(*rows)
     assert problems == []
     assert mappings[1].heartbeat == Heartbeat(('speed',), 500)
-    assert (mappings[1].cell('Requires'), mappings[1].cell('Requires_Timeout')) == ('speed', '500')
+    assert [cell_of(mappings[1], column) for column in ('Requires', 'Requires_Timeout')] == [
+        'speed', '500']
 
 
 @pytest.mark.parametrize(('cells', 'text'), [
@@ -156,7 +160,8 @@ def test_rule_3_requires_without_what_it_needs(cells: dict[str, str], text: str)
 
 
 def test_rule_3_only_a_heartbeat_vouches() -> None:
-    assert 'Requires is for Heartbeat rows; leave the cell empty' in fault(Requires='a')
+    assert 'a ReadWrite row has no Requires: it is for Heartbeat rows; leave the cell empty' in \
+        fault(Requires='a')
 
 
 @pytest.mark.parametrize('period', ['99', '60001', 'x'])
@@ -177,7 +182,7 @@ def test_rule_12_write_and_serve_rows_take_a_fallback(
         cells: dict[str, str], fallback: Fallback) -> None:
     mapping = one(**WRITE | cells)
     assert mapping.fallback == fallback
-    assert mapping.cell('Fallback_After') == str(fallback.after)
+    assert cell_of(mapping, 'Fallback_After') == str(fallback.after)
 
 
 @pytest.mark.parametrize(('cells', 'text'), [
@@ -189,9 +194,9 @@ def test_rule_12_write_and_serve_rows_take_a_fallback(
     ({'Fallback': '9', 'Max': '5', 'Fallback_After': '500'}, 'a number from -32768 to 5'),
     ({'Fallback': 'stop', 'Fallback_After': '500'}, 'Fallback "stop" should be a number'),
     ({'Address': 'B3:0/1', 'Fallback': '1', 'Fallback_After': '500'}, 'a bool falls back to 0'),
-    ({'Command': 'ReadWrite', 'Fallback': '0', 'Fallback_After': '500'},
-     'write a Write row and a Read row'),
-    ({'Command': 'Read', 'Fallback': '0', 'Fallback_After': '500'}, 'a Read row has no '
+    ({'Command': 'ReadWrite', 'Fallback': '0'},
+     'a ReadWrite row has no Fallback: it is for Write and Serve rows'),
+    ({'Command': 'Read', 'Fallback': '0'}, 'a Read row has no '
      'Fallback: it is for Write and Serve rows; leave the cell empty'),
     ({'Address': 'ST9:0', 'Fallback': '0', 'Fallback_After': '500'}, 'a string has no Fallback'),
     ({'Fallback': '1.5', 'Fallback_After': '500'},
@@ -230,12 +235,12 @@ def test_rule_13_values_depend_on_run_or_on_a_counter() -> None:
     mappings, problems = load_rows(row(**DOORS), row(**COUNTER))
     assert problems == []
     assert mappings[0].publish_while == PublishWhile('counter', 1000)
-    assert (mappings[0].cell('Publish_While'), mappings[0].cell('Heartbeat_Timeout')) == (
+    assert (cell_of(mappings[0], 'Publish_While'), cell_of(mappings[0], 'Heartbeat_Timeout')) == (
         'counter', '1000')
 
 
 @pytest.mark.parametrize(('cells', 'text'), [
-    ({'Command': 'ReadWrite'}, 'Publish_While is for Read rows'),
+    ({'Command': 'ReadWrite'}, 'a ReadWrite row has no Publish_While: it is for Read rows'),
     ({'Publish': 'Change'}, 'needs Publish Always'),
     ({'Publish_While': 'RUN'}, 'RUN has no Heartbeat_Timeout'),
     ({'Publish_While': 'doors'}, 'cannot depend on itself'),
@@ -279,11 +284,12 @@ def test_rule_15_a_row_left_out_takes_along_what_depends_on_it() -> None:
 
 def test_rule_22_bit_confirms_a_heartbeat_of_its_station() -> None:
     bit, rest = load_rows(row(**BIT), row(**BEAT))[0]
-    assert (bit.confirms, bit.cell('Confirms'), rest.cell('Confirms')) == ('beat', 'beat', '')
+    assert bit.confirms == 'beat'
+    assert [cell_of(mapping, 'Confirms') for mapping in (bit, rest)] == ['beat', '']
 
 
 @pytest.mark.parametrize('cells', [
-    {'Command': 'ReadWrite'}, {'Length': '2'}, {'Address': 'N12:0'}])
+    {'Length': '2'}, {'Address': 'N12:0'}])
 def test_rule_22_what_is_not_a_bit_that_is_read_confirms_nothing(cells: dict[str, str]) -> None:
     assert 'Confirms is for a Read row of one bit' in faults(row(**BIT | cells), row(**BEAT))[0]
 

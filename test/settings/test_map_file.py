@@ -79,7 +79,8 @@ def test_two_stations_behind_one_gateway() -> None:
 @pytest.mark.parametrize(('cells', 'text'), [
     ({'Via': '255'}, 'Via = "255" should be a whole number from 0 to 254'),
     ({'Via': 'KF3'}, 'Via = "KF3" should be a whole number from 0 to 254'),
-    ({'Via': '3', 'Command': 'Serve'}, 'a Serve row has words of ours; leave the cell empty'),
+    ({'Via': '3', 'Command': 'Serve'}, 'a Serve row has no Via: it is for Read, Write, ReadWrite '
+     'and Heartbeat rows; leave the cell empty'),
     ({'Via': '3', 'Command': 'Write', 'Station': '255'},
      'what is written to station 255 goes to the stations of this line only')])
 def test_via_that_cannot_be(cells: dict[str, str], text: str) -> None:

@@ -28,7 +28,7 @@ from abdf1_ros.settings.mapping import Command, Publish
 from abdf1_ros.settings.scaling import Scaling
 import pytest
 from support.cases import for_all
-from support.mappings import fault, load_rows, one, row
+from support.mappings import cell_of, fault, load_rows, one, row
 
 
 def test_row_with_every_column() -> None:
@@ -145,8 +145,9 @@ def test_command_says_whether_a_row_reads_and_writes(text: str, reads: bool, wri
      'should be one of 5/01, 5/02, 5/03, 5/04, 5/05, ML1000, ML1100, ML1200, ML1400, ML1500'),
     ({'Processor': '5/03'}, '17 (Processor): Item: 1, Processor is for PLCs of type SLC that we '
      'read or write; leave the cell empty'),
-    ({'PLC_Type': 'SLC', 'Processor': '5/03', 'Command': 'Serve'}, '17 (Processor): Item: 1, '
-     'Processor is for PLCs of type SLC that we read or write; leave the cell empty'),
+    ({'PLC_Type': 'SLC', 'Processor': '5/03', 'Command': 'Serve'}, '17 (Processor): Item: 1, a '
+     'Serve row has no Processor: it is for Read, Write, ReadWrite and Heartbeat rows; leave the '
+     'cell empty'),
     ({'PLC_Type': 'SLC', 'Processor': '5/05', 'Address': 'L10:0'}, '3 (Address): Item: 1, 5/05 '
      'has no file L10; ML1100, ML1200, ML1400, ML1500 may have it'),
     ({'PLC_Type': 'SLC', 'Processor': 'ML1000', 'Address': 'N10:0'}, '3 (Address): Item: 1, '
@@ -237,7 +238,7 @@ def test_word_order_is_high_where_the_cell_says_so_and_low_without_it(
         cells: dict[str, str]) -> None:
     mapping = one(Word_Order='high', **cells)
     assert mapping.word_order is mapping.codec.word_order is WordOrder.HIGH
-    assert mapping.cell('Word_Order') == 'High'
+    assert cell_of(mapping, 'Word_Order') == 'High'
     low = one(**cells)
     assert low.word_order is low.codec.word_order is WordOrder.LOW
     assert mapping != low
@@ -266,7 +267,7 @@ def test_scale_or_offset_make_the_message_float32(
 def test_access_chooses_the_dialect(plc: str, text: str, access: str) -> None:
     address = '020' if plc == 'PLC2' else 'N7:0'
     mapping = one(PLC_Type=plc, Address=address, Access=text)
-    assert (mapping.access, mapping.cell('Access')) == (Access(access), access)
+    assert (mapping.access, cell_of(mapping, 'Access')) == (Access(access), access)
     assert mapping.dialect is dialect_of(PlcType(plc), Access(access))
 
 
@@ -275,7 +276,7 @@ def test_access_chooses_the_dialect(plc: str, text: str, access: str) -> None:
 
 def test_io_by_the_word_of_the_image() -> None:
     mapping = one(PLC_Type='SLC', Address='i:5/3', Access='Flat', Command='Read')
-    assert (mapping.cell('Address'), mapping.address.is_flat) == ('I:5/3', True)
+    assert (cell_of(mapping, 'Address'), mapping.address.is_flat) == ('I:5/3', True)
     text = fault(PLC_Type='SLC', Address='I:1.0', Access='Flat', Command='Read')
     assert text.endswith('with access Flat write the word of the whole image, as in I:5 or O:0/3')
 
@@ -283,13 +284,13 @@ def test_io_by_the_word_of_the_image() -> None:
 @pytest.mark.parametrize('processor', Processor)
 def test_processor_chooses_the_dialect(processor: Processor) -> None:
     mapping = one(PLC_Type='SLC', Processor=processor.value.lower())
-    assert (mapping.processor, mapping.cell('Processor')) == (processor, processor.value)
+    assert (mapping.processor, cell_of(mapping, 'Processor')) == (processor, processor.value)
     assert mapping.dialect is dialect_of(PlcType.SLC, None, processor)
 
 
 def test_slc_without_a_processor_is_taken_for_a_5_03() -> None:
     mapping = one(PLC_Type='SLC', Address='L10:0', Command='Read')  # or for a MicroLogix
-    assert (mapping.processor, mapping.cell('Processor')) == (None, '')
+    assert (mapping.processor, cell_of(mapping, 'Processor')) == (None, '')
     assert mapping.dialect is dialect_of(PlcType.SLC, None, Processor.SLC_5_03)
 
 

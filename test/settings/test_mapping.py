@@ -23,21 +23,21 @@ from abdf1_ros.pccc.families import FAMILIES
 from abdf1_ros.pccc.file_types import PlcType
 from abdf1_ros.pccc.processor import Processor, USUAL
 from abdf1_ros.pccc.values import ValueType, WordOrder
-from abdf1_ros.settings.columns import COLUMNS, MAP_COLUMNS
+from abdf1_ros.settings.columns import BY_NAME, COLUMNS, MAP_COLUMNS
 from abdf1_ros.settings.mapping import Command, Publish
 from abdf1_ros.settings.names import MAX_LENGTH, sanitise
 from hypothesis import given
 from hypothesis import strategies as st
 import pytest
 from support.cases import ANY_CHARACTER, for_all
-from support.mappings import make_mapping, one
+from support.mappings import cell_of, make_mapping, one
 
 
 @pytest.mark.parametrize('cells, scale, offset', [
     ({'Scale': '0.1'}, '0.1', '0'), ({'Offset': '-40.5'}, '1', '-40.5'), ({}, '', '')])
 def test_scale_and_offset_as_text(cells: dict[str, str], scale: str, offset: str) -> None:
     mapping = one(**cells)
-    assert (mapping.cell('Scale'), mapping.cell('Offset')) == (scale, offset)
+    assert (cell_of(mapping, 'Scale'), cell_of(mapping, 'Offset')) == (scale, offset)
 
 
 def test_codec_of_a_bit_mapping_begins_at_its_bit() -> None:
@@ -47,7 +47,7 @@ def test_codec_of_a_bit_mapping_begins_at_its_bit() -> None:
 
 def test_cells_as_text_with_defaults_filled_in() -> None:
     mapping = one(Tag='Line speed', Command='read', Address='n7;3', Station='07')
-    cells = {column: mapping.cell(column) for column in COLUMNS}
+    cells = {column: cell_of(mapping, column) for column in COLUMNS}
     assert {column: cell for column, cell in cells.items() if cell} == {
         'Tag': 'Line speed', 'Command': 'Read', 'Address': 'N7:3', 'Station': '7',
         'PLC_Type': 'PLC5', 'Length': '1', 'Type': 'int16', 'Topic': 'Line_speed',
@@ -58,13 +58,13 @@ def test_cells_as_text_with_defaults_filled_in() -> None:
     ('0', '0'), ('-5', '-5'), ('0.1', '0.1'), ('1000000', '1000000'),
     ('2147483647', '2147483647'), ('-3.25', '-3.25'), ('1234567.5', '1234567.5')])
 def test_limits_as_text_lose_nothing(text: str, cell: str) -> None:
-    assert one(Max=text).cell('Max') == cell
-    assert replace(one(), minimum=float(text)).cell('Min') == cell
+    assert cell_of(one(Max=text), 'Max') == cell
+    assert cell_of(replace(one(), minimum=float(text)), 'Min') == cell
 
 
 def test_period_of_zero_is_not_the_default() -> None:
     assert one(Period='0').period == 0
-    assert one(Period='0').cell('Period') == '0'
+    assert cell_of(one(Period='0'), 'Period') == '0'
 
 
 def test_function_file_of_a_micrologix_is_no_file_of_that_number() -> None:
@@ -72,9 +72,6 @@ def test_function_file_of_a_micrologix_is_no_file_of_that_number() -> None:
     assert function.address.file == binary.address.file
     assert not binary.shares_words(function) and not function.shares_words(binary)
     assert function.shares_words(make_mapping('STI:0.PFN', 'Write', plc='SLC'))
-
-
-BY_NAME = {column.name: column for column in MAP_COLUMNS}
 
 
 def test_columns_are_those_of_the_interface() -> None:

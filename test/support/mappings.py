@@ -24,7 +24,7 @@ from abdf1_ros.pccc.file_types import PlcType
 from abdf1_ros.pccc.processor import Processor
 from abdf1_ros.pccc.values import types_of, ValueType, WordOrder
 from abdf1_ros.problems import Place, Problem
-from abdf1_ros.settings.columns import COLUMNS
+from abdf1_ros.settings.columns import BY_NAME, COLUMNS
 from abdf1_ros.settings.map_file import load_mappings
 from abdf1_ros.settings.mapping import Command, Mapping, Publish
 
@@ -50,6 +50,11 @@ def make_mapping(text: str = 'N7:0', command: str = 'Read', *, station: int = 1,
         type=ValueType(kind) if kind else types_of(address)[0], topic=topic or name,
         publish=Publish(publish), word_order=WordOrder(word_order), access=way,
         processor=Processor(processor) if processor else None, **others)
+
+
+def cell_of(mapping: Mapping, column: str) -> str:
+    """Return a column's value as text, defaults filled in."""
+    return BY_NAME[column].text(mapping)
 
 
 def load_text(text: str | bytes, name: str = 'map.csv') -> tuple[list[Mapping], list[Problem]]:

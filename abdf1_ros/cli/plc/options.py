@@ -29,7 +29,7 @@ from abdf1_ros.pccc.families import FAMILIES
 from abdf1_ros.pccc.processor import Processor
 from abdf1_ros.pccc.values import ValueType, WordOrder
 from abdf1_ros.settings import BAUD_RATES
-from abdf1_ros.settings.map_row import MAX_PERIOD
+from abdf1_ros.settings.columns import MAX_PERIOD
 from abdf1_ros.settings.station_lists import parse_stations
 
 DEFAULT_STATION = 1

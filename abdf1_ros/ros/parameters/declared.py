@@ -35,9 +35,8 @@ from abdf1_ros.ros.bridge.files import FileWatch
 from abdf1_ros.ros.parameters.arguments import Arguments, is_for
 from abdf1_ros.ros.parameters.files import parameters_in
 from abdf1_ros.ros.parameters.shown import descriptor_of, map_cells, MOST_SHOWN_ROWS, text_of
-from abdf1_ros.settings.columns import COLUMNS
+from abdf1_ros.settings.columns import COLUMNS, MAX_PERIOD
 from abdf1_ros.settings.map_file import load_mappings
-from abdf1_ros.settings.map_row import MAX_PERIOD
 from abdf1_ros.settings.mapping import Mapping
 from abdf1_ros.settings.network import FIELDS, load_network, make_network, Network, URLS
 from abdf1_ros.settings.station_lists import octal_of, parse_stations

@@ -65,7 +65,7 @@ def map_cells(mappings: Iterable[Mapping]) -> Iterator[tuple[str, str, str]]:
     for mapping in mappings:
         for column in MAP_COLUMNS:
             yield (f'map.{mapping.name.replace("/", ".")}.{column.name.lower()}',
-                   mapping.cell(column.name), column.description)
+                   column.text(mapping), column.description)
 
 
 def _net_cells(network: Network) -> Iterator[_Cell]:

@@ -38,6 +38,7 @@ from abdf1_ros.settings.mapping import Mapping
 from abdf1_ros.settings.network import load_network
 import pytest
 from support.cases import for_all
+from support.mappings import cell_of
 
 KEPSERVER = (
     'Tag Name,Address,Data Type,Respect Data Type,Client Access,Scan Rate,Scaling,Raw Low,'
@@ -98,7 +99,7 @@ def test_tag_of_kepserver_becomes_a_row(
         tmp_path: Path, row: str, expected: dict[str, str]) -> None:
     (mapping,), left_out = imported(tmp_path, f'{KEPSERVER}{row}\n')
     assert left_out == []
-    assert {column: mapping.cell(column) for column in expected} == expected
+    assert {column: cell_of(mapping, column) for column in expected} == expected
     assert (mapping.station, mapping.plc_type) == (2, PlcType.SLC)
 
 

@@ -32,6 +32,7 @@ from abdf1_ros.settings.network import load_network, Network
 import pytest
 from support.disks import no_file_longer_than
 from support.driver_bench import simulated_plc, store, stored
+from support.mappings import cell_of
 from support.plc_line import plc_line
 
 PATIENT = ('--timeout', '2000', '--duplex', 'half')  # ms; a busy host may be late
@@ -88,7 +89,7 @@ def test_rows_that_are_only_comments_are_good_rows_too(
     mappings, problems = load_mappings(str(path))
     assert (len(mappings), problems) == (15, [])
     # What the SLC lists of its files; the PLC-5 has no such list.
-    assert [mapping.cell('Address') for mapping in mappings if mapping.station == 2][5:] == [
+    assert [cell_of(mapping, 'Address') for mapping in mappings if mapping.station == 2][5:] == [
         'S2:0', 'B3:0', 'N7:0', 'F10:0', 'L11:0']
     guarded = [mapping.tag for mapping in mappings if mapping.publish_while is not None]
     assert guarded == ['interlocks_1', 'interlocks_2']
