@@ -74,6 +74,7 @@ GUESTS = range(33_000, 33_600)  # what only guests write: more than a heartbeat 
 OTHERS = 34_000  # what comes into a word from another network
 LARGEST = 31_000  # of what is published
 _LEAST_COMMAND = 10  # bytes: no poll
+_FIFO = 16  # bytes that come together; a longer reply shows before Timeout that it comes
 _PRESSED_EVERY = 1.0  # s
 _MASTER_RESTS = 0.005  # s, of one that polls us, before all that it sends
 SLAVE_PRESET = 1000  # of a watchdog where none is printed, in units of 10 ms
@@ -301,7 +302,7 @@ class World(DriverBench):
         settings = DriverSettings(
             write_timeout=plant.write_timeout, read_only=plant.is_read_only, processor_period=0.0,
             first_tns=self.dice.randrange(0x10000))
-        super().__init__(rows, network=plant.network, settings=settings, start=False, chunk=64)
+        super().__init__(rows, network=plant.network, settings=settings, start=False, chunk=_FIFO)
         self.rows = {row.tag: row for row in rows}
         self.messages = [row for row in rows if row.tag[0] in 'wfs']
         self.executed: list[Executed] = []
@@ -404,7 +405,7 @@ class World(DriverBench):
             replace(network.line, station=MASTER), self.clock, PollingSettings(stations),
             numbers=stations, timing=replace(network.timing, tx_delay=_MASTER_RESTS))
         self.line = VirtualLine(self.driver.machine, self.far, master.machine,
-                                baud=network.baud, chunk=64)
+                                baud=network.baud, chunk=_FIFO)
         master.machine.start(self.line.now, self.line.outlet(master.machine))
         place = self.rows['served'].address
         dialect = self.rows['served'].dialect
@@ -482,7 +483,9 @@ class World(DriverBench):
         if receiver != _FAR or len(data) < _LEAST_COMMAND or \
                 self.master and data.removeprefix(ACK).startswith(SOH):
             return  # a master that polls us passes on what we have sent
-        begun = data.index(STX) + len(STX)
+        begun = data.find(STX) + len(STX)
+        if begun < len(STX):
+            return  # responses: after a pause some go out together
         station, tail = data[begun], data[begun:]
         for name, begin in self._begins.items():
             at = tail.find(begin)
@@ -672,7 +675,7 @@ class OtherBridge(DriverBench):
             [row], network=Network(station=OTHER_BRIDGE, baud=19200, timeout=100, cmd_timeout=500),
             settings=DriverSettings(processor_period=0.0,
                                     first_tns=world.dice.randrange(0x10000)),
-            start=False, chunk=64)
+            start=False, chunk=_FIFO)
         self.line.now = world.line.now
         plc = SimulatedPlc(station, first.plc.table, self.network.checksum, self.clock)
         plc.processor = first.plc.processor

@@ -616,8 +616,10 @@ class View(Rule):
         for number in world.plcs:
             is_known = world.driver.stations[number].replies_in_time \
                 and (number, False) not in changes  # and back at once
+            # A master answers in the name of a PLC that it takes for inactive.
+            is_passed_on = world.master is None or world.master.stations[number].active
             is_well = now > max(world.ill[number], world.ill[0]) + self.flight \
-                and not world.holds
+                and not world.holds and is_passed_on
             self.demand(is_known or not is_well or number not in self._known,
                         world.driver.stations[number])
             if is_known and is_well:

@@ -16,10 +16,12 @@
 
 import secrets
 
+from abdf1_ros.df1.frames import ACK, ENQ
 import pytest
 from simulate.mistakes import MISTAKES
+from simulate.rules import Broken, View
 from simulate.run import simulate, Story
-from support.world import MODES, POLLED
+from support.world import MODES, Plant, POLLED, World
 
 
 @pytest.mark.parametrize('mode', MODES)
@@ -37,6 +39,33 @@ def test_seed_replays_a_plant_to_the_byte(mode: str) -> None:
         return story.world.wire.hexdigest()
 
     assert bytes_of_a_run() == bytes_of_a_run()
+
+
+def test_plc_need_not_be_known_that_a_master_still_has_as_inactive() -> None:
+    world = World(Plant('Slave'), seed=1)
+    rule = View(world)
+    world.run(6.0)
+    rule.stand()
+    assert world.master and world.driver.stations[1].replies_in_time
+    world.driver.stations[1].overdue = 2  # it answers for the PLC, and that is no reply of it
+    with pytest.raises(Broken):
+        rule.stand()
+    world.master.stations.lost(1, world.line.now)
+    rule.stand()
+
+
+@pytest.mark.parametrize('mode', ['Standard', 'Slave'])
+def test_long_reply_shows_before_timeout_that_it_comes(mode: str) -> None:
+    world = World(Plant(mode, baud=4800), seed=1)
+    assert max(world.line.chunks) * world.line.char_time < world.network.timeout / 1000
+
+
+def test_responses_that_go_out_together_are_no_command() -> None:
+    world = World(Plant('Peer'), seed=1)
+    world.run(2.0)
+    count = len(world.sent)
+    world.line._send(ENQ + 4 * ACK, world.line.now, 1)
+    assert len(world.sent) == count
 
 
 def test_mistakes_are_made_where_something_is() -> None:
