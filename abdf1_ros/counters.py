@@ -87,6 +87,11 @@ class Counters:
     refused_for_memory: int = 0
     unsent_messages: int = 0  # by radio, when the port was lost
 
+    @property
+    def damaged_frames(self) -> int:
+        """Return how many frames came with a wrong check."""
+        return self.bcc_errors + self.crc_errors
+
     def by_mnemonic(self) -> dict[str, int]:
         """Return every counter by its mnemonic, in the order of the numbers."""
         return {entry.metadata['mnemonic']: getattr(self, entry.name) for entry in numbered()}

@@ -14,13 +14,14 @@
 
 """A pseudo-terminal with simulated PLCs at its other end, in this process."""
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
 from abdf1_ros.df1.checksum import Checksum
 from abdf1_ros.df1.machine import Machine
 from abdf1_ros.df1.slave import multidrop
+from abdf1_ros.ports.descriptor import Port, PortAround
 from abdf1_ros.ports.endpoints import PtyEndpoint
 from abdf1_ros.ports.link_thread import LinkThread
 from abdf1_ros.simulator.gateway import stations_of
@@ -28,14 +29,31 @@ from abdf1_ros.simulator.simulated_plc import SimulatedPlc
 
 
 @contextmanager
-def plc_line(path: Path, *plcs: SimulatedPlc) -> Iterator[str]:
-    """Put PLCs on a half-duplex line with CRC; yield the name of its port."""
+def plc_line(path: Path, *plcs: SimulatedPlc,
+             around: Callable[[Port], Port] = lambda port: port) -> Iterator[str]:
+    """Put PLCs on a half-duplex line with CRC, ``around`` their port; yield the name of ours."""
     line = PtyEndpoint(str(path))
     stations = stations_of(plcs, Checksum.CRC)
-    link = LinkThread(Machine(multidrop(stations), checksum=Checksum.CRC), line.open)
+    link = LinkThread(Machine(multidrop(stations), checksum=Checksum.CRC),
+                      lambda: around(line.open()))
     link.start()
     try:
         yield line.name
     finally:
         link.stop()
         line.close()
+
+
+class LosesPolls(PortAround):
+    """A line on which the first poll of each of ``stations`` gets lost."""
+
+    def __init__(self, port: Port, stations: set[int]) -> None:
+        super().__init__(port)
+        self._stations = stations
+
+    def read(self, timeout: float | None, wake: int) -> bytes:
+        data = super().read(timeout, wake)
+        if len(data) == 4 and data[:2] == b'\x10\x05' and data[2] in self._stations:
+            self._stations.remove(data[2])
+            return b''
+        return data

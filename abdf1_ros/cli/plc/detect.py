@@ -16,8 +16,10 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from itertools import product
 import time
 
 from abdf1_ros.cli.plc.line import free_station, MODES
@@ -55,6 +57,9 @@ _WORDS = {'Peer': 'full duplex', 'Master': 'half duplex',
 _RADIO_ECHOES = 3
 _ENQ_TIME = 5.0
 
+ROUNDS = 2
+"""Each of the settings is tried this often: a lost frame is not absence."""
+
 
 @dataclass(frozen=True, slots=True)
 class Found:
@@ -68,33 +73,37 @@ class Search:
     """
     Try settings on the port of ``network``, in half duplex with each of ``stations``.
 
-    ``show`` gets a text about the settings being tried. ``traces`` has texts about bytes that came
-    without an answer. ``echoes`` tells that what was sent came back, which settles that no
-    full-duplex PLC can be there.
+    ``show`` gets a text about the settings being tried. ``echoes`` tells that what was sent came
+    back, which settles that no full-duplex PLC can be there.
     """
 
     def __init__(self, network: Network, stations: Sequence[int],
                  show: Callable[[str], None] = lambda text: None) -> None:
-        self.traces: list[str] = []
         self.echoes = False
         self._network = replace(network, nak_retries=0, enq_retries=1,
                                 cmd_timeout=max(500, network.timeout))
         self._stations = stations
         self._show = show
+        self._characters = Counter[LineSettings]()  # that came without an answer
         self._lacks_acks = False  # replies have come, and not one ACK
+
+    @property
+    def traces(self) -> list[str]:
+        """Return texts about characters that came without an answer."""
+        return [f'{settings}: {count} characters came'
+                for settings, count in self._characters.items()]
 
     def run(self, bauds: Sequence[int], modes: Sequence[str] = ('Peer', 'Master'),
             checks: Sequence[str] = CHECKS) -> Found | None:
         """Return the first settings that work, None when none do; raises OSError, PortLost."""
-        for baud in bauds:
-            for mode in modes:
-                found = self._try(baud, mode, checks)
-                if found is None:
-                    continue
-                radio = replace(found.settings, mode='Radio')
-                is_radio = mode == MODES['full'] and self._lacks_acks and self._is_radio(
-                    radio, found.presence.station)
-                return replace(found, settings=radio) if is_radio else found
+        for _, baud, mode in product(range(ROUNDS), bauds, modes):
+            found = self._try(baud, mode, checks)
+            if found is None:
+                continue
+            radio = replace(found.settings, mode='Radio')
+            is_radio = mode == MODES['full'] and self._lacks_acks and self._is_radio(
+                radio, found.presence.station)
+            return replace(found, settings=radio) if is_radio else found
         return None
 
     def _try(self, baud: int, mode: str, checks: Sequence[str]) -> Found | None:
@@ -139,8 +148,7 @@ class Search:
                 self._lacks_acks = not session.counters.acks_received
                 yield presence
             if session.counters.chars_received and not self.echoes:
-                self.traces.append(
-                    f'{settings}: {session.counters.chars_received} characters came')
+                self._characters[settings] += session.counters.chars_received
 
     def _is_radio(self, settings: LineSettings, station: int) -> bool:
         """Tell whether replies come without any symbol, though we give none either."""

@@ -16,7 +16,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 import os
 import sys
@@ -36,6 +36,10 @@ from abdf1_ros.pccc.steps import echo, identify
 from abdf1_ros.settings.network import Network
 
 _SLOTS_TRIED = 8
+
+# A silent station is asked twice, or this often at most while the line loses frames.
+_MOST_ROUNDS = 4
+
 _ECHO = bytes(range(1, 17))
 
 # A half-duplex station does not answer at all when a setting is wrong; so these come first.
@@ -49,7 +53,7 @@ class Presence:
     The identity of a station, and the seconds until its reply.
 
     Without an ``identity`` ``error`` says why; ``is_there`` tells whether the station has sent
-    anything, ``takes_commands`` whether it understands our frames.
+    anything, ``takes_commands`` whether it understands our frames. It was ``asked`` this often.
     """
 
     station: int
@@ -58,6 +62,12 @@ class Presence:
     error: Abdf1Error | None
     is_there: bool
     takes_commands: bool
+    asked: int = 1
+
+    @property
+    def is_settled(self) -> bool:
+        """Tell whether a reply has come, so that asking again would bring nothing new."""
+        return not isinstance(self.error, LinkError)
 
     def __str__(self) -> str:
         """Return one line of text."""
@@ -82,17 +92,44 @@ def look_at(session: Session, station: int) -> Presence:
     return Presence(station, seconds, identity, error, is_there, takes_commands)
 
 
-def scan(network: Network, stations: Sequence[int], via: int | None = None) -> Iterator[Presence]:
+def scan(network: Network, stations: Sequence[int], via: int | None = None,
+         show: Callable[[str], None] = lambda text: None) -> Iterator[Presence]:
     """
     Yield every station, there or not, ``via`` a gateway; raises OSError and PortLost.
 
-    Where each has a number, we take one that is none of theirs.
+    Silent stations are asked again after all others: a lost frame is not absence. ``show`` gets
+    a text about the station being asked. Where each has a number, we take one that no station has.
     """
     if not network.line_mode.has_one_plc:
         network = replace(network, station=free_station(network.station, stations))
     with Session(network, absent=stations, via=via) as session:
-        for station in stations:
-            yield look_at(session, station)
+        left: Sequence[int] = stations
+        for asked in range(1, _MOST_ROUNDS + 1):
+            damaged = session.counters.damaged_frames
+            silent = []
+            for count, station in enumerate(left, 1):
+                show(f'station {count} of {len(left)}{again(asked)}')
+                presence = replace(look_at(session, station), asked=asked)
+                if presence.is_settled:
+                    yield presence
+                else:
+                    silent.append(presence)
+            loses = session.counters.damaged_frames > damaged or len(silent) < len(left)
+            left = [presence.station for presence in silent]
+            if not left or asked == _MOST_ROUNDS or asked > 1 and not loses:
+                break
+        yield from silent
+
+
+def again(asked: int) -> str:
+    """Return how often a station was asked, where that is more than once."""
+    return f', asked {asked} times' if asked > 1 else ''
+
+
+def tally(found: int, count: int, asked: int) -> str:
+    """Return how many of ``count`` stations were found, and how often the others were asked."""
+    rest = f'; the others were asked {asked} times' if found < count and asked > 1 else ''
+    return f'{found} of {count} stations answer{rest}'
 
 
 def understands(session: Session, station: int) -> bool:

@@ -311,17 +311,20 @@ def _ping(options: argparse.Namespace, session: Session, prepared: None) -> int:
 def _scan(options: argparse.Namespace) -> int:
     progress = Progress()
     found = 0
+    asked = 1
     network = network_of(options)
-    for number, there in enumerate(presence.scan(network, options.stations, options.via), 1):
+    for there in presence.scan(network, options.stations, options.via, progress.show):
         if there.is_there:
             if not found:
                 print('station    answer  processor')
             found += 1
             progress.clear()
-            print(f'{there.station:7}  {there.seconds * 1000:5.0f} ms  {there}', flush=True)
-        progress.show(f'{number} of {len(options.stations)} stations asked, {found} found')
+            print(f'{there.station:7}  {there.seconds * 1000:5.0f} ms  {there}'
+                  f'{presence.again(there.asked)}', flush=True)
+        else:
+            asked = there.asked
     progress.clear()
-    print(f'{found} of {len(options.stations)} stations answer')
+    print(presence.tally(found, len(options.stations), asked))
     if found > 1 and network.mode == MODES['full']:
         print(_ONE_PLC_ANSWERS_TO_ALL)
     return 0 if found else EXIT_FAILED
@@ -360,7 +363,7 @@ def _found(options: argparse.Namespace, network: Network) -> detect.Found | None
     if search.echoes:
         _complain(COMES_BACK)
     if found is None:
-        _complain('nothing answers with any of these settings')
+        _complain(f'nothing answers with any of these settings, tried {detect.ROUNDS} times')
         for trace in search.traces or [_ALL_TRIED_IN_VAIN] * (not search.echoes):
             _complain(trace)
         kept = [option for option, value in (
@@ -383,11 +386,9 @@ def _init(options: argparse.Namespace) -> int:
     # A full-duplex port mostly answers to every station, and 0 is the one to avoid (see "check").
     others = options.stations if found.settings.mode != MODES['full'] else \
         [1] if found.presence.station == 0 else []
-    there = [seen for seen in presence.scan(found.settings.on(network), others)
-             if seen.is_there] if others else []
-    there = there or [found.presence]
+    there = _stations_there(found, found.settings.on(network), others)
     for seen in there:
-        print(f'station {seen.station}: {seen}')
+        print(f'station {seen.station}: {seen}{presence.again(seen.asked)}')
     with Session(found.settings.on(network)) as session:
         listed = {seen.station: files.listed(session, seen.station, seen.identity)
                   for seen in there}
@@ -400,6 +401,22 @@ def _init(options: argparse.Namespace) -> int:
           f'  {called("check")} {net} {map_file}\n'
           f'  {called("node")} --ros-args -p net_file:={net} -p map_file:={map_file}')
     return 0
+
+
+def _stations_there(found: detect.Found, network: Network,
+                    stations: Sequence[int]) -> list[presence.Presence]:
+    """Return who is there, the found one at least, and tell how often the others were asked."""
+    is_full = found.settings.mode == MODES['full']  # it answers to several numbers
+    there = {} if is_full and stations else {found.presence.station: found.presence}
+    asked = 1
+    for seen in presence.scan(network, stations) if stations else ():
+        if seen.is_there:
+            there[seen.station] = seen
+        else:
+            asked = seen.asked
+    if asked > 1:
+        print(presence.tally(len(there), len({*there, *stations}), asked))
+    return [there[number] for number in sorted(there)] or [found.presence]
 
 
 def _import(options: argparse.Namespace) -> int:

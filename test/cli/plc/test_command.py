@@ -347,7 +347,8 @@ def test_scan_finds_who_does_not_say_what_it_is(plc: Plc, simulator: Process) ->
 
 def test_scan_of_nobody_has_status_1(plc: Plc) -> None:
     said = plc('scan', '8,9', *FAST)
-    assert (said.status, said.lines) == (1, ['0 of 2 stations answer'])
+    assert (said.status, said.lines) == (
+        1, ['0 of 2 stations answer; the others were asked 2 times'])
 
 
 def test_watch_prints_changes_and_ends_by_count(plc: Plc) -> None:
@@ -483,7 +484,7 @@ def test_detect_of_nobody_has_status_1_and_says_what_was_tried(
     line.close()
     assert said.status == 1
     assert told(said) == [
-        'plc: nothing answers with any of these settings',
+        'plc: nothing answers with any of these settings, tried 2 times',
         'plc: not one character came: cable, port, power? Or a station that was '
         'not asked (--stations; a PLC-5 shows its own in octal)',
         'plc: --baud: nothing else was tried; leave it out to try all']
@@ -496,8 +497,8 @@ def test_detect_of_what_is_not_understood(tmp_path: Path, files: Files,
         said = call(main, capsys, 'detect', '--port', port, '--stations', '2', '--check', 'CRC',
                     '--duplex', 'half', '--baud', '9600', '--timeout', '2000')
     assert said.status == 1
-    assert told(said) == ['plc: nothing answers with any of these settings',
-                          'plc: 9600 baud, half duplex, CRC: 2 characters came',
+    assert told(said) == ['plc: nothing answers with any of these settings, tried 2 times',
+                          'plc: 9600 baud, half duplex, CRC: 4 characters came',
                           'plc: --duplex and --baud and --check: nothing else was '
                           'tried; leave it out to try all']
 
@@ -555,7 +556,7 @@ def test_detect_finds_nobody_in_an_echo(
                         '--baud', '9600')
     assert (said.status, said.out) == (1, '')
     assert told(said)[:2] == [
-        f'plc: {COMES_BACK}', 'plc: nothing answers with any of these settings']
+        f'plc: {COMES_BACK}', 'plc: nothing answers with any of these settings, tried 2 times']
     assert 'character' not in said.err  # what came was our own
 
 
@@ -576,7 +577,7 @@ def test_plcs_behind_a_radio_modem(
         assert call(main, capsys, 'status', '2', *line).lines[0].startswith('station 2: SLC 5/03')
         # 5 is ours usually.
         found = call(main, capsys, 'scan', '1-2,5', '--timeout', '2000', *line)
-        assert found.lines[-1] == '2 of 3 stations answer'
+        assert found.lines[-1] == '2 of 3 stations answer; the others were asked 2 times'
         process.say('silent 2')
         process.wait_for('station 2: silent')
         silent = call(main, capsys, 'status', '2', '--timeout', '500', *line)

@@ -39,6 +39,7 @@ from abdf1_ros.settings.network import Network
 from abdf1_ros.simulator.simulated_plc import SimulatedPlc
 import pytest
 from support.driver_bench import simulated_plc
+from support.plc_line import LosesPolls, plc_line
 from support.ptys import Pty
 
 
@@ -95,7 +96,7 @@ def test_everything_is_tried_on_a_silent_line(tmp_path: Path) -> None:
     one_speed = ['full duplex, CRC, station 3', 'full duplex, CRC, station 1',
                  'full duplex, BCC, station 3', 'full duplex, BCC, station 1',
                  'half duplex, CRC, station 3', 'half duplex, CRC, station 1']
-    assert trying == [f'{baud} baud, {text}' for baud in (19200, 9600) for text in one_speed]
+    assert trying == 2 * [f'{baud} baud, {text}' for baud in (19200, 9600) for text in one_speed]
     assert search.traces == []
 
 
@@ -114,6 +115,16 @@ def test_search_ends_with_the_first_answer(tmp_path: Path, duplex: Duplex, check
     assert found.settings == LineSettings(19200, mode, check)
     assert found.presence.station == 1
     assert len(trying) == tried
+
+
+@pytest.mark.usefixtures('half_duplex_only')
+def test_lost_poll_is_no_reason_to_find_nothing(tmp_path: Path) -> None:
+    trying = Trying()
+    plc = simulated_plc(1, 'SLC', lambda: 0.0)
+    with plc_line(tmp_path / 'line', plc, around=lambda port: LosesPolls(port, {1})) as name:
+        found = Search(Network(com_port=name, timeout=1000), [1], trying).run([9600])
+    assert found is not None and found.settings == LineSettings(9600, 'Master', 'CRC')
+    assert trying[-1] == '9600 baud, half duplex, CRC, station 1'
 
 
 class Particular(FullDuplexPeer):
@@ -177,7 +188,7 @@ def test_full_duplex_port_with_another_station_is_heard_all_the_same(tmp_path: P
     with plc_on(tmp_path / 'line', 'CRC', Duplex.FULL, Particular) as network:
         search = Search(network, [5])
         assert search.run([9600], ['Peer'], ['CRC']) is None
-    assert search.traces == ['9600 baud, full duplex, CRC: 2 characters came']  # NAK to an ENQ
+    assert search.traces == ['9600 baud, full duplex, CRC: 4 characters came']  # NAKs to ENQs
 
 
 def test_flood_of_acks_is_no_plc(tmp_path: Path) -> None:
@@ -232,4 +243,4 @@ def test_traces_of_the_wrong_settings(tmp_path: Path) -> None:
     with plc_on(tmp_path / 'line', 'BCC', Duplex.HALF) as network:
         search = Search(network, [1])
         assert search.run([9600], checks=['CRC']) is None
-    assert search.traces == ['9600 baud, half duplex, CRC: 2 characters came']
+    assert search.traces == ['9600 baud, half duplex, CRC: 4 characters came']

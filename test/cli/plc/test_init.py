@@ -33,7 +33,7 @@ import pytest
 from support.disks import no_file_longer_than
 from support.driver_bench import simulated_plc, store, stored
 from support.mappings import cell_of
-from support.plc_line import plc_line
+from support.plc_line import LosesPolls, plc_line
 
 PATIENT = ('--timeout', '2000', '--duplex', 'half')  # ms; a busy host may be late
 
@@ -115,6 +115,20 @@ def test_plc_that_falls_silent_after_it_was_found(
     assert 'watch S:0 --station 1 --net' in capsys.readouterr().out
     mappings, _ = load_mappings(str(tmp_path / 'map.csv'))
     assert [mapping.station for mapping in mappings] == [1]  # not a map for nobody
+
+
+@pytest.mark.usefixtures('half_duplex_only')
+def test_lost_poll_leaves_no_station_out(tmp_path: Path, capsys: Output) -> None:
+    plcs = [simulated_plc(number, 'SLC', time.monotonic, *SLC) for number in (1, 2)]
+    with plc_line(tmp_path / 'plc', *plcs, around=lambda port: LosesPolls(port, {2})) as name:
+        assert main(['init', '--port', name, '--into', str(tmp_path), '--baud', '19200',
+                     '--stations', '1-3', *PATIENT]) == 0
+    said = capsys.readouterr().out
+    assert '2 of 3 stations answer; the others were asked 3 times\n' in said
+    assert 'station 1: SLC 5/03' in said
+    assert 'station 2: SLC 5/03 series A revision 1, REM RUN, asked 2 times' in said
+    mappings, _ = load_mappings(str(tmp_path / 'map.csv'))
+    assert [mapping.station for mapping in mappings] == [1, 2]
 
 
 def test_init_leaves_files_alone_that_are_there(port: str, tmp_path: Path, capsys: Output) -> None:

@@ -22,10 +22,11 @@ from abdf1_ros.cli.plc.presence import describe, hint, look_at, Presence, scan, 
 from abdf1_ros.cli.plc.session import Session
 from abdf1_ros.errors import FormatError, StationInactive
 from abdf1_ros.pccc.identity import Identity, Mode
+from abdf1_ros.ports.descriptor import PortAround
 from abdf1_ros.settings.network import Network
 import pytest
 from support.driver_bench import simulated_plc
-from support.plc_line import plc_line
+from support.plc_line import LosesPolls, plc_line
 from support.ptys import Pty
 
 IDENTITY = Identity(
@@ -99,3 +100,33 @@ def test_scan_behind_a_gateway_finds_only_who_is_there(tmp_path: Path) -> None:
     assert [presence.is_there for presence in found] == [True, True, False]
     assert [str(presence.identity)[:5] for presence in found[:2]] == ['PLC-5', 'SLC 5']
     assert 'STS 02' in str(found[2].error)
+
+
+def test_scan_asks_silent_stations_again(tmp_path: Path) -> None:
+    plcs = [simulated_plc(1, 'SLC', time.monotonic), simulated_plc(2, 'SLC', time.monotonic)]
+    with plc_line(tmp_path / 'line', *plcs, around=lambda port: LosesPolls(port, {2})) as name:
+        found = list(scan(Network(com_port=name, timeout=1000), [1, 2]))
+    assert [(there.station, there.is_there, there.asked) for there in found] == [
+        (1, True, 1), (2, True, 2)]
+
+
+class Damages(PortAround):
+    """A line on which each message of a station comes with a wrong check."""
+
+    def write(self, data: bytes) -> None:
+        start = data.find(b'\x10\x02')
+        super().write(data if start < 0 else data[:-1] + bytes([data[-1] ^ 1]))
+
+
+def test_scan_of_nobody_ends_after_two_rounds(tmp_path: Path) -> None:
+    line = Pty(tmp_path / 'line')
+    presence, = scan(Network(com_port=str(line.name), timeout=50), [1])
+    line.close()
+    assert (presence.is_there, presence.asked) == (False, 2)
+
+
+def test_scan_asks_more_often_while_frames_come_damaged(tmp_path: Path) -> None:
+    plc = simulated_plc(1, 'SLC', time.monotonic)
+    with plc_line(tmp_path / 'line', plc, around=Damages) as name:
+        presence, = scan(Network(com_port=name, timeout=1000, enq_retries=0), [1])
+    assert (presence.is_there, presence.takes_commands, presence.asked) == (True, False, 4)
