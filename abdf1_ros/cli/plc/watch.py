@@ -93,6 +93,7 @@ class Watch:
         self._reads: Counter[Mapping] = Counter()
         self._shown: dict[Mapping, Values | _NoValue] = {}
         self._height = 0
+        self._size: tuple[int, int] | None = None
 
     def run(self, count: int | None) -> int:
         """
@@ -225,7 +226,7 @@ class Watch:
 
     def _redraw(self) -> None:
         """Draw the table over the one before."""
-        width, height = shutil.get_terminal_size()
+        size = width, height = shutil.get_terminal_size()
         heads = [self._head(mapping) for mapping in self._mappings]
         # Other columns keep their widths: the values get what is left of the line.
         titles = ('station', 'type', 'age s', '')
@@ -247,9 +248,11 @@ class Watch:
             hidden = len(lines) - (height - 2)
             lines = [*lines[:height - 2], f'+{hidden} more; a higher window shows them']
         picture = [cut(line, width - 1) for line in lines]
-        up = f'\x1b[{self._height}A' if self._height else ''
-        print(up + '\n'.join(f'\x1b[K{line}' for line in picture), flush=True)
-        self._height = len(picture)
+        # In a window of another size the lines before lie elsewhere.
+        start = '' if self._size is None else \
+            f'\x1b[{self._height}A' if size == self._size else '\x1b[H'
+        print(start + '\n'.join(f'\x1b[K{line}' for line in picture), end='\n\x1b[J', flush=True)
+        self._height, self._size = len(picture), size
 
 
 def _quoted(text: str) -> str:

@@ -21,6 +21,7 @@ import io
 from math import inf, nan
 import os
 from pathlib import Path
+import re
 
 from abdf1_ros.cli.plc.data import Tags
 from abdf1_ros.cli.plc.watch import _NoValue, curve_of, Watch
@@ -165,8 +166,56 @@ def draw(monkeypatch: pytest.MonkeyPatch) -> Draw:
             watch._redraw()
             screen.flush()
         text = screen.buffer.getvalue().decode(encoding)  # type: ignore[attr-defined]
-        return text.replace('\x1b[K', '').splitlines()
+        return text.replace('\x1b[K', '').removesuffix('\x1b[J').splitlines()
     return lines_of
+
+
+class Screen:
+    """The lines of a terminal after text with the sequences that move, erase to the end, home."""
+
+    def __init__(self, *lines: str) -> None:
+        self.lines = [*lines, '']
+        self._row = len(lines)
+
+    def take(self, text: str) -> None:
+        for part in re.split('(\x1b\\[\\d*[A-Z]|\n)', text):
+            if part == '\n':
+                self._row += 1
+                self.lines += [''] * (self._row == len(self.lines))
+            elif match := re.fullmatch(r'\x1b\[(\d*)([A-Z])', part):
+                self._move(int(match[1] or 1), match[2])
+            elif part:
+                self.lines[self._row] = part + self.lines[self._row][len(part):]
+
+    def _move(self, count: int, final: str) -> None:
+        self._row = {'A': max(self._row - count, 0), 'H': 0}.get(final, self._row)
+        if final in 'KJ':
+            self.lines[self._row] = ''
+        if final == 'J':
+            del self.lines[self._row + 1:]
+
+
+def test_nothing_old_stays_below_a_table_that_shrinks(
+        monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
+    screen = Screen('$ plc watch N7:0 C5:0.ACC')
+    monkeypatch.setattr('abdf1_ros.cli.plc.watch.opened', lambda network: None)
+    rows = SPEED, make_mapping('C5:0.ACC', item=2)
+
+    def show(size: tuple[int, int], *news: tuple[Mapping, Values | _NoValue]) -> list[str]:
+        monkeypatch.setattr('shutil.get_terminal_size', lambda: os.terminal_size(size))
+        watch._note_changes(news)
+        watch._redraw()
+        screen.take(capsys.readouterr().out)
+        return [' '.join(line.split()) for line in screen.lines if line.strip()]
+
+    watch = Watch(Network(), rows, 0.01)
+    fault = _NoValue('2509 ERR_INACTIVE_STATION: Slave Station (1) Inactive')
+    assert len(show((60, 9), *((row, fault) for row in rows))) > 4
+    healed = show((60, 9), *((row, array('h', [5])) for row in rows))
+    assert healed[1:] == [
+        'address station type age s value', 'N7:0 1 int16 * 5', 'C5:0.ACC 1 int16 * 5']
+    # What a narrower window did with the lines before is not known: it begins at its top.
+    assert show((52, 9)) == healed[1:]
 
 
 def test_table_marks_changes_and_says_what_does_not_fit(draw: Draw) -> None:
