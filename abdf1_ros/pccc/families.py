@@ -20,7 +20,9 @@ from abdf1_ros.counters import Counters
 from abdf1_ros.errors import FormatError
 from abdf1_ros.pccc import gateways
 from abdf1_ros.pccc.access import Access
-from abdf1_ros.pccc.address import Address
+from abdf1_ros.pccc.address import Address, AddressSyntaxError
+from abdf1_ros.pccc.address_advice import corrections
+from abdf1_ros.pccc.address_range import AddressRange, read_range
 from abdf1_ros.pccc.dialect import Dialect
 from abdf1_ros.pccc.family import Family
 from abdf1_ros.pccc.file_types import PlcType
@@ -68,7 +70,30 @@ def parse_address(text: str, plc_type: PlcType, access: Access | None = None) ->
 
     Raises AddressSyntaxError or AddressRangeError, whose text says what would be right.
     """
-    return FAMILIES[plc_type].addressing.parse(text, access)
+    found = parse_range(text, plc_type, access)
+    if isinstance(found, AddressRange):
+        raise AddressSyntaxError(f'write {found.first}, and Length {found.length()}')
+    return found
+
+
+def parse_range(text: str, plc_type: PlcType,
+                access: Access | None = None) -> Address | AddressRange:
+    """Read the text of an address or of a range; raises what ``parse_address`` does."""
+    addressing = FAMILIES[plc_type].addressing
+
+    def parse(part: str) -> Address:
+        return addressing.parse(part, access)
+
+    try:
+        return read_range(text, parse)
+    except AddressSyntaxError:
+        for reason, right in corrections(text):
+            try:
+                read_range(right, parse)
+            except FormatError:
+                continue
+            raise AddressSyntaxError(f'{reason}; write {right}') from None
+        raise
 
 
 def dialect_of(plc_type: PlcType, access: Access | None = None,

@@ -32,7 +32,6 @@ from typing import ClassVar
 
 from abdf1_ros.pccc.access import Access
 from abdf1_ros.pccc.address import Address, Addressing, AddressRangeError, AddressSyntaxError, BITS
-from abdf1_ros.pccc.address_advice import advice
 from abdf1_ros.pccc.file_types import FileType, FUNCTION_FILES
 from abdf1_ros.text import shown
 
@@ -60,7 +59,7 @@ class FileAddressing(Addressing):
     def parse(self, text: str, access: Access | None = None) -> Address:
         """Read an address; an error says what would be right."""
         text = text.strip().upper()
-        if found := self.mistaken(text) or advice(text):
+        if found := self.mistaken(text):
             raise AddressSyntaxError(found)
         match = _FORM.fullmatch(text)
         if match is None:

@@ -113,11 +113,12 @@ MAP_COLUMNS = (
            'Read, Write, ReadWrite; Serve: words of ours that PLCs read and write; Heartbeat: a '
            'word that counts while its conditions hold',
            kind=member_of(Command)),
-    Column('Address', None, 'PLC address of the first element'),
+    Column('Address', None,
+           'PLC address of the first element, or a range such as N7:0-9 or B3:1/0-7'),
     Column('Station', None,
            '0-254; of a Write also 255, all stations, none of which confirms; of a Serve our own'),
     Column('PLC_Type', None, 'PLC2, PLC3, PLC5 or SLC; a MicroLogix is SLC'),
-    Column('Length', '1',
+    Column('Length', '1; of a range its size',
            'elements: bits, words, floats; of timers, counters and control their words; of a '
            'string in N or A words the words',
            kind=whole(1, 65535)),

@@ -81,8 +81,10 @@ def _heartbeat(row: Row, values: Cells, mapping: Mapping, fault: ReportFault) ->
     """Return what a row with Command Heartbeat asks for (rules 1, 3 and 4)."""
     if row.get('Period') and _PERIODS.read(row.get('Period')) is None:
         fault('Period', f'Period = "{row.get("Period")}" should be {_PERIODS.right}')
-    if row.get('Length') not in ('', '1'):
-        fault('Length', 'a heartbeat is one word', is_superfluous=True)
+    if mapping.length != 1:
+        has_length = bool(row.get('Length'))
+        fault('Length' if has_length else 'Address', 'a heartbeat is one word',
+              is_superfluous=has_length)
     address = mapping.address
     if not counts(mapping.type, 1) or address.bit is not None:
         fault('Type' if row.get('Type') else 'Address',

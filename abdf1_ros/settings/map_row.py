@@ -25,7 +25,8 @@ from abdf1_ros.messages import Message
 from abdf1_ros.numbers import is_digits, Kind, member_of, one_of, whole
 from abdf1_ros.pccc.access import Access
 from abdf1_ros.pccc.address import Address, AddressRangeError, AddressSyntaxError
-from abdf1_ros.pccc.families import FAMILIES, parse_address
+from abdf1_ros.pccc.address_range import AddressRange
+from abdf1_ros.pccc.families import FAMILIES, parse_range
 from abdf1_ros.pccc.file_types import FileType, PlcType
 from abdf1_ros.pccc.processor import Processor
 from abdf1_ros.pccc.structures import type_fault, write_fault, wrong_type
@@ -116,8 +117,9 @@ class RowReader:
                               Message.ERR_BAD_STATION, MAX_STATION + 1)
         plc_type = self._plc_type()
         access = self._access(plc_type, command) if plc_type else None
-        address = self._address(plc_type, access) if plc_type else None
-        values = {
+        place = self._place(plc_type, access) if plc_type else None
+        address = place.first if isinstance(place, AddressRange) else place
+        values: dict[str, Any] = {
             'Tag': self._row.get('Tag'), 'Command': command, 'Station': station,
             'Via': self._via(station), 'PLC_Type': plc_type, 'Access': access,
             'Address': address, 'Processor': self._processor(plc_type, address)}
@@ -125,6 +127,8 @@ class RowReader:
             if column.kind and column.name not in values and (
                     command is None or not column.why_not(command)):
                 values[column.name] = self._value(column.name, column.kind)
+        if isinstance(place, AddressRange):
+            values['Length'] = self._length_of(place, values.get('Type'), values.get('Length'))
         return {column: value for column, value in values.items() if value is not None}
 
     def _mapping(self, values: dict[str, Any]) -> Mapping | None:
@@ -221,16 +225,33 @@ class RowReader:
                                    f'{address.file}; {having(address)} may have it')
         return processor
 
-    def _address(self, plc_type: PlcType, access: Access | None) -> Address | None:
+    def _place(self, plc_type: PlcType, access: Access | None) -> Address | AddressRange | None:
         text = self._row.get('Address')
         try:
-            return parse_address(text, plc_type, access)
+            return parse_range(text, plc_type, access)
         except AddressSyntaxError as error:
-            self._fault('Address', f'{error}{hint(text)}', Message.ERR_ADDRESS_SYNTAX, shown(text))
+            self._bad_syntax(error)
         except AddressRangeError as error:
             self._fault('Address', str(error), Message.ERR_ADDRESS_RANGE, shown(text),
                         shown(self._row.get('Length')) or 1)
         return None
+
+    def _bad_syntax(self, error: AddressSyntaxError) -> None:
+        text = self._row.get('Address')
+        self._fault('Address', f'{error}{hint(text)}', Message.ERR_ADDRESS_SYNTAX, shown(text))
+
+    def _length_of(self, place: AddressRange, kind: ValueType | None,
+                   given: int | None) -> int | None:
+        """Return the Length of a range, with which a Length that is given has to agree."""
+        try:
+            length = place.length(kind)
+        except AddressSyntaxError as error:
+            self._bad_syntax(error)
+            return None
+        if given not in (None, length):
+            self._fault('Length', f'{shown(self._row.get("Address"))} has Length {length}, not '
+                                  f'{given}')
+        return length
 
     def _check(self, mapping: Mapping) -> None:
         """Check what depends on more than one column."""

@@ -38,9 +38,10 @@ from abdf1_ros.df1.tasks import TaskSource
 from abdf1_ros.errors import FormatError, LinkError, RemoteError
 from abdf1_ros.numbers import decimal_number, Kind, member_of, one_of, whole, whole_number
 from abdf1_ros.pccc.address import Address
+from abdf1_ros.pccc.address_range import AddressRange
 from abdf1_ros.pccc.data_table import DataTable, NoSuchFile
 from abdf1_ros.pccc.emulated import EmulatedProcessor, Setting
-from abdf1_ros.pccc.families import dialect_of, FAMILIES, parse_address, served_counters
+from abdf1_ros.pccc.families import dialect_of, FAMILIES, parse_range, served_counters
 from abdf1_ros.pccc.file_types import PlcType
 from abdf1_ros.pccc.server import Server
 from abdf1_ros.pccc.status import check_status
@@ -309,7 +310,7 @@ def _load_row(row: Row, plcs: dict[int, SimulatedPlc],
               make: Callable[[int, PlcType, int | None], SimulatedPlc]) -> None:
     station = _value(row, 'Station', whole(0, MAX_STATION))
     via = _value(row, 'Via', whole(1, MAX_STATION)) if row.get('Via') else None
-    length = _value(row, 'Length', whole(1, 1000)) if row.get('Length') else 1
+    length = _value(row, 'Length', whole(1, 1000)) if row.get('Length') else None
     motion = _value(row, 'Motion', member_of(Motion))
     plc_type = _value(row, 'PLC_Type', one_of({kind.value: kind for kind in FAMILIES}))
     if station not in plcs:
@@ -323,8 +324,10 @@ def _load_row(row: Row, plcs: dict[int, SimulatedPlc],
         plc.processor.processor = _value(row, 'Processor', one_of({
             entry.value: entry for entry in FAMILIES[plc_type].by_processor}))
     try:
-        address = parse_address(row.get('Address'), plc_type)
-        codec = _natural_codec(address, length)
+        address, size = _place(row, plc_type)
+        codec = _natural_codec(address, length or size)
+        if size not in (1, codec.length):
+            raise Problem(row.where('Length'), f'{row.get("Address")} has Length {size}')
         _check_extent(row, address, codec)
         plc.table.create(address, codec.words)
     except (FormatError, NoSuchFile) as error:
@@ -355,6 +358,14 @@ def _check_extent(row: Row, address: Address, codec: Codec) -> None:
     if address.offset + codec.words > address.area_size:
         last = address.at_offset(address.area_size - 1)
         raise Problem(row.where('Length'), f'the last word there can be is {last}')
+
+
+def _place(row: Row, plc_type: PlcType) -> tuple[Address, int]:
+    """Return the address, and the Length that it gives: 1 without a range."""
+    found = parse_range(row.get('Address'), plc_type)
+    if isinstance(found, AddressRange):
+        return found.first, found.length()
+    return found, 1
 
 
 def _natural_codec(address: Address, length: int) -> Codec:

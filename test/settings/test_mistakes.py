@@ -65,8 +65,6 @@ SPREADSHEET = ('; a spreadsheet may have made a date or time of it: give the col
     ('05.03.2026', FORM + SPREADSHEET),
     ('"=""N7:0"""', FORM + '; signs that only a spreadsheet needs: write N7:0'),
     ("'N7:0", FORM + '; signs that only a spreadsheet needs: write N7:0'),
-    ('N7:0 - N7:9', 'write N7:0, and Length 10'), ('N7:0..9', 'write N7:0, and Length 10'),
-    ('N7:0...N7:9', 'write N7:0, and Length 10'), ('N7:0 to N7:9', 'write N7:0, and Length 10'),
     ('N7:0 L10', 'write N7:0, and Length 10'), ('N7:10 [10]', 'write N7:10, and Length 10'),
     ('N7:10 [' + 5000 * '9' + ']', 'write type, file, ":", element, as in N7:0, '
      'B3:1/5, T4:0.ACC or I:1.0/3'),

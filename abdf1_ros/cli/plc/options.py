@@ -200,9 +200,9 @@ def _add_data_options(parser: argparse.ArgumentParser,
 def _add_addresses(parser: argparse.ArgumentParser) -> None:
     _add_data_options(parser)
     parser.add_argument('addresses', metavar='ADDRESS', nargs='+',
-                        help='such as N7:0, B3:0/5, T4:0.ACC, ST9:1')
-    parser.add_argument('--length', metavar='N', default='1',
-                        help='elements of each address (default: %(default)s)')
+                        help='such as N7:0, N7:0-9, B3:0/5, B3:0/0-7, T4:0.ACC, ST9:1')
+    parser.add_argument('--length', metavar='N',
+                        help='elements of each address (default: 1, or those of the range)')
     parser.add_argument('--map', metavar='FILE',
                         help='a map CSV, whose tags are shown beside the addresses')
     parser.add_argument('--radix', type=str.lower, choices=tuple(RADIXES), default='dec',

@@ -76,10 +76,11 @@ _Wanted: TypeAlias = tuple[Cells, data.Tags | None]
 _UNCERTAIN = (Outcome.UNKNOWN, Outcome.PARTLY)
 
 
-def _cells(options: argparse.Namespace, command: Command, length: int | str) -> Cells:
+def _cells(options: argparse.Namespace, command: Command, length: int | str | None) -> Cells:
     """Return what the options say of the columns of a map CSV."""
-    given = {'Command': command.value, 'Station': str(options.station), 'Length': str(length),
-             'Type': options.type, 'Word_Order': options.word_order, 'Access': options.access,
+    given = {'Command': command.value, 'Station': str(options.station),
+             'Length': None if length is None else str(length), 'Type': options.type,
+             'Word_Order': options.word_order, 'Access': options.access,
              'Processor': options.processor, 'PLC_Type': options.plc_type,
              'Via': None if options.via is None else str(options.via)}
     return {column: text for column, text in given.items() if text}

@@ -398,7 +398,7 @@ def test_watch_redraws_a_table_on_a_terminal(line: str) -> None:
     os.close(ours)
     assert process.wait(20) == 0
     assert b'\x1b[2A\x1b[Kaddress' in screen
-    assert screen.rstrip().endswith(b'1200')
+    assert screen.endswith(b'1200\r\n\x1b[J')
 
 
 def test_write_names_its_station_where_there_may_be_several(plc: Plc) -> None:

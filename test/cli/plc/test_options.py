@@ -29,7 +29,7 @@ def parse(*args: str) -> argparse.Namespace:
 def test_options_that_are_left_out_have_defaults() -> None:
     read = parse('read', 'N7:0')
     assert (read.command, read.addresses) == ('read', ['N7:0'])
-    assert (read.length, read.radix) == ('1', 'dec')
+    assert (read.length, read.radix) == (None, 'dec')
     assert read.plc_type is read.type is read.access is read.word_order is None
     assert read.station is parse('status').station is parse('files').station is None
     assert parse('scan').stations == tuple(range(32))
