@@ -40,7 +40,7 @@ from typing import Any
 import rclpy
 from rclpy.clock import Clock, ClockType
 from rclpy.duration import Duration
-from rclpy.event_handler import SubscriptionEventCallbacks
+from rclpy.event_handler import SubscriptionEventCallbacks, UnsupportedEventTypeError
 from rclpy.exceptions import InvalidTopicNameException
 from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, LivelinessPolicy, QoSProfile, ReliabilityPolicy
@@ -77,21 +77,25 @@ class InterlockConsumer(Node):
             depth=1, reliability=ReliabilityPolicy.RELIABLE,
             durability=DurabilityPolicy.TRANSIENT_LOCAL, deadline=time,
             liveliness=LivelinessPolicy.MANUAL_BY_TOPIC, liveliness_lease_duration=time)
-        self._subscription = self.create_subscription(
-            UInt8MultiArray, topic, self._received, qos,
-            event_callbacks=SubscriptionEventCallbacks(
-                deadline=lambda event: self._stopped(),
-                liveliness=self._liveliness,
+        try:
+            self._subscribe(topic, qos, SubscriptionEventCallbacks(
+                deadline=lambda event: self._stopped(), liveliness=self._liveliness,
                 incompatible_qos=self._incompatible))
-        # DDS reports no missed deadline before the first value, so the start has a timer. The
-        # node's own clock may be a simulation's, which need not run.
-        self._start_timer = self.create_timer(
-            patience, self._still_silent, clock=Clock(clock_type=ClockType.STEADY_TIME))
+        except UnsupportedEventTypeError:  # rmw_zenoh has neither event
+            self._subscribe(topic, qos, SubscriptionEventCallbacks())
+        # DDS reports no missed deadline before the first value, and not every RMW does so later.
+        # The node's own clock may be a simulation's, which need not run.
+        self._silence = self.create_timer(
+            patience, self._silent, clock=Clock(clock_type=ClockType.STEADY_TIME))
         self.create_service(Trigger, '~/reset', self._reset)
         self._decide(False, self._why_not)
 
+    def _subscribe(self, topic: str, qos: QoSProfile, events: SubscriptionEventCallbacks) -> None:
+        self._subscription = self.create_subscription(
+            UInt8MultiArray, topic, self._received, qos, event_callbacks=events)
+
     def _received(self, message: UInt8MultiArray) -> None:
-        self._start_timer.cancel()
+        self._silence.reset()
         self._is_fresh = True
         self._why_not = self._missing_in(message)
         if self._why_not:
@@ -119,7 +123,7 @@ class InterlockConsumer(Node):
             self._stopped()
 
     def _stopped(self) -> None:
-        """Withdraw the permit until a person resets; both events come for the same silence."""
+        """Withdraw the permit until a person resets; events and timer come for one silence."""
         self._is_fresh = self._is_reset = False
         self._decide(False, 'values have stopped')
 
@@ -128,10 +132,12 @@ class InterlockConsumer(Node):
         if not self._is_fresh:
             self._decide(False, f'the bridge does not promise a value every {self._patience:g} s')
 
-    def _still_silent(self) -> None:
-        self._start_timer.cancel()
+    def _silent(self) -> None:
+        self._silence.cancel()  # until the next value
         if self._text == 'no value yet':
             self._decide(False, 'nothing heard since the start')
+        elif self._is_fresh:
+            self._stopped()
 
     def _reset(self, request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
         """

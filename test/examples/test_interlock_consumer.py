@@ -22,6 +22,7 @@ from types import SimpleNamespace
 
 import pytest
 import rclpy
+from rclpy import event_handler
 from std_msgs.msg import MultiArrayDimension, MultiArrayLayout, UInt8MultiArray
 from std_srvs.srv import Trigger
 from support.ros import Observer, Process
@@ -117,6 +118,33 @@ def test_permit_comes_back_by_itself_only_where_that_is_wanted(latches: bool) ->
         assert cell.permitted is not latches
         cell._liveliness(SimpleNamespace(alive_count=-1))  # its change to 1 went to others
         assert not cell.permitted
+        cell.destroy_node()
+    finally:
+        rclpy.shutdown()
+
+
+def unsupported(**kwargs: object) -> None:
+    """Refuse an event, as rmw_zenoh refuses deadlines and liveliness."""
+    raise event_handler.UnsupportedEventTypeError('not supported')
+
+
+def test_silence_takes_the_permit_where_the_rmw_has_no_events(
+        monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(event_handler, 'EventHandler', unsupported)
+    rclpy.init(args=[])
+    try:
+        cell = EXAMPLE_MODULE.InterlockConsumer('/nobody/read/bits', [0], 0.3)
+        cell._received(bits_of(1))
+        assert cell._reset(Trigger.Request(), Trigger.Response()).success
+        cell._received(bits_of(1))
+        assert cell.permitted
+        for _ in range(100):
+            if not cell.permitted:
+                break
+            rclpy.spin_once(cell, timeout_sec=0.1)
+        assert not cell.permitted
+        cell._received(bits_of(1))
+        assert not cell.permitted, 'a person has to reset'
         cell.destroy_node()
     finally:
         rclpy.shutdown()
