@@ -204,7 +204,9 @@ def test_messages_that_dds_drops_are_counted(
 # Writes that do not go well
 
 def test_results_of_all_writes_that_wait_fit_into_their_queue(make_bench: Benches) -> None:
-    assert make_bench(PULSES).node._surroundings.results.qos_profile.depth == MAX_WAITING_WRITES
+    depths = {publisher.topic_name: publisher.qos_profile.depth
+              for publisher in make_bench(PULSES).node.publishers}
+    assert depths['/abdf1/write_results'] == MAX_WAITING_WRITES
 
 
 def test_reply_to_a_command_of_an_earlier_run_is_no_error(

@@ -40,6 +40,7 @@ class GuestPlaces(GuestListener):
         self._driver = driver
         self._opener = opener
         self._notes = notes
+        self._has_begun = False
         network = configuration.network
         if configuration.parameters.read_only:
             network = replace(network, share_access='Read')
@@ -47,9 +48,11 @@ class GuestPlaces(GuestListener):
                       for place in share_places(network.share)]
 
     def start(self) -> None:
-        """Let guests connect."""
-        for line in self.lines:
-            line.start()
+        """Let guests connect, if they may not yet."""
+        if not self._has_begun:
+            self._has_begun = True
+            for line in self.lines:
+                line.start()
 
     def stop(self) -> None:
         """Let go of the guests."""

@@ -32,6 +32,7 @@ from abdf1_ros.ports.link_thread import LinkThread, PortState
 from abdf1_ros.ports.settings import PortSettings
 from abdf1_ros.ports.trace import PortOpener
 from abdf1_ros.problems import ConfigurationError
+from abdf1_ros.ros.bridge.offer import OfferedPublisher
 from abdf1_ros.ros.bridge.session import Session, Surroundings, tell_plcs
 from abdf1_ros.ros.diagnostics.graph import DISCOVERY, Graph, NameWatch
 from abdf1_ros.ros.diagnostics.log import bug_text
@@ -56,6 +57,8 @@ from rclpy.node import Node
 from std_msgs.msg import UInt16MultiArray
 from std_srvs.srv import SetBool, Trigger
 
+_POLLING = '~/polling'
+
 # Of the end (s): until when, counted from its beginning, writes that have come are waited for and
 # last diagnostics are begun; how long these may take, where a subscriber is stuck.
 _LATEST_WRITES = 3.0
@@ -77,7 +80,8 @@ class BridgeNode(Node):
                  port_owners: PortOwners | None = None,
                  arguments: Arguments = NO_ARGUMENTS, **kwargs: Any) -> None:
         super().__init__(name, automatically_declare_parameters_from_overrides=True, **kwargs)
-        self._is_stuck = self._is_ending = False
+        self._is_stuck = self._is_ending = self._is_changing = False
+        self._offered_services: dict[str, Any] = {}
         self._hold_ports = partial(
             (port_owners or PortOwners()).hold, self.get_fully_qualified_name())
         try:
@@ -95,17 +99,19 @@ class BridgeNode(Node):
         super().destroy_node()
 
     def _set_up(self, configuration: Configuration, graph: Graph) -> None:
+        self._configuration = configuration
         self._opener = self._make_opener(configuration)
         self.writes = WriteTopics(self)
         self._surroundings = Surroundings(
-            self, graph, NameWatch(self.get_fully_qualified_name(), lambda now: graph.nodes(
-                self.get_name(), self.get_namespace(), now), line_time() + DISCOVERY),
-            self._opener,
+            self, graph, self._name_watch(graph), self._opener,
             # All writes that wait can end at once, faster than a subscriber takes their results.
-            self.create_publisher(DiagnosticStatus, '~/write_results', MAX_WAITING_WRITES),
-            self.create_publisher(UInt16MultiArray, '~/active_stations', latched_qos()),
+            OfferedPublisher(self, DiagnosticStatus, '~/write_results', MAX_WAITING_WRITES,
+                             most=MAX_WAITING_WRITES),
+            OfferedPublisher(self, UInt16MultiArray, '~/active_stations', latched_qos(), most=1),
             self.create_publisher(DiagnosticArray, '/diagnostics', 10),
-            self.create_publisher(DiagnosticArray, '~/snapshot', 1), self.writes)
+            OfferedPublisher(self, DiagnosticArray, '~/snapshot', 1, most=1), self.writes)
+        if not configuration.parameters.standby:
+            self._offer()
         self.session = Session(self._surroundings, configuration)
         self.writes.give_to(self.session.writers)
         self.link = self._surroundings.link = LinkThread(
@@ -113,7 +119,6 @@ class BridgeNode(Node):
             on_state=self._port_changed, on_fault=self._fault,
             while_sending=self.session.reads.publish_later_values)
         self.session.begin()
-        self._create_services()
 
     def _make_opener(self, configuration: Configuration) -> PortOpener:
         parameters, network = configuration.parameters, configuration.network
@@ -127,12 +132,64 @@ class BridgeNode(Node):
                 lambda text: self.get_logger().error(f'trace_file: {printable(text)}'))
         return opener
 
-    def _create_services(self) -> None:
-        self.create_service(Trigger, '~/reset_counters', self._reset_counters)
-        self.create_service(Trigger, '~/reload', self._reload)
-        self.create_service(SetBool, '~/polling', self._set_polling)
-        self.create_service(Trigger, '~/read_link_counters', self._read_link_counters,
-                            callback_group=MutuallyExclusiveCallbackGroup())
+    def _name_watch(self, graph: Graph) -> NameWatch:
+        """Return what finds another node of our name; that of a spare is meant."""
+        name, namespace = self.get_name(), self.get_namespace()
+        is_spare = self._configuration.parameters.standby
+        return NameWatch(
+            self.get_fully_qualified_name(),
+            lambda now: 1 if is_spare else graph.nodes(name, namespace, now),
+            line_time() + DISCOVERY)
+
+    @property
+    def _offered_topics(self) -> tuple[OfferedPublisher, ...]:
+        """Return those that a spare does not have."""
+        there = self._surroundings
+        return there.results, there.active_stations, there.snapshot
+
+    def _offer(self) -> None:
+        """Make all topics and services that are not those of the map."""
+        self._surroundings.is_offered = True
+        for publisher in self._offered_topics:
+            publisher.offer()
+        for name, kind, answer, group in (
+                ('~/reset_counters', Trigger, self._reset_counters, None),
+                ('~/reload', Trigger, self._reload, None),
+                (_POLLING, SetBool, self._set_polling, None),
+                ('~/read_link_counters', Trigger, self._read_link_counters,
+                 MutuallyExclusiveCallbackGroup())):
+            if name not in self._offered_services:
+                self._offered_services[name] = self.create_service(
+                    kind, name, answer, callback_group=group)
+
+    def _look_for_line(self) -> None:
+        """Begin to offer, or to wait, where the line has become ours, or is not ours any more."""
+        has_line, is_offered = self.session.has_line, self._surroundings.is_offered
+        if has_line is is_offered or self._is_changing or self._is_ending \
+                or self.executor is None:
+            return
+        self._is_changing = True
+        self.executor.create_task(self._take_line if has_line else self._leave_line)
+
+    def _take_line(self) -> None:
+        """Offer everything: the line is ours."""
+        self.get_logger().info('has the line: it begins to publish and to take writes')
+        self._offer()
+        self.session.offer()
+        self._is_changing = False
+
+    def _leave_line(self) -> None:
+        """Withdraw everything but what takes a line that was left: another may have it."""
+        self.get_logger().warning('has lost the line: it waits, and is silent')
+        self._surroundings.is_offered = False
+        for name in [*self._offered_services]:
+            if name != _POLLING or not self.link.is_released:
+                self.destroy_service(self._offered_services.pop(name))
+        self.session.withdraw()
+        for publisher in self._offered_topics:
+            publisher.withdraw()
+            publisher.forget()
+        self._is_changing = False
 
     @property
     def has_failed(self) -> bool:
@@ -142,7 +199,8 @@ class BridgeNode(Node):
     def start(self) -> None:
         """Open the port and begin to read."""
         self.link.start()
-        self.session.guests.start()
+        if self._surroundings.is_offered:
+            self.session.guests.start()
 
     def begin_end(self) -> None:
         """Begin the end, as ``Session`` does; no request takes it back."""
@@ -156,12 +214,15 @@ class BridgeNode(Node):
         self._opener.close()
         self.session.publish_diagnostics(line_time())
         # Messages that are still under way would be lost with their publisher.
-        for publisher in (self._surroundings.results, self._surroundings.diagnostics):
-            publisher.wait_for_all_acked(Duration(seconds=max(0.0, give_up - time.monotonic())))
+        self._surroundings.results.wait_for_all_acked(max(0.0, give_up - time.monotonic()))
+        self._surroundings.diagnostics.wait_for_all_acked(
+            Duration(seconds=max(0.0, give_up - time.monotonic())))
 
     def check(self) -> None:
         """Publish what is due; take writes after the first look for a node of our name."""
         self.session.check()
+        if self._configuration.parameters.standby:
+            self._look_for_line()
         if self._surroundings.names.has_looked:
             self.writes.begin()
 

@@ -24,6 +24,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
+import math
 import random
 import time
 from typing import Any
@@ -35,6 +36,7 @@ from abdf1_ros.ports.clock import line_time
 from abdf1_ros.ports.link_thread import LinkThread, PortState
 from abdf1_ros.ports.trace import PortOpener
 from abdf1_ros.ros.bridge.guests import GuestPlaces
+from abdf1_ros.ros.bridge.offer import OfferedPublisher
 from abdf1_ros.ros.diagnostics.events import LineEvents
 from abdf1_ros.ros.diagnostics.graph import Graph, NameWatch, TypeWatch
 from abdf1_ros.ros.diagnostics.stations import LinkCounterService
@@ -46,7 +48,7 @@ from abdf1_ros.ros.topics.interlocks import InterlockWatch
 from abdf1_ros.ros.topics.messages import ACTIVE_LAYOUT
 from abdf1_ros.ros.topics.reads import ReadTopic, ReadTopics
 from abdf1_ros.ros.topics.snapshot import Snapshot
-from abdf1_ros.ros.topics.writes import WriteTopics
+from abdf1_ros.ros.topics.writes import WriteTopic, WriteTopics
 from abdf1_ros.settings.mapping import Mapping
 from abdf1_ros.text import first, printable
 from diagnostic_msgs.msg import DiagnosticArray
@@ -68,19 +70,21 @@ class Surroundings:
     """
     What belongs to the process and outlives the files.
 
-    ``published`` and ``subscriptions`` are those of the topics, kept where the next files have the
-    same row. ``link`` is there once the first session has a machine for it.
+    ``published`` are the read topics, kept where the next files have the same row. ``is_offered``
+    tells whether topics and services are there. ``link`` is there once the first session has a
+    machine for it.
     """
 
     node: Node
     graph: Graph
     names: NameWatch
     opener: PortOpener
-    results: Any
-    active_stations: Any
+    results: OfferedPublisher
+    active_stations: OfferedPublisher
     diagnostics: Any
-    snapshot: Any
+    snapshot: OfferedPublisher
     writes: WriteTopics
+    is_offered: bool = False
     published: dict[str, ReadTopic] = field(default_factory=dict)
     active_words: Sequence[int] = ()
     link: LinkThread = field(init=False)
@@ -111,10 +115,11 @@ class Session:
             scans=not network.line_mode.has_one_plc, seen=self._seen, read=self.reads.read,
             results=surroundings.results, table_changed=self._publish_active)
         self.driver = Driver(network, mappings, configuration.driver_settings(), self._events)
-        # Subscriptions first: where there are thousands of publishers, each takes DDS 5 ms.
-        self.writers = surroundings.writes.open(
-            self.driver, parameters.write_timeout, self._events.lost, self._wake_link)
-        self.reads.open(self.driver.points)
+        self.writers: dict[str, WriteTopic] = {}
+        if surroundings.is_offered:
+            # Subscriptions first: where there are thousands of publishers, each takes DDS 5 ms.
+            self.writers = self._open_writers()
+            self.reads.open(self.driver.points)
         self.guests = GuestPlaces(configuration, self.driver, surroundings.opener,
                                   self._events.notes, self._wake_link)
         self.diagnostics = Diagnostics(
@@ -129,6 +134,7 @@ class Session:
         self.link_counters = LinkCounterService(
             self.driver, self._wake_link, surroundings.wake_executor)
         self._port_text = ''
+        self._opened = math.inf
         self._levels: list[bytes] = []
         self._next_diagnostics = self._next_snapshot = 0.0
         self._snapshot: Snapshot | None = None
@@ -138,6 +144,39 @@ class Session:
     @property
     def port(self) -> str:
         return self.configuration.port
+
+    def _open_writers(self) -> dict[str, WriteTopic]:
+        return self._surroundings.writes.open(
+            self.driver, self.configuration.parameters.write_timeout, self._events.lost,
+            self._wake_link)
+
+    @property
+    def has_line(self) -> bool:
+        """
+        Tell whether no other program can have the line.
+
+        A device is ours while it is open. A device server may keep us waiting though it has
+        accepted our connection, so there a station has to answer.
+        """
+        stations = [*self.driver.stations]
+        return self._surroundings.link.state.is_open and (
+            '://' not in self.port or not stations
+            or any(station.last_heard is not None and station.last_heard >= self._opened
+                   for station in stations))
+
+    def offer(self) -> None:
+        """Make the topics of the map, while the driver has the line."""
+        self.writers = self._open_writers()
+        self._surroundings.writes.give_to(self.writers)
+        self.reads.offer(self.driver.points)
+        self._surroundings.active_words = ()
+        self._publish_active()
+        self.guests.start()
+
+    def withdraw(self) -> None:
+        """Close the topics of the map; the line is not ours any more."""
+        self._surroundings.writes.withdraw()
+        self.reads.withdraw()
 
     def begin(self) -> None:
         """Tell of the files; the driver is on the line, or is about to be."""
@@ -187,6 +226,7 @@ class Session:
         if state.text == self._port_text:
             return  # an attempt that failed like the one before
         self._port_text = state.text
+        self._opened = line_time() if state.is_open else math.inf
         self._events.port_changed()
         self._publish_active()
         is_meant = state.is_open or self._surroundings.link.is_released
@@ -202,7 +242,7 @@ class Session:
         for watch in self._watches:
             for news in watch.look(now):
                 self._events.notes.tell(news)
-        levels = self.diagnostics.levels(now)
+        levels = self.diagnostics.levels(now, is_waiting=not self._surroundings.is_offered)
         if now >= self._next_diagnostics or levels != self._levels:
             self._levels = levels
             self.publish_diagnostics(now)
@@ -213,7 +253,8 @@ class Session:
         period = self.configuration.parameters.diagnostics_period
         self._next_diagnostics = now + period - (now - self._phase) % period
         self._publish(self._surroundings.diagnostics,
-                      DiagnosticArray(status=self.diagnostics.statuses(now)))
+                      DiagnosticArray(status=self.diagnostics.statuses(
+                          now, is_waiting=not self._surroundings.is_offered)))
 
     def _publish_snapshot(self, now: float) -> None:
         """Publish all values where that is due and there is a subscriber."""
@@ -221,7 +262,7 @@ class Session:
         if not period or now < self._next_snapshot:
             return
         self._next_snapshot = now + period
-        if self._surroundings.snapshot.get_subscription_count():
+        if self._surroundings.snapshot.has_subscribers():
             self._snapshot = self._snapshot or Snapshot(self.driver.points, self.reads.latest)
             self._publish(self._surroundings.snapshot, self._snapshot.message(now))
 

@@ -25,6 +25,7 @@ from abdf1_ros.ros.diagnostics.interlocks import InterlockStatus
 from abdf1_ros.ros.diagnostics.line import LineView
 from abdf1_ros.ros.diagnostics.link import CountersStatus, LinkStatus
 from abdf1_ros.ros.diagnostics.mappings import MappingsStatus
+from abdf1_ros.ros.diagnostics.standby import StandbyStatus
 from abdf1_ros.ros.diagnostics.stations import StationStatus
 from abdf1_ros.ros.diagnostics.status import message_of, Seen, Status, WORDS
 from abdf1_ros.ros.diagnostics.writes import WriteLog
@@ -55,14 +56,18 @@ class Diagnostics:
             self._statuses.append(InterlockStatus(driver, port, seen))
         if guests:
             self._statuses.append(GuestsStatus(guests, port))
+        self._waiting: list[Status] = [StandbyStatus(self.line, port, seen)]
 
-    def levels(self, now: float) -> list[bytes]:
-        """Return the level of every status."""
-        return [status.judge(now)[0] for status in self._statuses]
+    def levels(self, now: float, *, is_waiting: bool = False) -> list[bytes]:
+        """Return the level of every status; that of a spare alone while it waits."""
+        return [status.judge(now)[0] for status in self._shown(is_waiting)]
 
-    def statuses(self, now: float) -> list[DiagnosticStatus]:
-        """Return every status."""
-        return [self._message(status, now) for status in self._statuses]
+    def statuses(self, now: float, *, is_waiting: bool = False) -> list[DiagnosticStatus]:
+        """Return every status; that of a spare alone while it waits."""
+        return [self._message(status, now) for status in self._shown(is_waiting)]
+
+    def _shown(self, is_waiting: bool) -> Sequence[Status]:
+        return self._waiting if is_waiting else self._statuses
 
     def _message(self, status: Status, now: float) -> DiagnosticStatus:
         level, text = status.judge(now)

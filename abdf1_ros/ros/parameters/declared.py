@@ -64,6 +64,9 @@ class Parameters:
         False, 'let the kernel switch an RS-485 transmitter with RTS, where it can')
     strict_map: bool = _parameter(False, 'a bad row in the map ends the process')
     read_only: bool = _parameter(False, 'refuse every write')
+    standby: bool = _parameter(
+        False, 'be silent on all topics and services until the line is ours; for each of two '
+        'hosts that share a line')
     default_period: int = _parameter(
         100, 'ms between reads of a mapping without Period; 0: as often as the line allows',
         0, MAX_PERIOD)

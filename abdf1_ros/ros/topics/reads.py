@@ -76,6 +76,20 @@ class ReadTopics:
         self._topics: dict[str, ReadTopic] = {}
         self._to_come: list[tuple[Mapping, ReadPoint]] = []
 
+    def offer(self, points: MappingType[Mapping, ReadPoint]) -> None:
+        """Make all publishers while the driver runs, and publish what it has read."""
+        self._to_come = list(points.items())
+        self.take_over()
+
+    def withdraw(self) -> None:
+        """Close all publishers; the port is closed, so nothing is being read."""
+        self._topics.clear()
+        self._later.clear()
+        self.latest.clear()
+        for topic in self._published.values():
+            self._node.destroy_publisher(topic.publisher)
+        self._published.clear()
+
     def open(self, points: MappingType[Mapping, ReadPoint]) -> None:  # noqa: A003
         """Have a publisher for each mapping that is read."""
         for mapping, point in points.items():
@@ -96,6 +110,7 @@ class ReadTopics:
             topic = self._topics[mapping.topic] = self._topic(mapping, point, None)
             if mapping.topic in self.latest:  # it may come twice
                 topic.publisher.publish(topic.encode(self.latest[mapping.topic]))
+        self._to_come.clear()
         self._published.clear()
         self._published.update(self._topics)
 

@@ -193,6 +193,13 @@ class WriteTopics:
             losses=LossCounter(partial(count_publishers, self._node, topic)))
             for topic, mappings in wanted.items()}
 
+    def withdraw(self) -> None:
+        """Close all subscriptions."""
+        self._topics = {}
+        for _, subscription in self._subscriptions.values():
+            self._node.destroy_subscription(subscription)
+        self._subscriptions.clear()
+
     def give_to(self, topics: dict[str, WriteTopic]) -> None:
         """Give messages to these from now on."""
         self._topics = topics

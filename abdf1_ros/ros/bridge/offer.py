@@ -1,0 +1,80 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""
+What a bridge offers on ROS, and when: a spare offers nothing until the line is its own.
+
+Two bridges of one name on two hosts may wait for one line. The topics and services of the one that
+waits would answer for the other, so they are not there.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from contextlib import suppress
+from typing import Any
+
+from rclpy.duration import Duration
+from rclpy.impl.implementation_singleton import rclpy_implementation
+from rclpy.node import Node
+
+
+class OfferedPublisher:
+    """
+    A publisher that exists while the bridge ``offers`` it.
+
+    Until then the last ``most`` messages wait: the line may be ours a moment before that is seen.
+    ``publish`` may be called in any thread, the others in that of the executor.
+    """
+
+    def __init__(self, node: Node, kind: type, topic: str, qos: Any, most: int) -> None:
+        self._node = node
+        self._make = kind, topic, qos
+        self._waiting: deque[Any] = deque(maxlen=most)
+        self._publisher: Any = None
+
+    def offer(self) -> None:
+        """Make the publisher, and publish what waits."""
+        self._publisher = self._node.create_publisher(*self._make)
+        self._publish_waiting()
+
+    def withdraw(self) -> None:
+        """Close the publisher."""
+        publisher, self._publisher = self._publisher, None
+        self._node.destroy_publisher(publisher)
+
+    def forget(self) -> None:
+        """Drop what waits: the line was not ours."""
+        self._waiting.clear()
+
+    def publish(self, message: Any) -> None:
+        """Publish a message now, or when the publisher is there."""
+        self._waiting.append(message)
+        if self._publisher is not None:
+            self._publish_waiting()
+
+    def _publish_waiting(self) -> None:
+        publisher = self._publisher
+        # Another thread may have taken the last message, or have closed the publisher.
+        with suppress(IndexError, rclpy_implementation.InvalidHandle):
+            while True:
+                publisher.publish(self._waiting.popleft())
+
+    def has_subscribers(self) -> bool:
+        """Tell whether a message would reach anybody."""
+        return self._publisher is not None and self._publisher.get_subscription_count() > 0
+
+    def wait_for_all_acked(self, patience: float) -> None:
+        """Wait until all subscribers have what was published, for ``patience`` s at most."""
+        if self._publisher is not None:
+            self._publisher.wait_for_all_acked(Duration(seconds=patience))

@@ -1,0 +1,44 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""The status ``standby``: all that a spare says while another bridge has the line."""
+
+from __future__ import annotations
+
+import socket
+
+from abdf1_ros.ros.diagnostics.line import LineView
+from abdf1_ros.ros.diagnostics.status import Judgement, OK, Seen, WARN
+
+
+class StandbyStatus:
+    """Why a spare waits, and whether it could take the line over as its files are now."""
+
+    name = 'standby'
+
+    def __init__(self, line: LineView, port: str, seen: Seen) -> None:
+        self.hardware_id = port
+        self._line = line
+        self._seen = seen
+
+    def judge(self, now: float) -> Judgement:
+        link = self._line.link
+        state = 'not started yet' if link is None else 'the port is open, and no station has ' \
+            'answered' if link.state.is_open else link.state.text
+        text = f'waits on {socket.gethostname()} for the line: {state}'
+        if changed := self._seen.changed_files:
+            return WARN, f'{text}; {", ".join(changed)} changed since read; start it again'
+        return OK, text
+
+    def values(self, now: float) -> dict[str, str]:
+        return {'host': socket.gethostname()}

@@ -1,0 +1,168 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Two bridges of one name for one line: the spare is silent until the line is its own."""
+
+from collections import Counter
+from collections.abc import Iterator
+from pathlib import Path
+import socket
+from typing import Any
+
+from abdf1_ros.ros.bridge.node import BridgeNode
+from diagnostic_msgs.msg import DiagnosticStatus
+import pytest
+from std_msgs.msg import Int16MultiArray, UInt16MultiArray
+from std_srvs.srv import SetBool, Trigger
+from support.cell import BridgeCell
+from support.ros import Observer, OK, ros_args, WARN, write_csv
+
+NET = 'NAK_Retries,ENQ_Retries,Cmd_Timeout,Baud,Timeout\n1,1,5000,115200,3000\n'
+ROWS = """\
+Tag,Command,Address,Station,PLC_Type,Length,Publish,Fallback,Fallback_After
+speed,Read,N7:0,1,PLC5,2,,,
+state,Read,N7:8,1,PLC5,1,Change,,
+recipe,Write,N7:4,1,PLC5,1,,,
+motor,Write,N7:6,1,PLC5,1,,7,60000
+"""
+DATA = 'Station,PLC_Type,Address,Length,Values,Motion,Period\n1,PLC5,N7:0,16,,,\n'
+SERVICES = ('reset_counters', 'reload', 'polling', 'read_link_counters')
+TOPICS = ('read/speed', 'read/state', 'write_results', 'active_stations', 'snapshot')
+
+
+class Pair(BridgeCell):
+    """A bridge and a spare of one name at one port, both with ``standby``."""
+
+    def __init__(self, folder: Path) -> None:
+        super().__init__(folder, DATA, ROWS, NET, 'standby:=true', 'write_timeout:=30.0')
+        self.spare: BridgeNode | None = None
+
+    def start(self) -> None:
+        """Start the bridge, and the spare once the line is not free any more."""
+        super().start()
+        self.ros.until(lambda: self.counts == (1, 1), 'the bridge to have the line')
+        self.spare = BridgeNode(context=self.ros.context, use_global_arguments=False,
+                                cli_args=ros_args(*self._assignments))
+        self.ros.run(self.spare)
+
+    def end(self, *args: Any) -> int:
+        """End both."""
+        if self.spare is not None:
+            self.ros.end(self.spare)
+        return super().end(*args)
+
+    @property
+    def counts(self) -> tuple[int, int]:
+        """Return how many bridges publish values, and how many take commands."""
+        node = self.ros.node
+        return (node.count_publishers('/abdf1/read/speed'),
+                node.count_subscribers('/abdf1/write/recipe'))
+
+    def services(self) -> dict[str, int]:
+        """Return how many bridges answer each service that only the owner of a line has."""
+        found: Counter[str] = Counter()
+        for bridge in (self.node, self.spare):
+            names = [service.srv_name for service in bridge.services] if bridge else []
+            found.update(name for name in SERVICES if f'~/{name}' in names)
+        return dict(found)
+
+    def publish(self, count: int) -> None:
+        """Publish messages, as often as there are bridges that take them, and count results."""
+        publisher = self.ros.publisher(Int16MultiArray, '/abdf1/write/recipe')
+        for number in range(count):
+            wanted = len(self.results) + 1
+            publisher.publish(Int16MultiArray(data=[number]))
+            self.ros.until(lambda wanted=wanted: len(self.results) >= wanted,  # type: ignore[misc]
+                           'a result')
+        assert [result.message for result in self.results if result.name == 'recipe'][-count:] \
+            == ['written'] * count
+
+    def until_status(self, name: str, level: bytes, end: str = '') -> None:
+        """Wait until any bridge has a status at a level, with a text that ends so."""
+        def matches(status: DiagnosticStatus) -> bool:
+            return status.name == f'abdf1: {name}' and status.level == level \
+                and status.message.endswith(end)
+
+        self.diagnostics.until(lambda array: any(map(matches, array.status)), name)
+
+
+@pytest.fixture
+def pair(tmp_path: Path) -> Iterator[Pair]:
+    with Pair(tmp_path) as pair:
+        yield pair
+
+
+def test_spare_is_silent_while_the_other_has_the_line(pair: Pair) -> None:
+    pair.until_status('standby', OK, 'another program has it open')
+    pair.publish(20)
+    assert len(pair.results) == 21  # with the fallback of the start
+    assert pair.counts == (1, 1)
+    assert [pair.ros.node.count_publishers(f'/abdf1/{topic}') for topic in TOPICS] == [1] * 5
+    assert pair.services() == dict.fromkeys(SERVICES, 1)
+
+
+def test_spare_takes_the_line_over_and_offers_everything(pair: Pair) -> None:
+    state = pair.ros.listen(Int16MultiArray, '/abdf1/read/state')
+    state.first()
+    pair.ros.end(pair.node)
+    del pair.results[:], state[:]
+    pair.ros.until(lambda: pair.counts == (1, 1), 'the spare to have the line')
+    assert state.first().data.tolist() == [0]  # of a row that publishes changes, too
+    stations = pair.ros.listen(UInt16MultiArray, '/abdf1/active_stations')
+    stations.until(lambda words: words.data[0] == 2, 'station 1 to be active')
+    pair.ros.until(lambda: 'motor' in [result.name for result in pair.results],
+                   'the result of the fallback that came before the spare was seen')
+    pair.publish(3)
+    pair.until_status('link', OK)
+    assert pair.services() == dict.fromkeys(SERVICES, 1)
+
+
+def test_line_that_is_left_goes_to_the_spare(pair: Pair) -> None:
+    pair.ros.call(SetBool, '/abdf1/polling', SetBool.Request(data=False))
+    pair.ros.until(lambda: pair.services() == dict.fromkeys(SERVICES, 1) | {'polling': 2},
+                   'the spare to have the line')
+    pair.publish(3)
+    assert pair.node.link.is_released
+    pair.ros.call(Trigger, '/abdf1/reset_counters', Trigger.Request())
+
+
+def test_spare_says_that_its_files_have_changed(pair: Pair) -> None:
+    pair.until_status('standby', OK)
+    pair.map.write_text(ROWS.replace('N7:8', 'N7:9'), encoding='utf-8')
+    pair.until_status('standby', WARN, 'map.csv changed since read; start it again')
+
+
+def test_line_that_is_lost_is_offered_no_longer(pair: Pair) -> None:
+    pair.plcs.lose()
+    pair.ros.until(lambda: pair.counts == (0, 0), 'both to wait')
+    pair.ros.until(lambda: not pair.services(), 'no services')
+
+
+def test_spare_in_the_queue_of_a_device_server_waits(tmp_path: Path) -> None:
+    with socket.create_server(('127.0.0.1', 0)) as server, Observer() as ros:  # accepts, is silent
+        write_csv(tmp_path / 'net.csv', NET.splitlines()[0], NET.splitlines()[1:])
+        write_csv(tmp_path / 'map.csv', ROWS.splitlines()[0], ROWS.splitlines()[1:])
+        port = f'socket://127.0.0.1:{server.getsockname()[1]}'
+        diagnostics = ros.diagnostics(port)
+        spare = BridgeNode(context=ros.context, use_global_arguments=False, cli_args=ros_args(
+            f'net_file:={tmp_path / "net.csv"}', f'map_file:={tmp_path / "map.csv"}',
+            f'port:={port}', 'standby:=true'))
+        ros.run(spare)
+        try:
+            diagnostics.until(lambda array: array.status[0].message.endswith(
+                'the port is open, and no station has answered'), 'the spare to wait')
+            assert not ros.node.count_publishers('/abdf1/write_results')
+            assert not {service.srv_name[2:] for service in spare.services} & {*SERVICES}
+        finally:
+            ros.end(spare)
