@@ -255,8 +255,9 @@ class Client(OpenLine):
         """
         Return the value at an address, or a list of ``length`` values from there on.
 
-        ``kind`` is int16, uint16, int32, uint32, float32, bcd16 or string where the natural type
-        of the file is not meant. Bits are bool; a string over words has ``length`` words.
+        ``kind`` is int16, uint16, int32, uint32, float32, bcd16, bcd12 or string where the
+        natural type of the file is not meant. Bits are bool; a string over words
+        has ``length`` words.
         """
         number, target = self._target(
             address, 1 if length is None else length, kind, word_order, station)

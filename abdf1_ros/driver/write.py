@@ -109,9 +109,10 @@ class Write:
 
     @property
     def may_rewrite(self) -> bool:
-        """Tell whether bits may be changed by writing back their word after a refusal."""
+        """Tell whether parts of words may be changed by rewriting them after a refusal."""
         processor = self.mapping.processor
-        return self.is_pulse and processor is not None and processor.may_lack_masked_write
+        return self.mapping.type.is_part and processor is not None \
+            and processor.may_lack_masked_write
 
     def bit_change(self, packet: int) -> tuple[Address, int, int]:
         """Return word, mask and bits of a packet that changes bits."""
@@ -130,7 +131,7 @@ class Write:
     def is_held(self, words: bytes) -> bool:
         """Tell whether the mapping's ``words`` hold the values of this write."""
         codec = self.mapping.codec
-        if isinstance(self.raw, str) or self.is_pulse:
+        if isinstance(self.raw, str) or self.mapping.type.is_part:
             try:
                 held = codec.decode(words)
             except FormatError:

@@ -136,7 +136,7 @@ def _confirmed(requests: Sequence[Request], address: Address) -> Steps[None]:
 def write_requests(address: Address, codec: Codec, values: Sequence[float] | str,
                    dialect: Dialect) -> list[Request]:
     """Return the requests that write checked values."""
-    if codec.type is ValueType.BOOL:
+    if codec.type.is_part:
         assert not isinstance(values, str)
         return [dialect.write_bits(*change) for change in codec.bit_changes(address, values)]
     data = codec.encode(values)

@@ -42,7 +42,9 @@ class ValueType(Enum):
 
     ``words`` are what one element takes in a PLC, 0 for a bit; ``message`` is the name of the
     message in std_msgs that carries such values, ``array_code`` the type code of the
-    ``array.array`` that holds them, ``range`` the least and the greatest of them.
+    ``array.array`` that holds them, ``range`` the least and the greatest of them. A word of a
+    ``bcd12`` has three digits in its lower 12 bits: the upper four are status bits of a PLC-2
+    (1772-6.8.3 p. 5-1), and a write leaves them alone.
     """
 
     words: int
@@ -57,6 +59,7 @@ class ValueType(Enum):
     UINT32 = 'uint32', 2, 'UInt32MultiArray', 'I', (0, 2**32 - 1)
     FLOAT32 = 'float32', 2, 'Float32MultiArray', 'f', (-FLOAT_MAX, FLOAT_MAX)
     BCD16 = 'bcd16', 1, 'UInt16MultiArray', 'H', (0, 9999)
+    BCD12 = 'bcd12', 1, 'UInt16MultiArray', 'H', (0, 999)
     STRING = 'string', strings.COUNTED_WORDS, 'String', '', (-math.inf, math.inf)
 
     def __new__(cls, name: str, words: int, message: str, array_code: str,
@@ -67,6 +70,11 @@ class ValueType(Enum):
         member.array_code, member.range = array_code, limits
         return member
 
+    @property
+    def is_part(self) -> bool:
+        """Tell whether such values are some bits of their words, and the others stay."""
+        return self in (ValueType.BOOL, ValueType.BCD12)
+
 
 class WordOrder(Enum):
     """Which word of a 32-bit value over 16-bit words comes first."""
@@ -75,15 +83,18 @@ class WordOrder(Enum):
     HIGH = 'High'
 
 
-_WORD_TYPES = (ValueType.INT16, ValueType.UINT16, ValueType.BCD16, ValueType.INT32,
-               ValueType.UINT32, ValueType.FLOAT32)
+_WORD_TYPES = (ValueType.INT16, ValueType.UINT16, ValueType.BCD16, ValueType.BCD12,
+               ValueType.INT32, ValueType.UINT32, ValueType.FLOAT32)
 _UNSIGNED_FIRST = (ValueType.UINT16, ValueType.INT16, *_WORD_TYPES[2:])
 _TYPES: dict[FileType, tuple[ValueType, ...]] = {
     FileType.FLOAT: (ValueType.FLOAT32,),
     FileType.LONG: (ValueType.INT32, ValueType.UINT32),
     FileType.STRING: (ValueType.STRING,),
     FileType.INTEGER: (*_WORD_TYPES, ValueType.STRING),
-    FileType.ASCII: (*_UNSIGNED_FIRST, ValueType.STRING)}
+    FileType.ASCII: (*_UNSIGNED_FIRST, ValueType.STRING),
+    FileType.BCD: (ValueType.BCD16, *(kind for kind in _UNSIGNED_FIRST
+                                      if kind is not ValueType.BCD16))}
+_BCD = (ValueType.BCD16, ValueType.BCD12)
 
 
 def types_of(address: Address) -> tuple[ValueType, ...]:
@@ -132,7 +143,7 @@ class Codec:
     def decoder(self) -> Callable[[bytes], Values]:
         """Return ``decode``, or for plain numbers what does the same in a third of the time."""
         is_plain = self.word_order is WordOrder.LOW and sys.byteorder == 'little' and \
-            self.type not in (ValueType.STRING, ValueType.BOOL, ValueType.BCD16)
+            self.type not in (ValueType.STRING, ValueType.BOOL, *_BCD)
         return partial(array, self.type.array_code) if is_plain else self.decode
 
     def decode(self, data: bytes) -> Values:
@@ -147,8 +158,9 @@ class Codec:
         values: Values = array(self.type.array_code, data)
         if sys.byteorder == 'big':
             values.byteswap()
-        if self.type is ValueType.BCD16:
-            return array('H', [_from_bcd(value) for value in values])
+        if self.type in _BCD:
+            mask = self._mask
+            return array('H', [_from_bcd(value & mask) for value in values])
         return values
 
     def check(self, values: Sequence[float] | str) -> None:
@@ -168,7 +180,7 @@ class Codec:
                     f'value {value} at index {index} is not a valid {self.type.value}')
 
     def encode(self, values: Sequence[float] | str) -> bytes:
-        """Return whole words for ``values`` that ``check`` has passed; not for bits."""
+        """Return whole words for ``values`` that ``check`` has passed; not for parts of words."""
         if isinstance(values, str):
             return self._encode_string(values)
         data = self._encode_numbers(values)
@@ -182,28 +194,49 @@ class Codec:
     def _encode_numbers(self, values: Sequence[float]) -> bytes:
         if self.type is ValueType.FLOAT32:
             return struct.pack(f'<{self.length}f', *values)
-        if self.type is ValueType.BCD16:
-            values = [int(f'{int(value):04d}', 16) for value in values]
+        if self.type in _BCD:
+            values = [*map(_to_bcd, values)]
         size = self.type.words * 2
         mask = (1 << 8 * size) - 1
         return b''.join((int(value) & mask).to_bytes(size, 'little') for value in values)
 
     def store(self, table: DataTable, start: Address, values: Sequence[float] | str) -> None:
-        """Write values into a data table; bits leave the others of their words as they are."""
-        if self.type is not ValueType.BOOL:
+        """Write values into a data table; parts of words leave the other bits as they are."""
+        if not self.type.is_part:
             table.write(start, self.encode(values))
             return
         assert not isinstance(values, str)
         for change in self.bit_changes(start, values):
             table.write_bits(*change)
 
+    def masks(self) -> list[int]:
+        """Return the bits of each word that belong to the values."""
+        if self.type is ValueType.BOOL:
+            return _words((1 << self.length) - 1 << self.bit, self.words)
+        return [self._mask] * self.words
+
+    @property
+    def _mask(self) -> int:
+        return 0x0FFF if self.type is ValueType.BCD12 else 0xFFFF
+
     def bit_changes(self, start: Address,
                     values: Sequence[float]) -> list[tuple[Address, int, int]]:
-        """Return word, mask and bits for each word that bits from ``start`` on touch."""
-        number = sum(int(value) << n for n, value in enumerate(values)) << self.bit
-        mask = (1 << self.length) - 1 << self.bit
-        return [(start.at_offset(start.offset + n), mask >> 16 * n & 0xFFFF,
-                 number >> 16 * n & 0xFFFF) for n in range(self.words)]
+        """Return word, mask and bits for each word that parts of words from ``start`` on touch."""
+        if self.type is ValueType.BOOL:
+            number = sum(int(value) << n for n, value in enumerate(values)) << self.bit
+            words = _words(number, self.words)
+        else:
+            words = [*map(_to_bcd, values)]
+        return [(start.at_offset(start.offset + n), mask, bits)
+                for n, (mask, bits) in enumerate(zip(self.masks(), words, strict=True))]
+
+
+def _words(number: int, count: int) -> list[int]:
+    return [number >> 16 * n & 0xFFFF for n in range(count)]
+
+
+def _to_bcd(value: float) -> int:
+    return int(str(int(value)), 16)
 
 
 def _from_bcd(word: int) -> int:

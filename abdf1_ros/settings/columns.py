@@ -123,7 +123,7 @@ MAP_COLUMNS = (
            'string in N or A words the words',
            kind=whole(1, 65535)),
     Column('Type', 'natural type of the file',
-           'bool, int16, uint16, int32, uint32, float32, bcd16 or string',
+           'bool, int16, uint16, int32, uint32, float32, bcd16, bcd12 or string',
            kind=member_of(ValueType)),
     Column('Topic', 'Tag', 'name below ~/read/ and ~/write/',
            commands=_TOPICS),

@@ -304,8 +304,7 @@ class RowReader:
 
     def _check_write(self, mapping: Mapping) -> None:
         address = mapping.address
-        if mapping.type is ValueType.BOOL and not mapping.serves \
-                and not mapping.dialect.writes_bits:
+        if mapping.type.is_part and not mapping.serves and not mapping.dialect.writes_bits:
             self._fault('Address', f'Access {self._row.get("Access")} has no command that '
                                    'changes single bits; write the whole word, or only read')
         # Structures of our own table may be written: there the ROS program is the processor.

@@ -176,14 +176,15 @@ class Mapping:
 
     def _meets(self, other: Mapping) -> bool:
         """Tell whether both have a word, or for bits a bit, of one number."""
-        if self.type is not ValueType.BOOL or other.type is not ValueType.BOOL:
-            return self.extent.first < other.extent.end and other.extent.first < self.extent.end
-        return self._first_bit < other._first_bit + other.length \
-            and other._first_bit < self._first_bit + self.length
+        first = max(self.extent.first, other.extent.first)
+        end = min(self.extent.end, other.extent.end)
+        if first >= end or not self.type.is_part or not other.type.is_part:
+            return first < end
+        return any(mine & theirs for mine, theirs in zip(
+            self._masks(first, end), other._masks(first, end), strict=True))
 
-    @property
-    def _first_bit(self) -> int:
-        return self.address.offset * 16 + (self.address.bit or 0)
+    def _masks(self, first: int, end: int) -> list[int]:
+        return self.codec.masks()[first - self.extent.first:end - self.extent.first]
 
     def place_of(self, number: int) -> Address:
         """Return the address of a value of the row, counted from 0."""

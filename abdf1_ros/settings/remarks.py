@@ -100,12 +100,13 @@ def row_remarks(row: Row, mapping: Mapping) -> Iterator[Problem]:
             and not USUAL.has_file(address.file, address.file_type):
         yield _at(row, 'Address', f'{address}: a {USUAL.value}, for which an empty Processor '
                                   f'stands, has no such file; {having(address)} may have it')
+    yield from _bcd_remarks(row, mapping)
     if not mapping.writes:
         return
     is_member = address.file_type.is_structure and address.bit is None
     if address.file_type in _WRITTEN and not mapping.serves and not is_member:
         yield _at(row, 'Command', f'{address} {_WRITTEN[address.file_type]}')
-    if mapping.fallback is not None and mapping.type is ValueType.BOOL \
+    if mapping.fallback is not None and mapping.type.is_part \
             and mapping.processor is not None and mapping.processor.may_lack_masked_write:
         yield _at(row, 'Fallback', f'{mapping.processor.value} may change bits by rewriting the '
                                    'whole word: what its program changes meanwhile is lost')
@@ -116,6 +117,16 @@ def row_remarks(row: Row, mapping: Mapping) -> Iterator[Problem]:
     if mapping.maximum > high and mapping.maximum != math.inf:
         yield _at(row, 'Max', f'Max {mapping.maximum:.10g} is above {high:.10g}, the most that '
                               f'{mapping.type.value} can hold here')
+
+
+def _bcd_remarks(row: Row, mapping: Mapping) -> Iterator[Problem]:
+    address = mapping.address
+    if address.file_type is FileType.BCD and not row.get('Type') and address.bit is None:
+        yield _at(row, 'Type', f'{address} holds BCD, so an empty Type is {mapping.type.value}; '
+                               'uint16 shows its words as they are')
+    if mapping.plc_type is PlcType.PLC2 and mapping.type is ValueType.BCD16:
+        yield _at(row, 'Type', f'{address}: a PLC-2 has three digits in a word, and status bits '
+                               'above them: bcd12 reads and writes the digits alone')
 
 
 def having(address: Address) -> str:

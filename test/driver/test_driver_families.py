@@ -20,7 +20,7 @@ from abdf1_ros.settings.network import Network
 from abdf1_ros.simulator.simulated_plc import SimulatedPlc
 import pytest
 from support.cases import for_all
-from support.driver_bench import DriverBench, stored
+from support.driver_bench import DriverBench, store, stored
 from support.mappings import make_mapping
 
 PLC2_WORDS = (('000', 512),)
@@ -37,6 +37,7 @@ VALUES: list[tuple[str, str | None, str, int, str | None, list[float] | str]] = 
     ('PLC2', None, '020', 2, 'int32', [-2, 70000]),
     ('PLC2', None, '110/17', 3, None, [1, 0, 1]), ('PLC2', None, '110/00', 1, None, [1]),
     ('PLC2', 'Protected', '020', 2, 'bcd16', [1234, 9999]),
+    ('PLC2', None, '030', 2, 'bcd12', [123, 50]),
     ('PLC2', 'Protected', '020/07', 4, None, [1, 1, 0, 1]),
     ('PLC2', None, '020', 250, None, list(range(1000, 1250))),
     ('PLC3', None, 'E3.1.8.10.0.3', 3, None, [1, 2, 0x1010]),
@@ -51,9 +52,11 @@ VALUES: list[tuple[str, str | None, str, int, str | None, list[float] | str]] = 
     ('PLC5', 'WordRange', 'PD10:1.SP', 1, None, [12.5]),
     ('PLC5', 'WordRange', 'N7:0', 300, None, list(range(-150, 150))),
     ('PLC5', None, 'N7:3', 2, None, [-5, 32767]), ('PLC5', None, 'F8:1', 2, None, [1.5, -0.25]),
+    ('PLC5', None, 'N7:3', 2, 'bcd12', [0, 999]),
     ('PLC5', None, 'B3:2/14', 4, None, [1, 0, 1, 1]), ('PLC5', None, 'T4:1.PRE', 1, None, [5]),
     ('PLC5', None, 'ST9:1', 1, None, 'Größe 7'), ('PLC5', None, 'PD10:1.KP', 2, None, [1.5, -2.0]),
     ('SLC', None, 'N7:3', 2, None, [-5, 32767]), ('SLC', None, 'F8:1', 2, None, [1.5, -0.25]),
+    ('SLC', None, 'O:2.0', 1, 'bcd12', [407]),
     ('SLC', None, 'B3:2/14', 4, None, [1, 0, 1, 1]), ('SLC', None, 'O:2.0', 1, None, [3]),
     ('SLC', None, 'T4:1.ACC', 1, None, [77]), ('SLC', None, 'ST12:1', 1, None, 'odd'),
     ('SLC', None, 'L13:2', 2, None, [-70000, 2**31 - 1])]
@@ -80,6 +83,27 @@ def decoded(station: SimulatedPlc, mapping: Mapping) -> list[float] | str:
     start = mapping.address.at_offset(mapping.address.offset)
     values = mapping.codec.decode(station.table.read(start, mapping.codec.words))
     return values if isinstance(values, str) else list(values)
+
+
+def test_digits_of_a_plc2_timer_are_written_without_its_status_bits() -> None:
+    mapping = make_mapping('030', 'ReadWrite', plc='PLC2', kind='bcd12', access='Protected')
+    bench = DriverBench([mapping])
+    station = bench.plc(1, 'PLC2', *PLC2_WORDS)
+    store(station, '030', [0xA123])
+    heard: list[bytes] = []
+
+    def hear(data: bytes) -> bytes:
+        heard.append(data)
+        return data
+
+    bench.far.hear = hear
+    bench.run(0.3)
+    assert bench.listener.values(mapping)[-1] == [123]
+    bench.write(mapping, [50], run=1.0)
+    assert bench.listener.outcomes() == [Outcome.WRITTEN]
+    assert stored(station, '030') == b'\x50\xA0'
+    # Protected bit write: of byte 48 set 50 and reset AF, of byte 49 reset 0F (M 7-19).
+    assert bytes.fromhex('30 00 50 AF 31 00 00 0F') in b''.join(heard)
 
 
 def test_common_interface_file_of_an_slc() -> None:

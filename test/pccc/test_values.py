@@ -20,6 +20,7 @@ from typing import Any
 
 from abdf1_ros.errors import FormatError
 from abdf1_ros.pccc.address import Address
+from abdf1_ros.pccc.data_table import DataTable
 from abdf1_ros.pccc.families import parse_address
 from abdf1_ros.pccc.file_types import PlcType
 from abdf1_ros.pccc.strings import (
@@ -41,6 +42,7 @@ _NUMBERS: dict[ValueType, st.SearchStrategy[Any]] = {
     ValueType.UINT32: st.integers(0, 2**32 - 1),
     ValueType.FLOAT32: st.floats(width=32, allow_nan=False, allow_infinity=False),
     ValueType.BCD16: st.integers(0, 9999),
+    ValueType.BCD12: st.integers(0, 999),
 }
 
 
@@ -97,6 +99,7 @@ def test_strings_survive_a_round_trip(text: str) -> None:
     (ValueType.INT16, 'Low', '01 00 ff ff 00 80', [1, -1, -32768]),
     (ValueType.UINT16, 'Low', '01 00 ff ff 34 12', [1, 65535, 0x1234]),
     (ValueType.BCD16, 'Low', '34 12 99 99', [1234, 9999]),
+    (ValueType.BCD12, 'Low', '34 02 99 09', [234, 999]),
     (ValueType.INT32, 'Low', '02 00 01 00 ff ff ff ff', [0x10002, -1]),
     (ValueType.UINT32, 'Low', '02 00 01 00 ff ff ff ff', [0x10002, 2**32 - 1]),
     (ValueType.FLOAT32, 'Low', '00 00 c0 3f 00 00 20 c1', [1.5, -10.0]),
@@ -128,6 +131,7 @@ def test_word_that_is_not_bcd(word: str, text: str) -> None:
     (ValueType.UINT16, [0, -1], 'value -1 at index 1 is not a valid uint16'),
     (ValueType.UINT16, [65536, 0], 'value 65536 at index 0 is not a valid uint16'),
     (ValueType.BCD16, [0, 10000], 'value 10000 at index 1 is not a valid bcd16'),
+    (ValueType.BCD12, [999, 1000], 'value 1000 at index 1 is not a valid bcd12'),
     (ValueType.BCD16, [-1, 0], 'value -1 at index 0 is not a valid bcd16'),
     (ValueType.INT32, [2**31, 0], 'value 2147483648 at index 0 is not a valid int32'),
     (ValueType.UINT32, [0, 2**32], 'value 4294967296 at index 1 is not a valid uint32'),
@@ -158,6 +162,23 @@ def test_words_that_elements_take(kind: ValueType, length: int, bit: int, words:
     assert Codec(kind, length, bit).words == words
 
 
+@pytest.mark.parametrize('status', ['0', '2', 'A', 'F'])
+def test_three_digits_below_the_status_bits_of_a_plc2(status: str) -> None:
+    codec = Codec(ValueType.BCD12, 1)
+    word = int(f'{status}123', 16)
+    for decode in codec.decode, codec.decoder():
+        assert list(decode(word.to_bytes(2, 'little'))) == [123]
+    start = parse_address('030', PlcType.PLC2)
+    assert codec.bit_changes(start, [50]) == [(start, 0x0FFF, 0x050)]
+    table = DataTable(PlcType.PLC2)
+    table.create(start, 1)
+    table.write(start, word.to_bytes(2, 'little'))
+    codec.store(table, start, [50])
+    assert table.read(start, 1).hex() == f'50{status}0'.lower()
+    with pytest.raises(FormatError, match='^word 0A23 is not BCD$'):
+        codec.decode(bytes.fromhex('23 1A'))
+
+
 def test_bits_across_words() -> None:
     codec = Codec(ValueType.BOOL, 4, 14)
     assert list(codec.decode(bytes.fromhex('00 40 02 00'))) == [1, 0, 0, 1]
@@ -170,7 +191,7 @@ def test_bits_across_words() -> None:
 
 @for_all(('text', 'family', 'natural'), [
     ('N7:0', 'PLC5', 'int16'), ('B3:0', 'PLC5', 'uint16'), ('I:000', 'PLC5', 'uint16'),
-    ('O:000', 'PLC5', 'uint16'), ('S:0', 'PLC5', 'uint16'), ('D9:0', 'PLC5', 'uint16'),
+    ('O:000', 'PLC5', 'uint16'), ('S:0', 'PLC5', 'uint16'), ('D9:0', 'PLC5', 'bcd16'),
     ('A9:0', 'PLC5', 'uint16'), ('F8:0', 'PLC5', 'float32'), ('L9:0', 'SLC', 'int32'),
     ('T4:0.ACC', 'PLC5', 'int16'), ('C5:0.ACC', 'PLC5', 'int16'), ('R6:0.LEN', 'PLC5', 'int16'),
     ('ST9:0', 'PLC5', 'string'), ('PD9:0.SP', 'PLC5', 'float32'), ('PD9:0', 'PLC5', 'int16'),

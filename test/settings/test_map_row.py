@@ -84,7 +84,7 @@ def test_command_says_whether_a_row_reads_and_writes(text: str, reads: bool, wri
     ({'Publish': 'Never'}, '10 (Publish): Item: 1, Publish = "Never" should be one of Always, '
      'Change'),
     ({'Type': 'int8'}, '7 (Type): Item: 1, Type = "int8" should be one of bool, int16, uint16, '
-     'int32, uint32, float32, bcd16, string'),
+     'int32, uint32, float32, bcd16, bcd12, string'),
     ({'Length': '0'}, '6 (Length): Item: 1, Length = "0" should be a whole number from 1 to '
      '65535'),
     ({'Period': '86400001'}, '9 (Period): Item: 1, Period = "86400001" should be a whole number '
@@ -103,9 +103,9 @@ def test_command_says_whether_a_row_reads_and_writes(text: str, reads: bool, wri
     # Cells that do not fit each other.
     ({'Address': 'F8:0', 'Type': 'int16'}, '7 (Type): Item: 1, F8:0 can be float32'),
     ({'Address': 'B3:0', 'Type': 'string'},
-     '7 (Type): Item: 1, B3:0 can be uint16, int16, bcd16, int32, uint32, float32'),
-    ({'Type': 'bool'}, '7 (Type): Item: 1, N7:0 can be int16, uint16, bcd16, int32, uint32, '
-     'float32, string; a bool needs a bit address such as B3:0/5'),
+     '7 (Type): Item: 1, B3:0 can be uint16, int16, bcd16, bcd12, int32, uint32, float32'),
+    ({'Type': 'bool'}, '7 (Type): Item: 1, N7:0 can be int16, uint16, bcd16, bcd12, int32, '
+     'uint32, float32, string; a bool needs a bit address such as B3:0/5'),
     ({'Address': 'B3:0/5', 'Type': 'int16'},
      '7 (Type): Item: 1, B3:0/5 can be bool: it is a bit; its word is B3:0'),
     ({'Address': 'T4:0.DN', 'Type': 'int16'}, '7 (Type): Item: 1, T4:0/DN can be bool: it is a '

@@ -74,6 +74,17 @@ def test_function_file_of_a_micrologix_is_no_file_of_that_number() -> None:
     assert function.shares_words(make_mapping('STI:0.PFN', 'Write', plc='SLC'))
 
 
+@pytest.mark.parametrize(('text', 'kind', 'is_shared'), [
+    ('030/14', None, False), ('030/17', None, False), ('030/13', None, True),
+    ('027/17', None, False), ('030', 'bcd12', True), ('030', 'uint16', True),
+    ('031', 'bcd12', False)])
+def test_digits_share_no_bit_with_the_status_bits_above_them(
+        text: str, kind: str | None, is_shared: bool) -> None:
+    digits = make_mapping('030', 'Write', plc='PLC2', kind='bcd12')
+    other = make_mapping(text, 'Write', plc='PLC2', kind=kind)
+    assert digits.shares_words(other) is other.shares_words(digits) is is_shared
+
+
 def test_columns_are_those_of_the_interface() -> None:
     assert COLUMNS == ('Tag', 'Command', 'Address', 'Station', 'PLC_Type', 'Length', 'Type',
                        'Topic', 'Period', 'Publish', 'Min', 'Max', 'Word_Order', 'Scale',

@@ -328,6 +328,14 @@ def remarks_of(folder: Path, row: str) -> list[str]:
         ':2:9 (Max): Max 4000 is above 3276.7, the most that int16 can hold here']),
     ('N7:0,Read,N7:0,1,SLC,,,,,', [':2:1 (Tag): Tag "N7:0" becomes the topic N7_0']),
     ('N7:0,Read,N7:0,1,SLC,,a b,,,', [':2:7 (Topic): Topic "a b" becomes the topic a_b']),
+    ('wheel,Read,D11:0,1,PLC5,,,,,', [
+        ':2:6 (Type): D11:0 holds BCD, so an empty Type is bcd16; uint16 shows its words as they '
+        'are']),
+    ('wheel,Read,D11:0,1,PLC5,uint16,,,,', []), ('wheel,Read,D11:0/3,1,PLC5,,,,,', []),
+    ('timer,Read,030,1,PLC2,bcd16,,,,', [
+        ':2:6 (Type): 030: a PLC-2 has three digits in a word, and status bits above them: bcd12 '
+        'reads and writes the digits alone']),
+    ('timer,Read,030,1,PLC2,bcd12,,,,', []),
     ('speed,Read,N7:0,07,SLC,,,,,', []),
     ('speed,Read,N7:0,018,SLC,,,,,', [])])
 def test_row_that_is_valid_and_odd(tmp_path: Path, row: str, expected: list[str]) -> None:

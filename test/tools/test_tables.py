@@ -46,7 +46,7 @@ def test_an_address_leads_to_its_message() -> None:
     found = {row[0]: row for row in rows(tables.addresses())}
     assert found['N integer'] == [
         'N integer', '`N7:0`', '`N7:0`', '`N7:0`', '', 'int16',
-        'uint16, bcd16, int32, uint32, float32, string', 'Int16MultiArray']
+        'uint16, bcd16, bcd12, int32, uint32, float32, string', 'Int16MultiArray']
     assert found['a bit'][4:] == ['`110/17`', 'bool', '', 'UInt8MultiArray']
 
 
