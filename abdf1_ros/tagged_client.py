@@ -51,8 +51,8 @@ class TaggedClient(OpenLine):
         problems += [problem for _, problem in line_problems(mappings, network)]
         if problems:
             raise ConfigurationError(problems)
-        self.rows = {row.tag: row for row in mappings if not row.serves
-                     and (row.polls or row.writes) and row.station <= MAX_STATION}
+        self.rows = {row.tag: row for row in mappings.of_plcs
+                     if (row.polls or row.writes) and row.station <= MAX_STATION}
         super().__init__(network.line_mode, network.line, PortSettings.of(network), routes={
             row.station: row.via for row in mappings if row.via is not None})
 

@@ -56,6 +56,7 @@ from abdf1_ros.settings.columns import MAX_PERIOD
 from abdf1_ros.settings.map_file import load_mappings
 from abdf1_ros.settings.mapping import Mapping
 from abdf1_ros.settings.network import load_network, Network
+from abdf1_ros.settings.rows import Rows
 from abdf1_ros.settings.scaling import Scaling
 from abdf1_ros.text import by_number, counted, cut, first, in_ms, printable
 
@@ -79,7 +80,7 @@ class Findings:
     """The contents and faults of both files; no network where the net file has faults."""
 
     network: Network | None = None
-    mappings: list[Mapping] = field(default_factory=list)
+    mappings: Rows = Rows()
     problems: list[Problem] = field(default_factory=list)
 
 
@@ -277,7 +278,7 @@ def _rows_text(report: Report) -> str:
 
 def _rows(mappings: Sequence[Mapping], report: Report | None) -> list[dict[str, Any]]:
     """Return what there is to say of each row."""
-    promised = report.promises(DriverSettings().stale_after) if report else {}
+    promised = report.promises() if report else {}
     return [_row(mapping, promised.get(mapping)) for mapping in mappings]
 
 

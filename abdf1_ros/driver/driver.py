@@ -40,13 +40,12 @@ last value, freshness, withheld                     ``reads.point.ReadPoint``
 from __future__ import annotations
 
 from collections.abc import Container, Iterable, Sequence
-import math
 from typing import Protocol
 
 from abdf1_ros.counters import Counters
 from abdf1_ros.df1.frames import Duplex
 from abdf1_ros.df1.machine import Procedure
-from abdf1_ros.df1.packet import BROADCAST, Packet
+from abdf1_ros.df1.packet import Packet
 from abdf1_ros.df1.stations import ActiveStationList, Station
 from abdf1_ros.df1.tasks import Task
 from abdf1_ros.driver.agenda import Agenda
@@ -69,9 +68,9 @@ from abdf1_ros.pccc.extent import Extent
 from abdf1_ros.pccc.families import served_counters
 from abdf1_ros.pccc.file_types import PlcType
 from abdf1_ros.pccc.identity import Identity
-from abdf1_ros.plan.bounds import MODE_PERIOD
 from abdf1_ros.settings.mapping import Mapping
 from abdf1_ros.settings.network import Network
+from abdf1_ros.settings.rows import Rows
 
 _NOT_OPEN = 'the port is not open'
 ENDS = 'this node ends'
@@ -103,13 +102,12 @@ class Driver:
     def __init__(self, network: Network, mappings: Sequence[Mapping], settings: DriverSettings,
                  listener: Listener) -> None:
         self.network = network
-        self.mappings = tuple(mappings)
+        self.mappings = Rows(mappings)
         self.counters = Counters()
         self.machine = network.line_mode.make_machine(
             network.line, self._run, self.counters, self)
         self.stations = ActiveStationList(
-            (mapping.station for mapping in mappings
-             if not mapping.serves and mapping.station != BROADCAST), self._station_changed,
+            self.mappings.stations, self._station_changed,
             _routes(network, mappings), network.line_mode.longest_probe(network.line),
             self.machine.took)
         self.is_online = False
@@ -126,7 +124,7 @@ class Driver:
         report = self._listener.written
         self._record = record = WriteRecord(machine, 2 * network.cmd_timeout / 1000)
         self.readings = Readings(
-            network, self.mappings, settings, self.stations, machine, self._listener, record)
+            network, self._active_rows(), settings, self.stations, machine, self._listener, record)
         self.points = self.readings.points
         self._served = self._make_served()
         writing = WritesUnderWay(
@@ -137,9 +135,9 @@ class Driver:
         self.checks = Checks(
             self.stations, {block.station for block in self.readings.blocks},
             settings.processor_period, machine, self.readings.link_failed,
-            self._station_told, self._status_periods())
+            self._station_told, self.readings.mode_periods)
         self.interlocks = Interlocks(
-            () if settings.read_only else self.mappings, self._writes, writing, self._served,
+            Rows() if settings.read_only else self.mappings, self._writes, writing, self._served,
             self._listener, self._foreign_value, settings.first_tns)
         self.guests = GuestQueue(self.stations, machine, network.cmd_timeout / 1000,
                                  self._station_of_guest, self._words_of_guest, record)
@@ -195,6 +193,11 @@ class Driver:
         for mapping in mappings:
             self._listener.written(
                 WriteResult(mapping, Outcome.REFUSED, reason, show(values), 0.0, request))
+
+    def _active_rows(self) -> Rows:
+        """Return the rows that mean work on the line."""
+        return self.mappings.without(self.mappings.own) if self._settings.read_only \
+            else self.mappings
 
     def _make_served(self) -> Served:
         plc_type, mode = PlcType(self.network.plc_type), self.network.mode
@@ -306,12 +309,3 @@ class Driver:
             self.interlocks.mode_seen(
                 station, identity.is_running and not identity.faults, self.machine.now)
         self.readings.told(station, identity, asked)
-
-    def _status_periods(self) -> dict[int, float]:
-        """Return how often (s) stations have to be asked for their mode."""
-        periods = self.readings.guards.status_periods()
-        for mapping in () if self._settings.read_only else self.mappings:
-            if (mapping.heartbeat or mapping.fallback) and not mapping.serves:
-                known = periods.get(mapping.station, math.inf)
-                periods[mapping.station] = min(known, MODE_PERIOD)
-        return periods

@@ -25,6 +25,7 @@ from abdf1_ros.pccc.extent import Extent
 from abdf1_ros.pccc.file_types import FileType, PlcType
 from abdf1_ros.pccc.server import Server
 from abdf1_ros.settings.mapping import Mapping
+from abdf1_ros.settings.rows import Rows
 
 
 class _NotedTable(DataTable):
@@ -55,15 +56,15 @@ class _NotedTable(DataTable):
 
 
 def written_extents(command: Packet, station: int,
-                    mappings: Sequence[Mapping]) -> list[Extent] | None:
+                    mappings: Rows) -> list[Extent] | None:
     """
     Return the words of the files of ``mappings`` that a command to a station writes.
 
     None where unknown: it may write any. A server of the family says so: a PLC-5's address
     does not tell the type of its file. What goes to all stations writes the words of each.
     """
-    rows = [mapping for mapping in mappings
-            if not mapping.serves and station in (mapping.station, BROADCAST)]
+    rows = [mapping for mapping in mappings.of_plcs
+            if station in (mapping.station, BROADCAST)]
     found: list[Extent] = []
     for number, plc_type in {(row.station, row.plc_type): None for row in rows}:
         table = _NotedTable(plc_type, [row for row in rows if row.station == number])

@@ -28,6 +28,7 @@ from abdf1_ros.pccc.file_types import PlcType
 from abdf1_ros.pccc.link_counters import ServedCounters
 from abdf1_ros.pccc.server import Server
 from abdf1_ros.settings.mapping import Mapping
+from abdf1_ros.settings.rows import Rows
 
 
 class _MappedTable(DataTable):
@@ -105,10 +106,10 @@ class Served:
     them; ``counters`` are what it reads as ours. All of it belongs to the link thread.
     """
 
-    def __init__(self, plc_type: PlcType, mappings: Sequence[Mapping],
+    def __init__(self, plc_type: PlcType, mappings: Rows,
                  on_write: Callable[[Mapping, bytes], None],
                  counters: ServedCounters | None = None, is_full_duplex: bool = False) -> None:
-        self._mappings = [mapping for mapping in mappings if mapping.serves]
+        self._mappings = mappings.served
         self._on_write = on_write
         self._table = _MappedTable(plc_type)
         for mapping in self._mappings:

@@ -19,6 +19,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from abdf1_ros.df1.settings import LinkOptions
+from abdf1_ros.plan.forecast import USUAL_STALE_AFTER
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -28,7 +29,7 @@ class DriverSettings(LinkOptions):
     default_period: float = 0.1
     """Between two reads of a row without Period."""
 
-    stale_after: float = 3.0
+    stale_after: float = USUAL_STALE_AFTER
     """A value is stale when it is older than so many periods."""
 
     write_timeout: float = 2.0

@@ -22,7 +22,7 @@ settings allow, with all repetitions. Times are in seconds.
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 import math
@@ -37,6 +37,7 @@ from abdf1_ros.settings.heartbeats import READS_IN_TIME, STABLE, TIME_BASE
 from abdf1_ros.settings.map_row import CellFault
 from abdf1_ros.settings.mapping import Mapping
 from abdf1_ros.settings.network import Network
+from abdf1_ros.settings.rows import Rows
 from abdf1_ros.text import milliseconds
 
 # A station that we write heartbeats or fallbacks to is asked for its mode so often (s): a change
@@ -45,6 +46,9 @@ MODE_PERIOD = 2.0
 
 # So many answers about the mode have to fit into the stale time of a row (rule 13).
 ANSWERS_IN_TIME = 3
+
+# A row without a pause between its reads has this period (s) here.
+_SHORTEST = 0.01
 
 # After so many heartbeats and fallbacks in a row a read has its turn (rule 11).
 OWN_IN_A_ROW = 7
@@ -107,25 +111,21 @@ class Times:
     answer. ``longest`` is T (s).
     """
 
-    def __init__(self, network: Network, mappings: Sequence[Mapping], blocks: Sequence[Block] = (),
+    def __init__(self, network: Network, mappings: Rows, blocks: Sequence[Block] = (),
                  response_time: float = forecast.USUAL_RESPONSE_TIME) -> None:
         self._network = network
         self._mappings = mappings
-        self._own = [mapping for mapping in mappings
-                     if (mapping.heartbeat or mapping.fallback) and not mapping.serves]
         self._blocks = blocks
         self._response_time = response_time
         self._mode, self._line = network.line_mode, network.line
-        self._stations = {mapping.station for mapping in mappings if not mapping.serves}
         model = forecast.line_model(network)
         reads = [forecast.longest_wait([block], 0.0) for block in blocks]
-        self._written = {mapping: _packets(model, mapping) for mapping in mappings
-                         if (mapping.writes or mapping.heartbeat) and not mapping.serves}
+        self._written = {mapping: _packets(model, mapping) for mapping in mappings.written}
         # A guest may have the longest command there is under way.
         guest = model.transaction_time(MAX_LINK_DATA, MAX_LINK_DATA) if network.share else 0.0
         written = map(max, self._written.values())
         self._any_frames = max(*reads, *written, guest, _question_time(model, 0.0))
-        served = [2 * mapping.codec.words for mapping in mappings if mapping.serves]
+        served = [2 * mapping.codec.words for mapping in mappings.served]
         self._serves = bool(served)
         self._reply = model.transaction_time(0, min(max(served, default=0), MAX_LINK_DATA))
         self._longest_reply = model.transaction_time(0, MAX_LINK_DATA)
@@ -134,7 +134,7 @@ class Times:
     def bounds(self) -> Iterator[Bound]:
         """Yield the bound of every row with Fallback, and the preset for every heartbeat."""
         return (self._bound(mapping) for mapping in self._mappings
-                if mapping.fallback is not None or mapping.heartbeat is not None)
+                if mapping.is_alone)
 
     def _bound(self, mapping: Mapping) -> Bound:
         if mapping.fallback is None:
@@ -151,7 +151,7 @@ class Times:
         assert mapping.period is not None
         period = mapping.period / 1000
         beats = sum(_with_answers(self._written[other], self._response_time)
-                    for other in self._own if other.heartbeat)
+                    for other in self._mappings.heartbeats)
         # The response time stands for the scan of the PLC.
         return max(3 * period, period + 2 * self.longest + beats + self._response_time)
 
@@ -164,7 +164,7 @@ class Times:
         """Return how long (s) a fallback that is due may wait, and take: at most, and usually."""
         # In standard polling the others have the line meanwhile; that is in each scan.
         turns: defaultdict[int, list[float]] = defaultdict(list)
-        for own in self._own:
+        for own in self._mappings.own:
             turns[self._turn(own)] += self._written[own]
         # Where others have turns, too, they may have had the writes between two reads.
         is_apart = self._mode.most_under_way(self._line) > 1 or len(turns) > 1
@@ -185,13 +185,14 @@ class Times:
 
     def _repeated(self, frames: float) -> float:
         return self._mode.longest_transaction(
-            self._line, frames, self._any_frames, len(self._stations))
+            self._line, frames, self._any_frames, len(self._mappings.stations))
 
     def _undisturbed(self, frames: float) -> float:
         """Return the same where no frame gets lost."""
         reply = self._reply + self._response_time if self._serves else 0.0
         return reply + self._mode.undisturbed(
-            self._line, frames, self._response_time, self._any_frames, len(self._stations))
+            self._line, frames, self._response_time, self._any_frames,
+            len(self._mappings.stations))
 
     def advice(self) -> Iterator[str]:
         """Yield which setting would shorten bounds and presets most, if that is worth it."""
@@ -210,10 +211,11 @@ class Times:
 
     @property
     def _worst(self) -> float:
-        return max((self._bound(mapping).seconds or 0.0 for mapping in self._own), default=0.0)
+        return max((self._bound(mapping).seconds or 0.0 for mapping in self._mappings.own),
+                   default=0.0)
 
 
-def remarks(network: Network, mappings: Sequence[Mapping],
+def remarks(network: Network, mappings: Rows,
             response_time: float = forecast.USUAL_RESPONSE_TIME) -> Iterator[str]:
     """Yield remarks on the times of heartbeats and fallbacks (rules 2 and 16)."""
     longest = Times(network, mappings, (), response_time).longest
@@ -245,29 +247,31 @@ def _packets(model: LineModel, mapping: Mapping) -> list[float]:
         mapping.address, mapping.codec, zeros, mapping.dialect)]
 
 
-def own_work(model: LineModel, mappings: Iterable[Mapping], default_period: float,
+def own_work(model: LineModel, mappings: Rows, default_period: float,
+             stale_after: float = forecast.USUAL_STALE_AFTER,
              response_time: float = forecast.USUAL_RESPONSE_TIME) -> list[tuple[float, float]]:
     """Return the seconds and the period (s) of each heartbeat and each question for a mode."""
-    mappings = list(mappings)
     question = _question_time(model, response_time)
     return [*((_with_answers(_packets(model, mapping), response_time), mapping.period / 1000)
-              for mapping in mappings if mapping.heartbeat is not None and mapping.period),
-            *((question, period) for period in _asked(mappings, default_period).values())]
+              for mapping in mappings.heartbeats if mapping.period),
+            *((question, period) for period in
+              mode_periods(mappings, default_period, stale_after).values())]
 
 
-def _asked(mappings: Iterable[Mapping], default_period: float) -> dict[int, float]:
-    """Return the seconds between two questions for the mode, by station."""
-    asked: dict[int, float] = {}
+def mode_periods(mappings: Rows, default_period: float, stale_after: float) -> dict[int, float]:
+    """
+    Return the stations that are asked for their mode, and how often (s) on a line that is free.
 
-    def ask(station: int, period: float) -> None:
-        asked[station] = min(period, asked.get(station, period))
-
-    for mapping in mappings:
-        if (mapping.heartbeat or mapping.fallback) and not mapping.serves:
-            ask(mapping.station, MODE_PERIOD)
+    A change to RUN is a first contact for what we write by ourselves (rule 2), and some answers
+    have to fit into the stale time of each row that is published while the PLC runs (rule 13).
+    """
+    periods = dict.fromkeys((mapping.station for mapping in mappings.own), MODE_PERIOD)
+    for mapping in mappings.guarded:
         if mapping.needs_run:
-            ask(mapping.station, max(forecast.period_of(mapping, default_period), 0.01))
-    return asked
+            period = max(forecast.period_of(mapping, default_period), _SHORTEST) \
+                * stale_after / ANSWERS_IN_TIME
+            periods[mapping.station] = min(period, periods.get(mapping.station, period))
+    return periods
 
 
 def _question_time(model: LineModel, response_time: float) -> float:
@@ -275,22 +279,20 @@ def _question_time(model: LineModel, response_time: float) -> float:
     return _with_answers([model.transaction_time(*_STATUS_BYTES)], response_time)
 
 
-def costs(network: Network, mappings: Sequence[Mapping], default_period: float,
+def costs(network: Network, mappings: Rows, default_period: float,
           response_time: float = forecast.USUAL_RESPONSE_TIME) -> Iterator[str]:
     """Yield what Publish_While RUN costs, for each station."""
-    guarded = {mapping.station for mapping in mappings if mapping.needs_run}
-    for station, period in sorted(_asked(mappings, default_period).items()):
-        if station in guarded:
-            part = _question_time(forecast.line_model(network), response_time) / period
-            yield (f'Publish_While RUN: asking station {station} for its mode about every '
-                   f'{milliseconds(period)} takes {part:.0%} of the time')
+    question = _question_time(forecast.line_model(network), response_time)
+    periods = mode_periods(mappings, default_period, forecast.USUAL_STALE_AFTER)
+    for station in sorted({mapping.station for mapping in mappings.guarded if mapping.needs_run}):
+        yield (f'Publish_While RUN: asking station {station} for its mode about every '
+               f'{milliseconds(periods[station])} takes {question / periods[station]:.0%} of the '
+               'time')
 
 
-def conditions(network: Network, mappings: Iterable[Mapping]) -> Iterator[str]:
+def conditions(network: Network, mappings: Rows) -> Iterator[str]:
     """Yield what has to be so that the bounds of a line hold, and is not in its settings."""
-    own = any((mapping.heartbeat or mapping.fallback) and not mapping.serves
-              for mapping in mappings)
-    if network.duplex is not Duplex.RADIO or not own:
+    if network.duplex is not Duplex.RADIO or not mappings.own:
         return
     yield ('bounds by radio: NAK_Retries makes up for lost commands. It does not for lost replies '
            'of a PLC that drops repetitions, as SLC and MicroLogix do: that PLC then counts as '
@@ -300,10 +302,10 @@ def conditions(network: Network, mappings: Iterable[Mapping]) -> Iterator[str]:
                'no bound holds after a lost packet')
 
 
-def guard_faults(model: LineModel, mappings: Sequence[Mapping],
+def guard_faults(model: LineModel, mappings: Rows,
                  default_period: float) -> Iterator[tuple[Mapping, CellFault]]:
     """Yield the guarded rows whose counter is not read often enough (rule 14), and why."""
-    counters = {mapping: (condition.text, condition.timeout) for mapping in mappings
+    counters = {mapping: (condition.text, condition.timeout) for mapping in mappings.guarded
                 if (condition := mapping.publish_while) and condition.timeout is not None}
     blocks = Planner(model, default_period).plan(mappings) if counters else []
     expected = forecast.intervals(blocks, own_work(model, mappings, default_period))

@@ -30,6 +30,7 @@ from abdf1_ros.settings.mapping import Mapping
 from abdf1_ros.settings.network import Network
 
 USUAL_RESPONSE_TIME = 0.01
+USUAL_STALE_AFTER = 3.0  # periods, after which a value counts as lost
 ANSWERS = 2
 
 # A read without a period gets the time that the others leave, but at least one turn in so many

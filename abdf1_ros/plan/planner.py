@@ -131,7 +131,7 @@ class Planner:
         """Return the blocks that serve every mapping that reads, and read heartbeats back."""
         areas: defaultdict[StationArea, list[_Demand]] = defaultdict(list)
         for mapping in mappings:
-            if mapping.polls or mapping.heartbeat:
+            if mapping.is_planned:
                 areas[_station_area(mapping)].append(
                     _Demand(mapping, _span(mapping), self._period(mapping)))
         plans = [self._plan_area(area, group, math.inf) for area, group in areas.items()]

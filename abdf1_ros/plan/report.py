@@ -39,6 +39,7 @@ from abdf1_ros.settings import BAUD_RATES
 from abdf1_ros.settings.mapping import Command, Mapping, Publish
 from abdf1_ros.settings.network import Network
 from abdf1_ros.settings.remarks import network_remarks
+from abdf1_ros.settings.rows import Rows
 from abdf1_ros.settings.share import share_places
 from abdf1_ros.text import counted, first, milliseconds
 
@@ -80,7 +81,7 @@ class Report:
     """
 
     network: Network
-    mappings: tuple[Mapping, ...]
+    mappings: Rows
     blocks: tuple[Block, ...]
     default_period: float
     response_time: float
@@ -93,8 +94,9 @@ class Report:
     @property
     def load(self) -> float:
         """Return the part of the line's time that the periods need."""
-        own = bounds.own_work(forecast.line_model(self.network), self.mappings,
-                              self.default_period, self._answer_time)
+        own = bounds.own_work(
+            forecast.line_model(self.network), self.mappings, self.default_period,
+            response_time=self._answer_time)
         return forecast.load(self.blocks, self._answer_time) + sum(
             seconds / period for seconds, period in own)
 
@@ -107,12 +109,12 @@ class Report:
         """Return what heartbeats and fallbacks can promise, and the longest transaction."""
         return Times(self.network, self.mappings, self.blocks, self.response_time)
 
-    def promises(self, stale_after: float) -> dict[Mapping, float]:
+    def promises(self) -> dict[Mapping, float]:
         """Return the stale time (s) of each row that we read and that promises to publish."""
         # As the node forecasts it, whatever a PLC really takes to answer.
         stale = forecast.stale_times(
-            self.blocks, self.default_period, stale_after,
-            bounds.own_work(forecast.line_model(self.network), self.mappings, self.default_period))
+            self.blocks, self.default_period, forecast.USUAL_STALE_AFTER, bounds.own_work(
+                forecast.line_model(self.network), self.mappings, self.default_period))
         return {mapping: time for mapping, time in stale.items()
                 if mapping.publish is Publish.ALWAYS}
 
@@ -162,16 +164,16 @@ class Report:
                 *(Remark(RemarkKind.INTERLOCK, text) for text in times)]
 
 
-def _unprotected(mappings: Sequence[Mapping]) -> Iterator[str]:
+def _unprotected(mappings: Rows) -> Iterator[str]:
     """Find what goes on when its sender has died (rule 20 of docs/heartbeats.md)."""
-    written = [mapping for mapping in mappings if mapping.writes and not mapping.serves]
+    written = mappings.of_plcs.messages
     bare = [mapping for mapping in written if mapping.fallback is None]
     if bare:
         bare.sort(key=lambda mapping: (mapping.address.file_type is not FileType.OUTPUT,
                                        mapping.type is not ValueType.BOOL))
         yield f'{len(bare)} of {len(written)} written rows, without Fallback: {_tags(bare)}'
     stations = {mapping.station for mapping in written}
-    beats = [mapping for mapping in mappings if mapping.heartbeat]
+    beats = mappings.heartbeats
     deaf = [mapping for mapping in beats if mapping.heartbeat and not mapping.heartbeat.requires
             and mapping.station in stations]
     if deaf:
@@ -180,8 +182,8 @@ def _unprotected(mappings: Sequence[Mapping]) -> Iterator[str]:
             and (mapping.heartbeat.requires_timeout or 0) > _LONG_REQUIRES]
     if slow:
         yield f'Requires_Timeout over {_LONG_REQUIRES // 1000} s: {_tags(slow)}'
-    pushed = [mapping for mapping in mappings
-              if mapping.serves and not mapping.is_read_only and not mapping.period]
+    pushed = [mapping for mapping in mappings.served
+              if not mapping.is_read_only and not mapping.period]
     if pushed:
         yield ('topics of Serve rows without Period, so a PLC that stops is not noticed: '
                f'{_tags(pushed)}')
@@ -190,7 +192,7 @@ def _unprotected(mappings: Sequence[Mapping]) -> Iterator[str]:
 def make_report(network: Network, mappings: Iterable[Mapping], default_period: float,
                 response_time: float = forecast.USUAL_RESPONSE_TIME) -> Report:
     """Plan the reads of ``mappings``; times in seconds."""
-    mappings = tuple(mappings)
+    mappings = Rows(mappings)
     planner = Planner(forecast.line_model(network), default_period)
     blocks = sorted(planner.plan(mappings), key=_row_order)
     return Report(network, mappings, tuple(blocks), default_period, response_time)

@@ -16,7 +16,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable
 from dataclasses import replace
 
 from abdf1_ros.df1.packet import BROADCAST
@@ -28,9 +28,10 @@ from abdf1_ros.problems import Problem
 from abdf1_ros.settings.map_file import broken_links
 from abdf1_ros.settings.mapping import Mapping
 from abdf1_ros.settings.network import Network
+from abdf1_ros.settings.rows import Rows
 
 
-def line_problems(mappings: Sequence[Mapping], network: Network) -> list[tuple[Mapping, Problem]]:
+def line_problems(mappings: Iterable[Mapping], network: Network) -> list[tuple[Mapping, Problem]]:
     """Return the rows that clash with ``network`` or an earlier Serve row, and why."""
     found: list[tuple[Mapping, Problem]] = []
     mode = network.line_mode
@@ -51,8 +52,8 @@ def line_problems(mappings: Sequence[Mapping], network: Network) -> list[tuple[M
     return found
 
 
-def usable_rows(mappings: Sequence[Mapping], network: Network,
-                default_period: float) -> tuple[list[Mapping], list[Problem]]:
+def usable_rows(mappings: Rows, network: Network,
+                default_period: float) -> tuple[Rows, list[Problem]]:
     """
     Return the rows that can be used on this line, and the faults of the others.
 
@@ -62,13 +63,13 @@ def usable_rows(mappings: Sequence[Mapping], network: Network,
     """
     found = line_problems(mappings, network)
     problems = [problem for _, problem in found]
-    left = [mapping for mapping in mappings if mapping not in dict(found)]
+    left = mappings.without(mapping for mapping, _ in found)
     faults = [*guard_faults(line_model(network), left, default_period)] or [*broken_links(left)]
     while faults:
         for mapping, fault in faults:
             where = replace(mapping.place, column=fault.column)
             problems.append(Problem(where, f'Item: {mapping.item}, {fault.text}'))
-            left = [other for other in left if other is not mapping]
+        left = left.without(mapping for mapping, _ in faults)
         faults = [*broken_links(left)]
     return left, problems
 

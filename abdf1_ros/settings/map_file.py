@@ -16,7 +16,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 import re
 
 from abdf1_ros.df1.packet import BROADCAST
@@ -28,13 +28,14 @@ from abdf1_ros.settings.csv_table import read_table, Row
 from abdf1_ros.settings.heartbeats import counts, READS_IN_TIME
 from abdf1_ros.settings.map_row import CellFault, RowReader
 from abdf1_ros.settings.mapping import Command, Mapping
+from abdf1_ros.settings.rows import Rows
 from abdf1_ros.text import shown
 
 Clash = Callable[[str, Mapping, str], None]
 """Takes column, other row, and what is wrong with both."""
 
 
-def load_mappings(path: str) -> tuple[list[Mapping], list[Problem]]:
+def load_mappings(path: str) -> tuple[Rows, list[Problem]]:
     """
     Read a map CSV: the good rows, and every fault of the bad ones.
 
@@ -53,24 +54,23 @@ def load_mappings(path: str) -> tuple[list[Mapping], list[Problem]]:
             mappings.append(mapping)
             kept[mapping.item] = row
         problems += [fault.in_file(row) for fault in faults]
-    while broken := list(broken_links(mappings)):
-        for mapping, fault in broken:
-            if mapping in mappings:
-                mappings.remove(mapping)
-            problems.append(fault.in_file(kept[mapping.item]))
+    rows = Rows(mappings)
+    while broken := list(broken_links(rows)):
+        problems += [fault.in_file(kept[mapping.item]) for mapping, fault in broken]
+        rows = rows.without(mapping for mapping, _ in broken)
     if not table.is_usable:
         raise ConfigurationError(problems)
-    return mappings, problems
+    return rows, problems
 
 
-def broken_links(mappings: Sequence[Mapping]) -> Iterator[tuple[Mapping, CellFault]]:
+def broken_links(mappings: Rows) -> Iterator[tuple[Mapping, CellFault]]:
     """
     Yield the rows that depend on a missing row, with the fault.
 
     A row that was left out takes the rows that depend on it along (docs/heartbeats.md, rule 15).
     """
     tags = {mapping.tag: mapping for mapping in mappings}
-    topics = {mapping.topic for mapping in mappings if mapping.writes}
+    topics = {mapping.topic for mapping in mappings.messages}
     for mapping in mappings:
         for topic in mapping.heartbeat.requires if mapping.heartbeat else ():
             if topic not in topics:
@@ -94,32 +94,31 @@ def broken_links(mappings: Sequence[Mapping]) -> Iterator[tuple[Mapping, CellFau
                 f'{READS_IN_TIME} x {counter.period} ms, the Period of {shown(counter.tag)}')
 
 
-def _no_topic(topic: str, mappings: Sequence[Mapping]) -> str:
+def _no_topic(topic: str, mappings: Rows) -> str:
     """Return why a heartbeat cannot require messages on ``topic``."""
     text = f'no good Write, ReadWrite or Serve row has the topic "{shown(topic)}"'
     if re.search('[,;|]', topic):
         return f'{text}; put spaces between topics'
     if any(mapping.topic == topic for mapping in mappings):
         return f'{text}: it is one that we publish; name topics whose messages we get'
-    other = next((mapping for mapping in mappings if mapping.writes and topic in (
+    other = next((mapping for mapping in mappings.messages if topic in (
         mapping.tag, f'/{mapping.topic}', f'~/write/{mapping.topic}')), None)
     return f'{text}; did you mean {other.topic}?' if other else text
 
 
-def _no_confirmation(mapping: Mapping, tags: dict[str, Mapping],
-                     mappings: Sequence[Mapping]) -> str:
+def _no_confirmation(mapping: Mapping, tags: dict[str, Mapping], mappings: Rows) -> str:
     """Return why a row cannot confirm a heartbeat's control, empty if it can (rules 21, 22)."""
     beat = tags.get(mapping.confirms)
     first = next(other for other in mappings if other.confirms == mapping.confirms)
     if not (beat and beat.heartbeat and beat.station == mapping.station and first is mapping):
         return 'should be the tag of a good Heartbeat row of station ' \
             f'{mapping.station} that no row before it confirms'
-    ours = next((row for row in mappings if _changes(row) and row.shares_words(mapping)), None)
+    ours = next((row for row in mappings if row.changes and row.shares_words(mapping)), None)
     return f'cannot be confirmed by {mapping.address}, which {shown(ours.tag)} writes: no ' \
         'heartbeat confirms itself; name a bit that the program of the PLC sets' if ours else ''
 
 
-def _no_counter(mapping: Mapping, counter: Mapping, mappings: Sequence[Mapping]) -> str:
+def _no_counter(mapping: Mapping, counter: Mapping, mappings: Rows) -> str:
     """Return why values cannot depend on ``counter``, empty if they can (rule 13)."""
     if counter.command is not Command.READ:
         return 'is not a Read row'
@@ -127,7 +126,7 @@ def _no_counter(mapping: Mapping, counter: Mapping, mappings: Sequence[Mapping])
         return f'is of station {counter.station}; a counter of the same PLC is needed'
     if not counts(counter.type, counter.length):
         return 'is not one int16 or uint16 word'
-    if any(beat.heartbeat and beat.shares_words(counter) for beat in mappings):
+    if any(beat.shares_words(counter) for beat in mappings.heartbeats):
         return 'reads our own heartbeat, so both sides would wait for each other'
     return 'depends on something itself' if counter.publish_while else ''
 
@@ -138,16 +137,6 @@ def _processor(mapping: Mapping) -> Processor | None:
     if not has_processors or mapping.serves or mapping.station == BROADCAST:
         return None
     return mapping.processor or USUAL
-
-
-def _changes(mapping: Mapping) -> bool:
-    """Tell whether a mapping writes, for messages or as a heartbeat."""
-    return mapping.writes or mapping.heartbeat is not None
-
-
-def _owns(mapping: Mapping) -> bool:
-    """Tell whether no other row may write the words of a mapping (rules 1 and 12)."""
-    return mapping.heartbeat is not None or mapping.fallback is not None
 
 
 class _Clashes:
@@ -192,7 +181,7 @@ class _Clashes:
         self._check_route(mapping, clash)
         self._check_words(mapping, clash)
         if not faults:
-            if _changes(mapping):
+            if mapping.changes:
                 self._changing.append(mapping)
             self._names[mapping.name] = mapping
             if not mapping.serves:
@@ -225,8 +214,8 @@ class _Clashes:
 
     def _check_words(self, mapping: Mapping, clash: Clash) -> None:
         """Find another writer of words that only a heartbeat or a Fallback may write."""
-        for other in self._changing if _changes(mapping) else ():
-            if (_owns(mapping) or _owns(other)) and mapping.shares_words(other):
+        for other in self._changing if mapping.changes else ():
+            if (mapping.is_alone or other.is_alone) and mapping.shares_words(other):
                 clash('Address', other, 'a heartbeat or a Fallback has its words for itself; '
                                         f'{mapping.address}{_why_same(mapping, other)} shares '
                                         'some with the row')

@@ -260,8 +260,7 @@ class RowReader:
             return
         self._check_values(mapping)
         self._check_extent(mapping)
-        changes = mapping.writes or mapping.command is Command.HEARTBEAT
-        if changes and not self.faults:
+        if (mapping.writes or mapping.command is Command.HEARTBEAT) and not self.faults:
             self._check_write(mapping)
         for column in ('Min', 'Max'):
             if mapping.type is ValueType.STRING and self._row.get(column):

@@ -144,6 +144,26 @@ class Mapping:
         return self.command not in (Command.READ, Command.HEARTBEAT)
 
     @property
+    def changes(self) -> bool:
+        """Tell whether we write the words, for messages or by ourselves."""
+        return self.writes or self.heartbeat is not None
+
+    @property
+    def is_alone(self) -> bool:
+        """Tell whether no other row may write the words (rules 1 and 12)."""
+        return self.heartbeat is not None or self.fallback is not None
+
+    @property
+    def is_own(self) -> bool:
+        """Tell whether we write the words of a PLC by ourselves."""
+        return self.is_alone and not self.serves
+
+    @property
+    def is_planned(self) -> bool:
+        """Tell whether we read the words from the PLC, to publish them or to compare them."""
+        return self.polls or self.heartbeat is not None
+
+    @property
     def access_cell(self) -> str | Access | None:
         """Return what the column Access says."""
         return READ_ONLY if self.is_read_only else self.access

@@ -45,6 +45,7 @@ from abdf1_ros.plan.line_model import LineModel
 from abdf1_ros.plan.planner import Planner
 from abdf1_ros.settings.mapping import Mapping
 from abdf1_ros.settings.network import Network
+from abdf1_ros.settings.rows import Rows
 from hypothesis import settings
 from hypothesis import strategies as st
 from hypothesis.stateful import initialize, invariant, precondition, rule, RuleBasedStateMachine
@@ -90,7 +91,7 @@ class Bench:
         self.tasks, line = JobTasks(5, 0), StillClock()
         listener = Recorder(lambda: 0.0)
         self.record = WriteRecord(line, 1.0)
-        readings = Readings(Network(), (), DriverSettings(), self.stations, line, listener,
+        readings = Readings(Network(), Rows(), DriverSettings(), self.stations, line, listener,
                             self.record)
         writing = WritesUnderWay(self.stations, self.record, readings, write_timeout,
                                  self.results.append)
@@ -99,8 +100,8 @@ class Bench:
         checks = Checks(self.stations, {job.station for job in jobs}, 0.0, line,
                         readings.link_failed, lambda station, identity, asked: None)
         checks.begin(0.0)
-        served = Served(PlcType.PLC5, (), readings.served)
-        interlocks = Interlocks((), self.writes, writing, served, listener,
+        served = Served(PlcType.PLC5, Rows(), readings.served)
+        interlocks = Interlocks(Rows(), self.writes, writing, served, listener,
                                 lambda mapping, text, is_conflict: None)
         guests = GuestQueue(self.stations, line, 1.0, lambda dst: dst,
                             lambda command, station: [], self.record)

@@ -46,6 +46,7 @@ from abdf1_ros.plan.report import make_report
 from abdf1_ros.settings.heartbeats import Fallback, Heartbeat
 from abdf1_ros.settings.mapping import Mapping
 from abdf1_ros.settings.network import Network
+from abdf1_ros.settings.rows import Rows
 from abdf1_ros.simulator.gateway import SimulatedGateway
 from abdf1_ros.simulator.simulated_plc import SimulatedPlc
 import pytest
@@ -399,11 +400,11 @@ def test_rule_16_nothing_can_be_left_out_of_the_bound() -> None:
     blocks = make_report(WORST.network, rows, 0.1).blocks
 
     def limit(network: Network, rows: Sequence[Mapping] = rows) -> float:
-        return max(bound.seconds or 0.0 for bound in Times(network, rows, blocks).bounds()
+        return max(bound.seconds or 0.0 for bound in Times(network, Rows(rows), blocks).bounds()
                    if bound.mapping.fallback)
 
     network = WORST.network
-    once = Times(network, rows, blocks)
+    once = Times(network, Rows(rows), blocks)
     mistaken = {
         'NAK_Retries': limit(replace(network, nak_retries=0)),
         'ENQ_Retries': limit(replace(network, enq_retries=0)),

@@ -23,6 +23,7 @@ from abdf1_ros.plan.bounds import Times
 from abdf1_ros.plan.report import make_report
 from abdf1_ros.settings.heartbeats import Fallback, Heartbeat, PublishWhile
 from abdf1_ros.settings.network import Network
+from abdf1_ros.settings.rows import Rows
 import pytest
 from support.driver_bench import DriverBench, store
 from support.mappings import make_mapping
@@ -47,7 +48,7 @@ class RadioBench(DriverBench):
         self.plcs = {number: self.plc(number, 'SLC', ('N7:0', 4), ('N10:0', 4))
                      for number in numbers}
         self.line.noise = self
-        self.bound = next(bound for bound in Times(network, rows).bounds()
+        self.bound = next(bound for bound in Times(network, Rows(rows)).bounds()
                           if bound.mapping is self.speed)
         self.open()
 

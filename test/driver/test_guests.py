@@ -28,6 +28,7 @@ from abdf1_ros.messages import Message
 from abdf1_ros.pccc.extent import Extent
 from abdf1_ros.settings.heartbeats import Heartbeat
 from abdf1_ros.settings.network import Network
+from abdf1_ros.settings.rows import Rows
 import pytest
 from support.cases import for_all
 from support.driver_bench import DriverBench, store, stored
@@ -131,7 +132,7 @@ def test_words_of_a_write_are_known_by_its_address(entry: tuple[str, str, str, i
     data = bytes.fromhex(text)
     rows = [make_mapping(text, plc=plc, station=1, period=50) for text in (
         'N7:0', 'F8:0', 'B3:0', *(('N20:0', 'N9:0') if plc == 'PLC5' else ()))]
-    found = written_extents(Packet(1, 9, data[0], 0, 1, data[1:]), 1, rows)
+    found = written_extents(Packet(1, 9, data[0], 0, 1, data[1:]), 1, Rows(rows))
     expected = [make_mapping(address, plc=plc, length=length).extent] if address else []
     assert found == expected
 
@@ -139,13 +140,13 @@ def test_words_of_a_write_are_known_by_its_address(entry: tuple[str, str, str, i
 @pytest.mark.parametrize('text', ['0F 80 01', '0F 57 00', '0F'])
 def test_words_of_a_command_that_nobody_knows_may_be_any(text: str) -> None:
     data, rows = bytes.fromhex(text), [make_mapping('N7:0', plc='SLC')]
-    assert written_extents(Packet(1, 9, data[0], 0, 1, data[1:]), 1, rows) is None
+    assert written_extents(Packet(1, 9, data[0], 0, 1, data[1:]), 1, Rows(rows)) is None
 
 
 def test_words_of_a_broadcast_are_those_of_every_station() -> None:
     rows = [make_mapping('N7:0', plc='SLC', station=number) for number in (1, 2)]
     rows.append(make_mapping('N7:0', 'Serve', plc='SLC', station=0))
-    found = written_extents(Packet(255, 9, 0x0F, 0, 1, WRITE_N7), 255, rows)
+    found = written_extents(Packet(255, 9, 0x0F, 0, 1, WRITE_N7), 255, Rows(rows))
     assert found == [row.extent for row in rows[:2]]
 
 

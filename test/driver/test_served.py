@@ -26,6 +26,7 @@ from abdf1_ros.pccc.emulated import EmulatedProcessor
 from abdf1_ros.pccc.families import dialect_of, parse_address
 from abdf1_ros.pccc.file_types import PlcType
 from abdf1_ros.settings.mapping import Mapping
+from abdf1_ros.settings.rows import Rows
 from hypothesis import given
 from hypothesis import strategies as st
 import pytest
@@ -54,7 +55,8 @@ class Bench:
         self.plc = PlcType(plc)
         self.published: list[tuple[Mapping, bytes]] = []
         self.served = Served(
-            self.plc, mappings, lambda mapping, words: self.published.append((mapping, words)))
+            self.plc, Rows(mappings),
+            lambda mapping, words: self.published.append((mapping, words)))
         self._dialect = dialect_of(self.plc)
         self._tns = 0
 
@@ -207,7 +209,7 @@ def test_bits_of_a_plc2() -> None:
     ('PLC5', 'N7:0', b'\2\0'), ('SLC', 'N9:0', b'\1\0')])  # a byte address, and a word's
 def test_plc2_commands_reach_the_compatibility_file(plc: str, file: str, place: bytes) -> None:
     published: list[bytes] = []
-    served = Served(PlcType(plc), [row(file, plc, 4)],
+    served = Served(PlcType(plc), Rows([row(file, plc, 4)]),
                     lambda mapping, words: published.append(words))
     reply = served.serve(Packet(STATION, 7, 0x08, 0, 1, place + b'\x34\x12'))
     assert (reply.sts, published) == (0, [b'\0\0\x34\x12\0\0\0\0'])

@@ -17,10 +17,12 @@
 from dataclasses import replace
 import math
 
+from abdf1_ros.driver.settings import DriverSettings
 from abdf1_ros.plan.bounds import (
     conditions,
     guard_faults,
     MODE_PERIOD,
+    mode_periods,
     own_work,
     remarks,
     Times,
@@ -30,8 +32,10 @@ from abdf1_ros.plan.report import make_report
 from abdf1_ros.settings.heartbeats import Fallback, Heartbeat, PublishWhile
 from abdf1_ros.settings.mapping import Mapping
 from abdf1_ros.settings.network import Network
+from abdf1_ros.settings.rows import Rows
 import pytest
 from support.counting import lines_run
+from support.driver_bench import DriverBench
 from support.mappings import make_mapping
 
 QUICK = Network(timeout=200, cmd_timeout=500, nak_retries=1, enq_retries=1, baud=19200)
@@ -86,7 +90,7 @@ def test_rule_16_bound_counts_all_that_may_go_before_a_fallback(others: int, rea
             for number in range(1, others + 1)]
     rows = [speed(), beat(), *more]
     question = line_model(QUICK).transaction_time(1, 26)  # as long as any here
-    first = next(Times(QUICK, rows).bounds())
+    first = next(Times(QUICK, Rows(rows)).bounds())
     own = at_most(write_time(QUICK, rows[0], 0.0))
     # What is under way, reads that have a turn, and our own writes, heartbeat 0 among them.
     assert first.seconds == pytest.approx(
@@ -100,8 +104,8 @@ def test_rule_16_bound_counts_all_that_may_go_before_a_fallback(others: int, rea
 
 def test_rule_16_standard_polling_adds_its_scans_and_slave_has_no_bound() -> None:
     rows = [speed(), *(make_mapping('N7:9', station=station) for station in range(2, 12))]
-    message, = Times(QUICK, rows).bounds()
-    standard, = Times(replace(QUICK, polling='Standard'), rows).bounds()
+    message, = Times(QUICK, Rows(rows)).bounds()
+    standard, = Times(replace(QUICK, polling='Standard'), Rows(rows)).bounds()
     assert message.seconds and standard.seconds and message.usual and standard.usual
     # A scan for each of the three transactions below, in which every station has a command.
     question = line_model(QUICK).transaction_time(1, 26)
@@ -110,18 +114,18 @@ def test_rule_16_standard_polling_adds_its_scans_and_slave_has_no_bound() -> Non
     # Of each station a poll and a command with all their retries, in two scans a transaction;
     # three transactions: what is under way, a read and the fallback.
     assert standard.seconds - message.seconds > 3 * 2 * 11 * 4 * 0.2
-    slave, = Times(Network(mode='Slave'), rows[:1]).bounds()
+    slave, = Times(Network(mode='Slave'), Rows(rows[:1])).bounds()
     assert (slave.seconds, str(slave)) == (
         None, 'fallback of speed, station 1: no bound, its master decides')
 
 
 def test_rule_16_what_plcs_ask_of_us_takes_turns_with_our_commands() -> None:
     served = make_mapping('N7:50', 'Serve', station=5, tag='served')
-    alone, = Times(QUICK, [speed()]).bounds()
-    beside, = Times(QUICK, [speed(), served]).bounds()
+    alone, = Times(QUICK, Rows([speed()])).bounds()
+    beside, = Times(QUICK, Rows([speed(), served])).bounds()
     assert alone.seconds and beside.seconds
     assert beside.seconds - alone.seconds > 3 * 2 * 0.2
-    shared, = Times(replace(QUICK, share='/tmp/guests'), [speed()]).bounds()
+    shared, = Times(replace(QUICK, share='/tmp/guests'), Rows([speed()])).bounds()
     assert shared.seconds and shared.seconds - alone.seconds > 2 * 2 * 400 * 10 / 19200
     assert alone.usual and shared.usual and shared.usual - alone.usual > 2 * 400 * 10 / 19200
     assert beside.usual and beside.usual > alone.usual
@@ -131,20 +135,20 @@ def test_rule_16_bounds_of_twice_the_rows_take_twice_the_work() -> None:
     def work(count: int) -> int:
         rows = [make_mapping(f'N7:{number}', 'Write', fallback=Fallback((0,), 500))
                 for number in range(count)]
-        return lines_run(lambda: [*Times(QUICK, rows).bounds()], 'plan')
+        return lines_run(lambda: [*Times(QUICK, Rows(rows)).bounds()], 'plan')
 
     assert work(100) < 2.2 * work(50)
 
 
 def test_rule_16_fallback_of_our_own_table_needs_no_line() -> None:
-    bound, = Times(Network(), [speed(500, 'Serve', station=5)]).bounds()
+    bound, = Times(Network(), Rows([speed(500, 'Serve', station=5)])).bounds()
     assert bound.seconds == 0.5
 
 
 @pytest.mark.parametrize('period, factor', [(100, None), (60_000, 3)])
 def test_rule_16_preset_of_the_timer(period: int, factor: int | None) -> None:
     mapping = beat(period)
-    bound, = Times(QUICK, [mapping], (), 0.01).bounds()
+    bound, = Times(QUICK, Rows([mapping]), (), 0.01).bounds()
     own = write_time(QUICK, mapping, 0.01)
     question = line_model(QUICK).transaction_time(1, 26)  # as long as any here
     longer = period / 1000 + 2 * at_most(question) + own + 0.01
@@ -164,7 +168,7 @@ def test_rule_16_preset_of_the_timer(period: int, factor: int | None) -> None:
     (replace(QUICK, timeout=100), '')])
 def test_rule_16_says_which_setting_shortens_the_times_most(network: Network, way: str) -> None:
     rows = [speed(200), beat(100)]
-    advice = list(Times(network, rows).advice())
+    advice = list(Times(network, Rows(rows)).advice())
     assert len(advice) == bool(way)
     assert all(text.startswith(f'{way} would shorten the longest of these times most, from ')
                for text in advice)
@@ -176,30 +180,30 @@ def test_rule_16_conditions_of_bounds_by_radio_are_told(forwards: str, count: in
     for row in (speed(), beat()):
         told = [note for note in make_report(network, [row], 0.1).notes() if 'by radio' in note]
         assert len(told) == count
-    assert list(conditions(network, [make_mapping('N7:0')])) == []
-    assert list(conditions(QUICK, [speed()])) == []
+    assert list(conditions(network, Rows([make_mapping('N7:0')]))) == []
+    assert list(conditions(QUICK, Rows([speed()]))) == []
 
 
 def test_rule_16_period_shorter_than_a_scan_is_warned_of() -> None:
-    assert [text for text in remarks(QUICK, [beat(150)]) if 'shorter than a scan' in text]
+    assert [text for text in remarks(QUICK, Rows([beat(150)])) if 'shorter than a scan' in text]
 
 
 def test_rule_16_transactions_longer_than_period_or_fallback_after_are_warned_of() -> None:
-    of_beat, of_speed = remarks(Network(), [beat(), speed()])
+    of_beat, of_speed = remarks(Network(), Rows([beat(), speed()]))
     assert 'one transaction may take 8380 ms' in of_beat
     assert 'its Period is 1000 ms' in of_beat
     assert 'Fallback_After 3000 ms is shorter than two transactions' in of_speed
 
 
 def test_rule_16_rows_that_are_fast_enough_are_not_warned_of() -> None:
-    assert list(remarks(QUICK, [beat(2000), speed()])) == []
+    assert list(remarks(QUICK, Rows([beat(2000), speed()]))) == []
 
 
 def test_rule_14_timeout_is_three_planned_intervals() -> None:
     counter = make_mapping('N11:3', tag='alive', period=100)
     guarded = make_mapping('N7:0', tag='level', period=1000,
                            publish_while=PublishWhile('alive', 250))
-    (mapping, fault), = guard_faults(line_model(QUICK), [counter, guarded], 0.1)
+    (mapping, fault), = guard_faults(line_model(QUICK), Rows([counter, guarded]), 0.1)
     assert mapping is guarded
     assert (fault.column, fault.text) == (
         'Heartbeat_Timeout', 'Heartbeat_Timeout 250 ms is shorter than 3 reads of alive on this '
@@ -210,9 +214,26 @@ def test_heartbeats_and_questions_for_run_are_counted_in_the_load() -> None:
     plain = make_mapping('N7:0', period=1000)
     guarded = make_mapping('N7:0', period=1000, publish_while=PublishWhile(None, None))
     model = line_model(QUICK)
-    assert own_work(model, [plain], 0.1) == []
-    (seconds, period), (_, asked) = own_work(model, [beat(100)], 0.1)
+    assert own_work(model, Rows([plain]), 0.1) == []
+    (seconds, period), (_, asked) = own_work(model, Rows([beat(100)]), 0.1)
     assert (seconds, period, asked) == (pytest.approx(write_time(QUICK, beat())), 0.1, MODE_PERIOD)
-    (question, asked), = own_work(model, [guarded], 0.1)
+    (question, asked), = own_work(model, Rows([guarded]), 0.1)
     assert (0.02 < question < 0.1, asked) == (True, 1.0)
     assert make_report(QUICK, [guarded], 0.1).load > make_report(QUICK, [plain], 0.1).load
+
+
+@pytest.mark.parametrize(('stale_after', 'period'), [(3.0, 1.0), (1.5, 0.5), (100.0, 100 / 3)])
+def test_rule_13_three_answers_about_the_mode_fit_into_the_stale_time(
+        stale_after: float, period: float) -> None:
+    guarded = make_mapping('N7:0', period=1000, publish_while=PublishWhile(None, None))
+    rows = Rows([guarded])
+    assert mode_periods(rows, 0.1, stale_after) == {1: pytest.approx(period)}
+    (_, asked), = own_work(line_model(QUICK), rows, 0.1, stale_after)
+    bench = DriverBench(rows, settings=DriverSettings(stale_after=stale_after))
+    assert asked == bench.driver.readings.mode_periods[1] == pytest.approx(period)
+
+
+def test_rule_8_mode_of_a_plc_that_we_write_to_by_ourselves_is_asked_every_two_seconds() -> None:
+    guarded = make_mapping('N7:0', period=9000, publish_while=PublishWhile(None, None))
+    assert mode_periods(Rows([guarded, speed()]), 0.1, 3.0) == {1: MODE_PERIOD}
+    assert mode_periods(Rows([make_mapping(), make_mapping(command='Write')]), 0.1, 3.0) == {}

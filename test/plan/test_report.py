@@ -300,6 +300,6 @@ def test_bits_that_go_on_without_the_program_are_noted_and_are_not_odd() -> None
 
 def test_rows_promise_three_intervals_and_a_read() -> None:
     row, silent = make_mapping('N7:0', length=2), make_mapping('N7:0', publish='Change')
-    assert report_of(row, silent).promises(3) == {row: pytest.approx(3 + TWO_WORDS + ANSWERS)}
+    assert report_of(row, silent).promises() == {row: pytest.approx(3 + TWO_WORDS + ANSWERS)}
     # The node does not know how slow the PLC is, and so promises the same.
-    assert report_of(row, response=0.1).promises(3) == report_of(row).promises(3)
+    assert report_of(row, response=0.1).promises() == report_of(row).promises()

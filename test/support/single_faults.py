@@ -41,6 +41,7 @@ from abdf1_ros.driver.write import Outcome
 from abdf1_ros.plan.bounds import Times
 from abdf1_ros.settings.mapping import Mapping
 from abdf1_ros.settings.network import Network
+from abdf1_ros.settings.rows import Rows
 from support.driver_bench import Recorder
 from support.mappings import make_mapping
 from support.virtual_line import VirtualLine
@@ -197,7 +198,7 @@ class Bench:
         rows, blocks = self.near.driver.mappings, self.near.driver.readings.blocks
         # What is printed as the longest transaction takes turns with our replies.
         self.bound = self.period + (2 if kind == 'two packets' else 1) * (
-            Times(near, rows, blocks).longest + near.line_mode.longest_reply(
+            Times(near, Rows(rows), blocks).longest + near.line_mode.longest_reply(
                 near.line, (2 * length + _FRAME) * self.line.char_time))
         self.line.run_for(0.5)
         if (why := self.carry_out(())) or (why := self.carry_out(())):

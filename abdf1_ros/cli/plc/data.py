@@ -40,6 +40,7 @@ from abdf1_ros.problems import ConfigurationError, Problem
 from abdf1_ros.settings.csv_table import Row
 from abdf1_ros.settings.map_row import CellFault, RowReader
 from abdf1_ros.settings.mapping import Command, Mapping
+from abdf1_ros.settings.rows import Rows
 from abdf1_ros.text import printable, value_text
 
 # The argument of the command line for each column of a map CSV.
@@ -208,11 +209,11 @@ def _number(mapping: Mapping, text: str) -> float:
     return value
 
 
-def tags_of(mappings: Sequence[Mapping], station: int) -> Tags:
+def tags_of(mappings: Rows, station: int) -> Tags:
     """Return the tags of a station's rows, with a number where a row has several values."""
     tags: dict[str, list[str]] = defaultdict(list)
-    for row in mappings:
-        if row.station != station or row.serves:
+    for row in mappings.of_plcs:
+        if row.station != station:
             continue
         count = 1 if row.type is ValueType.STRING else row.length
         for number in range(count):

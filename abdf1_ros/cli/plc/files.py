@@ -27,7 +27,7 @@ from abdf1_ros.pccc.file_types import FileType, PlcType
 from abdf1_ros.pccc.identity import Identity
 from abdf1_ros.pccc.processor import Processor
 from abdf1_ros.problems import Problem
-from abdf1_ros.settings.mapping import Mapping
+from abdf1_ros.settings.rows import Rows
 
 # Period of the proposed rows (ms): reading all files of a PLC is a lot for a slow line.
 _DRAFT_PERIOD = 5000
@@ -76,13 +76,13 @@ def listed(session: Session, station: int, identity: Identity | None) -> list[Da
         return []
 
 
-def outside(found: Sequence[DataFile], mappings: Sequence[Mapping],
+def outside(found: Sequence[DataFile], mappings: Rows,
             station: int) -> Iterator[Problem]:
     """Yield the rows of a map that lie outside of the files of a station, and why."""
     files = {entry.number: entry for entry in found if not entry.type.is_function}
-    for mapping in mappings:
+    for mapping in mappings.of_plcs:
         address = mapping.address
-        if mapping.station != station or mapping.serves or address.file_type.is_function or (
+        if mapping.station != station or address.file_type.is_function or (
                 address.file_type.is_io):
             continue
         entry, fault = files.get(address.file), ''

@@ -63,6 +63,7 @@ from abdf1_ros.problems import ConfigurationError, Problem
 from abdf1_ros.settings.map_file import load_mappings
 from abdf1_ros.settings.mapping import Command, Mapping
 from abdf1_ros.settings.network import load_network, Network
+from abdf1_ros.settings.rows import Rows
 from abdf1_ros.text import printable
 
 _ALL_TRIED_IN_VAIN = (
@@ -492,14 +493,14 @@ def _clock(options: argparse.Namespace, session: Session, prepared: None) -> int
     return EXIT_FAILED
 
 
-def _rows_of_map(options: argparse.Namespace) -> list[Mapping]:
-    mappings, problems = load_mappings(options.map) if options.map else ([], [])
+def _rows_of_map(options: argparse.Namespace) -> Rows:
+    mappings, problems = load_mappings(options.map) if options.map else (Rows(), [])
     for problem in problems:
         _complain(str(problem))
     return mappings
 
 
-def _files(options: argparse.Namespace, session: Session, mappings: Sequence[Mapping]) -> int:
+def _files(options: argparse.Namespace, session: Session, mappings: Rows) -> int:
     family, processor = _family(options, session)
     progress = Progress()
     found = []

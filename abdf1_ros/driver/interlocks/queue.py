@@ -23,7 +23,7 @@ while the host sleeps (rule 6). None of this is a safety function.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Container, Sequence
+from collections.abc import Callable, Container
 import heapq
 import itertools
 import math
@@ -42,6 +42,7 @@ from abdf1_ros.driver.writes.under_way import WriteJob, WritesUnderWay
 from abdf1_ros.errors import RemoteError
 from abdf1_ros.plan.planner import Block
 from abdf1_ros.settings.mapping import Mapping
+from abdf1_ros.settings.rows import Rows
 
 _OURS = -1  # stands for our own table
 _due_of = attrgetter('due')
@@ -84,14 +85,14 @@ class Interlocks(WriteListener):
     Only ``executor_ran``, ``wind_down`` and ``resume`` may be called from another thread.
     """
 
-    def __init__(self, mappings: Sequence[Mapping], writes: WriteQueue, writing: WritesUnderWay,
+    def __init__(self, mappings: Rows, writes: WriteQueue, writing: WritesUnderWay,
                  served: Served, listener: ValueListener,
                  warn: Callable[[Mapping, str, bool], None], seed: int = 0) -> None:
         record, dice = writing.record, Random(seed)
         self.heartbeats = [HeartbeatRow(record.words_of(mapping), 1 + seed % LARGEST, dice)
-                           for mapping in mappings if mapping.heartbeat]
+                           for mapping in mappings.heartbeats]
         self.fallbacks = [FallbackRow(record.words_of(mapping))
-                          for mapping in mappings if mapping.fallback]
+                          for mapping in mappings.fallbacks]
         self._conditions = Conditions()
         rows: list[OwnRow] = [*self.heartbeats, *self.fallbacks]
         stations_of = {row: _OURS if row.mapping.serves else row.mapping.station for row in rows}

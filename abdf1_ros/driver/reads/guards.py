@@ -25,7 +25,6 @@ import math
 
 from abdf1_ros.driver.reads.point import Guard, ReadPoint
 from abdf1_ros.pccc.identity import Identity
-from abdf1_ros.plan.bounds import ANSWERS_IN_TIME
 from abdf1_ros.settings.mapping import Mapping
 
 
@@ -36,11 +35,6 @@ class RunGuard(Guard):
         super().__init__()
         self._told = -math.inf
         self._state = 'its mode is not known'
-
-    @property
-    def status_period(self) -> float:
-        """Return how often (s) the station has to be asked for its mode."""
-        return min(self._since) / ANSWERS_IN_TIME
 
     def told(self, identity: Identity | None, asked: float) -> None:
         """Take an answer about the mode, None for one that cannot be used."""
@@ -113,10 +107,6 @@ class Guards:
             return self._runs.setdefault(mapping.station, RunGuard())
         # A tag is there once in the map.
         return self.counters.setdefault(condition.tag, CounterGuard(condition.tag))
-
-    def status_periods(self) -> dict[int, float]:
-        """Return how often (s) stations have to be asked for their mode."""
-        return {station: guard.status_period for station, guard in self._runs.items()}
 
     def mode_told(self, station: int, identity: Identity | None, asked: float) -> None:
         """Take what a station has reported of itself; it was ``asked`` at this clock value (s)."""

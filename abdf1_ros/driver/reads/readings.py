@@ -34,7 +34,7 @@ from abdf1_ros.errors import FormatError, LinkError, RemoteError
 from abdf1_ros.pccc.identity import Identity
 from abdf1_ros.pccc.status import is_address_fault
 from abdf1_ros.pccc.values import Values
-from abdf1_ros.plan.bounds import own_work
+from abdf1_ros.plan.bounds import mode_periods, own_work
 from abdf1_ros.plan.forecast import (
     answer_time,
     block_time,
@@ -47,6 +47,7 @@ from abdf1_ros.plan.planner import Block, Planner
 from abdf1_ros.plan.refusals import Change, Refusals
 from abdf1_ros.settings.mapping import Mapping
 from abdf1_ros.settings.network import Network
+from abdf1_ros.settings.rows import Rows
 
 # Other commands go between the packets of one read. On a busy line the read may take so many times
 # its own time.
@@ -74,17 +75,20 @@ class Readings:
     The ``points`` of all rows that are published, and the ``reads`` that serve them.
 
     ``listener`` is notified, and ``record`` of all words. ``planner`` knows which packets each
-    station takes.
+    station takes. ``mode_periods`` says which stations have to be asked for their mode, and how
+    often (s).
     """
 
-    def __init__(self, network: Network, mappings: Sequence[Mapping], settings: DriverSettings,
+    def __init__(self, network: Network, mappings: Rows, settings: DriverSettings,
                  stations: ActiveStationList, line: LineTime, listener: ValueListener,
                  record: WriteRecord) -> None:
         self.planner = Planner(line_model(network), settings.default_period)
-        blocks = self.planner.plan(mapping for mapping in mappings
-                              if not (settings.read_only and mapping.heartbeat))
+        blocks = self.planner.plan(mappings)
         self.guards = Guards()
-        self.points = _points(network, mappings, blocks, settings, self.guards)
+        times = settings.default_period, settings.stale_after
+        self.mode_periods = mode_periods(mappings, *times)
+        self.points = _points(mappings, blocks, settings, self.guards,
+                              own_work(self.planner.line_model, mappings, *times))
         self.reads = Reads(stations)
         self.expected_poll_cycle = poll_cycle(blocks, answer_time(network, blocks))
         self._network = network
@@ -231,16 +235,15 @@ class Readings:
                 point.fail(reason)
 
 
-def _points(network: Network, mappings: Sequence[Mapping], blocks: Sequence[Block],
-            settings: DriverSettings, guards: Guards) -> dict[Mapping, ReadPoint]:
-    """Return the points of all mappings that read, in their order."""
+def _points(mappings: Rows, blocks: Sequence[Block], settings: DriverSettings, guards: Guards,
+            own: Sequence[tuple[float, float]]) -> dict[Mapping, ReadPoint]:
+    """Return the points of all mappings that are published, in their order."""
     default = settings.default_period
-    stale = stale_times(blocks, default, settings.stale_after,
-                        own_work(line_model(network), mappings, default))
+    stale = stale_times(blocks, default, settings.stale_after, own)
     return {mapping: _served_point(mapping, settings) if mapping.serves
             else ReadPoint(mapping, period_of(mapping, default), stale[mapping],
                            guards.of(mapping))
-            for mapping in mappings if mapping.reads}
+            for mapping in mappings.published}
 
 
 def _served_point(mapping: Mapping, settings: DriverSettings) -> ReadPoint:

@@ -71,8 +71,8 @@ class GuestPlaces(GuestListener):
 
     def wrote(self, guest: Guest, command: Packet, station: int, words: list[Extent]) -> None:
         """Log a write of words that we write, too."""
-        rows = [row for row in self._driver.mappings if (row.writes or row.heartbeat)
-                and any(row.extent.meets(extent) for extent in words)]
+        rows = [row for row in self._driver.mappings if row.changes and any(
+                row.extent.meets(extent) for extent in words)]
         if rows:
             guest.collisions += 1
             self._notes.warning(

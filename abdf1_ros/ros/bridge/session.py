@@ -22,7 +22,7 @@ used from any thread.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 import math
 import random
@@ -49,7 +49,7 @@ from abdf1_ros.ros.topics.messages import ACTIVE_LAYOUT
 from abdf1_ros.ros.topics.reads import ReadTopic, ReadTopics
 from abdf1_ros.ros.topics.snapshot import Snapshot
 from abdf1_ros.ros.topics.writes import WriteTopic, WriteTopics
-from abdf1_ros.settings.mapping import Mapping
+from abdf1_ros.settings.rows import Rows
 from abdf1_ros.text import first, printable
 from diagnostic_msgs.msg import DiagnosticArray
 from rclpy.clock import Clock, ClockType
@@ -287,9 +287,9 @@ def tell_plcs(sessions: Sequence[Session], what: str) -> None:
         session.wait_for_plcs(give_up, what)
 
 
-def stations_of(mappings: Iterable[Mapping]) -> frozenset[int]:
+def stations_of(mappings: Rows) -> frozenset[int]:
     """Return the stations that we talk to, gateways among them."""
-    numbers = {number for mapping in mappings if not mapping.serves
+    numbers = {number for mapping in mappings.of_plcs
                for number in (mapping.station, mapping.via) if number is not None}
     return frozenset(numbers - {BROADCAST})
 
@@ -305,8 +305,7 @@ def _tell_files(logger: RcutilsLogger, configuration: Configuration) -> None:
     if len(remarks) > _MOST_REMARKS:
         logger.warning(
             f'and {len(remarks) - _MOST_REMARKS} more remarks; "check" has them all')
-    silent = [mapping.tag for mapping in configuration.mappings
-              if mapping.heartbeat or mapping.fallback]
+    silent = [mapping.tag for mapping in configuration.mappings if mapping.is_alone]
     if silent and configuration.parameters.read_only:
         logger.warning(
             f'read_only: no heartbeat and no fallback value is written: {first(silent)}')

@@ -25,10 +25,10 @@ from pathlib import Path
 import random
 from typing import Any
 
-from abdf1_ros.df1.packet import BROADCAST
 from abdf1_ros.df1.settings import PollingSettings
 from abdf1_ros.driver.settings import DriverSettings
 from abdf1_ros.paths import config_file
+from abdf1_ros.plan.forecast import USUAL_STALE_AFTER
 from abdf1_ros.plan.usable_rows import usable_rows
 from abdf1_ros.problems import ConfigurationError, Place, Problem
 from abdf1_ros.ros.bridge.files import FileWatch
@@ -39,6 +39,7 @@ from abdf1_ros.settings.columns import COLUMNS, MAX_PERIOD
 from abdf1_ros.settings.map_file import load_mappings
 from abdf1_ros.settings.mapping import Mapping
 from abdf1_ros.settings.network import FIELDS, load_network, make_network, Network, URLS
+from abdf1_ros.settings.rows import Rows
 from abdf1_ros.settings.station_lists import octal_of, parse_stations
 from abdf1_ros.text import counted
 from rcl_interfaces.msg import ParameterDescriptor
@@ -73,7 +74,8 @@ class Parameters:
     diagnostics_period: float = _parameter(1.0, 's between diagnostics', 0.1, 60.0)
     snapshot_period: float = _parameter(
         1.0, 's between snapshots of all values, while subscribed to; 0: never', 0.0, 3600.0)
-    stale_after: float = _parameter(3.0, 'periods after which a value counts as lost', 1.0, 1000.0)
+    stale_after: float = _parameter(
+        USUAL_STALE_AFTER, 'periods after which a value counts as lost', 1.0, 1000.0)
     processor_period: float = _parameter(
         10.0, 's between questions for type, mode and faults of each processor; 0: never',
         0.0, 3600.0)
@@ -140,7 +142,7 @@ class Configuration:
     parameters: Parameters
     network: Network
     port: str
-    mappings: list[Mapping]
+    mappings: Rows
     map_problems: list[Problem]
     given: Given
     polling: PollingSettings | None = None
@@ -169,8 +171,8 @@ class Configuration:
     def __str__(self) -> str:
         """Return one line that tells what the node runs with."""
         network, parameters = self.network, self.parameters
-        read = sum(mapping.reads for mapping in self.mappings)
-        written = len({mapping.topic for mapping in self.mappings if mapping.writes})
+        read = len(self.mappings.published)
+        written = len({mapping.topic for mapping in self.mappings.messages})
         return (f'{_resolved(parameters.net_file)} and {_resolved(parameters.map_file)}: '
                 f'port {self.port}, Mode {network.mode}, {network.baud} baud, '
                 f'{network.error_code}; {counted(len(self.mappings), "row")}, topics: '
@@ -220,7 +222,7 @@ def read_again(before: Configuration) -> Configuration:
 def _from_files(given: Given, parameters: Parameters, problems: list[Problem], *,
                 is_strict: bool) -> Configuration:
     network = Network()
-    mappings: list[Mapping] = []
+    mappings = Rows()
     map_problems: list[Problem] = []
     files = FileWatch((parameters.net_file, parameters.map_file))
     try:
@@ -338,7 +340,7 @@ def _nearest(name: str, known: Collection[str], begins: str, likeness: float) ->
     return 'another version may have it' if likeness < 0.75 else ''
 
 
-def _ignored(given: Given, mappings: list[Mapping]) -> list[str]:
+def _ignored(given: Given, mappings: Rows) -> list[str]:
     """Return the names of ``map.*`` that say something else than the map."""
     texts = {name: text_of(value) for name, value in given.items() if name.startswith('map.')}
     repeated = {name for name, value, _ in map_cells(mappings) if texts.get(name) == value} \
@@ -346,14 +348,13 @@ def _ignored(given: Given, mappings: list[Mapping]) -> list[str]:
     return sorted(texts.keys() - repeated)
 
 
-def _polling(parameters: Parameters, mappings: list[Mapping],
+def _polling(parameters: Parameters, mappings: Rows,
              problems: list[Problem]) -> PollingSettings:
     """Return how a master with standard polling polls."""
     priority = _stations('priority_poll_list', parameters.priority_poll_list, problems)
     normal = _stations('poll_list', parameters.poll_list, problems)
     if not parameters.poll_list:
-        mapped = {mapping.station for mapping in mappings if not mapping.serves}
-        normal = tuple(sorted(mapped - {BROADCAST, *priority}))
+        normal = tuple(sorted({*mappings.stations} - {*priority}))
     return PollingSettings(normal, priority, parameters.poll_group_size,
                            parameters.poll_multiple, parameters.send_in_sequence)
 

@@ -36,6 +36,7 @@ from abdf1_ros.errors import FormatError, PortLost
 from abdf1_ros.pccc.processor import Processor
 from abdf1_ros.problems import ConfigurationError
 from abdf1_ros.settings.mapping import Mapping
+from abdf1_ros.settings.rows import Rows
 from hypothesis import given
 from hypothesis import strategies as st
 import pytest
@@ -94,12 +95,12 @@ def test_rows_of_values() -> None:
 
 
 def test_values_have_the_tags_of_their_own_addresses() -> None:
-    tags = tags_of([
+    tags = tags_of(Rows([
         make_mapping('N7:1', tag='speed'), make_mapping('N7:1', tag='speed'),
         make_mapping('N7:1', tag='a\nb'), make_mapping('N7:2', length=2, tag='words'),
         make_mapping('N7:4', length=2, kind='string', tag='text'),
         make_mapping('N7:0', station=2, tag='other'), make_mapping('N7:0/3', tag='bit'),
-        make_mapping('N7:0', command='Serve', tag='ours')], 1)
+        make_mapping('N7:0', command='Serve', tag='ours')]), 1)
     mapping = make('N7:0', Length='6')
     assert list(rows(mapping, array('h', range(6)), labels(mapping, tags))) == [
         ('N7:0', '0'), (r'N7:1 speed, a\nb', '1'), ('N7:2 words[0]', '2'),

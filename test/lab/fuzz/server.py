@@ -23,6 +23,7 @@ from abdf1_ros.pccc.file_types import FileType, PlcType
 from abdf1_ros.pccc.server import Server
 from abdf1_ros.pccc.status import EXTENDED
 from abdf1_ros.settings.mapping import Mapping
+from abdf1_ros.settings.rows import Rows
 from support.mappings import make_mapping
 
 _STATION = 5
@@ -74,7 +75,7 @@ class _Own:
     def __init__(self, plc_type: PlcType) -> None:
         self.mapping = make_mapping(
             'N7:2', 'Serve', plc=plc_type.value, station=_STATION, length=3)
-        self.served = Served(plc_type, [self.mapping], self._take)
+        self.served = Served(plc_type, Rows([self.mapping]), self._take)
         self.told = 0
 
     def _take(self, mapping: Mapping, words: bytes) -> None:
