@@ -24,16 +24,18 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from contextlib import suppress
 from functools import partial
+import re
 import resource
 import threading
 import time
 from typing import Any
 
+from abdf1_ros.ports.clock import line_time
 from abdf1_ros.problems import ConfigurationError, Place, Problem
 from abdf1_ros.ros.bridge.node import BridgeNode
-from abdf1_ros.ros.diagnostics.graph import Graph
-from abdf1_ros.ros.diagnostics.log import bug_text
-from abdf1_ros.ros.diagnostics.status import ERROR, message_of, OK
+from abdf1_ros.ros.diagnostics.graph import DISCOVERY, Graph, NameWatch
+from abdf1_ros.ros.diagnostics.log import bug_text, LimitedLog
+from abdf1_ros.ros.diagnostics.status import ERROR, message_of, OK, WARN, WORDS
 from abdf1_ros.ros.parameters.arguments import Arguments
 from abdf1_ros.ros.parameters.declared import take_given, wrong_names
 from abdf1_ros.ros.parameters.files import node_sections, parameter_files, parameter_tree
@@ -171,6 +173,12 @@ class LinesNode(Node):
         super().__init__(NODE_NAME, automatically_declare_parameters_from_overrides=True)
         self.wanted, self.is_strict = _options(self, arguments)
         self.is_asked_again = False
+        self.graph = Graph(self)
+        self._notes = LimitedLog(self.get_logger(), line_time)
+        self._names = NameWatch(
+            self.get_fully_qualified_name(),
+            lambda now: self.graph.nodes(self.get_name(), self.get_namespace(), now),
+            line_time() + DISCOVERY, f'-r {NODE_NAME}:__node:=lines_2')
         self._publisher = self.create_publisher(DiagnosticArray, '/diagnostics', 10)
         self.create_service(Trigger, '~/reload', self._reload)
 
@@ -179,16 +187,24 @@ class LinesNode(Node):
         response.success, response.message = True, 'lines that do not run are tried again'
         return response
 
+    def look(self) -> None:
+        """Look for another process of the same name: one call of a service would reach both."""
+        for news in self._names.look(line_time()):
+            self._notes.tell(news)
+
     def publish(self, lines: Sequence[RestartedLine]) -> None:
         """Publish which lines run, and why others do not."""
         faulty = [line for line in lines if line.node is None]
-        level, text = (ERROR, f'ERROR: {len(faulty)} of {len(lines)} lines do not run') \
-            if faulty else (OK, f'OK: {len(lines)} of {len(lines)} lines run')
+        level, text = (ERROR, f'{len(faulty)} of {len(lines)} lines do not run') \
+            if faulty else (OK, f'{len(lines)} of {len(lines)} lines run')
+        if self._names.text:
+            level, text = max(level, WARN), f'{text}; {self._names.text}'
         values = {'lines': str(len(lines)), 'running': str(len(lines) - len(faulty)),
                   'restarts': str(sum(line.restarts for line in lines))}
         values |= {line.name: '; '.join(line.faults) or 'begins again' for line in faulty}
         name = f'{self.get_fully_qualified_name().lstrip("/")}: lines'
-        message = DiagnosticArray(status=[message_of(name, level, text, '', values)])
+        message = DiagnosticArray(status=[
+            message_of(name, level, f'{WORDS[level]}: {text}', '', values)])
         message.header.stamp = self.get_clock().now().to_msg()
         self._publisher.publish(message)
 
@@ -197,9 +213,9 @@ class Lines:
     """All lines, from their start to their end."""
 
     def __init__(self, names: Sequence[str], node: LinesNode, arguments: Arguments) -> None:
-        port_owners, graph = PortOwners(), Graph(node)
+        port_owners = PortOwners()
         self._lines = [RestartedLine(name, partial(
-            BridgeNode, _short(name), namespace=name.rpartition('/')[0] or '/', graph=graph,
+            BridgeNode, _short(name), namespace=name.rpartition('/')[0] or '/', graph=node.graph,
             port_owners=port_owners, arguments=arguments,
             parameter_overrides=[_NO_TYPE_DESCRIPTIONS]))
             for name in names]
@@ -222,6 +238,7 @@ class Lines:
     def _look(self) -> None:
         """Take requests to the process, and tell of all lines."""
         now = time.monotonic()
+        self._node.look()
         self._executor.spin_once(timeout_sec=0)
         if self._node.is_asked_again:
             self._node.is_asked_again = False
@@ -239,18 +256,18 @@ class Lines:
         self._runner.destroy()
 
 
-def sections(path: str) -> list[str]:
+def sections(path: str, own_name: str = NODE_NAME) -> list[str]:
     """
-    Return the full names of the nodes that a parameter file has a section for.
+    Return the full names of the lines that a parameter file has a section for.
 
-    Those with wildcards are no nodes.
+    A section with a wildcard is none, nor is that of the process, which is called ``own_name``.
     Raises ConfigurationError where there is none that can be read, and where one comes twice:
     only one of them would run.
     """
     found: dict[str, int] = {}
     problems = []
     for name, line, _ in node_sections(parameter_tree(path)):
-        if _short(name) == NODE_NAME or '*' in name:
+        if _short(name) in (NODE_NAME, own_name) or '*' in name:
             continue
         first = found.setdefault(name, line)
         if first != line:
@@ -308,13 +325,22 @@ def _allow_files() -> None:
         resource.setrlimit(resource.RLIMIT_NOFILE, (most, most))
 
 
+def _own_name(given: Sequence[str]) -> str:
+    """Return how the process is called; raises ConfigurationError for a name for all nodes."""
+    own = NODE_NAME
+    for text in given:
+        if renamed := re.fullmatch(rf'/?{NODE_NAME}:__(?:node|name):=(\w+)', text):
+            own = renamed[1]
+        elif any(word in text for word in ('__node:=', '__name:=', '__ns:=')):
+            raise ConfigurationError([Problem('arguments', (
+                f'{printable(text)} would give all nodes one name: the sections of the parameter '
+                f'file name the lines, and -r {NODE_NAME}:__node:=NAME the process'))])
+    return own
+
+
 def _make(given: Sequence[str]) -> Program:
-    if any(word in text for text in given for word in ('__node:=', '__name:=', '__ns:=')):
-        raise ConfigurationError([Problem('arguments', (
-            'the sections of the parameter file name the nodes; __node and __ns would give all '
-            'of them one name'))])
-    files = parameter_files(given)
-    names = [*dict.fromkeys(name for path in files for name in sections(path))]
+    own_name, files = _own_name(given), parameter_files(given)
+    names = [*dict.fromkeys(name for path in files for name in sections(path, own_name))]
     _allow_files()
     arguments = Arguments(files, others=names)
     node = LinesNode(arguments)

@@ -34,6 +34,7 @@ from abdf1_ros.ros.process import main as process
 from abdf1_ros.signals import EndRequest
 from abdf1_ros.testing import Plcs
 import pytest
+from rclpy.node import Node
 from rclpy.utilities import get_default_context
 from std_msgs.msg import Int16MultiArray
 from std_srvs.srv import Trigger
@@ -48,6 +49,7 @@ from support.ros import (
     stamp,
     until_status,
     values_in,
+    WARN,
     write_csv,
 )
 
@@ -236,6 +238,24 @@ def test_each_line_is_a_node_of_its_own(plant: Plant) -> None:
     assert not [thread for thread in threading.enumerate() if thread.name == 'callbacks']
 
 
+def test_process_has_a_name_of_its_own(plant: Plant) -> None:
+    plant.start('-r', 'lines:__node:=host_b', reads='a')
+    status = until_status(plant.observer.diagnostics(''), 'lines', OK)
+    assert status.name == 'host_b: lines'
+    assert plant.observer.call(Trigger, '/host_b/reload', Trigger.Request()).success
+
+
+def test_second_process_of_the_same_name_is_a_warning(plant: Plant) -> None:
+    plant.start('-p', 'lines:=[a]', reads='a')
+    other = Node('lines', context=plant.observer.context)
+    try:
+        status = until_status(plant.observer.diagnostics(''), 'lines', WARN)
+    finally:
+        other.destroy_node()
+    assert status.message.startswith(
+        'WARN: 1 of 1 lines run; another node is called /lines too')
+
+
 def test_process_may_open_as_many_files_as_the_system_allows(
         plant: Plant, monkeypatch: pytest.MonkeyPatch) -> None:
     limits: list[tuple[int, int]] = []
@@ -391,7 +411,8 @@ def test_argument_that_is_not_of_ros_is_refused(capsys: pytest.CaptureFixture[st
 
 def test_one_name_for_all_lines_is_refused(capfd: pytest.CaptureFixture[str]) -> None:
     assert main(['lines', '--ros-args', '-r', '__node:=x']) == 2
-    assert 'the sections of the parameter file name the nodes' in capfd.readouterr().err
+    assert 'the sections of the parameter file name the lines, and -r lines:__node:=NAME the ' \
+        'process' in capfd.readouterr().err
 
 
 @pytest.mark.parametrize(('option', 'text'), [

@@ -79,13 +79,16 @@ class NameWatch:
     ``count`` tells how many nodes of the name there are; ours is one of them. That is said as soon
     as it is seen, before it is known whether it is an earlier run: both may take the next command.
     The first look is at the clock value ``first_look`` (s); ``has_looked`` is true from then on.
+    ``renaming`` is the argument that gives another name.
     """
 
-    def __init__(self, name: str, count: Callable[[float], int], first_look: float = 0.0) -> None:
+    def __init__(self, name: str, count: Callable[[float], int], first_look: float = 0.0,
+                 renaming: str = '-r __node:=line_2') -> None:
         self.text = ''
         self.has_looked = False
         self._name = name
         self._count = count
+        self._renaming = renaming
         self._since: float | None = None
         self._next_look = first_look
 
@@ -101,7 +104,7 @@ class NameWatch:
             text = f'another node is called {self._name} too' + (
                 '' if stays else ', or an earlier run of it was killed less than 20 s ago')
             news = News(WARN, 'the name', f'{text}: both publish and take the same topics; give '
-                        'one another name, as in -r __node:=line_2')
+                        f'one another name, as in {self._renaming}')
         else:
             self._since, text = None, ''
             news = News(INFO, 'the name', f'no other node is called {self._name} any more')
