@@ -39,6 +39,7 @@ from abdf1_ros.ros.diagnostics.status import ERROR, message_of, OK, WARN, WORDS
 from abdf1_ros.ros.parameters.arguments import Arguments
 from abdf1_ros.ros.parameters.declared import take_given, wrong_names
 from abdf1_ros.ros.parameters.files import node_sections, parameter_files, parameter_tree
+from abdf1_ros.ros.process.callbacks import AnsweringNode, Executor
 from abdf1_ros.ros.process.main import EXIT_CONFIGURATION, make_parser, Program, REFUSALS, run_ros
 from abdf1_ros.ros.process.port_owners import PortOwners
 from abdf1_ros.ros.process.runner import Line, LinkFailed, Runner
@@ -46,7 +47,6 @@ from abdf1_ros.signals import EndRequest
 from abdf1_ros.text import printable
 from diagnostic_msgs.msg import DiagnosticArray
 from rcl_interfaces.msg import ParameterDescriptor
-from rclpy.executors import SingleThreadedExecutor
 from rclpy.logging import get_logger
 from rclpy.node import Node
 from rclpy.parameter import Parameter
@@ -166,7 +166,7 @@ def _options(node: Node, arguments: Arguments) -> tuple[list[str], bool]:
     return list(wanted), is_strict
 
 
-class LinesNode(Node):
+class LinesNode(AnsweringNode):
     """Tell of all lines on /diagnostics; ``~/reload`` tries those again that do not run."""
 
     def __init__(self, arguments: Arguments) -> None:
@@ -221,8 +221,7 @@ class Lines:
             for name in names]
         self._runner = Runner(self._lines, self._look)
         self._node = node
-        self._executor = SingleThreadedExecutor(context=node.context)
-        self._executor.add_node(node)
+        self._executor = Executor(node)
         self._next_status = 0.0
         for line in self._lines:
             line.make()
@@ -239,7 +238,10 @@ class Lines:
         """Take requests to the process, and tell of all lines."""
         now = time.monotonic()
         self._node.look()
-        self._executor.spin_once(timeout_sec=0)
+        try:
+            self._executor.spin_once(timeout_sec=0)
+        except Exception as error:  # the lines have executors of their own
+            self._node.tell_failure('the wait for calls', error)
         if self._node.is_asked_again:
             self._node.is_asked_again = False
             for line in self._lines:

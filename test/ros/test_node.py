@@ -37,6 +37,8 @@ from abdf1_ros.ros.bridge.node import end_together
 from abdf1_ros.ros.node import main
 from diagnostic_msgs.msg import DiagnosticStatus
 import pytest
+from rcl_interfaces.msg import Parameter, ParameterValue
+from rcl_interfaces.srv import SetParameters, SetParametersAtomically
 from rclpy.duration import Duration
 from rclpy.impl.implementation_singleton import rclpy_implementation
 from rclpy.node import Node
@@ -361,6 +363,41 @@ def test_internal_errors_are_told_and_the_third_is_the_end(
 
 
 # Starts that are refused
+
+
+@pytest.mark.parametrize('kind', [10, 200, 255])
+def test_call_that_no_client_library_would_send_is_refused_and_ends_nothing(
+        make_bench: Benches, kind: int) -> None:
+    bench = make_bench(SPEED)
+    odd = Parameter(name='read_only', value=ParameterValue(type=kind))
+    one, two = bench.call(SetParameters, 'set_parameters', SetParameters.Request(
+        parameters=[odd, odd])).results
+    whole = bench.call(SetParametersAtomically, 'set_parameters_atomically',
+                       SetParametersAtomically.Request(parameters=[odd])).result
+    for result in (one, two, whole):
+        assert not result.successful
+        assert f'{kind} is not a valid Parameter.Type' in result.reason
+
+
+def test_service_that_fails_answers_without_success(
+        make_bench: Benches, monkeypatch: pytest.MonkeyPatch) -> None:
+    bench = make_bench(SPEED)
+    monkeypatch.setattr(bench.node.session.diagnostics.counters, 'reset', None)
+    for _ in range(5):
+        answer = bench.call(Trigger, 'reset_counters', Trigger.Request())
+        assert (answer.success, answer.message[:17]) == (False, 'refused: TypeErro')
+
+
+def test_node_whose_name_cannot_be_read_keeps_no_message_back(
+        make_bench: Benches, monkeypatch: pytest.MonkeyPatch) -> None:
+    def names(node: Node) -> None:
+        raise UnicodeDecodeError('utf-8', b'/\xff', 1, 2, 'invalid start byte')
+
+    monkeypatch.setattr(Node, 'get_node_names_and_namespaces', names)
+    bench = make_bench(RECIPE)
+    bench.publisher(Int16MultiArray, 'recipe')(5, 6)
+    bench.until_results(1)
+    assert bench.words('N7:4', 2) == [5, 6]
 
 
 @pytest.mark.parametrize('arguments', [

@@ -13,19 +13,21 @@
 # limitations under the License.
 """The threads of callbacks, and the one sequence of an end, for one bridge or many."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from itertools import groupby
+from queue import SimpleQueue
 import threading
 import time
 from typing import Any
 
 from abdf1_ros.ros.bridge.node import end_together
-from abdf1_ros.ros.process.runner import _Callbacks
+from abdf1_ros.ros.diagnostics.log import MOST_ENTRIES
+from abdf1_ros.ros.process.callbacks import AnsweringNode, Callbacks
 from abdf1_ros.testing import PATIENCE
 import pytest
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.logging import get_logger
-from rclpy.node import Node
+from std_msgs.msg import Bool
 from support.ros import Observer
 
 
@@ -98,8 +100,8 @@ def test_bridge_that_fails_at_its_end_keeps_no_other_from_it(
 def test_executor_is_shut_down_when_its_thread_has_ended(monkeypatch: pytest.MonkeyPatch) -> None:
     ended: list[bool] = []
     with Observer() as observer:
-        node = Node('ends', context=observer.context)
-        callbacks = _Callbacks(node)
+        node = AnsweringNode('ends', context=observer.context)
+        callbacks = Callbacks(node)
         monkeypatch.setattr(SingleThreadedExecutor, 'shutdown',
                             lambda executor, **options: ended.append(not callbacks.is_alive()))
         callbacks.start()
@@ -112,8 +114,8 @@ def test_executor_is_shut_down_when_its_thread_has_ended(monkeypatch: pytest.Mon
 def test_thread_of_callbacks_turns_when_it_is_woken_unless_a_callback_hangs() -> None:
     hangs, goes_on = threading.Event(), threading.Event()
     with Observer() as observer:
-        node = Node('hangs', context=observer.context)
-        callbacks = _Callbacks(node)
+        node = AnsweringNode('hangs', context=observer.context)
+        callbacks = Callbacks(node)
         callbacks.start()
         callbacks.has_turned = False
         callbacks.wake()
@@ -132,4 +134,70 @@ def test_thread_of_callbacks_turns_when_it_is_woken_unless_a_callback_hangs() ->
         goes_on.set()
         observer.until(lambda: callbacks.has_turned, 'a turn')
         callbacks.end(time.monotonic() + PATIENCE)
+        node.destroy_node()
+
+
+@pytest.fixture
+def node() -> Iterator[AnsweringNode]:
+    with Observer() as observer:
+        node = AnsweringNode('takes', context=observer.context)
+        callbacks = Callbacks(node)
+        callbacks.start()
+        yield node
+        callbacks.end(time.monotonic() + PATIENCE)
+        assert callbacks.error is None
+        node.destroy_node()
+
+
+def test_callback_that_fails_ends_alone_and_is_logged_a_few_times(
+        node: AnsweringNode, capfd: pytest.CaptureFixture[str]) -> None:
+    done = threading.Event()
+    turns = iter(range(40))
+
+    def fail() -> None:
+        if next(turns) == 30:
+            done.set()
+        raise ValueError('from outside')
+
+    node.create_timer(0.002, fail)
+    assert done.wait(PATIENCE)
+    said = capfd.readouterr().err
+    assert f"all else goes on: ValueError('from outside') in {__file__}" in said
+    assert said.count('from outside') == MOST_ENTRIES
+
+
+def test_subscription_is_heard_again_after_a_message_that_cannot_be_taken(
+        node: AnsweringNode, monkeypatch: pytest.MonkeyPatch,
+        capfd: pytest.CaptureFixture[str]) -> None:
+    heard: SimpleQueue[bool] = SimpleQueue()
+    take = SingleThreadedExecutor._take_subscription
+    broken = iter([True, True])
+
+    def take_or_fail(executor: SingleThreadedExecutor, subscription: Any) -> Any:
+        callback = take(executor, subscription)
+        if next(broken, False):
+            raise RuntimeError('cannot be taken')
+        return callback
+
+    monkeypatch.setattr(SingleThreadedExecutor, '_take_subscription', take_or_fail)
+    node.create_subscription(Bool, 'odd', lambda message: heard.put(message.data), 10)
+    publisher = node.create_publisher(Bool, 'odd', 10)
+    for value in (True, True, False):
+        publisher.publish(Bool(data=value))
+    assert heard.get(timeout=PATIENCE) is False
+    assert capfd.readouterr().err.count('a message on /odd has failed') == 2
+
+
+def test_executor_that_cannot_wait_any_more_is_an_error(monkeypatch: pytest.MonkeyPatch) -> None:
+    with Observer() as observer:
+        node = AnsweringNode('deaf', context=observer.context)
+        callbacks = Callbacks(node)
+
+        def fail(executor: SingleThreadedExecutor, *args: object) -> None:
+            raise RuntimeError('no wait set')
+
+        monkeypatch.setattr(SingleThreadedExecutor, 'wait_for_ready_callbacks', fail)
+        callbacks.start()
+        callbacks.join(PATIENCE)
+        assert repr(callbacks.error) == "RuntimeError('no wait set')"
         node.destroy_node()

@@ -19,6 +19,7 @@ import time
 from typing import Any, cast
 
 from abdf1_ros.driver.driver import Driver
+from abdf1_ros.ros.process.callbacks import AnsweringNode
 from abdf1_ros.ros.topics.writes import count_publishers, LossCounter, WriteTopics
 from abdf1_ros.settings.mapping import Mapping
 import pytest
@@ -118,7 +119,7 @@ def node() -> Taker:
 @pytest.fixture
 def topics(node: Taker) -> WriteTopics:
     """Return the topics of a node that has not begun."""
-    topics = WriteTopics(cast(Node, node))
+    topics = WriteTopics(cast(AnsweringNode, node))
     topics.give_to(node.open(topics))
     return topics
 

@@ -45,6 +45,7 @@ from abdf1_ros.ros.parameters.declared import (
     read_again,
 )
 from abdf1_ros.ros.parameters.shown import ShownFiles
+from abdf1_ros.ros.process.callbacks import AnsweringNode
 from abdf1_ros.ros.process.main import LAST_WRITES, take_last_writes
 from abdf1_ros.ros.process.port_owners import PortOwners
 from abdf1_ros.ros.topics.messages import latched_qos
@@ -53,7 +54,6 @@ from abdf1_ros.text import printable
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from rclpy.callback_groups import MutuallyExclusiveCallbackGroup
 from rclpy.duration import Duration
-from rclpy.node import Node
 from std_msgs.msg import UInt16MultiArray
 from std_srvs.srv import SetBool, Trigger
 
@@ -68,7 +68,7 @@ _LAST_WORDS = 0.5
 _MOST_PROBLEMS = 20  # of a faulty file, in the answer of ~/reload
 
 
-class BridgeNode(Node):
+class BridgeNode(AnsweringNode):
     """
     The bridge; raises ConfigurationError when parameters or files are not fit to run with.
 

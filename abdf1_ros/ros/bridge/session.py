@@ -44,6 +44,7 @@ from abdf1_ros.ros.diagnostics.status import Seen
 from abdf1_ros.ros.diagnostics.statuses import Diagnostics
 from abdf1_ros.ros.diagnostics.watches import Watch, watches_of
 from abdf1_ros.ros.parameters.declared import Configuration
+from abdf1_ros.ros.process.callbacks import AnsweringNode
 from abdf1_ros.ros.topics.interlocks import InterlockWatch
 from abdf1_ros.ros.topics.messages import ACTIVE_LAYOUT
 from abdf1_ros.ros.topics.reads import ReadTopic, ReadTopics
@@ -54,7 +55,6 @@ from abdf1_ros.text import first, printable
 from diagnostic_msgs.msg import DiagnosticArray
 from rclpy.clock import Clock, ClockType
 from rclpy.impl.rcutils_logger import RcutilsLogger
-from rclpy.node import Node
 from std_msgs.msg import UInt16MultiArray
 
 _MOST_REMARKS = 20  # about both files, in the log
@@ -75,7 +75,7 @@ class Surroundings:
     machine for it.
     """
 
-    node: Node
+    node: AnsweringNode
     graph: Graph
     names: NameWatch
     opener: PortOpener
@@ -240,13 +240,20 @@ class Session:
         self.link_counters.check(now)
         self._events.unreadable_rows.look(now)
         for watch in self._watches:
-            for news in watch.look(now):
-                self._events.notes.tell(news)
+            self._look(watch, now)
         levels = self.diagnostics.levels(now, is_waiting=not self._surroundings.is_offered)
         if now >= self._next_diagnostics or levels != self._levels:
             self._levels = levels
             self.publish_diagnostics(now)
         self._publish_snapshot(now)
+
+    def _look(self, watch: Watch, now: float) -> None:
+        """Tell what is new; a look fails where DDS reports a name that rclpy cannot read."""
+        try:
+            for news in watch.look(now):
+                self._events.notes.tell(news)
+        except Exception as error:
+            self._surroundings.node.tell_failure('a look at the network', error)
 
     def publish_diagnostics(self, now: float) -> None:
         """Publish all statuses at the clock value ``now`` (s)."""

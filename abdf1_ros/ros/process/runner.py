@@ -24,15 +24,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 import itertools
-import threading
 import time
 
 from abdf1_ros.ros.bridge.node import BridgeNode, end_together
+from abdf1_ros.ros.process.callbacks import Callbacks
 from abdf1_ros.ros.process.main import EXIT_FAULT
 from abdf1_ros.ros.process.supervisor import Supervisor, Works
 from abdf1_ros.signals import EndRequest
-from rclpy.executors import SingleThreadedExecutor
-from rclpy.node import Node
 
 # How often (s) levels are compared, so that a change of one is published at once.
 _LEVEL_CHECK_PERIOD = 0.1
@@ -49,38 +47,6 @@ class LinkFailed(Exception):
     """The link of a bridge is broken; the argument says how, and the log has it."""
 
 
-class _Callbacks(threading.Thread):
-    """Run the callbacks of a node until ``end``; ``error`` is a bug that has ended that."""
-
-    def __init__(self, node: Node) -> None:
-        super().__init__(name='callbacks', daemon=True)
-        self.error: Exception | None = None
-        self.has_turned = True
-        self._ends = False
-        self._executor = SingleThreadedExecutor(context=node.context)
-        self._executor.add_node(node)
-
-    def run(self) -> None:
-        """Run callbacks."""
-        try:
-            while not self._ends:
-                self._executor.spin_once()
-        except Exception as error:  # a bug must not end the other lines
-            self.error = error
-
-    def wake(self) -> None:
-        """Have a callback that shows that it goes on."""
-        self._executor.create_task(setattr, self, 'has_turned', True)
-
-    def end(self, give_up: float) -> None:
-        """Take no more callbacks; wait for the one that runs up to a monotonic clock value."""
-        self._ends = True
-        self.wake()
-        self.join(max(0.0, give_up - time.monotonic()))
-        if not self.is_alive():  # before that it may wait with what would be destroyed
-            self._executor.shutdown()
-
-
 class Line:
     """
     A bridge with the thread of its callbacks.
@@ -89,14 +55,14 @@ class Line:
     """
 
     def __init__(self, node: BridgeNode | None = None,
-                 callbacks: _Callbacks | None = None) -> None:
+                 callbacks: Callbacks | None = None) -> None:
         self.node = node
         self._callbacks = callbacks
 
     def take_callbacks(self) -> None:
         """Begin to take callbacks, if there is a node."""
         if self.node is not None:
-            self._callbacks = _Callbacks(self.node)
+            self._callbacks = Callbacks(self.node)
             self._callbacks.start()
 
     def open_port(self) -> None:
@@ -105,7 +71,7 @@ class Line:
             self.node.start()
 
     def check(self) -> None:
-        """Publish what is due; raises LinkFailed, and what a callback has ended with."""
+        """Publish what is due; raises LinkFailed, and why no callbacks can be taken any more."""
         if self.node is None:
             return
         if self.node.has_failed:

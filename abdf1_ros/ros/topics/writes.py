@@ -32,6 +32,7 @@ from abdf1_ros.driver.driver import Driver, TOO_MANY
 from abdf1_ros.driver.writes.queue import MAX_WAITING_WRITES
 from abdf1_ros.errors import FormatError
 from abdf1_ros.ports.clock import line_time
+from abdf1_ros.ros.process.callbacks import AnsweringNode
 from abdf1_ros.ros.topics.messages import MESSAGES, values_of, write_qos
 from abdf1_ros.settings.mapping import Mapping
 from abdf1_ros.text import printable
@@ -150,7 +151,7 @@ class WriteTopics:
     Messages wait here until ``begin``, and go where ``give_to`` says; ``taken`` counts those.
     """
 
-    def __init__(self, node: Node) -> None:
+    def __init__(self, node: AnsweringNode) -> None:
         self._node = node
         self._waiting: list[tuple[str, Any, Any]] = []
         self._has_begun = self._is_open = False
@@ -165,12 +166,15 @@ class WriteTopics:
             self._node.executor.create_task(self._take_waiting)
 
     def _take_waiting(self) -> None:
-        for topic, message, info in self._waiting:
-            self.taken += 1
-            if topic in self._topics:  # a reload may have taken its rows away
-                self._topics[topic].take(message, info)
-        self._waiting.clear()
+        waiting, self._waiting = self._waiting, []
         self._is_open = True
+        for topic, message, info in waiting:
+            self.taken += 1
+            try:
+                if topic in self._topics:  # a reload may have taken its rows away
+                    self._topics[topic].take(message, info)
+            except Exception as error:  # the others are taken
+                self._node.tell_failure(f'a message on {_name(topic)}', error)
 
     def open(self, driver: Driver, patience: float,  # noqa: A003
              on_loss: Callable[[str, int], None], wake: Callable[[], None],

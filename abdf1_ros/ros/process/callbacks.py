@@ -1,0 +1,153 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+The callbacks of a node take what comes from outside: none of it ends the node or its line.
+
+Where rclpy or a callback of ours fails on a message or a call, only that one ends, with an entry
+in the log. A call is answered.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+import threading
+import time
+import traceback
+from typing import Any
+
+from abdf1_ros.ros.diagnostics.log import LimitedLog
+from rcl_interfaces.msg import SetParametersResult
+from rclpy.executors import (
+    await_or_execute,
+    ShutdownException,
+    SingleThreadedExecutor,
+    TimeoutException,
+)
+from rclpy.node import Node
+
+# An executor that cannot wait for callbacks tries again after a pause (s), at most this often.
+_MOST_FAILED_WAITS = 3
+_PAUSE = 0.1
+
+
+def failure_text(error: BaseException) -> str:
+    """Return an exception in one line, with the place where it was raised."""
+    place = traceback.extract_tb(error.__traceback__)[-1:]
+    return repr(error) + ''.join(f' in {frame.filename}:{frame.lineno}' for frame in place)
+
+
+class AnsweringNode(Node):
+    """A node whose services answer each call, without success where the callback fails."""
+
+    def __init__(self, name: str, **options: Any) -> None:
+        super().__init__(name, **options)
+        self._failures = LimitedLog(self.get_logger(), time.monotonic)
+
+    def create_service(self, srv_type: Any, srv_name: str, callback: Callable[..., Any],
+                       **options: Any) -> Any:
+        """Create a service; rclpy creates those of parameters with it."""
+        async def answer(request: Any, response: Any) -> Any:
+            try:
+                return await await_or_execute(callback, request, response)
+            except Exception as error:  # the caller caused it
+                self.tell_failure(f'a call of {srv_name}', error)
+                return _refusal(srv_type, request, f'refused: {error!r}')
+
+        return super().create_service(srv_type, srv_name, answer, **options)
+
+    def tell_failure(self, what: str, error: BaseException) -> None:
+        """Log that something has failed that came from outside."""
+        self._failures.error('what comes from outside', (
+            f'{what} has failed and was ended, all else goes on: {failure_text(error)}'))
+
+
+def _refusal(srv_type: Any, request: Any, reason: str) -> Any:
+    """Return the response to a call that has failed, with the reason where it has room for it."""
+    response = srv_type.Response()
+    if hasattr(response, 'message'):
+        response.message = reason
+    elif hasattr(response, 'result') and hasattr(response.result, 'reason'):
+        response.result.reason = reason
+    elif hasattr(response, 'results'):
+        response.results = [SetParametersResult(reason=reason) for _ in request.parameters]
+    return response
+
+
+class Executor(SingleThreadedExecutor):
+    """
+    Run callbacks of ``node``; one that fails ends alone.
+
+    ``spin_once`` raises only what keeps it from waiting for callbacks at all.
+    """
+
+    def __init__(self, node: AnsweringNode) -> None:
+        super().__init__(context=node.context)
+        self._node = node
+        self.add_node(node)
+
+    def spin_once(self, timeout_sec: float | None = None) -> None:
+        entity: Any
+        try:
+            handler, entity, _ = self.wait_for_ready_callbacks(timeout_sec)
+        except (ShutdownException, TimeoutException):
+            return
+        handler()
+        if (error := handler.exception()) is not None:
+            _give_back(entity)
+            name = getattr(entity, 'srv_name', None) or getattr(entity, 'topic_name', None)
+            self._node.tell_failure(f'a message on {name}' if name else 'a callback', error)
+
+
+def _give_back(entity: Any) -> None:
+    """Have an entity waited for again; where its message cannot be taken, rclpy forgets that."""
+    if entity is not None and entity._executor_event:
+        entity._executor_event = False
+        entity.callback_group.ending_execution(entity)
+
+
+class Callbacks(threading.Thread):
+    """Run the callbacks of a node until ``end``; ``error`` says why none can be taken any more."""
+
+    def __init__(self, node: AnsweringNode) -> None:
+        super().__init__(name='callbacks', daemon=True)
+        self.error: Exception | None = None
+        self.has_turned = True
+        self._ends = False
+        self._executor = Executor(node)
+
+    def run(self) -> None:
+        """Run callbacks."""
+        failures = 0
+        while not self._ends and failures < _MOST_FAILED_WAITS:
+            try:
+                self._executor.spin_once()
+                failures = 0
+            except Exception as error:  # it must not end the other lines
+                failures += 1
+                if failures == _MOST_FAILED_WAITS:
+                    self.error = error
+                time.sleep(_PAUSE)
+
+    def wake(self) -> None:
+        """Have a callback that shows that it goes on."""
+        self._executor.create_task(setattr, self, 'has_turned', True)
+
+    def end(self, give_up: float) -> None:
+        """Take no more callbacks; wait for the one that runs up to a monotonic clock value."""
+        self._ends = True
+        self.wake()
+        self.join(max(0.0, give_up - time.monotonic()))
+        if not self.is_alive():  # before that it may wait with what would be destroyed
+            self._executor.shutdown()
