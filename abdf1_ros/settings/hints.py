@@ -71,7 +71,7 @@ def looks_like_address(text: str) -> bool:
 
 def is_export_of_kepserver(names: Sequence[str]) -> bool:
     """Tell whether a first row is that of an export of tags from KEPServerEX."""
-    return {'tag name', 'address', 'data type'} <= {name.lower() for name in names}
+    return {'tag name', 'address', 'client access'} <= {name.lower() for name in names}
 
 
 def export_fault(path: str, names: Sequence[str]) -> str:

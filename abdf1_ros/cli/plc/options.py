@@ -47,6 +47,12 @@ class LineDefaults:
     net: str = 'the line'
 
 
+COLUMN_ROLES = {
+    'tag': 'the column with the names', 'address': 'the column with the addresses',
+    'type': 'the column with the types of the data', 'description': 'the column with descriptions',
+    'access': 'the column that says what may be written: RO, R/W; or yes and no under "Read Only"'}
+"""What the columns of a list may be, for the options of ``plc import``."""
+
 RADIXES = {'dec': Radix.DECIMAL, 'hex': Radix.HEXADECIMAL, 'oct': Radix.OCTAL, 'bin': Radix.BINARY}
 
 _LINE_DEFAULTS = LineDefaults()
@@ -59,13 +65,20 @@ _DETECT_DEFAULTS = LineDefaults(
 
 
 def _complete_import(command: argparse.ArgumentParser) -> None:
-    command.add_argument('file', metavar='FILE', help='the export, a CSV file')
+    command.add_argument('file', metavar='FILE', help='the export or list, a CSV file')
     _add_folder(command, 'map.csv is')
     command.add_argument('--station', metavar='LIST', type=_stations, dest='stations',
                          default=(DEFAULT_STATION,),
                          help='of the PLC, or of several with the same program, as in 1-4 '
                               f'(default: {DEFAULT_STATION})')
     command.add_argument('--read-only', action='store_true', help='make all rows Read rows')
+    for role, text in COLUMN_ROLES.items():
+        command.add_argument(f'--{role}', metavar='COLUMN', dest=f'{role}_column',
+                             help=f'of a list: {text}')
+    command.add_argument('--plc', metavar='NAME',
+                         help='the PLC that is meant, by its name in a file with several')
+    command.add_argument('--status', action='store_true',
+                         help='also take words of the status file without a symbol')
     command.add_argument('--period', metavar='MS', default=0,
                          type=number_option(f'a whole number of ms up to {MAX_PERIOD}', 0,
                                             MAX_PERIOD, whole_number),

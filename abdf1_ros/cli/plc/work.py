@@ -27,11 +27,12 @@ import shlex
 import sys
 from typing import Any, TypeAlias
 
-from abdf1_ros.cli.plc import data, detect, exports, files, init, presence
+from abdf1_ros.cli.plc import data, detect, files, init, presence
 from abdf1_ros.cli.plc.clock import Clock, TAKEN, told
-from abdf1_ros.cli.plc.exports import Cells
+from abdf1_ros.cli.plc.exports.form import Cells, Wanted
+from abdf1_ros.cli.plc.exports.imported import import_map
 from abdf1_ros.cli.plc.line import free_station, MODES, network_of
-from abdf1_ros.cli.plc.options import DEFAULT_STATION, RADIXES
+from abdf1_ros.cli.plc.options import COLUMN_ROLES, DEFAULT_STATION, RADIXES
 from abdf1_ros.cli.plc.session import Session
 from abdf1_ros.cli.plc.watch import Watch
 from abdf1_ros.cli.terminal import (
@@ -64,7 +65,7 @@ from abdf1_ros.settings.map_file import load_mappings
 from abdf1_ros.settings.mapping import Command, Mapping
 from abdf1_ros.settings.network import load_network, Network
 from abdf1_ros.settings.rows import Rows
-from abdf1_ros.text import printable
+from abdf1_ros.text import counted, printable
 
 _ALL_TRIED_IN_VAIN = (
     'not one character came: cable, port, power? Or a station that was not asked (--stations; a '
@@ -422,15 +423,24 @@ def _stations_there(found: detect.Found, network: Network,
 
 
 def _import(options: argparse.Namespace) -> int:
-    file = init.NewFiles(Path(options.into), 'map.csv')
-    result = exports.import_map(options.file, exports.Wanted(
-        PlcType(options.plc_type), options.stations, options.read_only, options.period))
-    file.write(result.text)
-    target, = file.paths
+    result = import_map(options.file, Wanted(
+        PlcType(options.plc_type), options.stations, options.read_only, options.period,
+        {role: name for role in COLUMN_ROLES if (name := getattr(options, f'{role}_column'))},
+        options.plc, options.status))
     for problem in result.left_out:
         _complain(str(problem))
+    for text, count in (+result.ignored).items():
+        print(f'ignored: {count} {text}')
+    for text, count in (+result.remarks).items():
+        _complain(f'{counted(count, "row")}: {text}')
     left_out = f', {len(result.left_out)} left out' if result.left_out else ''
-    print(f'written: {target}: {result.count} rows{left_out}')
+    if not result.count:
+        _complain(f'{options.file}: no row can be used{left_out}; nothing was written')
+        return EXIT_FAILED
+    file = init.NewFiles(Path(options.into), 'map.csv')
+    file.write(result.text)
+    target, = file.paths
+    print(f'written: {target}: {counted(result.count, "row")}{left_out}')
     nets = (target.with_name('net.csv'), Path('net.csv'))
     net = next((path for path in nets if path.exists()), None)
     print(f'how to go on: {called("check")} {shlex.quote(str(net or nets[1]))} '

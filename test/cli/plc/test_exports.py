@@ -18,6 +18,7 @@ Maps made of exports; the contents of the rows are made up, their forms are not.
 KEPServerEX: its 17 columns as Kepware ("CSV Import/Export"), Software Toolbox ("Comma Separated
 Variable File Support") and PTC's Kepware.Api (CsvTagSerializer) list them; arrays and data types
 as in the help of its drivers for Allen-Bradley ("Integer Files", "Data Types Description").
+RSView32 and FactoryTalk View, InTouch: the first lines that programs which write such files use.
 
 RSLogix 500: no header; address, scope, symbol, descriptions, and rows DFILE:, as two programs
 read them: FactoryTalk Optix (RSLogix500_TagImporter) and a parser of exports of an SLC
@@ -29,7 +30,8 @@ import math
 from pathlib import Path
 
 from abdf1_ros.cli.plc.command import main
-from abdf1_ros.cli.plc.exports import import_map, Wanted
+from abdf1_ros.cli.plc.exports.form import Wanted
+from abdf1_ros.cli.plc.exports.imported import import_map
 from abdf1_ros.cli.terminal import called
 from abdf1_ros.pccc.file_types import PlcType
 from abdf1_ros.problems import ConfigurationError
@@ -107,7 +109,7 @@ def test_tag_of_kepserver_becomes_a_row(
     ('"Root","N7:0",Word,1,RO,100,Square Root,0,100,0,10,Float,0,0,,"",',
      'Scaling "Square Root" has no counterpart; Linear has'),
     ('"Flat","N7:0",Word,1,RO,100,Linear,5,5,0,10,Float,0,0,,"",',
-     'Raw Low, Raw High, Scaled Low and Scaled High should be numbers, and both raw ones differ'),
+     'the ends of its scale should be numbers, and both raw ones differ: 5, 5, 0, 10'),
     ('"Char","N7:0",Char,1,RO,100,,,,,,,,,,"",', 'Data Type "Char" has no counterpart'),
     (f'"Long","N7:0 [{"9" * 5000}]",Word Array,1,RO,100,,,,,,,,,,"",',
      'write type, file, ":", element, as in N7:0, B3:1/5, T4:0.ACC or I:1.0/3'),
@@ -136,10 +138,22 @@ def test_symbols_of_rslogix_become_rows_and_the_rest_is_told(tmp_path: Path) -> 
             for mapping in mappings] == [
         ('DOOR_CLOSED', 'DOOR_CLOSED', 'I:1.0/3', 1, 'Guard door cell 2'),
         ('LINE_SPEED', 'LINE_SPEED', 'N7:0', 1, 'Conveyor speed'),
-        ('T4:0', 'T4_0', 'T4:0', 3, 'Cycle timer'), ('WAIT', 'WAIT', 'T4:1.ACC', 1, '')]
-    assert [text.partition(': ')[0] for text in left_out] == ['5', '6', '7']
-    assert left_out[0] == '5: DFILE:N7: is about a file or a rung'
-    assert left_out[2] == '7: LOST: Address is missing'
+        ('T4_0', 'T4_0', 'T4:0', 3, 'Cycle timer'), ('WAIT', 'WAIT', 'T4:1.ACC', 1, '')]
+    assert [text.partition(': ')[0] for text in left_out] == ['6', '7']
+    assert left_out[1] == '7: LOST: Address is missing'
+    assert not any(mapping.remarks for mapping in mappings)
+
+
+def test_what_is_not_about_an_address_is_counted(tmp_path: Path) -> None:
+    rows = RSLOGIX + ('"DFILE:N7","","","Numbers"\n"S:1/15","Global","","First Pass"\n'
+                      '"S:4","Global","CLOCK","Free running clock"\n')
+    mappings, left_out = imported(tmp_path, rows)
+    assert [mapping.tag for mapping in mappings][4:] == ['CLOCK']
+    source = str(tmp_path / 'export.csv')
+    assert (left_out, import_map(source, STATION_2).ignored) == ([], {
+        'DFILE rows': 1, 'rows of the status file without a symbol (--status takes them)': 1})
+    with_status = import_map(source, Wanted(has_status=True))
+    assert (with_status.count, with_status.left_out) == (6, [])
 
 
 def test_octal_addresses_are_for_a_plc5(tmp_path: Path) -> None:
@@ -229,10 +243,153 @@ def test_command_writes_a_map_once_and_says_how_to_go_on(
         'these rows need 205% of the time of the line in net.csv; --period 500 would do']
 
 
-@pytest.mark.parametrize('text', ['a,b\n1,2\n', '', 'Tag,Command,Address\n'])
-def test_what_is_no_export(tmp_path: Path, text: str) -> None:
-    with pytest.raises(ConfigurationError, match='is neither an export of KEPServerEX'):
+@for_all(('text', 'expected'), [
+    ('a,b\n1,2\n', 'is none of these: tags of KEPServerEX '), ('', 'is none of these: '),
+    # What the columns of a list without a header mean is not guessed.
+    ('N7:0,SPEED,Conveyor speed\n', 'is none of these: '),
+    ('N7:0,1,SPEED\nN7:1,2,LEVEL\n', 'is none of these: '),
+    ('Tag,Command,Address,Station,PLC_Type\na,Read,N7:0,1,SLC\n', 'is a map already'),
+    ('Address,Function\nN7:0,Speed\n', 'which column is the tag. Say --tag COLUMN; columns: '
+                                       'Address, Function'),
+    ('Name,Place\nSpeed,N7:0\n', 'which column is the address. Say --address COLUMN')])
+def test_what_is_no_export(tmp_path: Path, text: str, expected: str) -> None:
+    with pytest.raises(ConfigurationError, match=expected):
         imported(tmp_path, text)
+
+
+def told(mappings: list[Mapping]) -> list[tuple[str, ...]]:
+    return [(row.tag, row.command.value, str(row.address), row.description) for row in mappings]
+
+
+def test_columns_of_a_list_are_found_by_their_names(tmp_path: Path) -> None:
+    symbols = 'Address,Symbol,Description\nN7:0,SPEED,Conveyor speed\nB3:0/5,RUN,\n'
+    assert told(imported(tmp_path, symbols)[0]) == [
+        ('SPEED', 'Read', 'N7:0', 'Conveyor speed'), ('RUN', 'Read', 'B3:0/5', '')]
+    drawing = ('sep=;\nAddress;Description 1;Description 2;Wire No;Device Tag\n'
+               'I:1.0/0;START;CONVEYOR;1000;PB100\n')
+    assert told(imported(tmp_path, drawing)[0]) == [
+        ('PB100', 'Read', 'I:1.0/0', 'START CONVEYOR')]
+    access = ('Tag Name,Data Type,Address,Read Only\na,INT,N7:0,no\nb,DINT,N7:2,Yes\n'
+              'c,Real,F8:0,R/W\nd,Word,N7:4,perhaps\ne,LWORD,N7:5,no\n')
+    mappings, left_out = imported(tmp_path, access)
+    assert [(row.tag, row.command.value, row.type.value) for row in mappings] == [
+        ('a', 'ReadWrite', 'int16'), ('b', 'Read', 'int32'), ('c', 'ReadWrite', 'float32'),
+        ('d', 'Read', 'uint16')]
+    assert len(left_out) == 1 and left_out[0].startswith(
+        '6: e: the type "LWORD" has no counterpart; it can be default, bool, ')
+
+
+def test_list_that_says_nothing_of_access_is_only_read(tmp_path: Path) -> None:
+    text = 'Tag Name,Data Type,Address,Comment\nSPEED,Short,N7:0,read by the panel\n'
+    assert told(imported(tmp_path, text)[0]) == [('SPEED', 'Read', 'N7:0', 'read by the panel')]
+    assert import_map(str(tmp_path / 'export.csv'), Wanted()).remarks == {
+        'the file has no column about access: made Read rows (--access COLUMN)': 1}
+    empty = KEPSERVER + '"Speed","N7:0",Short,1,,100,,,,,,,,,,"",\n'
+    assert told(imported(tmp_path, empty)[0]) == [('Speed', 'Read', 'N7:0', '')]
+
+
+def test_columns_of_a_list_are_given_by_options(
+        tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    source = tmp_path / 'list.csv'
+    source.write_text('Place,What,Kind,Text,May\nN7:0,speed,INT,Speed of 1,RW\n',
+                      encoding='utf-8')
+    options = ['import', str(source), '--into', str(tmp_path), '--address', 'Place',
+               '--type', 'Kind', '--access', 'may']
+    assert main([*options, '--tag', 'Name']) == 2
+    assert '--tag "Name" is not a column; columns: Place, What' in capsys.readouterr().err
+    assert main([*options, '--tag', 'what', '--description', 'Text']) == 0
+    assert told(load_mappings(str(tmp_path / 'map.csv'))[0]) == [
+        ('speed', 'ReadWrite', 'N7:0', 'Speed of 1')]
+
+
+def test_characters_of_an_a_file_are_not_taken_for_words(tmp_path: Path) -> None:
+    rows = [('"a","A62:4/32",String', ''), ('"b","A62:0/5",String', 'or an even number'),
+            ('"c","A27:10 [80]",Char Array', 'read A27:5 as uint16 instead'),
+            ('"d","A9:20",Default', 'A9:20 counts characters, two in a word; read A9:10'),
+            ('"e","A9:21",Word', 'read A9:10 as uint16')]
+    text = KEPSERVER + ''.join(f'{row},1,R/W,100,,,,,,,,,,"",\n' for row, _ in rows)
+    (mapping,), left_out = imported(tmp_path, text)
+    assert (str(mapping.address), mapping.length, mapping.type.value) == ('A62:2', 16, 'string')
+    assert len(left_out) == 4 and all(
+        text in fault for (_, text), fault in zip(rows[1:], left_out, strict=True))
+
+
+def test_input_or_output_that_may_be_of_a_micrologix_is_only_read(tmp_path: Path) -> None:
+    text = KEPSERVER + '"Out","O:1",Word,1,R/W,500,,,,,,,,,,"",\n' \
+        '"Bit","O:2/3",Boolean,1,R/W,500,,,,,,,,,,"",\n"Sure","O:2.0",Word,1,R/W,500,,,,,,,,,,"",\n'
+    assert [row[1] for row in told(imported(tmp_path, text)[0])] == ['Read', 'Read', 'ReadWrite']
+    result = import_map(str(tmp_path / 'export.csv'), Wanted())
+    assert [(text.partition(',')[0], count) for text, count in result.remarks.items() if text] == [
+        ('an input or output without its word', 2)]
+
+
+VIEW = (';Tag Type, Tag Name, Tag Description, Read Only, Data Source, Security Code, Alarmed, {} '
+        'Native Type, Value Type, Min Analog, Max Analog, Initial Analog, Scale, Offset, '
+        'DeadBand, Units, Off Label Digital, On Label Digital, Initial Digital, Length String, '
+        'Initial String, {} Address\n;###001 - VERSION\n\n;Folders Section\n'
+        '"F","Press","","F"\n\n')
+
+
+@for_all('text', [
+    VIEW.format('Data Logged,', 'Node Name,')
+    + '"A","Press\\Speed","Speed, left","F","D","*","F","F","D","F",0,100,0,0.1,-5,0,"1/min",,,,,,'
+      '"PLC1","N7:0","A"\n"D","Press\\Run","","T","D","*","F","F",,,,,,,,,,"Off","On","Off",,,'
+      '"PLC1","B3:0/5","A"\n"A","mem","","F","M","*","F","F","D","F",0,1,0,1,0,0,,,,,,,,,\n',
+    VIEW.format('', 'Retentive,')
+    + '"A","Press\\Speed","Speed, left","F","D","*","F","D","F",0,100,0,0.1,-5,0,"1/min",,,,,,0,'
+      '"::[PLC1]N7:0"\nD,"Press\\Run",,"T","D","*","F",,,,,,,,,,"Off","On","Off",,,,'
+      '"{[PLC1]B3:0/5}"\n"S","mem","","F","M","*","F",,,,,,,,,,,,,82,"",0,\n'])
+def test_tags_of_rsview_and_factorytalk(tmp_path: Path, text: str) -> None:
+    mappings, left_out = imported(tmp_path, text)
+    assert (told(mappings), left_out) == ([
+        ('Press/Speed', 'ReadWrite', 'N7:0', 'Speed, left [1/min]'),
+        ('Press/Run', 'Read', 'B3:0/5', '')], [])
+    assert {column: cell_of(mappings[0], column) for column in ('Scale', 'Offset', 'Min', 'Max')
+            } == {'Scale': '0.1', 'Offset': '-5', 'Min': '0', 'Max': '100'}
+    assert import_map(str(tmp_path / 'export.csv'), Wanted()).ignored['tags without a PLC '
+                                                                     '(memory and system)'] == 1
+
+
+INTOUCH = (
+    ':mode=ask\n:IOAccess,Application,Topic\n"PLC1","DASABCIP","Line1"\n'
+    ':MemoryInt,Group,Comment\n"Count","$System","in memory"\n'
+    ':IODisc,Group,Comment,AccessName,ItemUseTagname,ItemName,ReadOnly\n'
+    '"Run","$System","motor runs","PLC1",No,"B3:0/5",No\n'
+    ':IOInt,Group,Comment,MinEU,MaxEU,MinRaw,MaxRaw,Conversion,AccessName,ItemUseTagname,ItemName,'
+    'ReadOnly\n"Speed","$System","speed",0,100,0,1000,Linear,"PLC1",No,"N7:0",No\n'
+    '"N7:1","$System","","0",10,0,10,Linear,"PLC1",Yes,"",Yes\n')
+
+
+def test_tags_of_intouch(tmp_path: Path) -> None:
+    for text in (INTOUCH, INTOUCH.replace(',', ';')):
+        mappings, left_out = imported(tmp_path, text)
+        assert (told(mappings), left_out) == ([
+            ('Run', 'ReadWrite', 'B3:0/5', 'motor runs'), ('Speed', 'ReadWrite', 'N7:0', 'speed'),
+            ('N7:1', 'Read', 'N7:1', '')], [])
+        assert [cell_of(mappings[1], column) for column in ('Scale', 'Max')] == ['0.1', '100']
+        assert mappings[2].scaling is None
+
+
+def test_rows_of_several_plcs_are_not_mixed(tmp_path: Path) -> None:
+    text = INTOUCH + '"Other","$System","",0,1,0,1,Linear,"PLC2",No,"N7:0",No\n'
+    with pytest.raises(ConfigurationError, match='rows of several PLCs: PLC1, PLC2; .* --plc'):
+        imported(tmp_path, text)
+    (mapping,), left_out = imported(tmp_path, text, Wanted(node='PLC2'))
+    assert (mapping.tag, left_out) == ('Other', [])
+    with pytest.raises(ConfigurationError, match='has no PLC "X"; it has PLC1, PLC2'):
+        imported(tmp_path, text, Wanted(node='X'))
+
+
+def test_nothing_is_left_behind_where_no_row_can_be_used(
+        tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    source, target = tmp_path / 'tags.csv', tmp_path / 'map.csv'
+    source.write_text('Tag,Address\na,DB1.DBW0\n', encoding='utf-8')
+    assert main(['import', str(source), '--into', str(tmp_path)]) == 1
+    assert 'no row can be used, 1 left out; nothing was written' in capsys.readouterr().err
+    assert not target.exists()
+    target.write_text('x', encoding='utf-8')
+    assert main(['import', str(tmp_path / 'nothere.csv'), '--into', str(tmp_path)]) == 2
+    assert 'nothere.csv: cannot be read' in capsys.readouterr().err
 
 
 def test_export_in_place_of_a_map_or_net_file_is_told(tmp_path: Path) -> None:

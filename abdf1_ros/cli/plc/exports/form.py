@@ -1,0 +1,139 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""What the formats have in common: what is wanted, what a row becomes, and words of many files."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+import re
+
+from abdf1_ros.cli.plc.exports.records import Record
+from abdf1_ros.numbers import decimal_number
+from abdf1_ros.pccc.file_types import PlcType
+from abdf1_ros.text import shown
+
+Cells = dict[str, str]
+
+READ, WRITE, READ_WRITE = 'Read', 'Write', 'ReadWrite'
+
+_ACCESS = {'ro': READ, 'r': READ, 'read': READ, 'read only': READ, 'readonly': READ,
+           'read-only': READ, 'rw': READ_WRITE, 'r/w': READ_WRITE, 'read/write': READ_WRITE,
+           'readwrite': READ_WRITE, 'read-write': READ_WRITE, 'w': WRITE, 'wo': WRITE,
+           'write': WRITE, 'write only': WRITE, 'write-only': WRITE}
+_YES, _NO = ('yes', 'true', 't', 'y', '1'), ('no', 'false', 'f', 'n', '0')
+_READ_ONLY = re.compile(r'read.?only|ro', re.IGNORECASE)
+
+
+@dataclass(frozen=True, slots=True)
+class Wanted:
+    """
+    What is made of each row: one for each of ``stations``, with at least ``period`` ms.
+
+    With ``read_only`` all are Read rows. ``columns`` are the names of columns that options give,
+    ``node`` the one PLC that is meant where a file has several. With ``has_status`` the words of
+    the status file are taken that have no symbol. Of several stations the tags begin with
+    ``station_N/``.
+    """
+
+    plc_type: PlcType = PlcType.SLC
+    stations: Sequence[int] = (1,)
+    read_only: bool = False
+    period: int = 0
+    columns: Cells = field(default_factory=dict)
+    node: str | None = None
+    has_status: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class FoundRow:
+    """The cells of a row, the PLC that the file names for it, and what the user should know."""
+
+    cells: Cells
+    node: str = ''
+    remark: str = ''
+
+
+@dataclass(frozen=True, slots=True)
+class Ignored:
+    """A row that is not about an address; without ``what`` it is not counted."""
+
+    what: str = ''
+
+
+class Unusable(ValueError):
+    """Why a row about an address cannot be used; ``tag`` names the row."""
+
+    def __init__(self, text: str, tag: str = '') -> None:
+        super().__init__(text)
+        self.tag = tag
+
+
+Reader = Callable[[Record], FoundRow | Ignored]
+"""Takes the records of a file one after the other; raises Unusable."""
+
+
+@dataclass(frozen=True, slots=True)
+class Format:
+    """
+    A form of file: what it is, and how it is read.
+
+    ``reader`` is None where the records are of another form. ConfigurationError where they are of
+    this one, but cannot be used.
+    """
+
+    title: str
+    reader: Callable[[str, Sequence[Record], Wanted], Reader | None]
+
+
+def cells_of(**texts: str) -> Cells:
+    """Return the cells of a row that are not empty."""
+    return {column: text for column, text in texts.items() if text}
+
+
+def command_of(text: str, column: str = '') -> str | None:
+    """Return the Command for a cell about access, in a column of this name; None if unknown."""
+    word = text.lower()
+    if _READ_ONLY.fullmatch(column):
+        return READ if word in _YES else READ_WRITE if word in _NO else _ACCESS.get(word)
+    return _ACCESS.get(word)
+
+
+def limited(command: str, wanted: Wanted) -> str:
+    """Return the Command that is wanted; Unusable where a row is only written."""
+    if not wanted.read_only:
+        return command
+    if command == WRITE:
+        raise Unusable('is only written, and --read-only is given')
+    return READ
+
+
+def scaling(ends: Sequence[str], sign: float = 1.0) -> Cells:
+    """Return Scale and Offset of the line through raw low and high, and low and high."""
+    numbers = [decimal_number(text.replace(',', '.')) for text in ends]
+    raw_low, raw_high, low, high = numbers
+    if raw_low is None or raw_high is None or low is None or high is None or raw_low == raw_high:
+        raise Unusable('the ends of its scale should be numbers, and both raw ones differ: '
+                       f'{", ".join(map(shown, ends))}')
+    scale = sign * (high - low) / (raw_high - raw_low)
+    return {'Scale': f'{scale:.12g}', 'Offset': f'{sign * low - raw_low * scale + 0.0:.12g}'}
+
+
+def number_text(text: str) -> str:
+    """Return a number as it stands in a map; Unusable for another text."""
+    value = decimal_number(text.replace(',', '.'))
+    if value is None:
+        raise Unusable(f'"{shown(text)}" should be a number')
+    return f'{value:.12g}'
