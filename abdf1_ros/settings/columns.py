@@ -24,14 +24,13 @@ from operator import attrgetter
 
 from abdf1_ros.numbers import decimal_number, Kind, member_of, TEXT, two_readings, whole
 from abdf1_ros.pccc.values import ValueType, WordOrder
-from abdf1_ros.settings.mapping import Command, Mapping, Publish
+from abdf1_ros.settings.mapping import Command, Mapping, MESSAGES, Publish, PUBLISHED
 from abdf1_ros.text import shown
 
 MAX_PERIOD = 86_400_000  # ms
 
-_PUBLISHED = (Command.READ, Command.READ_WRITE, Command.SERVE)
-_MESSAGES = (Command.WRITE, Command.READ_WRITE, Command.SERVE)
-_TOPICS = (Command.READ, *_MESSAGES)
+_TOPICS = (Command.READ, *MESSAGES)
+_PLCS = (Command.READ, Command.WRITE, Command.READ_WRITE, Command.HEARTBEAT)
 
 
 def milliseconds_from(low: int, high: int) -> Kind[int]:
@@ -131,15 +130,15 @@ MAP_COLUMNS = (
            'ms between reads; 0: as often as the line allows; of a Serve the longest time '
            'between two writes of the PLC; of a Heartbeat 100-60000, default 1000',
            kind=whole(0, MAX_PERIOD, 'ms'),
-           commands=(*_PUBLISHED, Command.HEARTBEAT), idle=(Command.WRITE,)),
+           commands=(*PUBLISHED, Command.HEARTBEAT), idle=(Command.WRITE,)),
     Column('Publish', 'Always',
            'Always: after every good read. Change: only new values, and the first after an '
            'outage',
-           kind=member_of(Publish), commands=_PUBLISHED, idle=(Command.WRITE,)),
+           kind=member_of(Publish), commands=PUBLISHED, idle=(Command.WRITE,)),
     Column('Min', 'none', 'least value that may be written, in the unit of the topic',
-           kind=_NUMBER, attribute='minimum', commands=_MESSAGES, idle=(Command.READ,)),
+           kind=_NUMBER, attribute='minimum', commands=MESSAGES, idle=(Command.READ,)),
     Column('Max', 'none', 'greatest value that may be written, in the unit of the topic',
-           kind=_NUMBER, attribute='maximum', commands=_MESSAGES, idle=(Command.READ,)),
+           kind=_NUMBER, attribute='maximum', commands=MESSAGES, idle=(Command.READ,)),
     Column('Word_Order', 'Low',
            'Low or High: which word of an int32, uint32 or float32 over 16-bit words comes first',
            kind=member_of(WordOrder)),
@@ -156,7 +155,7 @@ MAP_COLUMNS = (
     Column('Processor', '5/03',
            'of an SLC: 5/01, 5/02, 5/03, 5/04, 5/05, ML1000, ML1100, ML1200, ML1400 or ML1500; it '
            'limits packets and files; the same in all rows of a station',
-           commands=(Command.READ, Command.WRITE, Command.READ_WRITE, Command.HEARTBEAT)),
+           commands=_PLCS),
     Column('Fallback', 'none',
            'of a Write or Serve: values, separated by spaces, that are written when no good '
            'message has come for Fallback_After; of a bool 0',
@@ -183,7 +182,7 @@ MAP_COLUMNS = (
     Column('Via', 'Station',
            'with Mode Master: the station of a gateway on this line (KF2, KF3, KE) behind which '
            'Station is',
-           commands=(Command.READ, Command.WRITE, Command.READ_WRITE, Command.HEARTBEAT)),
+           commands=_PLCS),
     Column('Description', 'none', 'what it is in the plant, to be read',
            kind=TEXT),
 )

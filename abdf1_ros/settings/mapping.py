@@ -47,6 +47,12 @@ class Command(Enum):
     HEARTBEAT = 'Heartbeat'
 
 
+# Rows whose words we read to publish them, whose values are published, and which take messages.
+POLLED = (Command.READ, Command.READ_WRITE)
+PUBLISHED = (*POLLED, Command.SERVE)
+MESSAGES = (Command.WRITE, Command.READ_WRITE, Command.SERVE)
+
+
 class Publish(Enum):
     """When a read value is published."""
 
@@ -131,17 +137,17 @@ class Mapping:
     @property
     def polls(self) -> bool:
         """Tell whether we read the words from the PLC."""
-        return self.command in (Command.READ, Command.READ_WRITE)
+        return self.command in POLLED
 
     @property
     def reads(self) -> bool:
         """Tell whether values are published."""
-        return self.command not in (Command.WRITE, Command.HEARTBEAT)
+        return self.command in PUBLISHED
 
     @property
     def writes(self) -> bool:
         """Tell whether values of messages are written."""
-        return self.command not in (Command.READ, Command.HEARTBEAT)
+        return self.command in MESSAGES
 
     @property
     def changes(self) -> bool:
