@@ -80,13 +80,14 @@ from abdf1_ros.simulator.simulated_plc import load_plcs
 
 _NEAR = 2.0  # times --answer-time: a DLE ENQ that comes so early may be taken for an answer
 
+_NOTHING_TRIED = 'no rule was tried: each case says why'
 _NOBODY = 'no byte was received: check cable, port, speed and power'
 
 End = MasterEnd | PeerEnd | SlaveEnd | ServerEnd
 
 _EPILOG = """\
-exit status: 0 when no case failed, 1 when one did, nothing was ever heard, or the port cannot be
-opened, 2 for bad options and files, 130 after Ctrl-C
+exit status: 0 when no case failed, 1 when one did, nothing was ever heard or tried, or the port
+cannot be opened, 2 for bad options and files, 130 after Ctrl-C
 
 examples:
   conform slave --port /dev/ttyUSB0 --baud 19200 --station 1 --family SLC
@@ -155,7 +156,7 @@ def _run(options: argparse.Namespace, target: Target, cases: Sequence[Case]) -> 
         wire = Wire(line, BlockCheck(network.error_code), time.monotonic,
                     is_half_duplex=target.is_half_duplex, is_radio=target.is_radio,
                     answer_time=options.answer_time,
-                    char_time=0.0 if made else network.timing.char_time)
+                    char_time=0.0 if made else network.timing.char_time, passes_commands=asks)
         return _judge(options, target, cases, wire, network,
                       _end(options, target, wire, network, serve))
     except OSError as error:
@@ -189,7 +190,11 @@ def _judge(options: argparse.Namespace, target: Target, cases: Sequence[Case], w
     if not wire.has_heard:
         tell('conform', _NOBODY)
         return EXIT_FAILED
-    if not any(result.verdict is Verdict.FAIL for result in results):
+    verdicts = {result.verdict for result in results}
+    if verdicts == {Verdict.SKIP}:
+        tell('conform', _NOTHING_TRIED)
+        return EXIT_FAILED
+    if Verdict.FAIL not in verdicts:
         return 0
     if wire.enquired_after < _NEAR * options.answer_time:
         tell('conform', f'the other end asks with DLE ENQ after {wire.enquired_after:.2f} s; with '

@@ -16,14 +16,19 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 from abdf1_ros.conform import codec
 from abdf1_ros.conform.case import case, Target
-from abdf1_ros.conform.ends import AnsweringEnd, MOST_REPETITIONS, PATIENCE
+from abdf1_ros.conform.codec import Symbol, SymbolKind
+from abdf1_ros.conform.ends import AnsweringEnd, HIGHEST_LIMIT, PATIENCE
 from abdf1_ros.conform.wire import Failed, Skipped
 
 _ASKING = (Target.MASTER, Target.CLIENT, Target.RADIO_CLIENT)
+_ACKNOWLEDGED = (Target.MASTER, Target.CLIENT)
 
-_REPLY_BIT = 0x40
+_MOST_COMMANDS = 5
+_CLEARLY = 0.3  # s between what follows a reply and what follows none, for a difference to count
 
 
 @case('A command has DST, SRC, CMD, STS 00 and TNS, and the check covers what the manual says.',
@@ -31,7 +36,7 @@ _REPLY_BIT = 0x40
 def command_form(end: AnsweringEnd) -> None:
     command = end.next_command()
     data = command.data
-    if len(data) < codec.HEADER_SIZE or data[2] & _REPLY_BIT or data[3]:
+    if len(data) < codec.HEADER_SIZE or data[2] & codec.REPLY_BIT or data[3]:
         raise Failed('a command with STS 00', data.hex(' '))
     end.finish(command)
 
@@ -51,8 +56,72 @@ def tns_differs(end: AnsweringEnd) -> None:
       Target.MASTER, Target.RADIO_CLIENT)
 def repetitions_limited(end: AnsweringEnd) -> None:
     first = end.next_command()
-    for _ in range(MOST_REPETITIONS):
-        symbol = end.wire.hear(PATIENCE)
-        if symbol is None or symbol.data != first.data:
+    for _ in range(HIGHEST_LIMIT + 1):
+        try:
+            again = end.wire.until(
+                lambda symbol: symbol.kind is not SymbolKind.POLL, 'the next command', PATIENCE)
+        except Failed:
             return
-    raise Skipped(f'sent more than {MOST_REPETITIONS} times: a larger limit is set')
+        if again.data != first.data:
+            return
+    raise Failed(f'the command given up after {HIGHEST_LIMIT} repetitions at the latest, the '
+                 'highest limit of the products', 'the command once more')
+
+
+@case('A check byte of 10 is not doubled in a reply.', 'M 5-5', *_ASKING)
+def check_not_doubled(end: AnsweringEnd) -> None:
+    for _ in range(_MOST_COMMANDS):
+        command = end.next_command()
+        reply = end.serve(command.data)
+        frames = [] if len(reply) < codec.HEADER_SIZE + 2 else [
+            codec.message(reply[:-2] + value.to_bytes(2, 'little'), end.wire.check)
+            for value in range(0x1000)]
+        frame = next((frame for frame in frames
+                      if codec.has_10_in_check(frame, end.wire.check)), None)
+        if frame is not None:
+            break
+        end.finish(command)
+    else:
+        raise Skipped('not tried: no command reads a word')
+    end.acknowledge(command)
+    end.say(frame)
+    end.expect_taken(command)
+
+
+def _follows(end: AnsweringEnd, command: Symbol,
+             answer: Callable[[Symbol], None]) -> tuple[float, Symbol]:
+    """Answer a command; return what follows it, and after how long (s)."""
+    answer(command)
+    begun = end.wire.now
+    following = end.next_command('another command')
+    return following.at - begun, following
+
+
+def expect_not_used(end: AnsweringEnd, *answers: Callable[[Symbol], None]) -> None:
+    """Give answers that are no reply: what follows has to come as late as after none."""
+    answered, command = _follows(end, end.next_command(), end.finish)
+    unanswered, command = _follows(end, command, end.acknowledge)
+    if unanswered < 2 * answered + _CLEARLY:
+        raise Skipped('not judged: a command without a reply is followed as soon as one with it')
+    for answer in answers:
+        for _ in range(2):  # so that it does not count us as inactive
+            _, command = _follows(end, command, end.finish)
+        took, command = _follows(end, command, answer)
+        if took < (answered + unanswered) / 2:
+            raise Failed(f'nothing new for {unanswered:.1f} s, as without a reply',
+                         f'the next command after {took:.2f} s')
+    end.finish(command)
+
+
+# With another CMD it may end the command, as an error: that cannot be seen from here.
+@case('A reply with another TNS or DST is not that of the command.', 'M 6-3, 6-7', *_ACKNOWLEDGED)
+def other_reply_ignored(end: AnsweringEnd) -> None:
+    def with_change(at: int) -> Callable[[Symbol], None]:
+        def answer(command: Symbol) -> None:
+            reply = bytearray(end.serve(command.data))
+            reply[at] ^= 0x05
+            end.acknowledge(command)
+            end.say(codec.message(bytes(reply), end.wire.check))
+        return answer
+
+    expect_not_used(end, *map(with_change, (5, 4, 0)))

@@ -17,9 +17,15 @@
 from __future__ import annotations
 
 from abdf1_ros.conform import codec
+from abdf1_ros.conform.asking import expect_not_used
 from abdf1_ros.conform.case import case, Target
-from abdf1_ros.conform.codec import SymbolKind
-from abdf1_ros.conform.ends import expect_end_of_naks, PATIENCE, ServerEnd
+from abdf1_ros.conform.codec import Symbol, SymbolKind
+from abdf1_ros.conform.ends import (
+    expect_end_of_enquiries,
+    expect_end_of_naks,
+    PATIENCE,
+    ServerEnd,
+)
 from abdf1_ros.conform.wire import Failed
 
 _CLIENT = Target.CLIENT
@@ -81,14 +87,30 @@ def bad_reply_refused(end: ServerEnd) -> None:
 
 
 def _refuse(end: ServerEnd, *then: bytes) -> None:
-    """Send a damaged reply, which is refused, then what is answered DLE NAK again, then it."""
+    """Send damaged replies, which are refused, then what is answered DLE NAK again, then it."""
     command = end.next_command()
     end.wire.send(codec.ACK)
-    damaged = codec.damaged(codec.message(end.serve(command.data), end.wire.check))
-    for raw in (damaged, *then):
+    reply = codec.message(end.serve(command.data), end.wire.check)
+    for raw in (*codec.all_damaged(reply, end.wire.check), *then):
         end.wire.send(raw)
         end.wire.expect(SymbolKind.NAK)
     end.reply_and_hear(command, 'DLE ACK for the good reply')
+
+
+@case('A reply that was answered with DLE NAK is not used.', 'M 4-7 to 4-9', _CLIENT)
+def bad_reply_not_used(end: ServerEnd) -> None:
+    def answer(command: Symbol) -> None:
+        end.wire.send(codec.ACK)
+        end.wire.send(codec.damaged(codec.message(end.serve(command.data), end.wire.check)))
+        end.wire.expect(SymbolKind.NAK)
+
+    expect_not_used(end, answer)
+
+
+@case('A message that never gets a response is given up after some DLE ENQ.', 'M 4-5', _CLIENT)
+def enquiry_limit(end: ServerEnd) -> None:
+    end.next_command()
+    expect_end_of_enquiries(end.wire, PATIENCE)
 
 
 def _expect_ack(end: ServerEnd, what: str) -> None:

@@ -30,6 +30,7 @@ ACK, NAK, ENQ, EOT = b'\x10\x06', b'\x10\x15', b'\x10\x05', b'\x10\x04'
 _SOH, _STX, _ETX = 0x01, 0x02, 0x03
 
 HEADER_SIZE = 6  # DST SRC CMD STS TNS TNS (M 6-3)
+REPLY_BIT = 0x40  # of CMD
 
 
 class BlockCheck(Enum):
@@ -37,6 +38,9 @@ class BlockCheck(Enum):
 
     BCC = 'BCC'
     CRC = 'CRC'
+
+
+CHECK_SIZES = {BlockCheck.BCC: 1, BlockCheck.CRC: 2}
 
 
 class SymbolKind(Enum):
@@ -131,6 +135,23 @@ def poll(station: int) -> bytes:
 def damaged(frame: bytes) -> bytes:
     """Return ``frame`` with one bit of its check turned over."""
     return frame[:-1] + bytes((frame[-1] ^ 0x01,))
+
+
+def all_damaged(frame: bytes, check: BlockCheck) -> list[bytes]:
+    """Return ``frame`` with one bit turned over in each byte of its check."""
+    return [frame[:at] + bytes((frame[at] ^ 0x01,)) + frame[at:][1:]
+            for at in range(len(frame) - CHECK_SIZES[check], len(frame))]
+
+
+def has_10_in_check(frame: bytes, check: BlockCheck) -> bool:
+    """Tell whether a byte of the check, which is never doubled (M 5-5), is 10."""
+    return DLE in frame[-CHECK_SIZES[check]:]
+
+
+def is_command(symbol: Symbol) -> bool:
+    """Tell whether a symbol is a good message with a command (M 6-3)."""
+    return symbol.kind is SymbolKind.MESSAGE and symbol.is_good \
+        and len(symbol.data) >= HEADER_SIZE and not symbol.data[2] & REPLY_BIT
 
 
 def next_symbol(buffer: bytes, check: BlockCheck, is_half_duplex: bool) -> Symbol | None:

@@ -17,8 +17,9 @@
 from __future__ import annotations
 
 from abdf1_ros.conform import codec
-from abdf1_ros.conform.case import case, Target
-from abdf1_ros.conform.ends import AskingEnd
+from abdf1_ros.conform.case import case, Permission, Target
+from abdf1_ros.conform.data import changes_nothing
+from abdf1_ros.conform.ends import AskingEnd, check_reply
 
 _SILENT = (Target.SLAVE, Target.RADIO)
 _SOURCE = 'KF2 4-31, SLC 13-76 to 13-80'
@@ -26,26 +27,42 @@ _SOURCE = 'KF2 4-31, SLC 13-76 to 13-80'
 
 @case('A message with a wrong check is ignored: no slave sends DLE NAK.', _SOURCE, *_SILENT)
 def bad_check_ignored(end: AskingEnd) -> None:
-    end.wire.send(codec.damaged(end.frame(end.command())))
-    end.wire.expect_silence('the check was wrong')
+    for raw in codec.all_damaged(end.frame(end.command()), end.wire.check):
+        end.wire.send(raw)
+        end.expect_nothing('the check was wrong')
+
+
+@case('A message with a wrong check is not executed.', f'{_SOURCE}, M 4-7 to 4-9',
+      Target.PEER, *_SILENT, permission=Permission.WRITE)
+def bad_check_not_executed(end: AskingEnd) -> None:
+    def send(command: bytes) -> None:
+        end.wire.send(codec.damaged(end.frame(command)))
+        end.settle()
+
+    changes_nothing(end, send)
 
 
 @case('A message of fewer than six bytes is ignored.', 'M 3-4, 4-4', *_SILENT)
 def short_message_ignored(end: AskingEnd) -> None:
     end.send(end.command()[:5])
-    end.wire.expect_silence('the message was shorter than its header')
+    end.expect_nothing('the message was shorter than its header')
 
 
 @case('A message that breaks off leaves the station ready for the next one.', 'M 3-4', *_SILENT)
 def broken_message(end: AskingEnd) -> None:
-    frame = end.frame(end.command(body=b'\x00abc'))
-    end.wire.send(frame[:len(frame) // 2])
-    end.wire.expect_silence('the message was not complete', 0.3)
-    end.ask(0x06, b'\x00')
+    def break_off() -> None:
+        frame = end.frame(end.command(body=b'\x00abc'))
+        end.wire.send(frame[:len(frame) // 2])
+        end.wire.expect_silence('the message was not complete', 0.3)
+
+    command = end.command()
+    end.deliver(command, break_off)
+    check_reply(command, end.collect())
 
 
 @case('Bytes outside of a message do not spoil the next one.', 'M 3-4, 4-7 to 4-9',
       Target.PEER, *_SILENT)
 def noise_before_message(end: AskingEnd) -> None:
-    end.wire.send(b'\x55\x00\xFF\x03')
-    end.ask(0x06, b'\x00')
+    command = end.command()
+    end.deliver(command, lambda: end.wire.send(b'\x55\x00\xFF\x03'))
+    check_reply(command, end.collect())

@@ -22,10 +22,11 @@ and MicroLogix), 7-20 and 7-28 to 7-30 (PLC-5) have them.
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 
 from abdf1_ros.conform.case import case, Permission, Target
-from abdf1_ros.conform.codec import HEADER_SIZE
-from abdf1_ros.conform.ends import AskingEnd, Words
+from abdf1_ros.conform.codec import has_10_in_check, HEADER_SIZE, message, REPLY_BIT
+from abdf1_ros.conform.ends import AskingEnd, check_reply, Words
 from abdf1_ros.conform.wire import Failed, Skipped
 
 _ANSWERING = (Target.SLAVE, Target.PEER, Target.RADIO)
@@ -65,6 +66,21 @@ def _echoed(end: AskingEnd, data: bytes, tns: int | None = None) -> None:
       'M 2-7, 5-4', *_ANSWERING)
 def stuffing(end: AskingEnd) -> None:
     _echoed(end, _NASTY)
+
+
+@case('A check byte of 10 is not doubled.', 'M 5-5', *_ANSWERING)
+def check_not_doubled(end: AskingEnd) -> None:
+    def as_reply(command: bytes) -> bytes:
+        reply = bytes((command[1], command[0], command[2] | REPLY_BIT, 0)) + command[4:6]
+        return message(reply, end.wire.check)
+
+    for frame_of in (end.frame, as_reply):
+        command = end.command()
+        while not has_10_in_check(frame_of(command), end.wire.check):
+            command = end.command()
+        end.deliver(command)
+        check_reply(command, end.collect())
+        end.wire.expect_silence('the reply has ended')
 
 
 @case('The check of a reply is right for every value of a byte.', 'M 5-2 to 5-7', *_ANSWERING)
@@ -155,9 +171,9 @@ def _masked_body(words: Words, mask: int, bits: int) -> bytes:
     return b'\x26\x06' + place[0] + place[1] + keep + (bits & mask).to_bytes(2, 'little')
 
 
-def _read(end: AskingEnd, count: int) -> bytes:
+def _read(end: AskingEnd, count: int, words: Words | None = None) -> bytes:
     """Return ``count`` integers as bytes, without the type that a PLC-5 puts before them."""
-    data = _data(end.ask(_TYPED, _read_body(end.words, count)))
+    data = _data(end.ask(_TYPED, _read_body(words or end.words, count)))
     if len(data) < 2 * count:
         raise Failed(f'{2 * count} bytes of data', data.hex(' '))
     return data[len(data) - 2 * count:]
@@ -213,11 +229,30 @@ def write_and_read(end: AskingEnd) -> None:
     words = _words_of(end)
     before = _read(end, words.count)
     try:
-        for pattern in (b'\x10\x10', b'\x34\x12', b'\xFF\x7F', b'\x00\x00'):
-            wanted = pattern * words.count
+        for pattern in (0x1010, 0x1234, 0x7FFF, 0x8000, 0x0000):
+            wanted = b''.join((pattern ^ 0x0101 * number & 0xFFFF).to_bytes(2, 'little')
+                              for number in range(words.count))
             _data(end.ask(_TYPED, _write_body(words, wanted)))
             if (got := _read(end, words.count)) != wanted:
                 raise Failed(wanted.hex(' '), got.hex(' '))
+    finally:
+        _data(end.ask(_TYPED, _write_body(words, before)))
+
+
+@case('Words are written and read in the order of their elements.', 'M 7-18, 7-30', *_ANSWERING,
+      permission=Permission.WRITE)
+def word_order(end: AskingEnd) -> None:
+    words = _words_of(end)
+    if words.count < 2:
+        raise Skipped('needs --count 2 or more')
+    before = _read(end, words.count)
+    wanted = [(0x8001 + 0x0102 * number).to_bytes(2, 'little') for number in range(words.count)]
+    try:
+        _data(end.ask(_TYPED, _write_body(words, b''.join(wanted))))
+        for number, word in enumerate(wanted):
+            one = replace(words, element=words.element + number)
+            if (got := _read(end, 1, one)) != word:
+                raise Failed(f'{word.hex(" ")} in {one.address}', got.hex(' '))
     finally:
         _data(end.ask(_TYPED, _write_body(words, before)))
 
@@ -226,14 +261,19 @@ def write_and_read(end: AskingEnd) -> None:
       'M 7-20', *_ANSWERING, permission=Permission.WRITE)
 def masked_write(end: AskingEnd) -> None:
     words = _words_of(end)
+    following = replace(words, element=words.element + 1)
     before = _read(end, 1)
+    reply = end.ask(_TYPED, _read_body(following, 1))
+    beyond = b'' if reply[3] else reply[-2:]  # there may be no further word
     try:
         _data(end.ask(_TYPED, _write_body(words, b'\x55\xAA')))
-        reply = end.ask(_TYPED, _masked_body(words, 0x0108, 0x0108))
+        reply = end.ask(_TYPED, _masked_body(words, 0x8108, 0x0108))
         if reply[3] == _ILLEGAL:
             raise Skipped('STS 10: this processor has no masked write')
         _data(reply)
-        if (got := _read(end, 1)) != b'\x5D\xAB':
-            raise Failed('5d ab', got.hex(' '))
+        if (got := _read(end, 1)) != b'\x5D\x2B':
+            raise Failed('5d 2b', got.hex(' '))
+        if beyond and (got := _read(end, 1, following)) != beyond:
+            raise Failed(f'{beyond.hex(" ")} in {following.address}, as before', got.hex(' '))
     finally:
         _data(end.ask(_TYPED, _write_body(words, before)))

@@ -22,9 +22,7 @@ from dataclasses import dataclass
 
 from abdf1_ros.conform import codec
 from abdf1_ros.conform.codec import Symbol, SymbolKind
-from abdf1_ros.conform.wire import Failed, Wire
-
-REPLY_BIT = 0x40
+from abdf1_ros.conform.wire import Failed, Skipped, Wire
 
 # Between two polls of a station that answers DLE EOT (s), so that it can finish.
 POLL_PAUSE = 0.02
@@ -32,9 +30,7 @@ POLL_PAUSE = 0.02
 # A target that sends by itself may take so long (s) to send something.
 PATIENCE = 30.0
 
-# A case does not wait for more repetitions or enquiries than this.
-MOST_REPETITIONS = 12
-HIGHEST_LIMIT = 255  # of repetitions that any product can be set to
+HIGHEST_LIMIT = 255  # of repetitions and enquiries that any product can be set to
 
 
 def expect_end_of_naks(wire: Wire, message: bytes, patience: float) -> None:
@@ -48,7 +44,18 @@ def expect_end_of_naks(wire: Wire, message: bytes, patience: float) -> None:
                  'highest limit of the products', 'the message once more')
 
 
-_MOST_TRIES = 3
+def expect_end_of_enquiries(wire: Wire, patience: float) -> Symbol | None:
+    """Return what comes after DLE ENQ that get no answer, None for silence; Failed for no end."""
+    for _ in range(HIGHEST_LIMIT + 1):
+        symbol = wire.hear(patience, answers=False)
+        if symbol is None or symbol.kind is not SymbolKind.ENQ:
+            return symbol
+    raise Failed(f'an end after {HIGHEST_LIMIT} DLE ENQ at the latest, the highest limit of the '
+                 'products', 'DLE ENQ once more')
+
+
+_MOST_TRIES = 3  # of what a full sink may refuse, and of what is asked of a driver
+_MOST_COMMANDS = 20  # in a row that a slave asks by itself
 
 # A reply may take so many answer times.
 _REPLY_TIMES = 5
@@ -85,7 +92,7 @@ def check_reply(command: bytes, reply: bytes) -> bytes:
 
     DST and SRC are exchanged, CMD has bit 6, TNS is the same (M 6-3 to 6-8).
     """
-    wanted = bytes((command[1], command[0], command[2] | REPLY_BIT)), command[4:6]
+    wanted = bytes((command[1], command[0], command[2] | codec.REPLY_BIT)), command[4:6]
     if len(reply) < codec.HEADER_SIZE or (reply[:3], reply[4:6]) != wanted:
         raise Failed(f'a reply {wanted[0].hex(" ")} STS {wanted[1].hex(" ")} to this command',
                      reply.hex(' '))
@@ -134,11 +141,20 @@ class AskingEnd(ABC):
             self.owed.add(command[4:6])
         return symbol
 
-    def deliver(self, command: bytes) -> None:
-        """Send a message that has to be acknowledged; on a half-duplex line twice, if needed."""
-        symbol = self.offer(command)
-        if symbol is None and self.wire.is_half_duplex:
+    def deliver(self, command: bytes, before: Callable[[], object] = lambda: None) -> None:
+        """
+        Send a message that has to be acknowledged, each time after ``before``.
+
+        A sink may be full: a slave is silent then (KF2 4-31), and a full-duplex node answers DLE
+        NAK (M 4-8), so the message is sent again.
+        """
+        for _ in range(_MOST_TRIES):
+            before()
             symbol = self.offer(command)
+            is_full = symbol is None if self.wire.is_half_duplex else (
+                symbol is not None and symbol.kind is SymbolKind.NAK)
+            if not is_full:
+                break
         if symbol is None or symbol.kind is not SymbolKind.ACK:
             raise Failed('DLE ACK for a good message', str(symbol or 'silence'))
 
@@ -150,11 +166,20 @@ class AskingEnd(ABC):
     def further(self, seconds: float) -> Symbol | None:
         """Return the first answer within so many seconds that is not DLE EOT."""
 
+    def expect_nothing(self, what: str) -> None:
+        """Expect no answer at all, at a poll either; Failed says ``what`` should have none."""
+        self.wire.expect_silence(what)
+        symbol = self.further(self.wire.answer_time)
+        if symbol is not None:
+            raise Failed(f'no answer: {what}', str(symbol))
+
     def attempt(self, command: bytes) -> bytes | None:
         """Return the reply to a command; None where it is not taken."""
-        response = self.offer(command)
-        is_taken = response is not None and response.kind is SymbolKind.ACK
-        return check_reply(command, self.collect()) if is_taken else None
+        try:
+            self.deliver(command)
+        except Failed:
+            return None
+        return check_reply(command, self.collect())
 
     def taken(self, symbol: Symbol, acknowledge: bool = True) -> bytes:
         """Acknowledge a message, and return its link data."""
@@ -190,9 +215,13 @@ class MasterEnd(AskingEnd):
         return codec.master_message(self.station, command, self.wire.check)
 
     def poll(self) -> Symbol | None:
-        """Poll once and return what comes."""
-        self.wire.send(codec.poll(self.station))
-        return self.wire.hear()
+        """Poll and return what comes, after commands that the slave sends by itself."""
+        for _ in range(_MOST_COMMANDS):
+            self.wire.send(codec.poll(self.station))
+            symbol = self.wire.hear()
+            if symbol is None or not self.wire.has_passed_command(symbol):
+                return symbol
+        return None
 
     def collect(self, acknowledge: bool = True) -> bytes:
         symbol = self.further(_REPLY_TIMES * self.wire.answer_time)
@@ -237,7 +266,8 @@ class PeerEnd(AskingEnd):
 class RadioEnd(PeerEnd):
     """A node of a radio modem network that sends commands to another, ``station``."""
 
-    def deliver(self, command: bytes) -> None:
+    def deliver(self, command: bytes, before: Callable[[], object] = lambda: None) -> None:
+        before()
         self.send(command)
         self.owed.add(command[4:6])
 
@@ -271,8 +301,32 @@ class AnsweringEnd(ABC):
             return
 
     @abstractmethod
-    def next_command(self, what: str = 'a command') -> Symbol:
-        """Wait for a good command."""
+    def next_command(self, what: str = '') -> Symbol:
+        """Wait for a good command; Failed says ``what`` was expected, without it Skipped."""
+
+    def hear_command(self, is_wanted: Callable[[Symbol], bool], what: str) -> Symbol:
+        """Return the first good command that ``is_wanted``, as ``next_command`` does."""
+        try:
+            symbol = self.wire.until(is_wanted, what, PATIENCE)
+        except Failed:
+            if what:
+                raise
+            raise Skipped(f'not tried: no command has come within {PATIENCE:g} s') from None
+        if not symbol.is_good:
+            raise Failed('a message with the right check', symbol.raw.hex(' '))
+        return symbol
+
+    def acknowledge(self, command: Symbol) -> None:
+        """Acknowledge a command, where messages are."""
+        self.wire.send(codec.ACK)
+
+    @abstractmethod
+    def say(self, raw: bytes) -> None:
+        """Send a message in the place of the reply to a command that was acknowledged."""
+
+    def expect_taken(self, command: Symbol) -> None:
+        """Expect that the reply to a command was taken."""
+        self.wire.expect(SymbolKind.ACK, 'DLE ACK for a good reply')
 
     @abstractmethod
     def finish(self, command: Symbol) -> None:
@@ -287,11 +341,6 @@ class AnsweringEnd(ABC):
         self.reply_to(command)
         self.wire.expect(SymbolKind.ACK, what)
 
-    def _command(self, symbol: Symbol) -> Symbol:
-        if not symbol.is_good:
-            raise Failed('a message with the right check', symbol.raw.hex(' '))
-        return symbol
-
 
 class SlaveEnd(AnsweringEnd):
     """A slave, ``station``, that a half-duplex master polls and sends commands to."""
@@ -300,14 +349,18 @@ class SlaveEnd(AnsweringEnd):
         super().__init__(wire, serve)
         self.station = station
 
-    def next_command(self, what: str = 'a command for our station') -> Symbol:
+    def next_command(self, what: str = '') -> Symbol:
         """Wait for a good message to us; polls before it are answered DLE EOT."""
         def is_command(symbol: Symbol) -> bool:
             if symbol.kind is SymbolKind.POLL and symbol.station == self.station:
                 self.wire.send(codec.EOT)
             return symbol.kind is SymbolKind.MASTER_MESSAGE and symbol.station == self.station
 
-        return self._command(self.wire.until(is_command, what, PATIENCE))
+        return self.hear_command(is_command, what)
+
+    def say(self, raw: bytes) -> None:
+        self.next_poll()
+        self.wire.send(raw)
 
     def next_poll(self, what: str = 'a poll of our station') -> Symbol:
         """Wait for a poll of us; a message before it, or a reset of the line, is a failure."""
@@ -328,9 +381,11 @@ class SlaveEnd(AnsweringEnd):
 class ServerEnd(AnsweringEnd):
     """A full-duplex node that answers the commands of another."""
 
-    def next_command(self, what: str = 'a command') -> Symbol:
-        return self._command(self.wire.until(
-            lambda heard: heard.kind is SymbolKind.MESSAGE, what, PATIENCE))
+    def next_command(self, what: str = '') -> Symbol:
+        return self.hear_command(lambda heard: heard.kind is SymbolKind.MESSAGE, what)
+
+    def say(self, raw: bytes) -> None:
+        self.wire.send(raw)
 
     def finish(self, command: Symbol) -> None:
         self.wire.send(codec.ACK)
@@ -339,6 +394,15 @@ class ServerEnd(AnsweringEnd):
 
 class RadioServerEnd(ServerEnd):
     """A node of a radio modem network that answers the commands of another."""
+
+    def acknowledge(self, command: Symbol) -> None:
+        pass
+
+    def expect_taken(self, command: Symbol) -> None:
+        symbol = self.next_command('another command')
+        if symbol.data[4:6] == command.data[4:6]:
+            raise Failed('a new command: this one has its reply', symbol.data.hex(' '))
+        self.finish(symbol)
 
     def finish(self, command: Symbol) -> None:
         self.reply_to(command)

@@ -18,11 +18,12 @@ from __future__ import annotations
 
 from abdf1_ros.conform import codec
 from abdf1_ros.conform.case import case, Target
-from abdf1_ros.conform.codec import SymbolKind
+from abdf1_ros.conform.codec import Symbol, SymbolKind
 from abdf1_ros.conform.ends import PATIENCE, SlaveEnd
 from abdf1_ros.conform.wire import Failed
 
 _MASTER = Target.MASTER
+_COMMANDS = 4
 
 
 @case('A poll is DLE ENQ, the station, and a BCC, on a line with CRC too.', 'M 5-3', _MASTER)
@@ -62,9 +63,25 @@ def bad_reply_polled_again(end: SlaveEnd) -> None:
     end.wire.send(codec.ACK)
     end.next_poll()
     frame = codec.message(end.serve(command.data), end.wire.check)
-    end.wire.send(codec.damaged(frame))
-    end.next_poll('another poll of this station')
+    for damaged in codec.all_damaged(frame, end.wire.check):
+        end.wire.send(damaged)
+        symbol = end.wire.hear(PATIENCE)
+        if symbol is not None and symbol.kind is not SymbolKind.POLL:
+            raise Failed('another poll', str(symbol))
+        if symbol is None or symbol.station != end.station:
+            end.next_poll('another poll of this station')
     end.reply_and_hear(command, 'DLE ACK for the good reply')
+
+
+@case('DLE NAK resets the whole line: a master does not send it with each command.',
+      'M 2-7, 3-11', _MASTER)
+def no_needless_reset(end: SlaveEnd) -> None:
+    for _ in range(_COMMANDS):
+        end.finish(end.next_command())
+    resets = sum(isinstance(entry, Symbol) and entry.kind is SymbolKind.NAK
+                 for entry in end.wire.transcript)
+    if resets > 1:
+        raise Failed('no DLE NAK while all is answered', f'{resets} beside {_COMMANDS} commands')
 
 
 @case('A reply that comes again, as after a lost DLE ACK, is acknowledged again.',

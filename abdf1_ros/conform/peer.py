@@ -19,13 +19,22 @@ from __future__ import annotations
 from abdf1_ros.conform import codec
 from abdf1_ros.conform.case import case, Target
 from abdf1_ros.conform.codec import SymbolKind
-from abdf1_ros.conform.ends import check_reply, expect_end_of_naks, MOST_REPETITIONS, PeerEnd
-from abdf1_ros.conform.wire import Failed, Skipped
+from abdf1_ros.conform.ends import (
+    check_reply,
+    expect_end_of_enquiries,
+    expect_end_of_naks,
+    PeerEnd,
+)
+from abdf1_ros.conform.wire import Failed
 
 _PEER = Target.PEER
 # How long (s) a node may wait for the response to its message before it asks: 1 to 4.4 s are the
-# defaults of the products (M 7-25, 7-27).
-_ACK_TIMEOUT = 6.0
+# defaults of the products (M 7-25, 7-27). Once it has asked that is known.
+_LONGEST_ACK_TIMEOUT = 20.0
+
+
+def _ack_timeout(end: PeerEnd) -> float:
+    return min(_LONGEST_ACK_TIMEOUT, 1.5 * end.wire.enquired_after + 1.0)
 
 
 def _answer(end: PeerEnd, frame: bytes, kind: SymbolKind) -> None:
@@ -40,7 +49,8 @@ def message_acknowledged(end: PeerEnd) -> None:
 
 @case('A message with a wrong check is answered with DLE NAK.', 'M 4-7 to 4-9', _PEER)
 def bad_check_refused(end: PeerEnd) -> None:
-    _answer(end, codec.damaged(end.frame(end.command())), SymbolKind.NAK)
+    for raw in codec.all_damaged(end.frame(end.command()), end.wire.check):
+        _answer(end, raw, SymbolKind.NAK)
 
 
 @case('A message of fewer than six bytes is answered with DLE NAK.', 'M 4-4, 4-7 to 4-9', _PEER)
@@ -71,6 +81,14 @@ def enquiry_after_nak(end: PeerEnd) -> None:
     _answer(end, codec.ENQ, SymbolKind.NAK)
 
 
+@case('After bytes that are no message DLE ENQ gets DLE NAK, not an earlier DLE ACK.',
+      'M 4-7 to 4-9', _PEER)
+def enquiry_after_noise(end: PeerEnd) -> None:
+    end.ask(0x06, b'\x00')
+    end.wire.send(b'\x55\x00')
+    _answer(end, codec.ENQ, SymbolKind.NAK)
+
+
 @case('A message answered with DLE NAK is sent again.', 'M 4-5', _PEER)
 def reply_repeated_after_nak(end: PeerEnd) -> None:
     end.deliver(end.command(body=b'\x00again'))
@@ -84,20 +102,20 @@ def reply_repeated_after_nak(end: PeerEnd) -> None:
 @case('A message that is always answered with DLE NAK is given up.', 'M 4-5', _PEER)
 def nak_limit(end: PeerEnd) -> None:
     end.deliver(end.command())
-    expect_end_of_naks(end.wire, end.collect(acknowledge=False), _ACK_TIMEOUT)
+    expect_end_of_naks(end.wire, end.collect(acknowledge=False), _ack_timeout(end))
 
 
 @case('A message without any response is followed by DLE ENQ; DLE ACK ends it.', 'M 4-5', _PEER)
 def silence_is_enquired(end: PeerEnd) -> None:
     end.deliver(end.command())
     end.collect(acknowledge=False)
-    end.wire.expect(SymbolKind.ENQ, within=_ACK_TIMEOUT)
+    end.wire.expect(SymbolKind.ENQ, within=_LONGEST_ACK_TIMEOUT)
     end.wire.send(codec.ACK)
     _expect_no_enquiry(end)
 
 
 def _expect_no_enquiry(end: PeerEnd) -> None:
-    symbol = end.wire.hear(_ACK_TIMEOUT, answers=False)
+    symbol = end.wire.hear(_ack_timeout(end), answers=False)
     if symbol is not None:
         raise Failed('silence: the message has been acknowledged', str(symbol))
 
@@ -113,14 +131,15 @@ def no_needless_enquiry(end: PeerEnd) -> None:
 def enquiry_limit(end: PeerEnd) -> None:
     end.deliver(end.command())
     end.collect(acknowledge=False)
-    for _ in range(MOST_REPETITIONS):
-        symbol = end.wire.hear(_ACK_TIMEOUT, answers=False)
-        if symbol is None:
-            return
-        if symbol.kind is not SymbolKind.ENQ:
-            raise Failed('DLE ENQ, or silence', str(symbol))
-    end.settle()
-    raise Skipped(f'more than {MOST_REPETITIONS} enquiries: a larger limit is set')
+    symbol = expect_end_of_enquiries(end.wire, _ack_timeout(end))
+    if symbol is not None:
+        raise Failed('DLE ENQ, or silence', str(symbol))
+
+
+def _embed(end: PeerEnd, command: bytes, response: bytes) -> None:
+    begun, rest = codec.divided(end.frame(command))
+    for part in (begun, response, rest):
+        end.wire.send(part)
 
 
 @case('A response inside a message counts, and is not part of the message.', 'M 4-3', _PEER)
@@ -128,11 +147,26 @@ def embedded_response(end: PeerEnd) -> None:
     first, second = end.command(body=b'\x00one'), end.command(body=b'\x00two')
     end.deliver(first)
     check_reply(first, end.collect(acknowledge=False))
-    begun, rest = codec.divided(end.frame(second))
-    for part in (begun, codec.ACK, rest):
-        end.wire.send(part)
+    _embed(end, second, codec.ACK)
     end.wire.expect(SymbolKind.ACK, 'DLE ACK for a message with an embedded response')
-    symbol = end.wire.hear(_ACK_TIMEOUT, answers=False)
+    symbol = end.wire.hear(_ack_timeout(end), answers=False)
     if symbol is None or symbol.kind is not SymbolKind.MESSAGE:
         raise Failed('the next reply: the first has been acknowledged', str(symbol or 'silence'))
     check_reply(second, end.taken(symbol))
+
+
+@case('DLE NAK inside a message has the reply that it is for sent again.', 'M 4-3, 4-5', _PEER)
+def embedded_nak(end: PeerEnd) -> None:
+    first, second = end.command(body=b'\x00one'), end.command(body=b'\x00two')
+    end.deliver(first)
+    refused = check_reply(first, end.collect(acknowledge=False))
+    _embed(end, second, codec.NAK)
+    heard = {symbol.kind: symbol for symbol in (
+        end.wire.hear(_ack_timeout(end), answers=False) for _ in range(2)) if symbol}
+    again = heard.get(SymbolKind.MESSAGE)
+    if again is None or again.data != refused:
+        raise Failed('the reply again that was refused', again.data.hex(' ') if again else
+                     ', '.join(kind.value for kind in heard) or 'silence')
+    end.taken(again)
+    if SymbolKind.ACK in heard:
+        check_reply(second, end.collect())

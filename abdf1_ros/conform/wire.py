@@ -61,7 +61,7 @@ class Failed(Exception):
 
 
 class Skipped(Exception):
-    """The case cannot be judged here; the text says why."""
+    """The rule was not tried, or cannot be judged here; the text says why."""
 
 
 class Wire:
@@ -73,15 +73,18 @@ class Wire:
     ``is_radio`` nothing has a response, so DLE ENQ gets none. ``transcript`` keeps all bytes in
     order; ``has_heard`` tells whether any byte came. A response inside a message is heard before
     that message. ``enquired_after`` is the shortest time (s) from a message of the other end to
-    its DLE ENQ.
+    its DLE ENQ. With ``passes_commands`` what the other end asks by itself, as the MSG of a
+    program, is acknowledged and passed over.
     """
 
     def __init__(self, line: RawLine, check: BlockCheck, clock: Callable[[], float], *,
                  is_half_duplex: bool, is_radio: bool = False, answer_time: float = 1.0,
-                 char_time: float = 0.0) -> None:
+                 char_time: float = 0.0, passes_commands: bool = False) -> None:
         self.check = check
         self.is_half_duplex = is_half_duplex
         self._is_radio = is_radio
+        self._passes_commands = passes_commands
+        self._limit = math.inf
         self.answer_time = answer_time
         self.transcript: list[Sent | Symbol] = []
         self.has_heard = False
@@ -100,8 +103,18 @@ class Wire:
         """Return the time (s) on the clock of the transcript."""
         return self._clock()
 
+    def begin(self, limit: float) -> None:
+        """Begin a case, of at most ``limit`` s; after that it is Skipped wherever it is."""
+        self.transcript.clear()
+        self._limit = self._clock() + limit
+
+    def _check_limit(self) -> None:
+        if self._clock() > self._limit:
+            raise Skipped('not judged: it takes too long')
+
     def send(self, raw: bytes) -> None:
         """Send bytes as they are."""
+        self._check_limit()
         self.transcript.append(Sent(self._clock(), raw))
         self._sent_until = max(self._clock(), self._sent_until) + len(raw) * self._char_time
         if raw in (codec.ACK, codec.NAK):
@@ -117,11 +130,27 @@ class Wire:
         begun = max(self._clock(), self._sent_until)
         end = begun + (self.answer_time if within is None else within)
         symbol = self._next(begun, end)
-        answers = answers and not self._is_radio
-        while answers and symbol is not None and symbol.kind is SymbolKind.ENQ:
-            self.send(self._response)
+        while symbol is not None and self._has_passed(symbol, answers):
             symbol = self._next(begun, end) if self._clock() < end else None
         return symbol
+
+    def _has_passed(self, symbol: Symbol, answers: bool) -> bool:
+        """Answer a DLE ENQ, or what the other end asks by itself; tell whether it was that."""
+        if answers and not self._is_radio and symbol.kind is SymbolKind.ENQ:
+            self.send(self._response)
+            return True
+        # A slave has to be polled again for what it has beside a command.
+        return self._passes_commands and not self.is_half_duplex \
+            and self.has_passed_command(symbol)
+
+    def has_passed_command(self, symbol: Symbol) -> bool:
+        """Acknowledge a command that does not repeat one of ours; tell whether it was that."""
+        if not codec.is_command(symbol) or any(
+                symbol.raw in entry.raw for entry in self.transcript if isinstance(entry, Sent)):
+            return False
+        if not self._is_radio:
+            self.send(codec.ACK)
+        return True
 
     def _next(self, begun: float, end: float) -> Symbol | None:
         if self._embedded:
@@ -140,6 +169,7 @@ class Wire:
             self._read(left)
 
     def _read(self, timeout: float) -> None:
+        self._check_limit()
         data = self._line.read(timeout)
         self.has_heard = self.has_heard or bool(data)
         self._buffer = (self._buffer + data)[-_MOST_UNREAD:]

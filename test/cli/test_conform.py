@@ -53,6 +53,12 @@ def test_result_is_told_in_lines(port: str, capsys: pytest.CaptureFixture[str]) 
     assert lines[-1] == '2 passed, 0 failed, 1 skipped'
 
 
+def test_run_in_which_nothing_was_tried_has_not_passed(
+        port: str, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(['slave', '--port', port, '--only', 'nak-resets']) == 1
+    assert 'conform: no rule was tried: each case says why' in capsys.readouterr().err
+
+
 def test_failure_is_the_exit_status_and_shows_the_bytes(
         port: str, capsys: pytest.CaptureFixture[str]) -> None:
     options = ('--port', port, '--station', '2', '--answer-time', '0.05', '--only',

@@ -73,6 +73,25 @@ class Habit(Enum):
     SLOW = auto()  # each response and reply 300 ms late
     LATE_REPLY = auto()  # 300 ms after the command
     VERY_LATE_REPLY = auto()  # 1.5 s
+    EXECUTES_BAD_CHECK = auto()  # without a reply, whatever the response is
+    CHECKS_FIRST_BYTE_ONLY = auto()  # of the two of a CRC
+    CHECKS_LAST_BYTE_ONLY = auto()
+    DOUBLES_CHECK = auto()
+    REPLY_WITHOUT_BIT = auto()  # 6 of CMD
+    KEEPS_ADDRESSES = auto()  # of the command, in the reply
+    ADDS_BYTE_TO_ECHO = auto()
+    ACKS_TWICE = auto()
+    ALWAYS_STS = auto()  # 10
+    WORDS_REVERSED = auto()
+    WRITES_FIRST_WORD_ONLY = auto()
+    READS_NEXT_WORD = auto()
+    BYTES_EXCHANGED = auto()  # of words that are written
+    BIT_15_LOST = auto()
+    MASK_SETS_ONLY = auto()
+    MASK_CHANGES_NEXT_WORD = auto()
+    MASK_EXCHANGED = auto()  # with the bits
+    SENDS_COMMANDS = auto()  # of its own, as MSG does: 0.7 s after the last
+    FULL_AT_EVERY_THIRD = auto()  # message
     # Of a slave.
     NAKS_BAD_CHECK = auto()
     ACK_TO_POLL = auto()
@@ -92,6 +111,14 @@ class Habit(Enum):
     NO_EOT = auto()
     LAST_REPLY_FIRST = auto()
     ONE_MESSAGE_ONLY = auto()  # is full as long as it owes a reply
+    EXECUTES_BAD_CHECK_LATER = auto()  # without DLE ACK; the reply comes at the next poll
+    EXECUTES_SHORT_LATER = auto()  # and so a message that is too short
+    EXECUTES_OTHER_STATION = auto()
+    ANSWERS_POLL_OF_ALL = auto()  # of station 255
+    ACK_OF_ANY = auto()  # drops what was sent, as KF2 4-31 has it
+    DROPS_AT_ANY_ACK = auto()  # also what was not sent
+    NEVER_FULL = auto()
+    TWO_REPLIES_TO_A_POLL = auto()
     # Of a peer or client.
     IGNORES_BAD_CHECK = auto()
     NAK_AS_0F = auto()
@@ -106,6 +133,13 @@ class Habit(Enum):
     NO_REPETITION = auto()
     SILENCE_REPEATED = auto()  # the message instead of DLE ENQ
     ENQUIRES_ALWAYS = auto()  # 100 ms after each message
+    ENQ_AFTER_NOISE_OLD = auto()  # DLE ENQ gets the response of before the noise
+    EMBEDDED_NAK_IGNORED = auto()
+    EMBEDDED_NAK_AS_ACK = auto()
+    ENQUIRES_FOR_EVER = auto()
+    ACK_TIMEOUT_OF_8 = auto()  # s
+    REPEATS_AFTER_ACK = auto()  # once, after 2 s
+    USES_REFUSED_REPLY = auto()
     # Of a master or client.
     SAME_TNS = auto()
     NEW_TNS_FOR_REPETITION = auto()
@@ -118,6 +152,12 @@ class Habit(Enum):
     POLLS_BETWEEN_REPETITIONS = auto()
     POLLS_OTHERS = auto()
     POLLS_LATE = auto()
+    ACKS_BAD_REPLY = auto()  # and polls again
+    NAK_BEFORE_COMMAND = auto()
+    TAKES_ANY_TNS = auto()
+    TAKES_ANY_DESTINATION = auto()
+    REPEATS_FOR_EVER = auto()
+    STOPS_AFTER_10 = auto()  # commands
     # Of a radio modem node or client.
     ACKNOWLEDGES = auto()
     ANSWERS_SYMBOLS = auto()
@@ -203,6 +243,9 @@ class Wire:
         """Tell whether this end has a habit."""
         return habit in self.habits
 
+    def noise(self) -> None:
+        """Take note of a byte outside of any symbol."""
+
     def take(self, symbol: Symbol) -> None:
         """Take what was received."""
         raise NotImplementedError
@@ -210,6 +253,8 @@ class Wire:
     def frame(self, data: bytes, station: int | None = None) -> bytes:
         """Return a message as it stands on the line."""
         check = _right_check(self.check, station, data)
+        if self.has(Habit.DOUBLES_CHECK):
+            check = check.replace(b'\x10', b'\x10\x10')
         if self.has(Habit.BAD_CHECK_OF_HIGH_BYTES) and max(data) >= 0xC0:
             check = bytes(byte ^ 0xFF for byte in check)
         if self.has(Habit.CRC_WITHOUT_STATION):
@@ -228,7 +273,9 @@ class Wire:
             byte = yield
             if byte == _DLE:
                 yield from self._control((yield))
-            elif self.has(Habit.LOST_AFTER_NOISE):
+                continue
+            self.noise()
+            if self.has(Habit.LOST_AFTER_NOISE):
                 yield from self._deaf()
 
     def _deaf(self) -> Generator[None, int, None]:
@@ -269,8 +316,7 @@ class Wire:
             elif code in (_ACK, _NAK) and self.has(Habit.RESPONSE_IS_DATA):
                 data += bytes((_DLE, code))
             elif code in (_ACK, _NAK) or code == _ENQ and self.has(Habit.ENQ_IN_MESSAGE_ANSWERED):
-                if not self.has(Habit.RESPONSE_INSIDE_IGNORED):
-                    self.take((code,))
+                self._inside(code)
             elif code != _ENQ or not self.has(Habit.ENQ_IN_MESSAGE_IGNORED):
                 if self.has(Habit.LOST_AFTER_BROKEN_MESSAGE):
                     for _ in range(3):
@@ -280,10 +326,28 @@ class Wire:
                 if code in (_SOH, _STX) or code == _ENQ and self.is_half_duplex:
                     yield from self._control(code)
                 return
-        check = bytes([(yield)]) if self.check == 'BCC' else bytes([(yield), (yield)])
-        of_station = None if self.has(Habit.CRC_WITHOUT_STATION) else station
-        is_good = check == _right_check(self.check, of_station, bytes(data))
-        self.take(('message', station, bytes(data), is_good))
+        yield from self._check(station, bytes(data))
+
+    def _inside(self, code: int) -> None:
+        """Take a symbol inside of a message."""
+        if code == _NAK and self.has(Habit.EMBEDDED_NAK_AS_ACK):
+            code = _ACK
+        is_ignored = code == _NAK and self.has(Habit.EMBEDDED_NAK_IGNORED)
+        if not is_ignored and not self.has(Habit.RESPONSE_INSIDE_IGNORED):
+            self.take((code,))
+
+    def _check(self, station: int | None, data: bytes) -> Generator[None, int, None]:
+        check = b''
+        for _ in range(1 if self.check == 'BCC' else 2):
+            check += bytes(((yield),))
+            if self.has(Habit.DOUBLES_CHECK) and check[-1] == _DLE:
+                yield
+        right = _right_check(
+            self.check, None if self.has(Habit.CRC_WITHOUT_STATION) else station, data)
+        is_good = check == right or self.has(Habit.CHECKS_FIRST_BYTE_ONLY) and \
+            check[0] == right[0] or self.has(Habit.CHECKS_LAST_BYTE_ONLY) and \
+            check[-1] == right[-1]
+        self.take(('message', station, data, is_good))
 
 
 class _Executor:
@@ -293,6 +357,20 @@ class _Executor:
         self._wire = wire
         self._plc = simulated_plc(station, family, wire.clock, ('N7:0', 20), checksum=wire.check)
         self._seen: deque[bytes] = deque(maxlen=99 if wire.has(Habit.REMEMBERS_99) else 1)
+        self._count = 0
+        self._tns = 0x6000
+
+    @property
+    def is_full(self) -> bool:
+        """Count a message; tell whether it cannot be stored."""
+        self._count += 1
+        return self._wire.has(Habit.FULL_AT_EVERY_THIRD) and self._count % 3 == 0
+
+    def own_command(self) -> bytes:
+        """Return a command of its program."""
+        self._tns += 1
+        return bytes((5, 1, 0x0F, 0)) + self._tns.to_bytes(2, 'little') + bytes.fromhex(
+            'A2 04 07 89 00 00')
 
     def _key(self, data: bytes) -> bytes:
         has = self._wire.has
@@ -319,13 +397,25 @@ class _Executor:
         is_write = data[6:7] in (b'\xAA', b'\x67')
         if is_write and has(Habit.WRITES_NOTHING):
             return self._done(data)
-        if cmd == 0x0F and fnc == b'\xAB' and has(Habit.MASKS_NOTHING):
-            data = data[:-4] + b'\xFF\xFF' + data[-2:]
+        data = self._misread(data)
         if cmd == 0x0F and data[6:7] == b'\x68' and data[11:12] == b'\x07' and \
                 has(Habit.REFUSES_AREA):
             return self._done(data, sts=0x10)
         reply = self._plc.serve(Packet.decode(data)).encode()
+        if fnc == b'\xAB' and has(Habit.MASK_CHANGES_NEXT_WORD):
+            element = bytes((data[10] + 1,))
+            self._plc.serve(Packet.decode(
+                data[:6] + b'\xAA\x02' + data[8:10] + element + b'\0' + b'\x99\x99'))
+        if fnc == b'\xA2' and has(Habit.WORDS_REVERSED):
+            reply = reply[:6] + _reversed(reply[6:])
+        if has(Habit.ALWAYS_STS):
+            reply = self._done(data, sts=0x10)
+        if has(Habit.REPLY_WITHOUT_BIT):
+            reply = reply[:2] + bytes((cmd,)) + reply[3:]
+        if has(Habit.KEEPS_ADDRESSES):
+            reply = data[:2] + reply[2:]
         if cmd == 0x06 and fnc == b'\x00':
+            reply += bytes(has(Habit.ADDS_BYTE_TO_ECHO))
             reply = reply[:106] if has(Habit.CUTS_ECHO) else reply
             reply = reply[:86] if has(Habit.CUTS_ECHO_AT_80) else reply
         if cmd == 0x06 and fnc == b'\x03' and has(Habit.NO_IDENTITY):
@@ -341,9 +431,39 @@ class _Executor:
             reply = reply[:4] + reply[5:3:-1] + reply[6:]
         return reply
 
+    def _misread(self, data: bytes) -> bytes:
+        """Return a command as it is understood (M 7-17, 7-18, 7-20)."""
+        has, fnc = self._wire.has, data[6:7]
+        if fnc == b'\xAB':
+            before, mask, bits = data[:-4], data[-4:-2], data[-2:]
+            if has(Habit.MASKS_NOTHING):
+                mask = b'\xFF\xFF'
+            if has(Habit.MASK_SETS_ONLY):
+                mask = bytes(one & other for one, other in zip(mask, bits, strict=True))
+            return before + (bits + mask if has(Habit.MASK_EXCHANGED) else mask + bits)
+        if fnc == b'\xA2' and has(Habit.READS_NEXT_WORD):
+            return data[:10] + bytes((data[10] + 1 & 0xFF,)) + data[11:]
+        if fnc != b'\xAA':
+            return data
+        head, words = data[:12], data[12:]
+        if has(Habit.WORDS_REVERSED):
+            words = _reversed(words)
+        if has(Habit.BYTES_EXCHANGED):
+            words = _reversed(words[::-1])
+        if has(Habit.BIT_15_LOST):
+            words = bytes(byte & 0x7F if at % 2 else byte for at, byte in enumerate(words))
+        if has(Habit.WRITES_FIRST_WORD_ONLY):
+            head, words = head[:7] + b'\x02' + head[8:], words[:2]
+        return head + words
+
     @staticmethod
     def _done(data: bytes, sts: int = 0) -> bytes:
         return bytes((data[1], data[0], data[2] | 0x40, sts)) + data[4:6]
+
+
+def _reversed(words: bytes) -> bytes:
+    """Return words, the last first."""
+    return b''.join(words[at:at + 2] for at in reversed(range(0, len(words), 2)))
 
 
 class MutatedSlave(Wire):
@@ -356,12 +476,16 @@ class MutatedSlave(Wire):
         self._queue: deque[tuple[float, bytes]] = deque()
         self._held: bytes | None = None
         self._sent = 0
+        self._has_just_sent = False
+        self._asked = -1.0
 
     def take(self, symbol: Symbol) -> None:
         """React to a symbol."""
         kind = symbol[0]
+        was_sent, self._has_just_sent = self._has_just_sent, False
         if kind == 'poll':
-            is_ours = symbol[1] == self._station or self.has(Habit.ANSWERS_ALL_STATIONS)
+            is_ours = symbol[1] == self._station or self.has(Habit.ANSWERS_ALL_STATIONS) or (
+                symbol[1] == 0xFF and self.has(Habit.ANSWERS_POLL_OF_ALL))
             if is_ours and (symbol[2] or self.has(Habit.ANSWERS_BAD_POLL)):
                 self._polled()
         elif kind == 'message':
@@ -369,31 +493,40 @@ class MutatedSlave(Wire):
             assert isinstance(data, bytes)
             if station in (self._station, 0xFF) or self.has(Habit.ANSWERS_ALL_STATIONS):
                 self._received(data, bool(is_good), station == 0xFF)
+            elif self.has(Habit.EXECUTES_OTHER_STATION):
+                self._execute(data, wants_reply=True)
         elif kind == _ACK and not self.has(Habit.KEEPS_WHAT_WAS_ACKNOWLEDGED):
-            self._held = None
+            if was_sent or self.has(Habit.ACK_OF_ANY):
+                self._held = None
+            elif self.has(Habit.DROPS_AT_ANY_ACK):
+                self._held = None
+                self._queue.clear()
         elif kind == _NAK and not self.has(Habit.IGNORES_NAK):
             self._held = None
             self._queue.clear()
 
     def _respond(self, code: int = _ACK) -> None:
         if not self.has(Habit.NO_ACK):
-            self.say(bytes((_DLE, code)))
+            self.say(bytes((_DLE, code)) * (2 if self.has(Habit.ACKS_TWICE) else 1))
 
     def _received(self, data: bytes, is_good: bool, is_broadcast: bool) -> None:
         if not is_good and not self.has(Habit.TAKES_BAD_CHECK):
-            if self.has(Habit.NAKS_BAD_CHECK):
-                self._respond(_NAK)
-            return
+            return self._refused(data)
         if len(data) < 6 and self.has(Habit.TAKES_SHORT):
             self._respond()
+        if len(data) < 6 and self.has(Habit.EXECUTES_SHORT_LATER):
+            self._queue.append((self.now, data))
         if len(data) < 6 or self.has(Habit.SMALL_PACKETS) and len(data) > 110:
+            return
+        if not is_broadcast and self._plc.is_full:
             return
         if self._plc.is_duplicate(data):
             if not self.has(Habit.DUPLICATE_WITHOUT_ACK):
                 self._respond()
             return
         waiting = len(self._queue) + (self._held is not None)
-        if waiting >= (1 if self.has(Habit.ONE_MESSAGE_ONLY) else 3) and not is_broadcast:
+        limit = 1 if self.has(Habit.ONE_MESSAGE_ONLY) else 99 if self.has(Habit.NEVER_FULL) else 3
+        if waiting >= limit and not is_broadcast:
             if self.has(Habit.NAKS_WHEN_FULL):
                 self._respond(_NAK)
             if self.has(Habit.LOSES_WHEN_FULL):
@@ -403,6 +536,12 @@ class MutatedSlave(Wire):
         if not is_broadcast or self.has(Habit.ACKS_BROADCAST):
             self._respond()
         self._execute(data, not is_broadcast or self.has(Habit.REPLIES_TO_BROADCAST))
+
+    def _refused(self, data: bytes) -> None:
+        if self.habits & {Habit.EXECUTES_BAD_CHECK, Habit.EXECUTES_BAD_CHECK_LATER}:
+            self._execute(data, self.has(Habit.EXECUTES_BAD_CHECK_LATER))
+        if self.has(Habit.NAKS_BAD_CHECK):
+            self._respond(_NAK)
 
     def _execute(self, data: bytes, wants_reply: bool) -> None:
         reply = self._plc.serve(data)
@@ -419,9 +558,14 @@ class MutatedSlave(Wire):
             self._held = None
         if self._held is None and self._queue and self._queue[0][0] <= self.now:
             self._held, self._sent = self._queue.popleft()[1], 0
+        if self._held is None and self.has(Habit.SENDS_COMMANDS) and self.now > self._asked + 0.7:
+            self._held, self._sent, self._asked = self._plc.own_command(), 0, self.now
         if self._held is not None:
             self._sent += 1
+            self._has_just_sent = True
             self.say(self.frame(self._held))
+            if self._queue and self.has(Habit.TWO_REPLIES_TO_A_POLL):
+                self.say(self.frame(self._queue.popleft()[1]))
         elif not self.has(Habit.NO_EOT):
             self.say(bytes((_DLE, _ACK if self.has(Habit.ACK_TO_POLL) else _EOT)))
 
@@ -434,6 +578,7 @@ class _FullDuplex(Wire):
         self._last_response = _NAK
         self._outgoing: deque[bytes] = deque()
         self._naks = self._enquiries = 0
+        self._ack_timeout = 8.0 if self.has(Habit.ACK_TIMEOUT_OF_8) else _ACK_TIMEOUT
         self._sending = 0  # counts messages and repetitions, so that an old timer is known
 
     def execute(self, data: bytes) -> None:
@@ -446,6 +591,18 @@ class _FullDuplex(Wire):
 
     def failed(self) -> None:
         """Take note that a message was given up."""
+
+    def noise(self) -> None:
+        if not self.has(Habit.ENQ_AFTER_NOISE_OLD):
+            self._last_response = _NAK
+
+    def refused(self, data: bytes) -> None:
+        """Take note of a message with a wrong check."""
+
+    @property
+    def is_full(self) -> bool:
+        """Tell whether a message cannot be stored."""
+        return False
 
     def take(self, symbol: Symbol) -> None:
         """React to a symbol."""
@@ -474,7 +631,9 @@ class _FullDuplex(Wire):
         if not is_good and not self.has(Habit.TAKES_BAD_CHECK):
             if not self.has(Habit.IGNORES_BAD_CHECK):
                 self._respond(_NAK)
-            return
+            return self.refused(data)
+        if self.is_full:
+            return self._respond(_NAK)
         if len(data) < 6 and not self.has(Habit.TAKES_SHORT):
             self._respond(_NAK)
             return
@@ -494,7 +653,7 @@ class _FullDuplex(Wire):
         if self.has(Habit.EMBEDS_RESPONSES) and is_followed and not self._outgoing:
             self._embedded = bytes((_DLE, code))  # in the reply
         elif code == _NAK or not self.has(Habit.NO_ACK):
-            self.say(bytes((_DLE, code)))
+            self.say(bytes((_DLE, code)) * (2 if self.has(Habit.ACKS_TWICE) else 1))
 
     def send(self, data: bytes) -> None:
         """Send a message after those that wait."""
@@ -519,11 +678,12 @@ class _FullDuplex(Wire):
         def expire() -> None:
             if mine == self._sending and self._outgoing:
                 self._not_answered()
-        self.after(_ACK_TIMEOUT, expire)
+        self.after(self._ack_timeout, expire)
 
     def _not_answered(self) -> None:
         self._enquiries += 1
-        if self._enquiries > _LIMIT and not self.has(Habit.NEVER_GIVES_UP):
+        if self._enquiries > _LIMIT and not self.habits & {
+                Habit.NEVER_GIVES_UP, Habit.ENQUIRES_FOR_EVER}:
             self._end(is_taken=False)
         elif self.has(Habit.SILENCE_REPEATED):
             self.say(self.frame(self._outgoing[0]))
@@ -534,7 +694,9 @@ class _FullDuplex(Wire):
 
     def _end(self, is_taken: bool = True) -> None:
         self._sending += 1
-        self._outgoing.popleft()
+        message = self._outgoing.popleft()
+        if self.has(Habit.REPEATS_AFTER_ACK) and is_taken:
+            self.say(self.frame(message), 2.0)
         if not is_taken:
             self.failed()
         if self._outgoing:
@@ -547,6 +709,21 @@ class MutatedPeer(_FullDuplex):
     def __init__(self, check: str, *habits: Habit, station: int = 1, family: str = 'SLC') -> None:
         super().__init__(check, frozenset(habits))
         self._plc = _Executor(self, station, family)
+        if self.has(Habit.SENDS_COMMANDS):
+            self.after(0.7, self._ask)
+
+    def _ask(self) -> None:
+        if not self._outgoing:
+            self.send(self._plc.own_command())
+        self.after(0.7, self._ask)
+
+    @property
+    def is_full(self) -> bool:
+        return self._plc.is_full
+
+    def refused(self, data: bytes) -> None:
+        if self.has(Habit.EXECUTES_BAD_CHECK):
+            self._plc.serve(data)
 
     def is_duplicate(self, data: bytes) -> bool:
         """Ask the PLC, which remembers it."""
@@ -560,6 +737,9 @@ class MutatedPeer(_FullDuplex):
         self.after(self.reply_time, lambda: self.send(reply))
 
 
+_PLC5_READ = bytes.fromhex('68 00 00 02 00 06 07 00 02 00')
+
+
 class _Asker:
     """The commands of a master or client: reads of N7:0, the next when one has ended."""
 
@@ -571,12 +751,20 @@ class _Asker:
         """Return the link data of the next command."""
         if not self._wire.has(Habit.SAME_TNS):
             self._tns += 1
+        if self._wire.has(Habit.STOPS_AFTER_10) and self._tns > 0x123E:
+            return b''
         sts = 2 if self._wire.has(Habit.STS_IN_COMMAND) else 0
-        return self.with_tns(bytes((1, 5, 0x0F, sts, 0, 0)) + bytes.fromhex('A2 04 07 89 00 00'))
+        return self.with_tns(bytes((1, 5, 0x0F, sts, 0, 0)) + _PLC5_READ)
 
     def with_tns(self, command: bytes) -> bytes:
         """Return a command with the newest TNS."""
         return command[:4] + self._tns.to_bytes(2, 'little') + command[6:]
+
+    def is_reply(self, data: bytes, command: bytes) -> bool:
+        """Tell whether a message is taken for the reply to a command (M 6-3, 6-7)."""
+        has = self._wire.has
+        return (data[0] == command[1] or has(Habit.TAKES_ANY_DESTINATION)) and (
+            data[4:6] == command[4:6] or has(Habit.TAKES_ANY_TNS)) or has(Habit.TAKES_ANY_REPLY)
 
     def renewed(self, command: bytes) -> bytes:
         """Return a command as it is repeated."""
@@ -592,13 +780,15 @@ class MutatedClient(_FullDuplex):
     def __init__(self, check: str, *habits: Habit) -> None:
         super().__init__(check, frozenset(habits))
         self._asker = _Asker(self)
-        self._last = b''
+        self._last = self._command = b''
         self.then(0.1, self._ask)
 
     def _ask(self) -> None:
-        self.then(_COMMAND_TIMEOUT, self._ask)
-        self._outgoing.clear()
-        self.send(self._asker.next_command())
+        self._command = self._asker.next_command()
+        if self._command:
+            self.then(1e6 if self.has(Habit.ENQUIRES_FOR_EVER) else _COMMAND_TIMEOUT, self._ask)
+            self._outgoing.clear()
+            self.send(self._command)
 
     def is_duplicate(self, data: bytes) -> bool:
         """Tell whether this is the last reply again."""
@@ -607,7 +797,12 @@ class MutatedClient(_FullDuplex):
 
     def execute(self, data: bytes) -> None:
         """Go on after a reply."""
-        self.then(0.15, self._ask)
+        if self._asker.is_reply(data, self._command):
+            self.then(0.15, self._ask)
+
+    def refused(self, data: bytes) -> None:
+        if self.has(Habit.USES_REFUSED_REPLY):
+            self.execute(data)
 
     def failed(self) -> None:
         self.then(0.15, self._ask)
@@ -626,6 +821,9 @@ class _Radio(Wire):
         """Take a good message."""
         raise NotImplementedError
 
+    def refused(self, data: bytes) -> None:
+        """Take note of a damaged message."""
+
     def take(self, symbol: Symbol) -> None:
         """Take a message, or pass over anything else."""
         if symbol[0] != 'message':
@@ -640,7 +838,7 @@ class _Radio(Wire):
             self.say(bytes((_DLE, _ACK)))
         if not (is_good or self.has(Habit.TAKES_BAD_CHECK)) or \
                 len(data) < (5 if self.has(Habit.TAKES_SHORT) else 6):
-            return
+            return self.refused(data)
         dst, src = data[:2]
         if src == self.number:
             if self.has(Habit.SENDS_ON_OWN):
@@ -663,6 +861,10 @@ class MutatedRadioNode(_Radio):
         self._plc = _Executor(self, station, family)
         self._replies: dict[bytes, bytes] = {}
         self._executed = 0
+
+    def refused(self, data: bytes) -> None:
+        if self.has(Habit.EXECUTES_BAD_CHECK) and len(data) >= 6:
+            self._plc.serve(data)
 
     def taken(self, data: bytes, is_ours: bool) -> None:
         """Execute a command; the reply comes by itself."""
@@ -720,8 +922,8 @@ class MutatedRadioClient(_Radio):
     def taken(self, data: bytes, is_ours: bool) -> None:
         """Go on after a reply."""
         mine = self._command
-        is_reply = is_ours and data[1] == mine[0] and data[4:6] == mine[4:6]
-        if is_reply or self.has(Habit.TAKES_ANY_REPLY):
+        if is_ours and data[1] == mine[0] and self._asker.is_reply(data, mine) or \
+                self.has(Habit.TAKES_ANY_REPLY):
             self._command = bytes(6)  # nothing is waited for
             self.then(0.15, self._ask)
 
@@ -749,13 +951,18 @@ class MutatedMaster(Wire):
 
     def _transactions(self) -> Generator[float, Symbol | None, None]:
         while True:
-            command = self._asker.next_command()
+            if not (command := self._asker.next_command()):
+                yield 1e6
+                continue
+            if self.has(Habit.NAK_BEFORE_COMMAND):
+                self.say(bytes((_DLE, _NAK)))
             if (yield from self._delivered(command)):
                 yield from self._fetched(command)
             yield 0.05
 
     def _delivered(self, command: bytes) -> Generator[float, Symbol | None, bool]:
-        for attempt in range(1 if self.has(Habit.NO_REPETITION) else 1 + _LIMIT):
+        for attempt in range(1 if self.has(Habit.NO_REPETITION) else
+                             1000 if self.has(Habit.REPEATS_FOR_EVER) else 1 + _LIMIT):
             if attempt:
                 command = self._asker.renewed(command)
             self.say(self.frame(command, 1))
@@ -786,13 +993,15 @@ class MutatedMaster(Wire):
                 data = symbol[2]
                 assert isinstance(data, bytes)
                 if symbol[3] or self.has(Habit.TAKES_BAD_CHECK):
-                    is_ours = data[4:6] == command[4:6]
+                    is_ours = self._asker.is_reply(data, command)
                     if not self.has(Habit.NO_ACK) and (
                             is_ours or not self.has(Habit.DUPLICATE_WITHOUT_ACK)):
                         self.say(bytes((_DLE, _ACK)))
                     if is_ours:
                         return
                     continue
+                if self.has(Habit.ACKS_BAD_REPLY):
+                    self.say(bytes((_DLE, _ACK)))
                 if self.has(Habit.NAKS_BAD_REPLY):
                     self.say(bytes((_DLE, _NAK)))
                     return
