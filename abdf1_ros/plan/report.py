@@ -21,6 +21,7 @@ but may have an unexpected effect.
 
 from __future__ import annotations
 
+from bisect import bisect_left
 from collections import defaultdict
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
@@ -44,10 +45,12 @@ from abdf1_ros.settings.share import share_places
 from abdf1_ros.text import counted, first, milliseconds
 
 _HIGH_LOAD = 0.8
-_PERIODS = tuple(step * 10**power for power in (2, 3, 4) for step in (1, 2, 5))  # ms
 _WORTH_SAVING = 0.05  # of the poll cycle
 _NAMED_TAGS = 3
 _LONG_REQUIRES = 10_000  # ms
+
+PERIOD_STEPS = tuple(step * 10**power for power in (2, 3, 4) for step in (1, 2, 5))
+"""The values of Period (ms) that we advise."""
 
 
 class RemarkKind(Enum):
@@ -124,14 +127,15 @@ class Report:
 
     def needed_baud(self) -> int | None:
         """Return the lowest baud rate that is enough for all that is to be done, or None."""
-        return next((baud for baud in BAUD_RATES if make_report(
+        found = bisect_left(BAUD_RATES, True, key=lambda baud: make_report(
             replace(self.network, baud=baud), self.mappings, self.default_period,
-            self.response_time).load <= 1), None)
+            self.response_time).load <= 1)
+        return BAUD_RATES[found] if found < len(BAUD_RATES) else None
 
     def needed_period(self) -> int | None:
         """Return the ms that would do in place of all shorter periods, or None."""
         others = self.load - forecast.load(self.blocks, self._answer_time)
-        return next((period for period in _PERIODS if others + sum(
+        return next((period for period in PERIOD_STEPS if others + sum(
             self.time(block) / max(block.period, period / 1000) for block in self.blocks
             if block.period) <= _HIGH_LOAD), None)
 
@@ -160,8 +164,12 @@ class Report:
             text = 'the map has no usable row: nothing is read or written'
             return [*found, Remark(RemarkKind.MAP, text)]
         times = bounds.remarks(self.network, self.mappings, self.response_time)
-        return [*found, *_load_remarks(self), *_period_remarks(self), *_gap_remarks(self),
+        return [*found, *self.load_remarks(), *_gap_remarks(self),
                 *(Remark(RemarkKind.INTERLOCK, text) for text in times)]
+
+    def load_remarks(self) -> list[Remark]:
+        """Return the remarks on periods that the line cannot keep."""
+        return [*_load_remarks(self), *_period_remarks(self)]
 
 
 def _unprotected(mappings: Rows) -> Iterator[str]:

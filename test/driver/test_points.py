@@ -71,6 +71,22 @@ def test_interval_is_between_two_good_reads_without_a_failure() -> None:
     assert new.interval is None
     new.update(b'\1\0', 9.5)
     assert new.interval == 0.5
+    new.withhold('not in RUN', 10.0)
+    new.update(b'\1\0', 19.0)
+    assert new.interval is None
+
+
+def test_usual_interval_follows_slowly_and_forgets_a_single_long_one() -> None:
+    new = point('Change')
+    for now in (1.0, 2.0):
+        new.update(b'\1\0', now)
+    assert new.kept is None
+    for now in (3.0, 60.0, 61.0):
+        new.update(b'\1\0', now)
+    assert new.kept == 1.0
+    for now in (63.0, 65.0, 67.0):
+        new.update(b'\1\0', now)
+    assert 1.0 < new.kept < 1.5
 
 
 def test_failure_outweighs_age_and_ends_with_the_next_good_read() -> None:

@@ -277,9 +277,10 @@ def test_rates_are_those_since_the_last_look(bench: Bench) -> None:
 
 def test_poll_cycle_is_unknown_before_the_second_read(bench: Bench) -> None:
     values = details(bench.status('link'))
-    assert values['poll cycle'] == values['longest poll cycle'] == 'unknown'
+    assert values['poll cycle with Periods'] == \
+        values['longest poll cycle with Periods'] == 'unknown'
     expected = round(bench.driver.readings.expected_poll_cycle * 1000)
-    assert values['expected poll cycle'] == f'{expected} ms'
+    assert values['expected poll cycle, line time alone'] == f'{expected} ms'
 
 
 def test_link_tells_how_far_behind_each_period_is(bench: Bench) -> None:
@@ -293,11 +294,11 @@ def test_link_tells_how_far_behind_each_period_is(bench: Bench) -> None:
         point.period = 0.1
     assert periods() == {'period 100 ms': 'wanted 100 ms, not yet read twice'}
     first.interval, second.interval = 0.128, 0.136
-    assert periods() == {'period 100 ms': 'wanted 100 ms, reads every 132 ms'}
+    assert periods() == {'period 100 ms': 'wanted 100 ms, kept 132 ms'}
     second.period = 0.0
     assert periods() == {
-        'period 0 ms': 'as often as the line allows, reads every 136 ms',
-        'period 100 ms': 'wanted 100 ms, reads every 128 ms'}
+        'period 0 ms': 'as often as the line allows, kept 136 ms',
+        'period 100 ms': 'wanted 100 ms, kept 128 ms'}
     second.mapping = replace(second.mapping, command=Command.SERVE)
     assert 'period 0 ms' not in periods()  # what the PLC writes has no pace of ours
 
@@ -438,6 +439,34 @@ def test_mappings_from_the_start_until_they_are_stale(bench: Bench) -> None:
     assert bench.says('mappings', NOW + 3.1) == (ERROR, 'ERROR: of 2 mappings 1 late, 1 stale')
 
 
+def test_rows_that_cannot_keep_their_period_are_named_with_one_that_would_do(
+        make_bench: Callable[..., Bench]) -> None:
+    bench = make_bench('fast,Read,N7:0,1,PLC5,100', 'slow,Read,N7:100,1,PLC5,1000',
+                       'free,Read,N9:0,1,PLC5,0', 'faster,Read,N9:100,1,PLC5,50')
+
+    def read_until(end: float, intervals: dict[str, float]) -> None:
+        for tag, interval in intervals.items():
+            for number in range(40, -1, -1):
+                bench.point(tag).update(b'\x01\x00', end - number * interval)
+
+    read_until(NOW, {'fast': 0.345, 'slow': 1.1, 'free': 2.0, 'faster': 0.2})
+    assert bench.says('mappings', NOW) == (WARN, (
+        'WARN: of 4 mappings 4 fresh; Period not kept: faster (Period 50 ms, kept 200 ms), '
+        'fast (Period 100 ms, kept 345 ms); Period 500 would do'))
+    read_until(NOW + 100, {'fast': 0.1, 'slow': 1.0, 'free': 2.0, 'faster': 0.1})
+    assert bench.says('mappings', NOW + 100) == (WARN, (
+        'WARN: of 4 mappings 4 fresh; Period not kept: faster (Period 50 ms, kept 100 ms); '
+        'Period 200 would do'))
+
+
+def test_single_long_interval_is_no_load(bench: Bench) -> None:
+    speed = bench.point('speed')
+    for when in (0, 1, 2, 300, 301, 302):
+        speed.update(b'\x01\x00', NOW + when)
+    bench.point('level').update(bytes(4), NOW + 302)
+    assert bench.says('mappings', NOW + 302) == (OK, 'OK: of 2 mappings 2 fresh')
+
+
 def test_failed_mapping_is_named_with_the_reason(bench: Bench) -> None:
     bench.point('speed').update(b'\x01\x00', NOW)
     bench.point('level').update(bytes(4), NOW)
@@ -490,7 +519,7 @@ def test_blocks_may_be_divided_while_the_poll_cycle_is_asked_for(bench: Bench) -
 
     jobs.clear()
     jobs.add(Divided())
-    assert details(bench.status('link'))['poll cycle'] == '250 ms'
+    assert details(bench.status('link'))['poll cycle with Periods'] == '250 ms'
 
 
 # writes

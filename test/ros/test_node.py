@@ -517,6 +517,15 @@ def test_odd_settings_are_told_in_the_log_but_not_without_end(
     assert warnings[-1].endswith('and 3 more remarks; "check" has them all')
 
 
+def test_load_that_the_line_cannot_carry_is_told_before_other_remarks(
+        make_bench: Benches, capfd: pytest.CaptureFixture[str]) -> None:
+    rows = [f'N{number}:7,Read,N{number}:0,1,PLC5,1,' for number in range(10, 40)]
+    make_bench(*rows, parameters=('default_period:=50',))
+    warnings = [line for line in ''.join(capfd.readouterr()).splitlines() if 'WARN' in line]
+    assert re.search(r'the periods need \d+% of the time there is at \d+ baud', warnings[0])
+    assert '; or Period ' in warnings[0]
+
+
 def test_map_without_a_row_is_told(make_bench: Benches, capfd: pytest.CaptureFixture[str]) -> None:
     make_bench()
     assert 'the map has no usable row' in ''.join(capfd.readouterr())

@@ -34,7 +34,7 @@ _WORDS = {Style.GOOD: 'OK', Style.WARNING: 'WARN', Style.BAD: 'ERROR'}
 _RANKS = [Style.BAD, Style.WARNING, Style.GOOD]
 
 _NAME_WIDTH = 34
-_COLUMNS = ('state', 5, 'state'), ('load', 5, 'line load'), ('cycle', 8, 'poll cycle')
+_COLUMNS = ('state', 5, 'state'), ('load', 5, 'line load'), ('cycle', 8, 'poll cycle with Periods')
 
 
 @dataclass(frozen=True, slots=True)

@@ -40,8 +40,9 @@ _AGE_WIDTH = 7
 _GOOD_VALUE_WIDTH = 24
 _LEAST_VALUE_WIDTH = 12
 
-_LINK_KEYS = ('settings', 'transactions per second', 'line load', 'poll cycle',
-              'longest poll cycle', 'expected poll cycle')
+_LINK_KEYS = ('settings', 'transactions per second', 'line load', 'poll cycle with Periods',
+              'longest poll cycle with Periods', 'expected poll cycle, line time alone')
+_PERIOD = 'period '  # how keys of the link begin that tell of a Period
 _STATION_KEYS = ('last answer', 'transactions without reply', 'error replies', 'processor',
                  'mode', 'faults')
 
@@ -163,7 +164,8 @@ def _head(snapshot: Snapshot, now: float) -> Iterator[TextLine]:
 def _link(snapshot: Snapshot, width: int) -> Iterator[TextLine]:
     for status in _section(snapshot, 'link'):
         yield from _summary('link', status, width)
-        yield from _table(status.values, _LINK_KEYS, width)
+        periods = [key for key in status.values if key.startswith(_PERIOD)]
+        yield from _table(status.values, [*_LINK_KEYS, *periods], width)
         error = status.values.get('last error', 'none')
         if error != 'none':
             yield from _wrapped(f'last error: {error}', width, Style.WARNING)

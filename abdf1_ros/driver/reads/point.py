@@ -22,6 +22,9 @@ import math
 from abdf1_ros.pccc.values import Values
 from abdf1_ros.settings.mapping import Mapping, Publish
 
+# Weight of the newest interval in ``kept``.
+_SMOOTHING = 0.125
+
 
 class Freshness(Enum):
     """How good the last value of a point is."""
@@ -40,11 +43,13 @@ class ReadPoint:
 
     ``period`` and ``stale_time`` are in seconds. A value is late when it is older than one and a
     half periods and older than half of ``stale_time``; it is stale when older than ``stale_time``.
-    ``interval`` is the seconds between the last two good reads, None if a failed one was between
-    them. ``error`` says why the last read gave no value, ``withheld`` why its value was not
-    published. Values are withheld since ``withheld_since`` (clock value in s), and this is the
-    ``withholdings``-th time. ``guard`` decides that, where the row has one; what its condition
-    rests on may be as old as ``patience``, in seconds.
+    ``interval`` is the seconds between the last two good reads, None if a failed or withheld one
+    was between them. ``kept`` is the usual interval (s), None before it is known; a single long
+    one, as when the port was left to others, does not count. ``error`` says why the last read
+    gave no value, ``withheld`` why its value was not published. Values are withheld since
+    ``withheld_since`` (clock value in s), and this is the ``withholdings``-th time. ``guard``
+    decides that, where the row has one; what its condition rests on may be as old as
+    ``patience``, in seconds.
     """
 
     def __init__(self, mapping: Mapping, period: float, stale_time: float,
@@ -54,6 +59,7 @@ class ReadPoint:
         self.stale_time = stale_time
         self.last_good: float | None = None
         self.interval: float | None = None
+        self.kept: float | None = None
         self.error: str | None = None
         self.failures = 0
         self.guard = guard
@@ -79,10 +85,15 @@ class ReadPoint:
         """
         values = self._decode(words)
         is_same = self._is_on_change and not self._remember(values) and self.error is None
+        before, self.interval = self.interval, None
+        if self.last_good is not None and self.error is None and not self.withheld:
+            self.interval = now - self.last_good
+            if before is not None:
+                least = before if before < self.interval else self.interval
+                self.kept = least if self.kept is None else \
+                    self.kept + _SMOOTHING * (least - self.kept)
         if self.withheld and self.guard is not None:
             self.guard.withheld.discard(self)
-        if self.last_good is not None:
-            self.interval = now - self.last_good if self.error is None else None
         self.last_good, self.error, self.withheld = now, None, ''
         if is_same:
             return None

@@ -31,7 +31,8 @@ from typing import Any
 
 from abdf1_ros.df1.packet import BROADCAST
 from abdf1_ros.driver.driver import Driver
-from abdf1_ros.plan.report import setting_remarks
+from abdf1_ros.plan.forecast import USUAL_RESPONSE_TIME
+from abdf1_ros.plan.report import Remark, Report, setting_remarks
 from abdf1_ros.ports.clock import line_time
 from abdf1_ros.ports.link_thread import LinkThread, PortState
 from abdf1_ros.ports.trace import PortOpener
@@ -180,11 +181,20 @@ class Session:
 
     def begin(self) -> None:
         """Tell of the files; the driver is on the line, or is about to be."""
-        _tell_files(self._surroundings.node.get_logger(), self.configuration)
+        logger, configuration = self._surroundings.node.get_logger(), self.configuration
+        _tell_files(logger, configuration)
+        # Before the other remarks, of which there may be dozens.
+        _tell_remarks(logger, [*self._plan().load_remarks(), *setting_remarks(
+            configuration.network, configuration.mappings)])
         self.diagnostics.line.attach(self._surroundings.link, self._surroundings.opener)
         self.reads.take_over()
         if self._surroundings.link.state.is_open:  # otherwise it is said when it has been tried
             self._publish_active()
+
+    def _plan(self) -> Report:
+        return Report(self.configuration.network, self.driver.mappings,
+                      tuple(self.driver.readings.blocks),
+                      self.configuration.driver_settings().default_period, USUAL_RESPONSE_TIME)
 
     def end(self) -> None:
         """End what waits and watches; another session has taken over the topics."""
@@ -306,12 +316,6 @@ def _tell_files(logger: RcutilsLogger, configuration: Configuration) -> None:
     logger.info(str(configuration))
     for problem in configuration.map_problems:
         logger.error(f'{problem} (row left out)')
-    remarks = [*setting_remarks(configuration.network, configuration.mappings)]
-    for remark in remarks[:_MOST_REMARKS]:
-        logger.warning(printable(remark.text))
-    if len(remarks) > _MOST_REMARKS:
-        logger.warning(
-            f'and {len(remarks) - _MOST_REMARKS} more remarks; "check" has them all')
     silent = [mapping.tag for mapping in configuration.mappings if mapping.is_alone]
     if silent and configuration.parameters.read_only:
         logger.warning(
@@ -322,3 +326,12 @@ def _tell_files(logger: RcutilsLogger, configuration: Configuration) -> None:
         logger.warning(
             'parameters without effect, as the map comes from its file alone: '
             + first(configuration.ignored))
+
+
+def _tell_remarks(logger: RcutilsLogger, remarks: Sequence[Remark]) -> None:
+    """Log what ``check`` would remark on both files, in its order."""
+    for remark in remarks[:_MOST_REMARKS]:
+        logger.warning(printable(remark.text))
+    if len(remarks) > _MOST_REMARKS:
+        logger.warning(
+            f'and {len(remarks) - _MOST_REMARKS} more remarks; "check" has them all')

@@ -90,9 +90,11 @@ class LinkStatus:
             'settings': _settings(driver.network),
             'transactions per second': f'{self._rate.transactions:.1f}',
             'line load': f'{self._rate.load:.0f} %',
-            'poll cycle': milliseconds(driver.readings.reads.poll_cycle),
-            'longest poll cycle': milliseconds(driver.readings.reads.longest_poll_cycle),
-            'expected poll cycle': milliseconds(driver.readings.expected_poll_cycle),
+            'poll cycle with Periods': milliseconds(driver.readings.reads.poll_cycle),
+            'longest poll cycle with Periods': milliseconds(
+                driver.readings.reads.longest_poll_cycle),
+            'expected poll cycle, line time alone': milliseconds(
+                driver.readings.expected_poll_cycle),
             **_paces(driver.points.values()),
             **_poll_scans(driver),
             **_unnumbered_counts(driver),
@@ -172,7 +174,7 @@ def _pace(period: float, intervals: Sequence[float]) -> str:
     wanted = f'wanted {milliseconds(period)}' if period else 'as often as the line allows'
     if not intervals:
         return f'{wanted}, not yet read twice'
-    return f'{wanted}, reads every {milliseconds(fmean(intervals))}'
+    return f'{wanted}, kept {milliseconds(fmean(intervals))}'
 
 
 def _unnumbered_counts(driver: Driver) -> dict[str, str]:

@@ -21,6 +21,7 @@ from collections.abc import Sequence
 from abdf1_ros.driver.driver import Driver
 from abdf1_ros.driver.reads.point import Freshness, ReadPoint
 from abdf1_ros.problems import Problem
+from abdf1_ros.ros.diagnostics.load import SlowRows
 from abdf1_ros.ros.diagnostics.status import ERROR, Judgement, OK, WARN
 from abdf1_ros.text import counted
 
@@ -33,7 +34,7 @@ _FRESHNESS_LEVELS = {
 
 
 class MappingsStatus:
-    """How many rows are fresh, and why others are not; ``left_out`` are faults of the map."""
+    """How many rows are fresh or slow, and why others are not; ``left_out``: faults of the map."""
 
     name = 'mappings'
 
@@ -41,9 +42,12 @@ class MappingsStatus:
         self.hardware_id = port
         self._points = driver.points
         self._left_out = left_out
+        self._slow = SlowRows(driver.points.values())
 
     def judge(self, now: float) -> Judgement:
         level, text = self._judge_reads(now)
+        if slow := self._slow.text(now):
+            level, text = max(level, WARN), f'{text}; {slow}'
         if not self._left_out:
             return level, text
         rows = len({(problem.place.file, problem.place.line) for problem in self._left_out})

@@ -26,7 +26,8 @@ from support.commands import call
 from support.ros import ERROR, Observer, OK
 
 NOW = 1000.0
-LINK = Status('link', Style.GOOD, 'OK: port open', {'line load': '93 %', 'poll cycle': '34 ms'})
+LINK = Status('link', Style.GOOD, 'OK: port open',
+              {'line load': '93 %', 'poll cycle with Periods': '34 ms'})
 FRESH = Status('mappings', Style.GOOD, 'OK: of 10 mappings 10 fresh')
 SILENT = Status('station 3', Style.BAD, 'ERROR: station 3 inactive since 4.0 s')
 REFUSED = Status('writes', Style.WARNING, 'WARN: 3 of 4 writes confirmed')

@@ -111,10 +111,12 @@ def test_link_shows_load_and_poll_cycle() -> None:
     picture = snapshot(statuses=[Status(
         'link', Style.WARNING, 'WARN: port open', {
             'port': 'open', 'settings': '19200 baud, CRC', 'line load': '61 %',
-            'poll cycle': '240 ms', 'last error': '2509 ERR'})])
+            'poll cycle with Periods': '240 ms',
+            'period 100 ms': 'wanted 100 ms, kept 345 ms', 'last error': '2509 ERR'})])
     assert line_with('WARN: port open', picture).style is Style.WARNING
-    assert line_with('settings', picture).text == '      settings    19200 baud, CRC'
-    assert line_with('line load', picture).text == '      line load   61 %'
+    assert line_with('settings', picture).text.split(maxsplit=1) == ['settings', '19200 baud, CRC']
+    assert line_with('line load', picture).text.split() == ['line', 'load', '61', '%']
+    assert 'wanted 100 ms, kept 345 ms' in line_with('period 100 ms', picture).text
     assert line_with('last error: 2509 ERR', picture).style is Style.WARNING
 
 

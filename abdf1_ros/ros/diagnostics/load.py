@@ -1,0 +1,66 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Which rows are read less often than their Period says, because the line cannot do more."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+from abdf1_ros.driver.reads.point import Freshness, ReadPoint
+from abdf1_ros.plan.report import PERIOD_STEPS
+from abdf1_ros.text import first, milliseconds
+
+# A row is slow from this many of its periods on, and stays slow down to the second number.
+_SLOW, _STILL_SLOW = 1.5, 1.25
+
+_LOOK_PERIOD = 1.0  # s
+
+_MOST_NAMED = 3
+
+# With the Period that is advised, the line is busy for this part of the time at most.
+_ADVISED_LOAD = 0.8
+
+
+class SlowRows:
+    """The rows that do not keep their Period, as they are read and not as the plan has it."""
+
+    def __init__(self, points: Iterable[ReadPoint]) -> None:
+        self._points = [point for point in points if point.mapping.polls and point.period]
+        self._slow: dict[ReadPoint, float] = {}
+        self._next_look = 0.0
+
+    def text(self, now: float) -> str:
+        """Return which rows suffer most, and which Period would do; empty while all is well."""
+        if now >= self._next_look:
+            self._next_look = now + _LOOK_PERIOD
+            self._slow = self._look(now)
+        if not self._slow:
+            return ''
+        worst = sorted(self._slow, key=lambda point: self._slow[point] / -point.period)
+        named = [f'{point.mapping.tag} (Period {milliseconds(point.period)}, kept '
+                 f'{milliseconds(self._slow[point])})' for point in worst]
+        return f'Period not kept: {first(named, _MOST_NAMED)}{self._advice()}'
+
+    def _look(self, now: float) -> dict[ReadPoint, float]:
+        return {point: point.kept for point in self._points
+                if point.kept is not None and point.freshness(now) in (
+                    Freshness.FRESH, Freshness.LATE)
+                and point.kept > point.period * (_STILL_SLOW if point in self._slow else _SLOW)}
+
+    def _advice(self) -> str:
+        # What is read now fits the line. So all rows fit that are read as rarely as the rarest.
+        needed = max(self._slow.values()) / _ADVISED_LOAD * 1000
+        period = next((step for step in PERIOD_STEPS if step >= needed), None)
+        return '' if period is None else f'; Period {period} would do'
