@@ -200,7 +200,8 @@ OUTCOMES: dict[Outcome, str] = {
                      'ML1000) are written `by reading the word and writing it back`, in three '
                      'commands; what the program changes in that word in between is lost.',
     Outcome.BROADCAST: 'Station 255. It counts as accepted only, as no station confirms it.',
-    Outcome.SUPERSEDED: 'Words and floats: a newer message came while this one waited.',
+    Outcome.SUPERSEDED: 'Words and floats: a newer message came while this one waited. Bits: '
+                        'newer changes wait, and the line does not carry them all.',
     Outcome.REFUSED: 'Wrong length, outside Min and Max, not representable, `read_only`, port not '
                      'open: nothing was sent. The reason follows.',
     Outcome.NOT_SENT: 'Station inactive, or too late with its replies before; the port was '

@@ -184,8 +184,7 @@ class Driver:
             return _NOT_OPEN
         if self.interlocks.is_ending:
             return ENDS
-        waiting = len(self._inbox) + len(self._writes)
-        return TOO_MANY if waiting + count > MAX_WAITING_WRITES else ''
+        return TOO_MANY if len(self._inbox) + count > MAX_WAITING_WRITES else ''
 
     def refuse(self, mappings: Iterable[Mapping], reason: str,
                values: Sequence[float] | str, request: str) -> None:
@@ -256,10 +255,10 @@ class Driver:
                 self._end_write(write, Outcome.NOT_SENT, 'fallback')
                 continue
             self.interlocks.message_came(write)
-            if not write.mapping.serves:
-                self._writes.add(write, now)
-            elif reason := self._writes.why_too_old(write, now):
+            if reason := self._writes.why_too_old(write, now):
                 self._end_write(write, Outcome.NOT_SENT, reason)
+            elif not write.mapping.serves:
+                self._writes.add(write, now)
             else:
                 self._served.store(write.mapping, write.raw)
                 self._record.ended(self._record.begin(

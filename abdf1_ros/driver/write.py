@@ -16,9 +16,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass, field
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass, field, replace
 from enum import Enum
+from typing import NamedTuple
 
 from abdf1_ros.df1.packet import is_local_status
 from abdf1_ros.errors import FormatError, LinkError, RemoteError
@@ -48,10 +49,17 @@ class Outcome(Enum):
     FALLBACK = 'fallback value written'
 
 
+class Origin(NamedTuple):
+    """The message that asks for a write: its name, and when it was published (clock, s)."""
+
+    request: str
+    published: float
+
+
 @dataclass(frozen=True, slots=True)
 class WriteResult:
     """
-    The one result of one write to one mapping.
+    The one result of one message to one mapping.
 
     ``detail`` is empty for a write that went well; that of an unconfirmed one says what a read has
     found afterwards, or why there was none. ``latency`` is seconds from the request. ``request``
@@ -75,6 +83,11 @@ class WriteResult:
             return is_local_status(self.error.sts)
         return self.error is not None and self.error.sent
 
+    def of(self, origins: Iterable[Origin], now: float) -> Iterator[WriteResult]:
+        """Return the same result for each of these messages, as it is ``now`` (clock, s)."""
+        return (replace(self, request=origin.request, latency=now - origin.published)
+                for origin in origins)
+
     def __str__(self) -> str:
         """Return outcome and detail."""
         return f'{self.outcome.value}: {self.detail}' if self.detail else self.outcome.value
@@ -87,19 +100,38 @@ class Write:
     Raises FormatError, saying what is wrong, when they cannot or must not be written.
     ``value`` is their text, ``raw`` is what the PLC gets, ``commands`` are the requests that write
     it. ``is_probe`` tells that the station was inactive when the write got the line, ``is_own``
-    that no message has asked for it. ``request`` goes into the result.
+    that no message has asked for it. ``origins`` are the messages that it stands for, equal ones
+    in their order: the ``oldest`` and the youngest (``requested``) tell when they were published,
+    ``came`` when the first began to wait for the line (clock values in s).
     """
 
     def __init__(self, mapping: Mapping, values: Sequence[float] | str, now: float,
                  request: str = '') -> None:
         self.mapping = mapping
-        self.request = request
-        self.requested = now
+        self.origins = [Origin(request, now)]
+        self.requested = self.oldest = self.came = now
         self.is_probe = self.is_own = False
         self.value = show(values)
         self.raw = raw_values(mapping, values)
         self.commands = write_requests(
             mapping.address, mapping.codec, self.raw, mapping.dialect)
+
+    def equals(self, other: Write) -> bool:
+        """Tell whether both are for the same row with the same values, before anything is sent."""
+        return self.mapping is other.mapping and self.commands == other.commands
+
+    def stand_for(self, other: Write) -> None:
+        """Stand for the messages of an equal write, too."""
+        self.origins += other.origins
+        self.requested = max(self.requested, other.requested)
+        self.oldest = min(self.oldest, other.oldest)
+
+    def give_up(self, until: float) -> list[Origin]:
+        """Stand no longer for the messages published up to then; return them. One is younger."""
+        old = [origin for origin in self.origins if origin.published <= until]
+        self.origins = [origin for origin in self.origins if origin.published > until]
+        self.oldest = min(origin.published for origin in self.origins)
+        return old
 
     def speak(self, dialect: Dialect) -> None:
         """Keep to the packets of another dialect of the family, before anything has been sent."""
@@ -124,10 +156,6 @@ class Write:
         """Tell whether each write counts by itself, not only the newest."""
         return self.mapping.type is ValueType.BOOL
 
-    def overlaps(self, other: Write) -> bool:
-        """Tell whether both write to the same words, or to bits of them."""
-        return self.mapping.extent.meets(other.mapping.extent)
-
     def is_held(self, words: bytes) -> bool:
         """Tell whether the mapping's ``words`` hold the values of this write."""
         codec = self.mapping.codec
@@ -141,9 +169,10 @@ class Write:
 
     def result(self, outcome: Outcome, detail: str, now: float, packets_done: int = 0,
                error: LinkError | RemoteError | None = None) -> WriteResult:
-        """Return how this write ended."""
-        return WriteResult(self.mapping, outcome, detail, self.value, now - self.requested,
-                           self.request, packets_done, error)
+        """Return how this write ended, for the first of its messages."""
+        first = self.origins[0]
+        return WriteResult(self.mapping, outcome, detail, self.value, now - first.published,
+                           first.request, packets_done, error)
 
 
 def show(values: Sequence[float] | str) -> str:

@@ -18,12 +18,17 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from abdf1_ros.df1.packet import BROADCAST
 from abdf1_ros.pccc.address import Area
 
 
 @dataclass(frozen=True, slots=True)
 class Extent:
-    """The words from ``first`` up to, not including, ``end`` of an area of a station."""
+    """
+    The words from ``first`` up to, not including, ``end`` of an area of a station.
+
+    Those of a broadcast are the words of every station.
+    """
 
     station: int
     area: Area
@@ -32,8 +37,8 @@ class Extent:
 
     def meets(self, other: Extent) -> bool:
         """Tell whether both have a word in common."""
-        return self.first < other.end and other.first < self.end \
-            and self.station == other.station and self.area == other.area
+        return self.first < other.end and other.first < self.end and self.area == other.area \
+            and (self.station == other.station or BROADCAST in (self.station, other.station))
 
     def holds(self, other: Extent) -> bool:
         """Tell whether all words of ``other`` are in this one."""

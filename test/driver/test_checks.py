@@ -237,7 +237,7 @@ def test_writes_leave_a_read_its_turn_also_when_a_check_is_due() -> None:
     for n in range(200):
         bench.write(pulses, [n % 2])
     bench.run(2.0)
-    assert set(bench.listener.outcomes()) == {Outcome.WRITTEN}
+    assert bench.listener.outcomes().count(Outcome.WRITTEN) > 20
     functions = [(cmd, first) for _, cmd, first in ears.heard]
     last_write = max(at for at, entry in enumerate(functions) if entry == (0x0F, 0xAB))
     since_read = 0

@@ -15,24 +15,32 @@
 """
 The writes that wait for the line.
 
-For words only the newest value waits; for bits all of them wait in their order. The writes of a
-station keep their order, and two writes of the same words are never under way together.
+Equal messages are one write. For words only the newest value waits; for bits each change waits,
+unless there are more than the line can carry. The writes of a station keep their order, and two
+writes of the same words are never under way together.
 """
 
 from __future__ import annotations
 
-from collections import deque
-from collections.abc import Callable, Container
+from collections import Counter, deque
+from collections.abc import Callable, Container, Iterable
 import itertools
 import math
 
+from abdf1_ros.df1.packet import BROADCAST
 from abdf1_ros.df1.stations import ActiveStationList
-from abdf1_ros.driver.write import Outcome, Write, WriteResult
+from abdf1_ros.driver.write import Origin, Outcome, Write, WriteResult
 from abdf1_ros.driver.writes.under_way import WriteJob, WritesUnderWay
 from abdf1_ros.messages import Message
 from abdf1_ros.settings.mapping import Mapping
 
 MAX_WAITING_WRITES = 1000
+
+# A change that has waited for so long (s), or for half its patience, gives way to newer ones if
+# another write of its row has gone out meanwhile: the line does not carry them all.
+CARRIED_WITHIN = 1.0
+
+_WAITED_LONGER = 'waited longer than %g s for the line'
 
 
 class MessageJob(WriteJob):
@@ -72,6 +80,8 @@ class WriteQueue:
         # It does not count as waiting: it comes before a probe, and before the command.
         self._slack = 2 * tx_delay
         self.waiting: deque[Write] = deque()
+        self._begun: dict[Mapping, float] = {}  # when a write of a row had the line last
+        self._shared: dict[tuple[Mapping, Mapping], bool] = {}
         self.next_expiry = math.inf
 
     def __len__(self) -> int:
@@ -80,26 +90,49 @@ class WriteQueue:
 
     def add(self, write: Write, now: float) -> None:
         """
-        Let a write wait; it takes the place of an older value of its mapping.
+        Let a write wait, in the place of an older value of its mapping, or as one with an equal.
 
         If it went to the end instead, a topic that is published again and again would never have
         its turn. But it must not overtake a later write of another mapping to the same words. In
         that case the older value is sent as well, or two such topics would delay each other for
         ever.
         """
+        write.came = now
         self.next_expiry = min(self.next_expiry, self._expiry(write))
-        older = [] if write.is_pulse else [
-            old for old in self.waiting if old.mapping is write.mapping]
+        older = [old for old in self.waiting if old.mapping is write.mapping]
         if not older:
-            self.waiting.append(write)
+            self._append(write, now)
             return
-        at = self.waiting.index(older[-1])
-        is_overlapped = any(
-            map(write.overlaps, itertools.islice(self.waiting, at + 1, None)))
-        if len(older) > 1 or not is_overlapped:
-            self.waiting.remove(older[-1])
-            self.report(older[-1].result(Outcome.SUPERSEDED, '', now))
-        self.waiting.insert(len(self.waiting) if is_overlapped else at, write)
+        last = older[-1]
+        at = self.waiting.index(last)
+        is_overlapped = any(self._share_words(write.mapping, later.mapping)
+                            for later in itertools.islice(self.waiting, at + 1, None))
+        if not is_overlapped and last.equals(write) and not self.why_too_old(last, now):
+            last.stand_for(write)
+            if len(last.origins) > MAX_WAITING_WRITES and last.oldest < last.requested:
+                self._tell(last, last.give_up(last.oldest), Outcome.SUPERSEDED, '', now)
+        elif write.is_pulse:
+            self._append(write, now)
+        else:
+            if len(older) > 1 or not is_overlapped:
+                self._end(last, Outcome.SUPERSEDED, '', now)
+            self.waiting.insert(len(self.waiting) if is_overlapped else at, write)
+
+    def _append(self, write: Write, now: float) -> None:
+        """Let a write wait after all others; of too many the oldest of the fullest row ends."""
+        self.waiting.append(write)
+        if len(self.waiting) > MAX_WAITING_WRITES:
+            (row, count), = Counter(each.mapping for each in self.waiting).most_common(1)
+            if count > 1:
+                oldest = next(each for each in self.waiting if each.mapping is row)
+                self._end(oldest, Outcome.SUPERSEDED, '', now)
+
+    def _share_words(self, one: Mapping, other: Mapping) -> bool:
+        """Tell whether two rows write the same words, or bits; that takes long to find out."""
+        known = self._shared.get((one, other))
+        if known is None:
+            known = self._shared[one, other] = one.shares_words(other)
+        return known
 
     def next(self, now: float, busy: Container[int] = ()) -> MessageJob | None:  # noqa: A003
         """
@@ -109,20 +142,31 @@ class WriteQueue:
         written: the packets of two writes must not mix.
         """
         self.expire(now)
-        write = self._first_free(busy)
-        if write is None:
-            return None
-        self.waiting.remove(write)
-        return MessageJob(write, self._writing, self, self._slack)
+        while (write := self._first_free(busy)) is not None:
+            if not self._gives_way(write, now):
+                self.waiting.remove(write)
+                self._begun[write.mapping] = now
+                return MessageJob(write, self._writing, self, self._slack)
+            self._end(write, Outcome.SUPERSEDED, '', now)
+        return None
+
+    def _gives_way(self, write: Write, now: float) -> bool:
+        """Tell whether a change is left out, as the line does not carry all of its row."""
+        within = min(CARRIED_WITHIN, self.patience_of(write.mapping) / 2)
+        return now > write.came + within \
+            and self._begun.get(write.mapping, -math.inf) > write.came \
+            and any(other.mapping is write.mapping and other is not write
+                    for other in self.waiting)
 
     def _first_free(self, busy: Container[int]) -> Write | None:
         """Return the first write that does not have to wait."""
         held_up: set[int] = set()
         for write in self.waiting:
             station = write.mapping.station
-            if station in busy or station in held_up:
-                continue
-            if self._writing.record.may_begin(write.mapping):
+            is_held_up = bool(held_up) if station == BROADCAST \
+                else station in held_up or BROADCAST in held_up
+            if station not in busy and not is_held_up \
+                    and self._writing.record.may_begin(write.mapping):
                 return write
             held_up.add(station)
         return None
@@ -137,16 +181,20 @@ class WriteQueue:
         return found
 
     def expire(self, now: float) -> None:
-        """End the writes that are not to be sent any more."""
+        """End the writes, and messages, that are not to be sent any more."""
         self.next_expiry = math.inf
         for write in list(self.waiting):
-            reason = self._reject_reason(write, now)
-            if reason:
-                self.waiting.remove(write)
-                self.report(write.result(Outcome.NOT_SENT, reason, now))
+            if reason := self._reject_reason(write, now):
+                self._end(write, Outcome.NOT_SENT, reason, now)
                 self._writing.record.expired(write)
-            else:
-                self.next_expiry = min(self.next_expiry, self._expiry(write))
+                continue
+            patience = self.patience_of(write.mapping)
+            if now >= write.oldest + patience:
+                too_old = [each.published for each in write.origins
+                           if now >= each.published + patience]
+                self._tell(write, write.give_up(max(too_old)), Outcome.NOT_SENT,
+                           _WAITED_LONGER % patience, now)
+            self.next_expiry = min(self.next_expiry, write.oldest + patience)
 
     def patience_of(self, mapping: Mapping) -> float:
         """Return how long (s) a message may wait: less where a fallback is due before (rule 7)."""
@@ -157,8 +205,18 @@ class WriteQueue:
         """End the waiting writes, of one mapping or all, without sending them."""
         dropped = [write for write in self.waiting if mapping in (None, write.mapping)]
         for write in dropped:
-            self.waiting.remove(write)
-            self.report(write.result(Outcome.NOT_SENT, reason, now))
+            self._end(write, Outcome.NOT_SENT, reason, now)
+
+    def _end(self, write: Write, outcome: Outcome, detail: str, now: float) -> None:
+        """End a write that waits, without sending it."""
+        self.waiting.remove(write)
+        self._tell(write, write.origins, outcome, detail, now)
+
+    def _tell(self, write: Write, origins: Iterable[Origin], outcome: Outcome, detail: str,
+              now: float) -> None:
+        """Report the same result for messages of a write that waits, or did."""
+        for result in write.result(outcome, detail, now).of(origins, now):
+            self.report(result)
 
     def _expiry(self, write: Write) -> float:
         """Return the clock value (s) from which a write is too old."""
@@ -168,7 +226,7 @@ class WriteQueue:
         """Return that a message has waited too long to be written, empty if it has not."""
         if now < self._expiry(write):
             return ''
-        return f'waited longer than {self.patience_of(write.mapping):g} s for the line'
+        return _WAITED_LONGER % self.patience_of(write.mapping)
 
     def _reject_reason(self, write: Write, now: float) -> str:
         """Return why a write is not to be sent any more, empty if it is."""

@@ -15,7 +15,7 @@
 """
 Unconfirmed writes: the next read of the words shows what the PLC holds.
 
-The one result of such a write waits for that read, but not longer than a write may wait for the
+The results of such a write wait for that read, but not longer than a write may wait for the
 line.
 """
 
@@ -103,6 +103,6 @@ class ReadBacks(WriteListener):
         self.next_expiry = self._waiting[0].since + self._patience if self._waiting else math.inf
 
     def _tell(self, entry: _UnconfirmedWrite, finding: str, now: float) -> None:
-        write, result = entry.write, entry.result
-        self._report(replace(result, detail=f'{result.detail}; {finding}',
-                             latency=now - write.requested))
+        told = replace(entry.result, detail=f'{entry.result.detail}; {finding}')
+        for result in told.of(entry.write.origins, now):
+            self._report(result)

@@ -85,8 +85,9 @@ class WritesUnderWay:
         self.record.ended(job.claim, result.outcome, may_land=result.is_unconfirmed)
 
     def report(self, job: WriteJob) -> None:
-        """Report the result of a message, after a read where it is unconfirmed."""
+        """Report the result of each message, after a read where it is unconfirmed."""
         if job.result.is_unconfirmed:
             self.read_backs.add(job.write, job.result, self._readings.blocks, self.line.now)
         else:
-            self._report(job.result)
+            for result in job.result.of(job.write.origins, self.line.now):
+                self._report(result)
