@@ -171,6 +171,15 @@ class OpenLine:
         """Tell whether the line gives back what is sent."""
         return self._requests.machine.echoes
 
+    @property
+    def stray(self) -> str:
+        """Return the last reply that came and answers no command, empty for none."""
+        return self._requests.stray
+
+    def settle(self) -> None:
+        """Wait until the link takes commands: a peer only listens at first; raises PortLost."""
+        self.ask(0, _nothing())
+
     def ask(self, station: int, work: Steps[_Result]) -> _Result:
         """Carry out a request and return its result; raises what its steps raise."""
         return self.wait(self.start(station, work))
@@ -300,6 +309,10 @@ class Client(OpenLine):
                                   'known; name plc_type')
             self._kinds[station] = identity.plc_type, identity.processor
         return self._kinds[station]
+
+
+def _nothing() -> Steps[None]:
+    yield from ()
 
 
 def plain(values: Values, kind: ValueType) -> list[float] | str:

@@ -34,6 +34,7 @@ from abdf1_ros.df1.tasks import Task, TaskSource
 from abdf1_ros.driver.inbox import Inbox
 from abdf1_ros.driver.job_tasks import Job, JobTask, JobTasks
 from abdf1_ros.errors import LinkError, PortLost
+from abdf1_ros.messages import Event, Message
 from abdf1_ros.pccc.data_table import DataTable
 from abdf1_ros.pccc.dialect import Steps
 from abdf1_ros.pccc.file_types import PlcType
@@ -71,6 +72,7 @@ class Requests(TaskSource):
     the line. ``routes`` gives the gateways of stations that are behind one. ``first_tns`` should
     be random, or a station may take our first command for a repetition. Commands that come for us
     are refused, except an echo and the diagnostic status, which is that of a ``plc_type``.
+    ``stray`` tells the last reply that came and answers no command, empty for none.
     """
 
     def __init__(self, mode: LineMode, line: LinkSettings, absent: Sequence[int] = (),
@@ -84,10 +86,11 @@ class Requests(TaskSource):
         self._tasks = JobTasks(line.station or 0, first_tns)
         self._waiting: Inbox[_RequestJob] = Inbox()
         self._lost: LinkError = PortLost('not opened yet')
+        self.stray = ''
         # Without DLE NAK, which would make other stations of a line in use drop their replies.
         self._link = mode.make_link(
             self.machine, replace(line, nak_on_command_timeout=False), self.stations,
-            Server(DataTable(plc_type)).serve, lambda event: None)
+            Server(DataTable(plc_type)).serve, self._report)
 
     def add(self, station: int, work: Steps[_Result], succeed: Callable[[_Result], None],
             fail: Callable[[Exception], None]) -> None:
@@ -114,6 +117,10 @@ class Requests(TaskSource):
             with suppress(StopIteration):  # it has ended before its first command
                 return JobTask(self._tasks, request, now)
         return None
+
+    def _report(self, event: Event) -> None:
+        if event.message is Message.ERR_WRONG_MESSAGE:
+            self.stray = str(event)
 
     def _run(self) -> Procedure:
         self._waiting.open()

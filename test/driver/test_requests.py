@@ -19,7 +19,8 @@ from typing import Any
 
 from abdf1_ros.df1.machine import Machine
 from abdf1_ros.df1.peer import PEER
-from abdf1_ros.df1.slave import multidrop
+from abdf1_ros.df1.settings import LinkSettings
+from abdf1_ros.df1.slave import HalfDuplexSlave, multidrop, Responder
 from abdf1_ros.driver.requests import Requests
 from abdf1_ros.errors import LinkError, PortLost, StationInactive
 from abdf1_ros.pccc import diagnostics
@@ -46,10 +47,10 @@ class Ends:
 class Bench:
     """Requests at one end, an SLC that is station 1 at the other."""
 
-    def __init__(self, absent: tuple[int, ...] = ()) -> None:
+    def __init__(self, absent: tuple[int, ...] = (), slave: Responder | None = None) -> None:
         self.requests = Requests(NETWORK.line_mode, NETWORK.line, absent, first_tns=7)
         self.plc = simulated_plc(1, 'SLC', lambda: self.line.now, ('N7:0', 10))
-        self.far = Machine(multidrop([self.plc]), checksum=NETWORK.checksum)
+        self.far = Machine(multidrop([slave or self.plc]), checksum=NETWORK.checksum)
         self.line = VirtualLine(self.requests.machine, self.far, baud=115200)
         self.ends = Ends()
         self.added = 0
@@ -147,6 +148,30 @@ def test_lost_port_ends_all_requests() -> None:
     bench.requests.close()
     bench.add(1, identify())
     assert str(bench.ends.errors[3]) == 'port lost: closed by this program'
+
+
+def test_stray_reply_is_kept() -> None:
+    bench = Bench(slave=HalfDuplexSlave(
+        LinkSettings(station=1), lambda command: command.reply()._replace(src=9)))
+    assert bench.requests.stray == ''
+    bench.add(1, echo(b'x'))
+    bench.run()
+    assert str(bench.ends.errors[0]) == '2508 ERR_COMMAND_TIMEOUT: Command Timed Out'
+    assert bench.requests.stray == (
+        '2510 ERR_WRONG_MESSAGE: Wrong Message Received Src:0x09, Dst:0x05, Tns:0x0008 '
+        '[station 1]')
+
+
+def test_request_without_a_command_ends_when_the_link_takes_commands() -> None:
+    requests = Requests(PEER, Network(baud=115200).line)
+    ends = Ends()
+    nothing: Steps[None] = (step for step in ())
+    requests.add(0, nothing, ends.results.append, ends.errors.append)
+    requests.machine.start(0.0)
+    requests.machine.handle_timeout(0.05)
+    assert ends.count() == 0  # what comes now answers an earlier process
+    requests.machine.handle_timeout(0.1)
+    assert ends.results == [None]
 
 
 def test_other_modes_are_served_by_the_same_requests() -> None:

@@ -53,7 +53,9 @@ class LosesPolls(PortAround):
 
     def read(self, timeout: float | None, wake: int) -> bytes:
         data = super().read(timeout, wake)
-        if len(data) == 4 and data[:2] == b'\x10\x05' and data[2] in self._stations:
-            self._stations.remove(data[2])
-            return b''
+        for station in [*self._stations]:
+            at = data.find(bytes((0x10, 0x05, station)))  # an ACK may stand before it
+            if at >= 0:
+                self._stations.remove(station)
+                return data[:at] + data[at + 4:]
         return data

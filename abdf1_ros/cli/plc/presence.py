@@ -25,6 +25,7 @@ import time
 from abdf1_ros.cli.plc.line import free_station
 from abdf1_ros.cli.plc.session import Session
 from abdf1_ros.cli.terminal import colour, GREEN, RED, YELLOW
+from abdf1_ros.counters import Counters
 from abdf1_ros.df1.echo import COMES_BACK
 from abdf1_ros.errors import Abdf1Error, LinkError, PortLost, RemoteError, StationInactive
 from abdf1_ros.pccc.access import Access
@@ -34,6 +35,7 @@ from abdf1_ros.pccc.file_types import PlcType
 from abdf1_ros.pccc.identity import Identity
 from abdf1_ros.pccc.steps import echo, identify
 from abdf1_ros.settings.network import Network
+from abdf1_ros.text import counted
 
 _SLOTS_TRIED = 8
 
@@ -76,6 +78,7 @@ class Presence:
 
 def look_at(session: Session, station: int) -> Presence:
     """Ask a station for its identity; raises PortLost."""
+    session.settle()
     started = time.monotonic()
     identity, error = None, None
     try:
@@ -164,6 +167,7 @@ def io_access(session: Session, there: Presence) -> list[str]:
 
 def ping(session: Session, station: int) -> float:
     """Return the seconds that an echo takes; raises LinkError, RemoteError or FormatError."""
+    session.settle()
     started = time.monotonic()
     session.ask(station, echo(_ECHO))
     return time.monotonic() - started
@@ -213,6 +217,16 @@ def hint(session: Session, error: Abdf1Error) -> str:
         'duplex, or another master?')
     return (f'asked with {network.baud} baud, parity {network.parity}, {network.duplex.value}, '
             f'{network.error_code}: {cause} "plc detect" tries other settings')
+
+
+def traffic(counters: Counters, stray: str = '') -> str:
+    """Return how often silent stations were asked, and what came, for who gets no answer."""
+    again = counters.nak_retries + counters.enq_retries
+    came = [counted(counters.damaged_frames, 'damaged frame'),
+            f'{counters.naks_received} NAK'] + [stray] * bool(stray)
+    return (f'sent: {counted(counters.commands_sent, "command")}, '
+            f'{counted(counters.polls_sent, "poll")}, {counted(again, "repetition")} of them; '
+            f'received: {", ".join(came)}')
 
 
 def type_hint(session: Session, station: int, error: Abdf1Error, plc_type: str | None) -> str:

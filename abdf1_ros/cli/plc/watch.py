@@ -71,7 +71,8 @@ class Watch:
     With ``csv`` each read is a line for each value, also where nothing has changed. ``tags``
     stand beside the addresses.
 
-    It is the driver's ``Listener``. Raises OSError when the port cannot be opened.
+    It is the driver's ``Listener``; ``counters`` are those of the line. Raises OSError
+    when the port cannot be opened.
     """
 
     def __init__(self, network: Network, mappings: Sequence[Mapping], period: float,
@@ -87,6 +88,7 @@ class Watch:
         settings = DriverSettings(
             default_period=period, read_only=True, first_tns=random.randrange(0x10000))
         self._driver = Driver(network, mappings, settings, self)
+        self.counters = self._driver.counters
         self._link = LinkThread(self._driver.machine, opened(network))
         self._news: deque[tuple[Mapping, Values]] = deque(maxlen=_MAX_NEWS)
         self._has_news = Wake()  # an interrupt in an Event may leave its lock taken

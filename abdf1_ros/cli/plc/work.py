@@ -156,6 +156,8 @@ def _failed(options: argparse.Namespace, session: Session, error: Abdf1Error, pl
     if advice := presence.hint(session, error) \
             or presence.type_hint(session, station, error, plc_type):
         _complain(advice)
+    if isinstance(error, LinkError):
+        _complain(presence.traffic(session.counters, session.stray))
     if options.is_assumed and isinstance(error, LinkError):
         _complain(f'no station was given, so {station} was asked; "plc scan" tells who is there')
         options.is_assumed = False  # once is enough
@@ -276,8 +278,11 @@ def _watch(options: argparse.Namespace, session: Session, wanted: _Wanted) -> in
     cells, tags = wanted
     mappings = _mappings(options, session, cells, options.addresses)
     session.close()  # the driver opens the port itself
-    failed = Watch(session.network, mappings, options.period, RADIXES[options.radix],
-                   options.csv, tags).run(options.count)
+    watch = Watch(session.network, mappings, options.period, RADIXES[options.radix],
+                  options.csv, tags)
+    failed = watch.run(options.count)
+    if failed:
+        _complain(presence.traffic(watch.counters))
     return EXIT_FAILED if failed else 0
 
 

@@ -17,7 +17,10 @@
 from pathlib import Path
 import threading
 import time
+from types import SimpleNamespace
+from typing import cast
 
+from abdf1_ros.cli.plc import presence
 from abdf1_ros.cli.plc.presence import describe, hint, look_at, Presence, scan, type_to_say
 from abdf1_ros.cli.plc.session import Session
 from abdf1_ros.errors import FormatError, StationInactive
@@ -35,8 +38,8 @@ IDENTITY = Identity(
 
 
 def test_everything_a_station_has_said() -> None:
-    presence = Presence(2, 0.0312, IDENTITY, None, True, True)
-    assert describe(presence) == [
+    seen = Presence(2, 0.0312, IDENTITY, None, True, True)
+    assert describe(seen) == [
         'station 2: SLC 5/03 series B revision 3, REM PROG',
         '  mode       REM PROG', '  faults     major error 0x0021', '  remarks    forces active',
         '  own name   CELL_3', '  program ID 0x1A2B', '  memory     16 K',
@@ -44,8 +47,8 @@ def test_everything_a_station_has_said() -> None:
 
 
 def test_station_that_does_not_say_what_it_is() -> None:
-    presence = Presence(2, 0.1, None, FormatError('too short'), True, True)
-    assert str(presence) == 'answers, but not who it is: too short'
+    seen = Presence(2, 0.1, None, FormatError('too short'), True, True)
+    assert str(seen) == 'answers, but not who it is: too short'
 
 
 @pytest.mark.parametrize('identity, option', [
@@ -61,20 +64,20 @@ def test_silence_and_noise(tmp_path: Path, mode: str) -> None:
     line = Pty(tmp_path / 'line')
     network = Network(com_port=str(line.name), timeout=20, mode=mode)
     with Session(network, absent=[1]) as session:
-        presence = look_at(session, 1)
-        assert isinstance(presence.error, StationInactive)
-        assert not presence.is_there
-        assert not presence.takes_commands
+        seen = look_at(session, 1)
+        assert isinstance(seen.error, StationInactive)
+        assert not seen.is_there
+        assert not seen.takes_commands
         duplex = 'full' if mode == 'Peer' else 'half'
         asked = f'asked with 9600 baud, parity None, {duplex} duplex, CRC: '
-        assert hint(session, presence.error) == (
+        assert hint(session, seen.error) == (
             f'{asked}not one character came: station (a PLC-5 shows its own in octal), check or '
             'duplex wrong? Then cable, port, power, baud rate and parity. "plc detect" tries '
             'other settings')
         line.write(b'\x55\xaa\x00')
-        presence = look_at(session, 1)
-        assert presence.error is not None
-        assert hint(session, presence.error).startswith(f'{asked}3 characters came, but no answer')
+        seen = look_at(session, 1)
+        assert seen.error is not None
+        assert hint(session, seen.error).startswith(f'{asked}3 characters came, but no answer')
         assert hint(session, FormatError('x')) == ''
     line.close()
 
@@ -84,11 +87,27 @@ def test_poll_that_is_answered_is_a_station_though_it_takes_no_command(tmp_path:
     network = Network(com_port=str(line.name), timeout=1000, nak_retries=0)
     answer = threading.Thread(target=lambda: (line.read(4), line.write(b'\x10\x04')))
     answer.start()
-    presence, = scan(network, [1])
+    seen, = scan(network, [1])
     answer.join()
     line.close()
-    assert presence.is_there
-    assert not presence.takes_commands
+    assert seen.is_there
+    assert not seen.takes_commands
+
+
+def test_time_of_an_answer_begins_when_the_line_takes_commands(
+        monkeypatch: pytest.MonkeyPatch) -> None:
+    class Slow:
+        now = 0.0
+
+        def settle(self) -> None:
+            self.now += 0.1
+
+        def ask(self, station: int, work: object) -> None:
+            self.now += 0.01
+
+    session = Slow()
+    monkeypatch.setattr(presence, 'time', SimpleNamespace(monotonic=lambda: session.now))
+    assert presence.ping(cast(Session, session), 1) == pytest.approx(0.01)
 
 
 def test_scan_behind_a_gateway_finds_only_who_is_there(tmp_path: Path) -> None:
@@ -97,8 +116,8 @@ def test_scan_behind_a_gateway_finds_only_who_is_there(tmp_path: Path) -> None:
         plc.via = 10
     with plc_line(tmp_path / 'line', *plcs) as name:
         found = list(scan(Network(com_port=name, timeout=2000), [1, 2, 3], via=10))
-    assert [presence.is_there for presence in found] == [True, True, False]
-    assert [str(presence.identity)[:5] for presence in found[:2]] == ['PLC-5', 'SLC 5']
+    assert [seen.is_there for seen in found] == [True, True, False]
+    assert [str(seen.identity)[:5] for seen in found[:2]] == ['PLC-5', 'SLC 5']
     assert 'STS 02' in str(found[2].error)
 
 
@@ -120,13 +139,13 @@ class Damages(PortAround):
 
 def test_scan_of_nobody_ends_after_two_rounds(tmp_path: Path) -> None:
     line = Pty(tmp_path / 'line')
-    presence, = scan(Network(com_port=str(line.name), timeout=50), [1])
+    seen, = scan(Network(com_port=str(line.name), timeout=50), [1])
     line.close()
-    assert (presence.is_there, presence.asked) == (False, 2)
+    assert (seen.is_there, seen.asked) == (False, 2)
 
 
 def test_scan_asks_more_often_while_frames_come_damaged(tmp_path: Path) -> None:
     plc = simulated_plc(1, 'SLC', time.monotonic)
     with plc_line(tmp_path / 'line', plc, around=Damages) as name:
-        presence, = scan(Network(com_port=name, timeout=1000, enq_retries=0), [1])
-    assert (presence.is_there, presence.takes_commands, presence.asked) == (True, False, 4)
+        seen, = scan(Network(com_port=name, timeout=1000, enq_retries=0), [1])
+    assert (seen.is_there, seen.takes_commands, seen.asked) == (True, False, 4)
