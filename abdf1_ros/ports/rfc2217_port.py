@@ -109,7 +109,9 @@ class Rfc2217Port(DescriptorPort):
             self._send(_Telnet.WILL, option)
         for option in sorted(self._asked):
             self._send(_Telnet.DO, option)
-        self._wait(lambda: self._is_accepted, 'the other end does not speak RFC 2217')
+        self._wait(lambda: self._is_accepted, 'the other end does not speak RFC 2217', (
+            'the other end is silent: another host may have its port, or it does not speak RFC '
+            '2217'))
         wanted = {
             _Com.SET_BAUDRATE: struct.pack('!I', settings.baud),
             _Com.SET_DATASIZE: bytes([settings.data_bits]),
@@ -131,14 +133,20 @@ class Rfc2217Port(DescriptorPort):
                               f'{int.from_bytes(value, "big")}, its port has '
                               f'{int.from_bytes(self._answers[command], "big")}')
 
-    def _wait(self, condition: Callable[[], bool], failure: str) -> None:
-        """Take commands of the server until ``condition``; data before that are dropped."""
+    def _wait(self, condition: Callable[[], bool], failure: str, silence: str = '') -> None:
+        """
+        Take commands of the server until ``condition``; data before that are dropped.
+
+        Raises OSError with ``failure`` after 3 s, or with ``silence`` where nothing came at all.
+        """
+        has_come = False
         give_up = time.monotonic() + _NEGOTIATION_TIMEOUT
         while not condition():
             left = give_up - time.monotonic()
             if left <= 0:
-                raise OSError(failure)
+                raise OSError(failure if has_come or not silence else silence)
             if self._poll.poll(math.ceil(left * 1000)):
+                has_come = True
                 self._take()
 
     def _take(self) -> bytes:

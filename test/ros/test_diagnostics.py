@@ -358,7 +358,8 @@ def test_station_that_answers_polls_and_no_command(bench: Bench) -> None:
     for _ in range(2):
         stations.lost(1, NOW)
         stations.heard(1, NOW)
-    told = WARN, 'WARN: station 1 answers polls, but no command: is Error_Code right?'
+    told = WARN, ('WARN: station 1 answers polls, but no command: is Error_Code right, and '
+                  'Cmd_Timeout long enough?')
     assert bench.says('station 1') == told
     assert bench.says('link') == (
         WARN, 'WARN: port open, but 1 of 2 stations answer polls and no command')

@@ -73,7 +73,7 @@ class LineEvents:
         self.writes.lost(topic, count, self._clock())
         self.notes.warning(f'lost writes to {topic}', f'~/write/{topic}: {count} messages were '
                            'lost on their way here, and have no result: they come faster than '
-                           'they can be taken')
+                           'they can be taken, or the network was cut')
 
     def written(self, result: WriteResult) -> None:
         """Publish the result of a write."""

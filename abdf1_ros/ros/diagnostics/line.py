@@ -130,4 +130,5 @@ def takes_in_silence(station: Station) -> bool:
 
 def deaf_text(station: int) -> str:
     """Return what is wrong with a station that is heard, but not with replies to commands."""
-    return f'station {station} answers polls, but no command: is Error_Code right?'
+    return f'station {station} answers polls, but no command: is Error_Code right, ' \
+        'and Cmd_Timeout long enough?'

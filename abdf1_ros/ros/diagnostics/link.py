@@ -71,7 +71,9 @@ class LinkStatus:
         if deaf := len(self._line.deaf_stations(now)):
             return WARN, f'port open, but {deaf} of {total} stations answer polls and no command'
         if total and not active:
-            return ERROR, f'port open, but none of {total} stations answers'
+            return ERROR, f'port open, but none of {total} stations answers' + (
+                ', or the device server lets this connection wait' if '://' in self.hardware_id
+                else '')
         silent = sum(map(takes_in_silence, stations))
         if silent and silent == active:
             return ERROR, f'port open, but none of {total} stations replies to commands'
