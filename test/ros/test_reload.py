@@ -98,7 +98,8 @@ def test_rows_come_and_go_and_those_that_stay_are_not_disturbed(bench: Bench) ->
     speeds.values([7, 8])
     publisher = bench.node.session.reads._topics['speed'].publisher
     bench.write_map(SPEED, LEVEL)
-    assert bench.reload() == (True, str(bench.node.session.configuration))
+    assert bench.reload() == (True, (
+        f'{bench.node.session.configuration}; new: level; gone: recipe'))
     levels = bench.ros.listen(Float32MultiArray, '/abdf1/read/level')
     assert values_in(levels.first()) == [1.5]
     assert values_in(speeds.next()) == [7, 8]
@@ -161,6 +162,19 @@ def test_fault_in_one_row_changes_nothing(bench: Bench) -> None:
     assert bench.parameter('map.level.address') is None
     speeds = bench.ros.listen(Int16MultiArray, '/abdf1/read/speed', EVERYTHING)
     assert values_in(speeds.first()) == [7, 8]
+
+
+def test_files_that_would_stop_the_line_change_nothing(
+        bench: Bench, monkeypatch: pytest.MonkeyPatch) -> None:
+    session, held = bench.node.session, []
+    monkeypatch.setattr(bench.node, '_hold_ports', lambda *names: held.append(names))
+    bench.write_map()
+    assert bench.reload() == (False, (
+        f'goes on as before: {bench.map}: it has no row, so all topics would end; only a line '
+        'with Share can be without'))
+    assert bench.node.session is session
+    assert held[-1] == session.configuration.held
+    monkeypatch.undo()
 
 
 def test_link_that_does_not_take_the_files_is_the_end(

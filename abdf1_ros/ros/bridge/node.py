@@ -33,6 +33,7 @@ from abdf1_ros.ports.settings import PortSettings
 from abdf1_ros.ports.trace import PortOpener
 from abdf1_ros.problems import ConfigurationError
 from abdf1_ros.ros.bridge.offer import OfferedPublisher
+from abdf1_ros.ros.bridge.reload import changes, refuse_harm
 from abdf1_ros.ros.bridge.session import Session, Surroundings, tell_plcs
 from abdf1_ros.ros.diagnostics.graph import DISCOVERY, Graph, NameWatch
 from abdf1_ros.ros.diagnostics.log import bug_text
@@ -237,17 +238,22 @@ class BridgeNode(AnsweringNode):
         if self._is_ending:
             response.message = ENDS
             return response
+        before = self.session.configuration
         try:
-            configuration = read_again(self.session.configuration)
-            self._hold_ports(*self.session.configuration.held, *configuration.held)
+            configuration = read_again(before)
+            self._hold_ports(*before.held, *configuration.held)
+            refuse_harm(before, configuration, self.link.state.is_open,
+                        _port_settings(configuration))
         except ConfigurationError as error:
+            self._hold_ports(*before.held)
             for problem in error.problems:
                 self.get_logger().error(f'{problem} (goes on as before)')
             texts = [printable(str(problem)) for problem in error.problems]
             response.message = 'goes on as before: ' + '; '.join(texts[:_MOST_PROBLEMS])
             return response
         if self._hand_over(configuration):
-            response.success, response.message = True, printable(str(configuration))
+            response.success = True
+            response.message = f'{printable(str(configuration))}; {changes(before, configuration)}'
         else:
             response.message = 'ends: its link does not take the new files'
             self.get_logger().fatal(response.message)
