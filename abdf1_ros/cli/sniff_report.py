@@ -15,23 +15,21 @@
 """
 The bundle of ``sniff --report``: all that a report about a line needs, in one ZIP file.
 
-It holds no names of users or hosts. With ``is_anonymous`` it also leaves out the contents of data
-tables: the data of messages, and the names of tags and topics.
+With ``is_anonymous`` it has no values and no names: not the data of messages, and of the files
+given only what ``sniff_anonymous`` keeps.
 """
 
 from __future__ import annotations
 
 from collections.abc import Container, Iterable, Sequence
-import csv
 from dataclasses import dataclass, field, replace
-import io
 from itertools import count
 import json
 from pathlib import Path
 import platform
-import re
 from zipfile import is_zipfile, ZIP_DEFLATED, ZipFile
 
+from abdf1_ros.cli.sniff_anonymous import anonymous_result, anonymous_settings
 from abdf1_ros.df1.listener import LineKind
 from abdf1_ros.df1.packet import Packet
 from abdf1_ros.errors import Abdf1Error
@@ -49,8 +47,6 @@ _MOST_ENTRIES = 100_000
 
 # By which a bundle is known again.
 _COMMENT = b'abdf1_ros sniff --report'
-
-_PRIVATE = re.compile('tag|topic', re.IGNORECASE)
 
 _CONTENTS = {
     'summary.txt': 'what was seen on the line, counted',
@@ -95,11 +91,15 @@ class ReportBundle:
         try:
             identity = decode_identity(reply.data)
         except Abdf1Error as error:
-            self._processors[reply.src] = f'{reply.data.hex(" ")} ({error})'
+            self._processors[reply.src] = \
+                str(error) if self.is_anonymous else f'{reply.data.hex(" ")} ({error})'
             return
-        faults = ', '.join((*identity.faults, *identity.remarks))
-        self._processors[reply.src] = (
-            f'{identity}{f"; {faults}" if faults else ""}; status {reply.data.hex(" ")}')
+        # The name of the program is in the status.
+        who = str(identity).partition(' (')[0] if self.is_anonymous else str(identity)
+        facts = [who, *identity.faults, *identity.remarks]
+        if not self.is_anonymous:
+            facts.append(f'status {reply.data.hex(" ")}')
+        self._processors[reply.src] = '; '.join(facts)
 
     def write(self, path: str, summary: Summary, kind: LineKind) -> None:
         processors = [f'station {station}: {text}'
@@ -115,11 +115,14 @@ class ReportBundle:
             texts['entries.txt'] = '\n'.join(map(text_line, self._entries))
             for name in self.captures:
                 texts[_free_name('capture', name, texts)] = Path(name).read_bytes()
-        for folder, names in (('settings', self.settings), ('conformance', self.conformance)):
-            for name in names:
-                text = Path(name).read_text('utf-8-sig', 'replace')
-                texts[_free_name(folder, name, texts)] = (
-                    _without_names(text) if self.is_anonymous and folder == 'settings' else text)
+        for name in self.settings:
+            given = name, _text(name)
+            known, text = anonymous_settings(name) if self.is_anonymous else given
+            texts[_free_name('settings', known, texts)] = text
+        for name in self.conformance:
+            known = 'result.json' if self.is_anonymous else name
+            text = anonymous_result(_text(name)) if self.is_anonymous else _text(name)
+            texts[_free_name('conformance', known, texts)] = text
         with ZipFile(path, 'w', ZIP_DEFLATED) as bundle:
             bundle.comment = _COMMENT
             bundle.writestr('README.txt', self._readme(texts))
@@ -131,13 +134,15 @@ class ReportBundle:
                  'What it holds:']
         lines += [f'  {name:16} {text}' for name, text in _CONTENTS.items()
                   if any(entry.startswith(name) for entry in names)]
-        lines += ['', 'It holds no names of users or hosts.']
+        lines.append('')
         if self.is_anonymous:
             lines.append('It was made with --anonymous: the data of messages and the bytes of the '
-                         'recording are left out, tags and topics are numbered.')
+                         'recording are left out, tags and topics are numbered, and of the files '
+                         'only columns without names are kept; "?" is a cell that was not read.')
         else:
-            lines.append('The recording shows the values that were in the data tables. '
-                         '--anonymous leaves them out.')
+            lines.append('The recording shows the values that were in the data tables; heads of '
+                         'recordings and the files given may name ports, hosts, users and tags. '
+                         '--anonymous leaves all that out.')
         return '\n'.join([*lines, ''])
 
 
@@ -156,35 +161,23 @@ def _free_name(folder: str, path: str, taken: Container[str]) -> str:
     return next(name for name in names if name not in taken)
 
 
+def _text(path: str) -> str:
+    return Path(path).read_text('utf-8-sig', 'replace')
+
+
 def _versions() -> dict[str, str]:
     return {'abdf1_ros': package_version(), 'python': platform.python_version(),
-            'system': f'{platform.system()} {platform.release()} {platform.machine()}'}
+            'system': f'{platform.system()} {_release()} {platform.machine()}'}
+
+
+def _release() -> str:
+    """Return the version of the kernel without what a builder has added, which may be a name."""
+    return platform.release().partition('-')[0]
 
 
 def _without_data(entry: Entry) -> Entry:
-    """Return an entry without its guest, and its message's data, also not quoted in its text."""
+    """Return an entry without its guest, its text, and the data of its message."""
     packet = entry.packet
-    if packet is None:
-        return replace(entry, text='')
-    # The first byte of a command is its FNC. The words before the colon are stations and TNS.
-    data = packet.data[:1] if entry.kind is Kind.COMMAND else b''
-    return replace(entry, packet=packet._replace(data=data), text=entry.text.partition(':')[0],
-                   guest='')
-
-
-def _without_names(text: str) -> str:
-    """Return a CSV with its tags and topics numbered; comments go."""
-    lines = [line for line in text.splitlines() if line.strip() and not line.startswith('#')]
-    if not lines:
-        return ''
-    delimiter = max(',;\t', key=lines[0].count)
-    rows = list(csv.reader(lines, delimiter=delimiter))
-    private = {column: name.strip().lower() for column, name in enumerate(rows[0])
-               if _PRIVATE.search(name)}
-    out = io.StringIO()
-    writer = csv.writer(out, delimiter=delimiter, lineterminator='\n')
-    writer.writerow(rows[0])
-    for number, row in enumerate(rows[1:], 1):
-        writer.writerow([f'{private[column]}_{number}' if column in private and cell.strip()
-                         else cell for column, cell in enumerate(row)])
-    return out.getvalue().rstrip('\n')
+    # The first byte of a command is its FNC.
+    data = packet.data[:1] if packet and entry.kind is Kind.COMMAND else b''
+    return replace(entry, packet=packet and packet._replace(data=data), text='', guest='')

@@ -90,6 +90,72 @@ def test_anonymous_bundle_has_no_values_and_no_names(tmp_path: Path, capture: st
     assert 'numbered' in files['README.txt']
 
 
+NET = """\
+# Joe's line, ask jdoe
+Com_Port,Station,Baud,Mode,Share,Store_Forward,Timeout
+rfc2217://plc-gw.acme.example:4001,5,9600,Master,pty:/home/jdoe/hmi tcp:10.1.2.3:4002,,jdoe
+"""
+MAP = """\
+sep=,
+   # paint shop of jdoe
+Tag,Command,Address,Station,PLC_Type,Topic,Publish_While,Confirms,Requires,Fallback,Description,Min,Via
+booth_alive,Read,N7:0,2,SLC,,,,,,alive of the booth,,
+booth_speed,Read,N7:1,2,SLC,acme/speed,booth_alive,,,,ask jdoe,,
+booth_ros,Heartbeat,N7:9,2,SLC,,,,acme/setpoint acme/door,,,,
+booth_control,Read,B3:0/1,2,SLC,,RUN,booth_ros,,,,,
+setpoint,Write,N7:3-4,2,SLC,acme/setpoint,,,,acme jdoe,,jdoe,plc-gw
+door,Read,plc-gw.acme.example,10.1.2.3,/home/jdoe,,,,,,,,
+"""
+RESULT = {
+    'target': 'slave', 'processor': 'PRESS_ACME', 'station': '2', 'check': 'CRC', 'port': 'jdoe',
+    'baud': '/dev/ttyACME', 'cases': [{
+        'case': 'slave-ack', 'verdict': 'PASS', 'rule': 'an ACK', 'source': 'M 3-4',
+        'seconds': 0.1, 'expected': 'acme', 'got': 'jdoe', 'transcript': ['> 10 02 b7 2a']}]}
+NAMES = ('jdoe', 'joe', 'acme', 'plc-gw', '10.1.2.3', '4001', '4002', 'home', 'hmi', 'booth',
+         'paint', 'press', 'door', 'speed', 'alive', 'b7 2a', 'tty')
+
+
+def test_anonymous_bundle_has_no_name_of_a_host_user_path_or_port(
+        tmp_path: Path, capture: str) -> None:
+    folder = tmp_path / 'home' / 'jdoe'
+    folder.mkdir(parents=True)
+    files = {'acme_net.csv': NET, 'booth_map.csv': MAP, 'map2.csv': MAP.replace(',', ';'),
+             'plc-gw.txt': 'Port of jdoe\n',
+             'export.csv': 'Tag Name,Address,Client Access\njdoe,,\n',
+             'jdoe.json': json.dumps(RESULT), 'issue.md': '- port: /dev/ttyACME\n'}
+    for name, text in files.items():
+        (folder / name).write_text(text, encoding='utf-8')
+    recorded = folder / 'acme.cap'
+    recorded.write_text(Path(capture).read_text('ascii').replace(
+        '# baud: 9600', '# port: rfc2217://plc-gw.acme.example:4001\n# guest: /home/jdoe/hmi'),
+        'ascii')
+    report = tmp_path / 'report.zip'
+    paths = [str(folder / name) for name in files]
+    assert main([str(recorded), '--summary', '--report', str(report), '--anonymous',
+                 '--settings', *paths[:5], '--conformance', *paths[5:]]) == 0
+    with ZipFile(report) as bundle:
+        found = {name: bundle.read(name).decode() for name in bundle.namelist()}
+    everything = '\n'.join([*found, *found.values()]).lower()
+    assert [name for name in NAMES if name in everything] == []
+    assert found['settings/net.csv'] == (
+        'Station,Mode,Com_Port,Baud,Timeout,Share,Store_Forward\n'
+        '5,Master,rfc2217,9600,?,2 places,\n')
+    assert found['settings/map.csv'] == found['settings/1_map.csv'] == (
+        'Tag,Command,Address,Station,PLC_Type,Topic,Min,Requires,Publish_While,Confirms,Via\n'
+        'tag_1,Read,N7:0,2,SLC,,,,,,\n'
+        'tag_2,Read,N7:1,2,SLC,topic_1,,,tag_1,,\n'
+        'tag_3,Heartbeat,N7:9,2,SLC,,,topic_2 topic_3,,,\n'
+        'tag_4,Read,B3:0/1,2,SLC,,,,RUN,tag_3,\n'
+        'tag_5,Write,N7:3-4,2,SLC,topic_2,?,,,,?\n'
+        'tag_6,Read,?,?,?,,,,,,\n')
+    assert found['settings/unread.txt'].startswith('left out: ')
+    assert json.loads(found['conformance/result.json']) == {
+        'target': 'slave', 'check': 'CRC', 'station': '2', 'cases': [{
+            'case': 'slave-ack', 'verdict': 'PASS', 'rule': 'an ACK', 'source': 'M 3-4',
+            'seconds': '0.1'}]}
+    assert found['conformance/1_result.json'].startswith('left out: ')
+
+
 def test_processor_is_named(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     path = tmp_path / 'status.cap'
     lines = ['# abdf1_ros capture 1', '# check: CRC', '# duplex: full']
