@@ -98,13 +98,36 @@ def test_parameter_file_that_cannot_be_read(tmp_path: Path, text: str | None) ->
     ('a: [1\nb: 2\n', ":2:2: expected ',' or ']', but got ':'"),
     ('a:\n  ros__parameters: {}\nhall/press-plc:\n  ros__parameters: {"x-y": 1}\n',
      ':3: "hall/press-plc" cannot name a node: letters, digits and underscores, as in '
-     'hall/press_plc')])
+     'hall/press_plc'),
+    ('a: &x\n  ros__parameters: {}\nb: *x\n',
+     ':3:4: an alias, *x, which ROS does not take: write the values out'),
+    ('a: &x\n  b: *x\n', ':2:6: an alias, *x, which ROS does not take: write the values out'),
+    ('a:\n  ros__parameters: {b: ' + 600 * '[',
+     ':2:41: more than 20 levels, one within the other'),
+    (''.join(f'{number * " "}a:\n' for number in range(600)) + 600 * ' ' + 'a: 1\n',
+     ':21:21: more than 20 levels, one within the other'),
+    ('a:\n  ros__parameters: !foo {}\n', ':2:20: the tag !foo, which ROS does not know: leave it '
+     'out'),
+    ('a:\n  ros__parameters: {b: !!python/name:os.system x}\n',
+     ':2:24: the tag tag:yaml.org,2002:python/name:os.system, which ROS does not know: leave it '
+     'out'),
+    ('? [a]\n: {ros__parameters: {}}\n',
+     ':1:3: a list or mapping as a name: a name should be one word')])
 def test_parameter_file_that_ros_would_refuse(tmp_path: Path, text: str, expected: str) -> None:
     path = yaml_file(tmp_path, text)
     with pytest.raises(ConfigurationError) as error, \
             usable_files(['node', '--ros-args', '--params-file', path], leaves_out=False):
         pass
     assert str(error.value) == f'{path}{expected}'
+
+
+def test_what_is_left_out_changes_nothing_else(tmp_path: Path) -> None:
+    path = yaml_file(tmp_path, (
+        'hall/press-plc:\n  ros__parameters: {}\n'
+        "a:\n  ros__parameters: {day: 2001-99-99, number: 010, text: '5', list: [1, 2]}\n"))
+    with usable_files(['--params-file', path], leaves_out=True) as (_, usable):
+        assert Path(usable).read_text('utf-8') == (
+            "a:\n  ros__parameters: {day: 2001-99-99, number: 010, text: '5', list: [1, 2]}\n")
 
 
 def test_parameter_files_of_the_arguments() -> None:

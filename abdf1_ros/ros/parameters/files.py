@@ -21,13 +21,14 @@ from contextlib import contextmanager
 from pathlib import Path
 import re
 from tempfile import TemporaryDirectory
-from typing import Any
 
 from abdf1_ros.problems import ConfigurationError, Place, Problem
 from abdf1_ros.text import printable
 import yaml
 
 _PARAMETERS = 'ros__parameters'
+_MOST_LEVELS = 20
+_TAGS = ('!', *(f'tag:yaml.org,2002:{kind}' for kind in ('bool', 'float', 'int', 'null', 'str')))
 # Namespaces, a node, and wildcards for either.
 _NAME = re.compile(r'[\w/*]+', re.ASCII)
 
@@ -39,9 +40,15 @@ def parameter_files(args: Sequence[str]) -> list[str]:
 
 
 def parameter_tree(path: str) -> yaml.Node | None:
-    """Return the nodes of YAML in a parameter file; ConfigurationError where it is not YAML."""
+    """
+    Return the nodes of YAML in a parameter file.
+
+    Raises ConfigurationError where it is not YAML, or more of it than a parameter file needs.
+    """
     try:
-        return yaml.compose(Path(path).read_text(encoding='utf-8'))
+        text = Path(path).read_text(encoding='utf-8')
+        _check_events(path, yaml.parse(text))
+        return yaml.compose(text)
     except yaml.MarkedYAMLError as error:
         mark, text = error.problem_mark, ' '.join(str(error.problem or error).split())
         if "'\\t'" in text:
@@ -50,6 +57,37 @@ def parameter_tree(path: str) -> yaml.Node | None:
         raise ConfigurationError([Problem(place, text)]) from None
     except (OSError, ValueError, yaml.YAMLError) as error:
         raise ConfigurationError([Problem(path, ' '.join(str(error).split()))]) from None
+
+
+def _check_events(path: str, events: Iterable[yaml.Event]) -> None:
+    """Raise ConfigurationError for what ROS does not take, and what would not end here."""
+    keys: list[bool | None] = []  # of each open mapping whether a key is next, None of a list
+    for event in events:
+        if isinstance(event, yaml.CollectionEndEvent):
+            keys.pop()
+        if not isinstance(event, yaml.NodeEvent):
+            continue
+        if text := _fault_of(event, len(keys), is_key=bool(keys and keys[-1])):
+            place = Place(path, event.start_mark.line + 1, event.start_mark.column + 1)
+            raise ConfigurationError([Problem(place, text)])
+        if keys and keys[-1] is not None:
+            keys[-1] = not keys[-1]
+        if isinstance(event, yaml.CollectionStartEvent):
+            keys.append(True if isinstance(event, yaml.MappingStartEvent) else None)
+
+
+def _fault_of(event: yaml.NodeEvent, depth: int, *, is_key: bool) -> str:
+    """Return what is wrong with the beginning of a node, nothing where that is right."""
+    if isinstance(event, yaml.AliasEvent):
+        return f'an alias, *{event.anchor}, which ROS does not take: write the values out'
+    if event.tag and event.tag not in _TAGS:
+        return f'the tag {event.tag}, which ROS does not know: leave it out'
+    if isinstance(event, yaml.CollectionStartEvent):
+        if is_key:
+            return 'a list or mapping as a name: a name should be one word'
+        if depth >= _MOST_LEVELS:
+            return f'more than {_MOST_LEVELS} levels, one within the other'
+    return ''
 
 
 @contextmanager
@@ -65,26 +103,28 @@ def usable_files(args: Sequence[str], leaves_out: bool) -> Iterator[list[str]]:
         for number, path in enumerate(parameter_files(args)):
             if not Path(path).is_file():  # ROS says why it cannot be read
                 continue
-            bad = [(name, line) for name, line in _sections(parameter_tree(path))
+            tree = parameter_tree(path)
+            bad = [(name, line) for name, line in _sections(tree)
                    if not _NAME.fullmatch(name)]
             problems += [Problem(Place(path, line), (
                 f'"{printable(name)}" cannot name a node: letters, digits and underscores, as in '
                 f'{re.sub("[^0-9A-Za-z_/]", "_", name)}')) for name, line in bad]
             if bad and leaves_out:
                 copy = Path(folder, f'{number}.yaml')
-                copy.write_text(yaml.safe_dump(_without_bad_names(yaml.safe_load(
-                    Path(path).read_text(encoding='utf-8')))), encoding='utf-8')
+                _leave_out_bad_names(tree)
+                copy.write_text(yaml.serialize(tree), encoding='utf-8')
                 usable[usable.index(path)] = str(copy)
         if problems and not leaves_out:
             raise ConfigurationError(problems)
         yield usable
 
 
-def _without_bad_names(tree: Any) -> Any:
-    if not isinstance(tree, dict):
-        return tree
-    return {key: below if key == _PARAMETERS else _without_bad_names(below)
-            for key, below in tree.items() if _NAME.fullmatch(str(key))}
+def _leave_out_bad_names(tree: yaml.Node | None) -> None:
+    if isinstance(tree, yaml.MappingNode):
+        tree.value = [entry for entry in tree.value if _NAME.fullmatch(str(entry[0].value))]
+        for key, below in tree.value:
+            if key.value != _PARAMETERS:
+                _leave_out_bad_names(below)
 
 
 def _sections(tree: yaml.Node | None) -> Iterator[tuple[str, int]]:
