@@ -97,7 +97,7 @@ class RestartedLine(Line):
         self._make = make
         self._closing: threading.Thread | None = None
         self._again: float | None = None
-        self._logger = get_logger(name.strip('/').replace('/', '.'))
+        self._logger = get_logger(printable(name).strip('/').replace('/', '.'))
 
     def start(self) -> None:
         """Make the node and run it."""
@@ -133,7 +133,7 @@ class RestartedLine(Line):
     def _begin_again(self, error: Exception) -> None:
         """End the node, which may take seconds that the other lines do not have."""
         self.restarts += 1
-        text = str(error) if isinstance(error, LinkFailed) else bug_text(error)
+        text = printable(str(error)) if isinstance(error, LinkFailed) else bug_text(error)
         self._logger.error(f'ends by an internal error and begins again: {text}')
         self._again = time.monotonic() + _RESTART_AFTER
         if self.node is not None:

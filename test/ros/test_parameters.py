@@ -112,6 +112,14 @@ def test_one_line_tells_what_the_node_runs_with(
         'baud, CRC; 2 rows, topics: 2 to read, 1 to write')
 
 
+def test_no_path_and_no_port_forges_a_line_of_the_log(
+        configured: Callable[..., Configuration], files: dict[str, str], tmp_path: Path) -> None:
+    forged = tmp_path / 'net\n[FATAL] [abdf1]: \x1b[2J.csv'
+    Path(files['net_file']).rename(forged)
+    told = str(configured(net_file=str(forged), port='/dev/tty\n[FATAL]'))
+    assert told.isprintable() and r'net\n[FATAL] [abdf1]: \x1b[2J.csv' in told
+
+
 def test_defaults_are_those_of_the_contract() -> None:
     parameters = Parameters()
     assert (parameters.strict_map, parameters.read_only) == (False, False)

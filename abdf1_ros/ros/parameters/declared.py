@@ -41,7 +41,7 @@ from abdf1_ros.settings.mapping import Mapping
 from abdf1_ros.settings.network import FIELDS, load_network, make_network, Network, URLS
 from abdf1_ros.settings.rows import Rows
 from abdf1_ros.settings.station_lists import octal_of, parse_stations
-from abdf1_ros.text import counted
+from abdf1_ros.text import counted, printable
 from rcl_interfaces.msg import ParameterDescriptor
 from rclpy.exceptions import ParameterException
 from rclpy.node import Node
@@ -173,10 +173,11 @@ class Configuration:
         network, parameters = self.network, self.parameters
         read = len(self.mappings.published)
         written = len({mapping.topic for mapping in self.mappings.messages})
-        return (f'{_resolved(parameters.net_file)} and {_resolved(parameters.map_file)}: '
-                f'port {self.port}, Mode {network.mode}, {network.baud} baud, '
-                f'{network.error_code}; {counted(len(self.mappings), "row")}, topics: '
-                f'{read} to read, {written} to write')
+        files = f'{_resolved(parameters.net_file)} and {_resolved(parameters.map_file)}'
+        rows = counted(len(self.mappings), 'row')
+        return (f'{printable(files)}: port {printable(self.port)}, Mode {network.mode}, '
+                f'{network.baud} baud, {network.error_code}; {rows}, topics: {read} to read, '
+                f'{written} to write')
 
 
 def take_given(node: Node) -> Given:
