@@ -82,7 +82,7 @@ class Bound:
     @property
     def presets(self) -> tuple[int, int] | None:
         """Return the presets of rungs 3 and 5 in units of 10 ms, None where there are none."""
-        if self.mapping.heartbeat is None or self.seconds is None:
+        if not self.mapping.is_heartbeat or self.seconds is None:
             return None
         watchdog = math.ceil(round(self.seconds / TIME_BASE, 6))
         return watchdog, watchdog + STABLE
@@ -94,7 +94,7 @@ class Bound:
             watchdog, stable = self.presets
             return (f'heartbeat {tag}, station {station}: PLC timer presets {watchdog} (watchdog, '
                     f'rung 3) and {stable} (rung 5), time base 0.01 s')
-        kind = 'heartbeat' if self.mapping.heartbeat else 'fallback of'
+        kind = 'heartbeat' if self.mapping.is_heartbeat else 'fallback of'
         if self.seconds is None:
             return f'{kind} {tag}, station {station}: no bound, its master decides'
         usual = '' if self.usual is None else \
@@ -220,7 +220,7 @@ def remarks(network: Network, mappings: Rows,
     """Yield remarks on the times of heartbeats and fallbacks (rules 2 and 16)."""
     longest = Times(network, mappings, (), response_time).longest
     for mapping in mappings:
-        if mapping.heartbeat is not None and mapping.period is not None:
+        if mapping.is_heartbeat and mapping.period is not None:
             if longest > mapping.period / 1000:
                 yield (f'{mapping.tag}: one transaction may take {milliseconds(longest)}, its '
                        f'Period is {mapping.period} ms; shorten Timeout, Cmd_Timeout or the '
@@ -281,11 +281,11 @@ def _question_time(model: LineModel, response_time: float) -> float:
 
 def costs(network: Network, mappings: Rows, default_period: float,
           response_time: float = forecast.USUAL_RESPONSE_TIME) -> Iterator[str]:
-    """Yield what Publish_While RUN costs, for each station."""
+    """Yield what While RUN costs, for each station."""
     question = _question_time(forecast.line_model(network), response_time)
     periods = mode_periods(mappings, default_period, forecast.USUAL_STALE_AFTER)
     for station in sorted({mapping.station for mapping in mappings.guarded if mapping.needs_run}):
-        yield (f'Publish_While RUN: asking station {station} for its mode about every '
+        yield (f'While RUN: asking station {station} for its mode about every '
                f'{milliseconds(periods[station])} takes {question / periods[station]:.0%} of the '
                'time')
 
@@ -305,8 +305,8 @@ def conditions(network: Network, mappings: Rows) -> Iterator[str]:
 def guard_faults(model: LineModel, mappings: Rows,
                  default_period: float) -> Iterator[tuple[Mapping, CellFault]]:
     """Yield the guarded rows whose counter is not read often enough (rule 14), and why."""
-    counters = {mapping: (condition.text, condition.timeout) for mapping in mappings.guarded
-                if (condition := mapping.publish_while) and condition.timeout is not None}
+    counters = {mapping: (condition.names[0], condition.timeout) for mapping in mappings.guarded
+                if (condition := mapping.condition) and condition.timeout is not None}
     blocks = Planner(model, default_period).plan(mappings) if counters else []
     expected = forecast.intervals(blocks, own_work(model, mappings, default_period))
     found = {mapping.tag: expected[block.period] for block in blocks for mapping in block.mappings}
@@ -314,5 +314,5 @@ def guard_faults(model: LineModel, mappings: Rows,
         needed = READS_IN_TIME * found.get(tag, 0.0)
         if timeout / 1000 < needed:
             yield mapping, CellFault(
-                'Heartbeat_Timeout', f'Heartbeat_Timeout {timeout} ms is shorter than '
+                'While_Timeout', f'While_Timeout {timeout} ms is shorter than '
                 f'{READS_IN_TIME} reads of {tag} on this line; {needed * 1000:.0f} ms would do')

@@ -193,7 +193,7 @@ class Planner:
             return self._default_period
         seconds = mapping.period / 1000
         # A heartbeat is read back between two counts, wherever in between another writer writes.
-        return seconds / 2 if mapping.heartbeat else seconds
+        return seconds / 2 if mapping.is_heartbeat else seconds
 
     def _plan_area(self, area: StationArea, demands: Sequence[_Demand],
                    poll_cycle: float) -> list[Block]:

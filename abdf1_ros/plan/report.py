@@ -47,7 +47,7 @@ from abdf1_ros.text import counted, first, milliseconds
 _HIGH_LOAD = 0.8
 _WORTH_SAVING = 0.05  # of the poll cycle
 _NAMED_TAGS = 3
-_LONG_REQUIRES = 10_000  # ms
+_LONG_TIMEOUT = 10_000  # ms
 
 PERIOD_STEPS = tuple(step * 10**power for power in (2, 3, 4) for step in (1, 2, 5))
 """The values of Period (ms) that we advise."""
@@ -150,9 +150,9 @@ class Report:
         if silent:
             found.append(f'bits with Publish Change: {_tags(silent)}; their topics promise '
                          'nothing, so a subscriber with a deadline gets no values')
-        free = [mapping for mapping in bits if mapping.publish_while is None]
+        free = [mapping for mapping in bits if mapping.condition is None]
         if free:
-            found.append(f'bits without Publish_While: {_tags(free)}; their values go on when the '
+            found.append(f'bits without While: {_tags(free)}; their values go on when the '
                          'program of the PLC stops')
         if gaps := '; '.join(_unprotected(self.mappings)):
             found.append(f'nothing protects: {gaps}')
@@ -182,14 +182,14 @@ def _unprotected(mappings: Rows) -> Iterator[str]:
         yield f'{len(bare)} of {len(written)} written rows, without Fallback: {_tags(bare)}'
     stations = {mapping.station for mapping in written}
     beats = mappings.heartbeats
-    deaf = [mapping for mapping in beats if mapping.heartbeat and not mapping.heartbeat.requires
+    deaf = [mapping for mapping in beats if mapping.condition is None
             and mapping.station in stations]
     if deaf:
-        yield f'heartbeats that count whoever publishes, without Requires: {_tags(deaf)}'
-    slow = [mapping for mapping in beats if mapping.heartbeat
-            and (mapping.heartbeat.requires_timeout or 0) > _LONG_REQUIRES]
+        yield f'heartbeats that count whoever publishes, without While: {_tags(deaf)}'
+    slow = [mapping for mapping in beats
+            if mapping.condition and (mapping.condition.timeout or 0) > _LONG_TIMEOUT]
     if slow:
-        yield f'Requires_Timeout over {_LONG_REQUIRES // 1000} s: {_tags(slow)}'
+        yield f'While_Timeout over {_LONG_TIMEOUT // 1000} s: {_tags(slow)}'
     pushed = [mapping for mapping in mappings.served
               if not mapping.is_read_only and not mapping.period]
     if pushed:

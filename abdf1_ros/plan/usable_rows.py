@@ -58,7 +58,7 @@ def usable_rows(mappings: Rows, network: Network,
     Return the rows that can be used on this line, and the faults of the others.
 
     ``default_period`` (s) is for rows without Period. A row whose counter is not read often enough
-    for its Heartbeat_Timeout cannot be used, nor a row that depends on one that cannot
+    for its While_Timeout cannot be used, nor a row that depends on one that cannot
     (docs/heartbeats.md, rules 14 and 15).
     """
     found = line_problems(mappings, network)

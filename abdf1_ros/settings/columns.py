@@ -162,20 +162,15 @@ MAP_COLUMNS = (
            kind=_WORDS, attribute='fallback.values', commands=(Command.WRITE, Command.SERVE)),
     Column('Fallback_After', 'none', 'ms, 200-60000', kind=milliseconds_from(200, 60_000),
            attribute='fallback.after', commands=(Command.WRITE, Command.SERVE)),
-    Column('Requires', 'none',
-           'of a Heartbeat: write topics, separated by spaces, that must have messages',
-           kind=_WORDS, attribute='heartbeat.requires', commands=(Command.HEARTBEAT,)),
-    Column('Requires_Timeout', 'none', 'ms that the last good message of each may be old',
-           kind=milliseconds_from(100, 3_600_000),
-           attribute='heartbeat.requires_timeout', commands=(Command.HEARTBEAT,)),
-    Column('Publish_While', 'none',
+    Column('While', 'none',
            'of a Read: RUN, or the tag of a counter that the program of the PLC runs; values are '
-           'published only while it holds',
-           kind=TEXT, attribute='publish_while.text', commands=(Command.READ,)),
-    Column('Heartbeat_Timeout', 'none',
-           'ms that the counter of Publish_While may stay unchanged',
-           kind=milliseconds_from(100, 3_600_000),
-           attribute='publish_while.timeout', commands=(Command.READ,)),
+           'published only while it holds. Of a Heartbeat: write topics, separated by spaces, '
+           'that must have messages',
+           kind=TEXT, attribute='condition.names', commands=(Command.READ, Command.HEARTBEAT)),
+    Column('While_Timeout', 'none',
+           'ms that the counter may stay unchanged, or that the last good message of each topic '
+           'may be old; not with RUN', kind=milliseconds_from(100, 3_600_000),
+           attribute='condition.timeout', commands=(Command.READ, Command.HEARTBEAT)),
     Column('Confirms', 'none',
            'of a Read of the one bit "ROS in control": the tag of the Heartbeat row it goes with',
            kind=TEXT, commands=(Command.READ,)),
@@ -190,5 +185,9 @@ MAP_COLUMNS = (
 BY_NAME = {column.name: column for column in MAP_COLUMNS}
 
 COLUMNS = tuple(BY_NAME)
+
+RENAMED = {'Publish_While': 'While', 'Heartbeat_Timeout': 'While_Timeout', 'Requires': 'While',
+           'Requires_Timeout': 'While_Timeout'}
+"""What columns of earlier versions are called now."""
 
 NEEDED = tuple(column.name for column in MAP_COLUMNS if column.default is None)

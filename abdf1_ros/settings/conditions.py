@@ -33,12 +33,11 @@ from abdf1_ros.settings.heartbeats import (
     counts,
     DEFAULT_PERIOD,
     Fallback,
-    Heartbeat,
-    PublishWhile,
     RUN,
+    While,
 )
 from abdf1_ros.settings.limits import raw_values
-from abdf1_ros.settings.mapping import Command, Mapping, Publish
+from abdf1_ros.settings.mapping import Mapping, Publish
 from abdf1_ros.text import counted, shown
 
 # What was read of the cells of a row that are not empty, by column.
@@ -57,16 +56,14 @@ class ReportFault(Protocol):
 
 
 def with_conditions(row: Row, values: Cells, mapping: Mapping, fault: ReportFault) -> Mapping:
-    """Return a mapping with its heartbeat, fallback and condition for values."""
-    heartbeat = None
-    if mapping.command is Command.HEARTBEAT:
-        heartbeat = _heartbeat(row, values, mapping, fault)
+    """Return a mapping with its fallback and its condition."""
+    if mapping.is_heartbeat:
+        _check_heartbeat(row, mapping, fault)
         mapping = replace(mapping, period=mapping.period or DEFAULT_PERIOD)
-    fallback = _fallback(values, mapping, fault)
-    publish_while = _publish_while(values, mapping, fault)
     if mapping.confirms and (mapping.type, mapping.length) != (ValueType.BOOL, 1):
         fault('Confirms', 'Confirms is for a Read row of one bit (bool, Length 1)')
-    return replace(mapping, heartbeat=heartbeat, fallback=fallback, publish_while=publish_while)
+    return replace(mapping, fallback=_fallback(values, mapping, fault),
+                   condition=_condition(values, mapping, fault))
 
 
 def _needed(values: Cells, column: str, fault: ReportFault) -> int | None:
@@ -77,8 +74,8 @@ def _needed(values: Cells, column: str, fault: ReportFault) -> int | None:
     return value
 
 
-def _heartbeat(row: Row, values: Cells, mapping: Mapping, fault: ReportFault) -> Heartbeat:
-    """Return what a row with Command Heartbeat asks for (rules 1, 3 and 4)."""
+def _check_heartbeat(row: Row, mapping: Mapping, fault: ReportFault) -> None:
+    """Check what a row with Command Heartbeat asks for (rules 1 and 4)."""
     if row.get('Period') and _PERIODS.read(row.get('Period')) is None:
         fault('Period', f'Period = "{row.get("Period")}" should be {_PERIODS.right}')
     if mapping.length != 1:
@@ -93,13 +90,6 @@ def _heartbeat(row: Row, values: Cells, mapping: Mapping, fault: ReportFault) ->
         fault('Address', f'{address} has a meaning to the processor, and a heartbeat counts '
                          'through all values; take a word of its own in an N or B file, such as '
                          'N7:0')
-    topics = values.get('Requires', ())
-    if not topics:
-        if 'Requires_Timeout' in values:
-            fault('Requires_Timeout', 'Requires_Timeout is for a row with Requires',
-                  is_superfluous=True)
-        return Heartbeat()
-    return Heartbeat(topics, _needed(values, 'Requires_Timeout', fault))
 
 
 def _fallback(cells: Cells, mapping: Mapping, fault: ReportFault) -> Fallback | None:
@@ -144,31 +134,32 @@ def _fallback_values(texts: Sequence[str], mapping: Mapping,
             yield value
 
 
-def _publish_while(cells: Cells, mapping: Mapping, fault: ReportFault) -> PublishWhile | None:
-    """Return the condition for a row's values, None for none (rules 13 and 14)."""
-    condition, timeout = cells.get('Publish_While'), cells.get('Heartbeat_Timeout')
-    if not condition:
+def _condition(cells: Cells, mapping: Mapping, fault: ReportFault) -> While | None:
+    """Return what has to hold for a row, None for nothing (rules 3, 13 and 14)."""
+    text, timeout = cells.get('While', ''), cells.get('While_Timeout')
+    if not text:
         if timeout:
-            fault('Heartbeat_Timeout', 'Heartbeat_Timeout is for a row with Publish_While',
-                  is_superfluous=True)
+            fault('While_Timeout', 'While_Timeout is for a row with While', is_superfluous=True)
         return None
+    if mapping.is_heartbeat:
+        names = tuple(text.split())
+        if RUN in map(str.upper, names):
+            fault('While', 'RUN is the mode of a PLC, and a heartbeat depends on topics whose '
+                           'messages we get')
+        return While(names, _needed(cells, 'While_Timeout', fault))
     if mapping.publish is not Publish.ALWAYS:
-        fault('Publish_While', 'Publish_While needs Publish Always: with Change a silent topic '
-                               'would look normal')
-    if condition.upper() != RUN:
-        if condition == mapping.tag:
-            fault('Publish_While', 'a row cannot depend on itself; name the tag of a counter')
+        fault('While', 'While needs Publish Always: with Change a silent topic would look normal')
+    if text.upper() == RUN:
         if timeout:
-            return PublishWhile(condition, timeout)
-        if difflib.get_close_matches(condition.upper(), [RUN]):
-            fault('Publish_While', f'"{condition}" is not {RUN}: did you mean {RUN}? The tag of a '
-                                   'counter needs a Heartbeat_Timeout')
-        else:
-            fault('Heartbeat_Timeout', 'Heartbeat_Timeout is missing: ms that the counter '
-                  f'"{shown(condition)}" may stand still; for the mode of the processor '
-                  f'Publish_While is {RUN}')
-        return PublishWhile(condition, None)
-    if timeout:
-        fault('Heartbeat_Timeout', 'RUN has no Heartbeat_Timeout: the age of the mode is bounded '
-                                   'by the stale time', is_superfluous=True)
-    return PublishWhile(None, None)
+            fault('While_Timeout', 'RUN has no While_Timeout: the age of the mode is bounded by '
+                                   'the stale time', is_superfluous=True)
+        return While((RUN,))
+    if text == mapping.tag:
+        fault('While', 'a row cannot depend on itself; name the tag of a counter')
+    if not timeout and difflib.get_close_matches(text.upper(), [RUN]):
+        fault('While', f'"{text}" is not {RUN}: did you mean {RUN}? The tag of a counter needs a '
+                       'While_Timeout')
+    elif not timeout:
+        fault('While_Timeout', f'While_Timeout is missing: ms that the counter "{shown(text)}" '
+                               f'may stand still; for the mode of the processor While is {RUN}')
+    return While((text,), timeout)

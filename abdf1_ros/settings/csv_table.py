@@ -27,13 +27,14 @@ would hide all rows up to the next quote, without an error.
 from __future__ import annotations
 
 import codecs
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Mapping, Sequence
 import csv
 from dataclasses import dataclass, replace
 import difflib
 import io
 from pathlib import Path
 import re
+from types import MappingProxyType
 
 from abdf1_ros.problems import ConfigurationError, Place, Problem
 from abdf1_ros.settings.hints import export_fault, hint, is_spreadsheet_error, row_hint
@@ -106,12 +107,14 @@ def read_rows(path: str, known: Sequence[str]) -> list[Row]:
     return table.rows
 
 
-def read_table(path: str, known: Sequence[str], needed: Collection[str] = ()) -> Table:
+def read_table(path: str, known: Sequence[str], needed: Collection[str] = (),
+               renamed: Mapping[str, str] = MappingProxyType({})) -> Table:
     """
     Read a file whose header uses ``known`` column names, the ``needed`` ones among them.
 
     Raises ConfigurationError where there is no header. Where a needed column is missing there are
-    no rows: each would lack the same.
+    no rows: each would lack the same. Columns that were ``renamed``, and their cells, are faults
+    that say the new name.
     """
     try:
         (first, header), *others = _read_lines(path, known)
@@ -123,7 +126,8 @@ def read_table(path: str, known: Sequence[str], needed: Collection[str] = ()) ->
         _check_direction(Place(path, first), names, others, known)
     except Problem as problem:
         raise ConfigurationError([problem]) from None
-    columns, faults = _columns(Place(path, first), names, known, needed)
+    columns, faults = _columns(Place(path, first), names, known, needed, renamed)
+    old = {name.lower(): new for name, new in renamed.items()}
     rows: list[Row] = []
     problems: list[Problem] = []
     item = 0
@@ -134,6 +138,7 @@ def read_table(path: str, known: Sequence[str], needed: Collection[str] = ()) ->
             _check_text(place, text)
             cells = _cells(place, text, delimiter)
             _check_cells(place, cells, names, columns, delimiter)
+            faults += _moved(place, cells, names, old)
         except Problem as problem:
             problems.append(problem)
             continue
@@ -219,8 +224,17 @@ def _check_direction(place: Place, names: list[str], others: list[tuple[int, str
                              'side by side into one row, and the values into the row below it')
 
 
-def _columns(place: Place, names: list[str], known: Sequence[str],
-             needed: Collection[str]) -> tuple[dict[str, int], list[Problem]]:
+def _moved(place: Place, cells: Sequence[str], names: Sequence[str],
+           renamed: Mapping[str, str]) -> list[Problem]:
+    """Return the faults of the cells of columns that have another name now."""
+    return [Problem(replace(place, cell=number),
+                    f'write {renamed[name.lower()]} = "{shown(cell)}" instead of {name}')
+            for number, (name, cell) in enumerate(zip(names, cells, strict=False), 1)
+            if cell and name.lower() in renamed]
+
+
+def _columns(place: Place, names: list[str], known: Sequence[str], needed: Collection[str],
+             renamed: Mapping[str, str]) -> tuple[dict[str, int], list[Problem]]:
     """
     Return the cell number of each column, and the faults of the header.
 
@@ -232,6 +246,7 @@ def _columns(place: Place, names: list[str], known: Sequence[str],
         raise ConfigurationError([Problem(
             place, f'no column is named here{row_hint(names)}; the first row names them, with '
                    f'comma, semicolon or tab between: {", ".join(known)}')])
+    old = {name.lower(): new for name, new in renamed.items()}
     free = [name for name in known if name not in meant]
     listing = f'; known: {", ".join(known)}'
     columns: dict[str, int] = {}
@@ -241,7 +256,9 @@ def _columns(place: Place, names: list[str], known: Sequence[str],
         where = replace(place, cell=number)
         if not name:
             continue
-        if column is None:
+        if name.lower() in old:
+            problems.append(Problem(where, f'column {name} is called {old[name.lower()]} now'))
+        elif column is None:
             close = _close(name, free)
             advice = hint(name) or (f'; did you mean {close}?' if close else listing)
             problems.append(Problem(where, f'unknown column "{shown(name)}"{advice}'))

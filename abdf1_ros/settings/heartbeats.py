@@ -15,9 +15,9 @@
 """
 Heartbeats, fallback values and reads that depend on a running PLC, as a map CSV asks for them.
 
-A heartbeat tells the PLC that the bridge is alive, and that messages of the topics in Requires
-still come. A fallback value is written when no message comes any more. Publish_While withholds
-values of a PLC whose program does not run. None of them is a safety function. The numbers of rules
+A heartbeat tells the PLC that the bridge is alive, and that messages of the topics in While still
+come. A fallback value is written when no message comes any more. While withholds values of a PLC
+whose program does not run. None of them is a safety function. The numbers of rules
 are those of docs/heartbeats.md.
 """
 
@@ -31,10 +31,10 @@ DEFAULT_PERIOD = 1000
 """Of a heartbeat (ms)."""
 
 RUN = 'RUN'
-"""What Publish_While says for the mode of the processor."""
+"""What While says for the mode of the processor."""
 
 READS_IN_TIME = 3
-"""So often a counter has to be read within its Heartbeat_Timeout (rule 14)."""
+"""So often a counter has to be read within its While_Timeout (rule 14)."""
 
 TIME_BASE = 0.01
 """Of the timers in the PLC (s)."""
@@ -43,19 +43,6 @@ STABLE = 100
 """So many units of that rung 5 is longer than rung 3."""
 
 _COUNTING = (ValueType.INT16, ValueType.UINT16)
-
-
-@dataclass(frozen=True, slots=True)
-class Heartbeat:
-    """
-    A word that counts while its conditions hold (rules 1 to 4).
-
-    Each write topic in ``requires`` must have a message not older than ``requires_timeout`` (ms,
-    None where there are no such topics).
-    """
-
-    requires: tuple[str, ...] = ()
-    requires_timeout: int | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -71,23 +58,24 @@ class Fallback:
 
 
 @dataclass(frozen=True, slots=True)
-class PublishWhile:
+class While:
     """
-    The condition for values to be published (rules 13 to 15).
+    What has to hold for values to be published, or for a heartbeat to count.
 
-    ``tag`` is that of a counter in the PLC's program, None for the mode RUN; ``timeout`` (ms) is
-    how long the counter may stay unchanged, None for RUN.
+    ``names`` has RUN, or the tag of a counter in the PLC's program (rules 13 to 15); of a
+    heartbeat write topics (rule 3). ``timeout`` (ms) is how long the counter may stay unchanged,
+    and how old the last message of each topic may be; None for RUN.
     """
 
-    tag: str | None
-    timeout: int | None
+    names: tuple[str, ...]
+    timeout: int | None = None
 
     @property
-    def text(self) -> str:
-        """Return what stands in the cell."""
-        return self.tag or RUN
+    def is_run(self) -> bool:
+        """Tell whether it is the mode of the processor."""
+        return self.names == (RUN,)
 
 
 def counts(kind: ValueType, length: int) -> bool:
-    """Tell whether Publish_While may name this mapping: one integer word (rule 13)."""
+    """Tell whether While may name this mapping: one integer word (rule 13)."""
     return kind in _COUNTING and length == 1

@@ -16,16 +16,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Collection, Iterator
 import re
 
 from abdf1_ros.df1.packet import BROADCAST
 from abdf1_ros.pccc.families import FAMILIES
 from abdf1_ros.pccc.processor import Processor, USUAL
 from abdf1_ros.problems import ConfigurationError, Problem
-from abdf1_ros.settings.columns import COLUMNS, NEEDED
+from abdf1_ros.settings.columns import COLUMNS, NEEDED, RENAMED
 from abdf1_ros.settings.csv_table import read_table, Row
-from abdf1_ros.settings.heartbeats import counts, READS_IN_TIME
+from abdf1_ros.settings.heartbeats import counts, READS_IN_TIME, RUN
 from abdf1_ros.settings.map_row import CellFault, RowReader
 from abdf1_ros.settings.mapping import Command, Mapping
 from abdf1_ros.settings.rows import Rows
@@ -42,7 +42,7 @@ def load_mappings(path: str) -> tuple[Rows, list[Problem]]:
     Raises ConfigurationError when the file as a whole cannot be used.
     """
     mappings: list[Mapping] = []
-    table = read_table(path, COLUMNS, NEEDED)
+    table = read_table(path, COLUMNS, NEEDED, RENAMED)
     problems = table.faults + table.row_faults
     clashes = _Clashes()
     kept: dict[int, Row] = {}
@@ -70,28 +70,46 @@ def broken_links(mappings: Rows) -> Iterator[tuple[Mapping, CellFault]]:
     A row that was left out takes the rows that depend on it along (docs/heartbeats.md, rule 15).
     """
     tags = {mapping.tag: mapping for mapping in mappings}
+    runs = {mapping.tag.upper(): mapping for mapping in mappings if mapping.tag.upper() == RUN}
     topics = {mapping.topic for mapping in mappings.messages}
     for mapping in mappings:
-        for topic in mapping.heartbeat.requires if mapping.heartbeat else ():
-            if topic not in topics:
-                yield mapping, CellFault('Requires', _no_topic(topic, mappings))
         if mapping.confirms and (text := _no_confirmation(mapping, tags, mappings)):
             yield mapping, CellFault('Confirms', f'"{shown(mapping.confirms)}" {text}')
-        condition = mapping.publish_while
-        if condition is None or condition.tag is None:
-            continue
-        counter = tags.get(condition.tag)
-        if counter is None:
-            yield mapping, CellFault(
-                'Publish_While', 'should be RUN or the tag of a good Read row; '
-                f'"{shown(condition.tag)}" is neither')
-        elif text := _no_counter(mapping, counter, mappings):
-            yield mapping, CellFault('Publish_While', f'"{shown(condition.tag)}" {text}')
-        elif counter.period and condition.timeout \
-                and condition.timeout < READS_IN_TIME * counter.period:
-            yield mapping, CellFault(
-                'Heartbeat_Timeout', f'Heartbeat_Timeout {condition.timeout} is less than '
-                f'{READS_IN_TIME} x {counter.period} ms, the Period of {shown(counter.tag)}')
+        condition = mapping.condition
+        for name in condition.names if condition else ():
+            named = (runs if name == RUN else tags).get(name)
+            if named and (text := _two_meanings(name, named, topics)):
+                yield mapping, CellFault('While', f'"{shown(name)}" {text}')
+            elif mapping.is_heartbeat and name not in topics:
+                yield mapping, CellFault('While', _no_topic(name, mappings))
+            elif mapping.is_guarded and not mapping.needs_run:
+                if named is None:
+                    yield mapping, CellFault(
+                        'While', 'should be RUN or the tag of one good Read row; '
+                        f'"{shown(name)}" is neither')
+                elif text := _no_counter(mapping, named, mappings):
+                    yield mapping, CellFault('While', f'"{shown(name)}" {text}')
+                elif text := _too_rare(mapping, named):
+                    yield mapping, CellFault('While_Timeout', text)
+
+
+def _two_meanings(name: str, row: Mapping, topics: Collection[str]) -> str:
+    """Return what else than the tag of ``row`` a name in While may mean, empty for nothing."""
+    its_tag = f'the tag of item {row.item} (line {row.place.line})'
+    if name == RUN:
+        return f'is the mode of the PLC, and {its_tag}; give that row another tag'
+    if name in topics and row.topic != name:
+        return f'is a write topic, and {its_tag}; give that row another tag'
+    return ''
+
+
+def _too_rare(mapping: Mapping, counter: Mapping) -> str:
+    """Return why the Period of a counter is too long, empty if it is not (rule 14)."""
+    timeout = mapping.condition and mapping.condition.timeout
+    if not (timeout and counter.period) or timeout >= READS_IN_TIME * counter.period:
+        return ''
+    return f'While_Timeout {timeout} is less than {READS_IN_TIME} x {counter.period} ms, the ' \
+        f'Period of {shown(counter.tag)}'
 
 
 def _no_topic(topic: str, mappings: Rows) -> str:
@@ -110,7 +128,7 @@ def _no_confirmation(mapping: Mapping, tags: dict[str, Mapping], mappings: Rows)
     """Return why a row cannot confirm a heartbeat's control, empty if it can (rules 21, 22)."""
     beat = tags.get(mapping.confirms)
     first = next(other for other in mappings if other.confirms == mapping.confirms)
-    if not (beat and beat.heartbeat and beat.station == mapping.station and first is mapping):
+    if not (beat and beat.is_heartbeat and beat.station == mapping.station and first is mapping):
         return 'should be the tag of a good Heartbeat row of station ' \
             f'{mapping.station} that no row before it confirms'
     ours = next((row for row in mappings if row.changes and row.shares_words(mapping)), None)
@@ -128,7 +146,7 @@ def _no_counter(mapping: Mapping, counter: Mapping, mappings: Rows) -> str:
         return 'is not one int16 or uint16 word'
     if any(beat.shares_words(counter) for beat in mappings.heartbeats):
         return 'reads our own heartbeat, so both sides would wait for each other'
-    return 'depends on something itself' if counter.publish_while else ''
+    return 'depends on something itself' if counter.condition else ''
 
 
 def _processor(mapping: Mapping) -> Processor | None:

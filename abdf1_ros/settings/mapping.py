@@ -30,7 +30,7 @@ from abdf1_ros.pccc.file_types import FileType, PlcType
 from abdf1_ros.pccc.processor import Processor
 from abdf1_ros.pccc.values import Codec, ValueType, WordOrder
 from abdf1_ros.problems import Place, Problem
-from abdf1_ros.settings.heartbeats import Fallback, Heartbeat, PublishWhile
+from abdf1_ros.settings.heartbeats import Fallback, While
 from abdf1_ros.settings.scaling import Scaling
 
 # Access of a Serve row whose words the other end may only read.
@@ -71,7 +71,7 @@ class Mapping:
     in the unit of the topic: where ``scaling`` is given, that of the engineering values. ``via``
     is the gateway to the station, None for a station of the line itself. With
     ``is_read_only`` the words of a Serve row may not be written by the other end.
-    ``heartbeat`` is there in a Heartbeat row, ``fallback`` and ``publish_while`` where asked for.
+    ``fallback`` and ``condition`` are there where the row has them.
     ``confirms`` is the tag of the heartbeat whose control the bit tells, empty for none.
     ``description`` is to be read. ``remarks`` say what is odd about the row.
     """
@@ -98,9 +98,8 @@ class Mapping:
     is_read_only: bool = False
     via: int | None = None
     description: str = ''
-    heartbeat: Heartbeat | None = None
     fallback: Fallback | None = None
-    publish_while: PublishWhile | None = None
+    condition: While | None = None
     confirms: str = ''
     remarks: tuple[Problem, ...] = ()
     # The codec and the dialect are made once: every read needs them.
@@ -135,6 +134,16 @@ class Mapping:
         return self.command is Command.SERVE
 
     @property
+    def is_heartbeat(self) -> bool:
+        """Tell whether we count in the word."""
+        return self.command is Command.HEARTBEAT
+
+    @property
+    def is_guarded(self) -> bool:
+        """Tell whether values are published only while a condition holds."""
+        return self.reads and self.condition is not None
+
+    @property
     def polls(self) -> bool:
         """Tell whether we read the words from the PLC."""
         return self.command in POLLED
@@ -152,12 +161,12 @@ class Mapping:
     @property
     def changes(self) -> bool:
         """Tell whether we write the words, for messages or by ourselves."""
-        return self.writes or self.heartbeat is not None
+        return self.writes or self.is_heartbeat
 
     @property
     def is_alone(self) -> bool:
         """Tell whether no other row may write the words (rules 1 and 12)."""
-        return self.heartbeat is not None or self.fallback is not None
+        return self.is_heartbeat or self.fallback is not None
 
     @property
     def is_own(self) -> bool:
@@ -167,7 +176,7 @@ class Mapping:
     @property
     def is_planned(self) -> bool:
         """Tell whether we read the words from the PLC, to publish them or to compare them."""
-        return self.polls or self.heartbeat is not None
+        return self.polls or self.is_heartbeat
 
     @property
     def access_cell(self) -> str | Access | None:
@@ -177,7 +186,7 @@ class Mapping:
     @property
     def needs_run(self) -> bool:
         """Tell whether values are published only while the PLC says that it is in RUN."""
-        return self.publish_while is not None and self.publish_while.tag is None
+        return self.is_guarded and self.condition is not None and self.condition.is_run
 
     def shares_words(self, other: Mapping) -> bool:
         """

@@ -65,7 +65,7 @@ class Rows(tuple[Mapping, ...]):
     @cached_property
     def heartbeats(self) -> Rows:
         """Return those that count."""
-        return Rows(row for row in self if row.heartbeat)
+        return Rows(row for row in self if row.is_heartbeat)
 
     @cached_property
     def fallbacks(self) -> Rows:
@@ -75,7 +75,7 @@ class Rows(tuple[Mapping, ...]):
     @cached_property
     def guarded(self) -> Rows:
         """Return those whose values are published only while a condition holds."""
-        return Rows(row for row in self if row.publish_while)
+        return Rows(row for row in self if row.is_guarded)
 
     def without(self, others: Iterable[Mapping]) -> Rows:
         """Return the rows that are not among ``others``."""

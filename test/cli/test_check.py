@@ -87,7 +87,7 @@ def test_files_of_the_package_are_good_and_follow_our_own_advice(
     content = parsed(capsys)
     assert content['errors'] == content['warnings'] == []
     assert {block['station'] for block in content['blocks']} <= {1, 2}
-    assert not [note for note in content['notes'] if 'without Publish_While' in note]
+    assert not [note for note in content['notes'] if 'without While' in note]
 
 
 def test_every_error_of_both_files_at_once(files: tuple[Path, Path],
@@ -160,7 +160,7 @@ def test_notes_are_no_warnings(files: tuple[Path, Path],
                                capsys: pytest.CaptureFixture[str]) -> None:
     bits = 'bits,Read,B3:0/0,1,PLC5,3,1000'
     assert check(files, GOOD_NET, (bits,)) == 0
-    note = 'bits without Publish_While: bits; their values go on when the program of the PLC stops'
+    note = 'bits without While: bits; their values go on when the program of the PLC stops'
     assert capsys.readouterr().out.endswith(f'\nnote: {note}\nno errors, no warnings\n')
     assert check(files, GOOD_NET, (bits,), '--json') == 0
     content = parsed(capsys)

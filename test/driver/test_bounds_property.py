@@ -43,7 +43,7 @@ from abdf1_ros.pccc.families import parse_address
 from abdf1_ros.pccc.file_types import PlcType
 from abdf1_ros.plan.bounds import Times
 from abdf1_ros.plan.report import make_report
-from abdf1_ros.settings.heartbeats import Fallback, Heartbeat
+from abdf1_ros.settings.heartbeats import Fallback
 from abdf1_ros.settings.mapping import Mapping
 from abdf1_ros.settings.network import Network
 from abdf1_ros.settings.rows import Rows
@@ -113,7 +113,7 @@ class Worst(Lost):
         for station in range(1, self.stations + 1):
             via = GATEWAY if station > self.stations - self.behind else None
             common = {'station': station, 'plc': 'SLC', 'via': via}
-            found.append(make_mapping('N10:0', 'Heartbeat', heartbeat=Heartbeat(), period=1000,
+            found.append(make_mapping('N10:0', 'Heartbeat', period=1000,
                                       tag=f'beat_{station}', **common))  # type: ignore[arg-type]
             fallback = Fallback(self.length * (SAFE,), int(AFTER * 1000))
             found += [make_mapping(f'N7:{number * self.length}', 'Write', fallback=fallback,
@@ -330,7 +330,7 @@ class BoundBench:
                  for tag in judged}
         if plant.network.mode == 'Radio':
             found |= {bound.mapping.tag: (bound.seconds or 0.0, self.gaps[bound.mapping.tag])
-                      for bound in report.times.bounds() if bound.mapping.heartbeat
+                      for bound in report.times.bounds() if bound.mapping.is_heartbeat
                       and bound.mapping.station not in plant.silent}
         return found
 
@@ -409,7 +409,7 @@ def test_rule_16_nothing_can_be_left_out_of_the_bound() -> None:
         'NAK_Retries': limit(replace(network, nak_retries=0)),
         'ENQ_Retries': limit(replace(network, enq_retries=0)),
         'Cmd_Timeout': limit(replace(network, cmd_timeout=200)),
-        'heartbeats': limit(network, [row for row in rows if not row.heartbeat]),
+        'heartbeats': limit(network, [row for row in rows if not row.is_heartbeat]),
         'other fallbacks': limit(network, [row for row in rows if not row.fallback or row is
                                            rows[1]]),
         'one transaction': limit(network) - once._at_most(once._any_frames),

@@ -20,7 +20,7 @@ from abdf1_ros.df1.checksum import Checksum
 from abdf1_ros.df1.frames import Duplex, Frame, FrameDecoder, Poll
 from abdf1_ros.df1.packet import Packet
 from abdf1_ros.driver.settings import DriverSettings
-from abdf1_ros.settings.heartbeats import Fallback, Heartbeat
+from abdf1_ros.settings.heartbeats import Fallback
 from abdf1_ros.settings.mapping import Mapping
 from abdf1_ros.settings.network import Network
 from abdf1_ros.simulator.gateway import SimulatedGateway
@@ -162,7 +162,7 @@ class LateBench(DriverBench):
     def _rows(self, number: int, via: int | None) -> list[Mapping]:
         """Return the rows of a station that replies late."""
         rows = [make_mapping('N7:0', 'Heartbeat', station=number, via=via, tag=f'beat{number}',
-                             period=1000, heartbeat=Heartbeat()),
+                             period=1000),
                 make_mapping('N7:1', 'Write', station=number, via=via, tag=f'speed{number}',
                              fallback=Fallback((7,), 1000))]
         read = make_mapping('N7:2', station=number, via=via, tag=f'read{number}')

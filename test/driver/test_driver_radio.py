@@ -21,7 +21,7 @@ from random import Random
 
 from abdf1_ros.plan.bounds import Times
 from abdf1_ros.plan.report import make_report
-from abdf1_ros.settings.heartbeats import Fallback, Heartbeat, PublishWhile
+from abdf1_ros.settings.heartbeats import Fallback, While
 from abdf1_ros.settings.network import Network
 from abdf1_ros.settings.rows import Rows
 import pytest
@@ -38,8 +38,7 @@ class RadioBench(DriverBench):
     def __init__(self, network: Network = NETWORK, stations: int = SECOND) -> None:
         numbers = range(1, stations + 1)
         self.read = [make_mapping('N7:0', station=number, plc='SLC') for number in numbers]
-        self.beat = make_mapping('N10:0', 'Heartbeat', station=FIRST, plc='SLC', period=2000,
-                                 heartbeat=Heartbeat())
+        self.beat = make_mapping('N10:0', 'Heartbeat', station=FIRST, plc='SLC', period=2000)
         self.speed = make_mapping('N10:1', 'Write', station=FIRST, plc='SLC',
                                   fallback=Fallback((7,), 1000))
         rows = [*self.read, self.beat, self.speed]
@@ -76,7 +75,7 @@ def test_guarded_value_ends_with_the_program_of_its_plc(several: bool, loss: flo
     network = replace(NETWORK, collision_avoidance=several)
     alive = make_mapping('N11:3', plc='SLC', station=FIRST, tag='alive', period=500)
     level = make_mapping('N7:0', plc='SLC', station=FIRST, tag='level', period=500,
-                         publish_while=PublishWhile('alive', 3000))
+                         condition=While(('alive',), 3000))
     bench = DriverBench([alive, level], network=network, start=False)
     plc = bench.plc(FIRST, 'SLC', ('N7:0', 4), ('N11:0', 4))
     dice = Random(1)

@@ -26,7 +26,7 @@ from abdf1_ros.driver.write import Outcome
 from abdf1_ros.pccc.dialect import Request
 from abdf1_ros.pccc.families import dialect_of, parse_address
 from abdf1_ros.pccc.file_types import PlcType
-from abdf1_ros.settings.heartbeats import Fallback, Heartbeat
+from abdf1_ros.settings.heartbeats import Fallback
 from abdf1_ros.settings.mapping import Mapping
 from abdf1_ros.settings.network import Network
 import pytest
@@ -218,7 +218,7 @@ class Interlocked(Bench):
         self.speed = make_mapping('N7:10', 'Write', station=PLC, plc='SLC', tag='speed',
                                   fallback=Fallback((7,), 600))
         super().__init__([make_mapping('N7:20', 'Heartbeat', station=PLC, plc='SLC', tag='beat',
-                                       period=300, heartbeat=Heartbeat()), self.speed])
+                                       period=300), self.speed])
         self.is_alive = True
         self.seen: list[tuple[str, int]] = []
         self.plc.slave = HalfDuplexSlave(

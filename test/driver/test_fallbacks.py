@@ -28,7 +28,7 @@ from abdf1_ros.driver.write import Outcome, Write
 from abdf1_ros.pccc.address import Address
 from abdf1_ros.pccc.emulated import Setting
 from abdf1_ros.plan.bounds import MODE_PERIOD
-from abdf1_ros.settings.heartbeats import Fallback, Heartbeat
+from abdf1_ros.settings.heartbeats import Fallback
 from abdf1_ros.settings.network import Network
 import pytest
 from support.driver_bench import DriverBench, store
@@ -303,8 +303,8 @@ def test_rule_10_after_an_unknown_write_it_is_written_once_more() -> None:
 
 def test_rule_10_plc_that_answers_has_its_fallback_before_those_that_do_not() -> None:
     stations = range(11, 19)
-    rows = [make_mapping('N10:0', 'Heartbeat', station=number, tag=f'beat{number}', period=500,
-                         heartbeat=Heartbeat()) for number in stations]
+    rows = [make_mapping('N10:0', 'Heartbeat', station=number, tag=f'beat{number}', period=500)
+            for number in stations]
     speeds = [make_mapping('N7:0', 'Write', station=number, tag=f'speed{number}',
                            fallback=Fallback((7,), 8000)) for number in stations]
     line = Line([*rows, *speeds], stations)

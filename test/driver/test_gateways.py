@@ -22,7 +22,7 @@ from abdf1_ros.df1.checksum import Checksum
 from abdf1_ros.df1.frames import Duplex, Frame, FrameDecoder, Poll, Symbol
 from abdf1_ros.df1.packet import Packet
 from abdf1_ros.driver.settings import DriverSettings
-from abdf1_ros.settings.heartbeats import Fallback, Heartbeat
+from abdf1_ros.settings.heartbeats import Fallback
 from abdf1_ros.settings.network import Network
 from abdf1_ros.simulator.gateway import SimulatedGateway
 import pytest
@@ -226,7 +226,7 @@ class Interlocked(DriverBench):
     def __init__(self, polling: str) -> None:
         kinds = {FIRST: 'PLC5', SECOND: 'SLC'}
         beats = [make_mapping('N10:0', 'Heartbeat', station=number, via=GATEWAY, plc=kind,
-                              tag=f'beat{number}', period=300, heartbeat=Heartbeat())
+                              tag=f'beat{number}', period=300)
                  for number, kind in kinds.items()]
         self.commands = [make_mapping('N7:1', 'Write', station=number, via=GATEWAY, plc=kind,
                                       tag=f'speed{number}', fallback=Fallback((7,), 1000))

@@ -23,7 +23,7 @@ from abdf1_ros.driver.settings import DriverSettings
 from abdf1_ros.pccc.emulated import Setting
 from abdf1_ros.pccc.file_types import PlcType
 from abdf1_ros.pccc.identity import Identity, Mode
-from abdf1_ros.settings.heartbeats import PublishWhile
+from abdf1_ros.settings.heartbeats import While
 from abdf1_ros.settings.mapping import Mapping
 from abdf1_ros.settings.network import Network
 from support.driver_bench import DriverBench, store
@@ -32,7 +32,7 @@ from support.mappings import make_mapping
 
 
 def test_rule_13_run_guards_a_row() -> None:
-    read = make_mapping('N11:0', period=100, publish_while=PublishWhile(None, None))
+    read = make_mapping('N11:0', period=100, condition=While(('RUN',)))
     cell = Cell(read, run=3.0)
     assert len(cell.bench.listener.reads) > 20
     cell.plc.processor.setting = Setting.PROGRAM
@@ -50,7 +50,7 @@ def test_rule_13_run_guards_a_row() -> None:
 
 
 def test_rule_13_answer_about_the_mode_is_no_older_than_the_stale_time() -> None:
-    row = make_mapping('N11:0', publish_while=PublishWhile(None, None))
+    row = make_mapping('N11:0', condition=While(('RUN',)))
     guard = RunGuard()
     point = ReadPoint(row, 1.0, 3.0, guard)
     why_not = partial(guard.why_not, point)
@@ -82,10 +82,10 @@ def test_rule_11_mode_is_asked_for_though_heartbeats_take_the_whole_line() -> No
 
 def test_rule_13_questions_for_the_modes_of_many_plcs_have_their_share_of_a_full_line() -> None:
     stations = range(11, 23)
-    rows = [make_mapping('N11:0', period=300, station=station, publish_while=condition,
+    rows = [make_mapping('N11:0', period=300, station=station, condition=condition,
                          tag=f'row_{station}_{number}')
             for station in stations
-            for number, condition in enumerate((None, PublishWhile(None, None)))]
+            for number, condition in enumerate((None, While(('RUN',))))]
     bench = DriverBench(rows, network=Network(baud=9600))
     for station in stations:
         bench.plc(station, 'PLC5', ('N11:0', 1))
@@ -100,7 +100,7 @@ def test_rule_13_questions_for_the_modes_of_many_plcs_have_their_share_of_a_full
 def counter_cell() -> tuple[Cell, Mapping]:
     """Return a cell whose rows depend on a counter, which stands still."""
     counter = make_mapping('N11:3', tag='alive', period=100)
-    read = make_mapping('N7:0', period=100, publish_while=PublishWhile('alive', 500))
+    read = make_mapping('N7:0', period=100, condition=While(('alive',), 500))
     return Cell(counter, read), read
 
 
@@ -129,7 +129,7 @@ def test_rule_14_counter_has_to_change_twice_before_anything_is_published() -> N
 
 
 def test_rule_14_late_change_ends_what_two_in_time_have_permitted() -> None:
-    row = make_mapping('N7:0', publish_while=PublishWhile('alive', 500))
+    row = make_mapping('N7:0', condition=While(('alive',), 500))
     guard = CounterGuard('alive')
     point = ReadPoint(row, 0.1, 3.0, guard)
     for number, now in enumerate((0.0, 0.3, 0.6)):

@@ -26,7 +26,6 @@ from abdf1_ros.driver.write import Outcome
 from abdf1_ros.errors import CommandTimeout
 from abdf1_ros.messages import Message
 from abdf1_ros.pccc.extent import Extent
-from abdf1_ros.settings.heartbeats import Heartbeat
 from abdf1_ros.settings.network import Network
 from abdf1_ros.settings.rows import Rows
 import pytest
@@ -247,7 +246,7 @@ def test_every_command_has_one_reply_in_time_when_replies_are_lost() -> None:
 def beating_bench(mode: str, polling: str = 'Message') -> DriverBench:
     """Return a driver that reads ten times a second and counts a heartbeat."""
     rows = [make_mapping('N7:0', station=1, plc='SLC', period=100), make_mapping(
-        'N10:0', 'Heartbeat', station=1, plc='SLC', period=500, heartbeat=Heartbeat())]
+        'N10:0', 'Heartbeat', station=1, plc='SLC', period=500)]
     bench = DriverBench(rows, network=Network(
         mode=mode, polling=polling, baud=19200, timeout=100, cmd_timeout=1500))
     bench.plc(1, 'SLC', ('N7:0', 20), ('N10:0', 4))

@@ -23,7 +23,6 @@ from random import Random
 from abdf1_ros.df1.frames import EOT
 from abdf1_ros.driver.guests import ShareAccess
 from abdf1_ros.driver.interlocks.heartbeat import BeatState
-from abdf1_ros.settings.heartbeats import Heartbeat
 from abdf1_ros.settings.network import Network
 import pytest
 from support.driver_bench import DriverBench
@@ -51,8 +50,7 @@ def say(data: bytes, is_polled: bool) -> bytes:
 def made(mode: str, polling: str) -> DriverBench:
     """Return a driver with more to read than the line can carry, and a heartbeat."""
     rows = [make_mapping(f'N{20 + row}:0', station=1, plc='SLC', period=1) for row in range(6)]
-    beat = make_mapping('N10:0', 'Heartbeat', station=1, plc='SLC', period=500,
-                        heartbeat=Heartbeat())
+    beat = make_mapping('N10:0', 'Heartbeat', station=1, plc='SLC', period=500)
     bench = DriverBench([beat, *rows], network=Network(
         mode=mode, polling=polling, baud=19200, timeout=100, cmd_timeout=500))
     bench.plc(1, 'SLC', ('N7:0', 20), ('N10:0', 4), *((f'N{20 + row}:0', 4) for row in range(6)))

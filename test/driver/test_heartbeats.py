@@ -33,7 +33,7 @@ from abdf1_ros.driver.write import Outcome
 from abdf1_ros.pccc.data_table import DataTable
 from abdf1_ros.pccc.families import parse_address
 from abdf1_ros.pccc.file_types import PlcType
-from abdf1_ros.settings.heartbeats import Fallback, Heartbeat
+from abdf1_ros.settings.heartbeats import Fallback, While
 from abdf1_ros.settings.mapping import Mapping
 from abdf1_ros.settings.network import Network, POLLING_MODES
 from abdf1_ros.simulator.simulated_plc import SimulatedPlc
@@ -209,7 +209,7 @@ def test_rule_3d_lapse_that_nobody_saw_is_0_as_well() -> None:
     """Another station's 0 has the line until the topic is back."""
     speed = speed_row(None)
     beats = [make_mapping('N10:0', 'Heartbeat', station=number, tag=f'beat{number}', period=1000,
-                          heartbeat=Heartbeat((speed.topic,), 1000)) for number in (1, 2)]
+                          condition=While((speed.topic,), 1000)) for number in (1, 2)]
     line = Line([speed, *beats], (1, 2))
     for number in range(40):
         line.at(0.1 * number, lambda: line.write(speed, [3]))

@@ -20,7 +20,6 @@ from functools import partial
 from abdf1_ros.df1.packet import Packet
 from abdf1_ros.driver.guests import Guest, GuestCommand, ShareAccess
 from abdf1_ros.driver.interlocks.fallback import FallbackState
-from abdf1_ros.settings.heartbeats import Heartbeat
 from abdf1_ros.settings.mapping import Mapping
 from abdf1_ros.settings.network import POLLING_MODES
 import pytest
@@ -86,7 +85,7 @@ def test_rule_5_write_of_a_guest_on_the_line_when_the_end_begins_does_not_stay(
 def test_rule_5_write_of_a_guest_that_a_gateway_holds_does_not_stay(
         text: str, held: float) -> None:
     speed = make_mapping('N7:0', 'Write', tag='speed', fallback=FALLBACK, via=7)
-    beat = make_mapping('N10:0', 'Heartbeat', tag='beat', period=200, heartbeat=Heartbeat(), via=7)
+    beat = make_mapping('N10:0', 'Heartbeat', tag='beat', period=200, via=7)
     cell = GuestCell(beat, speed, start=False)
     cell.put_behind_gateway()
     cell.run(4.0)
@@ -135,7 +134,7 @@ def test_rule_8_guests_write_over_a_fallback_is_written_over_at_once(dst: int) -
 @pytest.mark.parametrize('count', [1, 2, 3])
 def test_rule_19_own_heartbeats_that_a_gateway_holds_are_no_other_program(
         held: float, count: int) -> None:
-    beat = make_mapping('N10:0', 'Heartbeat', tag='beat', period=200, heartbeat=Heartbeat(), via=7)
+    beat = make_mapping('N10:0', 'Heartbeat', tag='beat', period=200, via=7)
     cell = Cell(beat, start=False)
     cell.put_behind_gateway()
     cell.run(5.0)

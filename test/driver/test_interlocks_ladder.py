@@ -24,7 +24,7 @@ from random import Random
 
 from abdf1_ros.driver.settings import DriverSettings
 from abdf1_ros.pccc.emulated import Setting
-from abdf1_ros.settings.heartbeats import Fallback, Heartbeat
+from abdf1_ros.settings.heartbeats import Fallback
 from abdf1_ros.settings.network import Network
 from abdf1_ros.simulator.ladder import Ladder, Lamp
 import pytest
@@ -44,8 +44,7 @@ class Cell:
         self.gripper = make_mapping('N10:2', 'Write', tag='gripper', plc='SLC',
                                     fallback=Fallback((0,), 1000))
         self.publishes = True
-        self.beat = make_mapping('N10:0', 'Heartbeat', tag='beat', plc='SLC', period=period,
-                                 heartbeat=Heartbeat())
+        self.beat = make_mapping('N10:0', 'Heartbeat', tag='beat', plc='SLC', period=period)
         self.bench = DriverBench([self.beat, self.speed, self.gripper], network=Network(
             baud=19200, timeout=100, cmd_timeout=500, nak_retries=1, enq_retries=1,
             **MODES[mode]), settings=DriverSettings(), start=False)

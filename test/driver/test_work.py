@@ -17,7 +17,7 @@ import importlib
 from pathlib import Path
 
 from abdf1_ros.driver.write import Outcome
-from abdf1_ros.settings.heartbeats import Fallback, PublishWhile
+from abdf1_ros.settings.heartbeats import Fallback, While
 from abdf1_ros.settings.mapping import Mapping
 from abdf1_ros.settings.network import Network
 import pytest
@@ -28,13 +28,13 @@ from support.mappings import make_mapping
 ROWS, FILES = 2000, 10
 
 
-def read_rows(condition: PublishWhile | None, rows: int) -> list[Mapping]:
+def read_rows(condition: While | None, rows: int) -> list[Mapping]:
     """Return rows of one word each, in ten files."""
     return [make_mapping(f'N{20 + number % FILES}:{number // FILES}', tag=f'row{number}',
-                         period=1000, publish_while=condition) for number in range(rows)]
+                         period=1000, condition=condition) for number in range(rows)]
 
 
-def work_of_reads(condition: PublishWhile | None, rows: int) -> int:
+def work_of_reads(condition: While | None, rows: int) -> int:
     """Return the lines run for reading all rows while their condition ends and comes back."""
     counter = make_mapping('N7:0', tag='alive', period=100)
     bench = DriverBench([counter, *read_rows(condition, rows)],
@@ -58,7 +58,7 @@ def work_of_reads(condition: PublishWhile | None, rows: int) -> int:
 
 def test_guarded_rows_cost_little_more_than_others() -> None:
     plain = work_of_reads(None, ROWS)
-    guarded = work_of_reads(PublishWhile('alive', 500), ROWS)
+    guarded = work_of_reads(While(('alive',), 500), ROWS)
     assert guarded < 1.6 * plain  # lines; of the time less
 
 

@@ -29,7 +29,7 @@ from abdf1_ros.plan.bounds import (
 )
 from abdf1_ros.plan.forecast import line_model
 from abdf1_ros.plan.report import make_report
-from abdf1_ros.settings.heartbeats import Fallback, Heartbeat, PublishWhile
+from abdf1_ros.settings.heartbeats import Fallback, While
 from abdf1_ros.settings.mapping import Mapping
 from abdf1_ros.settings.network import Network
 from abdf1_ros.settings.rows import Rows
@@ -44,7 +44,7 @@ QUIET = 0.02 + 10 * 10 / 19200
 
 def beat(period: int = 1000, tag: str = 'beat') -> Mapping:
     """Return a Heartbeat row."""
-    return make_mapping('N10:0', 'Heartbeat', tag=tag, period=period, heartbeat=Heartbeat())
+    return make_mapping('N10:0', 'Heartbeat', tag=tag, period=period)
 
 
 def speed(after: int = 3000, command: str = 'Write', station: int = 1) -> Mapping:
@@ -202,17 +202,17 @@ def test_rule_16_rows_that_are_fast_enough_are_not_warned_of() -> None:
 def test_rule_14_timeout_is_three_planned_intervals() -> None:
     counter = make_mapping('N11:3', tag='alive', period=100)
     guarded = make_mapping('N7:0', tag='level', period=1000,
-                           publish_while=PublishWhile('alive', 250))
+                           condition=While(('alive',), 250))
     (mapping, fault), = guard_faults(line_model(QUICK), Rows([counter, guarded]), 0.1)
     assert mapping is guarded
     assert (fault.column, fault.text) == (
-        'Heartbeat_Timeout', 'Heartbeat_Timeout 250 ms is shorter than 3 reads of alive on this '
+        'While_Timeout', 'While_Timeout 250 ms is shorter than 3 reads of alive on this '
         'line; 300 ms would do')
 
 
 def test_heartbeats_and_questions_for_run_are_counted_in_the_load() -> None:
     plain = make_mapping('N7:0', period=1000)
-    guarded = make_mapping('N7:0', period=1000, publish_while=PublishWhile(None, None))
+    guarded = make_mapping('N7:0', period=1000, condition=While(('RUN',)))
     model = line_model(QUICK)
     assert own_work(model, Rows([plain]), 0.1) == []
     (seconds, period), (_, asked) = own_work(model, Rows([beat(100)]), 0.1)
@@ -225,7 +225,7 @@ def test_heartbeats_and_questions_for_run_are_counted_in_the_load() -> None:
 @pytest.mark.parametrize(('stale_after', 'period'), [(3.0, 1.0), (1.5, 0.5), (100.0, 100 / 3)])
 def test_rule_13_three_answers_about_the_mode_fit_into_the_stale_time(
         stale_after: float, period: float) -> None:
-    guarded = make_mapping('N7:0', period=1000, publish_while=PublishWhile(None, None))
+    guarded = make_mapping('N7:0', period=1000, condition=While(('RUN',)))
     rows = Rows([guarded])
     assert mode_periods(rows, 0.1, stale_after) == {1: pytest.approx(period)}
     (_, asked), = own_work(line_model(QUICK), rows, 0.1, stale_after)
@@ -234,6 +234,6 @@ def test_rule_13_three_answers_about_the_mode_fit_into_the_stale_time(
 
 
 def test_rule_8_mode_of_a_plc_that_we_write_to_by_ourselves_is_asked_every_two_seconds() -> None:
-    guarded = make_mapping('N7:0', period=9000, publish_while=PublishWhile(None, None))
+    guarded = make_mapping('N7:0', period=9000, condition=While(('RUN',)))
     assert mode_periods(Rows([guarded, speed()]), 0.1, 3.0) == {1: MODE_PERIOD}
     assert mode_periods(Rows([make_mapping(), make_mapping(command='Write')]), 0.1, 3.0) == {}

@@ -17,7 +17,7 @@
 from dataclasses import replace
 
 from abdf1_ros.plan.report import make_report, Remark, RemarkKind, Report, setting_remarks
-from abdf1_ros.settings.heartbeats import Fallback, Heartbeat, PublishWhile
+from abdf1_ros.settings.heartbeats import Fallback, While
 from abdf1_ros.settings.mapping import Mapping
 from abdf1_ros.settings.network import Network
 import pytest
@@ -153,7 +153,7 @@ def test_period_that_another_baud_rate_can_keep() -> None:
 
 def test_baud_rate_has_to_do_for_heartbeats_and_questions_too() -> None:
     rows = [make_mapping('N7:0', length=2, period=100, tag='speed'),
-            make_mapping('N10:0', 'Heartbeat', tag='beat', period=300, heartbeat=Heartbeat())]
+            make_mapping('N10:0', 'Heartbeat', tag='beat', period=300)]
     report = report_of(*rows)
     assert report_of(rows[0]).load < 1 < report.load
     needed = report.needed_baud()
@@ -260,37 +260,36 @@ def test_rule_20_what_nothing_protects_is_one_note() -> None:
     fallback = Fallback((0,), 2000)
     guarded = [make_mapping('N10:1', 'Write', tag='speed', fallback=fallback),
                make_mapping('N10:0', 'Heartbeat', tag='beat', period=1000,
-                            heartbeat=Heartbeat(('speed',), 10_000)),
+                            condition=While(('speed',), 10_000)),
                make_mapping('N7:9', 'Serve', station=5, tag='pushed', period=1000)]
     assert report_of(*guarded).notes() == []
     bare = [make_mapping('N7:1', 'Write', tag='word'), make_mapping('B3:0/2', 'Write', tag='bit'),
             make_mapping('N7:3', 'ReadWrite', tag='recipe'),
             make_mapping('O:001', 'Write', tag='lamp'),
-            make_mapping('N10:5', 'Heartbeat', tag='bare', period=1000, heartbeat=Heartbeat()),
-            make_mapping('N11:5', 'Heartbeat', tag='alone', period=1000, station=9,
-                         heartbeat=Heartbeat()),
+            make_mapping('N10:5', 'Heartbeat', tag='bare', period=1000),
+            make_mapping('N11:5', 'Heartbeat', tag='alone', period=1000, station=9),
             make_mapping('N10:6', 'Heartbeat', tag='slow', period=1000,
-                         heartbeat=Heartbeat(('speed',), 10_001)),
+                         condition=While(('speed',), 10_001)),
             make_mapping('N7:8', 'Serve', station=5, tag='silent')]
     note, = report_of(*guarded, *bare).notes()
     assert note == (
         'nothing protects: 4 of 5 written rows, without Fallback: lamp, bit, word and 1 more; '
-        'heartbeats that count whoever publishes, without Requires: bare; Requires_Timeout over '
+        'heartbeats that count whoever publishes, without While: bare; While_Timeout over '
         '10 s: slow; topics of Serve rows without Period, so a PLC that stops is not noticed: '
         'silent')
 
 
 def test_bits_that_go_on_without_the_program_are_noted_and_are_not_odd() -> None:
-    run = PublishWhile(None, None)
+    run = While(('RUN',))
     rows = [make_mapping('B3:0/0', tag='door', period=1000),
-            make_mapping('B3:0/1', tag='guarded', period=1000, publish_while=run),
+            make_mapping('B3:0/1', tag='guarded', period=1000, condition=run),
             make_mapping('B3:0/2', 'ReadWrite', tag='command', period=1000),
             make_mapping('N7:0', tag='word', period=1000)]
     # A command of 7 bytes in a frame of 16, ACK 2, poll 4, reply of 32 in a frame of 38, ACK 2.
     cost, bits, _ = report_of(*rows).notes()
-    assert bits == ('bits without Publish_While: door; their values go on when the program of the '
+    assert bits == ('bits without While: door; their values go on when the program of the '
                     'PLC stops')
-    assert cost == ('Publish_While RUN: asking station 1 for its mode about every 1000 ms takes '
+    assert cost == ('While RUN: asking station 1 for its mode about every 1000 ms takes '
                     f'{62 * CHARACTER + ANSWERS:.0%} of the time')
     assert report_of(rows[3]).notes() == []
     assert report_of(make_mapping('B3:0/0', tag='door', publish='Change')).notes()[0] == (

@@ -15,7 +15,7 @@
 """Rows that do not fit the line or each other."""
 
 from abdf1_ros.plan.usable_rows import line_problems, usable_rows
-from abdf1_ros.settings.heartbeats import Heartbeat, PublishWhile
+from abdf1_ros.settings.heartbeats import While
 from abdf1_ros.settings.mapping import Mapping
 from abdf1_ros.settings.network import Network
 from abdf1_ros.settings.rows import Rows
@@ -77,21 +77,21 @@ def test_station_to_be_read_is_not_our_own(network: Network, is_wrong: bool) -> 
 
 def test_rule_14_counter_has_to_be_read_often_enough_on_this_line() -> None:
     counter = make_mapping('N11:3', tag='alive', item=1)
-    guarded = make_mapping('N7:0', tag='level', item=2, publish_while=PublishWhile('alive', 250))
+    guarded = make_mapping('N7:0', tag='level', item=2, condition=While(('alive',), 250))
     good, (problem,) = usable_rows(Rows([counter, guarded]), Network(baud=19200), 0.1)
     assert good == (counter,)
     assert str(problem) == (
-        'map.csv:3 (Heartbeat_Timeout): Item: 2, Heartbeat_Timeout 250 ms is shorter than 3 reads '
+        'map.csv:3 (While_Timeout): Item: 2, While_Timeout 250 ms is shorter than 3 reads '
         'of alive on this line; 300 ms would do')
 
 
 def test_rule_15_row_that_does_not_fit_the_line_takes_along_what_depends_on_it() -> None:
     own = Network(station=1)
     counter = make_mapping('N11:3', tag='alive', period=100, item=1)
-    guarded = make_mapping('N7:0', tag='level', item=2, publish_while=PublishWhile('alive', 900))
+    guarded = make_mapping('N7:0', tag='level', item=2, condition=While(('alive',), 900))
     word = make_mapping('N7:5', 'Write', tag='speed', topic='speed', item=3)
     beat = make_mapping('N10:0', 'Heartbeat', tag='beat', period=500, station=2, item=4,
-                        heartbeat=Heartbeat(('speed',), 500))
+                        condition=While(('speed',), 500))
     good, problems = usable_rows(Rows([counter, guarded, word, beat]), own, 0.1)
     assert good == ()
     assert [problem.text.partition(',')[0] for problem in problems] == [

@@ -49,7 +49,7 @@ from support.rungs import PageLadder
 
 NET = 'NAK_Retries,ENQ_Retries,Cmd_Timeout,Baud,Timeout\n1,1,500,115200,100\n'
 MAP = """\
-Tag,Command,Address,Station,PLC_Type,Period,Fallback,Fallback_After,Publish_While
+Tag,Command,Address,Station,PLC_Type,Period,Fallback,Fallback_After,While
 speed,Write,N10:1,1,SLC,,7,400,
 doors,Read,N7:0,1,SLC,50,,,RUN
 beat,Heartbeat,N10:0,1,SLC,100,,,
@@ -334,7 +334,7 @@ def test_rule_18_read_only_writes_nothing_and_says_so(
 
 
 ECHO_NET = ('Station,Mode,PLC_Type,Cmd_Timeout,Timeout,Baud', ['5,Peer,PLC5,500,50,115200'])
-ECHO_MAP = ('Tag,Command,Address,Station,PLC_Type,Period,Publish_While,Heartbeat_Timeout', [
+ECHO_MAP = ('Tag,Command,Address,Station,PLC_Type,Period,While,While_Timeout', [
     'ours,Serve,N7:0,5,PLC5,,,', 'speed,Write,N7:0,1,PLC5,,,', 'doors,Read,N7:0,1,PLC5,50,RUN,',
     'counter,Read,N7:1,1,PLC5,50,,', 'lamps,Read,N7:2,1,PLC5,50,counter,1000',
     'beat,Heartbeat,N7:1,1,PLC5,100,,'])

@@ -12,21 +12,22 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Heartbeat, Fallback and Publish_While in a map CSV; tests are named by the rule they show."""
+"""Heartbeat, Fallback and While in a map CSV; tests are named by the rule they show."""
 
 from pathlib import Path
 
-from abdf1_ros.settings.heartbeats import Fallback, Heartbeat, PublishWhile
+from abdf1_ros.problems import ConfigurationError
+from abdf1_ros.settings.heartbeats import Fallback, While
 from abdf1_ros.settings.map_file import load_mappings
 from abdf1_ros.settings.mapping import Command
 import pytest
-from support.mappings import cell_of, fault, faults, load_rows, one, row
+from support.mappings import cell_of, fault, faults, load_rows, load_text, one, row
 
 BEAT = {'Tag': 'beat', 'Command': 'Heartbeat', 'Address': 'N10:0'}
 WRITE = {'Tag': 'speed', 'Command': 'Write', 'Address': 'N10:1'}
 COUNTER = {'Tag': 'counter', 'Command': 'Read', 'Address': 'N11:3', 'Period': '100'}
-DOORS = {'Tag': 'doors', 'Command': 'Read', 'Address': 'B3:0/0', 'Publish_While': 'counter',
-         'Heartbeat_Timeout': '1000'}
+DOORS = {'Tag': 'doors', 'Command': 'Read', 'Address': 'B3:0/0', 'While': 'counter',
+         'While_Timeout': '1000'}
 BIT = {'Tag': 'bit', 'Command': 'Read', 'Address': 'B12:0/2', 'Confirms': 'beat'}
 
 
@@ -37,8 +38,8 @@ def tags_of(*rows: str) -> list[str]:
 
 def test_rule_1_heartbeat_is_one_word_without_a_topic() -> None:
     mapping = one(**BEAT)
-    assert (mapping.command, mapping.period, mapping.heartbeat) == (
-        Command.HEARTBEAT, 1000, Heartbeat())
+    assert (mapping.command, mapping.period, mapping.condition) == (
+        Command.HEARTBEAT, 1000, None)
     assert not mapping.reads and not mapping.writes and not mapping.polls
 
 
@@ -141,27 +142,27 @@ def test_rule_1_words_of_another_station_are_others() -> None:
 
 
 def test_rule_3_requires_topics_with_a_time() -> None:
-    rows = (row(**WRITE), row(**BEAT, Requires='speed', Requires_Timeout='500'))
+    rows = (row(**WRITE), row(**BEAT, While='speed', While_Timeout='500'))
     mappings, problems = load_rows(*rows)
     assert problems == []
-    assert mappings[1].heartbeat == Heartbeat(('speed',), 500)
-    assert [cell_of(mappings[1], column) for column in ('Requires', 'Requires_Timeout')] == [
+    assert mappings[1].condition == While(('speed',), 500)
+    assert [cell_of(mappings[1], column) for column in ('While', 'While_Timeout')] == [
         'speed', '500']
 
 
 @pytest.mark.parametrize(('cells', 'text'), [
-    ({'Requires': 'speed'}, 'Requires_Timeout is missing: ms from 100 to 3600000'),
-    ({'Requires_Timeout': '500'}, 'Requires_Timeout is for a row with Requires; '
+    ({'While': 'speed'}, 'While_Timeout is missing: ms from 100 to 3600000'),
+    ({'While_Timeout': '500'}, 'While_Timeout is for a row with While; '
      'leave the cell empty'),
-    ({'Requires': 'nobody', 'Requires_Timeout': '500'},
+    ({'While': 'nobody', 'While_Timeout': '500'},
      'no good Write, ReadWrite or Serve row has the topic "nobody"')])
 def test_rule_3_requires_without_what_it_needs(cells: dict[str, str], text: str) -> None:
     assert text in faults(row(**WRITE), row(**BEAT | cells))[0]
 
 
 def test_rule_3_only_a_heartbeat_vouches() -> None:
-    assert 'a ReadWrite row has no Requires: it is for Heartbeat rows; leave the cell empty' in \
-        fault(Requires='a')
+    assert 'a ReadWrite row has no While: it is for Read and Heartbeat rows; leave the cell ' \
+        'empty' in fault(While='a')
 
 
 @pytest.mark.parametrize('period', ['99', '60001', 'x'])
@@ -210,8 +211,8 @@ def test_rule_12_what_a_fallback_cannot_be(cells: dict[str, str], text: str) -> 
 @pytest.mark.parametrize('cells', [
     WRITE | {'Fallback': 'x' * 5000, 'Fallback_After': '500'},
     WRITE | {'Fallback': '0', 'Fallback_After': 'x' * 5000},
-    COUNTER | {'Publish_While': 'x' * 5000},
-    BEAT | {'Requires': 'speed', 'Requires_Timeout': '9' * 5000}])
+    COUNTER | {'While': 'x' * 5000},
+    BEAT | {'While': 'speed', 'While_Timeout': '9' * 5000}])
 def test_long_cell_is_shown_without_its_end(cells: dict[str, str]) -> None:
     longest = max(cells.values(), key=len)
     found = faults(row(**cells))
@@ -231,21 +232,22 @@ def test_rule_12_a_fallback_owns_its_words() -> None:
 
 
 def test_rule_13_values_depend_on_run_or_on_a_counter() -> None:
-    assert one(Command='Read', Publish_While='run').publish_while == PublishWhile(None, None)
+    assert one(Command='Read', While='run').condition == While(('RUN',))
     mappings, problems = load_rows(row(**DOORS), row(**COUNTER))
     assert problems == []
-    assert mappings[0].publish_while == PublishWhile('counter', 1000)
-    assert (cell_of(mappings[0], 'Publish_While'), cell_of(mappings[0], 'Heartbeat_Timeout')) == (
+    assert mappings[0].condition == While(('counter',), 1000)
+    assert (cell_of(mappings[0], 'While'), cell_of(mappings[0], 'While_Timeout')) == (
         'counter', '1000')
 
 
 @pytest.mark.parametrize(('cells', 'text'), [
-    ({'Command': 'ReadWrite'}, 'a ReadWrite row has no Publish_While: it is for Read rows'),
+    ({'Command': 'ReadWrite'}, 'a ReadWrite row has no While: it is for Read and '
+     'Heartbeat rows'),
     ({'Publish': 'Change'}, 'needs Publish Always'),
-    ({'Publish_While': 'RUN'}, 'RUN has no Heartbeat_Timeout'),
-    ({'Publish_While': 'doors'}, 'cannot depend on itself'),
-    ({'Publish_While': 'nobody'}, 'should be RUN or the tag of a good Read row'),
-    ({'Publish_While': ''}, 'Heartbeat_Timeout is for a row with Publish_While'),
+    ({'While': 'RUN'}, 'RUN has no While_Timeout'),
+    ({'While': 'doors'}, 'cannot depend on itself'),
+    ({'While': 'nobody'}, 'should be RUN or the tag of one good Read row'),
+    ({'While': ''}, 'While_Timeout is for a row with While'),
     ({'Station': '2'}, 'is of station 1; a counter of the same PLC is needed')])
 def test_rule_13_what_values_cannot_depend_on(cells: dict[str, str], text: str) -> None:
     assert text in faults(row(**DOORS | cells), row(**COUNTER))[0]
@@ -254,30 +256,30 @@ def test_rule_13_what_values_cannot_depend_on(cells: dict[str, str], text: str) 
 @pytest.mark.parametrize(('cells', 'text'), [
     ({'Command': 'Write'}, 'is not a Read row'), ({'Length': '2'}, 'is not one int16'),
     ({'Address': 'F8:0'}, 'is not one int16'),
-    ({'Publish_While': 'RUN'}, 'depends on something itself')])
+    ({'While': 'RUN'}, 'depends on something itself')])
 def test_rule_13_what_is_no_counter(cells: dict[str, str], text: str) -> None:
     assert text in faults(row(**DOORS), row(**COUNTER | cells))[0]
 
 
 @pytest.mark.parametrize('text', ['RUM', 'runn', 'RNU'])
 def test_rule_13_misspelt_run_is_not_taken_for_a_tag(text: str) -> None:
-    told, = faults(row(**DOORS | {'Heartbeat_Timeout': '', 'Publish_While': text}))
-    assert f'(Publish_While): Item: 1, "{text}" is not RUN: did you mean RUN?' in told
+    told, = faults(row(**DOORS | {'While_Timeout': '', 'While': text}))
+    assert f'(While): Item: 1, "{text}" is not RUN: did you mean RUN?' in told
 
 
 def test_rule_14_timeout_has_no_default_and_allows_three_reads() -> None:
-    text, = faults(row(**DOORS | {'Heartbeat_Timeout': '', 'Publish_While': 'PROG'}))
-    assert 'Heartbeat_Timeout is missing: ms that the counter "PROG" may stand still; for the ' \
-        'mode of the processor Publish_While is RUN' in text
-    assert faults(row(**DOORS | {'Heartbeat_Timeout': '299'}), row(**COUNTER)) == [
-        '2:23 (Heartbeat_Timeout): Item: 1, Heartbeat_Timeout 299 is less than 3 x 100 ms, the '
+    text, = faults(row(**DOORS | {'While_Timeout': '', 'While': 'PROG'}))
+    assert 'While_Timeout is missing: ms that the counter "PROG" may stand still; for the ' \
+        'mode of the processor While is RUN' in text
+    assert faults(row(**DOORS | {'While_Timeout': '299'}), row(**COUNTER)) == [
+        '2:21 (While_Timeout): Item: 1, While_Timeout 299 is less than 3 x 100 ms, the '
         'Period of counter']
 
 
 def test_rule_15_a_row_left_out_takes_along_what_depends_on_it() -> None:
     assert tags_of(row(**DOORS), row(**COUNTER | {'Address': 'N11:x'}), row(**WRITE)) == ['speed']
     bad = WRITE | {'Length': '0'}
-    rows = (row(**bad), row(**BEAT, Requires='speed', Requires_Timeout='500'))
+    rows = (row(**bad), row(**BEAT, While='speed', While_Timeout='500'))
     assert tags_of(*rows) == []
     assert len(faults(*rows)) == 2
 
@@ -300,7 +302,7 @@ def test_rule_22_what_a_bit_cannot_confirm(cells: dict[str, str]) -> None:
     cells = BIT | cells
     station = cells.get('Station', '1')
     assert faults(row(**cells), row(**BEAT), row(**WRITE)) == [
-        f'2:24 (Confirms): Item: 1, "{cells["Confirms"]}" should be the tag of a good Heartbeat '
+        f'2:22 (Confirms): Item: 1, "{cells["Confirms"]}" should be the tag of a good Heartbeat '
         f'row of station {station} that no row before it confirms']
 
 
@@ -310,7 +312,7 @@ def test_rule_22_what_a_bit_cannot_confirm(cells: dict[str, str]) -> None:
 def test_rule_21_no_bit_that_we_write_confirms(ours: dict[str, str]) -> None:
     rows = {entry['Tag']: row(**entry) for entry in (BIT, BEAT, WRITE, ours)}
     assert faults(*rows.values()) == [
-        f'2:24 (Confirms): Item: 1, "beat" cannot be confirmed by B12:0/2, which {ours["Tag"]} '
+        f'2:22 (Confirms): Item: 1, "beat" cannot be confirmed by B12:0/2, which {ours["Tag"]} '
         'writes: no heartbeat confirms itself; name a bit that the program of the PLC sets']
 
 
@@ -345,3 +347,52 @@ def test_rule_13_counter_is_not_an_echo_of_our_heartbeat() -> None:
     found = faults(row(**BEAT), row(**COUNTER | {'Address': 'N10:0'}), row(**DOORS))
     assert len(found) == 1
     assert '"counter" reads our own heartbeat, so both sides would wait for each other' in found[0]
+
+
+@pytest.mark.parametrize('tag', ['RUN', 'Run'])
+def test_tag_like_the_mode_run_is_ambiguous(tag: str) -> None:
+    guarded = row(**DOORS | {'While': 'run', 'While_Timeout': ''})
+    text, = faults(row(**COUNTER | {'Tag': tag}), guarded)
+    assert text == ('3:20 (While): Item: 2, "RUN" is the mode of the PLC, and the tag of item 1 '
+                    '(line 2); give that row another tag')
+    assert faults(row(**COUNTER | {'Tag': tag})) == []
+
+
+@pytest.mark.parametrize('topics', ['RUN', 'speed run'])
+def test_rule_3_heartbeat_does_not_depend_on_the_mode(topics: str) -> None:
+    told = faults(row(**WRITE), row(**WRITE | {'Tag': 'run', 'Address': 'N7:1'}),
+                  row(**BEAT | {'While': topics, 'While_Timeout': '500'}))
+    assert told == ['4:20 (While): Item: 3, RUN is the mode of a PLC, and a heartbeat depends on '
+                    'topics whose messages we get']
+
+
+def test_name_that_is_the_tag_of_one_row_and_the_topic_of_another_is_ambiguous() -> None:
+    other = row(Tag='speed', Command='Read', Address='N7:9', Topic='actual')
+    write = row(**WRITE | {'Tag': 'set', 'Topic': 'speed'})
+    beat = row(**BEAT | {'While': 'speed', 'While_Timeout': '500'})
+    text, = faults(other, write, beat)
+    assert text == ('4:20 (While): Item: 3, "speed" is a write topic, and the tag of item 1 '
+                    '(line 2); give that row another tag')
+    counter = row(**COUNTER | {'Topic': 'alive'})
+    text, = faults(counter, row(**WRITE | {'Topic': 'counter'}), row(**DOORS))
+    assert '"counter" is a write topic, and the tag of item 1' in text
+    # Where the row with the tag has the topic, too, there is one meaning.
+    assert faults(row(Tag='speed', Command='Read', Address='N7:9'), write, beat) == []
+
+
+def test_columns_of_before_are_told_with_the_new_cells() -> None:
+    mappings = (
+        'Tag,Command,Address,Station,PLC_Type,Requires,Requires_Timeout,publish_while,'
+        'Heartbeat_Timeout\n'
+        'beat,Heartbeat,N10:0,1,SLC,speed stop,500,,\n'
+        'doors,Read,B3:0,1,SLC,,,RUN,\n')
+    with pytest.raises(ConfigurationError) as error:
+        load_text(mappings)
+    assert [str(problem).split('map.csv:')[1] for problem in error.value.problems] == [
+        '1:6: column Requires is called While now',
+        '1:7: column Requires_Timeout is called While_Timeout now',
+        '1:8: column publish_while is called While now',
+        '1:9: column Heartbeat_Timeout is called While_Timeout now',
+        '2:6: write While = "speed stop" instead of Requires',
+        '2:7: write While_Timeout = "500" instead of Requires_Timeout',
+        '3:8: write While = "RUN" instead of publish_while']

@@ -113,9 +113,9 @@ NEEDS = 'Item: 2, write topic "t" needs the message type (int16) and Length (1)'
      f'Processor of station 1 is ML1000 here, but 5/01 in the row{OF_A}'),
     (SLC, SLC | {'Processor': '5/01'}, '3:17 (Processor): Item: 2, Processor of station 1 is 5/01 '
      f'here, but 5/03 (an empty cell) in the row{OF_A}'),
-    ({'Via': '10'}, {'Via': '11'}, '3:25 (Via): Item: 2, station 1 has Via 11 here, but Via 10 in '
+    ({'Via': '10'}, {'Via': '11'}, '3:23 (Via): Item: 2, station 1 has Via 11 here, but Via 10 in '
      f'the row{OF_A}'),
-    ({'Via': '10'}, {}, '3:25 (Via): Item: 2, station 1 has no Via here, but Via 10 in the row'),
+    ({'Via': '10'}, {}, '3:23 (Via): Item: 2, station 1 has no Via here, but Via 10 in the row'),
     ({}, {'Via': '10'}, 'station 1 has Via 10 here, but no Via in the row'),
     ({'Via': '2'}, {'Station': '2', 'Via': '3'}, 'station 2 is itself the gateway in the row'),
     ({'Via': '2'}, {'Station': '3', 'Via': '1'},

@@ -167,8 +167,8 @@ def test_period_that_was_meant_as_seconds(tmp_path: Path) -> None:
     assert '3:6 (Period)' not in ' '.join(told)
 
 
-BEAT = f'{HEAD},Topic,Requires,Requires_Timeout\n'
-NO_TOPIC = '!2:7 (Requires): Item: 1, no good Write, ReadWrite or Serve row has the topic '
+BEAT = f'{HEAD},Topic,While,While_Timeout\n'
+NO_TOPIC = '!2:7 (While): Item: 1, no good Write, ReadWrite or Serve row has the topic '
 
 
 @for_all(('requires', 'expected'), [

@@ -43,7 +43,6 @@ from abdf1_ros.ports.endpoints import PtyEndpoint
 from abdf1_ros.ports.link_thread import LinkThread
 from abdf1_ros.ports.opening import open_port
 from abdf1_ros.ports.settings import PortSettings
-from abdf1_ros.settings.heartbeats import Heartbeat
 from abdf1_ros.settings.network import Network
 from abdf1_ros.settings.share import share_places
 from abdf1_ros.share.guest_line import GuestLine
@@ -69,7 +68,7 @@ class Shared:
                           share_access=access)
         self.listener = Recorder(line_time)
         rows = [make_mapping('N10:0', plc='SLC', period=50), make_mapping(
-            'N10:10', 'Heartbeat', plc='SLC', period=200, heartbeat=Heartbeat())]
+            'N10:10', 'Heartbeat', plc='SLC', period=200)]
         self.driver = Driver(network, rows, DriverSettings(), self.listener)
         name = self._line.name
         self._near = LinkThread(self.driver.machine, lambda: open_port(PortSettings(name)))

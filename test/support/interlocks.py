@@ -22,7 +22,7 @@ from abdf1_ros.df1.settings import LinkSettings
 from abdf1_ros.df1.slave import HalfDuplexSlave
 from abdf1_ros.driver.settings import DriverSettings
 from abdf1_ros.pccc.families import parse_address
-from abdf1_ros.settings.heartbeats import Fallback, Heartbeat
+from abdf1_ros.settings.heartbeats import Fallback, While
 from abdf1_ros.settings.mapping import Mapping
 from abdf1_ros.settings.network import Network
 from abdf1_ros.simulator.simulated_plc import SimulatedPlc
@@ -40,7 +40,7 @@ def beat_row(period: int = 200, requires: Sequence[str] = (), timeout: int | Non
              address: str = 'N10:0') -> Mapping:
     """Return a Heartbeat row."""
     return make_mapping(address, 'Heartbeat', tag='beat', period=period,
-                        heartbeat=Heartbeat(tuple(requires), timeout))
+                        condition=While(tuple(requires), timeout) if requires else None)
 
 
 def speed_row(fallback: Fallback | None = FALLBACK, address: str = 'N7:0', tag: str = 'speed',

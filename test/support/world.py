@@ -57,7 +57,7 @@ from abdf1_ros.pccc.emulated import Setting
 from abdf1_ros.pccc.families import dialect_of, parse_address
 from abdf1_ros.pccc.values import Values
 from abdf1_ros.plan.report import make_report
-from abdf1_ros.settings.heartbeats import Fallback, Heartbeat, PublishWhile, TIME_BASE
+from abdf1_ros.settings.heartbeats import Fallback, TIME_BASE, While
 from abdf1_ros.settings.mapping import Mapping
 from abdf1_ros.settings.network import Network
 from abdf1_ros.simulator.ladder import Ladder, Lamp
@@ -152,7 +152,7 @@ class Plant:
 
     @property
     def counts_within(self) -> int:
-        """Return the Heartbeat_Timeout of the counter; where polls have the line it is longer."""
+        """Return the While_Timeout of the counter; where polls have the line it is longer."""
         return 20_000 if self.mode in ('Radio', *POLLED) else 3500
 
     def mappings(self) -> list[Mapping]:
@@ -171,12 +171,12 @@ class Plant:
             add(FREE, 'Write', 'free')
             needed = (f'w0_{station}',) if self.requires else ()
             add(BEAT, 'Heartbeat', 'beat', period=self.period,
-                heartbeat=Heartbeat(needed, self.requires))
+                condition=While(needed, self.requires) if needed else None)
             add(CLOCK, 'Read', 'clock', length=2, period=1000)
-            add('N9:2', 'Read', 'running', period=1000, publish_while=PublishWhile(None, None))
+            add('N9:2', 'Read', 'running', period=1000, condition=While(('RUN',)))
             add(COUNTER, 'Read', 'counter', period=1000)
             add('N9:3', 'Read', 'counted', period=1000,
-                publish_while=PublishWhile(f'counter_{station}', self.counts_within))
+                condition=While((f'counter_{station}',), self.counts_within))
         if self.mode == 'Slave':
             found.append(make_mapping(SERVED, 'Serve', station=OURS, plc='SLC', tag='served',
                                       fallback=Fallback((SAFE,), self.after)))
@@ -349,7 +349,7 @@ class World(DriverBench):
     def longest_patience(self) -> float:
         """Return after how long (s) at most all guarded values of a stopped PLC are withheld."""
         return max(point.patience for mapping, point in self.driver.points.items()
-                   if mapping.publish_while) + 2 * self.longest
+                   if mapping.is_guarded) + 2 * self.longest
 
     @property
     def results(self) -> list[WriteResult]:
@@ -364,7 +364,7 @@ class World(DriverBench):
     def _watch(self, station: int) -> WatchedPlc:
         plc = self.plc(station, self.plant.kind, ('N7:0', 24), ('N9:0', 8), ('N10:0', 1))
         places = {row.tag: str(row.address) for row in self.rows.values()
-                  if row.station == station and (row.writes or row.heartbeat)}
+                  if row.station == station and (row.writes or row.is_heartbeat)}
         watched = WatchedPlc(plc, places)
         if self.plant.scan:
             self._run_ladder(watched)
@@ -669,8 +669,7 @@ class OtherBridge(DriverBench):
     def __init__(self, world: World, station: int) -> None:
         plant, first = world.plant, world.plcs[station]
         row = make_mapping(BEAT, 'Heartbeat', station=station, plc=plant.kind,
-                           tag=f'other_{station}', period=world.dice.choice([plant.period, 700]),
-                           heartbeat=Heartbeat())
+                           tag=f'other_{station}', period=world.dice.choice([plant.period, 700]))
         super().__init__(
             [row], network=Network(station=OTHER_BRIDGE, baud=19200, timeout=100, cmd_timeout=500),
             settings=DriverSettings(processor_period=0.0,

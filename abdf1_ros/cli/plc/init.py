@@ -38,7 +38,7 @@ _HEAD = """\
 # Command is Read, Write, ReadWrite, Serve or Heartbeat. With Fallback or Heartbeat take shorter
 # times in net.csv, or it takes long until a failure is noticed: Timeout 100, Cmd_Timeout 500,
 # NAK_Retries 1, ENQ_Retries 1. "check" says how long, and what the timers of the PLC need.
-Tag,Command,Address,Station,PLC_Type,Processor,Length,Period,Publish_While,Fallback,Fallback_After
+Tag,Command,Address,Station,PLC_Type,Processor,Length,Period,While,Fallback,Fallback_After
 """
 
 

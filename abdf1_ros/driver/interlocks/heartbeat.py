@@ -111,7 +111,6 @@ class HeartbeatRow:
 
     def __init__(self, words: Words, first: int, dice: Random) -> None:
         mapping = words.row
-        assert mapping.heartbeat is not None
         assert mapping.period is not None
         self.mapping = mapping
         self.words = words
@@ -125,13 +124,13 @@ class HeartbeatRow:
         self.is_first_try = True  # of the 0 that has to be written
         self.tried = -math.inf
         self.due = math.inf
-        self.requires = mapping.heartbeat.requires
-        self._requires_timeout = (mapping.heartbeat.requires_timeout or 0) / 1000
+        self.topics = mapping.condition.names if mapping.condition else ()
+        self._timeout = (mapping.condition and mapping.condition.timeout or 0) / 1000
         self._period = mapping.period / 1000
         self._is_confirmed = False
         self._next = -math.inf
         self._other = _OtherWriter(self._period, dice)
-        self._holds_at = math.inf  # without a further message of the topics that it requires
+        self._holds_at = math.inf  # without a further message of one of ``topics``
 
     def why_not(self, now: float) -> str:
         """Return why the PLC has no heartbeat that counts, empty if it has, or may have."""
@@ -199,8 +198,8 @@ class HeartbeatRow:
 
         ``messages`` tells when the last accepted message of each was published (clock value in s).
         """
-        return next((topic for topic in self.requires
-                     if now >= messages.get(topic, -math.inf) + self._requires_timeout), '')
+        return next((topic for topic in self.topics
+                     if now >= messages.get(topic, -math.inf) + self._timeout), '')
 
     def why_missing(self, messages: MappingType[str, float], now: float) -> str:
         """Return that a topic has had no message in time, empty where all have."""
@@ -209,8 +208,8 @@ class HeartbeatRow:
 
     def topics_until(self, messages: MappingType[str, float]) -> float:
         """Return until when it may count by rule 3 (d) without a further message."""
-        return min((messages.get(topic, -math.inf) + self._requires_timeout
-                    for topic in self.requires), default=math.inf)
+        return min((messages.get(topic, -math.inf) + self._timeout
+                    for topic in self.topics), default=math.inf)
 
     def executor_until(self, executor: float) -> float:
         """Return until when it may count by rule 3 (c); ``executor`` is when that ran last."""

@@ -190,7 +190,7 @@ class Interlocks(WriteListener):
         """Take note of a message that was accepted (rule 3 d)."""
         topic, messages = write.mapping.topic, self._conditions.messages
         for beat in self.heartbeats:
-            if topic in beat.requires:
+            if topic in beat.topics:
                 if beat.missing(messages, write.requested):
                     beat.hold()  # before anybody looked: the line was busy all the time
                 self._plc_of[beat].look_again(beat)

@@ -92,7 +92,7 @@ class CounterGuard(Guard):
 
 
 class Guards:
-    """The guards of all rows with Publish_While; ``counters`` has those of counters, by tag."""
+    """The guards of all rows with While; ``counters`` has those of counters, by tag."""
 
     def __init__(self) -> None:
         self._runs: dict[int, RunGuard] = {}
@@ -100,13 +100,12 @@ class Guards:
 
     def of(self, mapping: Mapping) -> Guard | None:
         """Return the guard of a row, None where it has no condition."""
-        condition = mapping.publish_while
-        if condition is None:
+        if mapping.condition is None:
             return None
-        if condition.tag is None:
+        if mapping.needs_run:
             return self._runs.setdefault(mapping.station, RunGuard())
-        # A tag is there once in the map.
-        return self.counters.setdefault(condition.tag, CounterGuard(condition.tag))
+        tag, = mapping.condition.names  # it is there once in the map
+        return self.counters.setdefault(tag, CounterGuard(tag))
 
     def mode_told(self, station: int, identity: Identity | None, asked: float) -> None:
         """Take what a station has reported of itself; it was ``asked`` at this clock value (s)."""

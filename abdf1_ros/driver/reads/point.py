@@ -67,7 +67,7 @@ class ReadPoint:
         self.withheld_since = 0.0
         self.withholdings = 0
         self._is_told = False
-        timeout = mapping.publish_while.timeout if mapping.publish_while else None
+        timeout = mapping.condition.timeout if mapping.condition else None
         self.patience = stale_time if timeout is None else timeout / 1000
         if guard is not None:
             guard.add(self)

@@ -153,7 +153,7 @@ class Reads(WriteListener):
     def write_ended(self, claim: Claim) -> None:
         """Make the reads of all words that it may have changed due at once."""
         now = claim.done
-        if not claim.has_changed or claim.write is not None and claim.write.mapping.heartbeat:
+        if not claim.has_changed or claim.write is not None and claim.write.mapping.is_heartbeat:
             return
         for job in self._due.jobs:
             if claim.meets(job.extent):

@@ -91,7 +91,7 @@ def test_rows_that_are_only_comments_are_good_rows_too(
     # What the SLC lists of its files; the PLC-5 has no such list.
     assert [cell_of(mapping, 'Address') for mapping in mappings if mapping.station == 2][5:] == [
         'S2:0', 'B3:0', 'N7:0', 'F10:0', 'L11:0']
-    guarded = [mapping.tag for mapping in mappings if mapping.publish_while is not None]
+    guarded = [mapping.tag for mapping in mappings if mapping.is_guarded]
     assert guarded == ['interlocks_1', 'interlocks_2']
 
 

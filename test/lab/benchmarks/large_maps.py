@@ -36,7 +36,7 @@ from typing import Any
 
 sys.path[:0] = map(str, Path(__file__).resolve().parents[1:4])
 
-from abdf1_ros.settings.heartbeats import Fallback, PublishWhile  # noqa: E402
+from abdf1_ros.settings.heartbeats import Fallback, While  # noqa: E402
 from abdf1_ros.settings.network import Network  # noqa: E402
 from support.driver_bench import DriverBench, store  # noqa: E402
 from support.mappings import make_mapping  # noqa: E402
@@ -92,11 +92,11 @@ def with_fallbacks(fallback: Fallback | None) -> tuple[float, float]:
     return Meter(bench).measure(lambda: bench.run(2.5))
 
 
-def with_guards(condition: PublishWhile | None) -> tuple[float, float]:
+def with_guards(condition: While | None) -> tuple[float, float]:
     """Return the time of a transaction of the line with 2000 rows."""
     counter = make_mapping('N7:0', tag='alive', period=100)
     rows = [make_mapping(f'N{20 + number % FILES}:{number // FILES}', tag=f'row{number}',
-                         period=1000, publish_while=condition) for number in range(ROWS)]
+                         period=1000, condition=condition) for number in range(ROWS)]
     bench = DriverBench([counter, *rows], network=NETWORK)
     plc = bench.plc(1, 'PLC5', ('N7:0', 4), *(
         (f'N{20 + number}:0', ROWS // FILES) for number in range(FILES)))
@@ -115,7 +115,7 @@ def main() -> None:
     pairs = parser.parse_args().pairs
     print('map        us each  without  ratio  longest call (ms)  without')
     for name, measure, option in (('fallbacks', with_fallbacks, Fallback((7,), 60_000)),
-                                  ('guarded', with_guards, PublishWhile('alive', 500))):
+                                  ('guarded', with_guards, While(('alive',), 500))):
         found = [(measure(option), measure(None)) for _ in range(pairs)]
         print(f'{name:9}  {median(a[0] for a, b in found) * 1e6:7.0f}  '
               f'{median(b[0] for a, b in found) * 1e6:7.0f}  '

@@ -157,7 +157,7 @@ def _refused_refreshes(ended: Any) -> Any:
 def _requires_nothing(init: Any) -> Any:
     def init_wrongly(self: HeartbeatRow, *arguments: Any, **named: Any) -> None:
         init(self, *arguments, **named)
-        self.requires = ()
+        self.topics = ()
 
     return init_wrongly
 

@@ -244,7 +244,7 @@ class Withheld(Rule):
 
     def __init__(self, world: World) -> None:
         super().__init__(world)
-        self._rows = [row for row in world.rows.values() if row.publish_while]
+        self._rows = [row for row in world.rows.values() if row.is_guarded]
         self._read = dict.fromkeys(world.rows, 0.0)  # when each was published last
         self._begun: dict[tuple[int, int], float] = {}  # when a driver read of a station first
         self._new: set[int] = set()  # stations that were read since the last look

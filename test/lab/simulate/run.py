@@ -168,7 +168,7 @@ class Story:
         readings = world.driver.readings
         if (readings.reads.poll_cycle or 0.0) > min(
                 point.stale_time for point in readings.points.values()):
-            wanted -= {row.tag for row in world.rows.values() if row.publish_while}
+            wanted -= {row.tag for row in world.rows.values() if row.is_guarded}
         if wanted:
             raise Broken('Recovery', f'{sorted(wanted)} not back after {limit} s', world)
 

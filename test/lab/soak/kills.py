@@ -70,8 +70,8 @@ SLACK = 0.25  # s: a machine that does other things as well
 
 NET = 'Station,Mode,Error_Code,Timeout,Cmd_Timeout,NAK_Retries,ENQ_Retries,Baud,Com_Port\n' \
       '5,Master,CRC,100,500,1,1,115200,{port}\n'
-MAP = ('Tag,Command,Address,Station,PLC_Type,Period,Fallback,Fallback_After,Requires,'
-       'Requires_Timeout\n'
+MAP = ('Tag,Command,Address,Station,PLC_Type,Period,Fallback,Fallback_After,While,'
+       'While_Timeout\n'
        f'beat,Heartbeat,N10:0,1,SLC,{PERIOD * 1000:.0f},,,speed,1500\n'
        f'speed,Write,N10:1,1,SLC,,0,{FALLBACK_AFTER * 1000:.0f},,\n'
        f'gripper,Write,N10:2,1,SLC,,0,{FALLBACK_AFTER * 1000:.0f},,\n')
