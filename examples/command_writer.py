@@ -36,6 +36,7 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Callable
+import os
 import signal
 import sys
 import time
@@ -147,6 +148,13 @@ def number(convert: Callable[[str], Any], text: str, what: str) -> Any:
         raise ValueError(f'"{text}" should be {what}') from None
 
 
+def hint() -> str:
+    """Return why a bridge may not be seen, empty where nothing is known."""
+    is_client = os.environ.get('ROS_DISCOVERY_SERVER') \
+        and os.environ.get('ROS_SUPER_CLIENT', '').upper() != 'TRUE'
+    return '; ROS_DISCOVERY_SERVER is set: set ROS_SUPER_CLIENT=TRUE too' if is_client else ''
+
+
 def judge(message: str) -> int:
     """Return the exit status that the text of a result stands for."""
     if message == 'written':
@@ -158,7 +166,7 @@ def run(node: CommandWriter, options: argparse.Namespace) -> int:
     """Write and tell the results; return the exit status."""
     if not node.connect(options.timeout):
         print(f'not written: {options.node} does not listen to write/{options.topic}'
-              if node.has_bridge else f'not written: there is no node {options.node}')
+              if node.has_bridge else f'not written: there is no node {options.node}{hint()}')
         return NOT_WRITTEN
     if options.station is not None and (
             why := node.why_not_in_control(options.station, options.timeout)):

@@ -150,8 +150,15 @@ def run(options: argparse.Namespace, file: TextIO, ended: list[int]) -> int:
     if not found:
         os.unlink(options.file)  # nothing is in it, and it would be in the way of the next try
     print(f'{node.rows} messages in {options.file}' if found else
-          f'{options.node} is not there, or has no read topic')
+          f'{options.node} is not there, or has no read topic{hint()}')
     return 0 if found else 1
+
+
+def hint() -> str:
+    """Return why a bridge may not be seen, empty where nothing is known."""
+    is_client = os.environ.get('ROS_DISCOVERY_SERVER') \
+        and os.environ.get('ROS_SUPER_CLIENT', '').upper() != 'TRUE'
+    return '; ROS_DISCOVERY_SERVER is set: set ROS_SUPER_CLIENT=TRUE too' if is_client else ''
 
 
 if __name__ == '__main__':

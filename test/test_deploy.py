@@ -16,6 +16,7 @@
 
 import configparser
 from fnmatch import fnmatch
+import itertools
 import json
 import os
 from pathlib import Path
@@ -32,8 +33,13 @@ from support.ros_tools import SOURCE
 
 DEPLOY = SOURCE / 'deploy'
 UNIT = DEPLOY / 'abdf1@.service'
-LINES_UNIT = DEPLOY / 'abdf1-lines.service'
+LINES_UNIT = DEPLOY / 'abdf1-lines@.service'
 UNITS = pytest.mark.parametrize('path', [UNIT, LINES_UNIT], ids=['line', 'lines'])
+DISCOVERY_UNIT = DEPLOY / 'abdf1-discovery@.service'
+# Wheels have the server beside Python, and its libraries in folders of their own.
+PATH = f'{Path(sys.executable).parent}:{os.environ["PATH"]}'
+LIBRARIES = ':'.join(map(str, [Path(sys.prefix, 'lib'), *Path(sys.prefix).glob(
+    'lib/python*/site-packages/ros_rmw_fastrtps_cpp.libs')]))
 RULES = DEPLOY / '99-abdf1.rules'
 DOCKERFILE = DEPLOY / 'Dockerfile'
 SETUP = (SOURCE / 'setup.py').read_text(encoding='utf-8')
@@ -55,7 +61,7 @@ def unit(path: Path = UNIT) -> dict[str, dict[str, list[str]]]:
     return sections
 
 
-@UNITS
+@pytest.mark.parametrize('path', [UNIT, LINES_UNIT, DISCOVERY_UNIT])
 def test_unit_has_the_syntax_of_systemd(path: Path) -> None:
     parser = configparser.ConfigParser(strict=False, interpolation=None)
     parser.optionxform = str  # type: ignore[assignment,method-assign]
@@ -64,8 +70,9 @@ def test_unit_has_the_syntax_of_systemd(path: Path) -> None:
 
 
 @pytest.mark.skipif(not shutil.which('systemd-analyze'), reason='there is no systemd here')
-def test_systemd_finds_nothing_wrong(tmp_path: Path) -> None:
-    instance = shutil.copy(UNIT, tmp_path / 'abdf1@press.service')
+@pytest.mark.parametrize('path', [UNIT, LINES_UNIT, DISCOVERY_UNIT])
+def test_systemd_finds_nothing_wrong(tmp_path: Path, path: Path) -> None:
+    instance = shutil.copy(path, tmp_path / path.name.replace('@', '@1'))
     result = subprocess.run(['systemd-analyze', 'verify', '--man=no', str(instance)],
                             check=False, capture_output=True, text=True, timeout=PATIENCE)
     assert (result.returncode, result.stderr) == (0, '')
@@ -92,7 +99,7 @@ def test_unit_may_open_serial_ports_only(path: Path) -> None:
 
 
 @pytest.mark.parametrize(('path', 'command', 'file', 'section'), [
-    (UNIT, 'node', 'press.yaml', '/**'), (LINES_UNIT, 'lines', 'lines.yaml', '/press')],
+    (UNIT, 'node', 'press.yaml', '/**'), (LINES_UNIT, 'lines', 'press.yaml', '/hall/line_1')],
     ids=['line', 'lines'])
 def test_command_of_the_unit_starts_a_bridge_and_ends_by_its_signal(
         tmp_path: Path, path: Path, command: str, file: str, section: str) -> None:
@@ -119,11 +126,34 @@ def test_command_of_the_unit_starts_a_bridge_and_ends_by_its_signal(
         'ABDF1_INSTALL': str(install), 'ROS_LOG_DIR': str(tmp_path)}
     with Observer() as observer, subprocess.Popen(words, env=environment) as process:
         try:
-            assert get_parameters(observer, 'stale_after', node='/press') == [9.0]
+            line = '/press' if section == '/**' else section
+            assert get_parameters(observer, 'stale_after', node=line) == [9.0]
+            observer.meet('press')
             process.send_signal(signal.Signals[service['KillSignal'][0]])
             assert process.wait(PATIENCE) == 0
         finally:
             process.kill()
+
+
+def test_command_of_the_discovery_unit_starts_a_server(tmp_path: Path) -> None:
+    if not shutil.which('fast-discovery-server', path=PATH):
+        pytest.skip('this ROS has no fast-discovery-server')
+    (tmp_path / 'setup.bash').write_text(f'export LD_LIBRARY_PATH={LIBRARIES} PATH={PATH}\n')
+    service = unit(DISCOVERY_UNIT)['Service']
+    settings = dict(entry.split('=', 1) for entry in service['Environment'])
+    assert settings['ROS_SETUP'] == '/opt/ros/jazzy/setup.bash'
+    words = [word.replace('%i', '1') for word in shlex.split(service['ExecStart'][0])]
+    environment = os.environ | settings | {
+        'ROS_SETUP': str(tmp_path / 'setup.bash'), 'ADDRESS': '127.0.0.1', 'PORT': '11897'}
+    with subprocess.Popen(words, env=environment, stdout=subprocess.PIPE, text=True) as process:
+        try:
+            assert process.stdout is not None
+            said = ''.join(itertools.takewhile(lambda line: 'Addresses' not in line,
+                                               process.stdout))
+            assert re.search(r'Server ID: +1\n', said)
+        finally:
+            process.terminate()
+            process.wait(PATIENCE)
 
 
 # udev

@@ -18,6 +18,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from contextlib import ExitStack
+import os
 import time
 from typing import Any, Self, TypeVar
 
@@ -26,6 +27,17 @@ from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node, NodeNameNonExistentError
 
 _Result = TypeVar('_Result')
+
+
+def graph_hint() -> str:
+    """
+    Return why the topics of other nodes may not be seen, empty where nothing is known.
+
+    A client of a discovery server learns only of the endpoints that match its own.
+    """
+    is_client = os.environ.get('ROS_DISCOVERY_SERVER') \
+        and os.environ.get('ROS_SUPER_CLIENT', '').upper() != 'TRUE'
+    return '; ROS_DISCOVERY_SERVER is set: set ROS_SUPER_CLIENT=TRUE too' if is_client else ''
 
 
 class Observer:

@@ -19,6 +19,7 @@ import runpy
 import sys
 import threading
 
+from abdf1_ros.ros.observer import graph_hint
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 import pytest
 from std_msgs.msg import Int16MultiArray
@@ -82,6 +83,18 @@ def test_value_that_the_bridge_refuses_is_not_written(bridge: Process, write: Wr
 def test_nobody_who_listens_is_not_written(write: Write) -> None:
     assert write('recipe', '1', '--timeout', '0.5', node='/nobody') == (
         1, ['not written: there is no node /nobody'])
+
+
+@pytest.mark.parametrize('name', ['command_writer', 'recorder'])
+def test_client_of_a_discovery_server_is_told_what_it_lacks(
+        monkeypatch: pytest.MonkeyPatch, name: str) -> None:
+    hint = runpy.run_path(str(EXAMPLE.with_stem(name)))['hint']
+    monkeypatch.setenv('ROS_DISCOVERY_SERVER', '127.0.0.1:11811')
+    monkeypatch.delenv('ROS_SUPER_CLIENT', raising=False)
+    assert hint() == graph_hint() == \
+        '; ROS_DISCOVERY_SERVER is set: set ROS_SUPER_CLIENT=TRUE too'
+    monkeypatch.setenv('ROS_SUPER_CLIENT', 'TRUE')
+    assert not hint()
 
 
 @pytest.mark.parametrize(('words', 'text'), [

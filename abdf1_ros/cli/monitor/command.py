@@ -55,6 +55,7 @@ from abdf1_ros.cli.terminal import (
     tell,
 )
 from abdf1_ros.errors import FormatError
+from abdf1_ros.ros.observer import graph_hint
 from rclpy.utilities import remove_ros_args
 
 _say = partial(tell, 'monitor')
@@ -308,7 +309,7 @@ def _not_found(watch: NodeWatch, seconds: float) -> str:
     hint = f'--node may be one of {", ".join(bridges)}' if bridges else (
         f'no bridge is heard with ROS_DOMAIN_ID {domain}; that and '
         'ROS_AUTOMATIC_DISCOVERY_RANGE have to be those of the bridge')
-    return f'there is no node {watch.name} within {seconds:g} s: {hint}'
+    return f'there is no node {watch.name} within {seconds:g} s: {hint}{graph_hint()}'
 
 
 def _show(watch: NodeWatch, options: argparse.Namespace, has_ended: _Ending) -> None:

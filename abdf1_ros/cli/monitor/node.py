@@ -23,7 +23,7 @@ from typing import Any
 
 from abdf1_ros.cli.monitor.view import Reading, Snapshot, Status, Style
 from abdf1_ros.errors import FormatError
-from abdf1_ros.ros.observer import Observer
+from abdf1_ros.ros.observer import graph_hint, Observer
 from abdf1_ros.ros.topics.messages import latched_qos, MESSAGES
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from rclpy.duration import Infinite
@@ -131,7 +131,7 @@ class NodeWatch(Listening):
         readings = [self._subscriptions[topic].reading for topic in sorted(self._subscriptions)]
         return Snapshot(
             self.name, self.is_there, self._told, tuple(self._statuses), readings,
-            self._active, tuple(self._results))
+            self._active, tuple(self._results), graph_hint())
 
     def _discover(self) -> None:
         """Subscribe to the read topics that the node publishes now."""

@@ -124,6 +124,8 @@ class Snapshot:
     readings: Sequence[Reading]
     active: Sequence[int] | None
     results: Sequence[Status]
+    hint: str = ''
+    """Why topics may not be seen, empty where nothing is known."""
 
 
 def render(snapshot: Snapshot, now: float, width: int) -> list[TextLine]:
@@ -207,7 +209,7 @@ def _values(snapshot: Snapshot, now: float, width: int) -> Iterator[TextLine]:
         address = cut(printable(reading.address), _ADDRESS_WIDTH)
         yield TextLine(row(name, age, state, value, address).rstrip(), style)
     if not snapshot.readings:
-        yield TextLine('  no read topic found', Style.WARNING)
+        yield TextLine(f'  no read topic found{snapshot.hint}', Style.WARNING)
 
 
 def _mappings(snapshot: Snapshot, width: int) -> Iterator[TextLine]:

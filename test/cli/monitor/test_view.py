@@ -169,6 +169,7 @@ def test_only_counters_that_have_counted_are_shown() -> None:
     ({'told': None}, 'no diagnostics yet', Style.WARNING),
     ({'told': NOW - 5}, 'no diagnostics for 5.0 s', Style.BAD),
     ({'readings': []}, 'no read topic found', Style.WARNING),
+    ({'readings': [], 'hint': '; set X'}, 'no read topic found; set X', Style.WARNING),
 ])
 def test_what_is_missing_is_said(changes: dict[str, object], text: str, style: Style) -> None:
     assert line_with(text, snapshot(**changes)).style is style
