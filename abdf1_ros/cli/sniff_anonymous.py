@@ -36,6 +36,8 @@ from abdf1_ros.pccc.processor import Processor
 from abdf1_ros.problems import ConfigurationError
 from abdf1_ros.settings.columns import MAP_COLUMNS
 from abdf1_ros.settings.csv_table import read_table, Row
+from abdf1_ros.settings.heartbeats import RUN
+from abdf1_ros.settings.mapping import Command
 from abdf1_ros.settings.network import DEVICE_SERVERS, FIELDS
 from abdf1_ros.settings.station_lists import parse_stations
 
@@ -44,6 +46,7 @@ _NO_RESULT = 'left out: not a result of "conform --json"'
 # What stands in a cell that is not read: the fault of a report may be just there.
 _LEFT_OUT = '?'
 
+_HEARTBEAT = Command.HEARTBEAT.value.lower()
 _STATION = whole(0, BROADCAST)
 _FAMILIES = {family.value: family for family in FAMILIES}
 _KINDS: dict[str, Kind[Any]] = {
@@ -53,9 +56,8 @@ _KINDS: dict[str, Kind[Any]] = {
 # Columns of a map that keep their cells; further ones get numbers for their names.
 _KEPT = ('Command', 'Address', 'Station', 'PLC_Type', 'Length', 'Type', 'Period', 'Publish', 'Min',
          'Max', 'Word_Order', 'Scale', 'Offset', 'Access', 'Processor', 'Fallback_After',
-         'Requires_Timeout', 'Heartbeat_Timeout', 'Via')
-_TAGS, _TOPICS = ('Tag', 'Publish_While', 'Confirms'), ('Topic', 'Requires')
-_RUN = 'RUN'
+         'While_Timeout', 'Via')
+_TAGS, _TOPICS = ('Tag', 'While', 'Confirms'), ('Topic',)
 # Of a case of conform; what came and was expected has bytes and values.
 _RESULT = ('target', 'check', 'baud', 'parity', 'station', 'abdf1_ros')
 _CASE = ('case', 'verdict', 'rule', 'source', 'seconds')
@@ -125,9 +127,11 @@ def _map_rows(rows: list[Row]) -> list[list[str]]:
         for name in columns:
             text = row.get(name)
             if name in _TAGS or name in _TOPICS:
-                words = text.split() if name == 'Requires' else [text] * bool(text)
-                kind = 'tag' if name in _TAGS else 'topic'
-                cells.append(' '.join(word if (name, word.upper()) == ('Publish_While', _RUN)
+                # A Heartbeat row depends on topics, a Read row on RUN or a tag.
+                has_topics = name == 'While' and row.get('Command').lower() == _HEARTBEAT
+                words = text.split() if has_topics else [text] * bool(text)
+                kind = 'topic' if has_topics or name in _TOPICS else 'tag'
+                cells.append(' '.join(word if (name, word.upper()) == ('While', RUN)
                                       else _number(numbers, kind, word) for word in words))
             elif name == 'Address':
                 cells.append(_address(text, row))
