@@ -211,6 +211,13 @@ check-install: build ## Build, then see that what is installed starts
 	        || { echo "$$command --help ended with status $$?" >&2; exit 1; }; \
 	done; \
 	echo 'check-install: check passed the installed files;' $$(ls "$$commands") start
+	@# As with a conda or pyenv that comes first in PATH.
+	@source install/setup.bash; set -e; other=$$(mktemp -d); trap 'rm -r "$$other"' EXIT; \
+	printf '#!/bin/sh\nexit 99\n' > "$$other/python3"; cp "$$other/python3" "$$other/python"; \
+	chmod +x "$$other"/*; cd /; for command in "$(CURDIR)/$(dir $(NODE))"/*; do \
+	    PATH="$$other:$$PATH" timeout 60 "$$command" --help > /dev/null \
+	        || { echo "$$command takes a python3 of PATH" >&2; exit 1; }; \
+	done; echo 'check-install: all of them start with another python3 first in PATH'
 
 endif
 

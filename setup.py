@@ -16,6 +16,7 @@
 
 from glob import glob
 from pathlib import Path
+import sys
 from xml.etree import ElementTree
 
 from setuptools import find_packages, setup
@@ -25,6 +26,12 @@ PACKAGE = 'abdf1_ros'
 # Maintainer and addresses are filled in there alone; a release counts up both versions.
 MANIFEST = ElementTree.parse(Path(__file__).resolve().parent / 'package.xml').getroot()
 MAINTAINER = MANIFEST.find('maintainer')
+
+# ROS finds all commands in lib/abdf1_ros, each with the interpreter of the build in its first
+# line. On the PATH of pip are only names that no other program has.
+COMMANDS = ('node', 'lines', 'monitor', 'demo', 'simulator', 'sniff', 'check', 'plc', 'conform')
+EXAMPLES = tuple(Path(name).stem for name in sorted(glob('examples/*.py')))
+IS_FOR_ROS = bool({'install', 'develop'} & {*sys.argv})  # colcon asks for these, pip never does
 
 setup(
     name=PACKAGE,
@@ -45,9 +52,6 @@ setup(
         (f'share/{PACKAGE}/deploy', sorted(glob('deploy/*.*') + ['deploy/Dockerfile'])),
         (f'share/{PACKAGE}/examples', sorted(glob('examples/*.*'))),
         (f'share/{PACKAGE}/examples/testing', sorted(glob('examples/testing/*.py'))),
-        # Where "ros2 run" finds them, and no PATH of pip does.
-        (f'lib/{PACKAGE}', sorted(glob('examples/*.py'))),
-        (f'lib/{PACKAGE}', ['scripts/node']),
         (f'share/{PACKAGE}/launch', sorted(glob('launch/*.py'))),
         (f'share/{PACKAGE}/wireshark', ['wireshark/abdf1.lua']),
     ],
@@ -58,14 +62,10 @@ setup(
     entry_points={
         'console_scripts': [
             f'abdf1 = {PACKAGE}.__main__:main',
-            f'lines = {PACKAGE}.cli.main:lines',
-            f'simulator = {PACKAGE}.cli.main:simulator',
-            f'sniff = {PACKAGE}.cli.main:sniff',
-            f'check = {PACKAGE}.cli.main:check',
-            f'plc = {PACKAGE}.cli.main:plc',
-            f'conform = {PACKAGE}.cli.main:conform',
-            f'monitor = {PACKAGE}.cli.main:monitor',
-            f'demo = {PACKAGE}.cli.main:demo',
+            *(f'{name} = {PACKAGE}.cli.main:{name}'
+              for name in (COMMANDS if IS_FOR_ROS else ('plc',))),
+            *(f'{name} = {PACKAGE}.cli.examples:{name}'
+              for name in (EXAMPLES if IS_FOR_ROS else ())),
         ],
     },
 )

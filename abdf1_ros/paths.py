@@ -49,10 +49,17 @@ class ShowVersion(argparse.Action):
 
 def config_file(name: str) -> Path:
     """Return a file of config/: of the installed package, or of the source tree."""
-    source = Path(__file__).resolve().parent.parent / 'config'
-    if source.is_dir():
-        return source / name
-    return _share() / 'config' / name
+    return _folder('config') / name
+
+
+def example_file(name: str) -> Path:
+    """Return a file of examples/, from where ``config_file`` has its own."""
+    return _folder('examples') / name
+
+
+def _folder(name: str) -> Path:
+    source = Path(__file__).resolve().parent.parent / name
+    return source if source.is_dir() else _share() / name
 
 
 def _share() -> Path:

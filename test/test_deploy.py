@@ -15,18 +15,24 @@
 """Deployment files: what can be checked of them without installing them."""
 
 import configparser
+import contextlib
 from fnmatch import fnmatch
+import importlib
 import itertools
 import json
 import os
 from pathlib import Path
 import re
+import runpy
 import shlex
 import shutil
 import signal
 import subprocess
 import sys
+from typing import Any
+from unittest import mock
 
+from abdf1_ros.cli.main import COMMANDS
 import pytest
 from support.ros import get_parameters, Observer, PATIENCE
 from support.ros_tools import SOURCE
@@ -43,7 +49,38 @@ LIBRARIES = ':'.join(map(str, [Path(sys.prefix, 'lib'), *Path(sys.prefix).glob(
 RULES = DEPLOY / '99-abdf1.rules'
 DOCKERFILE = DEPLOY / 'Dockerfile'
 SETUP = (SOURCE / 'setup.py').read_text(encoding='utf-8')
-EXECUTABLES = set(re.findall(r"(?:f'|scripts/)(\w+)(?: = \{PACKAGE\}|')", SETUP))
+
+
+def described(*arguments: str) -> dict[str, Any]:
+    """Return what setup.py says to setuptools when it is called with these arguments."""
+    with mock.patch('setuptools.setup') as setup, mock.patch.object(
+            sys, 'argv', ['setup.py', *arguments]), contextlib.chdir(SOURCE):
+        runpy.run_path('setup.py')
+    said: dict[str, Any] = setup.call_args.kwargs
+    return said
+
+
+def executables(*arguments: str) -> set[str]:
+    """Return the commands that setup.py installs when it is called with these arguments."""
+    said = described(*arguments)
+    return {line.partition(' ')[0] for line in said['entry_points']['console_scripts']}
+
+
+EXECUTABLES = executables('install')
+
+
+def test_ros_has_all_commands_and_pip_two_that_no_other_program_has() -> None:
+    examples = {path.stem for path in (SOURCE / 'examples').glob('*.py')}
+    assert EXECUTABLES == {'abdf1', *COMMANDS, *examples}
+    assert executables('develop', '--editable') == EXECUTABLES
+    for command in ('bdist_wheel', 'egg_info', 'dist_info', 'editable_wheel'):
+        assert executables(command) == {'abdf1', 'plc'}
+
+
+@pytest.mark.parametrize('line', described('install')['entry_points']['console_scripts'])
+def test_executables_are_there(line: str) -> None:
+    module, _, name = line.partition(' = ')[2].partition(':')
+    assert callable(getattr(importlib.import_module(module), name))
 
 
 # systemd

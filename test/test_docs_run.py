@@ -66,7 +66,7 @@ def test_marked_blocks_do_what_they_show(
     for block in documents.blocks(documents.text(name), only_run=True):
         for part in block.replace(PORT, str(port)).split('$ ')[1:]:
             line, *shown = part.splitlines()
-            command, *args = shlex.split(line)
+            command, *args = shlex.split(line.removeprefix('abdf1 '))
             if command in COMMANDS:
                 said = call(import_module(COMMANDS[command]).main, capsys, *args)
                 assert said.status == 0, f'{line}: {said}'

@@ -69,7 +69,7 @@ def install(folder: Path) -> None:
     for name in _INSTALLED:  # and no more: launch would find the files of a build as well
         shutil.copytree(SOURCE / name, share / 'abdf1_ros' / name, copy_function=os.symlink)
     started = {name: f'-m abdf1_ros {name}' for name in COMMANDS} | {
-        path.name: f'"{path}"' for path in (SOURCE / 'examples').glob('*.py')}
+        path.stem: f'"{path}"' for path in (SOURCE / 'examples').glob('*.py')}
     for name, arguments in started.items():
         command = commands / name
         command.write_text(

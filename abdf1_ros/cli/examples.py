@@ -1,4 +1,3 @@
-#!/usr/bin/env python3
 # Copyright 2026 abdf1_ros maintainers
 #
 # Licensed under the Apache License, Version 2.0 (the "License");
@@ -13,10 +12,25 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The executable ``node`` of ROS; pip installs it on no PATH, where it would hide that of Node.js."""
+"""
+The examples as executables of ROS.
 
-import sys
+They are no modules of the package, as each is one file to be copied.
+"""
 
-from abdf1_ros.cli.main import node
+from __future__ import annotations
 
-sys.exit(node())
+from functools import partial
+import runpy
+
+from abdf1_ros.paths import example_file
+
+
+def _run(name: str) -> None:
+    runpy.run_path(str(example_file(f'{name}.py')), run_name='__main__')
+
+
+command_writer = partial(_run, 'command_writer')
+handshake = partial(_run, 'handshake')
+interlock_consumer = partial(_run, 'interlock_consumer')
+recorder = partial(_run, 'recorder')
