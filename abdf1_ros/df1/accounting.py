@@ -20,7 +20,7 @@ from collections.abc import Callable
 
 from abdf1_ros.counters import Counters
 from abdf1_ros.df1.checksum import Checksum
-from abdf1_ros.df1.frames import Frame, FrameFault, MAX_LINK_DATA
+from abdf1_ros.df1.frames import Control, Frame, FrameFault, MAX_LINK_DATA, Symbol
 from abdf1_ros.df1.packet import HEADER_SIZE, is_local_status, Packet, REPLY_BIT
 from abdf1_ros.df1.stations import ActiveStationList
 from abdf1_ros.df1.tasks import Task
@@ -46,6 +46,22 @@ def count_fault(frame: Frame, checksum: Checksum, counters: Counters,
     if frame.fault is FrameFault.TOO_SHORT:
         return Event(Message.NTC_RCVD_MSG_TOO_SHORT, (HEADER_SIZE,), station)
     return Event(Message.NTC_RCVD_MSG_TOO_LONG, (MAX_LINK_DATA,), station)
+
+
+def count_unheard(symbol: Symbol, checksum: Checksum, counters: Counters) -> None:
+    """Count what a slave says while its master waits for nothing."""
+    if isinstance(symbol, Control):
+        counters.acks_received += symbol is Control.ACK
+        counters.naks_received += symbol is Control.NAK
+        counters.eots_received += symbol is Control.EOT
+    elif isinstance(symbol, Frame) and symbol.station is None:
+        if symbol.fault is not None:
+            count_fault(symbol, checksum, counters)
+            return
+        is_reply = Packet.decode(symbol.data).is_reply
+        counters.messages_received += 1
+        counters.replies_received += is_reply
+        counters.stale_messages += is_reply
 
 
 def wrong_message(packet: Packet, station: int) -> Event:
@@ -98,6 +114,11 @@ class Accounting:
         self.counters.stale_messages += may_answer
         self.counters.invalid_messages += not may_answer
         self.report(wrong_message(reply, reply.src))
+
+    def misdirected(self, command: Packet) -> None:
+        """Count and report a command for another node (S0, counter 2550 and message 2510)."""
+        self.counters.invalid_messages += 1
+        self.report(wrong_message(command, command.src))
 
     def nak_received(self, station: int | None) -> None:
         """Report that a message of ours has been answered with DLE NAK."""

@@ -150,7 +150,8 @@ class Frame(NamedTuple):
     ``data`` is the unstuffed link data, ``station`` the STN of a master's frame (None for
     any other). ``fault`` is None for a good frame. ``received`` and ``expected`` are the check
     as read and as computed, for a good frame or a BAD_CHECK; ``received`` of a NO_ETX is the code
-    after DLE that broke in. ``has_response`` tells that a response was embedded (M 4-3).
+    after DLE that broke in. After one that ``has_stopped`` nothing came.
+    ``has_response`` tells that a response was embedded (M 4-3).
     """
 
     data: bytes
@@ -159,6 +160,7 @@ class Frame(NamedTuple):
     received: int = 0
     expected: int = 0
     has_response: bool = False
+    has_stopped: bool = False
 
 
 Symbol = Control | Unknown | Poll | Frame
@@ -272,10 +274,10 @@ class FrameDecoder:
         """Return the message that is coming in as what it is if nothing follows."""
         data = bytes(self.link_data)
         if self._step != self._check:
-            return Frame(data, self._station, FrameFault.NO_ETX)
+            return Frame(data, self._station, FrameFault.NO_ETX, has_stopped=True)
         return Frame(data, self._station, FrameFault.BAD_CHECK,
                      int.from_bytes(self.waiting, 'little'),
-                     self._checksum.of_message(data, self._station))
+                     self._checksum.of_message(data, self._station), has_stopped=True)
 
     def next_symbol(self) -> Symbol | None:
         """Return the next whole symbol, or None when more bytes are needed."""

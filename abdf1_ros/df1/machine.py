@@ -39,6 +39,7 @@ import math
 from typing import NamedTuple, Protocol
 
 from abdf1_ros.counters import Counters
+from abdf1_ros.df1.accounting import count_unheard
 from abdf1_ros.df1.checksum import Checksum
 from abdf1_ros.df1.frames import Control, Duplex, Frame, FrameDecoder, MAX_LINK_DATA, NOISE, Symbol
 from abdf1_ros.df1.packet import begins_good_reply, HEADER_SIZE
@@ -201,6 +202,7 @@ class Machine:
                  duplex: Duplex = Duplex.HALF, timing: LineTiming | None = None,
                  counters: Counters | None = None, forget_on_send: bool = False,
                  background: Background | None = None) -> None:
+        self._checksum = checksum
         self.decoder = FrameDecoder(checksum, duplex)
         self.counters = counters or Counters()
         self.timing = timing or LineTiming()
@@ -228,6 +230,8 @@ class Machine:
         for moment in (self.deadline, self.sender.outgoing.due):
             if moment is not None and moment < first:
                 first = moment
+        if self.decoder.in_message:
+            first = min(first, self._message_end())
         return None if first == math.inf else first
 
     @property
@@ -287,16 +291,38 @@ class Machine:
         self.now = now
         self.counters.chars_received += len(data)
         if self._forget_on_send and (self.sender.waiting or not self._is_listening):
+            self._count(data)
             return  # it was said before what it would have to answer
-        is_idle = self.deadline is None or isinstance(self._step, Rest)
-        if self._is_listening and now - self._last_heard > self._pause_limit \
-                and (is_idle or not self.decoder.in_message):
-            self.decoder.reset()  # what broke off must not swallow what begins now
+        if self._is_listening and now - self._last_heard > self._pause_limit:
+            if not self.decoder.in_message:
+                self.decoder.reset()  # what broke off must not swallow what begins now
+            elif now > self._message_end():
+                self._break_off()
         self._last_heard = now
         self.decoder.feed(data)
         self._deliver_symbols()
         if self.decoder.in_message:
             self._hear_out(now)
+
+    def _count(self, data: bytes) -> None:
+        """Count the symbols in what comes while a master does not listen."""
+        if self.sender.waiting:
+            return
+        self.decoder.feed(data)
+        while (symbol := self._next_symbol()) is not None:
+            count_unheard(symbol, self._checksum, self.counters)
+
+    def _message_end(self) -> float:
+        """Return when a message that stops is over, infinite while an answer is waited for."""
+        is_idle = self.deadline is None or isinstance(self._step, Rest)
+        return self._last_heard + self._pause_limit if is_idle and self._is_listening \
+            else math.inf
+
+    def _break_off(self) -> None:
+        """Deliver a message that has stopped as what it is."""
+        message = self.decoder.broken_off()
+        self.decoder.reset()
+        self._resume(message)
 
     def _hear_out(self, now: float) -> None:
         """Let a message that has begun in time be heard to its end, unless it pauses or crawls."""
@@ -318,6 +344,8 @@ class Machine:
         due = self.sender.outgoing.due
         if due is not None and now >= due:
             self.sender.next_portion(now)
+        if self.decoder.in_message and now >= self._message_end():
+            self._break_off()
         if self.deadline is None or now < self.deadline:
             return
         self.late += now - self.deadline

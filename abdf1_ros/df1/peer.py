@@ -332,9 +332,11 @@ class FullDuplexPeer(EqualNode):
         """Judge a message and return the response to it."""
         if frame.fault is not None:
             self._report(count_fault(frame, self._settings.checksum, self._counters))
-            if frame.fault is FrameFault.NO_ETX and frame.received in (Code.STX, Code.ENQ):
+            is_given_up = frame.fault is FrameFault.NO_ETX and frame.received in (
+                Code.STX, Code.ENQ)  # its sender begins again, or asks
+            if is_given_up or frame.has_stopped:
                 self._last_response = frames.NAK
-                return b''  # its sender begins again, or asks
+                return b''
             return self._respond(frames.NAK)
         packet = Packet.decode(frame.data)
         self._counters.messages_received += 1
@@ -377,6 +379,8 @@ class FullDuplexPeer(EqualNode):
         key = packet.src, packet.tns
         entry = self._outstanding.get(key)
         if entry is None or not packet.answers(entry.task.command):
+            if entry is not None:  # to another node: ours may follow under the same numbers
+                self._accepted = None
             self._accounting.unexpected(packet)
             return
         del self._outstanding[key]

@@ -132,6 +132,10 @@ class HalfDuplexSlave:
         self._just_sent, self._sent_reply, self._unused = False, True, None
         self._queue.clear()
 
+    def forget_last(self) -> None:
+        """Take the next message as new, whatever its numbers."""
+        self._last_key = None
+
     def withdraw(self) -> None:
         """Do not send a command of our own again; the caller has ended it."""
         if self._held is not None and not self._held.packet.is_reply:

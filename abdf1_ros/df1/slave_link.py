@@ -29,7 +29,7 @@ from abdf1_ros.df1.accounting import Accounting
 from abdf1_ros.df1.link import Link, LinkStatus
 from abdf1_ros.df1.machine import Machine, Procedure, Rest, Silence
 from abdf1_ros.df1.mode import LineMode
-from abdf1_ros.df1.packet import BROADCAST, is_local_status, Packet
+from abdf1_ros.df1.packet import BROADCAST, is_local_status, Packet, STS_NOT_DELIVERED
 from abdf1_ros.df1.settings import LinkSettings
 from abdf1_ros.df1.slave import answer, HalfDuplexSlave, Initiator, TICK
 from abdf1_ros.df1.stations import ActiveStationList
@@ -53,8 +53,10 @@ class SlaveLink(Link, Initiator):
         self._machine = machine
         self._stations = stations
         self._settings = settings
+        self._serve = serve
         self._accounting = Accounting(machine.counters, stations, report, settings.station)
-        self._slave = HalfDuplexSlave(settings, serve, machine.counters, self, report)
+        self._slave = HalfDuplexSlave(
+            settings, self._serve_own, machine.counters, self, report)
         self._source: TaskSource | None = None
         self._outstanding: Outstanding | None = None
         self.last_poll = 0.0
@@ -82,6 +84,13 @@ class SlaveLink(Link, Initiator):
             if self._machine.now >= next_look:
                 self._look_after(source)
                 next_look = self._machine.now + TICK
+
+    def _serve_own(self, command: Packet) -> Packet:
+        """Execute a command for us; refuse one for a node behind us: we are not a gateway."""
+        if command.dst in (self._settings.station, BROADCAST):
+            return self._serve(command)
+        self._accounting.misdirected(command)
+        return command.reply(sts=STS_NOT_DELIVERED)
 
     def _expiry(self) -> float:
         """Return when the answer that is given now is too old, infinite unless it is a command."""
@@ -141,6 +150,8 @@ class SlaveLink(Link, Initiator):
         """Take a reply; one that fits nothing is stale."""
         entry = self._outstanding
         if entry is None or not reply.answers(entry.task.command):
+            if entry is not None and reply.src == entry.task.command.dst:
+                self._slave.forget_last()  # the right one may follow under the same numbers
             self._accounting.unexpected(reply)
             return
         self._end()  # also where the master's ACK got lost: it has had the command

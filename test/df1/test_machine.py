@@ -395,7 +395,24 @@ def test_pause_ends_what_broke_off(broken: bytes, limit: float | None, pause: fl
     bench = Bench(*[Listen(limit)] * 3, timing=LineTiming(char_time=0.01))
     bench.machine.receive_data(broken, 1.0)
     bench.machine.receive_data(EOT, 1.0 + pause)
-    assert (bench.got == [SAID_EOT]) is (forgotten or broken == b'\x10\x01')
+    assert (bench.got[-1:] == [SAID_EOT]) is (forgotten or broken == b'\x10\x01')
+
+
+def test_idle_master_counts_what_nobody_waits_for() -> None:
+    reply = message_frame(bytes.fromhex('05 01 4F 00 01 02'), Checksum.CRC)
+    bench = Bench(Rest(10.0), Send(FRAME, 1.0), forget_on_send=True)
+    bench.machine.receive_data(ACK + EOT + NAK + reply, 1.0)
+    bench.machine.receive_data(reply[:-1] + bytes([reply[-1] ^ 1]), 2.0)
+    bench.machine.receive_data(reply[:5], 3.0)  # does not begin what is heard later
+    counters = bench.machine.counters
+    assert (counters.acks_received, counters.eots_received, counters.naks_received) == (1, 1, 1)
+    assert (counters.messages_received, counters.replies_received) == (1, 1)
+    assert (counters.stale_messages, counters.crc_errors) == (1, 1)
+    bench.machine.handle_timeout(10.0)
+    assert bench.machine.data_to_send() == FRAME
+    bench.machine.receive_data(EOT, 10.1)
+    assert bench.got == [None, SAID_EOT]
+    assert counters.eots_received == 1  # the master itself counts what it waits for
 
 
 def test_wake_ends_a_rest() -> None:

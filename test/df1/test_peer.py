@@ -179,6 +179,26 @@ def test_part_of_a_message_is_no_old_ack(begun: int, pause: float, is_working: b
     assert peer.hear_packet(THEIRS).startswith(ACK)
 
 
+@for_all('begun', [2, 9, -3, -2, -1])
+def test_message_that_just_stops_is_counted_once_and_gets_no_answer(begun: int) -> None:
+    peer = bench()
+    assert peer.hear(peer.frame(THEIRS)[:begun]) == b''
+    assert peer.wait(60.0) == []
+    counts = peer.counts()
+    assert counts.get('invalid_messages', 0) + counts.get('crc_errors', 0) == 1
+    assert [number for number, *_ in peer.numbers()] == [2506 if begun in (-2, -1) else 2518]
+    assert peer.hear_packet(THEIRS).startswith(ACK)
+
+
+def test_reply_to_another_node_does_not_make_ours_a_repetition() -> None:
+    peer, task = acknowledged()
+    assert peer.hear_packet(REPLY._replace(dst=9)) == ACK
+    assert task.result is None
+    assert peer.counts()['stale_messages'] == 1
+    answer(peer, task)
+    assert peer.counts().get('duplicate_messages', 0) == 0
+
+
 def test_longest_message_is_served() -> None:
     peer = bench()
     command = THEIRS._replace(data=b'\x10' * (MAX_LINK_DATA - 6))

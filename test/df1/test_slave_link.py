@@ -77,6 +77,35 @@ def test_waiting_commands_expire_although_we_are_never_polled(busy: bool) -> Non
     assert not task.sent
 
 
+def test_message_that_just_stops_is_counted_once() -> None:
+    bench = SlaveBench(SETTINGS)
+    assert bench.hear(bench.frame(FROM_MASTER)[:9]) == b''
+    bench.wait(60.0)
+    assert bench.counts()['invalid_messages'] == 1
+    assert bench.hear(bench.frame(FROM_MASTER)) == ACK
+
+
+def test_reply_to_another_node_does_not_make_ours_a_repetition() -> None:
+    bench = SlaveBench(SETTINGS)
+    task = bench.add(own())
+    bench.poll()
+    bench.hear(ACK)
+    assert bench.hear(bench.frame(own().reply()._replace(dst=9), US)) == ACK
+    assert task.result is None
+    assert bench.hear(bench.frame(own().reply())) == ACK
+    assert task.result == own().reply()
+    assert bench.counts().get('duplicate_messages', 0) == 0
+
+
+def test_command_for_a_node_behind_us_is_refused_and_counted() -> None:
+    bench = SlaveBench(SETTINGS)
+    astray = FROM_MASTER._replace(dst=OTHER)
+    assert bench.hear(bench.frame(astray, US)) == ACK
+    assert bench.poll() == bench.own(astray.reply(sts=0x02))
+    assert bench.served == []
+    assert bench.counts()['invalid_messages'] == 1
+
+
 def said_within(bench: SlaveBench, seconds: float) -> list[tuple[float, bytes]]:
     """Return what the slave says by itself, each with the time from now."""
     start, end, said = bench.now, bench.now + seconds, []

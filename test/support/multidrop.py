@@ -320,8 +320,8 @@ class SlaveBench(SlaveNode):
     def wait(self, seconds: float) -> None:
         """Let time pass in silence; the slave says nothing by itself."""
         end = self.now + seconds
-        while self.machine.deadline is not None and self.machine.deadline <= end:
-            self.now = max(self.now, self.machine.deadline)
+        while (due := self.machine.next_call) is not None and due <= end:
+            self.now = max(self.now, due)
             self.machine.handle_timeout(self.now)
             assert self.machine.data_to_send() == b''
         self.now = end
