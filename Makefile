@@ -137,7 +137,7 @@ docs: $(INSTALLED) ## Write the parts of the documentation that repeat the code
 
 .PHONY: bench
 bench: $(INSTALLED) ## Measure plan, line, processor time, latency, scale (6 minutes)
-	@for name in planning cpu_time large_maps wire_efficiency node_cpu node_latency node_scale; do \
+	@for name in planning client_reads cpu_time large_maps wire_efficiency node_cpu node_latency node_scale; do \
 	    echo "$$name:"; timeout 300 $(PY) test/lab/benchmarks/$$name.py || exit; echo; \
 	done
 

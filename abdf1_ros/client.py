@@ -18,7 +18,8 @@ A blocking client, without ROS: read and write a PLC from any program.
 ::
 
     with Client('/dev/ttyUSB0', plc_type='SLC', station=1) as plc:
-        plc.read('N7:0', 10)
+        plc.read('N7:0', 10, 'int16')
+        plc.read_many(['N7:0-9', 'F8:2'])
         plc.write('B3:0/1', True)
 
     with Client.from_files('net.csv', 'map.csv') as plant:
@@ -30,16 +31,17 @@ milliseconds). Errors are those of ``abdf1_ros.errors``.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
-from contextlib import suppress
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager, suppress
+import logging
 import math
 from numbers import Real
 import os
 from queue import Empty, SimpleQueue
 import random
-from traceback import print_exception
+import time
 from types import TracebackType
-from typing import Any, Generic, overload, Self, TYPE_CHECKING, TypeVar
+from typing import Any, Generic, Literal, overload, Self, SupportsIndex, TYPE_CHECKING, TypeVar
 
 from abdf1_ros.df1.checksum import Checksum
 from abdf1_ros.df1.machine import LineTiming
@@ -49,12 +51,14 @@ from abdf1_ros.df1.peer import PEER
 from abdf1_ros.df1.settings import LinkSettings
 from abdf1_ros.df1.stations import MAX_STATION
 from abdf1_ros.driver.requests import Requests
-from abdf1_ros.errors import FormatError, PortLost
+from abdf1_ros.errors import Abdf1Error, FormatError, PortLost
+from abdf1_ros.messages import Event, Severity
 from abdf1_ros.numbers import Kind, member_of, one_of
 from abdf1_ros.pccc import steps
 from abdf1_ros.pccc.access import Access
+from abdf1_ros.pccc.address_range import AddressRange
 from abdf1_ros.pccc.dialect import Steps
-from abdf1_ros.pccc.families import FAMILIES
+from abdf1_ros.pccc.families import FAMILIES, parse_range
 from abdf1_ros.pccc.file_types import PlcType
 from abdf1_ros.pccc.identity import Identity
 from abdf1_ros.pccc.processor import Processor
@@ -68,12 +72,22 @@ from abdf1_ros.ports.settings import PortSettings
 from abdf1_ros.text import shown
 
 if TYPE_CHECKING:
+    from abdf1_ros.plan.line_model import LineModel
+    from abdf1_ros.ports.trace import Trace
+    from abdf1_ros.settings.mapping import Mapping as Row
     from abdf1_ros.tagged_client import TaggedClient
 
 _GLANCE = 0.2  # s; while waiting, look so often whether the thread of the link still runs
 _DUPLEX = one_of({'full': PEER, 'half': MASTER})
 _PARITY = one_of({name: name for name in ('None', 'Even', 'Odd')})
 _LONGEST = 60.0  # s
+_MOST_RETRIES = 10
+
+LOG = logging.getLogger('abdf1_ros')
+"""The logger where no other is given: requests with their times, and what happens on the line."""
+
+Whole = Literal['int16', 'uint16', 'int32', 'uint32', 'bcd16', 'bcd12']
+"""The kinds whose values are int."""
 
 _Result = TypeVar('_Result')
 _T = TypeVar('_T')
@@ -145,15 +159,26 @@ class OpenLine:
 
     ``absent`` stations get one try; ``routes`` gives the gateways of stations that are behind one.
     To a PLC that asks us we are a ``plc_type``. ``counters`` are those of the line, ``stations``
-    what is known of each station. Raises OSError when the port cannot be opened.
+    what is known of each station. All bytes go into the file ``trace``, for ``sniff``. Raises
+    OSError when the port cannot be opened or the file not be written.
     """
 
     def __init__(self, mode: LineMode, line: LinkSettings, port: PortSettings,
                  absent: Sequence[int] = (), routes: Mapping[int, int] | None = None,
-                 plc_type: PlcType = PlcType.PLC5) -> None:
-        self._requests = Requests(mode, line, absent, random.randrange(0x10000), routes, plc_type)
+                 plc_type: PlcType = PlcType.PLC5, trace: str | None = None,
+                 logger: logging.Logger = LOG) -> None:
+        self.log = logger
+        self._mode, self._settings = mode, line
+        self._requests = Requests(mode, line, absent, random.randrange(0x10000), routes, plc_type,
+                                  self._told)
         self.counters, self.stations = self._requests.counters, self._requests.stations
-        self._link = LinkThread(self._requests.machine, opened(port), on_fault=print_exception)
+        self._trace: Trace | None = None
+        port_of = opened(port)
+        if trace is not None:
+            port_of = self._traced(trace, port, port_of)
+        self._link = LinkThread(self._requests.machine, port_of,
+                                on_fault=lambda error: self.log.critical(
+                                    'internal error', exc_info=error))
         self._link.daemon = True  # a KeyboardInterrupt before ``with`` leaves nothing to stop it
         self._line = line_of(port.name)
         _ours.add(self._line)
@@ -203,7 +228,43 @@ class OpenLine:
         """End what is under way and close the port; every request has ended after this."""
         self._link.stop()
         self._requests.close()
+        if self._trace is not None:
+            self._trace.close()
         _ours.discard(self._line)
+
+    @property
+    def line_model(self) -> LineModel:
+        """Return what transactions cost on this line."""
+        from abdf1_ros.plan.line_model import LineModel  # only a plan needs it
+        return LineModel(self._settings.checksum, self._mode.duplex, self._settings.timing,
+                         self._mode.pause(self._settings))
+
+    @contextmanager
+    def naming(self, place: str) -> Iterator[None]:
+        """Let errors in the block say what they are about; log how long it took."""
+        begun = time.monotonic()
+        try:
+            yield
+        except Abdf1Error as error:
+            error.about = error.about or place
+            self.log.debug('%s', error)
+            raise
+        self.log.debug('%s: %.1f ms', place, (time.monotonic() - begun) * 1000)
+
+    def _told(self, event: Event) -> None:
+        is_error = event.message.severity is not Severity.NOTICE
+        self.log.log(logging.INFO if is_error else logging.DEBUG, '%s', event)
+
+    def _traced(self, path: str, port: PortSettings,
+                open_it: Callable[[], Port]) -> Callable[[], Port]:
+        """Begin the trace; return what opens the port whose bytes go into it."""
+        from abdf1_ros.ports.trace import begun_now, Trace, TracedPort
+        trace = self._trace = Trace(path, {
+            'begun': begun_now(), 'port': port.name, 'baud': str(port.baud),
+            'check': self._settings.checksum.value,
+            'duplex': self._mode.duplex.name.lower()}, self.log.error)
+        begun = time.monotonic()
+        return lambda: TracedPort(open_it(), trace, begun)
 
 
 class Client(OpenLine):
@@ -214,16 +275,19 @@ class Client(OpenLine):
     full, or half with us as the master; ``station`` is the PLC that is meant where a call names
     no other, ``own_station`` our address. Without ``plc_type`` (SLC, PLC5, PLC3, PLC2) a PLC is
     asked what it is. ``timeout`` and ``cmd_timeout`` are seconds: for each answer, and for a
-    reply. All calls block, may come from any thread, and raise RemoteError where the PLC refuses,
-    LinkError where it does not answer (``sent`` tells whether it may have executed the command),
-    and FormatError for what is wrong in the call, before anything is sent.
+    reply; ``retries`` are repetitions of what is not acknowledged or answered. ``trace`` is a file
+    for all bytes, which ``sniff`` reads. All calls block, may come from any thread, and raise
+    RemoteError where the PLC refuses, LinkError where it does not answer (``sent`` tells whether
+    it may have executed the command), and FormatError for what is wrong in the call, before
+    anything is sent.
     """
 
     def __init__(self, port: str | os.PathLike[str], *, plc_type: str | None = None,
                  station: int = 1, duplex: str = 'full', baud: int = 9600, parity: str = 'None',
                  check: str = 'CRC', own_station: int = 5, processor: str | None = None,
-                 access: str | None = None, timeout: float = 1.0,
-                 cmd_timeout: float = 1.0) -> None:
+                 access: str | None = None, timeout: float = 1.0, cmd_timeout: float = 1.0,
+                 retries: int = 3, trace: str | os.PathLike[str] | None = None,
+                 logger: logging.Logger = LOG) -> None:
         self.station = _whole('station', station, 0, MAX_STATION)
         self._access = None if access is None else _choice('access', member_of(Access), access)
         self._kinds: dict[int, tuple[PlcType, Processor | None]] = {}
@@ -235,43 +299,98 @@ class Client(OpenLine):
                     'processor', member_of(Processor), processor))
         elif processor is not None:
             raise FormatError('processor needs plc_type; without both the PLC is asked')
+        from abdf1_ros.settings import BAUD_RATES  # one list for files and programs
+        speed = _whole('baud', baud, 1)
+        if speed not in BAUD_RATES:
+            raise FormatError(f'baud {speed} should be one of {", ".join(map(str, BAUD_RATES))}')
         settings = PortSettings(
-            text_of('port', port), _whole('baud', baud, 1),
+            text_of('port', port), speed,
             parity=_choice('parity', _PARITY, parity))
+        times = _whole('retries', retries, 0, _MOST_RETRIES)
         super().__init__(_choice('duplex', _DUPLEX, duplex), LinkSettings(
+            nak_retries=times, enq_retries=times,
             checksum=_choice('check', member_of(Checksum), check),
             station=_whole('own_station', own_station, 0, MAX_STATION),
             timing=LineTiming(settings.char_time), timeout=_seconds('timeout', timeout),
-            cmd_timeout=_seconds('cmd_timeout', cmd_timeout)), settings)
+            cmd_timeout=_seconds('cmd_timeout', cmd_timeout)), settings,
+            trace=None if trace is None else text_of('trace', trace), logger=logger)
 
     @staticmethod
-    def from_files(net_file: str | os.PathLike[str],
-                   map_file: str | os.PathLike[str]) -> TaggedClient:
+    def from_files(net_file: str | os.PathLike[str], map_file: str | os.PathLike[str], *,
+                   trace: str | os.PathLike[str] | None = None,
+                   logger: logging.Logger = LOG) -> TaggedClient:
         """Return what reads and writes the rows of a map CSV by their tags."""
         from abdf1_ros.tagged_client import TaggedClient  # a program without files does without
-        return TaggedClient(text_of('net_file', net_file), text_of('map_file', map_file))
+        return TaggedClient(text_of('net_file', net_file), text_of('map_file', map_file),
+                            None if trace is None else text_of('trace', trace), logger)
+
+    # What there is without ``kind`` depends on the file of the address.
+    @overload
+    def read(self, address: str, length: SupportsIndex | None = None, kind: None = None, *,
+             word_order: str = 'Low', station: int | None = None) -> Any: ...
 
     @overload
-    def read(self, address: str, length: None = None, kind: str | None = None, *,
-             word_order: str = 'Low', station: int | None = None) -> float | str: ...
+    def read(self, address: str, length: None = None, *, kind: Whole,
+             word_order: str = 'Low', station: int | None = None) -> int: ...
 
     @overload
-    def read(self, address: str, length: int, kind: str | None = None, *,
-             word_order: str = 'Low', station: int | None = None) -> list[float] | str: ...
+    def read(self, address: str, length: SupportsIndex, kind: Whole, *,
+             word_order: str = 'Low', station: int | None = None) -> list[int]: ...
 
-    def read(self, address: str, length: int | None = None, kind: str | None = None, *,
-             word_order: str = 'Low', station: int | None = None) -> float | str | list[float]:
+    @overload
+    def read(self, address: str, length: None = None, *, kind: Literal['float32'],
+             word_order: str = 'Low', station: int | None = None) -> float: ...
+
+    @overload
+    def read(self, address: str, length: SupportsIndex, kind: Literal['float32'], *,
+             word_order: str = 'Low', station: int | None = None) -> list[float]: ...
+
+    @overload
+    def read(self, address: str, length: None = None, *, kind: Literal['bool'],
+             word_order: str = 'Low', station: int | None = None) -> bool: ...
+
+    @overload
+    def read(self, address: str, length: SupportsIndex, kind: Literal['bool'], *,
+             word_order: str = 'Low', station: int | None = None) -> list[bool]: ...
+
+    @overload
+    def read(self, address: str, length: SupportsIndex | None = None, *,
+             kind: Literal['string'], word_order: str = 'Low',
+             station: int | None = None) -> str: ...
+
+    @overload
+    def read(self, address: str, length: SupportsIndex | None = None, kind: str | None = None, *,
+             word_order: str = 'Low', station: int | None = None) -> Any: ...
+
+    def read(self, address: str, length: SupportsIndex | None = None, kind: str | None = None, *,
+             word_order: str = 'Low', station: int | None = None) -> Any:
         """
         Return the value at an address, or a list of ``length`` values from there on.
 
-        ``kind`` is int16, uint16, int32, uint32, float32, bcd16, bcd12 or string where the
-        natural type of the file is not meant. Bits are bool; a string over words
-        has ``length`` words.
+        ``kind`` is bool, int16, uint16, int32, uint32, float32, bcd16, bcd12 or string; without
+        it the natural type of the file is meant. A type checker knows the result by it. A string
+        over words has ``length`` words.
         """
         number, target = self._target(
             address, 1 if length is None else length, kind, word_order, station)
-        found = plain(self.ask(number, steps.read(target)), target.codec.type)
-        return found[0] if length is None and not isinstance(found, str) else found
+        with self.naming(_place(address, number)):
+            found = plain(self.ask(number, steps.read(target)), target.codec.type)
+        return single(found, length is None)
+
+    def read_many(self, addresses: Iterable[str], *, station: int | None = None) -> dict[str, Any]:
+        """
+        Return the values at many addresses or ranges (N7:0-9), in as few packets as it takes.
+
+        They are not of one instant: each packet is a transaction of its own. The result is by
+        address, in their order; of a range it is a list.
+        """
+        from abdf1_ros.plan.planner import Planner  # a program that reads one by one does without
+        from abdf1_ros.plan.reading import read_planned
+        number = self._of(station)
+        rows = [self._row(text, item, number)
+                for item, text in enumerate(dict.fromkeys(addresses), 1)]
+        values = dict(read_planned(Planner(self.line_model, 1.0), [row for row, _ in rows], self))
+        return {row.tag: single(plain(values[row], row.type), is_one) for row, is_one in rows}
 
     def write(self, address: str, values: float | str | Sequence[float], kind: str | None = None,
               *, word_order: str = 'Low', station: int | None = None) -> None:
@@ -281,24 +400,41 @@ class Client(OpenLine):
         length = (len(values) + 1) // 2 if is_packed else \
             1 if isinstance(values, str) else len(values)
         number, target = self._target(address, length, kind, word_order, station)
-        self.ask(number, steps.write(target, values))
+        with self.naming(_place(address, number)):
+            self.ask(number, steps.write(target, values))
 
     def identify(self, station: int | None = None) -> Identity:
         """Return what a station says of itself: model, mode, faults."""
-        return self.ask(self._of(station), steps.identify())
+        number = self._of(station)
+        with self.naming(f'status of station {number}'):
+            return self.ask(number, steps.identify())
 
     def _of(self, station: int | None) -> int:
         return _whole('station', self.station if station is None else station, 0, MAX_STATION)
 
-    def _target(self, address: str, length: int, kind: str | None, word_order: str,
+    def _row(self, text: str, item: int, station: int) -> tuple[Row, bool]:
+        """Return the row of a map that an address would have, and whether it is a single one."""
+        from abdf1_ros.plan.reading import row_of
+        plc_type, processor = self._kind or self._asked(station)
+        with self.naming(_place(text_of('address', text), station)):
+            found = parse_range(text, plc_type, self._access)
+            first, length = (found.first, found.length()) if isinstance(found, AddressRange) \
+                else (found, 1)
+            target = AddressedValues.of(str(first), plc_type, length, access=self._access,
+                                        processor=processor)
+        row = row_of(text, item, station, target, self._access, processor)
+        return row, found is first
+
+    def _target(self, address: str, length: SupportsIndex, kind: str | None, word_order: str,
                 station: int | None) -> tuple[int, AddressedValues]:
         number = self._of(station)
         place, count = text_of('address', address), _whole('length', length)
         chosen = None if kind is None else _choice('kind', member_of(ValueType), kind)
         order = _choice('word_order', member_of(WordOrder), word_order)
         plc_type, processor = self._kind or self._asked(number)
-        return number, AddressedValues.of(place, plc_type, count, chosen, word_order=order,
-                                          access=self._access, processor=processor)
+        with self.naming(_place(place, number)):
+            return number, AddressedValues.of(place, plc_type, count, chosen, word_order=order,
+                                              access=self._access, processor=processor)
 
     def _asked(self, station: int) -> tuple[PlcType, Processor | None]:
         """Return the family of a station, which is asked once."""
@@ -313,6 +449,15 @@ class Client(OpenLine):
 
 def _nothing() -> Steps[None]:
     yield from ()
+
+
+def _place(address: str, station: int) -> str:
+    return f'{shown(address)} of station {station}'
+
+
+def single(values: list[float] | str, is_one: bool) -> float | str | list[float]:
+    """Return the only value where one is meant."""
+    return values[0] if is_one and not isinstance(values, str) else values
 
 
 def plain(values: Values, kind: ValueType) -> list[float] | str:

@@ -20,7 +20,21 @@ from abdf1_ros.messages import Message
 
 
 class Abdf1Error(Exception):
-    """Anything this package raises on purpose."""
+    """
+    Anything this package raises on purpose.
+
+    ``about`` is what was asked for, such as "N7:0 of station 1", empty where that is not known.
+    """
+
+    about: str = ''
+
+    def words(self) -> str:
+        """Return what is wrong."""
+        return super().__str__()
+
+    def __str__(self) -> str:
+        """Return what is wrong, and with what."""
+        return f'{self.about}: {self.words()}' if self.about else self.words()
 
 
 class FormatError(Abdf1Error, ValueError):
@@ -41,7 +55,7 @@ class LinkError(Abdf1Error):
         super().__init__(*args)
         self.sent = sent
 
-    def __str__(self) -> str:
+    def words(self) -> str:
         """Return the numbered text."""
         return self.message.entry(*self.args)
 
@@ -77,7 +91,7 @@ class NeverTaken(LinkError):
 class CommandExpired(LinkError):
     """The command was too old to be sent, or to be repeated."""
 
-    def __str__(self) -> str:
+    def words(self) -> str:
         """Return that; the specification has no number for it."""
         return 'too old to be sent once more' if self.sent else 'too old to be sent'
 
@@ -88,7 +102,7 @@ INTERNAL_ERROR = 'internal error, see the log'  # where a bug ends the use of th
 class PortLost(LinkError):
     """The port failed or was closed while the transaction ran; the argument says how."""
 
-    def __str__(self) -> str:
+    def words(self) -> str:
         """Return what happened to the port; the specification has no number for it."""
         return f'port lost: {self.args[0]}'
 

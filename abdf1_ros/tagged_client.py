@@ -16,13 +16,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
+import logging
+from typing import Any, overload
 
-from abdf1_ros.client import OpenLine, plain, text_of, values_of
+from abdf1_ros.client import LOG, OpenLine, plain, single, text_of, values_of
 from abdf1_ros.df1.stations import MAX_STATION
 from abdf1_ros.errors import FormatError
 from abdf1_ros.pccc import steps
 from abdf1_ros.pccc.steps import AddressedValues
+from abdf1_ros.pccc.values import Values
+from abdf1_ros.plan.planner import Planner
+from abdf1_ros.plan.reading import read_planned
 from abdf1_ros.plan.usable_rows import line_problems
 from abdf1_ros.ports.settings import PortSettings
 from abdf1_ros.problems import ConfigurationError
@@ -43,7 +48,8 @@ class TaggedClient(OpenLine):
     fault of the files.
     """
 
-    def __init__(self, net_file: str, map_file: str) -> None:
+    def __init__(self, net_file: str, map_file: str, trace: str | None = None,
+                 logger: logging.Logger = LOG) -> None:
         network = load_network(net_file)
         if network.line_mode.is_polled:
             raise FormatError(f'{net_file}: Mode Slave: a client asks, and a slave may not')
@@ -54,21 +60,35 @@ class TaggedClient(OpenLine):
         self.rows = {row.tag: row for row in mappings.of_plcs
                      if (row.polls or row.writes) and row.station <= MAX_STATION}
         super().__init__(network.line_mode, network.line, PortSettings.of(network), routes={
-            row.station: row.via for row in mappings if row.via is not None})
+            row.station: row.via for row in mappings if row.via is not None},
+            trace=trace, logger=logger)
 
-    def read(self, tag: str) -> float | str | list[float]:
-        """Return the value of a Read or ReadWrite row; a list where its Length is above 1."""
-        row = self._row(tag, 'read', lambda row: row.polls)
-        values = self.ask(row.station, steps.read(_target_of(row)))
-        if row.scaling is not None:
-            values = row.scaling.publish(values)
-        found = plain(values, row.type)
-        return found[0] if row.length == 1 and not isinstance(found, str) else found
+    @overload
+    def read(self, tag: str) -> Any: ...
+
+    @overload
+    def read(self, tag: Iterable[str]) -> dict[str, Any]: ...
+
+    def read(self, tag: str | Iterable[str]) -> Any:
+        """
+        Return the value of a Read or ReadWrite row; a list where its Length is above 1.
+
+        Of several tags the values by tag, read in as few packets as it takes. They are not of one
+        instant: each packet is a transaction of its own.
+        """
+        if isinstance(tag, str):
+            row = self._row(tag, 'read', lambda row: row.polls)
+            with self.naming(_named(row)):
+                return _shown(row, self.ask(row.station, steps.read(_target_of(row))))
+        rows = [self._row(name, 'read', lambda row: row.polls) for name in dict.fromkeys(tag)]
+        values = dict(read_planned(Planner(self.line_model, 1.0), rows, self))
+        return {row.tag: _shown(row, values[row]) for row in rows}
 
     def write(self, tag: str, values: float | str | Sequence[float]) -> None:
         """Write to a Write or ReadWrite row; returns when the PLC has confirmed all."""
         row = self._row(tag, 'written', lambda row: row.writes)
-        self.ask(row.station, steps.write(_target_of(row), raw_values(row, values_of(values))))
+        with self.naming(_named(row)):
+            self.ask(row.station, steps.write(_target_of(row), raw_values(row, values_of(values))))
 
     def _row(self, tag: str, what: str, fits: Callable[[Mapping], bool]) -> Mapping:
         row = self.rows.get(text_of('tag', tag))
@@ -76,6 +96,17 @@ class TaggedClient(OpenLine):
             known = first([row.tag for row in self.rows.values() if fits(row)])
             raise FormatError(f'tag {tag!r} should be that of a row that is {what}: {known}')
         return row
+
+
+def _named(row: Mapping) -> str:
+    return f'{row.tag} ({row.address} of station {row.station})'
+
+
+def _shown(row: Mapping, values: Values) -> float | str | list[float]:
+    """Return values as the topic of a row has them."""
+    if row.scaling is not None:
+        values = row.scaling.publish(values)
+    return single(plain(values, row.type), row.length == 1)
 
 
 def _target_of(row: Mapping) -> AddressedValues:

@@ -19,6 +19,7 @@ from contextlib import ExitStack, suppress
 from inspect import signature
 import math
 from pathlib import Path
+import re
 import subprocess
 import sys
 from threading import Thread
@@ -26,6 +27,7 @@ import time
 from types import FrameType
 from typing import Any
 
+from abdf1_ros.cli.sniff import main as sniff
 from abdf1_ros.client import Client, Pending
 from abdf1_ros.counters import Counters
 from abdf1_ros.df1.peer import PEER
@@ -110,16 +112,61 @@ def test_inputs_by_slot_and_flat(port: str, plcs: tuple[SimulatedPlc, SimulatedP
 
 def test_errors_are_those_of_the_bridge(port: str) -> None:
     with client(port, plc_type='SLC') as plc:
-        with pytest.raises(RemoteError, match='^STS 50: address not there'):
+        with pytest.raises(RemoteError, match='^N7:250 of station 1: STS 50: address not there'):
             plc.read('N7:250')
-        with pytest.raises(RemoteError, match='^STS 10: '):
+        with pytest.raises(RemoteError, match='^N30:0 of station 1: STS 10: '):
             plc.write('N30:0', 1)
+        with pytest.raises(FormatError, match='^N7:x of station 1: write type, file'):
+            plc.read('N7:x')
         with pytest.raises(FormatError, match='station 300'):
             plc.read('N7:0', station=300)
     with Client(port, plc_type='SLC', duplex='half', baud=115200, timeout=0.1) as plc:
-        for ask in (lambda: plc.read('N7:0', station=9), lambda: plc.identify(station=9)):
-            with pytest.raises(LinkError, match='^2509'):
+        for ask, place in ((lambda: plc.read('N7:0', station=9), 'N7:0 of'),
+                           (lambda: plc.identify(station=9), 'status of')):
+            with pytest.raises(LinkError, match=f'^{place} station 9: 2509') as error:
                 ask()
+            assert error.value.words().startswith('2509')
+
+
+def test_many_addresses_are_read_by_the_plan(
+        port: str, plcs: tuple[SimulatedPlc, SimulatedPlc]) -> None:
+    store(plcs[0], 'N7:0', [*range(100, 120)])
+    store(plcs[0], 'T4:1', [0, 7, 5])
+    wanted = ['N7:9', 'B3:0/1', 'N7:0-2', 'F8:1', 'N7:12', 'T4:1.ACC', 'N7:5-5', 'T4:1-1']
+    with client(port, plc_type='SLC') as plc:
+        assert plc.read_many(wanted) == {
+            'N7:9': 109, 'B3:0/1': False, 'N7:0-2': [100, 101, 102], 'F8:1': 0.0, 'N7:12': 112,
+            'T4:1.ACC': 5, 'N7:5-5': [105], 'T4:1-1': [0, 7, 5]}
+        assert plc.counters.commands_sent == 4  # N7, B3, F8, T4
+        assert list(plc.read_many(reversed(wanted))) == wanted[::-1]
+        assert plc.read_many([]) == {}
+        # What the PLC lacks is named, and does not take its neighbours along.
+        with pytest.raises(RemoteError, match=r'^N7:250 \(N7:250 of station 1\): STS 50'):
+            plc.read_many(['N7:248', 'N7:249', 'N7:250'])
+        with pytest.raises(FormatError, match='^N7:3-0 of station 1: the lower end comes first'):
+            plc.read_many(['N7:0', 'N7:3-0'])
+
+
+def test_retries_trace_and_log_are_arguments(port: str, tmp_path: Path,
+                                             caplog: pytest.LogCaptureFixture) -> None:
+    trace = tmp_path / 'line.cap'
+    caplog.set_level('DEBUG', 'abdf1_ros')
+    with Client(port, plc_type='SLC', duplex='half', baud=115200, timeout=0.1, retries=1,
+                trace=trace) as plc:
+        plc.read('N7:0')
+        with pytest.raises(LinkError):
+            plc.read('N7:0', station=9)
+        assert plc.counters.nak_retries == 1
+    logged = [record.getMessage() for record in caplog.records if record.name == 'abdf1_ros']
+    assert logged[0].startswith('N7:0 of station 1: ') and logged[0].endswith(' ms')
+    assert logged[-1].startswith('N7:0 of station 9: 2509 ERR_INACTIVE_STATION')
+    assert sniff(['--summary', str(trace)]) == 0
+    with pytest.raises(OSError, match='exists and is not a capture'):
+        client_with(port, trace=__file__)
+
+
+def client_with(port: str, **more: Any) -> Client:
+    return Client(port, plc_type='SLC', duplex='half', baud=115200, **more)
 
 
 @pytest.mark.parametrize(('address', 'arguments', 'text'), [
@@ -167,6 +214,8 @@ def test_arguments_of_the_line(tmp_path: Path) -> None:
             ({'own_station': -1}, 'own_station -1'),
             ({'baud': '19200'}, "baud '19200' should be a whole number"),
             ({'baud': True}, 'baud True'), ({'baud': 0}, 'baud 0'),
+            ({'baud': 14400}, 'baud 14400 should be one of 1200, '),
+            ({'retries': 11}, 'retries 11 should be a whole number from 0 to 10'),
             ({'timeout': 300}, 'timeout 300 should be seconds above 0, up to 60; 0.3 for 300 ms'),
             ({'cmd_timeout': '1'}, "cmd_timeout '1' should be seconds above 0, up to 60$"),
             ({'timeout': 0}, 'timeout 0 '), ({'timeout': math.nan}, 'timeout nan'),
@@ -242,6 +291,10 @@ def test_rows_of_a_map_are_read_and_written_by_their_tags(
         assert stored(plcs[1], 'N7:11') == b'\2\0'
         plant.write('name', 'left')
         assert (plant.read('name'), plant.read('doors')) == ('left', [False] * 3)
+        before = plant.counters.commands_sent
+        assert plant.read(['name', 'speed', 'doors']) == {
+            'name': 'left', 'speed': pytest.approx(12.3), 'doors': [False] * 3}
+        assert plant.counters.commands_sent - before == 3
         for call, text in (
                 (lambda: plant.write('speed', 51), 'value 51 at index 0 is outside Min 0, Max 50'),
                 (lambda: plant.read('recipe'), "'recipe' should be .* that is read: speed, doors"),
@@ -293,6 +346,33 @@ def test_example_of_the_page_runs(peer: str, capsys: pytest.CaptureFixture[str])
     exec(example.replace('/dev/ttyUSB0', peer), names)  # noqa: S102
     assert names['speeds'] == [0] * 10 and names['level'] == 0.0
     assert capsys.readouterr().out == 'SLC 5/03 series A revision 1, REM RUN\n'
+
+
+@pytest.mark.parametrize('page', ['README.md', 'docs/library.md'])
+def test_examples_of_the_pages_have_precise_types(page: str, tmp_path: Path) -> None:
+    mypy = pytest.importorskip('mypy.api')
+    text = (Path(__file__).parents[1] / page).read_text(encoding='utf-8')
+    examples = re.findall('```python\n(.*?)```', text, re.DOTALL)
+    assert examples
+    source = tmp_path / 'example.py'
+    source.write_text(examples[0] + """
+words: list[int] = plc.read('N7:0', 10, 'int16')
+word: int = plc.read('N7:0', kind='uint16')
+height: float = plc.read('F8:0', kind='float32')
+bits: list[bool] = plc.read('B3:0/0', 4, 'bool')
+name: str = plc.read('ST9:0', kind='string')
+natural: list[int] = plc.read('N7:0', 10)
+both = sum(plc.read('N7:0', 10, 'int32')) + sum(natural)
+many: dict[str, int] = plc.read_many(['N7:0', 'N7:5'])
+with Client.from_files('net.csv', 'map.csv') as other:
+    speed: float = other.read('speed')
+    all_of: dict[str, float] = other.read(['speed', 'level'])
+wrong: str = plc.read('N7:0', kind='int16')
+""", encoding='utf-8')
+    said, fault, _ = mypy.run(['--strict', '--no-error-summary', str(source)])
+    *known, wrong = said.splitlines()
+    assert (known, fault) == ([], '')
+    assert 'expression has type "int", variable has type "str"' in wrong
 
 
 def test_program_that_breaks_off_without_closing_ends(port: str) -> None:

@@ -27,7 +27,7 @@ from typing import Any, TypeVar
 
 from abdf1_ros.counters import Counters
 from abdf1_ros.df1.machine import Procedure
-from abdf1_ros.df1.mode import LineMode
+from abdf1_ros.df1.mode import LineMode, Report
 from abdf1_ros.df1.settings import LinkSettings
 from abdf1_ros.df1.stations import ActiveStationList
 from abdf1_ros.df1.tasks import Task, TaskSource
@@ -72,12 +72,15 @@ class Requests(TaskSource):
     the line. ``routes`` gives the gateways of stations that are behind one. ``first_tns`` should
     be random, or a station may take our first command for a repetition. Commands that come for us
     are refused, except an echo and the diagnostic status, which is that of a ``plc_type``.
-    ``stray`` tells the last reply that came and answers no command, empty for none.
+    ``stray`` tells the last reply that came and answers no command, empty for none. ``report``
+    gets every numbered error and notice, in the link thread.
     """
 
     def __init__(self, mode: LineMode, line: LinkSettings, absent: Sequence[int] = (),
                  first_tns: int = 0, routes: Mapping[int, int] | None = None,
-                 plc_type: PlcType = PlcType.PLC5) -> None:
+                 plc_type: PlcType = PlcType.PLC5,
+                 report: Report = lambda event: None) -> None:
+        self._told = report
         self.counters = Counters()
         self.stations = ActiveStationList(absent, routes=routes)
         for number in absent:
@@ -119,6 +122,7 @@ class Requests(TaskSource):
         return None
 
     def _report(self, event: Event) -> None:
+        self._told(event)
         if event.message is Message.ERR_WRONG_MESSAGE:
             self.stray = str(event)
 
