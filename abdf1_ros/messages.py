@@ -24,6 +24,8 @@ from __future__ import annotations
 from enum import Enum
 from typing import Any, NamedTuple
 
+_CHOICE = ', %s'
+
 
 class Severity(Enum):
     """The weight of a numbered message, named as the specification names its tables."""
@@ -94,14 +96,23 @@ class Message(Enum):
         self.severity = severity
         self.template = template
 
+    @property
+    def has_choices(self) -> bool:
+        """Tell whether the text ends with a list."""
+        return self.template.endswith(_CHOICE * 2)
+
     def text(self, *args: Any) -> str:
         """
         Return the text with ``args`` in its places.
 
         A ``%d`` place also takes text, because a number that a user mistyped ("abc" as a
-        station) has to be shown as it was typed.
+        station) has to be shown as it was typed. A list of choices at the end takes as many as
+        there are.
         """
-        return self.template.replace('%d', '%s') % args
+        text = self.template.replace('%d', '%s')
+        if self.has_choices:
+            text += _CHOICE * (len(args) - text.count('%s'))
+        return text % args
 
     def entry(self, *args: Any) -> str:
         """Return number, mnemonic and text, as logs and diagnostics show them."""

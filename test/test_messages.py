@@ -45,8 +45,14 @@ def test_severity_follows_the_mnemonic(message: Message) -> None:
 def test_text_takes_as_many_arguments_as_it_has_places(message: Message) -> None:
     args = tuple(range(message.template.count('%')))
     assert '%' not in message.text(*args)
-    with pytest.raises(TypeError):
-        message.text(*args, 1)
+    if message.has_choices:
+        assert message.text(*args, 'TOY') == f'{message.text(*args)}, TOY'
+    else:
+        with pytest.raises(TypeError):
+            message.text(*args, 1)
+    if args:
+        with pytest.raises(TypeError):
+            message.text(*args[1:])
 
 
 @for_all(('shown', 'text'), [

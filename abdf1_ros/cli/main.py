@@ -22,7 +22,7 @@ time.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from functools import partial
 from importlib import import_module
@@ -66,16 +66,11 @@ def run(name: str) -> int:
     return _ended(status)
 
 
-# What the executables call.
-node = partial(run, 'node')
-lines = partial(run, 'lines')
-monitor = partial(run, 'monitor')
-demo = partial(run, 'demo')
-simulator = partial(run, 'simulator')
-sniff = partial(run, 'sniff')
-check = partial(run, 'check')
-plc = partial(run, 'plc')
-conform = partial(run, 'conform')
+def __getattr__(name: str) -> Callable[[], int]:
+    """Return what the executable of this name calls."""
+    if name not in COMMANDS:
+        raise AttributeError(name)
+    return partial(run, name)
 
 
 def _end_quietly(status: int) -> None:

@@ -130,6 +130,12 @@ MOST_LATE = 0.2
 # What an operating system or a device server may hold bytes of a frame back (s).
 HELD_BACK = 0.1
 
+# A message or a line is over after a pause of so many characters, besides that.
+QUIET_CHARACTERS = 20
+
+# A shorter time (s) counts as none: no wait ends so exactly.
+MOMENT = 0.0001
+
 # A message that has begun may take so many times as long as its bytes take at the set speed, but
 # no longer than the longest one, and two pauses besides. Without a limit a station that dribbles,
 # or never ends, would keep the line from all others.
@@ -213,7 +219,7 @@ class Machine:
         self._last_pause = -math.inf, 0.0  # its end, and its seconds
         self._background = background
         self._make_procedure = procedure
-        self._pause_limit = 20 * self.timing.char_time + HELD_BACK  # inside a frame
+        self._pause_limit = QUIET_CHARACTERS * self.timing.char_time + HELD_BACK  # inside a frame
         self._forget_on_send = forget_on_send
         self._is_half_duplex = duplex is Duplex.HALF
         self._procedure: Procedure | None = None

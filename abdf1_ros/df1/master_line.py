@@ -36,7 +36,17 @@ from abdf1_ros.df1 import frames
 from abdf1_ros.df1.accounting import Accounting, count_fault, wrong_message
 from abdf1_ros.df1.frames import Code, Control, Frame, FrameFault, Unknown
 from abdf1_ros.df1.link import ack_on_reply, quiet_time
-from abdf1_ros.df1.machine import Heard, Listen, LISTEN_ON, Machine, Procedure, Send, Silence, Step
+from abdf1_ros.df1.machine import (
+    Heard,
+    Listen,
+    LISTEN_ON,
+    Machine,
+    MOMENT,
+    Procedure,
+    Send,
+    Silence,
+    Step,
+)
 from abdf1_ros.df1.mode import answer_time
 from abdf1_ros.df1.packet import BROADCAST, is_local_status, Packet, REPLY_BIT, STS_NOT_DELIVERED
 from abdf1_ros.df1.sender import Reflex
@@ -65,9 +75,6 @@ _ACKNOWLEDGE = Send(frames.ACK)
 # What answers a message and a poll, but for the frames that answer a poll too.
 _MESSAGE_ANSWERS = (Control.ACK, Control.NAK)
 _POLL_ANSWERS = (Control.EOT, Control.NAK)
-
-# A shorter time (s) counts as none: no wait ends so exactly.
-_MOMENT = 0.0001
 
 
 class MasterLine:
@@ -243,7 +250,7 @@ class MasterLine:
         quiet = quiet_time(self.machine.timing.char_time)
         end = self.machine.now + quiet + frames.MAX_LINK_DATA * self.machine.timing.char_time
         left = quiet
-        while left > _MOMENT:
+        while left > MOMENT:
             symbol = yield Listen(left)
             heard = symbol.seconds if isinstance(symbol, Silence) else 0.0
             left = min(quiet - heard, end - self.machine.now)

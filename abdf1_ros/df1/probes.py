@@ -17,7 +17,7 @@
 from __future__ import annotations
 
 # After a probe that has taken the line for t, 7 t are left to the other stations.
-_OTHERS_SHARE = 7
+OTHERS_SHARE = 7
 
 
 class Probes:
@@ -32,7 +32,7 @@ class Probes:
     """
 
     def __init__(self, usual: float) -> None:
-        self.pause = _OTHERS_SHARE * usual
+        self.pause = OTHERS_SHARE * usual
         self._free = self._put_off = 0.0
         self._is_kept_for_message = False
         self._was_message = False
@@ -56,7 +56,7 @@ class Probes:
 
     def spent(self, seconds: float, now: float, *, is_message: bool = False) -> None:
         """Take note that a silent station has had the line for so long until now."""
-        self.pause = _OTHERS_SHARE * seconds
+        self.pause = OTHERS_SHARE * seconds
         self._free = max(self._free, now) + self.pause
         self._is_kept_for_message, self._was_message = False, is_message
 
@@ -66,7 +66,7 @@ class Probes:
 
         Only a message asks it at once. Silence that a gateway reports quickly, costs little.
         """
-        self._put_off = now + min(self.pause, _OTHERS_SHARE * seconds)
+        self._put_off = now + min(self.pause, OTHERS_SHARE * seconds)
 
     def none_waits(self, now: float) -> None:
         """Take note that probes keep no station waiting."""

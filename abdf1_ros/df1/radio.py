@@ -48,7 +48,9 @@ from abdf1_ros.df1.machine import (
     Listen,
     Machine,
     MIN_RESPONSE_TIME,
+    MOMENT,
     Procedure,
+    QUIET_CHARACTERS,
     Rest,
     Send,
     Silence,
@@ -73,9 +75,6 @@ _MOST_SENT = 256
 # Replies and packets of others that wait for a quiet line; with more, the newest are dropped.
 _MOST_WAITING = 16
 
-# The line is quiet after a pause of so many characters, besides what equipment holds bytes back.
-_QUIET_CHARACTERS = 20
-
 # The random time before the first try is up to that of our frame, twice as much before each
 # further one, but no more than this many times.
 _MOST_BACK_OFF = 8
@@ -85,8 +84,6 @@ LONGEST_WAIT = 2.0
 
 # Characters of a command that reads, and of the longest packet.
 _SHORT_FRAME, _LONG_FRAME = 24, MAX_LINK_DATA + 8
-
-_MOMENT = 0.0001  # s after the last byte
 
 # So often (s) a node that waits for replies looks whether there is something for other stations.
 _TICK = 0.05
@@ -249,7 +246,7 @@ class RadioNode(EqualNode):
         self._counters.messages_sent += 1
         self._sent.append(data)
         try:
-            symbol = yield Send(frame, _MOMENT, expires=expires)
+            symbol = yield Send(frame, MOMENT, expires=expires)
         except CommandExpired:
             self._counters.messages_sent -= 1
             raise
@@ -263,7 +260,7 @@ class RadioNode(EqualNode):
         machine = self._machine
         if self._settings.avoids_collisions:
             return
-        quiet = MIN_RESPONSE_TIME + _QUIET_CHARACTERS * machine.timing.char_time
+        quiet = MIN_RESPONSE_TIME + QUIET_CHARACTERS * machine.timing.char_time
         most = min(1 << command.tries if command else 1, _MOST_BACK_OFF) * (
             MIN_RESPONSE_TIME + machine.timing.tx_delay + size * machine.timing.char_time)
         give_up = machine.now + LONGEST_WAIT
@@ -405,7 +402,7 @@ class RadioMode(LineMode):
             return 0.0
         timing = line.timing
         most = MIN_RESPONSE_TIME + timing.tx_delay + _SHORT_FRAME * timing.char_time
-        return MIN_RESPONSE_TIME + _QUIET_CHARACTERS * timing.char_time + most / 2
+        return MIN_RESPONSE_TIME + QUIET_CHARACTERS * timing.char_time + most / 2
 
     def most_under_way(self, line: LinkSettings) -> int:
         return MOST_UNDER_WAY if line.avoids_collisions else 1
@@ -416,7 +413,7 @@ class RadioMode(LineMode):
         char_time = line.timing.char_time
         frame = _LONG_FRAME * char_time
         # What comes in is heard out, also where it breaks off.
-        heard = frame + _QUIET_CHARACTERS * char_time + HELD_BACK
+        heard = frame + QUIET_CHARACTERS * char_time + HELD_BACK
         wait = 0.0 if line.avoids_collisions else LONGEST_WAIT
         send = wait + line.timing.tx_delay + frame + heard
         # In turns go a packet of another, a repetition and, where there is room, a new command.

@@ -32,7 +32,17 @@ from abdf1_ros.counters import Counters
 from abdf1_ros.df1 import frames
 from abdf1_ros.df1.accounting import count_fault, wrong_message
 from abdf1_ros.df1.frames import Control, Frame, Poll, Symbol, Unknown
-from abdf1_ros.df1.machine import Heard, Listen, Machine, Procedure, Rest, Send, Silence, Step
+from abdf1_ros.df1.machine import (
+    Heard,
+    Listen,
+    Machine,
+    MOMENT,
+    Procedure,
+    Rest,
+    Send,
+    Silence,
+    Step,
+)
 from abdf1_ros.df1.packet import BROADCAST, Packet
 from abdf1_ros.df1.settings import LinkSettings
 from abdf1_ros.errors import LineReset, LinkError, NeverTaken
@@ -40,7 +50,6 @@ from abdf1_ros.messages import Event, Message
 
 # How often (s) a slave looks what has become overdue.
 TICK = 0.25
-_MOMENT = 0.0001  # s after the last byte
 
 
 class Initiator:
@@ -289,7 +298,7 @@ def answer(machine: Machine, symbol: Symbol, handle: Callable[[Symbol], bytes],
             # At once, but for what has an age: that is looked at by whoever has the port.
             limit = expires()
             after = yield Send(
-                data, 0 if limit == math.inf else _MOMENT, expires=limit, at_once=True)
+                data, 0 if limit == math.inf else MOMENT, expires=limit, at_once=True)
             heard = None if isinstance(after, Silence) else after
 
 

@@ -15,23 +15,23 @@
 """
 Who has the line next: one place decides.
 
-Heartbeats and fallbacks (``interlocks``) go first, but after seven of them in a row a check or
-read has its turn. Then there are three queues:
+Heartbeats and fallbacks (``interlocks``) go first, but after ``OWN_IN_A_ROW`` of them a
+check or read has its turn. Then there are three queues:
 
-- ``writes`` go first, but after four of their commands in a row a check or read that is due has
-  its turn.
+- ``writes`` go first, but after ``MAX_WRITES_IN_A_ROW`` of their commands a check or read that is
+  due has its turn.
 - ``checks``, such as the question for a station's mode, go before the reads. After a check, all
   reads that were due when it began go before the next check. Where rows depend on the modes of
   several stations, one read goes between two questions, and all of them before the same question.
 - ``reads`` go in the order of ``reads.queue``. Fallbacks that are written again take turns with
   them.
 
-``guests`` share what heartbeats, fallbacks and writes leave: a quarter of that time. After a
-command of theirs, checks and reads that are due have the line for three times as long as it had,
+``guests`` share what heartbeats, fallbacks and writes leave. After a command of theirs,
+checks and reads that are due have the line ``OURS_BESIDE_GUESTS`` times as long as it had,
 whatever became of it; and never a second one goes while anything of ours is due.
 
-A command that asks a silent station whether it is there again is a probe. Probes get at most an
-eighth of the line's time (``df1.probes``).
+A command that asks a silent station whether it is there again is a probe. ``df1.probes``
+says how much of the line's time probes get.
 """
 
 from __future__ import annotations

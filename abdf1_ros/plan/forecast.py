@@ -24,6 +24,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
+from abdf1_ros.df1.mode import LineMode
 from abdf1_ros.plan.line_model import LineModel
 from abdf1_ros.plan.planner import Block
 from abdf1_ros.settings.mapping import Mapping
@@ -31,7 +32,7 @@ from abdf1_ros.settings.network import Network
 
 USUAL_RESPONSE_TIME = 0.01
 USUAL_STALE_AFTER = 3.0  # periods, after which a value counts as lost
-ANSWERS = 2
+ANSWERS = LineMode.answers
 
 # A read without a period gets the time that the others leave, but at least one turn in so many
 # times the time of reading everything once.

@@ -20,7 +20,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from abdf1_ros.settings.network import Network
+    from abdf1_ros.settings.network import character_time, Network
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,4 +53,4 @@ class PortSettings:
     @property
     def char_time(self) -> float:
         """Return the seconds that a character takes."""
-        return (1 + self.data_bits + (self.parity != 'None') + self.stop_bits) / self.baud
+        return character_time(self.baud, self.data_bits, self.parity, self.stop_bits)

@@ -52,6 +52,11 @@ DEVICE_SERVERS = ('socket', 'rfc2217')
 URLS = ' or '.join(f'{scheme}://host:port' for scheme in DEVICE_SERVERS)
 
 
+def character_time(baud: int, data_bits: int, parity: str, stop_bits: int) -> float:
+    """Return the seconds that a character takes, start bit included."""
+    return (1 + data_bits + (parity != 'None') + stop_bits) / baud
+
+
 @dataclass(frozen=True, slots=True)
 class NetField:
     """
@@ -202,8 +207,9 @@ class Network:
     @property
     def timing(self) -> LineTiming:
         """Return character time and TX_Delay in seconds."""
-        bits = 1 + self.data_bits + (self.parity != 'None') + self.stop_bits
-        return LineTiming(bits / self.baud, self.tx_delay / 1000)
+        return LineTiming(
+            character_time(self.baud, self.data_bits, self.parity, self.stop_bits),
+            self.tx_delay / 1000)
 
 
 FIELDS: dict[str, NetField] = {

@@ -145,6 +145,7 @@ def main() -> None:
     from abdf1_ros.driver.settings import DriverSettings
     from abdf1_ros.driver.write import Outcome
     from abdf1_ros.pccc.describe import describe
+    from abdf1_ros.problems import ConfigurationError
     from abdf1_ros.settings.network import load_network, Network
     from support.driver_bench import DriverBench, stored
     from support.mappings import load_text
@@ -156,11 +157,21 @@ def main() -> None:
     assert problems == [], problems
     _, (problem,) = load_text(rows + 'bad,Read,N7:0,1,TOY,\n')
     assert 'write W and a hexadecimal number' in str(problem)
+    _, (problem,) = load_text(rows + 'bad,Read,W0,1,TOYS,\n')
+    assert 'PLC Type (TOYS) should be one of PLC2, PLC3, PLC5, SLC, TOY;' in str(problem)
     with tempfile.TemporaryDirectory() as folder:
         net, plan = Path(folder, 'net.csv'), Path(folder, 'map.csv')
         net.write_text('PLC_Type,Com_Port\ntoy,/dev/ttyUSB0\n', encoding='utf-8')
         plan.write_text(rows + 'words,Read,W0,1,TOY,9\n', encoding='utf-8')
         assert load_network(str(net)).plc_type == 'TOY'
+        wrong = Path(folder, 'wrong.csv')
+        wrong.write_text('PLC_Type\nTOYS\n', encoding='utf-8')
+        try:
+            load_network(str(wrong))
+        except ConfigurationError as error:
+            assert 'should be one of PLC2, PLC3, PLC5, SLC, TOY' in str(error.problems[0])
+        else:
+            raise AssertionError('a wrong PLC_Type was taken')
         assert check([str(net), str(plan)]) == 0
     assert make_parser('').parse_args(['read', 'W0', '--plc-type', 'toy']).plc_type == 'TOY'
 

@@ -27,6 +27,7 @@ from abdf1_ros.cli.plc.session import Session
 from abdf1_ros.cli.terminal import colour, GREEN, RED, YELLOW
 from abdf1_ros.counters import Counters
 from abdf1_ros.df1.echo import COMES_BACK
+from abdf1_ros.df1.packet import is_local_status
 from abdf1_ros.errors import Abdf1Error, LinkError, PortLost, RemoteError, StationInactive
 from abdf1_ros.pccc.access import Access
 from abdf1_ros.pccc.families import dialect_of, FAMILIES, parse_address
@@ -89,7 +90,7 @@ def look_at(session: Session, station: int) -> Presence:
         error = caught
     seconds = time.monotonic() - started
     # A gateway answers for a station that it does not reach (M 8-2).
-    is_reached = not (isinstance(error, RemoteError) and 0 < error.sts < 0x10)
+    is_reached = not (isinstance(error, RemoteError) and is_local_status(error.sts))
     takes_commands = is_reached and not isinstance(error, StationInactive)
     is_there = takes_commands or session.stations[station].last_heard is not None
     return Presence(station, seconds, identity, error, is_there, takes_commands)

@@ -25,6 +25,7 @@ from collections.abc import Mapping as MappingType
 from dataclasses import dataclass, field
 import math
 
+from abdf1_ros.df1.probes import OTHERS_SHARE
 from abdf1_ros.df1.stations import ActiveStationList
 from abdf1_ros.driver.interlocks.fallback import FallbackCause, FallbackRow
 from abdf1_ros.driver.interlocks.heartbeat import HeartbeatRow
@@ -36,10 +37,9 @@ from abdf1_ros.settings.mapping import Mapping
 # active: that of a gateway is.
 _FAILURES = 2
 
-# Then it is left alone for so long (s) at least; others on the line of a gateway have that for so
-# many times as long as the last attempt took: an eighth is left to the silent.
+# Then it is left alone for so long (s) at least; others on the line of a gateway have that for
+# OTHERS_SHARE times as long as the last attempt took.
 _LEAST_PAUSE = 1.0
-_SHARE_OF_OTHERS = 7
 
 _ANSWERED = (Outcome.WRITTEN, Outcome.PARTLY, Outcome.FAILED)
 
@@ -152,7 +152,7 @@ class Plc:
             self.failures += 1
             if self.is_lost:
                 took = self._record.line.took(claim.begun, now)
-                share = _SHARE_OF_OTHERS * took if is_behind_gateway else 0.0
+                share = OTHERS_SHARE * took if is_behind_gateway else 0.0
                 self.pause_end = now + max(_LEAST_PAUSE, share)
 
     # Which goes first
