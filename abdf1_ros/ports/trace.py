@@ -20,6 +20,8 @@ from collections.abc import Callable
 from datetime import datetime
 import math
 from pathlib import Path
+from queue import SimpleQueue
+import threading
 import time
 
 from abdf1_ros.df1.packet import Packet
@@ -28,6 +30,11 @@ from abdf1_ros.ports.opening import open_port
 from abdf1_ros.ports.serial_device import SerialDevice
 from abdf1_ros.ports.settings import PortSettings
 from abdf1_ros.sniffer.capture import CaptureWriter, Chunk, Direction, setting_line
+
+# Chunks that wait for the disk at most: some minutes of a busy line.
+_MOST_WAITING = 10_000
+
+_LAST_CHUNKS = 1.0  # s that the disk has for them at the end
 
 
 def begun_now() -> str:
@@ -39,30 +46,55 @@ class Trace:
     """
     A capture that ends when it cannot be written; then ``on_error`` is called once.
 
-    ``limit`` is the most bytes on the disk. Raises OSError when it cannot be begun.
+    A thread of its own writes it, so the line does not wait for a disk. What the disk does not
+    take in time is lost, and reported in the capture and by ``on_error``. ``limit`` is the most
+    bytes on the disk. Raises OSError when it cannot be begun.
     """
 
     def __init__(self, path: str, settings: dict[str, str], on_error: Callable[[str], None],
                  limit: float = math.inf) -> None:
         self._path = path
         self._on_error = on_error
-        self._writer: CaptureWriter | None = CaptureWriter(Path(path), limit, settings)
+        self._writer = CaptureWriter(Path(path), limit, settings)
+        self._waiting: SimpleQueue[Chunk | str | None] = SimpleQueue()
+        self._lost = self._told = 0
+        self._thread = threading.Thread(target=self._run, name='trace', daemon=True)
+        self._thread.start()
 
     def write(self, chunk: Chunk | str) -> None:
-        """Write a chunk or a setting, or nothing after an error."""
-        if self._writer is None:
-            return
-        try:
-            self._writer.write(chunk)
-        except OSError as error:
-            self.close()
-            self._on_error(f'{self._path}: {error.strerror}; nothing more is recorded')
+        """Write a chunk or a setting soon, or nothing after an error; from any thread."""
+        if self._waiting.qsize() < _MOST_WAITING:
+            self._waiting.put(chunk)
+        else:
+            self._lost += 1
 
     def close(self) -> None:
-        """End the capture."""
-        writer, self._writer = self._writer, None
-        if writer is not None:
-            writer.close()
+        """End the capture; wait for the disk, but not for long."""
+        self._waiting.put(None)
+        self._thread.join(_LAST_CHUNKS)
+
+    def _run(self) -> None:
+        """Write until ``close``, or until that fails."""
+        try:
+            self._write_all()
+        except OSError as error:
+            self._on_error(f'{self._path}: {error.strerror}; nothing more is recorded')
+            while self._waiting.get() is not None:
+                pass
+        self._writer.close()
+
+    def _write_all(self) -> None:
+        while (chunk := self._waiting.get()) is not None:
+            self._writer.write(chunk)
+            if self._waiting.empty():
+                self._tell_lost()
+        self._tell_lost()
+
+    def _tell_lost(self) -> None:
+        if lost := self._lost - self._told:
+            self._told += lost
+            self._writer.write(f'# {lost} lines were lost here: the disk was too slow')
+            self._on_error(f'{self._path}: the disk was too slow; {lost} lines were lost')
 
 
 class TracedPort(PortAround):

@@ -15,13 +15,15 @@
 """What passes a port is recorded, and nothing else changes."""
 
 from pathlib import Path
+import threading
 
+from abdf1_ros.ports import trace as trace_module
 from abdf1_ros.ports.settings import PortSettings
 from abdf1_ros.ports.trace import PortOpener, Trace, TracedPort
-from abdf1_ros.sniffer.capture import Chunk, Direction, read_capture
+from abdf1_ros.sniffer.capture import CaptureWriter, Chunk, Direction, read_capture
 import pytest
 from support.disks import no_file_longer_than
-from support.ptys import Pty
+from support.ptys import PATIENCE, Pty
 
 
 class Loop:
@@ -63,6 +65,7 @@ def test_both_directions_with_their_times(tmp_path: Path) -> None:
     assert port.read(None, 0) == b''
     port.close()
     assert loop.closed
+    trace.close()
     assert chunks_of(tmp_path / 'x') == [
         Chunk(0.5, Direction.OUT, b'\x10\x05'), Chunk(1.25, Direction.IN, b'\x10\x05')]
 
@@ -78,6 +81,7 @@ def test_trace_that_fails_says_so_once_and_the_port_goes_on(tmp_path: Path) -> N
     for _ in range(20):
         port.write(b'\x10\x05')
         assert port.read(None, 0) == b'\x10\x05'
+    trace.close()
     (error,) = errors
     assert 'No such file or directory' in error
     assert error.endswith('; nothing more is recorded')
@@ -92,10 +96,37 @@ def test_trace_that_cannot_grow_costs_neither_the_port_nor_its_whole_lines(
         for _ in range(20):
             port.write(b'\x10\x05')
             assert port.read(None, 0) == b'\x10\x05'
+        trace.close()
     assert errors == [f'{tmp_path}/x: File too large; nothing more is recorded']
-    trace.close()
     assert [chunk.data for chunk in chunks_of(tmp_path / 'x')] == [b'\x10\x05'] * 4
     assert (tmp_path / 'x').read_bytes().endswith(b'10 05\n')
+
+
+def test_line_does_not_wait_for_a_disk_that_stands_still(
+        tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    errors: list[str] = []
+    is_stuck, goes_on = threading.Event(), threading.Event()
+    write = CaptureWriter.write
+
+    def slow(writer: CaptureWriter, chunk: Chunk | str) -> None:
+        is_stuck.set()
+        goes_on.wait(PATIENCE)
+        write(writer, chunk)
+
+    monkeypatch.setattr(CaptureWriter, 'write', slow)
+    monkeypatch.setattr(trace_module, '_MOST_WAITING', 3)
+    trace = Trace(str(tmp_path / 'x'), {}, errors.append)
+    port = TracedPort(Loop(), trace, 0.0, lambda: 0.0)
+    port.write(b'\x01')
+    assert is_stuck.wait(PATIENCE)
+    for _ in range(5):  # none of them waits
+        port.write(b'\x02')
+    goes_on.set()
+    trace.close()
+    assert [chunk.data for chunk in chunks_of(tmp_path / 'x')] == [b'\x01', *[b'\x02'] * 3]
+    assert (tmp_path / 'x').read_text().endswith(
+        '# 2 lines were lost here: the disk was too slow\n')
+    assert errors == [f'{tmp_path}/x: the disk was too slow; 2 lines were lost']
 
 
 def test_opener_without_a_trace_gives_the_port_itself(tmp_path: Path) -> None:
