@@ -237,11 +237,11 @@ class Lines:
     def _look(self) -> None:
         """Take requests to the process, and tell of all lines."""
         now = time.monotonic()
-        self._node.look()
         try:
+            self._node.look()
             self._executor.spin_once(timeout_sec=0)
         except Exception as error:  # the lines have executors of their own
-            self._node.tell_failure('the wait for calls', error)
+            self._node.tell_failure('a look at the network', error)
         if self._node.is_asked_again:
             self._node.is_asked_again = False
             for line in self._lines:

@@ -22,8 +22,10 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Callable, Iterator, Sequence
+from contextlib import ExitStack
 import faulthandler
 import os
+from pathlib import Path
 import re
 import signal
 import sys
@@ -35,12 +37,13 @@ from abdf1_ros.paths import ShowVersion
 from abdf1_ros.problems import ConfigurationError, Problem
 from abdf1_ros.ros.diagnostics.log import bug_text
 from abdf1_ros.ros.parameters.files import usable_files
+from abdf1_ros.ros.process.console import Console
 from abdf1_ros.signals import EndRequest
 from abdf1_ros.text import printable
 import rclpy
 from rclpy.exceptions import NameValidationException, ParameterException
 from rclpy.impl.implementation_singleton import rclpy_implementation
-from rclpy.logging import get_logger
+from rclpy.logging import get_logger, get_logging_directory
 from rclpy.signals import SignalHandlerOptions
 from rclpy.utilities import remove_ros_args
 
@@ -67,6 +70,9 @@ LAST_WRITES = 1.5
 
 # The beginnings of rclpy's errors about the log directory.
 _LOG_FAILURES = re.compile('.*Failed to create log directory|Failed opening file')
+
+# Arguments of ROS about the log file.
+_NO_LOG_FILE, _LOG_FILE_NAME = '--disable-external-lib-logs', '--log-file-name'
 
 # Words in rclpy's errors about arguments.
 _BAD_ARGUMENTS = re.compile("Couldn't parse|should not exceed")
@@ -125,10 +131,12 @@ def run_ros(name: str, parser: argparse.ArgumentParser,
         _end_by_the_clock()
 
     given = list(sys.argv if args is None else args)
-    with EndRequest(_ending_signals(), begin_end) as ended:
+    with EndRequest(_ending_signals(), begin_end) as ended, ExitStack() as stack:
         try:
             with usable_files(given, leaves_out) as usable:
-                _begin(parser, usable)
+                _check_arguments(parser, usable)
+                stack.enter_context(Console(_log_file(name, usable)))
+                _begin(usable)
             made = _made(make, given)
         except ConfigurationError as error:
             for problem in error.problems:
@@ -156,14 +164,40 @@ def _ending_signals() -> Iterator[signal.Signals]:
         yield signal.SIGHUP
 
 
-def _begin(parser: argparse.ArgumentParser, given: list[str]) -> None:
-    """Check the arguments and begin the ROS context."""
+def _check_arguments(parser: argparse.ArgumentParser, given: list[str]) -> None:
+    """End the process where there are arguments that are not for ROS."""
     if unknown := parser.parse_known_args(remove_ros_args(given)[1:])[1]:
         parser.error(f'{printable(" ".join(unknown))}: not known here; parameters follow '
                      '--ros-args')
+
+
+def _log_file(name: str, given: Sequence[str]) -> int | None:
+    """
+    Return the descriptor of a new log file, None where none is wanted.
+
+    It has the name that rclpy would give it. What rclpy writes itself holds the interpreter's lock
+    for as long as the disk likes.
+    """
+    if _NO_LOG_FILE in given:
+        return None
     _check_log_directory()
+    if _LOG_FILE_NAME in given[:-1]:
+        name = given[given.index(_LOG_FILE_NAME) + 1]
+    folder = Path(get_logging_directory())
     try:
-        rclpy.init(args=given, signal_handler_options=SignalHandlerOptions.NO)
+        folder.mkdir(parents=True, exist_ok=True)
+        return os.open(folder / f'{name}_{os.getpid()}_{time.time_ns() // 1_000_000}.log',
+                       os.O_WRONLY | os.O_CREAT | os.O_APPEND, 0o644)
+    except OSError as error:
+        raise rclpy_implementation.RCLError(
+            f'Failed opening file in log directory {folder}: {error.strerror}') from error
+
+
+def _begin(given: list[str]) -> None:
+    """Begin the ROS context."""
+    try:
+        rclpy.init(args=[*given, '--ros-args', _NO_LOG_FILE],
+                   signal_handler_options=SignalHandlerOptions.NO)
     except RuntimeError as error:
         if isinstance(error, REFUSALS):
             raise

@@ -68,4 +68,5 @@ class Supervisor:
         """Send a line of sd_notify(3)."""
         if self._address:
             with suppress(OSError), socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as sender:
+                sender.setblocking(False)  # a supervisor that stands still ends us anyway
                 sender.sendto(state.encode(), self._address)

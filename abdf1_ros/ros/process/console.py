@@ -1,0 +1,217 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+What the process says on its terminal, pipe or journal, and in its log file: nothing waits for it.
+
+rclpy's log call holds the interpreter's lock while it writes, and rcl, DDS and faulthandler write
+to the same descriptors. So standard output and standard error become pipes of ours, whose write
+ends never block, and a process of its own passes on what it reads from them. Where a terminal
+stands still (Ctrl-S), a pipe is full or a disk hangs, that process waits. What it cannot keep any
+longer is lost, counted, and reported as soon as its sink goes on.
+
+This file is the program of that process, too: it starts without the package.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Sequence
+from contextlib import suppress
+import fcntl
+import os
+import re
+import select
+import signal
+import subprocess
+import sys
+import threading
+import time
+
+# Bytes that wait for each sink: some 10,000 entries.
+_MOST_WAITING = 1 << 20
+
+# What our own pipes hold: the process that reads them may not get to run for a while.
+_PIPE_SIZE = 1 << 20
+
+# How long (s) the last entries have after the end of the process, and how long that waits for it.
+_LAST_ENTRIES = 1.0
+_PATIENCE = 0.5
+
+_PAUSE = 1.0  # after a write that has failed (s)
+
+_COLOURS = re.compile(rb'\x1b\[[0-9;]*m')
+
+
+class Sink(threading.Thread):
+    """Write lines to a descriptor, which may take as long as it likes; ``put`` never waits."""
+
+    def __init__(self, descriptor: int, most: int = _MOST_WAITING,
+                 colours: bool = True) -> None:
+        super().__init__(daemon=True)
+        self._descriptor = descriptor
+        self._most = most
+        self._has_colours = colours
+        self._lines: deque[bytes] = deque()
+        self._size = self._lost = 0
+        self._is_ended = False
+        self._news = threading.Condition()
+
+    def put(self, line: bytes) -> None:
+        """Take a line, or count it as lost."""
+        with self._news:
+            if self._lost or self._size + len(line) > self._most:
+                self._lost += 1
+            else:
+                self._lines.append(line)
+                self._size += len(line)
+            self._news.notify()
+
+    def end(self) -> None:
+        """Have the thread end when all is written."""
+        with self._news:
+            self._is_ended = True
+            self._news.notify()
+
+    def run(self) -> None:
+        """Write until ``end``."""
+        while data := self._take():
+            try:
+                self._write(data)
+            except OSError:  # the disk is full, or the terminal gone
+                with self._news:
+                    self._lost += data.count(b'\n')
+                time.sleep(_PAUSE)
+
+    def _take(self) -> bytes:
+        """Wait for lines; return them, and after them how many were lost."""
+        with self._news:
+            self._news.wait_for(lambda: self._lines or self._lost or self._is_ended)
+            data = b''.join(self._lines)
+            lost, self._size, self._lost = self._lost, 0, 0
+            self._lines.clear()
+        if lost:
+            data += b'[WARN] abdf1_ros: %d lines were lost here: they were not taken\n' % lost
+        return data if self._has_colours else _COLOURS.sub(b'', data)
+
+    def _write(self, data: bytes) -> None:
+        while data:
+            try:
+                data = data[os.write(self._descriptor, data):]
+            except BlockingIOError:  # another process that has the terminal has asked for that
+                select.select([], [self._descriptor], [])
+
+
+def pass_on(source: int, sinks: Sequence[Sink]) -> None:
+    """Pass lines from a descriptor on to sinks, until its end."""
+    rest = b''
+    while data := os.read(source, _PIPE_SIZE):
+        *lines, rest = (rest + data).split(b'\n')
+        for line in lines:
+            for sink in sinks:
+                sink.put(line + b'\n')
+        if len(rest) > _PIPE_SIZE:  # no text
+            rest = b''
+    for sink in sinks:
+        if rest:
+            sink.put(rest)
+        sink.end()
+
+
+def relay(routes: Sequence[str]) -> None:
+    """
+    Pass on what comes from descriptors, as long as something has their other ends open.
+
+    A route is ``source:sink`` or ``source:sink,sink``; from the second one on they get no colours.
+    """
+    for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGTTOU):
+        signal.signal(number, signal.SIG_IGN)  # the last words of the other process are to come
+    threads: list[threading.Thread] = []
+    sinks: list[Sink] = []
+    for route in routes:
+        source, _, names = route.partition(':')
+        own = [Sink(int(name), colours=not at) for at, name in enumerate(names.split(','))]
+        sinks += own
+        threads.append(threading.Thread(target=pass_on, args=(int(source), own), daemon=True))
+    for thread in (*sinks, *threads):
+        thread.start()
+    for thread in threads:
+        thread.join()
+    give_up = time.monotonic() + _LAST_ENTRIES
+    for sink in sinks:
+        sink.join(max(0.0, give_up - time.monotonic()))
+    os._exit(0)
+
+
+class Console:
+    """
+    Give standard output and standard error to a process that may wait for them; a context manager.
+
+    ``log`` is the descriptor of a file that gets all that goes to standard error.
+    """
+
+    def __init__(self, log: int | None = None) -> None:
+        self._log = log
+        self._before: dict[int, int] = {}
+
+    def __enter__(self) -> Console:
+        routes, reads, writes = [], [], {}
+        for number in (1, 2):
+            with suppress(OSError):  # it is closed
+                self._before[number] = os.dup(number)
+        for number, before in self._before.items():
+            reader, writes[number] = os.pipe()
+            reads.append(reader)
+            log = '' if self._log is None or number != 2 else f',{self._log}'
+            routes.append(f'{reader}:{before}{log}')
+        if 2 in self._before and os.isatty(self._before[2]):
+            os.environ.setdefault('RCUTILS_COLORIZED_OUTPUT', '1')  # it cannot see that any more
+        kept = [*reads, *self._before.values(), *([] if self._log is None else [self._log])]
+        self._process = subprocess.Popen(
+            [sys.executable, '-I', '-S', __file__, *routes], pass_fds=kept,
+            stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+        for number in (*reads, *([] if self._log is None else [self._log])):
+            os.close(number)
+        for number, writer in writes.items():
+            with suppress(OSError):  # more than a user may have: it stays as it is
+                fcntl.fcntl(writer, fcntl.F_SETPIPE_SZ, _PIPE_SIZE)
+            os.set_blocking(writer, False)  # ours alone: no other process has it
+            _flush()
+            os.dup2(writer, number)
+            os.close(writer)
+        return self
+
+    def __exit__(self, *exception: object) -> None:
+        """Give both back; where the process still waits, nothing more is written to them."""
+        _flush()
+        for number, before in self._before.items():
+            os.dup2(before, number)
+            os.close(before)
+        try:
+            self._process.wait(_PATIENCE)
+        except subprocess.TimeoutExpired:
+            nowhere = os.open(os.devnull, os.O_WRONLY)
+            for number in self._before:
+                os.dup2(nowhere, number)
+            os.close(nowhere)
+
+
+def _flush() -> None:
+    for stream in (sys.stdout, sys.stderr):
+        with suppress(OSError, ValueError):
+            stream.flush()
+
+
+if __name__ == '__main__':
+    relay(sys.argv[1:])

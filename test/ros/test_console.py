@@ -1,0 +1,138 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""What a process says never holds it up, though its terminal, pipe or disk stands still."""
+
+from contextlib import ExitStack
+import os
+from pathlib import Path
+import pty
+import signal
+import subprocess
+import sys
+import termios
+from typing import Any
+
+from abdf1_ros.ros.process.console import Sink
+from abdf1_ros.testing import PATIENCE, Plcs
+import pytest
+from std_msgs.msg import Int16MultiArray
+from support.ros import Observer, ros_args, write_csv
+
+ROWS = ('speed,Write,N7:0,1,PLC5,1,speed,-1,500', 'refused,Write,N7:99,1,PLC5,1,refused,,')
+DATA = 'Station,PLC_Type,Address,Length,Values\n1,PLC5,N7:0,4,0 0 0 0\n'
+NET = 'Com_Port,Baud,Timeout,Cmd_Timeout\n/dev/plc,115200,300,3000\n'
+
+
+def fill(descriptor: int) -> None:
+    """Write until no more is taken, as many log lines would."""
+    os.set_blocking(descriptor, False)
+    try:
+        while True:
+            os.write(descriptor, b'x' * 4096)
+    except BlockingIOError:
+        os.set_blocking(descriptor, True)
+
+
+def full_pipe(stack: ExitStack) -> int:
+    """Return a pipe that nothing reads."""
+    reader, writer = os.pipe()
+    stack.callback(os.close, reader)
+    fill(writer)
+    return writer
+
+
+def stopped_terminal(stack: ExitStack) -> int:
+    """Return a terminal after Ctrl-S."""
+    master, slave = pty.openpty()
+    stack.callback(os.close, master)
+    termios.tcflow(slave, termios.TCOOFF)
+    return slave
+
+
+@pytest.mark.parametrize('make', [full_pipe, stopped_terminal])
+def test_fallback_and_end_come_in_time_where_nothing_reads_the_log(
+        make: Any, tmp_path: Path) -> None:
+    with ExitStack() as stack:
+        observer = stack.enter_context(Observer())
+        (tmp_path / 'data.csv').write_text(DATA)
+        plcs = stack.enter_context(Plcs(tmp_path / 'data.csv'))
+        write_csv(tmp_path / 'map.csv', 'Tag,Command,Address,Station,PLC_Type,Length,Topic,'
+                  'Fallback,Fallback_After', ROWS)
+        (tmp_path / 'net.csv').write_text(NET)
+        said = make(stack)
+        node = subprocess.Popen(
+            [sys.executable, '-m', 'abdf1_ros', 'node', *ros_args(
+                f'net_file:={tmp_path}/net.csv', f'map_file:={tmp_path}/map.csv',
+                f'port:={plcs.port}')], stdout=said, stderr=said,
+            env=os.environ | {'ROS_LOG_DIR': str(tmp_path / 'log')})
+        stack.callback(node.kill)
+        os.close(said)
+        publisher = observer.publisher(Int16MultiArray, '/abdf1/write/speed')
+        refused = observer.publisher(Int16MultiArray, '/abdf1/write/refused')
+        for turn in range(20):
+            publisher.publish(Int16MultiArray(data=[777]))
+            refused.publish(Int16MultiArray(data=[turn]))  # each refusal is logged, ten a minute
+            observer.wait(lambda: None, 0.05)
+        observer.until(lambda: plcs.word('N7:0') == 777, 'the message')
+        observer.node.destroy_publisher(publisher)
+        observer.until(lambda: plcs.word('N7:0') == 0xFFFF, 'the fallback')
+        node.send_signal(signal.SIGTERM)
+        assert node.wait(PATIENCE) == 0
+        (log,) = (tmp_path / 'log').iterdir()
+        assert f'{plcs.port}: open' in log.read_text()  # a file of its own, and /rosout, have it
+
+
+HANGS = """
+import sys, time
+from abdf1_ros.ros.bridge.node import BridgeNode
+BridgeNode.begin_end = lambda node: time.sleep(99)
+from abdf1_ros.cli.main import run
+sys.exit(run('node'))
+"""
+
+
+def test_process_that_hangs_is_ended_though_nothing_reads_its_log(tmp_path: Path) -> None:
+    with ExitStack() as stack:
+        observer = stack.enter_context(Observer())
+        (tmp_path / 'net.csv').write_text(NET)
+        write_csv(tmp_path / 'map.csv', 'Tag,Command,Address,Station,PLC_Type,Length,Topic,'
+                  'Fallback,Fallback_After', ROWS)
+        said = full_pipe(stack)
+        node = subprocess.Popen([sys.executable, '-c', HANGS, *ros_args(
+            f'net_file:={tmp_path}/net.csv', f'map_file:={tmp_path}/map.csv',
+            f'port:={tmp_path}/none')], stdout=said, stderr=said)
+        stack.callback(node.kill)
+        os.close(said)
+        observer.meet('/abdf1')
+        node.send_signal(signal.SIGTERM)
+        assert node.wait(PATIENCE) == 1
+
+
+def test_lines_that_nothing_takes_are_counted_and_told_when_they_are_taken_again() -> None:
+    reader, writer = os.pipe()
+    fill(writer)
+    sink = Sink(writer, most=40)
+    for number in range(10):
+        sink.put(b'line %d\n' % number)  # 7 bytes: five fit
+    sink.start()
+    sink.end()
+    text = b''
+    while b'lost' not in text:
+        text += os.read(reader, 65536).replace(b'x', b'')
+    sink.join(PATIENCE)
+    assert text.splitlines() == [*(b'line %d' % number for number in range(5)), (
+        b'[WARN] abdf1_ros: 5 lines were lost here: they were not taken')]
+    for descriptor in (reader, writer):
+        os.close(descriptor)
