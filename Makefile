@@ -170,6 +170,23 @@ mutate: $(INSTALLED) ## Make MUTANTS (200) small mistakes in PART (df1), tell wh
 	@$(PY) -c 'import mutmut' 2>/dev/null || $(PY) -m pip install --quiet -r requirements/mutation.txt
 	$(PY) test/lab/mutate.py $(PART) --count $(MUTANTS)
 
+# Hashes of all files that the index has of a version, so that they hold for each Python.
+LOCK = $(VENV)/lock/bin/uv pip compile --quiet --generate-hashes --no-annotate --no-header \
+    --no-strip-extras --python-version
+
+.PHONY: lock
+lock: ## Pin in requirements/*.txt, with hashes, what the *.in beside them need
+	@test -d $(VENV)/lock || $(PYTHON) -m venv $(VENV)/lock
+	$(VENV)/lock/bin/python -m pip install --quiet uv==0.13.9
+	set -e; for name in test tools fuzz; do \
+	    $(LOCK) 3.11 --python-platform linux --constraints requirements/ros.txt requirements/$$name.in \
+	        --output-file requirements/$$name.txt; \
+	done
+	set -e; for name in mutation audit ros_tools_needs; do \
+	    $(LOCK) 3.11 --universal requirements/$$name.in --output-file requirements/$$name.txt; \
+	done
+	$(LOCK) 3.12 --python-platform linux requirements/noble.in --output-file requirements/noble.txt
+
 .PHONY: audit
 audit: ## Look up known vulnerabilities of the pinned packages (asks a server on the Internet)
 	@test -d $(VENV)/audit || $(PYTHON) -m venv $(VENV)/audit

@@ -28,8 +28,8 @@ MANIFEST = ElementTree.parse(ROOT / 'package.xml').getroot()
 KEYS = dict(line.split() for line in
             (ROOT / 'requirements' / 'rosdep.txt').read_text(encoding='utf-8').splitlines()
             if line and not line.startswith('#'))
-PINNED = ('ros.in', 'ros_tools.txt', 'ros_tools_needs.txt', 'test.txt', 'tools.txt', 'fuzz.txt',
-          'mutation.txt', 'audit.txt', 'noble.txt')
+LOCKED = ('ros', 'ros_tools_needs', 'test', 'tools', 'fuzz', 'mutation', 'audit', 'noble')
+PINNED = ('ros_tools.txt', *(f'{name}.in' for name in LOCKED))
 
 # The key that brings a module which has another name.
 BRINGS = {'serial': 'python3-serial', 'yaml': 'python3-yaml'}
@@ -90,31 +90,33 @@ def test_tools_of_developers_are_pinned(name: str) -> None:
 
 def test_every_file_of_requirements_is_looked_at() -> None:
     assert {path.name for path in (ROOT / 'requirements').iterdir()} == {
-        *PINNED, 'ros.txt', 'rosdep.txt'}
+        *PINNED, *(f'{name}.txt' for name in LOCKED), 'rosdep.txt'}
 
 
 def versions(name: str) -> dict[str, str]:
     """Return the version of each package that a file of requirements pins."""
-    text = (ROOT / 'requirements' / name).read_text(encoding='utf-8')
+    text = (ROOT / 'requirements' / name).read_text(encoding='utf-8').lower().replace('_', '-')
     return dict(re.findall(r'^([\w.-]+)(?:\[\w+\])?==([\d.]+)', text, re.MULTILINE))
 
 
-def test_what_the_demo_installs_has_hashes_and_the_versions_of_the_tests() -> None:
-    text = (ROOT / 'requirements' / 'ros.txt').read_text(encoding='utf-8')
+@pytest.mark.parametrize('name', LOCKED)
+def test_what_is_installed_has_hashes(name: str) -> None:
+    text = (ROOT / 'requirements' / f'{name}.txt').read_text(encoding='utf-8')
     lines = [line for line in text.splitlines() if line and not line.startswith('#')]
-    locked = versions('ros.txt')
-    assert versions('ros.in').items() <= locked.items()
+    assert versions(f'{name}.in').items() <= versions(f'{name}.txt').items()
     for line, following in zip(lines, [*lines[1:], ''], strict=True):
         assert '==' in line or re.fullmatch(r' +--hash=sha256:[0-9a-f]{64}( \\)?', line)
         assert '==' not in line or following.startswith('    --hash=sha256:'), line
-    for name in ('test.txt', 'tools.txt'):
-        shared = versions(name).keys() & locked.keys()
-        assert {key: versions(name)[key] for key in shared} == {key: locked[key] for key in shared}
+
+
+@pytest.mark.parametrize('name', ['test.txt', 'tools.txt'])
+def test_tests_have_the_versions_of_the_demo(name: str) -> None:
+    locked, found = versions('ros.txt'), versions(name)
+    assert {key: found[key] for key in found.keys() & locked.keys()} == {
+        key: locked[key] for key in found.keys() & locked.keys()}
 
 
 def test_audit_looks_at_every_file() -> None:
     command = (ROOT / 'Makefile').read_text(encoding='utf-8').partition('\naudit:')[2]
     (names,) = re.findall(r'for name in ([\w ]+);', command.partition('\n\n')[0])
-    # Sources of github.com are in no index.
-    assert {f'{name}.txt' for name in names.split()} == {
-        *PINNED, 'ros.txt'} - {'ros.in', 'ros_tools.txt'}
+    assert {*names.split()} == {*LOCKED}

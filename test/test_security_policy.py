@@ -25,7 +25,10 @@ from typing import Any
 from xml.etree import ElementTree
 
 from abdf1_ros.ros.bridge.node import BridgeNode
+from abdf1_ros.ros.lines import LinesNode, sections
+from abdf1_ros.ros.parameters.arguments import Arguments
 import pytest
+import rclpy
 from rclpy.node import Node
 import rclpy.utilities
 from support.ros import EXAMPLE_FILES, Observer, ros_args
@@ -34,14 +37,16 @@ from support.ros_tools import needs
 ROOT = Path(__file__).resolve().parent.parent
 POLICY = ROOT / 'config' / 'sros2' / 'policy.xml'
 TWO_ROBOTS = POLICY.with_name('two_robots.xml')
+THREE_LINES = POLICY.with_name('three_lines.xml')
 SECURITY = ROOT / 'docs' / 'security.md'
 
 
-def allowed(node: str, kind: str, qualifier: str) -> set[str]:
+def allowed(node: str, kind: str, qualifier: str, policy: Path = POLICY,
+            namespace: str = '/') -> set[str]:
     """Return the names that the profile of a node allows, ``~`` written out."""
     names: set[str] = set()
-    for profile in ElementTree.parse(POLICY).getroot().iter('profile'):
-        if profile.attrib['node'] != node:
+    for profile in ElementTree.parse(policy).getroot().iter('profile'):
+        if (profile.attrib['ns'], profile.attrib['node']) != (namespace, node):
             continue
         own = f'{profile.attrib["ns"].rstrip("/")}/{node}'
         for group in profile.iter(kind):
@@ -222,3 +227,42 @@ def test_two_robots_have_keys_for_their_own_namespace_and_no_more(
         node.destroy_node()
         observed.destroy_node()
         rclpy.utilities.try_shutdown()
+
+
+# Many lines in a process
+
+
+def test_process_of_three_lines_is_allowed_exactly_what_its_nodes_do() -> None:
+    """A bridge in such a process has no service for the descriptions of types."""
+    names = sections(str(ROOT / 'config' / 'three_lines.yaml'))
+    profiles = ElementTree.parse(THREE_LINES).getroot().iter('profile')
+    assert [f'{entry.attrib["ns"].rstrip("/")}/{entry.attrib["node"]}' for entry in profiles] == [
+        '/lines', *names]
+    for _, kind, qualifier in ASKED:
+        own = {name for name in allowed('abdf1', kind, qualifier)
+               if not name.endswith('/get_type_description')}
+        for name in names:
+            namespace, _, node = name.rpartition('/')
+            assert allowed(node, kind, qualifier, THREE_LINES, namespace) == {
+                entry.replace('/abdf1/', f'{name}/') for entry in own}
+
+
+def test_node_of_the_process_is_allowed_exactly_what_it_does() -> None:
+    rclpy.init(args=[])
+    try:
+        node = LinesNode(Arguments())
+        for what, kind, qualifier in ASKED:
+            assert _names(node, what) == allowed('lines', kind, qualifier, THREE_LINES)
+        node.destroy_node()
+    finally:
+        rclpy.try_shutdown()
+
+
+# Where the code is checked
+
+
+def test_workflows_may_read_only_and_name_actions_by_commit() -> None:
+    for path in (ROOT / '.github' / 'workflows').iterdir():
+        text = path.read_text(encoding='utf-8')
+        assert '\npermissions: {contents: read}\n' in text
+        assert re.findall(r'uses: (?!\S+@[0-9a-f]{40}(?: |$))(.*)', text, re.MULTILINE) == []
