@@ -17,11 +17,12 @@
 from __future__ import annotations
 
 from collections import deque
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 import time
 from typing import Any
 
-from abdf1_ros.cli.monitor.view import Reading, Snapshot, Status, Style
+from abdf1_ros.cli.monitor.view import Reading, SILENCE, Snapshot, Status, Style
 from abdf1_ros.errors import FormatError
 from abdf1_ros.ros.observer import graph_hint, Observer
 from abdf1_ros.ros.topics.messages import latched_qos, MESSAGES
@@ -179,8 +180,11 @@ class NodeWatch(Listening):
         return take
 
     def _take_diagnostics(self, message: DiagnosticArray) -> None:
-        if statuses := shown_statuses(message, self.name.lstrip('/')):
-            self._statuses, self._told = statuses, time.monotonic()
+        statuses, now = shown_statuses(message, self.name.lstrip('/')), time.monotonic()
+        is_owner_heard = self._told is not None and now - self._told <= SILENCE \
+            and not is_spare(self._statuses)
+        if statuses and not (is_spare(statuses) and is_owner_heard):
+            self._statuses, self._told = statuses, now
 
     def _take_result(self, status: DiagnosticStatus) -> None:
         self._results.appendleft(
@@ -195,6 +199,11 @@ def shown_statuses(message: DiagnosticArray, node: str) -> list[Status]:
     """Return the statuses of a node as they are shown; there may be those of others too."""
     return [shown_status(status, node) for status in message.status
             if status.name.startswith(f'{node}: ')]
+
+
+def is_spare(statuses: Sequence[Status]) -> bool:
+    """Tell whether the bridge that says this waits for a line that another one may have."""
+    return [status.section for status in statuses] == ['standby']
 
 
 def shown_status(status: DiagnosticStatus, node: str) -> Status:

@@ -22,7 +22,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 import time
 
 from abdf1_ros.cli.monitor.node import Listening, shown_statuses
@@ -39,11 +39,16 @@ _COLUMNS = ('state', 5, 'state'), ('load', 5, 'line load'), ('cycle', 8, 'poll c
 
 @dataclass(frozen=True, slots=True)
 class LineState:
-    """What a bridge has said of itself last, at the clock value ``told`` (s)."""
+    """
+    What a bridge has said of itself last, at the clock value ``told`` (s).
+
+    ``spares`` are the hosts on which another bridge waits for its line.
+    """
 
     name: str
     told: float
     statuses: Sequence[Status]
+    spares: Sequence[str] = ()
 
     def worst(self, now: float) -> Status:
         """Return the status that says most at the clock value ``now`` (s)."""
@@ -65,11 +70,25 @@ class PlantWatch(Listening):
     def __init__(self, ros_arguments: list[str]) -> None:
         super().__init__(ros_arguments)
         self._lines: dict[str, LineState] = {}
+        self._waiting: dict[str, dict[str, float]] = {}  # when each host said so, by line
         self.subscribe(DiagnosticArray, '/diagnostics', self._take, 1000)
 
     def lines(self) -> list[LineState]:
         """Return all that have been heard."""
-        return [*self._lines.values()]
+        now = time.monotonic()
+        found = {name: replace(line, spares=self._spares(name, now))
+                 for name, line in self._lines.items()}
+        for name in self._waiting:
+            if (name not in found or now - found[name].told > SILENCE) \
+                    and (spares := self._spares(name, now)):
+                found[name] = LineState(name, now, [Status(
+                    '', Style.BAD, f'no bridge has the line; waiting: {", ".join(spares)}')])
+        return [*found.values()]
+
+    def _spares(self, name: str, now: float) -> list[str]:
+        """Return the hosts that wait for a line."""
+        return sorted(host for host, told in self._waiting.get(name, {}).items()
+                      if now - told <= SILENCE)
 
     def _take(self, message: DiagnosticArray) -> None:
         node = message.status[0].name.partition(': ')[0] if message.status else ''
@@ -81,6 +100,9 @@ class PlantWatch(Listening):
                 if name.startswith('/'):
                     self._lines[name] = LineState(
                         name, now, [Status('', Style.BAD, f'does not run: {reason}')])
+        elif 'standby' in sections:
+            host = sections['standby'].values.get('host', '')
+            self._waiting.setdefault(f'/{node}', {})[host] = now
         elif 'link' in sections and 'mappings' in sections:
             self._lines[f'/{node}'] = LineState(f'/{node}', now, statuses)
 
@@ -105,10 +127,12 @@ def render_plant(lines: Iterable[LineState], now: float, width: int) -> list[Tex
     return [TextLine(cut(title, width), Style.TITLE),
             TextLine(row('line', titles, ''), Style.TITLE),
             *(TextLine(row(name, {**line.values(), 'state': _WORDS[status.style]},
-                           _text(status)), status.style, line.name)
+                           _text(status, line.spares)), status.style, line.name)
               for name, (status, line) in zip(names, found, strict=True))]
 
 
-def _text(status: Status) -> str:
+def _text(status: Status, spares: Sequence[str]) -> str:
     text = status.message.removeprefix(f'{_WORDS[status.style]}: ')
-    return text if status.section in ('', 'link', 'mappings') else f'{status.section}: {text}'
+    if status.section not in ('', 'link', 'mappings'):
+        text = f'{status.section}: {text}'
+    return f'{text}; spare: {", ".join(spares)}' if spares else text

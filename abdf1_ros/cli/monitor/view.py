@@ -171,6 +171,8 @@ def _link(snapshot: Snapshot, width: int) -> Iterator[TextLine]:
         error = status.values.get('last error', 'none')
         if error != 'none':
             yield from _wrapped(f'last error: {error}', width, Style.WARNING)
+    for status in _section(snapshot, 'standby'):
+        yield from _summary('standby', status, width)
 
 
 def _stations(snapshot: Snapshot, width: int) -> Iterator[TextLine]:

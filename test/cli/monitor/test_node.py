@@ -157,6 +157,19 @@ def test_only_the_statuses_of_the_node_count(bridge: Bridge, watch: NodeWatch) -
     assert (station.section, station.style) == ('station 1', Style.BAD)
 
 
+def test_spare_of_the_same_name_does_not_hide_the_owner_of_the_line(
+        bridge: Bridge, watch: NodeWatch) -> None:
+    until(watch, lambda picture: picture.is_there and bridge.diagnostics.get_subscription_count())
+    bridge.status('cell/line_a: standby', 'OK: waits', DiagnosticStatus.OK)
+    until(watch, lambda picture: [status.section for status in picture.statuses] == ['standby'])
+    bridge.status('cell/line_a: link', 'OK: port open', DiagnosticStatus.OK)
+    bridge.status('cell/line_a: standby', 'OK: waits', DiagnosticStatus.OK)
+    bridge.status('cell/line_ab: link', 'OK', DiagnosticStatus.OK)
+    until(watch, lambda picture: [status.section for status in picture.statuses] == ['link'])
+    watch.spin_once(0.2)
+    assert [status.section for status in watch.snapshot().statuses] == ['link']
+
+
 def test_stations_are_taken_from_the_bits_of_the_active_node_table(
         bridge: Bridge, watch: NodeWatch) -> None:
     words = [0b110, 1, *[0] * 13, 1 << 15]

@@ -15,6 +15,7 @@
 """A line of text for each bridge."""
 
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 
 from abdf1_ros.cli.monitor.command import main
 from abdf1_ros.cli.monitor.plant import LineState, PlantWatch, render_plant
@@ -106,6 +107,25 @@ def test_bridges_are_heard_and_others_are_not(publish: Publish) -> None:
         lines = {line.name: line.worst(line.told) for line in watch.lines()}
     assert lines['/hall/a'] == Status('mappings', Style.BAD, '')
     assert lines['/hall/b'] == Status('', Style.BAD, 'does not run: b_net.csv:2:1: Baud')
+
+
+def test_spares_stand_beside_the_line_that_has_an_owner(publish: Publish) -> None:
+    waiting = array('hall/a', standby=OK), array('hall/b', standby=OK)
+    for message, host in zip(waiting, ('beta', 'gamma'), strict=True):
+        message.status[0].values = [KeyValue(key='host', value=host)]
+    with PlantWatch([]) as watch:
+        publish(watch, lambda lines: '/hall/b' in lines and bool(lines['/hall/a'].spares),
+                array('hall/a', link=OK, mappings=OK), *waiting)
+        lines = {line.name: line for line in watch.lines()}
+        assert lines['/hall/a'].spares == ['beta']
+        assert lines['/hall/a'].worst(lines['/hall/a'].told).style is Style.GOOD
+        assert lines['/hall/b'].worst(lines['/hall/b'].told) == Status(
+            '', Style.BAD, 'no bridge has the line; waiting: gamma')
+
+
+def test_spare_is_named() -> None:
+    assert texts(replace(line('/a'), spares=['beta']))[2] == \
+        '/a OK 93 % 34 ms of 10 mappings 10 fresh; spare: beta'
 
 
 def test_nobody_is_heard(capsys: pytest.CaptureFixture[str]) -> None:
