@@ -74,8 +74,8 @@ MESSAGES: dict[Message, Cause] = {
     Message.ERR_WRONG_MESSAGE: Cause(
         'A message that is neither a command for us nor a reply to one of ours: the reply came '
         'after its command had been given up, or was meant for another master, or has another SRC '
-        'than the station that was polled; or it is a command, and the map has no Serve row, or '
-        'it carries an STS.',
+        'than the station that was polled; or it is a command that carries an STS. A command for '
+        'us that no Serve row answers is refused, and the status `link` names it.',
         'Harmless once in a while, when Src and Dst are right. Often: Timeout or Cmd_Timeout is '
         'too short for this PLC, or a gateway holds replies back. Another Dst than our Station: '
         'a second master, a station number that two devices have, or, in Mode Peer, a gateway '

@@ -57,6 +57,7 @@ from abdf1_ros.driver.interlocks.queue import Interlocks
 from abdf1_ros.driver.job_tasks import JobTasks
 from abdf1_ros.driver.reads.readings import Readings, ValueListener
 from abdf1_ros.driver.record import WriteRecord
+from abdf1_ros.driver.refused import RefusedCommands
 from abdf1_ros.driver.served import Served
 from abdf1_ros.driver.settings import DriverSettings
 from abdf1_ros.driver.write import Outcome, show, Write, WriteResult
@@ -127,6 +128,7 @@ class Driver:
             network, self._active_rows(), settings, self.stations, machine, self._listener, record)
         self.points = self.readings.points
         self._served = self._make_served()
+        self.refused = RefusedCommands(PlcType(network.plc_type))
         writing = WritesUnderWay(
             self.stations, record, self.readings, settings.write_timeout, report)
         self._read_backs = writing.read_backs
@@ -271,7 +273,10 @@ class Driver:
     def _serve(self, command: Packet) -> Packet:
         """Execute a command of the other end, after all messages that came before it."""
         self._sort_inbox(self.machine.now)
-        return self._served.serve(command)
+        reply = self._served.serve(command)
+        if reply.sts:
+            self.refused.add(command, reply, self.machine.now)
+        return reply
 
     def _run(self) -> Procedure:
         """Begin to work, as long as there is a port."""

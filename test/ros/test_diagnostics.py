@@ -388,6 +388,30 @@ def test_plc_that_its_gateway_does_not_reach(bench: Bench) -> None:
         'STS 02: destination does not acknowledge, delivery not guaranteed'))
 
 
+def test_station_that_its_gateway_does_not_reach_is_not_called_silent(bench: Bench) -> None:
+    for number in (1, 2):
+        bench.driver.stations.heard(number, NOW)
+    bench.driver.stations[2].local_status = 0x02
+    bench.driver.stations[2].overdue = 2  # late refusals count so
+    assert bench.says('link') == (
+        WARN, 'WARN: port open, 1 of 2 stations are not reached by their gateway')
+
+
+def test_refused_command_of_a_plc_is_told_for_a_minute(bench: Bench) -> None:
+    for number in (1, 2):
+        bench.driver.stations.heard(number, NOW)
+    # An MSG of station 1: write one word to N7:10, as an SLC writes to an SLC (M 7-28).
+    command = Packet(5, 1, 0x0F, 0, 7, bytes.fromhex('AA 02 07 89 0A 00 39 30'))
+    for number in range(3):
+        bench.driver.refused.add(command, command.reply(sts=0x10), NOW + number)
+    text = ('station 1: protected typed logical write N7:10: STS 10: illegal command, format or '
+            'length, or the file does not exist')
+    assert bench.says('link', NOW + 61.0) == (
+        WARN, f'WARN: port open, but refused is a command of {text}')
+    assert bench.says('link', NOW + 62.1)[0] == OK
+    assert details(bench.status('link', NOW + 62.1))[f'refused: {text}'] == '3 times'
+
+
 def test_routine_is_no_event_of_a_station(bench: Bench) -> None:
     bench.happened(Message.NTC_NAK_LIMIT_EXCEEDED, (3,), 1, NOW)
     bench.happened(Message.NTC_REPLY_MSG_RCVD, (1,), 1, NOW)

@@ -74,14 +74,20 @@ class LinkStatus:
             return ERROR, f'port open, but none of {total} stations answers' + (
                 ', or the device server lets this connection wait' if '://' in self.hardware_id
                 else '')
+        unreached = sum(station.active and station.local_status != 0 for station in stations)
         silent = sum(map(takes_in_silence, stations))
         if silent and silent == active:
             return ERROR, f'port open, but none of {total} stations replies to commands'
         if active < total:
             return WARN, f'port open, {total - active} of {total} stations do not answer'
+        if unreached:
+            return WARN, (f'port open, {unreached} of {total} stations are not reached by their '
+                          'gateway')
         if silent:
             return WARN, f'port open, {silent} of {total} stations take commands and do not reply'
         heard = sum(station.last_heard is not None for station in stations)
+        if refused := self._line.driver.refused.lately(now):
+            return WARN, f'port open, but refused is a command of {refused[-1]}'
         return OK, f'port open, {heard} of {total} stations have answered'
 
     def values(self, now: float) -> dict[str, str]:
@@ -100,6 +106,8 @@ class LinkStatus:
             **_paces(driver.points.values()),
             **_poll_scans(driver),
             **_unnumbered_counts(driver),
+            **{f'refused: {text}': f'{count} times'
+               for text, count in driver.refused.counted().items()},
             **{name: str(count) for name, count in (opener.errors() if opener else {}).items()},
             'files': changed_text(self._seen.changed_files) or 'as read',
             'last error': with_age(self._seen.last_error, now),

@@ -94,6 +94,8 @@ def watches_of(line: LineView, port: str, seen: Seen, guests: Sequence[GuestLine
         Standing(WARN, 'publishers', crowded),
         Standing(ERROR, 'guests', lambda now: [
             f'guest {guest.guest.name}: {guest.fault}' for guest in guests if guest.fault]),
+        Standing(WARN, 'commands to us', lambda now: [
+            f'refused a command of {text}' for text in line.driver.refused.lately(now)]),
         Standing(WARN, 'types of PLCs', lambda now: line.wrong_types()),
         DeafStations(line),
         Standing(ERROR, 'line', fault)]

@@ -1,0 +1,72 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Commands of other nodes, such as the MSG of a PLC, that we have refused."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from abdf1_ros.df1.packet import Packet
+from abdf1_ros.errors import RemoteError
+from abdf1_ros.pccc.describe import describe
+from abdf1_ros.pccc.families import FAMILIES
+from abdf1_ros.pccc.file_types import PlcType
+from abdf1_ros.pccc.status import check_status
+
+# Different commands that are kept; a PLC with more has the same fault in all of them.
+_MOST = 8
+
+_LATELY = 60.0  # s
+
+
+@dataclass(slots=True)
+class _Refused:
+    """How often a command was refused, and when last (clock value in s)."""
+
+    count: int
+    last: float
+
+
+class RefusedCommands:
+    """
+    What was refused, by a text with station, address and reason.
+
+    Only the thread of the link adds; any thread may ask.
+    """
+
+    def __init__(self, plc_type: PlcType) -> None:
+        self._meanings = FAMILIES[plc_type].meanings
+        self._found: dict[str, _Refused] = {}
+
+    def add(self, command: Packet, reply: Packet, now: float) -> None:
+        """Keep what was refused; values that it would have written are left out."""
+        try:
+            check_status(reply, self._meanings)
+        except RemoteError as error:
+            asked = describe(command).partition(' = ')[0]
+            text = f'station {command.src}: {asked}: {error}'
+            entry = self._found.get(text)
+            if entry is not None:
+                entry.count, entry.last = entry.count + 1, now
+            elif len(self._found) < _MOST:
+                self._found[text] = _Refused(1, now)
+
+    def lately(self, now: float) -> list[str]:
+        """Return what was refused within the last minute."""
+        return [text for text, entry in [*self._found.items()] if now - entry.last < _LATELY]
+
+    def counted(self) -> dict[str, int]:
+        """Return how often each was refused."""
+        return {text: entry.count for text, entry in [*self._found.items()]}
