@@ -103,16 +103,19 @@ class Accounting:
         else:
             self.counters.commands_received += 1
 
-    def unexpected(self, reply: Packet) -> None:
+    def unexpected(self, reply: Packet, now: float) -> None:
         """
         Count and report a reply that no command waits for (S0, message 2510).
 
-        It is stale (S0, counter 2548) where it may answer one of before, and otherwise invalid
-        (2550, "incorrect addressing"): not for us, or of a station that we do not ask.
+        Its station is there, unless a node on the way has replied in its place. It is stale (S0,
+        counter 2548) where it may answer one of before, and otherwise invalid (2550, "incorrect
+        addressing"): not for us, or of a station that we do not ask.
         """
         may_answer = self._number in (None, reply.dst) and reply.src in self._stations
         self.counters.stale_messages += may_answer
         self.counters.invalid_messages += not may_answer
+        if may_answer and not is_local_status(reply.sts):
+            self._stations.heard(reply.src, now)
         self.report(wrong_message(reply, reply.src))
 
     def misdirected(self, command: Packet) -> None:

@@ -89,11 +89,14 @@ class HalfDuplexMaster(Link):
         # On this line (M 3-7).
         number = self._stations.routes.get(command.dst, command.dst)
         try:
-            if number != BROADCAST and not self._stations.records[number].active:
+            is_probe = number != BROADCAST and not self._stations.records[number].active
+            if is_probe and not task.is_own:
                 yield from self._line.probe(number)
+                is_probe = False
             task.sent = True
             started = yield from self._line.deliver(
-                number, command, task.expires, poll_on_ack(number))
+                number, command, task.expires, poll_on_ack(number),
+                is_probe=is_probe, answer_within=task.answer_within)
             reply = command.reply() if number == BROADCAST else (
                 yield from self._collect(number, command, started, task.reply_size))
         except CommandExpired as error:

@@ -49,6 +49,7 @@ from abdf1_ros.df1.machine import (
 )
 from abdf1_ros.df1.mode import answer_time
 from abdf1_ros.df1.packet import BROADCAST, is_local_status, Packet, REPLY_BIT, STS_NOT_DELIVERED
+from abdf1_ros.df1.probes import Asker
 from abdf1_ros.df1.sender import Reflex
 from abdf1_ros.df1.settings import LinkSettings
 from abdf1_ros.df1.stations import ActiveStationList
@@ -110,12 +111,14 @@ class MasterLine:
         self._passed_on: deque[Packet] = deque(maxlen=_MOST_PASSED_ON)
 
     def deliver(self, number: int, packet: Packet, expires: float = math.inf,
-                reflex: Reflex | None = None) -> Generator[Step, Heard, float]:
+                reflex: Reflex | None = None, *, is_probe: bool = False,
+                answer_within: float = math.inf) -> Generator[Step, Heard, float]:
         """
         Send a message to a station until it is acknowledged (S0, "Network Reads"; M 3-12).
 
         Return when the transmission began that was acknowledged (clock value in s); raises
-        CommandExpired, and StationInactive after the last retry.
+        CommandExpired, and StationInactive after the last retry. A probe has no retries, and its
+        answer is waited for ``answer_within`` s at most.
         """
         frame = frames.master_frame(number, packet.encode(), self.settings.checksum)
         self.accounting.sent(packet)
@@ -124,12 +127,13 @@ class MasterLine:
             begun = self.machine.now
             yield Send(frame, BROADCAST_PAUSE)
             return begun
+        timeout = min(self._timeout, answer_within) if is_probe else self._timeout
         for retry in range(1, self.settings.nak_retries + 2):
             self.counters.messages_sent += 1
             begun = self.machine.now
             try:
                 answer = yield from self._ask(
-                    Send(frame, self._timeout, expires=expires, reflex=reflex), number,
+                    Send(frame, timeout, expires=expires, reflex=reflex), number,
                     _MESSAGE_ANSWERS)
             except CommandExpired as error:
                 self.counters.messages_sent -= 1
@@ -139,6 +143,8 @@ class MasterLine:
                 self.stations.heard(number, self.machine.now)
                 return begun
             cause = self._note_cause(answer, number, Message.NTC_ACK_EXPECTED)
+            if is_probe:
+                raise StationInactive(number)
             if retry <= self.settings.nak_retries:
                 self.counters.nak_retries += 1
                 self.note(Message.NTC_NAK_RETRY, retry, cause.number, station=number)
@@ -344,7 +350,7 @@ class MasterLine:
             self._passed_on.remove(command)
             self.forwards.append(packet)
         elif packet.is_reply:
-            self.accounting.unexpected(packet)
+            self.accounting.unexpected(packet, self.machine.now)
         elif is_kept and not is_ours:
             self.forwards.append(packet)
         elif is_kept and self._serve is not None:
@@ -397,7 +403,7 @@ class MasterLine:
             yield
         finally:
             self.stations.tried(
-                number, begun, self.machine.now, was_silent=was_silent, is_message=True)
+                number, begun, self.machine.now, was_silent=was_silent, asker=Asker.MESSAGE)
 
     def has_forwards(self, busy: Container[int] = ()) -> bool:
         """Tell whether messages wait to be passed on, but not to ``busy`` stations."""

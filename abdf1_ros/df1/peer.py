@@ -381,7 +381,7 @@ class FullDuplexPeer(EqualNode):
         if entry is None or not packet.answers(entry.task.command):
             if entry is not None:  # to another node: ours may follow under the same numbers
                 self._accepted = None
-            self._accounting.unexpected(packet)
+            self._accounting.unexpected(packet, self._machine.now)
             return
         del self._outstanding[key]
         self._stations.heard(packet.src, self._machine.now)

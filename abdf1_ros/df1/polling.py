@@ -332,14 +332,17 @@ class StandardPollingMaster:
             yield from self._line.deliver(number, task.command)
             task.reply(task.command.reply())
             return
-        if not self._stations[number].active:
+        is_probe = not self._stations[number].active
+        if is_probe and not task.is_own:
             task.fail(StationInactive(number))  # it is polled when its turn comes
             return
         task.sent = True
         entry = self._outstanding[station] = Outstanding(task)
         now = self._machine.now
         try:
-            begun = yield from self._line.deliver(number, task.command, task.expires)
+            begun = yield from self._line.deliver(
+                number, task.command, task.expires, is_probe=is_probe,
+                answer_within=task.answer_within)
         except StationInactive as error:
             if task.blames:
                 self._lost(number, now, error)
@@ -349,7 +352,7 @@ class StandardPollingMaster:
             task.sent = error.sent
             self._end(station, error)
         else:
-            self._unproven.discard(number)
+            (self._unproven.add if is_probe else self._unproven.discard)(number)
             entry.deadline = begun + self._settings.cmd_timeout
 
     def _lost(self, number: int, begun: float, error: StationInactive) -> None:

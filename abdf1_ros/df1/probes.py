@@ -16,17 +16,27 @@
 
 from __future__ import annotations
 
+from enum import auto, Enum
+
 # After a probe that has taken the line for t, 7 t are left to the other stations.
 OTHERS_SHARE = 7
+
+
+class Asker(Enum):
+    """What asks a silent station whether it is there again."""
+
+    IN_TURN = auto()  # reads, checks and polls, one silent station after the other
+    MESSAGE = auto()
+    OWN = auto()  # a 0 or a fallback
 
 
 class Probes:
     """
     Keep what is spent on silent stations to an eighth of the line's time, whoever asks them.
 
-    Two kinds of askers take turns: whoever asks one silent station after the other, from ``next``
-    on (clock value, s), and a message that is for one of them. A message cannot wait; one that
-    comes too early gets nowhere, but the next turn is then kept free for one like it.
+    The kinds of askers take turns: ``next`` is the clock value (s) from which on silent stations
+    may be asked in their order. A message cannot wait; one that comes too early gets nowhere, but
+    the next turn is then kept free for one like it.
     ``pause`` is the seconds that are left to others after the last probe; before the first one
     ``usual`` stands for what that takes.
     """
@@ -35,7 +45,7 @@ class Probes:
         self.pause = OTHERS_SHARE * usual
         self._free = self._put_off = 0.0
         self._is_kept_for_message = False
-        self._was_message = False
+        self._last = Asker.IN_TURN
 
     @property
     def next(self) -> float:  # noqa: A003
@@ -46,19 +56,24 @@ class Probes:
     @property
     def next_message(self) -> float:
         """Return from when on (clock value, s) a message may go to a silent station."""
-        return self._free + self.pause if self._was_message else self._free
+        return self._free + self.pause if self._last is Asker.MESSAGE else self._free
+
+    @property
+    def next_own(self) -> float:
+        """Return from when on (clock value, s) a 0 or a fallback may be written again."""
+        return self._free + self.pause if self._last is Asker.OWN else self.next
 
     def claim_message(self, now: float) -> bool:
         """Take note of a message to a silent station; tell whether it may go now."""
         is_admitted = now >= self.next_message
-        self._is_kept_for_message |= not is_admitted and not self._was_message
+        self._is_kept_for_message |= not is_admitted and self._last is not Asker.MESSAGE
         return is_admitted
 
-    def spent(self, seconds: float, now: float, *, is_message: bool = False) -> None:
+    def spent(self, seconds: float, now: float, asker: Asker = Asker.IN_TURN) -> None:
         """Take note that a silent station has had the line for so long until now."""
         self.pause = OTHERS_SHARE * seconds
         self._free = max(self._free, now) + self.pause
-        self._is_kept_for_message, self._was_message = False, is_message
+        self._is_kept_for_message, self._last = False, asker
 
     def died(self, seconds: float, now: float) -> None:
         """
@@ -68,7 +83,8 @@ class Probes:
         """
         self._put_off = now + min(self.pause, OTHERS_SHARE * seconds)
 
-    def none_waits(self, now: float) -> None:
-        """Take note that probes keep no station waiting."""
+    def none_waits(self, now: float, asker: Asker = Asker.IN_TURN) -> None:
+        """Take note that probes keep no station waiting: then messages have no turns."""
         self._free = self._put_off = now
-        self._is_kept_for_message = self._was_message = False
+        self._is_kept_for_message = False
+        self._last = Asker.OWN if asker is Asker.OWN else Asker.IN_TURN

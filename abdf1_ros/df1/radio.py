@@ -377,7 +377,7 @@ class RadioNode(EqualNode):
                 self._counters.duplicate_messages += 1
             else:
                 self._accounting.received(packet)
-                self._accounting.unexpected(packet)
+                self._accounting.unexpected(packet, self._machine.now)
             return
         del self._under_way[packet.src]
         self._accounting.received(packet)

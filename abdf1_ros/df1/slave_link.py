@@ -152,7 +152,7 @@ class SlaveLink(Link, Initiator):
         if entry is None or not reply.answers(entry.task.command):
             if entry is not None and reply.src == entry.task.command.dst:
                 self._slave.forget_last()  # the right one may follow under the same numbers
-            self._accounting.unexpected(reply)
+            self._accounting.unexpected(reply, self._machine.now)
             return
         self._end()  # also where the master's ACK got lost: it has had the command
         if not is_local_status(reply.sts):

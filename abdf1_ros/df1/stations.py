@@ -21,7 +21,7 @@ from dataclasses import dataclass
 import math
 
 from abdf1_ros.df1.packet import Packet
-from abdf1_ros.df1.probes import Probes
+from abdf1_ros.df1.probes import Asker, Probes
 
 MAX_STATION = 254
 
@@ -186,23 +186,23 @@ class ActiveStationList:
         return self[number].replies_in_time or (
             not self.is_polled(number) and self.probes.claim_message(now))
 
-    def next_message(self, number: int) -> float:
-        """Return from when on (clock value, s) a message may go to an active station."""
-        return -math.inf if self[number].replies_in_time else self.probes.next_message
+    def next_own(self, number: int) -> float:
+        """Return from when on (clock value, s) a 0 or a fallback may be written again."""
+        return -math.inf if self[number].replies_in_time else self.probes.next_own
 
     def tried(self, number: int, begun: float, now: float, *, was_silent: bool,
-              is_message: bool = False) -> None:
+              asker: Asker = Asker.IN_TURN) -> None:
         """
         Take note that a station had the line from ``begun`` until now (clock values, s).
 
         What it took where it ``was_silent`` then is its probes'.
         """
-        if self[number].replies_in_time or self.is_polled(number):
+        if self[number].replies_in_time or self.is_polled(number) and asker is not Asker.OWN:
             return
         if not self._someone_waits:
-            self.probes.none_waits(now)
+            self.probes.none_waits(now, asker)
         elif was_silent:
-            self.probes.spent(self._took(begun, now), now, is_message=is_message)
+            self.probes.spent(self._took(begun, now), now, asker)
         else:
             self.probes.died(self._took(begun, now), now)
 

@@ -33,7 +33,9 @@ class Task(Protocol):
     is then unknown. It ends the command by calling ``reply`` or ``fail``, once. ``reply_size``
     is the bytes after the header of a good reply, 0 where that is not known. After ``expires``
     (clock value in s) the command is neither sent nor repeated. ``blames`` tells that a failure
-    says something about the station: that of a guest's command does not.
+    says something about the station: that of a guest's command does not. No message has asked for
+    one that ``is_own``: it goes to an inactive station without a poll before it, and once. The
+    answer to that is waited for ``answer_within`` s at most.
     """
 
     command: Packet
@@ -41,6 +43,8 @@ class Task(Protocol):
     reply_size: int
     expires: float
     blames: bool
+    is_own: bool
+    answer_within: float
 
     def reply(self, packet: Packet) -> None:
         """Take the reply."""

@@ -15,8 +15,8 @@
 """
 Who has the line next: one place decides.
 
-Heartbeats and fallbacks (``interlocks``) go first, but after ``OWN_IN_A_ROW`` of them a
-check or read has its turn. Then there are three queues:
+Heartbeats and fallbacks (``interlocks``) go first, but after ``OWN_IN_A_ROW`` of them, and after
+each to a silent station, a check or read has its turn. Then there are three queues:
 
 - ``writes`` go first, but after ``MAX_WRITES_IN_A_ROW`` of their commands a check or read that is
   due has its turn.
@@ -73,6 +73,7 @@ class Agenda:
         self._counted: list[JobTask] = []  # under way: of guests, and of ours while that is so
         self._tasks = tasks
         self._own_in_a_row = 0
+        self._was_silent = False  # the station of the last of them
         self._writes_in_a_row = 0
         self._has_begun_write = False
         self._last_check = -math.inf
@@ -107,18 +108,27 @@ class Agenda:
         """Return a heartbeat or fallback if there is one: no write in a row (rule 11)."""
         if self._own_in_a_row >= OWN_IN_A_ROW:
             self._own_in_a_row = 0
-            if job := self._checks.find_due(now) and self._check(now, busy) \
-                    or self._read(now, busy):
+            if job := self._check_or_read(now, busy):
                 return job
         # The rest of a long fallback first: heartbeats that are always due would keep it waiting.
         if under_way := self._tasks.first(busy, is_own=True):
             self._own_in_a_row += 1
             return self._tasks.take(under_way, now)
-        own = self._interlocks.next(now, busy)
+        own = self._interlocks.next(now, busy, only_active=self._was_silent)
+        if own is None and self._was_silent:  # after a try at a silent station
+            self._was_silent = False
+            if job := self._check_or_read(now, busy):
+                return job
+            own = self._interlocks.next(now, busy)
         if own is None:
             return self._usual(now, busy)
         self._own_in_a_row += 1
+        is_ending = self._interlocks.is_ending
+        self._was_silent = not is_ending and not self._stations[own.station].active
         return own
+
+    def _check_or_read(self, now: float, busy: Container[int]) -> Job | None:
+        return self._checks.find_due(now) and self._check(now, busy) or self._read(now, busy)
 
     def _usual(self, now: float, busy: Container[int]) -> Job | JobTask | None:
         has_writes = self._writes.waiting or self._tasks.waiting

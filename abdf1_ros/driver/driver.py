@@ -257,7 +257,9 @@ class Driver:
                 self._end_write(write, Outcome.NOT_SENT, 'fallback')
                 continue
             self.interlocks.message_came(write)
-            if reason := self._writes.why_too_old(write, now):
+            if self.interlocks.is_put_off(write):
+                self._end_write(write, Outcome.NOT_SENT, 'fallback')
+            elif reason := self._writes.why_too_old(write, now):
                 self._end_write(write, Outcome.NOT_SENT, reason)
             elif not write.mapping.serves:
                 self._writes.add(write, now)

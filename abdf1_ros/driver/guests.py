@@ -31,6 +31,7 @@ from enum import Enum
 import math
 
 from abdf1_ros.df1.packet import BROADCAST, is_local_status, Packet
+from abdf1_ros.df1.probes import Asker
 from abdf1_ros.df1.stations import ActiveStationList
 from abdf1_ros.driver.inbox import Inbox
 from abdf1_ros.driver.job_tasks import Job, LineTime
@@ -251,7 +252,7 @@ class GuestQueue:
             if was_sent:
                 command.guest.listener.wrote(
                     command.guest, command.packet, station, list(claim.extents or ()))
-        self._stations.tried(station, begun, self.line.now, is_message=True,
+        self._stations.tried(station, begun, self.line.now, asker=Asker.MESSAGE,
                              was_silent=not self._stations[station].replies_in_time)
 
     def _silent(self, station: int, now: float) -> None:

@@ -55,7 +55,8 @@ class Job:
     be so, a 0 and a Fallback never. Queues end what has waited as long, for its result to come in
     time.
     ``is_probe`` tells that a silent station is asked whether it is there again, ``is_own`` that
-    no message has asked for it: a heartbeat or a fallback. ``blames`` is that of ``Task``.
+    no message has asked for it: a heartbeat or a fallback. ``blames`` and ``answer_within`` are
+    those of ``Task``.
     """
 
     station: int
@@ -65,6 +66,7 @@ class Job:
     is_probe = False
     is_own = False
     blames = True
+    answer_within = math.inf
 
     def steps(self, now: float) -> Steps[None]:
         """Return what is to be done from ``now`` on (clock value in s)."""
@@ -151,6 +153,7 @@ class JobTask:
         self.reply_size = job.reply_size
         self.expires = job.expires
         self.blames = job.blames
+        self.is_own, self.answer_within = job.is_own, job.answer_within
         self.taken = now
         self.station = job.station
         self._tasks = tasks

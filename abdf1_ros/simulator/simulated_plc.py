@@ -119,6 +119,7 @@ class Sending:
         self.reply_size = 0
         self.expires = math.inf
         self.blames = True
+        self.is_own, self.answer_within = False, math.inf
         self._report = report
 
     def reply(self, packet: Packet) -> None:

@@ -14,7 +14,7 @@
 
 """The turns of those who ask silent stations, on a clock that the test moves."""
 
-from abdf1_ros.df1.probes import Probes
+from abdf1_ros.df1.probes import Asker, Probes
 from abdf1_ros.df1.stations import ActiveStationList
 import pytest
 
@@ -34,7 +34,7 @@ def test_station_that_has_just_died_is_asked_at_once_for_a_message_only() -> Non
         probes.died(2.0, now)
     assert probes.next == 15.0
     assert probes.claim_message(8.0)
-    probes.spent(1.0, 9.0, is_message=True)
+    probes.spent(1.0, 9.0, Asker.MESSAGE)
     assert probes.next == 16.0 and not probes.claim_message(16.0)
 
 
@@ -45,12 +45,22 @@ def test_message_that_came_too_early_has_the_next_turn_and_the_round_the_one_aft
     assert not probes.claim_message(7.9)
     assert probes.next == 15.0
     assert probes.claim_message(8.0)
-    probes.spent(1.0, 9.0, is_message=True)
+    probes.spent(1.0, 9.0, Asker.MESSAGE)
     assert probes.next == 16.0
     assert not probes.claim_message(22.9) and probes.claim_message(23.0)
     assert probes.next == 16.0  # kept for nobody: it was not the turn of a message
     probes.spent(1.0, 17.0)
     assert probes.claim_message(24.0)
+
+
+def test_own_writes_take_turns_with_all_others() -> None:
+    probes = Probes(1.0)
+    probes.spent(1.0, 1.0, Asker.OWN)
+    assert (probes.next, probes.next_own) == (8.0, 15.0)  # a read may have its turn
+    probes.spent(1.0, 9.0)
+    assert (probes.next, probes.next_own) == (16.0, 16.0)
+    probes.none_waits(20.0, Asker.OWN)
+    assert (probes.next, probes.next_own) == (20.0, 27.0)
 
 
 def test_silence_that_was_told_quickly_costs_what_it_took() -> None:

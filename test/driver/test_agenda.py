@@ -24,6 +24,7 @@ import math
 from abdf1_ros.df1.checksum import Checksum
 from abdf1_ros.df1.frames import Duplex
 from abdf1_ros.df1.machine import LineTiming
+from abdf1_ros.df1.probes import Asker
 from abdf1_ros.df1.stations import ActiveStationList
 from abdf1_ros.driver.agenda import Agenda, MAX_WRITES_IN_A_ROW
 from abdf1_ros.driver.checks import Checks
@@ -405,7 +406,8 @@ def test_writes_and_reads_take_turns_at_a_silent_station() -> None:
         job, begun = bench.next(now), now
         now += 0.02 if job is living else 1.0
         if isinstance(job, Write):
-            bench.stations.tried(2, begun, now, was_silent=job.is_probe, is_message=True)
+            bench.stations.tried(
+                2, begun, now, was_silent=job.is_probe, asker=Asker.MESSAGE)
             turns += 'w'
         else:
             assert isinstance(job, ReadJob)

@@ -250,7 +250,7 @@ def test_rule_3d_topic_that_comes_wakes_nobody_while_a_late_plc_has_to_wait() ->
     cell.run(2.0)
     cell.is_late = True
     stations, driver = cell.bench.driver.stations, cell.bench.driver
-    cell.bench.run_until(lambda: stations.next_message(1) > cell.now + 0.5)
+    cell.bench.run_until(lambda: stations.next_own(1) > cell.now + 0.5)
     cell.publish(speed, 3, run=0.1)
     assert driver.interlocks.heartbeats[0].state is BeatState.COUNTS
     assert driver.next_task(cell.now) is None

@@ -18,6 +18,7 @@ from collections.abc import Callable, Sequence
 import heapq
 import itertools
 from random import Random
+from typing import Any
 
 from abdf1_ros.df1.frames import Duplex
 from abdf1_ros.df1.machine import LineTiming, Machine, Procedure
@@ -182,19 +183,20 @@ class DriverBench:
     The driver on one end of a line, stations on the other, whole frames at a time.
 
     ``far.hear`` and ``far.say`` stand in the line: they return what comes through of a frame.
-    ``chunk`` bytes are handed over together.
+    ``chunk`` bytes are handed over together. ``far`` may be another end than simulated PLCs.
     """
 
     def __init__(self, mappings: Sequence[Mapping], *, network: Network | None = None,
                  settings: DriverSettings | None = None, start: bool = True,
-                 listener: Listener | None = None, chunk: int = _WHOLE_FRAMES) -> None:
+                 listener: Listener | None = None, chunk: int = _WHOLE_FRAMES,
+                 far: Any = None) -> None:
         # Not faster: a line that is read all the time has as much to show with fewer reads.
         self.network = network or Network(baud=19200, timeout=200)
         self.listener = Recorder(self.clock)
         self.driver = Driver(
             self.network, mappings, settings or DriverSettings(), listener or self.listener)
         self._stations: list[Responder] = []
-        self.far = FarEnd(self._stations, self.network)
+        self.far = far or FarEnd(self._stations, self.network)
         self.line = VirtualLine(self.driver.machine, self.far, baud=self.network.baud, chunk=chunk)
         self._actions: list[tuple[float, int, Callable[[], None]]] = []
         self._count = itertools.count()

@@ -43,6 +43,7 @@ class CommandTask:
         self.reply_size = 0
         self.expires = math.inf
         self.blames = True
+        self.is_own, self.answer_within = False, math.inf
         self.result: Packet | LinkError | None = None
         self.begun = clock()
         self.ended: float | None = None

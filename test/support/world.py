@@ -328,6 +328,7 @@ class World(DriverBench):
         self.wire = hashlib.sha256()
         self._values = dict.fromkeys(self.rows, 0)
         self.is_silent = False
+        self.deaf_since = math.inf  # when the wire to us broke
         self.plcs = {station: self._watch(station) for station in range(1, plant.stations + 1)}
         self.far.hear, self.far.say = self._hear, self._say
         self.master: MasterNode | None = None
@@ -505,7 +506,7 @@ class World(DriverBench):
     def _say(self, data: bytes) -> bytes:
         self.wire.update(b'%f<' % self.line.now + data)
         data = self.losses.say(data) if self.losses else data
-        return b'' if self.is_silent else data
+        return b'' if self.is_silent or self.is_deaf else data
 
     def _breathe(self) -> None:
         """Let the executor run, as it does while nothing holds it up."""
@@ -546,6 +547,15 @@ class World(DriverBench):
         self.line.wake(self.driver.machine)
 
     # What goes wrong
+
+    @property
+    def is_deaf(self) -> bool:
+        """Tell whether nothing reaches us, while all of ours reaches the PLCs."""
+        return self.deaf_since < math.inf
+
+    def break_wire(self) -> None:
+        """Let nothing reach us any more."""
+        self.deaf_since = self.line.now
 
     def fall_silent(self, station: int, is_silent: bool = True) -> None:
         """Let a PLC answer nothing; of a full-duplex line or a modem all of them."""
@@ -631,6 +641,7 @@ class World(DriverBench):
             watched.refuses = watched.refuses_messages = watched.swallows_replies = False
             watched.set_mode(Setting.RUN, self.line.now)
         self.is_alive = True
+        self.deaf_since = math.inf
         self.line.noise = QUIET
         self.losses = None
         self.holds = 0.0

@@ -74,6 +74,7 @@ class FallbackRow:
         self.refreshed = -math.inf
         self.sent = -math.inf
         self.tried = -math.inf  # like ``sent``, also when it is written again
+        self.tries = 0  # since it became due
         self.due = math.inf
         self.cause: FallbackCause | None = None
         self.refusal = ''
@@ -163,12 +164,14 @@ class FallbackRow:
 
     def take(self, now: float) -> Write:
         """Return the write of the fallback, which ends with ``ended``."""
+        if self.is_first_try:
+            self.tries = 0
         self.sent = now
         return self.refresh(now)
 
     def refresh(self, now: float) -> Write:
         """Return the write of a fallback that stands already."""
-        self.is_under_way, self.tried = True, now
+        self.is_under_way, self.tried, self.tries = True, now, self.tries + 1
         return Write(self.mapping, self._values, now)
 
     def ended(self, outcome: Outcome, now: float) -> float | None:

@@ -123,6 +123,7 @@ class HeartbeatRow:
         self.is_under_way = False
         self.is_first_try = True  # of the 0 that has to be written
         self.tried = -math.inf
+        self.tries = 0  # of what has to be written
         self.due = math.inf
         self.topics = mapping.condition.names if mapping.condition else ()
         self._timeout = (mapping.condition and mapping.condition.timeout or 0) / 1000
@@ -299,6 +300,7 @@ class HeartbeatRow:
 
     def take(self, now: float) -> Write:
         """Return the write of 0, or of the next value, which ends with ``ended``."""
+        self.tries = 1 if self.is_first_try else self.tries + 1
         self.is_under_way, self.is_first_try, self.tried = True, False, now
         if self.state is BeatState.SHOWN:  # it is written once more
             self.state = BeatState.CONTACT

@@ -41,6 +41,10 @@ _FAILURES = 2
 # OTHERS_SHARE times as long as the last attempt took.
 _LEAST_PAUSE = 1.0
 
+# A row that has just become due at a silent PLC may have been unlucky: it has so many tries before
+# those that had more.
+_QUICK_TRIES = 3
+
 _ANSWERED = (Outcome.WRITTEN, Outcome.PARTLY, Outcome.FAILED)
 
 OwnRow = HeartbeatRow | FallbackRow
@@ -53,12 +57,14 @@ class Conditions:
     What all PLCs of a line depend on.
 
     The ROS executor ran last at ``executor``, the last accepted message of each topic was
-    published at ``messages`` (clock values in s). ``is_ending`` tells of the end.
+    published at ``messages`` (clock values in s). ``is_ending`` tells of the end, which began at
+    ``ended``: infinite before it.
     """
 
     executor: float = -math.inf
     messages: dict[str, float] = field(default_factory=dict)
     is_ending: bool = False
+    ended: float = math.inf
 
 
 class Plc:
@@ -169,6 +175,11 @@ class Plc:
         beats = [beat for beat in self.heartbeats if beat.judge(
             now, why or beat.why_missing(conditions.messages, now), conditions.executor,
             conditions.messages)]
+        if not self.is_active:  # it gets no number but 0 (rule 4)
+            for beat in beats:
+                if not beat.wants_zero:
+                    beat.due = beat.first_due
+            beats = [beat for beat in beats if beat.wants_zero]
         self.plan()
         return [*beats, *(row for row in due if row not in held_up)]
 
@@ -183,31 +194,44 @@ class Plc:
         Return when a row has its turn, the least first; None where it has to wait (rules 10, 11).
 
         First tries go at once: the PLC may well carry out what it does not answer. Those that
-        answer go before those that do not. Of these the one goes first that was tried the longest
-        ago, and those that reply late have the time for probes only.
+        answer go before those that do not. Of these the one goes first that has had the fewest
+        tries, then the one that was tried the longest ago: a 0 that is due each second is not all.
+        They have the time for probes only. At the end a silent one has one try.
         """
+        if self._has_last_try:
+            return (1, 1, row.tried) if row.tried < self._conditions.ended else None
         is_zero = isinstance(row, HeartbeatRow) and row.wants_zero
         is_beat = isinstance(row, HeartbeatRow) and not row.wants_zero
         is_ill = self.failures > 0 or not self._stations[self.station].replies_in_time
         if row.is_first_try and not is_beat:
             return 0, is_ill, not is_zero
         if not is_ill:
-            return (2, row.tried) if is_beat else (1, not is_zero, row.tried)
+            return (2, row.tried) if is_beat else (1, 0, not is_zero, row.tried)
         if now < self._free_from:
             return None
-        return 3, self.pause_end, is_beat, not is_zero, row.tried
+        return 3, is_beat, min(row.tries, _QUICK_TRIES), row.tried
+
+    @property
+    def _has_last_try(self) -> bool:
+        """Tell whether this is the end, and the PLC silent."""
+        return self._conditions.ended < math.inf and not self.is_active
 
     @property
     def _free_from(self) -> float:
         """Return from when on more than first tries may be written (clock value in s)."""
         if self._conditions.is_ending:  # there is no later
             return -math.inf
-        return max(self.pause_end, self._stations.next_message(self.station))
+        # Probes of an inactive station have their own pause.
+        pause_end = self.pause_end if self.is_active else -math.inf
+        return max(pause_end, self._stations.next_own(self.station))
 
     def next_due(self, least: float) -> float:
         """Return when something may be written, if that is before ``least`` (clock values, s)."""
-        if self.due >= least or not self.is_active:
+        if self.due >= least:
             return least
+        if self._has_last_try:
+            return min([row.due for row in self.rows if row.tried < self._conditions.ended],
+                       default=least)
         return min(least, self.first_due, max(self.due, self._free_from))
 
     def good_until(self, beat: HeartbeatRow, youngest: MappingType[Mapping, float]) -> float:

@@ -44,6 +44,9 @@ from abdf1_ros.plan.planner import Block
 from abdf1_ros.settings.mapping import Mapping
 from abdf1_ros.settings.rows import Rows
 
+# At the end a silent station is given so long (s) to answer: all of them have their try.
+_HASTE = 0.1
+
 _OURS = -1  # stands for our own table
 _due_of = attrgetter('due')
 
@@ -53,14 +56,18 @@ class OwnWrite(WriteJob):
     A write that no message has asked for.
 
     It must not be sent after ``expires`` (clock value in s): its value may be wrong by then.
+    With ``is_last`` its PLC is silent, and there is no later.
     """
 
     is_own = True
 
     def __init__(self, row: OwnRow, write: Write, writing: WritesUnderWay, interlocks: Interlocks,
-                 expires: float = math.inf) -> None:
+                 expires: float = math.inf, *, is_free: bool = False,
+                 is_last: bool = False) -> None:
         write.is_own = True
         super().__init__(write, writing)
+        self.is_free = is_free
+        self.answer_within = _HASTE if is_last else math.inf
         # Of a fallback each packet goes out: the PLC may carry out what it does not answer.
         self.goes_on = isinstance(row, FallbackRow)
         self.row = row
@@ -110,13 +117,17 @@ class Interlocks(WriteListener):
         self._refreshes: list[tuple[float, int, FallbackRow]] = []
         self._tickets = itertools.count()
         self._has_begun = False
-        self._are_all_due = False
         self._awaited: frozenset[int] = frozenset()  # stations that answered when the end began
 
     @property
     def is_ending(self) -> bool:
         """Tell whether all is to end."""
         return self._conditions.is_ending
+
+    @property
+    def _are_all_due(self) -> bool:
+        """Tell whether the end has begun."""
+        return self._conditions.ended < math.inf
 
     # What happens
 
@@ -135,22 +146,27 @@ class Interlocks(WriteListener):
 
     def resume(self) -> None:
         """Go on after ``wind_down``: the next opening of the port is a first contact."""
-        self._conditions.is_ending = self._are_all_due = False
+        self._conditions.is_ending, self._conditions.ended = False, math.inf
         for row in self._plc_of:
             row.words.resume()
 
     @property
     def is_over(self) -> bool:
-        """Tell whether all stations that answered at ``wind_down`` have confirmed its writes."""
+        """
+        Tell whether all is written that can be.
+
+        The stations that answered at ``wind_down`` have confirmed it; silent ones have had it.
+        """
         return not self._plc_of or self._are_all_due and not any(
-            row.mapping.station in self._awaited
+            row.mapping.station in self._awaited or row.is_under_way
+            or row.tried < self._conditions.ended
             for row in self._plc_of if not row.is_confirmed)
 
     def unconfirmed(self) -> list[str]:
         """Return the tags of the rows that are not confirmed at the end, or may not stay so."""
         now = self._writing.record.line.now
         held = {row.mapping.tag: row.words.lands_until - now for plc in self._plcs.values()
-                for row in plc.rows if row.words.lands_until > now}
+                for row in plc.rows if row.is_confirmed and row.words.lands_until > now}
         return [*(row.mapping.tag for row in self._plc_of if not row.is_confirmed), *(
             f'{tag} (a gateway may hold a write to it for {seconds:.1f} s)'
             for tag, seconds in held.items())]
@@ -201,6 +217,15 @@ class Interlocks(WriteListener):
         row = self._by_mapping.get(write.mapping)
         return row is not None and (self._are_all_due or write.requested <= row.sent)
 
+    def is_put_off(self, write: Write) -> bool:
+        """
+        Tell whether a message comes while the fallback of its row is due at a silent PLC (4).
+
+        The PLC may carry out both: in turns, as long as messages come.
+        """
+        row = self._by_mapping.get(write.mapping)
+        return row is not None and row.cause is not None and not self._plc_of[row].is_active
+
     def write_ended(self, claim: Claim) -> None:
         """Take note how a write ended, of whomever: fallbacks may wait for that (rules 7, 9)."""
         now = self._writing.record.line.now
@@ -231,17 +256,20 @@ class Interlocks(WriteListener):
 
     # Who goes next
 
-    def next(self, now: float, busy: Container[int] = ()) -> OwnWrite | None:  # noqa: A003
-        """Return what has to be written next, None for nothing."""
+    def next(self, now: float, busy: Container[int] = (), *,  # noqa: A003
+             only_active: bool = False) -> OwnWrite | None:
+        """Return what has to be written next, maybe ``only_active`` PLCs; None for nothing."""
         self.expire(now)
-        if self._are_all_due:  # there is no later for silent PLCs
+        if self._are_all_due:  # there is no later for silent PLCs, but those that answer go first
+            only_active |= any(row.is_under_way and plc.is_active
+                               for row, plc in self._plc_of.items())
             self._writing.stations.probes.none_waits(now)
         if now < min(map(_due_of, self._plcs.values()), default=math.inf):
             return None
         best: tuple[TurnRank, Plc, OwnRow] | None = None
         youngest: dict[Mapping, float] | None = None
         for plc in self._plcs.values():
-            if plc.due > now or plc.station in busy or not plc.is_active:
+            if plc.due > now or plc.station in busy or only_active and not plc.is_active:
                 continue
             youngest = self._writes.youngest() if youngest is None else youngest
             for row in plc.ready(youngest, now):
@@ -259,10 +287,12 @@ class Interlocks(WriteListener):
             self._writes.drop('fallback', now, row.mapping)
         elif not row.wants_zero:
             expires = plc.good_until(row, youngest)
+        is_first = row.is_first_try
         write = row.take(now)
         row.due = math.inf
         plc.plan()
-        return OwnWrite(row, write, self._writing, self, expires)
+        return OwnWrite(row, write, self._writing, self, expires, is_free=is_first,
+                        is_last=self._are_all_due and not plc.is_active)
 
     def refresh(self, now: float, busy: Container[int] = ()) -> OwnWrite | None:
         """
@@ -348,7 +378,7 @@ class Interlocks(WriteListener):
         self._awaited = frozenset(plc.station for plc in self._plcs.values() if plc.is_active)
         for beat in self.heartbeats:
             beat.end(now)
-        self._are_all_due = True
+        self._conditions.ended = now
         for plc in (*self._plcs.values(), self.ours):
             plc.plan()
 

@@ -20,11 +20,20 @@ from collections.abc import Callable
 
 from abdf1_ros.df1.packet import BROADCAST, is_local_status
 from abdf1_ros.driver.write import Outcome, Write, WriteResult
-from abdf1_ros.errors import CommandTimeout, FormatError, LinkError, RemoteError
+from abdf1_ros.errors import (
+    CommandTimeout,
+    FormatError,
+    LinkError,
+    RemoteError,
+    StationInactive,
+)
 from abdf1_ros.pccc.dialect import Steps
 from abdf1_ros.pccc.fields import word
 from abdf1_ros.pccc.status import check_status, STS_ILLEGAL_COMMAND
 from abdf1_ros.pccc.steps import data_of
+
+# After these a station may carry out what comes next.
+_TAKEN_OR_NOT = RemoteError, CommandTimeout, StationInactive
 
 REWRITTEN = ('by reading the word and writing it back; a change that the PLC made in between is '
              'lost')
@@ -35,8 +44,8 @@ def carry_out(write: Write, clock: Callable[[], float], *,
     """
     Send every packet of a write, as long as each is confirmed; ``clock`` gives seconds.
 
-    With ``goes_on`` also after one that was refused, or that the station has not replied to: it
-    may carry out the others.
+    With ``goes_on`` also after one that was refused, or that the station has not answered: it may
+    carry out the others.
     """
     done, detail, failed = 0, '', None
     for packet in range(len(write.commands)):
@@ -45,7 +54,7 @@ def carry_out(write: Write, clock: Callable[[], float], *,
             done += 1
         except (RemoteError, LinkError) as error:
             failed = failed or error
-            if not goes_on or not isinstance(error, (RemoteError, CommandTimeout)):
+            if not goes_on or not isinstance(error, _TAKEN_OR_NOT):
                 break
     if failed is not None:
         return _ended_early(write, _outcome_of(failed), clock(), done, failed)

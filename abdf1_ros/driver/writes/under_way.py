@@ -19,6 +19,7 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from abdf1_ros.df1.packet import BROADCAST
+from abdf1_ros.df1.probes import Asker
 from abdf1_ros.df1.stations import ActiveStationList
 from abdf1_ros.driver.job_tasks import Job
 from abdf1_ros.driver.reads.readings import Readings
@@ -31,9 +32,14 @@ from abdf1_ros.pccc.dialect import Steps
 
 
 class WriteJob(Job):
-    """A write that has the line; ``result`` is there when it has ended."""
+    """
+    A write that has the line; ``result`` is there when it has ended.
+
+    With ``is_free`` what it takes of a silent station is not its probes'.
+    """
 
     result: WriteResult
+    is_free = False
 
     def __init__(self, write: Write, writing: WritesUnderWay) -> None:
         self.write = write
@@ -75,9 +81,9 @@ class WritesUnderWay:
     def ended(self, job: WriteJob) -> None:
         """Take note of the end of a write."""
         write, result, station = job.write, job.result, job.station
-        if station != BROADCAST:
+        if station != BROADCAST and not (job.is_free and write.is_probe):
             self.stations.tried(station, job.claim.begun, self.line.now, was_silent=write.is_probe,
-                                is_message=True)
+                                asker=Asker.OWN if write.is_own else Asker.MESSAGE)
         if isinstance(result.error, RemoteError):
             self.stations[station].remote_errors += 1
         elif result.error is not None and not isinstance(result.error, CommandExpired):

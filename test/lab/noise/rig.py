@@ -70,6 +70,8 @@ class _WatchedTask:
         self.reply_size = task.reply_size
         self.expires = task.expires
         self.blames = task.blames
+        self.is_own = task.is_own
+        self.answer_within = task.answer_within
         self.begun = end.driver.machine.now
         self._task = task
         self._end = end

@@ -36,6 +36,7 @@ from unittest import mock
 if __name__ == '__main__':  # pytest has its own paths
     sys.path[:0] = [str(Path(__file__).parents[number]) for number in (1, 2, 3)]
 
+from abdf1_ros.df1.master import HalfDuplexMaster
 from abdf1_ros.driver.agenda import Agenda
 from abdf1_ros.driver.driver import Driver
 from abdf1_ros.driver.guests import GuestJob
@@ -210,6 +211,19 @@ def _fallbacks_first(rank: Any) -> Any:
     return rank_wrongly
 
 
+def _polls_before(carry_out: Any) -> Any:
+    def carry_out_wrongly(self: HalfDuplexMaster, task: Any) -> Any:
+        task.is_own = False
+        return carry_out(self, task)
+
+    return carry_out_wrongly
+
+
+def _awaits_those_that_answer(before: Any) -> Any:
+    return property(lambda self: not self._plc_of or self._are_all_due and not any(
+        row.mapping.station in self._awaited for row in self._plc_of if not row.is_confirmed))
+
+
 def _stores_nothing(init: Any) -> Any:
     def init_wrongly(self: Interlocks, mappings: Any, writes: Any, writing: Any, store: Any,
                      *arguments: Any) -> None:
@@ -254,6 +268,10 @@ MISTAKES = (
     Mistake('4', 'heartbeats have results', Interlocks, 'ended', _beats_are_told),
     Mistake('4', 'a silent station is probed with heartbeats', Plc, 'is_active',
             lambda before: property(lambda self: True)),
+    Mistake('4', 'a silent PLC is polled before its fallback', HalfDuplexMaster, 'carry_out',
+            _polls_before),
+    Mistake('5', 'the end does not wait for silent PLCs', Interlocks, 'is_over',
+            _awaits_those_that_answer),
     Mistake('6', 'a message is not too old when it is sent', MessageJob, '__init__',
             _never_too_old),
     Mistake('11', 'messages go before heartbeats and fallbacks', Agenda, '_own_first',

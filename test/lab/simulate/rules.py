@@ -459,7 +459,7 @@ class OneResult(Rule):
 
 
 class Probes(Rule):
-    text = 'a station that is known to be silent gets no heartbeats (4)'
+    text = 'a station that is known to be silent gets no number but 0 (4)'
 
     def __init__(self, world: World) -> None:
         super().__init__(world)
@@ -468,7 +468,7 @@ class Probes(Rule):
 
     def sent(self, entry: Sent) -> None:
         if entry.tag.startswith('beat') and entry.station in self._silent \
-                and entry.value not in GUESTS:
+                and entry.value and entry.value not in GUESTS:
             self._sent[entry.station] = entry
 
     def stand(self) -> None:
@@ -478,6 +478,44 @@ class Probes(Rule):
         sent = [entry for number, entry in self._sent.items() if number in self._silent]
         self.demand(not sent, sent)
         self._sent.clear()
+
+
+class Unheard(Rule):
+    text = 'a PLC that is not heard is sent its 0 and its fallbacks, also at the end (4, 5, 11)'
+
+    def __init__(self, world: World) -> None:
+        super().__init__(world)
+        self._last: dict[str, Sent] = {}
+        self._fell: dict[str, float] = {}  # when a fallback was sent over a message
+
+    def sent(self, entry: Sent) -> None:
+        if entry.value in GUESTS:
+            return
+        before = self._last.get(entry.tag)
+        if entry.value == SAFE and before is not None and before.value != SAFE:
+            self._fell[entry.tag] = entry.when
+        self._last[entry.tag] = entry
+
+    def stand(self) -> None:
+        world, now = self.world, self.world.line.now
+        if not world.is_deaf or world.plant.is_read_only:
+            return
+        for station in world.plcs:
+            tags = [row.tag for row in world.rows_of(station)]
+            for tag in tags:
+                since = max(world.deaf_since, world.youngest.get(tag, 0.0))
+                self._demand_rest(tag, now > since + (world.bounds[tag] or math.inf) + STEP)
+            fell = max(self._fell.get(tag, 0.0) for tag in tags)
+            self._demand_rest(f'beat_{station}', world.deaf_since < fell < now - self.flight)
+
+    def over(self) -> None:
+        for tag in self._last if self.world.is_deaf else ():
+            if tag[0] in 'wb':
+                self._demand_rest(tag, True)
+
+    def _demand_rest(self, tag: str, is_due: bool) -> None:
+        last = self._last.get(tag)
+        self.demand(not is_due or last is None or last.value in (SAFE, 0), last, 'was the last')
 
 
 class AfterRun(Rule):
@@ -691,7 +729,7 @@ class OneOwner(Rule):
 
 RULES: tuple[type[Rule], ...] = (
     Results, Ages, Turns, Values, Guards, Withheld, Beats, BeatsAfterFallbacks, Order, Outputs,
-    OneResult, Probes, AfterRun, Held, ReadOnly, Guests, View, Served, Rungs)
+    OneResult, Probes, Unheard, AfterRun, Held, ReadOnly, Guests, View, Served, Rungs)
 
 
 class Judge:

@@ -82,22 +82,25 @@ class Story:
 
     def _ail(self, station: int, seconds: float, *, is_ill: bool) -> None:
         """Let something be wrong for a while, then nothing any more."""
-        world = self.world
-        end = world.line.now + seconds
-        while world.line.now < end:
+        self.endure(station, seconds, is_ill=is_ill)
+        self.world.mend()
+        if is_ill:
+            self._mark(station)
+
+    def endure(self, station: int, seconds: float, *, is_ill: bool = True) -> None:
+        """Let something be wrong for a while."""
+        end = self.world.line.now + seconds
+        while self.world.line.now < end:
             if is_ill:
                 self._mark(station)
             self.wait(STEP)
-        world.mend()
-        if is_ill:
-            self._mark(station)
 
     def _mark(self, station: int) -> None:
         """Keep that something was wrong, with a PLC or (0) with the line."""
         world = self.world
         world.ill[station] = world.line.now
         if world.line.noise is not QUIET or world.line.now < world.away or not world.is_alive \
-                or not world.driver.is_online or world.is_silent:
+                or not world.driver.is_online or world.is_silent or world.is_deaf:
             world.ill[0] = max(world.line.now, world.away)
 
     def publish_much(self) -> None:
@@ -186,9 +189,15 @@ class Story:
                 for _ in range(self.dice.randrange(3)):
                     world.ask(1, self.dice.choice([OUTPUTS, BEAT]))
                 world.run(pause * self.dice.random())
+            if world.plant.stations == 1 and not world.holds and self.dice.random() < 0.3:
+                world.break_wire()
+                world.run(self.dice.uniform(0.0, 1.0))
             world.end()
+            if world.is_deaf:
+                self._mark(1)
             self.judge.over()
-            self._demand_safe_words()
+            if not world.is_deaf:  # then the judge knows what was sent
+                self._demand_safe_words()
             world.mend()
             world.reload()
             self._recover()
@@ -279,6 +288,15 @@ def _lost_frames(story: Story, station: int) -> None:
         story.wait(story.longest_bound() + 2.0)
 
 
+def _broken_wire(story: Story, station: int) -> None:
+    """Let PLCs execute what they are not heard to answer, and then nobody publish any more."""
+    if story.world.network.mode != 'Slave':
+        story.world.break_wire()
+        story.endure(station, story.dice.uniform(0.0, 3.0))
+        story.be_quiet()
+        story.endure(station, story.longest_bound() + 2.0)
+
+
 def _overwritten(story: Story, station: int) -> None:
     story.be_quiet()  # for the fallback to stand
     story.wait(story.world.plant.after / 1000 + 1.0)
@@ -320,7 +338,8 @@ _TROUBLES: dict[str, Callable[[Story, int], None]] = {
     'port lost': _lost_port, 'process stands still': _pause, 'executor hangs': _hung_executor,
     'PROGRAM': _program, 'download': _download, 'killed': _kill, 'slow PLC': _slowness,
     'other writer': _other_writer, 'other bridge': _other_bridge, 'guest': _guest,
-    'gateway holds': _gateway_holds, 'frames lost': _lost_frames, 'another network': _overwritten}
+    'gateway holds': _gateway_holds, 'frames lost': _lost_frames, 'another network': _overwritten,
+    'receive wire broken': _broken_wire}
 
 
 @dataclass(slots=True)
