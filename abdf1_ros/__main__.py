@@ -16,10 +16,22 @@
 
 from __future__ import annotations
 
+from difflib import get_close_matches
 from pathlib import Path
 import sys
 
 from abdf1_ros.cli.main import COMMANDS, run
+from abdf1_ros.paths import package_version
+from abdf1_ros.text import printable
+
+_HELP = ('-h', '--help', 'help')
+_TEXTS = {
+    'plc': 'read, write and look for PLCs, without ROS',
+    'sniff': 'record and decode a line', 'check': 'check net.csv and map.csv, and forecast',
+    'simulator': 'PLCs to try things with',
+    'conform': 'check a PLC or a driver against the manual',
+    'node': 'the bridge: a ROS 2 node', 'lines': 'bridges for several lines in one process',
+    'monitor': 'show a running bridge', 'demo': 'all together, without a PLC'}
 
 
 def main() -> int:
@@ -28,11 +40,18 @@ def main() -> int:
     if name in COMMANDS:
         sys.argv[:2] = [name]
         return run(name)
-    is_help = name in ('-h', '--help')
-    print(f'usage: {"abdf1" if program == "abdf1" else "python3 -m abdf1_ros"} '
-          f'{{{",".join(COMMANDS)}}} ...\neach has --help',
-          file=sys.stdout if is_help else sys.stderr)
-    return 0 if is_help else 2
+    called = 'abdf1' if program == 'abdf1' else 'python3 -m abdf1_ros'
+    if name == '--version':
+        print(f'abdf1_ros {package_version()}')
+        return 0
+    if name and name not in _HELP:
+        meant = get_close_matches(name, COMMANDS, 1)
+        print(f'{called}: "{printable(name)}" is not a command'
+              + (f'; did you mean {meant[0]}?' if meant else ''), file=sys.stderr)
+    print(f'usage: {called} COMMAND ...\n\n' + '\n'.join(
+        f'  {command:10} {text}' for command, text in _TEXTS.items()) + '\n\neach has --help',
+          file=sys.stdout if name in _HELP else sys.stderr)
+    return 0 if name in _HELP else 2
 
 
 if __name__ == '__main__':

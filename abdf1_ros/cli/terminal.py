@@ -26,6 +26,7 @@ import io
 import math
 import os
 from pathlib import Path
+import re
 import shlex
 import shutil
 import signal
@@ -228,6 +229,8 @@ class _Parser(argparse.ArgumentParser):
         """Make a parser; ``complete`` adds its arguments when it is used."""
         super().__init__(*args, **details)
         self._complete = complete
+        # Python's own takes no exponent, so -1.5e3 would be an option.
+        self._negative_number_matcher = re.compile(r'-\d*\.?\d+(?:e[+-]?\d+)?', re.IGNORECASE)
 
     def parse_known_args(self, args: Any = None, namespace: Any = None) -> tuple[Any, list[str]]:
         """Parse arguments, once; all have to be known."""
@@ -240,9 +243,21 @@ class _Parser(argparse.ArgumentParser):
             meant = [f'{action.metavar} without {written}' for action in self._actions
                      if not action.option_strings and action.dest == word] or _alike(word, [
                          name for name in self._option_string_actions if name.startswith('--')])
-            hint = f'; did you mean {" or ".join(meant)}?' if meant else ''
+            hint = f'; did you mean {" or ".join(meant)}?' if meant else \
+                '' if option else self._surplus(unknown)
             self.error(f'unrecognized arguments: {" ".join(unknown)}{hint}')
         return found, unknown
+
+    def _surplus(self, words: Sequence[str]) -> str:
+        """Return what to do with words that are no options, and too many."""
+        if words[0].startswith('/dev/') or '://' in words[0]:
+            return f'; did you mean --port {words[0]}?'
+        places = [action for action in self._actions if not action.option_strings]
+        if any(action.nargs == '+' for action in places):
+            return '; these stand together, before or after all options'
+        wanted = ' and '.join(str(action.metavar) for action in places)
+        listed = '; a list has commas, as in 1,2,3' if wanted == 'STATIONS' else ''
+        return f'; it takes one {wanted}{listed}' if wanted else '; it takes only options'
 
     def error(self, message: str) -> NoReturn:
         """End with status 2."""

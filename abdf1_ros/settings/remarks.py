@@ -159,6 +159,21 @@ def _useless_cells(row: Row, mapping: Mapping) -> Iterator[Problem]:
             and not re.search('[./]', row.get('Address')):
         yield _at(row, 'Address', f'{row.get("Address")} is the control word of the element; its '
                                   f'values are {", ".join(value_addresses(address))}')
+    if control := _beyond_control(mapping):
+        yield _at(row, 'Length' if row.get('Length') else 'Address', (
+            f'{mapping.length} words from {address} on are also the control word {control}; '
+            f'whole elements are {address.at_offset(address.offset - address.word)}-'
+            f'{mapping.place_of(mapping.length - 1).element}'))
+
+
+def _beyond_control(mapping: Mapping) -> Address | None:
+    """Return the control word that values reach over from one element to the next."""
+    address = mapping.address
+    if not address.file_type.is_structure or address.bit is not None or not address.word:
+        return None
+    last = mapping.place_of(mapping.length - 1)
+    return None if last.element == address.element else \
+        address.at_offset((address.element + 1) * address.layout.words)
 
 
 def _at(row: Row, column: str, text: str) -> Problem:

@@ -126,3 +126,12 @@ def test_signal_where_nothing_is_under_way_ends_quietly(
     module = import_module(COMMANDS[name])
     monkeypatch.setattr(module if name == 'demo' else terminal, 'interruptible', interrupted)
     assert module.main(args) == status
+
+
+@pytest.mark.parametrize(('given', 'status', 'told'), [
+    (['plcc'], 2, '"plcc" is not a command; did you mean plc?'), (['--version'], 0, 'abdf1_ros '),
+    (['help'], 0, 'plc        read, write'), ([], 2, 'plc        read, write')])
+def test_first_word_that_is_no_command(given: list[str], status: int, told: str) -> None:
+    said = subprocess.run([sys.executable, '-m', 'abdf1_ros', *given], text=True, timeout=60,
+                          capture_output=True, check=False)
+    assert (said.returncode, told in said.stdout + said.stderr) == (status, True)

@@ -220,7 +220,9 @@ def test_port_that_cannot_be_opened_leads_to_the_cure(number: int, text: str) ->
     (['--sation', '1'], '--sation 1; did you mean --station?'),
     (['-s', '1'], '-s 1; did you mean --station?'),
     (['--baudrate=9600'], '--baudrate=9600; did you mean --baud?'),
-    (['-p'], '-p; did you mean --port or --parity?'), (['--zzz'], '--zzz'), (['more'], 'more')])
+    (['-p'], '-p; did you mean --port or --parity?'), (['--zzz'], '--zzz'),
+    (['more'], 'more; it takes only options'),
+    (['/dev/x'], '/dev/x; did you mean --port /dev/x?')])
 def test_option_that_may_be_meant(
         given: list[str], meant: str, capsys: pytest.CaptureFixture[str]) -> None:
     parser = command_parser('tool', None)
@@ -232,6 +234,30 @@ def test_option_that_may_be_meant(
     assert ending.value.code == 2
     assert capsys.readouterr().err == (f'tool read: error: unrecognized arguments: {meant}\n'
                                        '"tool read --help" tells what it takes\n')
+
+
+@pytest.mark.parametrize(('nargs', 'name', 'given', 'hint'), [
+    ('?', 'STATIONS', ['1', '2', '3'], '2 3; it takes one STATIONS; a list has commas, as '
+                                       'in 1,2,3'),
+    ('?', 'STATION', ['1', '2'], '2; it takes one STATION'),
+    ('+', 'ADDRESS', ['a', '--net', 'n', 'b'], 'b; these stand together, before or after all '
+                                               'options')])
+def test_words_that_are_too_many_are_told_where_they_belong(
+        nargs: str, name: str, given: list[str], hint: str,
+        capsys: pytest.CaptureFixture[str]) -> None:
+    parser = command_parser('tool', None)
+    parser.add_argument(name.lower(), metavar=name, nargs=nargs)
+    parser.add_argument('--net')
+    with pytest.raises(SystemExit):
+        parser.parse_args(given)
+    assert f'unrecognized arguments: {hint}\n' in capsys.readouterr().err
+
+
+def test_number_with_an_exponent_and_a_sign_is_no_option() -> None:
+    parser = command_parser('tool', None)
+    parser.add_argument('values', nargs='+')
+    assert parser.parse_args(['-1.5e3', '-2', '-.5', '-1E-3']).values == [
+        '-1.5e3', '-2', '-.5', '-1E-3']
 
 
 def test_commands_are_told_as_they_can_be_pasted(

@@ -148,7 +148,10 @@ def test_what_is_told_of_a_map(tmp_path: Path, text: str, expected: list[str]) -
         '2:3 (Address): T4:0 is the control word of the element; its values are T4:0.PRE, '
         'T4:0.ACC']),
     (f'{HEAD},Length\na,Read,C5:0,1,PLC5,3\n', []),
-    (f'{HEAD},Length\na,Read,T4:0.ACC,1,SLC,2\n', []),  # one tag cannot lie side by side
+    (f'{HEAD},Length\na,Read,T4:0.PRE,1,SLC,2\n', []),
+    (f'{HEAD},Length\na,Read,T4:0.ACC,1,SLC,4\n', [
+        '2:6 (Length): 4 words from T4:0.ACC on are also the control word T4:1; whole elements '
+        'are T4:0-1']),
     (f'{HEAD}\na,Write,T4:0/DN,1,SLC\nb,Write,C5:0.ACC,1,SLC\nc,Serve,C5:0/CU,5,PLC5\n', [
         '2:2 (Command): T4:0/DN is set anew by the instruction of the timer with each scan']),
     (f'{HEAD}\nSpeed,Read,N7:0,1,SLC\nspeed,Read,N7:1,1,SLC\nspeeds,Read,N7:2,1,SLC\n', [

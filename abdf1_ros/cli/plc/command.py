@@ -24,7 +24,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 import sys
 
-from abdf1_ros.cli.plc.parser import check_order, make_parser
+from abdf1_ros.cli.plc.parser import check_order, help_asked, make_parser
 from abdf1_ros.cli.terminal import EXIT_INTERRUPTED, EXIT_USAGE, prepare_output, run_command
 
 
@@ -32,7 +32,7 @@ def main(args: Sequence[str] | None = None) -> int:
     """Carry out one command; the exit statuses are those of --help."""
     prepare_output()
     parser = make_parser(__doc__)
-    words = sys.argv[1:] if args is None else args
+    words = help_asked(sys.argv[1:] if args is None else args)
     check_order(parser, words)
     options = parser.parse_args(words)
 

@@ -218,6 +218,7 @@ def tags_of(mappings: Rows, station: int) -> Tags:
         count = 1 if row.type is ValueType.STRING else row.length
         for number in range(count):
             tag = row.tag if count == 1 else f'{row.tag}[{number}]'
+            tag += ' (raw)' if row.scaling else ''
             if tag not in (names := tags[str(row.place_of(number))]):
                 names.append(tag)
     return {place: printable(', '.join(names)) for place, names in tags.items()}

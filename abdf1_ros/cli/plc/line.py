@@ -57,6 +57,8 @@ def network_of(options: argparse.Namespace, duplex: str | None = None,
              for option, column in _COLUMNS.items()
              if (value := getattr(options, option)) is not None}
     network = make_network(given, base)
+    if network.timeout == 0:
+        raise ConfigurationError([Problem('--timeout', '0 ms leaves no time for an answer')])
     if needs_port and not options.net and not options.port:
         raise ConfigurationError([Problem(
             '--port', 'name the port, such as --port /dev/ttyUSB0, or a net CSV with --net')])

@@ -40,9 +40,9 @@ examples:
   plc scan 0-31 --net net.csv                 who is there?
   plc files 1 --net net.csv                   which data files does it have?
   plc status 1 --port /dev/ttyUSB0 --baud 19200
-  plc read N7:0 --length 10 --peer --port /dev/ttyUSB0
+  plc read N7:0-9 B3:1/0-7 --peer --port /dev/ttyUSB0
   plc write N7:10 5 6 7 --station 1 --yes --net net.csv
-  plc write F8:2 --station 1 --yes --net net.csv -- -1.5e3
+  plc write F8:2 -1.5e3 --station 1 --yes --net net.csv
   plc watch B3:0 N7:0 T4:0.ACC --net net.csv
 
 "plc COMMAND --help" explains each command.
@@ -51,9 +51,9 @@ examples:
 
 # What each does, and examples.
 _COMMANDS = {
-    'read': ('read addresses once', 'read N7:0 --length 10 --net net.csv'),
+    'read': ('read addresses once', 'read N7:0-9 F8:2 --net net.csv'),
     'write': ('write values to an address', 'write N7:10 5 6 7 --station 1 --yes --net net.csv',
-              'write F8:2 --station 1 --yes --net net.csv -- -1.5e3'),
+              'write F8:2 -1.5e3 --station 1 --yes --net net.csv'),
     'watch': ('show values live until Ctrl-C', 'watch B3:0 N7:0 --period 0.5 --net net.csv',
               'watch I:1.0 --radix bin --net net.csv',
               'watch F8:0 --csv --net net.csv > curve.csv'),
@@ -67,7 +67,7 @@ _COMMANDS = {
              'init --into line1', 'init --port /dev/ttyUSB0 --stations 1-4'),
     'files': ('tell which data files a PLC has and how long they are', 'files 1 --net net.csv',
               'files 1 --map --net net.csv', 'files 1 --map map.csv --net net.csv'),
-    'import': ('make map.csv of an export of RSLogix 500 or 5 (symbols) or KEPServerEX (tags)',
+    'import': ('make map.csv of tags of RSLogix, KEPServerEX, RSView, InTouch, or of any list',
                'import plant.csv --station 2 --plc-type SLC',
                'import plant.csv --station 1-4 --read-only --period 1000'),
     'clock': ("tell a PLC's time and its drift, or set it", 'clock 1 --net net.csv',
@@ -93,6 +93,13 @@ def _complete(name: str, parser: argparse.ArgumentParser) -> None:
     from abdf1_ros.cli.plc.options import ADDERS
     if name in ADDERS:
         ADDERS[name](parser)
+
+
+def help_asked(words: Sequence[str]) -> Sequence[str]:
+    """Return what to parse: the word "help" stands for the option, as in other programs."""
+    if words[:1] == ['help']:
+        return [*words[1:2], '--help']
+    return [words[0], '--help'] if words[1:] == ['help'] else words
 
 
 def check_order(parser: argparse.ArgumentParser, words: Sequence[str]) -> None:

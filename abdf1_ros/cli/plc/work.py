@@ -54,7 +54,7 @@ from abdf1_ros.driver.settings import DriverSettings
 from abdf1_ros.driver.write import Outcome
 from abdf1_ros.errors import Abdf1Error, FormatError, LinkError, PortLost, RemoteError
 from abdf1_ros.pccc.file_search import DataFile
-from abdf1_ros.pccc.file_types import PlcType
+from abdf1_ros.pccc.file_types import FileType, PlcType
 from abdf1_ros.pccc.processor import Processor
 from abdf1_ros.pccc.status import is_address_fault
 from abdf1_ros.pccc.values import Values
@@ -170,6 +170,8 @@ def _read(options: argparse.Namespace, session: Session, wanted: _Wanted) -> int
     status, plc_type = 0, options.plc_type
     cells, tags = wanted
     for mapping in _mappings(options, session, cells, options.addresses):
+        for remark in mapping.remarks if mapping.address.file_type.is_structure else ():
+            _complain(remark.text)
         try:
             values = data.read(session, mapping)
         except Abdf1Error as error:
@@ -223,6 +225,9 @@ def _write(options: argparse.Namespace, session: Session, cells: Cells) -> int:
         writing = data.Writing(mapping, options.values)
     for remark in mapping.remarks:
         _complain(remark.text)
+    if mapping.address.file_type is FileType.BINARY and mapping.address.bit is None:
+        _complain(f'{mapping.address} is a word: this writes its 16 bits; a bit is '
+                  f'{mapping.address.with_bit(0)}')
     if not options.yes and not _is_confirmed(options, session, writing):
         _complain('nothing was written; --yes writes')
         return EXIT_USAGE

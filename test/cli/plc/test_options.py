@@ -18,7 +18,9 @@ import argparse
 import subprocess
 import sys
 
-from abdf1_ros.cli.plc.parser import make_parser
+from abdf1_ros.cli.plc.line import network_of
+from abdf1_ros.cli.plc.parser import help_asked, make_parser
+from abdf1_ros.problems import ConfigurationError
 import pytest
 
 
@@ -52,12 +54,6 @@ def help_of(capsys: pytest.CaptureFixture[str], *args: str) -> str:
     with pytest.raises(SystemExit):
         parse(*args, '--help')
     return ' '.join(capsys.readouterr().out.split())
-
-
-def test_help_tells_where_such_a_value_goes(capsys: pytest.CaptureFixture[str]) -> None:
-    text = help_of(capsys, 'write')
-    assert 'one such as -1.5e3 goes last, after all options and --' in text
-    assert 'plc write F8:2 --station 1 --yes --net net.csv -- -1.5e3' in text
 
 
 def test_help_tells_what_detect_does_by_default(capsys: pytest.CaptureFixture[str]) -> None:
@@ -115,3 +111,15 @@ def test_help_of_all_commands_loads_next_to_nothing() -> None:
     ours = [name for name in said if name.startswith('abdf1_ros.')]
     assert 'abdf1_ros.cli.plc.command' in ours and len(ours) < 16
     assert not {'serial', 'decimal', 'csv', 'concurrent.futures'} & set(said)
+
+
+@pytest.mark.parametrize(('words', 'parsed'), [
+    (['help'], ['--help']), (['help', 'read'], ['read', '--help']),
+    (['read', 'help'], ['read', '--help']), (['read', 'N7:0'], ['read', 'N7:0']), ([], [])])
+def test_help_is_also_a_word(words: list[str], parsed: list[str]) -> None:
+    assert help_asked(words) == parsed
+
+
+def test_no_time_for_an_answer_is_refused() -> None:
+    with pytest.raises(ConfigurationError, match='--timeout: 0 ms leaves no time for an answer'):
+        network_of(parse('read', 'N7:0', '--port', '/dev/x', '--timeout', '0'))
