@@ -152,6 +152,11 @@ Heard = Symbol | Silence
 Procedure = Generator[Step, Heard, None]
 
 
+def character_time(baud: int, data_bits: int, parity: str, stop_bits: int) -> float:
+    """Return the seconds that a character takes, start bit included."""
+    return (1 + data_bits + (parity != 'None') + stop_bits) / baud
+
+
 @dataclass(frozen=True, slots=True)
 class LineTiming:
     """

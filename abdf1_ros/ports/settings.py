@@ -19,8 +19,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+from abdf1_ros.df1.machine import character_time
+
 if TYPE_CHECKING:
-    from abdf1_ros.settings.network import character_time, Network
+    from abdf1_ros.settings.network import Network
 
 
 @dataclass(frozen=True, slots=True)

@@ -26,7 +26,7 @@ from urllib.parse import urlsplit
 
 from abdf1_ros.df1.checksum import Checksum
 from abdf1_ros.df1.frames import Duplex
-from abdf1_ros.df1.machine import LineTiming
+from abdf1_ros.df1.machine import character_time, LineTiming
 from abdf1_ros.df1.mode import LineMode
 from abdf1_ros.df1.modes import mode_of, MODES
 from abdf1_ros.df1.packet import BROADCAST
@@ -50,11 +50,6 @@ PLC_TYPES = tuple(entry.value for entry in FAMILIES)
 # Schemes of the URLs of device servers; each has a module in ``ports``.
 DEVICE_SERVERS = ('socket', 'rfc2217')
 URLS = ' or '.join(f'{scheme}://host:port' for scheme in DEVICE_SERVERS)
-
-
-def character_time(baud: int, data_bits: int, parity: str, stop_bits: int) -> float:
-    """Return the seconds that a character takes, start bit included."""
-    return (1 + data_bits + (parity != 'None') + stop_bits) / baud
 
 
 @dataclass(frozen=True, slots=True)
