@@ -573,7 +573,7 @@ def test_every_outcome_is_counted_in_its_place(
     log.add(result(bench, outcome, 'why'), NOW)
     values = log.values(NOW + 1)
     last = values.pop('last failure')
-    assert values.pop('last loss') == 'none'
+    assert values.pop('last loss') == values.pop('clock ahead') == 'none'
     assert {key: value for key, value in values.items() if value != '0'} == expected
     is_failure = outcome not in (Outcome.WRITTEN, Outcome.SUPERSEDED)
     assert last == (f'level {outcome.value}: why (1.0 s ago)' if is_failure else 'none')
@@ -697,6 +697,14 @@ def test_last_fallback_value_of_a_station_is_told_with_its_cause(
     told = Write(row, [0], NOW).result(Outcome.FALLBACK, FallbackCause.TIMEOUT.value, NOW)
     bench.written(told, NOW)
     assert bench.seen.last_fallbacks == {1: ('speed: timeout', NOW)}
+
+
+def test_publisher_whose_clock_is_ahead_is_named_for_ten_seconds(bench: Bench) -> None:
+    bench.events.ahead('level', 1.9, ['/panel'])
+    text = '~/write/level: the clock of /panel is 1.90 s ahead of the clock here'
+    assert bench.says('writes') == (WARN, f'WARN: 0 of 0 writes confirmed; {text}')
+    assert details(bench.status('writes'))['clock ahead'] == f'{text} (0.0 s ago)'
+    assert bench.says('writes', NOW + 10)[0] == OK
 
 
 def test_lost_message_is_counted_and_a_warning_for_ten_seconds(bench: Bench) -> None:

@@ -16,6 +16,7 @@
 
 from collections.abc import Callable, Sequence
 import time
+from types import SimpleNamespace
 from typing import Any, cast
 
 from abdf1_ros.driver.driver import Driver
@@ -106,9 +107,17 @@ class Taker:
             'publication_sequence_number': number, 'source_timestamp': now - int(age * 1e9),
             'received_timestamp': now})
 
+    def get_publishers_info_by_topic(self, name: str) -> list[Any]:
+        return [SimpleNamespace(node_namespace='/cell', node_name='panel')]
+
+    def lost(self, topic: str, count: int) -> None:
+        self.said.append(f'{topic}: {count} lost')
+
+    def ahead(self, topic: str, seconds: float, nodes: Sequence[str]) -> None:
+        self.said.append(f'{topic}: {nodes} ahead by {seconds:.1f} s')
+
     def open(self, topics: WriteTopics, patience: float = 2.0) -> Any:
-        return topics.open(cast(Driver, self), patience, lambda topic, count: self.said.append(
-            f'{topic}: {count} lost'), lambda: None)
+        return topics.open(cast(Driver, self), patience, self, lambda: None)
 
 
 @pytest.fixture
@@ -141,7 +150,7 @@ def test_messages_wait_in_their_order_until_the_node_has_begun(
     too_old = ('s after it was published, write_timeout is 2 s; the network is slow, this node '
                'stood still or had just begun, or the clocks differ')
     assert node.said == ['a: 1 lost', 'a 1', f'b 2: it came 3.0 {too_old}', 'a 3', 'a 4',
-                         f'b 3: it came 7.4 {too_old}', 'b 4',
+                         f'b 3: it came 7.4 {too_old}', 'b 4', "b: ['/cell/panel'] ahead by 1.5 s",
                          'b 5: its time stamp is 2.6 s ahead of the clock here, write_timeout is '
                          '2 s; the clocks differ, so its age is unknown']
     assert topics.taken == 7

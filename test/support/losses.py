@@ -22,7 +22,7 @@ from dataclasses import dataclass, KW_ONLY
 import math
 from random import Random
 
-from abdf1_ros.df1.frames import ACK, Code
+from abdf1_ros.df1.frames import ACK, Code, STX
 
 
 @dataclass(frozen=True, slots=True)
@@ -101,22 +101,29 @@ class AirLosses(Losses):
         super().__init__(plant, clock)
         self._lost_of: Counter[int] = Counter()
         self._loses_reply: set[int] = set()
+        self._is_lost = self._is_reply_lost = False
 
     def hear(self, data: bytes) -> bytes:
         """Return what the stations hear of a frame."""
+        if not data.startswith(STX):  # the rest of a frame
+            return b'' if self._is_lost else data
         plant, station = self._plant, data[2]
         self._loses_reply.discard(station)
         is_lost = self.is_due and self._lost_of[station] < plant.nak_retries \
             and self._dice.random() < plant.lost and (plant.lose_commands or plant.lose_replies)
         self._lost_of[station] = self._lost_of[station] + 1 if is_lost else 0
+        self._is_lost = False
         both = plant.lose_commands and plant.lose_replies
         if is_lost and (self._dice.random() < 0.5 if both else plant.lose_replies):
             self._loses_reply.add(station)
             return data
+        self._is_lost = is_lost
         return b'' if is_lost else data
 
     def say(self, data: bytes) -> bytes:
         """Return what the driver hears."""
-        is_lost = data[3] in self._loses_reply
+        if not data.startswith(STX):
+            return b'' if self._is_reply_lost else data
+        self._is_reply_lost = is_lost = data[3] in self._loses_reply
         self._loses_reply.discard(data[3])
         return b'' if is_lost else data

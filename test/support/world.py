@@ -51,7 +51,8 @@ from abdf1_ros.df1.slave import HalfDuplexSlave
 from abdf1_ros.driver.guests import Guest, GuestCommand, ShareAccess
 from abdf1_ros.driver.settings import DriverSettings
 from abdf1_ros.driver.write import WriteResult
-from abdf1_ros.errors import PortLost
+from abdf1_ros.driver.writes.ages import Ages, most_ahead, Standstills
+from abdf1_ros.errors import FormatError, PortLost
 from abdf1_ros.pccc.address import Address
 from abdf1_ros.pccc.emulated import Setting
 from abdf1_ros.pccc.families import dialect_of, parse_address
@@ -281,6 +282,43 @@ def ticks(now: float) -> int:
     return int(now // STEP) % _TICKS
 
 
+class Clocks:
+    """
+    The clocks of the publishers, and of the host, and what the process knows of them.
+
+    That of the publishers is ``lead`` s ahead. ``counted`` has of each message that was not too
+    old the tag, when it was published, and from when its age counts.
+    """
+
+    def __init__(self, patience: float, messages: Sequence[Mapping],
+                 rows: Sequence[Mapping]) -> None:
+        self.lead = 0.0
+        self.allowed = {row.tag: most_ahead(row.topic, rows) for row in messages}
+        self.counted: list[tuple[str, float, float]] = []
+        self._patience = patience
+        self._set_by, self._set_at = 0.0, -math.inf
+        self.forget()
+
+    def forget(self) -> None:
+        """Begin like a process that has just started."""
+        self.standstills = Standstills()
+        self._ages = {tag: Ages(self._patience, self.standstills, allowed)
+                      for tag, allowed in self.allowed.items()}
+
+    def set(self, seconds: float, now: float) -> None:  # noqa: A003
+        """Set the clock of the host, by which its publishers go."""
+        self._set_by, self._set_at = seconds, now
+
+    def stamp(self, published: float) -> float:
+        """Return the stamp of a message that was published then."""
+        return published + self.lead + (self._set_by if published >= self._set_at else 0.0)
+
+    def age(self, tag: str, stamp: float, now: float) -> float:
+        """Return from when the age of a message counts, or raise FormatError."""
+        wall = now + self._set_by
+        return self._ages[tag].of([stamp, wall], wall, now)
+
+
 class World(DriverBench):
     """
     A plant, and all that may happen to it.
@@ -297,7 +335,7 @@ class World(DriverBench):
         self.killed_at = 0.0
         self.others: dict[int, OtherBridge] = {}  # by the station of the PLC
         self.opened = 0.0  # when the port was last
-        self.ended = -math.inf  # when an orderly end began last
+        self.ended = self._dead_until = -math.inf  # when an orderly end began last; after a kill
         rows = plant.mappings()
         settings = DriverSettings(
             write_timeout=plant.write_timeout, read_only=plant.is_read_only, processor_period=0.0,
@@ -319,6 +357,7 @@ class World(DriverBench):
                                   max(0.01, plant.scan / 1000))
         self.bounds = {bound.mapping.tag: bound.seconds for bound in self.report.times.bounds()}
         self.longest = self.report.times.longest  # s
+        self.clocks = Clocks(plant.write_timeout, self.messages, rows)
         self.is_alive = True  # the executor
         self.away = 0.0  # until when the process stands still
         self.ill: dict[int, float] = dict.fromkeys(range(plant.stations + 1), 0.0)
@@ -510,6 +549,8 @@ class World(DriverBench):
 
     def _breathe(self) -> None:
         """Let the executor run, as it does while nothing holds it up."""
+        if self.line.now >= self.away:
+            self.clocks.standstills.look(self.line.now)
         if self.is_alive and self.line.now >= self.away:
             self.executor_ran = self.line.now
             self.driver.interlocks.executor_ran(self.line.now)
@@ -517,19 +558,43 @@ class World(DriverBench):
     # What people and programs do
 
     def publish(self, row: Mapping, late: float = 0.0) -> None:
-        """Publish a value that nobody has published before, ``late`` s ago."""
+        """
+        Publish a value that nobody has published before, ``late`` s ago.
+
+        It waits for a process that stands still. Its stamp is of the clock of the publisher.
+        """
         value = self._values[row.tag] = self._values[row.tag] % LARGEST + 1
-        now = self.line.now
-        self.published[row.tag, value] = now - late
-        self.keys.append((row.tag, value))
+        now, published = self.line.now, self.line.now - late
+        self.published[row.tag, value] = published
         self.came[row.tag] = now
+        if now < self._dead_until:  # nothing is kept for it
+            return
+        self.keys.append((row.tag, value))
+        stamp = self.clocks.stamp(published)
+        if now < self.away:
+            self.at(self.away, partial(self._take, self.drivers, row, value, stamp))
+        else:
+            self._take(self.drivers, row, value, stamp)
+
+    def _take(self, driver: int, row: Mapping, value: int, stamp: float) -> None:
+        """Take a message as the node does, unless the driver has ended that it was for."""
+        if driver != self.drivers:
+            return
+        now = self.line.now
+        try:
+            age = self.clocks.age(row.tag, stamp, now)
+        except FormatError as error:
+            self.driver.refuse([row], str(error), [value], '')
+            return
+        key = row.tag, value
+        self.clocks.counted.append((row.tag, self.published[key], now - age))
+        self.published[key] = now - age
         missing = self.youngest.get(row.tag, 0.0) + (self.plant.requires or 0) / 1000
-        if now - late > missing:
+        if now - age > missing:
             self.gaps[row.tag] = missing
-        self.youngest[row.tag] = max(now - late, self.youngest.get(row.tag, -math.inf))
-        self.driver.write([row], [value], now - late)
-        if now >= self.away:
-            self.line.wake(self.driver.machine)
+        self.youngest[row.tag] = max(now - age, self.youngest.get(row.tag, -math.inf))
+        self.driver.write([row], [value], now - age)
+        self.line.wake(self.driver.machine)
 
     def ask(self, station: int, text: str) -> None:
         """Let a guest write a value of its own to a word, of all stations, or what none knows."""
@@ -571,6 +636,8 @@ class World(DriverBench):
         self._settings = replace(self._settings, first_tns=self.dice.randrange(0x10000))
         self.restart()
         self.hold_up(pause)
+        self._dead_until = self.away
+        self.clocks.forget()
         self.executor_ran = self.line.now
 
     def hold_up(self, seconds: float) -> None:
@@ -644,7 +711,8 @@ class World(DriverBench):
         self.deaf_since = math.inf
         self.line.noise = QUIET
         self.losses = None
-        self.holds = 0.0
+        self.holds = self.clocks.lead = 0.0
+        self.clocks.set(0.0, self.line.now)
 
     def end(self) -> None:
         """End in order (rule 5), within 2 s, and stay ended for as long as a gateway keeps."""

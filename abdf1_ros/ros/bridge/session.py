@@ -148,7 +148,7 @@ class Session:
 
     def _open_writers(self) -> dict[str, WriteTopic]:
         return self._surroundings.writes.open(
-            self.driver, self.configuration.parameters.write_timeout, self._events.lost,
+            self.driver, self.configuration.parameters.write_timeout, self._events,
             self._wake_link)
 
     @property
@@ -247,6 +247,7 @@ class Session:
     def check(self) -> None:
         """Publish diagnostics when they are due or a level has changed; end what waits."""
         now = line_time()
+        self._surroundings.writes.standstills.look(now)
         self.link_counters.check(now)
         self._events.unreadable_rows.look(now)
         for watch in self._watches:

@@ -16,7 +16,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection
+from collections.abc import Callable, Collection, Sequence
 from typing import Any
 
 from abdf1_ros.df1.stations import Station
@@ -33,6 +33,9 @@ from rclpy.impl.rcutils_logger import RcutilsLogger
 _RESULT_LEVELS = {
     Outcome.WRITTEN: OK, Outcome.BROADCAST: WARN, Outcome.SUPERSEDED: WARN,
     Outcome.FALLBACK: WARN}
+
+
+_SHOWN_NODES = 4
 
 
 class LineEvents:
@@ -74,6 +77,14 @@ class LineEvents:
         self.notes.warning(f'lost writes to {topic}', f'~/write/{topic}: {count} messages were '
                            'lost on their way here, and have no result: they come faster than '
                            'they can be taken, or the network was cut')
+
+    def ahead(self, topic: str, seconds: float, nodes: Sequence[str]) -> None:
+        """Tell of nodes that publish of which the clock of one is ahead of ours."""
+        shown = ' or '.join(nodes[:_SHOWN_NODES]) or 'a node that is gone'
+        text = f'the clock of {shown} is {seconds:.2f} s ahead of the clock here'
+        self.writes.ahead(f'~/write/{topic}: {text}', self._clock())
+        self.notes.warning(
+            f'clock of {topic}', f'~/write/{topic}: {text}, so old messages look new')
 
     def written(self, result: WriteResult) -> None:
         """Publish the result of a write."""

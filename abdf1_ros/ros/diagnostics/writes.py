@@ -50,6 +50,7 @@ class WriteLog:
         self._lost = 0
         self._last_loss: Moment | None = None
         self._last_failure: Moment | None = None
+        self._last_lead: Moment | None = None
 
     def add(self, result: WriteResult, now: float) -> None:
         """Count a result."""
@@ -63,18 +64,24 @@ class WriteLog:
         self._lost += count
         self._last_loss = f'{count} to ~/write/{topic}', now
 
+    def ahead(self, text: str, now: float) -> None:
+        """Take note of a publisher whose clock is ahead."""
+        self._last_lead = text, now
+
     def _messages(self) -> int:
         """Return the number of results of messages; fallback values do not count."""
         return self._counts.total() - self._counts[Outcome.FALLBACK]
 
     def judge(self, now: float) -> Judgement:
-        """Return WARN for a while after a write that was not confirmed, or a lost message."""
+        """Return WARN for a while after a failed write, a lost message or a wrong clock."""
         total = self._messages()
         summary = f'{self._counts[Outcome.WRITTEN]} of {total} writes confirmed'
         if self._last_failure and now - self._last_failure[1] < _WRITE_MEMORY:
             return WARN, f'{summary}; {self._last_failure[0]}'
         if self._last_loss and now - self._last_loss[1] < _WRITE_MEMORY:
             return WARN, f'{summary}; {self._lost} messages were lost on their way here'
+        if self._last_lead and now - self._last_lead[1] < _WRITE_MEMORY:
+            return WARN, f'{summary}; {self._last_lead[0]}'
         return OK, summary
 
     def values(self, now: float) -> dict[str, str]:
@@ -89,4 +96,5 @@ class WriteLog:
             'fallback values': counts[Outcome.FALLBACK], 'lost on their way': self._lost}
         return {**{name: str(number) for name, number in numbers.items()},
                 'last loss': with_age(self._last_loss, now),
+                'clock ahead': with_age(self._last_lead, now),
                 'last failure': with_age(self._last_failure, now)}

@@ -25,10 +25,12 @@ from __future__ import annotations
 from collections import defaultdict
 from collections.abc import Callable, Sequence
 from functools import partial
+import math
 import time
-from typing import Any
+from typing import Any, Protocol
 
 from abdf1_ros.driver.driver import Driver, TOO_MANY
+from abdf1_ros.driver.writes.ages import Ages, most_ahead, Standstills
 from abdf1_ros.driver.writes.queue import MAX_WAITING_WRITES
 from abdf1_ros.errors import FormatError
 from abdf1_ros.ports.clock import line_time
@@ -40,6 +42,9 @@ from rclpy.node import Node
 from std_msgs.msg import String
 
 _LONGEST_LABEL = 100
+
+# A clock that is ahead is reported every so many seconds at most.
+_LOOK = 2.0
 
 # Publishers of one topic whose numbers are followed at a time.
 _MOST_PUBLISHERS = 16
@@ -89,59 +94,63 @@ def _request(message: Any, info: Any) -> str:
     return str(info['source_timestamp'] or '')
 
 
+class WriteTopicListener(Protocol):
+    """Gets what is wrong with the messages of a topic."""
+
+    def lost(self, topic: str, count: int) -> None:
+        """Take note that so many messages were dropped on their way to us."""
+
+    def ahead(self, topic: str, seconds: float, nodes: Sequence[str]) -> None:
+        """Take note that the clock of a node that publishes is ahead of ours by so much."""
+
+
 class WriteTopic:
     """
     The mappings that one topic writes to; ``take`` is the callback of its subscription.
 
-    ``on_loss`` is called with the topic and the number of messages that were dropped on their
-    way to us, ``wake`` when the link has something to do. What waited longer than ``patience`` s
-    is refused.
+    ``listener`` gets what is wrong: messages that were dropped on their way to us, and nodes among
+    ``publishers`` with a clock that is ahead. ``wake`` is called when the link has something to
+    do. What is too old by its ``ages`` is refused.
     """
 
-    def __init__(self, topic: str, mappings: Sequence[Mapping], driver: Driver, patience: float,
-                 *, losses: LossCounter, on_loss: Callable[[str, int], None],
-                 wake: Callable[[], None]) -> None:
+    def __init__(self, topic: str, mappings: Sequence[Mapping], driver: Driver, ages: Ages,
+                 *, losses: LossCounter, listener: WriteTopicListener,
+                 publishers: Callable[[], Sequence[str]], wake: Callable[[], None]) -> None:
         self._topic = topic
         self._mappings = mappings
         self._driver = driver
-        self._patience = patience
+        self._ages = ages
         self._losses = losses
-        self._on_loss = on_loss
+        self._listener = listener
+        self._publishers = publishers
         self._wake = wake
+        self._next_ahead = -math.inf
 
     def arrived(self, info: Any) -> None:
         """Tell what was lost before a message that has come."""
         if lost := self._losses.lost_before(info['publication_sequence_number']):
-            self._on_loss(self._topic, lost)
+            self._listener.lost(self._topic, lost)
 
     def take(self, message: Any, info: Any, reject_reason: str = '') -> None:
         """Write a message to every mapping of the topic, or refuse it for a ``reject_reason``."""
-        # It may have waited while this process was paused or the network was down.
-        now = time.time_ns()
-        ages = [(now - stamp) / 1e9 for stamp in (
+        now, wall = line_time(), time.time_ns() / 1e9
+        stamps = [stamp / 1e9 for stamp in (
             info['source_timestamp'], info['received_timestamp']) if stamp]
-        waited = max([0.0, *ages])
-        requested = line_time() - waited
         request = _request(message, info)
         try:
             if reject_reason:
                 raise FormatError(reject_reason)
-            if waited > self._patience:
-                raise FormatError(
-                    f'it came {waited:.1f} s after it was published, write_timeout is '
-                    f'{self._patience:g} s; the network is slow, this node stood still or had '
-                    'just begun, or the clocks differ')
-            # A clock that is ahead, or was set back meanwhile, makes an old message look new.
-            if (ahead := -min([0.0, *ages])) > self._patience:
-                raise FormatError(
-                    f'its time stamp is {ahead:.1f} s ahead of the clock here, write_timeout is '
-                    f'{self._patience:g} s; the clocks differ, so its age is unknown')
+            # It may have waited while this process was paused or the network was down.
+            waited = self._ages.of(stamps, wall, now)
             values = values_of(message)
         except FormatError as error:
             self._driver.refuse(self._mappings, str(error), message.data, request)
         else:
-            self._driver.write(self._mappings, values, requested, request)
+            self._driver.write(self._mappings, values, now - waited, request)
             self._wake()
+        if self._ages.is_ahead and now >= self._next_ahead:
+            self._next_ahead = now + _LOOK
+            self._listener.ahead(self._topic, self._ages.lead, self._publishers())
 
 
 class WriteTopics:
@@ -149,6 +158,7 @@ class WriteTopics:
     The subscriptions of a node; ``open`` may be called again, in the thread of the executor.
 
     Messages wait here until ``begin``, and go where ``give_to`` says; ``taken`` counts those.
+    ``standstills`` is to look ten times a second.
     """
 
     def __init__(self, node: AnsweringNode) -> None:
@@ -157,6 +167,7 @@ class WriteTopics:
         self._has_begun = self._is_open = False
         self._subscriptions: dict[str, tuple[Any, Any]] = {}
         self._topics: dict[str, WriteTopic] = {}
+        self.standstills = Standstills()
         self.taken = 0
 
     def begin(self) -> None:
@@ -177,8 +188,7 @@ class WriteTopics:
                 self._node.tell_failure(f'a message on {_name(topic)}', error)
 
     def open(self, driver: Driver, patience: float,  # noqa: A003
-             on_loss: Callable[[str, int], None], wake: Callable[[], None],
-             ) -> dict[str, WriteTopic]:
+             listener: WriteTopicListener, wake: Callable[[], None]) -> dict[str, WriteTopic]:
         """Subscribe to the topics of a driver, and return them; subscriptions that are, stay."""
         wanted: defaultdict[str, list[Mapping]] = defaultdict(list)
         for mapping in driver.mappings:
@@ -193,7 +203,9 @@ class WriteTopics:
             if topic not in self._subscriptions:
                 self._subscriptions[topic] = kind, self._subscription(topic, kind)
         return {topic: WriteTopic(
-            topic, mappings, driver, patience, on_loss=on_loss, wake=wake,
+            topic, mappings, driver,
+            Ages(patience, self.standstills, most_ahead(topic, driver.mappings)),
+            listener=listener, publishers=partial(self._publishers, topic), wake=wake,
             losses=LossCounter(partial(count_publishers, self._node, topic)))
             for topic, mappings in wanted.items()}
 
@@ -207,6 +219,10 @@ class WriteTopics:
     def give_to(self, topics: dict[str, WriteTopic]) -> None:
         """Give messages to these from now on."""
         self._topics = topics
+
+    def _publishers(self, topic: str) -> list[str]:
+        return [f'{end.node_namespace.rstrip("/")}/{end.node_name}'
+                for end in self._node.get_publishers_info_by_topic(_name(topic))]
 
     def _subscription(self, topic: str, kind: Any) -> Any:
         def take(message: Any, info: Any) -> None:

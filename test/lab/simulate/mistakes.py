@@ -48,6 +48,7 @@ from abdf1_ros.driver.reads.guards import CounterGuard, RunGuard
 from abdf1_ros.driver.reads.point import ReadPoint
 from abdf1_ros.driver.record import Claim, Words
 from abdf1_ros.driver.write import Outcome, Write
+from abdf1_ros.driver.writes.ages import RecentMax, Standstills
 from abdf1_ros.driver.writes.queue import MessageJob, WriteQueue
 from abdf1_ros.pccc.values import Codec
 from abdf1_ros.plan.bounds import Times
@@ -289,6 +290,10 @@ MISTAKES = (
     Mistake('5', 'no fallbacks at the end', FallbackRow, 'end', _always(None)),
     Mistake('7', 'a refused message refreshes its row', FallbackRow, 'message_ended',
             _refused_refreshes),
+    Mistake('7', 'a clock that is ahead is forgotten', RecentMax, 'add',
+            lambda before: lambda self, number, now: number),
+    Mistake('7', 'nobody sees that the process stood still', Standstills, 'least_age',
+            _always(0.0)),
     Mistake('7', 'messages wait for ever', WriteQueue, 'patience_of', _always(60.0)),
     Mistake('8', 'no fallback after the timeout', FallbackRow, 'deadline', _always(math.inf)),
     Mistake('8', 'a change to RUN is not seen', Interlocks, 'mode_seen', _always(None)),

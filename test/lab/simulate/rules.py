@@ -182,6 +182,22 @@ class Ages(Rule):
             self._stand.discard(entry.tag)
 
 
+class Stamps(Rule):
+    text = 'no clock makes a message younger than it is, by more than is allowed (7)'
+
+    def __init__(self, world: World) -> None:
+        super().__init__(world)
+        self._seen = 0
+
+    def stand(self) -> None:
+        new = self.world.clocks.counted[self._seen:]
+        self._seen += len(new)
+        for tag, published, counted in new:
+            allowed = self.world.clocks.allowed[tag]
+            self.demand(allowed is None or counted - published <= allowed + 1e-6, tag,
+                        'was published at', published, 'and counts from', counted)
+
+
 class Turns(Rule):
     text = 'no message goes before a fallback of its station that is due (11)'
 
@@ -728,8 +744,8 @@ class OneOwner(Rule):
 
 
 RULES: tuple[type[Rule], ...] = (
-    Results, Ages, Turns, Values, Guards, Withheld, Beats, BeatsAfterFallbacks, Order, Outputs,
-    OneResult, Probes, Unheard, AfterRun, Held, ReadOnly, Guests, View, Served, Rungs)
+    Results, Ages, Stamps, Turns, Values, Guards, Withheld, Beats, BeatsAfterFallbacks, Order,
+    Outputs, OneResult, Probes, Unheard, AfterRun, Held, ReadOnly, Guests, View, Served, Rungs)
 
 
 class Judge:

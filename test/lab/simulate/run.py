@@ -247,6 +247,24 @@ def _pause(story: Story, station: int) -> None:
         story.be_quiet()
 
 
+def _clock_ahead(story: Story, station: int) -> None:
+    """Let the clock of the publishers be ahead, and their messages come late."""
+    world = story.world
+    lead = world.clocks.lead = story.dice.choice([0.04, 0.3, 1.0, 1.9, 3.0])
+    story.publish_much()
+    story.wait(story.dice.choice([0.0, 1.0]))
+    world.hold_up(lead * story.dice.uniform(0.6, 1.4))
+
+
+def _clock_set(story: Story, station: int) -> None:
+    """Set the clock, and set it again when the trouble ends."""
+    story.publish_much()
+    story.wait(1.0)
+    story.world.clocks.set(story.dice.uniform(-3.0, 3.0), story.world.line.now)
+    if story.dice.random() < 0.5:
+        story.world.hold_up(story.dice.uniform(0.0, 2.0))
+
+
 def _hung_executor(story: Story, station: int) -> None:
     story.world.is_alive = False
 
@@ -335,7 +353,8 @@ _EXPECTED = ('guest', 'gateway holds', 'another network', 'frames lost')
 _TROUBLES: dict[str, Callable[[Story, int], None]] = {
     'noise': _noise, 'silence': _silence, 'refusal': _refusal,
     _NO_EXCUSE: _refused_messages, 'replies lost': _lost_replies,
-    'port lost': _lost_port, 'process stands still': _pause, 'executor hangs': _hung_executor,
+    'port lost': _lost_port, 'process stands still': _pause, 'clock ahead': _clock_ahead,
+    'clock set': _clock_set, 'executor hangs': _hung_executor,
     'PROGRAM': _program, 'download': _download, 'killed': _kill, 'slow PLC': _slowness,
     'other writer': _other_writer, 'other bridge': _other_bridge, 'guest': _guest,
     'gateway holds': _gateway_holds, 'frames lost': _lost_frames, 'another network': _overwritten,

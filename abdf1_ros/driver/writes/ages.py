@@ -1,0 +1,142 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+How old a message is, as far as clocks can be trusted (rule 7 of docs/heartbeats.md).
+
+Its stamp is of the clock of its publisher. Where that is ahead, an old message looks new; so it
+does where the clock here was set back, or where this process stood still and the message waited.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+import math
+
+from abdf1_ros.errors import FormatError
+from abdf1_ros.settings.mapping import Mapping
+
+# A stamp may be ahead by so many seconds, or by a quarter of the time after which a fallback or a
+# 0 is written.
+MOST_AHEAD = 0.2
+_SHARE = 4
+
+# A clock that was ahead is remembered for so many seconds, twice that at most.
+_REMEMBERED = 5.0
+
+# The process looks at least so often (s). Where it has not, messages that come within so many
+# seconds after that may have waited all the time.
+_LOOKS = 0.25
+_DRAINED = 0.5
+
+
+def most_ahead(topic: str, mappings: Iterable[Mapping]) -> float | None:
+    """Return by how much (s) stamps may be ahead, None where no fallback or heartbeat depends."""
+    times = [mapping.fallback.after for mapping in mappings
+             if mapping.fallback and mapping.topic == topic]
+    times += [mapping.condition.timeout or 0 for mapping in mappings
+              if mapping.is_heartbeat and mapping.condition and topic in mapping.condition.names]
+    return min([MOST_AHEAD, *(after / 1000 / _SHARE for after in times)]) if times else None
+
+
+class RecentMax:
+    """
+    The greatest of the numbers that came in the last ``seconds``, twice that at most.
+
+    Nothing is forgotten while nothing comes.
+    """
+
+    def __init__(self, seconds: float) -> None:
+        self._seconds = seconds
+        self._since = -math.inf
+        self._earlier = self._latest = -math.inf
+
+    def add(self, number: float, now: float) -> float:
+        """Take a number at a clock value (s); return the greatest."""
+        if now >= self._since + self._seconds:
+            self._earlier, self._latest, self._since = self._latest, -math.inf, now
+        self._latest = max(self._latest, number)
+        return max(self._earlier, self._latest)
+
+
+class Standstills:
+    """Finds out that this process has stood still; ``look`` is to be called ten times a second."""
+
+    def __init__(self) -> None:
+        self._looked = math.inf
+        self._length, self._ended = 0.0, -math.inf
+
+    def look(self, now: float) -> None:
+        """Take the clock value (s)."""
+        if now - self._looked > _LOOKS:
+            self._length, self._ended = now - self._looked, now
+        self._looked = now
+
+    def least_age(self, now: float) -> float:
+        """Return how old (s) a message may be that comes now, whatever its stamp says."""
+        self.look(now)
+        return self._length if now < self._ended + _DRAINED else 0.0
+
+
+class Ages:
+    """
+    The ages of the messages of one topic, which have to be younger than ``patience`` (s).
+
+    Stamps may be ahead by ``allowed`` s; None where no fallback or heartbeat depends on them.
+    ``lead`` is by how much they were ahead lately (s).
+    """
+
+    def __init__(self, patience: float, standstills: Standstills, allowed: float | None) -> None:
+        self._patience = patience
+        self._standstills = standstills
+        self._allowed = allowed
+        self._leads = RecentMax(_REMEMBERED)
+        self._offsets = RecentMax(patience)
+        self.lead = 0.0
+
+    @property
+    def is_ahead(self) -> bool:
+        """Tell whether the clock of a publisher is ahead."""
+        return self.lead > (MOST_AHEAD if self._allowed is None else self._allowed)
+
+    def of(self, stamps: Iterable[float], wall: float, now: float) -> float:
+        """
+        Return how old (s) a message is that was published and received at these stamps (s).
+
+        It is ``wall`` by the clock of stamps, and ``now`` by one that is never set. Raises
+        FormatError where it is too old, or where that is unknown.
+        """
+        ages = [wall - stamp for stamp in stamps]
+        ahead = -min([0.0, *ages])
+        self.lead = max(0.0, self._leads.add(ahead, now))
+        behind = self._offsets.add(wall - now, now) - (wall - now)  # as the clock was set back
+        least = self._standstills.least_age(now)
+        waited = max([0.0, *ages])
+        if self._allowed is not None:
+            waited = max([least, *(age + behind for age in ages)])
+        if waited > self._patience:
+            raise FormatError(
+                f'it came {waited:.1f} s after it was published, write_timeout is '
+                f'{self._patience:g} s; the network is slow, this node stood still or had '
+                'just begun, or the clocks differ')
+        if self._allowed is not None and self.lead > self._allowed:
+            raise FormatError(
+                f'time stamps of this topic were {self.lead:.2f} s ahead of the clock here, '
+                f'{self._allowed:g} s are allowed where a fallback value or a heartbeat depends '
+                'on it; the clocks differ, so its age is unknown')
+        if ahead > self._patience:
+            raise FormatError(
+                f'its time stamp is {ahead:.1f} s ahead of the clock here, write_timeout is '
+                f'{self._patience:g} s; the clocks differ, so its age is unknown')
+        return waited
