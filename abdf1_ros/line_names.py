@@ -20,10 +20,16 @@ from contextlib import suppress
 from ipaddress import ip_address, IPv6Address
 from pathlib import Path
 import stat
+from typing import Any
 
 from abdf1_ros.numbers import is_digits, whole_number
 
 LOOPBACK = '127.0.0.1'
+
+
+# Major numbers of pseudo-terminals (Linux, admin-guide/devices.txt). Each mount of devpts, such as
+# that of a container, has numbers of its own below them.
+_PSEUDO_TERMINALS = range(136, 144)
 
 
 def device_of(path: str) -> str:
@@ -32,8 +38,15 @@ def device_of(path: str) -> str:
         status = Path(path).stat()
     except OSError:
         return str(Path(path).resolve())
-    is_device = stat.S_ISCHR(status.st_mode)
-    return f'device {status.st_rdev}' if is_device else str(Path(path).resolve())
+    return number_of(status) or str(Path(path).resolve())
+
+
+def number_of(status: Any) -> str:
+    """Return the same text for all nodes of a device, empty for other files; see stat(2)."""
+    if not stat.S_ISCHR(status.st_mode):
+        return ''
+    is_own = status.st_rdev >> 8 & 0xFFF in _PSEUDO_TERMINALS
+    return f'device {status.st_rdev}' + (f' of {status.st_dev}' if is_own else '')
 
 
 def link_of(path: str) -> str:

@@ -22,7 +22,7 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Callable
-from contextlib import suppress
+from contextlib import ExitStack, suppress
 import errno
 import fcntl
 import os
@@ -32,8 +32,9 @@ import time
 from typing import Any
 
 from abdf1_ros.df1.frames import Damaged
+from abdf1_ros.line_names import device_of, number_of
 from abdf1_ros.ports.descriptor import DescriptorPort
-from abdf1_ros.ports.ownership import BUSY
+from abdf1_ros.ports.ownership import BUSY, own
 from abdf1_ros.ports.settings import PortSettings
 import serial
 import serial.rs485
@@ -54,6 +55,9 @@ _PSEUDO_TERMINALS = '/dev/pts/'
 _LAST_BYTES = 1.0
 _LOOK = 0.005
 
+# How often (s) it is looked at whether another program has changed the settings.
+_SETTINGS_LOOK = 1.0
+
 # What the system puts before a damaged character, and doubles where it is one itself (PARMRK).
 _MARK = 0xFF
 
@@ -65,13 +69,31 @@ def is_pseudo_terminal(name: str) -> bool:
 
 def open_device(settings: PortSettings, tell: Callable[[str], None]) -> SerialDevice:
     """
-    Open a device exclusively.
+    Open a device exclusively, whatever its name (rule 25 of docs/heartbeats.md).
 
     ``tell`` is called with settings that the port does not support, which is not an error. Raises
     OSError.
     """
+    with ExitStack() as stack:
+        number = device_of(settings.name)
+        stack.callback(own(number).close)
+        port = _opened(settings)
+        stack.callback(port.close)
+        if number_of(os.fstat(port.fileno())) != number:
+            raise OSError(f'{settings.name} leads to another device by now')
+        if not is_pseudo_terminal(settings.name):  # theirs lasts as long as the other end
+            fcntl.ioctl(port.fileno(), termios.TIOCEXCL)
+        _set_options(port, settings, tell)
+        has_parity = settings.parity != 'None'
+        if has_parity:
+            mark_damage(port.fileno())
+        return SerialDevice(port.fileno(), stack.pop_all().close, is_marked=has_parity)
+
+
+def _opened(settings: PortSettings) -> serial.Serial:
+    """Return the port with its speed and character format; raises OSError."""
     try:
-        port = serial.Serial(
+        return serial.Serial(
             settings.name, baudrate=settings.baud, bytesize=settings.data_bits,
             parity=_PARITIES[settings.parity], stopbits=settings.stop_bits,
             rtscts=settings.handshake, exclusive=True)
@@ -79,11 +101,6 @@ def open_device(settings: PortSettings, tell: Callable[[str], None]) -> SerialDe
         if settings.parity != 'None' and is_pseudo_terminal(settings.name):
             raise OSError(errno.EINVAL, 'a pseudo-terminal has no parity: Parity None') from error
         raise OSError(*_plain(error)) from error
-    _set_options(port, settings, tell)
-    has_parity = settings.parity != 'None'
-    if has_parity:
-        mark_damage(port.fileno())
-    return SerialDevice(port.fileno(), port.close, is_marked=has_parity)
 
 
 def _plain(error: Exception) -> tuple[Any, ...]:
@@ -134,6 +151,22 @@ class SerialDevice(DescriptorPort):
         self._held = b''  # the beginning of an incomplete mark
         self._pieces: deque[bytes] = deque()
         self._origin = self._counts()
+        self._settings = self._current_settings()
+        self._next_look = 0.0
+
+    def _current_settings(self) -> list[Any]:
+        try:
+            return termios.tcgetattr(self._descriptor)
+        except (OSError, termios.error):  # gone, which is noticed elsewhere
+            return []
+
+    def write(self, data: bytes) -> None:
+        """Send; OSError where another program has changed the settings: they are set anew then."""
+        if (now := time.monotonic()) >= self._next_look:
+            self._next_look = now + _SETTINGS_LOOK
+            if self._current_settings() not in ([], self._settings):
+                raise OSError('another program has changed the settings of the port')
+        super().write(data)
 
     def read(self, timeout: float | None, wake: int) -> bytes:
         if self._pieces:

@@ -19,13 +19,16 @@ import errno
 import fcntl
 import os
 from pathlib import Path
+import stat
 import struct
 import termios
 from typing import Any
 
 from abdf1_ros.df1.frames import Damaged
+from abdf1_ros.line_names import number_of
 from abdf1_ros.ports import serial_device
 from abdf1_ros.ports.opening import open_port
+from abdf1_ros.ports.ownership import own
 from abdf1_ros.ports.serial_device import mark_damage, SerialDevice
 from abdf1_ros.ports.settings import PortSettings
 import pytest
@@ -230,3 +233,89 @@ def test_close_does_not_wait_for_what_cannot_leave(close_with: Callable[..., lis
 def test_last_bytes_leave_before_the_close(
         close_with: Callable[..., list[str]], unsent: tuple[int, ...]) -> None:
     assert close_with(*unsent) == ['closed']
+
+
+# One master, and its settings
+
+
+def status_of(major: int, minor: int, mount: int, inode: int) -> os.stat_result:
+    return os.stat_result((stat.S_IFCHR | 0o660, inode, mount, 1, 0, 0, 0, 0, 0, 0),
+                          {'st_rdev': os.makedev(major, minor)})
+
+
+def test_all_nodes_of_a_device_are_one_line() -> None:
+    """A container has a node of its own (--device); flock, which looks at the inode, lets it in."""
+    usb = number_of(status_of(188, 0, mount=6, inode=90))
+    assert usb == number_of(status_of(188, 0, mount=41, inode=7))
+    assert usb != number_of(status_of(188, 1, mount=6, inode=91))
+    # A container has pseudo-terminals of its own with these numbers.
+    assert number_of(status_of(136, 3, mount=24, inode=6)) != number_of(
+        status_of(136, 3, mount=55, inode=6))
+    assert not number_of(os.stat('/tmp'))
+
+
+def test_line_is_ours_whatever_name_another_program_uses(pty: Pty) -> None:
+    number = number_of(os.stat(pty.name))
+    port = open_port(PortSettings(str(pty.name)))
+    with pytest.raises(OSError, match='another program has it open'):
+        own(number)
+    port.close()
+    lock = own(number)
+    with pytest.raises(OSError, match='another program has it open'):
+        open_port(PortSettings(str(pty.name)))
+    lock.close()
+    open_port(PortSettings(str(pty.name))).close()
+
+
+def test_name_that_leads_elsewhere_while_it_is_opened_is_not_taken(
+        pty: Pty, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    other, link = Pty(tmp_path / 'other'), tmp_path / 'by-id'
+    link.symlink_to(os.path.realpath(pty.name))
+    begin = serial.Serial.__init__
+
+    def swapped(port: serial.Serial, *args: Any, **options: Any) -> None:
+        link.unlink()
+        link.symlink_to(os.path.realpath(other.name))
+        begin(port, *args, **options)
+
+    monkeypatch.setattr(serial.Serial, '__init__', swapped)
+    with pytest.raises(OSError, match='leads to another device by now'):
+        open_port(PortSettings(str(link)))
+    monkeypatch.undo()
+    for line in (pty, other):
+        open_port(PortSettings(str(line.name))).close()
+    other.close()
+
+
+def test_device_is_kept_from_other_users(pty: Pty, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(serial_device, 'is_pseudo_terminal', lambda name: False)
+    asked = []
+    ioctl = fcntl.ioctl
+
+    def keep(descriptor: int, request: int, *args: Any) -> Any:
+        asked.append(request)
+        return ioctl(descriptor, request, *args)
+
+    monkeypatch.setattr(fcntl, 'ioctl', keep)
+    open_port(PortSettings(str(pty.name))).close()
+    assert termios.TIOCEXCL in asked
+
+
+def test_settings_that_another_program_changes_are_a_lost_port(
+        pty: Pty, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(serial_device, '_SETTINGS_LOOK', 0.0)
+    port = open_port(PortSettings(str(pty.name)))
+    port.write(b'\x01')
+    assert pty.read(1) == b'\x01'
+    theirs = os.open(pty.name, os.O_RDWR | os.O_NOCTTY)
+    attributes = termios.tcgetattr(theirs)
+    attributes[3] |= termios.ICANON | termios.ECHO  # as "stty sane" does
+    termios.tcsetattr(theirs, termios.TCSANOW, attributes)
+    with pytest.raises(OSError, match='another program has changed the settings of the port'):
+        port.write(b'\x02')
+    port.close()
+    port = open_port(PortSettings(str(pty.name)))
+    port.write(b'\x03')
+    assert pty.read(1) == b'\x03'
+    port.close()
+    os.close(theirs)
