@@ -251,11 +251,28 @@ class Machine:
         return self.sender.echo.is_heard
 
     @property
+    def message_begun(self) -> float:
+        """Return when the last message began to come in: now, where it came at once."""
+        is_known = self._message.number == self.decoder.begun
+        return self._message.begun if is_known else self.now
+
+    @property
+    def hears_until(self) -> float:
+        """Return until when the message that is coming in is heard; -inf where none is."""
+        if not self.decoder.in_message:
+            return -math.inf
+        heard = self.counters.chars_received - self._message.heard
+        characters = min(_SLOWEST * heard, _LONGEST)
+        return min(self._last_heard + self._pause_limit, self._message.begun
+                   + 2 * self._pause_limit + characters * self.timing.char_time)
+
+    @property
     def spare_time(self) -> float:
         """
         Return for how long (s) nothing that comes can matter: a reply is coming in, and is long.
 
-        To read it in one go spares most of the wakings that its bytes cost, a few at a time.
+        To read it in one go spares most of the wakings that its bytes cost, a few at a time. It is
+        read well before the deadline, which each byte puts off.
         """
         step, char_time = self._step, self.timing.char_time
         if not isinstance(step, Send) or not step.reply_size or not self.decoder.in_message:
@@ -265,7 +282,9 @@ class Machine:
         if is_faster or not begins_good_reply(data):
             return 0.0  # it does not have that speed (a simulator's), or the reply is another
         missing = HEADER_SIZE + step.reply_size - len(data) - _LAST_CHARACTERS
-        return max(missing, 0) * char_time
+        spare = max(missing, 0) * char_time
+        return spare if self.deadline is None else min(
+            spare, max(0.0, self.deadline - self.now) / 2)
 
     def start(self, now: float, outlet: Outlet | None = None) -> None:
         """Begin the procedure from its beginning, on a line that has this outlet."""
@@ -343,9 +362,7 @@ class Machine:
         if self.deadline is None or isinstance(self._step, Rest) or not self._message.is_in_time \
                 or not self._is_listening:
             return
-        characters = min(_SLOWEST * (heard - self._message.heard), _LONGEST)
-        limit = self._message.begun + 2 * self._pause_limit + characters * self.timing.char_time
-        self.deadline = max(self.deadline, min(now + self._pause_limit, limit))
+        self.deadline = max(self.deadline, self.hears_until)
 
     def handle_timeout(self, now: float) -> None:
         """Take note that the clock reads ``now``; does nothing before ``next_call``."""

@@ -148,7 +148,8 @@ class FullDuplexPeer(EqualNode):
 
     def _idle_time(self, source: TaskSource) -> float | None:
         """Return the seconds until a reply is overdue or a task is due that may be sent."""
-        moments: list[float | None] = [entry.deadline for entry in self._outstanding.values()]
+        moments: list[float | None] = [
+            self._given_up(entry) for entry in self._outstanding.values()]
         if len(self._outstanding) < self._settings.max_outstanding:
             moments.append(source.next_due())
         known = [moment for moment in moments if moment is not None]
@@ -374,7 +375,7 @@ class FullDuplexPeer(EqualNode):
 
     def _take_reply(self, packet: Packet) -> None:
         """Give a reply to its command, if that still waits."""
-        self._expire()
+        self._expire(self._machine.message_begun)
         self._accounting.received(packet)
         key = packet.src, packet.tns
         entry = self._outstanding.get(key)
@@ -387,10 +388,16 @@ class FullDuplexPeer(EqualNode):
         self._stations.heard(packet.src, self._machine.now)
         self._accounting.complete(entry.task, packet, keeps_others_waiting=True)
 
-    def _expire(self) -> None:
-        """End the commands whose reply is overdue (S0, counter 2545)."""
-        now = self._machine.now
-        overdue = [key for key, entry in self._outstanding.items() if entry.deadline <= now]
+    def _given_up(self, entry: Outstanding) -> float:
+        """Return when a reply is overdue: what has begun in time is heard to its end."""
+        machine = self._machine
+        is_in_time = machine.message_begun <= entry.deadline
+        return max(entry.deadline, machine.hears_until) if is_in_time else entry.deadline
+
+    def _expire(self, begun: float | None = None) -> None:
+        """End the commands whose reply is overdue (S0, counter 2545), or was when it began."""
+        now = self._machine.now if begun is None else begun
+        overdue = [key for key, entry in self._outstanding.items() if self._given_up(entry) <= now]
         for key in overdue:
             self._accounting.overdue(self._outstanding.pop(key).task, keeps_others_waiting=True)
 

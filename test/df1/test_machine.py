@@ -295,7 +295,7 @@ REPLY = Packet(1, 5, 0x0F, 0, 7).reply(bytes(94))  # with DLE STX, 102 bytes bef
     (8, 78), (28, 58), (85, 1), (86, 0), (101, 0)])
 def test_reply_of_known_size_need_not_be_looked_at_until_its_last_characters(
         size: int, characters: int) -> None:
-    bench = Bench(Send(FRAME, 1.0, reply_size=94), Send(FRAME, 1.0),
+    bench = Bench(Send(FRAME, 9.0, reply_size=94), Send(FRAME, 1.0),
                   timing=LineTiming(char_time=0.01))
     frame = message_frame(REPLY.encode(), Checksum.CRC)
     bench.machine.receive_data(frame[:size], 0.1 + 0.01 * size)  # as fast as the line goes
@@ -303,6 +303,14 @@ def test_reply_of_known_size_need_not_be_looked_at_until_its_last_characters(
     bench.machine.receive_data(frame[size:], 2.0)
     assert isinstance(bench.got[0], Frame)
     assert bench.machine.spare_time == 0.0
+
+
+def test_reply_is_looked_at_well_before_its_deadline() -> None:
+    """Each byte puts that off: by 0.3 s at this speed."""
+    bench = Bench(Send(FRAME, 0.2, reply_size=94), timing=LineTiming(char_time=0.01))
+    bench.machine.receive_data(message_frame(REPLY.encode(), Checksum.CRC)[:8], 0.18)
+    assert bench.machine.deadline == pytest.approx(0.48)
+    assert bench.machine.spare_time == pytest.approx(0.15)
 
 
 @pytest.mark.parametrize(('packet', 'reply_size'), [

@@ -339,6 +339,52 @@ def test_time_that_is_up_goes_before_bytes_that_lie_in_the_buffer() -> None:
     assert script.next() is None
 
 
+class SlowLine(_NoLine):
+    """A device whose frame comes at so many seconds a character, on a clock of its own."""
+
+    is_terminal = True
+
+    def __init__(self, frame: bytes, char_time: float) -> None:
+        self.now = 0.0
+        self._frame = frame
+        self._char_time = char_time
+        self._taken = 0
+
+    def clock(self) -> float:
+        """Return the time."""
+        return self.now
+
+    def read(self, timeout: float | None, wake: int) -> bytes:
+        """Return what has come, or wait for the next character."""
+        if self._taken == len(self._frame):
+            raise OSError('the end')
+        begun, self._taken = self._taken, max(self._taken + 1, int(self.now / self._char_time))
+        self.now = max(self.now, self._taken * self._char_time)
+        return self._frame[begun:self._taken]
+
+
+class Late(LinkThread):
+    """A link thread on a host that lets it run 20 ms after each pause."""
+
+    def __init__(self, machine: Machine, port: SlowLine) -> None:
+        super().__init__(machine, lambda: port, clock=port.clock)
+        self._port = port
+
+    def _pause(self, seconds: float) -> None:
+        self._port.now += seconds + 0.02
+
+
+@pytest.mark.parametrize('char_time', [0.0083, 0.0042, 0.0021, 0.001])
+def test_long_reply_at_a_low_speed_is_heard_to_its_end(char_time: float) -> None:
+    packet = Packet(1, 5, 0x0F, 0, 7).reply(bytes(234))
+    script = Script(Send(b'?', 0.3, reply_size=234), timing=LineTiming(char_time=char_time))
+    port = SlowLine(message_frame(packet.encode(), Checksum.CRC), char_time)
+    thread = Late(script.machine, port)
+    assert not thread._run_on(port)
+    assert isinstance(script.next(), Frame)
+    thread.stop()
+
+
 def test_process_that_stops_just_before_it_writes_sends_no_old_command() -> None:
     """The clock is looked at again after all that Python does, right before the write."""
     script, written = Script(Send(b'command', 1.0, expires=2.0)), list[bytes]()

@@ -244,7 +244,7 @@ def status_of(major: int, minor: int, mount: int, inode: int) -> os.stat_result:
 
 
 def test_all_nodes_of_a_device_are_one_line() -> None:
-    """A container has a node of its own (--device); flock, which looks at the inode, lets it in."""
+    """A container has a node of its own (--device); flock looks at the inode alone."""
     usb = number_of(status_of(188, 0, mount=6, inode=90))
     assert usb == number_of(status_of(188, 0, mount=41, inode=7))
     assert usb != number_of(status_of(188, 1, mount=6, inode=91))
