@@ -1,0 +1,77 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+Read and write Allen-Bradley PLCs over their DF1 serial port.
+
+PLC-5, SLC 500, MicroLogix, PLC-2 and PLC-3; full duplex, half duplex and radio modem; Linux.
+
+A program without ROS uses ``Client``. It opens the port, blocks until the PLC has replied, and
+repeats what gets lost on the line:
+
+    from abdf1_ros import Client
+
+    with Client('/dev/ttyUSB0', plc_type='SLC', station=1) as plc:
+        speeds = plc.read('N7:0', 10)           # a list of ten int16
+        plc.write('N7:0', [speeds[0] + 1])      # returns when the PLC has confirmed it
+        plc.write('B3:0/1', True)
+        print(plc.identify())
+
+Its errors are in ``abdf1_ros.errors``. ``Client.from_files`` takes the two files of the node, and
+reads and writes by tag. The node itself (``abdf1 node``, or ``ros2 run abdf1_ros node``) makes
+topics of the rows of a map, polls them, and writes heartbeats and fallback values; for a machine
+take the node.
+
+Importing this package imports nothing else: a name is looked up when it is used, and only
+``abdf1_ros.ros`` and a few commands need ROS.
+
+The rooms, from the wire up. Each imports from those above it only; each ``__init__`` is a map:
+
+- ``df1``: the link. Bytes and time in, bytes and a deadline out
+- ``pccc``: commands, addresses, values, and a folder for each family of PLCs
+- ``settings``: both CSV files, every fault with its place
+- ``plan``: what is read together, and what the line can do
+- ``driver``: who has the line next, and what comes of it
+- ``ports``: serial ports, and the thread that runs a link on one
+- ``share``: other programs on the same port
+- ``simulator``, ``sniffer``, ``conform``: the other end, recorded bytes, and cases of the manual
+- ``client``: the library; ``ros``: the node; ``cli``: the commands
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from abdf1_ros.client import Client
+
+    __version__: str
+
+__all__ = ['Client', '__version__']
+
+
+def __getattr__(name: str) -> object:
+    """Return what is imported when it is used: Client brings pyserial, the version is read."""
+    if name == 'Client':
+        from abdf1_ros.client import Client
+        return Client
+    if name == '__version__':
+        from abdf1_ros.paths import package_version
+        return package_version()
+    raise AttributeError(f'module {__name__!r} has no attribute {name!r}')
+
+
+def __dir__() -> list[str]:
+    """Return the names that are there, looked up or not."""
+    return sorted({*globals(), *__all__})

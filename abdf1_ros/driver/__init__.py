@@ -12,4 +12,15 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The driver: what to read and write, when, and what comes of it; still without clock or ROS."""
+"""
+What to read and write on one line, when, and what comes of it; without clock, thread, port or ROS.
+
+Begin with ``driver``: its docstring says where each fact lives. ``agenda`` alone decides who has
+the line next. The queues yield jobs (``job_tasks``): ``interlocks`` has what the bridge writes
+by itself, ``writes`` the messages, ``checks`` the questions to a station, ``reads`` the planned
+reads, ``guests`` the commands of other programs. ``record`` knows who writes which
+words, ``served`` has the words that PLCs read and write, ``requests`` asks once, without a map.
+
+Nothing here waits, and nothing looks at a clock: each call brings the time (s). Other threads come
+in through an ``inbox`` only.
+"""

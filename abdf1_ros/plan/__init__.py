@@ -12,4 +12,14 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""What is read together, what it costs on the line, and what comes of it."""
+"""
+What is read together, what it costs on the line, and what comes of it.
+
+``planner`` makes blocks of mappings, with ``partition`` and the costs of ``line_model``.
+``forecast`` says what the line will be able to do, ``bounds`` which times heartbeats and fallback
+values can keep, ``report`` all of it in words for ``check``. ``usable_rows`` leaves out rows that
+do not fit the line; ``refusals`` divides blocks that a PLC has refused. ``reading`` reads mappings
+once, for the library.
+
+Nothing here asks a PLC: the same plan is printed before the start, and carried out.
+"""

@@ -12,4 +12,12 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Ports, the thread that runs a link on one, recording and listening."""
+"""
+Ports, and the thread that runs a link on one: the only room that waits for bytes.
+
+Begin with ``link_thread``. ``opening`` opens what a net file names: ``serial_device``, or a device
+server (``socket_port``, ``rfc2217_port``). ``ownership`` says who has a line, ``wake`` ends a wait
+from another thread, ``trace`` records bytes, ``tap`` listens, ``endpoints`` are ends that we make.
+
+No protocol lives here: a machine of ``df1`` gets the bytes and the time.
+"""

@@ -12,4 +12,12 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The ROS node: parameters, messages, diagnostics and log."""
+"""
+The ROS node: parameters, messages, diagnostics, log.
+
+``node`` and ``lines`` are the commands; ``process`` has signals, threads and the end. ``bridge``
+is one line: its node outlives the ``session`` of a pair of files. ``parameters`` come in,
+``topics`` go both ways, ``diagnostics`` is what goes out to be read.
+
+What is decided on the line is decided in ``driver``. Here values get names, types and a QoS.
+"""

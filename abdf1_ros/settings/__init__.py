@@ -12,7 +12,17 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Both CSV files, the line and its mappings, and the values in them."""
+"""
+Both CSV files: the line, its mappings, and the values in them.
+
+``network`` is the net file, a field for each column. The map file is ``map_file``, one row of it
+``map_row``; ``columns`` says what may stand in each column, and in which rows. What comes of a row
+is a ``mapping``, and ``rows`` has them all, in groups. ``csv_table`` reads what spreadsheets
+write; ``hints`` and ``remarks`` say what a cell may be that is wrong or odd.
+
+Every fault has file, line and column, and all of a file are found at once. Nothing here knows a
+port or the plan of a line.
+"""
 
 BAUD_RATES = (1200, 2400, 4800, 9600, 19200, 38400, 57600, 115200)
 PARITIES = ('None', 'Even', 'Odd')

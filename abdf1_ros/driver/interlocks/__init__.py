@@ -12,4 +12,10 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""What the bridge writes by itself: heartbeats and fallback values."""
+"""
+What the bridge writes by itself: heartbeats and fallback values (docs/heartbeats.md).
+
+``queue`` is asked at each turn of the line what has to be written; ``plc`` has the rows of one
+station and says which of them goes first; ``heartbeat`` and ``fallback`` are one row each, and
+the rules that they keep.
+"""

@@ -12,4 +12,10 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""What is read: which blocks are due, what comes of them, and what is withheld."""
+"""
+What is read: which blocks are due, what comes of them, and what is withheld.
+
+``readings`` takes the words of each block and gives them to the points of its rows (``point``);
+``job`` is one block, ``queue`` the order of all, ``silent`` the reads of stations that do not
+answer, ``guards`` withhold values while the program of a PLC does not run.
+"""

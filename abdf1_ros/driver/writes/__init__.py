@@ -12,4 +12,9 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Messages on their way to a PLC: the queue, the packets, and the end of each."""
+"""
+Messages on their way to a PLC: the queue, the packets, and the end of each.
+
+``queue`` has what waits for the line, ``under_way`` what is on it, ``packets`` the commands of one
+write. ``read_backs`` keeps the result of an unconfirmed write until a read has shown the words.
+"""
