@@ -171,6 +171,32 @@ def test_rule_8_row_is_fresh_by_a_confirmed_message_only() -> None:
     assert row.is_fresh(1.2 + 0.9 * AFTER)
 
 
+@pytest.mark.parametrize('silent', [0.4, 1.0])
+def test_rule_8_plc_that_comes_back_with_an_old_word_has_its_fallback_first(
+        silent: float) -> None:
+    beat, speed = beat_row(), speed_row(Fallback((7,), 800))
+    cell = Cell(beat, speed, run=3.0)
+    cell.publish(speed, 3, run=0.2)
+    cell.plc.faults.silent = True
+    cell.run(silent)  # the station is lost after 0.4 s; the message is 0.6 or 1.2 s old
+    cell.plc.faults.silent = False
+    came_back = cell.now
+    cell.run(3.0)
+    last_3 = max(when for when, name, value in cell.writes if (name, value) == ('N7:0', 3))
+    fallback = next(when for when, name, value in cell.writes
+                    if (name, value) == ('N7:0', 7) and when > last_3)
+    counts = [when for when, name, value in cell.writes
+              if name == 'N10:0' and value and max(came_back, last_3 + 0.8) < when < fallback]
+    assert counts == []
+
+
+def test_rule_8_message_is_fresh_for_fallback_after() -> None:
+    one = OneRow()
+    one.message(1.0, 1.1, Outcome.WRITTEN)
+    assert one.row.is_fresh(1.0 + AFTER - 0.001)
+    assert not one.row.is_fresh(1.0 + AFTER)
+
+
 def test_rule_8_fallback_that_stands_is_written_again_without_a_result() -> None:
     cell = Cell(speed_row(), speed_row(address='N7:1', tag='slow', fallback=Fallback((5,), 7000)))
     cell.run(1.0)

@@ -22,6 +22,7 @@ from abdf1_ros.df1.packet import BROADCAST, Packet
 from abdf1_ros.driver.guest_words import written_extents
 from abdf1_ros.driver.guests import _outcome, Guest, GuestListener, ShareAccess
 from abdf1_ros.driver.interlocks.heartbeat import BeatState
+from abdf1_ros.driver.settings import DriverSettings
 from abdf1_ros.driver.write import Outcome
 from abdf1_ros.errors import CommandTimeout
 from abdf1_ros.messages import Message
@@ -76,6 +77,16 @@ def test_access_says_what_goes_to_the_line(
         entry: tuple[ShareAccess, int, bytes, bool]) -> None:
     access, cmd, data, is_allowed = entry
     assert access.allows(Packet(1, 9, cmd, 0, 1, data)) is is_allowed
+
+
+def test_command_that_has_become_too_old_after_it_was_taken_is_not_sent() -> None:
+    bench = bench_of()
+    program = Program(bench, ShareAccess.WRITE)
+    program.ask(WRITE_N7)
+    guests = bench.driver.guests
+    job = guests.next(bench.clock(), ())
+    assert job is not None
+    assert bench.clock() < job.expires <= bench.clock() + DriverSettings().write_timeout
 
 
 def test_what_is_not_allowed_is_refused_at_once_and_changes_nothing() -> None:

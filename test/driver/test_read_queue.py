@@ -229,3 +229,16 @@ def test_long_read_begins_anew_after_an_error() -> None:
     assert job.started == 3.0
     job.interrupted()
     assert not job.is_unfinished
+
+
+def test_words_of_before_an_outage_do_not_go_into_the_read_after_it() -> None:
+    taken: list[bytes | None] = []
+    job = ReadJob(make_block(100, 'N7:0', 236), [], StillClock(),
+                  lambda job, words, error: taken.append(words), math.inf)
+    assert not is_last_packet_read(job, 1.0)
+    job.interrupted()
+    assert not is_last_packet_read(job, 3.0)
+    assert job.started == 3.0
+    assert is_last_packet_read(job, 3.1)
+    assert taken[:2] == [None, None] and taken[2] is not None
+    assert len(taken[2]) == 2 * 236

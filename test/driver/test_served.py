@@ -316,6 +316,18 @@ def test_command_for_several_words_is_published_once_and_all_or_nothing() -> Non
     assert (guarded.read('B3:0', 2), guarded.heard()) == (bytes(4), [])
 
 
+def test_refused_command_is_undone_in_each_of_its_words() -> None:
+    bench = Bench('SLC', row('B3:0', 'SLC', 3), replace(row('B3:3', 'SLC'), is_read_only=True))
+    assert bench.write('B3:0', 1, 2, 3) == (0, b'')
+    bench.heard()
+    table = bench.served._table
+    table.changed.clear()
+    table.write(bench._place('B3:0'), bytes.fromhex('04 00 05 00 06 00'))
+    table.take_back()
+    assert bench.read('B3:0', 3) == bytes.fromhex('01 00 02 00 03 00')
+    assert bench.heard() == []
+
+
 def test_rows_of_the_same_words_are_all_published() -> None:
     word, bits = row('N7:0'), row('N7:0/4', length=2)
     bench = Bench('PLC5', word, bits)

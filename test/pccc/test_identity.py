@@ -188,6 +188,20 @@ def test_faults_and_remarks(identity: Identity, faults: tuple[str, ...],
     assert (identity.faults, identity.remarks) == (faults, remarks)
 
 
+def test_each_bit_of_a_plc5_has_one_remark_or_none() -> None:
+    told = {(byte, bit): changed(PLC5, **{f'byte{byte}': PLC5[byte - 1] & mask | 1 << bit}).remarks
+            for byte, mask in ((1, 0x07), (17, 0), (16, 0)) for bit in range(8)
+            if byte != 1 or bit > 3}
+    none: tuple[str, ...] = ()
+    assert {bit for bit, remarks in told.items() if remarks != none} == {
+        (1, 4), (1, 6), (1, 7), (16, 0), (16, 4), *((17, bit) for bit in range(8))}
+    assert told[1, 7] == ('edits in the processor',)
+    quiet = changed(PLC5, byte1=0x06, byte16=0, byte17=0)
+    assert [changed(PLC5, byte1=mode, byte16=0, byte17=0).remarks for mode in range(8)] == [
+        none] * 8
+    assert quiet.remarks == none
+
+
 @for_all(('data', 'family', 'text', 'address', 'size'), [
     (PLC3, PlcType.PLC3, 'PLC-3 series C revision B, RUN', 0x1234, 55),
     (PLC2, PlcType.PLC2, 'PLC-2/30 at 1771-KG series B revision A, REM TEST', 0x4144, 55),

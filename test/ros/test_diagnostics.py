@@ -673,9 +673,12 @@ def test_value_of_a_guest_over_a_fallback_is_a_warning(make_bench: Callable[...,
 
 def test_station_is_told_by_the_worst_of_its_heartbeats(make_bench: Callable[..., Bench]) -> None:
     bench = make_bench(*(f'beat_{word},Heartbeat,N10:{word},1,PLC5,1000' for word in range(3)))
-    for beat in bench.driver.interlocks.heartbeats[::2]:
-        beat.confirmed, beat.state = NOW, BeatState.COUNTS
+    beats = bench.driver.interlocks.heartbeats
+    for beat in beats[::2]:
+        beat.confirmed, beat.state, beat.value = NOW, BeatState.COUNTS, 1
     assert details(bench.status('interlocks'))['station 1'].startswith('not in control: ')
+    beats[1].confirmed, beats[1].state, beats[1].value = NOW, BeatState.COUNTS, 1
+    assert details(bench.status('interlocks'))['station 1'].startswith('heartbeat counts since ')
 
 
 def test_heartbeat_that_another_program_writes_is_an_error_with_what_it_wrote(

@@ -79,6 +79,7 @@ class Taker:
         self.mappings = [make_mapping('N7:0', 'Write', tag=tag) for tag in tags]
         self.executor, self.tasks, self.said = self, list[Callable[[], None]](), list[str]()
         self.callbacks: dict[str, Callable[[Any, Any], None]] = {}
+        self.wakes = 0
 
     def create_subscription(self, kind: Any, name: str, callback: Any, qos: Any) -> None:
         self.callbacks[name.rpartition('/')[2]] = callback
@@ -117,7 +118,10 @@ class Taker:
         self.said.append(f'{topic}: {nodes} ahead by {seconds:.1f} s')
 
     def open(self, topics: WriteTopics, patience: float = 2.0) -> Any:
-        return topics.open(cast(Driver, self), patience, self, lambda: None)
+        return topics.open(cast(Driver, self), patience, self, self._woken)
+
+    def _woken(self) -> None:
+        self.wakes += 1
 
 
 @pytest.fixture
@@ -154,6 +158,13 @@ def test_messages_wait_in_their_order_until_the_node_has_begun(
                          'b 5: its time stamp is 2.6 s ahead of the clock here, write_timeout is '
                          '2 s; the clocks differ, so its age is unknown']
     assert topics.taken == 7
+
+
+def test_message_wakes_the_link(node: Taker, topics: WriteTopics) -> None:
+    topics.begin()
+    node.tasks[0]()
+    node.publish('a', 1)
+    assert (node.said, node.wakes) == (['a 1'], 1)
 
 
 def test_messages_that_are_too_many_to_wait_are_refused(node: Taker, topics: WriteTopics) -> None:

@@ -21,9 +21,11 @@ import time
 from abdf1_ros.cli.plc import work
 from abdf1_ros.cli.plc.command import main
 from abdf1_ros.cli.plc.files import find_files
-from abdf1_ros.cli.plc.init import NewFiles
+from abdf1_ros.cli.plc.init import map_rows, NewFiles
+from abdf1_ros.cli.plc.presence import Presence
 from abdf1_ros.cli.plc.session import Session
 from abdf1_ros.pccc.file_types import PlcType
+from abdf1_ros.pccc.identity import Identity
 from abdf1_ros.pccc.processor import Processor
 from abdf1_ros.ports.listing import SerialPortInfo
 from abdf1_ros.problems import ConfigurationError
@@ -93,6 +95,14 @@ def test_rows_that_are_only_comments_are_good_rows_too(
         'S2:0', 'B3:0', 'N7:0', 'F10:0', 'L11:0']
     guarded = [mapping.tag for mapping in mappings if mapping.is_guarded]
     assert guarded == ['interlocks_1', 'interlocks_2']
+
+
+def test_plc_of_an_unknown_family_leaves_no_later_one_out() -> None:
+    unknown = Identity(None, 'type 0x77')
+    known = Identity(PlcType.SLC, 'SLC 5/03')
+    rows = ''.join(map_rows([Presence(number, 0.1, identity, None, True, True)
+                             for number, identity in ((1, unknown), (2, known))], {}))
+    assert '# words_1,' in rows and '\nstatus_2,Read,S:0,2,SLC,' in rows
 
 
 @pytest.mark.usefixtures('half_duplex_only')
