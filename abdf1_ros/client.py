@@ -49,6 +49,7 @@ from abdf1_ros.df1.master import MASTER
 from abdf1_ros.df1.mode import LineMode
 from abdf1_ros.df1.peer import PEER
 from abdf1_ros.df1.settings import LinkSettings
+from abdf1_ros.df1.slave_link import SLAVE
 from abdf1_ros.df1.stations import MAX_STATION
 from abdf1_ros.driver.requests import Requests
 from abdf1_ros.errors import Abdf1Error, FormatError, PortLost
@@ -78,7 +79,7 @@ if TYPE_CHECKING:
     from abdf1_ros.tagged_client import TaggedClient
 
 _GLANCE = 0.2  # s; while waiting, look so often whether the thread of the link still runs
-_DUPLEX = one_of({'full': PEER, 'half': MASTER})
+_DUPLEX = one_of({'full': PEER, 'half': MASTER, 'slave': SLAVE})
 _PARITY = one_of({name: name for name in ('None', 'Even', 'Odd')})
 _LONGEST = 60.0  # s
 _MOST_RETRIES = 10
@@ -272,14 +273,14 @@ class Client(OpenLine):
     The PLC at the other end of a line, or in half duplex the PLCs on it.
 
     ``port`` is a device path, ``socket://host:port`` or ``rfc2217://host:port``. ``duplex`` is
-    full, or half with us as the master; ``station`` is the PLC that is meant where a call names
-    no other, ``own_station`` our address. Without ``plc_type`` (SLC, PLC5, PLC3, PLC2) a PLC is
-    asked what it is. ``timeout`` and ``cmd_timeout`` are seconds: for each answer, and for a
-    reply; ``retries`` are repetitions of what is not acknowledged or answered. ``trace`` is a file
-    for all bytes, which ``sniff`` reads. All calls block, may come from any thread, and raise
-    RemoteError where the PLC refuses, LinkError where it does not answer (``sent`` tells whether
-    it may have executed the command), and FormatError for what is wrong in the call, before
-    anything is sent.
+    full, half with us as the master, or slave, which another master polls; ``station`` is the PLC
+    that is meant where a call names no other, ``own_station`` our address. Without ``plc_type``
+    (SLC, PLC5, PLC3, PLC2) a PLC is asked what it is. ``timeout`` and ``cmd_timeout`` are seconds:
+    for each answer, and for a reply; ``retries`` are repetitions of what is not acknowledged or
+    answered. ``trace`` is a file for all bytes, which ``sniff`` reads. All calls block, may come
+    from any thread, and raise RemoteError where the PLC refuses, LinkError where it does not
+    answer (``sent`` tells whether it may have executed the command), and FormatError for what is
+    wrong in the call, before anything is sent.
     """
 
     def __init__(self, port: str | os.PathLike[str], *, plc_type: str | None = None,

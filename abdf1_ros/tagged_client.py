@@ -51,8 +51,6 @@ class TaggedClient(OpenLine):
     def __init__(self, net_file: str, map_file: str, trace: str | None = None,
                  logger: logging.Logger = LOG) -> None:
         network = load_network(net_file)
-        if network.line_mode.is_polled:
-            raise FormatError(f'{net_file}: Mode Slave: a client asks, and a slave may not')
         mappings, problems = load_mappings(map_file)
         problems += [problem for _, problem in line_problems(mappings, network)]
         if problems:

@@ -42,6 +42,9 @@ from abdf1_ros.pccc.server import Server
 
 _Result = TypeVar('_Result')
 
+# A slave that is not polled for so long (s) ends its request: a person waits.
+_LONGEST_UNPOLLED = 5.0
+
 
 class _RequestJob(Job):
     """Steps with a station, and who wants to know how they end."""
@@ -92,7 +95,8 @@ class Requests(TaskSource):
         self.stray = ''
         # Without DLE NAK, which would make other stations of a line in use drop their replies.
         self._link = mode.make_link(
-            self.machine, replace(line, nak_on_command_timeout=False), self.stations,
+            self.machine, replace(
+                line, nak_on_command_timeout=False, poll_timeout=_LONGEST_UNPOLLED), self.stations,
             Server(DataTable(plc_type)).serve, self._report)
 
     def add(self, station: int, work: Steps[_Result], succeed: Callable[[_Result], None],

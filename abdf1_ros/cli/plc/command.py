@@ -16,7 +16,8 @@
 Read, write and look for PLCs on a DF1 line from the command line.
 
 It is for commissioning. No other program may have the port, so stop the node first. On a
-half-duplex line it is the master, so there must be no other master. It needs no ROS.
+half-duplex line it is the master, so there must be no other master, or with --slave one that polls
+us. It needs no ROS.
 """
 
 from __future__ import annotations

@@ -140,7 +140,7 @@ class Search:
                 presence = look_at(session, station)
                 if session.echoes:
                     self.echoes = True
-                    self.traces.clear()  # our own characters, which came back late
+                    self._characters.clear()  # our own characters, which came back late
                     if settings.mode == MODES['full']:
                         return
                 if presence.takes_commands and not understands(session, station):

@@ -32,7 +32,7 @@ DEFAULTS = Network(timeout=300)
 _FIRST_SPARE = 10
 
 MODES = {Duplex.HALF.name.lower(): 'Master', Duplex.FULL.name.lower(): 'Peer',
-         Duplex.RADIO.name.lower(): 'Radio'}
+         Duplex.RADIO.name.lower(): 'Radio', 'slave': 'Slave'}
 
 # Options that stand for a column of the net CSV.
 _COLUMNS = {'port': 'com_port', 'baud': 'baud', 'check': 'error_code', 'parity': 'parity',
@@ -64,11 +64,6 @@ def network_of(options: argparse.Namespace, duplex: str | None = None,
             '--port', 'name the port, such as --port /dev/ttyUSB0, or a net CSV with --net')])
     network = replace(network, mode=MODES.get(duplex or options.duplex, network.mode),
                       polling=DEFAULTS.polling)
-    if network.line_mode.is_polled:
-        raise ConfigurationError([Problem(
-            options.net, 'Mode Slave: another node is the master of this line; plc can only '
-            'be a master (--duplex half), have the PLC for itself (--duplex full), or be a node '
-            'of radio modems (--radio)')])
     # By radio only the reply is waited for.
     is_told = network.duplex is Duplex.RADIO and options.timeout is not None
     return replace(network, cmd_timeout=network.timeout) if is_told else network

@@ -187,11 +187,15 @@ def _add_duplex(group: argparse._ArgumentGroup, defaults: LineDefaults) -> None:
     either = group.add_mutually_exclusive_group()
     either.add_argument('--duplex', type=str.lower, choices=tuple(MODES),
                         help='half: several stations on a line; full: one PLC; radio: DF1 radio '
-                             f'modem (default: {defaults.duplex})')
+                             'modem; slave: another master polls us '
+                             f'(default: {defaults.duplex})')
     either.add_argument('--peer', action='store_const', const='full', dest='duplex',
                         help='the same as --duplex full')
     either.add_argument('--radio', action='store_const', const='radio', dest='duplex',
                         help='the same as --duplex radio')
+    either.add_argument('--slave', action='store_const', const='slave', dest='duplex',
+                        help='the same as --duplex slave: --own-station is a number that the '
+                             'master polls')
 
 
 def _add_data_options(parser: argparse.ArgumentParser,

@@ -91,7 +91,10 @@ def look_at(session: Session, station: int) -> Presence:
     seconds = time.monotonic() - started
     # A gateway answers for a station that it does not reach (M 8-2).
     is_reached = not (isinstance(error, RemoteError) and is_local_status(error.sts))
-    takes_commands = is_reached and not isinstance(error, StationInactive)
+    # Through a master only a reply tells.
+    is_silent = isinstance(
+        error, LinkError if session.network.line_mode.is_polled else StationInactive)
+    takes_commands = is_reached and not is_silent
     is_there = takes_commands or session.stations[station].last_heard is not None
     return Presence(station, seconds, identity, error, is_there, takes_commands)
 
@@ -104,7 +107,7 @@ def scan(network: Network, stations: Sequence[int], via: int | None = None,
     Silent stations are asked again after all others: a lost frame is not absence. ``show`` gets
     a text about the station being asked. Where each has a number, we take one that no station has.
     """
-    if not network.line_mode.has_one_plc:
+    if not network.line_mode.has_one_plc and not network.line_mode.is_polled:
         network = replace(network, station=free_station(network.station, stations))
     with Session(network, absent=stations, via=via) as session:
         left: Sequence[int] = stations
@@ -211,6 +214,9 @@ def hint(session: Session, error: Abdf1Error) -> str:
     if session.echoes:
         return COMES_BACK
     received, network = session.counters.chars_received, session.network
+    if network.line_mode.is_polled and not session.counters.polls_received:
+        return (f'no master has polled us, station {network.station}: "plc detect" tells whom it '
+                'polls; --own-station takes such a number')
     if session.counters.messages_received + session.counters.acks_received:
         return ''
     cause = SILENCE if not received else (

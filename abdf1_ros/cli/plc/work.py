@@ -33,6 +33,7 @@ from abdf1_ros.cli.plc.exports.form import Cells, Wanted
 from abdf1_ros.cli.plc.exports.imported import import_map
 from abdf1_ros.cli.plc.line import free_station, MODES, network_of
 from abdf1_ros.cli.plc.options import COLUMN_ROLES, DEFAULT_STATION, RADIXES
+from abdf1_ros.cli.plc.overhear import overhear
 from abdf1_ros.cli.plc.session import Session
 from abdf1_ros.cli.plc.watch import Watch
 from abdf1_ros.cli.terminal import (
@@ -117,7 +118,7 @@ def _line(options: argparse.Namespace) -> Network:
     if options.is_assumed:
         raise ConfigurationError([Problem(
             '--station', f'say which station to ask; {options.station} is our own')])
-    if options.net or options.own_station is not None:
+    if options.net or options.own_station is not None or network.line_mode.is_polled:
         raise ConfigurationError([Problem('--own-station', (
             f'{network.station} is our own Station, so no PLC can answer as {options.station}; '
             'give us a number that no PLC of the line has'))])
@@ -365,11 +366,21 @@ def _detect(options: argparse.Namespace) -> int:
 
 def _found(options: argparse.Namespace, network: Network) -> detect.Found | None:
     """Return the settings that work; where none do, tell what was received."""
+    if options.duplex == 'slave':
+        raise ConfigurationError([Problem(
+            '--duplex', 'a slave cannot try settings; without it detect listens first')])
     progress = Progress()
     bauds: Sequence[int] = [network.baud] if options.baud or '://' in network.port \
         else detect.BAUD_RATES
     modes = [MODES[options.duplex]] if options.duplex else [MODES['full'], MODES['half']]
     checks = [network.error_code] if options.check else detect.CHECKS
+    master = overhear(network, bauds, progress.show)
+    if master is not None:
+        progress.clear()
+        _complain(f'{master}: nothing was sent. "plc --slave --own-station N" asks through it if '
+                  'it polls N and no PLC has that number, as a node of Mode Slave does; "sniff" '
+                  'shows what it reads')
+        return None
     search = detect.Search(network, options.stations, progress.show)
     found = search.run(bauds, modes, checks)
     progress.clear()

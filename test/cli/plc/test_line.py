@@ -53,10 +53,10 @@ def test_options_go_before_the_file(tmp_path: Path) -> None:
         baud=1200, error_code='BCC', com_port='/dev/ttyS7')
 
 
-def test_line_of_another_master_is_refused_unless_duplex_is_given(tmp_path: Path) -> None:
+def test_line_of_another_master_makes_us_a_slave_unless_duplex_is_given(tmp_path: Path) -> None:
     path = write_csv(tmp_path / 'net.csv', 'Mode,Com_Port', ['Slave,/dev/ttyS7'])
-    with pytest.raises(ConfigurationError, match='Mode Slave: another node is the master'):
-        line_of('--net', str(path))
+    assert line_of('--net', str(path)).mode == 'Slave'
+    assert line_of('--port', '1', '--slave') == line_of('--port', '1', '--duplex', 'slave')
     assert line_of('--net', str(path), '--duplex', 'half').mode == 'Master'
 
 

@@ -1,0 +1,89 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Listen to a line before anything is sent on it: another master may poll its stations."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+import time
+
+from abdf1_ros.cli.plc.session import opened
+from abdf1_ros.df1.checksum import Checksum
+from abdf1_ros.df1.frames import Poll
+from abdf1_ros.df1.listener import LineKind, ListeningDecoder
+from abdf1_ros.ports.wake import Wake
+from abdf1_ros.settings.network import Network
+
+LISTENED = 1.0
+"""At each speed (s); masters poll a few times a second."""
+
+# One in 256 pairs of wrong bytes looks like a poll.
+_SURE_POLLS = 2
+
+
+@dataclass(frozen=True, slots=True)
+class ForeignMaster:
+    """What was heard of a master: its speed, the stations it polls, the check of its messages."""
+
+    baud: int
+    stations: Sequence[int]
+    check: Checksum | None
+
+    def __str__(self) -> str:
+        """Return one line of text."""
+        check = 'check unknown' if self.check is None else self.check.value
+        stations = ', '.join(map(str, self.stations))
+        return (f'another master polls {"stations" if len(self.stations) > 1 else "station"} '
+                f'{stations}, {self.baud} baud, {check}')
+
+
+def overhear(network: Network, bauds: Sequence[int],
+             show: Callable[[str], None] = lambda text: None) -> ForeignMaster | None:
+    """
+    Listen at each speed, but at no further one where the first is silent.
+
+    Return the master that is heard. Sends nothing; raises OSError.
+    """
+    for baud in bauds:
+        show(f'listening at {baud} baud')
+        characters, polls, check = _heard(replace(network, baud=baud))
+        if polls.total() >= _SURE_POLLS:
+            return ForeignMaster(baud, sorted(polls), check)
+        if not characters:
+            return None
+    return None
+
+
+def _heard(network: Network) -> tuple[int, Counter[int], Checksum | None]:
+    """Return how many characters came, the polls with a good check, and the check of messages."""
+    kind = LineKind()
+    decoder = ListeningDecoder(kind)
+    characters, polls = 0, Counter[int]()
+    port, wake = opened(network)(), Wake()
+    try:
+        end = time.monotonic() + LISTENED
+        while (left := end - time.monotonic()) > 0:
+            data = port.read(left, wake.descriptor)
+            characters += len(data)
+            decoder.feed(data)
+            while (symbol := decoder.next_symbol()) is not None:
+                if isinstance(symbol, Poll) and symbol.valid:
+                    polls[symbol.station] += 1
+    finally:
+        port.close()
+        wake.close()
+    return characters, polls, kind.checksum

@@ -1,0 +1,153 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""A line that has a master: it is heard before anything is sent, and asked through."""
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+import os
+from pathlib import Path
+import threading
+
+from abdf1_ros import client
+from abdf1_ros.cli.plc import overhear
+from abdf1_ros.cli.plc.command import main
+from abdf1_ros.cli.plc.overhear import ForeignMaster
+from abdf1_ros.df1.checksum import Checksum
+from abdf1_ros.driver import requests
+from abdf1_ros.settings.network import Network
+import pytest
+from support.ptys import Pty
+
+Output = pytest.CaptureFixture[str]
+
+
+def crc(data: bytes) -> bytes:
+    """Return the CRC-16 of M 5-1, low byte first."""
+    value = 0
+    for byte in data:
+        value ^= byte
+        for _ in range(8):
+            value = value >> 1 ^ (0xA001 if value & 1 else 0)
+    return value.to_bytes(2, 'little')
+
+
+class Master(threading.Thread):
+    """
+    A master, by hand: it polls ``stations``, and gives what they say to a PLC that is itself.
+
+    The PLC is an SLC whose N7:0 is 42, as station 1; it says no more.
+    """
+
+    def __init__(self, line: Pty, *stations: int) -> None:
+        super().__init__(daemon=True)
+        self._line, self._stations = line, stations
+        self.heard = b''
+        self.over = threading.Event()
+        os.set_blocking(line.fileno(), False)
+
+    def run(self) -> None:
+        while not self.over.wait(0.02):
+            for station in self._stations:
+                self._line.write(bytes((0x10, 0x05, station, -station & 0xFF)))
+                if self.over.wait(0.02):
+                    return
+                self._take(station)
+
+    def _take(self, station: int) -> None:
+        try:
+            data = os.read(self._line.fileno(), 300)
+        except BlockingIOError:
+            return
+        self.heard += data
+        if not data.startswith(b'\x10\x02'):
+            return
+        dst, src, cmd, _, *tns = data[2:8]
+        value = b'\x2a\x00' if dst == 1 else b''
+        reply = bytes((src, dst, cmd | 0x40, 0 if dst == 1 else 2, *tns)) + value
+        # The check of a master's frame covers STN, STX, the data and ETX (M 5-3).
+        body = bytes((station, 0x02)) + reply
+        self._line.write(b'\x10\x06')
+        if self.over.wait(0.02):
+            return
+        self._line.write(bytes((0x10, 0x01, station, 0x10, 0x02))
+                         + reply.replace(b'\x10', b'\x10\x10') + b'\x10\x03'
+                         + crc(body + b'\x03'))
+
+
+@contextmanager
+def master_on(path: Path, *stations: int) -> Iterator[tuple[str, Master]]:
+    """Put a master on a pseudo-terminal."""
+    line = Pty(path)
+    master = Master(line, *stations)
+    master.start()
+    try:
+        yield str(line.name), master
+    finally:
+        master.over.set()
+        master.join()
+        line.close()
+
+
+@pytest.mark.parametrize('command', ['detect', 'init'])
+def test_line_that_has_a_master_is_only_listened_to(
+        tmp_path: Path, capsys: Output, command: str) -> None:
+    into = ['--into', str(tmp_path / 'new')] if command == 'init' else []
+    with master_on(tmp_path / 'line', 1, 3, 7) as (port, master):
+        assert main([command, '--port', port, *into]) == 1
+        assert master.heard == b''
+    assert capsys.readouterr().err.splitlines()[-1].startswith(
+        'plc: another master polls stations 1, 3, 7, 19200 baud, check unknown: nothing was sent.')
+    assert not (tmp_path / 'new').exists()
+
+
+def test_silent_line_is_listened_to_at_one_speed(
+        tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(overhear, 'LISTENED', 0.05)
+    line = Pty(tmp_path / 'line')
+    shown: list[str] = []
+    assert overhear.overhear(Network(com_port=str(line.name)), (19200, 9600), shown.append) is None
+    line.close()
+    assert shown == ['listening at 19200 baud']
+
+
+def test_what_is_told_of_a_master() -> None:
+    assert str(ForeignMaster(9600, [2], Checksum.BCC)) == (
+        'another master polls station 2, 9600 baud, BCC')
+
+
+def test_plc_asks_through_the_master_of_a_line(tmp_path: Path, capsys: Output) -> None:
+    line = '--slave', '--own-station', '7', '--timeout', '2000', '--plc-type', 'SLC'
+    with master_on(tmp_path / 'line', 7) as (port, master):
+        assert main(['read', 'N7:0', '--station', '1', '--port', port, *line]) == 0
+        assert capsys.readouterr().out.split() == ['N7:0', '42']
+        assert main(['read', 'N7:0', '--station', '2', '--port', port, *line]) == 1
+        assert 'STS 02' in capsys.readouterr().err
+        with client.Client(port, plc_type='SLC', station=1, duplex='slave',
+                           own_station=7) as plc:
+            assert plc.read('N7:0') == 42
+
+
+def test_slave_that_nobody_polls_says_so(
+        tmp_path: Path, capsys: Output, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(requests, '_LONGEST_UNPOLLED', 0.3)
+    with master_on(tmp_path / 'line', 3) as (port, master):
+        assert main(['ping', '1', '--count', '1', '--slave', '--port', port]) == 1
+    assert 'no master has polled us, station 5: "plc detect" tells whom it polls' in (
+        capsys.readouterr().err)
+
+
+def test_slave_that_searches_is_refused(capsys: Output) -> None:
+    assert main(['detect', '--port', '/dev/ttyS0', '--slave']) == 2
+    assert 'a slave cannot try settings' in capsys.readouterr().err
