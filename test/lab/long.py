@@ -16,11 +16,12 @@
 Try for hours what the tests try for minutes, each time with something new.
 
 The parts, each for its share of the time: ``properties`` (all property tests, with new examples),
-``simulate`` (plants of any kind), ``fuzz`` (all targets, from a corpus that is kept), ``faults``
-(each fault of a byte, and pairs), ``noise`` and ``soak`` (every mode, in virtual time), ``bridge``
-(node and simulator as processes, with faults) and ``kills``. What they say is in the folder of
-``--work``, with the corpus and the examples that failed. At the end stands what was tried. The
-same seed draws the same, as far as time does not decide. Status 1 when a part failed.
+``simulate`` (plants of any kind), ``rehearsal`` (hosts that die, and their spares), ``fuzz`` (all
+targets, from a corpus that is kept), ``faults`` (each fault of a byte, and pairs), ``noise`` and
+``soak`` (every mode, in virtual time), ``bridge`` (node and simulator as processes, with faults)
+and ``kills``. What they say is in the folder of ``--work``, with the corpus and the examples that
+failed. At the end stands what was tried. The same seed draws the same, as far as time does not
+decide. Status 1 when a part failed.
 """
 
 import argparse
@@ -103,6 +104,9 @@ def parts(work: Path) -> dict[str, Part]:
         'simulate': Part(0.1, lambda seed, left: script(
             'simulate/run.py', f'--seed={seed}', f'--seconds={left:.0f}'),
             {'plants': r'(?m)^(\d+) plants', 'values': r'(\d+) values'}),
+        'rehearsal': Part(0.1, lambda seed, left: script(
+            'rehearsal/run.py', f'--seed={seed}', f'--seconds={left:.0f}'),
+            {'faults': r'(?m)^\w+ +(\d+) times', 'values': r'(\d+) values'}, least=600.0),
         'fuzz': Part(0.2, lambda seed, left: script(
             'fuzz/run.py', f'--seconds={left:.0f}', f'--work={work / "fuzz"}'),
             {'inputs': r'(?m)^\w+ +([\d,]+)[ \d,]+  '}),

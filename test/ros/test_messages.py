@@ -56,8 +56,8 @@ from support.ros import write_csv
 
 TYPES = {
     'bool': UInt8MultiArray, 'int16': Int16MultiArray, 'uint16': UInt16MultiArray,
-    'bcd16': UInt16MultiArray, 'int32': Int32MultiArray, 'uint32': UInt32MultiArray,
-    'float32': Float32MultiArray, 'string': String}
+    'bcd16': UInt16MultiArray, 'bcd12': UInt16MultiArray, 'int32': Int32MultiArray,
+    'uint32': UInt32MultiArray, 'float32': Float32MultiArray, 'string': String}
 
 
 def make_mapping(folder: Path, address: str, **cells: object) -> Mapping:

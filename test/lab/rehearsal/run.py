@@ -1,0 +1,342 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+Rehearse a plant: hosts that die, stand still and lose their network, and spares that take over.
+
+Each host is a network namespace with a process of ``lines``. That has some lines of its own, and
+the next host has the same lines too: both with ``standby``. Device servers take one client and let
+a silent one go after 5 s. Faults strike the owner of a line that ``--seed`` draws. The observer on
+a host of its own writes to every line and judges: no value and no command may be older than one
+before, no message may have two results, and after each fault one bridge has each line, reads it
+and writes to it.
+
+Needs root, for the namespaces; all of it ends with the program. Status 1 when a rule was broken.
+"""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager, ExitStack
+import math
+import os
+from pathlib import Path
+import random
+import secrets
+import shutil
+import signal
+import subprocess
+import sys
+import tempfile
+import threading
+import time
+
+_HERE = Path(__file__).resolve().parent
+_ROOT = _HERE.parents[2]
+_SWITCH = 'switch'  # a link
+_PLANT, _OBSERVER = 'P', 'O'  # hosts of the device servers, and of the observer
+
+_IDLE = 5.0
+_FAULT_LASTS = 15.0
+_LIMIT = 45.0  # s within which all lines have to be well; a killed node is seen for up to 20 s
+_FAULTS = ('kill', 'stop', 'cut')
+
+# Wheels have the libraries of the discovery server in folders of their own.
+_LIBRARIES = ':'.join(map(str, [Path(sys.prefix, 'lib'), *Path(sys.prefix).glob(
+    'lib/python*/site-packages/ros_rmw_fastrtps_cpp.libs')]))
+
+_DATA = """\
+Station,PLC_Type,Address,Length,Values,Motion,Period
+1,PLC5,N7:0,16,,,
+1,PLC5,N7:0,1,0,Ramp,100
+"""
+_MAP = """\
+Tag,Command,Address,Station,PLC_Type,Period
+ramp,Read,N7:0,1,PLC5,200
+held,Read,N7:4,1,PLC5,200
+command,Write,N7:4,1,PLC5,
+"""
+
+
+class Network:
+    """Hosts as namespaces on one switch, which is in a namespace too."""
+
+    def __init__(self, hosts: Sequence[str], *, has_server: bool) -> None:
+        self._prefix = f'ab{os.getpid() % 100_000}'
+        self._hosts = hosts
+        self._environment = {
+            'FASTDDS_BUILTIN_TRANSPORTS': 'UDPv4', 'ROS_AUTOMATIC_DISCOVERY_RANGE': 'SUBNET',
+            'ROS_DOMAIN_ID': '73', 'PYTHONPATH': str(_ROOT)}
+        if has_server:
+            self._environment |= {'ROS_DISCOVERY_SERVER': f'{self.address(_OBSERVER)}:11811',
+                                  'ROS_SUPER_CLIENT': 'TRUE'}
+
+    def __enter__(self) -> Network:
+        try:
+            self._make()
+        except BaseException:
+            self.__exit__()
+            raise
+        return self
+
+    def _make(self) -> None:
+        _ip('netns', 'add', self._name('sw'))
+        _ip('-n', self._name('sw'), 'link', 'add', 'name', _SWITCH, 'type', 'bridge')
+        _ip('-n', self._name('sw'), 'link', 'set', _SWITCH, 'up')
+        for host in self._hosts:
+            _ip('netns', 'add', self._name(host))
+            _ip('-n', self._name('sw'), 'link', 'add', host, 'type', 'veth', 'peer', 'name', 'eth',
+                'netns', self._name(host))
+            _ip('-n', self._name('sw'), 'link', 'set', host, 'master', _SWITCH, 'up')
+            _ip('-n', self._name(host), 'addr', 'add', f'{self.address(host)}/24', 'dev', 'eth')
+            for link in ('lo', 'eth'):
+                _ip('-n', self._name(host), 'link', 'set', link, 'up')
+            # DDS finds others by multicast.
+            _ip('-n', self._name(host), 'route', 'add', '224.0.0.0/4', 'dev', 'eth')
+
+    def __exit__(self, *exception: object) -> None:
+        for host in ('sw', *self._hosts):
+            subprocess.run(['ip', 'netns', 'del', self._name(host)], check=False,
+                           stderr=subprocess.DEVNULL)
+
+    def _name(self, host: str) -> str:
+        return f'{self._prefix}{host}'
+
+    def address(self, host: str) -> str:
+        """Return the address of a host."""
+        return f'10.73.0.{1 + self._hosts.index(host)}'
+
+    def connect(self, host: str, *, is_on: bool) -> None:
+        """Plug the cable of a host in, or pull it."""
+        _ip('-n', self._name('sw'), 'link', 'set', host, 'up' if is_on else 'down')
+
+    def start(self, host: str, log: Path, *command: str) -> subprocess.Popen[str]:
+        """Run a program on a host; its output goes to ``log``, or to us with ``-``."""
+        environment = os.environ | self._environment | {'ROS_LOG_DIR': str(log.parent)}
+        environment.pop('FASTRTPS_DEFAULT_PROFILES_FILE', None)
+        is_ours = log.name == '-'
+        return subprocess.Popen(
+            ['ip', 'netns', 'exec', self._name(host), *command],
+            env=environment, text=True, stdin=subprocess.PIPE, start_new_session=True,
+            stdout=subprocess.PIPE if is_ours else log.open('a'),
+            stderr=None if is_ours else subprocess.STDOUT)
+
+
+def _ip(*words: str) -> None:
+    subprocess.run(['ip', *words], check=True)
+
+
+class Plant:
+    """PLCs, device servers, and a process of lines on each host."""
+
+    def __init__(self, network: Network, folder: Path, hosts: Sequence[str], lines: int,
+                 stack: ExitStack) -> None:
+        self.network, self._folder, self.hosts = network, folder, hosts
+        self._stack = stack
+        self.count = len(hosts) * lines
+        (folder / 'plc.csv').write_text(_DATA, encoding='utf-8')
+        (folder / 'map.csv').write_text(_MAP, encoding='utf-8')
+        for number in range(1, self.count + 1):
+            self._run(_PLANT, f'plc{number}', '-m', 'abdf1_ros', 'simulator', '--data',
+                      str(folder / 'plc.csv'), '--tcp', f'127.0.0.1:{5000 + number}')
+            (folder / f'net{number}.csv').write_text(
+                'Station,Com_Port,Baud,Timeout,Cmd_Timeout,NAK_Retries,ENQ_Retries\n'
+                f'5,socket://{network.address(_PLANT)}:{4000 + number},19200,200,500,1,1\n',
+                encoding='utf-8')
+        time.sleep(1.0 + 0.5 * self.count)
+        self._run(_PLANT, 'servers', str(_HERE / 'device_servers.py'), str(_IDLE), *(
+            f'{4000 + number}:{5000 + number}' for number in range(1, self.count + 1)))
+        self._bridges: dict[str, subprocess.Popen[str]] = {}
+        for place, host in enumerate(hosts):
+            own = [*range(place * lines + 1, (place + 1) * lines + 1)]
+            neighbour = (place + 1) % len(hosts)
+            others = [*range(neighbour * lines + 1, (neighbour + 1) * lines + 1)]
+            (folder / f'{host}.yaml').write_text(''.join(
+                f'/line_{number}/abdf1:\n  ros__parameters:\n    standby: true\n'
+                f'    net_file: {folder}/net{number}.csv\n    map_file: {folder}/map.csv\n'
+                for number in (*own, *others)), encoding='utf-8')
+            self.boot(host)
+
+    def _run(self, host: str, name: str, *command: str) -> subprocess.Popen[str]:
+        return self._stack.enter_context(_ending(self.network.start(
+            host, self._folder / f'{name}.log', sys.executable, '-u', *command)))
+
+    def boot(self, host: str) -> None:
+        """Start the process of a host."""
+        self._bridges[host] = self._run(
+            host, host, '-m', 'abdf1_ros', 'lines', '--ros-args', '-r', f'lines:__node:={host}',
+            '--params-file', str(self._folder / f'{host}.yaml'))
+
+    def owner(self, line: int) -> str:
+        """Return the host that has a line."""
+        clients = [said.split() for said in
+                   (self._folder / 'servers.log').read_text(encoding='utf-8').splitlines()]
+        address = [words[1] for words in clients if words[0] == str(4000 + line)][-1]
+        return next(host for host in self.hosts if self.network.address(host) == address)
+
+    def send(self, host: str, number: signal.Signals) -> None:
+        """Send a signal to the process of a host."""
+        os.killpg(self._bridges[host].pid, number)
+
+
+@contextmanager
+def _ending(process: subprocess.Popen[str]) -> Iterator[subprocess.Popen[str]]:
+    try:
+        yield process
+    finally:
+        for number in (signal.SIGCONT, signal.SIGKILL):
+            try:
+                os.killpg(process.pid, number)
+            except ProcessLookupError:
+                pass
+        process.wait()
+
+
+class Judge:
+    """The observer as a process; ``broken`` has what must not be."""
+
+    def __init__(self, network: Network, folder: Path, count: int, stack: ExitStack) -> None:
+        self._process = stack.enter_context(_ending(network.start(
+            _OBSERVER, folder / '-', sys.executable, '-u', str(_HERE / 'observer.py'),
+            str(count))))
+        self.broken: list[str] = []
+        self.state, self.since = 'ill: not looked yet', time.monotonic()
+        self.flows_since = math.inf
+        self.tried = ''
+        self._thread = threading.Thread(target=self._read, daemon=True)
+        self._thread.start()
+
+    def _read(self) -> None:
+        assert self._process.stdout is not None
+        for line in map(str.strip, self._process.stdout):
+            if line.startswith('BROKEN'):
+                self.broken.append(line)
+                print(line, flush=True)
+            elif line.startswith(('ill', 'doubled', 'well')):
+                self.state, self.since = line, time.monotonic()
+                if line.startswith('ill'):
+                    self.flows_since = math.inf
+                else:
+                    self.flows_since = min(self.flows_since, self.since)
+            else:
+                self.tried = line
+
+    def wait(self, seconds: float) -> float | None:
+        """
+        Wait until all lines are well for 2 s; None where that takes too long.
+
+        Return after how long all of them were read and written to. A host that has died is seen
+        for longer: by default up to 20 s.
+        """
+        begun = time.monotonic()
+        while time.monotonic() - begun < seconds:
+            time.sleep(0.05)
+            if self.state == 'well' and time.monotonic() - max(self.since, begun) > 2.0:
+                return max(0.0, self.flows_since - begun)
+        return None
+
+    def end(self) -> str:
+        """End the observer; return what it has judged."""
+        assert self._process.stdin is not None
+        self._process.stdin.close()
+        self._thread.join(10.0)
+        return self.tried
+
+
+def strike(plant: Plant, judge: Judge, fault: str, host: str) -> float | None:
+    """Let a fault begin; return the seconds until all lines are well again, None for too long."""
+    begin = {'kill': lambda: plant.send(host, signal.SIGKILL),
+             'stop': lambda: plant.send(host, signal.SIGSTOP),
+             'cut': lambda: plant.network.connect(host, is_on=False)}[fault]
+    begin()
+    time.sleep(1.0)  # until it shows
+    took = judge.wait(_LIMIT)
+    time.sleep(_FAULT_LASTS if fault != 'kill' else 1.0)
+    if fault == 'kill':
+        plant.boot(host)
+    elif fault == 'stop':
+        plant.send(host, signal.SIGCONT)
+    else:
+        plant.network.connect(host, is_on=True)
+    time.sleep(3.0)
+    back = judge.wait(_LIMIT)
+    return None if took is None or back is None else took + 1.0  # since it has begun
+
+
+def main() -> int:
+    """Rehearse; return the exit status."""
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument('--hosts', type=int, default=3, help='hosts (3)')
+    parser.add_argument('--lines', type=int, default=2, help='lines of each host (2)')
+    parser.add_argument('--seconds', type=float, default=600.0, help='of faults (600)')
+    parser.add_argument('--faults', type=int, help='this many, instead of --seconds')
+    parser.add_argument('--only', action='append', choices=_FAULTS, help='this fault')
+    parser.add_argument('--work', type=Path, help='a folder for files and logs, which stays')
+    parser.add_argument('--discovery-server', action='store_true',
+                        help='let the hosts find each other by a server, not by multicast')
+    parser.add_argument('--seed', type=int, default=secrets.randbelow(1 << 31))
+    options = parser.parse_args()
+    if os.geteuid() or not shutil.which('ip'):
+        print('rehearsal: not done, as namespaces need root and ip')
+        return 0
+    dice, hosts = random.Random(options.seed), [f'h{n}' for n in range(1, options.hosts + 1)]
+    print(f'rehearsal: {options.hosts} hosts of {options.lines} lines, --seed {options.seed}',
+          flush=True)
+    took: dict[str, list[float]] = {fault: [] for fault in _FAULTS}
+    failed, faults = [], options.only or _FAULTS
+    with ExitStack() as stack:
+        folder = options.work or Path(stack.enter_context(
+            tempfile.TemporaryDirectory(prefix='abdf1_rehearsal')))
+        folder.mkdir(parents=True, exist_ok=True)
+        network = stack.enter_context(
+            Network([*hosts, _PLANT, _OBSERVER], has_server=options.discovery_server))
+        if options.discovery_server:
+            stack.enter_context(_ending(network.start(
+                _OBSERVER, folder / 'discovery.log', 'env', f'LD_LIBRARY_PATH={_LIBRARIES}',
+                str(Path(sys.executable).with_name('fast-discovery-server')), '-i', '0', '-l',
+                network.address(_OBSERVER), '-p', '11811')))
+            time.sleep(1.0)
+        plant = Plant(network, folder, hosts, options.lines, stack)
+        judge = Judge(network, folder, plant.count, stack)
+        if judge.wait(60.0) is None:
+            failed.append(f'start: {judge.state}')
+        end, done = time.monotonic() + options.seconds, 0
+        while not failed and (done < options.faults if options.faults is not None
+                              else time.monotonic() < end):
+            fault = faults[done % len(faults)]
+            host = plant.owner(dice.randint(1, plant.count))
+            done += 1
+            seconds = strike(plant, judge, fault, host)
+            if seconds is None:
+                failed.append(f'{fault} of {host}: {judge.state}')
+                print((folder / f'{host}.log').read_text()[-3000:])
+            else:
+                took[fault].append(seconds)
+            print(f'{fault} of {host}: ' + (
+                'never well again' if seconds is None else f'{seconds:.1f} s'), flush=True)
+        tried = judge.end()
+    for fault, times in took.items():
+        if times:
+            print(f'{fault:<6}{len(times):>4} times, all lines read and written to after '
+                  f'{max(times):.1f} s at most')
+    print(tried)
+    for text in failed:
+        print(f'FAILED {text}')
+    return int(bool(failed or judge.broken))
+
+
+if __name__ == '__main__':
+    sys.exit(main())
