@@ -13,10 +13,12 @@
 # limitations under the License.
 
 """
-Read recorded bytes from files of several kinds: captures, packets, hex dumps, raw bytes.
+Read recorded bytes from files of several kinds: captures, packets, dumps, logs, raw bytes.
 
 A hex dump is bytes in hexadecimal, with or without spaces, and with or without the offsets and
 characters that ``xxd`` and ``hexdump -C`` put beside them. It has neither times nor directions.
+``hexdump`` and ``od -x`` alone write words of two bytes, the low one last. Other lines are those
+of logs, see ``logs``.
 """
 
 from __future__ import annotations
@@ -29,6 +31,7 @@ import re
 from abdf1_ros.problems import Problem
 from abdf1_ros.sniffer.capture import Chunk, Direction, is_capture_line, read_capture
 from abdf1_ros.sniffer.ethernet_ip import chunks_of, CSP
+from abdf1_ros.sniffer.logs import LogReader
 from abdf1_ros.sniffer.packet_files import is_packet_file, PacketFile
 from abdf1_ros.sniffer.pcapng import LINK_TYPE
 
@@ -39,6 +42,7 @@ _LONGEST_LINE = 1_000_000
 # The bytes, and after two spaces the same as characters.
 _XXD = re.compile(r'(?P<offset>[0-9a-f]{6,}): (?P<bytes>\S.*?)(?:  .*)?', re.IGNORECASE)
 _HEXDUMP = re.compile(r'(?P<offset>[0-9a-f]{7,})  (?P<bytes>[0-9a-f ]+)(?:\|.*)?', re.IGNORECASE)
+_WORDS = re.compile(r'(?P<offset>[0-9a-f]{7,})(?P<words>(?: +[0-9a-f]{4}){1,8})?', re.IGNORECASE)
 _REPEATED = '*'
 # Bytes that a dump may leave out: hours of one and the same byte on the fastest line.
 _MOST_LEFT_OUT = 100_000_000
@@ -82,6 +86,8 @@ class Recording:
         lines = chain([first], lines)
         if is_capture_line(first):
             return read_capture(self._name, lines, self.settings)
+        if _WORDS.fullmatch(first.strip()) and ' ' in first.strip():
+            return read_words(self._name, lines)
         return read_hex(self._name, lines)
 
     def _packets(self) -> Iterator[Chunk]:
@@ -115,6 +121,7 @@ class Recording:
 
 def read_hex(name: str, lines: Iterable[str]) -> Iterator[Chunk]:
     """Yield the chunks of a hex dump; Problem names file and line of anything else."""
+    log = LogReader()
     end = 0  # where the last line with an offset has ended
     last = b''
     is_repeated = False
@@ -127,8 +134,10 @@ def read_hex(name: str, lines: Iterable[str]) -> Iterator[Chunk]:
             continue
         match = _XXD.fullmatch(line) or _HEXDUMP.fullmatch(line)
         offset = int(match['offset'], 16) if match else _bare_offset(line, end, is_repeated)
-        data = b'' if match is None and offset is not None else _bytes(
-            match['bytes'] if match else line, f'{name}:{number}')
+        if match is None and offset is None:
+            yield from _of_log(log, line, f'{name}:{number}')
+            continue
+        data = _bytes(match['bytes'], f'{name}:{number}') if match else b''
         if is_repeated and offset is not None:
             yield from _repetition(last, offset - end, f'{name}:{number}')
         is_repeated = False
@@ -136,6 +145,46 @@ def read_hex(name: str, lines: Iterable[str]) -> Iterator[Chunk]:
             end, last = (offset or 0) + len(data), data
         if data:
             yield Chunk(None, Direction.UNKNOWN, data)
+
+
+def read_words(name: str, lines: Iterable[str]) -> Iterator[Chunk]:
+    """
+    Yield the chunks of a dump in words, whose offsets are hexadecimal or octal.
+
+    The last offset tells whether the last word is one byte. Problem where the offsets do not fit.
+    """
+    data, last = b'', b''
+    is_repeated = False
+    for number, line in enumerate(lines, 1):
+        where, match = f'{name}:{number}', _WORDS.fullmatch(line.strip())
+        if line.strip() == _REPEATED and last:
+            is_repeated = True
+            continue
+        if match is None:
+            raise Problem(where, f'"{line[:60]}" is not an offset and words as in those before')
+        places = {int(match['offset'], base) for base in (8, 16)
+                  if base == 16 or re.fullmatch('[0-7]+', match['offset'])}
+        if is_repeated:
+            raise Problem(where, 'lines are left out here, and offsets of words may be octal; use '
+                                 '"hexdump -v" or "hexdump -C"')
+        if not places & {len(data), len(data) - 1}:
+            raise Problem(where, f'the offset does not follow {len(data)} bytes')
+        if len(data) not in places:
+            data = data[:-1]
+        last = b''.join(bytes.fromhex(word)[::-1] for word in (match['words'] or '').split())
+        data += last
+    yield Chunk(None, Direction.UNKNOWN, data)
+
+
+def _of_log(log: LogReader, line: str, where: str) -> Iterator[Chunk]:
+    try:
+        chunk = log.read(line)
+    except ValueError:
+        raise Problem(where, f'"{line[:60]}" is not a hexadecimal dump; write bytes as in '
+                      '10 05 01 FF, after a direction such as TX or RX, or give --binary for a '
+                      'file of raw bytes') from None
+    if chunk is not None:
+        yield chunk
 
 
 def _bare_offset(line: str, end: int, is_repeated: bool) -> int | None:

@@ -1,0 +1,165 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+Logs of serial port monitors, by one rule for all.
+
+A line has an optional time, a word or sign for the direction, and bytes as pairs of hexadecimal
+digits with blanks, commas or dashes between; characters beside them have to be the same bytes. A
+line without bytes tells time and direction of the lines after it. What fits the rule in two ways
+is refused.
+"""
+
+from __future__ import annotations
+
+import ast
+from collections.abc import Iterator
+import re
+
+from abdf1_ros.sniffer.capture import Chunk, Direction
+
+# Before a time of day; alone it might be bytes.
+_DATE = r'(?:\d{4}[-/.]\d\d?[-/.]\d\d?|\d\d?[-/.]\d\d?[-/.]\d{2,4})[ T]+'
+_TIME_OF_DAY = re.compile(
+    rf'(?:{_DATE})?(?P<hours>\d\d?):(?P<minutes>\d\d):(?P<seconds>\d\d(?:[.,]\d+)?)(?!:?\d)')
+_SECONDS = re.compile(r'(?<![\d.])\d+\.\d{3,}(?![\d.])')
+_DAY = 86400.0
+
+_OUT = {'tx', 'sent', 'send', 'sending', 'written', 'write', 'wrote', 'irp_mj_write', 'out',
+        'transmit', 'transmitted', '>', '>>', '>>>', '->', '-->'}
+_IN = {'rx', 'received', 'receive', 'recv', 'receiving', 'read', 'irp_mj_read', 'in', '<', '<<',
+       '<<<', '<-', '<--'}
+_WORD = re.compile(r'[A-Za-z_]+|-*>+|<+-*')
+
+# Nothing but bytes: pairs, or groups of them, with one sign between.
+_PAIRS = re.compile(r'(?P<group>(?:[0-9A-Fa-f]{2})+)(?:(?P<sign>[ -])(?:[0-9A-Fa-f]{2})+'
+                    r'(?:(?P=sign)(?:[0-9A-Fa-f]{2})+)*)?')
+_BYTE = r'(?:0x)?[0-9A-Fa-f]{2}'
+_AFTER = r'(?![0-9A-Za-z:=.])'
+# Up to the characters beside them, which may look like more bytes.
+_BYTES = re.compile(rf'(?:^|(?<=[\s,\[({{"\'])){_BYTE}(?:[\s,;-]+{_BYTE})*{_AFTER}')
+_GAP = re.compile(r'\s{2,}|\t')
+_REST = re.compile(r'[\s,;\])}"\']*')
+# What a line with a direction, and without bytes, must not have.
+_LEFT_OVER = re.compile(r'(?<![\w=(.])[0-9A-Fa-f]{1,4}(?![\w=)]| bytes?\b)')
+_LITERAL = re.compile(r'\bb(?P<sign>[\'"])(?:\\.|(?!(?P=sign)).)*(?P=sign)')
+
+
+class LogReader:
+    """
+    Read the lines of a log, one after the other.
+
+    ``read`` returns the chunk of a line, None for one without bytes; ValueError for a line that
+    does not fit the rule.
+    """
+
+    def __init__(self) -> None:
+        self._way = Direction.UNKNOWN
+        self._time: float | None = None
+        self._begun: float | None = None
+        self._is_first = True
+
+    def read(self, line: str) -> Chunk | None:
+        """Read a line that is not empty."""
+        is_first, self._is_first = self._is_first, False
+        if _PAIRS.fullmatch(line):
+            return self._chunk(bytes.fromhex(line.replace('-', '')))
+        head, data = _divided(line)
+        time, words = _time_of(head)
+        ways = [way for way, names in ((Direction.OUT, _OUT), (Direction.IN, _IN))
+                if names & {word.lower() for word in _WORD.findall(words)}]
+        has_words = re.search('[A-Za-z]', words) is not None
+        if time is None and not ways and not data and not (is_first and ',' in line):
+            raise ValueError
+        if ways and not data and _LEFT_OVER.search(words):
+            raise ValueError
+        if data and has_words and not ways and '0x' not in line.lower():
+            data = b''  # such as the settings of a port in the log of a port monitor
+            if time is None:
+                raise ValueError
+        if time is not None:
+            self._time = self._since_begin(time)
+        if ways or not data or has_words:
+            self._way = ways[0] if len(ways) == 1 else Direction.UNKNOWN
+        return self._chunk(data) if data else None
+
+    def _chunk(self, data: bytes) -> Chunk:
+        return Chunk(self._time, self._way, data)
+
+    def _since_begin(self, time: float) -> float:
+        if self._begun is None:
+            self._begun = time
+        later = time - self._begun
+        while self._time is not None and later < self._time - _DAY / 2:
+            later += _DAY  # a time of day starts again at midnight
+        return later
+
+
+def _divided(line: str) -> tuple[str, bytes]:
+    """Return what stands before the bytes of a line, and these; ValueError where it is unclear."""
+    if match := _LITERAL.search(line):
+        data = ast.literal_eval(match[0])
+        assert isinstance(data, bytes)
+        return line[:match.start()], data
+    rest = _TIME_OF_DAY.sub(lambda match: '~' * len(match[0]), line)
+    match = next((match for match in _BYTES.finditer(rest)
+                  if _REST.fullmatch(rest, match.end()) or _GAP.match(rest, match.end())
+                  or _GAP.search(match[0])), None)
+    if match is None:
+        return line, b''
+    data = _bytes_of(rest, match)
+    head = line[:match.start()]
+    # "RX 02 10 06": a count of two bytes, or three bytes?
+    first = re.match(r'\d\d\b', match[0])
+    if first and re.search('[A-Za-z]\\s*$', head) and int(first[0]) == len(data) - 1:
+        raise ValueError
+    return head, data
+
+
+def _bytes_of(line: str, match: re.Match[str]) -> bytes:
+    """Return the bytes of a run, without the characters beside them."""
+    for text, others in _splits(line, match.start()):
+        data = bytes.fromhex(re.sub('0x|[,;-]', ' ', text, flags=re.IGNORECASE))
+        if _are_characters(others, data):
+            return data
+    if _REST.fullmatch(line, match.end()):
+        return bytes.fromhex(re.sub('0x|[,;-]', ' ', match[0], flags=re.IGNORECASE))
+    raise ValueError
+
+
+def _splits(line: str, start: int) -> Iterator[tuple[str, str]]:
+    """Yield the ways to divide a line into bytes and characters: at each gap."""
+    for gap in _GAP.finditer(line, start):
+        text = line[start:gap.start()]
+        if re.fullmatch(rf'{_BYTE}(?:[\s,;-]+{_BYTE})*', text):
+            yield text, line[gap.end():]
+
+
+def _are_characters(text: str, data: bytes) -> bool:
+    """Tell whether a text is what a dump shows of bytes: themselves, or a sign for others."""
+    text, data = text.strip(' '), data.strip(b' ')  # blanks at the ends may be missing
+    return len(text) == len(data) > 0 and all(
+        chr(byte) == sign or sign == '.' or not (0x20 < byte < 0x7F or sign.isalnum())
+        for sign, byte in zip(text, data, strict=True))
+
+
+def _time_of(head: str) -> tuple[float | None, str]:
+    """Return the time (s) of a head, and its other words."""
+    if match := _TIME_OF_DAY.search(head):
+        time = 3600.0 * int(match['hours']) + 60 * int(match['minutes']) \
+            + float(match['seconds'].replace(',', '.'))
+        return time, head[:match.start()] + ' ' + head[match.end():]
+    if match := _SECONDS.search(head):
+        return float(match[0]), head[:match.start()] + ' ' + head[match.end():]
+    return None, head

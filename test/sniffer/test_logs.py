@@ -1,0 +1,200 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Logs of serial port monitors: what each form says comes back, or the line is refused."""
+
+from collections.abc import Callable, Iterator
+from contextlib import suppress
+
+from abdf1_ros.problems import Problem
+from abdf1_ros.sniffer.capture import Chunk, Direction
+from abdf1_ros.sniffer.dumps import read_hex, read_words
+from hypothesis import given
+from hypothesis import strategies as st
+import pytest
+from support.cases import for_all
+
+OUT, IN, UNKNOWN = Direction.OUT, Direction.IN, Direction.UNKNOWN
+# A read of an SLC, its ACK, the reply and its ACK: what went out first.
+SAID = [(OUT, '10 02 02 05 0F 00 34 12 A2 04 07 89 00 00 10 03 B7 2A'), (IN, '10 06'),
+        (IN, '10 02 05 02 4F 00 34 12 41 42 43 44 10 03 11 22'), (OUT, '10 06')]
+Writer = Callable[[list[tuple[Direction, bytes]]], Iterator[str]]
+
+
+def characters(data: bytes) -> str:
+    return ''.join(chr(byte) if 32 <= byte < 127 else '.' for byte in data)
+
+
+def rows(data: bytes) -> Iterator[tuple[int, bytes]]:
+    return ((at, data[at:at + 16]) for at in range(0, len(data), 16))
+
+
+def word(way: Direction, names: str) -> str:
+    return names.split()[way is IN]
+
+
+def terminal(said: list[tuple[Direction, bytes]]) -> Iterator[str]:
+    for way, data in said:
+        yield f'{word(way, "TX: RX:")} {data.hex(" ").upper()}'
+
+
+def array(said: list[tuple[Direction, bytes]]) -> Iterator[str]:
+    for _, data in said:
+        yield '{ ' + ', '.join(f'0x{byte:02x}' for byte in data) + ' },'
+
+
+def dashes(said: list[tuple[Direction, bytes]]) -> Iterator[str]:
+    for _, data in said:
+        yield data.hex('-').upper()
+
+
+def docklight(said: list[tuple[Direction, bytes]]) -> Iterator[str]:
+    for number, (way, data) in enumerate(said):
+        yield (f'25.11.2026 19:00:00.{number:03} {word(way, "[TX] [RX]")} - '
+               f'{data.hex(" ").upper()} ')
+
+
+def monitor(said: list[tuple[Direction, bytes]]) -> Iterator[str]:
+    for number, (way, data) in enumerate(said):
+        yield f'[25/11/2026 19:00:{number:02}] {word(way, "Written Read")} data (COM12)'
+        for _, row in rows(data):
+            yield f'    {row.hex(" "):<47}   {characters(row)}'
+
+
+def driver(said: list[tuple[Direction, bytes]]) -> Iterator[str]:
+    yield '0\t0.00000000\tapp.exe\tIRP_MJ_CREATE\tSerial10\tSUCCESS\tOptions: Open '
+    yield '1\t0.00001000\tapp.exe\tIOCTL_SERIAL_SET_CHARS\tSerial10\tSUCCESS\tXON:11 XOFF: 13'
+    for number, (way, data) in enumerate(said, 2):
+        yield (f'{number}\t{number / 1000:.8f}\tapp.exe\tIRP_MJ_{word(way, "WRITE READ")}'
+               f'\tSerial10\tSUCCESS\tLength {len(data)}: {data.hex(" ").upper()} \t')
+
+
+def spy(said: list[tuple[Direction, bytes]]) -> Iterator[str]:
+    for number, (way, data) in enumerate(said):
+        for at, row in rows(data):
+            left, right = row[:8].hex(' ').upper(), row[8:].hex(' ').upper()
+            yield (f'{number / 1000:010.3f} {word(way, "TX RX")}   {at:04X}  {left:<23}  '
+                   f'{right:<23}  {characters(row)}')
+
+
+def python(said: list[tuple[Direction, bytes]]) -> Iterator[str]:
+    for way, data in said:
+        yield f'{word(way, "Sent: Received:")} {data!r}'
+
+
+def analyser(said: list[tuple[Direction, bytes]]) -> Iterator[str]:
+    yield 'Time [s],Value,Parity Error,Framing Error'
+    for number, byte in enumerate(b''.join(data for _, data in said)):
+        yield f'{number / 1000:.6f},0x{byte:02X},,'
+
+
+def relay(said: list[tuple[Direction, bytes]]) -> Iterator[str]:
+    at = 0
+    for number, (way, data) in enumerate(said):
+        yield (f'{way.value} 2026/11/25 19:00:00.{number:06}  length={len(data)} from={at} '
+               f'to={at + len(data) - 1}')
+        yield f' {data.hex(" ")}'
+        at += len(data)
+
+
+def two_ports(said: list[tuple[Direction, bytes]]) -> Iterator[str]:
+    for number, (way, data) in enumerate(said):
+        yield f'2026-11-25 19:00:00.{number:06}: {word(way, "ttyS0 ttyS1")}'
+        for _, row in rows(data):
+            yield f'{row.hex(" ").upper():<47}       {characters(row)}'
+
+
+WITH_WAYS = [terminal, docklight, monitor, driver, spy, python, relay]
+WITH_TIMES = [docklight, monitor, driver, spy, relay, two_ports, analyser]
+FORMS = [*WITH_WAYS, array, dashes, analyser, two_ports]
+
+
+def read(lines: Iterator[str]) -> list[Chunk]:
+    return list(read_hex('x', lines))
+
+
+@for_all('write', FORMS)
+def test_each_form_gives_back_bytes_directions_and_times(write: Writer) -> None:
+    said = [(way, bytes.fromhex(text)) for way, text in SAID]
+    chunks = read(write(said))
+    assert b''.join(chunk.data for chunk in chunks) == b''.join(data for _, data in said)
+    if write in WITH_WAYS:
+        merged: list[tuple[Direction, bytes]] = []
+        for chunk in chunks:  # rows of one message, and messages of one way after each other
+            before = merged.pop() if merged and merged[-1][0] is chunk.direction else (
+                chunk.direction, b'')
+            merged.append((chunk.direction, before[1] + chunk.data))
+        assert merged == [said[0], (IN, said[1][1] + said[2][1]), said[3]]
+    else:
+        assert {chunk.direction for chunk in chunks} == {UNKNOWN}
+    times = [chunk.time for chunk in chunks]
+    if write in WITH_TIMES:
+        assert times == sorted(times) and times[-1] > times[0] >= 0  # type: ignore[operator, type-var]
+    else:
+        assert set(times) == {None}
+
+
+@given(st.sampled_from(FORMS), st.lists(st.tuples(
+    st.sampled_from([OUT, IN]), st.binary(min_size=1, max_size=40)), min_size=1, max_size=5))
+def test_whatever_the_bytes_are_none_is_misread(
+        write: Writer, said: list[tuple[Direction, bytes]]) -> None:
+    with suppress(Problem):
+        chunks = read(write(said))
+        assert b''.join(chunk.data for chunk in chunks) == b''.join(data for _, data in said)
+
+
+@given(st.binary(min_size=1, max_size=70), st.sampled_from(['07x', '07o']))
+def test_words_of_hexdump_and_od_give_back_their_bytes(data: bytes, offset: str) -> None:
+    lines = []
+    for at, row in rows(data):
+        pairs = [row[n:n + 2].ljust(2, b'\0')[::-1].hex() for n in range(0, len(row), 2)]
+        lines.append(f'{at:{offset}} {" ".join(pairs)}')
+    chunk, = read_words('x', [*lines, f'{len(data):{offset}}'])
+    assert chunk == Chunk(None, UNKNOWN, data)
+
+
+@pytest.mark.parametrize(('lines', 'text'), [
+    (['0000000 0210', '*', '0000040'], 'use "hexdump -v" or "hexdump -C"'),
+    (['0000000 0210', '0000030 0310'], 'the offset does not follow 2 bytes'),
+    (['0000000 0210', 'TX 10'], 'is not an offset and words')])
+def test_words_whose_offsets_do_not_fit_are_refused(lines: list[str], text: str) -> None:
+    with pytest.raises(Problem, match=text):
+        list(read_words('x', lines))
+
+
+@pytest.mark.parametrize('line', [
+    'TX 02 10 06',  # a count and two bytes, or three bytes
+    'TX 10 06    ABCD', 'TX: 10 0', 'TX 10 06 and more', 'COM1 opened', 'TX: 10:06', 'RX 1006 1'])
+def test_what_can_be_read_in_two_ways_is_refused(line: str) -> None:
+    with pytest.raises(Problem, match='is not a hexadecimal dump'):
+        assert read(iter(['TX: 10 05', line])) == []
+
+
+def test_characters_that_look_like_bytes_stay_characters() -> None:
+    data = b'41 42  4'
+    for line in (f'TX  {data.hex(" ")}  {characters(data)}',
+                 f'TX   0000  {data.hex(" ")}   {characters(data)}'):
+        chunk, = read(iter([line]))
+        assert (chunk.data, chunk.direction) == (data, OUT)
+
+
+def test_time_of_day_goes_on_after_midnight() -> None:
+    lines = ['23:59:59.900 TX: 10 05', '00:00:00.100 RX: 10 06', '00:00:01,100 RX: 10 06']
+    times = [chunk.time for chunk in read(iter(lines))]
+    assert times == [0.0, pytest.approx(0.2), pytest.approx(1.2)]
+
+
+def test_direction_holds_for_lines_without_one_until_the_next() -> None:
+    lines = ['TX: 10 02', '01 02', 'RX: 10 06', 'uint8_t tx[] = { 0x10, 0x04 };']
+    assert [chunk.direction for chunk in read(iter(lines))] == [OUT, OUT, IN, OUT]
