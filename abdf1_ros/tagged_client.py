@@ -20,9 +20,9 @@ from collections.abc import Callable, Iterable, Sequence
 import logging
 from typing import Any, overload
 
-from abdf1_ros.client import LOG, OpenLine, plain, single, text_of, values_of
 from abdf1_ros.df1.stations import MAX_STATION
 from abdf1_ros.errors import FormatError
+from abdf1_ros.open_line import LOG, OpenLine, plain, single, text_of, values_of
 from abdf1_ros.pccc import steps
 from abdf1_ros.pccc.steps import AddressedValues
 from abdf1_ros.pccc.values import Values

@@ -28,12 +28,13 @@ from types import FrameType
 from typing import Any
 
 from abdf1_ros.cli.sniff import main as sniff
-from abdf1_ros.client import Client, Pending
+from abdf1_ros.client import Client
 from abdf1_ros.counters import Counters
 from abdf1_ros.df1.peer import PEER
 from abdf1_ros.df1.stations import ActiveStationList
 from abdf1_ros.df1.tasks import TaskSource
 from abdf1_ros.errors import FormatError, LinkError, RemoteError
+from abdf1_ros.open_line import Pending
 from abdf1_ros.pccc.identity import Mode
 from abdf1_ros.ports.endpoints import PtyEndpoint
 from abdf1_ros.ports.link_thread import LinkThread

@@ -20,13 +20,13 @@ import sys
 import pytest
 from support.cases import for_all
 
-from tools.rooms import imports, MODULES, PACKAGE, room_of
+from tools.rooms import imports, MODULES, PACKAGE, room_of, ROOMS
 
 _SANS_IO = {'time', 'threading', 'serial', 'select', 'socket', 'os', 'rclpy'}
 # The shells that wait for signals, input or bytes; only one of them opens a port.
 _WAITING = {'select', 'threading'}
 _MAY_WAIT = ('signals.py', 'testing.py', 'ports/', 'ros/lines.py', 'ros/process/main.py',
-             'ros/process/callbacks.py', 'ros/process/console.py', 'cli/simulator.py',
+             'ros/callbacks.py', 'ros/process/console.py', 'cli/simulator.py',
              'cli/sniff.py', 'cli/plc/watch.py')
 
 
@@ -62,6 +62,52 @@ def violations(module: str, source: str) -> list[str]:
 def test_imports_follow_the_arrows(module: str) -> None:
     source = (PACKAGE / module).read_text(encoding='utf-8')
     assert violations(module, source) == []
+
+
+def imported(module: str) -> set[str]:
+    """Return what a module imports of the package, by dotted names."""
+    source = (PACKAGE / module).read_text(encoding='utf-8')
+    return {name.removeprefix('abdf1_ros.') for name in imports(module, source)
+            if name.startswith('abdf1_ros.')}
+
+
+def test_rooms_allow_nothing_that_is_not_used() -> None:
+    unused = []
+    for room in ROOMS:
+        used = set().union(*(imported(module) for module in MODULES if room.has(module)))
+        unused += [(room.name, entry) for entry in room.allowed or () if not any(
+            name == entry or name.startswith(f'{entry}.') for name in used)]
+    assert unused == []
+
+
+def circles(arrows: dict[str, set[str]]) -> set[str]:
+    """Return those that reach themselves."""
+    left = {name: {*to} for name, to in arrows.items()}
+    while ends := {name for name, to in left.items() if not to & left.keys()}:
+        left = {name: to for name, to in left.items() if name not in ends}
+    return {*left}
+
+
+def test_no_module_imports_itself_by_others() -> None:
+    arrows = {module.removesuffix('.py').replace('/', '.'): imported(module)
+              for module in MODULES}
+    assert circles({name: to - {name} for name, to in arrows.items()}) == set()
+    assert circles({'a': {'b'}, 'b': {'a'}, 'c': {'a'}, 'd': set()}) == {'a', 'b', 'c'}
+
+
+@pytest.mark.parametrize('room', ['ros', 'driver', 'pccc', 'cli'])
+def test_folders_of_a_room_import_one_way(room: str) -> None:
+    arrows: dict[str, set[str]] = {}
+
+    def place(name: str) -> str:
+        return '.'.join(name.split('.')[:2])
+
+    for module in MODULES:
+        if module.startswith(f'{room}/'):
+            name = module.removesuffix('.py').replace('/', '.')
+            arrows.setdefault(place(name), set()).update(
+                place(other) for other in imported(module) if other.startswith(f'{room}.'))
+    assert circles({name: to - {name} for name, to in arrows.items()}) == set()
 
 
 @for_all('module', MODULES)

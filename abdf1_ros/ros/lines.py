@@ -33,15 +33,15 @@ from typing import Any
 from abdf1_ros.ports.clock import line_time
 from abdf1_ros.problems import ConfigurationError, Place, Problem
 from abdf1_ros.ros.bridge.node import BridgeNode
+from abdf1_ros.ros.bridge.port_owners import PortOwners
+from abdf1_ros.ros.callbacks import AnsweringNode, Executor
 from abdf1_ros.ros.diagnostics.graph import DISCOVERY, Graph, NameWatch
 from abdf1_ros.ros.diagnostics.log import bug_text, LimitedLog
 from abdf1_ros.ros.diagnostics.status import ERROR, message_of, OK, WARN, WORDS
 from abdf1_ros.ros.parameters.arguments import Arguments
 from abdf1_ros.ros.parameters.declared import take_given, wrong_names
 from abdf1_ros.ros.parameters.files import node_sections, parameter_files, parameter_tree
-from abdf1_ros.ros.process.callbacks import AnsweringNode, Executor
 from abdf1_ros.ros.process.main import EXIT_CONFIGURATION, make_parser, Program, REFUSALS, run_ros
-from abdf1_ros.ros.process.port_owners import PortOwners
 from abdf1_ros.ros.process.runner import Line, LinkFailed, Runner
 from abdf1_ros.signals import EndRequest
 from abdf1_ros.text import printable

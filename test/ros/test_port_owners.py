@@ -17,7 +17,7 @@
 from pathlib import Path
 
 from abdf1_ros.problems import ConfigurationError
-from abdf1_ros.ros.process.port_owners import PortOwners
+from abdf1_ros.ros.bridge.port_owners import PortOwners
 import pytest
 
 

@@ -19,7 +19,7 @@ from pathlib import Path
 import re
 import signal
 
-from abdf1_ros.ros.process.main import LAST_WRITES, take_last_writes
+from abdf1_ros.ros.bridge.last_writes import LAST_WRITES, take_last_writes
 import pytest
 from rclpy.duration import Infinite
 from std_msgs.msg import (  # noqa: I101

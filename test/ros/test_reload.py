@@ -22,11 +22,11 @@ from typing import Any
 from abdf1_ros.ports.link_thread import LinkThread
 from abdf1_ros.ports.opening import open_port
 from abdf1_ros.ports.settings import PortSettings
-from abdf1_ros.ros.bridge.files import FileWatch
 from abdf1_ros.ros.bridge.guests import GuestPlaces
 from abdf1_ros.ros.bridge.session import Session
 from abdf1_ros.ros.diagnostics.graph import Graph
 from abdf1_ros.ros.diagnostics.line import LineView
+from abdf1_ros.ros.parameters.file_watch import FileWatch
 from abdf1_ros.ros.parameters.shown import ShownFiles
 import pytest
 from rcl_interfaces.srv import GetParameters
@@ -87,7 +87,7 @@ class Bench(BridgeCell):
 
 @pytest.fixture
 def bench(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Bench]:
-    monkeypatch.setattr('abdf1_ros.ros.bridge.files._PERIOD', 0.3)
+    monkeypatch.setattr('abdf1_ros.ros.parameters.file_watch._PERIOD', 0.3)
     with Bench(tmp_path, DATA, '\n'.join((HEADER, SPEED, RECIPE)),
                'Baud,Timeout\n115200,100') as bench:
         yield bench

@@ -21,8 +21,8 @@ import time
 from typing import Any
 
 from abdf1_ros.ros.bridge.node import end_together
+from abdf1_ros.ros.callbacks import AnsweringNode, Callbacks
 from abdf1_ros.ros.diagnostics.log import MOST_ENTRIES
-from abdf1_ros.ros.process.callbacks import AnsweringNode, Callbacks
 from abdf1_ros.testing import PATIENCE
 import pytest
 from rclpy.executors import SingleThreadedExecutor

@@ -20,7 +20,7 @@ from types import SimpleNamespace
 from typing import Any, cast
 
 from abdf1_ros.driver.driver import Driver
-from abdf1_ros.ros.process.callbacks import AnsweringNode
+from abdf1_ros.ros.callbacks import AnsweringNode
 from abdf1_ros.ros.topics.writes import count_publishers, LossCounter, WriteTopics
 from abdf1_ros.settings.mapping import Mapping
 import pytest

@@ -25,11 +25,11 @@ import time
 from typing import TypeAlias
 
 from abdf1_ros.cli.plc.session import Session
-from abdf1_ros.client import Pending
 from abdf1_ros.driver.write import Outcome, Write, WriteResult
 from abdf1_ros.driver.writes.packets import carry_out
 from abdf1_ros.errors import Abdf1Error, FormatError, PortLost
 from abdf1_ros.numbers import decimal_number, two_readings, whole_number
+from abdf1_ros.open_line import Pending
 from abdf1_ros.pccc import steps
 from abdf1_ros.pccc.families import FAMILIES
 from abdf1_ros.pccc.file_types import PlcType

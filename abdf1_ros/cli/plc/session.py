@@ -18,7 +18,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 
-from abdf1_ros import client
+from abdf1_ros import open_line
 from abdf1_ros.cli.terminal import NoPort
 from abdf1_ros.df1.stations import MAX_STATION
 from abdf1_ros.pccc.file_types import PlcType
@@ -30,12 +30,12 @@ from abdf1_ros.settings.network import Network
 def opened(network: Network) -> Callable[[], Port]:
     """Open the port of ``network``; NoPort when that fails."""
     try:
-        return client.opened(PortSettings.of(network))
+        return open_line.opened(PortSettings.of(network))
     except OSError as error:
         raise NoPort(network.port, error) from None
 
 
-class Session(client.OpenLine):
+class Session(open_line.OpenLine):
     """
     The line of a net CSV; with ``via`` all stations are behind this gateway.
 

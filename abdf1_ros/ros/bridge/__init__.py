@@ -12,4 +12,4 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""One bridge: its node, the session of a pair of files, and the places of guests."""
+"""One bridge: its node and port, the session of a pair of files, and the places of guests."""

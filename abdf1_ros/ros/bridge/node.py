@@ -32,9 +32,12 @@ from abdf1_ros.ports.link_thread import LinkThread, PortState
 from abdf1_ros.ports.settings import PortSettings
 from abdf1_ros.ports.trace import PortOpener
 from abdf1_ros.problems import ConfigurationError
+from abdf1_ros.ros.bridge.last_writes import LAST_WRITES, take_last_writes
 from abdf1_ros.ros.bridge.offer import OfferedPublisher
+from abdf1_ros.ros.bridge.port_owners import PortOwners
 from abdf1_ros.ros.bridge.reload import changes, refuse_harm
 from abdf1_ros.ros.bridge.session import Session, Surroundings, tell_plcs
+from abdf1_ros.ros.callbacks import AnsweringNode
 from abdf1_ros.ros.diagnostics.graph import DISCOVERY, Graph, NameWatch
 from abdf1_ros.ros.diagnostics.log import bug_text
 from abdf1_ros.ros.parameters.arguments import Arguments
@@ -46,9 +49,6 @@ from abdf1_ros.ros.parameters.declared import (
     read_again,
 )
 from abdf1_ros.ros.parameters.shown import ShownFiles
-from abdf1_ros.ros.process.callbacks import AnsweringNode
-from abdf1_ros.ros.process.main import LAST_WRITES, take_last_writes
-from abdf1_ros.ros.process.port_owners import PortOwners
 from abdf1_ros.ros.topics.messages import latched_qos
 from abdf1_ros.ros.topics.writes import WriteTopics
 from abdf1_ros.text import printable

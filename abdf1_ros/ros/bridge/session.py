@@ -38,6 +38,7 @@ from abdf1_ros.ports.link_thread import LinkThread, PortState
 from abdf1_ros.ports.trace import PortOpener
 from abdf1_ros.ros.bridge.guests import GuestPlaces
 from abdf1_ros.ros.bridge.offer import OfferedPublisher
+from abdf1_ros.ros.callbacks import AnsweringNode
 from abdf1_ros.ros.diagnostics.events import LineEvents
 from abdf1_ros.ros.diagnostics.graph import Graph, NameWatch, TypeWatch
 from abdf1_ros.ros.diagnostics.stations import LinkCounterService
@@ -45,7 +46,6 @@ from abdf1_ros.ros.diagnostics.status import Seen
 from abdf1_ros.ros.diagnostics.statuses import Diagnostics
 from abdf1_ros.ros.diagnostics.watches import Watch, watches_of
 from abdf1_ros.ros.parameters.declared import Configuration
-from abdf1_ros.ros.process.callbacks import AnsweringNode
 from abdf1_ros.ros.topics.interlocks import InterlockWatch
 from abdf1_ros.ros.topics.messages import ACTIVE_LAYOUT
 from abdf1_ros.ros.topics.reads import ReadTopic, ReadTopics

@@ -31,8 +31,8 @@ from abdf1_ros.paths import config_file
 from abdf1_ros.plan.forecast import USUAL_STALE_AFTER
 from abdf1_ros.plan.usable_rows import usable_rows
 from abdf1_ros.problems import ConfigurationError, Place, Problem
-from abdf1_ros.ros.bridge.files import FileWatch
 from abdf1_ros.ros.parameters.arguments import Arguments, is_for
+from abdf1_ros.ros.parameters.file_watch import FileWatch
 from abdf1_ros.ros.parameters.files import parameters_in
 from abdf1_ros.ros.parameters.shown import descriptor_of, map_cells, MOST_SHOWN_ROWS, text_of
 from abdf1_ros.settings.columns import COLUMNS, MAX_PERIOD

@@ -12,4 +12,4 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The process of one bridge or many: start, signals, end, and who owns a port."""
+"""The process of one bridge or many: start, signals, and end."""

@@ -60,14 +60,6 @@ _DESTRUCTION_LIMIT = 4.5
 REFUSALS = (NameValidationException, ParameterException, rclpy_implementation.RCLError,
             rclpy_implementation.UnknownROSArgsError)
 
-# A look that takes so long (s) without a write has found none. Only several in a row tell that no
-# write from before the end still waits: another callback, held up by a busy host, takes as long.
-_LOOK = 0.02
-_LOOKS = 3
-
-# A publisher that never pauses is not waited for longer than this (s).
-LAST_WRITES = 1.5
-
 # The beginnings of rclpy's errors about the log directory.
 _LOG_FAILURES = re.compile('.*Failed to create log directory|Failed opening file')
 
@@ -232,21 +224,6 @@ def _destroy(program: Program, give_up: float) -> None:
     thread = threading.Thread(target=destroy, name='destroying', daemon=True)
     thread.start()
     thread.join(max(0.0, give_up - time.monotonic()))
-
-
-def take_last_writes(look: Callable[[float], None], taken: Callable[[], int], give_up: float,
-                     now: Callable[[], float] = time.monotonic) -> None:
-    """
-    Let a node take the writes that have come before its end, so that each has its result.
-
-    ``look`` lets callbacks run for so long (s) at most, ``taken`` counts the writes; ``give_up``
-    is a value of the clock ``now``.
-    """
-    empty = 0
-    while empty < _LOOKS and (begun := now()) < give_up:
-        before = taken()
-        look(_LOOK)
-        empty = empty + 1 if taken() == before and now() - begun >= _LOOK else 0
 
 
 def _check_log_directory() -> None:

@@ -34,7 +34,7 @@ from abdf1_ros.driver.writes.ages import Ages, most_ahead, Standstills
 from abdf1_ros.driver.writes.queue import MAX_WAITING_WRITES
 from abdf1_ros.errors import FormatError
 from abdf1_ros.ports.clock import line_time
-from abdf1_ros.ros.process.callbacks import AnsweringNode
+from abdf1_ros.ros.callbacks import AnsweringNode
 from abdf1_ros.ros.topics.messages import MESSAGES, values_of, write_qos
 from abdf1_ros.settings.mapping import Mapping
 from abdf1_ros.text import printable

@@ -30,9 +30,9 @@ from abdf1_ros.cli.plc.data import (
     Writing,
 )
 from abdf1_ros.cli.plc.session import Session
-from abdf1_ros.client import Pending
 from abdf1_ros.driver.write import Outcome, WriteResult
 from abdf1_ros.errors import FormatError, PortLost
+from abdf1_ros.open_line import Pending
 from abdf1_ros.pccc.processor import Processor
 from abdf1_ros.problems import ConfigurationError
 from abdf1_ros.settings.mapping import Mapping

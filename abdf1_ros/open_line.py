@@ -1,0 +1,263 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""An open line: requests of one program, each with its result, and what goes with that."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager, suppress
+import logging
+from numbers import Real
+import os
+from queue import Empty, SimpleQueue
+import random
+import time
+from types import TracebackType
+from typing import Any, Generic, Self, TYPE_CHECKING, TypeVar
+
+from abdf1_ros.df1.mode import LineMode
+from abdf1_ros.df1.settings import LinkSettings
+from abdf1_ros.driver.requests import Requests
+from abdf1_ros.errors import Abdf1Error, FormatError, PortLost
+from abdf1_ros.messages import Event, Severity
+from abdf1_ros.pccc.dialect import Steps
+from abdf1_ros.pccc.file_types import PlcType
+from abdf1_ros.pccc.values import Values, ValueType
+from abdf1_ros.ports.descriptor import Port
+from abdf1_ros.ports.link_thread import LinkThread
+from abdf1_ros.ports.opening import open_port
+from abdf1_ros.ports.ownership import line_of
+from abdf1_ros.ports.settings import PortSettings
+from abdf1_ros.text import shown
+
+if TYPE_CHECKING:
+    from abdf1_ros.plan.line_model import LineModel
+    from abdf1_ros.ports.trace import Trace
+
+_GLANCE = 0.2  # s; while waiting, look so often whether the thread of the link still runs
+
+LOG = logging.getLogger('abdf1_ros')
+"""The logger where no other is given: requests with their times, and what happens on the line."""
+
+_Result = TypeVar('_Result')
+
+_ours: set[str] = set()  # the lines that this program has open
+
+
+def opened(settings: PortSettings) -> Callable[[], Port]:
+    """
+    Open a port; return a function that returns it, and later opens it again.
+
+    So a port that does not exist is an OSError here, not a state of a thread.
+    """
+    try:
+        ports = [open_port(settings)]
+    except OSError as error:
+        if line_of(settings.name) in _ours:
+            error.strerror = 'this program has it open already; is a close() missing?'
+        error.filename = error.filename or settings.name
+        raise
+    return lambda: ports.pop() if ports else open_port(settings)
+
+
+class Pending(Generic[_Result]):
+    """
+    What a request comes to, made in the thread of the link.
+
+    Not a Future: its lock stays taken for ever when a KeyboardInterrupt comes between taking it
+    and the block that gives it back, and then the thread of the link never ends.
+    """
+
+    def __init__(self) -> None:
+        self.error: Exception | None = None
+        self._results: list[_Result] = []
+        self._ended: SimpleQueue[None] = SimpleQueue()
+
+    @property
+    def is_done(self) -> bool:
+        """Tell whether the request has ended."""
+        return self.error is not None or bool(self._results)
+
+    def succeed(self, result: _Result) -> None:
+        """End the request with its result."""
+        self._results.append(result)
+        self._ended.put(None)
+
+    def fail(self, error: Exception) -> None:
+        """End the request with an error."""
+        self.error = error
+        self._ended.put(None)
+
+    def wait(self, seconds: float) -> bool:
+        """Wait for the end, but not for longer; return whether it has come."""
+        if not self.is_done:
+            with suppress(Empty):
+                self._ended.get(timeout=seconds)
+        return self.is_done
+
+    def result(self) -> _Result:
+        """Return the result of a request that has ended; raises its error."""
+        if self.error is not None:
+            raise self.error
+        return self._results[0]
+
+
+class OpenLine:
+    """
+    A line on which one request is carried out after the other, from here to the end of ``with``.
+
+    ``absent`` stations get one try; ``routes`` gives the gateways of stations that are behind one.
+    To a PLC that asks us we are a ``plc_type``. ``counters`` are those of the line, ``stations``
+    what is known of each station. All bytes go into the file ``trace``, for ``sniff``. Raises
+    OSError when the port cannot be opened or the file not be written.
+    """
+
+    def __init__(self, mode: LineMode, line: LinkSettings, port: PortSettings,
+                 absent: Sequence[int] = (), routes: Mapping[int, int] | None = None,
+                 plc_type: PlcType = PlcType.PLC5, trace: str | None = None,
+                 logger: logging.Logger = LOG) -> None:
+        self.log = logger
+        self._mode, self._settings = mode, line
+        self._requests = Requests(mode, line, absent, random.randrange(0x10000), routes, plc_type,
+                                  self._told)
+        self.counters, self.stations = self._requests.counters, self._requests.stations
+        self._trace: Trace | None = None
+        port_of = opened(port)
+        if trace is not None:
+            port_of = self._traced(trace, port, port_of)
+        self._link = LinkThread(self._requests.machine, port_of,
+                                on_fault=lambda error: self.log.critical(
+                                    'internal error', exc_info=error))
+        self._link.daemon = True  # a KeyboardInterrupt before ``with`` leaves nothing to stop it
+        self._line = line_of(port.name)
+        _ours.add(self._line)
+        self._link.start()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None,
+                 trace: TracebackType | None) -> None:
+        self.close()
+
+    @property
+    def echoes(self) -> bool:
+        """Tell whether the line gives back what is sent."""
+        return self._requests.machine.echoes
+
+    @property
+    def stray(self) -> str:
+        """Return the last reply that came and answers no command, empty for none."""
+        return self._requests.stray
+
+    def settle(self) -> None:
+        """Wait until the link takes commands: a peer only listens at first; raises PortLost."""
+        self.ask(0, _nothing())
+
+    def ask(self, station: int, work: Steps[_Result]) -> _Result:
+        """Carry out a request and return its result; raises what its steps raise."""
+        return self.wait(self.start(station, work))
+
+    def start(self, station: int, work: Steps[_Result],
+              pending: Pending[_Result] | None = None) -> Pending[_Result]:
+        """Begin to carry out a request; ``pending`` is where its result goes."""
+        pending = pending or Pending()
+        self._requests.add(station, work, pending.succeed, pending.fail)
+        self._link.wake()
+        return pending
+
+    def wait(self, pending: Pending[_Result]) -> _Result:
+        """Return the result of a request; raises what it raises, PortLost at the latest."""
+        while not pending.wait(_GLANCE):
+            if not self._link.is_alive() and not pending.is_done:
+                raise PortLost(self._link.state.text)
+        return pending.result()
+
+    def close(self) -> None:
+        """End what is under way and close the port; every request has ended after this."""
+        self._link.stop()
+        self._requests.close()
+        if self._trace is not None:
+            self._trace.close()
+        _ours.discard(self._line)
+
+    @property
+    def line_model(self) -> LineModel:
+        """Return what transactions cost on this line."""
+        from abdf1_ros.plan.line_model import LineModel  # only a plan needs it
+        return LineModel(self._settings.checksum, self._mode.duplex, self._settings.timing,
+                         self._mode.pause(self._settings))
+
+    @contextmanager
+    def naming(self, place: str) -> Iterator[None]:
+        """Let errors in the block say what they are about; log how long it took."""
+        begun = time.monotonic()
+        try:
+            yield
+        except Abdf1Error as error:
+            error.about = error.about or place
+            self.log.debug('%s', error)
+            raise
+        self.log.debug('%s: %.1f ms', place, (time.monotonic() - begun) * 1000)
+
+    def _told(self, event: Event) -> None:
+        is_error = event.message.severity is not Severity.NOTICE
+        self.log.log(logging.INFO if is_error else logging.DEBUG, '%s', event)
+
+    def _traced(self, path: str, port: PortSettings,
+                open_it: Callable[[], Port]) -> Callable[[], Port]:
+        """Begin the trace; return what opens the port whose bytes go into it."""
+        from abdf1_ros.ports.trace import begun_now, Trace, TracedPort
+        trace = self._trace = Trace(path, {
+            'begun': begun_now(), 'port': port.name, 'baud': str(port.baud),
+            'check': self._settings.checksum.value,
+            'duplex': self._mode.duplex.name.lower()}, self.log.error)
+        begun = time.monotonic()
+        return lambda: TracedPort(open_it(), trace, begun)
+
+
+def _nothing() -> Steps[None]:
+    yield from ()
+
+
+def single(values: list[float] | str, is_one: bool) -> float | str | list[float]:
+    """Return the only value where one is meant."""
+    return values[0] if is_one and not isinstance(values, str) else values
+
+
+def plain(values: Values, kind: ValueType) -> list[float] | str:
+    """Return values as a program without arrays takes them."""
+    if isinstance(values, str):
+        return values
+    return [*map(bool, values)] if kind is ValueType.BOOL else [*values]
+
+
+def values_of(values: Any) -> Sequence[float] | str:
+    """Return what is to be written; arrays and numbers of numpy become Python's."""
+    found = values.tolist() if hasattr(values, 'tolist') else values
+    found = [found] if isinstance(found, Real) else found
+    if isinstance(found, str) or (
+            isinstance(found, Sequence) and not isinstance(found, bytes)
+            and all(isinstance(value, Real) for value in found)):
+        return found
+    raise FormatError(f'{shown(repr(values))} should be a number, several, or a text')
+
+
+def text_of(name: str, value: Any) -> str:
+    if isinstance(value, os.PathLike):
+        value = os.fspath(value)
+    if not isinstance(value, str) or not value:
+        raise FormatError(f'{name} {shown(repr(value))} should be a text')
+    return value
