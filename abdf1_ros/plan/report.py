@@ -316,18 +316,20 @@ def _file_remarks(station: int, mappings: Iterable[Mapping]) -> Iterator[Remark]
 
 
 def _gateway_remarks(network: Network, stations: dict[int, list[Mapping]]) -> Iterator[Remark]:
-    """Find unusual values in the column Via."""
+    """Find unusual values in the column Via, and of stations behind a gateway."""
+    is_behind = network.line_mode.has_one_plc and len(stations) > 1
     for station, mappings in sorted(stations.items()):
         via = mappings[0].via
-        if via is None:
+        if via is None and not is_behind:
             continue
-        if not network.line_mode.is_master:
+        if via is not None and not network.line_mode.is_master:
             yield Remark(RemarkKind.STATION, (
                 f'station {station} of {_tags(mappings)}: Via is for Mode Master; in Mode '
                 f'{network.mode} the gateway is not addressed'), station)
         elif station > 7 and set(str(station)) <= set('01234567'):
             yield Remark(RemarkKind.STATION, (
-                f'station {station} of {_tags(mappings)} is behind gateway {via}: on Data Highway '
+                f'station {station} of {_tags(mappings)} is behind '
+                f'{"a gateway" if via is None else f"gateway {via}"}: on Data Highway '
                 f'Plus node numbers are octal; if {station} is what a panel there shows, write '
                 f'{int(str(station), 8)}'), station)
 

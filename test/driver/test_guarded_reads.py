@@ -64,6 +64,9 @@ def test_rule_13_answer_about_the_mode_is_no_older_than_the_stale_time() -> None
     assert [why_not(13.5, 13.6), why_not(13.6, 13.6)] == [begun, '']
     guard.told(replace(running, faults=('bad RAM', 'low battery')), 14.0)
     assert why_not(14.5, 14.5) == 'not in RUN: it is in RUN, bad RAM; low battery'
+    guard.told(Identity(None, '1785-KE'), 14.6)
+    assert why_not(14.7, 14.7) == (
+        'not in RUN: 1785-KE has no mode; does a gateway answer for the PLC?')
     guard.told(None, 15.0)
     assert why_not(15.5, 15.5) == 'not in RUN: its mode is not known'
 

@@ -125,6 +125,13 @@ def test_node_behind_a_gateway_may_be_octal_on_its_panel(station: int, octal: in
     assert texts(report_of(make_mapping('N7:0', station=station)), RemarkKind.STATION) == []
 
 
+def test_nodes_of_a_full_duplex_gateway_may_be_octal_too() -> None:
+    rows = [make_mapping('N7:0'), make_mapping('N7:0', station=10)]
+    text, = [text for text in texts(report_of(*rows, mode='Peer'), RemarkKind.STATION)
+             if 'octal' in text]
+    assert 'station 10 of' in text and text.endswith('write 8')
+
+
 @pytest.mark.parametrize('mode', ['Peer', 'Slave'])
 def test_via_is_for_a_master(mode: str) -> None:
     text, = texts(report_of(make_mapping('N7:0', station=2, via=3), mode=mode), RemarkKind.STATION)

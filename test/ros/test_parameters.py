@@ -222,6 +222,21 @@ def test_parameters_tell_how_stations_are_polled(
     assert configured(**values).driver_settings().polling == expected
 
 
+def test_gateway_is_polled_for_the_stations_behind_it(
+        configured: Callable[..., Configuration], make_node: Nodes, files: dict[str, str],
+        tmp_path: Path) -> None:
+    rows = [f'{tag},Read,N7:0,{station},PLC5,{via}'
+            for tag, station, via in (('a', 1, 8), ('b', 9, 8), ('c', 2, ''))]
+    files['map_file'] = str(write_csv(
+        tmp_path / 'via.csv', 'Tag,Command,Address,Station,PLC_Type,Via', rows))
+    assert configured().driver_settings().polling == PollingSettings((2, 8))
+    assert problems_of(make_node(files | {'poll_list': '8,9'})) == [
+        'parameter poll_list: station 9 is behind gateway 8, which is polled in its place']
+    assert problems_of(make_node(files | {'priority_poll_list': '1'})) == [
+        'parameter priority_poll_list: station 1 is behind gateway 8, which is polled in its '
+        'place']
+
+
 @pytest.mark.parametrize(('name', 'value', 'expected'), [
     ('default_period', -1, 'default_period = -1 should be a whole number from 0 to 86400000'),
     ('default_period', 1.5, 'default_period = 1.5 should be a whole number from 0 to 86400000'),

@@ -64,6 +64,9 @@ def network_of(options: argparse.Namespace, duplex: str | None = None,
             '--port', 'name the port, such as --port /dev/ttyUSB0, or a net CSV with --net')])
     network = replace(network, mode=MODES.get(duplex or options.duplex, network.mode),
                       polling=DEFAULTS.polling)
+    if getattr(options, 'via', None) is not None and network.line_mode.has_one_plc:
+        raise ConfigurationError([Problem(
+            '--via', 'in full duplex a gateway has no address: --station is the node behind it')])
     # By radio only the reply is waited for.
     is_told = network.duplex is Duplex.RADIO and options.timeout is not None
     return replace(network, cmd_timeout=network.timeout) if is_told else network

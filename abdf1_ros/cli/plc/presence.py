@@ -30,10 +30,13 @@ from abdf1_ros.df1.echo import COMES_BACK
 from abdf1_ros.df1.packet import is_local_status
 from abdf1_ros.errors import Abdf1Error, LinkError, PortLost, RemoteError, StationInactive
 from abdf1_ros.pccc.access import Access
+from abdf1_ros.pccc.dialect import Steps
 from abdf1_ros.pccc.families import dialect_of, FAMILIES, parse_address
 from abdf1_ros.pccc.file_search import is_there
 from abdf1_ros.pccc.file_types import PlcType
 from abdf1_ros.pccc.identity import Identity
+from abdf1_ros.pccc.plc2.commands import BasicRead, READ
+from abdf1_ros.pccc.status import check_status
 from abdf1_ros.pccc.steps import echo, identify
 from abdf1_ros.settings.network import Network
 from abdf1_ros.text import counted
@@ -89,14 +92,40 @@ def look_at(session: Session, station: int) -> Presence:
     except Abdf1Error as caught:
         error = caught
     seconds = time.monotonic() - started
+    if identity is not None and identity.plc_type is None and session.via not in (None, station):
+        error = _refusal_of_gateway(session, station)
+        identity = identity if error is None else None
     # A gateway answers for a station that it does not reach (M 8-2).
     is_reached = not (isinstance(error, RemoteError) and is_local_status(error.sts))
     # Through a master only a reply tells.
     is_silent = isinstance(
         error, LinkError if session.network.line_mode.is_polled else StationInactive)
     takes_commands = is_reached and not is_silent
-    is_there = takes_commands or session.stations[station].last_heard is not None
+    is_there = takes_commands or (
+        is_reached and session.stations[station].last_heard is not None)
     return Presence(station, seconds, identity, error, is_there, takes_commands)
+
+
+def _refusal_of_gateway(session: Session, station: int) -> Abdf1Error | None:
+    """
+    Return why a read does not reach a station, None where it does, whatever the station says.
+
+    A gateway may answer diagnostic commands itself, for every number (a switch of the 1770-KF2).
+    All families know the read of a PLC-2.
+    """
+    try:
+        session.ask(station, _basic_read())
+    except PortLost:
+        raise
+    except RemoteError as error:
+        return error if is_local_status(error.sts) else None
+    except LinkError as error:
+        return error
+    return None
+
+
+def _basic_read() -> Steps[None]:
+    check_status((yield READ, BasicRead(0, 2).encode()))
 
 
 def scan(network: Network, stations: Sequence[int], via: int | None = None,

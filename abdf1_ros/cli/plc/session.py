@@ -37,7 +37,7 @@ def opened(network: Network) -> Callable[[], Port]:
 
 class Session(open_line.OpenLine):
     """
-    The line of a net CSV; with ``via`` all stations are behind this gateway.
+    The line of a net CSV; with ``via`` all others are behind this gateway.
 
     Raises NoPort when the port cannot be opened.
     """
@@ -45,6 +45,7 @@ class Session(open_line.OpenLine):
     def __init__(self, network: Network, absent: Sequence[int] = (),
                  via: int | None = None) -> None:
         self.network = network
+        self.via = via
         routes = {} if via is None else dict.fromkeys(range(MAX_STATION + 1), via)
         try:
             super().__init__(network.line_mode, network.line, PortSettings.of(network), absent,

@@ -47,6 +47,8 @@ class RunGuard(Guard):
         self._told = asked
         if identity is None:
             self._state = 'its mode is not known'
+        elif identity.mode is None:
+            self._state = f'{identity} has no mode; does a gateway answer for the PLC?'
         else:
             self._state = f'it is in {identity.mode_text}'
             if identity.faults:

@@ -354,8 +354,14 @@ def _polling(parameters: Parameters, mappings: Rows,
     """Return how a master with standard polling polls."""
     priority = _stations('priority_poll_list', parameters.priority_poll_list, problems)
     normal = _stations('poll_list', parameters.poll_list, problems)
+    routes = {mapping.station: mapping.via for mapping in mappings if mapping.via is not None}
+    for name, listed in (('priority_poll_list', priority), ('poll_list', normal)):
+        problems += (Problem(f'parameter {name}', f'station {station} is behind gateway '
+                             f'{routes[station]}, which is polled in its place')
+                     for station in listed if station in routes)
     if not parameters.poll_list:
-        normal = tuple(sorted({*mappings.stations} - {*priority}))
+        polled = {routes.get(station, station) for station in mappings.stations}
+        normal = tuple(sorted(polled - {*priority}))
     return PollingSettings(normal, priority, parameters.poll_group_size,
                            parameters.poll_multiple, parameters.send_in_sequence)
 

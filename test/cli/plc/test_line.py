@@ -44,6 +44,11 @@ def test_peer_is_full_duplex() -> None:
     assert line_of('--port', '1', '--peer') == line_of('--port', '1', '--duplex', 'full')
 
 
+def test_gateway_in_full_duplex_has_no_address() -> None:
+    with pytest.raises(ConfigurationError, match='--via: in full duplex a gateway has no address'):
+        line_of('--port', '1', '--peer', '--via', '8')
+
+
 def test_options_go_before_the_file(tmp_path: Path) -> None:
     path = write_csv(tmp_path / 'net.csv', 'Mode,Baud,Error_Code,Com_Port,Polling',
                      ['Peer,19200,BCC,/dev/ttyS7,Standard'])

@@ -23,10 +23,20 @@ from typing import cast
 from abdf1_ros.cli.plc import presence
 from abdf1_ros.cli.plc.presence import describe, hint, look_at, Presence, scan, type_to_say
 from abdf1_ros.cli.plc.session import Session
+from abdf1_ros.df1.checksum import Checksum
+from abdf1_ros.df1.frames import Duplex
+from abdf1_ros.df1.machine import Machine
+from abdf1_ros.df1.packet import Packet
+from abdf1_ros.df1.peer import FullDuplexPeer
+from abdf1_ros.df1.settings import LinkSettings
+from abdf1_ros.df1.stations import ActiveStationList
 from abdf1_ros.errors import FormatError, StationInactive
 from abdf1_ros.pccc.identity import Identity, Mode
 from abdf1_ros.ports.descriptor import PortAround
+from abdf1_ros.ports.endpoints import PtyEndpoint
+from abdf1_ros.ports.link_thread import LinkThread
 from abdf1_ros.settings.network import Network
+from abdf1_ros.simulator.gateway import SimulatedGateway
 import pytest
 from support.driver_bench import simulated_plc
 from support.plc_line import LosesPolls, plc_line
@@ -119,6 +129,48 @@ def test_scan_behind_a_gateway_finds_only_who_is_there(tmp_path: Path) -> None:
     assert [seen.is_there for seen in found] == [True, True, False]
     assert [str(seen.identity)[:5] for seen in found[:2]] == ['PLC-5', 'SLC 5']
     assert 'STS 02' in str(found[2].error)
+
+
+class AnswersDiagnostics(SimulatedGateway):
+    """A 1770-KF2 with "execute received diagnostic commands" on: it answers 06 for every node."""
+
+    def _serve(self, command: Packet) -> Packet:
+        if command.cmd == 0x06:
+            return command.reply(bytes.fromhex('00 FE 19 00 00 00 10 00 20 00'))
+        return super()._serve(command)
+
+
+def test_node_behind_a_gateway_that_answers_diagnostics_itself_is_proven_by_a_read(
+        tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr('abdf1_ros.simulator.gateway.SimulatedGateway', AnswersDiagnostics)
+    plc = simulated_plc(9, 'SLC', time.monotonic)
+    plc.via = 8
+    with plc_line(tmp_path / 'line', plc) as name:
+        found = list(scan(Network(com_port=name, timeout=2000), [3, 8, 9], via=8))
+    assert [(seen.station, seen.is_there, str(seen.identity)[:7]) for seen in found] == [
+        (3, False, 'None'), (8, True, '1785-KE'), (9, True, '1785-KE')]
+    assert 'STS 02' in str(found[0].error)
+
+
+def test_scan_in_full_duplex_does_not_count_what_a_gateway_refuses(tmp_path: Path) -> None:
+    plc = simulated_plc(1, 'SLC', time.monotonic)
+    plc.be_full_duplex()
+    serve = plc.serve
+
+    def gateway(command: Packet) -> Packet:
+        return serve(command) if command.dst == 1 else command.reply(sts=0x02)
+
+    line = PtyEndpoint(str(tmp_path / 'line'))
+    link = LinkThread(Machine(lambda machine: FullDuplexPeer(
+        machine, LinkSettings(station=None), ActiveStationList(), gateway).run(plc),
+        checksum=Checksum.CRC, duplex=Duplex.FULL), line.open)
+    link.start()
+    try:
+        found = list(scan(Network(com_port=line.name, mode='Peer', timeout=2000), [1, 2, 3]))
+    finally:
+        link.stop()
+        line.close()
+    assert [seen.is_there for seen in found] == [True, False, False]
 
 
 def test_scan_asks_silent_stations_again(tmp_path: Path) -> None:
