@@ -16,10 +16,13 @@
 
 from collections.abc import Callable
 from functools import partial
+import math
 
 from abdf1_ros.df1.packet import Packet
 from abdf1_ros.driver.guests import Guest, GuestCommand, ShareAccess
 from abdf1_ros.driver.interlocks.fallback import FallbackState
+from abdf1_ros.driver.record import Claim
+from abdf1_ros.driver.write import Outcome
 from abdf1_ros.settings.mapping import Mapping
 from abdf1_ros.settings.network import POLLING_MODES
 import pytest
@@ -151,6 +154,22 @@ def test_rule_19_own_heartbeats_that_a_gateway_holds_are_no_other_program(
     assert left[0] < 0
     assert cell.bench.listener.foreign == []
     assert cell.bench.driver.interlocks.heartbeats[0].why_not(cell.now) == ''
+
+
+@pytest.mark.parametrize('outcome', [Outcome.WRITTEN, Outcome.PARTLY, Outcome.FAILED])
+def test_rule_2_plc_behind_a_gateway_that_answers_at_all_is_a_first_contact(
+        outcome: Outcome) -> None:
+    cell = Cell(make_mapping('N10:0', 'Heartbeat', tag='beat', period=200, via=7), start=False)
+    cell.put_behind_gateway()
+    cell.run(3.0)
+    plc = cell.bench.driver.interlocks._plcs[1]
+    beat, = plc.heartbeats
+    assert not beat.wants_zero
+    plc.failures = 2
+    claim = Claim(1, [beat.mapping.extent])
+    claim.end(outcome, cell.now, -math.inf)
+    plc.write_ended(claim, cell.now)
+    assert (plc.failures, beat.wants_zero) == (0, True)
 
 
 def test_rule_8_guests_write_over_a_0_is_written_over_at_once() -> None:

@@ -50,6 +50,7 @@ import pytest
 from support.device_server import OWN_HOST
 from support.driver_bench import Recorder, simulated_plc, store, stored
 from support.mappings import make_mapping
+from support.ptys import Pty
 
 # The rules themselves are those of a peer, played in test/conform; here that a place is one.
 QUICK = ('bad-check-refused', 'masked-write')
@@ -170,6 +171,20 @@ def test_place_is_a_peer_of_the_manual(
     said = capsys.readouterr().out
     assert status == 0, said
     assert '0 failed' in said
+
+
+def test_place_on_a_serial_device(tmp_path: Path) -> None:
+    device = Pty(tmp_path / 'hmi')
+    try:
+        with shared(tmp_path, f'{device.name}?baud=9600&check=BCC') as line:
+            wait_for(lambda: line.guests[0].guest.is_connected)
+            device.write(frames.message_frame(
+                Packet(1, 9, 0x06, 0, 1, b'\0ab').encode(), Checksum.BCC))
+            reply = frames.message_frame(Packet(9, 1, 0x46, 0, 1, b'ab').encode(), Checksum.BCC)
+            assert device.read(2 + len(reply)) == frames.ACK + reply
+            assert all(guest.link.daemon for guest in line.guests)
+    finally:
+        device.close()
 
 
 def test_place_of_ipv6(tmp_path: Path) -> None:

@@ -17,6 +17,7 @@
 import codecs
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+import curses
 import os
 import pty
 import re
@@ -25,7 +26,8 @@ import signal
 import termios
 import time
 
-from abdf1_ros.cli.monitor.command import main
+from abdf1_ros.cli.monitor.command import _Screen, main
+from abdf1_ros.cli.monitor.view import TextLine
 import pytest
 from std_msgs.msg import UInt16MultiArray
 from support.commands import call
@@ -208,6 +210,42 @@ def test_line_is_chosen_from_all_and_q_leads_back(simulator: Process) -> None:
         screen.press('q')
         assert screen.result() == 0
         assert 'Traceback' not in screen.drawn
+
+
+class Window:
+    """As much of a curses window as a list needs; ``keys`` are pressed one after the other."""
+
+    def __init__(self) -> None:
+        self.keys: list[int] = []
+
+    def getmaxyx(self) -> tuple[int, int]:
+        return 24, 80
+
+    def getch(self) -> int:
+        return self.keys.pop(0) if self.keys else -1
+
+    def _ignore(self, *args: object) -> None:
+        pass
+
+    nodelay = erase = addnstr = refresh = clearok = _ignore
+
+
+def test_mark_stays_at_its_line_where_others_come(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr('curses.has_colors', lambda: False)
+    window = Window()
+    screen = _Screen(window, marked='paint')  # type: ignore[arg-type]
+
+    def chosen(names: str, *keys: int) -> str:
+        screen.show_list([TextLine('heading'), *(
+            TextLine(name, section=name) for name in names.split())])
+        window.keys = [*keys]
+        return screen.chosen if screen.wants_other_list() else ''
+
+    assert chosen('packing paint press', ord('\n')) == 'paint'
+    assert chosen('glue packing paint press', ord('\n')) == 'paint'
+    assert chosen('glue packing paint press', curses.KEY_DOWN) == ''
+    assert chosen('glue packing paint press', ord('\n')) == 'press'
+    assert chosen('glue packing', ord('\n')) == 'glue'
 
 
 def test_signal_gives_the_terminal_back(simulator: Process) -> None:

@@ -319,7 +319,11 @@ def test_ping_shows_each_answer_and_sums_up(plc: Plc) -> None:
     assert said.status == 0
     assert len(said.lines) == 4
     assert said.lines[0].startswith('station 2: ')
-    assert said.lines[3].startswith('3 sent, 3 answered; shortest ')
+    times = [float(line.split()[2]) for line in said.lines[:3]]
+    assert said.lines[3] == (
+        f'3 sent, 3 answered; shortest {min(times)}, mean {said.lines[3].split()[-4]} longest '
+        f'{max(times)} ms')
+    assert min(times) <= float(said.lines[3].split()[-4].rstrip(',')) <= max(times)
 
 
 def test_ping_of_nobody_has_status_1_and_says_that_nothing_came(plc: Plc) -> None:
