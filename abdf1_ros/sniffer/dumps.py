@@ -24,9 +24,13 @@ of logs, see ``logs``.
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
+from gzip import BadGzipFile, GzipFile
+from io import BufferedReader
 from itertools import chain
 from pathlib import Path
 import re
+from typing import BinaryIO, cast
+import zlib
 
 from abdf1_ros.problems import Problem
 from abdf1_ros.sniffer.capture import Chunk, Direction, is_capture_line, read_capture
@@ -36,6 +40,7 @@ from abdf1_ros.sniffer.packet_files import is_packet_file, PacketFile
 from abdf1_ros.sniffer.pcapng import LINK_TYPE
 
 _BLOCK = 4096
+_GZIP = b'\x1F\x8B'
 # The longest text line in bytes: no program writes longer ones, and a file without line ends, such
 # as /dev/zero, must not fill the memory.
 _LONGEST_LINE = 1_000_000
@@ -63,7 +68,9 @@ class Recording:
         self._position = 0
         self._name = str(path)
         self._is_binary = is_binary
-        self._file = path.open('rb')
+        file = path.open('rb')
+        is_packed = not is_binary and file.peek(2).startswith(_GZIP)
+        self._file: BufferedReader | GzipFile = GzipFile(fileobj=file) if is_packed else file
 
     @property
     def percent(self) -> int:
@@ -72,6 +79,12 @@ class Recording:
 
     def chunks(self) -> Iterator[Chunk]:
         """Yield the chunks; Problem names file and line where something cannot be read."""
+        try:
+            yield from self._chunks()
+        except (EOFError, zlib.error, BadGzipFile) as error:
+            raise Problem(self._name, f'damaged gzip file: {error}') from None
+
+    def _chunks(self) -> Iterator[Chunk]:
         with self._file:
             if self._is_binary:
                 yield from self._binary()
@@ -91,7 +104,7 @@ class Recording:
         return read_hex(self._name, lines)
 
     def _packets(self) -> Iterator[Chunk]:
-        file = PacketFile(self._name, self._file)
+        file = PacketFile(self._name, cast(BinaryIO, self._file))
         is_empty, ports = True, set[int]()
         for chunk in chunks_of(file.packets(), ports):
             is_empty, self._position = False, file.position

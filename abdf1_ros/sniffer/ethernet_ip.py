@@ -17,8 +17,8 @@ Traffic out of recorded packets: DF1 that ``sniff`` has written, and PCCC inside
 
 PCCC goes through TCP port 44818 in CIP service 4B (Execute PCCC) of the PCCC object (class 67), as
 it is or inside of an Unconnected Send (52). It has no frame, check, DST and SRC: the last numbers
-of the IP addresses stand for these two. A response names no class: it is PCCC where its request
-was seen.
+of the IP addresses stand for these two, for a second address with the same last number one that
+is free. A response names no class: it is PCCC where its request was seen.
 """
 
 from __future__ import annotations
@@ -42,8 +42,10 @@ CSP = 2222  # PCCC of older Ethernet processors, in a way of its own
 # The bytes before an IPv4 header, and where among them its EtherType stands, by link type:
 # loopback, Ethernet, raw IP, Linux cooked 1 and 2.
 _LINKS = {0: (4, None), 1: (14, 12), 101: (0, None), 113: (16, 14), 276: (20, 0)}
-_IP, _VLAN, _TCP = b'\x08\x00', b'\x81\x00', 6
+_IP, _TCP = b'\x08\x00', 6
+_TAGS = b'\x81\x00', b'\x88\xA8'  # 802.1Q and 802.1ad
 _MOST_STREAMS = 1000
+_MOST_EARLY = 8  # segments that wait for one before them
 
 _SEND_RR, _SEND_UNIT = 0x6F, 0x70
 _COMMANDS = (0x00, 0x01, 0x04, 0x63, 0x64, 0x65, 0x66, _SEND_RR, _SEND_UNIT, 0x72, 0x73)
@@ -52,32 +54,131 @@ _EXECUTE_PCCC, _UNCONNECTED_SEND, _REPLY = 0x4B, 0x52, 0x80  # services
 _PCCC_OBJECT = b'\x20\x67', b'\x21\x00\x67\x00'  # a path begins with its class
 
 
+class _Stations:
+    """Numbers that stand for IP addresses: the last of the address, or one that is free."""
+
+    def __init__(self) -> None:
+        self._numbers: dict[bytes, int] = {}
+
+    def number(self, address: bytes) -> int:
+        """Return the number of an address."""
+        if address not in self._numbers:
+            taken = set(self._numbers.values())
+            free = (number for number in (address[3], *range(254, 0, -1)) if number not in taken)
+            self._numbers[address] = next(free, address[3])
+        return self._numbers[address]
+
+
 class _Stream:
-    """The bytes of one direction of a TCP connection, in their order."""
+    """
+    The bytes of one direction of a TCP connection, in their order.
+
+    A segment that comes before its time waits, but not where it is whole messages: these may not
+    come after what answers them.
+    """
 
     def __init__(self) -> None:
         self._next: int | None = None
         self._waiting = b''
+        self._early: dict[int, bytes] = {}
+        self._taken: dict[int, int] = {}  # sizes of whole messages that came early
 
     def feed(self, number: int, data: bytes) -> Iterator[bytes]:
         """Take a segment; yield the data of the EtherNet/IP messages that it completes."""
         known = 0 if self._next is None else self._next - number & 0xFFFFFFFF
-        if known >= 1 << 31:  # bytes are missing
-            known, self._waiting = 0, b''
-        if known and known >= len(data):
-            return  # they come again
-        self._next = number + len(data) & 0xFFFFFFFF
-        self._waiting += data[known:]
-        while len(self._waiting) >= 24:
-            command, size = struct.unpack_from('<HH', self._waiting)
-            if command not in _COMMANDS:
-                self._waiting = b''  # not the beginning of a message
-            elif len(self._waiting) < 24 + size:
-                return
+        if known >= 1 << 31:  # a segment before it comes later, or was lost
+            yield from self._take_early(number, data)
+        elif not known or known < len(data):  # otherwise they come again
+            self._next = number & 0xFFFFFFFF if self._next is None else self._next
+            yield from self._take(data[known:])
+            yield from self._follow()
+
+    def flush(self) -> Iterator[bytes]:
+        """Yield what is complete although bytes before it are missing."""
+        while early := {*self._early, *self._taken}:
+            self._waiting = b''
+            self._next = min(early)
+            yield from self._follow()
+
+    def _take_early(self, number: int, data: bytes) -> Iterator[bytes]:
+        messages = [*_sent(_messages(data)[0])]
+        if messages and sum(map(len, messages)) == len(data) - 24 * len(messages):
+            if number not in self._taken:
+                yield from messages
+            self._taken[number] = len(data)
+        elif data:
+            self._early[number] = data
+        if len(self._early) + len(self._taken) > _MOST_EARLY:
+            yield from self.flush()
+
+    def _follow(self) -> Iterator[bytes]:
+        while self._next is not None and (self._next in self._early or self._next in self._taken):
+            size = self._taken.pop(self._next, 0)
+            if size:
+                self._next = self._next + size & 0xFFFFFFFF
             else:
-                message, self._waiting = self._waiting[24:24 + size], self._waiting[24 + size:]
-                if command in (_SEND_RR, _SEND_UNIT):
-                    yield message
+                yield from self._take(self._early.pop(self._next))
+
+    def _take(self, data: bytes) -> Iterator[bytes]:
+        assert self._next is not None
+        self._next = self._next + len(data) & 0xFFFFFFFF
+        messages, self._waiting = _messages(self._waiting + data)
+        yield from _sent(messages)
+
+
+def _messages(data: bytes) -> tuple[list[bytes], bytes]:
+    """Return the whole messages at the beginning of data, and the rest if it may become one."""
+    found: list[bytes] = []
+    while len(data) >= 24:
+        command, size = struct.unpack_from('<HH', data)
+        if command not in _COMMANDS:
+            return found, b''  # not the beginning of a message
+        if len(data) < 24 + size:
+            break
+        found.append(data[:24 + size])
+        data = data[24 + size:]
+    return found, data
+
+
+def _sent(messages: Iterable[bytes]) -> Iterator[bytes]:
+    """Yield the data of messages that carry CIP."""
+    return (message[24:] for message in messages
+            if struct.unpack_from('<H', message)[0] in (_SEND_RR, _SEND_UNIT))
+
+
+class _Connections:
+    """The TCP connections of EtherNet/IP: their streams, and which requests were seen."""
+
+    def __init__(self) -> None:
+        self._streams: dict[bytes, _Stream] = {}
+        self._asked: set[bytes] = set()  # connection and TNS of requests
+        self._stations = _Stations()
+
+    def feed(self, ends: bytes, number: int, payload: bytes,
+             time: float | None) -> Iterator[Chunk]:
+        """Take a segment between these addresses and ports; yield the PCCC that it completes."""
+        if len(self._streams) > _MOST_STREAMS:
+            self._streams.clear()
+            self._asked.clear()
+        for message in self._streams.setdefault(ends, _Stream()).feed(number, payload):
+            yield from self._chunks(ends, message, time)
+
+    def flush(self, time: float | None) -> Iterator[Chunk]:
+        """Yield what is complete although bytes before it are missing."""
+        for ends, stream in self._streams.items():
+            for message in stream.flush():
+                yield from self._chunks(ends, message, time)
+
+    def _chunks(self, ends: bytes, message: bytes, time: float | None) -> Iterator[Chunk]:
+        way = Direction.OUT if ends[10:12] == _PORT.to_bytes(2, 'big') else Direction.IN
+        for is_reply, pccc in _pccc(message):
+            key = (ends[4:8] + ends[:4] + ends[10:] + ends[8:10] if is_reply else ends) + pccc[2:4]
+            if not is_reply:
+                self._asked.add(key)
+            elif key not in self._asked:
+                continue
+            ours = bytes(map(self._stations.number, (ends[4:8], ends[:4])))
+            yield Chunk(time, way, ours + pccc, is_message=True)
 
 
 def chunks_of(packets: Iterable[RecordedPacket], ports: set[int]) -> Iterator[Chunk]:
@@ -86,9 +187,9 @@ def chunks_of(packets: Iterable[RecordedPacket], ports: set[int]) -> Iterator[Ch
 
     All TCP ports that were seen come into ``ports``.
     """
-    streams: dict[bytes, _Stream] = {}
-    asked: set[bytes] = set()  # connection and TNS of requests
+    connections = _Connections()
     begun: float | None = None
+    later: float | None = None
     for time, link_type, data in packets:
         begun = time if begun is None else begun
         later = None if time is None or begun is None else time - begun
@@ -100,28 +201,16 @@ def chunks_of(packets: Iterable[RecordedPacket], ports: set[int]) -> Iterator[Ch
             ends, number, payload = segment
             both = {int.from_bytes(ends[8:10], 'big'), int.from_bytes(ends[10:], 'big')}
             ports |= both
-            if _PORT not in both:
-                continue
-            if len(streams) > _MOST_STREAMS:
-                streams.clear()
-                asked.clear()
-            way = Direction.OUT if ends[10:12] == _PORT.to_bytes(2, 'big') else Direction.IN
-            for message in streams.setdefault(ends, _Stream()).feed(number, payload):
-                for is_reply, pccc in _pccc(message):
-                    key = (ends[4:8] + ends[:4] + ends[10:] + ends[8:10] if is_reply else ends) \
-                        + pccc[2:4]
-                    if not is_reply:
-                        asked.add(key)
-                    elif key not in asked:
-                        continue
-                    yield Chunk(later, way, bytes((ends[7], ends[3])) + pccc, is_message=True)
+            if _PORT in both:
+                yield from connections.feed(ends, number, payload, later)
+    yield from connections.flush(later)
 
 
 def _tcp(link_type: int, data: bytes) -> tuple[bytes, int, bytes] | None:
     """Return addresses and ports, sequence number and payload of a segment."""
     start, kind = _LINKS.get(link_type, (len(data), None))
     if kind is not None:
-        while data[kind:kind + 2] == _VLAN:
+        while data[kind:kind + 2] in _TAGS:
             start, kind = start + 4, kind + 4
         if data[kind:kind + 2] != _IP:
             return None

@@ -15,6 +15,7 @@
 """pcap and pcapng: our own, PCCC in EtherNet/IP, and files that are damaged."""
 
 from collections.abc import Sequence
+import gzip
 from pathlib import Path
 import struct
 
@@ -57,9 +58,10 @@ def encapsulated(data: bytes, is_connected: bool = False) -> bytes:
     return struct.pack('<HH', 0x70 if is_connected else 0x6F, len(content)) + bytes(20) + content
 
 
-def tcp(payload: bytes, number: int, to_plc: bool = True, flags: int = 0x18) -> bytes:
+def tcp(payload: bytes, number: int, to_plc: bool = True, flags: int = 0x18,
+        net: int = 0) -> bytes:
     """Return a segment in IP, without options."""
-    hosts = bytes((192, 168, 0, 65)), bytes((192, 168, 0, 30))
+    hosts = bytes((192, 168, 0, 65)), bytes((192, 168, net, 30))
     ports = 50000, 44818
     ways = (hosts, ports) if to_plc else (hosts[::-1], ports[::-1])
     segment = struct.pack('>HHIIBBHHH', *ways[1], number & 0xFFFFFFFF, 0, 0x50, flags, 0, 0, 0)
@@ -68,7 +70,8 @@ def tcp(payload: bytes, number: int, to_plc: bool = True, flags: int = 0x18) -> 
 
 
 def ethernet(ip: bytes, vlan: bool = False) -> bytes:
-    return bytes(12) + (b'\x81\0\0\x07' if vlan else b'') + b'\x08\0' + ip + b'padding'
+    tags = b'\x88\xA8\0\x03\x81\0\0\x07' if vlan else b''
+    return bytes(12) + tags + b'\x08\0' + ip + b'padding'
 
 
 def pcap(packets: Sequence[tuple[float, bytes]], link_type: int = ETHERNET, order: str = '<',
@@ -152,6 +155,35 @@ def test_segments_are_put_together_and_those_that_come_again_are_dropped(tmp_pat
     found = chunks_of(tmp_path / 'x', pcap(packets))
     assert [(chunk.time, chunk.data[4:6].hex()) for chunk in found] == [
         (4.0, '63c5'), (4.0, '0100'), (6.0, '63c5')]
+
+
+def test_segments_that_come_out_of_order_lose_no_message(tmp_path: Path) -> None:
+    messages = [encapsulated(cip(STATUS[:2] + bytes((number, 1)) + STATUS[4:]))
+                for number in range(4)]
+    whole = b''.join(messages)
+    cuts = [(0, 30), (90, 200), (30, 60), (60, 90), (200, len(whole))]
+    packets = [(float(at), ethernet(tcp(whole[first:end], 0xFFFFFFF0 + first)))
+               for at, (first, end) in enumerate(cuts)]
+    found = chunks_of(tmp_path / 'x', pcap(packets))
+    assert [chunk.data[4:6].hex() for chunk in found] == ['0001', '0101', '0201', '0301']
+
+
+def test_two_plcs_whose_addresses_end_alike_are_two_stations(tmp_path: Path) -> None:
+    packets = [(0.0, ethernet(tcp(encapsulated(cip(STATUS)), 1))),
+               (0.1, ethernet(tcp(encapsulated(cip(STATUS)), 1, net=7))),
+               (0.2, ethernet(tcp(encapsulated(cip(STATUS_REPLY, True)), 9, False, net=7)))]
+    entries = entries_of(chunks_of(tmp_path / 'x', pcap(packets)))
+    assert [(entry.kind, entry.station) for entry in entries if entry.packet] == [
+        (Kind.COMMAND, 30), (Kind.COMMAND, 254), (Kind.REPLY, 254), (Kind.UNANSWERED, 30)]
+    assert not any(entry.marks for entry in entries)
+
+
+def test_packed_files_are_read_and_damage_is_told(tmp_path: Path) -> None:
+    packed = gzip.compress(pcap(exchange()))
+    assert len(chunks_of(tmp_path / 'x', packed)) == 2
+    for damaged in (packed[:-20], packed[:30] + bytes(40)):
+        with pytest.raises(Problem, match='damaged gzip file'):
+            chunks_of(tmp_path / 'x', damaged)
 
 
 def test_what_sniff_has_written_is_read_as_it_was(tmp_path: Path) -> None:
