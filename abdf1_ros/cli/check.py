@@ -53,6 +53,7 @@ from abdf1_ros.plan.usable_rows import usable_rows
 from abdf1_ros.ports.ownership import line_of
 from abdf1_ros.problems import ConfigurationError, Problem
 from abdf1_ros.settings.columns import MAX_PERIOD
+from abdf1_ros.settings.heartbeats import LONGEST_END
 from abdf1_ros.settings.map_file import load_mappings
 from abdf1_ros.settings.mapping import Mapping
 from abdf1_ros.settings.network import load_network, Network
@@ -338,7 +339,9 @@ def _times_text(report: Report) -> str:
             f'{response:g} ms for each answer of a PLC\n'
             f'load of the line: {report.load:.0%} of the time is needed to keep the periods\n'
             f'longest transaction: {times.longest * 1000:.0f} ms with all repetitions'
-            + ''.join(f'\n{printable(str(line))}' for line in (*times.bounds(), *times.advice())))
+            + ''.join(f'\n{printable(str(line))}' for line in (*times.bounds(), *times.advice()))
+            + (f'\norderly end: {times.end * 1000:.0f} ms where no frame gets lost, '
+               f'{LONGEST_END * 1000:.0f} ms at most' if times.end else ''))
 
 
 def _content(found: Findings, report: Report | None) -> dict[str, Any]:
@@ -348,7 +351,7 @@ def _content(found: Findings, report: Report | None) -> dict[str, Any]:
         'warnings': [], 'notes': [], 'network': None, 'mappings': len(found.mappings),
         'rows': _rows(found.mappings, report), 'blocks': [],
         'scan_time_ms': None, 'load': None, 'longest_transaction_ms': None, 'needed_baud': None,
-        'bounds': [],
+        'bounds': [], 'end_ms': None,
         'response_time_ms': None}
     if report is not None:
         content |= {
@@ -359,6 +362,7 @@ def _content(found: Findings, report: Report | None) -> dict[str, Any]:
             'longest_transaction_ms': in_ms(report.times.longest),
             'needed_baud': report.needed_baud(),
             'bounds': [_bound(bound) for bound in report.times.bounds()],
+            'end_ms': in_ms(report.times.end),
             'response_time_ms': in_ms(report.response_time)}
     return content
 

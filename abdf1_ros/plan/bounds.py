@@ -33,7 +33,13 @@ from abdf1_ros.pccc.values import ValueType
 from abdf1_ros.plan import forecast
 from abdf1_ros.plan.line_model import LineModel
 from abdf1_ros.plan.planner import Block, Planner
-from abdf1_ros.settings.heartbeats import READS_IN_TIME, STABLE, TIME_BASE
+from abdf1_ros.settings.heartbeats import (
+    HAND_OVER,
+    LONGEST_END,
+    READS_IN_TIME,
+    STABLE,
+    TIME_BASE,
+)
 from abdf1_ros.settings.map_row import CellFault
 from abdf1_ros.settings.mapping import Mapping
 from abdf1_ros.settings.network import Network
@@ -155,6 +161,14 @@ class Times:
         # The response time stands for the scan of the PLC.
         return max(3 * period, period + 2 * self.longest + beats + self._response_time)
 
+    @cached_property
+    def end(self) -> float | None:
+        """Return the seconds of an orderly end where no frame gets lost, None for no bound."""
+        if self._mode.is_polled:
+            return None
+        writes = [packet for own in self._mappings.own for packet in self._written[own]]
+        return sum(map(self._undisturbed, [self._any_frames, *writes])) if writes else 0.0
+
     def _turn(self, mapping: Mapping) -> int:
         """Return with whom a row takes turns: its station, or all where these have no turns."""
         return mapping.station if self._mode.takes_turns else 0
@@ -218,7 +232,14 @@ class Times:
 def remarks(network: Network, mappings: Rows,
             response_time: float = forecast.USUAL_RESPONSE_TIME) -> Iterator[str]:
     """Yield remarks on the times of heartbeats and fallbacks (rules 2 and 16)."""
-    longest = Times(network, mappings, (), response_time).longest
+    times = Times(network, mappings, (), response_time)
+    longest, end = times.longest, times.end or 0.0
+    if end > LONGEST_END:
+        yield (f'an orderly end needs {milliseconds(end)} and has {milliseconds(LONGEST_END)}: '
+               'the last rows keep what they have; fewer rows, a higher Baud or several lines')
+    elif end > HAND_OVER:
+        yield (f'an orderly end needs {milliseconds(end)}; ~/polling has '
+               f'{milliseconds(HAND_OVER)}, and the last rows keep what they have')
     for mapping in mappings:
         if mapping.is_heartbeat and mapping.period is not None:
             if longest > mapping.period / 1000:

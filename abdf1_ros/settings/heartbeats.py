@@ -42,6 +42,12 @@ TIME_BASE = 0.01
 STABLE = 100
 """So many units of that rung 5 is longer than rung 3."""
 
+LONGEST_END = 6.0
+"""How long (s) an orderly end may take until all is confirmed (rule 5)."""
+
+HAND_OVER = 2.0
+"""The same where the process goes on: a caller waits for the answer of ~/polling and ~/reload."""
+
 _COUNTING = (ValueType.INT16, ValueType.UINT16)
 
 

@@ -29,13 +29,13 @@ from abdf1_ros.plan.bounds import (
 )
 from abdf1_ros.plan.forecast import line_model
 from abdf1_ros.plan.report import make_report
-from abdf1_ros.settings.heartbeats import Fallback, While
+from abdf1_ros.settings.heartbeats import Fallback, LONGEST_END, While
 from abdf1_ros.settings.mapping import Mapping
 from abdf1_ros.settings.network import Network
 from abdf1_ros.settings.rows import Rows
 import pytest
 from support.counting import lines_run
-from support.driver_bench import DriverBench
+from support.driver_bench import DriverBench, stored
 from support.mappings import make_mapping
 
 QUICK = Network(timeout=200, cmd_timeout=500, nak_retries=1, enq_retries=1, baud=19200)
@@ -193,6 +193,52 @@ def test_rule_16_transactions_longer_than_period_or_fallback_after_are_warned_of
     assert 'one transaction may take 8380 ms' in of_beat
     assert 'its Period is 1000 ms' in of_beat
     assert 'Fallback_After 3000 ms is shorter than two transactions' in of_speed
+
+
+def plant(stations: int, rows: int) -> list[Mapping]:
+    """Return rows with Fallback and a heartbeat of so many PLCs."""
+    return [row for station in range(11, 11 + stations) for row in (
+        make_mapping('N10:0', 'Heartbeat', station=station, tag=f'beat{station}', period=1000),
+        *(make_mapping(f'N7:{number}', 'Write', station=station, fallback=Fallback((7,), 3000))
+          for number in range(rows)))]
+
+
+def test_rule_5_orderly_end_has_the_time_that_is_printed() -> None:
+    """Until now it had 2 s: of these 25 rows three kept their command."""
+    network, rows = replace(QUICK, baud=9600), plant(5, 5)
+    end = Times(network, Rows(rows)).end
+    assert end is not None
+    assert 2.0 < end < LONGEST_END
+    bench = DriverBench(rows, network=network)
+    plcs = [bench.plc(number, 'PLC5', ('N7:0', 5), ('N10:0', 1)) for number in range(11, 16)]
+    bench.breathe()
+    bench.run(10.0)
+    for row in rows:
+        if row.fallback:
+            bench.write(row, [42], 0.2)
+    begun, interlocks = bench.line.now, bench.driver.interlocks
+    interlocks.wind_down()
+    bench.line.wake(bench.driver.machine)
+    bench.run_until(lambda: interlocks.is_over, LONGEST_END)
+    assert bench.line.now - begun < end
+    assert interlocks.unconfirmed() == []
+    assert [stored(plc, 'N7:0', 5) for plc in plcs] == [bytes([7, 0] * 5)] * 5
+
+
+@pytest.mark.parametrize(('stations', 'rows', 'text'), [
+    (1, 5, ''), (5, 5, '~/polling has 2000 ms, and the last rows keep what they have'),
+    (5, 30, 'and has 6000 ms: the last rows keep what they have')])
+def test_rule_5_end_that_takes_longer_than_it_has_is_warned_of(
+        stations: int, rows: int, text: str) -> None:
+    network = replace(QUICK, baud=9600)
+    found = [warning for warning in remarks(network, Rows(plant(stations, rows)))
+             if 'orderly end' in warning]
+    assert [text in warning for warning in found] == ([True] if text else [])
+
+
+def test_rule_5_mode_slave_has_no_time_for_an_end() -> None:
+    assert Times(Network(mode='Slave'), Rows([speed()])).end is None
+    assert Times(QUICK, Rows([make_mapping('N7:0')])).end == 0.0
 
 
 def test_rule_16_rows_that_are_fast_enough_are_not_warned_of() -> None:

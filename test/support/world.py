@@ -58,7 +58,7 @@ from abdf1_ros.pccc.emulated import Setting
 from abdf1_ros.pccc.families import dialect_of, parse_address
 from abdf1_ros.pccc.values import Values
 from abdf1_ros.plan.report import make_report
-from abdf1_ros.settings.heartbeats import Fallback, TIME_BASE, While
+from abdf1_ros.settings.heartbeats import Fallback, LONGEST_END, TIME_BASE, While
 from abdf1_ros.settings.mapping import Mapping
 from abdf1_ros.settings.network import Network
 from abdf1_ros.simulator.ladder import Ladder, Lamp
@@ -715,12 +715,12 @@ class World(DriverBench):
         self.clocks.set(0.0, self.line.now)
 
     def end(self) -> None:
-        """End in order (rule 5), within 2 s, and stay ended for as long as a gateway keeps."""
+        """End in order (rule 5), and stay ended for as long as a gateway keeps."""
         interlocks = self.driver.interlocks
         self.ended = self.line.now
         interlocks.wind_down()
         self.line.wake(self.driver.machine)
-        limit = self.line.now + 2.0
+        limit = self.line.now + LONGEST_END
         while not interlocks.is_over and self.line.now < limit:
             self.run(STEP / 10)
         self.driver.machine.stop(PortLost('the end'))

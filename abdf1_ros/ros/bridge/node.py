@@ -51,6 +51,7 @@ from abdf1_ros.ros.parameters.declared import (
 from abdf1_ros.ros.parameters.shown import ShownFiles
 from abdf1_ros.ros.topics.messages import latched_qos
 from abdf1_ros.ros.topics.writes import WriteTopics
+from abdf1_ros.settings.heartbeats import HAND_OVER, LONGEST_END
 from abdf1_ros.text import printable
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from rclpy.callback_groups import MutuallyExclusiveCallbackGroup
@@ -62,8 +63,8 @@ _POLLING = '~/polling'
 
 # Of the end (s): until when, counted from its beginning, writes that have come are waited for and
 # last diagnostics are begun; how long these may take, where a subscriber is stuck.
-_LATEST_WRITES = 3.0
-_LATEST_WORDS = 4.0
+_LATEST_WRITES = LONGEST_END + 1.0
+_LATEST_WORDS = LONGEST_END + 2.0
 _LAST_WORDS = 0.5
 
 _MOST_PROBLEMS = 20  # of a faulty file, in the answer of ~/reload
@@ -271,7 +272,7 @@ class BridgeNode(AnsweringNode):
         With its machine on the line the old one ends, then the new one begins, and only then may
         guests come and the old port be taken by others.
         """
-        tell_plcs([self.session], 'goes on with new files')
+        tell_plcs([self.session], 'goes on with new files', HAND_OVER)
         before, session = self.session, Session(self._surroundings, configuration)
         self.session = session
         self.writes.give_to(session.writers)
@@ -299,7 +300,7 @@ class BridgeNode(AnsweringNode):
             self.link.take()
             response.success, response.message = True, f'{self.session.port} is being opened'
         else:
-            tell_plcs([self.session], 'the port is left')
+            tell_plcs([self.session], 'the port is left', HAND_OVER)
             response.success = self.link.release()
             response.message = f'{self.session.port}: {self.link.state.text}'
         return response
@@ -327,13 +328,13 @@ def end_together(nodes: Sequence[BridgeNode], patience: float = _LAST_WORDS) -> 
     End nodes, all at once: PLCs, links, results of what has come, last words.
 
     Callbacks may run meanwhile: what they still take gets its result, that it is not sent. A node
-    that fails here does not keep the others from their end. It takes 4 s at most, and ``patience``
+    that fails here does not keep the others from their end. It takes 8 s at most, and ``patience``
     more (s) for a subscriber that is stuck.
     """
     begun = time.monotonic()
     for node in nodes:
         node.begin_end()
-    tell_plcs([node.session for node in nodes if node.link.is_alive()], 'ends')
+    tell_plcs([node.session for node in nodes if node.link.is_alive()], 'ends', LONGEST_END)
     for node in nodes:
         node.link.ask_to_stop()
     for node in nodes:

@@ -60,10 +60,7 @@ from std_msgs.msg import UInt16MultiArray
 
 _MOST_REMARKS = 20  # about both files, in the log
 
-# How long (s) an orderly end may take until all is confirmed (rule 5 of docs/heartbeats.md), and
-# how often that is looked at.
-_END_LIMIT = 2.0
-_GLANCE = 0.005
+_GLANCE = 0.005  # how often (s) it is looked at whether all is confirmed
 
 
 @dataclass(slots=True)
@@ -299,13 +296,13 @@ class Session:
         publisher.publish(message)
 
 
-def tell_plcs(sessions: Sequence[Session], what: str) -> None:
+def tell_plcs(sessions: Sequence[Session], what: str, limit: float) -> None:
     """
     Have heartbeats set to 0 and fallbacks written, and wait for all of it together (rule 5).
 
-    ``what`` says in the log what goes on then.
+    It takes ``limit`` s at most. ``what`` says in the log what goes on then.
     """
-    give_up = time.monotonic() + _END_LIMIT
+    give_up = time.monotonic() + limit
     for session in sessions:
         session.begin_end()
     for session in sessions:

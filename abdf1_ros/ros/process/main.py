@@ -38,6 +38,7 @@ from abdf1_ros.problems import ConfigurationError, Problem
 from abdf1_ros.ros.diagnostics.log import bug_text
 from abdf1_ros.ros.parameters.files import usable_files
 from abdf1_ros.ros.process.console import Console
+from abdf1_ros.settings.heartbeats import LONGEST_END
 from abdf1_ros.signals import EndRequest
 from abdf1_ros.text import printable
 import rclpy
@@ -51,9 +52,10 @@ EXIT_CONFIGURATION = 2
 EXIT_FAULT = 1
 
 # After a signal the process is gone within so many seconds, and nodes are taken off the network
-# for so long. What comes before takes 4 s at most: PLCs, writes that have come, last words.
-_END_LIMIT = 5.0
-_DESTRUCTION_LIMIT = 4.5
+# for so long. What comes before takes 8 s at most: PLCs, writes that have come, last words. In
+# all it is less than the 10 s after which systemd, launch and Docker kill.
+_END_LIMIT = LONGEST_END + 3.0
+_DESTRUCTION_LIMIT = LONGEST_END + 2.5
 
 # What rclpy raises for names, parameters and arguments, and where ROS does not start. Other errors
 # are bugs.
