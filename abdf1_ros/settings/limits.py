@@ -18,35 +18,70 @@ from __future__ import annotations
 
 from array import array
 from collections.abc import Sequence
+import math
 
 from abdf1_ros.errors import FormatError
 from abdf1_ros.pccc.values import ValueType
 from abdf1_ros.settings.mapping import Mapping
+from abdf1_ros.settings.scaling import float32_step, Scaling
 from abdf1_ros.text import value_text
+
+# A raw value may be so much of a step outside of a limit: what double precision loses of 32 bits.
+_EXACT = 1e-6
+
+_UNSCALED = Scaling()
+_NO_LIMITS = -math.inf, math.inf
 
 
 def raw_values(mapping: Mapping, values: Sequence[float] | str) -> Sequence[float] | str:
-    """Return the raw values to write; FormatError where a limit or the type forbids one."""
+    """
+    Return the raw values to write; FormatError where a limit or the type forbids one.
+
+    No raw value is outside of Min and Max. A float32 can be the nearest one to a limit, and
+    outside: then it stands for the limit, and the nearest raw value inside is written.
+    """
     codec, scaling = mapping.codec, mapping.scaling
-    if isinstance(values, str) or scaling is None:
-        codec.check(values)
-        _check_limits(mapping, values)
-        return values
-    raw = scaling.raw(values, mapping.type)
+    raw = values if isinstance(values, str) or scaling is None \
+        else scaling.raw(values, mapping.type)
     codec.check(raw)
-    _check_limits(mapping, values)
-    if mapping.type is not ValueType.FLOAT32:  # rounding must not exceed a limit either
-        _check_limits(mapping, scaling.publish(raw), ', the nearest that can be written,')
-    return raw
+    limits = mapping.minimum, mapping.maximum
+    if isinstance(values, str) or limits == _NO_LIMITS:
+        return raw
+    if mapping.message_type is not ValueType.FLOAT32:
+        _check_limits(mapping, values, *limits)
+        return raw
+    _check_limits(mapping, values, *array('f', limits))
+    return _raw_inside(mapping, values)
 
 
-def _check_limits(mapping: Mapping, values: Sequence[float] | str, what: str = '') -> None:
-    if isinstance(values, str):
-        return
-    minimum, maximum = mapping.minimum, mapping.maximum
-    if mapping.message_type is ValueType.FLOAT32:  # the nearest possible values
-        minimum, maximum = array('f', (minimum, maximum))
+def _raw_inside(mapping: Mapping, values: Sequence[float]) -> list[float]:
+    """Return raw values inside the limits; FormatError where the nearest one is outside."""
+    scaling, low, high = mapping.scaling or _UNSCALED, mapping.minimum, mapping.maximum
+    found = scaling.raw([min(max(value, low), high) for value in values], mapping.type)
+    low, high = sorted((end - scaling.offset) / scaling.scale for end in (low, high))
+    if mapping.type is ValueType.FLOAT32:
+        return [_inside(raw, low, high) for raw in found]
+    for index, raw in enumerate(found):
+        if not low - _EXACT <= raw <= high + _EXACT:
+            raise _outside(mapping, index, raw * scaling.scale + scaling.offset,
+                           ', the nearest that can be written,')
+    return found
+
+
+def _inside(value: float, low: float, high: float) -> float:
+    """Return the float32 next to a value that is inside the limits."""
+    nearest, = array('f', [value])
+    step = float32_step(nearest)
+    return nearest + step * ((nearest < low) - (nearest > high))
+
+
+def _check_limits(mapping: Mapping, values: Sequence[float], minimum: float,
+                  maximum: float) -> None:
     for index, value in enumerate(values):
         if not minimum <= value <= maximum:
-            raise FormatError(f'value {value_text(value)} at index {index}{what} is outside '
-                              f'Min {mapping.minimum:.15g}, Max {mapping.maximum:.15g}')
+            raise _outside(mapping, index, value)
+
+
+def _outside(mapping: Mapping, index: int, value: float, what: str = '') -> FormatError:
+    return FormatError(f'value {value_text(value)} at index {index}{what} is outside '
+                       f'Min {mapping.minimum:.15g}, Max {mapping.maximum:.15g}')

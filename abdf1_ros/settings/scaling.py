@@ -69,7 +69,7 @@ class Scaling:
         if kind is not ValueType.FLOAT32 and widest > FLOAT_MAX:
             return f'a float32 cannot hold {self._range(kind)}'
         # The float32 is off by a quarter of a raw step at most; half a step would be too much.
-        if kind.words == 1 and 2 * _float32_step(widest) > abs(self.scale):
+        if kind.words == 1 and 2 * float32_step(widest) > abs(self.scale):
             return ('a float32 has too few digits to tell the values apart in '
                     f'{self._range(kind)}')
         return None
@@ -85,6 +85,6 @@ class Scaling:
                 f'Scale {self.scale:.10g}, Offset {self.offset:.10g}')
 
 
-def _float32_step(value: float) -> float:
+def float32_step(value: float) -> float:
     """Return the distance of float32 numbers around ``value``."""
     return math.ldexp(1.0, max(math.frexp(value)[1] - 24, -149))

@@ -153,14 +153,43 @@ def test_what_a_float32_cannot_hold_is_published_as_infinite() -> None:
     assert Scaling(2.0).publish([3e38, math.inf, 1.0]) == array('f', [math.inf, math.inf, 2.0])
 
 
-def test_limit_of_floats_is_as_near_as_a_float32_can_come_to_it() -> None:
-    mapping = make_mapping('F8:0', 'Write', minimum=-0.1, maximum=0.1)
+@pytest.mark.parametrize('scaling', [None, Scaling(0.37, 0.011), Scaling(-3.0, 0.5)])
+def test_limit_of_floats_is_kept_by_the_float32_that_is_written(scaling: Scaling | None) -> None:
+    """The float32 nearest to a limit may be outside of it, and stands for it in a message."""
+    mapping = make_mapping('F8:0', 'Write', minimum=-0.1, maximum=0.1, scaling=scaling)
     (tenth,) = array('f', [0.1])
     assert tenth > 0.1
-    assert raw_values(mapping, [tenth]) == [tenth]
-    assert raw_values(mapping, [-tenth]) == [-tenth]
+    for value in (tenth, -tenth):
+        raw, = raw_values(mapping, [value])
+        assert [raw] == [*array('f', [raw])]
+        written = raw if scaling is None else raw * scaling.scale + scaling.offset
+        assert -0.1 <= written <= 0.1
+        assert written == pytest.approx(value, abs=1e-7)
     with pytest.raises(FormatError, match=r'value 0.1001 at index 0 is outside Min -0.1, Max 0.1'):
         raw_values(mapping, [0.1001])
+
+
+@pytest.mark.parametrize(('kind', 'scale', 'offset', 'limit'), [
+    ('int32', 0.001, 0.0, 2_000_000.123), ('uint32', 0.001, 0.0, 4_000_000.377),
+    ('int32', 1.0, 0.0, 2_000_000_001), ('int32', -0.01, 7.0, 12_345_678.91)])
+def test_limit_of_scaled_32_bits_is_kept_to_the_raw_step(
+        kind: str, scale: float, offset: float, limit: float) -> None:
+    """A float32 has 24 bits: the one nearest to the limit is up to 128 steps away."""
+    mapping = make_mapping('N7:0', 'Write', kind=kind, maximum=limit,
+                           scaling=Scaling(scale, offset))
+    nearest, = array('f', [limit])
+    above, = array('f', [limit + 300 * abs(scale)])
+    raw, = raw_values(mapping, [nearest])
+    assert raw * scale + offset <= limit + abs(scale) * 1e-6
+    with pytest.raises(FormatError, match='is outside Min -inf'):
+        raw_values(mapping, [above])
+
+
+def test_message_between_the_last_raw_step_and_the_limit_is_refused() -> None:
+    mapping = make_mapping('N7:0', 'Write', maximum=10.6, scaling=Scaling(1.0))
+    assert raw_values(mapping, [10.4]) == [10]
+    with pytest.raises(FormatError, match='value 11 at index 0, the nearest that can be written'):
+        raw_values(mapping, [10.55])
 
 
 def test_limit_of_long_words_is_not_that_of_a_float32() -> None:
