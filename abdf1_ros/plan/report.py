@@ -154,6 +154,8 @@ class Report:
         if free:
             found.append(f'bits without While: {_tags(free)}; their values go on when the '
                          'program of the PLC stops')
+        if alarms := [mapping for mapping in self.mappings if mapping.alarm is not None]:
+            found.append(f'alarms on /diagnostics: {_tags(alarms)}')
         if gaps := '; '.join(_unprotected(self.mappings)):
             found.append(f'nothing protects: {gaps}')
         return found

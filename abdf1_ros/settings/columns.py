@@ -24,6 +24,7 @@ from operator import attrgetter
 
 from abdf1_ros.numbers import decimal_number, Kind, member_of, TEXT, two_readings, whole
 from abdf1_ros.pccc.values import ValueType, WordOrder
+from abdf1_ros.settings.alarms import ALARM
 from abdf1_ros.settings.mapping import Command, Mapping, MESSAGES, Publish, PUBLISHED
 from abdf1_ros.text import shown
 
@@ -180,6 +181,10 @@ MAP_COLUMNS = (
            commands=_PLCS),
     Column('Description', 'none', 'what it is in the plant, to be read',
            kind=TEXT),
+    Column('Alarm', 'none',
+           'of bits: WARN or ERROR, the level on /diagnostics while a bit is 1; "WARN 0" or '
+           '"ERROR 0" while it is 0',
+           kind=ALARM, commands=PUBLISHED),
 )
 
 BY_NAME = {column.name: column for column in MAP_COLUMNS}

@@ -62,6 +62,8 @@ def with_conditions(row: Row, values: Cells, mapping: Mapping, fault: ReportFaul
         mapping = replace(mapping, period=mapping.period or DEFAULT_PERIOD)
     if mapping.confirms and (mapping.type, mapping.length) != (ValueType.BOOL, 1):
         fault('Confirms', 'Confirms is for a Read row of one bit (bool, Length 1)')
+    if mapping.alarm is not None and mapping.type is not ValueType.BOOL:
+        fault('Alarm', 'Alarm is for bits (bool), such as B3:0/0')
     return replace(mapping, fallback=_fallback(values, mapping, fault),
                    condition=_condition(values, mapping, fault))
 

@@ -30,6 +30,7 @@ from abdf1_ros.pccc.file_types import FileType, PlcType
 from abdf1_ros.pccc.processor import Processor
 from abdf1_ros.pccc.values import Codec, ValueType, WordOrder
 from abdf1_ros.problems import Place, Problem
+from abdf1_ros.settings.alarms import Alarm
 from abdf1_ros.settings.heartbeats import Fallback, While
 from abdf1_ros.settings.scaling import Scaling
 
@@ -71,7 +72,7 @@ class Mapping:
     in the unit of the topic: where ``scaling`` is given, that of the engineering values. ``via``
     is the gateway to the station, None for a station of the line itself. With
     ``is_read_only`` the words of a Serve row may not be written by the other end.
-    ``fallback`` and ``condition`` are there where the row has them.
+    ``alarm``, ``fallback`` and ``condition`` are there where the row has them.
     ``confirms`` is the tag of the heartbeat whose control the bit tells, empty for none.
     ``description`` is to be read. ``remarks`` say what is odd about the row.
     """
@@ -101,6 +102,7 @@ class Mapping:
     fallback: Fallback | None = None
     condition: While | None = None
     confirms: str = ''
+    alarm: Alarm | None = None
     remarks: tuple[Problem, ...] = ()
     # The codec and the dialect are made once: every read needs them.
     codec: Codec = field(init=False, repr=False)

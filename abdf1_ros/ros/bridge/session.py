@@ -22,7 +22,7 @@ used from any thread.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 import math
 import random
@@ -31,6 +31,7 @@ from typing import Any
 
 from abdf1_ros.df1.packet import BROADCAST
 from abdf1_ros.driver.driver import Driver
+from abdf1_ros.pccc.values import Values
 from abdf1_ros.plan.forecast import USUAL_RESPONSE_TIME
 from abdf1_ros.plan.report import Remark, Report, setting_remarks
 from abdf1_ros.ports.clock import line_time
@@ -39,6 +40,7 @@ from abdf1_ros.ports.trace import PortOpener
 from abdf1_ros.ros.bridge.guests import GuestPlaces
 from abdf1_ros.ros.bridge.offer import OfferedPublisher
 from abdf1_ros.ros.callbacks import AnsweringNode
+from abdf1_ros.ros.diagnostics.alarms import Alarms
 from abdf1_ros.ros.diagnostics.events import LineEvents
 from abdf1_ros.ros.diagnostics.graph import Graph, NameWatch, TypeWatch
 from abdf1_ros.ros.diagnostics.stations import LinkCounterService
@@ -51,6 +53,7 @@ from abdf1_ros.ros.topics.messages import ACTIVE_LAYOUT
 from abdf1_ros.ros.topics.reads import ReadTopic, ReadTopics
 from abdf1_ros.ros.topics.snapshot import Snapshot
 from abdf1_ros.ros.topics.writes import WriteTopic, WriteTopics
+from abdf1_ros.settings.mapping import Mapping
 from abdf1_ros.settings.rows import Rows
 from abdf1_ros.text import first, printable
 from diagnostic_msgs.msg import DiagnosticArray
@@ -110,9 +113,10 @@ class Session:
         self._seen = Seen(lambda: surroundings.names.text, latest=self.reads.latest)
         self._events = LineEvents(
             node.get_logger(), self.port, stations_of(mappings),
-            scans=not network.line_mode.has_one_plc, seen=self._seen, read=self.reads.read,
+            scans=not network.line_mode.has_one_plc, seen=self._seen, read=self._reader(),
             results=surroundings.results, table_changed=self._publish_active)
         self.driver = Driver(network, mappings, configuration.driver_settings(), self._events)
+        self._alarms = Alarms(self.driver.points.values(), self.port, line_time)
         self.writers: dict[str, WriteTopic] = {}
         if surroundings.is_offered:
             # Subscriptions first: where there are thousands of publishers, each takes DDS 5 ms.
@@ -122,7 +126,8 @@ class Session:
                                   self._events.notes, self._wake_link)
         self.diagnostics = Diagnostics(
             node.get_fully_qualified_name().lstrip('/'), self.driver, self.port, self._seen,
-            self._events.writes, configuration.map_problems, self.guests.lines)
+            self._events.writes, configuration.map_problems, self.guests.lines,
+            self._alarms.statuses)
         self._interlocks = InterlockWatch(node, self.driver)
         self._watches: list[Watch] = [
             surroundings.names,
@@ -142,6 +147,16 @@ class Session:
     @property
     def port(self) -> str:
         return self.configuration.port
+
+    def _reader(self) -> Callable[[Mapping, Values], None]:
+        """Return what gets the values of good reads, in the thread of the link."""
+        if any(mapping.alarm for mapping in self.configuration.mappings):
+            return self._read_with_alarms
+        return self.reads.read
+
+    def _read_with_alarms(self, mapping: Mapping, values: Values) -> None:
+        self.reads.read(mapping, values)
+        self._alarms.read(mapping, values)
 
     def _open_writers(self) -> dict[str, WriteTopic]:
         return self._surroundings.writes.open(

@@ -39,19 +39,19 @@ class Diagnostics:
 
     ``node_name`` is the full name, or nodes of one name in two namespaces would be one here.
     ``left_out`` are the faults of the rows that the map was read without, ``guests`` are the
-    places of other programs.
+    places of other programs, ``alarms`` the statuses of rows with an alarm.
     """
 
     def __init__(self, node_name: str, driver: Driver, port: str,
                  seen: Seen, writes: WriteLog, left_out: Sequence[Problem] = (),
-                 guests: Sequence[GuestLine] = ()) -> None:
+                 guests: Sequence[GuestLine] = (), alarms: Sequence[Status] = ()) -> None:
         self._node_name = node_name
         self.line = LineView(driver)
         self.counters = CountersStatus(self.line, port)
         self._statuses: list[Status] = [
             LinkStatus(self.line, port, seen), self.counters,
             *(StationStatus(self.line, station, port, seen) for station in driver.stations),
-            MappingsStatus(driver, port, left_out), writes]
+            MappingsStatus(driver, port, left_out), writes, *alarms]
         if driver.interlocks.heartbeats or driver.interlocks.fallbacks:
             self._statuses.append(InterlockStatus(driver, port, seen))
         if guests:

@@ -1,0 +1,123 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+Statuses of alarms: bits of the PLC that mean a fault of the plant.
+
+A bit that was seen between two statuses is shown once, though it has gone again.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
+
+from abdf1_ros.driver.reads.point import Freshness, ReadPoint
+from abdf1_ros.pccc.values import Values
+from abdf1_ros.ros.diagnostics.status import ERROR, Judgement, OK, WARN
+from abdf1_ros.settings.alarms import Severity
+from abdf1_ros.settings.mapping import Mapping
+from abdf1_ros.text import counted, first
+
+_LEVELS = {Severity.WARN: WARN, Severity.ERROR: ERROR}
+
+# Rows whose bits are not what the PLC has now.
+_UNKNOWN = {Freshness.STALE: ERROR, Freshness.FAILED: ERROR, Freshness.WITHHELD: ERROR,
+            Freshness.WAITING: WARN}
+
+
+@dataclass(slots=True)
+class Bit:
+    """
+    One bit: whether it is an alarm, since when (clock value, s), and how often that began.
+
+    ``is_news`` tells that it was an alarm at some time since the last status.
+    """
+
+    place: str
+    is_on: bool = False
+    since: float | None = None
+    times: int = 0
+    is_news: bool = False
+
+    def take(self, is_on: bool, now: float) -> None:
+        """Take what was read."""
+        if is_on is not self.is_on:
+            self.is_on, self.since = is_on, now
+            self.times += is_on
+        self.is_news |= is_on
+
+    def text(self, now: float) -> str:
+        """Return what is known of it."""
+        if self.since is None:
+            return 'never'
+        times = counted(self.times, 'time')
+        return f'since {now - self.since:.1f} s, {times}' if self.is_on else \
+            f'{times}, gone {now - self.since:.1f} s ago'
+
+
+class AlarmStatus:
+    """The alarms of one row, whose bits are read as ``point`` says."""
+
+    def __init__(self, point: ReadPoint, port: str) -> None:
+        mapping = self._mapping = point.mapping
+        assert mapping.alarm is not None
+        self.name = f'alarm {mapping.tag}'
+        self.hardware_id = port
+        self._alarm = mapping.alarm
+        self._point = point
+        self._bits = [Bit(str(mapping.place_of(number))) for number in range(mapping.length)]
+
+    def take(self, values: Values, now: float) -> None:
+        """Take the values of a good read."""
+        for bit, value in zip(self._bits, values, strict=True):
+            bit.take(value == self._alarm.state, now)
+
+    def judge(self, now: float) -> Judgement:
+        state = self._point.freshness(now)
+        if state in _UNKNOWN:
+            return _UNKNOWN[state], f'unknown: its row is {state.value}{self._description}'
+        shown = [f'{bit.place} {bit.text(now)}' for bit in self._bits if bit.is_on or bit.is_news]
+        if not shown:
+            return OK, f'no alarm{self._description}'
+        return _LEVELS[self._alarm.severity], f'{first(shown)}{self._description}'
+
+    @property
+    def _description(self) -> str:
+        return f': {self._mapping.description}' if self._mapping.description else ''
+
+    def values(self, now: float) -> dict[str, str]:
+        """Return each bit; what it was between two statuses has been shown then."""
+        for bit in self._bits:
+            bit.is_news = False
+        return {bit.place: bit.text(now) for bit in self._bits}
+
+
+class Alarms:
+    """The statuses of all rows with an alarm; ``read`` gets values in the thread of the link."""
+
+    def __init__(self, points: Iterable[ReadPoint], port: str,
+                 clock: Callable[[], float]) -> None:
+        self._clock = clock
+        self._by_mapping = {point.mapping: AlarmStatus(point, port) for point in points
+                            if point.mapping.alarm is not None}
+
+    @property
+    def statuses(self) -> Sequence[AlarmStatus]:
+        return [*self._by_mapping.values()]
+
+    def read(self, mapping: Mapping, values: Values) -> None:
+        """Take the values of a good read, of any row."""
+        if status := self._by_mapping.get(mapping):
+            status.take(values, self._clock())
