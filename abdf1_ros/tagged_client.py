@@ -102,7 +102,7 @@ def _named(row: Mapping) -> str:
 
 def _shown(row: Mapping, values: Values) -> float | str | list[float]:
     """Return values as the topic of a row has them."""
-    if row.scaling is not None:
+    if row.scaling is not None and not isinstance(values, str):
         values = row.scaling.publish(values)
     return single(plain(values, row.type), row.length == 1)
 

@@ -24,7 +24,7 @@ from functools import partial
 import math
 import struct
 import sys
-from typing import Any
+from typing import TypeAlias
 
 from abdf1_ros.errors import FormatError
 from abdf1_ros.pccc import strings
@@ -108,7 +108,7 @@ def types_of(address: Address) -> tuple[ValueType, ...]:
     return _TYPES.get(address.file_type, _UNSIGNED_FIRST)
 
 
-Values = Any
+Values: TypeAlias = 'array[int] | array[float] | str'
 """An ``array.array`` with the type code of its ValueType, or a str."""
 
 
@@ -155,12 +155,12 @@ class Codec:
             return array('B', ((number >> n) & 1 for n in range(self.length)))
         if self.word_order is WordOrder.HIGH:
             data = _exchange_words(data)
-        values: Values = array(self.type.array_code, data)
+        values = array(self.type.array_code, data)
         if sys.byteorder == 'big':
             values.byteswap()
         if self.type in _BCD:
             mask = self._mask
-            return array('H', [_from_bcd(value & mask) for value in values])
+            return array('H', [_from_bcd(int(value) & mask) for value in values])
         return values
 
     def check(self, values: Sequence[float] | str) -> None:

@@ -217,14 +217,15 @@ class Times:
                 'ENQ_Retries 1': replace(network, enq_retries=1),
                 'Baud 19200': replace(network, baud=19200),
                 'Polling Message': replace(network, polling='Message')}
-        least, way = min((Times(other, self._mappings, self._blocks)._worst, way)
+        least, way = min((Times(other, self._mappings, self._blocks).worst, way)
                          for way, other in ways.items())
-        if least < _WORTH_IT * self._worst:
+        if least < _WORTH_IT * self.worst:
             yield (f'{way} would shorten the longest of these times most, from '
-                   f'{milliseconds(self._worst)} to {milliseconds(least)}')
+                   f'{milliseconds(self.worst)} to {milliseconds(least)}')
 
     @property
-    def _worst(self) -> float:
+    def worst(self) -> float:
+        """Return the longest bound (s), 0 where there is none."""
         return max((self._bound(mapping).seconds or 0.0 for mapping in self._mappings.own),
                    default=0.0)
 

@@ -112,8 +112,8 @@ class Executor(SingleThreadedExecutor):
 
 def _give_back(entity: Any) -> None:
     """Have an entity waited for again; where its message cannot be taken, rclpy forgets that."""
-    if entity is not None and entity._executor_event:
-        entity._executor_event = False
+    if entity is not None and entity._executor_event:  # noqa: SLF001
+        entity._executor_event = False  # noqa: SLF001
         entity.callback_group.ending_execution(entity)
 
 

@@ -84,6 +84,8 @@ class _Mover:
         steps = int((now - self.next_time) / self.period) + 1
         self.next_time += steps * self.period
         values = self.codec.decode(table.read(self.address, self.codec.words))
+        if isinstance(values, str):
+            return
         if self.motion is Motion.RAMP:
             changed = [(value + steps) % _RAMP_TOP for value in values]
         else:

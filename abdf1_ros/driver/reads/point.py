@@ -97,7 +97,9 @@ class ReadPoint:
         self.last_good, self.error, self.withheld = now, None, ''
         if is_same:
             return None
-        return values if self._scaling is None else self._scaling.publish(values)
+        if self._scaling is None or isinstance(values, str):
+            return values
+        return self._scaling.publish(values)
 
     def _remember(self, values: Values) -> bool:
         """Remember values; return whether they differ from the last ones."""

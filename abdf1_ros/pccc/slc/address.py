@@ -103,21 +103,21 @@ class _SlcAddressing(FileAddressing):
         """Return how many words a file or slot can have at most."""
         if self.slot_of(address) is not None:
             return _LAST_SLOT_WORD + 1
-        return FileAddressing.area_size(self, address)
+        return super().area_size(address)
 
     def _with_word(self, address: Address, word: int) -> Address:
         if address.is_flat:
             raise AddressSyntaxError(
                 'with access Flat write the word of the whole image, as in I:5 or O:0/3')
         if self.slot_of(address) is None:
-            return FileAddressing._with_word(self, address, word)
+            return super()._with_word(address, word)
         if word > _LAST_SLOT_WORD:
             raise AddressRangeError(f'words of a slot run from 0 to {_LAST_SLOT_WORD}')
         return replace(address, word=word)
 
     def _rest_text(self, address: Address) -> str:
         if self.slot_of(address) is None:
-            return FileAddressing._rest_text(self, address)
+            return super()._rest_text(address)
         return f'.{address.word}' + ('' if address.bit is None else f'/{address.bit}')
 
 

@@ -67,13 +67,16 @@ def encoder(mapping: Mapping) -> Callable[[Values], Any]:
         return lambda values: MESSAGES[ValueType.STRING](data=values)
     message.data = example = array(message.data.typecode, [1] * mapping.length)
     before, _, after = serialize_message(message).rpartition(example.tobytes())
-    return lambda values: before + values.tobytes() + after
+
+    def encode(values: Values) -> bytes:
+        return before + after if isinstance(values, str) else before + values.tobytes() + after
+    return encode
 
 
 def values_of(message: Any) -> Values:
     """Return the values of a message to be written; FormatError when they do not start at 0."""
     if isinstance(message, String):
-        return message.data
+        return str(message.data)
     if message.layout.data_offset:
         raise FormatError('layout.data_offset should be 0')
     values: array[float] = message.data
