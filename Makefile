@@ -130,6 +130,7 @@ test-ros: $(INSTALLED) ## Run the tests that need these tools; what is missing f
 lint: $(INSTALLED) ## Check style and types
 	$(PY) -m ruff check .
 	$(PY) -m mypy
+	$(PY) -m tools.ament
 
 .PHONY: docs
 docs: $(INSTALLED) ## Write the parts of the documentation that repeat the code

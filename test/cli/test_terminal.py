@@ -46,6 +46,7 @@ import pytest
 
 
 class Screen(io.StringIO):
+
     def isatty(self) -> bool:
         return True
 

@@ -112,6 +112,7 @@ def test_a_write_of_a_guest_is_read_again_at_once(kind: str, address: str, write
     wrote: list[tuple[int, list[Extent]]] = []
 
     class Told(GuestListener):
+
         def wrote(self, guest: Guest, command: Packet, station: int, words: list[Extent]) -> None:
             wrote.append((station, words))
 

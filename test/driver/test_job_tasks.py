@@ -101,6 +101,7 @@ def test_all_jobs_end_with_the_port() -> None:
 
 def test_error_in_a_job_ends_it() -> None:
     class Faulty(TwoRequests):
+
         def _steps(self) -> Steps[None]:
             yield 0x0F, b''
             raise ZeroDivisionError

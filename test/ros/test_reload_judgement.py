@@ -16,6 +16,7 @@
 
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 from abdf1_ros.ports.settings import PortSettings
 from abdf1_ros.problems import ConfigurationError
@@ -28,9 +29,9 @@ from support.mappings import make_mapping
 ROW = make_mapping(tag='speed')
 
 
-def configured(*rows: object, port: str = '/dev/ttyS0', **network: object) -> Configuration:
-    return Configuration(Parameters(map_file='map.csv'), Network(**network),  # type: ignore[arg-type]
-                         port, Rows(rows), [], {})  # type: ignore[arg-type]
+def configured(*rows: Any, port: str = '/dev/ttyS0', **network: Any) -> Configuration:
+    return Configuration(
+        Parameters(map_file='map.csv'), Network(**network), port, Rows(rows), [], {})
 
 
 def refusal(before: Configuration, after: Configuration, *, is_open: bool = True,

@@ -117,7 +117,7 @@ class Taker:
     def ahead(self, topic: str, seconds: float, nodes: Sequence[str]) -> None:
         self.said.append(f'{topic}: {nodes} ahead by {seconds:.1f} s')
 
-    def open(self, topics: WriteTopics, patience: float = 2.0) -> Any:
+    def open(self, topics: WriteTopics, patience: float = 2.0) -> Any:  # noqa: A003
         return topics.open(cast(Driver, self), patience, self, self._woken)
 
     def _woken(self) -> None:

@@ -249,6 +249,7 @@ def requested(*reads: tuple[float, bytes]) -> list[tuple[float, float]]:
     port, found = Waits(*((0.1, b''),) * 5, *reads), list[tuple[float, float]]()
 
     class Queue(GuestQueue):
+
         def __init__(self) -> None:
             pass
 

@@ -206,9 +206,10 @@ class Bench:
         frames = self.line.frames  # of one transaction
         # Each byte that may suffer, by who hears it. Of polls of an idle line that follow each
         # other one is enough.
-        self.places = [(side, begun + at) for number, (side, begun, data) in enumerate(frames)
-                        if number < 2 or frames[number - 2][::2] != (side, data)
-                        for at in range(len(data))]
+        self.places = [
+            (side, begun + at) for number, (side, begun, data) in enumerate(frames)
+            if number < 2 or frames[number - 2][::2] != (side, data)
+            for at in range(len(data))]
 
     def _end(self, network: Network, rows: tuple[Mapping, ...]) -> End:
         listener = Recorder(lambda: self.line.now)

@@ -380,7 +380,8 @@ class World(DriverBench):
         self._begins = {  # how each write begins on the line, by tag without the station
             row.tag[:-2]: stuff(row.dialect.write(row.address, b'\0\0')[1][:-2])
             for row in self.rows_of(1, ('w', 'free', 'beat'))}
-        self._send, self.line._send = self.line._send, self._note_sent  # type: ignore[method-assign]
+        self._send, self.line._send = (  # type: ignore[method-assign]
+            self.line._send, self._note_sent)
         self.line._random = Random(seed)
         self.executor_ran = 0.0
         self.open()

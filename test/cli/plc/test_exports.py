@@ -316,7 +316,8 @@ def test_characters_of_an_a_file_are_not_taken_for_words(tmp_path: Path) -> None
 
 def test_input_or_output_that_may_be_of_a_micrologix_is_only_read(tmp_path: Path) -> None:
     text = KEPSERVER + '"Out","O:1",Word,1,R/W,500,,,,,,,,,,"",\n' \
-        '"Bit","O:2/3",Boolean,1,R/W,500,,,,,,,,,,"",\n"Sure","O:2.0",Word,1,R/W,500,,,,,,,,,,"",\n'
+        '"Bit","O:2/3",Boolean,1,R/W,500,,,,,,,,,,"",\n' \
+        '"Sure","O:2.0",Word,1,R/W,500,,,,,,,,,,"",\n'
     assert [row[1] for row in told(imported(tmp_path, text)[0])] == ['Read', 'Read', 'ReadWrite']
     result = import_map(str(tmp_path / 'export.csv'), Wanted())
     assert [(text.partition(',')[0], count) for text, count in result.remarks.items() if text] == [
@@ -346,8 +347,8 @@ def test_tags_of_rsview_and_factorytalk(tmp_path: Path, text: str) -> None:
         ('Press/Run', 'Read', 'B3:0/5', '')], [])
     assert {column: cell_of(mappings[0], column) for column in ('Scale', 'Offset', 'Min', 'Max')
             } == {'Scale': '0.1', 'Offset': '-5', 'Min': '0', 'Max': '100'}
-    assert import_map(str(tmp_path / 'export.csv'), Wanted()).ignored['tags without a PLC '
-                                                                     '(memory and system)'] == 1
+    ignored = import_map(str(tmp_path / 'export.csv'), Wanted()).ignored
+    assert ignored['tags without a PLC (memory and system)'] == 1
 
 
 INTOUCH = (

@@ -134,6 +134,7 @@ def test_silent_station_is_shown(plcs: Plcs, capsys: pytest.CaptureFixture[str])
 def test_interrupt_of_the_start_leaves_no_thread(
         plcs: Plcs, monkeypatch: pytest.MonkeyPatch) -> None:
     class Interrupted(LinkThread):
+
         def start(self) -> None:
             self.daemon = True  # or a thread that is left would hold up the end of all tests
             super().start()

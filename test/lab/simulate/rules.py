@@ -297,7 +297,7 @@ class Beats(Rule):
         self._sent: dict[str, Sent] = {}
 
     def sent(self, entry: Sent) -> None:
-        """Judge what a heartbeat vouches for when it is sent (3 c, d)."""
+        """Judge what a heartbeat vouches for when it goes out (3 c, d)."""
         world, plant = self.world, self.world.plant
         if not entry.tag.startswith('beat') or entry.value in GUESTS:
             return

@@ -49,6 +49,7 @@ def test_faults_cannot_grow_memory(mode: str) -> None:
 
 def test_long_containers_are_found() -> None:
     class Keeper:
+
         def __init__(self) -> None:
             self.inner = {'a': deque(range(7)), 'b': [{1: set(range(9))}]}
 
