@@ -23,7 +23,7 @@ from setuptools import find_packages, setup
 
 PACKAGE = 'abdf1_ros'
 
-# Maintainer and addresses are filled in there alone; a release counts up both versions.
+# Authors, maintainer and addresses are filled in there alone; a release counts up both versions.
 MANIFEST = ElementTree.parse(Path(__file__).resolve().parent / 'package.xml').getroot()
 MAINTAINER = MANIFEST.find('maintainer')
 
@@ -37,7 +37,23 @@ setup(
     name=PACKAGE,
     version='0.1.0',
     description='Bridge between Allen-Bradley PLCs and ROS topics over DF1',
+    long_description=(Path(__file__).resolve().parent / 'README.md').read_text(encoding='utf-8'),
+    long_description_content_type='text/markdown',
+    classifiers=[
+        'Development Status :: 4 - Beta',
+        'Environment :: Console',
+        'Intended Audience :: Manufacturing',
+        'Operating System :: POSIX :: Linux',
+        'Programming Language :: Python :: 3 :: Only',
+        'Topic :: Communications',
+        'Topic :: Scientific/Engineering :: Interface Engine/Protocol Translator',
+        'Topic :: System :: Hardware',
+        'Typing :: Typed',
+    ],
+    keywords=['DF1', 'PCCC', 'Allen-Bradley', 'PLC', 'PLC-5', 'SLC 500', 'MicroLogix', 'ROS'],
     url=MANIFEST.find('url[@type="repository"]').text,
+    author=MAINTAINER.text,
+    author_email=MAINTAINER.get('email'),
     maintainer=MAINTAINER.text,
     maintainer_email=MAINTAINER.get('email'),
     license='Apache-2.0',

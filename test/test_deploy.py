@@ -77,6 +77,13 @@ def test_ros_has_all_commands_and_pip_two_that_no_other_program_has() -> None:
         assert executables(command) == {'abdf1', 'plc'}
 
 
+def test_package_index_has_what_a_reader_looks_for() -> None:
+    said = described('bdist_wheel')
+    assert said['long_description'].startswith('# abdf1_ros')
+    assert said['author'] == said['maintainer']
+    assert 'Typing :: Typed' in said['classifiers']
+
+
 @pytest.mark.parametrize('line', described('install')['entry_points']['console_scripts'])
 def test_executables_are_there(line: str) -> None:
     module, _, name = line.partition(' = ')[2].partition(':')
@@ -289,8 +296,8 @@ def test_all_that_is_installed_reaches_the_image() -> None:
     allowed = [line.removeprefix('!') for line in (
         DEPLOY / 'Dockerfile.dockerignore').read_text(encoding='utf-8').splitlines()
         if line.startswith('!')]
-    wanted = {'package.xml', 'setup.py', 'setup.cfg', 'LICENSE', 'abdf1_ros/ros/node.py',
-              'abdf1_ros/df1/frames.py', 'abdf1_ros/py.typed', 'resource/abdf1_ros'}
+    wanted = {'README.md', 'package.xml', 'setup.py', 'setup.cfg', 'LICENSE', 'abdf1_ros/py.typed',
+              'abdf1_ros/ros/node.py', 'abdf1_ros/df1/frames.py', 'resource/abdf1_ros'}
     wanted |= {f'{folder}/x' for folder in re.findall(r"glob\('(\w+)/", SETUP)}
     wanted |= set(re.findall(r"\['(\w+/[\w.]+)'\]", SETUP))
     for name in wanted:

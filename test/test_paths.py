@@ -18,7 +18,9 @@ from pathlib import Path
 import sys
 from types import SimpleNamespace
 
+import abdf1_ros
 from abdf1_ros import paths
+from abdf1_ros.__main__ import main
 import pytest
 
 
@@ -51,3 +53,12 @@ def test_file_of_the_installed_package(
         monkeypatch.setitem(sys.modules, name, module if share else None)
     place = installed / 'share' if share == 'share' else Path(sys.prefix) / 'share' / 'abdf1_ros'
     assert paths.config_file('net.csv') == place / 'config' / 'net.csv'
+
+
+def test_version_of_the_package_is_that_of_its_commands(
+        monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
+    monkeypatch.setattr(sys, 'argv', ['abdf1', '--version'])
+    assert main() == 0
+    assert capsys.readouterr().out == f'abdf1_ros {abdf1_ros.__version__}\n'
+    with pytest.raises(AttributeError, match="module 'abdf1_ros' has no attribute 'x'"):
+        _ = abdf1_ros.x

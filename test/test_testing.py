@@ -17,6 +17,8 @@
 from collections.abc import Callable
 from pathlib import Path
 import re
+import subprocess
+import sys
 import threading
 import time
 from typing import Any
@@ -65,6 +67,14 @@ def test_plugin_of_the_tutorial_is_that_of_the_example() -> None:
     line = "pytest_plugins = ['abdf1_ros.testing']"
     assert line in TUTORIAL
     assert line in (EXAMPLE / 'conftest.py').read_text(encoding='utf-8')
+
+
+def test_example_is_collected_where_there_is_no_launch_testing() -> None:
+    found = subprocess.run(
+        [sys.executable, '-m', 'pytest', '--collect-only', '-q', 'examples/testing'], cwd=SOURCE,
+        check=False, capture_output=True, text=True, timeout=60)
+    assert found.returncode == 0, found.stdout
+    assert 'test_press.py' in found.stdout
 
 
 def test_test_of_the_tutorial_passes(abdf1_cell: Cells) -> None:  # noqa: F811
