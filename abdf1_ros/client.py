@@ -41,11 +41,12 @@ from typing import Any, Literal, overload, SupportsIndex, TYPE_CHECKING, TypeVar
 from abdf1_ros.df1.checksum import Checksum
 from abdf1_ros.df1.machine import LineTiming
 from abdf1_ros.df1.master import MASTER
+from abdf1_ros.df1.packet import is_local_status
 from abdf1_ros.df1.peer import PEER
 from abdf1_ros.df1.settings import LinkSettings
 from abdf1_ros.df1.slave_link import SLAVE
 from abdf1_ros.df1.stations import MAX_STATION
-from abdf1_ros.errors import FormatError
+from abdf1_ros.errors import FormatError, RemoteError
 from abdf1_ros.numbers import Kind, member_of, one_of
 from abdf1_ros.open_line import LOG, OpenLine, plain, single, text_of, values_of
 from abdf1_ros.pccc import steps
@@ -247,7 +248,13 @@ class Client(OpenLine):
     def _asked(self, station: int) -> tuple[PlcType, Processor | None]:
         """Return the family of a station, which is asked once."""
         if station not in self._kinds:
-            identity = self.identify(station)
+            try:
+                identity = self.identify(station)
+            except RemoteError as error:
+                if is_local_status(error.sts):
+                    raise
+                raise FormatError(f'station {station} does not say what it is (STS '
+                                  f'{error.sts:02X} to that question); name plc_type') from None
             if identity.plc_type is None:
                 raise FormatError(f'station {station} is "{identity}", and its family is not '
                                   'known; name plc_type')

@@ -330,6 +330,14 @@ def peer(tmp_path: Path) -> Iterator[str]:
         line.close()
 
 
+def test_plc_without_diagnostic_status_needs_its_family(tmp_path: Path) -> None:
+    plc = simulated_plc(1, 'SLC', time.monotonic, *FILES)
+    plc.faults.status = (0x10,)
+    with plc_line(tmp_path / 'line', plc) as name, Client(name, duplex='half') as here, \
+            pytest.raises(FormatError, match=r'does not say what it is \(STS 10 .*name plc_type'):
+        here.read('N7:0')
+
+
 def test_client_talks_to_a_full_duplex_peer(peer: str) -> None:
     with Client(peer) as here:
         here.write('N7:0', [1, 2])

@@ -312,8 +312,8 @@ def test_what_is_not_supported_is_refused_with_what_would_be_right(
     ('B3:0/O', PLC5, 'that is the letter O where a digit should be; write B3:0/0'),
     ('O:OO1/O0', PLC5, 'that is the letter O where a digit should be; write O:001/00'),
     ('T4:O.ACC', SLC, 'that is the letter O where a digit should be; write T4:0.ACC'),
-    ('RTC:0.HR', SLC, 'RTC is a function file whose type code is not known (the clock is S:37 to '
-                      'S:42); let the program copy what is needed into an N file'),
+    ('RTC:0.HR', SLC, 'RTC is a function file whose type code is not known (S:37 to S:42 may '
+                      'show the clock, or 0); let the program copy what is needed into an N file'),
     ('CS0:4', SLC, 'CS is a function file whose type code is not known; let the program copy what '
                    'is needed into an N file'),
 ])

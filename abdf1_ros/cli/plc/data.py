@@ -25,9 +25,10 @@ import time
 from typing import TypeAlias
 
 from abdf1_ros.cli.plc.session import Session
+from abdf1_ros.df1.packet import is_local_status
 from abdf1_ros.driver.write import Outcome, Write, WriteResult
 from abdf1_ros.driver.writes.packets import carry_out
-from abdf1_ros.errors import Abdf1Error, FormatError, PortLost
+from abdf1_ros.errors import Abdf1Error, FormatError, PortLost, RemoteError
 from abdf1_ros.numbers import decimal_number, two_readings, whole_number
 from abdf1_ros.open_line import Pending
 from abdf1_ros.pccc import steps
@@ -134,7 +135,13 @@ def ask_family(session: Session, station: int) -> tuple[PlcType, Processor | Non
 
     Raises LinkError, RemoteError, or FormatError where that is unknown.
     """
-    identity = session.ask(station, steps.identify())
+    try:
+        identity = session.ask(station, steps.identify())
+    except RemoteError as error:
+        if is_local_status(error.sts):
+            raise
+        raise FormatError(f'does not say what it is (STS {error.sts:02X} to that question); say '
+                          '--plc-type') from None
     if identity.plc_type is None:
         raise FormatError(f'is "{identity}", and its family is not known; say --plc-type')
     return identity.plc_type, identity.processor

@@ -79,7 +79,7 @@ class _SlcAddressing(FileAddressing):
     def mistaken(self, text: str) -> str | None:
         """Recognise function files that cannot be read, and the octal I/O of a PLC-5."""
         if match := _UNKNOWN_FILES.fullmatch(text):
-            clock = ' (the clock is S:37 to S:42)' if match['name'] == 'RTC' else ''
+            clock = ' (S:37 to S:42 may show the clock, or 0)' if match['name'] == 'RTC' else ''
             return (f'{match["name"]} is a function file whose type code is not known{clock}; let '
                     'the program copy what is needed into an N file')
         if match := _PLC5_IO.fullmatch(text):

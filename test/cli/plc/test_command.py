@@ -351,6 +351,16 @@ def test_scan_finds_who_does_not_say_what_it_is(plc: Plc, simulator: Process) ->
     assert 'answers, but not who it is: STS 10' in said.lines[1]
 
 
+def test_plc_without_diagnostic_status_is_not_called_a_missing_file(
+        plc: Plc, simulator: Process) -> None:
+    simulator.say('error 2 10')
+    said = plc('read', 'N7:0', '--station', '2')
+    assert said.status == 1
+    assert 'station 2: does not say what it is (STS 10 to that question); say --plc-type' in (
+        said.err)
+    assert 'file' not in said.err
+
+
 def test_scan_of_nobody_has_status_1(plc: Plc) -> None:
     said = plc('scan', '8,9', *FAST)
     assert (said.status, said.lines) == (
