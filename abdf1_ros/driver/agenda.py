@@ -172,8 +172,8 @@ class Agenda:
         write = None
         if under_way is None or not self._has_begun_write:
             write = self._writes.next(now, busy)
-        self._has_begun_write = write is not None
         if write or under_way:
+            self._has_begun_write = write is not None
             self._writes_in_a_row += 1
         if write is not None or under_way is None:
             return write

@@ -242,6 +242,22 @@ def test_new_writes_and_packets_of_a_long_one_take_turns() -> None:
                                    writes[3], task.job])
 
 
+def test_packets_of_a_long_write_keep_their_turn_while_their_station_is_polled() -> None:
+    """Else new writes to a station take all turns of a line with standard polling."""
+    bench = Bench()
+    task = JobTask(bench.tasks, NinePackets(), 0.0)
+    task.reply(task.command.reply())
+    order = []
+    for number in range(6):
+        bench.write(make_mapping(f'N7:{20 + number}', 'Write'), 1, 0.0)
+        taken = bench.next(0.0)
+        order.append(taken is task.job)
+        if taken is task.job:
+            task.reply(task.command.reply())
+        assert bench.agenda.next(0.0, frozenset({1})) is None
+    assert order.count(True) == 3
+
+
 def test_probe_of_an_inactive_station_has_its_turn_among_writes() -> None:
     bench = Bench(make_job(station=9))
     bench.stations.lost(9, 0.0)
