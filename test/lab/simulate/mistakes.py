@@ -47,11 +47,12 @@ from abdf1_ros.driver.interlocks.queue import Interlocks, OwnWrite
 from abdf1_ros.driver.reads.guards import CounterGuard, RunGuard
 from abdf1_ros.driver.reads.point import ReadPoint
 from abdf1_ros.driver.record import Claim, Words
-from abdf1_ros.driver.write import Outcome, Write
+from abdf1_ros.driver.write import Outcome, Write, WriteResult
 from abdf1_ros.driver.writes.ages import RecentMax, Standstills
 from abdf1_ros.driver.writes.queue import MessageJob, WriteQueue
 from abdf1_ros.pccc.values import Codec
 from abdf1_ros.plan.bounds import Times
+from abdf1_ros.settings.mapping import Mapping
 from simulate.rules import Broken
 from simulate.run import Story
 
@@ -286,6 +287,13 @@ MISTAKES = (
     Mistake('16', 'the preset is a Period', Times, '_preset', _preset_of_a_period),
     Mistake('17', 'each writing of a fallback has a result', Interlocks, '_fallback_ended',
             _told_each_time),
+    Mistake('results', 'equal messages have a turn each', Write, 'equals', _always(False)),
+    Mistake('results', 'no change gives way to a newer one', WriteQueue, '_gives_way',
+            _always(False)),
+    Mistake('results', 'the first of equal messages has the only result', WriteResult, 'of',
+            lambda of: lambda self, origins, now: of(self, origins[:1], now)),
+    Mistake('results', 'rows that share words pass each other', Mapping, 'shares_words',
+            lambda before: lambda self, other: self is other),
     Mistake('results', 'a result comes twice', WriteQueue, '__init__', _told_twice),
     Mistake('5', 'no fallbacks at the end', FallbackRow, 'end', _always(None)),
     Mistake('7', 'a refused message refreshes its row', FallbackRow, 'message_ended',

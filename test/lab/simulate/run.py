@@ -41,6 +41,7 @@ if __name__ == '__main__':  # pytest has its own paths
 from abdf1_ros.driver.write import Outcome
 from abdf1_ros.pccc.emulated import Setting
 from simulate.rules import Broken, Judge
+from simulate.steady import Steady
 from support.virtual_line import QUIET
 from support.world import BEAT, FREE, GREAT, MODES, OUTPUTS, Plant, SAFE, SMALL, STEP, World
 
@@ -62,6 +63,9 @@ class Story:
 
     def run(self) -> None:
         """Let it happen; raise Broken where a rule does not hold."""
+        steady = Steady(self.world.seed)
+        if text := steady.fault():
+            raise Broken('Steady', text, self.world)
         self.wait(2.0)
         for _ in range(self._turns):
             self._publish_anew()
