@@ -65,9 +65,13 @@ class CommandTimeout(LinkError):
 
 
 class StationInactive(LinkError):
-    """The station does not answer (2509); the argument is its number."""
+    """The station does not answer (2509); the argument is its ``number``."""
 
     message = Message.ERR_INACTIVE_STATION
+
+    def __init__(self, number: int, *, sent: bool = True) -> None:
+        super().__init__(number, sent=sent)
+        self.number = number
 
 
 class WrongCommandCode(LinkError):

@@ -89,14 +89,12 @@ class HalfDuplexMaster(Link):
         # On this line (M 3-7).
         number = self._stations.routes.get(command.dst, command.dst)
         try:
-            is_probe = number != BROADCAST and not self._stations.records[number].active
-            if is_probe and not task.is_own:
+            is_silent = number != BROADCAST and not self._stations.records[number].active
+            if is_silent and not task.is_own:
                 yield from self._line.probe(number)
-                is_probe = False
             task.sent = True
             started = yield from self._line.deliver(
-                number, command, task.expires, poll_on_ack(number),
-                is_probe=is_probe, answer_within=task.answer_within)
+                number, command, task.expires, poll_on_ack(number), task.answer_within)
             reply = command.reply() if number == BROADCAST else (
                 yield from self._collect(number, command, started, task.reply_size))
         except CommandExpired as error:
@@ -104,7 +102,7 @@ class HalfDuplexMaster(Link):
             task.fail(error)
         except StationInactive as error:
             if task.blames:
-                self._line.accounting.lost(number, self._machine.now)
+                self._line.accounting.lost(error.number, self._machine.now)
             task.fail(error)
         except CommandTimeout as error:
             yield from self._give_up(task)

@@ -54,7 +54,7 @@ from abdf1_ros.df1.sender import Reflex
 from abdf1_ros.df1.settings import LinkSettings
 from abdf1_ros.df1.stations import ActiveStationList
 from abdf1_ros.df1.tasks import Task
-from abdf1_ros.errors import CommandExpired, StationInactive
+from abdf1_ros.errors import CommandExpired, CommandTimeout, StationInactive
 from abdf1_ros.messages import Event, Message
 
 # No station answers a broadcast; after one the master waits so long (s) for the slaves.
@@ -111,14 +111,17 @@ class MasterLine:
         self._passed_on: deque[Packet] = deque(maxlen=_MOST_PASSED_ON)
 
     def deliver(self, number: int, packet: Packet, expires: float = math.inf,
-                reflex: Reflex | None = None, *, is_probe: bool = False,
-                answer_within: float = math.inf) -> Generator[Step, Heard, float]:
+                reflex: Reflex | None = None, answer_within: float = math.inf
+                ) -> Generator[Step, Heard, float]:
         """
         Send a message to a station until it is acknowledged (S0, "Network Reads"; M 3-12).
 
         Return when the transmission began that was acknowledged (clock value in s); raises
-        CommandExpired, and StationInactive after the last retry. A probe has no retries, and its
-        answer is waited for ``answer_within`` s at most.
+        CommandExpired, and StationInactive after the last retry: of the station that the message
+        is for, where its gateway answers a poll. Of the gateway itself that is CommandTimeout.
+        To a silent station, and to one that was never there behind a gateway that is, it goes
+        once: the gateway's other nodes would wait for all retries. The answer of a silent one is
+        waited for ``answer_within`` s at most.
         """
         frame = frames.master_frame(number, packet.encode(), self.settings.checksum)
         self.accounting.sent(packet)
@@ -127,7 +130,11 @@ class MasterLine:
             begun = self.machine.now
             yield Send(frame, BROADCAST_PAUSE)
             return begun
-        timeout = min(self._timeout, answer_within) if is_probe else self._timeout
+        station = self.stations.records[packet.dst]
+        gateway = self.stations.records[number]
+        is_once = not station.active or (
+            gateway is not station and gateway.last_heard is not None and not station.replies)
+        timeout = self._timeout if station.active else min(self._timeout, answer_within)
         for retry in range(1, self.settings.nak_retries + 2):
             self.counters.messages_sent += 1
             begun = self.machine.now
@@ -143,13 +150,17 @@ class MasterLine:
                 self.stations.heard(number, self.machine.now)
                 return begun
             cause = self._note_cause(answer, number, Message.NTC_ACK_EXPECTED)
-            if is_probe:
-                raise StationInactive(number)
+            if is_once:
+                break
             if retry <= self.settings.nak_retries:
                 self.counters.nak_retries += 1
                 self.note(Message.NTC_NAK_RETRY, retry, cause.number, station=number)
-        self.counters.nak_limit_exceeded += 1
-        self.note(Message.NTC_NAK_LIMIT_EXCEEDED, self.settings.nak_retries, station=number)
+        else:
+            self.counters.nak_limit_exceeded += 1
+            self.note(Message.NTC_NAK_LIMIT_EXCEEDED, self.settings.nak_retries, station=number)
+        if gateway.active and len(self.stations.behind(number)) > 1:
+            yield from self.probe(number)
+            raise CommandTimeout if packet.dst == number else StationInactive(packet.dst)
         raise StationInactive(number)
 
     def _note_cause(self, answer: Heard, number: int, expected: Message) -> Message:
@@ -164,7 +175,7 @@ class MasterLine:
 
     def probe(self, number: int) -> Procedure:
         """
-        Poll an inactive station once (S0, "Active Station List").
+        Poll a station once (S0, "Active Station List").
 
         Any proper answer makes it active; StationInactive when there is none.
         """
@@ -173,7 +184,7 @@ class MasterLine:
             raise StationInactive(number)
         if isinstance(answer, Frame):
             packet = yield from self.receive(number, answer)
-            if packet is not None:
+            if packet is not None and not self._take_reply(packet.src, packet):
                 self.take_unwanted(packet)
 
     def poll_inactive(self, number: int) -> Generator[Step, Heard, Heard]:
@@ -382,8 +393,9 @@ class MasterLine:
                 if number != BROADCAST and not self.stations[number].active:
                     yield from self.probe(number)
                 yield from self.deliver(number, packet)
-            except StationInactive:
-                self.accounting.lost(number, self.machine.now)
+            except (StationInactive, CommandTimeout) as error:
+                if isinstance(error, StationInactive):
+                    self.accounting.lost(error.number, self.machine.now)
                 self._refuse(packet)
                 return None
             if collect is not None and not packet.is_reply and number != BROADCAST:

@@ -37,14 +37,14 @@ not wait for them.
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Callable, Container
+from collections.abc import Callable, Container, Generator
 from dataclasses import dataclass, field, replace
 from itertools import chain
 import math
 
 from abdf1_ros.df1.frames import Control, Frame
 from abdf1_ros.df1.link import Link, LinkStatus, quiet_time, ScanTimes
-from abdf1_ros.df1.machine import Machine, Procedure, Rest
+from abdf1_ros.df1.machine import Heard, Machine, Procedure, Rest, Step
 from abdf1_ros.df1.master import MasterMode
 from abdf1_ros.df1.master_line import is_good, MasterLine, MOST_QUEUED
 from abdf1_ros.df1.mode import answer_time, Report, Serve
@@ -52,7 +52,7 @@ from abdf1_ros.df1.packet import BROADCAST, Packet
 from abdf1_ros.df1.settings import LinkSettings, PollingSettings
 from abdf1_ros.df1.stations import ActiveStationList
 from abdf1_ros.df1.tasks import Outstanding, Task, TaskSource
-from abdf1_ros.errors import CommandExpired, LinkError, StationInactive
+from abdf1_ros.errors import CommandExpired, CommandTimeout, LinkError, StationInactive
 from abdf1_ros.messages import Event
 
 # "At least four" may leave between two polls (1766-RM001).
@@ -320,40 +320,43 @@ class StandardPollingMaster:
                 self._overdue(number)
         for _ in range(COMMANDS_BETWEEN_POLLS):
             task = source.next_task(self._machine.now, self._busy())
-            if task is None:
+            if task is None or not (yield from self._send(task)):
                 return
-            yield from self._send(task)
 
-    def _send(self, task: Task) -> Procedure:
+    def _send(self, task: Task) -> Generator[Step, Heard, bool]:
+        """Send a command; return False where nothing took it, which has cost polls their time."""
         station = task.command.dst
         number = self._stations.via(station)
         if number == BROADCAST:
             task.sent = True
             yield from self._line.deliver(number, task.command)
             task.reply(task.command.reply())
-            return
-        is_probe = not self._stations[number].active
-        if is_probe and not task.is_own:
+            return True
+        was_silent = not self._stations[number].active
+        if was_silent and not task.is_own:
             task.fail(StationInactive(number))  # it is polled when its turn comes
-            return
+            return True
         task.sent = True
         entry = self._outstanding[station] = Outstanding(task)
         now = self._machine.now
         try:
             begun = yield from self._line.deliver(
-                number, task.command, task.expires, is_probe=is_probe,
-                answer_within=task.answer_within)
+                number, task.command, task.expires, answer_within=task.answer_within)
         except StationInactive as error:
             if task.blames:
-                self._lost(number, now, error)
+                self._lost(error.number, now, error)
             else:
                 self._end(station, error)
+        except CommandTimeout:
+            self._overdue(station)
         except CommandExpired as error:
             task.sent = error.sent
             self._end(station, error)
         else:
-            (self._unproven.add if is_probe else self._unproven.discard)(number)
+            (self._unproven.add if was_silent else self._unproven.discard)(number)
             entry.deadline = begun + self._settings.cmd_timeout
+            return True
+        return False
 
     def _lost(self, number: int, begun: float, error: StationInactive) -> None:
         """Take note that a station does not answer any more, and has had the line since then."""

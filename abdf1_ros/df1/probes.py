@@ -17,6 +17,7 @@
 from __future__ import annotations
 
 from enum import auto, Enum
+import math
 
 # After a probe that has taken the line for t, 7 t are left to the other stations.
 OTHERS_SHARE = 7
@@ -38,12 +39,14 @@ class Probes:
     may be asked in their order. A message cannot wait; one that comes too early gets nowhere, but
     the next turn is then kept free for one like it.
     ``pause`` is the seconds that are left to others after the last probe; before the first one
-    ``usual`` stands for what that takes.
+    ``usual`` stands for what that takes. ``died_at`` is when a station died last (clock value, s),
+    until all that waited for that has had its turn: then minus infinity.
     """
 
     def __init__(self, usual: float) -> None:
         self.pause = OTHERS_SHARE * usual
         self._free = self._put_off = 0.0
+        self.died_at = -math.inf
         self._is_kept_for_message = False
         self._last = Asker.IN_TURN
 
@@ -82,6 +85,11 @@ class Probes:
         Only a message asks it at once. Silence that a gateway reports quickly, costs little.
         """
         self._put_off = now + min(self.pause, OTHERS_SHARE * seconds)
+        self.died_at = now
+
+    def caught_up(self) -> None:
+        """Take note that nothing waits any more that did when a station died."""
+        self.died_at = -math.inf
 
     def none_waits(self, now: float, asker: Asker = Asker.IN_TURN) -> None:
         """Take note that probes keep no station waiting: then messages have no turns."""

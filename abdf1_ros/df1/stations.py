@@ -108,10 +108,10 @@ class ActiveStationList:
     sends something, has a record as well, but no message can put it into the list.
 
     ``records`` has the record of every station, of the list or not, by number. ``routes`` gives
-    the gateway to a station, by number: the gateway is polled in place of the station, and all its
-    stations are active while the gateway is (M 3-7). ``probes`` says when silent stations may be
-    asked; one takes ``probe_time`` seconds. ``took`` tells how much of the time between two clock
-    values (s) this process has run.
+    the gateway to a station, by number: the gateway is polled in place of the station (M 3-7), and
+    none of its stations is active while the gateway is not. ``probes`` says when silent stations
+    may be asked; one takes ``probe_time`` seconds. ``took`` tells how much of the time between two
+    clock values (s) this process has run.
     """
 
     def __init__(self, numbers: Iterable[int] = (),
@@ -126,7 +126,9 @@ class ActiveStationList:
         self._on_change = on_change
         self.routes = {station: gateway for station, gateway in (routes or {}).items()
                        if station != gateway}
-        self.add((*numbers, *self.routes.values()))
+        numbers = frozenset(numbers)
+        self._only_gateways = frozenset(self.routes.values()) - numbers
+        self.add((*numbers, *self._only_gateways))
 
     def add(self, numbers: Iterable[int], *, are_polled: bool = False) -> None:
         """
@@ -159,27 +161,31 @@ class ActiveStationList:
         return [number, *(station for station, via in self.routes.items() if via == number)]
 
     def heard(self, number: int, now: float) -> None:
-        """Note an answer of any kind: the station is active, and all that share its gateway."""
+        """Note an answer of any kind: the station is active, with a gateway all behind that."""
         station = self.records[number]
         station.last_heard = now
         if station.active:
-            return  # and so are all that share its gateway
-        for station in map(self.__getitem__, self.behind(self.via(number))):
+            return
+        gateway = self.via(number)
+        # Of those behind a gateway that answered, only this one was silent.
+        back = [number] if self.records[gateway].active else self.behind(gateway)
+        for station in map(self.__getitem__, back):
             if not station.active:
                 station.active, station.silent_since = True, None
                 station.returns += 1
                 self._tell(station)
 
     def lost(self, number: int, now: float) -> None:
-        """Take a station out of the active ones, and all that share its gateway."""
-        for station in map(self.__getitem__, self.behind(self.via(number))):
+        """Take a station out of the active ones, with a gateway all that are behind it."""
+        for station in map(self.__getitem__, self.behind(number)):
             if station.active:
                 station.active, station.silent_since = False, now
                 self._tell(station)
 
     def is_polled(self, number: int) -> bool:
-        """Tell whether the link polls a station, or its gateway, all the time."""
-        return self.via(number) in self._polled
+        """Tell whether the link polls a station all the time, and so finds out when it is back."""
+        gateway = self.via(number)
+        return gateway in self._polled and (gateway == number or not self.records[gateway].active)
 
     def claim_message(self, number: int, now: float) -> bool:
         """Tell whether a message may go to a station; to a silent one in its probes' time only."""
@@ -215,7 +221,8 @@ class ActiveStationList:
 
     @property
     def _someone_waits(self) -> bool:
-        return any(station.replies_in_time for station in self)
+        return any(station.replies_in_time for station in self
+                   if station.number not in self._only_gateways)
 
     def _tell(self, station: Station) -> None:
         if station.number in self._stations:

@@ -145,6 +145,8 @@ class Agenda:
             isinstance(task.job, GuestJob) for task in self._counted)
         if has_guests and is_guests_turn and (guest := self._guest(now, busy)):
             return guest
+        if self._stations.probes.died_at > -math.inf and (late := self._after_death(now, busy)):
+            return late
         job = self._checks.find_due(now) and self._check(now, busy) \
             or self._has_own and self._refresh(now, busy) or self._read(now, busy)
         if job and self._owed > 0:
@@ -153,6 +155,18 @@ class Agenda:
             return task
         return job or has_writes and self._write(now, busy) \
             or has_guests and self._guest(now, busy) or None
+
+    def _after_death(self, now: float, busy: Container[int]) -> Job | JobTask | None:
+        """
+        Return what has waited while a station died: a read of one that has replied, or a write.
+
+        Otherwise stations that have never been there would die one after the other meanwhile.
+        """
+        probes = self._stations.probes
+        if job := self._reads.next_proven(probes.died_at, busy):
+            return job
+        probes.caught_up()
+        return self._write(now, busy) if self._writes.waiting else None
 
     def _guest(self, now: float, busy: Container[int]) -> JobTask | None:
         """Return a command of a guest."""

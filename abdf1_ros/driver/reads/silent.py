@@ -93,6 +93,19 @@ class Reads(WriteListener):
             self._due.put(other, other.due)
         return job
 
+    def next_proven(self, due: float, busy: Container[int]) -> ReadJob | None:
+        """Return the next read that was due then, of a station that has replied; None for none."""
+        passed_over = []
+        while (job := self._due.take(due)) is not None:
+            station = self._stations.records[job.station]
+            if station.replies and station.replies_in_time and job.station not in busy:
+                job.is_probe = False
+                break
+            passed_over.append(job)
+        for other in passed_over:
+            self._due.put(other, other.due)
+        return job
+
     def _probe(self, now: float, busy: Container[int]) -> ReadJob | None:
         """Return the next read of a silent station, None while no probe may be sent."""
         for number in list(self._aside):

@@ -74,7 +74,10 @@ class StationStatus:
             return WARN, deaf_text(station.number)
         if not station.active:
             since = now - (station.silent_since or now)
-            return ERROR, f'station {station.number} inactive since {since:.1f} s'
+            via = line.driver.stations.via(station.number)
+            is_passed_on = via != station.number and line.driver.stations[via].active
+            but = f'; its gateway, station {via}, answers' if is_passed_on else ''
+            return ERROR, f'station {station.number} inactive since {since:.1f} s{but}'
         if station.local_status:
             return WARN, f'commands do not get to station {station.number}: ' \
                          f'{status_text(station.local_status)}'

@@ -1,0 +1,139 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+A node that is not there, behind a gateway, takes no other node with it.
+
+Half duplex: reports of Yokogawa ACM11 and 1770-KF2 users, where a gateway answers a command for
+an absent node with DLE NAK, or not at all, or with STS 02.
+"""
+
+from collections.abc import Sequence
+from itertools import pairwise
+
+from abdf1_ros.driver.settings import DriverSettings
+from abdf1_ros.driver.write import Outcome
+from abdf1_ros.settings.heartbeats import Fallback
+from abdf1_ros.settings.network import Network
+import pytest
+from support.driver_bench import DriverBench
+from support.mappings import make_mapping
+from support.odd_device import Answer, OddDevice, Wiring
+
+GATEWAY, LIVING, SECONDS, TIMEOUT = 8, 1, 20.0, 0.3
+ABSENT = (11, 12, 13)
+NAK, NOTHING, STATUS = Answer.NAK, Answer.NOTHING, Answer.ACK
+KINDS = [('Message', STATUS), ('Message', NOTHING), ('Message', NAK), ('Standard', STATUS),
+         ('Standard', NOTHING), ('Standard', NAK), ('Peer', STATUS), ('Peer', NAK)]
+
+
+class Plant(DriverBench):
+    """A living node that is read and written to, and ``absent`` ones, behind a gateway."""
+
+    def __init__(self, polling: str, answer: Answer, absent: Sequence[int] = (),
+                 *, has_own: bool = False) -> None:
+        is_peer = polling == 'Peer'
+        via = None if is_peer else GATEWAY
+        self.read = make_mapping('N7:0', station=LIVING, plc='SLC', via=via, period=200)
+        self.order = make_mapping(
+            'N7:20', 'Write', station=LIVING, plc='SLC', via=via, tag='order',
+            fallback=Fallback((0,), 3000) if has_own else None)
+        beat = make_mapping('N10:0', 'Heartbeat', station=LIVING, plc='SLC', via=via, period=500)
+        rows = [self.read, self.order, *([beat] if has_own else []), *(
+            make_mapping('N7:0', station=number, plc='SLC', via=via, period=200)
+            for number in absent)]
+        self.device = OddDevice(Wiring.FULL if is_peer else Wiring.HALF, GATEWAY, (LIVING,))
+        self.device.takes = lambda data: answer if data[0] in ABSENT else Answer.ACK
+        mode = {'mode': 'Peer'} if is_peer else {'polling': polling}
+        super().__init__(
+            rows, network=Network(
+                station=5, baud=19200, timeout=int(TIMEOUT * 1000), cmd_timeout=1000,
+                **mode),  # type: ignore[arg-type]
+            settings=DriverSettings(), start=False, far=self.device)
+        for second in range(int(SECONDS)):
+            self.at(second + 0.5, lambda second=second: self.write(  # type: ignore[misc]
+                self.order, [second + 1]))
+        self.breathe()
+        self.open(run=SECONDS)
+
+    @property
+    def longest_gap(self) -> float:
+        """Return the longest time (s) between two values of the living node."""
+        times = [0.0, *self.listener.times(self.read), SECONDS]
+        return max(after - before for before, after in pairwise(times))
+
+    @property
+    def silent(self) -> set[int]:
+        """Return the stations that do not answer."""
+        return {station.number for station in self.driver.stations
+                if not station.replies_in_time or station.has_no_replies or station.local_status}
+
+
+@pytest.mark.parametrize('polling, answer', KINDS)
+@pytest.mark.parametrize('count', [1, 3])
+def test_living_node_keeps_its_reads_and_writes(
+        polling: str, answer: Answer, count: int) -> None:
+    alone, plant = Plant(polling, answer), Plant(polling, answer, ABSENT[:count])
+    reads = [len(bench.listener.times(bench.read)) for bench in (alone, plant)]
+    assert reads[1] >= 0.75 * reads[0], reads
+    assert plant.listener.outcomes() == int(SECONDS) * [Outcome.WRITTEN]
+    assert plant.longest_gap <= alone.longest_gap + 4 * TIMEOUT + 0.1
+    assert plant.silent == {*ABSENT[:count]}
+
+
+@pytest.mark.parametrize('polling, answer', KINDS)
+@pytest.mark.parametrize('count', [1, 3])
+def test_heartbeat_of_a_living_node_counts_and_no_fallback_is_written_after_first_contact(
+        polling: str, answer: Answer, count: int) -> None:
+    plant = Plant(polling, answer, ABSENT[:count], has_own=True)
+    assert plant.device.words[LIVING, 10, 0] >= 35  # in 20 s with a Period of 0.5 s
+    fallbacks = [str(result) for result in plant.listener.results
+                 if result.outcome is Outcome.FALLBACK]
+    assert fallbacks == ['fallback value written: start']
+    assert plant.device.words[LIVING, 7, 20] == int(SECONDS)
+
+
+@pytest.mark.parametrize('polling', ['Message', 'Standard'])
+@pytest.mark.parametrize('answer', [NAK, NOTHING])
+def test_node_that_comes_back_is_read_again(polling: str, answer: Answer) -> None:
+    plant = Plant(polling, answer, ABSENT[:1])
+    plant.device.takes = lambda data: Answer.ACK
+    plant.device.nodes = frozenset((LIVING, *ABSENT))
+    plant.run(3.0)  # seven Timeouts after the last probe at most
+    assert plant.listener.changes == [(11, False), (11, True)]
+    assert plant.silent == set()
+
+
+@pytest.mark.parametrize('polling', ['Message', 'Standard'])
+def test_gateway_that_takes_no_command_for_itself_passes_others_on(polling: str) -> None:
+    plant = Plant(polling, NAK)
+    plant.device.takes = lambda data: NAK if data[0] == GATEWAY else Answer.ACK
+    before = len(plant.listener.times(plant.read))
+    plant.run(20.0)
+    assert len(plant.listener.times(plant.read)) >= before + 95
+    assert plant.listener.changes == []
+
+
+@pytest.mark.parametrize('polling', ['Message', 'Standard'])
+def test_gateway_that_answers_no_poll_either_is_silent_with_all_behind_it(polling: str) -> None:
+    plant = Plant(polling, NAK, ABSENT[:1])
+    plant.device.takes = lambda data: NOTHING
+    plant.device.say = lambda data: b''
+    plant.run(5.0)
+    assert {station.number for station in plant.driver.stations if not station.active} \
+        == {GATEWAY, LIVING, 11}
+    plant.device.say = bytes
+    plant.device.takes = lambda data: Answer.ACK
+    plant.run(5.0)
+    assert plant.driver.stations[LIVING].active
