@@ -85,6 +85,7 @@ class RowReader:
 
     def __init__(self, row: Row) -> None:
         self._row = row
+        self._given = [column for column in MAP_COLUMNS if row.cells.get(column.name)]
         self.faults: list[CellFault] = []
 
     def read(self) -> Mapping | None:
@@ -99,8 +100,8 @@ class RowReader:
         if mapping is None:
             return None
         self._check(mapping)
-        for column in MAP_COLUMNS:
-            if self._row.get(column.name) and (fault := column.why_not(mapping.command)):
+        for column in self._given:
+            if fault := column.why_not(mapping.command):
                 self._fault(column.name, fault, is_superfluous=True)
         mapping = with_conditions(self._row, values, mapping, self._fault)
         if self.faults:
@@ -123,7 +124,7 @@ class RowReader:
             'Tag': self._row.get('Tag'), 'Command': command, 'Station': station,
             'Via': self._via(station), 'PLC_Type': plc_type, 'Access': access,
             'Address': address, 'Processor': self._processor(plc_type, address)}
-        for column in MAP_COLUMNS:
+        for column in self._given:
             if column.kind and column.name not in values and (
                     command is None or not column.why_not(command)):
                 values[column.name] = self._value(column.name, column.kind)
@@ -139,7 +140,7 @@ class RowReader:
         if self.faults:
             return None
         told = {'type': _natural_type(values['Address'])} | {
-            column.attribute: values[column.name] for column in MAP_COLUMNS
+            column.attribute: values[column.name] for column in self._given
             if column.name in values and column.attribute in Mapping.__slots__}
         return Mapping(**told, item=self._row.item, place=self._row.where(), name=name,
                        topic=topic, access=values['Access'], scaling=scaling,

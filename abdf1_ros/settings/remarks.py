@@ -148,7 +148,7 @@ def _useless_cells(row: Row, mapping: Mapping) -> Iterator[Problem]:
     """Yield cells that have no effect, or another one than a newcomer expects."""
     for column in MAP_COLUMNS:
         name = column.name
-        if row.get(name) and mapping.command in column.idle \
+        if mapping.command in column.idle and row.get(name) \
                 and column.text(mapping) != column.default:
             yield _at(row, name, f'{name} has no effect in a {mapping.command.value} row')
     period = mapping.period or 0
