@@ -34,6 +34,7 @@ import tempfile
 
 _ROOT = Path(__file__).resolve().parents[2]
 _COUNTING = 'test/driver/test_work.py'  # counts calls: those of mutmut, too
+_PATCHING = '*/test_made_up_co*.py'  # patches are for the code without mistakes
 _MISSED = (0, 33, None)  # its tests pass, none reaches it, or it was not tried
 
 
@@ -79,7 +80,8 @@ def _copy(to: Path, modules: str, tests: str) -> None:
     others = sorted({name.split('/')[0] for name in names} - {'abdf1_ros'})
     lines = ['source_paths=abdf1_ros', f'only_mutate={modules}',
              f'pytest_add_cli_args_test_selection={tests}', 'pytest_add_cli_args=',
-             f'    --ignore={_COUNTING}', '    -p', '    no:cacheprovider',
+             f'    --ignore={_COUNTING}', f'    --ignore-glob={_PATCHING}', '    -p',
+             '    no:cacheprovider',
              'also_copy=', *(f'    {name}' for name in others)]
     with (to / 'setup.cfg').open('a', encoding='utf-8') as file:
         print('\n[mutmut]', *lines, sep='\n', file=file)
