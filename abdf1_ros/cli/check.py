@@ -196,8 +196,9 @@ def _summary(name: str, found: Findings, report: Report | None) -> str:
     if report is None:
         return '\n'.join(errors)
     text = (f'{printable(name)}: {counted(len(found.mappings), "row")}, port '
-            f'{printable(report.network.port)}, poll cycle {report.poll_cycle * 1000:.0f} ms, '
-            f'load {report.load:.0%}')
+            f'{printable(report.network.port)}, '
+            + (f'poll cycle {report.poll_cycle * 1000:.0f} ms, ' if report.is_timed else '')
+            + f'load {report.load:.0%}')
     if warnings := len(report.remarks()):
         text += colour(f', {counted(warnings, "warning")}', YELLOW, sys.stdout)
     return '\n'.join([*errors, text])
@@ -334,6 +335,9 @@ def _entry(report: Report, block: Block) -> dict[str, Any]:
 
 
 def _times_text(report: Report) -> str:
+    if not report.is_timed:
+        return ('the master of this line decides when we read and write, so no time is known; '
+                f'the periods need {report.load:.0%} of the line at least')
     response, times = report.response_time * 1000, report.times
     return (f'expected poll cycle: {report.poll_cycle * 1000:.1f} ms for everything once, with '
             f'{response:g} ms for each answer of a PLC\n'
@@ -358,8 +362,9 @@ def _content(found: Findings, report: Report | None) -> dict[str, Any]:
             'network': report.network.cells(),
             'warnings': [*map(_remark, report.remarks())], 'notes': report.notes(),
             'blocks': [_entry(report, block) for block in report.blocks],
-            'scan_time_ms': in_ms(report.poll_cycle), 'load': round(report.load, 4),
-            'longest_transaction_ms': in_ms(report.times.longest),
+            'scan_time_ms': in_ms(report.poll_cycle if report.is_timed else None),
+            'load': round(report.load, 4),
+            'longest_transaction_ms': in_ms(report.times.longest if report.is_timed else None),
             'needed_baud': report.needed_baud(),
             'bounds': [_bound(bound) for bound in report.times.bounds()],
             'end_ms': in_ms(report.times.end),

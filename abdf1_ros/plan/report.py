@@ -90,6 +90,11 @@ class Report:
     response_time: float
 
     @property
+    def is_timed(self) -> bool:
+        """Tell whether we decide when a row is read; in Mode Slave the master does."""
+        return not self.network.line_mode.is_polled
+
+    @property
     def poll_cycle(self) -> float:
         """Return the seconds that it takes to read every block once."""
         return forecast.poll_cycle(self.blocks, self._answer_time)

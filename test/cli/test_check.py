@@ -167,6 +167,19 @@ def test_notes_are_no_warnings(files: tuple[Path, Path],
     assert (content['notes'], content['warnings']) == ([note], [])
 
 
+def test_mode_slave_has_no_time_that_its_master_decides(
+        files: tuple[Path, Path], capsys: pytest.CaptureFixture[str]) -> None:
+    net = GOOD_NET.replace('Master', 'Slave')
+    assert check(files, net, (GOOD_ROW,), '--json') == 0
+    content = parsed(capsys)
+    assert [content[name] for name in ('scan_time_ms', 'longest_transaction_ms', 'end_ms')] == [
+        None, None, None]
+    assert check(files, net, (GOOD_ROW,)) == 0
+    said = capsys.readouterr().out
+    assert 'the master of this line decides when we read and write, so no time is known' in said
+    assert 'expected poll cycle' not in said
+
+
 def test_json_of_a_plan(files: tuple[Path, Path], capsys: pytest.CaptureFixture[str]) -> None:
     rows = (GOOD_ROW, 'fast,Read,F8:0,1,SLC,,50')
     assert check(files, GOOD_NET, rows, '--json', '--response-time', '20') == 0

@@ -158,7 +158,7 @@ class Console:
     """
     Give standard output and standard error to a process that may wait for them; a context manager.
 
-    ``log`` is the descriptor of a file that gets all that goes to standard error.
+    ``log`` is the descriptor of a file that gets all that goes where rclpy writes its log.
     """
 
     def __init__(self, log: int | None = None) -> None:
@@ -167,15 +167,16 @@ class Console:
 
     def __enter__(self) -> Console:
         routes, reads, writes = [], [], {}
+        logged = 1 if os.environ.get('RCUTILS_LOGGING_USE_STDOUT') == '1' else 2
         for number in (1, 2):
             with suppress(OSError):  # it is closed
                 self._before[number] = os.dup(number)
         for number, before in self._before.items():
             reader, writes[number] = os.pipe()
             reads.append(reader)
-            log = '' if self._log is None or number != 2 else f',{self._log}'
+            log = '' if self._log is None or number != logged else f',{self._log}'
             routes.append(f'{reader}:{before}{log}')
-        if 2 in self._before and os.isatty(self._before[2]):
+        if logged in self._before and os.isatty(self._before[logged]):
             os.environ.setdefault('RCUTILS_COLORIZED_OUTPUT', '1')  # it cannot see that any more
         kept = [*reads, *self._before.values(), *([] if self._log is None else [self._log])]
         self._process = subprocess.Popen(
