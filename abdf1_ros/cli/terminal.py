@@ -253,7 +253,7 @@ class _Parser(argparse.ArgumentParser):
         if words[0].startswith('/dev/') or '://' in words[0]:
             return f'; did you mean --port {words[0]}?'
         places = [action for action in self._actions if not action.option_strings]
-        if any(action.nargs == '+' for action in places):
+        if any(action.nargs in ('+', '*') for action in places):
             return '; these stand together, before or after all options'
         wanted = ' and '.join(str(action.metavar) for action in places)
         listed = '; a list has commas, as in 1,2,3' if wanted == 'STATIONS' else ''

@@ -20,6 +20,7 @@ from collections import defaultdict
 from collections.abc import Iterator, Sequence
 from collections.abc import Mapping as MappingType
 from enum import Enum
+from functools import partial
 import re
 import time
 from typing import TypeAlias
@@ -155,7 +156,14 @@ def processor_cell(processor: Processor | None) -> str:
 def read(session: Session, mapping: Mapping) -> Values:
     """Return the values of a mapping; raises LinkError, RemoteError or FormatError."""
     target = AddressedValues(mapping.address, mapping.codec, mapping.dialect)
-    return session.ask(mapping.station, steps.read(target))
+    return scaled(mapping, session.ask(mapping.station, steps.read(target)))
+
+
+def scaled(mapping: Mapping, values: Values) -> Values:
+    """Return values as the topic of the row has them."""
+    if mapping.scaling is None or isinstance(values, str):
+        return values
+    return mapping.scaling.publish(values)
 
 
 class Writing:
@@ -231,10 +239,17 @@ def tags_of(mappings: Rows, station: int) -> Tags:
     return {place: printable(', '.join(names)) for place, names in tags.items()}
 
 
+def tag_of(mapping: Mapping, number: int, tags: Tags | None) -> str:
+    """Return the tag of a value: its own where it is a row of a map, or those of its address."""
+    if tags is None or not mapping.place.file:
+        return (tags or {}).get(str(mapping.place_of(number)), '')
+    return printable(mapping.tag if mapping.length == 1 else f'{mapping.tag}[{number}]')
+
+
 def labels(mapping: Mapping, tags: Tags | None) -> list[str]:
-    """Return the address of each value, and its tags beside it."""
-    places = [str(mapping.place_of(number)) for number in range(mapping.length)]
-    return [f'{place} {(tags or {}).get(place, "")}'.rstrip() for place in places]
+    """Return the address of each value, and its tag beside it."""
+    return [f'{mapping.place_of(number)} {tag_of(mapping, number, tags)}'.rstrip()
+            for number in range(mapping.length)]
 
 
 def rows(mapping: Mapping, values: Values, names: Sequence[str], radix: Radix = Radix.DECIMAL,
@@ -249,6 +264,11 @@ def rows(mapping: Mapping, values: Values, names: Sequence[str], radix: Radix = 
         return
     texts = value_texts(mapping, values, radix)
     width = max(map(len, texts))
+    has_members = mapping.address.file_type.is_structure and mapping.address.bit is None
+    if has_members and mapping.length > 1:
+        yield from zip(names, map(partial(_with_bits, mapping), range(len(texts)), values, texts),
+                       strict=True)
+        return
     step = 1 if any(' ' in name for name in names) else \
         _BITS_IN_ROW if mapping.type is ValueType.BOOL else _VALUES_IN_ROW
     if room is not None:
@@ -258,6 +278,17 @@ def rows(mapping: Mapping, values: Values, names: Sequence[str], radix: Radix = 
         yield names[first], _BETWEEN.join(shown)
 
 
+def _with_bits(mapping: Mapping, number: int, value: float, text: str) -> str:
+    """Return a value of a structure; of a word of bits the names of those that are set."""
+    place = mapping.place_of(number)
+    named = [name for name, member in place.layout.members.items()
+             if member.bit is not None and member.word == place.word
+             and int(value) >> member.bit & 1]
+    is_bits = any(member.word == place.word and member.bit is not None
+                  for member in place.layout.members.values())
+    return f'{text}  {" ".join(named)}' if is_bits and named else text
+
+
 def value_texts(mapping: Mapping, values: Sequence[float], radix: Radix) -> list[str]:
     """
     Return each value as text.
@@ -265,7 +296,7 @@ def value_texts(mapping: Mapping, values: Sequence[float], radix: Radix) -> list
     In another radix than ten a number has as many digits as its type has bits; floats and single
     bits are the same in all.
     """
-    if radix is Radix.DECIMAL or mapping.type not in _BITS:
+    if radix is Radix.DECIMAL or mapping.type not in _BITS or mapping.scaling:
         return [*map(value_text, values)]
     bits = _BITS[mapping.type]
     digits = len(f'{(1 << bits) - 1:{radix.value}}')

@@ -215,12 +215,15 @@ def _add_data_options(parser: argparse.ArgumentParser,
 
 def _add_addresses(parser: argparse.ArgumentParser) -> None:
     _add_data_options(parser)
-    parser.add_argument('addresses', metavar='ADDRESS', nargs='+',
-                        help='such as N7:0, N7:0-9, B3:0/5, B3:0/0-7, T4:0.ACC, ST9:1')
+    parser.add_argument('addresses', metavar='ADDRESS', nargs='*',
+                        help='such as N7:0, N7:0-9, B3:0/5, B3:0/0-7, T4:0.ACC, ST9:1; with '
+                             '--map also a tag, whose values are scaled; none: all rows that read')
     parser.add_argument('--length', metavar='N',
                         help='elements of each address (default: 1, or those of the range)')
     parser.add_argument('--map', metavar='FILE',
                         help='a map CSV, whose tags are shown beside the addresses')
+    parser.add_argument('--record', metavar='FILE',
+                        help='keep all bytes of the line in a capture, for "sniff"')
     parser.add_argument('--radix', type=str.lower, choices=tuple(RADIXES), default='dec',
                         help='how whole numbers are written (default: %(default)s)')
 

@@ -44,6 +44,7 @@ examples:
   plc write N7:10 5 6 7 --station 1 --yes --net net.csv
   plc write F8:2 -1.5e3 --station 1 --yes --net net.csv
   plc watch B3:0 N7:0 T4:0.ACC --net net.csv
+  plc watch --map map.csv --net net.csv
 
 "plc COMMAND --help" explains each command.
 """
@@ -55,7 +56,7 @@ _COMMANDS = {
     'write': ('write values to an address', 'write N7:10 5 6 7 --station 1 --yes --net net.csv',
               'write F8:2 -1.5e3 --station 1 --yes --net net.csv'),
     'watch': ('show values live until Ctrl-C', 'watch B3:0 N7:0 --period 0.5 --net net.csv',
-              'watch I:1.0 --radix bin --net net.csv',
+              'watch I:1.0 --radix bin --net net.csv', 'watch --map map.csv --net net.csv',
               'watch F8:0 --csv --net net.csv > curve.csv'),
     'status': ('tell model, mode and faults of a PLC', 'status 1 --net net.csv'),
     'ping': ('measure how long a PLC takes to send something back',

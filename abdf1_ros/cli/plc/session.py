@@ -17,13 +17,16 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from functools import partial
+import time
 
 from abdf1_ros import open_line
-from abdf1_ros.cli.terminal import NoPort
+from abdf1_ros.cli.terminal import NoPort, tell
 from abdf1_ros.df1.stations import MAX_STATION
 from abdf1_ros.pccc.file_types import PlcType
 from abdf1_ros.ports.descriptor import Port
 from abdf1_ros.ports.settings import PortSettings
+from abdf1_ros.ports.trace import begun_now, Trace, TracedPort
 from abdf1_ros.settings.network import Network
 
 
@@ -35,6 +38,16 @@ def opened(network: Network) -> Callable[[], Port]:
         raise NoPort(network.port, error) from None
 
 
+def recorded(network: Network, open_it: Callable[[], Port],
+             path: str) -> tuple[Callable[[], Port], Trace]:
+    """Return what opens a port whose bytes go into a capture, and this."""
+    trace = Trace(path, {'begun': begun_now(), 'port': network.port, 'baud': str(network.baud),
+                         'check': network.error_code, 'duplex': network.duplex.name.lower()},
+                  partial(tell, 'plc'))
+    begun = time.monotonic()
+    return lambda: TracedPort(open_it(), trace, begun), trace
+
+
 class Session(open_line.OpenLine):
     """
     The line of a net CSV; with ``via`` all others are behind this gateway.
@@ -42,13 +55,13 @@ class Session(open_line.OpenLine):
     Raises NoPort when the port cannot be opened.
     """
 
-    def __init__(self, network: Network, absent: Sequence[int] = (),
-                 via: int | None = None) -> None:
+    def __init__(self, network: Network, absent: Sequence[int] = (), via: int | None = None,
+                 record: str | None = None) -> None:
         self.network = network
         self.via = via
         routes = {} if via is None else dict.fromkeys(range(MAX_STATION + 1), via)
         try:
             super().__init__(network.line_mode, network.line, PortSettings.of(network), absent,
-                             routes, PlcType(network.plc_type))
+                             routes, PlcType(network.plc_type), record)
         except OSError as error:
             raise NoPort(network.port, error) from None

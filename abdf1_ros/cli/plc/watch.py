@@ -17,7 +17,7 @@
 from __future__ import annotations
 
 from collections import Counter, defaultdict, deque
-from collections.abc import Callable, Collection, Sequence
+from collections.abc import Callable, Collection, Iterator, Sequence
 from dataclasses import dataclass
 from datetime import datetime
 import math
@@ -26,8 +26,8 @@ import shutil
 import sys
 import textwrap
 
-from abdf1_ros.cli.plc.data import labels, Radix, rows, Tags, value_texts
-from abdf1_ros.cli.plc.session import opened
+from abdf1_ros.cli.plc.data import labels, Radix, rows, tag_of, Tags, value_texts
+from abdf1_ros.cli.plc.session import opened, recorded
 from abdf1_ros.cli.terminal import is_terminal, table
 from abdf1_ros.df1.stations import Station
 from abdf1_ros.driver.driver import Driver
@@ -44,6 +44,9 @@ _GLANCE = 250
 
 # Values that wait to be shown; when more come, the older ones are dropped.
 _MAX_NEWS = 1000
+
+# A PLC is asked for its mode so often (s).
+_MODE_PERIOD = 3.0
 
 # So long (s) a value that has changed is marked.
 _MARKED = 1.0
@@ -69,15 +72,16 @@ class Watch:
     The driver without ROS: read ``mappings`` every ``period`` seconds and show them.
 
     With ``csv`` each read is a line for each value, also where nothing has changed. ``tags``
-    stand beside the addresses.
+    stand beside the addresses. On a terminal the mode of each PLC stands above the values. All
+    bytes go into the capture ``record``.
 
     It is the driver's ``Listener``; ``counters`` are those of the line. Raises OSError
     when the port cannot be opened.
     """
 
     def __init__(self, network: Network, mappings: Sequence[Mapping], period: float,
-                 radix: Radix = Radix.DECIMAL, csv: bool = False,
-                 tags: Tags | None = None) -> None:
+                 radix: Radix = Radix.DECIMAL, csv: bool = False, tags: Tags | None = None,
+                 record: str | None = None) -> None:
         self._csv = csv
         self._mappings = mappings
         self._radix = radix
@@ -86,10 +90,14 @@ class Watch:
         self._changed: dict[Mapping, float] = {}
         self._past: dict[Mapping, deque[float]] = defaultdict(lambda: deque(maxlen=_CURVE))
         settings = DriverSettings(
-            default_period=period, read_only=True, first_tns=random.randrange(0x10000))
+            default_period=period, read_only=True, first_tns=random.randrange(0x10000),
+            processor_period=_MODE_PERIOD if is_terminal(sys.stdout) and not csv else 0.0)
         self._driver = Driver(network, mappings, settings, self)
         self.counters = self._driver.counters
-        self._link = LinkThread(self._driver.machine, opened(network))
+        port, self._trace = opened(network), None
+        if record is not None:
+            port, self._trace = recorded(network, port, record)
+        self._link = LinkThread(self._driver.machine, port)
         self._news: deque[tuple[Mapping, Values]] = deque(maxlen=_MAX_NEWS)
         self._has_news = Wake()  # an interrupt in an Event may leave its lock taken
         self._reads: Counter[Mapping] = Counter()
@@ -120,6 +128,8 @@ class Watch:
                          for mapping in self._mappings)
             self._link.stop()
             self._has_news.close()
+            if self._trace is not None:
+                self._trace.close()
         return failed
 
     def read(self, mapping: Mapping, values: Values) -> None:
@@ -181,7 +191,8 @@ class Watch:
                 value_texts(mapping, what, self._radix)
             for number, text in enumerate(texts):
                 place = str(mapping.place_of(number))
-                tag = [] if self._tags is None else [_quoted(self._tags.get(place, ''))]
+                tag = [] if self._tags is None else [
+                    _quoted(tag_of(mapping, number, self._tags))]
                 print(time, mapping.station, place, *tag, text, sep=',', flush=True)
 
     def _note_changes(self, news: Sequence[tuple[Mapping, Values | _NoValue]]) -> None:
@@ -226,6 +237,25 @@ class Watch:
         return curve_of(self._past[mapping], lambda number: value_texts(
             mapping, [number], self._radix)[0])
 
+    def _modes(self) -> Iterator[str]:
+        """Yield what each PLC that was asked says it is, its mode and its faults."""
+        for station in dict.fromkeys(mapping.station for mapping in self._mappings):
+            health = self._driver.checks.known(station)
+            if health.identity is None:
+                continue
+            faults = '; '.join(health.identity.faults)
+            stands = '' if health.identity.is_running in (None, True) else \
+                ': its program does not run, values may stand still'
+            yield printable(f'station {station}: {health.processor}{stands}'
+                            + (f'; {faults}' if faults else ''))
+
+    def _faults_of_line(self) -> list[str]:
+        """Return the repetitions and damaged frames so far, nothing where there were none."""
+        counters = self.counters
+        repeated = counters.nak_retries + counters.enq_retries
+        damaged = counters.bcc_errors + counters.crc_errors
+        return [f'line: {repeated} repeated, {damaged} damaged'] if repeated or damaged else []
+
     def _redraw(self) -> None:
         """Draw the table over the one before."""
         size = width, height = shutil.get_terminal_size()
@@ -246,9 +276,12 @@ class Watch:
             cells.append((name, *head, text))
             cells += [(name, *[''] * len(head), text) for name, text in more]
         lines = table(('address', *titles, value), cells, right=(1, 3)).split('\n')
-        if len(lines) > height - 1:
-            hidden = len(lines) - (height - 2)
-            lines = [*lines[:height - 2], f'+{hidden} more; a higher window shows them']
+        above, below = [*self._modes()], self._faults_of_line()
+        left = height - 1 - len(above) - len(below)
+        if len(lines) > left:
+            hidden = len(lines) - (left - 1)
+            lines = [*lines[:left - 1], f'+{hidden} more; a higher window shows them']
+        lines = [*above, *lines, *below]
         picture = [cut(line, width - 1) for line in lines]
         # In a window of another size the lines before lie elsewhere.
         start = '' if self._size is None else \

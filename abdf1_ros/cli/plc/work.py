@@ -66,7 +66,7 @@ from abdf1_ros.settings.map_file import load_mappings
 from abdf1_ros.settings.mapping import Command, Mapping
 from abdf1_ros.settings.network import load_network, Network
 from abdf1_ros.settings.rows import Rows
-from abdf1_ros.text import counted, printable
+from abdf1_ros.text import counted, first, printable
 
 _ALL_TRIED_IN_VAIN = (
     'not one character came: cable, port, power? Or a station that was not asked (--stations; a '
@@ -74,7 +74,8 @@ _ALL_TRIED_IN_VAIN = (
 _ONE_PLC_ANSWERS_TO_ALL = (
     'full duplex tells no addresses apart: most PLCs answer to every station, so these may be one')
 
-_Wanted: TypeAlias = tuple[Cells, data.Tags | None]
+_Wanted: TypeAlias = tuple[Cells, data.Tags | None, Sequence[Mapping | str]]
+"""Cells of the options, tags by address, and rows of a map or addresses."""
 
 _UNCERTAIN = (Outcome.UNKNOWN, Outcome.PARTLY)
 
@@ -90,12 +91,16 @@ def _cells(options: argparse.Namespace, command: Command, length: int | str | No
 
 
 def _mappings(options: argparse.Namespace, session: Session, cells: Cells,
-              addresses: Sequence[str]) -> list[Mapping]:
+              wanted: Sequence[Mapping | str]) -> list[Mapping]:
     """Return the mappings of addresses; where needed, ask the PLC for its type first."""
+    rows = [entry for entry in wanted if isinstance(entry, Mapping)]
+    if len(rows) == len(wanted):
+        return rows
     plc_type, processor = _family(options, session)
     kind = {'PLC_Type': plc_type.value, 'Processor': data.processor_cell(processor)}
     cells = {column: text for column, text in kind.items() if text} | cells
-    return [data.mapping_of(address, cells, item) for item, address in enumerate(addresses, 1)]
+    return [entry if isinstance(entry, Mapping) else data.mapping_of(entry, cells, item)
+            for item, entry in enumerate(wanted, 1)]
 
 
 def _line(options: argparse.Namespace) -> Network:
@@ -135,7 +140,8 @@ def _asking(work: Callable[[argparse.Namespace, Session, Any], int],
     """
     def command(options: argparse.Namespace) -> int:
         network, prepared = _line(options), prepare(options)
-        with Session(network, via=options.via) as session:
+        record = None if options.command == 'watch' else getattr(options, 'record', None)
+        with Session(network, via=options.via, record=record) as session:
             if options.via is not None and (
                     who := presence.said_by_both(session, options.station, options.via)):
                 _complain(f'stations {options.station} and {options.via} are both "{who}": if '
@@ -169,8 +175,8 @@ def _failed(options: argparse.Namespace, session: Session, error: Abdf1Error, pl
 
 def _read(options: argparse.Namespace, session: Session, wanted: _Wanted) -> int:
     status, plc_type = 0, options.plc_type
-    cells, tags = wanted
-    for mapping in _mappings(options, session, cells, options.addresses):
+    cells, tags, entries = wanted
+    for mapping in _mappings(options, session, cells, entries):
         for remark in mapping.remarks if mapping.address.file_type.is_structure else ():
             _complain(remark.text)
         try:
@@ -190,8 +196,22 @@ def _wanted(options: argparse.Namespace) -> _Wanted:
     Raises ConfigurationError where no PLC could have the addresses.
     """
     cells = _cells(options, Command.READ, options.length)
-    data.check_for_some_family(options.addresses, cells)
-    return cells, data.tags_of(_rows_of_map(options), options.station) if options.map else None
+    if not options.map:
+        if not options.addresses:
+            raise ConfigurationError([Problem(
+                'ADDRESS', 'name one such as N7:0, or a map with --map, for all of its rows')])
+        data.check_for_some_family(options.addresses, cells)
+        return cells, None, options.addresses
+    mappings = _rows_of_map(options)
+    rows = {row.tag: row for row in mappings.of_plcs if row.polls}
+    entries: list[Mapping | str] = [rows.get(word, word) for word in options.addresses]
+    addresses = [entry for entry in entries if isinstance(entry, str)]
+    try:
+        data.check_for_some_family(addresses, cells)
+    except ConfigurationError as error:
+        raise ConfigurationError([*error.problems, Problem(options.map, (
+            f'tags that are read: {first(list(rows))}'))]) from None
+    return cells, data.tags_of(mappings, options.station), entries or list(rows.values())
 
 
 def _print_values(mapping: Mapping, values: Values, radix: data.Radix = data.Radix.DECIMAL,
@@ -281,11 +301,11 @@ def _carry_out(session: Session, writing: data.Writing) -> int:
 
 
 def _watch(options: argparse.Namespace, session: Session, wanted: _Wanted) -> int:
-    cells, tags = wanted
-    mappings = _mappings(options, session, cells, options.addresses)
+    cells, tags, entries = wanted
+    mappings = _mappings(options, session, cells, entries)
     session.close()  # the driver opens the port itself
     watch = Watch(session.network, mappings, options.period, RADIXES[options.radix],
-                  options.csv, tags)
+                  options.csv, tags, options.record)
     failed = watch.run(options.count)
     if failed:
         _complain(presence.traffic(watch.counters))

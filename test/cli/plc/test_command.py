@@ -79,7 +79,8 @@ def plc(line: str, capsys: pytest.CaptureFixture[str]) -> Plc:
     (1, 'F8:0', ('--length', '3'), ['F8:0 12.5 40.25 -3.5']),
     (1, 'A10:0', ('--type', 'string', '--length', '3'), ["A10:0 'abc'"]),
     (1, 'N7:6', ('--type', 'uint32', '--word-order', 'High'), ['N7:6 65538']),
-    (1, 'T4:1', ('--length', '3'), ['T4:1 8192 500 120']), (1, 'T4:1.ACC', (), ['T4:1.ACC 120']),
+    (1, 'T4:1-1', (), ['T4:1 8192 DN', 'T4:1.PRE 500', 'T4:1.ACC 120']),
+    (1, 'T4:1.ACC', (), ['T4:1.ACC 120']),
     (1, 'T4:1/DN', (), ['T4:1/DN 1']), (2, 'C5:2.ACC', (), ['C5:2.ACC -17']),
     (2, 'I:1.0', ('--length', '2'), ['I:1.0 5 40960']), (2, 'O:2.0/4', (), ['O:2.0/4 1']),
     (2, 'L10:0', ('--length', '2'), ['L10:0 -70000 2000000000']),
@@ -107,6 +108,29 @@ def test_tags_of_a_map_stand_beside_addresses(plc: Plc, tmp_path: Path) -> None:
     said = plc('watch', 'N7:0', '--count', '1', '--map', str(path))
     assert said.lines[-1].split()[1:] == ['N7:0', 'speed', '1200']
     assert plc('read', 'N7:0', '--map', str(tmp_path / 'none.csv')).status == 2
+
+
+MAP_OF_TAGS = ('Tag,Command,Address,Station,PLC_Type,Length,Scale,Min,Max', [
+    'speed,Read,N7:0-1,1,PLC5,,0.1,,', 'level,ReadWrite,N7:30,2,SLC,,0.5,0,10',
+    'order,Write,N7:31,2,SLC,,,,'])
+
+
+def test_rows_of_a_map_are_read_by_their_tags(plc: Plc, tmp_path: Path) -> None:
+    path = write_csv(tmp_path / 'map.csv', *MAP_OF_TAGS)
+    capture = tmp_path / 'line.cap'
+    said = plc('read', 'speed', 'N7:0', '--map', str(path), '--record', str(capture))
+    assert (said.status, said.lines) == (0, ['N7:0 speed[0] 120', 'N7:1 speed[1] -80',
+                                             'N7:0 speed[0] (raw) 1200'])
+    assert capture.read_text('ascii').startswith('# abdf1_ros capture 1\n')
+    assert [line.split()[:2] for line in plc('read', '--map', str(path)).lines] == [
+        ['N7:0', 'speed[0]'], ['N7:1', 'speed[1]'], ['N7:30', 'level']]
+    said = plc('watch', 'speed', '--count', '1', '--map', str(path))
+    assert [line.split()[1:] for line in said.lines] == [
+        ['N7:0', 'speed[0]', '120'], ['N7:1', 'speed[1]', '-80']]
+    said = plc('read', 'sped', '--map', str(path))
+    assert said.status == 2 and f'{path}: tags that are read: speed, level' in said.err
+    said = plc('read')
+    assert said.status == 2 and 'ADDRESS: name one such as N7:0, or a map with --map' in said.err
 
 
 def test_read_with_the_family_given_asks_nothing_else(plc: Plc) -> None:
@@ -413,7 +437,7 @@ def test_watch_redraws_a_table_on_a_terminal(line: str) -> None:
         pass
     os.close(ours)
     assert process.wait(20) == 0
-    assert b'\x1b[2A\x1b[Kaddress' in screen
+    assert b'\x1b[3A\x1b[Kstation 1: ' in screen and b'\x1b[Kaddress' in screen
     assert screen.endswith(b'1200\r\n\x1b[J')
 
 

@@ -82,7 +82,7 @@ def test_list_of_stations_has_ranges_and_numbers() -> None:
     ('scan', ''), ('scan', '300'), ('ping', '1-2'), ('ping', '1', '--count', '-1'),
     ('watch', 'N7:0', '--period', '-1'), ('watch', 'N7:0', '--period', 'nan'),
     ('watch', 'N7:0', '--count', '1.5'), ('watch', 'N7:0', '--count', '\u0661'),
-    ('watch', 'N7:0', '--period', '1_0'), ('ping', '\u0661'), ('read',),
+    ('watch', 'N7:0', '--period', '1_0'), ('ping', '\u0661'),
     ('scan', '1', '--peer', '--duplex', 'half'), ('scan', '1', '--duplex', 'half', '--peer'),
     ('write', 'N7:0'), ('fly',), ('write', 'N7:0', '1', '--ye'),
     ('read', 'N7:0', '--type', 'int8')])

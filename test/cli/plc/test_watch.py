@@ -14,6 +14,8 @@
 
 """Values live, against PLCs on a pseudo-terminal."""
 
+from __future__ import annotations
+
 from array import array
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
@@ -23,12 +25,17 @@ import os
 from pathlib import Path
 import re
 
-from abdf1_ros.cli.plc.data import Tags
+from abdf1_ros.cli.plc.data import mapping_of, Tags
 from abdf1_ros.cli.plc.watch import _NoValue, curve_of, Watch
+from abdf1_ros.driver.checks import Checks, StationHealth
+from abdf1_ros.pccc.file_types import PlcType
+from abdf1_ros.pccc.identity import Identity, Mode
 from abdf1_ros.pccc.values import Values
 from abdf1_ros.ports.link_thread import LinkThread
 from abdf1_ros.settings.mapping import Mapping
 from abdf1_ros.settings.network import Network
+from abdf1_ros.settings.scaling import Scaling
+from abdf1_ros.sniffer.dumps import Recording
 from abdf1_ros.testing import Plcs
 import pytest
 from support.driver_bench import store
@@ -92,8 +99,9 @@ def test_each_read_is_a_line_of_csv_for_each_value(
         plcs: Plcs, capsys: pytest.CaptureFixture[str], tags: Tags | None, title: str,
         first: str, other: str) -> None:
     store(plcs[1], 'ST9:0', 'a,"b"')
-    words = make_mapping('N7:0', length=2, item=1)
-    assert Watch(network_on(plcs), [words, NAME], 0.01, csv=True, tags=tags).run(2) == 0
+    words, name = (mapping_of(text, {'Command': 'Read', 'Station': '1', 'PLC_Type': 'PLC5'})
+                   for text in ('N7:0-1', 'ST9:0'))
+    assert Watch(network_on(plcs), [words, name], 0.01, csv=True, tags=tags).run(2) == 0
     head, *lines = capsys.readouterr().out.splitlines()
     assert head == f'time,station,address,{title}value'
     told = [line.partition(',')[2] for line in lines]
@@ -230,8 +238,9 @@ def test_table_marks_changes_and_says_what_does_not_fit(draw: Draw) -> None:
 
 
 def test_table_has_tags_beside_addresses(draw: Draw) -> None:
-    words = make_mapping('N7:8', length=3)
-    lines = draw([words, SPEED], (words, array('h', [9, 2, 3])), (words, array('h', [1, 2, 3])),
+    cells = {'Command': 'Read', 'Station': '1', 'PLC_Type': 'PLC5'}
+    words, speed = mapping_of('N7:8-10', cells), mapping_of('N7:0', cells, 2)
+    lines = draw([words, speed], (words, array('h', [9, 2, 3])), (words, array('h', [1, 2, 3])),
                  tags={'N7:0': 'speed', 'N7:10': 'a_long_tag'})
     assert [(line[:16], line[18:].split()[-1:]) for line in lines] == [
         ('address         ', ['value']), ('N7:8            ', ['1']), ('N7:9            ', ['2']),
@@ -259,6 +268,32 @@ def test_number_has_a_curve_where_it_fits_and_can_be_shown(draw: Draw) -> None:
 def test_curve_lies_between_its_lowest_and_highest_number(
         numbers: list[float], curve: str) -> None:
     assert curve_of(numbers, lambda number: f'{number:.7g}') == curve
+
+
+def test_rows_of_a_map_have_their_own_tags_and_scaled_values(
+        plcs: Plcs, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    store(plcs[1], 'N7:1', [125])
+    row = make_mapping('N7:1', tag='height', scaling=Scaling(0.1, -2.0))
+    capture = tmp_path / 'line.cap'
+    watch = Watch(network_on(plcs), [row], 0.01, tags={'N7:1': 'another'}, record=str(capture))
+    assert watch.run(1) == 0
+    assert shown(capsys) == ['N7:1 height  10.5']
+    assert capture.read_text('ascii').startswith('# abdf1_ros capture 1\n')
+    assert Recording(capture).chunks()
+
+
+def test_mode_of_each_plc_and_faults_of_the_line_stand_around_the_values(
+        draw: Draw, monkeypatch: pytest.MonkeyPatch) -> None:
+    stopped = Identity(PlcType.PLC5, 'PLC-5/40', mode=Mode.PROGRAM, mode_text='PROG',
+                       faults=('memory lost',))
+    monkeypatch.setattr(Checks, 'known', lambda self, station: StationHealth(
+        str(stopped), stopped))
+    lines = draw([SPEED], (SPEED, array('h', [5])))
+    assert lines[0] == ('station 1: PLC-5/40, PROG: its program does not run, values may stand '
+                        'still; memory lost')
+    assert lines[1].startswith('address') and len(lines) == 3
+    monkeypatch.setattr(Watch, '_faults_of_line', lambda self: ['line: 3 repeated, 1 damaged'])
+    assert draw([SPEED], (SPEED, array('h', [5])))[-1] == 'line: 3 repeated, 1 damaged'
 
 
 def test_port_that_is_not_there() -> None:
