@@ -328,8 +328,7 @@ class World(DriverBench):
     """
 
     def __init__(self, plant: Plant, seed: int) -> None:
-        self.plant = plant
-        self.seed = seed
+        self.plant, self.seed = plant, seed
         self.dice = Random(seed)
         self.drivers = 0  # killed so far
         self.killed_at = 0.0
@@ -350,6 +349,8 @@ class World(DriverBench):
                         for number in range(self.dice.choice([1, 2, 16]))]
         self.asked: list[Packet] = []  # by the guest
         self.answered: list[Packet] = []
+        # When a guest sent a value last; what this driver has said, where it is the only master.
+        self.asked_at, self.said = dict[int, float](), bytearray()
         self.came: dict[str, float] = {}  # when a message of a row came last
         self.youngest: dict[str, float] = {}  # when the last of a row was published
         self.gaps: dict[str, float] = {}  # from when the topic was missing last that is required
@@ -521,6 +522,8 @@ class World(DriverBench):
 
     def _note_sent(self, data: bytes, start: float, receiver: int) -> None:
         self._send(data, start, receiver)
+        if receiver == _FAR and not self.master:
+            self.said += data
         if receiver != _FAR or len(data) < _LEAST_COMMAND or \
                 self.master and data.removeprefix(ACK).startswith(SOH):
             return  # a master that polls us passes on what we have sent
@@ -608,6 +611,7 @@ class World(DriverBench):
             station = _ALL
         command = Packet(station, 9, cmd, 0, len(self.asked), data)
         self.asked.append(command)
+        self.asked_at[value] = self.line.now
         self.driver.guests.put(GuestCommand(
             dice.choice(self._guests), command, self.line.now, self.answered.append))
         self.line.wake(self.driver.machine)
@@ -635,6 +639,7 @@ class World(DriverBench):
         self.drivers += 1
         self.killed_at = self.opened = self.line.now
         self._settings = replace(self._settings, first_tns=self.dice.randrange(0x10000))
+        self.said.clear()
         self.restart()
         self.hold_up(pause)
         self._dead_until = self.away
@@ -731,6 +736,7 @@ class World(DriverBench):
         """Put another driver in the place of one that has ended."""
         self.drivers += 1
         self.killed_at = self.opened = self.line.now
+        self.said.clear()
         self.restart()
 
     def rows_of(self, station: int, tags: Sequence[str] = ('w',)) -> list[Mapping]:

@@ -153,6 +153,14 @@ def _writes_in_spite(init: Any) -> Any:
     return init_wrongly
 
 
+def _lives_longer(init: Any) -> Any:
+    def init_wrongly(self: GuestJob, *args: Any) -> None:
+        init(self, *args)
+        self.expires += 60.0
+
+    return init_wrongly
+
+
 def _refused_refreshes(ended: Any) -> Any:
     return lambda self, requested, outcome: ended(self, requested, Outcome.WRITTEN)
 
@@ -320,6 +328,8 @@ MISTAKES = (
             _always(None)),
     Mistake('8', 'a guest over a fallback is not seen', FallbackRow, 'write_ended',
             _sees_no_guest),
+    Mistake('guests', 'a command of a guest lives 60 s longer', GuestJob, '__init__',
+            _lives_longer),
     Mistake('guests', 'a guest is blamed for the station', GuestJob, 'blames',
             lambda before: True),
     Mistake('guests', 'its broadcast has the words of one station', Claim, 'meets',

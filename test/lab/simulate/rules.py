@@ -21,10 +21,12 @@ outside: at words that PLCs have executed, at values and results, not at the sta
 
 from __future__ import annotations
 
-from collections import defaultdict
+from collections import Counter, defaultdict
 import math
 from operator import attrgetter
 
+from abdf1_ros.conform.codec import BlockCheck, next_symbol, SymbolKind
+from abdf1_ros.df1.frames import Duplex
 from abdf1_ros.df1.radio import LONGEST_WAIT
 from abdf1_ros.driver.write import Outcome, WriteResult
 from abdf1_ros.plan.bounds import MODE_PERIOD
@@ -655,6 +657,51 @@ class Guests(Rule):
                     'without a reply since', self._waits)
 
 
+class GuestAges(Rule):
+    text = 'no command of a guest is sent that is older than Cmd_Timeout'
+
+    def sent(self, entry: Sent) -> None:
+        if entry.value in GUESTS and not entry.is_again:
+            asked = self.world.asked_at[entry.value]
+            limit = self.world.network.line.cmd_timeout + self.lag
+            self.demand(entry.when - asked < limit, entry, 'was asked at', asked)
+
+
+class OnTheWire(Rule):
+    text = 'the counters tell what the driver has put on the wire'
+
+    def __init__(self, world: World) -> None:
+        super().__init__(world)
+        self._driver = 0
+        self._buffer = b''
+        self._taken = 0
+        self._counts: Counter[SymbolKind] = Counter()
+
+    def stand(self) -> None:
+        world = self.world
+        if world.master:
+            return
+        if self._driver != world.drivers:
+            self._driver, self._buffer, self._taken = world.drivers, b'', 0
+            self._counts.clear()
+        self._buffer += world.said[self._taken:]
+        self._taken = len(world.said)
+        is_half = world.network.duplex is Duplex.HALF
+        while (symbol := next_symbol(self._buffer, BlockCheck.CRC, is_half)) is not None:
+            self._buffer = self._buffer[len(symbol.raw):]
+            self._counts[symbol.kind] += 1
+        counters, counts = world.driver.counters, self._counts
+        lead = [told - counts[kind] for told, kind in (
+            (counters.messages_sent - counts[SymbolKind.MASTER_MESSAGE], SymbolKind.MESSAGE),
+            (counters.polls_sent, SymbolKind.POLL), (counters.acks_sent, SymbolKind.ACK),
+            (counters.naks_sent, SymbolKind.NAK))]
+        # What is sent next may be counted before the line is free for it.
+        self.demand(min(lead) >= 0 and sum(lead) <= 1, 'messages, polls, ACK and NAK too many',
+                    lead)
+        self.demand(counters.chars_sent == self._taken, counters.chars_sent, 'characters, not',
+                    self._taken)
+
+
 class View(Rule):
     text = 'a station that answers all of ours is not taken for one that does not'
 
@@ -745,7 +792,8 @@ class OneOwner(Rule):
 
 RULES: tuple[type[Rule], ...] = (
     Results, Ages, Stamps, Turns, Values, Guards, Withheld, Beats, BeatsAfterFallbacks, Order,
-    Outputs, OneResult, Probes, Unheard, AfterRun, Held, ReadOnly, Guests, View, Served, Rungs)
+    Outputs, OneResult, Probes, Unheard, AfterRun, Held, ReadOnly, Guests, GuestAges, OnTheWire,
+    View, Served, Rungs)
 
 
 class Judge:

@@ -19,9 +19,9 @@ import secrets
 from abdf1_ros.df1.frames import ACK, ENQ
 import pytest
 from simulate.mistakes import MISTAKES
-from simulate.rules import Broken, View
+from simulate.rules import Broken, GuestAges, OnTheWire, View
 from simulate.run import simulate, Story
-from support.world import MODES, Plant, POLLED, World
+from support.world import GUESTS, MODES, Plant, POLLED, Sent, STEP, World
 
 
 @pytest.mark.parametrize('mode', MODES)
@@ -52,6 +52,31 @@ def test_plc_need_not_be_known_that_a_master_still_has_as_inactive() -> None:
         rule.stand()
     world.master.stations.lost(1, world.line.now)
     rule.stand()
+
+
+@pytest.mark.parametrize('counter', ['polls_sent', 'acks_sent', 'messages_sent', 'chars_sent'])
+@pytest.mark.parametrize('much', [2, -1])
+def test_counter_that_is_not_what_is_on_the_wire_is_found(counter: str, much: int) -> None:
+    world = World(Plant('Message'), seed=1)
+    rule = OnTheWire(world)
+    for _ in range(20):
+        world.run(STEP)
+        rule.stand()
+    setattr(world.driver.counters, counter, getattr(world.driver.counters, counter) + much)
+    with pytest.raises(Broken):
+        for _ in range(20):
+            world.run(STEP)
+            rule.stand()
+
+
+def test_command_of_a_guest_that_is_too_old_is_found() -> None:
+    world = World(Plant('Message'), seed=1)
+    rule = GuestAges(world)
+    world.asked_at[GUESTS[0]] = 10.0
+    rule.sent(Sent(10.4, 1, 'free_1', GUESTS[0], is_again=False))
+    rule.sent(Sent(12.0, 1, 'free_1', GUESTS[0], is_again=True))
+    with pytest.raises(Broken):
+        rule.sent(Sent(10.6, 1, 'free_1', GUESTS[0], is_again=False))
 
 
 @pytest.mark.parametrize('mode', ['Standard', 'Slave'])
