@@ -37,7 +37,7 @@ from abdf1_ros.pccc.file_types import PlcType
 from abdf1_ros.pccc.values import Values, ValueType
 from abdf1_ros.ports.descriptor import Port
 from abdf1_ros.ports.link_thread import LinkThread
-from abdf1_ros.ports.opening import open_port
+from abdf1_ros.ports.opening import name_port, open_port
 from abdf1_ros.ports.ownership import line_of
 from abdf1_ros.ports.settings import PortSettings
 from abdf1_ros.text import shown
@@ -67,7 +67,7 @@ def opened(settings: PortSettings) -> Callable[[], Port]:
     except OSError as error:
         if line_of(settings.name) in _ours:
             error.strerror = 'this program has it open already; is a close() missing?'
-        error.filename = error.filename or settings.name
+        name_port(error, settings.name)
         raise
     return lambda: ports.pop() if ports else open_port(settings)
 

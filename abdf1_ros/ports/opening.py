@@ -17,11 +17,19 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from errno import EIO
 from importlib import import_module
 
 from abdf1_ros.ports.descriptor import Port
 from abdf1_ros.ports.serial_device import open_device
 from abdf1_ros.ports.settings import PortSettings
+
+
+def name_port(error: OSError, name: str) -> None:
+    """Give an error the name of the port, if it has none, and leave its text as it is."""
+    if error.errno is None:  # then a name alone would take the place of the text
+        error.errno, error.strerror = EIO, error.strerror or str(error)
+    error.filename = error.filename or name
 
 
 def open_port(settings: PortSettings, tell: Callable[[str], None] = lambda text: None) -> Port:

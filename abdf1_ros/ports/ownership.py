@@ -51,7 +51,7 @@ def _number_of(host: str) -> str:
     """Return the address that a host has by its name alone, otherwise the name."""
     try:
         found = socket.getaddrinfo(host, None, flags=socket.AI_NUMERICHOST)
-    except OSError:
+    except (OSError, UnicodeError):  # a name with an empty or a long part has no address
         return LOOPBACK if host == 'localhost' else host
     return str(found[0][4][0])
 

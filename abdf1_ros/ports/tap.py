@@ -25,6 +25,7 @@ import time
 
 from abdf1_ros.ports.descriptor import Port
 from abdf1_ros.ports.endpoints import Endpoint, PtyEndpoint, SerialEndpoint
+from abdf1_ros.ports.opening import name_port
 from abdf1_ros.ports.settings import PortSettings
 from abdf1_ros.ports.wake import Wake
 from abdf1_ros.sniffer.capture import Chunk, Direction
@@ -144,7 +145,7 @@ class Tap:
         try:
             return SerialEndpoint(replace(self._settings, name=name))
         except OSError as error:
-            error.filename = name
+            name_port(error, name)
             raise
 
     def _reader(self, port: Port, direction: Direction, onward: Port | None) -> _TapReader:

@@ -291,7 +291,9 @@ def _port_fault(text: str) -> str:
         return ''
     advice = f'"plc ports" lists the devices{hint(text)}'
     match = _HOST.fullmatch(text)
-    if match and match['port']:
+    if match and match['port'] and not _is_host(match['host']):
+        advice = f'"{shown(match["host"])}" is not the name of a host'
+    elif match and match['port']:
         advice = f'write socket://{shown(match["host"])}{match["port"]}'
     elif match and match['scheme']:
         advice = f'the port is missing, as in {shown(text)}:4001'
@@ -316,11 +318,20 @@ def _nodes_fault(text: str) -> str:
 _FAULTS = {'com_port': _port_fault, 'share': _share_fault, 'store_forward': _nodes_fault}
 
 
+def _is_host(name: str) -> bool:
+    """Tell whether a name server could be asked for a name: no part is empty or too long."""
+    try:
+        return bool(name.encode('idna'))
+    except UnicodeError:
+        return False
+
+
 def _is_url(text: str) -> bool:
     """Tell whether ``text`` is the URL of a device server: host, port, and nothing after them."""
     try:
         url = urlsplit(text)
-        return '://' in text and url.scheme in DEVICE_SERVERS and bool(
-            url.hostname and url.port) and not (url.path or url.query or url.fragment)
+        is_server = url.scheme in DEVICE_SERVERS and url.hostname and url.port
+        return '://' in text and bool(is_server) and _is_host(url.hostname or '') \
+            and not (url.path or url.query or url.fragment)
     except ValueError:  # a port above 65535
         return False

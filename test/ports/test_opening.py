@@ -19,7 +19,7 @@ import sys
 from types import ModuleType
 
 from abdf1_ros.ports.descriptor import DescriptorPort
-from abdf1_ros.ports.opening import open_port
+from abdf1_ros.ports.opening import name_port, open_port
 from abdf1_ros.ports.settings import PortSettings
 from abdf1_ros.problems import ConfigurationError
 from abdf1_ros.settings import network
@@ -52,6 +52,15 @@ def test_scheme_that_nobody_knows_is_no_port(name: str) -> None:
         network.make_network({'com_port': (name, 'test')})
     with pytest.raises(OSError, match='No such file'):
         open_port(PortSettings(name))
+
+
+@pytest.mark.parametrize(('error', 'text'), [
+    (OSError('the device server refuses RFC 2217'),
+     "[Errno 5] the device server refuses RFC 2217: 'rfc2217://loft:7'"),
+    (OSError(2, 'No such file'), "[Errno 2] No such file: 'rfc2217://loft:7'")])
+def test_error_that_gets_the_name_of_the_port_keeps_its_text(error: OSError, text: str) -> None:
+    name_port(error, 'rfc2217://loft:7')
+    assert str(error) == text
 
 
 def test_scheme_that_lacks_what_it_needs_says_so(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -44,6 +44,11 @@ def test_other_device_servers_are_others(url: str) -> None:
     assert line_of(url) == line_of(url.upper())
 
 
+@pytest.mark.parametrize('host', ['192.168.0..9', 64 * 'a'])
+def test_name_that_no_host_can_have_is_itself(host: str) -> None:
+    assert line_of(f'socket://{host}:4001') == f'{host}:4001'
+
+
 def test_device_is_known_by_its_number(tmp_path: Path) -> None:
     line, other = Pty(tmp_path / 'line'), Pty(tmp_path / 'other')
     (tmp_path / 'link').symlink_to('line')

@@ -142,6 +142,10 @@ def test_left_out_is_as_empty(path: Path) -> None:
     ('Com_Port', 'COM1',
      'Com_Port = "COM1" should be a number from 1, a device path such as /dev/ttyUSB0, '
      'socket://host:port or rfc2217://host:port; "plc ports" lists the devices'),
+    ('Com_Port', 'socket://192.168.0..9:4001',
+     'Com_Port = "socket://192.168.0..9:4001" should be a number from 1, a device path such as '
+     '/dev/ttyUSB0, socket://host:port or rfc2217://host:port; "192.168.0..9" is not the name of '
+     'a host'),
 ])
 def test_fault_of_a_cell_is_told_word_for_word(
         path: Path, column: str, text: str, expected: str) -> None:
