@@ -90,11 +90,17 @@ def _missing_is_named() -> Iterator[None]:
     except ModuleNotFoundError as error:
         if error.name is None or error.name.startswith('abdf1_ros'):
             raise
-        cure = '"pip install pyserial", or "make setup" in a checkout' if error.name == 'serial' \
-            else 'is ROS 2 sourced, as by ". /opt/ros/jazzy/setup.bash"?'
-        print(f'{Path(sys.argv[0]).name}: the Python module {error.name} is missing; {cure}',
-              file=sys.stderr)
+        print(f'{Path(sys.argv[0]).name}: the Python module {error.name} is missing; '
+              f'{_cure(error.name)}', file=sys.stderr)
         sys.exit(_NOT_INSTALLED)
+
+
+def _cure(module: str) -> str:
+    if module == 'serial':
+        return '"pip install pyserial", or "make setup" in a checkout'
+    if module.startswith('serial.'):
+        return 'serial is of another package: "pip uninstall serial", then "pip install pyserial"'
+    return 'is ROS 2 sourced, as by ". /opt/ros/jazzy/setup.bash"?'
 
 
 def _ended(status: int) -> int:

@@ -178,7 +178,8 @@ def _read_text(path: str) -> str:
         with Path(path).open('rb') as file:
             raw = file.read(_LARGEST + 1).removeprefix(codecs.BOM_UTF8)
     except OSError as error:
-        raise Problem(path, f'cannot be read: {error.strerror or error}') from None
+        where = '' if Path(path).is_absolute() else f' in the folder {Path.cwd()}'
+        raise Problem(path, f'cannot be read: {error.strerror or error}{where}') from None
     if raw.startswith(_WORKBOOKS):
         raise Problem(path, 'is a workbook or a project of some program, not text; save what is '
                             'in it as "CSV UTF-8"')

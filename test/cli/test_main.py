@@ -92,14 +92,18 @@ def test_signal_before_a_command_has_its_own_handlers_ends_quietly(
     assert end.value.code == {**NAMES, 'conform': ('', 130)}[name][1]
 
 
-@pytest.mark.parametrize('name', ['node', 'plc'])
-def test_module_that_is_missing_is_named(tmp_path: Path, name: str) -> None:
-    text = "raise ModuleNotFoundError('no', name='rclpy')\n"
+@pytest.mark.parametrize(('name', 'module', 'cure'), [
+    ('node', 'rclpy', 'is ROS 2 sourced, as by ". /opt/ros/jazzy/setup.bash"?'),
+    ('plc', 'serial', '"pip install pyserial", or "make setup" in a checkout'),
+    ('plc', 'serial.rs485', 'serial is of another package: "pip uninstall serial", then "pip '
+                            'install pyserial"')])
+def test_module_that_is_missing_is_named(
+        tmp_path: Path, name: str, module: str, cure: str) -> None:
+    text = f"raise ModuleNotFoundError('no', name='{module}')\n"
     with held_at_an_import(tmp_path, name, text) as process:
         _, errors = process.communicate(timeout=PATIENCE)
     assert process.returncode == 2
-    assert errors == ('-c: the Python module rclpy is missing; is ROS 2 sourced, as by '
-                      '". /opt/ros/jazzy/setup.bash"?\n')
+    assert errors == f'-c: the Python module {module} is missing; {cure}\n'
 
 
 @pytest.mark.parametrize('name', sorted(COMMANDS))

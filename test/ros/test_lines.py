@@ -29,6 +29,7 @@ from abdf1_ros.problems import ConfigurationError
 from abdf1_ros.ros import lines as module
 from abdf1_ros.ros.bridge.node import BridgeNode
 from abdf1_ros.ros.lines import chosen, main, sections
+from abdf1_ros.ros.parameters import files
 from abdf1_ros.ros.parameters.files import parameter_files, usable_files
 from abdf1_ros.ros.process import main as process
 from abdf1_ros.signals import EndRequest
@@ -130,6 +131,22 @@ def test_what_is_left_out_changes_nothing_else(tmp_path: Path) -> None:
     with usable_files(['--params-file', path], leaves_out=True) as (_, usable):
         assert Path(usable).read_text('utf-8') == (
             "a:\n  ros__parameters: {day: 2001-99-99, number: 010, text: '5', list: [1, 2]}\n")
+
+
+def test_temporary_folder_is_asked_for_only_where_a_name_is_left_out(
+        tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A disk may be full or read-only, as in a container."""
+    def refuse(**kwargs: object) -> None:
+        raise FileNotFoundError('no usable temporary directory')
+
+    monkeypatch.setattr(files, 'TemporaryDirectory', refuse)
+    good = ['--params-file', yaml_file(tmp_path, 'a: {ros__parameters: {port: x}}')]
+    with usable_files(good, leaves_out=True) as given:
+        assert given == good
+    bad = yaml_file(tmp_path, 'a-b: {ros__parameters: {port: x}}')
+    with pytest.raises(ConfigurationError, match='"a-b" cannot name a node'), \
+            usable_files(['--params-file', bad], leaves_out=True):
+        pass
 
 
 def test_parameter_files_of_the_arguments() -> None:

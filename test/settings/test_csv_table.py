@@ -250,3 +250,12 @@ def test_what_is_no_file_of_text(path: Path, tmp_path: Path) -> None:
         with pytest.raises(ConfigurationError) as caught:
             read_rows(str(name), KNOWN)
         assert str(caught.value) == f'{name}: {right}'
+
+
+def test_folder_of_a_relative_path_is_named(
+        tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises(ConfigurationError) as caught:
+        read_table('net.csv', ['Baud'])
+    assert str(caught.value) == (
+        f'net.csv: cannot be read: No such file or directory in the folder {tmp_path}')

@@ -158,7 +158,9 @@ def _head(snapshot: Snapshot, now: float) -> Iterator[TextLine]:
     if not snapshot.is_there:
         yield TextLine('  the node is gone; these are its last words', Style.BAD)
     if snapshot.told is None:
-        yield TextLine('  no diagnostics yet', Style.WARNING)
+        remapped = '; where /diagnostics is remapped, monitor needs the same -r' \
+            if snapshot.is_there else ''
+        yield TextLine(f'  no diagnostics yet{remapped}', Style.WARNING)
     elif now - snapshot.told > SILENCE:
         yield TextLine(f'  no diagnostics for {now - snapshot.told:.1f} s', Style.BAD)
 

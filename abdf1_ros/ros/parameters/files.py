@@ -17,7 +17,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, ExitStack
 from pathlib import Path
 import re
 from tempfile import TemporaryDirectory
@@ -99,7 +99,7 @@ def usable_files(args: Sequence[str], leaves_out: bool) -> Iterator[list[str]]:
     Raises ConfigurationError for such names otherwise, and for files that are not YAML.
     """
     usable, problems = list(args), []
-    with TemporaryDirectory(prefix='abdf1_') as folder:
+    with ExitStack() as copies:  # a folder only where it is needed: the disk may be read-only
         for number, path in enumerate(parameter_files(args)):
             if not Path(path).is_file():  # ROS says why it cannot be read
                 continue
@@ -110,6 +110,10 @@ def usable_files(args: Sequence[str], leaves_out: bool) -> Iterator[list[str]]:
                 f'"{printable(name)}" cannot name a node: letters, digits and underscores, as in '
                 f'{re.sub("[^0-9A-Za-z_/]", "_", name)}')) for name, line in bad]
             if bad and leaves_out:
+                try:
+                    folder = copies.enter_context(TemporaryDirectory(prefix='abdf1_'))
+                except OSError:  # no folder for files: the names have to be put right
+                    raise ConfigurationError(problems) from None
                 copy = Path(folder, f'{number}.yaml')
                 _leave_out_bad_names(tree)
                 copy.write_text(yaml.serialize(tree), encoding='utf-8')
