@@ -26,6 +26,7 @@ from collections import defaultdict
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from enum import Enum
+import math
 
 from abdf1_ros.df1.packet import BROADCAST
 from abdf1_ros.pccc.access import Access
@@ -37,7 +38,7 @@ from abdf1_ros.plan.bounds import OURS_BESIDE_GUESTS, Times
 from abdf1_ros.plan.line_model import ReadRequest
 from abdf1_ros.plan.planner import Block, Planner, StationArea
 from abdf1_ros.settings import BAUD_RATES
-from abdf1_ros.settings.mapping import Command, Mapping, Publish
+from abdf1_ros.settings.mapping import Command, Mapping
 from abdf1_ros.settings.network import Network
 from abdf1_ros.settings.remarks import network_remarks
 from abdf1_ros.settings.rows import Rows
@@ -123,8 +124,8 @@ class Report:
         stale = forecast.stale_times(
             self.blocks, self.default_period, forecast.USUAL_STALE_AFTER, bounds.own_work(
                 forecast.line_model(self.network), self.mappings, self.default_period))
-        return {mapping: time for mapping, time in stale.items()
-                if mapping.publish is Publish.ALWAYS}
+        return {mapping: promise for mapping, time in stale.items()
+                if math.isfinite(promise := mapping.promise(time))}
 
     def time(self, block: Block) -> float:
         """Return the seconds that a block takes, answers included."""
@@ -151,10 +152,11 @@ class Report:
         found += bounds.conditions(self.network, self.mappings)
         bits = [mapping for mapping in self.mappings if mapping.command is Command.READ
                 and mapping.type is ValueType.BOOL]
-        silent = [mapping for mapping in bits if mapping.publish is Publish.CHANGE]
+        silent = [mapping for mapping in bits if math.isinf(mapping.promise(0.0))]
         if silent:
             found.append(f'bits with Publish Change: {_tags(silent)}; their topics promise '
-                         'nothing, so a subscriber with a deadline gets no values')
+                         'nothing, so a subscriber with a deadline gets no values; Max_Silence '
+                         'changes that')
         free = [mapping for mapping in bits if mapping.condition is None]
         if free:
             found.append(f'bits without While: {_tags(free)}; their values go on when the '

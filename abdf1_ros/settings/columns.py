@@ -185,6 +185,14 @@ MAP_COLUMNS = (
            'of bits: WARN or ERROR, the level on /diagnostics while a bit is 1; "WARN 0" or '
            '"ERROR 0" while it is 0',
            kind=ALARM, commands=PUBLISHED),
+    Column('Deadband', '0',
+           'with Publish Change: differences up to this one, in the unit of the topic, are no '
+           'change',
+           kind=_NUMBER, commands=PUBLISHED),
+    Column('Max_Silence', 'none',
+           'with Publish Change: ms after which a value is published again though it has not '
+           'changed, 100-3600000; the topic then promises a deadline',
+           kind=milliseconds_from(100, 3_600_000), commands=PUBLISHED),
 )
 
 BY_NAME = {column.name: column for column in MAP_COLUMNS}

@@ -45,6 +45,8 @@ Cells: TypeAlias = MappingType[str, Any]
 
 _PERIODS = milliseconds_from(100, 60_000)
 
+_NO_NUMBERS = (ValueType.BOOL, ValueType.STRING)
+
 # The processor reads or writes their words itself.
 _NO_COUNTING = (FileType.STATUS, FileType.INPUT, FileType.OUTPUT)
 
@@ -62,6 +64,11 @@ def with_conditions(row: Row, values: Cells, mapping: Mapping, fault: ReportFaul
         mapping = replace(mapping, period=mapping.period or DEFAULT_PERIOD)
     if mapping.confirms and (mapping.type, mapping.length) != (ValueType.BOOL, 1):
         fault('Confirms', 'Confirms is for a Read row of one bit (bool, Length 1)')
+    for column, value in (('Deadband', mapping.deadband), ('Max_Silence', mapping.max_silence)):
+        if value is not None and mapping.publish is not Publish.CHANGE:
+            fault(column, f'{column} is for rows with Publish Change')
+    if mapping.deadband is not None and (mapping.deadband < 0 or mapping.type in _NO_NUMBERS):
+        fault('Deadband', 'Deadband should be a number from 0 on, for values that are numbers')
     if mapping.alarm is not None and mapping.type is not ValueType.BOOL:
         fault('Alarm', 'Alarm is for bits (bool), such as B3:0/0')
     return replace(mapping, fallback=_fallback(values, mapping, fault),

@@ -73,6 +73,8 @@ class Mapping:
     is the gateway to the station, None for a station of the line itself. With
     ``is_read_only`` the words of a Serve row may not be written by the other end.
     ``alarm``, ``fallback`` and ``condition`` are there where the row has them.
+    A row that publishes changes ignores differences up to ``deadband``, in the unit of the topic,
+    and repeats its value after ``max_silence`` ms.
     ``confirms`` is the tag of the heartbeat whose control the bit tells, empty for none.
     ``description`` is to be read. ``remarks`` say what is odd about the row.
     """
@@ -103,6 +105,8 @@ class Mapping:
     condition: While | None = None
     confirms: str = ''
     alarm: Alarm | None = None
+    deadband: float | None = None
+    max_silence: int | None = None
     remarks: tuple[Problem, ...] = ()
     # The codec and the dialect are made once: every read needs them.
     codec: Codec = field(init=False, repr=False)
@@ -129,6 +133,16 @@ class Mapping:
     def limits(self) -> tuple[float, float]:
         """Return the least and the greatest value that its type can hold, in the topic's unit."""
         return self.type.range if self.scaling is None else self.scaling.limits(self.type)
+
+    def promise(self, stale_time: float) -> float:
+        """
+        Return after how many seconds without a message values have stopped.
+
+        Values are read at least every ``stale_time`` s. Infinite where nothing is promised.
+        """
+        if self.publish is Publish.ALWAYS:
+            return stale_time
+        return math.inf if self.max_silence is None else stale_time + self.max_silence / 1000
 
     @property
     def serves(self) -> bool:

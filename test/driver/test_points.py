@@ -29,7 +29,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 import pytest
 from support.driver_bench import simulated_plc
-from support.mappings import make_mapping
+from support.mappings import fault, make_mapping, one
 
 
 def point(publish: str = 'Always', **cells: str) -> ReadPoint:
@@ -135,6 +135,46 @@ def test_bits_that_are_not_ours_are_not_a_change_of_value() -> None:
     bits = point('Change', text='B3:0/4')
     assert bits.update(b'\x10\0', 0.0) == array('B', [1])
     assert bits.update(b'\x11\xff', 1.0) is None
+
+
+def test_difference_within_the_deadband_is_no_change() -> None:
+    row = one(Command='Read', Length='2', Publish='Change', Deadband='0.3', Scale='0.1')
+    level = ReadPoint(row, 0.1, 0.6)
+    assert level.update(b'\x0a\0\x14\0', 0.0) == array('f', [1.0, 2.0])
+    for step, words in enumerate((b'\x0d\0\x14\0', b'\x07\0\x11\0', b'\x0c\0\x17\0')):
+        assert level.update(words, 1.0 + step) is None  # creeping is measured from the last one
+    assert level.update(b'\x0a\0\x18\0', 4.0) == array('f', [1.0, 2.4])
+    assert level.update(b'\x0d\0\x15\0', 5.0) is None
+
+
+def test_number_that_becomes_none_is_a_change() -> None:
+    level = ReadPoint(one(Command='Read', Address='F8:0', Publish='Change', Deadband='5'),
+                      0.1, 0.6)
+    assert level.update(b'\0\0\0\0', 0.0) is not None
+    assert level.update(b'\0\0\xc0\x7f', 1.0) is not None  # NaN
+    assert level.update(b'\0\0\xc0\x7f', 2.0) is None
+
+
+def test_value_that_does_not_change_is_published_again_after_the_longest_silence() -> None:
+    row = one(Command='Read', Publish='Change', Max_Silence='1000', Deadband='2')
+    level = ReadPoint(row, 0.1, 0.6)
+    assert row.promise(0.6) == 1.6
+    assert level.update(b'\5\0', 0.0) is not None
+    assert level.update(b'\6\0', 0.9) is None
+    assert level.update(b'\6\0', 1.0) == array('h', [6])
+    assert level.update(b'\4\0', 1.9) is None  # measured from what was published last
+    assert level.update(b'\3\0', 1.95) == array('h', [3])
+    assert level.update(b'\3\0', 2.9) is None
+
+
+@pytest.mark.parametrize(('cells', 'text'), [
+    ({'Deadband': '3'}, 'Deadband is for rows with Publish Change'),
+    ({'Max_Silence': '500'}, 'Max_Silence is for rows with Publish Change'),
+    ({'Publish': 'Change', 'Max_Silence': '50'}, 'should be ms from 100 to 3600000'),
+    ({'Publish': 'Change', 'Deadband': '-1'}, 'Deadband should be a number from 0 on'),
+    ({'Publish': 'Change', 'Deadband': '1', 'Address': 'B3:0/1'}, 'for values that are numbers')])
+def test_cells_that_go_with_changes_only(cells: dict[str, str], text: str) -> None:
+    assert text in fault(Command='Read', **cells)
 
 
 def test_change_is_one_of_the_raw_value() -> None:

@@ -301,7 +301,7 @@ def test_bits_that_go_on_without_the_program_are_noted_and_are_not_odd() -> None
     assert report_of(rows[3]).notes() == []
     assert report_of(make_mapping('B3:0/0', tag='door', publish='Change')).notes()[0] == (
         'bits with Publish Change: door; their topics promise nothing, so a subscriber with a '
-        'deadline gets no values')
+        'deadline gets no values; Max_Silence changes that')
 
 
 def test_rows_promise_three_intervals_and_a_read() -> None:

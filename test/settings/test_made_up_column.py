@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""A column that is made up, Deadband: three files have to know it."""
+"""A column that is made up, Unseen: three files have to know it."""
 
 from pathlib import Path
 
@@ -25,10 +25,10 @@ from array import array
 from abdf1_ros.driver.reads.point import ReadPoint
 from support.mappings import cell_of, fault, one
 
-row = one(Command='Read', Publish='Change', Deadband='3')
-assert cell_of(row, 'Deadband') == '3' and cell_of(one(), 'Deadband') == '0'
-assert 'Deadband = "x" should be a number' in fault(Deadband='x')
-assert 'a Write row has no Deadband: it is for Read' in fault(Command='Write', Deadband='3')
+row = one(Command='Read', Publish='Change', Unseen='7')
+assert cell_of(row, 'Unseen') == '7' and cell_of(one(), 'Unseen') == ''
+assert 'Unseen = "x" should be a number' in fault(Unseen='x')
+assert 'a Write row has no Unseen: it is for Read' in fault(Command='Write', Unseen='7')
 point = ReadPoint(row, 0.1, 0.6)
 words = (b'\\x05\\x00', b'\\x07\\x00', b'\\x08\\x00')
 assert [point.update(word, now) for now, word in enumerate(words)] == [

@@ -89,7 +89,8 @@ def test_columns_are_those_of_the_interface() -> None:
     assert COLUMNS == ('Tag', 'Command', 'Address', 'Station', 'PLC_Type', 'Length', 'Type',
                        'Topic', 'Period', 'Publish', 'Min', 'Max', 'Word_Order', 'Scale',
                        'Offset', 'Access', 'Processor', 'Fallback', 'Fallback_After',
-                       'While', 'While_Timeout', 'Confirms', 'Via', 'Description', 'Alarm')
+                       'While', 'While_Timeout', 'Confirms', 'Via', 'Description', 'Alarm',
+                       'Deadband', 'Max_Silence')
 
 
 def test_every_column_is_there_once_and_described() -> None:

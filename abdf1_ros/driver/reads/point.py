@@ -22,6 +22,9 @@ import math
 from abdf1_ros.pccc.values import Values
 from abdf1_ros.settings.mapping import Mapping, Publish
 
+# 0.3 / 0.1 is a little less than 3.
+_ROUNDING = 1e-9
+
 # Weight of the newest interval in ``kept``.
 _SMOOTHING = 0.125
 
@@ -75,7 +78,12 @@ class ReadPoint:
         self._scaling = mapping.scaling
         self._usual_age = min(max(1.5 * period, stale_time / 2), stale_time)
         self._is_on_change = mapping.publish is Publish.CHANGE
-        self._published: bytes | str | None = None
+        scale = 1.0 if mapping.scaling is None else abs(mapping.scaling.scale)
+        self._deadband = (mapping.deadband or 0.0) / scale * (1 + _ROUNDING)
+        silence = mapping.max_silence
+        self._max_silence = math.inf if silence is None else silence / 1000
+        self._published: Values | None = None
+        self._published_at = -math.inf
 
     def update(self, words: bytes, now: float) -> Values | None:
         """
@@ -84,7 +92,7 @@ class ReadPoint:
         Raises FormatError when the words are no value of the mapping's type.
         """
         values = self._decode(words)
-        is_same = self._is_on_change and not self._remember(values) and self.error is None
+        is_same = self._is_on_change and self._is_kept_back(values, now)
         before, self.interval = self.interval, None
         if self.last_good is not None and self.error is None and not self.withheld:
             self.interval = now - self.last_good
@@ -101,14 +109,24 @@ class ReadPoint:
             return values
         return self._scaling.publish(values)
 
-    def _remember(self, values: Values) -> bool:
-        """Remember values; return whether they differ from the last ones."""
+    def _is_kept_back(self, values: Values, now: float) -> bool:
+        """Tell whether values are not published: nothing has changed, and it is not time again."""
+        if self.error is None and now - self._published_at < self._max_silence \
+                and not self._is_change(values):
+            return True
+        self._published, self._published_at = values, now
+        return False
+
+    def _is_change(self, values: Values) -> bool:
+        """Tell whether any value differs from the published one by more than the deadband."""
+        before = self._published
         # Compare bytes of values: other bits of the same words are not a change, and a NaN equals
         # itself.
-        content = values if isinstance(values, str) else values.tobytes()
-        is_change: bool = content != self._published
-        self._published = content
-        return is_change
+        if before is None or _content(values) == _content(before):
+            return before is None
+        return not self._deadband or not all(
+            abs(new - old) <= self._deadband
+            for new, old in zip(values, before, strict=True))
 
     def fail(self, error: str) -> bool:
         """Take note that a read gave no value; return whether the reason is a new one."""
@@ -168,6 +186,10 @@ class ReadPoint:
         if age <= self._usual_age:
             return Freshness.FRESH
         return Freshness.STALE if age > self.stale_time else Freshness.LATE
+
+
+def _content(values: Values) -> bytes | str:
+    return values if isinstance(values, str) else values.tobytes()
 
 
 class Guard:

@@ -23,7 +23,7 @@ from typing import Any
 
 from abdf1_ros.errors import FormatError
 from abdf1_ros.pccc.values import Values, ValueType
-from abdf1_ros.settings.mapping import Mapping, Publish
+from abdf1_ros.settings.mapping import Mapping
 from rclpy.duration import Duration
 from rclpy.qos import DurabilityPolicy, LivelinessPolicy, QoSProfile, ReliabilityPolicy
 from rclpy.serialization import serialize_message
@@ -87,13 +87,14 @@ def read_qos(mapping: Mapping, stale_time: float) -> QoSProfile:
     """
     Return the QoS of a read topic.
 
-    A late subscriber gets the last value, but never one older than ``stale_time`` seconds. A
-    subscriber with deadline or liveliness QoS gets an event that values have stopped.
-    A topic that is published on change only, or when a PLC writes, cannot promise this.
+    A late subscriber gets the last value, but never one older than the row promises where values
+    are read every ``stale_time`` s at least. A subscriber with deadline or liveliness QoS gets an
+    event that values have stopped. A topic that is published when a PLC writes, or on change
+    without Max_Silence, cannot promise this.
     """
     profile = latched_qos()
-    if mapping.publish is Publish.ALWAYS and math.isfinite(stale_time):
-        time = Duration(seconds=stale_time)
+    if math.isfinite(promise := mapping.promise(stale_time)):
+        time = Duration(seconds=promise)
         profile.lifespan = profile.deadline = profile.liveliness_lease_duration = time
         profile.liveliness = LivelinessPolicy.MANUAL_BY_TOPIC
     return profile

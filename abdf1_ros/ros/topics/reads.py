@@ -26,7 +26,7 @@ from typing import Any
 from abdf1_ros.driver.reads.point import ReadPoint
 from abdf1_ros.pccc.values import Values
 from abdf1_ros.ros.topics.messages import encoder, MESSAGES, read_qos
-from abdf1_ros.settings.mapping import Mapping, Publish
+from abdf1_ros.settings.mapping import Mapping
 from rclpy.event_handler import PublisherEventCallbacks
 from rclpy.node import Node
 
@@ -116,7 +116,7 @@ class ReadTopics:
 
     def _topic(self, mapping: Mapping, point: ReadPoint, old: ReadTopic | None) -> ReadTopic:
         shape = mapping.message_type, str(mapping.address), mapping.length
-        promise = point.stale_time if mapping.publish is Publish.ALWAYS else math.inf
+        promise = mapping.promise(point.stale_time)
         if old is not None and old.is_fit_for(shape, promise):
             return old
         # The default callbacks would cost time for every publisher at every turn of the executor.
