@@ -106,7 +106,7 @@ def bridge(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Bridge]:
         with files.start_simulator() as bridge.simulator, \
                 Process('node', *arguments) as bridge.node:
             bridge.open_publishers()
-            until_status(bridge.diagnostics, 'mappings', OK)
+            bridge.diagnostics.until_fresh()
             yield bridge
             bridge.node.end(signal.SIGINT)
             bridge.simulator.end(signal.SIGTERM)

@@ -32,7 +32,6 @@ from support.ros import (
     ERROR,
     get_parameters,
     Observer,
-    OK,
     Process,
     until_status,
     values_in,
@@ -106,7 +105,7 @@ def test_silent_station_is_told_at_once_and_does_not_delay_the_end(
                                      'net.timeout:=200')) as node:
         observer.meet('/abdf1')  # what is told once is told to who listens
         with files.start_simulator() as simulator:
-            until_status(diagnostics, 'mappings', OK)
+            diagnostics.until_fresh()
             diagnostics.clear()
             simulator.say('silent 2')
             until_status(diagnostics, 'station 2', ERROR)
@@ -185,7 +184,7 @@ def test_names_can_be_remapped(observer: Observer, files: Files) -> None:
         assert values_in(bits.first()) == [1, 0, 0, 1, 1, 0]
         assert active.first().data[0] == 0b110
         # Also with the clock of a simulation, which nobody publishes here.
-        until_status(diagnostics, 'mappings', OK)
+        diagnostics.until_fresh()
         assert [status.name for status in diagnostics[-1].status] == [
             f'cell/line_a: {name}' for name in STATUSES]
         assert not observer.node.count_publishers('/cell/line_a/read/door')

@@ -32,7 +32,7 @@ import pytest
 from std_msgs.msg import UInt16MultiArray
 from support.commands import call
 from support.forked import Forked
-from support.ros import Observer, OK, PATIENCE, Process, until_status
+from support.ros import Observer, PATIENCE, Process
 from support.simulator_process import Files, IMPATIENT_ROW, make_files, READS, STATUSES
 
 NODE = '/cell/line_a'
@@ -51,7 +51,7 @@ def files(tmp_path_factory: pytest.TempPathFactory) -> Files:
 def simulator(files: Files) -> Iterator[Process]:
     with files.start_simulator() as simulator, Process('node', *files.args(), *ARGUMENTS) as node:
         with Observer() as observer:
-            until_status(observer.diagnostics(files.port), 'mappings', OK)
+            observer.diagnostics(files.port).until_fresh()
         yield simulator
         node.end()
 
