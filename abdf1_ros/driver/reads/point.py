@@ -124,9 +124,10 @@ class ReadPoint:
         # itself.
         if before is None or _content(values) == _content(before):
             return before is None
-        return not self._deadband or not all(
-            abs(new - old) <= self._deadband
-            for new, old in zip(values, before, strict=True))
+        if not self._deadband or isinstance(values, str) or isinstance(before, str):
+            return True
+        return not all(abs(new - old) <= self._deadband
+                       for new, old in zip(values, before, strict=True))
 
     def fail(self, error: str) -> bool:
         """Take note that a read gave no value; return whether the reason is a new one."""
