@@ -1,0 +1,60 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Odd but legal devices, played against the driver in every mode in which they can occur."""
+
+from abdf1_ros.driver.write import Outcome
+from abdf1_ros.settings.network import Network
+import pytest
+from support.devices import Device, DEVICES
+from support.driver_bench import DriverBench, store, stored
+from support.guests import Program, READ_N7
+from support.mappings import make_mapping
+
+NETWORKS = {
+    'Message': {}, 'Standard': {'polling': 'Standard'}, 'Peer': {'mode': 'Peer'}}
+
+
+@pytest.mark.parametrize(('device', 'mode'), [
+    (device, mode) for device in DEVICES for mode in device.modes], ids=str)
+@pytest.mark.parametrize('check', ['CRC', 'BCC'])
+def test_values_are_right_and_writes_are_told_as_they_ended(
+        device: Device, mode: str, check: str) -> None:
+    words = make_mapping('N7:0', plc='SLC', length=3)
+    target = make_mapping('N7:5', 'Write', plc='SLC')
+    bench = DriverBench([words, target], start=False, network=Network(
+        baud=19200, timeout=200, error_code=check, **NETWORKS[mode]))  # type: ignore[arg-type]
+    plc = bench.plc(1, 'SLC', ('N7:0', 10))
+    store(plc, 'N7:0', [0x1010, 0x0310, -2])
+    bench.far.say, bench.far.hear = device.say(), device.hear()
+    bench.open(run=1.0)
+    guest = Program(bench)
+    guest.keep_asking(READ_N7)
+    bench.run(3.0)
+    assert {tuple(values) for values in bench.listener.values(words)} == {(0x1010, 0x0310, -2)}
+    assert bench.driver.stations[1].active
+    for value in range(1, 4):
+        bench.write(target, [value])
+        bench.run_until(lambda count=value: len(bench.listener.results) == count, 20.0)
+    assert bench.listener.outcomes() == 3 * [Outcome.WRITTEN]
+    assert stored(plc, 'N7:5') == b'\x03\x00'
+    before = len(bench.listener.values(words))
+    bench.far.say = bench.far.hear = bytes  # a usual device from now on
+    bench.run_until(lambda: len(bench.listener.values(words)) > before, 20.0)
+    assert {reply.data for _, reply in guest.replies if not reply.sts} == {b'\x10\x10'}
+
+
+def test_every_device_has_a_source_and_a_name_of_its_own() -> None:
+    assert all(device.source and device.modes for device in DEVICES)
+    assert len({device.name for device in DEVICES}) == len(DEVICES)
