@@ -62,6 +62,13 @@ OWN_IN_A_ROW = 7
 # After a guest's command, checks and reads that are due have so many times as long as it had.
 OURS_BESIDE_GUESTS = 3
 
+# A change that has waited for so long (s), or for half its patience, gives way to newer ones if
+# another write of its row has gone out meanwhile: the line does not carry them all.
+CARRIED_WITHIN = 1.0
+
+# The parameter write_timeout (s), which the files do not tell, unless it was changed.
+_PATIENCE = 2.0
+
 # A heartbeat with a shorter Period (ms) may be quicker than a PLC's scan.
 _SHORT_PERIOD = 200
 
@@ -255,6 +262,23 @@ def remarks(network: Network, mappings: Rows,
             yield (f'{mapping.tag}: Fallback_After {mapping.fallback.after} ms is shorter than '
                    f'two transactions of {milliseconds(longest)}; a few lost frames bring the '
                    'fallback')
+    yield from _late_states(network, mappings, response_time)
+
+
+def _late_states(network: Network, mappings: Rows, response_time: float) -> Iterator[str]:
+    """Yield the row that may lose its newest state first, where more comes than is carried."""
+    model = forecast.line_model(network)
+    rows = [mapping for mapping in mappings.messages if not mapping.serves]
+    a_write_each = sum(_with_answers(_packets(model, mapping), response_time) for mapping in rows)
+    for mapping in rows:
+        after = mapping.fallback.after / 1000 if mapping.fallback else math.inf
+        patience = min(_PATIENCE, after)
+        if min(CARRIED_WITHIN, patience / 2) + a_write_each > patience:
+            yield (f'{mapping.tag}: where all write topics are published faster than the line '
+                   f'carries, a message waits for a write of each, {milliseconds(a_write_each)}; '
+                   f'so its newest value may be older than {milliseconds(patience)} and is not '
+                   'sent. Publish less often, or fewer rows')
+            return
 
 
 def _with_answers(packets: Sequence[float], response_time: float) -> float:

@@ -283,3 +283,14 @@ def test_rule_8_mode_of_a_plc_that_we_write_to_by_ourselves_is_asked_every_two_s
     guarded = make_mapping('N7:0', period=9000, condition=While(('RUN',)))
     assert mode_periods(Rows([guarded, speed()]), 0.1, 3.0) == {1: MODE_PERIOD}
     assert mode_periods(Rows([make_mapping(), make_mapping(command='Write')]), 0.1, 3.0) == {}
+
+
+@pytest.mark.parametrize(('rows', 'after', 'is_late'), [
+    (5, None, False), (40, None, True), (5, 3000, False), (5, 300, True)])
+def test_newest_state_that_may_be_too_old_on_a_full_line_is_named(
+        rows: int, after: int | None, is_late: bool) -> None:
+    map_rows = Rows([make_mapping(
+        f'N7:{number}', 'Write', tag=f'w{number}', fallback=after and Fallback((0,), after))
+        for number in range(rows)])
+    texts = [text for text in remarks(QUICK, map_rows) if 'newest value may be older' in text]
+    assert [text.partition(':')[0] for text in texts] == ['w0'] * is_late

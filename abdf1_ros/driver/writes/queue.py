@@ -32,13 +32,10 @@ from abdf1_ros.df1.stations import ActiveStationList
 from abdf1_ros.driver.write import Origin, Outcome, Write, WriteResult
 from abdf1_ros.driver.writes.under_way import WriteJob, WritesUnderWay
 from abdf1_ros.messages import Message
+from abdf1_ros.plan.bounds import CARRIED_WITHIN
 from abdf1_ros.settings.mapping import Mapping
 
 MAX_WAITING_WRITES = 1000
-
-# A change that has waited for so long (s), or for half its patience, gives way to newer ones if
-# another write of its row has gone out meanwhile: the line does not carry them all.
-CARRIED_WITHIN = 1.0
 
 _WAITED_LONGER = 'waited longer than %g s for the line'
 
