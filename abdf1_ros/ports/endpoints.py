@@ -149,7 +149,7 @@ def _own(link: Path) -> socket.socket:
     try:
         return own(link_of(str(link)))
     except OSError:
-        raise OSError(f'{link} is in use by another simulator or sniff') from None
+        raise OSError(f'{link} is in use by another bridge, simulator or sniff') from None
 
 
 def _remove_left_over(link: Path) -> None:

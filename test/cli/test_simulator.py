@@ -230,7 +230,7 @@ def test_name_is_not_shared_and_what_a_killed_simulator_left_is_taken_by_the_nex
     os.close(held)
     before = os.readlink(name)
     assert _refused(capsys, '--data', str(data), '--pty', str(name), status=1) == \
-        f'simulator: {name} is in use by another simulator or sniff\n'
+        f'simulator: {name} is in use by another bridge, simulator or sniff\n'
     assert os.readlink(name) == before
     again.send(signal.SIGTERM)
     _ended(again)

@@ -140,7 +140,7 @@ def test_link_is_one_however_it_is_written(tmp_path: Path) -> None:
         with closing(PtyEndpoint(first)):
             before = os.readlink(names[0])
             for other in names:
-                with pytest.raises(OSError, match='is in use by another simulator or sniff'):
+                with pytest.raises(OSError, match='is in use by another bridge, simulator'):
                     PtyEndpoint(other)
             assert os.readlink(names[0]) == before
 
