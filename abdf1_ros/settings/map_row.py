@@ -139,8 +139,9 @@ class RowReader:
         scaling = self._scaling(values)
         if self.faults:
             return None
+        # Not only given cells: an address range tells the Length.
         told = {'type': _natural_type(values['Address'])} | {
-            column.attribute: values[column.name] for column in self._given
+            column.attribute: values[column.name] for column in MAP_COLUMNS
             if column.name in values and column.attribute in Mapping.__slots__}
         return Mapping(**told, item=self._row.item, place=self._row.where(), name=name,
                        topic=topic, access=values['Access'], scaling=scaling,
