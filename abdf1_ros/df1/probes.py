@@ -40,10 +40,12 @@ class Probes:
     the next turn is then kept free for one like it.
     ``pause`` is the seconds that are left to others after the last probe; before the first one
     ``usual`` stands for what that takes. ``died_at`` is when a station died last (clock value, s),
-    until all that waited for that has had its turn: then minus infinity.
+    until all that waited for that has had its turn: then minus infinity. Where no station
+    answers, ``rest`` seconds are left between two probes.
     """
 
-    def __init__(self, usual: float) -> None:
+    def __init__(self, usual: float, rest: float = 0.0) -> None:
+        self._rest = rest
         self.pause = OTHERS_SHARE * usual
         self._free = self._put_off = 0.0
         self.died_at = -math.inf
@@ -93,6 +95,6 @@ class Probes:
 
     def none_waits(self, now: float, asker: Asker = Asker.IN_TURN) -> None:
         """Take note that probes keep no station waiting: then messages have no turns."""
-        self._free = self._put_off = now
+        self._free = self._put_off = now + self._rest
         self._is_kept_for_message = False
         self._last = Asker.OWN if asker is Asker.OWN else Asker.IN_TURN

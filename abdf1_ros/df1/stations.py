@@ -110,16 +110,17 @@ class ActiveStationList:
     ``records`` has the record of every station, of the list or not, by number. ``routes`` gives
     the gateway to a station, by number: the gateway is polled in place of the station (M 3-7), and
     none of its stations is active while the gateway is not. ``probes`` says when silent stations
-    may be asked; one takes ``probe_time`` seconds. ``took`` tells how much of the time between two
-    clock values (s) this process has run.
+    may be asked; one takes ``probe_time`` seconds, and they ``rest`` where none answers. ``took``
+    tells how much of the time between two clock values (s) this process has run.
     """
 
     def __init__(self, numbers: Iterable[int] = (),
                  on_change: Callable[[Station], None] = lambda station: None,
                  routes: Mapping[int, int] | None = None, probe_time: float = 0.0,
-                 took: Callable[[float, float], float] = lambda begun, now: now - begun) -> None:
+                 took: Callable[[float, float], float] = lambda begun, now: now - begun,
+                 rest: float = 0.0) -> None:
         self._polled: set[int] = set()
-        self.probes = Probes(probe_time)
+        self.probes = Probes(probe_time, rest)
         self._took = took
         self.records = _Records()
         self._stations: dict[int, Station] = {}

@@ -50,6 +50,11 @@ from abdf1_ros.plan.bounds import OURS_BESIDE_GUESTS, OWN_IN_A_ROW
 
 MAX_WRITES_IN_A_ROW = 4
 
+# On a connection that has not been heard so many questions go out without a pause, then one in so
+# many seconds.
+_QUICK_QUESTIONS = 10
+QUESTION_PERIOD = 1.0
+
 
 class Agenda:
     """
@@ -74,6 +79,8 @@ class Agenda:
         self._tasks = tasks
         self._own_in_a_row = 0
         self._was_silent = False  # the station of the last of them
+        self._questions = 0  # on a connection that has not been heard
+        self._next_question = -math.inf  # after the first of them (clock value in s)
         self._writes_in_a_row = 0
         self._has_begun_write = False
         self._last_check = -math.inf
@@ -84,10 +91,30 @@ class Agenda:
         """Return what has the line next, None for nothing; stations in ``busy`` have to wait."""
         if self._counted:
             self._settle(now)
-        job = self._own_first(now, busy) if self._has_own else self._usual(now, busy)
+        if not self._tasks.is_heard:
+            job = self._unheard(now, busy)
+        else:
+            self._questions = 0
+            job = self._own_first(now, busy) if self._has_own else self._usual(now, busy)
         if job is None or isinstance(job, JobTask):
             return job
         return JobTask(self._tasks, job, now)
+
+    def _unheard(self, now: float, busy: Container[int]) -> Job | JobTask | None:
+        """
+        Return what goes out on a connection that has not been heard.
+
+        After the first questions it is one a second, as the port may store them. A 0 or a fallback
+        need not wait: late, it is still the value of rest.
+        """
+        is_limited = self._questions >= _QUICK_QUESTIONS and now < self._next_question
+        if is_limited:
+            return self._interlocks.next(now, busy) if self._has_own else None
+        job = self._own_first(now, busy) if self._has_own else self._usual(now, busy)
+        if job is not None:
+            self._questions += 1
+            self._next_question = now + QUESTION_PERIOD
+        return job
 
     def _settle(self, now: float) -> None:
         """Count the time that commands which have ended have had, of guests and of ours."""
@@ -170,7 +197,7 @@ class Agenda:
 
     def _guest(self, now: float, busy: Container[int]) -> JobTask | None:
         """Return a command of a guest."""
-        job = self._guests.next(now, busy)
+        job = self._guests.next(now, busy, may_write=self._tasks.is_heard)
         if job is None:
             return None
         self._writes_in_a_row = 0
@@ -241,8 +268,10 @@ class Agenda:
         """Return when there is something to do next (clock value in s), None for never."""
         moments = [moment for moment in (self._reads.next_due(), self._checks.next_due())
                    if moment is not None]
-        if self._has_own and (own := self._interlocks.next_due()) < math.inf:
-            moments.append(own)
         if self._held_until < math.inf:
             moments.append(self._held_until)
+        if not self._tasks.is_heard and self._questions >= _QUICK_QUESTIONS:
+            moments = [max(moment, self._next_question) for moment in moments]
+        if self._has_own and (own := self._interlocks.next_due()) < math.inf:
+            moments.append(own)
         return min(moments, default=None)

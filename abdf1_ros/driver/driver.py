@@ -48,7 +48,7 @@ from abdf1_ros.df1.machine import Procedure
 from abdf1_ros.df1.packet import Packet
 from abdf1_ros.df1.stations import ActiveStationList, Station
 from abdf1_ros.df1.tasks import Task
-from abdf1_ros.driver.agenda import Agenda
+from abdf1_ros.driver.agenda import Agenda, QUESTION_PERIOD
 from abdf1_ros.driver.checks import Checks
 from abdf1_ros.driver.guest_words import written_extents
 from abdf1_ros.driver.guests import GuestQueue
@@ -74,6 +74,7 @@ from abdf1_ros.settings.network import Network
 from abdf1_ros.settings.rows import Rows
 
 _NOT_OPEN = 'the port is not open'
+_NOT_HEARD = 'nothing has been heard on this connection'
 ENDS = 'this node ends'
 TOO_MANY = 'too many writes are waiting'
 
@@ -110,7 +111,7 @@ class Driver:
         self.stations = ActiveStationList(
             self.mappings.stations, self._station_changed,
             _routes(network, mappings), network.line_mode.longest_probe(network.line),
-            self.machine.took)
+            self.machine.took, QUESTION_PERIOD if settings.may_store else 0.0)
         self.is_online = False
         self._settings = settings
         self._listener = listener
@@ -238,6 +239,8 @@ class Driver:
             self.checks.ask_status(station.number, self.machine.now)
         else:
             self.checks.went_away(station.number)
+            if not any(other.active for other in self.stations):
+                self._connect()
         self._listener.station_changed(station)
 
     def _station_of_guest(self, dst: int) -> int:
@@ -262,7 +265,10 @@ class Driver:
             elif reason := self._writes.why_too_old(write, now):
                 self._end_write(write, Outcome.NOT_SENT, reason)
             elif not write.mapping.serves:
-                self._writes.add(write, now)
+                if self.tasks.is_heard:
+                    self._writes.add(write, now)
+                else:
+                    self._end_write(write, Outcome.NOT_SENT, _NOT_HEARD)
             else:
                 self._served.store(write.mapping, write.raw)
                 self._record.ended(self._record.begin(
@@ -280,8 +286,21 @@ class Driver:
             self.refused.add(command, reply, self.machine.now)
         return reply
 
+    def _connect(self) -> None:
+        """
+        Send no message until a reply comes: the port may store it for long.
+
+        A line where nothing could be asked is spared, and one where a master asks.
+        """
+        network = self.network
+        if self._settings.may_store and not network.line_mode.is_polled \
+                and (network.share or any(self.stations)):
+            self.tasks.connect()
+            self._writes.drop(_NOT_HEARD, self.machine.now)
+
     def _run(self) -> Procedure:
         """Begin to work, as long as there is a port."""
+        self._connect()
         self.readings.reads.begin(self.machine.now)
         self.checks.begin(self.machine.now)
         self.interlocks.begin(self.machine.now)

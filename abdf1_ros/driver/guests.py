@@ -190,8 +190,9 @@ class GuestQueue:
         self.waiting.clear()
         self._look()
 
-    def next(self, now: float, busy: Container[int]) -> GuestJob | None:  # noqa: A003
-        """Return the next command of the guest whose turn it is."""
+    def next(self, now: float, busy: Container[int], *,  # noqa: A003
+             may_write: bool = True) -> GuestJob | None:
+        """Return the next command of the guest whose turn it is, maybe only if it reads."""
         self._sort()
         for guest in list(self.waiting):
             station = self._station_of(guest.waiting[0].packet.dst)
@@ -205,7 +206,8 @@ class GuestQueue:
             if self._stations[station].last_heard is None:
                 self._silent(station, now)  # it may not exist: one poll or try at a time
             # A broadcast has no reply.
-            is_vain = station == BROADCAST and effect_of(command.packet) is Effect.READS
+            is_read = effect_of(command.packet) is Effect.READS
+            is_vain = station == BROADCAST if is_read else not may_write
             if not is_vain and self._stations.claim_message(station, now):
                 return GuestJob(self, command, station, self._claim(command.packet, station))
             self._give_up(command, _OFF_LINE)

@@ -27,7 +27,7 @@ from inspect import GEN_CLOSED, getgeneratorstate
 import math
 from typing import Protocol, TypeVar
 
-from abdf1_ros.df1.packet import Packet
+from abdf1_ros.df1.packet import BROADCAST, Packet
 from abdf1_ros.errors import Abdf1Error, CommandExpired, LinkError
 from abdf1_ros.pccc.dialect import Request, Steps
 
@@ -83,19 +83,25 @@ class JobTasks:
 
     All are in ``under_way``; the next command of those in ``waiting`` waits to be sent.
     ``station`` is our own, ``first_tns`` the number before the first. ``transactions`` counts the
-    replies. ``char_time`` is seconds a character. ``next_expiry`` is when a waiting command will
-    have waited too long (clock value in s), infinite for never.
+    replies. ``is_heard`` tells whether one has come on this connection, where that matters.
+    ``char_time`` is seconds a character. ``next_expiry`` is when a waiting command will have
+    waited too long (clock value in s), infinite for never.
     """
 
     def __init__(self, station: int, first_tns: int, char_time: float = 0.0) -> None:
         self.char_time = char_time
         self.transactions = 0
+        self.is_heard = True
         self._station = station
         self._tns = first_tns
         self._last_tns: dict[int, int] = {}
         self.under_way: set[JobTask] = set()
         self.waiting: deque[JobTask] = deque()
         self.next_expiry = math.inf
+
+    def connect(self) -> None:
+        """Take note of a connection that has to be heard before anything is written."""
+        self.is_heard = False
 
     def first(self, busy: Container[int], is_own: bool = False) -> JobTask | None:
         """Return the first that waits, but not for a ``busy`` station; only our own if asked."""
@@ -169,6 +175,8 @@ class JobTask:
     def reply(self, packet: Packet) -> None:
         """Take the reply and go on to the next request."""
         self._tasks.transactions += 1
+        if self.station != BROADCAST:
+            self._tasks.is_heard = True
         self._advance(self._steps.send, packet)
 
     def fail(self, error: LinkError) -> None:

@@ -35,6 +35,9 @@ class DriverSettings(LinkOptions):
     write_timeout: float = 2.0
     """A message that waits for longer is not sent any more."""
 
+    may_store: bool = False
+    """The port may store what is sent: a device server, while another client has its line."""
+
     read_only: bool = False
     """Nothing is written to a PLC."""
 

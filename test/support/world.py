@@ -119,6 +119,7 @@ class Plant:
     write_timeout: float = 2.0
     is_read_only: bool = False
     scan: int = 0  # ms of the ladder, 0 for none
+    may_store: bool = False  # the port, while another client has the line
 
     @classmethod
     def drawn(cls, dice: Random, mode: str = '') -> Plant:
@@ -137,7 +138,7 @@ class Plant:
             dice.choice([4800, 4800, 9600] if 'Standard' in mode else
                         [19200, 38400] if mode == 'Slave' else [9600, 19200, 38400]),
             dice.choice([1, 2]), dice.choice([0.5, 2.0]), dice.random() < 0.06,
-            dice.choice([0, 0, 50, 100]))
+            dice.choice([0, 0, 50, 100]), dice.random() < 0.25)
 
     @property
     def network(self) -> Network:
@@ -338,6 +339,7 @@ class World(DriverBench):
         rows = plant.mappings()
         settings = DriverSettings(
             write_timeout=plant.write_timeout, read_only=plant.is_read_only, processor_period=0.0,
+            may_store=plant.may_store,
             first_tns=self.dice.randrange(0x10000))
         super().__init__(rows, network=plant.network, settings=settings, start=False, chunk=_FIFO)
         self.rows = {row.tag: row for row in rows}
@@ -367,7 +369,7 @@ class World(DriverBench):
         self.losses: Losses | None = None
         self.wire = hashlib.sha256()
         self._values = dict.fromkeys(self.rows, 0)
-        self.is_silent = False
+        self.is_silent = self.is_queued = False  # behind another client
         self.deaf_since = math.inf  # when the wire to us broke
         self.plcs = {station: self._watch(station) for station in range(1, plant.stations + 1)}
         self.far.hear, self.far.say = self._hear, self._say
@@ -544,12 +546,12 @@ class World(DriverBench):
     def _hear(self, data: bytes) -> bytes:
         self.wire.update(b'%f>' % self.line.now + data)
         data = self.losses.hear(data) if self.losses else data
-        return b'' if self.is_silent else data.replace(DAMAGED, b'ZYZZ')
+        return b'' if self.is_silent or self.is_queued else data.replace(DAMAGED, b'ZYZZ')
 
     def _say(self, data: bytes) -> bytes:
         self.wire.update(b'%f<' % self.line.now + data)
         data = self.losses.say(data) if self.losses else data
-        return b'' if self.is_silent or self.is_deaf else data
+        return b'' if self.is_unheard else data
 
     def _breathe(self) -> None:
         """Let the executor run, as it does while nothing holds it up."""
@@ -623,6 +625,11 @@ class World(DriverBench):
         """Tell whether nothing reaches us, while all of ours reaches the PLCs."""
         return self.deaf_since < math.inf
 
+    @property
+    def is_unheard(self) -> bool:
+        """Tell whether nothing reaches us."""
+        return self.is_silent or self.is_queued or self.is_deaf
+
     def break_wire(self) -> None:
         """Let nothing reach us any more."""
         self.deaf_since = self.line.now
@@ -666,6 +673,11 @@ class World(DriverBench):
         self.lose_port()
         self.open()
         self.opened = self.line.now
+
+    def be_queued(self) -> None:
+        """Connect again to a device server that another client has the line of."""
+        self.unplug()
+        self.is_queued = True
 
     def add_bridge(self, station: int) -> None:
         """Put another bridge on a port of its own of a PLC; it counts in the same word."""
@@ -713,7 +725,7 @@ class World(DriverBench):
             self.fall_silent(station, False)
             watched.refuses = watched.refuses_messages = watched.swallows_replies = False
             watched.set_mode(Setting.RUN, self.line.now)
-        self.is_alive = True
+        self.is_alive, self.is_queued = True, False
         self.deaf_since = math.inf
         self.line.noise = QUIET
         self.losses = None

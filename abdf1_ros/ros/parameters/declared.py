@@ -160,7 +160,8 @@ class Configuration:
         same = {entry.name: getattr(self.parameters, entry.name)
                 for entry in fields(DriverSettings) if entry.name in own}
         return replace(
-            DriverSettings(**same), default_period=self.parameters.default_period / 1000,
+            DriverSettings(**same), may_store='://' in self.port,
+            default_period=self.parameters.default_period / 1000,
             polling=self.polling, first_tns=random.randrange(0x10000))
 
     def shown_rows(self) -> Sequence[Mapping]:

@@ -536,6 +536,15 @@ class Unheard(Rule):
         self.demand(not is_due or last is None or last.value in (SAFE, 0), last, 'was the last')
 
 
+class Queued(Rule):
+    text = 'no message goes out on a connection that has not been heard (23)'
+
+    def sent(self, entry: Sent) -> None:
+        is_message = entry.tag[0] in 'wf' and entry.value != SAFE
+        since = max(self.world.opened, 0.0)
+        self.demand(not is_message or not self.world.is_queued or entry.when < since, entry)
+
+
 class AfterRun(Rule):
     text = 'after a change to RUN that was seen come 0 and all fallbacks (2, 8)'
 
@@ -792,8 +801,8 @@ class OneOwner(Rule):
 
 RULES: tuple[type[Rule], ...] = (
     Results, Ages, Stamps, Turns, Values, Guards, Withheld, Beats, BeatsAfterFallbacks, Order,
-    Outputs, OneResult, Probes, Unheard, AfterRun, Held, ReadOnly, Guests, GuestAges, OnTheWire,
-    View, Served, Rungs)
+    Outputs, OneResult, Probes, Unheard, Queued, AfterRun, Held, ReadOnly, Guests, GuestAges,
+    OnTheWire, View, Served, Rungs)
 
 
 class Judge:

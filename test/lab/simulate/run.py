@@ -104,7 +104,7 @@ class Story:
         world = self.world
         world.ill[station] = world.line.now
         if world.line.noise is not QUIET or world.line.now < world.away or not world.is_alive \
-                or not world.driver.is_online or world.is_silent or world.is_deaf:
+                or not world.driver.is_online or world.is_unheard:
             world.ill[0] = max(world.line.now, world.away)
 
     def publish_much(self) -> None:
@@ -319,6 +319,11 @@ def _broken_wire(story: Story, station: int) -> None:
         story.endure(station, story.longest_bound() + 2.0)
 
 
+def _queued(story: Story, station: int) -> None:
+    if story.world.plant.may_store and story.world.network.mode != 'Slave':
+        story.world.be_queued()
+
+
 def _overwritten(story: Story, station: int) -> None:
     story.be_quiet()  # for the fallback to stand
     story.wait(story.world.plant.after / 1000 + 1.0)
@@ -362,7 +367,7 @@ _TROUBLES: dict[str, Callable[[Story, int], None]] = {
     'PROGRAM': _program, 'download': _download, 'killed': _kill, 'slow PLC': _slowness,
     'other writer': _other_writer, 'other bridge': _other_bridge, 'guest': _guest,
     'gateway holds': _gateway_holds, 'frames lost': _lost_frames, 'another network': _overwritten,
-    'receive wire broken': _broken_wire}
+    'receive wire broken': _broken_wire, 'queued': _queued}
 
 
 @dataclass(slots=True)

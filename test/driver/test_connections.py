@@ -1,0 +1,168 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Nothing that was published before a device server lets us through reaches the line (rule 23)."""
+
+from collections.abc import Sequence
+
+from abdf1_ros.df1.packet import Packet
+from abdf1_ros.driver.guests import Guest, GuestCommand, ShareAccess
+from abdf1_ros.driver.settings import DriverSettings
+from abdf1_ros.driver.write import Outcome
+from abdf1_ros.settings.heartbeats import Fallback
+from abdf1_ros.settings.mapping import Mapping
+from abdf1_ros.settings.network import Network
+import pytest
+from support.deaths import MODES
+from support.driver_bench import DriverBench
+from support.mappings import make_mapping
+from support.odd_device import frame, OddDevice, Wiring
+
+NOT_HEARD = 'not written: not sent: nothing has been heard on this connection'
+SAFE = 0
+_WIRING = {'Peer': Wiring.FULL, 'Radio': Wiring.RADIO}
+_BEGINNINGS = b'\x10\x01', b'\x10\x02', b'\x10\x05'  # of messages and polls
+
+
+class Queue(DriverBench):
+    """A driver at a device server that keeps what it sends while another client has the line."""
+
+    def __init__(self, mode: str = 'Master', rows: Sequence[Mapping] | None = None,
+                 share: str = '', *, is_open: bool = False) -> None:
+        self.order = make_mapping('N7:0', 'Write', plc='SLC', tag='order')
+        self.device = OddDevice(_WIRING.get(mode, Wiring.HALF))
+        self.stored: list[tuple[float, bytes]] = []
+        if not is_open:
+            self.device.hear = self._keep
+        super().__init__(
+            [self.order, make_mapping('N9:0', plc='SLC', period=200)] if rows is None else rows,
+            network=Network(station=200, baud=19200, timeout=100, cmd_timeout=500, nak_retries=1,
+                            enq_retries=1, share=share,
+                            **MODES[mode]),  # type: ignore[arg-type]
+            settings=DriverSettings(may_store=True), far=self.device)
+
+    def _keep(self, data: bytes) -> bytes:
+        self.stored.append((self.clock(), data))
+        return b''
+
+    def questions(self, since: float) -> int:
+        """Return how many messages and polls have been kept since then."""
+        data = b''.join(data for when, data in self.stored if when >= since)
+        return sum(map(data.count, _BEGINNINGS))
+
+    def let_through(self) -> None:
+        """Give us the line, and first all that was kept."""
+        self.device.hear = bytes
+        self.device.receive_data(b''.join(data for _, data in self.stored), self.clock())
+
+    def values_written(self) -> list[int]:
+        """Return what writes of a word have brought to the device."""
+        return [int.from_bytes(data[-2:], 'little') for data in self.device.executed
+                if data[6:7] == b'\xAA']
+
+    def results(self) -> list[str]:
+        """Return the results of messages."""
+        return [str(result) for result in self.listener.results]
+
+
+@pytest.mark.parametrize('mode', MODES)
+def test_message_from_before_a_take_over_never_reaches_the_line(mode: str) -> None:
+    bench = Queue(mode)
+    for number in range(45):
+        bench.at(0.4 * number, lambda number=number: bench.write(  # type: ignore[misc]
+            bench.order, [100 + number]))
+    bench.run(18.0)
+    bench.let_through()
+    bench.run(5.0)
+    assert bench.values_written() == []
+    assert set(bench.results()) == {NOT_HEARD}
+    bench.write(bench.order, [7], run=1.0)
+    assert bench.values_written() == [7]
+    assert bench.results()[-1] == 'written'
+
+
+@pytest.mark.parametrize('mode', MODES)
+def test_after_the_first_ten_one_question_a_second_is_kept(mode: str) -> None:
+    bench = Queue(mode)
+    bench.run(30.0)
+    assert bench.questions(0.0) <= 10 + 30
+    assert 5 <= bench.questions(10.0) <= 21
+
+
+@pytest.mark.parametrize('mode', MODES)
+def test_fallback_may_be_kept_as_it_is_the_value_of_rest(mode: str) -> None:
+    speed = make_mapping('N7:0', 'Write', plc='SLC', fallback=Fallback((SAFE,), 1000))
+    bench = Queue(mode, [speed, make_mapping('N9:0', plc='SLC', period=200)])
+    for number in range(20):
+        bench.at(0.4 * number, lambda: bench.write(speed, [777]))
+    bench.run(10.0)
+    bench.let_through()
+    bench.run(2.0)
+    assert {*bench.values_written()} == {SAFE}
+
+
+def test_banner_noise_and_a_reply_to_another_client_are_not_heard() -> None:
+    bench = Queue()
+    other = bytes((9, 1, 0x4F, 0, 0x12, 0x34, 0, 0))
+    for data in (b'Welcome\r\n', b'\xff\xfb\x01', b'\x10\x04', b'\x10\x06', frame(other)):
+        bench.run(1.0)
+        bench.driver.machine.receive_data(data, bench.clock())
+        bench.write(bench.order, [1], run=0.1)
+    assert set(bench.results()) == {NOT_HEARD}
+
+
+def test_connection_whose_stations_are_all_silent_is_unheard_again() -> None:
+    bench = Queue(is_open=True)
+    bench.run(1.0)
+    bench.write(bench.order, [1], run=0.5)
+    bench.device.say = lambda data: b''
+    bench.run(2.0)
+    bench.write(bench.order, [2], run=0.5)
+    bench.device.say = bytes
+    bench.run(3.0)
+    bench.write(bench.order, [3], run=0.5)
+    assert bench.results() == ['written', NOT_HEARD, 'written']
+    assert bench.values_written() == [1, 3]
+
+
+def test_row_without_a_read_is_asked_by_an_echo() -> None:
+    order = make_mapping('N7:0', 'Write', plc='SLC')
+    bench = Queue(rows=[order], is_open=True)
+    bench.run(0.5)
+    bench.write(order, [3], run=0.5)
+    assert bench.results() == ['written']
+
+
+def test_line_that_only_broadcasts_is_spared() -> None:
+    every = make_mapping('N7:0', 'Write', station=255, plc='SLC')
+    bench = Queue(rows=[every])
+    bench.write(every, [3], run=0.5)
+    assert bench.listener.outcomes() == [Outcome.BROADCAST]
+
+
+def test_read_of_a_guest_is_the_question_where_there_are_no_rows_no_write() -> None:
+    bench = Queue(rows=[], share='tcp:6000', is_open=True)
+    guest, answers = Guest('tcp:6000', ShareAccess.ALL), list[Packet]()
+
+    def ask(tns: int, data: bytes) -> None:
+        bench.driver.guests.put(GuestCommand(
+            guest, Packet(1, 9, 0x0F, 0, tns, data), bench.clock(), answers.append))
+        bench.line.wake(bench.driver.machine)
+        bench.run(1.0)
+
+    write, read = b'\xAA\x02\x07\x89\0\0\x05\0', b'\xA2\x02\x07\x89\0\0'
+    for tns, data in enumerate((write, read, write)):
+        ask(tns, data)
+    assert [reply.sts for reply in answers] == [0x07, 0, 0]
+    assert bench.values_written() == [5]
