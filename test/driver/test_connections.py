@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Nothing that was published before a device server lets us through reaches the line (rule 23)."""
+"""Nothing that was published before a device server lets us through reaches the line (rule 26)."""
 
 from collections.abc import Sequence
 

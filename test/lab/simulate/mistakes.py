@@ -293,7 +293,7 @@ MISTAKES = (
     Mistake('16', 'the bound is Fallback_After alone', Times, '_at_most', _always(0.0)),
     Mistake('16', 'the bound counts no repetitions', Times, '_at_most', _undisturbed),
     Mistake('16', 'the preset is a Period', Times, '_preset', _preset_of_a_period),
-    Mistake('23', 'messages go out before the connection was heard', Driver, '_connect',
+    Mistake('26', 'messages go out before the connection was heard', Driver, '_connect',
             _always(None)),
     Mistake('17', 'each writing of a fallback has a result', Interlocks, '_fallback_ended',
             _told_each_time),

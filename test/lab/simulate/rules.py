@@ -537,7 +537,7 @@ class Unheard(Rule):
 
 
 class Queued(Rule):
-    text = 'no message goes out on a connection that has not been heard (23)'
+    text = 'no message goes out on a connection that has not been heard (26)'
 
     def sent(self, entry: Sent) -> None:
         is_message = entry.tag[0] in 'wf' and entry.value != SAFE
