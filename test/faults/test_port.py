@@ -19,7 +19,7 @@ import os
 from pathlib import Path
 
 import pytest
-from support.fault_rig import boxed, is_unanswered, NO_ANSWER, NOT_SENT, rigged, SETPOINT
+from support.fault_rig import boxed, is_unanswered, NOT_SENT, rigged, SETPOINT
 from support.ros import ERROR, Observer, Process
 from support.simulator_process import IMPATIENT_ROW, make_files
 
@@ -61,7 +61,7 @@ def test_process_at_the_far_end_of_tcp_is_frozen(observer: Observer, tmp_path: P
         simulator.stop()
         assert is_unanswered(rig.write(3.0))
         rig.status('link', ERROR, 'port open, but none of 2 stations answers')
-        rig.writes(4.0, NOT_SENT + NO_ANSWER)
+        rig.writes(4.0, NOT_SENT + 'nothing has been heard on this connection')  # rule 26
         simulator.go_on()
         rig.recovers()
         # Commands that the connection has kept are expired for the far end, and not answered.
