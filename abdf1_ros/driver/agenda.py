@@ -109,7 +109,8 @@ class Agenda:
         """
         is_limited = self._questions >= _QUICK_QUESTIONS and now < self._next_question
         if is_limited:
-            return self._interlocks.next(now, busy) if self._has_own else None
+            own = self._interlocks
+            return (own.next(now, busy) or own.refresh(now, busy)) if self._has_own else None
         job = self._own_first(now, busy) if self._has_own else self._usual(now, busy)
         if job is not None:
             self._questions += 1

@@ -101,6 +101,19 @@ def test_after_the_first_ten_one_question_a_second_is_kept(mode: str) -> None:
 
 
 @pytest.mark.parametrize('mode', MODES)
+def test_fallback_that_stands_calls_for_nothing_while_all_are_silent(mode: str) -> None:
+    speed = make_mapping('N7:0', 'Write', plc='SLC', fallback=Fallback((SAFE,), 1000))
+    bench = Queue(mode, [speed, make_mapping('N9:0', plc='SLC', period=200)], is_open=True)
+    bench.run(3.0)
+    bench.device.hear = bench._keep  # noqa: SLF001
+    bench.run(20.0)  # it is to be written again after 5 s
+    bench.let_through()
+    bench.run(3.0)
+    assert bench.results() == [
+        f'fallback value written: {cause}' for cause in ('start', 'return')]
+
+
+@pytest.mark.parametrize('mode', MODES)
 def test_fallback_may_be_kept_as_it_is_the_value_of_rest(mode: str) -> None:
     speed = make_mapping('N7:0', 'Write', plc='SLC', fallback=Fallback((SAFE,), 1000))
     bench = Queue(mode, [speed, make_mapping('N9:0', plc='SLC', period=200)])
