@@ -283,6 +283,10 @@ def ticks(now: float) -> int:
     return int(now // STEP) % _TICKS
 
 
+# A lead that a stamp has shown is remembered for so long (s) at least (rule 7).
+LEAD_IS_KNOWN = 5.0
+
+
 class Clocks:
     """
     The clocks of the publishers, and of the host, and what the process knows of them.
@@ -302,6 +306,7 @@ class Clocks:
 
     def forget(self) -> None:
         """Begin like a process that has just started."""
+        self._shown: dict[str, float] = {}  # when a stamp of a topic was too far ahead
         self.standstills = Standstills()
         self._ages = {tag: Ages(self._patience, self.standstills, allowed)
                       for tag, allowed in self.allowed.items()}
@@ -317,7 +322,24 @@ class Clocks:
     def age(self, tag: str, stamp: float, now: float) -> float:
         """Return from when the age of a message counts, or raise FormatError."""
         wall = now + self._set_by
+        allowed = self.allowed[tag]
+        if allowed is not None and stamp - wall > allowed:
+            self._shown[tag] = now
         return self._ages[tag].of([stamp, wall], wall, now)
+
+    def is_unknowable(self, tag: str, published: float, stamp: float, age: float,
+                      now: float) -> bool:
+        """
+        Tell whether a clock was ahead, and nothing that came lately can have shown that.
+
+        A message that was late on its way for longer than its clock is ahead looks like a new one.
+        What the process knows is that its age is at least the time for which it stood still.
+        """
+        allowed = self.allowed[tag]
+        lead = stamp - published - (self._set_by if published >= self._set_at else 0.0)
+        return allowed is not None and lead > allowed \
+            and now - self._shown.get(tag, -math.inf) > LEAD_IS_KNOWN \
+            and age >= self.standstills.least_age(now)
 
 
 class World(DriverBench):
@@ -593,7 +615,8 @@ class World(DriverBench):
             self.driver.refuse([row], str(error), [value], '')
             return
         key = row.tag, value
-        self.clocks.counted.append((row.tag, self.published[key], now - age))
+        if not self.clocks.is_unknowable(row.tag, self.published[key], stamp, age, now):
+            self.clocks.counted.append((row.tag, self.published[key], now - age))
         self.published[key] = now - age
         missing = self.youngest.get(row.tag, 0.0) + (self.plant.requires or 0) / 1000
         if now - age > missing:
