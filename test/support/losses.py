@@ -24,6 +24,9 @@ from random import Random
 
 from abdf1_ros.df1.frames import ACK, Code, STX
 
+_BEGINNINGS = tuple(bytes((Code.DLE, code)) for code in (
+    Code.ENQ, Code.SOH, Code.STX, Code.ACK, Code.NAK, Code.EOT))
+
 
 @dataclass(frozen=True, slots=True)
 class Lost:
@@ -48,7 +51,8 @@ class Losses:
     """
     The line: it loses a frame of the driver, or the answer to it, but never too often in a row.
 
-    ``is_due`` says whether what goes wrong has begun.
+    A frame may come in pieces; it is lost as a whole. ``is_due`` says whether what goes wrong has
+    begun.
     """
 
     def __init__(self, plant: Lost, clock: Callable[[], float]) -> None:
@@ -58,10 +62,14 @@ class Losses:
         self._dice = Random(plant.seed)
         self._lost = {False: 0, True: 0}  # in a row: of messages, of polls
         self._takes_answer = False
+        self._loses_rest = self._takes_rest = False  # of a frame that has begun
         self.is_due = False
 
     def hear(self, data: bytes) -> bytes:
         """Return what the stations hear of a frame, which may follow an ACK at once."""
+        if not data.startswith(_BEGINNINGS):
+            return b'' if self._loses_rest else data
+        self._loses_rest = False
         if data[:2] == ACK and len(data) > 2:
             return ACK + self.hear(data[2:])
         is_poll = data[:2] == bytes((Code.DLE, Code.ENQ))
@@ -85,10 +93,16 @@ class Losses:
         if not is_lost or not is_command:
             return data
         # A full-duplex message that leaves no trace gets the ACK of the one before.
-        return data[:-1] + bytes((data[-1] ^ 1,)) if is_peer and is_message else b''
+        if is_peer and is_message:
+            return data[:-1] + bytes((data[-1] ^ 1,))
+        self._loses_rest = True
+        return b''
 
     def say(self, data: bytes) -> bytes:
         """Return what the driver hears."""
+        if not data.startswith(_BEGINNINGS):
+            return b'' if self._takes_rest else data
+        self._takes_rest = self._takes_answer and not data.startswith(ACK)
         is_taken, self._takes_answer = self._takes_answer, False
         # A full-duplex reply that comes with the ACK has frames, and losses, of its own.
         return (data[len(ACK):] if data.startswith(ACK) else b'') if is_taken else data
