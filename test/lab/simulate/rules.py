@@ -207,6 +207,12 @@ class Turns(Rule):
         super().__init__(world)
         self._holds: dict[str, int] = {}  # the last value of ours
         self._tried: dict[str, float] = {}  # when the fallback was sent last
+        self._silent: dict[int, float] = {}  # when messages to it were probes
+
+    def stand(self) -> None:
+        for station in self.world.driver.stations:
+            if not (station.active and station.replies_in_time):
+                self._silent[station.number] = self.world.line.now
 
     def executed(self, entry: Executed) -> None:
         if entry.value not in GUESTS and not entry.is_late:  # that comes in its own time (10)
@@ -216,7 +222,8 @@ class Turns(Rule):
         world = self.world
         if entry.tag[0] in 'wf' and entry.value != SAFE and entry.value not in GUESTS \
                 and not entry.is_again and entry.when > self.flight + max(
-                    world.ill[entry.station], world.ill[0]):  # no probe, and no try of before
+                    world.ill[entry.station], world.ill[0],  # no probe, and no try of before
+                    self._silent.get(entry.station, 0.0)):
             limit = entry.when - world.plant.after / 1000 - self.lag
             due = [row.tag for row in world.rows_of(entry.station)
                    if self._holds.get(row.tag, SAFE) != SAFE and row.tag != entry.tag
