@@ -101,11 +101,10 @@ class BridgeNode(AnsweringNode):
         super().destroy_node()
 
     def _set_up(self, configuration: Configuration, graph: Graph) -> None:
-        self._configuration = configuration
         self._opener = self._make_opener(configuration)
         self.writes = WriteTopics(self)
         self._surroundings = Surroundings(
-            self, graph, self._name_watch(graph), self._opener,
+            self, graph, self._name_watch(graph, configuration), self._opener,
             # All writes that wait can end at once, faster than a subscriber takes their results.
             OfferedPublisher(self, DiagnosticStatus, '~/write_results', MAX_WAITING_WRITES,
                              most=MAX_WAITING_WRITES),
@@ -136,10 +135,10 @@ class BridgeNode(AnsweringNode):
                 lambda text: self.get_logger().error(f'trace_file: {printable(text)}'))
         return opener
 
-    def _name_watch(self, graph: Graph) -> NameWatch:
+    def _name_watch(self, graph: Graph, configuration: Configuration) -> NameWatch:
         """Return what finds another node of our name; that of a spare is meant."""
         name, namespace = self.get_name(), self.get_namespace()
-        is_spare = self._configuration.parameters.standby
+        is_spare = configuration.parameters.standby
         return NameWatch(
             self.get_fully_qualified_name(),
             lambda now: 1 if is_spare else graph.nodes(name, namespace, now),
@@ -225,7 +224,7 @@ class BridgeNode(AnsweringNode):
     def check(self) -> None:
         """Publish what is due; take writes after the first look for a node of our name."""
         self.session.check()
-        if self._configuration.parameters.standby:
+        if self.session.configuration.parameters.standby:
             self._look_for_line()
         if self._surroundings.names.has_looked:
             self.writes.begin()
