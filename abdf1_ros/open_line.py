@@ -29,6 +29,7 @@ from typing import Any, Generic, Self, TYPE_CHECKING, TypeVar
 
 from abdf1_ros.df1.mode import LineMode
 from abdf1_ros.df1.settings import LinkSettings
+from abdf1_ros.df1.stations import ActiveStationList
 from abdf1_ros.driver.requests import Requests
 from abdf1_ros.errors import Abdf1Error, FormatError, PortLost
 from abdf1_ros.messages import Event, Severity
@@ -130,9 +131,12 @@ class OpenLine:
                  logger: logging.Logger = LOG) -> None:
         self.log = logger
         self._mode, self._settings = mode, line
-        self._requests = Requests(mode, line, absent, random.randrange(0x10000), routes, plc_type,
-                                  self._told)
-        self.counters, self.stations = self._requests.counters, self._requests.stations
+        self.stations = ActiveStationList(absent, routes=routes)
+        for number in absent:
+            self.stations.lost(number, 0.0)
+        self._requests = Requests(mode, line, self.stations, random.randrange(0x10000), plc_type,
+                                  self._told, may_store='://' in port.name)
+        self.counters = self._requests.counters
         self._trace: Trace | None = None
         port_of = opened(port)
         if trace is not None:

@@ -20,7 +20,7 @@ They use the same links, with the same rules, as the driver.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Container, Mapping, Sequence
+from collections.abc import Callable, Container
 from contextlib import suppress
 from dataclasses import replace
 from typing import Any, TypeVar
@@ -36,9 +36,12 @@ from abdf1_ros.driver.job_tasks import Job, JobTask, JobTasks
 from abdf1_ros.errors import LinkError, PortLost
 from abdf1_ros.messages import Event, Message
 from abdf1_ros.pccc.data_table import DataTable
+from abdf1_ros.pccc.describe import effect_of
 from abdf1_ros.pccc.dialect import Steps
 from abdf1_ros.pccc.file_types import PlcType
+from abdf1_ros.pccc.notation import Effect
 from abdf1_ros.pccc.server import Server
+from abdf1_ros.pccc.steps import echo
 
 _Result = TypeVar('_Result')
 
@@ -67,27 +70,44 @@ class _RequestJob(Job):
         """Do nothing: the steps have reported it."""
 
 
+class _Question(Job):
+    """An echo, after whose answer a task goes out; without an answer the task fails unsent."""
+
+    def __init__(self, tasks: JobTasks, task: JobTask) -> None:
+        self.station = task.station
+        self._tasks, self._task = tasks, task
+
+    def steps(self, now: float) -> Steps[None]:
+        """Ask for the echo; a refusal is an answer as well."""
+        return echo(b'')
+
+    def ended(self, error: Exception | None) -> None:
+        """Let the task go on, or end."""
+        if isinstance(error, LinkError):
+            self._task.fail(error)
+        else:
+            self._tasks.advanced(self._task)
+
+
 class Requests(TaskSource):
     """
     Carry out requests over a line; ``machine`` is to be run on its port.
 
-    Stations that are ``absent`` get one try each until they answer, all others every retry of
-    the line. ``routes`` gives the gateways of stations that are behind one. ``first_tns`` should
-    be random, or a station may take our first command for a repetition. Commands that come for us
-    are refused, except an echo and the diagnostic status, which is that of a ``plc_type``.
-    ``stray`` tells the last reply that came and answers no command, empty for none. ``report``
-    gets every numbered error and notice, in the link thread.
+    Inactive ``stations`` get one try each until they answer, all others every retry of the line.
+    ``first_tns`` should be random, or a station may take our first command for a repetition.
+    Commands that come for us are refused, except an echo and the diagnostic status, which is that
+    of a ``plc_type``. ``stray`` tells the last reply that came and answers no command, empty for
+    none. ``report`` gets every numbered error and notice, in the link thread. Where the port
+    ``may_store`` what we send, nothing but reads goes out before an answer has come on this
+    connection, and after a request without one (rule 26 of docs/heartbeats.md).
     """
 
-    def __init__(self, mode: LineMode, line: LinkSettings, absent: Sequence[int] = (),
-                 first_tns: int = 0, routes: Mapping[int, int] | None = None,
-                 plc_type: PlcType = PlcType.PLC5,
-                 report: Report = lambda event: None) -> None:
+    def __init__(self, mode: LineMode, line: LinkSettings, stations: ActiveStationList,
+                 first_tns: int = 0, plc_type: PlcType = PlcType.PLC5,
+                 report: Report = lambda event: None, *, may_store: bool = False) -> None:
         self._told = report
-        self.counters = Counters()
-        self.stations = ActiveStationList(absent, routes=routes)
-        for number in absent:
-            self.stations.lost(number, 0.0)
+        self._may_store = may_store and not mode.is_polled
+        self.counters, self.stations = Counters(), stations
         self.machine = mode.make_machine(line, self._run, self.counters)
         self._tasks = JobTasks(line.station or 0, first_tns)
         self._waiting: Inbox[_RequestJob] = Inbox()
@@ -107,7 +127,12 @@ class Requests(TaskSource):
         Exactly one of ``succeed`` and ``fail`` is called, in the link thread; ``fail`` at once
         while the port is lost, and after ``close``.
         """
-        request = _RequestJob(station, work, succeed, fail)
+        def failed(error: Exception) -> None:
+            if self._may_store and isinstance(error, LinkError):
+                self._tasks.connect()
+            fail(error)
+
+        request = _RequestJob(station, work, succeed, failed)
         if not self._waiting.put(request):
             _refuse(request, self._lost)
 
@@ -122,8 +147,14 @@ class Requests(TaskSource):
             return self._tasks.take(under_way, now)
         for request in self._waiting.take():
             with suppress(StopIteration):  # it has ended before its first command
-                return JobTask(self._tasks, request, now)
+                return self._heard_first(JobTask(self._tasks, request, now), now)
         return None
+
+    def _heard_first(self, task: JobTask, now: float) -> JobTask:
+        """Return a task, or the question before one that may write."""
+        if self._tasks.is_heard or effect_of(task.command) is Effect.READS:
+            return task
+        return JobTask(self._tasks, _Question(self._tasks, task), now)
 
     def _report(self, event: Event) -> None:
         self._told(event)
@@ -131,6 +162,8 @@ class Requests(TaskSource):
             self.stray = str(event)
 
     def _run(self) -> Procedure:
+        if self._may_store:
+            self._tasks.connect()
         self._waiting.open()
         try:
             yield from self._link.run(self)

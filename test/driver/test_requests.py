@@ -21,6 +21,7 @@ from abdf1_ros.df1.machine import Machine
 from abdf1_ros.df1.peer import PEER
 from abdf1_ros.df1.settings import LinkSettings
 from abdf1_ros.df1.slave import HalfDuplexSlave, multidrop, Responder
+from abdf1_ros.df1.stations import ActiveStationList
 from abdf1_ros.driver.requests import Requests
 from abdf1_ros.errors import LinkError, PortLost, StationInactive
 from abdf1_ros.pccc import diagnostics
@@ -48,7 +49,10 @@ class Bench:
     """Requests at one end, an SLC that is station 1 at the other."""
 
     def __init__(self, absent: tuple[int, ...] = (), slave: Responder | None = None) -> None:
-        self.requests = Requests(NETWORK.line_mode, NETWORK.line, absent, first_tns=7)
+        stations = ActiveStationList(absent)
+        for number in absent:
+            stations.lost(number, 0.0)
+        self.requests = Requests(NETWORK.line_mode, NETWORK.line, stations, first_tns=7)
         self.plc = simulated_plc(1, 'SLC', lambda: self.line.now, ('N7:0', 10))
         self.far = Machine(multidrop([slave or self.plc]), checksum=NETWORK.checksum)
         self.line = VirtualLine(self.requests.machine, self.far, baud=115200)
@@ -163,7 +167,7 @@ def test_stray_reply_is_kept() -> None:
 
 
 def test_request_without_a_command_ends_when_the_link_takes_commands() -> None:
-    requests = Requests(PEER, Network(baud=115200).line)
+    requests = Requests(PEER, Network(baud=115200).line, ActiveStationList())
     ends = Ends()
     nothing: Steps[None] = (step for step in ())
     requests.add(0, nothing, ends.results.append, ends.errors.append)
@@ -175,7 +179,7 @@ def test_request_without_a_command_ends_when_the_link_takes_commands() -> None:
 
 
 def test_other_modes_are_served_by_the_same_requests() -> None:
-    requests = Requests(PEER, Network(baud=115200).line)
+    requests = Requests(PEER, Network(baud=115200).line, ActiveStationList())
     ends = Ends()
     requests.add(1, identify(), ends.results.append, ends.errors.append)
     requests.machine.start(0.0)
