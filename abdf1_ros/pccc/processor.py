@@ -51,6 +51,16 @@ class Processor(Enum):
         """Tell whether it may lack the masked write (0F/AB): no manual says that it has it."""
         return _MODELS[self] in (_OLD, _ML1000)
 
+    @property
+    def has_clock(self) -> bool:
+        """Tell whether S:37 to S:42 are its clock, to be read and to be set."""
+        return _MODELS[self] is _NEW
+
+    @property
+    def is_micrologix(self) -> bool:
+        """Tell whether this is a MicroLogix."""
+        return self.value.startswith('ML')
+
     def has_file(self, file: int, file_type: FileType) -> bool:
         """Tell whether it can have such a file."""
         model = _MODELS[self]

@@ -23,6 +23,7 @@ from abdf1_ros.errors import FormatError
 from abdf1_ros.pccc import steps
 from abdf1_ros.pccc.families import FAMILIES
 from abdf1_ros.pccc.file_types import PlcType
+from abdf1_ros.pccc.processor import Processor
 from abdf1_ros.pccc.steps import AddressedValues
 from abdf1_ros.pccc.values import ValueType
 
@@ -37,10 +38,13 @@ class Clock:
     ``address`` is that of the first word.
     """
 
-    def __init__(self, session: Session, station: int, plc_type: PlcType) -> None:
+    def __init__(self, session: Session, station: int, plc_type: PlcType,
+                 processor: Processor | None) -> None:
         family = FAMILIES[plc_type]
         if not family.clock:
             raise FormatError(f'is a {family.addressing.title}, whose clock is not known')
+        if processor is not None and not processor.has_clock:
+            raise FormatError(_why_none(processor))
         self._session, self._station = session, station
         self._words = AddressedValues.of(family.clock, plc_type, 6, ValueType.UINT16)
         self.address = str(self._words.address)
@@ -62,6 +66,15 @@ class Clock:
         now = datetime.now()
         values = now.year, now.month, now.day, now.hour, now.minute, now.second
         self._session.ask(self._station, steps.write(self._words, values))
+
+
+def _why_none(processor: Processor) -> str:
+    """Return why S:37 to S:42 of a processor are not taken for its clock."""
+    if not processor.is_micrologix:
+        return f'is an SLC {processor.value}, which has no clock'
+    return (f'is a {processor.value}: S:37 to S:42 are the clock of an SLC 5/03, 5/04 or 5/05. '
+            'The clock of a MicroLogix is its function file RTC, whose type code is not known; '
+            'let the program copy it into an N file')
 
 
 def told(time: datetime, ahead: timedelta) -> str:

@@ -523,7 +523,7 @@ def _ports(options: argparse.Namespace) -> int:
 
 
 def _clock(options: argparse.Namespace, session: Session, prepared: None) -> int:
-    clock = Clock(session, options.station, _family(options, session)[0])
+    clock = Clock(session, options.station, *_family(options, session))
     try:
         if not options.set:
             print(f'station {options.station}: {told(*clock.read())}')

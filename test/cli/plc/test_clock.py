@@ -22,10 +22,11 @@ import time
 
 from abdf1_ros.cli.plc.clock import told
 from abdf1_ros.cli.plc.command import main
+from abdf1_ros.pccc.processor import Processor
 from abdf1_ros.simulator.simulated_plc import SimulatedPlc
 import pytest
 from support.commands import call
-from support.driver_bench import simulated_plc, store
+from support.driver_bench import simulated_plc, store, stored
 from support.plc_line import plc_line
 
 WORDS = {1: 'S:37', 2: 'S:18'}
@@ -84,6 +85,22 @@ def test_clock_that_holds_no_time(port: str, capsys: Output) -> None:
 def test_family_without_a_known_clock(port: str, capsys: Output) -> None:
     said = call(main, capsys, 'clock', '3', '--port', port)
     assert (said.status, said.err) == (1, 'plc: station 3: is a PLC-2, whose clock is not known\n')
+
+
+@pytest.mark.parametrize(('processor', 'text'), [
+    (Processor.ML1400, 'is a ML1400: S:37 to S:42 are the clock of an SLC 5/03, 5/04 or 5/05. '
+     'The clock of a MicroLogix is its function file RTC, whose type code is not known; let the '
+     'program copy it into an N file'),
+    (Processor.SLC_5_02, 'is an SLC 5/02, which has no clock')])
+def test_status_words_of_other_processors_are_no_clock(
+        port: str, plcs: tuple[SimulatedPlc, ...], processor: Processor, text: str,
+        capsys: Output) -> None:
+    plcs[0].processor.processor = processor
+    set_clock(plcs[0], datetime(2001, 2, 3, 4, 5, 6))
+    for options in ((), ('--set', '--yes')):
+        said = call(main, capsys, 'clock', '1', *options, '--port', port)
+        assert (said.status, said.err) == (1, f'plc: station 1: {text}\n')
+    assert stored(plcs[0], 'S:37') == (2001).to_bytes(2, 'little')
 
 
 def test_refused_write_is_told(port: str, capsys: Output) -> None:
