@@ -151,7 +151,7 @@ MAP_COLUMNS = (
            kind=_NUMBER, attribute='scaling.offset', commands=_TOPICS),
     Column('Access', 'the first of them',
            'how words are reached. PLC5: Typed, WordRange. SLC: Slot, Flat. PLC2: Unprotected, '
-           'Protected, CIF. Serve: Read, so that the other end cannot write',
+           'Protected, CIF. Serve: Read, so that a PLC cannot write',
            attribute='access_cell'),
     Column('Processor', '5/03',
            'of an SLC: 5/01, 5/02, 5/03, 5/04, 5/05, ML1000, ML1100, ML1200, ML1400 or ML1500; it '
