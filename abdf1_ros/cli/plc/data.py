@@ -27,14 +27,14 @@ from typing import TypeAlias
 
 from abdf1_ros.cli.plc.session import Session
 from abdf1_ros.df1.packet import is_local_status
-from abdf1_ros.driver.write import Outcome, Write, WriteResult
+from abdf1_ros.driver.write import Outcome, show, Write, WriteResult
 from abdf1_ros.driver.writes.packets import carry_out
 from abdf1_ros.errors import Abdf1Error, FormatError, PortLost, RemoteError
 from abdf1_ros.numbers import decimal_number, two_readings, whole_number
 from abdf1_ros.open_line import Pending
 from abdf1_ros.pccc import steps
 from abdf1_ros.pccc.families import FAMILIES
-from abdf1_ros.pccc.file_types import PlcType
+from abdf1_ros.pccc.file_types import FileType, PlcType
 from abdf1_ros.pccc.processor import Processor, USUAL
 from abdf1_ros.pccc.steps import AddressedValues
 from abdf1_ros.pccc.values import Values, ValueType
@@ -166,9 +166,32 @@ def scaled(mapping: Mapping, values: Values) -> Values:
     return mapping.scaling.publish(values)
 
 
+def named(mapping: Mapping) -> str:
+    """Return what errors call a mapping: the tag too, where it is a row of a map."""
+    return f'{printable(mapping.tag)} ({mapping.address})' if is_row(mapping) \
+        else str(mapping.address)
+
+
+def is_row(mapping: Mapping) -> bool:
+    """Tell whether a mapping is a row of a map, not an address of the command line."""
+    return bool(mapping.place.file)
+
+
+def remarks_of_write(mapping: Mapping) -> Iterator[str]:
+    """Yield what a person may not expect of a write."""
+    for remark in mapping.remarks:
+        yield remark.text
+    if mapping.address.file_type is FileType.BINARY and mapping.address.bit is None:
+        yield (f'{mapping.address} is a word: this writes its 16 bits; a bit is '
+               f'{mapping.address.with_bit(0)}')
+    if mapping.fallback is not None:
+        yield (f'{named(mapping)} has a Fallback, which only the bridge writes: after this write '
+               'nothing brings the value of rest back')
+
+
 class Writing:
     """
-    One write to one mapping; ``value`` is what is to be written, as text.
+    One write to one mapping; as text it is what is to be written.
 
     Raises FormatError, saying what is wrong, when ``texts`` are not values of the mapping.
     """
@@ -176,7 +199,12 @@ class Writing:
     def __init__(self, mapping: Mapping, texts: Sequence[str]) -> None:
         self.mapping = mapping
         self._write = Write(mapping, parse_values(mapping, texts), time.monotonic())
-        self.value = self._write.value
+
+    def __str__(self) -> str:
+        """Return the values, with the raw ones where they differ."""
+        if self.mapping.scaling is None:
+            return self._write.value
+        return f'{self._write.value} (raw {show(self._write.raw)})'
 
     def carry_out(self, session: Session) -> WriteResult:
         """Write; also when interrupted by KeyboardInterrupt, return how far it got."""
@@ -197,7 +225,7 @@ class Writing:
 
 def parse_values(mapping: Mapping, texts: Sequence[str]) -> Sequence[float] | str:
     """Return the values of texts, whole numbers also as 0x and 0b; FormatError for others."""
-    if texts and mapping.type is ValueType.STRING:
+    if texts and mapping.message_type is ValueType.STRING:
         if len(texts) != 1:
             raise FormatError(f'{mapping.address} takes one text; quote it if it has spaces')
         return texts[0]
@@ -205,7 +233,7 @@ def parse_values(mapping: Mapping, texts: Sequence[str]) -> Sequence[float] | st
 
 
 def _number(mapping: Mapping, text: str) -> float:
-    kind = mapping.type
+    kind = mapping.message_type
     low, high = kind.range
     value: float | None
     if kind is not ValueType.FLOAT32:
@@ -241,7 +269,7 @@ def tags_of(mappings: Rows, station: int) -> Tags:
 
 def tag_of(mapping: Mapping, number: int, tags: Tags | None) -> str:
     """Return the tag of a value: its own where it is a row of a map, or those of its address."""
-    if tags is None or not mapping.place.file:
+    if tags is None or not is_row(mapping):
         return (tags or {}).get(str(mapping.place_of(number)), '')
     return printable(mapping.tag if mapping.length == 1 else f'{mapping.tag}[{number}]')
 

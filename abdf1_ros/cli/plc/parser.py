@@ -53,8 +53,10 @@ examples:
 # What each does, and examples.
 _COMMANDS = {
     'read': ('read addresses once', 'read N7:0-9 F8:2 --net net.csv'),
-    'write': ('write values to an address', 'write N7:10 5 6 7 --station 1 --yes --net net.csv',
-              'write F8:2 -1.5e3 --station 1 --yes --net net.csv'),
+    'write': ('write values to an address or a tag',
+              'write N7:10 5 6 7 --station 1 --yes --net net.csv',
+              'write F8:2 -1.5e3 --station 1 --yes --net net.csv',
+              'write line_speed 12.5 --map map.csv --net net.csv'),
     'watch': ('show values live until Ctrl-C', 'watch B3:0 N7:0 --period 0.5 --net net.csv',
               'watch I:1.0 --radix bin --net net.csv', 'watch --map map.csv --net net.csv',
               'watch F8:0 --csv --net net.csv > curve.csv'),

@@ -16,7 +16,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 import time
 
@@ -52,16 +52,18 @@ class Session(open_line.OpenLine):
     """
     The line of a net CSV; with ``via`` all others are behind this gateway.
 
+    ``routes`` are the gateways of single stations.
+
     Raises NoPort when the port cannot be opened.
     """
 
     def __init__(self, network: Network, absent: Sequence[int] = (), via: int | None = None,
-                 record: str | None = None) -> None:
+                 record: str | None = None, routes: Mapping[int, int] | None = None) -> None:
         self.network = network
         self.via = via
-        routes = {} if via is None else dict.fromkeys(range(MAX_STATION + 1), via)
+        through = {} if via is None else dict.fromkeys(range(MAX_STATION + 1), via)
         try:
             super().__init__(network.line_mode, network.line, PortSettings.of(network), absent,
-                             routes, PlcType(network.plc_type), record)
+                             {**through, **(routes or {})}, PlcType(network.plc_type), record)
         except OSError as error:
             raise NoPort(network.port, error) from None

@@ -17,24 +17,25 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager, suppress
+from collections.abc import Callable, Sequence
+from contextlib import suppress
 from dataclasses import replace
 import errno
 from functools import partial
 from pathlib import Path
 import shlex
 import sys
-from typing import Any, TypeAlias
+from typing import Any
 
 from abdf1_ros.cli.plc import data, detect, files, init, presence
 from abdf1_ros.cli.plc.clock import Clock, TAKEN, told
-from abdf1_ros.cli.plc.exports.form import Cells, Wanted
+from abdf1_ros.cli.plc.exports.form import Wanted
 from abdf1_ros.cli.plc.exports.imported import import_map
 from abdf1_ros.cli.plc.line import free_station, MODES, network_of
 from abdf1_ros.cli.plc.options import COLUMN_ROLES, DEFAULT_STATION, RADIXES
 from abdf1_ros.cli.plc.overhear import overhear
 from abdf1_ros.cli.plc.session import Session
+from abdf1_ros.cli.plc.targets import no_value, rows_of_map, Targets, to_read, to_write
 from abdf1_ros.cli.plc.watch import Watch
 from abdf1_ros.cli.terminal import (
     advice_for,
@@ -53,9 +54,9 @@ from abdf1_ros.cli.terminal import (
 from abdf1_ros.df1.echo import COMES_BACK
 from abdf1_ros.driver.settings import DriverSettings
 from abdf1_ros.driver.write import Outcome
-from abdf1_ros.errors import Abdf1Error, FormatError, LinkError, PortLost, RemoteError
+from abdf1_ros.errors import Abdf1Error, LinkError, PortLost, RemoteError
 from abdf1_ros.pccc.file_search import DataFile
-from abdf1_ros.pccc.file_types import FileType, PlcType
+from abdf1_ros.pccc.file_types import PlcType
 from abdf1_ros.pccc.processor import Processor
 from abdf1_ros.pccc.status import is_address_fault
 from abdf1_ros.pccc.values import Values
@@ -63,10 +64,10 @@ from abdf1_ros.plan.report import make_report
 from abdf1_ros.ports.listing import serial_ports
 from abdf1_ros.problems import ConfigurationError, Problem
 from abdf1_ros.settings.map_file import load_mappings
-from abdf1_ros.settings.mapping import Command, Mapping
+from abdf1_ros.settings.mapping import Mapping
 from abdf1_ros.settings.network import load_network, Network
 from abdf1_ros.settings.rows import Rows
-from abdf1_ros.text import counted, first, printable
+from abdf1_ros.text import counted, printable
 
 _ALL_TRIED_IN_VAIN = (
     'not one character came: cable, port, power? Or a station that was not asked (--stations; a '
@@ -74,43 +75,33 @@ _ALL_TRIED_IN_VAIN = (
 _ONE_PLC_ANSWERS_TO_ALL = (
     'full duplex tells no addresses apart: most PLCs answer to every station, so these may be one')
 
-_Wanted: TypeAlias = tuple[Cells, data.Tags | None, Sequence[Mapping | str]]
-"""Cells of the options, tags by address, and rows of a map or addresses."""
-
 _UNCERTAIN = (Outcome.UNKNOWN, Outcome.PARTLY)
 
 
-def _cells(options: argparse.Namespace, command: Command, length: int | str | None) -> Cells:
-    """Return what the options say of the columns of a map CSV."""
-    given = {'Command': command.value, 'Station': str(options.station),
-             'Length': None if length is None else str(length), 'Type': options.type,
-             'Word_Order': options.word_order, 'Access': options.access,
-             'Processor': options.processor, 'PLC_Type': options.plc_type,
-             'Via': None if options.via is None else str(options.via)}
-    return {column: text for column, text in given.items() if text}
-
-
-def _mappings(options: argparse.Namespace, session: Session, cells: Cells,
-              wanted: Sequence[Mapping | str]) -> list[Mapping]:
+def _mappings(options: argparse.Namespace, session: Session, targets: Targets) -> list[Mapping]:
     """Return the mappings of addresses; where needed, ask the PLC for its type first."""
-    rows = [entry for entry in wanted if isinstance(entry, Mapping)]
-    if len(rows) == len(wanted):
-        return rows
+    if not targets.addresses:
+        return targets.rows
     plc_type, processor = _family(options, session)
     kind = {'PLC_Type': plc_type.value, 'Processor': data.processor_cell(processor)}
-    cells = {column: text for column, text in kind.items() if text} | cells
+    cells = {column: text for column, text in kind.items() if text} | targets.cells
     return [entry if isinstance(entry, Mapping) else data.mapping_of(entry, cells, item)
-            for item, entry in enumerate(wanted, 1)]
+            for item, entry in enumerate(targets.entries, 1)]
 
 
-def _line(options: argparse.Namespace) -> Network:
+def _line(options: argparse.Namespace, prepared: Any) -> Network:
     """
     Return the line of a command for one station, and settle which station that is.
 
     Raises ConfigurationError for a write to one of several that it does not name, and where the
-    station is ourselves.
+    station is ourselves. Rows of a map name their stations.
     """
     network = network_of(options)
+    if isinstance(prepared, Targets) and prepared.rows:
+        prepared.check_line(network)
+        if not prepared.addresses:
+            options.is_assumed, options.station = False, prepared.rows[0].station
+            return network
     has_several = network.mode != MODES['full']
     options.is_assumed = has_several and options.station is None
     if options.is_assumed and (options.command == 'write' or getattr(options, 'set', False)):
@@ -139,9 +130,11 @@ def _asking(work: Callable[[argparse.Namespace, Session, Any], int],
     ``work`` gets what ``prepare`` returns, which tells what is wrong before the port is opened.
     """
     def command(options: argparse.Namespace) -> int:
-        network, prepared = _line(options), prepare(options)
+        prepared = prepare(options)
+        network = _line(options, prepared)
         record = None if options.command == 'watch' else getattr(options, 'record', None)
-        with Session(network, via=options.via, record=record) as session:
+        routes = prepared.routes if isinstance(prepared, Targets) else None
+        with Session(network, via=options.via, record=record, routes=routes) as session:
             if options.via is not None and (
                     who := presence.said_by_both(session, options.station, options.via)):
                 _complain(f'stations {options.station} and {options.via} are both "{who}": if '
@@ -154,11 +147,11 @@ def _asking(work: Callable[[argparse.Namespace, Session, Any], int],
 
 
 def _failed(options: argparse.Namespace, session: Session, error: Abdf1Error, place: str = '',
-            plc_type: str | None = None) -> int:
+            plc_type: str | None = None, row: Mapping | None = None) -> int:
     """Tell why a request to a station, about ``place``, has failed; return the exit status."""
     if isinstance(error, ConfigurationError | PortLost):
         raise error
-    station = options.station
+    station = options.station if row is None else row.station
     _complain(f'{place and f"{place} of "}station {station}: {error}')
     if advice := presence.hint(session, error) \
             or presence.type_hint(session, station, error, plc_type):
@@ -173,45 +166,19 @@ def _failed(options: argparse.Namespace, session: Session, error: Abdf1Error, pl
     return EXIT_FAILED
 
 
-def _read(options: argparse.Namespace, session: Session, wanted: _Wanted) -> int:
+def _read(options: argparse.Namespace, session: Session, targets: Targets) -> int:
     status, plc_type = 0, options.plc_type
-    cells, tags, entries = wanted
-    for mapping in _mappings(options, session, cells, entries):
+    for mapping in _mappings(options, session, targets):
         for remark in mapping.remarks if mapping.address.file_type.is_structure else ():
             _complain(remark.text)
         try:
             values = data.read(session, mapping)
         except Abdf1Error as error:
-            status = _failed(options, session, error, str(mapping.address), plc_type)
+            status = _failed(options, session, error, data.named(mapping), plc_type, mapping)
             plc_type = None  # once is enough
         else:
-            _print_values(mapping, values, RADIXES[options.radix], tags)
+            _print_values(mapping, values, RADIXES[options.radix], targets.tags)
     return status
-
-
-def _wanted(options: argparse.Namespace) -> _Wanted:
-    """
-    Return the cells of a read, and the tags of --map.
-
-    Raises ConfigurationError where no PLC could have the addresses.
-    """
-    cells = _cells(options, Command.READ, options.length)
-    if not options.map:
-        if not options.addresses:
-            raise ConfigurationError([Problem(
-                'ADDRESS', 'name one such as N7:0, or a map with --map, for all of its rows')])
-        data.check_for_some_family(options.addresses, cells)
-        return cells, None, options.addresses
-    mappings = _rows_of_map(options)
-    rows = {row.tag: row for row in mappings.of_plcs if row.polls}
-    entries: list[Mapping | str] = [rows.get(word, word) for word in options.addresses]
-    addresses = [entry for entry in entries if isinstance(entry, str)]
-    try:
-        data.check_for_some_family(addresses, cells)
-    except ConfigurationError as error:
-        raise ConfigurationError([*error.problems, Problem(options.map, (
-            f'tags that are read: {first(list(rows))}'))]) from None
-    return cells, data.tags_of(mappings, options.station), entries or list(rows.values())
 
 
 def _print_values(mapping: Mapping, values: Values, radix: data.Radix = data.Radix.DECIMAL,
@@ -222,33 +189,12 @@ def _print_values(mapping: Mapping, values: Values, radix: data.Radix = data.Rad
         print(f'{address:{width}}  {printable(text)}')
 
 
-def _cells_to_write(options: argparse.Namespace) -> Cells:
-    """Return the cells of a write; raises ConfigurationError where no PLC could take it."""
-    cells = _cells(options, Command.READ_WRITE,
-                   data.length_of(options.address, options.type, options.values))
-    with _no_value(options.address):
-        data.check_for_some_family([options.address], cells, options.values)
-    return cells
-
-
-@contextmanager
-def _no_value(address: str) -> Iterator[None]:
-    """Turn a FormatError, about values that are none, into a ConfigurationError."""
-    try:
-        yield
-    except FormatError as error:
-        raise ConfigurationError([Problem(address, str(error))]) from None
-
-
-def _write(options: argparse.Namespace, session: Session, cells: Cells) -> int:
-    mapping, = _mappings(options, session, cells, [options.address])
-    with _no_value(options.address):
+def _write(options: argparse.Namespace, session: Session, targets: Targets) -> int:
+    mapping, = _mappings(options, session, targets)
+    with no_value(options.address):
         writing = data.Writing(mapping, options.values)
-    for remark in mapping.remarks:
-        _complain(remark.text)
-    if mapping.address.file_type is FileType.BINARY and mapping.address.bit is None:
-        _complain(f'{mapping.address} is a word: this writes its 16 bits; a bit is '
-                  f'{mapping.address.with_bit(0)}')
+    for remark in data.remarks_of_write(mapping):
+        _complain(remark)
     if not options.yes and not _is_confirmed(options, session, writing):
         _complain('nothing was written; --yes writes')
         return EXIT_USAGE
@@ -262,8 +208,8 @@ def _is_confirmed(options: argparse.Namespace, session: Session, writing: data.W
         print('now:')
         _print_values(mapping, data.read(session, mapping))
     except Abdf1Error as error:
-        _failed(options, session, error, str(mapping.address))
-    return _is_wanted(f'write {writing.value} to {mapping.address} of station {mapping.station}')
+        _failed(options, session, error, data.named(mapping), row=mapping)
+    return _is_wanted(f'write {writing} to {data.named(mapping)} of station {mapping.station}')
 
 
 def _is_wanted(question: str) -> bool:
@@ -280,7 +226,7 @@ def _is_wanted(question: str) -> bool:
 def _carry_out(session: Session, writing: data.Writing) -> int:
     """Write, show what the PLC holds after it, and return the exit status."""
     mapping = writing.mapping
-    place = f'{mapping.address} of station {mapping.station}'
+    place = f'{data.named(mapping)} of station {mapping.station}'
     result = writing.carry_out(session)
     text = str(result)
     if result.outcome is not Outcome.WRITTEN:
@@ -300,12 +246,11 @@ def _carry_out(session: Session, writing: data.Writing) -> int:
     return 0
 
 
-def _watch(options: argparse.Namespace, session: Session, wanted: _Wanted) -> int:
-    cells, tags, entries = wanted
-    mappings = _mappings(options, session, cells, entries)
+def _watch(options: argparse.Namespace, session: Session, targets: Targets) -> int:
+    mappings = _mappings(options, session, targets)
     session.close()  # the driver opens the port itself
     watch = Watch(session.network, mappings, options.period, RADIXES[options.radix],
-                  options.csv, tags, options.record)
+                  options.csv, targets.tags, options.record)
     failed = watch.run(options.count)
     if failed:
         _complain(presence.traffic(watch.counters))
@@ -544,13 +489,6 @@ def _clock(options: argparse.Namespace, session: Session, prepared: None) -> int
     return EXIT_FAILED
 
 
-def _rows_of_map(options: argparse.Namespace) -> Rows:
-    mappings, problems = load_mappings(options.map) if options.map else (Rows(), [])
-    for problem in problems:
-        _complain(str(problem))
-    return mappings
-
-
 def _files(options: argparse.Namespace, session: Session, mappings: Rows) -> int:
     family, processor = _family(options, session)
     progress = Progress()
@@ -589,9 +527,10 @@ def _extent(entry: DataFile) -> str:
 
 
 COMMANDS: dict[str, Callable[[argparse.Namespace], int]] = {
-    'read': _asking(_read, _wanted), 'write': _asking(_write, _cells_to_write),
-    'watch': _asking(_watch, _wanted), 'status': _asking(_status), 'ping': _asking(_ping),
+    'read': _asking(_read, to_read), 'write': _asking(_write, to_write),
+    'watch': _asking(_watch, to_read), 'status': _asking(_status), 'ping': _asking(_ping),
     'scan': _scan, 'detect': _detect, 'init': _init, 'ports': _ports,
-    'files': _asking(_files, _rows_of_map), 'clock': _asking(_clock), 'import': _import}
+    'files': _asking(_files, lambda options: rows_of_map(options.map)),
+    'clock': _asking(_clock), 'import': _import}
 
 _complain = partial(tell, 'plc', code=RED)

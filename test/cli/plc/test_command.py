@@ -133,6 +133,83 @@ def test_rows_of_a_map_are_read_by_their_tags(plc: Plc, tmp_path: Path) -> None:
     assert said.status == 2 and 'ADDRESS: name one such as N7:0, or a map with --map' in said.err
 
 
+def test_map_says_of_each_tag_what_options_say_of_addresses(plc: Plc, tmp_path: Path) -> None:
+    path = str(write_csv(tmp_path / 'map.csv', *MAP_OF_TAGS))
+    assert plc('read', 'level', '--length', '2', '--map', path).err == (
+        'plc: --length: is for an address; the map says it of each tag\n')
+    assert plc('read', 'level', '--station', '1', '--map', path).err == (
+        'plc: --station: level is of station 2 in the map\n')
+    assert plc('read', '--station', '2', '--map', path).lines == ['N7:30 level 2330']
+    assert plc('read', '--station', '3', '--map', path).err == (
+        f'plc: {path}: has no row of station 3 that is read\n')
+    assert plc('read', 'Level', '--map', path).err.endswith(
+        'tags that are read: speed, level; did you mean level?\n')
+    assert plc('read', 'level', '--map', path, '--own-station', '2').err == (
+        f'plc: {path}:3: Item: 2, Station 2 is our own in the net file; here belongs the station '
+        'to read or write\n')
+
+
+@pytest.mark.parametrize('args', [
+    ('read', 'far'), ('read', 'N7:1', '--station', '7', '--plc-type', 'SLC'),
+    ('write', 'far', '1', '--yes')])
+def test_row_behind_a_gateway_is_asked_through_it(tmp_path: Path, args: tuple[str, ...]) -> None:
+    path = write_csv(tmp_path / 'map.csv', 'Tag,Command,Address,Station,PLC_Type,Via',
+                     ['far,ReadWrite,N7:0,7,SLC,9'])
+    line = Pty(tmp_path / 'line')
+    with Process('plc', *args, '--map', str(path), '--port', str(line.name), '--timeout',
+                 '9000') as process:
+        assert line.read(6) == bytes.fromhex('10 01 09 10 02 07')  # to 9, for 7
+        wait_until(lambda: process.catches(signal.SIGTERM))
+        process.send(signal.SIGTERM)
+        process.result()
+    line.close()
+
+
+MAP_TO_WRITE = ('Tag,Command,Address,Station,PLC_Type,Max,Fallback,Fallback_After,Scale', [
+    'Level,ReadWrite,N7:55,2,SLC,10,,,0.5', 'speed,Read,N7:0,1,PLC5,,,,',
+    'all,Write,N7:9,255,SLC,,,,', 'beat,Heartbeat,N7:56,2,SLC,,,,',
+    'valve,Write,N7:57,2,SLC,,0,1000,'])
+
+
+def test_row_of_a_map_is_written_by_its_tag(plc: Plc, tmp_path: Path) -> None:
+    path = str(write_csv(tmp_path / 'map.csv', *MAP_TO_WRITE))
+    said = plc('write', 'Level', '5.5', '--map', path)
+    assert (said.status, said.lines) == (
+        2, ['now:', 'N7:55 0', 'would write [5.5] (raw [11]) to Level (N7:55) of station 2'])
+    said = plc('write', 'Level', '5.5', '--map', path, '--yes')
+    assert (said.status, said.lines, said.err) == (
+        0, ['Level (N7:55) of station 2: written; now:', 'N7:55 5.5'], '')
+    assert plc('read', 'N7:55', '--station', '2').lines == ['N7:55 11']
+
+
+@for_all(('args', 'text'), [
+    (('level', '5'), '"level" is not a tag of this map; tags that can be written: Level, valve; '
+                     'did you mean Level?'),
+    (('speed', '5'), '"speed" is a Read row of station 1; tags'),
+    (('beat', '5'), '"beat" is a Heartbeat row of station 2; tags'),
+    (('all', '5'), '"all" is a Write row of station 255; tags'),
+    (('N7:55', '5'), '"N7:55" is an address; with --map a tag is written, within the limits'),
+    (('Level', '11'), 'Level: value 11 at index 0 is outside Min -inf, Max 10'),
+    (('Level', '1', '2'), 'Level: 2 values, the mapping has 1'),
+    (('Level', 'full'), 'Level: "full" is not a valid float32'),
+    (('Level', '1', '--station', '1'), '--station: Level is of station 2 in the map'),
+    (('Level', '1', '--type', 'int32'), '--type: is for an address; the map says it')])
+def test_what_a_row_does_not_allow_is_told_before_the_port_is_opened(
+        tmp_path: Path, capsys: pytest.CaptureFixture[str], args: tuple[str, ...],
+        text: str) -> None:
+    path = write_csv(tmp_path / 'map.csv', *MAP_TO_WRITE)
+    assert main(['write', *args, '--yes', '--map', str(path), '--port', '/nowhere/plc']) == 2
+    assert text in capsys.readouterr().err
+
+
+def test_write_over_a_fallback_is_told(plc: Plc, tmp_path: Path) -> None:
+    path = write_csv(tmp_path / 'map.csv', *MAP_TO_WRITE)
+    said = plc('write', 'valve', '0', '--map', str(path), '--yes')
+    assert said.status == 0 and said.err == (
+        'plc: valve (N7:57) has a Fallback, which only the bridge writes: after this write '
+        'nothing brings the value of rest back\n')
+
+
 def test_read_with_the_family_given_asks_nothing_else(plc: Plc) -> None:
     assert plc('read', 'N7:0', '--plc-type', 'plc5').lines == ['N7:0 1200']
 

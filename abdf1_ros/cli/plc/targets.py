@@ -1,0 +1,192 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""What ``plc`` is to read or to write: addresses of the command line, and rows of a map."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Collection, Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from difflib import get_close_matches
+
+from abdf1_ros.cli.plc import data
+from abdf1_ros.cli.plc.exports.form import Cells
+from abdf1_ros.cli.plc.options import DEFAULT_STATION
+from abdf1_ros.cli.terminal import RED, tell
+from abdf1_ros.df1.stations import MAX_STATION
+from abdf1_ros.errors import FormatError
+from abdf1_ros.plan.usable_rows import line_problems
+from abdf1_ros.problems import ConfigurationError, Problem
+from abdf1_ros.settings.hints import looks_like_address
+from abdf1_ros.settings.map_file import load_mappings
+from abdf1_ros.settings.mapping import Command, Mapping
+from abdf1_ros.settings.network import Network
+from abdf1_ros.settings.rows import Rows
+from abdf1_ros.text import first, printable, shown
+
+# Options that say for an address what a row of a map says itself.
+_FOR_ADDRESSES = ('length', 'type', 'word_order', 'access', 'processor', 'plc_type', 'via')
+
+
+@dataclass(frozen=True, slots=True)
+class Targets:
+    """
+    Rows of a map, and addresses, for which ``cells`` has what the options say.
+
+    ``tags`` are those of the map by address, ``routes`` the gateways of its stations.
+    """
+
+    entries: Sequence[Mapping | str]
+    cells: Cells
+    tags: data.Tags | None = None
+    routes: dict[int, int] = field(default_factory=dict)
+
+    @property
+    def rows(self) -> list[Mapping]:
+        """Return the rows of a map."""
+        return [entry for entry in self.entries if isinstance(entry, Mapping)]
+
+    @property
+    def addresses(self) -> list[str]:
+        """Return the addresses, whose station the options say."""
+        return [entry for entry in self.entries if isinstance(entry, str)]
+
+    def check_line(self, network: Network) -> None:
+        """Raise ConfigurationError where the line cannot have a row."""
+        if problems := [problem for _, problem in line_problems(self.rows, network)]:
+            raise ConfigurationError(problems)
+
+
+def to_read(options: argparse.Namespace) -> Targets:
+    """
+    Return what "plc read" and "plc watch" read.
+
+    Raises ConfigurationError where no PLC could have the addresses.
+    """
+    cells = _cells(options, Command.READ, options.length)
+    if not options.map:
+        if not options.addresses:
+            raise ConfigurationError([Problem(
+                'ADDRESS', 'name one such as N7:0, or a map with --map, for all of its rows')])
+        data.check_for_some_family(options.addresses, cells)
+        return Targets(options.addresses, cells)
+    mappings = rows_of_map(options.map)
+    rows = {row.tag: row for row in mappings.of_plcs if row.polls}
+    entries: list[Mapping | str] = [rows.get(word, word) for word in options.addresses]
+    if not entries:
+        entries = [row for row in rows.values() if options.station in (None, row.station)]
+        if not entries:
+            of = '' if options.station is None else f' of station {options.station}'
+            raise ConfigurationError([Problem(options.map, f'has no row{of} that is read')])
+    routes = _routes(mappings)
+    if options.via is None and (gateway := routes.get(_station(options))) is not None:
+        cells['Via'] = str(gateway)
+    targets = Targets(entries, cells, data.tags_of(mappings, _station(options)), routes)
+    try:
+        data.check_for_some_family(targets.addresses, cells)
+    except ConfigurationError as error:
+        raise ConfigurationError([*error.problems, Problem(options.map, (
+            f'tags that are read: {first(list(rows)) or "none"}'
+            f'{"".join(_meant(word, rows) for word in targets.addresses)}'))]) from None
+    _check_options(options, targets)
+    return targets
+
+
+def to_write(options: argparse.Namespace) -> Targets:
+    """Return what "plc write" writes; raises ConfigurationError where no PLC could take it."""
+    if options.map:
+        mappings = rows_of_map(options.map)
+        row = _row_to_write(mappings, options.map, options.address)
+        targets = Targets([row], {}, routes=_routes(mappings))
+        _check_options(options, targets)
+        with no_value(options.address):
+            data.Writing(targets.rows[0], options.values)
+        return targets
+    cells = _cells(options, Command.READ_WRITE,
+                   data.length_of(options.address, options.type, options.values))
+    with no_value(options.address):
+        data.check_for_some_family([options.address], cells, options.values)
+    return Targets([options.address], cells)
+
+
+def rows_of_map(path: str | None) -> Rows:
+    """Return the good rows of a map, and tell the faults of the others."""
+    mappings, problems = load_mappings(path) if path else (Rows(), [])
+    for problem in problems:
+        tell('plc', str(problem), RED)
+    return mappings
+
+
+@contextmanager
+def no_value(address: str) -> Iterator[None]:
+    """Turn a FormatError, about values that are none, into a ConfigurationError."""
+    try:
+        yield
+    except FormatError as error:
+        raise ConfigurationError([Problem(address, str(error))]) from None
+
+
+def _station(options: argparse.Namespace) -> int:
+    return DEFAULT_STATION if options.station is None else options.station
+
+
+def _cells(options: argparse.Namespace, command: Command, length: int | str | None) -> Cells:
+    """Return what the options say of the columns of a map CSV."""
+    given = {'Command': command.value, 'Station': str(_station(options)),
+             'Length': None if length is None else str(length), 'Type': options.type,
+             'Word_Order': options.word_order, 'Access': options.access,
+             'Processor': options.processor, 'PLC_Type': options.plc_type,
+             'Via': None if options.via is None else str(options.via)}
+    return {column: text for column, text in given.items() if text}
+
+
+def _routes(mappings: Rows) -> dict[int, int]:
+    return {row.station: row.via for row in mappings.of_plcs if row.via is not None}
+
+
+def _row_to_write(mappings: Rows, path: str, tag: str) -> Mapping:
+    """Return the row of a map that has the tag and takes messages for one PLC."""
+    rows = {row.tag: row for row in mappings.of_plcs
+            if row.writes and row.station <= MAX_STATION}
+    if tag in rows:
+        return rows[tag]
+    other = next((row for row in mappings if row.tag == tag), None)
+    text = 'is not a tag of this map' if other is None else \
+        f'is a {other.command.value} row of station {other.station}'
+    if other is None and looks_like_address(tag):
+        text = 'is an address; with --map a tag is written, within the limits of its row'
+    raise ConfigurationError([Problem(path, f'"{shown(tag)}" {text}; tags that can be written: '
+                                            f'{first(list(rows)) or "none"}'
+                                            f'{_meant(tag, rows)}')])
+
+
+def _meant(word: str, rows: Collection[str]) -> str:
+    """Return the tag that a word may stand for, as a question; empty for none."""
+    names = {tag.casefold(): tag for tag in rows}
+    meant = get_close_matches(word.casefold(), names, 1)
+    return f'; did you mean {printable(names[meant[0]])}?' if meant else ''
+
+
+def _check_options(options: argparse.Namespace, targets: Targets) -> None:
+    """Raise ConfigurationError where an option contradicts rows of a map, or does nothing."""
+    problems = [] if targets.addresses else [
+        Problem(f'--{name.replace("_", "-")}', 'is for an address; the map says it of each tag')
+        for name in _FOR_ADDRESSES if getattr(options, name, None) is not None]
+    if not targets.addresses:
+        problems += [Problem('--station', f'{row.tag} is of station {row.station} in the map')
+                     for row in targets.rows if options.station not in (None, row.station)]
+    if problems:
+        raise ConfigurationError(problems)
