@@ -162,7 +162,6 @@ class SlaveLink(Link, Initiator):
     def _look_after(self, source: TaskSource) -> None:
         """End what is overdue."""
         now = self._machine.now
-        source.expire(now)
         entry = self._outstanding
         is_overdue = entry is not None and now >= entry.deadline
         is_alone = 0 < self._settings.poll_timeout <= now - self.last_poll

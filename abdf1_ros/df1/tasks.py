@@ -79,7 +79,3 @@ class TaskSource(Protocol):
     def next_due(self) -> float | None:
         """Return when something will be due (clock value in s), None for never."""
         return None
-
-    def expire(self, now: float) -> None:
-        """Do what needs no line, such as ending what has waited too long to be sent."""
-        return

@@ -43,7 +43,7 @@ from abdf1_ros.df1.stations import ActiveStationList
 from abdf1_ros.driver.checks import Checks
 from abdf1_ros.driver.guests import GuestJob, GuestQueue
 from abdf1_ros.driver.interlocks.queue import Interlocks
-from abdf1_ros.driver.job_tasks import Job, JobTask, JobTasks
+from abdf1_ros.driver.job_tasks import Job, JobTasks
 from abdf1_ros.driver.reads.silent import Reads
 from abdf1_ros.driver.writes.queue import WriteQueue
 from abdf1_ros.plan.bounds import OURS_BESIDE_GUESTS, OWN_IN_A_ROW
@@ -75,7 +75,7 @@ class Agenda:
         self._owed = 0.0  # seconds of the line for checks and reads, before the next guest
         self._guests_from = -math.inf  # no command of a guest before (clock value in s)
         self._held_until = math.inf  # the same, while one waits for that
-        self._counted: list[JobTask] = []  # under way: of guests, and of ours while that is so
+        self._counted: list[Job] = []  # under way: of guests, and of ours while that is so
         self._tasks = tasks
         self._own_in_a_row = 0
         self._was_silent = False  # the station of the last of them
@@ -87,7 +87,7 @@ class Agenda:
         self._is_reads_turn = False  # after a check, or a fallback that was written again
         self._last_probe_was_check = False
 
-    def next(self, now: float, busy: Container[int] = ()) -> JobTask | None:  # noqa: A003
+    def next(self, now: float, busy: Container[int] = ()) -> Job | None:  # noqa: A003
         """Return what has the line next, None for nothing; stations in ``busy`` have to wait."""
         if self._counted:
             self._settle(now)
@@ -96,11 +96,11 @@ class Agenda:
         else:
             self._questions = 0
             job = self._own_first(now, busy) if self._has_own else self._usual(now, busy)
-        if job is None or isinstance(job, JobTask):
+        if job is None or job in self._tasks.under_way:
             return job
-        return JobTask(self._tasks, job, now)
+        return job.start(self._tasks, now)
 
-    def _unheard(self, now: float, busy: Container[int]) -> Job | JobTask | None:
+    def _unheard(self, now: float, busy: Container[int]) -> Job | None:
         """
         Return what goes out on a connection that has not been heard.
 
@@ -119,20 +119,20 @@ class Agenda:
 
     def _settle(self, now: float) -> None:
         """Count the time that commands which have ended have had, of guests and of ours."""
-        for task in [task for task in self._counted if task not in self._tasks.under_way]:
-            self._counted.remove(task)
-            took = self._guests.line.took(task.taken, now)
-            if isinstance(task.job, GuestJob):
+        for job in [job for job in self._counted if job not in self._tasks.under_way]:
+            self._counted.remove(job)
+            took = self._guests.line.took(job.taken, now)
+            if isinstance(job, GuestJob):
                 # What ours had too much counts; what guests had while we rested does not add up.
                 owed = min(self._owed, 0.0) + OURS_BESIDE_GUESTS * took
                 self._owed = max(self._owed, owed)
-                if task.job.has_failed and task.station in self._stations:
+                if job.has_failed and job.station in self._stations:
                     # The next one may fail, too, and hold up what becomes due meanwhile.
                     self._guests_from = now + OURS_BESIDE_GUESTS * took
             else:
                 self._owed -= took
 
-    def _own_first(self, now: float, busy: Container[int]) -> Job | JobTask | None:
+    def _own_first(self, now: float, busy: Container[int]) -> Job | None:
         """Return a heartbeat or fallback if there is one: no write in a row (rule 11)."""
         if self._own_in_a_row >= OWN_IN_A_ROW:
             self._own_in_a_row = 0
@@ -158,7 +158,7 @@ class Agenda:
     def _check_or_read(self, now: float, busy: Container[int]) -> Job | None:
         return self._checks.find_due(now) and self._check(now, busy) or self._read(now, busy)
 
-    def _usual(self, now: float, busy: Container[int]) -> Job | JobTask | None:
+    def _usual(self, now: float, busy: Container[int]) -> Job | None:
         has_writes = self._writes.waiting or self._tasks.waiting
         if has_writes and self._writes_in_a_row < MAX_WRITES_IN_A_ROW \
                 and (write := self._write(now, busy)):
@@ -170,7 +170,7 @@ class Agenda:
         self._held_until = self._guests_from if is_held else math.inf
         has_guests = has_guests and not is_held
         is_guests_turn = self._owed <= 0 and not any(
-            isinstance(task.job, GuestJob) for task in self._counted)
+            isinstance(job, GuestJob) for job in self._counted)
         if has_guests and is_guests_turn and (guest := self._guest(now, busy)):
             return guest
         if self._stations.probes.died_at > -math.inf and (late := self._after_death(now, busy)):
@@ -178,13 +178,11 @@ class Agenda:
         job = self._checks.find_due(now) and self._check(now, busy) \
             or self._has_own and self._refresh(now, busy) or self._read(now, busy)
         if job and self._owed > 0:
-            task = JobTask(self._tasks, job, now)
-            self._counted.append(task)
-            return task
+            self._counted.append(job.start(self._tasks, now))
         return job or has_writes and self._write(now, busy) \
             or has_guests and self._guest(now, busy) or None
 
-    def _after_death(self, now: float, busy: Container[int]) -> Job | JobTask | None:
+    def _after_death(self, now: float, busy: Container[int]) -> Job | None:
         """
         Return what has waited while a station died: a read of one that has replied, or a write.
 
@@ -196,19 +194,18 @@ class Agenda:
         probes.caught_up()
         return self._write(now, busy) if self._writes.waiting else None
 
-    def _guest(self, now: float, busy: Container[int]) -> JobTask | None:
+    def _guest(self, now: float, busy: Container[int]) -> Job | None:
         """Return a command of a guest."""
         job = self._guests.next(now, busy, may_write=self._tasks.is_heard)
         if job is None:
             return None
         self._writes_in_a_row = 0
-        task = JobTask(self._tasks, job, now)
-        self._counted.append(task)
-        guest = job.command.guest
-        guest.listener.sends(guest, task.command)
-        return task
+        self._counted.append(job.start(self._tasks, now))
+        guest = job.asked.guest
+        guest.listener.sends(guest, job.command)
+        return job
 
-    def _write(self, now: float, busy: Container[int]) -> Job | JobTask | None:
+    def _write(self, now: float, busy: Container[int]) -> Job | None:
         """Return a new write, or the next packet of one under way, in turns."""
         under_way = self._tasks.first(busy)
         write = None

@@ -119,11 +119,11 @@ class GuestJob(Job):
 
     blames = False
 
-    def __init__(self, queue: GuestQueue, command: GuestCommand, station: int,
+    def __init__(self, queue: GuestQueue, asked: GuestCommand, station: int,
                  claim: Claim | None) -> None:
-        self.command = command
+        self.asked = asked
         self.station = station
-        self.expires = queue.expiry(command)
+        self.expires = queue.expiry(asked)
         self.claim = claim
         self.sts = 0  # of the reply
         self.has_failed = False  # there was none
@@ -133,10 +133,10 @@ class GuestJob(Job):
     def steps(self, now: float) -> Steps[None]:
         """Send the command, and hand its reply on."""
         self._begun = now
-        packet = self.command.packet
+        packet = self.asked.packet
         reply = yield packet.cmd, packet.data
         self.sts = reply.sts
-        self._queue.answered(self.command, reply)
+        self._queue.answered(self.asked, reply)
 
     def ended(self, error: Exception | None) -> None:
         self._queue.ended(self, self._begun, error)
@@ -241,7 +241,7 @@ class GuestQueue:
 
     def ended(self, job: GuestJob, begun: float, error: Exception | None) -> None:
         """Refuse a command that has no reply; tell what it may have changed."""
-        command, station = job.command, job.station
+        command, station = job.asked, job.station
         job.has_failed = error is not None
         was_sent = error is None or getattr(error, 'sent', True)
         if error is not None:

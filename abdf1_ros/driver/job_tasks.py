@@ -47,19 +47,22 @@ class Job:
     """
     What is done with a station, one command after the other; each kind has a queue.
 
-    The reply to the first command has ``reply_size`` bytes after its header, 0 where that is not
-    known. That command must not be sent after ``expires`` (clock value in s); each later one has
+    It is a ``Task`` of the link, with its present ``command``, from ``start`` until it has
+    ``ended``; then it may be started again. ``taken`` is when the link took that command (clock
+    value in s). The reply to the first command has ``reply_size`` bytes after its header, 0 where
+    that is not known. That command must not be sent after ``expires``; each later one has
     ``patience`` s after the command before it, without that command's own time on the line. The
     link judges this for all kinds alike, when it sends. When that is, each kind says: a message
     and a guest's command get old by the clock, a heartbeat when what it vouches for may no longer
     be so, a 0 and a Fallback never. Queues end what has waited as long, for its result to come in
     time.
     ``is_probe`` tells that a silent station is asked whether it is there again, ``is_own`` that
-    no message has asked for it: a heartbeat or a fallback. ``blames`` and ``answer_within`` are
-    those of ``Task``.
+    no message has asked for it: a heartbeat or a fallback.
     """
 
     station: int
+    command: Packet
+    sent = False
     reply_size = 0
     expires = math.inf
     patience = 0.0
@@ -67,6 +70,9 @@ class Job:
     is_own = False
     blames = True
     answer_within = math.inf
+    taken: float
+    _tasks: JobTasks
+    _steps: Steps[None]
 
     def steps(self, now: float) -> Steps[None]:
         """Return what is to be done from ``now`` on (clock value in s)."""
@@ -75,6 +81,53 @@ class Job:
     def ended(self, error: Exception | None) -> None:
         """Take note, once, that it has ended, by an error that it has not handled or by itself."""
         raise NotImplementedError
+
+    def start(self, tasks: JobTasks, now: float) -> Job:
+        """Begin, with the first command; return the job itself."""
+        self.sent, self.taken = False, now
+        self._tasks, self._steps = tasks, self.steps(now)
+        try:
+            request = next(self._steps)
+        except Exception as error:  # a bug, or it has ended before its first command
+            self.ended(error)
+            raise
+        self.command = tasks.new_command(self.station, request)
+        tasks.under_way.add(self)
+        return self
+
+    def reply(self, packet: Packet) -> None:
+        """Take the reply and go on to the next request."""
+        self._tasks.transactions += 1
+        if self.station != BROADCAST:
+            self._tasks.is_heard = True
+        self._advance(self._steps.send, packet)
+
+    def fail(self, error: LinkError) -> None:
+        """Raise ``error`` in the steps, unless they have ended."""
+        if getgeneratorstate(self._steps) == GEN_CLOSED:  # closed by the garbage collector
+            return
+        # One of its own: where the port is lost, all jobs are failed with the same.
+        self._advance(self._steps.throw, type(error)(*error.args, sent=self.sent))
+
+    def _advance(self, resume: Callable[[_With], Request], what: _With) -> None:
+        try:
+            request = resume(what)
+        except StopIteration:
+            self._tasks.under_way.discard(self)
+            self.ended(None)
+            return
+        except Exception as error:
+            self._tasks.under_way.discard(self)
+            self.ended(error)
+            if not isinstance(error, Abdf1Error):
+                raise  # a bug
+            return
+        self.sent, self.reply_size = False, 0
+        if self.patience:
+            line_time = len(self.command.encode()) * self._tasks.char_time
+            self.expires = max(self.expires, self.taken + line_time + self.patience)
+        self.command = self._tasks.new_command(self.station, request)
+        self._tasks.advanced(self)
 
 
 class JobTasks:
@@ -95,39 +148,39 @@ class JobTasks:
         self._station = station
         self._tns = first_tns
         self._last_tns: dict[int, int] = {}
-        self.under_way: set[JobTask] = set()
-        self.waiting: deque[JobTask] = deque()
+        self.under_way: set[Job] = set()
+        self.waiting: deque[Job] = deque()
         self.next_expiry = math.inf
 
     def connect(self) -> None:
         """Take note of a connection that has to be heard before anything is written."""
         self.is_heard = False
 
-    def first(self, busy: Container[int], is_own: bool = False) -> JobTask | None:
+    def first(self, busy: Container[int], is_own: bool = False) -> Job | None:
         """Return the first that waits, but not for a ``busy`` station; only our own if asked."""
-        return next((task for task in self.waiting if task.station not in busy
-                     and (task.job.is_own or not is_own)), None)
+        return next((job for job in self.waiting if job.station not in busy
+                     and (job.is_own or not is_own)), None)
 
-    def take(self, task: JobTask, now: float) -> JobTask:
-        """Return a waiting task that is now to be sent."""
-        self._stop_waiting(task)
-        task.taken = now
-        return task
+    def take(self, job: Job, now: float) -> Job:
+        """Return a waiting job whose command is now to be sent."""
+        self._stop_waiting(job)
+        job.taken = now
+        return job
 
     def expire(self, now: float) -> None:
         """End the jobs whose next command has waited too long."""
-        for task in [task for task in self.waiting if now >= task.expires]:
-            self._stop_waiting(task)
-            task.fail(CommandExpired())
+        for job in [job for job in self.waiting if now >= job.expires]:
+            self._stop_waiting(job)
+            job.fail(CommandExpired())
 
-    def _stop_waiting(self, task: JobTask) -> None:
-        self.waiting.remove(task)
-        self.next_expiry = min((task.expires for task in self.waiting), default=math.inf)
+    def _stop_waiting(self, job: Job) -> None:
+        self.waiting.remove(job)
+        self.next_expiry = min((job.expires for job in self.waiting), default=math.inf)
 
     def fail(self, error: LinkError) -> None:
         """End every job with ``error``."""
-        for task in list(self.under_way):
-            task.fail(error)
+        for job in list(self.under_way):
+            job.fail(error)
         self.waiting.clear()
         self.next_expiry = math.inf
 
@@ -144,64 +197,7 @@ class JobTasks:
         self._last_tns[station] = self._tns
         return Packet(station, self._station, cmd, 0, self._tns, data)
 
-    def advanced(self, task: JobTask) -> None:
-        """Take note that a task has its next command ready."""
-        self.waiting.append(task)
-        self.next_expiry = min(self.next_expiry, task.expires)
-
-
-class JobTask:
-    """A job as the link sees it; ``taken`` is when the link took its command."""
-
-    def __init__(self, tasks: JobTasks, job: Job, now: float) -> None:
-        self.job = job
-        self.sent = False
-        self.reply_size = job.reply_size
-        self.expires = job.expires
-        self.blames = job.blames
-        self.is_own, self.answer_within = job.is_own, job.answer_within
-        self.taken = now
-        self.station = job.station
-        self._tasks = tasks
-        self._steps = job.steps(now)
-        try:
-            request = next(self._steps)
-        except Exception as error:  # a bug, or it has ended before its first command
-            job.ended(error)
-            raise
-        self.command = tasks.new_command(job.station, request)
-        tasks.under_way.add(self)
-
-    def reply(self, packet: Packet) -> None:
-        """Take the reply and go on to the next request."""
-        self._tasks.transactions += 1
-        if self.station != BROADCAST:
-            self._tasks.is_heard = True
-        self._advance(self._steps.send, packet)
-
-    def fail(self, error: LinkError) -> None:
-        """Raise ``error`` in the job, unless it has ended."""
-        if getgeneratorstate(self._steps) == GEN_CLOSED:  # closed by the garbage collector
-            return
-        # One of its own: where the port is lost, all tasks are failed with the same.
-        self._advance(self._steps.throw, type(error)(*error.args, sent=self.sent))
-
-    def _advance(self, resume: Callable[[_With], Request], what: _With) -> None:
-        try:
-            request = resume(what)
-        except StopIteration:
-            self._tasks.under_way.discard(self)
-            self.job.ended(None)
-            return
-        except Exception as error:
-            self._tasks.under_way.discard(self)
-            self.job.ended(error)
-            if not isinstance(error, Abdf1Error):
-                raise  # a bug
-            return
-        self.sent, self.reply_size = False, 0
-        if self.job.patience:
-            line_time = len(self.command.encode()) * self._tasks.char_time
-            self.expires = max(self.expires, self.taken + line_time + self.job.patience)
-        self.command = self._tasks.new_command(self.station, request)
-        self._tasks.advanced(self)
+    def advanced(self, job: Job) -> None:
+        """Take note that a job has its next command ready."""
+        self.waiting.append(job)
+        self.next_expiry = min(self.next_expiry, job.expires)

@@ -32,7 +32,7 @@ from abdf1_ros.df1.settings import LinkSettings
 from abdf1_ros.df1.stations import ActiveStationList
 from abdf1_ros.df1.tasks import Task, TaskSource
 from abdf1_ros.driver.inbox import Inbox
-from abdf1_ros.driver.job_tasks import Job, JobTask, JobTasks
+from abdf1_ros.driver.job_tasks import Job, JobTasks
 from abdf1_ros.errors import LinkError, PortLost
 from abdf1_ros.messages import Event, Message
 from abdf1_ros.pccc.data_table import DataTable
@@ -55,14 +55,14 @@ class _RequestJob(Job):
     def __init__(self, station: int, work: Steps[Any], succeed: Callable[[Any], None],
                  fail: Callable[[Exception], None]) -> None:
         self.station = station
-        self._work, self._succeed, self.fail = work, succeed, fail
+        self._work, self._succeed, self.give_up = work, succeed, fail
 
     def steps(self, now: float) -> Steps[None]:
         """Carry out the request and report its end; a bug in it ends no other request."""
         try:
             result = yield from self._work
         except Exception as error:
-            self.fail(error)
+            self.give_up(error)
         else:
             self._succeed(result)
 
@@ -71,22 +71,22 @@ class _RequestJob(Job):
 
 
 class _Question(Job):
-    """An echo, after whose answer a task goes out; without an answer the task fails unsent."""
+    """An echo, after whose answer a job goes out; without an answer the job fails unsent."""
 
-    def __init__(self, tasks: JobTasks, task: JobTask) -> None:
-        self.station = task.station
-        self._tasks, self._task = tasks, task
+    def __init__(self, job: Job) -> None:
+        self.station = job.station
+        self._job = job
 
     def steps(self, now: float) -> Steps[None]:
         """Ask for the echo; a refusal is an answer as well."""
         return echo(b'')
 
     def ended(self, error: Exception | None) -> None:
-        """Let the task go on, or end."""
+        """Let the job go on, or end."""
         if isinstance(error, LinkError):
-            self._task.fail(error)
+            self._job.fail(error)
         else:
-            self._tasks.advanced(self._task)
+            self._tasks.advanced(self._job)
 
 
 class Requests(TaskSource):
@@ -147,14 +147,14 @@ class Requests(TaskSource):
             return self._tasks.take(under_way, now)
         for request in self._waiting.take():
             with suppress(StopIteration):  # it has ended before its first command
-                return self._heard_first(JobTask(self._tasks, request, now), now)
+                return self._heard_first(request.start(self._tasks, now), now)
         return None
 
-    def _heard_first(self, task: JobTask, now: float) -> JobTask:
-        """Return a task, or the question before one that may write."""
-        if self._tasks.is_heard or effect_of(task.command) is Effect.READS:
-            return task
-        return JobTask(self._tasks, _Question(self._tasks, task), now)
+    def _heard_first(self, job: Job, now: float) -> Job:
+        """Return a job that has started, or the question before one that may write."""
+        if self._tasks.is_heard or effect_of(job.command) is Effect.READS:
+            return job
+        return _Question(job).start(self._tasks, now)
 
     def _report(self, event: Event) -> None:
         self._told(event)
@@ -180,4 +180,4 @@ class Requests(TaskSource):
 
 
 def _refuse(request: _RequestJob, reason: LinkError) -> None:
-    request.fail(PortLost(*reason.args, sent=False))
+    request.give_up(PortLost(*reason.args, sent=False))

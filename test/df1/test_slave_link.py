@@ -65,18 +65,6 @@ def test_command_whose_reply_has_come_is_not_sent_again() -> None:
     assert bench.poll() == EOT
 
 
-@pytest.mark.parametrize('busy', [False, True])
-def test_waiting_commands_expire_although_we_are_never_polled(busy: bool) -> None:
-    bench = SlaveBench(SETTINGS, poll_timeout=60.0, patience=1.0)
-    task = bench.add(own())
-    if busy:
-        bench.listen(1.5, OTHERS_TRAFFIC, 0.01)
-    else:
-        bench.wait(1.5)
-    assert isinstance(task.result, CommandTimeout)
-    assert not task.sent
-
-
 def test_message_that_just_stops_is_counted_once() -> None:
     bench = SlaveBench(SETTINGS)
     assert bench.hear(bench.frame(FROM_MASTER)[:9]) == b''

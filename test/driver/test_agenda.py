@@ -30,7 +30,7 @@ from abdf1_ros.driver.agenda import Agenda, MAX_WRITES_IN_A_ROW
 from abdf1_ros.driver.checks import Checks
 from abdf1_ros.driver.guests import GuestQueue
 from abdf1_ros.driver.interlocks.queue import Interlocks
-from abdf1_ros.driver.job_tasks import Job, JobTask, JobTasks
+from abdf1_ros.driver.job_tasks import Job, JobTasks
 from abdf1_ros.driver.reads.job import ReadJob
 from abdf1_ros.driver.reads.point import ReadPoint
 from abdf1_ros.driver.reads.readings import Readings
@@ -112,11 +112,11 @@ class Bench:
 
     def next(self, now: float) -> object:  # noqa: A003
         """Return who has the line next; a write ends at once."""
-        task = self.agenda.next(now)
-        if task is None or not isinstance(task.job, MessageJob):
-            return task and task.job
-        self.end(task.job)
-        return task.job.write
+        job = self.agenda.next(now)
+        if not isinstance(job, MessageJob):
+            return job
+        self.end(job)
+        return job.write
 
     def end(self, job: MessageJob) -> None:
         """Let a write end unsent."""
@@ -213,47 +213,46 @@ class NinePackets(Job):
 
 
 def test_packets_of_a_long_write_use_up_the_turn_of_writes() -> None:
-    job = make_job()
-    bench = Bench(job)
+    read = make_job()
+    bench = Bench(read)
     write = bench.write(WORD, 1, 0.0)
     assert bench.next(0.0) is write
-    task = JobTask(bench.tasks, NinePackets(), 0.0)
+    job = NinePackets().start(bench.tasks, 0.0)
     for _ in range(MAX_WRITES_IN_A_ROW - 1):
-        task.reply(task.command.reply())
-        assert bench.next(0.0) is task.job
+        job.reply(job.command.reply())
+        assert bench.next(0.0) is job
     another = bench.write(WORD, 2, 0.0)
-    assert bench.next(0.0) is job
+    assert bench.next(0.0) is read
     assert bench.next(0.0) is another
 
 
 def test_new_writes_and_packets_of_a_long_one_take_turns() -> None:
     bench = Bench()
-    task = JobTask(bench.tasks, NinePackets(), 0.0)
-    task.reply(task.command.reply())
+    job = NinePackets().start(bench.tasks, 0.0)
+    job.reply(job.command.reply())
     writes = [bench.write(make_mapping(f'N7:{20 + n}', 'Write'), n, 0.0) for n in range(4)]
     order = []
     for _ in range(8):
         taken = bench.next(0.0)
         order.append(taken)
-        if taken is task.job:
-            task.reply(task.command.reply())
-    assert order in ([task.job, writes[0], task.job, writes[1], task.job, writes[2], task.job,
-                      writes[3]], [writes[0], task.job, writes[1], task.job, writes[2], task.job,
-                                   writes[3], task.job])
+        if taken is job:
+            job.reply(job.command.reply())
+    assert order in ([job, writes[0], job, writes[1], job, writes[2], job, writes[3]],
+                     [writes[0], job, writes[1], job, writes[2], job, writes[3], job])
 
 
 def test_packets_of_a_long_write_keep_their_turn_while_their_station_is_polled() -> None:
     """Else new writes to a station take all turns of a line with standard polling."""
     bench = Bench()
-    task = JobTask(bench.tasks, NinePackets(), 0.0)
-    task.reply(task.command.reply())
+    job = NinePackets().start(bench.tasks, 0.0)
+    job.reply(job.command.reply())
     order = []
     for number in range(6):
         bench.write(make_mapping(f'N7:{20 + number}', 'Write'), 1, 0.0)
         taken = bench.next(0.0)
-        order.append(taken is task.job)
-        if taken is task.job:
-            task.reply(task.command.reply())
+        order.append(taken is job)
+        if taken is job:
+            job.reply(job.command.reply())
         assert bench.agenda.next(0.0, frozenset({1})) is None
     assert order.count(True) == 3
 

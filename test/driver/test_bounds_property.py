@@ -37,7 +37,7 @@ from abdf1_ros.df1.packet import Packet, STS_NOT_DELIVERED
 from abdf1_ros.df1.settings import LinkSettings
 from abdf1_ros.df1.slave import HalfDuplexSlave
 from abdf1_ros.driver.interlocks.plc import Plc
-from abdf1_ros.driver.job_tasks import JobTask
+from abdf1_ros.driver.job_tasks import Job
 from abdf1_ros.driver.settings import DriverSettings
 from abdf1_ros.pccc.families import parse_address
 from abdf1_ros.pccc.file_types import PlcType
@@ -231,15 +231,15 @@ class BoundBench:
         plc.slave = HalfDuplexSlave(LinkSettings(station=station), execute)
         return plc
 
-    def _timed_task(self, now: float, busy: Container[int] = ()) -> JobTask | None:
+    def _timed_task(self, now: float, busy: Container[int] = ()) -> Job | None:
         """Give the link its next command, and measure how long it takes."""
         task = self._next_task(now, busy)
-        if isinstance(task, JobTask):
+        if isinstance(task, Job):
             for end in ('reply', 'fail'):
                 setattr(task, end, partial(self._ended, task, end, self.bench.clock()))
         return task
 
-    def _ended(self, task: JobTask, end: str, begun: float, how: Any) -> None:
+    def _ended(self, task: Job, end: str, begun: float, how: Any) -> None:
         del task.reply, task.fail
         # A reply of before, that comes first, is more than the retries allow.
         if not self.bench.driver.counters.stale_messages:

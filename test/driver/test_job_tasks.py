@@ -18,7 +18,7 @@ import math
 from unittest.mock import Mock
 
 from abdf1_ros.df1.packet import Packet
-from abdf1_ros.driver.job_tasks import Job, JobTask, JobTasks
+from abdf1_ros.driver.job_tasks import Job, JobTasks
 from abdf1_ros.errors import CommandTimeout, PortLost
 from abdf1_ros.pccc.dialect import Steps
 import pytest
@@ -56,7 +56,7 @@ class TwoRequests(Job):
 
 def test_job_is_one_command_after_the_other() -> None:
     job, tasks = TwoRequests(), JobTasks(OURS, 0x10)
-    task = JobTask(tasks, job, NOW)
+    task = job.start(tasks, NOW)
     assert task.command == Packet(1, OURS, 0x0F, 0, 0x11, b'a')
     assert tasks.first(()) is None  # whoever has started it sends it
     task.sent = True
@@ -71,7 +71,7 @@ def test_job_is_one_command_after_the_other() -> None:
 
 
 def test_size_of_the_reply_is_that_of_the_first_command() -> None:
-    task = JobTask(JobTasks(OURS, 0), TwoRequests(reply_size=20), NOW)
+    task = TwoRequests(reply_size=20).start(JobTasks(OURS, 0), NOW)
     assert task.reply_size == 20
     task.reply(task.command.reply(bytes(20)))
     assert task.reply_size == 0
@@ -81,7 +81,7 @@ def test_error_ends_the_job_and_says_whether_the_command_was_sent() -> None:
     tasks = JobTasks(OURS, 0)
     for was_sent in (False, True):
         job = TwoRequests()
-        task = JobTask(tasks, job, NOW)
+        task = job.start(tasks, NOW)
         task.sent = was_sent
         task.fail(CommandTimeout())
         error, = job.errors
@@ -92,7 +92,7 @@ def test_error_ends_the_job_and_says_whether_the_command_was_sent() -> None:
 
 def test_all_jobs_end_with_the_port() -> None:
     jobs, tasks = (TwoRequests(1), TwoRequests(2)), JobTasks(OURS, 0)
-    first, _ = (JobTask(tasks, job, NOW) for job in jobs)
+    first, _ = (job.start(tasks, NOW) for job in jobs)
     first.reply(first.command.reply(b'one'))
     tasks.fail(PortLost('unplugged'))
     assert [str(error) for job in jobs for error in job.errors] == ['port lost: unplugged'] * 2
@@ -107,7 +107,7 @@ def test_error_in_a_job_ends_it() -> None:
             raise ZeroDivisionError
 
     job, tasks = Faulty(), JobTasks(OURS, 0)
-    task = JobTask(tasks, job, NOW)
+    task = job.start(tasks, NOW)
     with pytest.raises(ZeroDivisionError):
         task.reply(task.command.reply())
     tasks.fail(PortLost('unplugged'))  # there is nothing left to be ended
@@ -142,7 +142,7 @@ def test_transaction_number_is_passed_over_when_a_whole_round_lies_between() -> 
 
 def test_job_that_the_garbage_collector_has_ended_is_left_alone() -> None:
     job, tasks = TwoRequests(), JobTasks(OURS, 0)
-    JobTask(tasks, job, NOW)
+    job.start(tasks, NOW)
     assert job.under_way is not None
     job.under_way.close()
     tasks.fail(PortLost('unplugged'))
@@ -151,7 +151,7 @@ def test_job_that_the_garbage_collector_has_ended_is_left_alone() -> None:
 
 def test_command_expires_by_the_request_or_by_the_command_before() -> None:
     tasks = JobTasks(OURS, 0, char_time=0.01)
-    task = JobTask(tasks, TwoRequests(expires=NOW + 1.5, patience=2.0), NOW)
+    task = TwoRequests(expires=NOW + 1.5, patience=2.0).start(tasks, NOW)
     size = len(task.command.encode())
     task.reply(task.command.reply())
     assert task.expires == pytest.approx(NOW + 2.0 + 0.01 * size)
@@ -161,7 +161,7 @@ def test_command_expires_by_the_request_or_by_the_command_before() -> None:
 @pytest.mark.parametrize('after, errors', [(-0.001, 0), (0.0, 1), (4.0, 1)])
 def test_job_ends_whose_next_command_has_waited_too_long(after: float, errors: int) -> None:
     job, tasks = TwoRequests(expires=NOW + 2.0, patience=2.0), JobTasks(OURS, 0)
-    task = JobTask(tasks, job, NOW)
+    task = job.start(tasks, NOW)
     task.sent = True
     task.reply(task.command.reply())
     tasks.expire(task.expires + after)

@@ -28,7 +28,7 @@ from abdf1_ros.df1.settings import LinkSettings, PollingSettings
 from abdf1_ros.df1.slave import HalfDuplexSlave, multidrop
 from abdf1_ros.df1.slave_link import SlaveLink
 from abdf1_ros.df1.stations import ActiveStationList
-from abdf1_ros.errors import CommandTimeout, LinkError
+from abdf1_ros.errors import LinkError
 from support.peers import CommandTask, Recorded
 from support.virtual_line import char_time, VirtualLine
 
@@ -36,14 +36,13 @@ Serve = Callable[[Packet], Packet]
 
 
 class CommandTasks(Recorded):
-    """Commands that wait for a link; after ``patience`` s of waiting they fail."""
+    """Commands that wait for a link."""
 
-    def __init__(self, clock: Callable[[], float], patience: float = float('inf')) -> None:
+    def __init__(self, clock: Callable[[], float]) -> None:
         super().__init__()
         self.clock = clock
         self.waiting: deque[CommandTask] = deque()
         self.all: list[CommandTask] = []
-        self.patience = patience
 
     def add(self, command: Packet) -> CommandTask:
         """Queue a command."""
@@ -54,7 +53,6 @@ class CommandTasks(Recorded):
 
     def next_task(self, now: float, busy: Container[int] = ()) -> CommandTask | None:
         """Return the next command for a station that is not busy."""
-        self.expire(now)
         for task in self.waiting:
             if task.command.dst not in busy:
                 self.waiting.remove(task)
@@ -64,11 +62,6 @@ class CommandTasks(Recorded):
     def next_due(self) -> float | None:
         """Return None: there is something to do when there is."""
         return None
-
-    def expire(self, now: float) -> None:
-        """End what has waited too long."""
-        while self.waiting and now - self.waiting[0].begun > self.patience:
-            self.waiting.popleft().fail(CommandTimeout())
 
 
 class Told(Machine):
@@ -260,9 +253,8 @@ class SlaveNode(CommandTasks):
     """A slave that is a driver of its own, on a machine of its own."""
 
     def __init__(self, settings: LinkSettings, clock: Callable[[], float], *,
-                 patience: float = float('inf'), serve: Serve = Packet.reply,
-                 timing: LineTiming | None = None) -> None:
-        super().__init__(clock, patience)
+                 serve: Serve = Packet.reply, timing: LineTiming | None = None) -> None:
+        super().__init__(clock)
         self.number = settings.station
         self.settings = settings
         self.served: list[Packet] = []
@@ -286,13 +278,11 @@ class SlaveNode(CommandTasks):
 class SlaveBench(SlaveNode):
     """A slave whose line says what the test tells it."""
 
-    def __init__(self, settings: LinkSettings, *, patience: float = float('inf'),
-                 serve: Serve = Packet.reply, timing: LineTiming | None = None,
-                 **others: float) -> None:
+    def __init__(self, settings: LinkSettings, *, serve: Serve = Packet.reply,
+                 timing: LineTiming | None = None, **others: float) -> None:
         self.now = 100.0
         super().__init__(
-            replace(settings, **others), lambda: self.now, patience=patience, serve=serve,
-            timing=timing)
+            replace(settings, **others), lambda: self.now, serve=serve, timing=timing)
         self.machine.start(self.now)
 
     def hear(self, *data: bytes) -> bytes:

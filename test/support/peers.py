@@ -135,9 +135,6 @@ class PeerNode(Recorded):
         """Return None: there is something to do when there is."""
         return None
 
-    def expire(self, now: float) -> None:
-        """Do nothing: a command waits for the line as long as it takes."""
-
 
 class PeerBench(PeerNode):
     """A peer whose line says what the test tells it."""
