@@ -22,7 +22,7 @@ from abdf1_ros.counters import Counters
 from abdf1_ros.df1.checksum import Checksum
 from abdf1_ros.df1.frames import Control, Frame, FrameFault, MAX_LINK_DATA, Symbol
 from abdf1_ros.df1.packet import HEADER_SIZE, is_local_status, Packet, REPLY_BIT
-from abdf1_ros.df1.stations import ActiveStationList
+from abdf1_ros.df1.stations import ActiveStationList, MOST_OVERDUE
 from abdf1_ros.df1.tasks import Task
 from abdf1_ros.errors import CommandTimeout, WrongCommandCode
 from abdf1_ros.messages import Event, Message
@@ -159,8 +159,11 @@ class Accounting:
         self.counters.command_timeouts += 1
         number = task.command.dst
         if task.blames:
-            self._stations[number].overdue += keeps_others_waiting
-            self._stations[number].unanswered += 1
+            station = self._stations[number]
+            if keeps_others_waiting:
+                station.overdue = MOST_OVERDUE if self._stations.is_new(number) \
+                    else station.overdue + 1
+            station.unanswered += 1
         self.note(Message.ERR_COMMAND_TIMEOUT, station=number)
 
     def overdue(self, task: Task, *, keeps_others_waiting: bool) -> None:

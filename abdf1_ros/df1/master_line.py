@@ -337,9 +337,28 @@ class MasterLine:
 
     def answers(self, packet: Packet, command: Packet) -> bool:
         """Tell whether a message is the reply to ``command``; a gateway may fill in its DST."""
-        if command.dst in self.stations.routes:
+        if packet.dst != command.src and command.dst in self.stations.routes \
+                and self._is_of_gateway(packet, command):
             packet = packet._replace(dst=command.src)
         return packet.answers(command)
+
+    def _is_of_gateway(self, packet: Packet, command: Packet) -> bool:
+        """
+        Tell whether a reply has the number of its gateway in place of ours (M 6-4).
+
+        That is the number of Via. On its other network the gateway may have another number, which
+        we do not know: we take one that two replies in a row have, and no other station of ours.
+        """
+        if not packet._replace(dst=command.src).answers(command):
+            return False
+        gateway = self.stations.records[self.stations.routes[command.dst]]
+        if packet.dst == gateway.number:
+            return True
+        if packet.dst in self.stations:
+            return False
+        is_known = packet.dst == gateway.other_number
+        gateway.other_number = packet.dst
+        return is_known
 
     def complete(self, task: Task, reply: Packet, *, keeps_others_waiting: bool) -> None:
         """End a task with the reply to its command."""

@@ -162,10 +162,12 @@ class FullDuplexPeer(EqualNode):
         self._accounting.sent(task.command)
         task.sent = True
         # A station that did not answer last time gets one try, not a whole cycle of them.
+        station = self._stations[number]
+        is_once = not station.active or not station.replies and self._stations.is_new(number)
         try:
             delivered = yield from self._transfer(
                 task.command, lambda: key not in self._outstanding,
-                is_probe=not self._stations[number].active, expires=task.expires)
+                is_once=is_once, expires=task.expires)
         except CommandExpired as error:
             if self._outstanding.pop(key, None):
                 task.sent = error.sent
@@ -180,12 +182,12 @@ class FullDuplexPeer(EqualNode):
 
     def _send_reply(self, reply: Packet) -> Procedure:
         self._accounting.sent(reply)
-        delivered = yield from self._transfer(reply, lambda: False, is_probe=False)
+        delivered = yield from self._transfer(reply, lambda: False, is_once=False)
         if self._accepted is not None and self._accepted.key == reply.key_of_command:
             self._accepted.is_answered = delivered is not None
 
     def _transfer(self, packet: Packet, is_answered: Callable[[], bool],
-                  is_probe: bool, expires: float = math.inf
+                  is_once: bool, expires: float = math.inf
                   ) -> Generator[Step, Heard, float | None]:
         """Return when the message was delivered, None if it was not (M 4-5, TRANSFER)."""
         message = frames.message_frame(packet.encode(), self._settings.checksum)
@@ -205,14 +207,14 @@ class FullDuplexPeer(EqualNode):
             if response is Code.NAK:
                 naks += 1
                 self._accounting.nak_received(packet.dst)
-                if is_probe or not self._note_nak(naks, packet.dst):
+                if is_once or not self._note_nak(naks, packet.dst):
                     break
                 if naks > 1:
                     yield from self._listen((naks - 1) * _NAK_PAUSE)
                 sending = message
             else:
                 enqs += 1
-                if is_probe or not self._note_silence(enqs, packet.dst):
+                if is_once or not self._note_silence(enqs, packet.dst):
                     break
                 sending = frames.ENQ
         delivered = self._machine.now if response in (Code.ACK, Code.STX) else None

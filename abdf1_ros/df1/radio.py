@@ -203,7 +203,11 @@ class RadioNode(EqualNode):
         number = task.command.dst
         self._accounting.sent(task.command)
         # A station that did not answer last time gets one try, not a whole cycle of them.
-        most = self._settings.nak_retries + 1 if self._stations[number].active else 1
+        station = self._stations[number]
+        keeps_others_waiting = self._most_under_way == 1
+        is_once = not station.active or (
+            keeps_others_waiting and not station.replies and self._stations.is_new(number))
+        most = 1 if is_once else self._settings.nak_retries + 1
         self._under_way[number] = command = _Command(task, most)
         yield from self._try(command)
         if number == BROADCAST and not self._is_over(command):

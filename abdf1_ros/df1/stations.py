@@ -26,7 +26,7 @@ from abdf1_ros.df1.probes import Asker, Probes
 MAX_STATION = 254
 
 # After so many commands in a row without a reply in time the station is treated as silent.
-_MOST_OVERDUE = 2
+MOST_OVERDUE = 2
 
 # A station that has come back so often without a reply to a command does not come from an outage.
 _MOST_RETURNS = 2
@@ -46,6 +46,7 @@ class Station:
     ``local_status`` is the STS of the last reply to a command where a node on the way, such as a
     gateway, has sent that in its place, 0 where it is its own.
     ``returns`` counts how often it has become active again since its last reply to a command.
+    ``other_number`` of a gateway is the DST of its last reply that had neither our number nor its.
     """
 
     number: int
@@ -62,16 +63,17 @@ class Station:
     unanswered: int = 0
     local_status: int = 0
     returns: int = 0
+    other_number: int | None = None
 
     @property
     def replies_in_time(self) -> bool:
         """Tell whether this station is likely to reply to a command in time."""
-        return self.active and self.overdue < _MOST_OVERDUE
+        return self.active and self.overdue < MOST_OVERDUE
 
     @property
     def has_no_replies(self) -> bool:
         """Tell whether the last commands to it have had no reply in time."""
-        return self.unanswered >= _MOST_OVERDUE
+        return self.unanswered >= MOST_OVERDUE
 
     @property
     def takes_no_commands(self) -> bool:
@@ -219,6 +221,14 @@ class ActiveStationList:
             self.probes.spent(self._took(begun, now), now)
         else:
             self.probes.none_waits(now)
+
+    def is_new(self, number: int) -> bool:
+        """
+        Tell whether a station has never replied to a command, though another one has.
+
+        It may not be there, so it gets one try at a time: the others would wait for all retries.
+        """
+        return not self.records[number].replies and any(station.replies for station in self)
 
     @property
     def _someone_waits(self) -> bool:

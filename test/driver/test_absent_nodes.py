@@ -33,9 +33,12 @@ from support.odd_device import Answer, OddDevice, Wiring
 
 GATEWAY, LIVING, SECONDS, TIMEOUT = 8, 1, 20.0, 0.3
 ABSENT = (11, 12, 13)
-NAK, NOTHING, STATUS = Answer.NAK, Answer.NOTHING, Answer.ACK
+MESSAGES = 15
+NAK, NOTHING, STATUS, LOSES = Answer.NAK, Answer.NOTHING, Answer.ACK, Answer.LOSES
+_MODES = {'Peer': (Wiring.FULL, {'mode': 'Peer'}), 'Radio': (Wiring.RADIO, {'mode': 'Radio'})}
 KINDS = [('Message', STATUS), ('Message', NOTHING), ('Message', NAK), ('Standard', STATUS),
-         ('Standard', NOTHING), ('Standard', NAK), ('Peer', STATUS), ('Peer', NAK)]
+         ('Standard', NOTHING), ('Standard', NAK), ('Peer', STATUS), ('Peer', NOTHING),
+         ('Peer', NAK), ('Peer', LOSES), ('Message', LOSES), ('Radio', STATUS), ('Radio', NOTHING)]
 
 
 class Plant(DriverBench):
@@ -43,8 +46,7 @@ class Plant(DriverBench):
 
     def __init__(self, polling: str, answer: Answer, absent: Sequence[int] = (),
                  *, has_own: bool = False) -> None:
-        is_peer = polling == 'Peer'
-        via = None if is_peer else GATEWAY
+        via = None if polling in _MODES else GATEWAY
         self.read = make_mapping('N7:0', station=LIVING, plc='SLC', via=via, period=200)
         self.order = make_mapping(
             'N7:20', 'Write', station=LIVING, plc='SLC', via=via, tag='order',
@@ -53,17 +55,17 @@ class Plant(DriverBench):
         rows = [self.read, self.order, *([beat] if has_own else []), *(
             make_mapping('N7:0', station=number, plc='SLC', via=via, period=200)
             for number in absent)]
-        self.device = OddDevice(Wiring.FULL if is_peer else Wiring.HALF, GATEWAY, (LIVING,))
+        wiring, mode = _MODES.get(polling, (Wiring.HALF, {'polling': polling}))
+        self.device = OddDevice(wiring, GATEWAY, (LIVING,))
         self.device.takes = lambda data: answer if data[0] in ABSENT else Answer.ACK
-        mode = {'mode': 'Peer'} if is_peer else {'polling': polling}
         super().__init__(
             rows, network=Network(
                 station=5, baud=19200, timeout=int(TIMEOUT * 1000), cmd_timeout=1000,
                 **mode),  # type: ignore[arg-type]
             settings=DriverSettings(), start=False, far=self.device)
-        for second in range(int(SECONDS)):
-            self.at(second + 0.5, lambda second=second: self.write(  # type: ignore[misc]
-                self.order, [second + 1]))
+        for number in range(MESSAGES):
+            self.at(1.25 * number + 0.5, lambda number=number: self.write(  # type: ignore[misc]
+                self.order, [number + 1]))
         self.breathe()
         self.open(run=SECONDS)
 
@@ -87,7 +89,7 @@ def test_living_node_keeps_its_reads_and_writes(
     alone, plant = Plant(polling, answer), Plant(polling, answer, ABSENT[:count])
     reads = [len(bench.listener.times(bench.read)) for bench in (alone, plant)]
     assert reads[1] >= 0.75 * reads[0], reads
-    assert plant.listener.outcomes() == int(SECONDS) * [Outcome.WRITTEN]
+    assert plant.listener.outcomes() == MESSAGES * [Outcome.WRITTEN]
     assert plant.longest_gap <= alone.longest_gap + 4 * TIMEOUT + 0.1
     assert plant.silent == {*ABSENT[:count]}
 
@@ -97,11 +99,11 @@ def test_living_node_keeps_its_reads_and_writes(
 def test_heartbeat_of_a_living_node_counts_and_no_fallback_is_written_after_first_contact(
         polling: str, answer: Answer, count: int) -> None:
     plant = Plant(polling, answer, ABSENT[:count], has_own=True)
-    assert plant.device.words[LIVING, 10, 0] >= 35  # in 20 s with a Period of 0.5 s
+    assert plant.device.words[LIVING, 10, 0] >= 30  # of 40
     fallbacks = [str(result) for result in plant.listener.results
                  if result.outcome is Outcome.FALLBACK]
     assert fallbacks == ['fallback value written: start']
-    assert plant.device.words[LIVING, 7, 20] == int(SECONDS)
+    assert plant.device.words[LIVING, 7, 20] == MESSAGES
 
 
 @pytest.mark.parametrize('polling', ['Message', 'Standard'])

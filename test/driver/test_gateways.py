@@ -16,15 +16,19 @@
 
 from collections.abc import Callable
 from functools import partial
+import itertools
 
 from abdf1_ros.df1 import frames
 from abdf1_ros.df1.checksum import Checksum
 from abdf1_ros.df1.frames import Duplex, Frame, FrameDecoder, Poll, Symbol
 from abdf1_ros.df1.packet import Packet
 from abdf1_ros.driver.settings import DriverSettings
+from abdf1_ros.driver.write import Outcome
+from abdf1_ros.messages import Message
 from abdf1_ros.settings.heartbeats import Fallback
 from abdf1_ros.settings.network import Network
 from abdf1_ros.simulator.gateway import SimulatedGateway
+from abdf1_ros.simulator.simulated_plc import SimulatedPlc
 import pytest
 from support.driver_bench import DriverBench, simulated_plc, store, stored
 from support.mappings import make_mapping
@@ -191,21 +195,46 @@ def test_plcs_that_never_reply_cost_another_behind_their_gateway_little() -> Non
     assert counts[:2] == [0, 0] and counts[2] > 70  # of 100
 
 
+def address_replies(bench: Bench, address: Callable[[int], int],
+                    plc: SimulatedPlc | None = None) -> None:
+    """Let a PLC, the first if none is given, reply to other nodes, by the count of replies."""
+    plc = plc or bench.plcs[0]
+    serve, count = plc.serve, itertools.count()
+    plc.serve = lambda command: serve(command)._replace(  # type: ignore[method-assign]
+        dst=address(next(count)))
+
+
+def wrong_messages(bench: Bench) -> list[tuple[int, int]]:
+    """Return SRC and DST of all that was refused as 2510."""
+    return [event.args[:2] for event in bench.listener.events
+            if event.message is Message.ERR_WRONG_MESSAGE]
+
+
 @pytest.mark.parametrize('polling', POLLING)
-def test_gateway_that_fills_in_its_own_node(polling: str) -> None:
+@pytest.mark.parametrize('node', [GATEWAY, 0, 9])
+def test_gateway_that_fills_in_its_own_node(polling: str, node: int) -> None:
     """M 6-4: it may put its node in place of our station, so replies come to that."""
     bench = Bench(polling)
-    serve = bench.plcs[0].serve
-
-    def serve_for_itself(command: Packet) -> Packet:
-        reply = serve(command)
-        return Packet(0, reply.src, reply.cmd, reply.sts, reply.tns, reply.data)
-
-    bench.plcs[0].serve = serve_for_itself  # type: ignore[method-assign]
-    bench.run(1.0)
+    address_replies(bench, lambda count: node)
+    bench.run(2.0)
     assert len(bench.listener.values(bench.first)) >= 8
     assert len(bench.listener.values(bench.second)) >= 8
-    assert bench.listener.numbers() == {2523}
+    # A number that we do not know is believed when the next reply has it, too.
+    wrong = [] if node == GATEWAY else [(FIRST, node)]
+    assert wrong_messages(bench) == wrong
+
+
+@pytest.mark.parametrize('polling', POLLING)
+@pytest.mark.parametrize('nodes', [(SECOND,), (DIRECT,), (9, 12)])
+def test_reply_to_another_node_confirms_no_write(polling: str, nodes: tuple[int, ...]) -> None:
+    bench = Bench(polling)
+    bench.run(1.0)
+    address_replies(bench, lambda count: nodes[count % len(nodes)], bench.plcs[1])
+    bench.run(0.5)
+    bench.write(bench.second, [7], run=5.0)
+    assert stored(bench.plcs[1], 'N7:0') == b'\x07\x00'
+    assert bench.listener.outcomes() == [Outcome.UNKNOWN]
+    assert {number for number, _ in wrong_messages(bench)} == {SECOND}
 
 
 def test_processors_behind_a_gateway_tell_what_they_are() -> None:

@@ -149,8 +149,7 @@ class Reads(WriteListener):
             return
         station = self._stations.records[job.station]
         if not station.replies_in_time:
-            is_probe = job.is_probe or station.active  # or a reply that is late once more
-            self._stations.tried(job.station, job.asked, now, was_silent=is_probe)
+            self._stations.tried(job.station, job.asked, now, was_silent=job.is_probe)
             self._put_off = now if self._due else now + job.block.period
             self._set_aside(job)
             return
