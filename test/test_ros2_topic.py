@@ -70,7 +70,7 @@ def test_echo_of_a_read_topic_is_what_the_reference_shows(bridge: Process) -> No
 
 def test_state_of_all_is_a_few_lines(bridge: Process) -> None:
     shown = block_after('docs/reference/diagnostics.md',
-                        '$ ros2 topic echo --once /diagnostics | grep message')
+                        "$ ros2 topic echo --once /diagnostics | grep '^  message'")
     for _ in range(10):  # the first ones may come before every mapping has been read
         lines = said('topic', 'echo', '--once', '/diagnostics', *DIRECT)
         messages = [line for line in lines if 'message' in line]
