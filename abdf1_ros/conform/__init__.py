@@ -13,7 +13,7 @@
 # limitations under the License.
 
 """
-The conformance kit: it plays one end of a line and checks the other end.
+The conformance kit: it plays one end of a line and checks the target at the far end.
 
 ``codec`` makes and reads bytes, ``wire`` sends and receives them, ``case`` defines and runs a
 case, ``ends`` are the parts that we play. ``slave``, ``master``, ``peer``, ``client`` and

@@ -25,7 +25,7 @@ from abdf1_ros.conform.wire import Failed, Sent, Skipped, Wire
 
 
 class Target(Enum):
-    """The kind of the other end."""
+    """The kind of the target."""
 
     SLAVE = 'slave'
     MASTER = 'master'
@@ -64,8 +64,8 @@ class Case:
     """
     One rule.
 
-    ``name`` is unique, ``rule`` is what the manual requires of the other end, ``source`` is its
-    page. ``run`` raises Failed or Skipped; its argument is the end that we play.
+    ``name`` is unique, ``rule`` is what the manual requires of the target, ``source`` is its page.
+    ``run`` raises Failed or Skipped; its argument is the end that we play.
     """
 
     name: str
@@ -88,7 +88,8 @@ class CaseResult:
     transcript: tuple[str, ...] = field(default=())
 
 
-# No case takes longer (s), and after the other none is begun: a run has a verdict in 15 minutes.
+# Longest time (s) of a case, and the time (s) after which no case begins. So a run has a verdict
+# in 15 minutes.
 LONGEST_CASE = 290.0
 LONGEST_RUN = 600.0
 
@@ -107,10 +108,10 @@ def case(rule: str, source: str, *targets: Target,
 def run_cases(cases: Iterable[Case], wire: Wire, end: Any,
               allowed: frozenset[Permission]) -> Iterator[CaseResult]:
     """
-    Yield the result of each case, one after the other.
+    Yield the result of each case, in their order.
 
-    ``end`` is the one that we play; before each case it waits until the other end has done what
-    the last case has left. The caller handles OSError of the line.
+    ``end`` is the end that we play. Before each case it waits until the target has finished what
+    the case before has left. The caller handles OSError of the line.
     """
     first = wire.now
     for entry in cases:

@@ -15,8 +15,8 @@
 """
 Cases of the commands, which slaves, full-duplex nodes and radio modem nodes answer alike.
 
-Statuses are those of M 8-2 to 8-4. The commands are written out byte by byte, as M 7-17 (SLC 500
-and MicroLogix), 7-20 and 7-28 to 7-30 (PLC-5) have them.
+Statuses come from M 8-2 to 8-4. The commands are written out byte by byte, as M 7-17 (SLC 500 and
+MicroLogix), 7-20 and 7-28 to 7-30 (PLC-5) have them.
 """
 
 from __future__ import annotations

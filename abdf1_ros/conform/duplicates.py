@@ -15,8 +15,8 @@
 """
 Cases of duplicate detection, which is the same for a half-duplex slave and a full-duplex node.
 
-A message is a duplicate when SRC, CMD and TNS are those of the message before it. Products have
-a setting that turns detection off.
+A message is a duplicate if it has the SRC, CMD and TNS of the message before it. Products have a
+setting that turns detection off.
 """
 
 from __future__ import annotations

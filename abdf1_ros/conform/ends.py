@@ -27,7 +27,7 @@ from abdf1_ros.conform.wire import Failed, Skipped, Wire
 # Between two polls of a station that answers DLE EOT (s), so that it can finish.
 POLL_PAUSE = 0.02
 
-# A target that sends by itself may take so long (s) to send something.
+# Longest time (s) until a target that sends by itself sends something.
 PATIENCE = 30.0
 
 HIGHEST_LIMIT = 255  # of repetitions and enquiries that any product can be set to
@@ -57,7 +57,7 @@ def expect_end_of_enquiries(wire: Wire, patience: float) -> Symbol | None:
 _MOST_TRIES = 3  # of what a full sink may refuse, and of what is asked of a driver
 _MOST_COMMANDS = 20  # in a row that a slave asks by itself
 
-# A reply may take so many answer times.
+# Longest time of a reply, in answer times.
 _REPLY_TIMES = 5
 
 
@@ -66,8 +66,8 @@ class Words:
     """
     Words of the target for the cases that read and write.
 
-    ``address`` is that of an integer file, as N7:0; ``count`` of its words may be overwritten
-    (0: none). ``family`` is PLC5 or SLC, empty where it is not known.
+    ``address`` is in an integer file, as N7:0; ``count`` of its words may be overwritten (0:
+    none). ``family`` is PLC5 or SLC, empty where it is not known.
     """
 
     file: int = 7
@@ -123,7 +123,7 @@ class AskingEnd(ABC):
 
     @abstractmethod
     def settle(self) -> None:
-        """Take what the other end still sends or owes, so that a case begins clean."""
+        """Take what the target still sends or owes, so that a case begins clean."""
 
     def frame(self, command: bytes) -> bytes:
         """Return a message as it stands on the line."""
@@ -164,7 +164,7 @@ class AskingEnd(ABC):
 
     @abstractmethod
     def further(self, seconds: float) -> Symbol | None:
-        """Return the first answer within so many seconds that is not DLE EOT."""
+        """Return the first answer within ``seconds`` that is not DLE EOT."""
 
     def expect_nothing(self, what: str) -> None:
         """Expect no answer at all, at a poll either; Failed says ``what`` should have none."""
@@ -285,7 +285,7 @@ Serve = Callable[[bytes], bytes]
 
 
 class AnsweringEnd(ABC):
-    """What both ends that answer commands have."""
+    """The common part of both ends that answer commands."""
 
     def __init__(self, wire: Wire, serve: Serve) -> None:
         self.wire = wire

@@ -39,7 +39,7 @@ _COUNTERS = b'\x01\x00\x00\x1A'  # FNC, address and size of a read of diagnostic
 
 
 def _sent_on(end: RadioEnd, command: bytes) -> int:
-    """Send what is not for the target; return how often it sends that on, Failed for a reply."""
+    """Send a message for another node; return how often it is forwarded, Failed for a reply."""
     end.send(command)
     until, count = end.wire.now + 2 * end.wire.answer_time, 0
     while (symbol := end.wire.hear(max(until - end.wire.now, 0.0))) is not None:
@@ -142,7 +142,7 @@ def silence_not_enquired(end: RadioServerEnd) -> None:
 
 
 def _not_taken(end: RadioServerEnd, command: Symbol, *frames: bytes) -> None:
-    """Send frames before the reply to a command: its sender may only send those of others on."""
+    """Send frames before the reply to a command; the target may only forward them."""
     for frame in frames:
         end.wire.send(frame)
     while (symbol := end.wire.hear(_MOMENT)) is not None:

@@ -68,13 +68,13 @@ class Wire:
     """
     One end of a line.
 
-    ``answer_time`` is how long (s) an answer may take; after so long without bytes there is
+    ``answer_time`` is the longest time (s) of an answer, and the time without bytes that counts as
     silence. It counts from the end of what was sent, at ``char_time`` s a byte. Where it
     ``is_radio`` nothing has a response, so DLE ENQ gets none. ``transcript`` keeps all bytes in
     order; ``has_heard`` tells whether any byte came. A response inside a message is heard before
-    that message. ``enquired_after`` is the shortest time (s) from a message of the other end to
-    its DLE ENQ. With ``passes_commands`` what the other end asks by itself, as the MSG of a
-    program, is acknowledged and passed over.
+    that message. ``enquired_after`` is the shortest time (s) from a message of the target to its
+    DLE ENQ. With ``passes_commands`` a command of the target itself, such as a MSG of its program,
+    is acknowledged and ignored.
     """
 
     def __init__(self, line: RawLine, check: BlockCheck, clock: Callable[[], float], *,
@@ -135,7 +135,7 @@ class Wire:
         return symbol
 
     def _has_passed(self, symbol: Symbol, answers: bool) -> bool:
-        """Answer a DLE ENQ, or what the other end asks by itself; tell whether it was that."""
+        """Answer a DLE ENQ or a command of the target; return True if it was one of them."""
         if answers and not self._is_radio and symbol.kind is SymbolKind.ENQ:
             self.send(self._response)
             return True

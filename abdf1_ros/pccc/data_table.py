@@ -39,8 +39,8 @@ class DataTable:
     """
     Words by address, each low byte first.
 
-    A file is as long as ``create`` has made it; reads and writes past its end raise
-    OutOfRange, those of a missing file NoSuchFile, and neither changes anything.
+    A file is as long as ``create`` has made it. A read or write past its end raises OutOfRange, of
+    a missing file NoSuchFile. Neither changes anything.
     """
 
     def __init__(self, plc_type: PlcType) -> None:

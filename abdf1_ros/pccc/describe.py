@@ -203,7 +203,7 @@ def _ranged(read: Callable[[Reader, Callable[[Reader], _Range]], Any]) -> Callab
     return lambda reader: read(reader, _range_address)
 
 
-# What every family has, or more than one.
+# Commands of all families, or of several.
 _SHARED: dict[CommandCode, KnownCommand] = {
     (diagnostics.CMD, diagnostics.STATUS): KnownCommand(
         'diagnostic status', Effect.READS, Reader.end, lambda request: '', _identity_reply),

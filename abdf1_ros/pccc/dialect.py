@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""What the driver needs of a PLC family to read and write the words of its data table."""
+"""How the driver reads and writes the words of the data table of a PLC family."""
 
 from __future__ import annotations
 
@@ -38,9 +38,10 @@ Steps = Generator[Request, Packet, _Result]
 @dataclass(frozen=True, slots=True)
 class Transfer:
     """
-    What several packets move together: ``words`` words from ``start`` on.
+    The words that several packets move together: ``words`` words from ``start`` on.
 
-    Commands with an offset and a total name it; the others only know their own packet.
+    Commands with an offset and a total name the transfer. All other commands know only their own
+    packet.
     """
 
     start: Address
@@ -48,7 +49,7 @@ class Transfer:
 
 
 def exactly(words: int, data: bytes) -> bytes:
-    """Return a reply's data; FormatError unless they are so many words."""
+    """Return the data of a reply; FormatError unless they are ``words`` words."""
     if len(data) != words * 2:
         raise FormatError(f'the reply holds {len(data)} bytes, asked were {words * 2}')
     return data

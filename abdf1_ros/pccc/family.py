@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""What makes a PLC family."""
+"""The parts of a PLC family."""
 
 from __future__ import annotations
 
@@ -41,14 +41,14 @@ class Family:
     A PLC family: its addresses, its commands for us as a client, and its emulation as a server.
 
     ``dialects`` has the usual access first. ``decode_identity`` returns None for the reply of
-    another family to 06/03; ``encode_identity`` makes that of an emulated processor.
-    ``described`` has its commands in words. ``meanings`` are those of its own error codes.
+    another family to 06/03. ``encode_identity`` makes the reply of an emulated processor.
+    ``described`` has its commands in words. ``meanings`` explains its own error codes.
     ``by_processor`` is for a family whose processors take packets of different lengths.
     ``served_counters`` returns the layout of a port in a mode (Master, Slave, Peer, Radio), None
     where its counters are not emulated; they are at every address where ``counters_anywhere``.
-    ``is_spoken_by_all`` tells that PLCs of other families know its commands too.
-    ``file_search`` finds out which files a PLC has, None where they cannot be looked for.
-    ``clock`` is the first of six words: year, month, day, hour, minute, second.
+    ``is_spoken_by_all`` tells that PLCs of other families know its commands too. ``file_search``
+    finds out which files a PLC has, None where they cannot be looked for. ``clock`` is the first
+    of six words: year, month, day, hour, minute, second.
     """
 
     addressing: Addressing

@@ -203,7 +203,7 @@ def _two_words(kind: FileType) -> str:
 def _with_member(address: Address, name: str) -> Address:
     members = address.layout.members
     member = members.get(name)
-    # The name of a bit may follow the number of its word, that of a value may not.
+    # The name of a bit may follow the number of its word; the name of a value may not.
     if member is None or address.bit is not None or (
             address.word and (member.bit is None or member.word != address.word)):
         if address.file_type is FileType.STRING and name == 'LEN':

@@ -70,7 +70,7 @@ def is_there(address: Address, dialect: Dialect) -> Steps[bool]:
 
 def counted(addressing: Addressing, dialect: Dialect, kind: FileType, number: int,
             most: int) -> Steps[DataFile]:
-    """Count the elements of a file, which are at most so many, by halving: the first is there."""
+    """Count the elements of a file, at most ``most``, by halving; element 0 exists."""
     low, high = 1, most
     while low < high:
         middle = (low + high + 1) // 2

@@ -69,10 +69,10 @@ def _lines(value: int) -> str:
 
 class ServedCounters:
     """
-    The counters of our own link, as the other end reads and resets them.
+    The counters of our own link, as a PLC reads and resets them.
 
-    A reset moves only their origin for the other end: the counters themselves are also shown
-    elsewhere, and only the thread of the link changes them.
+    A reset by a PLC moves only the origin that this PLC sees. The counters themselves are also
+    shown elsewhere, and only the thread of the link changes them.
     """
 
     def __init__(self, counters: Counters, layout: CounterLayout) -> None:
@@ -93,7 +93,7 @@ class ServedCounters:
         return b''
 
     def _counts(self) -> dict[str, int]:
-        """Return those of the names that we count."""
+        """Return the names that we count."""
         counters = self._counters
         return {
             SENT: counters.messages_sent, RECEIVED: counters.messages_received,

@@ -33,7 +33,7 @@ CommandCode = tuple[int, int | None]
 
 
 class Effect(Enum):
-    """What a command does: whoever may only read data, or write them, may not send the others."""
+    """The effect of a command, by which guests are allowed to send it."""
 
     READS = 'reads'
     WRITES = 'writes data'
@@ -70,7 +70,7 @@ def place_text(addressing: Addressing, kind: FileType, file: int, element: int, 
 
 
 def beyond(words: int) -> str:
-    """Return that something is so many words after a place, nothing for none."""
+    """Return `` + n words`` for a place n words further on, an empty text for 0."""
     return f' + {counted(words, "word")}' if words else ''
 
 

@@ -15,8 +15,8 @@
 """
 Answer commands from a data table, as a PLC of the table's family does.
 
-M 8-2..8-4 tell only a part of the answers of a real PLC to bad requests; the others are those that
-drivers in the field report.
+M 8-2..8-4 have only a part of the answers of a real PLC to bad requests. The rest comes from
+reports of drivers in the field.
 """
 
 from __future__ import annotations

@@ -127,7 +127,7 @@ def status_text(sts: int, ext_sts: int | None = None, meanings: Meanings = USUAL
     """
     Return codes and meaning, e.g. "STS 50: address not there, or memory protected".
 
-    ``meanings`` are those of the family of the station that has answered.
+    ``meanings`` belongs to the family of the station that has answered.
     """
     if sts & EXTENDED == EXTENDED and ext_sts is not None:
         known = {**_EXTENDED, **meanings.ext_sts}

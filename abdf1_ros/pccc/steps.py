@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""What is done with a station, as steps: who it is, an echo, values read and written."""
+"""Dialogues with a station, as steps: its identity, an echo, values read and written."""
 
 from __future__ import annotations
 

@@ -41,8 +41,8 @@ class TypedData:
     """
     Elements of one type.
 
-    ``type_id`` is the data type (M 7-29), ``element_size`` the bytes of one element, ``data``
-    all elements one after the other.
+    ``type_id`` is the data type (M 7-29), ``element_size`` the bytes of one element, ``data`` the
+    bytes of all elements in their order.
     """
 
     type_id: int

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Values on topics and words in a PLC: how one becomes the other."""
+"""From values on topics to words in a PLC, and back."""
 
 from __future__ import annotations
 
@@ -72,7 +72,7 @@ class ValueType(Enum):
 
     @property
     def is_part(self) -> bool:
-        """Tell whether such values are some bits of their words, and the others stay."""
+        """Tell whether a value is a part of the bits of its words, so that all other bits stay."""
         return self in (ValueType.BOOL, ValueType.BCD12)
 
 

@@ -13,13 +13,15 @@
 # limitations under the License.
 
 """
-What is read together, what it costs on the line, and what comes of it.
+The read plan: which words are read together, what that costs on the line, and its times.
 
-``planner`` makes blocks of mappings, with ``partition`` and the costs of ``line_model``.
-``forecast`` says what the line will be able to do, ``bounds`` which times heartbeats and fallback
-values can keep, ``report`` all of it in words for ``check``. ``usable_rows`` leaves out rows that
-do not fit the line; ``refusals`` divides blocks that a PLC has refused. ``reading`` reads mappings
-once, for the library.
+- ``planner`` makes blocks of mappings, with ``partition`` and the costs of ``line_model``.
+- ``forecast`` computes poll cycle, load and intervals.
+- ``bounds`` computes which times heartbeats and fallback values can keep.
+- ``report`` puts all of it into words for ``check``.
+- ``usable_rows`` leaves out rows that do not fit the line.
+- ``refusals`` divides blocks that a PLC has refused.
+- ``reading`` reads mappings once, for the library.
 
-Nothing here asks a PLC: the same plan is printed before the start, and carried out.
+Nothing here asks a PLC. ``check`` prints the plan that the node carries out.
 """

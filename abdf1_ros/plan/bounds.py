@@ -46,33 +46,34 @@ from abdf1_ros.settings.network import Network
 from abdf1_ros.settings.rows import Rows
 from abdf1_ros.text import milliseconds
 
-# A station that we write heartbeats or fallbacks to is asked for its mode so often (s): a change
-# to RUN is a first contact (rule 2).
+# Period (s) of the question for the mode of a station with heartbeats or fallbacks. A change to
+# RUN is a first contact (rule 2).
 MODE_PERIOD = 2.0
 
-# So many answers about the mode have to fit into the stale time of a row (rule 13).
+# Number of answers about the mode that have to fit into the stale time of a row (rule 13).
 ANSWERS_IN_TIME = 3
 
-# A row without a pause between its reads has this period (s) here.
+# Period (s) that bounds assume for a row without a pause between its reads.
 _SHORTEST = 0.01
 
-# After so many heartbeats and fallbacks in a row a read has its turn (rule 11).
+# After this number of heartbeats and fallbacks in a row, a read has a turn (rule 11).
 OWN_IN_A_ROW = 7
 
-# After a guest's command, checks and reads that are due have so many times as long as it had.
+# After a guest's command, due checks and reads have the line this many times as long as the
+# command had it.
 OURS_BESIDE_GUESTS = 3
 
-# A change that has waited for so long (s), or for half its patience, gives way to newer ones if
-# another write of its row has gone out meanwhile: the line does not carry them all.
+# The line may not carry all changes of a row. After this wait (s), or half its patience, a change
+# gives way to a newer one if another write of the row has gone out meanwhile.
 CARRIED_WITHIN = 1.0
 
-# The parameter write_timeout (s), which the files do not tell, unless it was changed.
+# Default of the parameter write_timeout (s), which is not in the files.
 _PATIENCE = 2.0
 
-# A heartbeat with a shorter Period (ms) may be quicker than a PLC's scan.
+# A heartbeat with a shorter Period (ms) may count faster than the PLC scans.
 _SHORT_PERIOD = 200
 
-# What is worth mentioning to be so much shorter.
+# A bound is worth a remark if another setting makes it this factor shorter.
 _WORTH_IT = 0.9
 
 _STATUS_BYTES = 1, 26  # of the command after TNS, and of the longest usual reply
@@ -83,9 +84,10 @@ class Bound:
     """
     The times of a row (rule 16), in seconds.
 
-    For a row with Fallback ``seconds`` is how long its outputs keep their value at most without a
-    message, and ``usual`` how long where no frame gets lost; None where a master of the line
-    decides that. For a heartbeat ``seconds`` is the preset for the watchdog in the PLC.
+    For a row with Fallback, ``seconds`` is the longest time that its outputs keep their value
+    without a message. ``usual`` is the same time where no frame gets lost. Both are None if a
+    master of the line decides that. For a heartbeat, ``seconds`` is the preset for the watchdog in
+    the PLC.
     """
 
     mapping: Mapping
@@ -120,8 +122,9 @@ class Times:
     """
     What heartbeats and fallbacks of a line can promise.
 
-    ``blocks`` is what is read, ``response_time`` the seconds that a station usually takes for an
-    answer. ``longest`` is T (s).
+    - ``blocks``: the blocks that are read.
+    - ``response_time``: usual seconds of a station for an answer.
+    - ``longest``: T (s).
     """
 
     def __init__(self, network: Network, mappings: Rows, blocks: Sequence[Block] = (),
@@ -134,7 +137,7 @@ class Times:
         model = forecast.line_model(network)
         reads = [forecast.longest_wait([block], 0.0) for block in blocks]
         self._written = {mapping: _packets(model, mapping) for mapping in mappings.written}
-        # A guest may have the longest command there is under way.
+        # The command of a guest that is under way may be the longest that exists.
         guest = model.transaction_time(MAX_LINK_DATA, MAX_LINK_DATA) if network.share else 0.0
         written = map(max, self._written.values())
         self._any_frames = max(*reads, *written, guest, _question_time(model, 0.0))
@@ -177,29 +180,29 @@ class Times:
         return sum(map(self._undisturbed, [self._any_frames, *writes])) if writes else 0.0
 
     def _turn(self, mapping: Mapping) -> int:
-        """Return with whom a row takes turns: its station, or all where these have no turns."""
+        """Return the station of a row where stations take turns, else 0 for the whole line."""
         return mapping.station if self._mode.takes_turns else 0
 
     @cached_property
     def _waits(self) -> dict[int, tuple[float, float]]:
-        """Return how long (s) a fallback that is due may wait, and take: at most, and usually."""
-        # In standard polling the others have the line meanwhile; that is in each scan.
+        """Return the seconds of a due fallback with its wait: at most, and with no frame lost."""
+        # In standard polling each scan also has the turns of all other stations.
         turns: defaultdict[int, list[float]] = defaultdict(list)
         for own in self._mappings.own:
             turns[self._turn(own)] += self._written[own]
-        # Where others have turns, too, they may have had the writes between two reads.
+        # If other stations have turns, too, their writes may come between two reads.
         is_apart = self._mode.most_under_way(self._line) > 1 or len(turns) > 1
         found = {}
         for turn, writes in turns.items():
             reads = len(writes) if is_apart else 1 + (len(writes) - 1) // OWN_IN_A_ROW
-            # What is under way, the reads that have a turn in between, and all of ours.
+            # The transaction under way, the reads with a turn in between, and all our own writes.
             at_most, usual = ((1 + reads) * time(self._any_frames) + sum(map(time, writes))
                               for time in (self._at_most, self._undisturbed))
             found[turn] = at_most, usual
         return found
 
     def _at_most(self, frames: float) -> float:
-        """Return the seconds of a transaction, with a reply of ours that takes turns with it."""
+        """Return the most seconds of a transaction, with one reply of ours in between."""
         reply = self._mode.longest_reply(self._line, self._longest_reply) \
             if self._serves or self._mode.answers_by_itself else 0.0
         return reply + self._repeated(frames)
@@ -216,7 +219,7 @@ class Times:
             len(self._mappings.stations))
 
     def advice(self) -> Iterator[str]:
-        """Yield which setting would shorten bounds and presets most, if that is worth it."""
+        """Yield the setting that would shorten bounds and presets most, if that pays."""
         network = self._network
         ways = {'Timeout 100': replace(network, timeout=100),
                 'Cmd_Timeout 500': replace(network, cmd_timeout=500),
@@ -266,7 +269,7 @@ def remarks(network: Network, mappings: Rows,
 
 
 def _late_states(network: Network, mappings: Rows, response_time: float) -> Iterator[str]:
-    """Yield the row that may lose its newest state first, where more comes than is carried."""
+    """Yield the first row to lose its newest state if messages come faster than writes."""
     model = forecast.line_model(network)
     rows = [mapping for mapping in mappings.messages if not mapping.serves]
     a_write_each = sum(_with_answers(_packets(model, mapping), response_time) for mapping in rows)
@@ -306,10 +309,10 @@ def own_work(model: LineModel, mappings: Rows, default_period: float,
 
 def mode_periods(mappings: Rows, default_period: float, stale_after: float) -> dict[int, float]:
     """
-    Return the stations that are asked for their mode, and how often (s) on a line that is free.
+    Return the stations that are asked for their mode, and the period (s) on a free line.
 
-    A change to RUN is a first contact for what we write by ourselves (rule 2), and some answers
-    have to fit into the stale time of each row that is published while the PLC runs (rule 13).
+    A change to RUN is a first contact for heartbeats and fallbacks (rule 2). Several answers have
+    to fit into the stale time of each row with While RUN (rule 13).
     """
     periods = dict.fromkeys((mapping.station for mapping in mappings.own), MODE_PERIOD)
     for mapping in mappings.guarded:
@@ -337,7 +340,7 @@ def costs(network: Network, mappings: Rows, default_period: float,
 
 
 def conditions(network: Network, mappings: Rows) -> Iterator[str]:
-    """Yield what has to be so that the bounds of a line hold, and is not in its settings."""
+    """Yield the conditions of the bounds that are not in the settings of the line."""
     if network.duplex is not Duplex.RADIO or not mappings.own:
         return
     yield ('bounds by radio: NAK_Retries makes up for lost commands. It does not for lost replies '

@@ -13,7 +13,7 @@
 # limitations under the License.
 
 """
-The forecast of a line: what it will be able to do, before anything is connected.
+The forecast of a line: poll cycle, load and intervals, before anything is connected.
 
 It uses the line model of the planner, and assumes how long a station takes to answer. A
 transaction has two answers (M 14-2): to the command, and to the poll, or in full duplex the
@@ -34,8 +34,8 @@ USUAL_RESPONSE_TIME = 0.01
 USUAL_STALE_AFTER = 3.0  # periods, after which a value counts as lost
 ANSWERS = LineMode.answers
 
-# A read without a period gets the time that the others leave, but at least one turn in so many
-# times the time of reading everything once.
+# Reads without a period get the time that reads with a period leave. At the least each has one
+# turn in this number of poll cycles.
 PATIENCE = 4
 
 
@@ -53,7 +53,7 @@ def block_time(block: Block, response_time: float = USUAL_RESPONSE_TIME) -> floa
 def answer_time(network: Network, blocks: Iterable[Block],
                 response_time: float = USUAL_RESPONSE_TIME) -> float:
     """
-    Return the seconds that the line waits for an answer of a station that takes so long.
+    Return the seconds that the line waits for an answer that takes ``response_time`` seconds.
 
     By radio a transaction has one answer, and several stations may work on theirs at a time.
     """
@@ -82,9 +82,9 @@ def intervals(blocks: Iterable[Block],
     """
     Return the expected seconds between two reads of a block, by its period (s).
 
-    That is the period, as far as the line allows. Otherwise all periods become longer by the
-    factor of the load, but none by more than a poll cycle, as in ``ReadQueue``. ``own`` has what
-    goes in between: the seconds and the period of each heartbeat and question for a mode.
+    That is the period, as far as the line allows. On a full line all periods become longer by the
+    factor of the load, at most by a poll cycle, as in ``ReadQueue``. ``own`` holds the seconds and
+    the period of each heartbeat and each question for a mode: they go in between.
     """
     blocks, own = list(blocks), list(own)
     once = poll_cycle(blocks)
@@ -109,8 +109,8 @@ def stale_times(blocks: Iterable[Block], default_period: float, stale_after: flo
     """
     Return after how many seconds a value of each mapping that is read counts as lost.
 
-    That is what topics promise: ``stale_after`` times the interval that can be expected, and the
-    longest wait for the line. ``default_period`` is in seconds, ``own`` that of ``intervals``.
+    Topics promise this time: ``stale_after`` times the expected interval, plus the longest wait
+    for the line. ``default_period`` is in seconds; ``own`` is described at ``intervals``.
     """
     blocks = list(blocks)
     expected, wait = intervals(blocks, own), longest_wait(blocks)
@@ -120,5 +120,5 @@ def stale_times(blocks: Iterable[Block], default_period: float, stale_after: flo
 
 
 def period_of(mapping: Mapping, default_period: float) -> float:
-    """Return the seconds that a mapping wants from one read to the next."""
+    """Return the seconds from one read of a mapping to the next, as its Period asks."""
     return default_period if mapping.period is None else mapping.period / 1000

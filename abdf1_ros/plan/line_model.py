@@ -13,7 +13,7 @@
 # limitations under the License.
 
 """
-What a transaction costs on the line: the model that plans and forecasts are made with.
+The time of a transaction on the line: the model behind plans and forecasts.
 
 It counts the characters of the real frames. It does not know the data of a reply, of which one
 byte in 256 has to be doubled (M 2-7), nor the response time of a station.
@@ -43,7 +43,7 @@ class ReadRequest:
 
 @dataclass(frozen=True, slots=True)
 class LineModel:
-    """A line with this check, discipline and timing; ``wait`` is s before a command goes out."""
+    """A line with this check, discipline and timing; ``wait`` is the pause (s) before commands."""
 
     checksum: Checksum
     duplex: Duplex
@@ -71,8 +71,8 @@ class LineModel:
 
 @cache
 def _overhead(duplex: Duplex, checksum: Checksum, station: int) -> int:
-    """Return the characters of a transaction, without what commands and replies have after TNS."""
-    # Of a frame only the size counts, so the check need not be that of its data.
+    """Return the characters of a transaction, without the bytes after TNS of both messages."""
+    # Only the size of a frame counts here, so its check may be wrong.
     message = frames.message_frame(b'', checksum)
     sent = message if duplex is not Duplex.HALF else \
         frames.master_frame(station, b'', checksum) + frames.poll_frame(station)

@@ -15,9 +15,9 @@
 """
 Stretches of words, and the cheapest way to put them into blocks.
 
-This is the arithmetic of the read planner; it knows nothing of PLCs. A block is one span of
-words that is read by one command. A command costs a good deal by itself and a little for each
-word, so a short gap is read as well where that is cheaper than another command.
+This is the arithmetic of the read planner; it knows nothing of PLCs. A block is one span of words
+that one command reads. A command costs much by itself and little for each word. So a block
+includes a short gap if that is cheaper than another command.
 """
 
 from __future__ import annotations
@@ -44,7 +44,7 @@ class Span:
         return self.end - self.first
 
     def holds(self, other: Span) -> bool:
-        """Tell whether all words of ``other`` are among these."""
+        """Tell whether this span has all words of ``other``."""
         return self.first <= other.first and other.end <= self.end
 
     def aligned(self, per_element: int) -> Span:
@@ -64,7 +64,7 @@ class Candidate:
 
 class CostModel:
     """
-    What blocks of an area cost, and which blocks are possible.
+    The cost of blocks of an area, and which blocks are possible.
 
     ``costs[n]`` is the seconds that a read of n words takes; the last n is ``limit``, the most
     that one command reads. A block of more than one word has whole elements of ``per_element``
@@ -144,7 +144,7 @@ def without_contained(spans: Iterable[Span]) -> list[Span]:
 def partition(needed: Mapping[float, Iterable[Span]], model: CostModel,
               poll_cycle: float) -> list[Candidate]:
     """
-    Return the blocks that hold all ``needed`` spans; its keys are their periods in seconds.
+    Return the blocks that hold all spans of ``needed``, whose keys are periods in seconds.
 
     Spans of a long period may share a block with spans of a short one, where that is cheaper.
     A block is not expected to be read more often than every ``poll_cycle`` seconds.

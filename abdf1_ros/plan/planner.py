@@ -46,7 +46,7 @@ StationArea = tuple[int, Area, Dialect]
 @dataclass(frozen=True, slots=True)
 class Block:
     """
-    What is read together: one request, or several for one mapping longer than a packet.
+    A block that is read together: one request, or several for one mapping longer than a packet.
 
     It has the words of all ``mappings``. ``period`` is the shortest of their periods, in seconds.
     ``line_time`` is the seconds that its transactions take on the line when the station answers
@@ -113,9 +113,9 @@ class Planner:
     """
     Plan reads for a line; mappings without a period get ``default_period`` (s).
 
-    ``refuse`` and ``allow`` tell which words stations were found to lack or to have; no block
-    holds all words of a refused span. ``processors`` are those that stations have said to be:
-    their packets are kept to, even where the map says that longer ones are taken.
+    ``refuse`` and ``allow`` record which words a station lacks or has. No block holds all words of
+    a refused span. ``processors`` holds the processor that each station has named. The planner
+    keeps to the packets of that processor, even if the map allows longer packets.
     """
 
     def __init__(self, line: LineModel, default_period: float) -> None:
@@ -123,7 +123,7 @@ class Planner:
         self.processors: dict[int, Processor] = {}
         self._default_period = default_period
         self._refused: defaultdict[StationArea, set[Span]] = defaultdict(set)
-        # Words per packet of blocks that were refused with more of them.
+        # Words per packet, for each block that was refused with longer packets.
         self._limits: dict[tuple[StationArea, Span], int] = {}
         self._costs: dict[tuple[Dialect, FileType], list[float]] = {}
 
@@ -135,8 +135,8 @@ class Planner:
                 areas[_station_area(mapping)].append(
                     _Demand(mapping, _span(mapping), self._period(mapping)))
         plans = [self._plan_area(area, group, math.inf) for area, group in areas.items()]
-        # On a full line no block is read more often than once in a poll cycle. So keeping fast
-        # blocks short saves less there than their periods promise.
+        # On a full line a block is read once in a poll cycle at most. So short fast blocks save
+        # less there than their periods promise.
         poll_cycle = sum(block.line_time for plan in plans for block in plan)
         return [block for area, group in areas.items()
                 for block in self._plan_area(area, group, poll_cycle)]
@@ -145,8 +145,9 @@ class Planner:
         """
         Return what to read instead of a refused block.
 
-        That is two blocks, each with half of the mappings; where all are the same words, the
-        same block in shorter packets, as long as some processor may need them; else nothing.
+        A block with several spans becomes two blocks, each with half of the mappings. A block of
+        equal words becomes the same block in shorter packets, as long as a processor may need
+        them. Otherwise the list is empty.
         """
         spans = sorted(set(map(_span, block.mappings)))
         if len(spans) == 1:
@@ -167,17 +168,17 @@ class Planner:
         return [self._block(block.mappings, block.span)]
 
     def refuse(self, area: StationArea, span: Span) -> None:
-        """Take note that no read at ``area`` may hold all of ``span``."""
+        """Record that no read at ``area`` may hold all of ``span``."""
         self._refused[area].add(span)
 
     def allow(self, area: StationArea, span: Span) -> bool:
-        """Take note that all of ``span`` can be read; return whether that is news."""
+        """Record that all of ``span`` can be read; return True if it was refused before."""
         wrong = {other for other in self._refused[area] if span.holds(other)}
         self._refused[area] -= wrong
         return bool(wrong)
 
     def dialect(self, mapping: Mapping) -> Dialect:
-        """Return how the station of a mapping is spoken to, as far as one knows."""
+        """Return the dialect of the station of a mapping, as far as it is known."""
         processor = self.processors.get(mapping.station)
         others = FAMILIES[mapping.plc_type].by_processor
         if processor is None or processor not in others:
@@ -192,7 +193,8 @@ class Planner:
         if mapping.period is None:
             return self._default_period
         seconds = mapping.period / 1000
-        # A heartbeat is read back between two counts, wherever in between another writer writes.
+        # Each count of a heartbeat needs a read, so that a foreign value is found whenever it is
+        # written.
         return seconds / 2 if mapping.is_heartbeat else seconds
 
     def _plan_area(self, area: StationArea, demands: Sequence[_Demand],
@@ -279,7 +281,7 @@ def _cover(mappings: Iterable[Mapping]) -> Span:
 
 def _served(demands: Iterable[_Demand],
             candidates: Iterable[Candidate]) -> dict[Span, list[Mapping]]:
-    """Return the mappings of each block; each mapping is in the slowest block that is enough."""
+    """Return the mappings of each block; a mapping is in the slowest block that is fast enough."""
     levels: dict[float, list[Span]] = defaultdict(list)
     for entry in sorted(candidates, key=lambda entry: (-entry.period, entry.span)):
         levels[entry.period].append(entry.span)
@@ -292,7 +294,7 @@ def _served(demands: Iterable[_Demand],
 
 
 def _holder(spans: Sequence[Span], wanted: Span) -> Span | None:
-    """Return the one of ``spans`` (sorted, none within another) that holds ``wanted``."""
-    # The last that begins early enough also ends last of these.
+    """Return the span that holds ``wanted``; ``spans`` are sorted, and none contains another."""
+    # Of the spans that begin early enough, the last one also ends last.
     index = bisect_right(spans, wanted.first, key=lambda span: span.first)
     return spans[index - 1] if index and spans[index - 1].holds(wanted) else None

@@ -35,7 +35,7 @@ _Result = TypeVar('_Result')
 
 
 class Asking(Protocol):
-    """What carries out steps with a station, and returns their result."""
+    """A function that carries out steps with a station, and returns their result."""
 
     def ask(self, station: int, work: Steps[_Result]) -> _Result: ...
 
@@ -45,8 +45,8 @@ def read_planned(planner: Planner, mappings: Iterable[Mapping],
     """
     Yield each mapping with its values.
 
-    A block that a station refuses is read in parts, so that an error is about as few mappings as
-    possible. Raises what ``line`` and the steps raise, about these.
+    If a station refuses a block, its parts are read, so that an error concerns as few mappings as
+    possible. Raises the errors of ``line`` and of the steps for those mappings.
     """
     waiting = planner.plan(mappings)
     while waiting:

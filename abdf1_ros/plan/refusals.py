@@ -13,7 +13,7 @@
 # limitations under the License.
 
 """
-What to read instead of a block that a station refuses.
+Which blocks replace a block that a station refuses.
 
 A station refuses a whole block for one address that it does not have: of a mapping, or of a gap
 between mappings. The block is divided until each part is good or cannot be divided any more. A
@@ -34,7 +34,7 @@ from abdf1_ros.plan.planner import Block, Planner, StationArea
 
 @dataclass(frozen=True, slots=True)
 class Change:
-    """Blocks, and those that take their place."""
+    """Blocks, and the blocks that take their place."""
 
     old: Sequence[Block]
     new: Sequence[Block]
@@ -46,7 +46,7 @@ class _RefusalSearch:
     def __init__(self, block: Block) -> None:
         self.parts = [block]
         self._open = 1
-        self._divided: list[tuple[Span, Span]] = []  # what was refused, and where it was cut
+        self._divided: list[tuple[Span, Span]] = []  # refused spans, and where each was divided
         self._refused: list[Span] = []
 
     def divide(self, block: Block, halves: Sequence[Block]) -> None:
@@ -55,19 +55,19 @@ class _RefusalSearch:
         self.parts += halves
         if len(halves) > 1:
             left, right = (half.span for half in halves)
-            gap = Span(left.end - 1, right.first + 1)  # with the word on each side of it
+            gap = Span(left.end - 1, right.first + 1)  # the gap with one word on each side
             self._divided.append((block.span, gap if gap.words > 1 else block.span))
             self._open += 1
 
     def settle(self, block: Block, is_refused: bool) -> bool:
-        """Take note of the end of one branch; return whether it was the last."""
+        """Record the end of one branch; return True if it was the last."""
         if is_refused:
             self._refused.append(block.span)
         self._open -= 1
         return self._open == 0
 
     def findings(self) -> list[Span]:
-        """Return the spans that cannot be read; a gap is one where both of its sides are good."""
+        """Return the spans that cannot be read, also a gap between two sides that can be read."""
         found = list(self._refused)
         smaller = list(self._refused)
         for span, gap in reversed(self._divided):  # parts before the whole
@@ -78,7 +78,7 @@ class _RefusalSearch:
 
 
 class Refusals:
-    """Return the blocks to read after a refusal, and tell ``planner`` the result."""
+    """Choose the blocks to read after a refusal, and report the result to ``planner``."""
 
     def __init__(self, planner: Planner) -> None:
         self._planner = planner
@@ -87,7 +87,7 @@ class Refusals:
 
     def refused(self, block: Block, blocks: Iterable[Block]) -> Change | None:
         """
-        Take note that a station has refused a block; None: go on reading it.
+        Record that a station has refused a block; return None if it is to be read as before.
 
         ``blocks`` are all that are read.
         """
@@ -96,7 +96,7 @@ class Refusals:
         if not halves:
             if search:
                 return self._settle(search, block, blocks, is_refused=True)
-            # So that no later plan puts it together with good ones.
+            # Later plans then keep it apart from good blocks.
             self._planner.refuse(block.station_area, block.span)
             return None
         search = search or _RefusalSearch(block)
@@ -106,7 +106,7 @@ class Refusals:
         return Change([block], halves)
 
     def recovered(self, block: Block, blocks: Iterable[Block]) -> Change | None:
-        """Take note of a good read after a bad one; ``blocks`` are all that are read."""
+        """Record a good read after a bad one; ``blocks`` are all that are read."""
         search = self._searches.pop(block, None)
         if search is not None:
             return self._settle(search, block, blocks, is_refused=False)
@@ -116,9 +116,10 @@ class Refusals:
 
     def read_again(self, block: Block, blocks: Iterable[Block]) -> Change | None:
         """
-        Take note of a further good read of the last block in ``recovering`` of its area.
+        Record another good read of the last recovering block of its area, and plan the area anew.
 
-        All others that recover with it have done so: a file that comes back is planned once.
+        All other blocks of the area have recovered before it, so a file that comes back is planned
+        once.
         """
         if self.recovering.get(block.station_area) is not block:
             return None
@@ -127,7 +128,7 @@ class Refusals:
 
     def processor_told(self, station: int, processor: Processor | None,
                        blocks: Iterable[Block]) -> Change | None:
-        """Take note what a station has said to be; keep to the packets of such a processor."""
+        """Record the processor that a station has named; keep to its packets."""
         if processor is None or self._planner.processors.get(station) is processor:
             return None
         self._planner.processors[station] = processor
@@ -135,7 +136,7 @@ class Refusals:
         return change if change.old else None
 
     def _planned_anew(self, blocks: Iterable[Block]) -> Change:
-        """Return what to read in place of ``blocks``, but for parts of those being divided."""
+        """Return the blocks that replace ``blocks``, without parts of divided blocks."""
         parts = {part for search in self._searches.values() for part in search.parts}
         old = {block for block in blocks if block not in parts}
         new = set(self._planner.plan(sorted(

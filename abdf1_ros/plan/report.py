@@ -15,8 +15,8 @@
 """
 The report on two checked files: the read plan, its times, and remarks.
 
-All times are forecasts (see ``forecast``), in seconds. A remark is about a setting that is valid,
-but may have an unexpected effect.
+All times are forecasts (see ``forecast``), in seconds. A remark names a setting that is valid, but
+may have an unexpected effect.
 """
 
 from __future__ import annotations
@@ -68,7 +68,7 @@ class RemarkKind(Enum):
 
 @dataclass(frozen=True, slots=True)
 class Remark:
-    """Something unusual; ``station`` is the one that it is about, None for the line."""
+    """An unusual setting; ``station`` is the station that it concerns, None for the whole line."""
 
     kind: RemarkKind
     text: str
@@ -80,8 +80,8 @@ class Report:
     """
     The read plan of a line.
 
-    ``default_period`` is for mappings without Period, ``response_time`` what a station takes for
-    each answer, both in seconds.
+    ``default_period`` is for mappings without Period. ``response_time`` is the time of a station
+    for each answer. Both are in seconds.
     """
 
     network: Network
@@ -115,12 +115,12 @@ class Report:
 
     @property
     def times(self) -> Times:
-        """Return what heartbeats and fallbacks can promise, and the longest transaction."""
+        """Return the times that heartbeats and fallbacks can keep, and the longest transaction."""
         return Times(self.network, self.mappings, self.blocks, self.response_time)
 
     def promises(self) -> dict[Mapping, float]:
         """Return the stale time (s) of each row that we read and that promises to publish."""
-        # As the node forecasts it, whatever a PLC really takes to answer.
+        # The node promises the same time, however long a PLC really takes to answer.
         stale = forecast.stale_times(
             self.blocks, self.default_period, forecast.USUAL_STALE_AFTER, bounds.own_work(
                 forecast.line_model(self.network), self.mappings, self.default_period))
@@ -132,21 +132,21 @@ class Report:
         return forecast.block_time(block, self._answer_time)
 
     def needed_baud(self) -> int | None:
-        """Return the lowest baud rate that is enough for all that is to be done, or None."""
+        """Return the lowest baud rate that carries all periods, or None."""
         found = bisect_left(BAUD_RATES, True, key=lambda baud: make_report(
             replace(self.network, baud=baud), self.mappings, self.default_period,
             self.response_time).load <= 1)
         return BAUD_RATES[found] if found < len(BAUD_RATES) else None
 
     def needed_period(self) -> int | None:
-        """Return the ms that would do in place of all shorter periods, or None."""
+        """Return the shortest Period (ms) that the line can keep for all rows, or None."""
         others = self.load - forecast.load(self.blocks, self._answer_time)
         return next((period for period in PERIOD_STEPS if others + sum(
             self.time(block) / max(block.period, period / 1000) for block in self.blocks
             if block.period) <= _HIGH_LOAD), None)
 
     def notes(self) -> list[str]:
-        """Return what a reader should know, and what is not odd at all."""
+        """Return facts that a reader should know though nothing is unusual."""
         found = list(bounds.costs(
             self.network, self.mappings, self.default_period, self.response_time))
         found += bounds.conditions(self.network, self.mappings)
@@ -182,7 +182,7 @@ class Report:
 
 
 def _unprotected(mappings: Rows) -> Iterator[str]:
-    """Find what goes on when its sender has died (rule 20 of docs/heartbeats.md)."""
+    """Find outputs that stay on when their publisher has died (rule 20 of docs/heartbeats.md)."""
     written = mappings.of_plcs.messages
     bare = [mapping for mapping in written if mapping.fallback is None]
     if bare:
@@ -216,7 +216,7 @@ def make_report(network: Network, mappings: Iterable[Mapping], default_period: f
 
 
 def setting_remarks(network: Network, mappings: Sequence[Mapping]) -> Iterator[Remark]:
-    """Find valid, but unusual settings in both files, also stations that clash."""
+    """Find unusual settings in both files that are valid, and stations that clash."""
     for text in network_remarks(network):
         yield Remark(RemarkKind.SETTING, text)
     for mapping in mappings:
@@ -288,7 +288,7 @@ def _station_remarks(network: Network, rows: Sequence[Mapping]) -> Iterator[Rema
         types: dict[str, list[Mapping]] = {}
         for mapping in mappings:
             if mapping.access is Access.CIF:
-                continue  # PLC-2 commands to an SLC: two types that are one PLC
+                continue  # two types, one PLC: PLC-2 commands to an SLC
             types.setdefault(mapping.plc_type.value, []).append(mapping)
         if len(types) > 1:
             kinds = ', '.join(f'{name} ({_tags(group)})' for name, group in types.items())
@@ -309,7 +309,7 @@ def _station_remarks(network: Network, rows: Sequence[Mapping]) -> Iterator[Rema
 
 
 def _file_remarks(station: int, mappings: Iterable[Mapping]) -> Iterator[Remark]:
-    """Find files of a PLC that rows take for files of different types."""
+    """Find files of a PLC that have different types in two rows."""
     files: defaultdict[tuple[PlcType, int], dict[FileType, list[Mapping]]] = defaultdict(dict)
     for mapping in mappings:
         address = mapping.address
@@ -325,7 +325,7 @@ def _file_remarks(station: int, mappings: Iterable[Mapping]) -> Iterator[Remark]
 
 
 def _gateway_remarks(network: Network, stations: dict[int, list[Mapping]]) -> Iterator[Remark]:
-    """Find unusual values in the column Via, and of stations behind a gateway."""
+    """Find unusual values in the column Via, and unusual stations behind a gateway."""
     is_behind = network.line_mode.has_one_plc and len(stations) > 1
     for station, mappings in sorted(stations.items()):
         via = mappings[0].via
@@ -344,7 +344,7 @@ def _gateway_remarks(network: Network, stations: dict[int, list[Mapping]]) -> It
 
 
 def _load_remarks(report: Report) -> Iterator[Remark]:
-    """Compare what the periods need with what the line can do."""
+    """Compare the time that the periods need with the time of the line."""
     load = report.load
     if load > 1:
         baud = report.needed_baud()
@@ -376,7 +376,7 @@ def _period_remarks(report: Report) -> Iterator[Remark]:
 
 
 def _gap_remarks(report: Report) -> Iterator[Remark]:
-    """Find tags that are so far apart in the PLC that reading them costs much more."""
+    """Find tags that lie far apart in the PLC, so that reading them costs much more."""
     groups: defaultdict[tuple[StationArea, float], list[Block]] = defaultdict(list)
     for block in report.blocks:
         groups[block.station_area, block.period].append(block)

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Which rows of a map can be used on a line, and what is wrong with the others."""
+"""Which rows of a map can be used on a line, and the faults of all other rows."""
 
 from __future__ import annotations
 
@@ -55,7 +55,7 @@ def line_problems(mappings: Iterable[Mapping], network: Network) -> list[tuple[M
 def usable_rows(mappings: Rows, network: Network,
                 default_period: float) -> tuple[Rows, list[Problem]]:
     """
-    Return the rows that can be used on this line, and the faults of the others.
+    Return the rows that can be used on this line, and the faults of all other rows.
 
     ``default_period`` (s) is for rows without Period. A row whose counter is not read often enough
     for its While_Timeout cannot be used, nor a row that depends on one that cannot

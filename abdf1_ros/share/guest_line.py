@@ -35,7 +35,7 @@ from abdf1_ros.ports.settings import PortSettings
 from abdf1_ros.settings.network import Network
 from abdf1_ros.settings.share import SharePlace
 
-# So often (s) a place is looked at: for a program that comes, and for how old commands can be.
+# Poll interval (s) for new programs at a place; it also bounds the error of a command's age.
 _GLANCE = 0.1
 
 

@@ -44,8 +44,8 @@ _PLC_HEARTBEAT = 10
 _LAST_COUNT = 32000
 _COMMANDS = {1: 2, 2: 4}  # what the machine uses of N10: words of N11
 
-# After a pause of the simulator only so many seconds of scans are made up for: earlier ones would
-# not change the result.
+# Most seconds of scans that the simulator makes up for after a pause. Earlier scans would not
+# change the result.
 _LONGEST_PAUSE = 60.0
 
 _ROUNDING = 1e-6

@@ -98,10 +98,10 @@ class InjectedFaults:
     """
     The faults that a station has at the moment.
 
-    ``silent``: it does not answer. ``full``: it has no room for commands, so it ignores them
-    (half duplex) or answers NAK (full duplex). ``slow``: so many polls get EOT before each
-    reply. ``delay``: polls get EOT until so many seconds after the command. ``noise``: the share
-    of its characters that is damaged. ``status``: STS and EXT STS of every reply.
+    ``silent``: it does not answer. ``full``: it has no room for commands, so it ignores them (half
+    duplex) or answers NAK (full duplex). ``slow``: number of polls that get EOT before each reply.
+    ``delay``: seconds after a command during which polls get EOT. ``noise``: the share of its
+    characters that is damaged. ``status``: STS and EXT STS of every reply.
     """
 
     silent: bool = False
@@ -272,7 +272,7 @@ class SimulatedPlc(TaskSource):
         return self.outbox.popleft() if is_free else None
 
     def damaged(self, data: bytes) -> bytes:
-        """Return ``data`` as they arrive at the other end."""
+        """Return ``data`` as they arrive at the far end."""
         if not self.faults.noise:
             return data
         return bytes(byte ^ 1 << self._random.randrange(8)

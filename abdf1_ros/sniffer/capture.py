@@ -62,7 +62,7 @@ class Direction(Enum):
 
     @property
     def opposite(self) -> Direction:
-        """Return the other way."""
+        """Return the opposite direction."""
         return {Direction.OUT: Direction.IN, Direction.IN: Direction.OUT}.get(self, self)
 
 

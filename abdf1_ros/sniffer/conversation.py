@@ -29,8 +29,8 @@ from abdf1_ros.sniffer.entries import Mark
 _PATIENCE = 10.0
 _MOST_OPEN = 1000
 
-# By radio modem a message that comes again within so many seconds is taken for one that a node
-# sends on. Its sender waits for longer until it repeats it: for the time-out of its command.
+# By radio modem, a message that comes again within this time (s) is treated as forwarded by a
+# node. Its sender waits for longer until it repeats it: for the time-out of its command.
 _FORWARDED_WITHIN = 1.0
 _MOST_RECENT = 20  # messages; a node that sends on remembers as many (1763-RM001C)
 
@@ -143,7 +143,7 @@ class Conversation:
         self._guest = tns, place
 
     def acknowledge(self, direction: Direction) -> None:
-        """Take an ACK in this ``direction``: it is for the last message in the other."""
+        """Take an ACK in ``direction``: it is for the last message of the opposite direction."""
         said = self._last.get(direction.opposite)
         if said is not None:
             said.acknowledged = True

@@ -17,8 +17,8 @@ Read recorded bytes from files of several kinds: captures, packets, dumps, logs,
 
 A hex dump is bytes in hexadecimal, with or without spaces, and with or without the offsets and
 characters that ``xxd`` and ``hexdump -C`` put beside them. It has neither times nor directions.
-``hexdump`` and ``od -x`` alone write words of two bytes, the low one last. Other lines are those
-of logs, see ``logs``.
+``hexdump`` and ``od -x`` alone write words of two bytes, the low one last. All other lines are
+read by ``logs``.
 """
 
 from __future__ import annotations
@@ -55,10 +55,10 @@ _MOST_LEFT_OUT = 100_000_000
 
 class Recording:
     """
-    The chunks of a file; ``settings`` are those of a capture, as far as it has been read.
+    The chunks of a file; ``settings`` come from a capture, as far as it has been read.
 
-    ``has_size`` tells whether the size of the file is known; that of a pipe or device is not.
-    Raises OSError when the file cannot be opened.
+    ``has_size`` tells whether the file has a known size; a pipe or device has none. Raises OSError
+    when the file cannot be opened.
     """
 
     def __init__(self, path: Path, is_binary: bool = False) -> None:

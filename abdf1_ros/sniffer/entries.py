@@ -43,12 +43,12 @@ class Kind(Enum):
 
 class Mark(Enum):
     """
-    What is special about a message.
+    The role of a message in its conversation, if it is not a plain message.
 
-    A message that comes again is a duplicate once the other side has acknowledged it (the
-    receiver has to drop it, M 3-4), before that a retransmission. A master passes messages of
-    slaves to slaves on as they are. By radio modem a node has forwarded a message that comes again
-    soon, or from the other side. A stray reply is one to no command that was seen.
+    A message that comes again is a duplicate if the receiver has acknowledged it; the receiver has
+    to drop it (M 3-4). Before the acknowledgement it is a retransmission. A master passes messages
+    of slaves to slaves on as they are. By radio modem, a message that comes again soon or from the
+    opposite side has been forwarded by a node. A stray reply is one to no command that was seen.
     """
 
     RETRANSMISSION = 'retransmission'
@@ -62,7 +62,7 @@ class Mark(Enum):
 @dataclass(frozen=True, slots=True)
 class Entry:
     """
-    What was seen, and what is known of it.
+    A thing that was seen on the line, and what is known of it.
 
     ``time`` is seconds, None where the recording has no times. ``station`` is the slave, or
     on a full-duplex line the node that commands go to and replies come from. ``valid`` is the

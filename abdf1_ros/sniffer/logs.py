@@ -51,14 +51,14 @@ _AFTER = r'(?![0-9A-Za-z:=.])'
 _BYTES = re.compile(rf'(?:^|(?<=[\s,\[({{"\'])){_BYTE}(?:[\s,;-]+{_BYTE})*{_AFTER}')
 _GAP = re.compile(r'\s{2,}|\t')
 _REST = re.compile(r'[\s,;\])}"\']*')
-# What a line with a direction, and without bytes, must not have.
+# A line with a direction, and without bytes, must not have this.
 _LEFT_OVER = re.compile(r'(?<![\w=(.])[0-9A-Fa-f]{1,4}(?![\w=)]| bytes?\b)')
 _LITERAL = re.compile(r'\bb(?P<sign>[\'"])(?:\\.|(?!(?P=sign)).)*(?P=sign)')
 
 
 class LogReader:
     """
-    Read the lines of a log, one after the other.
+    Read the lines of a log in their order.
 
     ``read`` returns the chunk of a line, None for one without bytes; ValueError for a line that
     does not fit the rule.

@@ -15,7 +15,7 @@
 """
 Packets of files that Wireshark and tcpdump write: pcap and pcapng.
 
-The formats are those of draft-ietf-opsawg-pcap and draft-ietf-opsawg-pcapng, sections 4.1 to 4.4.
+The formats follow draft-ietf-opsawg-pcap and draft-ietf-opsawg-pcapng, sections 4.1 to 4.4.
 """
 
 from __future__ import annotations

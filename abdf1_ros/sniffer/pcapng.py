@@ -16,10 +16,10 @@
 Entries as a pcapng file, which Wireshark reads with the dissector of this package.
 
 The link type is USER0. Each packet is one symbol of DF1 (a message, a poll, DLE ACK, ...) as its
-bytes stood on the line, after four bytes of ours: version (1), direction (0 not known, 1 ">",
-2 "<"), check (0 none, 1 BCC, 2 CRC) and its verdict (0 none, 1 right, 2 wrong). There are no
-packets for noise, silence and missing replies. The format is that of draft-ietf-opsawg-pcapng,
-sections 4.1 to 4.3.
+bytes stood on the line, after four bytes of ours: version (1), direction (0 not known, 1 ">", 2
+"<"), check (0 none, 1 BCC, 2 CRC) and its verdict (0 none, 1 right, 2 wrong). There are no packets
+for noise, silence and missing replies. The format follows draft-ietf-opsawg-pcapng, sections 4.1
+to 4.3.
 """
 
 from __future__ import annotations

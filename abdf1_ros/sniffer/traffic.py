@@ -36,7 +36,7 @@ _PAUSE = 0.15
 # as its file.
 _PART = 4096
 
-# After so many replies without any DLE ACK, NAK or ENQ the line has none: it is radio modem.
+# After this number of replies without any DLE ACK, NAK or ENQ the line is treated as radio modem.
 _RADIO_REPLIES = 3
 
 _CONTROLS = {

@@ -113,7 +113,7 @@ def _word(window: Window, address: int) -> Address:
 
 
 class Plc2Commands:
-    """The commands a PLC-2 serves; those of other families have FNCs it does not know."""
+    """The commands that a PLC-2 serves; it does not know the FNCs of other families."""
 
     no_such_file: Codes = status.STS_ADDRESS, None
     out_of_range: Codes = status.STS_ADDRESS, None

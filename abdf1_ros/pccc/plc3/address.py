@@ -20,10 +20,10 @@ Grammar, letters in any case::
     address  := type [file] ":" number ["." member] ["/" bit]       B10:5/03, T:4.ACC
               | "E3.1." section "." file "." structure "." word ["/" bit]
 
-The second form is the manuals' own (M 13-5). Both name the same places: T:4.ACC is
-E3.1.3.0.4.2. Bits are octal in every section, words of the I/O image too. Sections and ranges
-are those of publication 1775-6.5.5 A-15, which 1779-KFM B-5 confirms. Floats, high-order
-integers and pointers are left out: what their words hold is in neither.
+The second form is the manuals' own (M 13-5). Both name the same places: T:4.ACC is E3.1.3.0.4.2.
+Bits are octal in every section, words of the I/O image too. Sections and ranges come from
+publication 1775-6.5.5 A-15, and 1779-KFM B-5 confirms them. Floats, high-order integers and
+pointers are left out: what their words hold is in neither.
 """
 
 from __future__ import annotations

@@ -13,7 +13,7 @@
 # limitations under the License.
 
 """
-Addresses of a PLC-5: those of ``file_address``; racks, groups and bits of its I/O are octal.
+Addresses of a PLC-5, in the grammar of ``file_address``; its I/O has octal numbers.
 
 ::
 

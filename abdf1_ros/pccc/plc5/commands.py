@@ -47,11 +47,11 @@ _DEFAULT_FILE = 1  # of an address without a file level (M 13-10..13-15)
 @dataclass(frozen=True, slots=True)
 class Element:
     """
-    What a typed command counts.
+    The unit in which a typed command counts.
 
-    ``type_id`` is its data type (M 7-29), ``wire_size`` its bytes on the line, ``size`` those
-    of them that have an address. It travels as ``parts`` pieces of that type: a word of an A
-    file as two characters (publication 1785-6.5.9 6-12 gives the type one byte).
+    ``type_id`` is the data type (M 7-29), ``wire_size`` the bytes of a unit on the line, ``size``
+    the bytes among them that have an address. It travels as ``parts`` pieces of that type: a word
+    of an A file as two characters (publication 1785-6.5.9 6-12 gives the type one byte).
     """
 
     type_id: int
@@ -86,8 +86,8 @@ class SystemAddress:
         """
         Return the logical binary form (M 13-10..13-12).
 
-        The memory area is left out: without it the data table is meant, and there are servers
-        that refuse an address which names it (``read`` takes both).
+        The address leaves the memory area out, which means the data table. Some servers refuse an
+        address that names the area; ``read`` takes both forms.
         """
         mask = _FILE | _ELEMENT
         levels = number(self.file) + number(self.element)

@@ -89,7 +89,7 @@ def _system_address(address: Address, words: int) -> plc5.SystemAddress:
 
 
 def _element(address: Address, words: int) -> plc5.Element:
-    """Return what so many words at an address are counted in."""
+    """Return the unit in which ``words`` words at an address are counted."""
     return plc5.element_of(address, address.is_value(words))
 
 

@@ -38,7 +38,7 @@ _RANGE_CODES = RangeCodes((status.EXTENDED, status.EXT_ILLEGAL_FIELD), _TOO_LARG
 
 class TypedService:
     """
-    Typed read and write of ``table``, whose places are those of ``addressing``.
+    Typed read and write of ``table``, whose places follow ``addressing``.
 
     A PLC-5 has them, and the SLC 5/03 and later from operating system 303 on; of an SLC only
     files that a PLC-5 has in the same form.
@@ -110,7 +110,7 @@ class TypedService:
         return start.at_offset(start.offset + offset * _element(start, address).size // 2)
 
     def _is_other(self, kind: FileType) -> bool:
-        """Tell whether such files differ from those of a PLC-5, or are not in one piece."""
+        """Tell whether files of this type differ from files of a PLC-5, or have several pieces."""
         theirs, ours = self._addressing.files[kind], ADDRESSING.files.get(kind)
         has_slots = kind.is_io and self._addressing is not ADDRESSING
         return ours is None or ours.words != theirs.words or has_slots

@@ -13,7 +13,7 @@
 # limitations under the License.
 
 """
-Addresses of an SLC 500 or MicroLogix: those of ``file_address``; its I/O is by slot and word.
+Addresses of an SLC 500 or MicroLogix, as in ``file_address``; its I/O is by slot and word.
 
 ::
 

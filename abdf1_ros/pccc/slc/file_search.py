@@ -17,10 +17,10 @@ The data files of an SLC 500 or MicroLogix.
 
 Newer ones have a list, the file directory, in file 0 of a type that depends on the processor: a
 row each for programs, configuration, the data files in the order of their numbers, forces, and
-function files. In no manual that was read: layout and commands are those of a recorded MicroLogix
-1400 and its programming software (vectors/processors.json); pycomm3, which was tried with an SLC
-5/05 and a MicroLogix 1100, has the same rows at the same places. Others are asked for every type
-that a file may have, because a read has to name it.
+function files. No manual that was read has this list. Layout and commands come from a recorded
+MicroLogix 1400 and its programming software (vectors/processors.json). pycomm3, which was tried
+with an SLC 5/05 and a MicroLogix 1100, has the same rows at the same places. Processors without
+the list are asked for every type that a file may have, because a read has to name the type.
 """
 
 from __future__ import annotations

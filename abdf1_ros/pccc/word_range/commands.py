@@ -68,7 +68,7 @@ class WordRangeRead(Generic[_Place]):
     @classmethod
     def read(cls, reader: Reader,
              read_address: Callable[[Reader], _Place]) -> WordRangeRead[_Place]:
-        """Take the parameters off ``reader``, those of a file read with 0F/04 too."""
+        """Take the parameters off ``reader``; those of a file read, 0F/04, are the same."""
         offset, total = reader.word(), reader.word()
         address = read_address(reader)
         size = reader.byte()

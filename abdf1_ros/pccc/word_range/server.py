@@ -41,8 +41,9 @@ class RangeCodes:
     """
     What a family answers to word range commands that cannot be executed.
 
-    ``bad_size`` is for sizes, offsets and totals that do not fit each other, ``missing`` for a
-    first word that is not there, the others for a transaction that ends after its file.
+    - ``bad_size``: sizes, offsets and totals that do not fit each other.
+    - ``missing``: a first word that is not there.
+    - The remaining codes: a transaction that ends after its file.
     """
 
     bad_size: Codes
