@@ -275,6 +275,28 @@ def test_rates_are_those_since_the_last_look(bench: Bench) -> None:
     assert (values['transactions per second'], values['line load']) == ('0.0', '0 %')
 
 
+def test_load_of_the_line_is_told_by_topic_the_largest_first(tmp_path: Path) -> None:
+    bench = Bench(tmp_path, ('slow,Read,N9:0,1,PLC5,1000,1', 'short,Read,N7:0,1,PLC5,100,1',
+                             'long,Read,N7:1,1,PLC5,100,3'), header=f'{HEADER},Length')
+    assert details(bench.status('link'))['line load by topic'] == ''  # nothing was read twice
+    for job in bench.driver.readings.reads.jobs:
+        for now in (NOW, NOW + job.block.period):
+            job.done(now)
+    fast, = (job.block for job in bench.driver.readings.reads.jobs if job.block.period < 1)
+    slow, = (job.block for job in bench.driver.readings.reads.jobs if job.block.period >= 1)
+    assert details(bench.status('link'))['line load by topic'] == (
+        f'long {fast.line_time / 0.1 * 3 / 4:.1%}, short {fast.line_time / 0.1 / 4:.1%}, '
+        f'slow {slow.line_time / 1.0:.1%}')
+
+
+def test_load_by_topic_names_no_more_than_forty(tmp_path: Path) -> None:
+    bench = Bench(tmp_path, tuple(f't{n},Read,N{n}:0,1,PLC5,1000' for n in range(10, 90)))
+    for job in bench.driver.readings.reads.jobs:
+        job.done(NOW)
+        job.done(NOW + 1)
+    assert details(bench.status('link'))['line load by topic'].count('%') == 40
+
+
 def test_poll_cycle_is_unknown_before_the_second_read(bench: Bench) -> None:
     values = details(bench.status('link'))
     assert values['poll cycle with Periods'] == \
@@ -532,7 +554,7 @@ def test_blocks_may_be_divided_while_the_poll_cycle_is_asked_for(bench: Bench) -
     class Part:
         """A job that has not been done yet."""
 
-        intervals = SimpleNamespace(last=None, longest=None)
+        intervals = SimpleNamespace(last=None, usual=None, longest=None)
 
     class Divided:
         """A job that gives way to two others while it is looked at."""
@@ -540,7 +562,7 @@ def test_blocks_may_be_divided_while_the_poll_cycle_is_asked_for(bench: Bench) -
         @property
         def intervals(self) -> SimpleNamespace:
             jobs.add(Part())
-            return SimpleNamespace(last=0.25, longest=None)
+            return SimpleNamespace(last=0.25, usual=None, longest=None)
 
     jobs.clear()
     jobs.add(Divided())
@@ -736,6 +758,7 @@ def test_failed_write_is_a_warning_for_ten_seconds(bench: Bench) -> None:
 
 def test_monitor_looks_for_values_that_there_are(bench: Bench) -> None:
     columns = {key for *_, key in plant._COLUMNS} - {'state'}
-    assert {*view._LINK_KEYS, *columns, 'last error'} <= details(bench.status('link')).keys()
+    expected = {*view._LINK_KEYS, view._LOAD_BY_TOPIC, *columns, 'last error'}
+    assert expected <= details(bench.status('link')).keys()
     assert {*view._STATION_KEYS} <= details(bench.status('station 1')).keys()
     assert 'total' in details(bench.status('mappings'))

@@ -15,15 +15,17 @@
 """
 Show what a running bridge does, or all of them, from their topics alone.
 
-It shows values and their ages, stations, the load of the line, writes and counters. On a terminal
-the picture is renewed in place, and its last line names the keys. Elsewhere, or with
---once, plain text is printed.
+First comes the verdict, then each topic with its age, its part of the line's time, a curve of
+the last seconds and its value, then what is wrong. Writes, link, stations and counters follow. On
+a terminal the picture is renewed in place; arrows, pages and the keys of its last line move it.
+Elsewhere, or with --once, plain text is printed.
 
 With --all there is a line for each bridge that is heard, the worst first; Return shows the one
 that is marked, q goes back.
 
-A value is fresh, or STALE when it is older than its topic promises; topics that are published on
-change, or when a PLC writes to us, promise nothing.
+A value is fresh, or STALE when it is older than its topic promises. Topics that are published on
+change, or when a PLC writes to us, promise nothing: their value may have any age. A blank in a
+curve is a time without a fresh value.
 """
 
 from __future__ import annotations
@@ -42,6 +44,7 @@ import sys
 import time
 from types import FrameType
 
+from abdf1_ros.cli.monitor.curves import ASCII, BLOCKS
 from abdf1_ros.cli.monitor.node import full_name, NodeWatch
 from abdf1_ros.cli.monitor.plant import PlantWatch, render_plant
 from abdf1_ros.cli.monitor.view import render, Style, TextLine
@@ -76,7 +79,7 @@ _RETURN = (curses.KEY_ENTER, ord('\n'), ord('\r'))
 _SECTION_KEYS = {ord('l'): 'link', ord('s'): 'stations', ord('v'): 'values',
                  ord('r'): 'reasons', ord('w'): 'writes', ord('c'): 'counters'}
 _PLANT_KEYS = 'q end  arrows, pages  Return shows a line'
-_KEYS = 'q end  arrows, pages  l link  s stations  v values  r reasons  w writes  c counters'
+_KEYS = 'q:end v:values r:reasons w:writes l:link s:stations c:counters'
 
 # Colours by the codes of ANSI, which stand for the same colours in curses.
 _COLOURS = {Style.GOOD: 2, Style.WARNING: 3, Style.BAD: 1}
@@ -318,8 +321,13 @@ def _show(watch: NodeWatch, options: argparse.Namespace, has_ended: _Ending) -> 
         return
     # Some time for the values that topics have promised.
     watch.wait(lambda: has_ended() or watch.is_complete, _COMPLETION)
-    _print_pictures(watch, lambda width: render(watch.snapshot(), time.monotonic(), width),
-                    options, has_ended)
+    _print_pictures(watch, partial(_picture, watch), options, has_ended)
+
+
+def _picture(watch: NodeWatch, width: int) -> list[TextLine]:
+    # What the C library cannot write would spoil a screen of curses; the console has few letters.
+    has_blocks = locale.getencoding() == 'UTF-8' and os.environ.get('TERM') != 'linux'
+    return render(watch.snapshot(), time.monotonic(), width, BLOCKS if has_blocks else ASCII)
 
 
 def _is_screen() -> bool:
@@ -337,7 +345,7 @@ def _is_screen() -> bool:
 def _draw(window: curses.window, watch: NodeWatch, has_ended: _Ending) -> None:
     screen = _Screen(window)
     while not has_ended() and not screen.wants_end():
-        screen.show(render(watch.snapshot(), time.monotonic(), screen.width))
+        screen.show(_picture(watch, screen.width))
         watch.wait(has_ended, _RENEWAL)
 
 

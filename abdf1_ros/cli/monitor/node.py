@@ -22,6 +22,7 @@ from dataclasses import dataclass, replace
 import time
 from typing import Any
 
+from abdf1_ros.cli.monitor.curves import Curve
 from abdf1_ros.cli.monitor.view import Reading, SILENCE, Snapshot, Status, Style
 from abdf1_ros.errors import FormatError
 from abdf1_ros.ros.observer import graph_hint, Observer
@@ -39,6 +40,8 @@ _DISCOVERY_PERIOD = 0.5
 _RESULTS_KEPT = 8
 
 _TYPES = {f'std_msgs/msg/{message.__name__}': message for message in MESSAGES.values()}
+
+_TEXT, _BITS = 'std_msgs/msg/String', 'std_msgs/msg/UInt8MultiArray'
 
 _STYLES = {DiagnosticStatus.OK: Style.GOOD, DiagnosticStatus.WARN: Style.WARNING}
 
@@ -153,8 +156,9 @@ class NodeWatch(Listening):
         known = self._subscriptions.get(topic)
         if known is None:
             handle = self.subscribe(_TYPES[type_name], topic, self._taker(topic), latched_qos())
+            curve = None if type_name == _TEXT else Curve(is_bits=type_name == _BITS)
             known = _Subscription(
-                type_name, handle, Reading(topic.removeprefix(f'{self.name}/read/')))
+                type_name, handle, Reading(topic.removeprefix(f'{self.name}/read/'), curve=curve))
             self._subscriptions[topic] = known
         known.reading = replace(known.reading, promised=self._promised(topic))
 
@@ -175,6 +179,8 @@ class NodeWatch(Listening):
             address = ''
             if not isinstance(message, String) and message.layout.dim:
                 address = message.layout.dim[0].label
+            if reading.curve:
+                reading.curve.take(message.data, received)
             subscription.reading = replace(
                 reading, values=message.data, address=address, received=received)
         return take

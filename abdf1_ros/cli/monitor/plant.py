@@ -26,12 +26,9 @@ from dataclasses import dataclass, replace
 import time
 
 from abdf1_ros.cli.monitor.node import Listening, shown_statuses
-from abdf1_ros.cli.monitor.view import SILENCE, Status, Style, TextLine
+from abdf1_ros.cli.monitor.view import LEVELS, SILENCE, Status, Style, TextLine
 from abdf1_ros.text import by_number, counted, cut, printable
 from diagnostic_msgs.msg import DiagnosticArray
-
-_WORDS = {Style.GOOD: 'OK', Style.WARNING: 'WARN', Style.BAD: 'ERROR'}
-_RANKS = [Style.BAD, Style.WARNING, Style.GOOD]
 
 _NAME_WIDTH = 34
 _COLUMNS = ('state', 5, 'state'), ('load', 5, 'line load'), ('cycle', 8, 'poll cycle with Periods')
@@ -54,9 +51,7 @@ class LineState:
         """Return the status that says most at the clock value ``now`` (s)."""
         if now - self.told > SILENCE:
             return Status('', Style.BAD, f'no diagnostics for {now - self.told:.0f} s')
-        # Among equals that of the mappings: what it says of a good line is worth most.
-        return min(self.statuses, key=lambda status: (
-            _RANKS.index(status.style), status.section != 'mappings'))
+        return min(self.statuses, key=lambda status: status.rank)
 
     def values(self) -> dict[str, str]:
         """Return what the link tells."""
@@ -110,9 +105,9 @@ class PlantWatch(Listening):
 def render_plant(lines: Iterable[LineState], now: float, width: int) -> list[TextLine]:
     """Return two lines of heading, and one for each bridge, whose ``section`` is its name."""
     found = sorted(((line.worst(now), line) for line in lines),
-                   key=lambda pair: (_RANKS.index(pair[0].style), by_number(pair[1].name)))
+                   key=lambda pair: (pair[0].rank[0], by_number(pair[1].name)))
     counts = Counter(status.style for status, _ in found)
-    told = ', '.join(f'{counts[style]} {_WORDS[style]}' for style in reversed(_RANKS)
+    told = ', '.join(f'{counts[style]} {LEVELS[style]}' for style in reversed(LEVELS)
                      if counts[style])
     longest = min(_NAME_WIDTH, width // 3)
     names = [cut(printable(line.name), longest) for _, line in found]
@@ -123,16 +118,14 @@ def render_plant(lines: Iterable[LineState], now: float, width: int) -> list[Tex
         return cut(f'  {name:<{name_width}}  {cells}  {printable(text)}'.rstrip(), width)
 
     titles = {key: title for title, _, key in _COLUMNS}
-    title = f'{counted(len(found), "line")}: {told}' if found else 'no line is heard'
+    title = f'{counted(len(found), "line")}: {told}' if found else \
+        'no line is heard; diagnostics come every second'
     return [TextLine(cut(title, width), Style.TITLE),
             TextLine(row('line', titles, ''), Style.TITLE),
-            *(TextLine(row(name, {**line.values(), 'state': _WORDS[status.style]},
+            *(TextLine(row(name, {**line.values(), 'state': LEVELS[status.style]},
                            _text(status, line.spares)), status.style, line.name)
               for name, (status, line) in zip(names, found, strict=True))]
 
 
 def _text(status: Status, spares: Sequence[str]) -> str:
-    text = status.message.removeprefix(f'{_WORDS[status.style]}: ')
-    if status.section not in ('', 'link', 'mappings'):
-        text = f'{status.section}: {text}'
-    return f'{text}; spare: {", ".join(spares)}' if spares else text
+    return f'{status.short}; spare: {", ".join(spares)}' if spares else status.short

@@ -26,7 +26,8 @@ from dataclasses import dataclass, field
 from enum import Enum
 import textwrap
 
-from abdf1_ros.text import cut, printable, value_text
+from abdf1_ros.cli.monitor import curves
+from abdf1_ros.text import counted, cut, printable, value_text
 
 # After so many seconds without diagnostics the picture says so; by default they come every second.
 SILENCE = 3.0
@@ -35,14 +36,20 @@ SILENCE = 3.0
 _NAME_WIDTH = 30
 _ADDRESS_WIDTH = 12
 _STATE_WIDTH = 16
-_SHORT_STATE = 6
+_SHORT_STATE = 8
+_WORD = 5
+_LOAD_WIDTH = 5
 _AGE_WIDTH = 7
-_GOOD_VALUE_WIDTH = 24
+_GOOD_VALUE_WIDTH = 16
 _LEAST_VALUE_WIDTH = 12
 
+_STATION = 'station '
+# How the second line shows values of the link.
+_FACTS = (('load', 'line load'), ('cycle', 'poll cycle with Periods'))
 _LINK_KEYS = ('settings', 'transactions per second', 'line load', 'poll cycle with Periods',
               'longest poll cycle with Periods', 'expected poll cycle, line time alone')
 _PERIOD = 'period '  # how keys of the link begin that tell of a Period
+_LOAD_BY_TOPIC = 'line load by topic'
 _STATION_KEYS = ('last answer', 'transactions without reply', 'error replies', 'processor',
                  'mode', 'faults')
 
@@ -55,6 +62,12 @@ class Style(Enum):
     GOOD = 'good'
     WARNING = 'warning'
     BAD = 'bad'
+
+
+LEVELS = {Style.BAD: 'ERROR', Style.WARNING: 'WARN', Style.GOOD: 'OK'}
+"""How diagnostics call what is shown in these styles, the worst first."""
+
+_RANKS = [*LEVELS]
 
 
 @dataclass(frozen=True, slots=True)
@@ -80,14 +93,25 @@ class Reading:
     address: str = ''
     received: float = 0.0
     promised: float | None = None
+    curve: curves.Curve | None = None
+
+    @property
+    def is_missing(self) -> bool:
+        """Tell whether there is no value of a topic that promises some."""
+        return self.values is None and self.promised is not None
+
+    def is_stale(self, now: float) -> bool:
+        """Tell whether the value is older than the topic promises."""
+        return self.values is not None and self.promised is not None \
+            and now - self.received > self.promised
 
     def state(self, now: float) -> tuple[str, Style]:
         """Return the state of the values in a word, at the clock value ``now`` (s)."""
         if self.values is None:
             return 'no value', Style.BAD
         if self.promised is None:
-            return 'no promise', Style.PLAIN
-        if now - self.received > self.promised:
+            return 'any age', Style.PLAIN
+        if self.is_stale(now):
             return f'STALE (>{self.promised:.3g} s)', Style.BAD
         return 'fresh', Style.GOOD
 
@@ -106,6 +130,19 @@ class Status:
     message: str
     values: Mapping[str, str] = field(default_factory=dict)
     received: float = 0.0
+
+    @property
+    def rank(self) -> tuple[int, bool]:
+        """Return what sorts the worst to the front, and of equal ones what says most."""
+        says_most = 'mappings' if self.style is Style.GOOD else 'link'
+        return _RANKS.index(self.style), self.section not in ('', says_most)
+
+    @property
+    def short(self) -> str:
+        """Return the message without its level, and the section where that is not plain."""
+        text = self.message.removeprefix(f'{LEVELS[self.style]}: ')
+        is_plain = self.section in ('', 'link', 'mappings')
+        return text if is_plain else f'{self.section}: {text}'
 
 
 @dataclass(frozen=True, slots=True)
@@ -128,12 +165,18 @@ class Snapshot:
     """Why topics may not be seen, empty where nothing is known."""
 
 
-def render(snapshot: Snapshot, now: float, width: int) -> list[TextLine]:
-    """Return the lines that show ``snapshot`` at the clock value ``now`` (s), cut to ``width``."""
+def render(snapshot: Snapshot, now: float, width: int,
+           levels: str = curves.BLOCKS) -> list[TextLine]:
+    """
+    Return the lines that show ``snapshot`` at the clock value ``now`` (s), cut to ``width``.
+
+    What is looked for first comes first: the verdict, the values, what is wrong. ``levels`` are
+    the characters of curves.
+    """
     parts = {
-        'link': [*_head(snapshot, now), *_link(snapshot, width)],
-        'stations': _stations(snapshot, width), 'values': _values(snapshot, now, width),
-        'reasons': _mappings(snapshot, width), 'writes': _writes(snapshot, now, width),
+        'values': [*_head(snapshot, now), *_values(snapshot, now, width, levels)],
+        'reasons': _reasons(snapshot, width), 'writes': _writes(snapshot, now, width),
+        'link': _link(snapshot, width), 'stations': _stations(snapshot, width),
         'counters': _counters(snapshot, width)}
     return [TextLine(cut(line.text, width), line.style, '' if number else name)
             for name, lines in parts.items() for number, line in enumerate(lines)]
@@ -154,15 +197,52 @@ def show(values: Sequence[float] | str, width: int) -> str:
 
 
 def _head(snapshot: Snapshot, now: float) -> Iterator[TextLine]:
-    yield TextLine(printable(snapshot.node), Style.TITLE)
+    """Yield the verdict, and how line and PLCs are."""
+    found = sorted([*_heard(snapshot, now), *snapshot.statuses, *_missing(snapshot, now)],
+                   key=lambda status: status.rank)
+    worst, bad = found[0], sum(status.style is not Style.GOOD for status in found)
+    more = f' (1 of {bad})' if bad > 1 else ''
+    yield TextLine(printable(f'{snapshot.node}  {LEVELS[worst.style]}{more}: {worst.short}'),
+                   worst.style)
+    link = next(_section(snapshot, 'link'), None)
+    facts = [f'{name} {link.values[key]}' for name, key in _FACTS if key in link.values] \
+        if link else []
+    stations = [status for status in snapshot.statuses if status.section.startswith(_STATION)]
+    if stations:
+        facts.append('stations ' + ', '.join(map(_mode, stations)))
+    if facts:
+        is_good = all(status.style is Style.GOOD for status in stations)
+        yield TextLine(printable('  ' + '   '.join(facts)),
+                       Style.PLAIN if is_good else Style.WARNING)
+
+
+def _heard(snapshot: Snapshot, now: float) -> Iterator[Status]:
+    """Yield what is wrong with hearing the node."""
     if not snapshot.is_there:
-        yield TextLine('  the node is gone; these are its last words', Style.BAD)
+        yield Status('', Style.BAD, 'the node is gone; these are its last words')
     if snapshot.told is None:
         remapped = '; where /diagnostics is remapped, monitor needs the same -r' \
             if snapshot.is_there else ''
-        yield TextLine(f'  no diagnostics yet{remapped}', Style.WARNING)
+        yield Status('', Style.WARNING, f'no diagnostics yet{remapped}')
     elif now - snapshot.told > SILENCE:
-        yield TextLine(f'  no diagnostics for {now - snapshot.told:.1f} s', Style.BAD)
+        yield Status('', Style.BAD, f'no diagnostics for {now - snapshot.told:.1f} s')
+
+
+def _missing(snapshot: Snapshot, now: float) -> Iterator[Status]:
+    """Yield how many topics have no fresh value here, which the bridge may not know."""
+    missing = sum(reading.is_missing or reading.is_stale(now) for reading in snapshot.readings)
+    topics = counted(len(snapshot.readings), 'topic')
+    if missing:
+        yield Status('topics', Style.BAD, f'{missing} of {topics} without a fresh value here')
+    elif not snapshot.statuses:
+        yield Status('', Style.GOOD, topics)
+
+
+def _mode(status: Status) -> str:
+    """Return the number of a station and the mode of its processor, as far as it answers."""
+    mode = status.values.get('mode', '').partition(' (')[0] or LEVELS[status.style]
+    number = status.section.removeprefix(_STATION)
+    return f'{number} {"silent" if status.style is Style.BAD else mode}'
 
 
 def _link(snapshot: Snapshot, width: int) -> Iterator[TextLine]:
@@ -182,53 +262,92 @@ def _stations(snapshot: Snapshot, width: int) -> Iterator[TextLine]:
         numbers = ', '.join(map(str, snapshot.active)) or 'none'
         yield TextLine(f'  active stations: {numbers}')
     for status in snapshot.statuses:
-        if status.section.startswith('station '):
+        if status.section.startswith(_STATION):
             yield from _summary(status.section, status, width)
             yield from _table(status.values, _STATION_KEYS, width)
 
 
-def _values(snapshot: Snapshot, now: float, width: int) -> Iterator[TextLine]:
+@dataclass(frozen=True, slots=True)
+class _Widths:
+    """The columns of the values; 0 for those that a narrow terminal has no room for."""
+
+    topic: int
+    state: int
+    value: int
+    address: int = 0
+    load: int = 0
+    curve: int = 0
+
+    @classmethod
+    def of(cls, topic: int, width: int) -> _Widths:
+        """Share a width out: the value gets what it needs first."""
+        left = width - topic - _AGE_WIDTH - _WORD - 8 - _GOOD_VALUE_WIDTH
+        sizes = []
+        for size in (_SHORT_STATE - _WORD - 2, curves.WIDTH, _LOAD_WIDTH,
+                     _STATE_WIDTH - _SHORT_STATE - 2, _ADDRESS_WIDTH):
+            fits = left >= size + 2
+            left -= (size + 2) * fits
+            sizes.append((size + 2) * fits)
+        short, curve, load, long, address = sizes
+        return cls(topic, _WORD + short + long, max(_LEAST_VALUE_WIDTH, _GOOD_VALUE_WIDTH + left),
+                   address and _ADDRESS_WIDTH, load and _LOAD_WIDTH, curve and curves.WIDTH)
+
+    def row(self, topic: str, address: str, age: str, state: str, load: str, curve: str,
+            value: str) -> str:
+        """Return a line of the table."""
+        state = state if len(state) <= self.state else state.split()[0]
+        cells = [f'{topic:<{self.topic}}', f'{cut(address, self.address):<{self.address}}',
+                 f'{age:>{_AGE_WIDTH}}', f'{state:<{self.state}}', f'{load:>{self.load}}',
+                 f'{curve:<{self.curve}}', value]
+        sizes = self.topic, self.address, _AGE_WIDTH, self.state, self.load, self.curve, 1
+        shown = (cell for cell, size in zip(cells, sizes, strict=True) if size)
+        return ('  ' + '  '.join(shown)).rstrip()
+
+
+def _values(snapshot: Snapshot, now: float, width: int, levels: str) -> Iterator[TextLine]:
     longest = min(_NAME_WIDTH, width // 3)
     names = [cut(printable(reading.topic), longest) for reading in snapshot.readings]
-    name_width = max(map(len, ['topic', *names]))
-    # The value is kept longest: a narrow terminal first drops the address, then cuts the state.
-    left = width - name_width - _AGE_WIDTH - 6
-    state_width = _STATE_WIDTH if left - _STATE_WIDTH - 2 >= _GOOD_VALUE_WIDTH else _SHORT_STATE
-    left -= state_width + 2
-    has_address = left - _ADDRESS_WIDTH - 2 >= _GOOD_VALUE_WIDTH
-    value_width = max(_LEAST_VALUE_WIDTH, left - (_ADDRESS_WIDTH + 2) * has_address)
-
-    def row(topic: str, age: str, state: str, value: str, address: str) -> str:
-        state = f'{state[:state_width]:<{state_width}}'
-        place = f'  {address:<{_ADDRESS_WIDTH}}' if has_address else ''
-        return f'  {topic:<{name_width}}{place}  {age:>{_AGE_WIDTH}}  {state}  {value}'
-
-    yield TextLine(row('topic', 'age', 'state', 'value', 'address').rstrip(), Style.TITLE)
+    widths = _Widths.of(max(map(len, ['topic', *names])), width)
+    loads = _loads(snapshot)
+    heads = 'topic', 'address', 'age', 'state', 'load', f'last {curves.SECONDS:g} s', 'value'
+    yield TextLine(widths.row(*heads), Style.TITLE)
     for name, reading in zip(names, snapshot.readings, strict=True):
         state, style = reading.state(now)
-        age, value = '', ''
+        age = value = curve = ''
         if reading.values is not None:
-            age = f'{now - reading.received:.1f} s'
-            value = show(reading.values, value_width)
-        address = cut(printable(reading.address), _ADDRESS_WIDTH)
-        yield TextLine(row(name, age, state, value, address).rstrip(), style)
+            age, value = f'{now - reading.received:.1f} s', show(reading.values, widths.value)
+        if reading.curve and widths.curve:
+            curve = reading.curve.draw(now, reading.promised, levels)
+        yield TextLine(widths.row(name, printable(reading.address), age, state,
+                                  loads.get(reading.topic, ''), curve, value), style)
     if not snapshot.readings:
         yield TextLine(f'  no read topic found{snapshot.hint}', Style.WARNING)
 
 
-def _mappings(snapshot: Snapshot, width: int) -> Iterator[TextLine]:
-    for status in _section(snapshot, 'mappings'):
-        yield from _summary('mappings', status, width)
-        for key, value in status.values.items():
-            if not value.isdecimal():  # the counts are in the summary
-                yield from _wrapped(f'{key}: {value}', width, status.style)
+def _loads(snapshot: Snapshot) -> dict[str, str]:
+    """Return the part of the line's time that each topic takes, by its name."""
+    told = ', '.join(status.values.get(_LOAD_BY_TOPIC, '')
+                     for status in _section(snapshot, 'link'))
+    pairs = (entry.rpartition(' ') for entry in printable(told).split(', '))
+    return {topic: load for topic, _, load in pairs}
+
+
+def _reasons(snapshot: Snapshot, width: int) -> Iterator[TextLine]:
+    """Yield what is wrong, the worst first, with each bad row of the map."""
+    shown = (status for status in snapshot.statuses if status.style is not Style.GOOD
+             or status.section in ('mappings', 'interlocks'))
+    for status in sorted(shown, key=lambda status: status.rank):
+        yield from _summary(status.section, status, width)
+        if status.section == 'mappings':
+            for key, value in status.values.items():
+                if not value.isdecimal():  # the counts are in the summary
+                    yield from _wrapped(f'{key}: {value}', width, status.style)
 
 
 def _writes(snapshot: Snapshot, now: float, width: int) -> Iterator[TextLine]:
-    for name in ('writes', 'interlocks'):
-        for status in _section(snapshot, name):
-            if status.style is not Style.GOOD or any(map(_says_something, status.values.values())):
-                yield from _summary(name, status, width)
+    for status in _section(snapshot, 'writes'):
+        if status.style is not Style.GOOD or any(map(_says_something, status.values.values())):
+            yield from _summary('writes', status, width)
     for result in snapshot.results:
         value, latency = (result.values.get(key, '?') for key in ('value', 'latency_ms'))
         yield from _wrapped(f'{now - result.received:.1f} s ago: {result.section} {value} '

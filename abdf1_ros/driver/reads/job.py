@@ -24,7 +24,7 @@ from typing import NamedTuple
 from abdf1_ros.df1.machine import MOST_LATE
 from abdf1_ros.df1.packet import Packet
 from abdf1_ros.driver.job_tasks import Job, LineTime
-from abdf1_ros.driver.reads.point import ReadPoint
+from abdf1_ros.driver.reads.point import ReadPoint, SMOOTHING
 from abdf1_ros.errors import Abdf1Error
 from abdf1_ros.pccc.dialect import Request, Steps
 from abdf1_ros.pccc.steps import words_in
@@ -37,13 +37,14 @@ class ReadTooOld(Abdf1Error):
 
 class Intervals:
     """
-    The seconds between good reads: the ``last`` ones and the ``longest``.
+    The seconds between good reads: the ``last`` ones, the ``usual`` and the ``longest``.
 
     An outage of the station does not count.
     """
 
     def __init__(self) -> None:
         self.last: float | None = None
+        self.usual: float | None = None
         self.longest: float | None = None
         self._since: float | None = None
 
@@ -52,6 +53,8 @@ class Intervals:
         if self._since is not None:
             self.last = now - self._since
             self.longest = max(self.last, self.longest or 0.0)
+            usual = self.last if self.usual is None else self.usual
+            self.usual = usual + SMOOTHING * (self.last - usual)
         self._since = now
 
     def outage(self) -> None:

@@ -25,8 +25,8 @@ from abdf1_ros.settings.mapping import Mapping, Publish
 # 0.3 / 0.1 is a little less than 3.
 _ROUNDING = 1e-9
 
-# Weight of the newest interval in ``kept``.
-_SMOOTHING = 0.125
+# Weight of the newest of several intervals, where the usual one is wanted.
+SMOOTHING = 0.125
 
 
 class Freshness(Enum):
@@ -99,7 +99,7 @@ class ReadPoint:
             if before is not None:
                 least = before if before < self.interval else self.interval
                 self.kept = least if self.kept is None else \
-                    self.kept + _SMOOTHING * (least - self.kept)
+                    self.kept + SMOOTHING * (least - self.kept)
         if self.withheld and self.guard is not None:
             self.guard.withheld.discard(self)
         self.last_good, self.error, self.withheld = now, None, ''

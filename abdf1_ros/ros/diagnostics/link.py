@@ -22,6 +22,7 @@ from statistics import fmean
 
 from abdf1_ros.df1.frames import Duplex
 from abdf1_ros.driver.driver import Driver
+from abdf1_ros.driver.reads.job import ReadJob
 from abdf1_ros.driver.reads.point import ReadPoint
 from abdf1_ros.pccc.link_counters import NO_MEMORY, UNSENT
 from abdf1_ros.ports.clock import line_time
@@ -33,6 +34,9 @@ from abdf1_ros.text import counted, milliseconds
 
 # After so many seconds without a poll of the master there is a warning.
 _LONGEST_UNPOLLED = 5.0
+
+LOAD_BY_TOPIC = 'line load by topic'
+_MOST_TOPICS = 40  # a map may have thousands
 
 
 class LinkStatus:
@@ -103,6 +107,7 @@ class LinkStatus:
                 driver.readings.reads.longest_poll_cycle),
             'expected poll cycle, line time alone': milliseconds(
                 driver.readings.expected_poll_cycle),
+            LOAD_BY_TOPIC: load_by_topic(driver.readings.reads.jobs),
             **_paces(driver.points.values()),
             **_poll_scans(driver),
             **_unnumbered_counts(driver),
@@ -168,6 +173,23 @@ class _LoadMeter:
             on_line = (total - characters) * driver.network.timing.char_time
             self.load = min(100.0, 100 * on_line / (now - before))
             self._seen = now, driver.tasks.transactions, total
+
+
+def load_by_topic(jobs: Iterable[ReadJob]) -> str:
+    """
+    Return which part of the time is for the reads of each topic, the largest first.
+
+    Rows that are read together have the part of their words.
+    """
+    loads: defaultdict[str, float] = defaultdict(float)
+    for job in jobs:
+        if interval := job.intervals.usual:
+            load = job.block.line_time / interval
+            words = sum(mapping.codec.words for mapping in job.block.mappings)
+            for mapping in job.block.mappings:
+                loads[mapping.topic] += load * mapping.codec.words / words
+    largest = sorted(loads.items(), key=lambda item: (-item[1], item[0]))[:_MOST_TOPICS]
+    return ', '.join(f'{topic} {load:.1%}' for topic, load in largest)
 
 
 def _paces(points: Iterable[ReadPoint]) -> dict[str, str]:

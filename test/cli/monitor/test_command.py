@@ -25,6 +25,7 @@ import select
 import signal
 import termios
 import time
+from typing import Any
 
 from abdf1_ros.cli.monitor.command import _Screen, main
 from abdf1_ros.cli.monitor.view import TextLine
@@ -64,14 +65,17 @@ def test_one_picture_shows_every_topic_and_status(
         said = call(main, capsys, '--node', NODE, '--once')  # the simulator stood still
     assert said.status == 0, said
     lines = said.out.splitlines()
-    assert NODE in lines
+    assert lines[0] == f'{NODE}  OK: of {len(READS)} mappings {len(READS)} fresh'
+    assert re.fullmatch(r'  load \d+ %   cycle \d+ ms   stations 1 REM RUN, 2 REM RUN', lines[1])
     assert '\x1b' not in said.out  # no terminal, no colours
     for topic, (_, address, values) in READS.items():
         (line,) = [line for line in lines if line.split()[:1] == [topic]]
         shown = f'"{values}"' if isinstance(values, str) else ' '.join(map(str, values))
         assert line.endswith(shown.replace('.0', '')), line
         assert address in line
-        assert ('no promise' if topic == 'recipe' else 'fresh') in line
+        assert ('any age' if topic == 'recipe' else 'fresh') in line
+    # How much of the line's time a row takes is known when it has been read twice.
+    assert len(re.findall(r'^  \S+ .* \d+\.\d%  ', said.out, re.MULTILINE)) > 0
     for status in STATUSES:
         assert any(re.match(f' *{status} +OK: ', line) for line in lines), status
     assert re.search(r'\n +settings +115200 baud, 8 data bits, .*CRC', said.out)
@@ -111,9 +115,10 @@ PAGE_UP, PAGE_DOWN, CONTROL_L = '\x1b[5~', '\x1b[6~', '\x0c'
 class Terminal:
     """A terminal that remembers what was drawn, and can press keys."""
 
-    def __init__(self, *args: str, term: str = 'xterm-256color') -> None:
+    def __init__(self, *args: str, term: str = 'xterm-256color',
+                 size: tuple[int, int] = (60, 120)) -> None:
         self._ours, theirs = pty.openpty()
-        termios.tcsetwinsize(theirs, (60, 120))
+        termios.tcsetwinsize(theirs, size)
         with pytest.MonkeyPatch.context() as environment:
             environment.setenv('TERM', term)
             for name in _SIZES:
@@ -135,6 +140,13 @@ class Terminal:
             assert select.select([self._ours], [], [], left)[0], self.drawn
             self._read()
         self.drawn = self.drawn.partition(text)[2]
+
+    def new(self) -> str:
+        """Return what has been drawn since the last call, after waiting a little for it."""
+        if select.select([self._ours], [], [], 0.1)[0]:
+            self._read()
+        drawn, self.drawn = self.drawn, ''
+        return drawn
 
     def redraw_until(self, text: str, keys: str = '') -> None:
         """Wait until ``text`` is there when, after keys, all is drawn anew."""
@@ -171,8 +183,8 @@ class Terminal:
 
 
 @contextmanager
-def terminal(*args: str, term: str = 'xterm-256color') -> Iterator[Terminal]:
-    screen = Terminal(*args, term=term)
+def terminal(*args: str, **options: Any) -> Iterator[Terminal]:
+    screen = Terminal(*args, **options)
     try:
         yield screen
     finally:
@@ -192,11 +204,29 @@ def test_picture_is_drawn_in_place_and_keys_lead_to_its_parts(simulator: Process
         screen.resize(8, 60)
         screen.redraw_until(NODE)
         screen.redraw_until('counters', 'c')
-        screen.redraw_until(NODE, 'l')
+        screen.redraw_until(NODE, 'v')
         screen.press('q')
         assert screen.result() == 0
         assert '\x1b[?1049l' in screen.drawn
         assert 'Traceback' not in screen.drawn
+
+
+def test_what_counts_is_on_a_screen_of_80_by_24(simulator: Process) -> None:
+    pyte = pytest.importorskip('pyte')
+    screen = pyte.Screen(80, 24)
+    stream = pyte.Stream(screen)
+    with terminal('--node', NODE, term='vt220', size=(24, 80)) as shown:
+        end = time.monotonic() + PATIENCE
+        while not ('any age' in '\n'.join(screen.display) and '▁▁' in '\n'.join(screen.display)):
+            assert time.monotonic() < end, screen.display
+            stream.feed(shown.new())
+        told = [line.rstrip() for line in screen.display]
+    assert told[0].startswith(f'{NODE}  ')
+    assert told[1].startswith('  load ') and 'stations 1 REM RUN, 2 REM RUN' in told[1]
+    assert told[2].split() == ['topic', 'age', 'state', 'load', 'last', '24', 's', 'value']
+    # The topics of this bridge are 25, in their order.
+    assert [line.split()[0] for line in told[3:23]] == sorted(READS)[:20]
+    assert re.fullmatch(r'1-23 of \d+  q:end .* c:counters', told[23])
 
 
 def test_line_is_chosen_from_all_and_q_leads_back(simulator: Process) -> None:
@@ -258,7 +288,7 @@ def test_signal_gives_the_terminal_back(simulator: Process) -> None:
 
 def test_terminal_that_cannot_move_its_cursor_gets_plain_pictures(simulator: Process) -> None:
     with terminal('--node', NODE, '--period', '0.1', term='no-such-terminal') as screen:
-        screen.wait_for(f'\n{NODE}')
+        screen.wait_for(f'{NODE}  ')
         screen.process.send_signal(signal.SIGINT)
         assert screen.result() == 0
 

@@ -57,7 +57,7 @@ def test_line_that_is_not_heard_any_more_is_bad() -> None:
 
 
 def test_no_line_at_all() -> None:
-    assert texts() == ['no line is heard', 'line state load cycle']
+    assert texts() == ['no line is heard; diagnostics come every second', 'line state load cycle']
 
 
 @pytest.mark.parametrize('width', [20, 40, 80])
@@ -130,4 +130,5 @@ def test_spare_is_named() -> None:
 
 def test_nobody_is_heard(capsys: pytest.CaptureFixture[str]) -> None:
     said = call(main, capsys, '--all', '--once', '--wait', '0.1', '--seconds', '0.2')
-    assert (said.status, said.out.splitlines()[0]) == (1, 'no line is heard')
+    assert (said.status, said.out.splitlines()[0]) == (
+        1, 'no line is heard; diagnostics come every second')

@@ -14,6 +14,7 @@
 
 """The lines that show a running bridge."""
 
+from abdf1_ros.cli.monitor.curves import ASCII, Curve
 from abdf1_ros.cli.monitor.view import (
     Reading,
     render,
@@ -50,6 +51,11 @@ def line_with(text: str, picture: Snapshot) -> TextLine:
     return line
 
 
+def styles_of(text: str, picture: Snapshot) -> list[Style]:
+    """Return the styles of all lines with a text: what is wrong is told there, and in its part."""
+    return [line.style for line in render(picture, NOW, WIDTH) if text in line.text]
+
+
 def test_a_reading_is_shown_with_address_age_state_and_values() -> None:
     line = line_with('speeds', snapshot())
     assert line.text.split() == ['speeds', 'N7:0', '0.2', 's', 'fresh', '1200', '-800']
@@ -62,7 +68,7 @@ def test_value_is_the_last_column_to_go(width: int) -> None:
     line = next(text for text in lines(snapshot(readings=[reading]), width) if 'a_t' in text)
     assert len(line) <= width
     assert '12345' in line if width < 60 else '12345 -12345' in line
-    assert ('N7:0' in line) == (width > 80)
+    assert ('N7:0' in line) == (width > 100)
 
 
 def test_every_part_can_be_found_by_its_first_line() -> None:
@@ -75,10 +81,78 @@ def test_every_part_can_be_found_by_its_first_line() -> None:
         'reasons': 'mappings', 'writes': 'writes', 'counters': 'counters'}
 
 
+WITHHELD = [
+    Status('link', Style.GOOD, 'OK: port open', {
+        'line load': '47 %', 'poll cycle with Periods': '240 ms',
+        'line load by topic': 'row_2 12.5%, row_1 0.4%'}),
+    Status('station 1', Style.GOOD, 'OK: station 1 active', {'mode': 'REM RUN (0.1 s ago)'}),
+    Status('station 2', Style.WARNING, 'WARN: station 2 in mode REM PROG',
+           {'mode': 'REM PROG (0.1 s ago)'}),
+    Status('mappings', Style.BAD, 'ERROR: of 10 mappings 2 withheld', {
+        'total': '10', 'row_1': 'withheld: the processor is in mode REM PROG',
+        'row_2': 'withheld: the processor is in mode REM PROG'}),
+    Status('writes', Style.GOOD, 'OK: 0 of 0 writes confirmed')]
+
+
+def test_verdict_values_and_what_is_wrong_fit_a_terminal_of_80_by_24_for_ten_rows() -> None:
+    rows = [Reading(f'row_{number}', [number, 7], f'N7:{number}', NOW - 0.1, 0.5, Curve())
+            for number in range(10)]
+    shown = lines(snapshot(statuses=WITHHELD, readings=rows), 79)[:23]
+    assert shown[0] == '/cell/abdf1  ERROR (1 of 2): of 10 mappings 2 withheld'
+    assert shown[1].split('   ') == [
+        '  load 47 %', 'cycle 240 ms', 'stations 1 REM RUN, 2 REM PROG']
+    assert [line.split()[0] for line in shown[3:13]] == [f'row_{number}' for number in range(10)]
+    assert shown[13:17] == [
+        '  mappings     ERROR: of 10 mappings 2 withheld',
+        '      row_1: withheld: the processor is in mode REM PROG',
+        '      row_2: withheld: the processor is in mode REM PROG',
+        '  station 2    WARN: station 2 in mode REM PROG']
+
+
+def test_load_of_the_line_is_shown_by_row() -> None:
+    picture = snapshot(statuses=WITHHELD, readings=[
+        Reading(f'row_{number}', [number], '', NOW, 0.5) for number in range(3)])
+    assert [line.split()[1:-1] for line in lines(picture) if 'row_' in line][:3] == [
+        ['0.0', 's', 'fresh'], ['0.0', 's', 'fresh', '0.4%'], ['0.0', 's', 'fresh', '12.5%']]
+
+
+def test_curve_stands_beside_its_value() -> None:
+    curve = Curve()
+    for second in range(20):
+        curve.take([5, second], NOW - 19 + second)
+    reading = Reading('ramp', [5, 19], 'N7:0', NOW, 1.5, curve)
+    assert line_with('ramp', snapshot(readings=[reading])).text.endswith(
+        f'  {curve.draw(NOW, 1.5)}  5 19')
+    ascii_line = next(line.text for line in render(snapshot(readings=[reading]), NOW, 80, ASCII)
+                      if 'ramp' in line.text)
+    assert ascii_line.isascii()
+
+
+@pytest.mark.parametrize(('statuses', 'verdict', 'style'), [
+    ((), 'OK: 1 topic', Style.GOOD),
+    ((Status('mappings', Style.GOOD, 'OK: of 1 mappings 1 fresh'),
+      Status('link', Style.GOOD, 'OK: port open')), 'OK: of 1 mappings 1 fresh', Style.GOOD),
+    ((Status('mappings', Style.BAD, 'ERROR: of 1 mappings 1 failed'),
+      Status('link', Style.BAD, 'ERROR: port gone')), 'ERROR (1 of 2): port gone', Style.BAD),
+    ((Status('writes', Style.WARNING, 'WARN: 1 lost'),), 'WARN: writes: 1 lost', Style.WARNING),
+])
+def test_verdict_is_the_worst_that_is_told(
+        statuses: tuple[Status, ...], verdict: str, style: Style) -> None:
+    first = render(snapshot(statuses=statuses), NOW, WIDTH)[0]
+    assert (first.text, first.style) == (f'/cell/abdf1  {verdict}', style)
+
+
+def test_value_that_does_not_come_here_is_in_the_verdict_though_the_bridge_is_content() -> None:
+    good = [Status('mappings', Style.GOOD, 'OK: of 2 mappings 2 fresh')]
+    for reading in (Reading('a', [1], received=NOW - 5, promised=1.0), Reading('a', promised=1.0)):
+        told = lines(snapshot(statuses=good, readings=[reading, Reading('b', [1])]))
+        assert told[0] == '/cell/abdf1  ERROR: topics: 1 of 2 topics without a fresh value here'
+
+
 @pytest.mark.parametrize(('reading', 'state'), [
     (Reading('a', [1], received=NOW - 0.5, promised=0.5), ('fresh', Style.GOOD)),
     (Reading('a', [1], received=NOW - 0.51, promised=0.5), ('STALE (>0.5 s)', Style.BAD)),
-    (Reading('a', [1], received=NOW - 900, promised=None), ('no promise', Style.PLAIN)),
+    (Reading('a', [1], received=NOW - 900, promised=None), ('any age', Style.PLAIN)),
     (Reading('a', None, promised=0.5), ('no value', Style.BAD)),
     (Reading('a', None, promised=None), ('no value', Style.BAD)),
 ])
@@ -113,7 +187,7 @@ def test_link_shows_load_and_poll_cycle() -> None:
             'port': 'open', 'settings': '19200 baud, CRC', 'line load': '61 %',
             'poll cycle with Periods': '240 ms',
             'period 100 ms': 'wanted 100 ms, kept 345 ms', 'last error': '2509 ERR'})])
-    assert line_with('WARN: port open', picture).style is Style.WARNING
+    assert styles_of('  link         WARN: port open', picture) == [Style.WARNING] * 2
     assert line_with('settings', picture).text.split(maxsplit=1) == ['settings', '19200 baud, CRC']
     assert line_with('line load', picture).text.split() == ['line', 'load', '61', '%']
     assert 'wanted 100 ms, kept 345 ms' in line_with('period 100 ms', picture).text
@@ -124,7 +198,7 @@ def test_stations_are_told_from_the_active_node_table_and_the_diagnostics() -> N
     picture = snapshot(statuses=[Status(
         'station 2', Style.BAD, 'ERROR: station 2 inactive', {'last answer': '4.7 s ago'})])
     assert 'active stations: 1, 17' in '\n'.join(lines(picture))
-    assert line_with('station 2 ', picture).style is Style.BAD
+    assert styles_of('  station 2    ERROR', picture) == [Style.BAD] * 2
     assert line_with('last answer  4.7 s ago', picture).style is Style.PLAIN
     assert 'active stations: none' in '\n'.join(lines(snapshot(active=[])))
     assert 'active stations' not in '\n'.join(lines(snapshot(active=None)))

@@ -1,0 +1,115 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""A small curve of what a topic has shown: a character for every two seconds."""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Iterator, Sequence
+import math
+from typing import NamedTuple
+
+WIDTH = 12
+BLOCKS = '▁▂▃▄▅▆▇█'
+ASCII = '_.-=*#'
+
+_STEP = 2.0  # s
+SECONDS = WIDTH * _STEP
+_ELEMENTS = 8  # of a long row only the first ones are looked at
+
+
+class _Step(NamedTuple):
+    """What came in a step: its number, when the last came (s), and that by element."""
+
+    number: int
+    time: float
+    low: list[float]
+    high: list[float]
+    last: list[float]
+
+
+class Curve:
+    """
+    The last values of a row of numbers; ``is_bits`` tells that each is 0 or 1.
+
+    Of several elements the first that has changed is drawn. Of a step with several values the
+    extreme that is farther from the step before is drawn, so a bit that blinks is seen.
+    """
+
+    def __init__(self, is_bits: bool = False) -> None:
+        self._is_bits = is_bits
+        self._steps: deque[_Step] = deque(maxlen=WIDTH + 1)
+
+    def take(self, values: Sequence[float], now: float) -> None:
+        """Take the values of a message that came at the clock value ``now`` (s)."""
+        number, last = int(now // _STEP), [float(value) for value in values[:_ELEMENTS]]
+        low = high = last
+        if self._steps and self._steps[-1].number == number:
+            before = self._steps.pop()
+            low = [*map(min, before.low, last)]
+            high = [*map(max, before.high, last)]
+        self._steps.append(_Step(number, now, low, high, last))
+
+    def draw(self, now: float, promised: float | None, levels: str = BLOCKS) -> str:
+        """
+        Return ``WIDTH`` characters, the newest last; a blank is a time without a good value.
+
+        A value is good for ``promised`` seconds, or until the next where that is None.
+        """
+        newest = int(now // _STEP)
+        shown = [self._at(number, promised) for number in range(newest - WIDTH + 1, newest + 1)]
+        points = [*_points(shown, _changing([step for step in shown if step is not None]))]
+        known = [point for point in points if math.isfinite(point)]
+        bottom, top = (0.0, 1.0) if self._is_bits or not known else (min(known), max(known))
+        return ''.join(_level(point, bottom, top, levels) for point in points)
+
+    def _at(self, number: int, promised: float | None) -> _Step | None:
+        """Return what held in a step, None where no value was good."""
+        for step in reversed(self._steps):
+            if step.number == number:
+                return step
+            if step.number < number:
+                is_good = promised is None or number * _STEP - step.time <= promised
+                return step._replace(low=step.last, high=step.last) if is_good else None
+        return None
+
+
+def _changing(steps: Sequence[_Step]) -> int:
+    """Return the number of the first element that has changed, 0 for none."""
+    count = min((len(step.last) for step in steps), default=0)
+    return next((element for element in range(count) if len(
+        {value for step in steps for value in (step.low[element], step.high[element])}) > 1), 0)
+
+
+def _points(steps: Sequence[_Step | None], element: int) -> Iterator[float]:
+    """Yield one value for each step, NaN for none."""
+    before = math.nan
+    for step in steps:
+        if step is None or len(step.last) <= element:
+            yield math.nan
+            continue
+        low, high = step.low[element], step.high[element]
+        if math.isnan(before):
+            before = step.last[element]
+        before = low if abs(low - before) > abs(high - before) else high
+        yield before
+
+
+def _level(point: float, bottom: float, top: float, levels: str) -> str:
+    if not math.isfinite(point):
+        return ' '
+    if top <= bottom:
+        return levels[0]
+    return levels[round((point - bottom) / (top - bottom) * (len(levels) - 1))]
