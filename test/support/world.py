@@ -393,6 +393,7 @@ class World(DriverBench):
         self._values = dict.fromkeys(self.rows, 0)
         self.is_silent = self.is_queued = False  # behind another client
         self.deaf_since = math.inf  # when the wire to us broke
+        self.heard_again = -math.inf  # when it was mended
         self.plcs = {station: self._watch(station) for station in range(1, plant.stations + 1)}
         self.far.hear, self.far.say = self._hear, self._say
         self.master: MasterNode | None = None
@@ -749,6 +750,8 @@ class World(DriverBench):
             watched.refuses = watched.refuses_messages = watched.swallows_replies = False
             watched.set_mode(Setting.RUN, self.line.now)
         self.is_alive, self.is_queued = True, False
+        if self.is_deaf:
+            self.heard_again = self.line.now
         self.deaf_since = math.inf
         self.line.noise = QUIET
         self.losses = None

@@ -404,7 +404,9 @@ class Order(Rule):
         is_own = entry.value in (0, SAFE) and entry.tag[0] in 'wb'
         left = self._left[station]
         # Not after a port that was lost and opened again: a fresh row needs no fallback then.
-        is_well = max(world.ill[station], world.ill[0], world.opened) <= world.killed_at
+        # A PLC whose replies were lost until then may have no room for another one.
+        is_well = max(world.ill[station], world.ill[0], world.opened) <= world.killed_at \
+            and world.heard_again < world.killed_at
         if not left or not is_well or entry.value in GUESTS or entry.is_late \
                 or entry.tag.startswith('other') or entry.driver != world.drivers:
             return

@@ -19,7 +19,7 @@ import secrets
 from abdf1_ros.df1.frames import ACK, ENQ
 import pytest
 from simulate.mistakes import MISTAKES
-from simulate.rules import Broken, GuestAges, OnTheWire, View
+from simulate.rules import Broken, GuestAges, OnTheWire, Order, View
 from simulate.run import simulate, Story
 from support.world import GUESTS, MODES, Plant, POLLED, Sent, STEP, World
 
@@ -83,6 +83,26 @@ def test_command_of_a_guest_that_is_too_old_is_found() -> None:
 def test_long_reply_shows_before_timeout_that_it_comes(mode: str) -> None:
     world = World(Plant(mode, baud=4800), seed=1)
     assert max(world.line.chunks) * world.line.char_time < world.network.timeout / 1000
+
+
+def test_plc_that_has_replies_left_need_not_take_the_first_zero() -> None:
+    world = World(Plant('Peer', rows=3, baud=38400), seed=1)
+    rule = Order(world)
+    world.run(4.0)
+    world.break_wire()
+    world.run(0.1)
+    world.end()
+    world.mend()
+    world.reload()
+    count = len(world.executed)
+    world.run(2.0)
+    assert world.executed[count].tag == 'w0_1'  # it answered the 0 with NAK
+    for entry in world.executed[count:]:
+        rule.executed(entry)
+    world.heard_again = 0.0
+    with pytest.raises(Broken):
+        for entry in world.executed[count:]:
+            Order(world).executed(entry)
 
 
 def test_responses_that_go_out_together_are_no_command() -> None:
