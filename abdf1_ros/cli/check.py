@@ -345,6 +345,7 @@ def _times_text(report: Report) -> str:
             f'longest transaction: {times.longest * 1000:.0f} ms with all repetitions'
             + ''.join(f'\n{printable(str(line))}' for line in (*times.bounds(), *times.advice()))
             + (f'\norderly end: {times.end * 1000:.0f} ms where no frame gets lost, '
+               f'{(times.end_in_silence or 0.0) * 1000:.0f} ms where no PLC answers, '
                f'{LONGEST_END * 1000:.0f} ms at most' if times.end else ''))
 
 
@@ -355,7 +356,7 @@ def _content(found: Findings, report: Report | None) -> dict[str, Any]:
         'warnings': [], 'notes': [], 'network': None, 'mappings': len(found.mappings),
         'rows': _rows(found.mappings, report), 'blocks': [],
         'scan_time_ms': None, 'load': None, 'longest_transaction_ms': None, 'needed_baud': None,
-        'bounds': [], 'end_ms': None,
+        'bounds': [], 'end_ms': None, 'end_in_silence_ms': None,
         'response_time_ms': None}
     if report is not None:
         content |= {
@@ -368,6 +369,7 @@ def _content(found: Findings, report: Report | None) -> dict[str, Any]:
             'needed_baud': report.needed_baud(),
             'bounds': [_bound(bound) for bound in report.times.bounds()],
             'end_ms': in_ms(report.times.end),
+            'end_in_silence_ms': in_ms(report.times.end_in_silence),
             'response_time_ms': in_ms(report.response_time)}
     return content
 

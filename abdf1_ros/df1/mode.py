@@ -16,7 +16,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from typing import ClassVar, Protocol
 
 from abdf1_ros.counters import Counters
@@ -132,6 +132,16 @@ class LineMode:
     def longest_reply(self, line: LinkSettings, frames: float) -> float:
         """Return how long a reply of ours takes at most, which takes turns with commands."""
         return (line.nak_retries + 1) * (answer_time(line) + frames)
+
+    def last_tries(self, line: LinkSettings, frames: Sequence[float],
+                   answer_within: float) -> float:
+        """
+        Return how long it takes to send each of these once where no station answers.
+
+        The answers are waited for ``answer_within`` at most. A probe may be under way.
+        """
+        wait = min(answer_time(line), answer_within)
+        return self.longest_probe(line) + sum(frames) + len(frames) * wait
 
     def longest_probe(self, line: LinkSettings) -> float:
         """Return how long it takes to find a silent station silent."""

@@ -44,7 +44,7 @@ a new one: some processors count from 0 after each power-up, some programs alway
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Callable, Generator
+from collections.abc import Callable, Generator, Sequence
 from dataclasses import dataclass
 import math
 
@@ -167,7 +167,7 @@ class FullDuplexPeer(EqualNode):
         try:
             delivered = yield from self._transfer(
                 task.command, lambda: key not in self._outstanding,
-                is_once=is_once, expires=task.expires)
+                is_once=is_once, expires=task.expires, answer_within=task.answer_within)
         except CommandExpired as error:
             if self._outstanding.pop(key, None):
                 task.sent = error.sent
@@ -187,7 +187,7 @@ class FullDuplexPeer(EqualNode):
             self._accepted.is_answered = delivered is not None
 
     def _transfer(self, packet: Packet, is_answered: Callable[[], bool],
-                  is_once: bool, expires: float = math.inf
+                  is_once: bool, expires: float = math.inf, answer_within: float = math.inf
                   ) -> Generator[Step, Heard, float | None]:
         """Return when the message was delivered, None if it was not (M 4-5, TRANSFER)."""
         message = frames.message_frame(packet.encode(), self._settings.checksum)
@@ -197,7 +197,8 @@ class FullDuplexPeer(EqualNode):
             self._counters.messages_sent += sending is message
             try:
                 response = yield from self._response(
-                    sending, is_answered, expires if sending is message else math.inf)
+                    sending, is_answered, expires if sending is message else math.inf,
+                    min(self._timeout, answer_within))
             except CommandExpired as error:
                 self._counters.messages_sent -= 1
                 error.sent = naks + enqs > 0
@@ -244,12 +245,12 @@ class FullDuplexPeer(EqualNode):
         return True
 
     def _response(self, sending: bytes, is_answered: Callable[[], bool],
-                  expires: float) -> Generator[Step, Heard, Code | None]:
+                  expires: float, timeout: float) -> Generator[Step, Heard, Code | None]:
         """Send; return ACK, NAK, STX where the reply itself came first, or None for silence."""
         machine = self._machine
         last_byte, begun = 0, machine.now
-        symbol = yield Send(sending, min(self._timeout, _TICK), expires=expires, reflex=_REFLEX)
-        end, position = machine.sender.free_at + self._timeout, machine.sender.position
+        symbol = yield Send(sending, min(timeout, _TICK), expires=expires, reflex=_REFLEX)
+        end, position = machine.sender.free_at + timeout, machine.sender.position
         while not isinstance(symbol, Silence) or self._left(end) > 0:
             if symbol in (Control.ACK, Control.NAK) and machine.sender.has_left(position):
                 assert isinstance(symbol, Control)
@@ -429,6 +430,12 @@ class PeerMode(LineMode):
                             stations: int = 0) -> float:
         """Return it with the pauses after NAKs and late responses."""
         return super().longest_transaction(line, frames) + _pauses(line)
+
+    def last_tries(self, line: LinkSettings, frames: Sequence[float],
+                   answer_within: float) -> float:
+        """Return it with the pauses in which late responses count for nothing."""
+        return super().last_tries(line, frames, answer_within) \
+            + (1 + len(frames)) * _LATE_RESPONSE
 
     def longest_reply(self, line: LinkSettings, frames: float) -> float:
         """Return how long the transfer of a reply takes: messages, ENQs and pauses."""

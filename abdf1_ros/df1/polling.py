@@ -37,7 +37,7 @@ not wait for them.
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Callable, Container, Generator
+from collections.abc import Callable, Container, Generator, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import chain
 import math
@@ -356,7 +356,7 @@ class StandardPollingMaster:
             (self._unproven.add if was_silent else self._unproven.discard)(number)
             entry.deadline = begun + self._settings.cmd_timeout
             return True
-        return False
+        return task.answer_within < math.inf  # a last try, which is short
 
     def _lost(self, number: int, begun: float, error: StationInactive) -> None:
         """Take note that a station does not answer any more, and has had the line since then."""
@@ -393,6 +393,13 @@ class StandardPollingMode(MasterMode):
         # It leaves within a scan, and is polled for until Cmd_Timeout and for one scan more.
         return super().longest_transaction(line, frames) + 2 * stations * (
             poll + self.longest_reply(line, others))
+
+    def last_tries(self, line: LinkSettings, frames: Sequence[float],
+                   answer_within: float) -> float:
+        """Return it with the polls in between."""
+        in_a_row = 1 if line.polling and line.polling.in_sequence else COMMANDS_BETWEEN_POLLS
+        return super().last_tries(line, frames, answer_within) \
+            + -(-len(frames) // in_a_row) * self.longest_probe(line)
 
     def undisturbed(self, line: LinkSettings, frames: float, response_time: float,
                     others: float = 0.0, stations: int = 0) -> float:

@@ -33,7 +33,7 @@ its table, and not among the last packets.
 from __future__ import annotations
 
 from collections import defaultdict, deque
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 import math
 from random import Random
@@ -433,6 +433,11 @@ class RadioMode(LineMode):
     def longest_reply(self, line: LinkSettings, frames: float) -> float:
         """Return 0: packets that wait for their turn are part of a transaction."""
         return 0.0
+
+    def last_tries(self, line: LinkSettings, frames: Sequence[float],
+                   answer_within: float) -> float:
+        """Return it with Cmd_Timeout for each: a reply may come as late as that."""
+        return (1 + len(frames)) * self.longest_probe(line) + sum(frames)
 
     def longest_probe(self, line: LinkSettings) -> float:
         """Return how long one command takes that is not answered."""

@@ -134,6 +134,8 @@ class Agenda:
 
     def _own_first(self, now: float, busy: Container[int]) -> Job | None:
         """Return a heartbeat or fallback if there is one: no write in a row (rule 11)."""
+        if self._interlocks.is_ending:  # nothing that is read now would be of use
+            self._own_in_a_row, self._was_silent = 0, False
         if self._own_in_a_row >= OWN_IN_A_ROW:
             self._own_in_a_row = 0
             if job := self._check_or_read(now, busy):
@@ -151,8 +153,7 @@ class Agenda:
         if own is None:
             return self._usual(now, busy)
         self._own_in_a_row += 1
-        is_ending = self._interlocks.is_ending
-        self._was_silent = not is_ending and not self._stations[own.station].active
+        self._was_silent = not self._stations[own.station].active
         return own
 
     def _check_or_read(self, now: float, busy: Container[int]) -> Job | None:

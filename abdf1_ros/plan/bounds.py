@@ -35,6 +35,7 @@ from abdf1_ros.plan.line_model import LineModel
 from abdf1_ros.plan.planner import Block, Planner
 from abdf1_ros.settings.heartbeats import (
     HAND_OVER,
+    LAST_ANSWER,
     LONGEST_END,
     READS_IN_TIME,
     STABLE,
@@ -176,8 +177,20 @@ class Times:
         """Return the seconds of an orderly end where no frame gets lost, None for no bound."""
         if self._mode.is_polled:
             return None
-        writes = [packet for own in self._mappings.own for packet in self._written[own]]
+        writes = self._own_packets
         return sum(map(self._undisturbed, [self._any_frames, *writes])) if writes else 0.0
+
+    @property
+    def end_in_silence(self) -> float | None:
+        """Return the seconds of an orderly end where no PLC answers, None for no bound."""
+        if self._mode.is_polled:
+            return None
+        writes = self._own_packets
+        return self._mode.last_tries(self._line, writes, LAST_ANSWER) if writes else 0.0
+
+    @property
+    def _own_packets(self) -> list[float]:
+        return [packet for own in self._mappings.own for packet in self._written[own]]
 
     def _turn(self, mapping: Mapping) -> int:
         """Return the station of a row where stations take turns, else 0 for the whole line."""
@@ -251,6 +264,10 @@ def remarks(network: Network, mappings: Rows,
     elif end > HAND_OVER:
         yield (f'an orderly end needs {milliseconds(end)}; ~/polling has '
                f'{milliseconds(HAND_OVER)}, and the last rows keep what they have')
+    if end <= LONGEST_END < (silent := times.end_in_silence or 0.0):
+        yield (f'an orderly end where no PLC answers needs {milliseconds(silent)} and has '
+               f'{milliseconds(LONGEST_END)}: the last rows are not tried; shorten Timeout or '
+               'Cmd_Timeout, or take fewer rows')
     for mapping in mappings:
         if mapping.is_heartbeat and mapping.period is not None:
             if longest > mapping.period / 1000:

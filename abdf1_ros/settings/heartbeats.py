@@ -45,6 +45,9 @@ STABLE = 100
 LONGEST_END = 6.0
 """How long (s) an orderly end may take until all is confirmed (rule 5)."""
 
+LAST_ANSWER = 0.1
+"""How long (s) a silent station has at the end to answer: all of them have their try."""
+
 HAND_OVER = 2.0
 """The same where the process goes on: a caller waits for the answer of ~/polling and ~/reload."""
 

@@ -186,7 +186,8 @@ def test_json_of_a_plan(files: tuple[Path, Path], capsys: pytest.CaptureFixture[
     content = parsed(capsys)
     assert list(content) == [
         'errors', 'warnings', 'notes', 'network', 'mappings', 'rows', 'blocks', 'scan_time_ms',
-        'load', 'longest_transaction_ms', 'needed_baud', 'bounds', 'end_ms', 'response_time_ms']
+        'load', 'longest_transaction_ms', 'needed_baud', 'bounds', 'end_ms', 'end_in_silence_ms',
+        'response_time_ms']
     assert content['blocks'][1]['last'] == 'F8:0'
     assert content['blocks'][0] == {
         'station': 1, 'plc_type': 'PLC5', 'first': 'N7:0', 'last': 'N7:1', 'words': 2,

@@ -18,6 +18,7 @@ from dataclasses import replace
 import math
 
 from abdf1_ros.driver.settings import DriverSettings
+from abdf1_ros.driver.write import Outcome
 from abdf1_ros.plan.bounds import (
     conditions,
     guard_faults,
@@ -223,6 +224,49 @@ def test_rule_5_orderly_end_has_the_time_that_is_printed() -> None:
     assert bench.line.now - begun < end
     assert interlocks.unconfirmed() == []
     assert [stored(plc, 'N7:0', 5) for plc in plcs] == [bytes([7, 0] * 5)] * 5
+
+
+@pytest.mark.parametrize(('mode', 'stations'), [
+    ({}, 3), ({'polling': 'Standard'}, 3), ({'mode': 'Peer'}, 1), ({'mode': 'Radio'}, 1)])
+@pytest.mark.parametrize('timeout', [100, 1000])
+def test_rules_5_and_16_end_where_no_plc_answers_has_the_time_that_is_printed(
+        mode: dict[str, str], stations: int, timeout: int) -> None:
+    """Polls came in between: with Timeout 1000 most rows had no try within 6 s."""
+    network = replace(QUICK, timeout=timeout, cmd_timeout=500, **mode)  # type: ignore[arg-type]
+    rows = plant(stations, 5)
+    bench = DriverBench(rows, network=network)
+    numbers = range(11, 11 + stations)
+    for number in numbers:
+        bench.plc(number, 'PLC5', ('N7:0', 5), ('N10:0', 1))
+    bench.breathe()
+    bench.run(10.0)
+    for row in rows:
+        if row.fallback:
+            bench.write(row, [42])
+    bench.run(2.5)
+    assert {result.outcome for result in bench.listener.results[-5 * stations:]} == {
+        Outcome.WRITTEN}
+    hear, heard = bench.far.hear, bytearray()
+    bench.far.hear = lambda data: (heard.extend(data), hear(data))[1]
+    bench.far.say = lambda data: b''
+    interlocks = bench.driver.interlocks
+    bench.run_until(lambda: not any(
+        bench.driver.stations[number].active for number in numbers), 20.0)
+    printed = Times(network, Rows(rows)).end_in_silence
+    assert printed is not None
+    heard.clear()
+    interlocks.wind_down()
+    bench.line.wake(bench.driver.machine)
+    bench.run_until(lambda: interlocks.is_over, printed)
+    tries = [row.dialect.write(row.address, bytes([7, 0]))[1] for row in rows if row.fallback]
+    assert [heard.count(body) for body in tries] == [stations] * len(tries)
+
+
+def test_rule_5_end_that_is_too_long_where_no_plc_answers_is_warned_of() -> None:
+    many = [warning for warning in remarks(replace(QUICK, mode='Radio'), Rows(plant(2, 5)))
+            if 'where no PLC answers' in warning]
+    assert ['the last rows are not tried' in warning for warning in many] == [True]
+    assert not [warning for warning in remarks(QUICK, Rows(plant(2, 5))) if 'answers' in warning]
 
 
 @pytest.mark.parametrize(('stations', 'rows', 'text'), [

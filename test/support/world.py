@@ -392,8 +392,7 @@ class World(DriverBench):
         self.wire = hashlib.sha256()
         self._values = dict.fromkeys(self.rows, 0)
         self.is_silent = self.is_queued = False  # behind another client
-        self.deaf_since = math.inf  # when the wire to us broke
-        self.heard_again = -math.inf  # when it was mended
+        self.deaf_since, self.heard_again = math.inf, -math.inf  # when the wire to us broke
         self.plcs = {station: self._watch(station) for station in range(1, plant.stations + 1)}
         self.far.hear, self.far.say = self._hear, self._say
         self.master: MasterNode | None = None

@@ -41,11 +41,9 @@ from abdf1_ros.driver.writes.queue import WriteQueue
 from abdf1_ros.driver.writes.under_way import WriteJob, WritesUnderWay
 from abdf1_ros.errors import RemoteError
 from abdf1_ros.plan.planner import Block
+from abdf1_ros.settings.heartbeats import LAST_ANSWER
 from abdf1_ros.settings.mapping import Mapping
 from abdf1_ros.settings.rows import Rows
-
-# At the end a silent station is given so long (s) to answer: all of them have their try.
-_HASTE = 0.1
 
 _OURS = -1  # stands for our own table
 _due_of = attrgetter('due')
@@ -67,7 +65,7 @@ class OwnWrite(WriteJob):
         write.is_own = True
         super().__init__(write, writing)
         self.is_free = is_free
-        self.answer_within = _HASTE if is_last else math.inf
+        self.answer_within = LAST_ANSWER if is_last else math.inf
         # Of a fallback each packet goes out: the PLC may carry out what it does not answer.
         self.goes_on = isinstance(row, FallbackRow)
         self.row = row
