@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""What every kind of link counts and reports, and how its commands end."""
+"""The counters and reports of every kind of link, and the end of its commands."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ def count_fault(frame: Frame, checksum: Checksum, counters: Counters,
 
 
 def count_unheard(symbol: Symbol, checksum: Checksum, counters: Counters) -> None:
-    """Count what a slave says while its master waits for nothing."""
+    """Count symbols of a slave that come while its master waits for nothing."""
     if isinstance(symbol, Control):
         counters.acks_received += symbol is Control.ACK
         counters.naks_received += symbol is Control.NAK
@@ -71,9 +71,9 @@ def wrong_message(packet: Packet, station: int) -> Event:
 
 class Accounting:
     """
-    The accounts of one link: its counters, the records of stations, what it reports.
+    The accounts of one link: its counters, the records of its stations, its reports.
 
-    ``number`` is our own, None where messages to any number are ours.
+    ``number`` is our own station, None if messages to any station are ours.
     """
 
     def __init__(self, counters: Counters, stations: ActiveStationList,
@@ -107,9 +107,9 @@ class Accounting:
         """
         Count and report a reply that no command waits for (S0, message 2510).
 
-        Its station is there, unless a node on the way has replied in its place. It is stale (S0,
-        counter 2548) where it may answer one of before, and otherwise invalid (2550, "incorrect
-        addressing"): not for us, or of a station that we do not ask.
+        The reply proves its station, unless a node on the way has replied for the station. A reply
+        that may answer an earlier command is stale (S0, counter 2548). Any other is invalid (2550,
+        "incorrect addressing"): not for us, or from a station that we do not ask.
         """
         may_answer = self._number in (None, reply.dst) and reply.src in self._stations
         self.counters.stale_messages += may_answer
@@ -130,10 +130,10 @@ class Accounting:
 
     def complete(self, task: Task, reply: Packet, *, keeps_others_waiting: bool) -> None:
         """
-        End a task with the reply to its command, or as WrongCommandCode where not its (S0).
+        End a task with the reply to its command, or as WrongCommandCode if CMD differs (S0).
 
-        A gateway replies in place of a PLC that it does not reach, maybe after a long time: this
-        is as good as no reply in time, where waiting for it keeps others waiting.
+        A gateway replies for a PLC that it does not reach, maybe after a long time. A late error
+        reply of a gateway counts as a timeout if other commands had to wait for it.
         """
         number = reply.src
         expected = task.command.cmd | REPLY_BIT

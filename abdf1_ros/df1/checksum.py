@@ -20,7 +20,7 @@ from enum import Enum
 
 
 class Checksum(Enum):
-    """The check after DLE ETX; the value is what the net CSV calls it (S0, Error_Code)."""
+    """The check after DLE ETX; the value is its name in the net CSV (S0, Error_Code)."""
 
     BCC = 'BCC'
     CRC = 'CRC'

@@ -13,13 +13,13 @@
 # limitations under the License.
 
 """
-What comes back of what we have sent: TX and RX are connected, or the adapter echoes.
+The echo of our own frames: TX and RX are connected, or the adapter echoes.
 
-A line that echoes gives back all that is sent, in its order, and before anybody can have
-answered. So a message that is byte for byte one of ours which has not come back yet is ours,
-not a PLC's. When an ACK that cannot be ours comes after a message of ours has left, and that
-has not come back before, the line does not echo: an equal message that comes later is a PLC's.
-Where that is unknown, it counts as ours, once: a PLC that gets no response sends it again.
+A line that echoes gives back all frames in their order, before any station can answer. So a
+message equal to a message that we sent, and have not yet seen again, is our echo. If a foreign ACK
+arrives before our message has come back, the line does not echo. An equal message that comes later
+is then from a PLC. As long as this is unknown, an equal message counts as our echo, once. If it
+was from a PLC, the PLC gets no response and sends it again.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ COMES_BACK = ('what is sent comes back: TX and RX are connected, or the adapter 
 # Frames that may not have come back yet: what is sent in some seconds, at the shortest Timeout.
 _MOST_EXPECTED = 64
 
-# After so many messages that have not come back the echo has ended. It may only be late: device
+# Number of messages without an echo after which the echo has ended. A few may only be late: device
 # servers are far away, and Timeout is short.
 _MOST_MISSING = 8
 
@@ -46,7 +46,7 @@ class LineEcho:
     """
     Know the echo of one line; ``is_heard`` tells that it gives back what is sent.
 
-    In half duplex everybody waits until what he has sent has come back, before he sends again.
+    In half duplex a node sends again only after its last frame has come back.
     """
 
     def __init__(self, is_half_duplex: bool) -> None:
@@ -55,7 +55,7 @@ class LineEcho:
         self._expected: deque[tuple[int, bytes]] = deque(maxlen=_MOST_EXPECTED)
 
     def sent(self, frame: bytes, end: int) -> None:
-        """Take note of a frame on its way; ``end`` is the position of its last byte."""
+        """Record a frame on its way; ``end`` is the position of its last byte."""
         if self._is_half_duplex and not self.is_heard:
             self._expected.clear()
         elif sum(map(_is_message, self._expected)) >= _MOST_MISSING:
@@ -63,7 +63,7 @@ class LineEcho:
         self._expected.append((end, frame))
 
     def withdrawn(self) -> None:
-        """Take note that the last frame does not go out after all."""
+        """Forget the last frame: it does not go out after all."""
         self._expected.pop()
 
     def forget(self) -> None:
@@ -75,7 +75,7 @@ class LineEcho:
         """
         Take a symbol; tell whether it is our own. ``has_left`` knows positions.
 
-        ACK, NAK and ENQ are alike whoever sends them: they are ours only where an echo is known.
+        An ACK, NAK or ENQ does not name its sender: it is ours only if an echo is known.
         """
         if not self._expected:
             return False

@@ -13,7 +13,7 @@
 # limitations under the License.
 
 """
-Frames and symbols: what stands on the line.
+Frames and symbols: the bytes on the line.
 
 Encoding is three functions; decoding is ``FrameDecoder``, which turns any bytes, in any
 chunks, into symbols and never raises. A control symbol is a pair DLE x; a data byte equal to
@@ -31,8 +31,8 @@ from typing import Final, NamedTuple
 from abdf1_ros.df1.checksum import bcc, Checksum
 from abdf1_ros.df1.packet import HEADER_SIZE
 
-# Bytes of unstuffed link data that we take: the largest reply is 244 bytes after a header
-# (M 7-30..7-40), and no known device sends more than this.
+# Most bytes of unstuffed link data that we take. The largest reply is 244 bytes after a header (M
+# 7-30..7-40), and no known device sends more than this limit.
 MAX_LINK_DATA = 261
 
 # Bytes that wait to be read while a machine does not listen, some seconds of the fastest line.
@@ -95,7 +95,7 @@ def poll_frame(station: int) -> bytes:
 
 
 class FrameFault(Enum):
-    """Why a received frame cannot be used."""
+    """The reason why a received frame cannot be used."""
 
     BAD_CHECK = 'wrong check'
     TOO_SHORT = 'shorter than a header'
@@ -130,8 +130,8 @@ class Unknown:
         return self.byte in _CODES
 
 
-# Bytes outside of any symbol since the last message. Told before a DLE ENQ, which then asks for
-# the response to what we have not understood (M 4-8).
+# Bytes outside of any symbol since the last message. NOISE comes before a DLE ENQ, which then asks
+# for the response to bytes that we have not understood (M 4-8).
 NOISE = Unknown(Code.DLE)
 
 
@@ -147,11 +147,11 @@ class Frame(NamedTuple):
     """
     A message frame, good or bad.
 
-    ``data`` is the unstuffed link data, ``station`` the STN of a master's frame (None for
-    any other). ``fault`` is None for a good frame. ``received`` and ``expected`` are the check
-    as read and as computed, for a good frame or a BAD_CHECK; ``received`` of a NO_ETX is the code
-    after DLE that broke in. After one that ``has_stopped`` nothing came.
-    ``has_response`` tells that a response was embedded (M 4-3).
+    ``data`` is the unstuffed link data, ``station`` the STN of a master's frame (None for any
+    other). ``fault`` is None for a good frame. ``received`` and ``expected`` are the check as read
+    and as computed, for a good frame or a BAD_CHECK; ``received`` of a NO_ETX is the code after
+    the DLE that broke in. After a frame that ``has_stopped`` no byte came. ``has_response`` tells
+    that a response was embedded (M 4-3).
     """
 
     data: bytes
@@ -180,7 +180,7 @@ def beginning_of(symbol: Symbol) -> bytes:
 
 class Duplex(Enum):
     """
-    Which line discipline gives DLE ENQ and DLE SOH their meaning (M 2-6..2-8).
+    The line discipline that gives DLE ENQ and DLE SOH their meaning (M 2-6..2-8).
 
     By radio modem the messages of full duplex are sent without any other symbol.
     """
@@ -191,7 +191,7 @@ class Duplex(Enum):
 
 
 class Need(Enum):
-    """What a step says that can do nothing without more bytes."""
+    """The result of a step of the decoder that needs more bytes."""
 
     MORE = 'more bytes'
 
@@ -215,10 +215,13 @@ class FrameDecoder:
     Turn bytes into symbols.
 
     ``feed`` takes bytes, ``next_symbol`` gives the symbols one by one, ``reset`` forgets
-    everything heard. ``waiting`` are bytes that are to be read. Bytes outside of any symbol are
-    counted in ``noise``, and the last byte heard stays in ``last_byte`` for whoever reports it.
-    ``link_data`` are those of the message that is coming in, as far as it has come.
-    ``in_message`` tells whether a message has begun and not ended, ``begun`` counts beginnings.
+    everything heard. - ``waiting``: bytes that are still to be read.
+
+    - ``noise``: number of bytes outside of any symbol.
+    - ``last_byte``: the last byte heard, for reports.
+    - ``link_data``: link data of the message that is coming in, as far as it has come.
+    - ``in_message``: a message has begun and not ended.
+    - ``begun``: number of messages that have begun.
     """
 
     def __init__(self, checksum: Checksum, duplex: Duplex) -> None:
@@ -262,16 +265,16 @@ class FrameDecoder:
         if self.in_message:
             self._is_damaged = True
             if self._step == self._check:
-                self.waiting += data  # it counts, as one of the check
+                self.waiting += data  # it counts as a byte of the check
                 return
         else:
             self._step = self._idle
-        # With what has come of a pair: what follows is not its other half.
+        # With the first half of a pair: the byte that follows is not its second half.
         self.noise += len(self.waiting) + len(data)
         self.waiting.clear()
 
     def broken_off(self) -> Frame:
-        """Return the message that is coming in as what it is if nothing follows."""
+        """Return the message that is coming in, as broken off."""
         data = bytes(self.link_data)
         if self._step != self._check:
             return Frame(data, self._station, FrameFault.NO_ETX, has_stopped=True)
@@ -312,7 +315,7 @@ class FrameDecoder:
         elif pair == ENQ and self._is_half_duplex:
             self._step = self._poll_station
         elif pair == _DATA_DLE:
-            self.noise += 1  # a data byte of a message whose beginning we missed
+            self.noise += 1  # a data byte of a message; we missed its beginning
         else:
             return _CONTROLS.get(pair) or Unknown(pair[1])
         return None
@@ -392,7 +395,7 @@ class FrameDecoder:
         return self._frame(FrameFault.NO_ETX, pair[1])  # the pair is read again as a symbol
 
     def _take_data(self, count: int) -> None:
-        """Take bytes of a message; those that are too many are dropped, up to its end (M 4-8)."""
+        """Take bytes of a message; drop bytes beyond the limit, up to its end (M 4-8)."""
         self.link_data += self.waiting[:min(count, MAX_LINK_DATA + 1 - len(self.link_data))]
         del self.waiting[:count]
 

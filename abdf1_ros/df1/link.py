@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""What every kind of link needs to know, and offers to the driver and to the diagnostics."""
+"""The common base of all links, and the details that diagnostics show of them."""
 
 from __future__ import annotations
 
@@ -60,9 +60,10 @@ class LinkStatus:
     """
     Details that only some kinds of links have.
 
-    ``last_poll`` is the clock value (s) of the last poll of a slave, or of its start;
-    ``same_number`` that of the last packet of another radio modem node that has our number, too;
-    ``scans`` are the times of a master's poll lists, by their names.
+    - ``last_poll``: clock value (s) of the last poll of a slave, or of its start.
+    - ``same_number``: clock value (s) of the last packet of another radio modem node with our
+      number.
+    - ``scans``: times of the poll lists of a master, by their names.
     """
 
     last_poll: float | None = None
@@ -72,8 +73,8 @@ class LinkStatus:
 
 NO_STATUS = LinkStatus()
 
-# A pause of so many characters, plus the time that the equipment may hold bytes back, ends a
-# message that has broken off.
+# Pause, in characters, that ends a message that has broken off. The time that the equipment may
+# hold bytes back is added.
 _QUIET_CHARACTERS = 10
 
 
@@ -94,7 +95,7 @@ class Link(Protocol):
 
 
 class EqualNode(Link):
-    """What a node has on a line where everybody may send at any time, and no master polls."""
+    """The base of nodes on a line without a master, where every node may send at any time."""
 
     def __init__(self, machine: Machine, stations: ActiveStationList,
                  serve: Callable[[Packet], Packet | None],

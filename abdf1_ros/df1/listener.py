@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""A decoder for the traffic of others, which finds out check and duplex by itself."""
+"""A decoder for foreign traffic, which finds out check and duplex by itself."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ from abdf1_ros.df1.frames import (
 
 # One in 256 wrong frames seems to have a good BCC, so a single one proves nothing.
 _BCC_FRAMES = 2
-# After so many frames in a row that are right with BCC only, the guess CRC was wrong.
+# Number of frames in a row, right with BCC only, after which the guess CRC was wrong.
 _CONTRARY_FRAMES = 3
 # Bytes that are kept of noise, or of a message that does not end.
 _MOST_KEPT = 2048
@@ -60,11 +60,12 @@ class ListeningDecoder(FrameDecoder):
     """
     A frame decoder that finds check and duplex by itself, where ``kind`` does not have them.
 
-    DLE SOH and DLE EOT exist in half duplex only (M 2-6); a message before the first of them is
-    taken for full duplex. One frame with a right CRC settles the check for CRC, two with a right
-    BCC settle it for BCC. Until then a frame is given out when the byte after its BCC is there,
-    which may be the second byte of a CRC. A guess is given up for CRC when a frame is right with
-    CRC only, for BCC when three in a row are right with BCC only.
+    DLE SOH and DLE EOT exist in half duplex only (M 2-6). A message before the first of them
+    counts as full duplex. One frame with a right CRC settles the check for CRC, two frames with a
+    right BCC settle it for BCC. Until then a frame is given out when the byte after its BCC is
+    there, because it may be the second byte of a CRC. The guess BCC is given up when a frame is
+    right with CRC only. The guess CRC is given up when three frames in a row are right with BCC
+    only.
 
     ``wire`` has the bytes of the last symbol, without noise before it.
     """
@@ -122,7 +123,7 @@ class ListeningDecoder(FrameDecoder):
         self.wire = heard[start:]
 
     def finish(self) -> Frame | None:
-        """Return a frame that waits for a second check byte, where none will come any more."""
+        """Return a frame that waits for a second check byte which will not come any more."""
         kind = self._kind
         waits = self._step == self._check and len(self.waiting) == 1
         if not waits or kind.is_certain or not self._matches(Checksum.BCC):
@@ -145,7 +146,7 @@ class ListeningDecoder(FrameDecoder):
         return frame
 
     def _begin(self, pair: bytes) -> Decoded:
-        # What came before is noise, whose last byte may look like the beginning.
+        # The bytes before are noise; their last byte may look like the beginning.
         del self._heard[:max(0, len(self._heard) - len(self.waiting) - len(pair))]
         kind = self._kind
         if not self._duplex_given:
@@ -169,7 +170,7 @@ class ListeningDecoder(FrameDecoder):
             if not self._kind.is_certain and len(self.waiting) >= self._checksum.size:
                 if len(self.waiting) == 1 and not self._matches(self._checksum) and (
                         self._matches(Checksum.CRC, 1)):
-                    return MORE  # a CRC may be what it is
+                    return MORE  # the check may be a CRC
                 self._reconsider()
                 self._checksum = self._kind.checksum
         elif len(self.waiting) < Checksum.CRC.size:
@@ -200,6 +201,6 @@ class ListeningDecoder(FrameDecoder):
             self._kind.checksum = other
 
     def _matches(self, checksum: Checksum, count: int = 2) -> bool:
-        """Tell whether the check that has come is of this kind, by its first ``count`` bytes."""
+        """Tell whether the received check has this kind, by its first ``count`` bytes."""
         check = checksum.encode(checksum.of_message(self.link_data, self._station))
         return self.waiting.startswith(check[:count])

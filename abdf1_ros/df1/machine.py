@@ -15,10 +15,10 @@
 """
 The engine under every link procedure: bytes and a clock value in, bytes and a deadline out.
 
-A procedure is a generator with one effect. ``heard = yield Send(frame, timeout)`` means "put
-this frame on the line, then give me the next symbol, or a Silence when the time is up". What the
-manual writes as a program is written here as the same program, and composed with ``yield
-from``. The machine alone knows of TX_Delay and of the time that characters take.
+A procedure is a generator with one effect. ``heard = yield Send(frame, timeout)`` means "put this
+frame on the line, then give me the next symbol, or a Silence when the time is up". A procedure is
+written as the program that the manual prints, and composed with ``yield from``. The machine alone
+knows of TX_Delay and of the time that characters take.
 
 The machine never reads a clock: every call brings ``now``, seconds of any monotonic clock. A
 driving loop (a thread with a port, or a test with a virtual line) does this::
@@ -51,15 +51,17 @@ class Send(NamedTuple):
     """
     Put ``frame`` on the line, then wait for the next symbol.
 
-    ``timeout`` is in seconds from the moment the last byte has left, None for no limit; with 0
-    nothing is waited for. ``delay`` seconds pass before the frame goes out, and TX_Delay at least,
-    unless it goes ``at_once``. After ``expires`` (clock value in s) it does not go out any more:
-    CommandExpired is raised at the ``yield``. ``reply_size`` is the bytes after the header of the
-    reply that is expected, if that tells no error; 0 where it is not known.
+    - ``timeout``: seconds after the last byte has left, None for no limit; with 0 the step does
+      not wait.
+    - ``delay``: seconds before the frame goes out, at least TX_Delay unless ``at_once``.
+    - ``expires``: clock value (s) after which the frame does not go out any more. CommandExpired
+      is then raised at the ``yield``.
+    - ``reply_size``: bytes after the header of the expected good reply, 0 if unknown.
 
-    ``reflex`` gives the frame that answers the next symbol, empty for none. That goes on the line
-    before the procedure hears of the symbol, and has to be what the procedure then sends. It is
-    not asked where there is a TX_Delay, or something else still has to go out.
+    ``reflex`` returns the frame that answers the next symbol, empty for none. The machine sends
+    this frame before the procedure hears of the symbol; the procedure has to send the same frame
+    then. The machine does not ask ``reflex`` if there is a TX_Delay, or if other bytes still have
+    to go out.
     """
 
     frame: bytes
@@ -75,8 +77,8 @@ class Listen(NamedTuple):
     """
     Wait for the next symbol, for ``timeout`` seconds after all has left, None for no limit.
 
-    With 0 only a symbol is heard that is here already. ``is_continued`` leaves the time-limit as
-    it was in the step before. ``reflex`` is that of ``Send``.
+    With 0 the step hears only a symbol that is here already. ``is_continued`` keeps the time limit
+    of the step before. ``reflex`` is described at ``Send``.
     """
 
     timeout: float | None
@@ -88,8 +90,8 @@ class Rest(NamedTuple):
     """
     Wait until ``timeout`` seconds are over, None for no limit, or ``Machine.wake``.
 
-    A half-duplex master is deaf meanwhile, all others hear the next symbol. ``reflex`` is that of
-    ``Send``.
+    A half-duplex master is deaf meanwhile, all other nodes hear the next symbol. ``reflex`` is
+    described at ``Send``.
     """
 
     timeout: float | None = None
@@ -104,11 +106,11 @@ LISTEN_ON = Listen(None, is_continued=True)
 
 class Silence(NamedTuple):
     """
-    What was heard when the time of a step was up: no symbol.
+    No symbol came before the time of a step was up.
 
-    ``last_byte`` is the last byte that was heard, 0 for none (where a transmission forgets what
-    was before it: since the last one). ``is_broken_off`` tells that a message had begun. The
-    line has been quiet for ``seconds``.
+    ``last_byte`` is the last byte that was heard, 0 for none; a half-duplex master counts from its
+    last transmission. ``is_broken_off`` tells that a message had begun. The line has been quiet
+    for ``seconds``.
     """
 
     last_byte: int = 0
@@ -119,33 +121,33 @@ class Silence(NamedTuple):
 # After a step that was not to wait.
 _NOTHING = Silence()
 
-# An operating system or USB adapter may hold a byte back for so long (s). No wait is shorter, so
-# Timeout = 0, which S0 allows, means "as short as the equipment can do".
+# Longest time (s) that an operating system or USB adapter holds a byte back. No wait is shorter,
+# so Timeout = 0, which S0 allows, means "as short as the equipment can do".
 MIN_RESPONSE_TIME = 0.02
 
-# Whoever is called so many seconds after a deadline has not run meanwhile: this process, or its
-# host, was paused, and it is unknown how long what comes then has lain in a buffer.
+# If a call comes this late (s) after a deadline, the process or its host was paused. The age of
+# the bytes read next is then unknown.
 MOST_LATE = 0.2
 
-# What an operating system or a device server may hold bytes of a frame back (s).
+# Longest time (s) that an operating system or a device server holds bytes of a frame back.
 HELD_BACK = 0.1
 
-# A message or a line is over after a pause of so many characters, besides that.
+# Pause, in characters, that ends a message besides that time.
 QUIET_CHARACTERS = 20
 
 # A shorter time (s) counts as none: no wait ends so exactly.
 MOMENT = 0.0001
 
-# A message that has begun may take so many times as long as its bytes take at the set speed, but
-# no longer than the longest one, and two pauses besides. Without a limit a station that dribbles,
-# or never ends, would keep the line from all others.
+# A message that has begun may take this many times the time of its bytes at the set speed, plus
+# two pauses, at most the time of the longest message. Without a limit a station that dribbles, or
+# never ends, would keep the line from all other stations.
 _SLOWEST = 4
 _LONGEST = 2 * MAX_LINK_DATA
 
-# Characters that a UART may hand on at once. The end of a reply is waited for as it comes.
+# Characters that a UART may hand on at once. Bytes at the end of a reply are read as they come.
 _LAST_CHARACTERS = 16
 
-# What no node says in full duplex before it has heard a message or an ENQ to its end.
+# Responses: a full-duplex node sends them only after a complete message or ENQ.
 _RESPONSES = (Control.ACK, Control.NAK)
 
 Heard = Symbol | Silence
@@ -160,7 +162,7 @@ def character_time(baud: int, data_bits: int, parity: str, stop_bits: int) -> fl
 @dataclass(frozen=True, slots=True)
 class LineTiming:
     """
-    What the machine must know of the line.
+    The timing of a line.
 
     ``char_time`` is seconds per character, start and stop bits included (0 where the line
     has no speed of its own); ``tx_delay`` seconds pass before each transmission (S0, TX_Delay).
@@ -184,29 +186,29 @@ class _Incoming(NamedTuple):
 
 
 class Background(Protocol):
-    """What has to be done in time whatever the line is busy with, and at the end."""
+    """Work that has to be done in time whatever the line is busy with, and at the end."""
 
     def expire(self, now: float) -> None:
-        """Do what needs no line, such as ending what has waited too long for it."""
+        """Do work that needs no line, such as ending commands that have waited too long for it."""
 
     def next_expiry(self) -> float:
         """Return when there is something to do next (clock value in s), infinite for never."""
 
     def ended(self, error: Exception | None) -> None:
-        """Take note that the procedure has ended, and why if that is known."""
+        """React to the end of the procedure; ``error`` is the reason if it is known."""
 
 
 class Machine:
     """
     Run one procedure over one line.
 
-    ``procedure`` makes the generator, afresh at every ``start``. With ``forget_on_send`` what
-    was heard before a transmission is dropped: for the master of a half-duplex line it cannot
-    be the answer. ``counters`` gets the characters in both directions. ``background`` has its time
-    whatever the line is busy with.
+    ``procedure`` makes the generator, afresh at every ``start``. With ``forget_on_send`` bytes
+    that were heard before a transmission are dropped: for the master of a half-duplex line they
+    cannot be the answer. ``counters`` gets the characters in both directions. ``background`` has
+    its time whatever the line is busy with.
 
-    ``sender`` has what goes out. ``late`` is the sum of the seconds by which the machine was
-    called after a deadline of its procedure: so long this process, or its host, has not run.
+    ``sender`` has the bytes that go out. ``late`` is the sum of the seconds by which calls came
+    after a deadline of the procedure: for this time the process, or its host, has not run.
     """
 
     def __init__(self, procedure: Callable[[Machine], Procedure], *, checksum: Checksum,
@@ -252,13 +254,13 @@ class Machine:
 
     @property
     def message_begun(self) -> float:
-        """Return when the last message began to come in: now, where it came at once."""
+        """Return when the last message began to come in: now for a message in one piece."""
         is_known = self._message.number == self.decoder.begun
         return self._message.begun if is_known else self.now
 
     @property
     def hears_until(self) -> float:
-        """Return until when the message that is coming in is heard; -inf where none is."""
+        """Return until when the message that is coming in is heard; -inf if none is."""
         if not self.decoder.in_message:
             return -math.inf
         heard = self.counters.chars_received - self._message.heard
@@ -269,10 +271,10 @@ class Machine:
     @property
     def spare_time(self) -> float:
         """
-        Return for how long (s) nothing that comes can matter: a reply is coming in, and is long.
+        Return for how long (s) incoming bytes need no look: a long reply is coming in.
 
-        To read it in one go spares most of the wakings that its bytes cost, a few at a time. It is
-        read well before the deadline, which each byte puts off.
+        One read of the whole reply spares most of the wake-ups that its bytes cost. The read comes
+        well before the deadline, which each byte puts off.
         """
         step, char_time = self._step, self.timing.char_time
         if not isinstance(step, Send) or not step.reply_size or not self.decoder.in_message:
@@ -280,7 +282,7 @@ class Machine:
         data = self.decoder.link_data
         is_faster = self.now - self.sender.free_at < len(data) * char_time
         if is_faster or not begins_good_reply(data):
-            return 0.0  # it does not have that speed (a simulator's), or the reply is another
+            return 0.0  # the line is faster (of a simulator), or it is another reply
         missing = HEADER_SIZE + step.reply_size - len(data) - _LAST_CHARACTERS
         spare = max(missing, 0) * char_time
         return spare if self.deadline is None else min(
@@ -298,8 +300,8 @@ class Machine:
         """
         End the procedure; with ``error``, raise that inside it first.
 
-        A procedure handles the error like the end of its transaction, so nothing it was doing
-        is left without a result.
+        A procedure handles the error like the end of its transaction, so each command of it gets a
+        result.
         """
         procedure, self._procedure = self._procedure, None
         self.sender.clear()
@@ -322,10 +324,10 @@ class Machine:
         self.counters.chars_received += len(data)
         if self._forget_on_send and (self.sender.waiting or not self._is_listening):
             self._count(data)
-            return  # it was said before what it would have to answer
+            return  # these bytes came before our command left, so they cannot answer it
         if self._is_listening and now - self._last_heard > self._pause_limit:
             if not self.decoder.in_message:
-                self.decoder.reset()  # what broke off must not swallow what begins now
+                self.decoder.reset()  # the message that broke off must not swallow the next one
             elif now > self._message_end():
                 self._break_off()
         self._last_heard = now
@@ -335,7 +337,7 @@ class Machine:
             self._hear_out(now)
 
     def _count(self, data: bytes) -> None:
-        """Count the symbols in what comes while a master does not listen."""
+        """Count the symbols that come while a master does not listen."""
         if self.sender.waiting:
             return
         self.decoder.feed(data)
@@ -349,7 +351,7 @@ class Machine:
             else math.inf
 
     def _break_off(self) -> None:
-        """Deliver a message that has stopped as what it is."""
+        """Deliver a message that has stopped, as broken off."""
         message = self.decoder.broken_off()
         self.decoder.reset()
         self._resume(message)
@@ -365,7 +367,7 @@ class Machine:
         self.deadline = max(self.deadline, self.hears_until)
 
     def handle_timeout(self, now: float) -> None:
-        """Take note that the clock reads ``now``; does nothing before ``next_call``."""
+        """Do what is due when the clock reads ``now``; nothing before ``next_call``."""
         self.now = now
         if self._background is not None and now >= self._background.next_expiry():
             self._background.expire(now)
@@ -409,7 +411,7 @@ class Machine:
         """
         Take back a command that has become too old since it was looked at.
 
-        The procedure gets no error where it has gone on by then.
+        The procedure gets no error if it has gone on by then.
         """
         self.now = now
         expires = self.sender.send_before
@@ -420,14 +422,14 @@ class Machine:
 
     def _next_symbol(self) -> Symbol | None:
         """
-        Return what another node has said, None when more bytes are needed.
+        Return the next symbol of another node, None if more bytes are needed.
 
-        A message of ours that comes back is noise in full duplex: a response that was given before
-        must not count for it (M 4-8), in case that it is a PLC's after all.
+        In full duplex the echo of our message is treated as noise: it clears the last response (M
+        4-8). If the message was from a PLC after all, the PLC then repeats it.
         """
         echo = self.sender.echo
         while (symbol := self.decoder.next_symbol()) is not None:
-            # A master sends no frame without a station, and no response before it hears its echo.
+            # A master sends no frame without a station number, and no response before its echo.
             is_slaves = self._forget_on_send and (
                 symbol.station is None if isinstance(symbol, Frame)
                 else isinstance(symbol, Control) and not echo.is_heard)
@@ -456,7 +458,7 @@ class Machine:
         procedure = self._procedure
         while procedure is not None:
             try:
-                # None is what a generator is started with, and no procedure sees it.
+                # A generator is started with None; no procedure sees it.
                 step = procedure.throw(error) if error else procedure.send(
                     heard)  # type: ignore[arg-type]
             except StopIteration:

@@ -57,7 +57,7 @@ class HalfDuplexMaster(Link):
     """
     Carry out transactions on the line of ``machine``.
 
-    ``report`` and ``serve`` are those of ``MasterLine``.
+    ``report`` and ``serve`` are described at ``MasterLine``.
     """
 
     def __init__(self, machine: Machine, settings: LinkSettings, stations: ActiveStationList,
@@ -69,7 +69,7 @@ class HalfDuplexMaster(Link):
         self._line = MasterLine(machine, settings, stations, serve, report)
 
     def run(self, source: TaskSource) -> Procedure:
-        """Carry out the tasks of ``source``, one after the other, for ever."""
+        """Carry out the tasks of ``source``, one at a time, for ever."""
         self._line.begin()
         while True:
             # In turns, or slaves that send all the time would keep our own commands from the line.

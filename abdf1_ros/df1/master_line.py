@@ -13,14 +13,14 @@
 # limitations under the License.
 
 """
-What every half-duplex master does on its line: deliver, poll, receive, pass on.
+The work of every half-duplex master on its line: deliver, poll, receive, pass on.
 
-The rules are S0's, "Functional Overview", and those of M 3-12..3-17; how they make up a
-transaction is in ``master``, how they make up a polling scan in ``polling``.
+The rules come from S0, "Functional Overview", and M 3-12..3-17. ``master`` makes a transaction of
+them, ``polling`` a polling scan.
 
-Every good message is acknowledged, also one that is not waited for: the slave keeps it until then
-(M 3-15). A master never asks for a repetition with DLE NAK, which resets all slaves of the line
-(M 2-7, 3-11).
+Every good message is acknowledged, also an unexpected one: the slave keeps it until then (M 3-15).
+A master never asks for a repetition with DLE NAK, which resets all slaves of the line (M 2-7,
+3-11).
 """
 
 from __future__ import annotations
@@ -57,23 +57,24 @@ from abdf1_ros.df1.tasks import Task
 from abdf1_ros.errors import CommandExpired, CommandTimeout, StationInactive
 from abdf1_ros.messages import Event, Message
 
-# No station answers a broadcast; after one the master waits so long (s) for the slaves.
+# Pause (s) after a broadcast, which no station answers.
 BROADCAST_PAUSE = 0.05
 
 # Messages of slaves that wait to be passed on; with more, a slave gets no ACK and keeps its own.
 MAX_FORWARDS = 16
 
-# Commands passed on whose replies may still come; of more, the oldest have been waiting longest.
+# Most commands passed on that are remembered until their replies come; the oldest are dropped
+# first.
 _MOST_PASSED_ON = 2 * MAX_FORWARDS
 
-# Messages that a slave may have queued before the reply to our command. They are taken even when
-# the time of the command is up. Otherwise, on a slow line, each reply would stay queued after an
+# Messages that a slave may have queued before the reply to our command. The master takes them even
+# after the time of the command. Otherwise, on a slow line, each reply would stay queued after an
 # older one for ever.
 MOST_QUEUED = 8
 
 _ACKNOWLEDGE = Send(frames.ACK)
 
-# What answers a message and a poll, but for the frames that answer a poll too.
+# Symbols that answer a message, and a poll. Frames also answer a poll.
 _MESSAGE_ANSWERS = (Control.ACK, Control.NAK)
 _POLL_ANSWERS = (Control.EOT, Control.NAK)
 
@@ -105,7 +106,7 @@ class MasterLine:
         self.begin()
 
     def begin(self) -> None:
-        """Forget what was to be passed on."""
+        """Forget messages that wait to be passed on."""
         self.forwards: deque[Packet] = deque()
         # Commands between slaves, whose replies are passed on as well.
         self._passed_on: deque[Packet] = deque(maxlen=_MOST_PASSED_ON)
@@ -116,12 +117,12 @@ class MasterLine:
         """
         Send a message to a station until it is acknowledged (S0, "Network Reads"; M 3-12).
 
-        Return when the transmission began that was acknowledged (clock value in s); raises
-        CommandExpired, and StationInactive after the last retry: of the station that the message
-        is for, where its gateway answers a poll. Of the gateway itself that is CommandTimeout.
-        To a silent station, and to one that was never there behind a gateway that is, it goes
-        once: the gateway's other nodes would wait for all retries. The answer of a silent one is
-        waited for ``answer_within`` s at most.
+        Return when the acknowledged transmission began (clock value in s). Raises CommandExpired,
+        and StationInactive after the last retry. If the gateway of the station answers a poll, the
+        error names only the station. For a message to the gateway itself the error is
+        CommandTimeout. A silent station gets the message once, and so does a station behind an
+        active gateway that has never replied: the other nodes of the gateway would wait for all
+        retries. The answer of a silent station is waited for ``answer_within`` s at most.
         """
         frame = frames.master_frame(number, packet.encode(), self.settings.checksum)
         self.accounting.sent(packet)
@@ -164,7 +165,7 @@ class MasterLine:
         raise StationInactive(number)
 
     def _note_cause(self, answer: Heard, number: int, expected: Message) -> Message:
-        """Note why something has to be sent again, at worst what was ``expected``; return it."""
+        """Note why a frame has to be sent again, at worst that ``expected`` did not come."""
         if answer is Control.NAK:
             self.accounting.nak_received(number)
             return Message.ERR_RCVD_NAK_SYMBOL
@@ -188,7 +189,7 @@ class MasterLine:
                 self.take_unwanted(packet)
 
     def poll_inactive(self, number: int) -> Generator[Step, Heard, Heard]:
-        """Poll an inactive station; report whatever was heard that is not a good answer."""
+        """Poll an inactive station; report each symbol that is not a good answer."""
         answer = yield from self._poll(number)
         if is_good(answer):
             self.stations.heard(number, self.machine.now)
@@ -201,7 +202,7 @@ class MasterLine:
         """
         Poll until EOT or a good message; raises StationInactive after the last retry.
 
-        ``reply_size`` is that of the task whose reply is expected.
+        ``reply_size`` belongs to the task whose reply is expected.
         """
         for retry in range(1, self.settings.enq_retries + 2):
             answer = yield from self._poll(number, pause, reply_size)
@@ -230,8 +231,7 @@ class MasterLine:
         """
         Send a question; return a ``wanted`` control symbol, a frame of this station, or silence.
 
-        Other symbols are counted and passed over while the time runs: noise, or an answer that
-        comes late.
+        Other symbols, such as noise or a late answer, are counted and ignored while the time runs.
         """
         self._last_code = 0
         step = question
@@ -280,10 +280,11 @@ class MasterLine:
 
     def _take_late(self, number: int, frame: Frame) -> bool:
         """
-        Take a message of another station than the one asked; return whether it was one.
+        Take a late message of a station other than the asked one; return True if it was one.
 
-        It answers an earlier poll, whose time was up. It gets no ACK: the station asked now would
-        take that for its own message. So the message comes again, and is then a repetition.
+        Such a message answers an earlier poll, whose time was up. It gets no ACK, because the
+        station asked now would relate the ACK to its own message. So the message comes again, as a
+        repetition.
         """
         src = frame.data[1]
         if src == number or self._speaks_for(number, src) or src not in self.stations:
@@ -346,8 +347,9 @@ class MasterLine:
         """
         Tell whether a reply has the number of its gateway in place of ours (M 6-4).
 
-        That is the number of Via. On its other network the gateway may have another number, which
-        we do not know: we take one that two replies in a row have, and no other station of ours.
+        This number is Via. On its other network the gateway may have another number, which we do
+        not know. We accept a number that two replies in a row have, unless it is another station
+        of ours.
         """
         if not packet._replace(dst=command.src).answers(command):
             return False
@@ -363,15 +365,17 @@ class MasterLine:
     def complete(self, task: Task, reply: Packet, *, keeps_others_waiting: bool) -> None:
         """End a task with the reply to its command."""
         if reply.src in self.stations.routes and not is_local_status(reply.sts):
-            self.stations.heard(reply.src, self.machine.now)  # others were, when it came
+            # the station was heard when the reply came
+            self.stations.heard(reply.src, self.machine.now)
         self.accounting.complete(task, reply, keeps_others_waiting=keeps_others_waiting)
 
     def take_unwanted(self, packet: Packet) -> None:
         """
-        Take a message that answers nothing of ours (S0, DispatchAbDf1Message).
+        Take a message that answers no command of ours (S0, DispatchAbDf1Message).
 
-        It is served, kept to be passed on, or dropped and counted: a reply to another node, too,
-        that answers no command which we have passed on. Its DST is damaged, or it is late.
+        The message is served, kept to be passed on, or dropped and counted. A reply to another
+        node is dropped if it answers no command that we have passed on: its DST is damaged, or it
+        is late.
         """
         is_ours = packet.dst == self.settings.station
         is_kept = self.settings.accept_slave_messages
@@ -428,7 +432,7 @@ class MasterLine:
 
     @contextmanager
     def _probe_of(self, number: int) -> Iterator[None]:
-        """Count what goes on as a probe, if the station is silent."""
+        """Count the following work as a probe if the station is silent."""
         was_silent, begun = not self.stations[number].replies_in_time, self.machine.now
         try:
             yield

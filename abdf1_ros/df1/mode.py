@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""What is known of a mode of a line: how its link is made, and which times it can keep."""
+"""A mode of a line: how its link is made, and which times it can keep."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ Report = Callable[[Event], None]
 
 
 class LinkMaker(Protocol):
-    """What makes a link, such as its class."""
+    """A function that makes a link, such as its class."""
 
     def __call__(self, machine: Machine, settings: LinkSettings, stations: ActiveStationList,
                  serve: Serve, report: Report) -> Link: ...
@@ -109,8 +109,8 @@ class LineMode:
         """
         Return how long a transaction takes at most that ends within its retries.
 
-        Its frames, each once, take ``frames``, those of another one up to ``others``.
-        ``stations`` are on the line.
+        ``frames`` is the time of its frames, each once. ``others`` is the longest such time of
+        another transaction. ``stations`` are on the line.
         """
         timeout = answer_time(line)
         # Cmd_Timeout runs from the beginning of the try that is acknowledged.
@@ -130,7 +130,7 @@ class LineMode:
         return frames + self.answers * response_time
 
     def longest_reply(self, line: LinkSettings, frames: float) -> float:
-        """Return how long a reply of ours takes at most, which takes turns with commands."""
+        """Return the longest time of a reply of ours; our replies take turns with commands."""
         return (line.nak_retries + 1) * (answer_time(line) + frames)
 
     def last_tries(self, line: LinkSettings, frames: Sequence[float],

@@ -23,8 +23,9 @@ import math
 from abdf1_ros.df1.checksum import Checksum
 from abdf1_ros.df1.frames import DLE, ETX, STX
 
-# A portion of a message takes so long (s) on the line; the next one is given out when so much is
-# left. A response waits for one portion at most, and a thread that is a little late leaves no gap.
+# Line time (s) of a portion of a message, and the rest of the line time at which the next portion
+# is given out. A response waits for one portion at most, and a thread that is a little late leaves
+# no gap.
 _AHEAD = 0.03
 _LEFT = 0.015
 
@@ -56,7 +57,7 @@ class Outgoing:
         return len(self._kept) > 1
 
     def put(self, frame: bytes, free: float) -> bytes:
-        """Return what goes out at once of a frame; before it the line is busy until ``free``."""
+        """Return the part of a frame that goes out at once; the line is busy until ``free``."""
         if not self._kept:
             if not frame.startswith(STX) or not 0 < self._portion < len(frame):
                 return frame
@@ -78,7 +79,7 @@ class Outgoing:
         return bytes(portion)
 
     def clear(self) -> None:
-        """Forget what has not been given out."""
+        """Forget all portions that have not been given out."""
         self._kept.clear()
         self.due, self.size = None, 0
 

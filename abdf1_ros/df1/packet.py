@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The message in a frame, with the header that commands and replies share."""
+"""The message in a frame; commands and replies have the same header."""
 
 from __future__ import annotations
 
@@ -38,13 +38,13 @@ def is_local_status(sts: int) -> bool:
 
 
 def begins_good_reply(link_data: bytes | bytearray) -> bool:
-    """Tell whether the header is there, and is that of a reply without an error."""
+    """Tell whether the data begin with the header of a reply without an error."""
     return len(link_data) >= HEADER_SIZE and link_data[2] & REPLY_BIT != 0 and link_data[3] == 0
 
 
 class Packet(NamedTuple):
     """
-    DST SRC CMD STS TNS and what follows them (M 6-3).
+    A message: DST SRC CMD STS TNS and the bytes after them (M 6-3).
 
     ``dst`` and ``src`` are station addresses (0-255), ``cmd`` has bit 6 set in a reply (M 6-5),
     ``tns`` is the 16-bit transaction number, low byte first on the line (M 6-7). ``data`` is

@@ -26,14 +26,14 @@ The receiver answers every message at once with ACK or NAK and remembers what it
 an ENQ (M 4-7..4-9). That memory begins as NAK, and goes back to NAK after anything that is not a
 message: an old ACK must not count for a new message that got lost.
 
-A response does not say which message it is for. One that comes before all bytes of our message
-have left is not for that message (M 4-5: WAIT follows SEND). After the start, and after a
-transfer that needed a second try, there is a short pause: a response in that pause is late, and
-must not be taken for the response to the next message.
+A response does not name its message. A response that comes before all bytes of our message have
+left is not for that message (M 4-5: WAIT follows SEND). After the start, and after a transfer that
+needed a second try, there is a short pause. A response in that pause is late, and must not count
+for the next message.
 
-An ACK is not a reply. Commands wait for theirs as long as Cmd_Timeout after the ACK, several
-at a time where ``max_outstanding`` allows, and replies find them by station, command and TNS.
-A reply that overtakes its ACK counts as one (M 4-13).
+An ACK is not a reply. A command waits for its reply up to Cmd_Timeout after the ACK. Several
+commands may wait, up to ``max_outstanding``; a reply finds its command by station, CMD and TNS. A
+reply that overtakes its ACK counts as the ACK, too (M 4-13).
 
 A message is sent again when its sender has not understood our response (M 4-5). So a repetition
 comes within the time that the sender's retries take. If the sender has acknowledged our reply and
@@ -61,15 +61,15 @@ from abdf1_ros.df1.tasks import Outstanding, Task, TaskSource
 from abdf1_ros.errors import CommandExpired, StationInactive
 from abdf1_ros.messages import Event, Message
 
-# Repeated NAKs mostly mean that the other end is out of buffers: from the second on, each
+# Repeated NAKs mostly mean that the far end is out of buffers. From the second NAK on, each
 # repetition waits this much longer (s).
 _NAK_PAUSE = 0.25
 
 # Replies that wait for their turn on the line; with more, commands are answered with NAK.
 MAX_WAITING_REPLIES = 8
 
-# A response may come so late (s): after its time-out, after another response, or after the reply
-# that overtook it.
+# Longest delay (s) of a late response: after its time-out, after another response, or after the
+# reply that overtook it.
 _LATE_RESPONSE = 0.1
 
 # The ACK time-out (s) and the number of ENQs in the default settings of the products.
@@ -78,7 +78,7 @@ _ENQ_LIMIT = 3
 
 _REFLEX = ack_on_reply()
 
-# While a response is waited for, overdue commands are looked for so often (s).
+# Interval (s) of looks for overdue commands while the peer waits for a response.
 _TICK = 0.25
 
 
@@ -101,9 +101,9 @@ class FullDuplexPeer(EqualNode):
     """
     Carry out tasks on the line of ``machine`` and answer the commands that come in.
 
-    ``serve`` executes a command and returns its reply; it is called once for each command,
-    never for a repetition. Where it returns None, the caller adds the reply to ``replies`` (others
-    after a start) later, in any thread, and then wakes the machine. ``report`` is called with
+    ``serve`` executes a command and returns its reply; it is called once for each command, never
+    for a repetition. Where it returns None, the caller later adds the reply to ``replies``, in any
+    thread, and wakes the machine. Each start makes a new ``replies``. ``report`` is called with
     every numbered error and notice.
     """
 
@@ -116,12 +116,12 @@ class FullDuplexPeer(EqualNode):
         self._forget()
 
     def run(self, source: TaskSource) -> Procedure:
-        """Carry out the tasks of ``source`` and serve the other end, for ever."""
+        """Carry out the tasks of ``source`` and serve the far end, for ever."""
         self._forget()
         yield from self._listen()  # it answers an earlier process
         while True:
             self._expire()
-            # In turns, or an end that asks all the time would keep our commands waiting.
+            # In turns, or a far end that asks all the time would keep our commands waiting.
             if self.replies:
                 yield from self._send_reply(self.replies.popleft())
             task = self._next_task(source)
@@ -224,7 +224,7 @@ class FullDuplexPeer(EqualNode):
         return delivered
 
     def _note_nak(self, naks: int, station: int) -> bool:
-        """Count and report that a message is sent again, or is not any more."""
+        """Count and report that a message is sent again, or is given up."""
         if naks > self._settings.nak_retries:
             self._counters.nak_limit_exceeded += 1
             self._note(Message.NTC_NAK_LIMIT_EXCEEDED, self._settings.nak_retries, station=station)
@@ -235,7 +235,7 @@ class FullDuplexPeer(EqualNode):
         return True
 
     def _note_silence(self, enqs: int, station: int) -> bool:
-        """Count and report that an ENQ asks for the response, or does not any more."""
+        """Count and report that an ENQ asks for the response, or that the message is given up."""
         if enqs > self._settings.enq_retries:
             self._counters.enq_limit_exceeded += 1
             self._note(Message.NTC_ENQ_LIMIT_EXCEEDED, self._settings.enq_retries, station=station)
@@ -272,7 +272,7 @@ class FullDuplexPeer(EqualNode):
         return silence.last_byte if self._machine.now - silence.seconds > begun else 0
 
     def _listen(self, seconds: float = _LATE_RESPONSE) -> Procedure:
-        """Only receive for a while; responses that come now are late and count for nothing."""
+        """Only receive for a while; responses that come now are late and ignored."""
         end = max(self._machine.now, self._machine.sender.free_at) + seconds
         symbol = yield from self._next(end)
         while not isinstance(symbol, Silence) or self._left(end) > 0:
@@ -293,9 +293,9 @@ class FullDuplexPeer(EqualNode):
         return (yield Listen(min(left, _TICK), reflex=_REFLEX))
 
     def _answer(self, symbol: Symbol) -> Procedure:
-        """Send the response to a symbol, and make use of the message that it brings."""
+        """Send the response to a symbol, and use the message that it brings."""
         response = self._hear(symbol)
-        if self._machine.timing.tx_delay:  # the response waits for that, the message need not
+        if self._machine.timing.tx_delay:  # the response waits for TX_Delay, the message need not
             self._make_use()
         if response:
             yield Send(response)
@@ -317,7 +317,7 @@ class FullDuplexPeer(EqualNode):
                 self.replies.append(reply)
 
     def _hear(self, symbol: Symbol) -> bytes:
-        """Return what the receiver answers to a symbol (M 4-7..4-9)."""
+        """Return the response of the receiver to a symbol (M 4-7..4-9)."""
         if isinstance(symbol, Frame):
             return self._message(symbol)
         if symbol is Control.ENQ:
@@ -344,7 +344,7 @@ class FullDuplexPeer(EqualNode):
             return self._respond(frames.NAK)
         packet = Packet.decode(frame.data)
         self._counters.messages_received += 1
-        # On a line with an echo a command may be ours, with damage that no check shows.
+        # On a line with an echo, a command may be our own with damage that no check shows.
         if not packet.is_sound or (self._machine.echoes and not packet.is_reply):
             self._counters.invalid_messages += 1
             self._report(wrong_message(packet, packet.src))
@@ -367,12 +367,12 @@ class FullDuplexPeer(EqualNode):
             return False
         is_settled = last.is_answered and not last.may_come_again
         enq_retries = 0 if is_settled else max(_ENQ_LIMIT, settings.enq_retries)
-        # What the other end needs for so many ENQs, at most.
+        # Most seconds that the far end needs for ``ENQ_Retries`` ENQs.
         retry_time = (enq_retries + 1) * max(_ACK_TIMEOUT, settings.timeout)
         return self._machine.now - last.when < retry_time
 
     def _expect_repetition(self) -> None:
-        """Take note that the other end may send its last message again."""
+        """Record that the far end may send its last message again."""
         if self._accepted is not None:
             self._accepted.may_come_again = True
 
@@ -383,7 +383,7 @@ class FullDuplexPeer(EqualNode):
         key = packet.src, packet.tns
         entry = self._outstanding.get(key)
         if entry is None or not packet.answers(entry.task.command):
-            if entry is not None:  # to another node: ours may follow under the same numbers
+            if entry is not None:  # for another node: our reply may follow with the same numbers
                 self._accepted = None
             self._accounting.unexpected(packet, self._machine.now)
             return
@@ -392,7 +392,7 @@ class FullDuplexPeer(EqualNode):
         self._accounting.complete(entry.task, packet, keeps_others_waiting=True)
 
     def _given_up(self, entry: Outstanding) -> float:
-        """Return when a reply is overdue: what has begun in time is heard to its end."""
+        """Return when a reply is overdue; a reply that began in time is heard to its end."""
         machine = self._machine
         is_in_time = machine.message_begun <= entry.deadline
         return max(entry.deadline, machine.hears_until) if is_in_time else entry.deadline
@@ -428,7 +428,7 @@ class PeerMode(LineMode):
 
     def longest_transaction(self, line: LinkSettings, frames: float, others: float = 0.0,
                             stations: int = 0) -> float:
-        """Return it with the pauses after NAKs and late responses."""
+        """Return the same with the pauses after NAKs and late responses."""
         return super().longest_transaction(line, frames) + _pauses(line)
 
     def last_tries(self, line: LinkSettings, frames: Sequence[float],
@@ -440,13 +440,13 @@ class PeerMode(LineMode):
     def longest_reply(self, line: LinkSettings, frames: float) -> float:
         """Return how long the transfer of a reply takes: messages, ENQs and pauses."""
         tries = line.nak_retries + line.enq_retries + 1
-        # A command that is overdue meanwhile is ended with the next look.
+        # If a command becomes overdue meanwhile, the next look ends it.
         return tries * answer_time(line) + (line.nak_retries + 1) * frames \
             + _pauses(line) + _TICK
 
 
 def _pauses(line: LinkSettings) -> float:
-    """Return the seconds of all pauses in a transfer that is repeated as often as can be."""
+    """Return the seconds of all pauses in a transfer with all its repetitions."""
     return _LATE_RESPONSE + _NAK_PAUSE * sum(range(line.nak_retries))
 
 

@@ -61,9 +61,9 @@ COMMANDS_BETWEEN_POLLS = 4
 # A poll and the EOT that answers it.
 _POLL_CHARACTERS = 6
 
-# Where several stations behind a gateway have not replied in time, it gets one command at a time
-# for so long (s). It may work on one after the other; with more than it can do in Cmd_Timeout it
-# would be late with all of them, for ever.
+# If several stations behind a gateway have not replied in time, the gateway gets one command at a
+# time for this long (s). It may work on one command at a time. With more commands than it can do
+# in Cmd_Timeout it would be late with each of them, for ever.
 _SLOW_TIME = 30.0
 
 # Pause between scans in which no station could be polled (s).
@@ -72,7 +72,7 @@ _PAUSE = 0.05
 
 @dataclass(slots=True)
 class _PollList:
-    """One poll list and where the master is in it."""
+    """One poll list, and the place of the master in it."""
 
     stations: tuple[int, ...]
     times: ScanTimes = field(default_factory=ScanTimes)
@@ -102,7 +102,7 @@ class StandardPollingMaster:
     """
     Poll all stations and carry out tasks on the line of ``machine``.
 
-    ``report`` and ``serve`` are those of ``MasterLine``.
+    ``report`` and ``serve`` are described at ``MasterLine``.
     """
 
     def __init__(self, machine: Machine, settings: LinkSettings,
@@ -120,13 +120,13 @@ class StandardPollingMaster:
         self._listed = frozenset((*polling.priority, *polling.normal))
         self._polled = self._listed - {settings.station}
         stations.add(self._polled, are_polled=True)
-        # Stations that got a command of another station and have not replied, and until when
-        # (clock value in s) they may. They get no second one meanwhile: several senders would
-        # soon fill the sink, which a poll empties by one message only, and our own commands would
-        # find no room.
+        # Stations that got a command of another station and have not replied, with the time (clock
+        # value, s) until which they may reply. Until then the master passes no second command on
+        # to them. Several senders would soon fill the message sink of the station, a poll empties
+        # it by one message only, and our own commands would find no room.
         self._given: dict[int, float] = {}
         # Stations that have answered a probe, but no command since. Their time on the line counts
-        # as that of a probe: otherwise a station that takes no commands would come back at once.
+        # as time of probes: otherwise a station that takes no commands would come back at once.
         self._unproven: set[int] = set()
         self._last_probed: _PollList | None = None
         self._slow_until: defaultdict[int, float] = defaultdict(lambda: -math.inf)  # of gateways
@@ -215,7 +215,8 @@ class StandardPollingMaster:
                 answer = yield from self._line.poll_with_retries(
                     number, 0.0, self._reply_size(number))
             except StationInactive as error:
-                # A reply that cannot be had is that of a guest first of all: the next poll tells.
+                # Of several pending commands the guest's is given up first. The next poll shows
+                # whether the remaining commands get replies.
                 guests = [station for station, entry in self._waiting_for(number)
                           if not entry.task.blames]
                 for station in guests:
@@ -236,7 +237,7 @@ class StandardPollingMaster:
                 if station in self._outstanding]
 
     def _reply_size(self, number: int) -> int:
-        """Return the size of the reply that comes next, 0 where that is not known."""
+        """Return the size of the reply that comes next, 0 if unknown."""
         sizes = [entry.task.reply_size for _, entry in self._waiting_for(number)]
         return sizes[0] if len(sizes) == 1 else 0
 
@@ -262,7 +263,7 @@ class StandardPollingMaster:
                 self._overdue(station)
 
     def _take_reply(self, number: int, packet: Packet) -> bool:
-        """Complete the command that a message answers, by its SRC; tell whether it is one."""
+        """Complete the command that a message answers, by its SRC; return False for none."""
         entry = self._outstanding.get(packet.src)
         if entry is None or not self._line.answers(packet, entry.task.command):
             return False
@@ -279,7 +280,7 @@ class StandardPollingMaster:
     def _overdue(self, number: int) -> None:
         """End the command whose reply has not come in time."""
         via, now = self._stations.via(number), self._machine.now
-        # Mostly no other station waits for it: the others are polled meanwhile.
+        # Mostly no other station waits for it: all other stations are polled meanwhile.
         self._line.accounting.overdue(self._outstanding.pop(number).task,
                                       keeps_others_waiting=now < self._slow_until[via])
         behind = self._stations.behind(via)
@@ -324,7 +325,7 @@ class StandardPollingMaster:
                 return
 
     def _send(self, task: Task) -> Generator[Step, Heard, bool]:
-        """Send a command; return False where nothing took it, which has cost polls their time."""
+        """Send a command; return False if no station took it, which has cost polls their time."""
         station = task.command.dst
         number = self._stations.via(station)
         if number == BROADCAST:
@@ -359,7 +360,7 @@ class StandardPollingMaster:
         return task.answer_within < math.inf  # a last try, which is short
 
     def _lost(self, number: int, begun: float, error: StationInactive) -> None:
-        """Take note that a station does not answer any more, and has had the line since then."""
+        """Record that a station does not answer any more; it has had the line since ``begun``."""
         self._line.accounting.lost(number, self._machine.now)
         for station in self._stations.behind(number):
             self._end(station, error)
@@ -376,7 +377,7 @@ class StandardPollingMode(MasterMode):
 
     def make_link(self, machine: Machine, line: LinkSettings, stations: ActiveStationList,
                   serve: Serve, report: Report) -> Link:
-        """Return the link; every mapped station is polled: one without a poll could not reply."""
+        """Return the link; it polls every mapped station, as none replies without a poll."""
         polling = line.polling or PollingSettings(())
         listed = {*polling.priority, *polling.normal}
         mapped = dict.fromkeys(stations.via(station.number) for station in stations)
@@ -387,10 +388,10 @@ class StandardPollingMode(MasterMode):
 
     def longest_transaction(self, line: LinkSettings, frames: float, others: float = 0.0,
                             stations: int = 0) -> float:
-        """Return it with all that the other stations may have of the line meanwhile."""
+        """Return the same with the time that all other stations may have meanwhile."""
         poll = (line.enq_retries + 1) * (
             answer_time(line) + others + quiet_time(line.timing.char_time))
-        # It leaves within a scan, and is polled for until Cmd_Timeout and for one scan more.
+        # The command leaves within a scan. Polls for its reply end a scan after Cmd_Timeout.
         return super().longest_transaction(line, frames) + 2 * stations * (
             poll + self.longest_reply(line, others))
 
@@ -403,7 +404,7 @@ class StandardPollingMode(MasterMode):
 
     def undisturbed(self, line: LinkSettings, frames: float, response_time: float,
                     others: float = 0.0, stations: int = 0) -> float:
-        """Return it with the scan in which every station is polled, and has a command."""
+        """Return the same with a scan in which each station is polled and gets a command."""
         poll = _POLL_CHARACTERS * line.timing.char_time + line.timing.tx_delay + response_time
         other = super().undisturbed(line, others, response_time)
         return super().undisturbed(line, frames, response_time) + stations * (poll + other)

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""How often a station that does not answer is asked whether it is there again."""
+"""How often a silent station is asked whether it answers again."""
 
 from __future__ import annotations
 
@@ -24,24 +24,26 @@ OTHERS_SHARE = 7
 
 
 class Asker(Enum):
-    """What asks a silent station whether it is there again."""
+    """The kinds of commands that ask a silent station whether it answers again."""
 
-    IN_TURN = auto()  # reads, checks and polls, one silent station after the other
+    IN_TURN = auto()  # reads, checks and polls, which ask the silent stations in their order
     MESSAGE = auto()
     OWN = auto()  # a 0 or a fallback
 
 
 class Probes:
     """
-    Keep what is spent on silent stations to an eighth of the line's time, whoever asks them.
+    Limit the time of all probes to an eighth of the line's time.
 
-    The kinds of askers take turns: ``next`` is the clock value (s) from which on silent stations
-    may be asked in their order. A message cannot wait; one that comes too early gets nowhere, but
-    the next turn is then kept free for one like it.
-    ``pause`` is the seconds that are left to others after the last probe; before the first one
-    ``usual`` stands for what that takes. ``died_at`` is when a station died last (clock value, s),
-    until all that waited for that has had its turn: then minus infinity. Where no station
-    answers, ``rest`` seconds are left between two probes.
+    The kinds of probes take turns: (a) the round of silent stations, from ``next`` on (clock
+    value, s), and (b) messages to silent stations. A message cannot wait: a message that comes
+    before its turn is refused, and the next turn is then reserved for a message.
+
+    - ``pause``: seconds for active stations after the last probe. Before the first probe it
+      follows from ``usual``, the usual seconds of a probe.
+    - ``died_at``: when a station became silent last (clock value, s). It is minus infinity after
+      all commands that waited at that time have had their turn.
+    - ``rest``: seconds between two probes if no station answers.
     """
 
     def __init__(self, usual: float, rest: float = 0.0) -> None:
@@ -69,32 +71,33 @@ class Probes:
         return self._free + self.pause if self._last is Asker.OWN else self.next
 
     def claim_message(self, now: float) -> bool:
-        """Take note of a message to a silent station; tell whether it may go now."""
+        """Claim a turn for a message to a silent station; return True if it may go now."""
         is_admitted = now >= self.next_message
         self._is_kept_for_message |= not is_admitted and self._last is not Asker.MESSAGE
         return is_admitted
 
     def spent(self, seconds: float, now: float, asker: Asker = Asker.IN_TURN) -> None:
-        """Take note that a silent station has had the line for so long until now."""
+        """Record that a silent station has had the line for ``seconds`` until now."""
         self.pause = OTHERS_SHARE * seconds
         self._free = max(self._free, now) + self.pause
         self._is_kept_for_message, self._last = False, asker
 
     def died(self, seconds: float, now: float) -> None:
         """
-        Take note that a station does not answer any more, which took ``seconds`` until now.
+        Record that a station has become silent, which took ``seconds`` until now.
 
-        Only a message asks it at once. Silence that a gateway reports quickly, costs little.
+        Only a message may ask it at once. If a gateway reports the silence quickly, that costs
+        little.
         """
         self._put_off = now + min(self.pause, OTHERS_SHARE * seconds)
         self.died_at = now
 
     def caught_up(self) -> None:
-        """Take note that nothing waits any more that did when a station died."""
+        """Record that all commands which waited when a station died have had their turn."""
         self.died_at = -math.inf
 
     def none_waits(self, now: float, asker: Asker = Asker.IN_TURN) -> None:
-        """Take note that probes keep no station waiting: then messages have no turns."""
+        """Record that probes keep no station waiting: then messages need no turns."""
         self._free = self._put_off = now + self._rest
         self._is_kept_for_message = False
         self._last = Asker.OWN if asker is Asker.OWN else Asker.IN_TURN

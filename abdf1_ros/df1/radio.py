@@ -20,14 +20,14 @@ frames of full duplex. A node takes what has its number or 255 as DST, and drops
 command is answered by its reply, or by nothing: then we send it again, with the same TNS, so that
 a PLC knows it as a repetition.
 
-Ours: a node waits until the line is quiet, and then for a random time, before it sends; that
-time grows with each try, as everybody may have waited for the same end. A repetition of a command
-is answered with the reply that we have given, as that may be what was lost. A packet with our
-number as SRC that we have not sent is of another node with that number: no reply is taken for ours
-that may be the reply to its command.
+Ours: a node waits until the line is quiet, and then for a random time, before it sends. That time
+grows with each try, because several nodes may have waited for the same end. A repetition of a
+command is answered with the reply that we have given, because that reply may have been lost. If we
+hear a packet with our number that we did not send, another node has our number. We then ignore
+replies that may belong to its commands.
 
-A node that stores and forwards sends a packet again, once, if it has both its SRC and its DST in
-its table, and not among the last packets.
+A node that stores and forwards sends a packet again, once. It does so if SRC and DST are in its
+table and the packet is not among the last packets.
 """
 
 from __future__ import annotations
@@ -64,32 +64,32 @@ from abdf1_ros.df1.tasks import Task, TaskSource
 from abdf1_ros.errors import CommandExpired, PortLost, StationInactive
 from abdf1_ros.messages import Event, Message
 
-# Packets that a node does not send on once more (1763-RM001C), and for how long (s): some programs
-# always send TNS 0.
+# Number of last packets that a node does not forward once more (1763-RM001C), and for how long
+# (s): some programs always send TNS 0.
 _MOST_HEARD = 20
 _RECENT = 10.0
 
-# Packets of ours that may come back, from nodes that send them on.
+# Number of our packets that nodes may forward back to us.
 _MOST_SENT = 256
 
-# Replies and packets of others that wait for a quiet line; with more, the newest are dropped.
+# Most replies and forwarded packets that wait for a quiet line; the newest are dropped.
 _MOST_WAITING = 16
 
-# The random time before the first try is up to that of our frame, twice as much before each
-# further one, but no more than this many times.
+# The random time before the first try is at most the line time of our frame. It doubles with each
+# further try, up to this many times the frame.
 _MOST_BACK_OFF = 8
 
-# A line that is never quiet does not keep us from it for longer (s).
+# Longest wait (s) for a quiet line; then the node sends all the same.
 LONGEST_WAIT = 2.0
 
 # Characters of a command that reads, and of the longest packet.
 _SHORT_FRAME, _LONG_FRAME = 24, MAX_LINK_DATA + 8
 
-# So often (s) a node that waits for replies looks whether there is something for other stations.
+# Interval (s) at which a node that waits for replies looks for commands to other stations.
 _TICK = 0.05
 
-# Commands that may be under way where the radios avoid collisions. With default settings so many
-# of the longest replies need Cmd_Timeout on the air.
+# Most commands that are under way if the radios avoid collisions. With default settings this
+# number of longest replies fills Cmd_Timeout.
 MOST_UNDER_WAY = 4
 
 
@@ -108,9 +108,8 @@ class _Command:
     """
     A command that waits for its reply, which is overdue at ``deadline`` (clock value in s).
 
-    It has been sent ``tries`` times, and is sent ``most`` times. It ``is_doubtful`` where another
-    node with our number has asked the same station under the same TNS: it is unknown whose
-    reply comes.
+    It has been sent ``tries`` times, of ``most``. It ``is_doubtful`` if another node with our
+    number has asked the same station with the same TNS: a reply may then belong to either command.
     """
 
     task: Task
@@ -137,7 +136,7 @@ class RadioNode(EqualNode):
         self._settings = settings
         self._numbers = {settings.station, *settings.also}
         self._most_under_way = RADIO.most_under_way(settings)
-        # Within so many seconds a node of these settings repeats a command.
+        # Seconds within which a node of these settings repeats a command.
         self._repetition_time = (settings.nak_retries + 1) * (
             settings.cmd_timeout + 2 * LONGEST_WAIT)
         self._random = random or Random()
@@ -158,7 +157,7 @@ class RadioNode(EqualNode):
         self._begun = self._machine.now
 
     def run(self, source: TaskSource) -> Procedure:
-        """Carry out the tasks of ``source`` and serve others, for ever."""
+        """Carry out the tasks of ``source`` and serve other nodes, for ever."""
         self._forget()
         try:
             yield from self._work(source)
@@ -260,7 +259,7 @@ class RadioNode(EqualNode):
             self._hear((yield Listen(left)))
 
     def _wait_for_quiet(self, size: int, command: _Command | None) -> Procedure:
-        """Wait until a frame of so many characters may go, or its command has had its reply."""
+        """Wait until a frame of ``characters`` may go, or its command has had its reply."""
         machine = self._machine
         if self._settings.avoids_collisions:
             return
@@ -290,7 +289,7 @@ class RadioNode(EqualNode):
                        station=command.task.command.dst)
 
     def _note_heard(self, data: bytes) -> bool:
-        """Keep link data; tell whether they were among the last ones that were heard."""
+        """Keep link data; return True if they were among the last link data heard."""
         now = self._machine.now
         is_known = any(seen == data and now - when < _RECENT for seen, when in self._heard)
         if not is_known:
@@ -326,9 +325,9 @@ class RadioNode(EqualNode):
             self._take_command(packet)
 
     def _hear_our_number(self, packet: Packet, data: bytes) -> None:
-        """Take a packet of ours, sent on by another node, or of a node that has our number."""
+        """Take a packet with our SRC: our own, forwarded, or from a node that has our number."""
         if data in self._sent or self._machine.now < self._begun + _RECENT:
-            return  # just after a start it may be one of before
+            return  # just after a start it may be a packet of the last run
         self._same_number = self._machine.now
         self._counters.invalid_messages += 1
         self._report(wrong_message(packet, packet.dst))
@@ -343,7 +342,7 @@ class RadioNode(EqualNode):
                       and now - entry.when < self._repetition_time), None)
         if known is not None:
             self._counters.duplicate_messages += 1
-            # What a node has sent on comes soon after the first; a sender waits for longer.
+            # A forwarded packet comes soon after the first; a repetition comes later.
             if now - known.answered > self._settings.cmd_timeout / 2:
                 known.answered = now
                 self._answer(known.reply)
@@ -413,20 +412,20 @@ class RadioMode(LineMode):
 
     def longest_transaction(self, line: LinkSettings, frames: float = 0.0, others: float = 0.0,
                             stations: int = 0) -> float:
-        """Return it with the longest frames there are."""
+        """Return the same with the longest frames that exist."""
         char_time = line.timing.char_time
         frame = _LONG_FRAME * char_time
-        # What comes in is heard out, also where it breaks off.
+        # An incoming message is heard to its end, also if it breaks off.
         heard = frame + QUIET_CHARACTERS * char_time + HELD_BACK
         wait = 0.0 if line.avoids_collisions else LONGEST_WAIT
         send = wait + line.timing.tx_delay + frame + heard
-        # In turns go a packet of another, a repetition and, where there is room, a new command.
+        # Forwarded packets, repetitions and (if there is room) new commands take turns.
         turns = 3 * MOST_UNDER_WAY if line.avoids_collisions else 2
         return (line.nak_retries + 1) * (turns * send + line.cmd_timeout + heard)
 
     def undisturbed(self, line: LinkSettings, frames: float, response_time: float,
                     others: float = 0.0, stations: int = 0) -> float:
-        """Return it with the longest random pause before a first try."""
+        """Return the same with the longest random pause before a first try."""
         chance = 0.0 if line.avoids_collisions else MIN_RESPONSE_TIME + frames
         return super().undisturbed(line, frames, response_time) + chance
 

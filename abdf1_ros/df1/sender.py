@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""What goes out on a line: at once or in portions, until when, and what has left."""
+"""The bytes that go out on a line: at once or in portions, until when, and what has left."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ class Outlet(Protocol):
     """Where bytes leave: the port."""
 
     def write(self, data: bytes) -> None:
-        """Put bytes on the line, after those of before."""
+        """Put bytes on the line, after all earlier bytes."""
 
     def unsent(self) -> int:
         """Return how many bytes have still to leave, as far as this is known."""
@@ -43,12 +43,16 @@ class Sender:
     """
     Send the frames of one line, on which a character takes ``char_time`` seconds.
 
-    A reflex, and what is flushed, go to the outlet, where there is one; all else is ``waiting``
-    for ``data_to_send``. ``position`` counts the bytes given out so far, ``free_at`` is when they
-    have left, by their number (clock value in s). Once the other end ``embeds`` responses, a long
-    message is given out in portions, and a response goes between two of them (M 4-3), as products
-    do with Embedded Responses = Auto-detect. ``send_before`` is the clock value (s) after which
-    ``withdraw`` is due in place of ``data_to_send``.
+    If there is an outlet, a reflex and flushed bytes go to it. All other bytes are ``waiting`` for
+    ``data_to_send``.
+
+    - ``position``: number of bytes given out so far.
+    - ``free_at``: when they have left, by their number (clock value in s).
+    - ``embeds``: the far end embeds responses. A long message is then given out in portions, and a
+      response goes between two of them (M 4-3), as in products with Embedded Responses =
+      Auto-detect.
+    - ``send_before``: clock value (s) after which ``withdraw`` is due in place of
+      ``data_to_send``.
     """
 
     def __init__(self, checksum: Checksum, duplex: Duplex, char_time: float,
@@ -72,14 +76,14 @@ class Sender:
             self._keep, lambda: 0)
 
     def clear(self) -> None:
-        """Forget what has not been given out, and what may come back."""
+        """Forget frames that have not been given out, and echoes that may come back."""
         self.waiting, self._ahead, self.send_before = b'', b'', math.inf
         self.outgoing.clear()
         self.embeds = False
         self.echo.forget()
 
     def put(self, frame: bytes, now: float, expires: float = math.inf) -> None:
-        """Send a frame after all that waits, unless it has gone by reflex."""
+        """Send a frame after all waiting bytes, unless it has gone by reflex."""
         free = max(now, self.free_at)
         is_alone = not self.outgoing.size
         self._fresh = frame
@@ -97,19 +101,19 @@ class Sender:
         self.echo.sent(frame, self.position)
 
     def _given_out(self, frame: bytes, free: float) -> bytes:
-        """Return what goes out at once of a frame; the line is busy until ``free``."""
+        """Return the part of a frame that goes out at once; the line is busy until ``free``."""
         if self.outgoing.can_embed and frame in (ACK, NAK):
             return frame  # after the portion of our message on the line, before the rest of it
         return self.outgoing.put(frame, free)
 
     def react(self, reflex: Reflex, symbol: Symbol) -> None:
-        """Send what a reflex answers to a symbol, but not before what still has to go out."""
+        """Send the answer of a reflex to a symbol, unless other bytes still have to go out."""
         if not self.waiting and not self.outgoing.size and (frame := reflex(symbol)):
             self._ahead = frame
             self._write(frame)
 
     def flush(self) -> None:
-        """Hand out at once what waits, so that it is on the line while others work."""
+        """Hand out waiting bytes at once, so that they are on the line while other code works."""
         self._write(self.data_to_send())
 
     def _keep(self, data: bytes) -> None:
@@ -144,5 +148,5 @@ class Sender:
         return self.position - self.still_here >= position
 
     def answered(self, now: float) -> None:
-        """Conclude from an answer that what was sent has left, but for what is still here."""
+        """Conclude from an answer that all bytes have left, except bytes that are still here."""
         self.free_at = min(self.free_at, now + self.still_here * self._char_time)

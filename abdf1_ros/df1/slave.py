@@ -16,7 +16,7 @@
 The half-duplex slave: a station that answers a master (M 3-4, 3-5, 3-9..3-11; KF2 4-31).
 
 A slave only reacts, so it is one method: ``handle`` takes a symbol and returns the bytes to send.
-It never sends DLE NAK. To a message that it cannot accept it gives no answer, and the master tries
+It never sends DLE NAK. If it cannot accept a message, it gives no answer, and the master tries
 again.
 """
 
@@ -48,25 +48,25 @@ from abdf1_ros.df1.settings import LinkSettings
 from abdf1_ros.errors import LineReset, LinkError, NeverTaken
 from abdf1_ros.messages import Event, Message
 
-# How often (s) a slave looks what has become overdue.
+# Interval (s) at which a slave looks for overdue commands.
 TICK = 0.25
 
 
 class Initiator:
-    """Gives a slave commands to send, and takes their results; by itself it has none."""
+    """Give a slave commands to send, and take their results; this base class has no commands."""
 
     def polled(self) -> None:
-        """Take note that the master has polled us."""
+        """Record that the master has polled us."""
 
     def next_command(self) -> Packet | None:
         """Return a command to send in answer to a poll."""
         return None
 
     def delivered(self, command: Packet) -> None:
-        """Take note that the master has acknowledged a command."""
+        """Record that the master has acknowledged a command."""
 
     def undelivered(self, command: Packet, error: LinkError) -> None:
-        """Take note that a command was given up, and why."""
+        """Record that a command was given up, and why."""
 
     def replied(self, reply: Packet) -> None:
         """Take a reply that the master has passed on to us."""
@@ -88,8 +88,8 @@ class HalfDuplexSlave:
     accepted, once for each command, never for a repetition. ``initiator`` has commands of its
     own to send, if there are any; ``report`` gets the faults of messages for us.
 
-    A message that is stored may be acknowledged (KF2 4-31). So whoever has a line sends what
-    ``respond`` returns, and calls ``make_use`` then; ``handle`` does both.
+    A stored message may be acknowledged before it is executed (KF2 4-31). So a caller with a line
+    sends the bytes of ``respond`` first, and then calls ``make_use``; ``handle`` does both.
     """
 
     def __init__(self, settings: LinkSettings, serve: Callable[[Packet], Packet],
@@ -114,7 +114,7 @@ class HalfDuplexSlave:
         return response
 
     def respond(self, symbol: Symbol) -> bytes:
-        """Return the same, and leave the message that it brings to ``make_use``."""
+        """Return the same bytes, and leave the message of the symbol to ``make_use``."""
         just_sent, self._just_sent = self._just_sent, False
         if isinstance(symbol, Poll):
             return self._polled(symbol)
@@ -142,7 +142,7 @@ class HalfDuplexSlave:
         self._queue.clear()
 
     def forget_last(self) -> None:
-        """Take the next message as new, whatever its numbers."""
+        """Treat the next message as new, whatever its numbers."""
         self._last_key = None
 
     def withdraw(self) -> None:
@@ -156,7 +156,7 @@ class HalfDuplexSlave:
         return self._just_sent and self._held is not None and not self._held.packet.is_reply
 
     def take_back(self) -> bool:
-        """Forget a command that was given and has not left; return whether it had been before."""
+        """Forget a command that was given and has not left; return True if it had left earlier."""
         held, self._held, self._just_sent = self._held, None, False
         assert held is not None
         was_sent = held.sent > 1
@@ -271,7 +271,7 @@ class HalfDuplexSlave:
 
 
 class Responder(Protocol):
-    """Anything that answers symbols on a line: a slave, or one that misbehaves on purpose."""
+    """Anything that answers symbols on a line: a slave, or a device that misbehaves."""
 
     def handle(self, symbol: Symbol) -> bytes:
         """Return the bytes to send in answer to ``symbol``."""
@@ -283,11 +283,12 @@ def answer(machine: Machine, symbol: Symbol, handle: Callable[[Symbol], bytes],
     """
     Send the answer of ``handle`` to ``symbol`` after TX_Delay; meanwhile call ``look`` repeatedly.
 
-    ``expires`` tells the clock value (s) after which an answer must not leave: CommandExpired.
+    ``expires`` returns the clock value (s) after which an answer must not leave; then
+    CommandExpired is raised.
 
-    A master that has sent something else does not wait for the old answer any more, and would take
-    it for the answer to the new symbol. So a poll or a message is ignored when another symbol has
-    come after it.
+    A master that has sent another symbol does not wait for the old answer any more. It would
+    relate the old answer to the new symbol. So a poll or a message is ignored if another symbol
+    has come after it.
     """
     heard: Symbol | None = symbol
     while heard is not None:
@@ -295,7 +296,7 @@ def answer(machine: Machine, symbol: Symbol, handle: Callable[[Symbol], bytes],
         if _wants_answer(symbol):
             heard = yield from _next_within(machine, machine.timing.tx_delay, look)
         if heard is None and (data := handle(symbol)):
-            # At once, but for what has an age: that is looked at by whoever has the port.
+            # At once, except an answer with an age: the caller that has the port checks it.
             limit = expires()
             after = yield Send(
                 data, 0 if limit == math.inf else MOMENT, expires=limit, at_once=True)

@@ -13,11 +13,11 @@
 # limitations under the License.
 
 """
-A slave that is a driver of its own: it serves the master, and sends commands when it is polled.
+A slave with a driver: it serves the master, and sends commands when it is polled.
 
 The master passes its commands on to other stations, and their replies back. Nothing is sent before
-a poll: when no poll has come for the poll timeout, all waiting commands fail, so that no old
-command is sent when the polls come back.
+a poll. If no poll has come for the poll timeout, all waiting commands fail, so that no old command
+is sent when the polls come back.
 """
 
 from __future__ import annotations
@@ -43,8 +43,9 @@ class SlaveLink(Link, Initiator):
     Serve the master on the line of ``machine``, and send the commands of a source.
 
     A command waits Cmd_Timeout for its reply after the master has taken it, or before that for the
-    next poll. ``serve`` and ``report`` are those of every link. It is the ``Initiator`` of
-    its own slave. ``last_poll`` is the clock value (s) of the last poll, or of the start.
+    next poll. ``serve`` and ``report`` are the same as in every link. The link is the
+    ``Initiator`` of its own slave. ``last_poll`` is the clock value (s) of the last poll, or of
+    the start.
     """
 
     def __init__(self, machine: Machine, settings: LinkSettings, stations: ActiveStationList,
@@ -72,7 +73,7 @@ class SlaveLink(Link, Initiator):
         self.last_poll = self._machine.now
         next_look = self._machine.now + TICK
         while True:
-            # At a fixed time, not so long after each symbol: the line may never be quiet.
+            # At a fixed time, not after a pause: the line may never be quiet.
             symbol = yield Rest(max(0.0, next_look - self._machine.now))
             if not isinstance(symbol, Silence):
                 try:
@@ -93,12 +94,12 @@ class SlaveLink(Link, Initiator):
         return command.reply(sts=STS_NOT_DELIVERED)
 
     def _expiry(self) -> float:
-        """Return when the answer that is given now is too old, infinite unless it is a command."""
+        """Return when the answer that is given now expires, infinite unless it is a command."""
         entry = self._outstanding
         return math.inf if entry is None or not self._slave.gives_command else entry.task.expires
 
     def _take_back(self, error: CommandExpired) -> None:
-        """End a command that was too old when the port was to have it."""
+        """End a command that was too old when the port was free for it."""
         was_sent = self._slave.take_back()
         entry = self._end()
         if entry is not None:
@@ -147,14 +148,14 @@ class SlaveLink(Link, Initiator):
             entry.task.fail(error)
 
     def replied(self, reply: Packet) -> None:
-        """Take a reply; one that fits nothing is stale."""
+        """Take a reply; a reply that answers no command is stale."""
         entry = self._outstanding
         if entry is None or not reply.answers(entry.task.command):
             if entry is not None and reply.src == entry.task.command.dst:
-                self._slave.forget_last()  # the right one may follow under the same numbers
+                self._slave.forget_last()  # the right reply may follow with the same numbers
             self._accounting.unexpected(reply, self._machine.now)
             return
-        self._end()  # also where the master's ACK got lost: it has had the command
+        self._end()  # also if the master's ACK got lost: the master has had the command
         if not is_local_status(reply.sts):
             self._stations.heard(reply.src, self._machine.now)
         self._accounting.complete(entry.task, reply, keeps_others_waiting=True)
@@ -169,7 +170,7 @@ class SlaveLink(Link, Initiator):
             self._fail()
         if not is_alone:
             return
-        waiting = []  # first take all of them: a read that fails is soon due again
+        waiting = []  # first take all commands: a read that fails is soon due again
         while (task := source.next_task(now)) is not None:
             waiting.append(task)
         for task in waiting:

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The Active Station List: what the master knows of each station on its line (S0)."""
+"""The Active Station List: the state of each station on the line (S0)."""
 
 from __future__ import annotations
 
@@ -25,10 +25,10 @@ from abdf1_ros.df1.probes import Asker, Probes
 
 MAX_STATION = 254
 
-# After so many commands in a row without a reply in time the station is treated as silent.
+# Number of commands in a row without a reply in time after which a station is treated as silent.
 MOST_OVERDUE = 2
 
-# A station that has come back so often without a reply to a command does not come from an outage.
+# Number of returns without a reply to a command after which a return is not treated as recovered.
 _MOST_RETURNS = 2
 
 
@@ -37,16 +37,18 @@ class Station:
     """
     One station: its place in the list and the last transaction received from it.
 
-    ``last_heard`` is the clock value (s) of the last answer of any kind, None before the
-    first. ``last_key`` is DST and duplicate key of the last message accepted: replies to two
-    nodes that we pass on may have the same TNS. ``last_refused`` is the link data of the last
-    message whose addresses cannot be right. ``overdue`` counts the commands in a row that
-    were delivered and not answered within Cmd_Timeout, where that keeps others waiting;
-    ``unanswered`` counts all of them.
-    ``local_status`` is the STS of the last reply to a command where a node on the way, such as a
-    gateway, has sent that in its place, 0 where it is its own.
-    ``returns`` counts how often it has become active again since its last reply to a command.
-    ``other_number`` of a gateway is the DST of its last reply that had neither our number nor its.
+    - ``last_heard``: clock value (s) of the last answer of any kind, None before the first.
+    - ``last_key``: DST and duplicate key of the last message accepted. DST is part of it because
+      replies to two nodes that we pass on may have the same TNS.
+    - ``last_refused``: link data of the last message whose addresses cannot be right.
+    - ``overdue``: number of commands in a row that were delivered, not answered within
+      Cmd_Timeout, and kept other commands waiting.
+    - ``unanswered``: the same, whether other commands waited or not.
+    - ``local_status``: STS of the last reply if a gateway sent it for the station; 0 if the
+      station replied itself.
+    - ``returns``: how often the station has become active again since its last reply to a command.
+    - ``other_number``: of a gateway, the DST of its last reply that had neither our number nor its
+      own.
     """
 
     number: int
@@ -77,7 +79,7 @@ class Station:
 
     @property
     def takes_no_commands(self) -> bool:
-        """Tell whether it comes and goes: it answers polls, and no command between them."""
+        """Tell whether the station comes and goes: it answers polls, but no command."""
         return self.returns >= _MOST_RETURNS
 
     def note_new(self, packet: Packet) -> bool:
@@ -111,9 +113,10 @@ class ActiveStationList:
 
     ``records`` has the record of every station, of the list or not, by number. ``routes`` gives
     the gateway to a station, by number: the gateway is polled in place of the station (M 3-7), and
-    none of its stations is active while the gateway is not. ``probes`` says when silent stations
-    may be asked; one takes ``probe_time`` seconds, and they ``rest`` where none answers. ``took``
-    tells how much of the time between two clock values (s) this process has run.
+    none of its stations is active while the gateway is not. ``probes`` decides when silent
+    stations may be asked. A probe takes ``probe_time`` seconds; if no station answers, ``rest``
+    seconds pass between two probes. ``took`` returns for how much of the time between two clock
+    values (s) this process has run.
     """
 
     def __init__(self, numbers: Iterable[int] = (),
@@ -137,7 +140,7 @@ class ActiveStationList:
         """
         Take stations into the list.
 
-        Where the link polls them all the time, no probe need ask whether they are there again.
+        If the link polls them all the time, they need no probes.
         """
         numbers = list(numbers)
         self._polled.update(numbers if are_polled else ())
@@ -164,13 +167,13 @@ class ActiveStationList:
         return [number, *(station for station, via in self.routes.items() if via == number)]
 
     def heard(self, number: int, now: float) -> None:
-        """Note an answer of any kind: the station is active, with a gateway all behind that."""
+        """Record an answer of any kind: the station is active, with a gateway all behind it."""
         station = self.records[number]
         station.last_heard = now
         if station.active:
             return
         gateway = self.via(number)
-        # Of those behind a gateway that answered, only this one was silent.
+        # The gateway answered all the time, so only this station was silent.
         back = [number] if self.records[gateway].active else self.behind(gateway)
         for station in map(self.__getitem__, back):
             if not station.active:
@@ -186,7 +189,7 @@ class ActiveStationList:
                 self._tell(station)
 
     def is_polled(self, number: int) -> bool:
-        """Tell whether the link polls a station all the time, and so finds out when it is back."""
+        """Tell whether the link polls a station all the time, so that its return is seen."""
         gateway = self.via(number)
         return gateway in self._polled and (gateway == number or not self.records[gateway].active)
 
@@ -202,9 +205,9 @@ class ActiveStationList:
     def tried(self, number: int, begun: float, now: float, *, was_silent: bool,
               asker: Asker = Asker.IN_TURN) -> None:
         """
-        Take note that a station had the line from ``begun`` until now (clock values, s).
+        Record that a station had the line from ``begun`` until now (clock values, s).
 
-        What it took where it ``was_silent`` then is its probes'.
+        If the station ``was_silent``, the time counts as time of probes.
         """
         if self[number].replies_in_time or self.is_polled(number) and asker is not Asker.OWN:
             return
@@ -216,7 +219,7 @@ class ActiveStationList:
             self.probes.died(self._took(begun, now), now)
 
     def polled_in_vain(self, begun: float, now: float) -> None:
-        """Take note that the link has asked a silent station from ``begun`` until now."""
+        """Record that the link has asked a silent station from ``begun`` until now."""
         if self._someone_waits:
             self.probes.spent(self._took(begun, now), now)
         else:
@@ -226,7 +229,7 @@ class ActiveStationList:
         """
         Tell whether a station has never replied to a command, though another one has.
 
-        It may not be there, so it gets one try at a time: the others would wait for all retries.
+        It may be absent, so it gets one try at a time: other stations would wait for all retries.
         """
         return not self.records[number].replies and any(station.replies for station in self)
 

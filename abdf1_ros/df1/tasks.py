@@ -27,15 +27,19 @@ from abdf1_ros.errors import LinkError
 
 class Task(Protocol):
     """
-    One command on its way, and whoever waits for its reply.
+    One command on its way; its job waits for the reply.
 
-    The link sets ``sent`` when the command has been on the line: without a reply its outcome
-    is then unknown. It ends the command by calling ``reply`` or ``fail``, once. ``reply_size``
-    is the bytes after the header of a good reply, 0 where that is not known. After ``expires``
-    (clock value in s) the command is neither sent nor repeated. ``blames`` tells that a failure
-    says something about the station: that of a guest's command does not. No message has asked for
-    one that ``is_own``: it goes to an inactive station without a poll before it, and once. The
-    answer to that is waited for ``answer_within`` s at most.
+    The link ends the command by calling ``reply`` or ``fail``, once.
+
+    - ``sent``: set by the link when the command has been on the line. Without a reply its outcome
+      is then unknown.
+    - ``reply_size``: bytes after the header of a good reply, 0 if unknown.
+    - ``expires``: clock value (s) after which the command is neither sent nor repeated.
+    - ``blames``: a failure says something about the station. The failure of a guest's command does
+      not.
+    - ``is_own``: a 0 or a Fallback, which no message has asked for. It goes to an inactive station
+      once, without a poll before it.
+    - ``answer_within``: most seconds that the link waits for the answer to that.
     """
 
     command: Packet
@@ -50,7 +54,7 @@ class Task(Protocol):
         """Take the reply."""
 
     def fail(self, error: LinkError) -> None:
-        """Take note that there will be no reply."""
+        """Record that there will be no reply."""
 
 
 @dataclass(slots=True)
@@ -58,9 +62,9 @@ class Outstanding:
     """
     A task whose command is on its way or waits for its reply.
 
-    ``deadline`` (clock value in s) is when the reply is overdue; it runs from the delivery
-    (``is_delivered``), before that as each kind of link has it. ``passed_over`` counts other
-    messages that came in its place.
+    ``deadline`` is when the reply is overdue (clock value in s), counted from the delivery
+    (``is_delivered``); before the delivery each kind of link decides. ``passed_over`` counts other
+    messages that came in place of the reply.
     """
 
     task: Task
@@ -70,12 +74,12 @@ class Outstanding:
 
 
 class TaskSource(Protocol):
-    """Where a link gets its tasks; by itself it has none."""
+    """The source of the tasks of a link; this base class has none."""
 
     def next_task(self, now: float, busy: Container[int] = ()) -> Task | None:
-        """Return what has the line next, not for a ``busy`` station; None for nothing."""
+        """Return the next task, not for a ``busy`` station; None for none."""
         return None
 
     def next_due(self) -> float | None:
-        """Return when something will be due (clock value in s), None for never."""
+        """Return when the next task will be due (clock value in s), None for never."""
         return None
