@@ -14,7 +14,9 @@
 # limitations under the License.
 
 """
-Write one value to a PLC and wait for the result.
+Write values to a PLC and wait for the result.
+
+For one bit nothing of this is needed: the service ~/set/<topic> answers with the same result.
 
 The bridge answers every message to ~/write/<topic> with exactly one result for each mapping of
 that topic on ~/write_results. It repeats the label of the message as "request", so that several
@@ -59,7 +61,7 @@ examples:
   command_writer.py recipe 211 222 233 244
   command_writer.py setpoint 21.5 --node /cell/line_1
   command_writer.py name 'Tank 4'
-  command_writer.py lamps 1 --tags lamp_north lamp_south     two mappings, one topic
+  command_writer.py speeds 40 --tags speed_north speed_south two mappings, one topic
   command_writer.py speed 40 --station 1                     while ROS is in control there
 """
 

@@ -49,7 +49,7 @@ LAUNCH_ARGUMENTS = set(re.findall(
     ''.join(path.read_text('utf-8') for path in (documents.ROOT / 'launch').glob('*.py'))))
 PARAMETERS = {entry.name for entry in fields(Parameters)} | {
     entry.parameter for entry in FIELDS.values()} | OPTIONS.keys()
-TOPICS = {'read', 'write', *re.findall(r"'~/(\w+)'", (
+TOPICS = {'read', 'write', 'set', 'read_now', *re.findall(r"'~/(\w+)'", (
     ROOT / 'abdf1_ros' / 'ros' / 'bridge' / 'node.py').read_text('utf-8'))}
 AT_HOME = {'fuzz'}  # folders that a page puts into the user's home
 TARGETS = set(re.findall(r'^([\w-]+):', (ROOT / 'Makefile').read_text('utf-8'), re.MULTILINE))

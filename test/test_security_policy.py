@@ -24,6 +24,7 @@ import subprocess
 from typing import Any
 from xml.etree import ElementTree
 
+from abdf1_ros.paths import config_file
 from abdf1_ros.ros.bridge.node import BridgeNode
 from abdf1_ros.ros.lines import LinesNode, sections
 from abdf1_ros.ros.parameters.arguments import Arguments
@@ -74,13 +75,20 @@ Graph = Callable[[str], set[str]]
 
 
 @pytest.fixture
-def graph() -> Iterator[Graph]:
+def graph(tmp_path: Path) -> Iterator[Graph]:
     """Return what a running bridge publishes, subscribes to and serves, as the graph tells."""
     with Observer() as observer:
         node = BridgeNode(context=observer.context, use_global_arguments=False,
-                          cli_args=ros_args(*EXAMPLE_FILES, 'port:=/nowhere/port'))
+                          cli_args=ros_args(*with_bit(tmp_path), 'port:=/nowhere/port'))
         yield lambda what: _names(node, what)
         node.destroy_node()
+
+
+def with_bit(folder: Path) -> tuple[str, str]:
+    """Return the example files, with a row of one bit more."""
+    rows = config_file('map.csv').read_text('utf-8') + 'horn,Write,B3:1/8,1,PLC5,,,,,,,,\n'
+    (folder / 'map.csv').write_text(rows, encoding='utf-8')
+    return EXAMPLE_FILES[0], f'map_file:={folder / "map.csv"}'
 
 
 def _names(node: Node, what: str) -> set[str]:
@@ -215,7 +223,7 @@ def test_two_robots_have_keys_for_their_own_namespace_and_no_more(
         bridge, cell = folder / 'abdf1' / 'permissions.xml', folder / 'cell' / 'permissions.xml'
         observed = consumer(f'/{robot}')
         node = BridgeNode(use_global_arguments=False, cli_args=[
-            *ros_args(*EXAMPLE_FILES, 'port:=/nowhere/port'), '-r', f'__ns:=/{robot}'])
+            *ros_args(*with_bit(tmp_path), 'port:=/nowhere/port'), '-r', f'__ns:=/{robot}'])
         for what in ('publish', 'subscribe'):
             assert uncovered(dds_names(node, what), topics_of(bridge, what)) == set()
             assert unused(dds_names(node, what), topics_of(bridge, what)) == set()

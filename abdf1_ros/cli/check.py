@@ -256,7 +256,7 @@ def _folded(text: str) -> str:
 
 def _line_text(report: Report) -> str:
     network = report.network
-    mappings, blocks = len(report.mappings), len(report.blocks)
+    mappings, blocks = len(report.mappings.repeated), len(report.blocks)
     return (f'{printable(network.port)}: Mode {network.mode}, {network.baud} baud, '
             f'{network.data_bits} data bits, parity {network.parity}, {network.stop_bits} stop, '
             f'{network.error_code}; our own Station is {network.station}\n'

@@ -26,6 +26,7 @@ Where each fact lives:
 who writes which words, until when it may land      ``record.WriteRecord``, ``record.Words``
 messages that wait                                  ``writes.queue.WriteQueue.waiting``
 commands of guests that wait                        ``guests.Guest.waiting``
+calls that wait for a read                          ``reads.demands.Demands.waiting``
 until when a command may be sent                    ``job_tasks.Job.expires``
 commands of jobs under way                          ``job_tasks.JobTasks``
 when an own row has to be looked at                 its ``due``; the first of a PLC in ``Plc.due``
@@ -39,7 +40,7 @@ last value, freshness, withheld                     ``reads.point.ReadPoint``
 
 from __future__ import annotations
 
-from collections.abc import Container, Iterable, Sequence
+from collections.abc import Callable, Container, Iterable, Sequence
 from typing import Protocol
 
 from abdf1_ros.counters import Counters
@@ -55,6 +56,7 @@ from abdf1_ros.driver.guests import GuestQueue
 from abdf1_ros.driver.inbox import Inbox
 from abdf1_ros.driver.interlocks.queue import Interlocks
 from abdf1_ros.driver.job_tasks import JobTasks
+from abdf1_ros.driver.reads.demands import Demand, ReadAnswer
 from abdf1_ros.driver.reads.readings import Readings, ValueListener
 from abdf1_ros.driver.record import WriteRecord
 from abdf1_ros.driver.refused import RefusedCommands
@@ -128,6 +130,7 @@ class Driver:
         self.readings = Readings(
             network, self._active_rows(), settings, self.stations, machine, self._listener, record)
         self.points = self.readings.points
+        self._demands = self.readings.demands
         self._served = self._make_served()
         self.refused = RefusedCommands(PlcType(network.plc_type))
         writing = WritesUnderWay(
@@ -189,6 +192,19 @@ class Driver:
             return ENDS
         return TOO_MANY if len(self._inbox) + count > MAX_WAITING_WRITES else ''
 
+    def read_now(self, mapping: Mapping, now: float,
+                 answer: Callable[[ReadAnswer], None]) -> None:
+        """
+        Ask for a row that a PLC has to be read at once.
+
+        May be called from any thread, followed by ``LinkThread.wake``. Exactly one ``answer``
+        follows, mostly in the link thread.
+        """
+        if self.interlocks.is_ending:
+            answer(ReadAnswer(error=ENDS))
+        elif not self._demands.inbox.put(Demand(mapping, now, answer)):
+            answer(ReadAnswer(error=_NOT_OPEN))
+
     def refuse(self, mappings: Iterable[Mapping], reason: str,
                values: Sequence[float] | str, request: str) -> None:
         """Report that values were not taken for any of ``mappings``."""
@@ -212,6 +228,8 @@ class Driver:
         """Return the command that has the line next, not for a ``busy`` station."""
         if self._inbox.items:
             self._sort_inbox(now)  # the machine has let expire what has waited too long
+        if self._demands.inbox.items:
+            self._sort_demands(now)
         return self._agenda.next(now, busy)
 
     def next_due(self) -> float | None:
@@ -221,16 +239,21 @@ class Driver:
     def expire(self, now: float) -> None:
         """Do what needs no line: store values that we serve, end what has waited too long."""
         self._sort_inbox(now)
+        if self._demands.inbox.items:
+            self._sort_demands(now)
         self.interlocks.expire(now)
         self._writes.expire(now)
         self.tasks.expire(now)
         self.guests.expire(now)
         self._read_backs.expire(now)
+        if now >= self._demands.next_expiry:
+            self._demands.expire(now)
 
     def next_expiry(self) -> float:
         """Return when ``expire`` has something to do (clock value in s), infinite for never."""
         return min(self._writes.next_expiry, self.tasks.next_expiry, self.guests.next_expiry,
-                   self.interlocks.ours.due, self._read_backs.next_expiry)
+                   self.interlocks.ours.due, self._read_backs.next_expiry,
+                   self._demands.next_expiry)
 
     def _station_changed(self, station: Station) -> None:
         if station.active:
@@ -239,6 +262,7 @@ class Driver:
             self.checks.ask_status(station.number, self.machine.now)
         else:
             self.checks.went_away(station.number)
+            self.readings.station_lost(station.number)
             if not any(other.active for other in self.stations):
                 self._connect()
         self._listener.station_changed(station)
@@ -252,6 +276,10 @@ class Driver:
     def _words_of_guest(self, command: Packet, station: int) -> list[Extent] | None:
         # A PLC-5 has words for each number that writes as to a PLC-2; on the line it is ours.
         return written_extents(command._replace(src=self.network.station), station, self.mappings)
+
+    def _sort_demands(self, now: float) -> None:
+        for demand in self._demands.inbox.take():
+            self.readings.want(demand, now)
 
     def _sort_inbox(self, now: float) -> None:
         """Store messages of Serve rows in our table; let all others wait for the line."""
@@ -305,6 +333,7 @@ class Driver:
         self.checks.begin(self.machine.now)
         self.interlocks.begin(self.machine.now)
         self._inbox.open()
+        self._demands.inbox.open()
         self.guests.begin()
         self.is_online = True
         return self.link.run(self)

@@ -373,7 +373,7 @@ def guard_faults(model: LineModel, mappings: Rows,
     """Yield the guarded rows whose counter is not read often enough (rule 14), and why."""
     counters = {mapping: (condition.names[0], condition.timeout) for mapping in mappings.guarded
                 if (condition := mapping.condition) and condition.timeout is not None}
-    blocks = Planner(model, default_period).plan(mappings) if counters else []
+    blocks = Planner(model, default_period).plan(mappings.repeated) if counters else []
     expected = forecast.intervals(blocks, own_work(model, mappings, default_period))
     found = {mapping.tag: expected[block.period] for block in blocks for mapping in block.mappings}
     for mapping, (tag, timeout) in counters.items():

@@ -38,6 +38,9 @@ ANSWERS = LineMode.answers
 # turn in this number of poll cycles.
 PATIENCE = 4
 
+# What depends on a row that is read on demand is asked as if it were read so often (s).
+_ON_DEMAND = 1.0
+
 
 def line_model(network: Network) -> LineModel:
     """Return the line of a net CSV."""
@@ -121,4 +124,6 @@ def stale_times(blocks: Iterable[Block], default_period: float, stale_after: flo
 
 def period_of(mapping: Mapping, default_period: float) -> float:
     """Return the seconds from one read of a mapping to the next, as its Period asks."""
+    if mapping.is_on_demand:
+        return _ON_DEMAND
     return default_period if mapping.period is None else mapping.period / 1000

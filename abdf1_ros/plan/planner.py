@@ -141,6 +141,10 @@ class Planner:
         return [block for area, group in areas.items()
                 for block in self._plan_area(area, group, poll_cycle)]
 
+    def alone(self, mapping: Mapping) -> Block:
+        """Return what is read for a row by itself, such as one that is read on demand."""
+        return self._block([mapping], _span(mapping))
+
     def split(self, block: Block) -> list[Block]:
         """
         Return what to read instead of a refused block.

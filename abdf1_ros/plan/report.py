@@ -163,9 +163,17 @@ class Report:
                          'program of the PLC stops')
         if alarms := [mapping for mapping in self.mappings if mapping.alarm is not None]:
             found.append(f'alarms on /diagnostics: {_tags(alarms)}')
+        if self.mappings.on_demand:
+            found.append(f'read on demand alone, by ~/read_now: {self._on_demand()}')
         if gaps := '; '.join(_unprotected(self.mappings)):
             found.append(f'nothing protects: {gaps}')
         return found
+
+    def _on_demand(self) -> str:
+        """Return the rows that are read on demand, with the time that each read takes."""
+        planner = Planner(forecast.line_model(self.network), self.default_period)
+        return first([f'{mapping.tag} ({milliseconds(self.time(planner.alone(mapping)))})'
+                      for mapping in self.mappings.on_demand], _NAMED_TAGS)
 
     def remarks(self) -> list[Remark]:
         found = [*setting_remarks(self.network, self.mappings)]
@@ -211,7 +219,7 @@ def make_report(network: Network, mappings: Iterable[Mapping], default_period: f
     """Plan the reads of ``mappings``; times in seconds."""
     mappings = Rows(mappings)
     planner = Planner(forecast.line_model(network), default_period)
-    blocks = sorted(planner.plan(mappings), key=_row_order)
+    blocks = sorted(planner.plan(mappings.repeated), key=_row_order)
     return Report(network, mappings, tuple(blocks), default_period, response_time)
 
 

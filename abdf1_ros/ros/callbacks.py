@@ -35,6 +35,7 @@ from rclpy.executors import (
     SingleThreadedExecutor,
     TimeoutException,
 )
+from rclpy.impl.implementation_singleton import rclpy_implementation
 from rclpy.node import Node
 
 # An executor that cannot wait for callbacks tries again after a pause (s), at most this often.
@@ -49,10 +50,16 @@ def failure_text(error: BaseException) -> str:
 
 
 class AnsweringNode(Node):
-    """A node whose services answer each call, without success where the callback fails."""
+    """
+    A node whose services answer each call, without success where the callback fails.
+
+    At its beginning a callback finds in ``call_stamps`` when its call was sent and received (ns),
+    0 where that is not known.
+    """
 
     def __init__(self, name: str, **options: Any) -> None:
         super().__init__(name, **options)
+        self.call_stamps = 0, 0
         self._failures = LimitedLog(self.get_logger(), time.monotonic)
 
     def create_service(self, srv_type: Any, srv_name: str, callback: Callable[..., Any],
@@ -108,6 +115,22 @@ class Executor(SingleThreadedExecutor):
             _give_back(entity)
             name = getattr(entity, 'srv_name', None) or getattr(entity, 'topic_name', None)
             self._node.tell_failure(f'a message on {name}' if name else 'a callback', error)
+
+    def _take_service(self, srv: Any) -> Callable[[], Any] | None:
+        """Take a call as rclpy does, and keep its stamps for the callback."""
+        try:
+            with srv.handle:
+                request, header = srv.handle.service_take_request(srv.srv_type.Request)
+        except rclpy_implementation.InvalidHandle:
+            return None
+
+        async def execute() -> None:
+            if header is None:
+                return
+            self._node.call_stamps = header.source_timestamp, header.received_timestamp
+            response = await await_or_execute(srv.callback, request, srv.srv_type.Response())
+            srv.send_response(response, header)
+        return execute
 
 
 def _give_back(entity: Any) -> None:

@@ -25,7 +25,14 @@ from operator import attrgetter
 from abdf1_ros.numbers import decimal_number, Kind, member_of, TEXT, two_readings, whole
 from abdf1_ros.pccc.values import ValueType, WordOrder
 from abdf1_ros.settings.alarms import ALARM
-from abdf1_ros.settings.mapping import Command, Mapping, MESSAGES, Publish, PUBLISHED
+from abdf1_ros.settings.mapping import (
+    Command,
+    Mapping,
+    MESSAGES,
+    ON_DEMAND,
+    Publish,
+    PUBLISHED,
+)
 from abdf1_ros.text import shown
 
 MAX_PERIOD = 86_400_000  # ms
@@ -48,6 +55,14 @@ def _clear_number(text: str) -> str:
     right = two_readings(text)
     return right and f'could be two numbers; write {shown(right)}'
 
+
+def _period(text: str) -> int | str | None:
+    """Return ms, or that a row is read on demand alone."""
+    return ON_DEMAND if ' '.join(text.lower().split()) == ON_DEMAND else _TIMES.read(text)
+
+
+_TIMES = whole(0, MAX_PERIOD, 'ms')
+_PERIOD = Kind(_period, f'{_TIMES.right}, or "{ON_DEMAND}"', 0, MAX_PERIOD)
 
 _WORDS = Kind(lambda text: tuple(text.split()))
 _NUMBER = Kind(_number, 'a number', why_not=_clear_number)
@@ -128,9 +143,10 @@ MAP_COLUMNS = (
     Column('Topic', 'Tag', 'name below ~/read/ and ~/write/',
            commands=_TOPICS),
     Column('Period', 'parameter default_period',
-           'ms between reads; 0: as often as the line allows; of a Serve the longest time '
-           'between two writes of the PLC; of a Heartbeat 100-60000, default 1000',
-           kind=whole(0, MAX_PERIOD, 'ms'),
+           'ms between reads; 0: as often as the line allows; "on demand": only when '
+           '~/read_now/<topic> is called; of a Serve the longest time between two writes of the '
+           'PLC; of a Heartbeat 100-60000, default 1000',
+           kind=_PERIOD, attribute='period_cell',
            commands=(*PUBLISHED, Command.HEARTBEAT), idle=(Command.WRITE,)),
     Column('Publish', 'Always',
            'Always: after every good read. Change: only new values, and the first after an '

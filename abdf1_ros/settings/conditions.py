@@ -37,7 +37,7 @@ from abdf1_ros.settings.heartbeats import (
     While,
 )
 from abdf1_ros.settings.limits import raw_values
-from abdf1_ros.settings.mapping import Mapping, Publish
+from abdf1_ros.settings.mapping import Mapping, ON_DEMAND, Publish
 from abdf1_ros.text import counted, shown
 
 # What was read of the cells of a row that are not empty, by column.
@@ -57,8 +57,13 @@ class ReportFault(Protocol):
     def __call__(self, column: str, text: str, *, is_superfluous: bool = False) -> None: ...
 
 
+_NEEDS_READS = 'Alarm', 'Confirms'
+
+
 def with_conditions(row: Row, values: Cells, mapping: Mapping, fault: ReportFault) -> Mapping:
     """Return a mapping with its fallback and its condition."""
+    if mapping.is_on_demand:
+        _check_on_demand(row, mapping, fault)
     if mapping.is_heartbeat:
         _check_heartbeat(row, mapping, fault)
         mapping = replace(mapping, period=mapping.period or DEFAULT_PERIOD)
@@ -73,6 +78,19 @@ def with_conditions(row: Row, values: Cells, mapping: Mapping, fault: ReportFaul
         fault('Alarm', 'Alarm is for bits (bool), such as B3:0/0')
     return replace(mapping, fallback=_fallback(values, mapping, fault),
                    condition=_condition(values, mapping, fault))
+
+
+def _check_on_demand(row: Row, mapping: Mapping, fault: ReportFault) -> None:
+    """Check what a row asks for that is read only on demand."""
+    if not mapping.polls:
+        fault('Period', f'Period "{ON_DEMAND}" is for Read and ReadWrite rows')
+    if mapping.publish is not Publish.ALWAYS:
+        fault('Publish', f'a row with Period "{ON_DEMAND}" is published each time it is read',
+              is_superfluous=True)
+    for column in _NEEDS_READS:
+        if row.get(column):
+            fault(column, f'{column} needs a row that is read again and again, not one with '
+                          f'Period "{ON_DEMAND}"')
 
 
 def _needed(values: Cells, column: str, fault: ReportFault) -> int | None:

@@ -140,6 +140,8 @@ def _no_counter(mapping: Mapping, counter: Mapping, mappings: Rows) -> str:
     """Return why values cannot depend on ``counter``, empty if they can (rule 13)."""
     if counter.command is not Command.READ:
         return 'is not a Read row'
+    if counter.is_on_demand:
+        return 'is read only on demand'
     if counter.station != mapping.station:
         return f'is of station {counter.station}; a counter of the same PLC is needed'
     if not counts(counter.type, counter.length):

@@ -36,7 +36,7 @@ from abdf1_ros.settings.columns import MAP_COLUMNS, NEEDED
 from abdf1_ros.settings.conditions import with_conditions
 from abdf1_ros.settings.csv_table import Row
 from abdf1_ros.settings.hints import hint
-from abdf1_ros.settings.mapping import Command, Mapping, READ_ONLY
+from abdf1_ros.settings.mapping import Command, Mapping, ON_DEMAND, READ_ONLY
 from abdf1_ros.settings.names import MAX_LENGTH, sanitise
 from abdf1_ros.settings.remarks import having, row_remarks
 from abdf1_ros.settings.scaling import Scaling
@@ -140,11 +140,14 @@ class RowReader:
         if self.faults:
             return None
         # Not only given cells: an address range tells the Length.
+        period = values.get('Period')
         told = {'type': _natural_type(values['Address'])} | {
             column.attribute: values[column.name] for column in MAP_COLUMNS
             if column.name in values and column.attribute in Mapping.__slots__}
         return Mapping(**told, item=self._row.item, place=self._row.where(), name=name,
                        topic=topic, access=values['Access'], scaling=scaling,
+                       period=None if period == ON_DEMAND else period,
+                       is_on_demand=period == ON_DEMAND,
                        is_read_only=self._is_read_only(values['Command']))
 
     def _fault(self, column: str, text: str, message: Message | None = None,

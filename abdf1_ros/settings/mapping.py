@@ -37,6 +37,9 @@ from abdf1_ros.settings.scaling import Scaling
 # Access of a Serve row whose words the other end may only read.
 READ_ONLY = 'Read'
 
+# Period of a row that is read only when a call asks for it.
+ON_DEMAND = 'on demand'
+
 
 class Command(Enum):
     """What a mapping does."""
@@ -68,7 +71,8 @@ class Mapping:
 
     ``item`` counts data rows from 1, ``place`` is file and line. ``name`` is the tag and
     ``topic`` the topic as ROS takes them. ``period`` is ms between reads, 0 for as often as the
-    line allows, None for the node's default. ``minimum`` and ``maximum`` bound what is written,
+    line allows, None for the node's default. A row that ``is_on_demand`` has none: it is read when
+    it is asked for. ``minimum`` and ``maximum`` bound what is written,
     in the unit of the topic: where ``scaling`` is given, that of the engineering values. ``via``
     is the gateway to the station, None for a station of the line itself. With
     ``is_read_only`` the words of a Serve row may not be written by the other end.
@@ -91,6 +95,7 @@ class Mapping:
     type: ValueType  # noqa: A003
     topic: str
     period: int | None = None
+    is_on_demand: bool = False
     publish: Publish = Publish.ALWAYS
     minimum: float = -math.inf
     maximum: float = math.inf
@@ -140,6 +145,8 @@ class Mapping:
 
         Values are read at least every ``stale_time`` s. Infinite where nothing is promised.
         """
+        if self.is_on_demand:
+            return math.inf
         if self.publish is Publish.ALWAYS:
             return stale_time
         return math.inf if self.max_silence is None else stale_time + self.max_silence / 1000
@@ -193,6 +200,11 @@ class Mapping:
     def is_planned(self) -> bool:
         """Tell whether we read the words from the PLC, to publish them or to compare them."""
         return self.polls or self.is_heartbeat
+
+    @property
+    def period_cell(self) -> str | int | None:
+        """Return what the column Period says."""
+        return ON_DEMAND if self.is_on_demand else self.period
 
     @property
     def access_cell(self) -> str | Access | None:

@@ -48,6 +48,16 @@ class Rows(tuple[Mapping, ...]):
         return Rows(row for row in self if row.reads)
 
     @cached_property
+    def on_demand(self) -> Rows:
+        """Return those that are read only when a call asks for them."""
+        return Rows(row for row in self if row.is_on_demand)
+
+    @cached_property
+    def repeated(self) -> Rows:
+        """Return those that are read, written or served without any call."""
+        return self.without(self.on_demand) if self.on_demand else self
+
+    @cached_property
     def messages(self) -> Rows:
         """Return those that take messages."""
         return Rows(row for row in self if row.writes)

@@ -35,9 +35,11 @@ speed,Read,N7:0,1,PLC5,2,,,
 state,Read,N7:8,1,PLC5,1,Change,,
 recipe,Write,N7:4,1,PLC5,1,,,
 motor,Write,N7:6,1,PLC5,1,,7,60000
+start,Write,N7:9/0,1,PLC5,1,,,
 """
 DATA = 'Station,PLC_Type,Address,Length,Values,Motion,Period\n1,PLC5,N7:0,16,,,\n'
-SERVICES = ('reset_counters', 'reload', 'polling', 'read_link_counters')
+SERVICES = ('reset_counters', 'reload', 'polling', 'read_link_counters', 'read_now/speed',
+            'read_now/state', 'set/start')
 TOPICS = ('read/speed', 'read/state', 'write_results', 'active_stations', 'snapshot')
 
 

@@ -28,7 +28,7 @@ from abdf1_ros.settings.mapping import Command, Publish
 from abdf1_ros.settings.scaling import Scaling
 import pytest
 from support.cases import for_all
-from support.mappings import cell_of, fault, load_rows, one, row
+from support.mappings import cell_of, fault, faults, load_rows, one, row
 
 
 def test_row_with_every_column() -> None:
@@ -88,7 +88,7 @@ def test_command_says_whether_a_row_reads_and_writes(text: str, reads: bool, wri
     ({'Length': '0'}, '6 (Length): Item: 1, Length = "0" should be a whole number from 1 to '
      '65535'),
     ({'Period': '86400001'}, '9 (Period): Item: 1, Period = "86400001" should be a whole number '
-     'from 0 to 86400000 ms'),
+     'from 0 to 86400000 ms, or "on demand"'),
     ({'Min': 'low'}, '11 (Min): Item: 1, Min = "low" should be a number'),
     ({'Min': '1_000'}, '11 (Min): Item: 1, Min = "1_000" should be a number'),
     ({'Min': '\u0661'}, '11 (Min): Item: 1, Min = "\u0661" should be a number; '
@@ -299,3 +299,28 @@ def test_structures_that_we_serve_are_ours_to_write(place: str) -> None:
     served = one(Command='Serve', Address=place, Station='5')
     assert str(served.address).startswith(place[:4])
     assert 'belongs to the processor' in fault(Command='ReadWrite', Address=place)
+
+
+def test_row_on_demand_has_no_period_and_promises_nothing() -> None:
+    row = one(Period=' On  Demand', Command='Read')
+    assert (row.is_on_demand, row.period, row.promise(3.0)) == (True, None, math.inf)
+    assert cell_of(row, 'Period') == 'on demand'
+
+
+@pytest.mark.parametrize(('cells', 'expected'), [
+    ({'Command': 'Serve', 'Station': '5'},
+     'Period "on demand" is for Read and ReadWrite rows'),
+    ({'Command': 'Heartbeat'}, 'Period = "on demand" should be ms from 100 to 60000'),
+    ({'Publish': 'Change'}, 'a row with Period "on demand" is published each time it is read'),
+    ({'Address': 'B3:0/0', 'Command': 'Read', 'Alarm': 'WARN'},
+     'Alarm needs a row that is read again and again, not one with Period "on demand"')])
+def test_what_a_row_on_demand_cannot_have(cells: dict[str, str], expected: str) -> None:
+    assert any(expected in text for text in faults(row(**{'Period': 'on demand'} | cells)))
+
+
+def test_row_on_demand_is_no_counter() -> None:
+    counter = row(Tag='counter', Command='Read', Period='on demand')
+    guarded = row(Tag='guarded', Command='Read', Address='N7:1', While='counter',
+                  While_Timeout='5000')
+    told = faults(counter, guarded)
+    assert [text for text in told if '"counter" is read only on demand' in text]

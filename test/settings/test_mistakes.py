@@ -119,7 +119,8 @@ def test_address_that_cannot_be_used(tmp_path: Path, address: str, expected: str
         '!2 (Length): 2504 ERR_ADDRESS_RANGE: Item: 1, Address is out of range (N7:255, len=1); '
         '1 int32 from N7:255 on take 2 words; the last word there can be is N7:255']),
     (f'{HEAD},Period\na,Read,N7:0,1,SLC,0.5\n', [
-        '!2:6 (Period): Item: 1, Period = "0.5" should be a whole number from 0 to 86400000 ms']),
+        '!2:6 (Period): Item: 1, Period = "0.5" should be a whole number from 0 to 86400000 ms, '
+        'or "on demand"']),
 ])
 def test_what_is_told_of_a_map(tmp_path: Path, text: str, expected: list[str]) -> None:
     assert told_of_map(tmp_path, text) == expected

@@ -19,7 +19,7 @@ from __future__ import annotations
 import argparse
 from collections.abc import Collection, Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from difflib import get_close_matches
 
 from abdf1_ros.cli.plc import data
@@ -84,7 +84,7 @@ def to_read(options: argparse.Namespace) -> Targets:
         data.check_for_some_family(options.addresses, cells)
         return Targets(options.addresses, cells)
     mappings = rows_of_map(options.map)
-    rows = {row.tag: row for row in mappings.of_plcs if row.polls}
+    rows = {row.tag: replace(row, is_on_demand=False) for row in mappings.of_plcs if row.polls}
     entries: list[Mapping | str] = [rows.get(word, word) for word in options.addresses]
     if not entries:
         entries = [row for row in rows.values() if options.station in (None, row.station)]

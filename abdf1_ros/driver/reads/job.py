@@ -76,11 +76,13 @@ class ReadJob(Job):
 
     ``due`` is the clock value (s) from which it wants the line. ``refreshed`` is when a write has
     changed words of the block, the last time before a read that has not come yet; otherwise minus
-    infinity. ``started`` is when the read under way or the last one began; its last packet was
-    ``asked`` for. All packets of a read have to come within ``longest_read`` seconds.
+    infinity. ``wanted`` is the same for the last call that asks for the block. ``started`` is when
+    the read under way or the last one began; its last packet was ``asked`` for. All
+    packets of a read have to come within ``longest_read`` seconds.
     ``is_unfinished`` tells that there are packets already, and more to come, or that the last read
-    was too old. ``ticket`` is the number of its valid entry in the queue. ``take`` is called at
-    the end of each packet: with the words after the last one of a read, or with the error.
+    was too old. ``ticket`` is the number of its valid entry in the queue, 0 for none. ``take`` is
+    called at the end of each packet: with the words after the last one of a read, or with the
+    error.
     """
 
     def __init__(self, block: Block, points: Sequence[ReadPoint], line: LineTime,
@@ -92,13 +94,14 @@ class ReadJob(Job):
         self.points = {point: block.slice_of(point.mapping) for point in points}
         self.intervals = Intervals()
         self.due = self.started = self.asked = 0.0
-        self.refreshed = -math.inf
+        self.refreshed = self.wanted = -math.inf
+        self.is_on_demand = block.mappings[0].is_on_demand
         self.is_unfinished = False
         self.ticket = 0
+        self.longest_read = longest_read
         self._late = 0.0  # ``Machine.late`` when the read began
         self._line = line
         self._take = take
-        self._longest_read = longest_read
         self._packets = _packet_reads(block)  # needed at every read, and always the same
         self._words: list[bytes] = []
         self.reply_size = self._packets[0].reply_size
@@ -115,9 +118,9 @@ class ReadJob(Job):
         stood_still, spent = self._line.late - self._late, self._line.now - self.started
         if stood_still > MOST_LATE:
             raise ReadTooOld(f'this process, or its host, stood still for {stood_still:.1f} s')
-        if len(self._packets) > 1 and spent > self._longest_read:
+        if len(self._packets) > 1 and spent > self.longest_read:
             raise ReadTooOld(
-                f'its packets took {spent:.1f} s, more than {self._longest_read:.1f} s')
+                f'its packets took {spent:.1f} s, more than {self.longest_read:.1f} s')
 
     def ended(self, error: Exception | None) -> None:
         """Let the packet be made use of; after an error the next read begins anew."""

@@ -109,6 +109,13 @@ class ReadPoint:
             return values
         return self._scaling.publish(values)
 
+    def values_of(self, words: bytes) -> Values:
+        """Return the values that words stand for, as they are published."""
+        values = self._decode(words)
+        if self._scaling is None or isinstance(values, str):
+            return values
+        return self._scaling.publish(values)
+
     def _is_kept_back(self, values: Values, now: float) -> bool:
         """Tell whether values are not published: nothing has changed, and it is not time again."""
         if self.error is None and now - self._published_at < self._max_silence \
@@ -181,6 +188,8 @@ class ReadPoint:
             return Freshness.FAILED
         if self.is_withheld:
             return Freshness.WITHHELD
+        if self.mapping.is_on_demand:
+            return Freshness.FRESH
         if self.last_good is None:
             return Freshness.WAITING
         age = now - self.last_good

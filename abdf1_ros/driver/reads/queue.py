@@ -22,6 +22,9 @@ periods late. So all periods become longer by about the same factor: many slow r
 the fast ones as slow as themselves. The fourth turn still goes to the earliest deadline: a period
 that no line can keep does not block the others.
 
+A read that a call has asked for goes first. Then the others have the line three times as long as
+one of its packets takes, so calls get a quarter of a full line, however many there are.
+
 A block of several packets is in the queue once for each packet, so other reads wait for one packet
 at most. A read without a period is due again as soon as it has begun. It gets the time that the
 others leave: its period counts as four times the time of reading everything once.
@@ -35,10 +38,12 @@ import itertools
 import math
 
 from abdf1_ros.driver.reads.job import ReadJob
-from abdf1_ros.plan.forecast import PATIENCE, poll_cycle
+from abdf1_ros.plan.forecast import block_time, PATIENCE, poll_cycle
 
 _TURNS = 4
 _MOST_ENTRIES = 4  # for each read
+_WANTED = -1.0  # in place of a period: the reads that calls have asked for
+_OTHERS_BESIDE_WANTED = 3
 
 
 _QueueEntry = tuple[float, int, ReadJob]
@@ -55,7 +60,9 @@ class ReadQueue:
     def __init__(self) -> None:
         self.jobs: set[ReadJob] = set()
         self._poll_cycle = 0.0
-        self._heaps: dict[float, list[_QueueEntry]] = {}
+        self._wanted: list[_QueueEntry] = []
+        self._heaps: dict[float, list[_QueueEntry]] = {_WANTED: self._wanted}
+        self._wanted_from = -math.inf  # where others are due (clock value in s)
         self._tickets = itertools.count(1)
         self._turn = 0
 
@@ -79,7 +86,8 @@ class ReadQueue:
         if job not in self.jobs:
             return
         job.due, job.ticket = due, next(self._tickets)
-        heap = self._heaps.setdefault(job.block.period, [])
+        is_wanted = job.wanted > -math.inf
+        heap = self._heaps.setdefault(_WANTED if is_wanted else job.block.period, [])
         heapq.heappush(heap, (due, job.ticket, job))
         if len(heap) > _MOST_ENTRIES * len(self.jobs):
             # A refresh of a slow read leaves an old entry, which would stay until it had been due.
@@ -90,7 +98,14 @@ class ReadQueue:
         """Remove and return the job that goes next, None where none is due."""
         heap = self._next_heap(now)
         self._turn = (self._turn + 1) % _TURNS
-        return None if heap is None else heapq.heappop(heap)[2]
+        if heap is None:
+            return None
+        job = heapq.heappop(heap)[2]
+        job.ticket = 0
+        if heap is self._wanted:
+            packet = block_time(job.block) / len(job.block.requests)
+            self._wanted_from = now + (1 + _OTHERS_BESIDE_WANTED) * packet
+        return job
 
     def first(self, now: float) -> ReadJob | None:
         """Return the job that goes next, None where none is due."""
@@ -104,6 +119,10 @@ class ReadQueue:
     def _next_heap(self, now: float) -> list[_QueueEntry] | None:
         """Return the heap that begins with the job that goes next."""
         due = self._heaps_due(now)
+        if len(due) > 1 and due[0] is self._wanted:
+            if now >= self._wanted_from:
+                return self._wanted
+            del due[0]
         if len(due) < 2:
             return due[0] if due else None
         latest = max(due, key=lambda heap: self._periods_late(heap[0], now))

@@ -23,6 +23,7 @@ from typing import Protocol
 from abdf1_ros.df1.packet import BROADCAST
 from abdf1_ros.df1.stations import ActiveStationList
 from abdf1_ros.driver.job_tasks import LineTime
+from abdf1_ros.driver.reads.demands import Demand, Demands, ReadAnswer
 from abdf1_ros.driver.reads.guards import Guards
 from abdf1_ros.driver.reads.job import ReadJob, ReadTooOld
 from abdf1_ros.driver.reads.point import Guard, ReadPoint
@@ -30,7 +31,7 @@ from abdf1_ros.driver.reads.silent import Reads
 from abdf1_ros.driver.record import WriteRecord
 from abdf1_ros.driver.settings import DriverSettings
 from abdf1_ros.driver.write import WriteResult
-from abdf1_ros.errors import FormatError, LinkError, RemoteError
+from abdf1_ros.errors import CommandTimeout, FormatError, LinkError, RemoteError, StationInactive
 from abdf1_ros.pccc.identity import Identity
 from abdf1_ros.pccc.status import is_address_fault
 from abdf1_ros.pccc.values import Values
@@ -83,13 +84,14 @@ class Readings:
                  stations: ActiveStationList, line: LineTime, listener: ValueListener,
                  record: WriteRecord) -> None:
         self.planner = Planner(line_model(network), settings.default_period)
-        blocks = self.planner.plan(mappings)
+        blocks = self.planner.plan(mappings.repeated)
         self.guards = Guards()
         times = settings.default_period, settings.stale_after
         self.mode_periods = mode_periods(mappings, *times)
         self.points = _points(mappings, blocks, settings, self.guards,
                               own_work(self.planner.line_model, mappings, *times))
         self.reads = Reads(stations)
+        self.demands = Demands(settings.write_timeout)
         self.expected_poll_cycle = poll_cycle(blocks, answer_time(network, blocks))
         self._network = network
         self._stations = stations
@@ -101,14 +103,47 @@ class Readings:
 
     @property
     def blocks(self) -> list[Block]:
-        """Return what is read together."""
-        return [job.block for job in self.reads.jobs]
+        """Return what is read again and again, together."""
+        return [job.block for job in self.reads.jobs if not job.is_on_demand]
 
     def _job(self, block: Block) -> ReadJob:
         longest = self._network.line_mode.longest_transaction(self._network.line, 0.0) \
             + _TURNS_OF_A_READ * block_time(block)
         points = [self.points[mapping] for mapping in block.mappings if mapping.reads]
         return ReadJob(block, points, self._line, self._packet_ended, longest)
+
+    def want(self, demand: Demand, now: float) -> None:
+        """Read a row at once for a call; one for a silent station is answered without that."""
+        mapping = demand.mapping
+        station = self._stations[mapping.station]
+        if not station.replies_in_time:
+            demand.answer(ReadAnswer(error=str(
+                CommandTimeout() if station.active else StationInactive(station.number))))
+            return
+        job = next((job for job in self.reads.jobs if mapping in job.block.mappings), None) \
+            or self._job(self.planner.alone(mapping))
+        self.demands.add(demand, now, job.longest_read)
+        self.reads.want(job, now)
+
+    def _settle(self, job: ReadJob, words: bytes | None, error: Exception | None) -> None:
+        """Answer the calls for a read that has ended, unless it is made again."""
+        if job.is_unfinished or job not in self.reads.jobs:
+            return
+        waiting = self.demands.waiting
+        for point, place in job.points.items():
+            if point.mapping in waiting:
+                self.demands.settle(
+                    point.mapping, self._answer(point, words and words[place], error), job.started)
+        if not any(point.mapping in waiting for point in job.points):
+            job.wanted = -math.inf
+
+    def _answer(self, point: ReadPoint, words: bytes | None,
+                error: Exception | None) -> ReadAnswer:
+        if text := point.error or point.withheld and f'withheld: {point.withheld}':
+            return ReadAnswer(error=text)
+        if words is None:
+            return ReadAnswer(error=str(error))
+        return ReadAnswer(point.values_of(words), self._line.now)
 
     def _packet_ended(self, job: ReadJob, words: bytes | None, error: Exception | None) -> None:
         try:
@@ -125,6 +160,8 @@ class Readings:
             elif isinstance(error, FormatError):
                 self._failed(job, f'unusable reply: {error}', is_refusal=False)
         finally:
+            if self.demands.waiting:
+                self._settle(job, words, error)
             self.reads.ended(job, self._line.now)
 
     def _read(self, job: ReadJob, data: bytes) -> None:
@@ -135,7 +172,7 @@ class Readings:
         if self.guards.counters:
             self.guards.values_read(job.points, data, now)
         has_recovered, period = False, job.block.period
-        is_refresh = job.refreshed > -math.inf
+        is_refresh = job.refreshed > -math.inf or job.wanted > -math.inf
         for point, place in job.points.items():
             has_recovered |= point.error is not None
             is_rare = point.period > period and not is_refresh  # others are for every read
@@ -143,7 +180,10 @@ class Readings:
                 continue
             guard = point.guard
             if guard is not None and (reason := guard.why_not(point, job.started, now)):
-                self._withhold(point, guard, reason)
+                if point.mapping.is_on_demand:  # its call has the reason
+                    point.withheld = reason
+                else:
+                    self._withhold(point, guard, reason)
             elif guard is not None and point in guard.withheld:
                 self._release(point, guard, data[place])
             else:
@@ -189,6 +229,12 @@ class Readings:
     def _failed(self, job: ReadJob, reason: str, is_refusal: bool) -> None:
         """Fail the points; after a refusal read smaller blocks."""
         job.interrupted()
+        if job.is_on_demand:
+            if is_refusal and (shorter := self.planner.split(job.block)):
+                self.reads.drop([job], self._line.now)
+                self.reads.want(self._job(*shorter), self._line.now)
+                return
+            is_refusal = False  # other rows are not read with it
         is_news = is_refusal and job in self.reads.jobs
         change = self._refusals.refused(job.block, self.blocks) if is_news else None
         is_divided = change is not None and list(change.old) == [job.block]
@@ -218,7 +264,8 @@ class Readings:
             return
         self._stations[station].failures += 1
         for point in self._affected(station, points):
-            point.fail(str(error))
+            if not point.mapping.is_on_demand:  # the call has the error
+                point.fail(str(error))
 
     def _affected(self, station: int, points: Iterable[ReadPoint]) -> Iterable[ReadPoint]:
         """Return the points of a failed transaction, all of the station where it is silent."""
@@ -226,12 +273,19 @@ class Readings:
             return points
         return [point for point in self.points.values() if point.mapping.station == station]
 
+    def station_lost(self, station: int) -> None:
+        """Answer all calls for rows of a station that has become inactive."""
+        self.demands.fail([mapping for mapping in self.demands.waiting
+                           if mapping.station == station], str(StationInactive(station)))
+
     def port_lost(self, reason: str) -> None:
         """Fail all that depends on the port."""
+        self.demands.close(reason)
+        self.reads.drop([job for job in self.reads.jobs if job.is_on_demand], self._line.now)
         for job in self.reads.jobs:
             job.interrupted()
         for mapping, point in self.points.items():
-            if mapping.polls:
+            if mapping.polls and not mapping.is_on_demand:
                 point.fail(reason)
 
 
@@ -240,6 +294,9 @@ def _points(mappings: Rows, blocks: Sequence[Block], settings: DriverSettings, g
     """Return the points of all mappings that are published, in their order."""
     default = settings.default_period
     stale = stale_times(blocks, default, settings.stale_after, own)
+    # What is read on demand is never stale; the mode that While RUN asks for may be.
+    stale |= {mapping: settings.stale_after * period_of(mapping, default)
+              for mapping in mappings.on_demand}
     return {mapping: _served_point(mapping, settings) if mapping.serves
             else ReadPoint(mapping, period_of(mapping, default), stale[mapping],
                            guards.of(mapping))

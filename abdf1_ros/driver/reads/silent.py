@@ -64,6 +64,18 @@ class Reads(WriteListener):
         """Put ``new`` jobs, due at once, in the place of ``old`` ones."""
         self._due.replace(old, new, now)
 
+    def want(self, job: ReadJob, now: float) -> None:
+        """Make a read due at once that a call has asked for, also one that was not there."""
+        job.wanted = now
+        if job not in self._due.jobs:
+            self._due.replace((), [job], now)
+        elif job.ticket:  # else it is under way, or set aside
+            self._due.put(job, now)
+
+    def drop(self, jobs: Iterable[ReadJob], now: float) -> None:
+        """Forget reads."""
+        self._due.replace(jobs, (), now)
+
     def begin(self, now: float) -> None:
         """Make all reads due at once: the port has been opened."""
         waiting = self._due.jobs.difference(*self._aside.values())
@@ -157,8 +169,10 @@ class Reads(WriteListener):
             self.release(job.station, now)
         if job.is_unfinished:
             self._due.put(job, job.due)
-        elif job.started < job.refreshed:  # it had begun before the write
+        elif job.started < job.refreshed or job.started < job.wanted:  # it had begun before
             self._due.put(job, now)
+        elif job.is_on_demand:
+            self.drop([job], now)
         else:
             self._due.put(job, max(job.due + job.block.period, job.started))
 
@@ -180,4 +194,7 @@ class Reads(WriteListener):
 
     def _set_aside(self, job: ReadJob) -> None:
         job.interrupted()
+        if job.is_on_demand:  # no call waits for the station to come back
+            self.drop([job], job.due)
+            return
         self._aside.setdefault(job.station, deque()).append(job)

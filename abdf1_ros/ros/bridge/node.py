@@ -211,6 +211,11 @@ class BridgeNode(AnsweringNode):
         self.session.begin_end()  # before messages are taken that have waited, to refuse them
         self.writes.begin()
 
+    def end_calls(self) -> None:
+        """Let calls that wait have their answer: the link has ended."""
+        self._surroundings.services.end()
+        self.session.link_counters.end()
+
     def say_last_words(self, give_up: float) -> None:
         """Let guests go and tell the last state, up to a monotonic clock value."""
         self.session.guests.stop()
@@ -338,6 +343,7 @@ def end_together(nodes: Sequence[BridgeNode], patience: float = _LAST_WORDS) -> 
         node.link.ask_to_stop()
     for node in nodes:
         node.link.stop()
+        node.end_calls()
     take_last_writes(time.sleep, lambda: sum(node.writes.taken for node in nodes),
                      min(time.monotonic() + LAST_WRITES, begun + _LATEST_WRITES))
     give_up = time.monotonic() + patience

@@ -51,6 +51,7 @@ from abdf1_ros.ros.parameters.declared import Configuration
 from abdf1_ros.ros.topics.interlocks import InterlockWatch
 from abdf1_ros.ros.topics.messages import ACTIVE_LAYOUT
 from abdf1_ros.ros.topics.reads import ReadTopic, ReadTopics
+from abdf1_ros.ros.topics.services import RowServices
 from abdf1_ros.ros.topics.snapshot import Snapshot
 from abdf1_ros.ros.topics.writes import WriteTopic, WriteTopics
 from abdf1_ros.settings.mapping import Mapping
@@ -85,10 +86,15 @@ class Surroundings:
     diagnostics: Any
     snapshot: OfferedPublisher
     writes: WriteTopics
+    services: RowServices = field(init=False)
     is_offered: bool = False
     published: dict[str, ReadTopic] = field(default_factory=dict)
     active_words: Sequence[int] = ()
     link: LinkThread = field(init=False)
+
+    def __post_init__(self) -> None:
+        """Make what has the services of rows."""
+        self.services = RowServices(self.node, self.writes, self.wake_executor)
 
     def wake_executor(self) -> None:
         if self.node.executor is not None:
@@ -114,7 +120,8 @@ class Session:
         self._events = LineEvents(
             node.get_logger(), self.port, stations_of(mappings),
             scans=not network.line_mode.has_one_plc, seen=self._seen, read=self._reader(),
-            results=surroundings.results, table_changed=self._publish_active)
+            results=surroundings.results, table_changed=self._publish_active,
+            answer=surroundings.services.take)
         self.driver = Driver(network, mappings, configuration.driver_settings(), self._events)
         self._alarms = Alarms(self.driver.points.values(), self.port, line_time)
         self.writers: dict[str, WriteTopic] = {}
@@ -159,9 +166,11 @@ class Session:
         self._alarms.read(mapping, values)
 
     def _open_writers(self) -> dict[str, WriteTopic]:
-        return self._surroundings.writes.open(
-            self.driver, self.configuration.parameters.write_timeout, self._events,
-            self._wake_link)
+        parameters, surroundings = self.configuration.parameters, self._surroundings
+        surroundings.services.open(
+            self.driver, parameters.most_services, parameters.write_timeout, self._wake_link)
+        return surroundings.writes.open(
+            self.driver, parameters.write_timeout, self._events, self._wake_link)
 
     @property
     def is_waiting(self) -> bool:
@@ -193,6 +202,7 @@ class Session:
 
     def withdraw(self) -> None:
         """Close the topics of the map; the line is not ours any more."""
+        self._surroundings.services.withdraw()
         self._surroundings.writes.withdraw()
         self.reads.withdraw()
 
@@ -268,6 +278,7 @@ class Session:
         now = line_time()
         self._surroundings.writes.standstills.look(now)
         self.link_counters.check(now)
+        self._surroundings.services.look(now)
         self._events.unreadable_rows.look(now)
         for watch in self._watches:
             self._look(watch, now)

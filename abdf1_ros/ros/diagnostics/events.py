@@ -42,14 +42,15 @@ class LineEvents:
     """
     The listener of a driver.
 
-    ``read`` gets values, ``results`` publishes what came of writes, ``table_changed`` is called
-    when a station has come or gone. ``stations`` are those that we talk to; ``scans`` where
-    "plc scan" finds others.
+    ``read`` gets values, ``results`` publishes what came of writes, ``answer`` gets that too.
+    ``table_changed`` is called when a station has come or gone. ``stations`` are those that we
+    talk to; ``scans`` where "plc scan" finds others.
     """
 
     def __init__(self, logger: RcutilsLogger, port: str, stations: Collection[int], *,
                  scans: bool, seen: Seen, read: Callable[[Mapping, Values], None], results: Any,
                  table_changed: Callable[[], None],
+                 answer: Callable[[WriteResult], None] = lambda result: None,
                  clock: Callable[[], float] = line_time) -> None:
         self.read = read
         self._clock = clock
@@ -61,7 +62,7 @@ class LineEvents:
         self._stations = stations
         self._scans = scans
         self._seen = seen
-        self._results = results
+        self._results, self._answer = results, answer
         self._table_changed = table_changed
         # A station may have a reply ready for a command from before.
         self._may_have_left_over = set(stations)
@@ -100,6 +101,7 @@ class LineEvents:
                   'value': result.value, 'latency_ms': f'{result.latency * 1000:.1f}',
                   'request': result.request}
         self._results.publish(message_of(mapping.tag, level, str(result), self._port, values))
+        self._answer(result)
 
     def unreadable(self, mapping: Mapping, reason: str) -> None:
         """Have it logged why a read of a station that answers has no value."""

@@ -196,7 +196,7 @@ def _paces(points: Iterable[ReadPoint]) -> dict[str, str]:
     """Return how late the reads of each period are; Serve rows do not count."""
     found: defaultdict[float, list[float]] = defaultdict(list)
     for point in points:
-        if point.mapping.polls:
+        if point.mapping.polls and not point.mapping.is_on_demand:
             found[point.period] += [] if point.interval is None else [point.interval]
     return {f'period {milliseconds(period)}': _pace(period, found[period])
             for period in sorted(found)}

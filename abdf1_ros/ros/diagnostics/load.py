@@ -37,7 +37,8 @@ class SlowRows:
     """The rows that do not keep their Period, as they are read and not as the plan has it."""
 
     def __init__(self, points: Iterable[ReadPoint]) -> None:
-        self._points = [point for point in points if point.mapping.polls and point.period]
+        self._points = [point for point in points if point.mapping.polls and point.period
+                        and not point.mapping.is_on_demand]
         self._slow: dict[ReadPoint, float] = {}
         self._next_look = 0.0
 

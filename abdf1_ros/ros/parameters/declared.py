@@ -101,6 +101,9 @@ class Parameters:
     poll_timeout: float = _parameter(
         60.0, 'Mode Slave: s without a poll after which own commands fail; 0: never', 0.0,
         3600.0)
+    most_services: int = _parameter(
+        100, 'services ~/set of bits, then ~/read_now of rows with a Period, as long as there are '
+        'at most so many: a service costs as much as three topics', 0, 10_000)
     expose_map_parameters: bool = _parameter(
         True, 'show every mapping as read-only parameters map.<tag>.<column>; where this is not '
         f'given, of maps of up to {MOST_SHOWN_ROWS} rows')

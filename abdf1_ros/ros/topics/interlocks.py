@@ -64,7 +64,7 @@ class InterlockWatch:
 
     def look(self, now: float) -> tuple[str, ...]:
         """
-        Return the topics of Fallback rows that two or more publishers feed (rule 17).
+        Return the topics of Fallback rows that two or more publishers and callers feed (rule 17).
 
         They are counted every now and then.
         """
@@ -72,5 +72,11 @@ class InterlockWatch:
             self._next_look = now + _LOOK
             topics = dict.fromkeys(row.mapping.topic for row in self._interlocks.fallbacks)
             self._crowded = tuple(
-                topic for topic in topics if count_publishers(self._node, topic) > 1)
+                topic for topic in topics if count_owners(self._node, topic) > 1)
         return self._crowded
+
+
+def count_owners(node: Node, topic: str) -> int:
+    """Return how many publishers a write topic has, and callers its ~/set."""
+    return count_publishers(node, topic) + node.count_clients(
+        node.resolve_service_name(f'~/set/{topic}'))

@@ -224,17 +224,18 @@ class WriteTopics:
         return [f'{end.node_namespace.rstrip("/")}/{end.node_name}'
                 for end in self._node.get_publishers_info_by_topic(_name(topic))]
 
-    def _subscription(self, topic: str, kind: Any) -> Any:
-        def take(message: Any, info: Any) -> None:
-            self._topics[topic].arrived(info)
-            reject_reason = '' if self._is_open else TOO_MANY
-            if reject_reason and len(self._waiting) < MAX_WAITING_WRITES:
-                self._waiting.append((topic, message, info))
-                return
-            self.taken += 1
-            self._topics[topic].take(message, info, reject_reason)
+    def take(self, topic: str, message: Any, info: Any) -> None:
+        """Take a message, in the thread of the executor."""
+        self._topics[topic].arrived(info)
+        reject_reason = '' if self._is_open else TOO_MANY
+        if reject_reason and len(self._waiting) < MAX_WAITING_WRITES:
+            self._waiting.append((topic, message, info))
+            return
+        self.taken += 1
+        self._topics[topic].take(message, info, reject_reason)
 
-        callback: Any = take
+    def _subscription(self, topic: str, kind: Any) -> Any:
+        callback: Any = partial(self.take, topic)
         return self._node.create_subscription(kind, _name(topic), callback, write_qos())
 
 

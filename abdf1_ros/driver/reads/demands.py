@@ -1,0 +1,102 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""
+Reads that are asked for: each call ends in one answer, and all calls of one row are one read.
+
+A row that is read again and again is due at once. One with Period "on demand" has a read of its
+own, for as long as a call waits for it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+import math
+
+from abdf1_ros.driver.inbox import Inbox
+from abdf1_ros.pccc.values import Values
+from abdf1_ros.settings.mapping import Mapping
+
+
+@dataclass(frozen=True, slots=True)
+class ReadAnswer:
+    """The ``values`` of a reply that came at ``read`` (clock, s), or the ``error``."""
+
+    values: Values | None = None
+    read: float = -math.inf
+    error: str = ''
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Demand:
+    """A call for the values of a row, of a read that begins after ``since`` (clock, s)."""
+
+    mapping: Mapping
+    since: float
+    answer: Callable[[ReadAnswer], None]
+
+
+class Demands:
+    """
+    The calls that wait for a read: ``patience`` s, and as long as the read itself may take.
+
+    ``inbox`` takes them from any thread. All else belongs to the link thread. Those of each row in
+    ``waiting`` have the clock value (s) up to which they wait; ``next_expiry`` is the first.
+    """
+
+    def __init__(self, patience: float) -> None:
+        self.inbox: Inbox[Demand] = Inbox(is_open=False)
+        self.waiting: dict[Mapping, list[tuple[float, Demand]]] = {}
+        self.next_expiry = math.inf
+        self._patience = patience
+
+    def add(self, demand: Demand, now: float, longest: float) -> None:
+        """Let a call wait for a read that takes ``longest`` s at most."""
+        until = now + self._patience + longest
+        self.waiting.setdefault(demand.mapping, []).append((until, demand))
+        self.next_expiry = min(self.next_expiry, until)
+
+    def settle(self, mapping: Mapping, answer: ReadAnswer, started: float) -> None:
+        """Answer the calls for a row that came before its read ``started`` (clock, s)."""
+        self._end(mapping, answer, lambda until, demand: demand.since <= started)
+
+    def fail(self, mappings: Iterable[Mapping], error: str) -> None:
+        """Answer all calls for some rows with an error."""
+        for mapping in mappings:
+            self._end(mapping, ReadAnswer(error=error), lambda until, demand: True)
+
+    def expire(self, now: float) -> None:
+        """Answer the calls that have waited too long."""
+        answer = ReadAnswer(error=f'not read in time: no turn on the line for {self._patience:g} '
+                                  's, or the read was broken off')
+        for mapping in [*self.waiting]:
+            self._end(mapping, answer, lambda until, demand: now >= until)
+        self.next_expiry = min((until for calls in self.waiting.values() for until, _ in calls),
+                               default=math.inf)
+
+    def close(self, error: str) -> None:
+        """Answer all calls: there is no port."""
+        for demand in self.inbox.close():
+            demand.answer(ReadAnswer(error=error))
+        self.fail([*self.waiting], error)
+        self.next_expiry = math.inf
+
+    def _end(self, mapping: Mapping, answer: ReadAnswer,
+             is_over: Callable[[float, Demand], bool]) -> None:
+        calls = self.waiting.pop(mapping, ())
+        if kept := [call for call in calls if not is_over(*call)]:
+            self.waiting[mapping] = kept
+        for call in calls:
+            if is_over(*call):
+                call[1].answer(answer)

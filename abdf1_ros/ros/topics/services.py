@@ -1,0 +1,232 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""
+The services of rows: ~/set/<topic> of one bit, and ~/read_now/<topic> of what a PLC has.
+
+A call of ~/set is a message to the write topic, under the same rules, with the same result. No
+callback waits: it goes on when the link has the answer (rule 3 c of docs/heartbeats.md).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from datetime import datetime, UTC
+from functools import partial
+import math
+import time
+from typing import Any
+import uuid
+
+from abdf1_ros.driver.driver import Driver, ENDS
+from abdf1_ros.driver.reads.demands import ReadAnswer
+from abdf1_ros.driver.write import Outcome, WriteResult
+from abdf1_ros.pccc.values import Values, ValueType
+from abdf1_ros.ports.clock import line_time
+from abdf1_ros.ros.callbacks import AnsweringNode
+from abdf1_ros.ros.topics.writes import WriteTopics
+from abdf1_ros.settings.mapping import Mapping
+from abdf1_ros.settings.rows import Rows
+from abdf1_ros.text import printable, value_text
+from rclpy.callback_groups import ReentrantCallbackGroup
+from rclpy.qos import QoSProfile
+from rclpy.task import Future
+from std_msgs.msg import MultiArrayDimension, MultiArrayLayout, UInt8MultiArray
+from std_srvs.srv import SetBool, Trigger
+
+MOST_CALLS = 100
+"""So many calls wait at a time; more are refused at once: each costs every turn of rclpy."""
+
+# What comes at the same moment has to fit; unused places take no memory.
+_DEPTH = 1000
+
+_TOO_MANY = f'{MOST_CALLS} calls wait already'
+_GONE = 'the map has no such row any more'
+
+
+class _Call:
+    """A call that waits for so many ``results``, up to a clock value (s)."""
+
+    def __init__(self, count: int, until: float, wake: Callable[[], None]) -> None:
+        self.results: list[Any] = []
+        self.until = until
+        self.done = Future()
+        self._count = count
+        self._wake = wake
+
+    def take(self, result: Any) -> None:
+        """Take a result, in any thread."""
+        self.results.append(result)
+        if len(self.results) == self._count:
+            self.end()
+
+    def end(self) -> None:
+        """Let the callback go on."""
+        if not self.done.done():
+            self.done.set_result(None)
+            self._wake()
+
+
+class RowServices:
+    """
+    All services of rows; ``take`` may be called in any thread, ``look`` ten times a second in one.
+
+    The rest belongs to the thread of the executor, which ``wake_executor`` has look for answers.
+    """
+
+    def __init__(self, node: AnsweringNode, writes: WriteTopics,
+                 wake_executor: Callable[[], None]) -> None:
+        self._node = node
+        self._writes = writes
+        self._wake_executor = wake_executor
+        self._group = ReentrantCallbackGroup()
+        self._services: dict[str, Any] = {}
+        self._retired: list[Any] = []
+        self._rows: dict[str, tuple[Mapping, ...]] = {}
+        self._calls: dict[str, _Call] = {}
+
+    def open(self, driver: Driver, most: int, patience: float,  # noqa: A003
+             wake_link: Callable[[], None]) -> None:
+        """Offer the services of the rows of a driver; services that are, stay."""
+        self._driver, self._wake_link = driver, wake_link
+        network = driver.network
+        # A write waits for the line and for a read; in between it is under way.
+        self._longest = 2 * (patience + network.line_mode.longest_transaction(network.line, 0.0))
+        self._rows = dict(_offered(driver.mappings, most))
+        self._retire()
+        for name in self._rows:
+            if name not in self._services:
+                kind, answer = (SetBool, self._set) if name.startswith('~/set/') \
+                    else (Trigger, self._read)
+                self._services[name] = self._node.create_service(
+                    kind, name, partial(answer, name), callback_group=self._group,
+                    qos_profile=QoSProfile(depth=_DEPTH))
+
+    def withdraw(self) -> None:
+        """Close all services."""
+        self._rows = {}
+        self.end()
+        self._retire()
+
+    def end(self) -> None:
+        """Let all calls have their answer: nothing more comes from the link."""
+        for call in [*self._calls.values()]:
+            call.end()
+
+    def take(self, result: WriteResult) -> None:
+        """Take the result of a write; a call may wait for it."""
+        if call := self._calls.get(result.request):
+            call.take(result)
+
+    def look(self, now: float) -> None:
+        """End calls that have waited too long, and close services that no call waits for."""
+        for call in [*self._calls.values()]:
+            if now >= call.until:
+                call.end()
+        if self._retired and not self._calls and self._node.executor is not None:
+            self._node.executor.create_task(self._close_retired)
+
+    def _retire(self) -> None:
+        """Have the services closed that no row has any more, when all calls are answered."""
+        self._retired += [self._services.pop(name) for name in [*self._services]
+                          if name not in self._rows]
+
+    def _close_retired(self) -> None:
+        retired, self._retired = self._retired, []
+        for service in retired:
+            self._node.destroy_service(service)
+
+    async def _set(self, name: str, request: SetBool.Request,
+                   response: SetBool.Response) -> SetBool.Response:
+        """Write a bit as a message does, and answer with its result."""
+        rows = self._rows.get(name, ())
+        published, received = self._node.call_stamps
+        until = line_time() + self._longest
+        if (call := self._new(len(rows), until, response)) is None:
+            return response
+        label = f'set {uuid.uuid4()}'  # no publisher has the same
+        self._calls[label] = call
+        self._writes.take(rows[0].topic, UInt8MultiArray(
+            layout=MultiArrayLayout(dim=[MultiArrayDimension(label=label)]),
+            data=[int(request.data)]), {
+                'source_timestamp': published, 'received_timestamp': received,
+                'publication_sequence_number': None})
+        await call.done
+        del self._calls[label]
+        results: list[WriteResult] = call.results
+        response.success = len(results) == len(rows) and all(
+            result.outcome is Outcome.WRITTEN for result in results)
+        response.message = '; '.join(
+            printable(str(result) if len(rows) == 1 else f'{result.mapping.tag}: {result}')
+            for result in results) or f'{Outcome.UNKNOWN.value}: no result has come'
+        return response
+
+    async def _read(self, name: str, request: Trigger.Request,
+                    response: Trigger.Response) -> Trigger.Response:
+        """Have a row read and published, and answer with what was read."""
+        rows = self._rows.get(name, ())
+        if (call := self._new(len(rows), math.inf, response)) is None:  # the driver has bounds
+            return response
+        self._calls[label := f'read {uuid.uuid4()}'] = call
+        self._driver.read_now(rows[0], line_time(), call.take)
+        self._wake_link()
+        await call.done
+        del self._calls[label]
+        answer: ReadAnswer = (call.results or [ReadAnswer(error=ENDS)])[0]
+        response.success = answer.values is not None
+        response.message = printable(answer.error) if answer.values is None else \
+            f'{_text(answer.values)} at {_moment(answer.read)}'
+        return response
+
+    def _new(self, count: int, until: float, response: Any) -> _Call | None:
+        """Return a call that waits for so many results; None where it is refused."""
+        if not count or len(self._calls) >= MOST_CALLS:
+            response.message = f'refused: {_TOO_MANY if count else _GONE}'
+            return None
+        return _Call(count, until, self._wake_executor)
+
+
+def _offered(mappings: Rows, most: int) -> Iterator[tuple[str, tuple[Mapping, ...]]]:
+    """
+    Yield the services of a map, and the rows of each.
+
+    Those of rows on demand are always there. Of ~/set, then of ~/read_now there are all or none,
+    as long as there are at most so many.
+    """
+    bits: dict[str, tuple[Mapping, ...]] = {}
+    for row in mappings.messages:
+        if row.type is ValueType.BOOL and row.length == 1:
+            name = f'~/set/{row.topic}'
+            bits[name] = (*bits.get(name, ()), row)
+    yield from _reading(mappings.on_demand).items()
+    for services in (bits, _reading(Rows(row for row in mappings.repeated if row.polls))):
+        most -= len(services)
+        if most >= 0:
+            yield from services.items()
+
+
+def _reading(mappings: Rows) -> dict[str, tuple[Mapping, ...]]:
+    return {f'~/read_now/{row.topic}': (row,) for row in mappings}
+
+
+def _text(values: Values) -> str:
+    if isinstance(values, str):
+        return printable(values)
+    texts = [value_text(value) for value in values]
+    return texts[0] if len(texts) == 1 else f'[{", ".join(texts)}]'
+
+
+def _moment(read: float) -> str:
+    """Return a clock value (s) in UTC."""
+    seconds = time.time() - line_time() + read
+    return datetime.fromtimestamp(seconds, UTC).isoformat(timespec='milliseconds')

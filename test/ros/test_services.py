@@ -1,0 +1,243 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""Services of rows over DDS: ~/set/<topic> and ~/read_now/<topic>."""
+
+from collections.abc import Iterator
+from datetime import datetime, UTC
+from pathlib import Path
+import signal
+import threading
+import time
+from typing import Any
+
+import pytest
+from rclpy.qos import QoSProfile
+from std_msgs.msg import Int16MultiArray, UInt8MultiArray
+from std_srvs.srv import SetBool, Trigger
+from support.cell import BridgeCell
+from support.ros import details, Observer, Process, write_csv
+from support.simulator_process import make_files
+
+DATA = """Station,PLC_Type,Address,Length,Values
+1,PLC5,N7:0,16,7 8 211 222 233
+1,PLC5,B3:0,4,
+2,PLC5,B3:0,4,
+"""
+HEADER = 'Tag,Command,Address,Station,PLC_Type,Length,Topic,Period,Fallback,Fallback_After,While'
+ROWS = (
+    'speed,Read,N7:0,1,PLC5,2,,5000,,,',
+    'recipe,Read,N7:2,1,PLC5,3,,on demand,,,',
+    'run_only,Read,N7:6,1,PLC5,,,on demand,,,RUN',
+    'lamp,Write,B3:0/0,1,PLC5,,,,,,',
+    'lamp_south,Write,B3:0/0,2,PLC5,,lamp,,,,',
+    'horn,ReadWrite,B3:0/1,1,PLC5,,,,,,',
+    'motor,Write,B3:1/0,1,PLC5,,,,0,1000,',
+    'everybody,Write,B3:2/0,255,PLC5,,,,,,',
+    'flags,Write,B3:0/4,1,PLC5,2,,,,,')
+SET, READ = '/abdf1/set/', '/abdf1/read_now/'
+
+
+class Bench(BridgeCell):
+    """A bridge on simulated PLCs with calls."""
+
+    def start(self) -> None:
+        super().start()
+        self.ros.until(lambda: self.node.session.driver.is_online, 'the port')
+        self.ros.until(lambda: self.node.writes._is_open, 'writes are taken')
+
+    def put(self, topic: str, data: bool) -> tuple[bool, str]:
+        response = self.call(SetBool, f'set/{topic}', SetBool.Request(data=data))
+        return response.success, response.message
+
+    def read(self, topic: str) -> tuple[bool, str]:
+        response = self.call(Trigger, f'read_now/{topic}', Trigger.Request())
+        return response.success, response.message
+
+    def services(self) -> set[str]:
+        """Return the services of rows that there are."""
+        found = self.ros.node.get_service_names_and_types_by_node('abdf1', '/')
+        return {name for name, _ in found if name.startswith((SET, READ))}
+
+    def hold(self, kind: Any, name: str, request: Any) -> Any:
+        """Call a service; return the future of its answer."""
+        client = self.ros.node.create_client(kind, name)
+        self.ros.until(client.service_is_ready, name)
+        return client.call_async(request)
+
+
+@pytest.fixture
+def bench(tmp_path: Path) -> Iterator[Bench]:
+    with Bench(tmp_path, DATA, '\n'.join((HEADER, *ROWS)), 'Baud,Timeout\n115200,100') as bench:
+        yield bench
+
+
+def test_rows_of_one_bit_can_be_set_and_all_that_a_plc_has_can_be_read(bench: Bench) -> None:
+    expected = {SET + topic for topic in ('lamp', 'horn', 'motor', 'everybody')} \
+        | {READ + topic for topic in ('speed', 'recipe', 'run_only', 'horn')}
+    bench.ros.until(lambda: bench.services() == expected, f'{expected}')
+
+
+def test_set_is_answered_when_the_plc_has_confirmed(bench: Bench) -> None:
+    assert bench.put('horn', True) == (True, 'written')
+    assert bench.plcs.word('B3:0') == 2
+    assert bench.put('horn', False) == (True, 'written')
+    assert bench.plcs.word('B3:0') == 0
+    results = [result for result in bench.results if result.name == 'horn']
+    assert [details(result)['value'] for result in results] == ['[1]', '[0]']
+    assert results[0].message == 'written'
+
+
+def test_set_of_several_rows_waits_for_all_of_them(bench: Bench) -> None:
+    assert bench.put('lamp', True) == (True, 'lamp: written; lamp_south: written')
+    bench.plcs.say('error 2 10')
+    success, text = bench.put('lamp', False)
+    assert not success
+    assert text.startswith('lamp: written; lamp_south: not written: the PLC refused it: ')
+
+
+def test_broadcast_is_no_success_as_no_station_confirms_it(bench: Bench) -> None:
+    assert bench.put('everybody', True) == (
+        False, 'sent to all stations; no station confirms a broadcast')
+
+
+def test_set_feeds_a_fallback_once(bench: Bench) -> None:
+    bench.results.until(lambda result: result.message == 'fallback value written: start', 'start')
+    assert bench.put('motor', True) == (True, 'written')
+    bench.results.until(lambda result: result.message == 'fallback value written: timeout', 'it')
+    assert bench.plcs.word('B3:1') == 0
+
+
+def test_read_now_publishes_and_answers_with_value_and_time(bench: Bench) -> None:
+    recipes = bench.ros.listen(Int16MultiArray, '/abdf1/read/recipe')
+    begun = datetime.now(UTC)
+    success, text = bench.read('recipe')
+    assert success
+    values, _, moment = text.partition(' at ')
+    assert values == '[211, 222, 233]'
+    assert begun.timestamp() - 0.001 <= datetime.fromisoformat(moment).timestamp() <= time.time()
+    assert recipes.first().data.tolist() == [211, 222, 233]
+    bench.ros.wait(lambda: False, 1.0)
+    assert len(recipes) == 1
+    bench.plcs.set('N7:0', 70)
+    assert bench.read('speed')[1].startswith('[70, 8] at ')
+    assert bench.read('horn')[1].startswith('0 at ')
+
+
+def test_read_now_of_a_withheld_row_answers_withheld(bench: Bench) -> None:
+    values = bench.ros.listen(Int16MultiArray, '/abdf1/read/run_only')
+    bench.ros.until(lambda: bench.read('run_only')[0], 'a value while it runs')
+    bench.plcs.say('mode 1 program')
+    bench.ros.until(lambda: not bench.read('run_only')[0], 'the mode')
+    del values[:]
+    success, text = bench.read('run_only')
+    assert (success, text[:21]) == (False, 'withheld: not in RUN:')
+    bench.ros.wait(lambda: False, 0.5)
+    assert not values
+
+
+def test_silent_plc_is_answered_with_the_numbered_error(bench: Bench) -> None:
+    bench.plcs.say('silent 1')
+    success, text = bench.read('recipe')
+    assert (success, text[:5]) == (False, '2509 ')
+    success, text = bench.put('horn', True)
+    assert (success, text[:12]) in {(False, 'not written:'), (False, 'unknown whet')}
+
+
+def test_hundred_callers_at_once_have_an_answer_each_and_more_are_refused(bench: Bench) -> None:
+    bench.plcs.say('delay 1 300')
+    client = bench.ros.node.create_client(
+        Trigger, READ + 'recipe', qos_profile=QoSProfile(depth=1000))
+    bench.ros.until(client.service_is_ready, 'the service')
+    futures = [client.call_async(Trigger.Request()) for _ in range(150)]
+    bench.ros.until(lambda: all(future.done() for future in futures), 'all answers')
+    answers = [future.result() for future in futures]
+    good = [answer for answer in answers if answer.success]
+    refused = {answer.message for answer in answers if not answer.success}
+    assert len(good) >= 100
+    assert refused <= {'refused: 100 calls wait already'}
+    assert not bench.node._surroundings.services._calls
+
+
+def test_reload_answers_who_waits_and_closes_what_is_gone(bench: Bench) -> None:
+    bench.plcs.say('delay 1 1500')
+    read = bench.hold(Trigger, READ + 'recipe', Trigger.Request())
+    written = bench.hold(SetBool, SET + 'horn', SetBool.Request(data=True))
+    calls = bench.node._surroundings.services._calls
+    bench.ros.until(lambda: len(calls) == 2, 'both calls')
+    write_csv(bench.map, HEADER, ROWS[:1])
+    assert bench.call(Trigger, 'reload', Trigger.Request()).success
+    bench.ros.until(lambda: read.done() and written.done(), 'both answers')
+    assert read.result().message == 'port lost: the files have been read again'
+    assert written.result().message.startswith(('not written: not sent', 'unknown whether'))
+    bench.ros.until(lambda: bench.services() == {READ + 'speed'}, 'the end of the others')
+    bench.plcs.say('normal 1')
+    assert bench.read('speed')[0]
+
+
+def test_read_only_refuses_to_set_and_reads(tmp_path: Path) -> None:
+    with Bench(tmp_path, DATA, '\n'.join((HEADER, *ROWS)), 'Baud,Timeout\n115200,100',
+               'read_only:=true') as bench:
+        assert bench.put('horn', True) == (False, 'not written: refused: this node is read_only')
+        assert bench.read('recipe')[0]
+
+
+@pytest.mark.parametrize(('most', 'expected'), [
+    (0, {READ + 'recipe', READ + 'run_only'}),
+    (5, {READ + 'recipe', READ + 'run_only', SET + 'lamp', SET + 'horn', SET + 'motor',
+         SET + 'everybody'})])
+def test_map_of_many_rows_has_the_services_that_matter(
+        tmp_path: Path, most: int, expected: set[str]) -> None:
+    with Bench(tmp_path, DATA, '\n'.join((HEADER, *ROWS)), 'Baud,Timeout\n115200,100',
+               f'most_services:={most}') as bench:
+        bench.ros.until(lambda: bench.services() == expected, f'{expected}')
+
+
+def test_publisher_and_caller_of_one_fallback_row_are_two_owners(bench: Bench) -> None:
+    client = bench.ros.node.create_client(SetBool, SET + 'motor')
+    bench.ros.until(client.service_is_ready, 'the service')
+    publisher = bench.ros.publisher(UInt8MultiArray, '/abdf1/write/motor')
+    bench.ros.until(lambda: bench.node.session._interlocks.look(float('inf')) == ('motor',),
+                    'both owners')
+    bench.ros.node.destroy_client(client)
+    bench.ros.node.destroy_publisher(publisher)
+
+
+def test_old_call_is_not_written_and_the_end_answers_who_waits(tmp_path: Path) -> None:
+    """The process stands still for longer than a write may wait; later it ends with calls."""
+    files = make_files(tmp_path)
+    arguments = files.args('net.com_port:=2', 'write_timeout:=1.0')
+    with Observer() as observer, files.start_simulator() as simulator, \
+            Process('node', *arguments) as node:
+        observer.call(Trigger, '/abdf1/read_now/heartbeat', Trigger.Request())
+        client = observer.node.create_client(SetBool, '/abdf1/set/reset')
+        observer.until(client.service_is_ready, 'the service')
+        first = client.call_async(SetBool.Request(data=True))
+        observer.until(first.done, 'an answer')
+        assert first.result().message == 'written'
+        node.stop()
+        late = client.call_async(SetBool.Request(data=False))
+        goes_on = threading.Timer(2.5, node.go_on)
+        goes_on.start()
+        observer.until(late.done, 'the answer to the old call')
+        goes_on.join()
+        assert late.result().message.startswith('not written: refused: it came ')
+        simulator.say('delay 2 4000')
+        waiting = [client.call_async(SetBool.Request(data=True)),
+                   observer.node.create_client(
+                       Trigger, '/abdf1/read_now/heartbeat').call_async(Trigger.Request())]
+        observer.wait(lambda: False, 0.5)
+        node.end(signal.SIGINT)
+        observer.until(lambda: all(future.done() for future in waiting), 'the last answers')
+        assert [future.result().success for future in waiting] == [False, False]
+        simulator.say('normal 2')
