@@ -17,7 +17,8 @@ Look at the lines of a plant from another host, write to them, and judge.
 
 ``observer.py LINES`` says on standard output, a line each: ``ill WHY`` while a line is not read
 or not written to, ``doubled WHY`` while the endpoints of two bridges are seen, ``well`` otherwise,
-and ``BROKEN WHY`` for what must never be. At the end of its input it says what it has judged.
+``quiet NUMBER`` and ``back NUMBER`` when values of a line end and come again, and ``BROKEN WHY``
+for what must never be. At the end of its input it says what it has judged.
 """
 
 from __future__ import annotations
@@ -36,6 +37,7 @@ from std_msgs.msg import Int16MultiArray, MultiArrayDimension, MultiArrayLayout
 
 _WRITES = 0.25  # s between two commands to a line
 _FRESH = 2.0  # s
+_GAP = 0.7  # s; a value is read each 0.2 s
 _LOOKS = 0.1
 _RAMP = 1000  # where a ramp of the simulator begins again
 
@@ -45,11 +47,13 @@ class Line:
 
     def __init__(self, node: Node, name: str) -> None:
         self.name, self._node = name, node
-        self.values = self.results = self.number = 0
+        self.values = self.results = self.number = self.fallbacks = self.late = 0
         self.broken: list[str] = []
         self._ramp = self._held = -1
         self._seen = self._written = -1e9
         self._requests: dict[str, int] = {}
+        self._sent: dict[str, float] = {}
+        self.slowest, self._is_quiet = 0.0, True
         self._publisher = node.create_publisher(Int16MultiArray, f'{name}/write/command', 10)
         for tag, take in (('ramp', self._take_ramp), ('held', self._take_held)):
             node.create_subscription(Int16MultiArray, f'{name}/read/{tag}', take, latched_qos())
@@ -60,8 +64,16 @@ class Line:
         """Send the next command."""
         self.number += 1
         label = f'{self.name} {self.number}'
+        self._sent[str(self.number)] = time.monotonic()
         self._publisher.publish(Int16MultiArray(
             layout=MultiArrayLayout(dim=[MultiArrayDimension(label=label)]), data=[self.number]))
+
+    def look(self, now: float) -> None:
+        """Say when no more values come, and when they come again."""
+        if self._is_quiet != (now - self._seen > _GAP):
+            self._is_quiet = not self._is_quiet
+            number = self.name.split('/')[1].removeprefix('line_')
+            print('quiet' if self._is_quiet else 'back', number, flush=True)
 
     def ill(self, now: float) -> str:
         """Return why the line is not well, empty where it is."""
@@ -79,22 +91,29 @@ class Line:
         value = message.data[0]
         self.values += 1
         self._seen = time.monotonic()
+        self.look(self._seen)
         if 0 < (self._ramp - value) % _RAMP < _RAMP // 2:
             self.broken.append(f'{self.name}: the value {value} came after {self._ramp}')
         self._ramp = value
 
     def _take_held(self, message: Any) -> None:
         value = message.data[0]
-        if value < self._held:
+        if value and value < self._held:  # 0 is the fallback value
             self.broken.append(f'{self.name}: command {value} was written after {self._held}')
-        self._held = value
+        self._held = max(self._held, value)
 
     def _take_result(self, result: Any) -> None:
         self.results += 1
+        if result.message.startswith('fallback value written: '):
+            self.fallbacks += result.message.endswith('timeout')
+            return
+        self.late += 'after it was published' in result.message or 'waited' in result.message
         request = next((pair.value for pair in result.values if pair.key == 'request'), '')
         self._requests[request] = self._requests.get(request, 0) + 1
         if self._requests[request] > 1:
             self.broken.append(f'{request} has {self._requests[request]} results')
+        if request.startswith(f'{self.name} ') and request.split()[1] in self._sent:
+            self.slowest = max(self.slowest, time.monotonic() - self._sent.pop(request.split()[1]))
         if result.message == 'written':
             self._written = time.monotonic()
 
@@ -116,6 +135,7 @@ def main() -> int:
             print(text, flush=True)
         said[0] = text
         for line in lines:
+            line.look(now)
             for reason in line.broken:
                 print(f'BROKEN {reason}', flush=True)
             is_broken.extend(line.broken)
@@ -129,7 +149,10 @@ def main() -> int:
         rclpy.spin_once(node, timeout_sec=0.1)
     print(f'{sum(line.values for line in lines)} values, '
           f'{sum(line.number for line in lines)} commands, '
-          f'{sum(line.results for line in lines)} results', flush=True)
+          f'{sum(line.results for line in lines)} results, '
+          f'{sum(line.fallbacks for line in lines)} fallbacks by timeout, '
+          f'{sum(line.late for line in lines)} writes too late, '
+          f'the slowest result after {max(line.slowest for line in lines):.1f} s', flush=True)
     node.destroy_node()
     rclpy.try_shutdown()
     return int(bool(is_broken))

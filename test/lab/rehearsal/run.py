@@ -51,7 +51,8 @@ _PLANT, _OBSERVER = 'P', 'O'  # hosts of the device servers, and of the observer
 _IDLE = 5.0
 _FAULT_LASTS = 15.0
 _LIMIT = 45.0  # s within which all lines have to be well; a killed node is seen for up to 20 s
-_FAULTS = ('kill', 'stop', 'cut')
+FAULTS = ('kill', 'stop', 'cut')
+_PROFILES = 'FASTRTPS_DEFAULT_PROFILES_FILE', 'FASTDDS_DEFAULT_PROFILES_FILE'
 
 # Wheels have the libraries of the discovery server in folders of their own.
 _LIBRARIES = ':'.join(map(str, [Path(sys.prefix, 'lib'), *Path(sys.prefix).glob(
@@ -63,22 +64,30 @@ Station,PLC_Type,Address,Length,Values,Motion,Period
 1,PLC5,N7:0,1,0,Ramp,100
 """
 _MAP = """\
-Tag,Command,Address,Station,PLC_Type,Period
-ramp,Read,N7:0,1,PLC5,200
-held,Read,N7:4,1,PLC5,200
-command,Write,N7:4,1,PLC5,
+Tag,Command,Address,Station,PLC_Type,Period,Fallback,Fallback_After
+ramp,Read,N7:0,1,PLC5,200,,
+held,Read,N7:4,1,PLC5,200,,
+command,Write,N7:4,1,PLC5,,0,2000
 """
 
 
 class Network:
-    """Hosts as namespaces on one switch, which is in a namespace too."""
+    """
+    Hosts as namespaces on one switch, which is in a namespace too.
 
-    def __init__(self, hosts: Sequence[str], *, has_server: bool) -> None:
+    With ``fault``, the milliseconds and per cent of ``lossy_switch.py``, what hosts send to each
+    other is late and gets lost, but not what device servers are sent.
+    """
+
+    def __init__(self, hosts: Sequence[str], *, has_server: bool = False,
+                 fault: Sequence[float] = (), profile: str = '') -> None:
         self._prefix = f'ab{os.getpid() % 100_000}'
-        self._hosts = hosts
+        self._hosts, self._fault = hosts, fault
+        self._switch = ExitStack()
         self._environment = {
             'FASTDDS_BUILTIN_TRANSPORTS': 'UDPv4', 'ROS_AUTOMATIC_DISCOVERY_RANGE': 'SUBNET',
             'ROS_DOMAIN_ID': '73', 'PYTHONPATH': str(_ROOT)}
+        self._variables = dict.fromkeys(_PROFILES, profile)
         if has_server:
             self._environment |= {'ROS_DISCOVERY_SERVER': f'{self.address(_OBSERVER)}:11811',
                                   'ROS_SUPER_CLIENT': 'TRUE'}
@@ -93,20 +102,29 @@ class Network:
 
     def _make(self) -> None:
         _ip('netns', 'add', self._name('sw'))
-        _ip('-n', self._name('sw'), 'link', 'add', 'name', _SWITCH, 'type', 'bridge')
-        _ip('-n', self._name('sw'), 'link', 'set', _SWITCH, 'up')
+        if not self._fault:
+            _ip('-n', self._name('sw'), 'link', 'add', 'name', _SWITCH, 'type', 'bridge')
+            _ip('-n', self._name('sw'), 'link', 'set', _SWITCH, 'up')
         for host in self._hosts:
             _ip('netns', 'add', self._name(host))
             _ip('-n', self._name('sw'), 'link', 'add', host, 'type', 'veth', 'peer', 'name', 'eth',
                 'netns', self._name(host))
-            _ip('-n', self._name('sw'), 'link', 'set', host, 'master', _SWITCH, 'up')
+            _ip('-n', self._name('sw'), 'link', 'set', host, *self._master(), 'up')
             _ip('-n', self._name(host), 'addr', 'add', f'{self.address(host)}/24', 'dev', 'eth')
             for link in ('lo', 'eth'):
                 _ip('-n', self._name(host), 'link', 'set', link, 'up')
             # DDS finds others by multicast.
             _ip('-n', self._name(host), 'route', 'add', '224.0.0.0/4', 'dev', 'eth')
+        if self._fault:
+            self._switch.enter_context(_ending(self.start(
+                'sw', Path(os.devnull), sys.executable, str(_HERE / 'lossy_switch.py'), _PLANT,
+                *map(str, self._fault), *self._hosts)))
+
+    def _master(self) -> Sequence[str]:
+        return () if self._fault else ('master', _SWITCH)
 
     def __exit__(self, *exception: object) -> None:
+        self._switch.close()
         for host in ('sw', *self._hosts):
             subprocess.run(['ip', 'netns', 'del', self._name(host)], check=False,
                            stderr=subprocess.DEVNULL)
@@ -124,8 +142,11 @@ class Network:
 
     def start(self, host: str, log: Path, *command: str) -> subprocess.Popen[str]:
         """Run a program on a host; its output goes to ``log``, or to us with ``-``."""
-        environment = os.environ | self._environment | {'ROS_LOG_DIR': str(log.parent)}
-        environment.pop('FASTRTPS_DEFAULT_PROFILES_FILE', None)
+        environment = os.environ | self._environment | self._variables | {
+            'ROS_LOG_DIR': str(log.parent)}
+        if not self._variables[_PROFILES[0]]:
+            for variable in _PROFILES:
+                environment.pop(variable)
         is_ours = log.name == '-'
         return subprocess.Popen(
             ['ip', 'netns', 'exec', self._name(host), *command],
@@ -139,13 +160,14 @@ def _ip(*words: str) -> None:
 
 
 class Plant:
-    """PLCs, device servers, and a process of lines on each host."""
+    """PLCs, a device server in front of each, and a process of lines on each host."""
 
-    def __init__(self, network: Network, folder: Path, hosts: Sequence[str], lines: int,
-                 stack: ExitStack) -> None:
+    def __init__(self, network: Network, folder: Path, hosts: Sequence[str],
+                 servers: Sequence[str], stack: ExitStack) -> None:
         self.network, self._folder, self.hosts = network, folder, hosts
         self._stack = stack
-        self.count = len(hosts) * lines
+        self._bridges: dict[str, subprocess.Popen[str]] = {}
+        self.count = len(servers)
         (folder / 'plc.csv').write_text(_DATA, encoding='utf-8')
         (folder / 'map.csv').write_text(_MAP, encoding='utf-8')
         for number in range(1, self.count + 1):
@@ -155,19 +177,17 @@ class Plant:
                 'Station,Com_Port,Baud,Timeout,Cmd_Timeout,NAK_Retries,ENQ_Retries\n'
                 f'5,socket://{network.address(_PLANT)}:{4000 + number},19200,200,500,1,1\n',
                 encoding='utf-8')
-        time.sleep(1.0 + 0.5 * self.count)
-        self._run(_PLANT, 'servers', str(_HERE / 'device_servers.py'), str(_IDLE), *(
-            f'{4000 + number}:{5000 + number}' for number in range(1, self.count + 1)))
-        self._bridges: dict[str, subprocess.Popen[str]] = {}
-        for place, host in enumerate(hosts):
-            own = [*range(place * lines + 1, (place + 1) * lines + 1)]
-            neighbour = (place + 1) % len(hosts)
-            others = [*range(neighbour * lines + 1, (neighbour + 1) * lines + 1)]
-            (folder / f'{host}.yaml').write_text(''.join(
-                f'/line_{number}/abdf1:\n  ros__parameters:\n    standby: true\n'
-                f'    net_file: {folder}/net{number}.csv\n    map_file: {folder}/map.csv\n'
-                for number in (*own, *others)), encoding='utf-8')
-            self.boot(host)
+        self._run(_PLANT, 'servers', str(_HERE / 'device_servers.py'), *(
+            f'{4000 + number}:{5000 + number}:{server}'
+            for number, server in enumerate(servers, 1)))
+
+    def assign(self, host: str, lines: Sequence[int]) -> None:
+        """Write the parameters of a host for the lines that it has or takes over."""
+        folder = self._folder
+        (folder / f'{host}.yaml').write_text(''.join(
+            f'/line_{number}/abdf1:\n  ros__parameters:\n    standby: true\n'
+            f'    net_file: {folder}/net{number}.csv\n    map_file: {folder}/map.csv\n'
+            for number in lines), encoding='utf-8')
 
     def _run(self, host: str, name: str, *command: str) -> subprocess.Popen[str]:
         return self._stack.enter_context(_ending(self.network.start(
@@ -179,16 +199,24 @@ class Plant:
             host, host, '-m', 'abdf1_ros', 'lines', '--ros-args', '-r', f'lines:__node:={host}',
             '--params-file', str(self._folder / f'{host}.yaml'))
 
-    def owner(self, line: int) -> str:
-        """Return the host that has a line."""
-        clients = [said.split() for said in
-                   (self._folder / 'servers.log').read_text(encoding='utf-8').splitlines()]
-        address = [words[1] for words in clients if words[0] == str(4000 + line)][-1]
-        return next(host for host in self.hosts if self.network.address(host) == address)
+    def owners(self, line: int) -> list[str]:
+        """Return the hosts that have had a line, in order."""
+        by_address = {self.network.address(host): host for host in self.hosts}
+        said = (self._folder / 'servers.log').read_text(encoding='utf-8').splitlines()
+        return [by_address[words[1]] for words in map(str.split, said)
+                if words[0] == str(4000 + line)]
 
     def send(self, host: str, number: signal.Signals) -> None:
         """Send a signal to the process of a host."""
         os.killpg(self._bridges[host].pid, number)
+
+
+def populate(plant: Plant, lines: int) -> None:
+    """Give each host some lines of its own, and those of the next host to take over."""
+    for place, host in enumerate(plant.hosts):
+        firsts = place * lines + 1, (place + 1) % len(plant.hosts) * lines + 1
+        plant.assign(host, [number for first in firsts for number in range(first, first + lines)])
+        plant.boot(host)
 
 
 @contextmanager
@@ -207,11 +235,14 @@ def _ending(process: subprocess.Popen[str]) -> Iterator[subprocess.Popen[str]]:
 class Judge:
     """The observer as a process; ``broken`` has what must not be."""
 
-    def __init__(self, network: Network, folder: Path, count: int, stack: ExitStack) -> None:
+    def __init__(self, network: Network, folder: Path, count: int, stack: ExitStack, *,
+                 is_quiet: bool = False) -> None:
+        self._is_quiet = is_quiet
         self._process = stack.enter_context(_ending(network.start(
             _OBSERVER, folder / '-', sys.executable, '-u', str(_HERE / 'observer.py'),
             str(count))))
         self.broken: list[str] = []
+        self.flow: list[tuple[float, int, bool]] = []  # when the values of which line come or end
         self.state, self.since = 'ill: not looked yet', time.monotonic()
         self.flows_since = math.inf
         self.tried = ''
@@ -223,7 +254,10 @@ class Judge:
         for line in map(str.strip, self._process.stdout):
             if line.startswith('BROKEN'):
                 self.broken.append(line)
-                print(line, flush=True)
+                if not self._is_quiet:
+                    print(line, flush=True)
+            elif line.startswith(('quiet', 'back')):
+                self.flow.append((time.monotonic(), int(line.split()[1]), line[0] == 'b'))
             elif line.startswith(('ill', 'doubled', 'well')):
                 self.state, self.since = line, time.monotonic()
                 if line.startswith('ill'):
@@ -255,21 +289,31 @@ class Judge:
         return self.tried
 
 
-def strike(plant: Plant, judge: Judge, fault: str, host: str) -> float | None:
-    """Let a fault begin; return the seconds until all lines are well again, None for too long."""
-    begin = {'kill': lambda: plant.send(host, signal.SIGKILL),
-             'stop': lambda: plant.send(host, signal.SIGSTOP),
-             'cut': lambda: plant.network.connect(host, is_on=False)}[fault]
-    begin()
-    time.sleep(1.0)  # until it shows
-    took = judge.wait(_LIMIT)
-    time.sleep(_FAULT_LASTS if fault != 'kill' else 1.0)
-    if fault == 'kill':
-        plant.boot(host)
+def begin(plant: Plant, fault: str, host: str) -> None:
+    """Let a fault begin."""
+    if fault == 'cut':
+        plant.network.connect(host, is_on=False)
+    else:
+        plant.send(host, signal.SIGKILL if fault == 'kill' else signal.SIGSTOP)
+
+
+def undo(plant: Plant, fault: str, host: str) -> None:
+    """End a fault; a process that was killed starts again."""
+    if fault == 'cut':
+        plant.network.connect(host, is_on=True)
     elif fault == 'stop':
         plant.send(host, signal.SIGCONT)
     else:
-        plant.network.connect(host, is_on=True)
+        plant.boot(host)
+
+
+def strike(plant: Plant, judge: Judge, fault: str, host: str) -> float | None:
+    """Let a fault begin; return the seconds until all lines are well again, None for too long."""
+    begin(plant, fault, host)
+    time.sleep(1.0)  # until it shows
+    took = judge.wait(_LIMIT)
+    time.sleep(_FAULT_LASTS if fault != 'kill' else 1.0)
+    undo(plant, fault, host)
     time.sleep(3.0)
     back = judge.wait(_LIMIT)
     return None if took is None or back is None else took + 1.0  # since it has begun
@@ -283,10 +327,13 @@ def main() -> int:
     parser.add_argument('--lines', type=int, default=2, help='lines of each host (2)')
     parser.add_argument('--seconds', type=float, default=600.0, help='of faults (600)')
     parser.add_argument('--faults', type=int, help='this many, instead of --seconds')
-    parser.add_argument('--only', action='append', choices=_FAULTS, help='this fault')
+    parser.add_argument('--only', action='append', choices=FAULTS, help='this fault')
     parser.add_argument('--work', type=Path, help='a folder for files and logs, which stays')
     parser.add_argument('--discovery-server', action='store_true',
                         help='let the hosts find each other by a server, not by multicast')
+    parser.add_argument('--lossy', type=float, nargs=2, metavar=('MS', 'PERCENT'),
+                        help='delay and loss of all that hosts send to each other')
+    parser.add_argument('--profile', default='', help='of Fast DDS, for all programs')
     parser.add_argument('--seed', type=int, default=secrets.randbelow(1 << 31))
     options = parser.parse_args()
     if os.geteuid() or not shutil.which('ip'):
@@ -295,29 +342,34 @@ def main() -> int:
     dice, hosts = random.Random(options.seed), [f'h{n}' for n in range(1, options.hosts + 1)]
     print(f'rehearsal: {options.hosts} hosts of {options.lines} lines, --seed {options.seed}',
           flush=True)
-    took: dict[str, list[float]] = {fault: [] for fault in _FAULTS}
-    failed, faults = [], options.only or _FAULTS
+    took: dict[str, list[float]] = {fault: [] for fault in FAULTS}
+    failed, faults = [], options.only or FAULTS
     with ExitStack() as stack:
         folder = options.work or Path(stack.enter_context(
             tempfile.TemporaryDirectory(prefix='abdf1_rehearsal')))
         folder.mkdir(parents=True, exist_ok=True)
-        network = stack.enter_context(
-            Network([*hosts, _PLANT, _OBSERVER], has_server=options.discovery_server))
+        network = stack.enter_context(Network(
+            [*hosts, _PLANT, _OBSERVER], has_server=options.discovery_server,
+            fault=options.lossy or (), profile=options.profile))
         if options.discovery_server:
             stack.enter_context(_ending(network.start(
                 _OBSERVER, folder / 'discovery.log', 'env', f'LD_LIBRARY_PATH={_LIBRARIES}',
                 str(Path(sys.executable).with_name('fast-discovery-server')), '-i', '0', '-l',
                 network.address(_OBSERVER), '-p', '11811')))
             time.sleep(1.0)
-        plant = Plant(network, folder, hosts, options.lines, stack)
+        plant = Plant(network, folder, hosts, [f'close:{_IDLE}:0'] * options.hosts * options.lines,
+                      stack)
+        populate(plant, options.lines)
         judge = Judge(network, folder, plant.count, stack)
         if judge.wait(60.0) is None:
             failed.append(f'start: {judge.state}')
+        if options.faults == 0:
+            time.sleep(options.seconds)
         end, done = time.monotonic() + options.seconds, 0
         while not failed and (done < options.faults if options.faults is not None
                               else time.monotonic() < end):
             fault = faults[done % len(faults)]
-            host = plant.owner(dice.randint(1, plant.count))
+            host = plant.owners(dice.randint(1, plant.count))[-1]
             done += 1
             seconds = strike(plant, judge, fault, host)
             if seconds is None:
