@@ -192,14 +192,14 @@ lock: ## Pin in requirements/*.txt, with hashes, what the *.in beside them need
 	set -e; for name in mutation audit ros_tools_needs; do \
 	    $(LOCK) 3.11 --universal requirements/$$name.in --output-file requirements/$$name.txt; \
 	done
-	$(LOCK) 3.12 --python-platform linux requirements/noble.in --output-file requirements/noble.txt
+	$(LOCK) 3.12 --python-platform linux requirements/kilted.in --output-file requirements/kilted.txt
 
 .PHONY: audit
 audit: ## Look up known vulnerabilities of the pinned packages (asks a server on the Internet)
 	@test -d $(VENV)/audit || $(PYTHON) -m venv $(VENV)/audit
 	$(VENV)/audit/bin/python -m pip install --quiet -r requirements/audit.txt
 	@# Each file for itself, as they do not go together; the sources of ros_tools.txt are in no index.
-	set -e; for name in test tools fuzz mutation audit noble ros_tools_needs ros; do \
+	set -e; for name in test tools fuzz mutation audit kilted ros_tools_needs ros; do \
 	    $(VENV)/audit/bin/pip-audit --strict -r requirements/$$name.txt; \
 	done
 

@@ -28,7 +28,7 @@ MANIFEST = ElementTree.parse(ROOT / 'package.xml').getroot()
 KEYS = dict(line.split() for line in
             (ROOT / 'requirements' / 'rosdep.txt').read_text(encoding='utf-8').splitlines()
             if line and not line.startswith('#'))
-LOCKED = ('ros', 'ros_tools_needs', 'test', 'tools', 'fuzz', 'mutation', 'audit', 'noble')
+LOCKED = ('ros', 'ros_tools_needs', 'test', 'tools', 'fuzz', 'mutation', 'audit', 'kilted')
 PINNED = ('ros_tools.txt', *(f'{name}.in' for name in LOCKED))
 
 # The key that brings a module which has another name.

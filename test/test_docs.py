@@ -25,6 +25,8 @@ import io
 import os
 from pathlib import Path
 import re
+import subprocess
+import sys
 from xml.etree import ElementTree
 
 from abdf1_ros.cli.main import COMMANDS as MAINS
@@ -37,6 +39,7 @@ import pytest
 import serial.serialposix
 from support import documents
 from support.cases import for_all
+from support.ros import HAS_FAST_DDS_3, PROFILES_VARIABLE
 from support.simulator_process import STATUSES
 
 NAMESPACE = 'http://www.eprosima.com/XMLSchemas/fastRTPS_Profiles'
@@ -266,11 +269,21 @@ def test_troubleshooting_quotes_what_is_printed() -> None:
                 assert phrase in printed(), span
 
 
-def test_profile_of_dds_is_the_one_that_these_tests_run_with_but_for_their_transport() -> None:
-    page = (ROOT / 'docs' / 'deployment.md').read_text('utf-8')
-    (block,) = [block for block in documents.blocks(page) if '<profiles ' in block]
+@pytest.mark.parametrize(('version', 'element'), [(2, 'heartbeatPeriod'), (3, 'heartbeat_period')])
+def test_profiles_of_config_are_those_of_these_tests_but_for_their_transport(
+        version: int, element: str) -> None:
+    shipped = (ROOT / 'config' / f'fastdds{version}.xml').read_text('utf-8')
     ours = (ROOT / 'test' / 'support' / 'dds.xml').read_text('utf-8')
-    assert ElementTree.canonicalize(block, strip_text=True) == ElementTree.canonicalize(
-        ours, strip_text=True, exclude_tags=[
+    assert ElementTree.canonicalize(shipped, strip_text=True) == ElementTree.canonicalize(
+        ours.replace('heartbeatPeriod', element), strip_text=True, exclude_tags=[
             f'{{{NAMESPACE}}}{tag}' for tag in (
                 'transport_descriptors', 'useBuiltinTransports', 'userTransports')])
+
+
+def test_profile_of_config_is_taken_by_the_dds_of_this_ros(tmp_path: Path) -> None:
+    profile = ROOT / 'config' / f'fastdds{3 if HAS_FAST_DDS_3 else 2}.xml'
+    done = subprocess.run(
+        [sys.executable, '-c', 'import rclpy; rclpy.init(); rclpy.create_node("profile")'],
+        env=os.environ | {PROFILES_VARIABLE: str(profile)}, check=True, capture_output=True,
+        text=True)
+    assert 'XMLPARSER' not in done.stdout + done.stderr

@@ -22,6 +22,7 @@ test sessions side by side do not hear each other.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
+from importlib.metadata import version
 import os
 from pathlib import Path
 import signal
@@ -45,13 +46,24 @@ from rclpy.parameter import parameter_value_to_python
 from rclpy.qos import QoSProfile
 from support.forked import Forked
 
+HAS_FAST_DDS_3 = int(version('rclpy').partition('.')[0]) >= 9  # of ROS Kilted
+PROFILES_VARIABLE = f'{"FASTDDS" if HAS_FAST_DDS_3 else "FASTRTPS"}_DEFAULT_PROFILES_FILE'
+
+
+def profiles_text() -> str:
+    """Return the profiles of the tests as the Fast DDS of this ROS spells them."""
+    text = Path(__file__).with_name('dds.xml').read_text(encoding='utf-8')
+    return text.replace('heartbeatPeriod', 'heartbeat_period') if HAS_FAST_DDS_3 else text
+
+
 # Read when the first context is made, here and in every child process. The profile keeps all on
 # 127.0.0.1, without shared memory, which rmw_fastrtps adds wherever the range is LOCALHOST.
 _LOGS = tempfile.TemporaryDirectory(prefix='abdf1_log_')  # goes away with this process
 os.environ |= {
     'ROS_LOG_DIR': _LOGS.name, 'RCUTILS_COLORIZED_OUTPUT': '0',
     'RMW_IMPLEMENTATION': 'rmw_fastrtps_cpp', 'ROS_AUTOMATIC_DISCOVERY_RANGE': 'SYSTEM_DEFAULT',
-    'FASTRTPS_DEFAULT_PROFILES_FILE': str(Path(__file__).with_name('dds.xml'))}
+    PROFILES_VARIABLE: f'{_LOGS.name}/dds.xml'}
+Path(_LOGS.name, 'dds.xml').write_text(profiles_text(), encoding='utf-8')
 
 OK, WARN, ERROR = DiagnosticStatus.OK, DiagnosticStatus.WARN, DiagnosticStatus.ERROR
 
