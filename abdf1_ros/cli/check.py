@@ -143,7 +143,7 @@ def pairs(folder: Path) -> tuple[list[tuple[str, Path, Path]], list[str]]:
     others = []
     for path in sorted(folder.rglob('*.csv')):
         name, end = str(path.relative_to(folder)), path.name[-len(_ENDS[0]):]
-        line = name[:-len(end)].rstrip('/_-. ') or folder.name
+        line = name[:-len(end)].rstrip('/_-. ') or folder.resolve().name
         if end in _ENDS and end not in found.get(line, ()):
             found.setdefault(line, {})[end] = path
         else:

@@ -43,6 +43,7 @@ from abdf1_ros.cli.terminal import (
     EXIT_FAILED,
     EXIT_USAGE,
     has_reader_left,
+    is_port,
     may_replace,
     NoPort,
     prepare_output,
@@ -245,6 +246,8 @@ def _parse(args: Sequence[str] | None) -> argparse.Namespace:
     parser.add_argument('--seconds', type=seconds_option, default=math.inf,
                         help='end after so many seconds')
     options = parser.parse_args(args)
+    if port := next(filter(is_port, options.files), None):
+        parser.error(f'did you mean --port {port}? A FILE is a recording')
     if sum(map(bool, (options.files, options.port, options.tap))) != 1:
         parser.error('give files, or --port, or --tap')
     if options.tap and options.tap[0] == options.tap[1] != 'pty':

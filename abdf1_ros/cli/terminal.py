@@ -56,6 +56,8 @@ _ADVICE = {
                   'again',
     errno.ENOENT: '"plc ports" lists the ports that there are'}
 
+_ALIKE = 0.7  # --period is named for --perod, --port not for --force
+
 _PROGRESS_DELAY = 2.0  # shorter work shows no progress
 
 
@@ -170,7 +172,8 @@ def has_reader_left(error: OSError, tell: Callable[[str], None]) -> bool:
 def reason_of(name: str, error: OSError) -> str:
     """Return why ``name`` cannot be used, and advice where there is any; it is named once."""
     text = error.strerror or str(error)
-    advice = advice_for(error.errno) if name.startswith('/dev/') else ''
+    advice = advice_for(error.errno) if name.startswith('/dev/') else \
+        f'a device path is /dev/{name}' if name.startswith('tty') else ''
     return (text if name in text else f'{name}: {text}') + (f'; {advice}' if advice else '')
 
 
@@ -250,7 +253,7 @@ class _Parser(argparse.ArgumentParser):
 
     def _surplus(self, words: Sequence[str]) -> str:
         """Return what to do with words that are no options, and too many."""
-        if words[0].startswith('/dev/') or '://' in words[0]:
+        if words[0].startswith('/dev/') or is_port(words[0]):
             return f'; did you mean --port {words[0]}?'
         places = [action for action in self._actions if not action.option_strings]
         if any(action.nargs in ('+', '*') for action in places):
@@ -264,11 +267,16 @@ class _Parser(argparse.ArgumentParser):
         self.exit(2, f'{self.prog}: error: {message}\n"{self.prog} --help" tells what it takes\n')
 
 
+def is_port(word: str) -> bool:
+    """Tell whether a word is more likely a port than anything else."""
+    is_device = word.startswith(('/dev/tty', '/dev/serial/', 'tty')) and not Path(word).is_file()
+    return is_device or '://' in word
+
+
 def _alike(name: str, options: Sequence[str]) -> list[str]:
-    """Return the options that a name may stand for: all that begin with a single letter."""
-    if len(name) == 1:
-        return [option for option in options if option[2:].startswith(name)]
-    return difflib.get_close_matches(f'--{name}', options, 2)
+    """Return the options that a name may stand for: all that begin with it, or those like it."""
+    return [option for option in options if name and option[2:].startswith(name)] \
+        or difflib.get_close_matches(f'--{name}', options, 2, _ALIKE)
 
 
 def command_parser(name: str, description: str | None,

@@ -136,7 +136,7 @@ def read_range(text: str, parse: Callable[[str], Address]) -> Address | AddressR
                                      'last address, too')
         end = _NUMBER.sub(end, start)
     first, last = parse(start), parse(end)
-    found = AddressRange(first, last, _is_whole(first, start) and _is_whole(last, end), is_short)
+    found = AddressRange(first, last, is_element(first, start) and is_element(last, end), is_short)
     found.length()  # raises what is wrong with both ends together
     return found
 
@@ -159,7 +159,7 @@ def _of_count(first: Address, names_word: bool, count: int) -> AddressRange:
     return AddressRange(first, last, is_whole, is_short=True)
 
 
-def _is_whole(address: Address, text: str) -> bool:
+def is_element(address: Address, text: str) -> bool:
     """Tell whether a text names an element of a structure without a word of it."""
     return address.file_type.is_structure and address.bit is None and '.' not in text
 

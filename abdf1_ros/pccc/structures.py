@@ -44,6 +44,23 @@ def value_addresses(address: Address) -> list[str]:
             for member in address.layout.members.values() if member.word and member.bit is None]
 
 
+def named_runs(address: Address) -> list[tuple[Address, int, int]]:
+    """
+    Return the named words of the element at an address: runs of values of one size.
+
+    Of each run the first address, the number of values, and the words of a value; a word whose
+    bits have names is a value of one word.
+    """
+    sizes = {member.word: member.words for member in address.layout.members.values()}
+    runs: list[list[int]] = []
+    for word, size in sorted(sizes.items()):
+        if runs and runs[-1][2] == size and runs[-1][0] + runs[-1][1] * size == word:
+            runs[-1][1] += 1
+        else:
+            runs.append([word, 1, size])
+    return [(replace(address, word=word, bit=None), count, size) for word, count, size in runs]
+
+
 def type_fault(address: Address, kind: ValueType, length: int) -> str | None:
     """Return the word of ``length`` elements that is not a ``kind``, None if all are."""
     if not address.file_type.is_structure or kind is ValueType.BOOL:

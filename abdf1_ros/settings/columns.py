@@ -195,7 +195,8 @@ MAP_COLUMNS = (
            'with Mode Master: the station of a gateway on this line (KF2, KF3, KE) behind which '
            'Station is',
            commands=_PLCS),
-    Column('Description', 'none', 'what it is in the plant, to be read',
+    Column('Description', 'none',
+           'what it is in the plant, to be read; in brackets at its end the unit: Tank level [%]',
            kind=TEXT),
     Column('Alarm', 'none',
            'of bits: WARN or ERROR, the level on /diagnostics while a bit is 1; "WARN 0" or '

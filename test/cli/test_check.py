@@ -363,3 +363,13 @@ def test_one_file_is_not_enough(
     with pytest.raises(SystemExit):
         main([str(files[0])])
     assert f'{files[0]} is not a folder, so a map CSV has to follow' in capsys.readouterr().err
+
+
+def test_folder_of_this_place_has_its_own_name(
+        tmp_path: Path, monkeypatch: pytest.MonkeyPatch,
+        capsys: pytest.CaptureFixture[str]) -> None:
+    write_csv(tmp_path / 'net.csv', 'Com_Port', ['/dev/ttyUSB0'])
+    write_csv(tmp_path / 'map.csv', 'Tag,Command,Address,Station,PLC_Type', ['a,Read,N7:0,1,SLC'])
+    monkeypatch.chdir(tmp_path)
+    main(['.'])
+    assert capsys.readouterr().out.startswith(f'{tmp_path.name}: 1 row, port /dev/ttyUSB0')

@@ -15,6 +15,7 @@
 """The command: files, a tap between the simulator and a master, and what it refuses."""
 
 from collections.abc import Iterator
+from contextlib import suppress
 import json
 import os
 from pathlib import Path
@@ -352,3 +353,16 @@ def test_reader_that_leaves_does_not_cut_a_tap(tmp_path: Path, way: str, goes_on
     else:
         os.write(near, SAID[0] + SAID[1])
     assert sniff.wait(PATIENCE) == 0
+
+
+@pytest.mark.parametrize('args, text', [
+    (('ttyUSB0',), 'did you mean --port ttyUSB0? A FILE is a recording'),
+    (('/dev/ttyUSB99',), 'did you mean --port /dev/ttyUSB99? A FILE is a recording'),
+    (('socket://127.0.0.1:1',), 'did you mean --port socket://127.0.0.1:1?'),
+    (('--port', 'ttyUSB99'), 'ttyUSB99: No such file or directory; a device path is '
+                             '/dev/ttyUSB99')])
+def test_port_that_is_named_in_another_way(
+        args: tuple[str, ...], text: str, capsys: pytest.CaptureFixture[str]) -> None:
+    with suppress(SystemExit):
+        main(args)
+    assert text in capsys.readouterr().err

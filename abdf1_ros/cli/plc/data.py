@@ -19,6 +19,7 @@ from __future__ import annotations
 from collections import defaultdict
 from collections.abc import Iterator, Sequence
 from collections.abc import Mapping as MappingType
+from dataclasses import replace
 from enum import Enum
 from functools import partial
 import re
@@ -33,10 +34,13 @@ from abdf1_ros.errors import Abdf1Error, FormatError, PortLost, RemoteError
 from abdf1_ros.numbers import decimal_number, two_readings, whole_number
 from abdf1_ros.open_line import Pending
 from abdf1_ros.pccc import steps
-from abdf1_ros.pccc.families import FAMILIES
+from abdf1_ros.pccc.address import Address, BITS
+from abdf1_ros.pccc.address_range import AddressRange, is_element
+from abdf1_ros.pccc.families import FAMILIES, parse_range
 from abdf1_ros.pccc.file_types import FileType, PlcType
 from abdf1_ros.pccc.processor import Processor, USUAL
 from abdf1_ros.pccc.steps import AddressedValues
+from abdf1_ros.pccc.structures import named_runs
 from abdf1_ros.pccc.values import Values, ValueType
 from abdf1_ros.problems import ConfigurationError, Problem
 from abdf1_ros.settings.csv_table import Row
@@ -51,6 +55,7 @@ _ARGUMENTS = {'Address': 'ADDRESS', 'Length': '--length', 'Type': '--type',
               'Via': '--via'}
 
 _WITH_BASE = re.compile('0(?:x[0-9a-f]+|b[01]+|o[0-7]+)', re.IGNORECASE)
+_UNIT = re.compile(r'\[(?P<unit>[^][]{1,12})\]$')
 _VALUES_IN_ROW = 10
 _BITS_IN_ROW = 16
 _BETWEEN = '  '
@@ -85,6 +90,40 @@ def mapping_of(address: str, cells: MappingType[str, str], item: int = 1) -> Map
     return mapping
 
 
+def mappings_of(address: str, cells: MappingType[str, str], item: int = 1) -> list[Mapping]:
+    """
+    Return the mappings of an address: several where one read cannot have all that it names.
+
+    Elements of structures without a word of them, such as T4:0 or PD10:0-1, are all of their named
+    words. Raises ConfigurationError like ``mapping_of``.
+    """
+    elements = [] if {'Length', 'Type'} & {*cells} else _elements(address, cells)
+    runs = [run for element in elements for run in named_runs(element)]
+    if not runs:
+        return [mapping_of(address, cells, item)]
+    first, last = elements[0], elements[-1]
+    if len(runs) == len(elements) and runs[0][1] == first.layout.words:
+        runs = [(first, len(elements) * first.layout.words, 1)]
+    wide = ValueType.INT32 if last.file_type.is_function else ValueType.FLOAT32
+    return [replace(mapping_of(str(place), {
+        **cells, 'Length': str(count), 'Type': (wide if words > 1 else ValueType.INT16).value},
+        item), remarks=()) for place, count, words in runs]
+
+
+def _elements(text: str, cells: MappingType[str, str]) -> list[Address]:
+    """Return the elements of structures that an address names as a whole, none for others."""
+    plc_type = PlcType(cells.get('PLC_Type', PlcType.SLC.value))
+    ways = {way.value.lower(): way for way in FAMILIES[plc_type].accesses}
+    try:
+        found = parse_range(text, plc_type, ways.get(cells.get('Access', '').lower()))
+    except FormatError:
+        return []  # ``mapping_of`` tells it
+    if isinstance(found, AddressRange):
+        numbers = range(found.first.element, found.last.element + 1) if found.is_whole else ()
+        return [replace(found.first, element=number) for number in numbers]
+    return [found] if is_element(found, text) else []
+
+
 def check_for_some_family(addresses: Sequence[str], cells: MappingType[str, str],
                           texts: Sequence[str] = ()) -> None:
     """
@@ -96,7 +135,8 @@ def check_for_some_family(addresses: Sequence[str], cells: MappingType[str, str]
         errors: dict[str, Abdf1Error] = {}
         for family in FAMILIES:
             try:
-                parse_values(mapping_of(address, {'PLC_Type': family.value, **cells}, item), texts)
+                for mapping in mappings_of(address, {'PLC_Type': family.value, **cells}, item):
+                    parse_values(mapping, texts)
             except (ConfigurationError, FormatError) as error:
                 errors[family.value] = error
         if len(errors) == len(FAMILIES):
@@ -238,7 +278,8 @@ def _number(mapping: Mapping, text: str) -> float:
     value: float | None
     if kind is not ValueType.FLOAT32:
         value = int(text, 0) if _WITH_BASE.fullmatch(text) else whole_number(text)
-        right = f'a whole number from {low:.0f} to {high:.0f}'
+        right = '0 or 1' if kind is ValueType.BOOL else \
+            f'a whole number from {low:.0f} to {high:.0f}'
     elif right := two_readings(text):
         raise FormatError(f'"{text}" could be two numbers; write {right}')
     else:
@@ -285,25 +326,49 @@ def rows(mapping: Mapping, values: Values, names: Sequence[str], radix: Radix = 
     """
     Yield values in rows of up to ``room`` characters, each with the name of its first.
 
-    ``names`` are the ``labels`` of all values; where one has a tag each value has a row.
+    ``names`` are the ``labels`` of all values; where one has a tag each value has a row. Bits are
+    numbered as the file numbers them, and a value has the unit of its row.
     """
     if isinstance(values, str):
         yield names[0], repr(values)
         return
+    has_tags = any(' ' in name for name in names)
     texts = value_texts(mapping, values, radix)
+    if mapping.type is ValueType.BOOL and len(texts) > 1 and not has_tags:
+        texts = [f'{_bit(mapping.place_of(number))}={text}' for number, text in enumerate(texts)]
+    if radix is Radix.BINARY and mapping.type in (ValueType.INT16, ValueType.UINT16):
+        texts = [f'{text}  {_bits_set(mapping.place_of(number), value)}'.rstrip()
+                 for number, (text, value) in enumerate(zip(texts, values, strict=True))]
+    if unit := unit_of(mapping):
+        texts = [f'{text} {unit}' for text in texts]
     width = max(map(len, texts))
     has_members = mapping.address.file_type.is_structure and mapping.address.bit is None
-    if has_members and mapping.length > 1:
+    if has_members and not mapping.scaling:
         yield from zip(names, map(partial(_with_bits, mapping), range(len(texts)), values, texts),
                        strict=True)
         return
-    step = 1 if any(' ' in name for name in names) else \
+    step = 1 if has_tags or any('  ' in text for text in texts) else \
         _BITS_IN_ROW if mapping.type is ValueType.BOOL else _VALUES_IN_ROW
     if room is not None:
         step = min(step, max(1, (room + len(_BETWEEN)) // (width + len(_BETWEEN))))
     for first in range(0, len(texts), step):
-        shown = (text.rjust(width) for text in texts[first:first + step])
+        pad = str.ljust if radix is Radix.BINARY else str.rjust
+        shown = (pad(text, width) for text in texts[first:first + step])
         yield names[first], _BETWEEN.join(shown)
+
+
+def unit_of(mapping: Mapping) -> str:
+    """Return the unit that a Description ends with, as in "Tank level [%]"; empty for none."""
+    match = _UNIT.search(mapping.description)
+    return printable(match['unit']) if match else ''
+
+
+def _bit(place: Address) -> str:
+    return '/' + str(place).rpartition('/')[2]
+
+
+def _bits_set(place: Address, value: float) -> str:
+    return ' '.join(_bit(place.with_bit(bit)) for bit in range(BITS) if int(value) >> bit & 1)
 
 
 def _with_bits(mapping: Mapping, number: int, value: float, text: str) -> str:

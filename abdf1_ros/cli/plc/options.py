@@ -147,7 +147,7 @@ def _complete_write(write: argparse.ArgumentParser) -> None:
     _add_data_options(write, f'needed in half duplex (default in full: {DEFAULT_STATION})')
     write.add_argument('address', metavar='ADDRESS',
                        help='such as N7:10, B3:0/5, F8:2; with --map a tag')
-    write.add_argument('values', metavar='VALUE', nargs='+',
+    write.add_argument('values', metavar='VALUE', nargs='*',
                        help='numbers, 0x and 0b too; 0 and 1 for bits; one text for a string')
     write.add_argument('--map', metavar='FILE',
                        help='a map CSV: a row is written by its tag, scaled, within Min and Max, '

@@ -265,12 +265,14 @@ def traffic(counters: Counters, stray: str = '') -> str:
             f'received: {", ".join(came)}')
 
 
-def type_hint(session: Session, station: int, error: Abdf1Error, plc_type: str | None) -> str:
-    """Return the type of a PLC that refuses commands because another type was given."""
-    if plc_type is None or not isinstance(error, RemoteError):
+def type_hint(session: Session, station: int, plc_type: str | None) -> str:
+    """Return what a PLC is where that is not the type that is given; empty where it is unknown."""
+    if plc_type is None:
         return ''
     try:
         identity = session.ask(station, identify())
+    except PortLost:
+        raise
     except Abdf1Error:
         return ''
     if identity.plc_type is None or identity.plc_type.value == plc_type:

@@ -52,7 +52,8 @@ class Session(open_line.OpenLine):
     """
     The line of a net CSV; with ``via`` all others are behind this gateway.
 
-    ``routes`` are the gateways of single stations.
+    ``routes`` are the gateways of single stations. ``said`` has the advice that was
+    given, ``is_silent`` tells that a command had no reply.
 
     Raises NoPort when the port cannot be opened.
     """
@@ -61,6 +62,8 @@ class Session(open_line.OpenLine):
                  record: str | None = None, routes: Mapping[int, int] | None = None) -> None:
         self.network = network
         self.via = via
+        self.said: set[str] = set()
+        self.is_silent = False
         through = {} if via is None else dict.fromkeys(range(MAX_STATION + 1), via)
         try:
             super().__init__(network.line_mode, network.line, PortSettings.of(network), absent,

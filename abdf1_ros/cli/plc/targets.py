@@ -21,6 +21,7 @@ from collections.abc import Collection, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from difflib import get_close_matches
+import re
 
 from abdf1_ros.cli.plc import data
 from abdf1_ros.cli.plc.exports.form import Cells
@@ -36,6 +37,8 @@ from abdf1_ros.settings.mapping import Command, Mapping
 from abdf1_ros.settings.network import Network
 from abdf1_ros.settings.rows import Rows
 from abdf1_ros.text import first, printable, shown
+
+_LIKE_A_TAG = re.compile(r'(?![A-Z]{1,3}\d*$)[A-Z_][\w/.]*', re.ASCII | re.IGNORECASE)
 
 # Options that say for an address what a row of a map says itself.
 _FOR_ADDRESSES = ('length', 'type', 'word_order', 'access', 'processor', 'plc_type', 'via')
@@ -81,7 +84,12 @@ def to_read(options: argparse.Namespace) -> Targets:
         if not options.addresses:
             raise ConfigurationError([Problem(
                 'ADDRESS', 'name one such as N7:0, or a map with --map, for all of its rows')])
-        data.check_for_some_family(options.addresses, cells)
+        try:
+            data.check_for_some_family(options.addresses, cells)
+        except ConfigurationError as error:
+            hints = [Problem('--map', f'if {shown(word)} is a tag, name its map with --map FILE')
+                     for word in options.addresses if _LIKE_A_TAG.fullmatch(word)]
+            raise ConfigurationError([*error.problems, *hints]) from None
         return Targets(options.addresses, cells)
     mappings = rows_of_map(options.map)
     rows = {row.tag: replace(row, is_on_demand=False) for row in mappings.of_plcs if row.polls}
@@ -107,6 +115,11 @@ def to_read(options: argparse.Namespace) -> Targets:
 
 def to_write(options: argparse.Namespace) -> Targets:
     """Return what "plc write" writes; raises ConfigurationError where no PLC could take it."""
+    address, is_both, value = options.address.partition('=')
+    if is_both and not options.map:  # N7:10=5
+        options.address, options.values = address, [value] * bool(value) + options.values
+    if not options.values:
+        raise ConfigurationError([Problem('VALUE', 'say what to write, as in N7:10 5')])
     if options.map:
         mappings = rows_of_map(options.map)
         row = _row_to_write(mappings, options.map, options.address)

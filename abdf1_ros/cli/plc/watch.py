@@ -273,9 +273,9 @@ class Watch:
             with_curve = f'{text:8}  {curve}'
             if curve and len(with_curve) <= room:  # never a part of one
                 text, value = with_curve, _VALUE_AND_CURVE
-            cells.append((name, *head, text))
-            cells += [(name, *[''] * len(head), text) for name, text in more]
-        lines = table(('address', *titles, value), cells, right=(1, 3)).split('\n')
+            cells.append((name, *head, text, printable(mapping.description)))
+            cells += [(name, *[''] * len(head), text, '') for name, text in more]
+        lines = _with_descriptions(('address', *titles, value), cells, width - taken)
         above, below = [*self._modes()], self._faults_of_line()
         left = height - 1 - len(above) - len(below)
         if len(lines) > left:
@@ -288,6 +288,16 @@ class Watch:
             f'\x1b[{self._height}A' if size == self._size else '\x1b[H'
         print(start + '\n'.join(f'\x1b[K{line}' for line in picture), end='\n\x1b[J', flush=True)
         self._height, self._size = len(picture), size
+
+
+def _with_descriptions(titles: Sequence[str], cells: Sequence[tuple[str, ...]],
+                       left: int) -> list[str]:
+    """Return the lines of the table; its last column, the descriptions, only where it fits."""
+    title = 'description'
+    if not any(row[-1] for row in cells) \
+            or left - max(len(row[-2]) for row in cells) < len(title) + 2:
+        cells, title = [(*row[:-1], '') for row in cells], ''
+    return table((*titles, title), cells, right=(1, 3)).split('\n')
 
 
 def _quoted(text: str) -> str:

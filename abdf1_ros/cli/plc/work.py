@@ -85,8 +85,8 @@ def _mappings(options: argparse.Namespace, session: Session, targets: Targets) -
     plc_type, processor = _family(options, session)
     kind = {'PLC_Type': plc_type.value, 'Processor': data.processor_cell(processor)}
     cells = {column: text for column, text in kind.items() if text} | targets.cells
-    return [entry if isinstance(entry, Mapping) else data.mapping_of(entry, cells, item)
-            for item, entry in enumerate(targets.entries, 1)]
+    return [mapping for item, entry in enumerate(targets.entries, 1) for mapping in (
+        [entry] if isinstance(entry, Mapping) else data.mappings_of(entry, cells, item))]
 
 
 def _line(options: argparse.Namespace, prepared: Any) -> Network:
@@ -143,41 +143,60 @@ def _asking(work: Callable[[argparse.Namespace, Session, Any], int],
                 return work(options, session, prepared)
             except Abdf1Error as error:
                 return _failed(options, session, error)
+            finally:
+                if session.is_silent:
+                    _complain(presence.traffic(session.counters, session.stray))
     return command
 
 
 def _failed(options: argparse.Namespace, session: Session, error: Abdf1Error, place: str = '',
-            plc_type: str | None = None, row: Mapping | None = None) -> int:
+            row: Mapping | None = None) -> int:
     """Tell why a request to a station, about ``place``, has failed; return the exit status."""
     if isinstance(error, ConfigurationError | PortLost):
         raise error
     station = options.station if row is None else row.station
     _complain(f'{place and f"{place} of "}station {station}: {error}')
-    if advice := presence.hint(session, error) \
-            or presence.type_hint(session, station, error, plc_type):
-        _complain(advice)
-    if isinstance(error, LinkError):
-        _complain(presence.traffic(session.counters, session.stray))
+    if isinstance(error, RemoteError):
+        _check_type(options, session, station)
+    _advise(session, presence.hint(session, error))
+    session.is_silent |= isinstance(error, LinkError)
     if options.is_assumed and isinstance(error, LinkError):
-        _complain(f'no station was given, so {station} was asked; "plc scan" tells who is there')
-        options.is_assumed = False  # once is enough
+        _advise(session, f'no station was given, so {station} was asked; "plc scan" tells who is '
+                         'there')
     if place and isinstance(error, RemoteError) and is_address_fault(error):
-        _complain(f'"plc files {station}" tells which data files it has, and how long they are')
+        _advise(session, f'"plc files {station}" tells which data files it has, and how long they '
+                         'are')
     return EXIT_FAILED
 
 
+def _check_type(options: argparse.Namespace, session: Session, station: int) -> None:
+    """Tell where a PLC is of another type than an option says, asking it once."""
+    if '--plc-type' not in session.said:
+        session.said.add('--plc-type')
+        _advise(session, presence.type_hint(session, station, options.plc_type))
+
+
+def _advise(session: Session, text: str) -> None:
+    """Give advice, but once in a command."""
+    if text and text not in session.said:
+        session.said.add(text)
+        _complain(text)
+
+
 def _read(options: argparse.Namespace, session: Session, targets: Targets) -> int:
-    status, plc_type = 0, options.plc_type
+    status, is_read = 0, False
     for mapping in _mappings(options, session, targets):
         for remark in mapping.remarks if mapping.address.file_type.is_structure else ():
             _complain(remark.text)
         try:
             values = data.read(session, mapping)
         except Abdf1Error as error:
-            status = _failed(options, session, error, data.named(mapping), plc_type, mapping)
-            plc_type = None  # once is enough
+            status = _failed(options, session, error, data.named(mapping), mapping)
         else:
+            is_read = True
             _print_values(mapping, values, RADIXES[options.radix], targets.tags)
+    if is_read:  # some PLCs answer commands of another family
+        _check_type(options, session, options.station)
     return status
 
 
@@ -185,8 +204,10 @@ def _print_values(mapping: Mapping, values: Values, radix: data.Radix = data.Rad
                   tags: data.Tags | None = None) -> None:
     rows = list(data.rows(mapping, values, data.labels(mapping, tags), radix))
     width = max(len(address) for address, _ in rows)
+    note = mapping.description if data.is_row(mapping) else ''
     for address, text in rows:
-        print(f'{address:{width}}  {printable(text)}')
+        print(printable(f'{address:{width}}  {text}  {note}'.rstrip()))
+        note = ''
 
 
 def _write(options: argparse.Namespace, session: Session, targets: Targets) -> int:
@@ -198,7 +219,10 @@ def _write(options: argparse.Namespace, session: Session, targets: Targets) -> i
     if not options.yes and not _is_confirmed(options, session, writing):
         _complain('nothing was written; --yes writes')
         return EXIT_USAGE
-    return _carry_out(session, writing)
+    status = _carry_out(session, writing)
+    if status != EXIT_UNKNOWN:
+        _check_type(options, session, mapping.station)
+    return status
 
 
 def _is_confirmed(options: argparse.Namespace, session: Session, writing: data.Writing) -> bool:
@@ -208,7 +232,7 @@ def _is_confirmed(options: argparse.Namespace, session: Session, writing: data.W
         print('now:')
         _print_values(mapping, data.read(session, mapping))
     except Abdf1Error as error:
-        _failed(options, session, error, data.named(mapping), row=mapping)
+        _failed(options, session, error, data.named(mapping), mapping)
     return _is_wanted(f'write {writing} to {data.named(mapping)} of station {mapping.station}')
 
 

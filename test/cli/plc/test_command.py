@@ -73,14 +73,17 @@ def plc(line: str, capsys: pytest.CaptureFixture[str]) -> Plc:
 
 
 @pytest.mark.parametrize('station, address, options, lines', [
-    (1, 'B3:0/2', ('--length', '6'), ['B3:0/2 1 0 0 1 1 0']),
+    (1, 'B3:0/2', ('--length', '6'), ['B3:0/2 /2=1 /3=0 /4=0 /5=1 /6=1 /7=0']),
     (1, 'I:017/12', (), ['I:017/12 1']), (1, 'I:017', (), ['I:017 1024']),
     (1, 'N7:0', ('--length', '2'), ['N7:0 1200 -800']),
     (1, 'F8:0', ('--length', '3'), ['F8:0 12.5 40.25 -3.5']),
     (1, 'A10:0', ('--type', 'string', '--length', '3'), ["A10:0 'abc'"]),
     (1, 'N7:6', ('--type', 'uint32', '--word-order', 'High'), ['N7:6 65538']),
     (1, 'T4:1-1', (), ['T4:1 8192 DN', 'T4:1.PRE 500', 'T4:1.ACC 120']),
+    (1, 'T4:1', (), ['T4:1 8192 DN', 'T4:1.PRE 500', 'T4:1.ACC 120']),
     (1, 'T4:1.ACC', (), ['T4:1.ACC 120']),
+    (1, 'N7:0', ('--radix', 'bin'), ['N7:0 0000010010110000 /4 /5 /7 /10']),
+    (1, 'I:017', ('--radix', 'bin'), ['I:017 0000010000000000 /12']),
     (1, 'T4:1/DN', (), ['T4:1/DN 1']), (2, 'C5:2.ACC', (), ['C5:2.ACC -17']),
     (2, 'I:1.0', ('--length', '2'), ['I:1.0 5 40960']), (2, 'O:2.0/4', (), ['O:2.0/4 1']),
     (2, 'L10:0', ('--length', '2'), ['L10:0 -70000 2000000000']),
@@ -110,9 +113,9 @@ def test_tags_of_a_map_stand_beside_addresses(plc: Plc, tmp_path: Path) -> None:
     assert plc('read', 'N7:0', '--map', str(tmp_path / 'none.csv')).status == 2
 
 
-MAP_OF_TAGS = ('Tag,Command,Address,Station,PLC_Type,Length,Scale,Min,Max', [
-    'speed,Read,N7:0-1,1,PLC5,,0.1,,', 'level,ReadWrite,N7:30,2,SLC,,0.5,0,10',
-    'order,Write,N7:31,2,SLC,,,,'])
+MAP_OF_TAGS = ('Tag,Command,Address,Station,PLC_Type,Length,Scale,Min,Max,Description', [
+    'speed,Read,N7:0-1,1,PLC5,,0.1,,,', 'level,ReadWrite,N7:30,2,SLC,,0.5,0,10,Tank 4 [%]',
+    'order,Write,N7:31,2,SLC,,,,,'])
 
 
 def test_rows_of_a_map_are_read_by_their_tags(plc: Plc, tmp_path: Path) -> None:
@@ -139,7 +142,7 @@ def test_map_says_of_each_tag_what_options_say_of_addresses(plc: Plc, tmp_path: 
         'plc: --length: is for an address; the map says it of each tag\n')
     assert plc('read', 'level', '--station', '1', '--map', path).err == (
         'plc: --station: level is of station 2 in the map\n')
-    assert plc('read', '--station', '2', '--map', path).lines == ['N7:30 level 2330']
+    assert plc('read', '--station', '2', '--map', path).lines == ['N7:30 level 2330 % Tank 4 [%]']
     assert plc('read', '--station', '3', '--map', path).err == (
         f'plc: {path}: has no row of station 3 that is read\n')
     assert plc('read', 'Level', '--map', path).err.endswith(
@@ -202,6 +205,40 @@ def test_what_a_row_does_not_allow_is_told_before_the_port_is_opened(
     assert text in capsys.readouterr().err
 
 
+def test_write_with_an_equals_sign(plc: Plc) -> None:
+    assert plc('write', 'N7:58=6', '--station', '2', '--yes').lines[-1] == 'N7:58 6'
+
+
+STRUCTURES = """\
+Station,PLC_Type,Address,Length,Values
+1,PLC5,PD10:0,164,
+1,PLC5,PD10:0/EN,1,1
+1,PLC5,PD10:0.SP,2,350 1.5
+1,PLC5,PD10:1.TIE,1,7.5
+1,PLC5,MG11:0,56,
+1,PLC5,MG11:0.ERR,1,-3
+2,SLC,PD10:0,23,
+2,SLC,PD10:0.SPS,1,12
+"""
+
+
+def test_element_of_a_structure_is_a_block_of_its_named_words(
+        tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (tmp_path / 'data.csv').write_text(STRUCTURES)
+    port = str(tmp_path / 'line')
+    with running_simulator('--pty', port, '--data', str(tmp_path / 'data.csv')):
+        def read(*args: str) -> list[str]:
+            return call(main, capsys, 'read', *args, '--port', port, *PATIENT).lines
+        lines = read('PD10:0-1')
+        assert lines[:4] == ['PD10:0 -32768 EN', 'PD10:0.1 0', 'PD10:0.SP 350', 'PD10:0.KP 1.5']
+        assert len(lines) == 2 * 26 and lines[-1] == 'PD10:1.TIE 7.5'
+        assert read('MG11:0') == ['MG11:0 0', 'MG11:0.ERR -3', 'MG11:0.RLEN 0', 'MG11:0.DLEN 0']
+        assert read('PD10:0', '--station', '2')[:3] == ['PD10:0 0', 'PD10:0.SPS 12', 'PD10:0.KC 0']
+        watched = call(main, capsys, 'watch', 'MG11:0', '--count', '1', '--port', port, *PATIENT)
+        assert [line.split()[1:] for line in watched.lines] == [
+            ['MG11:0', '0'], ['MG11:0.ERR', '-3'], ['MG11:0.RLEN', '0'], ['MG11:0.DLEN', '0']]
+
+
 def test_write_over_a_fallback_is_told(plc: Plc, tmp_path: Path) -> None:
     path = write_csv(tmp_path / 'map.csv', *MAP_TO_WRITE)
     said = plc('write', 'valve', '0', '--map', str(path), '--yes')
@@ -210,8 +247,14 @@ def test_write_over_a_fallback_is_told(plc: Plc, tmp_path: Path) -> None:
         'nothing brings the value of rest back\n')
 
 
-def test_read_with_the_family_given_asks_nothing_else(plc: Plc) -> None:
-    assert plc('read', 'N7:0', '--plc-type', 'plc5').lines == ['N7:0 1200']
+def test_family_that_is_given_is_compared_with_what_the_plc_says(plc: Plc) -> None:
+    said = plc('read', 'N7:0', '--plc-type', 'plc5')
+    assert (said.lines, said.err) == (['N7:0 1200'], '')
+    told = 'plc: station 2 is SLC 5/03 series A revision 1, REM RUN; --plc-type says PLC5\n'
+    said = plc('read', 'N7:10', 'N7:11', '--plc-type', 'PLC5', '--station', '2')
+    assert (said.status, said.lines, said.err) == (0, ['N7:10 101', 'N7:11 102'], told)
+    said = plc('write', 'N7:19', '4', '--plc-type', 'PLC5', '--station', '2', '--yes')
+    assert (said.status, said.err) == (0, told)
 
 
 def test_type_that_is_not_that_of_the_plc_is_named_once(plc: Plc) -> None:
@@ -227,6 +270,8 @@ def test_read_goes_on_after_a_refusal(plc: Plc) -> None:
     assert (said.status, said.lines) == (1, ['N7:0 1200'])
     assert said.err.startswith('plc: N99:0 of station 1: STS F0 EXT STS')
     assert '"plc files 1" tells which data files it has' in said.err
+    said = plc('read', 'N99:0', 'N98:0')
+    assert said.err.count('of station 1: STS F0') == 2 and said.err.count('"plc files 1"') == 1
 
 
 def test_silence_of_a_station_that_nobody_named(plc: Plc, simulator: Process) -> None:
@@ -276,7 +321,7 @@ def test_read_over_a_net_file(line: str, files: Files, capsys: pytest.CaptureFix
 @pytest.mark.parametrize('address, values, options, lines', [
     ('N7:10', ('5', '-6', '0x10'), (), ['N7:10 5 -6 16']),
     ('F8:6', ('-1.5', '2'), (), ['F8:6 -1.5 2']), ('ST9:0', ('Tank 5',), (), ["ST9:0 'Tank 5'"]),
-    ('B3:2/3', ('1', '0', '1'), (), ['B3:2/3 1 0 1']),
+    ('B3:2/3', ('1', '0', '1'), (), ['B3:2/3 /3=1 /4=0 /5=1']),
     ('N7:50', ('70000',), ('--type', 'int32'), ['N7:50 70000']),
     ('N7:52', ('abcde',), ('--type', 'string'), ["N7:52 'abcde'"]),
     ('C5:2.PRE', ('9',), (), ['C5:2.PRE 9'])])
@@ -366,6 +411,12 @@ def test_write_of_what_cannot_be_written(plc: Plc, args: tuple[str, ...], text: 
     (('watch', 'N7:0', '--length', '0'), '--length: "0" should be a whole number from 1 to 65535'),
     (('read', 'N7:0', 'ST9:0', '--length', '3'),
      '--length of ST9:0: a string mapping has Length 1'),
+    (('watch', 'line_speed'), 'ADDRESS "line_speed": write type, file, ":", element, as in N7:0, '
+                              'B3:1/5, T4:0.ACC or I:1.0/3\nplc: --map: if line_speed is a tag, '
+                              'name its map with --map FILE'),
+    (('write', 'N7:0'), 'VALUE: say what to write, as in N7:10 5'),
+    (('write', 'N7:0='), 'VALUE: say what to write, as in N7:10 5'),
+    (('write', 'B3:0/1=on'), 'B3:0/1: "on" is not a valid bool, 0 or 1'),
     (('read', 'N7:0', 'B3:O'), 'ADDRESS "B3:O": that is the letter O where a digit should be; '
                                'write B3:0'),
     (('write', 'N7:0', '99999'), 'N7:0: "99999" is not a valid int16, a whole number from -32768 '
@@ -431,7 +482,7 @@ def test_ping_of_nobody_has_status_1_and_says_that_nothing_came(plc: Plc) -> Non
     said = plc('ping', '9', '--count', '2', *FAST)
     assert (said.status, said.lines) == (1, ['2 sent, 0 answered'])
     assert said.err.count('2509 ERR_INACTIVE_STATION: Slave Station (9) Inactive') == 2
-    assert 'not one character came' in said.err
+    assert said.err.count('not one character came') == said.err.count('plc: sent: ') == 1
     assert said.err.endswith('plc: sent: 1 command, 1 poll, 3 repetitions of them; received: '
                              '0 damaged frames, 0 NAK\n')
 
@@ -758,6 +809,9 @@ def test_signal_ends_it(tmp_path: Path) -> None:
     (('--port', '/dev/x', 'read', 'N7:0'),
      'options come after the command, as in "plc read ... --port ..."'),
     (('raed', 'N7:0'), '"raed" is not a command; did you mean read?'),
+    (('init', '/dev/x'), 'unrecognized arguments: /dev/x; did you mean --port /dev/x?'),
+    (('read', 'N7:0', '--len', '5'), 'unrecognized arguments: --len 5; did you mean --length?'),
+    (('write', 'N7:0', '5', '--force'), 'unrecognized arguments: --force\n'),
     ((), 'the following arguments are required: COMMAND')])
 def test_option_that_is_wrong_is_told_with_status_2(
         args: tuple[str, ...], text: str, capsys: pytest.CaptureFixture[str]) -> None:

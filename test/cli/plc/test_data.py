@@ -26,6 +26,7 @@ from abdf1_ros.cli.plc.data import (
     Radix,
     rows,
     tags_of,
+    unit_of,
     value_texts,
     Writing,
 )
@@ -132,7 +133,7 @@ def test_text_that_is_no_value_is_a_format_error(address: str, texts: list[str])
     ('N7:0', '1_000', '"1_000" is not a valid int16, a whole number from -32768 to 32767'),
     ('N7:0', '0xFFFF', '"0xFFFF" is not a valid int16, a whole number from -32768 to 32767; with '
                        '--type uint16 it is one'),
-    ('B3:0/1', '2', '"2" is not a valid bool, a whole number from 0 to 1'),
+    ('B3:0/1', '2', '"2" is not a valid bool, 0 or 1'),
     ('F8:0', '1_000', '"1_000" is not a valid float32, a number such as -1.5 or 2e3'),
     ('F8:0', '1,000', '"1,000" could be two numbers; write 1000 or 1.000')])
 def test_value_that_is_none_says_what_would_be_right(address: str, text: str, right: str) -> None:
@@ -162,6 +163,13 @@ def test_write_that_is_interrupted_while_it_begins_is_unknown() -> None:
     (Processor.ML1500, 'ML1500')])
 def test_processor_that_says_what_it_is(processor: Processor | None, cell: str) -> None:
     assert processor_cell(processor) == cell
+
+
+@pytest.mark.parametrize('text, unit', [
+    ('Tank level [%]', '%'), ('speed [m/min]', 'm/min'), ('[bar]', 'bar'), ('[%] of tank', ''),
+    ('a [\x1b]', r'\x1b'), ('b []', ''), ('a [plant with halls]', '')])
+def test_unit_of_a_description(text: str, unit: str) -> None:
+    assert unit_of(make('N7:0', Description=text)) == unit
 
 
 @given(st.integers(-32768, 32767))

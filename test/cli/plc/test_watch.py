@@ -247,6 +247,14 @@ def test_table_has_tags_beside_addresses(draw: Draw) -> None:
         ('N7:10 a_long_tag', ['3']), ('N7:0 speed      ', ['int16'])]
 
 
+def test_description_stands_where_there_is_room(draw: Draw) -> None:
+    level = make_mapping('N7:0', tag='level', description='Tank level [%]')
+    for width, title, end in ((100, 'description', 'Tank level [%]'), (48, 'value', '5 %'),
+                              (54, 'description', 'Tank leve...')):
+        head, line = draw([level], (level, array('h', [5])), size=(width, 9))
+        assert head.endswith(title) and line.endswith(end), width
+
+
 def test_number_has_a_curve_where_it_fits_and_can_be_shown(draw: Draw) -> None:
     news = [(SPEED, array('h', [value])) for value in (9, *range(1, 25), 12)]
     silence = (SPEED, _NoValue('silent'))
