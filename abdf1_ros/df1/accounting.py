@@ -21,7 +21,7 @@ from collections.abc import Callable
 from abdf1_ros.counters import Counters
 from abdf1_ros.df1.checksum import Checksum
 from abdf1_ros.df1.frames import Control, Frame, FrameFault, MAX_LINK_DATA, Symbol
-from abdf1_ros.df1.packet import HEADER_SIZE, is_local_status, Packet, REPLY_BIT
+from abdf1_ros.df1.packet import DIAGNOSTIC_REPLY, HEADER_SIZE, is_local_status, Packet, REPLY_BIT
 from abdf1_ros.df1.stations import ActiveStationList, MOST_OVERDUE
 from abdf1_ros.df1.tasks import Task
 from abdf1_ros.errors import CommandTimeout, WrongCommandCode
@@ -144,8 +144,11 @@ class Accounting:
             task.fail(WrongCommandCode(*details))
             return
         local_status = reply.sts if reply.sts and is_local_status(reply.sts) else 0
-        if task.blames or not local_status:
-            station = self._stations.records[number]
+        station = self._stations.records[number]
+        # A gateway may execute diagnostic commands itself, whatever node they are for.
+        is_gateways = reply.cmd == DIAGNOSTIC_REPLY and not local_status and (
+            station.local_status or number in self._stations.routes)
+        if (task.blames or not local_status) and not is_gateways:
             station.replies += 1
             station.unanswered = station.returns = 0
             station.local_status = local_status

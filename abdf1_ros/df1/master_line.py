@@ -48,7 +48,14 @@ from abdf1_ros.df1.machine import (
     Step,
 )
 from abdf1_ros.df1.mode import answer_time
-from abdf1_ros.df1.packet import BROADCAST, is_local_status, Packet, REPLY_BIT, STS_NOT_DELIVERED
+from abdf1_ros.df1.packet import (
+    BROADCAST,
+    DIAGNOSTIC_REPLY,
+    is_local_status,
+    Packet,
+    REPLY_BIT,
+    STS_NOT_DELIVERED,
+)
 from abdf1_ros.df1.probes import Asker
 from abdf1_ros.df1.sender import Reflex
 from abdf1_ros.df1.settings import LinkSettings
@@ -364,7 +371,8 @@ class MasterLine:
 
     def complete(self, task: Task, reply: Packet, *, keeps_others_waiting: bool) -> None:
         """End a task with the reply to its command."""
-        if reply.src in self.stations.routes and not is_local_status(reply.sts):
+        if reply.src in self.stations.routes and not is_local_status(reply.sts) \
+                and reply.cmd != DIAGNOSTIC_REPLY:
             # the station was heard when the reply came
             self.stations.heard(reply.src, self.machine.now)
         self.accounting.complete(task, reply, keeps_others_waiting=keeps_others_waiting)

@@ -32,6 +32,10 @@ STS_NOT_DELIVERED = 0x02
 """The destination does not acknowledge (M 8-2)."""
 
 
+DIAGNOSTIC_REPLY = 0x46
+"""The reply to echo, status and counters, which a gateway may give in place of a node."""
+
+
 def is_local_status(sts: int) -> bool:
     """Tell whether STS is of a node on the way: the command may not have got there (M 8-2)."""
     return 0 < sts < 0x10

@@ -120,10 +120,10 @@ class HalfDuplexSlave:
             return self._polled(symbol)
         if isinstance(symbol, Frame):
             return self._received(symbol)
-        if symbol is Control.ACK and just_sent:
-            # An ACK names no station: it is ours only straight after our own message.
+        if symbol is Control.ACK:
             self.counters.acks_received += 1
-            self._release()
+            if just_sent:  # an ACK names no station: it is ours only straight after our message
+                self._release()
         elif symbol is Control.NAK:
             self.counters.naks_received += 1
             self._report(Event(Message.NTC_RCVD_NAK_SYMBOL))

@@ -54,10 +54,11 @@ def decode(data: bytes) -> Identity | None:
     for start, module in _MODULES.items():
         if data[1:1 + len(start)] == start and len(data) > module.release:
             return Identity(None, module.name, *letters(data[module.release]), interface=data[2],
-                            counter_address=word_at(data, module.counters))
+                            counter_address=word_at(data, module.counters),
+                            has_no_processor=True)
     if len(data) < _NAMED_SIZE or data[1] != _NAMED:
         return None
     name = name_in(data[5:16])
     known = Identity(None, name or f'module 0x{data[2]:02X}', *release(data[4]), name=name,
-                     interface=data[2])
+                     interface=data[2], has_no_processor=True)
     return replace(known, counter_size=_KF3_COUNTERS) if data[2] == _KF3 else known

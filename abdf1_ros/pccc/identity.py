@@ -87,6 +87,7 @@ class Identity:
     code of the port that was asked. Its counters have a ``counter_layout``, or are bytes of the
     module: at ``counter_address``, ``counter_size`` of them. ``processor`` is what the map file
     would call it, None where it has no word for it. ``inquiry`` tells more about a fault.
+    A gateway or a computer card ``has_no_processor``.
     """
 
     plc_type: PlcType | None
@@ -106,6 +107,7 @@ class Identity:
     processor: Processor | None = None
     counter_layout: CounterLayout | None = None
     inquiry: Inquiry | None = field(default=None, compare=False)
+    has_no_processor: bool = False
 
     @property
     def counters(self) -> ReadCounters:

@@ -45,7 +45,7 @@ class Plant(DriverBench):
     """A living node that is read and written to, and ``absent`` ones, behind a gateway."""
 
     def __init__(self, polling: str, answer: Answer, absent: Sequence[int] = (),
-                 *, has_own: bool = False) -> None:
+                 *, has_own: bool = False, executes_diagnostics: bool = False) -> None:
         via = None if polling in _MODES else GATEWAY
         self.read = make_mapping('N7:0', station=LIVING, plc='SLC', via=via, period=200)
         self.order = make_mapping(
@@ -57,12 +57,15 @@ class Plant(DriverBench):
             for number in absent)]
         wiring, mode = _MODES.get(polling, (Wiring.HALF, {'polling': polling}))
         self.device = OddDevice(wiring, GATEWAY, (LIVING,))
-        self.device.takes = lambda data: answer if data[0] in ABSENT else Answer.ACK
+        self.device.takes = lambda data: Answer.ACK if data[0] not in ABSENT or (
+            executes_diagnostics and data[2] == 6) else answer
+        self.device.executes_diagnostics = executes_diagnostics
         super().__init__(
             rows, network=Network(
                 station=5, baud=19200, timeout=int(TIMEOUT * 1000), cmd_timeout=1000,
                 **mode),  # type: ignore[arg-type]
-            settings=DriverSettings(), start=False, far=self.device)
+            settings=DriverSettings(processor_period=1.0 if executes_diagnostics else 0.0),
+            start=False, far=self.device)
         for number in range(MESSAGES):
             self.at(1.25 * number + 0.5, lambda number=number: self.write(  # type: ignore[misc]
                 self.order, [number + 1]))
@@ -115,6 +118,19 @@ def test_node_that_comes_back_is_read_again(polling: str, answer: Answer) -> Non
     plant.run(3.0)  # seven Timeouts after the last probe at most
     assert plant.listener.changes == [(11, False), (11, True)]
     assert plant.silent == set()
+
+
+@pytest.mark.parametrize('polling', ['Message', 'Standard', 'Peer'])
+@pytest.mark.parametrize('answer', [STATUS, NAK])
+def test_node_is_not_proven_by_a_diagnostic_command_that_its_gateway_executes(
+        polling: str, answer: Answer) -> None:
+    plant = Plant(polling, answer, ABSENT[:1], executes_diagnostics=True)
+    for _ in range(20):
+        plant.run(0.1)
+        assert plant.silent == {11}
+    assert len(plant.listener.times(plant.read)) >= 90
+    assert plant.listener.changes in ([], [(11, False)])
+    assert plant.driver.checks.known(11).processor
 
 
 @pytest.mark.parametrize('polling', ['Message', 'Standard'])

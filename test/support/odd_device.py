@@ -79,6 +79,7 @@ class OddDevice:
     def __init__(self, wiring: Wiring, station: int = 1, nodes: Iterable[int] = ()) -> None:
         self.wiring, self.station = wiring, station
         self.nodes = frozenset(nodes or {station})
+        self.executes_diagnostics = False  # for all nodes
         self.words: dict[tuple[int, int, int], int] = {}
         self.takes: Callable[[bytes], Answer] = lambda data: Answer.ACK
         self.hear: Callable[[bytes], bytes] = bytes
@@ -177,7 +178,8 @@ class OddDevice:
         status, result = (_NOT_DELIVERED, b'')
         if is_refused:
             status = _ILLEGAL
-        elif data[0] in self.nodes | {self.station}:
+        elif data[0] in self.nodes | {self.station} or (
+                self.executes_diagnostics and data[2] == _ECHO):
             status, result = self._answer(data)
         reply = bytes((data[1], data[0], data[2] | _REPLY, status)) + data[4:6] + result
         if self.wiring is Wiring.HALF:

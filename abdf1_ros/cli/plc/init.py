@@ -99,6 +99,10 @@ def map_rows(stations: Iterable[Presence],
         number, identity = presence.station, presence.identity
         family = identity.plc_type if identity else None
         yield f'# station {number}: {presence}\n'
+        if identity and identity.has_no_processor:
+            yield f'# it has no processor: PLCs behind it have Via {number}; this finds them:\n' \
+                  f'#   plc scan 0-63 --via {number} --net net.csv\n'
+            continue
         if family is None or identity is None:
             yield f'# its family is not known: write PLC_Type yourself\n' \
                   f'# words_{number},Read,N7:0,{number},SLC,,10,1000,,,\n'

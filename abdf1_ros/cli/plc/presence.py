@@ -28,7 +28,7 @@ from abdf1_ros.cli.terminal import colour, GREEN, RED, YELLOW
 from abdf1_ros.counters import Counters
 from abdf1_ros.df1.echo import COMES_BACK
 from abdf1_ros.df1.packet import is_local_status
-from abdf1_ros.errors import Abdf1Error, LinkError, PortLost, RemoteError, StationInactive
+from abdf1_ros.errors import Abdf1Error, FormatError, LinkError, PortLost, RemoteError, StationInactive
 from abdf1_ros.pccc.access import Access
 from abdf1_ros.pccc.dialect import Steps
 from abdf1_ros.pccc.families import dialect_of, FAMILIES, parse_address
@@ -94,6 +94,8 @@ def look_at(session: Session, station: int) -> Presence:
     seconds = time.monotonic() - started
     if identity is not None and identity.plc_type is None and session.via not in (None, station):
         error = _refusal_of_gateway(session, station)
+        if error is None and identity.has_no_processor:
+            error = FormatError(f'its gateway answers in its place, as {identity}')
         identity = identity if error is None else None
     # A gateway answers for a station that it does not reach (M 8-2).
     is_reached = not (isinstance(error, RemoteError) and is_local_status(error.sts))

@@ -24,6 +24,7 @@ from abdf1_ros.cli.plc.files import find_files
 from abdf1_ros.cli.plc.init import map_rows, NewFiles
 from abdf1_ros.cli.plc.presence import Presence
 from abdf1_ros.cli.plc.session import Session
+from abdf1_ros.pccc import gateways
 from abdf1_ros.pccc.file_types import PlcType
 from abdf1_ros.pccc.identity import Identity
 from abdf1_ros.pccc.processor import Processor
@@ -103,6 +104,13 @@ def test_plc_of_an_unknown_family_leaves_no_later_one_out() -> None:
     rows = ''.join(map_rows([Presence(number, 0.1, identity, None, True, True)
                              for number, identity in ((1, unknown), (2, known))], {}))
     assert '# words_1,' in rows and '\nstatus_2,Read,S:0,2,SLC,' in rows
+
+
+def test_gateway_leads_to_the_nodes_behind_it() -> None:
+    gateway = gateways.decode(bytes.fromhex('00 FE 19 00 00 00 10 00 20 00'))
+    rows = ''.join(map_rows([Presence(8, 0.0, gateway, None, True, True)], {}))
+    assert 'plc scan 0-63 --via 8 --net net.csv' in rows
+    assert 'words_8' not in rows
 
 
 @pytest.mark.usefixtures('half_duplex_only')

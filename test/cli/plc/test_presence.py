@@ -148,7 +148,9 @@ def test_node_behind_a_gateway_that_answers_diagnostics_itself_is_proven_by_a_re
     with plc_line(tmp_path / 'line', plc) as name:
         found = list(scan(Network(com_port=name, timeout=2000), [3, 8, 9], via=8))
     assert [(seen.station, seen.is_there, str(seen.identity)[:7]) for seen in found] == [
-        (3, False, 'None'), (8, True, '1785-KE'), (9, True, '1785-KE')]
+        (3, False, 'None'), (8, True, '1785-KE'), (9, True, 'None')]
+    assert str(found[2]) == ('answers, but not who it is: its gateway answers in its place, as '
+                             '1785-KE series B revision A')
     assert 'STS 02' in str(found[0].error)
 
 
