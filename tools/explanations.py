@@ -170,7 +170,8 @@ COUNTERS: dict[str, str] = {
                  'messages.',
     'naks_received': 'Peer: our messages arrive damaged, or the PLC has no room. Masters: 2511.',
     'acks_sent': 'Good messages that we have received.',
-    'acks_received': 'Messages that others have received from us.',
+    'acks_received': 'Messages that others have received from us. In Mode Slave also those for '
+                     'other slaves.',
     'eots_sent': 'Mode Slave: polls when we had nothing to send.',
     'eots_received': 'Polls that came before the reply was ready.',
     'error_messages_sent': 'PLCs ask for words that no `Serve` row has.',

@@ -25,12 +25,19 @@ _BIT_AFTER_DOT = re.compile(
 _LETTERS_O = re.compile(r'(?<=[:;./0-9-])O+(?![A-Z])', re.ASCII)
 
 
+# In other programs bits of the status file count through it.
+_STATUS_BIT = re.compile(r'S2?/(?P<bit>\d{1,5})', re.ASCII)
+
+
 def corrections(text: str) -> Iterator[tuple[str, str]]:
     """Yield what may be wrong with a text, and another that may be right."""
     text = text.strip().upper()
     if _LETTERS_O.search(text):
         yield ('that is the letter O where a digit should be',
                _LETTERS_O.sub(lambda match: '0' * len(match[0]), text))
+    if found := _STATUS_BIT.fullmatch(text):
+        word, bit = divmod(int(found['bit']), 16)
+        yield 'the word of the status file comes first', f'S:{word}/{bit}'
     if _BIT_AFTER_DOT.search(text):
         yield ('a bit stands after "/"',
                _BIT_AFTER_DOT.sub(lambda match: f'{match["word"]}/{int(match["bit"])}', text))

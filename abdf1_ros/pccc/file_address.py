@@ -47,7 +47,8 @@ _FLAT_BITS = (FileType.BINARY, FileType.INTEGER, FileType.ASCII, FileType.BCD)
 # S0 writes "/" before a word of such an element, others write it before a bit.
 _NAMED_BITS = (FileType.TIMER, FileType.COUNTER, FileType.CONTROL)
 # Files that exist, but that we do not know well enough to read.
-_OTHER_FILES = {'CT': 'ControlNet transfer', 'PLS': 'programmable limit switch'}
+_OTHER_FILES = {'CT': 'ControlNet transfer', 'PLS': 'programmable limit switch',
+                'M': 'words of an I/O module, which COP brings into an N file'}
 
 
 class FileAddressing(Addressing):
@@ -134,6 +135,10 @@ class FileAddressing(Addressing):
         return element
 
     def _flat_bit(self, bit: str | None, kind: FileType, file: int) -> Address:
+        if kind.is_io and bit is not None:
+            example = f'{kind.value}:017/12' if self.is_octal(kind) else f'{kind.value}:1/3'
+            raise AddressSyntaxError('bits are not counted through the file, as its words belong '
+                                     f'to slots or racks: write the word too, as in {example}')
         if bit is None or not bit.isdigit() or kind not in _FLAT_BITS:
             raise AddressSyntaxError('an element is missing, as in N7:0')
         last = (self.last_element(kind) + 1) * BITS - 1

@@ -24,6 +24,7 @@ from abdf1_ros.df1.frames import Duplex
 from abdf1_ros.df1.machine import MIN_RESPONSE_TIME
 from abdf1_ros.pccc.address import Address
 from abdf1_ros.pccc.file_types import FileType, PlcType
+from abdf1_ros.pccc.plc5.address import USUAL_LAST_ELEMENT
 from abdf1_ros.pccc.processor import Processor, USUAL
 from abdf1_ros.pccc.structures import value_addresses
 from abdf1_ros.pccc.values import ValueType
@@ -101,6 +102,11 @@ def row_remarks(row: Row, mapping: Mapping) -> Iterator[Problem]:
         yield _at(row, 'Address', f'{address}: a {USUAL.value}, for which an empty Processor '
                                   f'stands, has no such file; {having(address)} may have it')
     yield from _bcd_remarks(row, mapping)
+    last = mapping.place_of(mapping.length - 1)
+    if mapping.plc_type is PlcType.PLC5 and not mapping.serves \
+            and last.element > USUAL_LAST_ELEMENT:
+        yield _at(row, 'Address', f'{last}: files of most PLC-5 end with element '
+                                  f'{USUAL_LAST_ELEMENT}; those of a 5/40 to 5/80 may have more')
     if not mapping.writes:
         return
     is_member = address.file_type.is_structure and address.bit is None

@@ -14,6 +14,8 @@
 
 """Addresses: the grammar, ranges, where words lie, and advice for other forms."""
 
+import re
+
 from abdf1_ros.errors import FormatError
 from abdf1_ros.pccc.access import Access
 from abdf1_ros.pccc.address import Address, AddressRangeError, AddressSyntaxError, Area
@@ -86,7 +88,7 @@ def test_what_is_no_address(family: PlcType, text: str) -> None:
 
 @for_all('text', [
     'N7:0/16', 'B3:0/16', 'N2:0', 'N7:123456', 'N7:100000',
-    'N1000:0', 'N1234567:0', 'N7/16000', 'B0:0', 'T1:0', 'S3:0', 'T4:0.3', 'T4:0.255',
+    'N1000:0', 'N1234567:0', 'N7/32000', 'B0:0', 'T1:0', 'S3:0', 'T4:0.3', 'T4:0.255',
     'ST9:99999'])
 @for_all('family', BOTH)
 def test_out_of_range_in_both_families(text: str, family: PlcType) -> None:
@@ -95,14 +97,14 @@ def test_out_of_range_in_both_families(text: str, family: PlcType) -> None:
 
 
 @for_all(('family', 'last', 'beyond'), [
-    (PLC5, 'N999:999', 'N999:1000'), (SLC, 'N255:255', 'N255:256'),
+    (PLC5, 'N999:1999', 'N999:2000'), (SLC, 'N255:255', 'N255:256'),
     (SLC, 'N255:0', 'N256:0'), (PLC5, 'S:127', 'S:128'), (PLC5, 'ST9:779', 'ST9:780'),
     (PLC5, 'PD9:398', 'PD9:399'), (PLC5, 'MG9:584', 'MG9:585'),
     (SLC, 'PD9:255', 'PD9:256'), (SLC, 'PD9:0.22', 'PD9:0.23'), (SLC, 'MG9:0.24', 'MG9:0.25'),
     (PLC5, 'PD9:0.80', 'PD9:0.82'), (PLC5, 'MG9:0.55', 'MG9:0.56'),
-    (PLC5, 'BT9:999.5', 'BT9:0.6'),
+    (PLC5, 'BT9:1999.5', 'BT9:0.6'),
     (PLC5, 'I:277', 'I:300'), (PLC5, 'I:277/17', 'I:277/20'), (SLC, 'I:30', 'I:31'),
-    (SLC, 'I:0.255', 'I:0.256'), (PLC5, 'B3/15999', 'B3/16000'), (SLC, 'B3/4095', 'B3/4096'),
+    (SLC, 'I:0.255', 'I:0.256'), (PLC5, 'B3/31999', 'B3/32000'), (SLC, 'B3/4095', 'B3/4096'),
     (SLC, 'I1:0', 'I2:0'), (PLC5, 'O0:0', 'O1:0'), (PLC5, 'N3:0', 'N2:0'),
     (SLC, 'T255:255.ACC', 'T256:0.ACC')])
 def test_last_and_first_beyond(family: PlcType, last: str, beyond: str) -> None:
@@ -112,7 +114,7 @@ def test_last_and_first_beyond(family: PlcType, last: str, beyond: str) -> None:
 
 
 @pytest.mark.parametrize(('family', 'text', 'last'), [
-    (SLC, 'B3/4096', 'B3 run from 0 to 4095'), (PLC5, 'b10/16000', 'B10 run from 0 to 15999')])
+    (SLC, 'B3/4096', 'B3 run from 0 to 4095'), (PLC5, 'b10/32000', 'B10 run from 0 to 31999')])
 def test_bits_counted_through_a_file_have_limits_of_their_own(
         family: PlcType, text: str, last: str) -> None:
     with pytest.raises(AddressRangeError, match=f'^bits of {last}$'):
@@ -127,6 +129,20 @@ def test_bits_counted_through_a_file_have_limits_of_their_own(
     ('#N7;3', PLC5, 'N7:3'), ('S:1', PLC5, 'S2:1')])
 def test_str_is_the_plain_form(text: str, family: PlcType, shown: str) -> None:
     assert str(parse_address(text, family)) == shown
+
+
+@pytest.mark.parametrize(('text', 'family', 'advice'), [
+    ('S/26', SLC, 'the word of the status file comes first; write S:1/10'),
+    ('s2/15', PLC5, 'the word of the status file comes first; write S:0/15'),
+    ('I/3', SLC, 'write the word too, as in I:1/3'),
+    ('O/5', PLC5, 'write the word too, as in O:017/12'),
+    ('M0:1.0', SLC, 'M files (words of an I/O module, which COP brings into an N file)')])
+def test_what_other_programs_write_leads_to_what_is_right(
+        text: str, family: PlcType, advice: str) -> None:
+    with pytest.raises(AddressSyntaxError, match=re.escape(advice)):
+        parse_address(text, family)
+    if right := re.search(r'(?:write|as in) ([A-Z]\d*:[\d/]+)$', advice):
+        parse_address(right[1], family)
 
 
 @st.composite
@@ -243,11 +259,11 @@ def test_any_text_is_an_address_or_a_format_error(text: str, family: PlcType) ->
 
 
 @pytest.mark.parametrize(('text', 'family', 'offset', 'size'), [
-    ('N7:5', SLC, 5, 256), ('N7:5', PLC5, 5, 1000), ('T4:2.ACC', SLC, 8, 768),
-    ('F8:3', PLC5, 6, 2000), ('ST9:1', SLC, 42, 256 * 42), ('I:3.2', SLC, 2, 256),
+    ('N7:5', SLC, 5, 256), ('N7:5', PLC5, 5, 2000), ('T4:2.ACC', SLC, 8, 768),
+    ('F8:3', PLC5, 6, 4000), ('ST9:1', SLC, 42, 256 * 42), ('I:3.2', SLC, 2, 256),
     ('I:012', PLC5, 10, 192), ('S:1', PLC5, 1, 128), ('L9:2', SLC, 4, 512),
     ('PD9:2.SP', PLC5, 166, 399 * 82), ('PD9:2.SPS', SLC, 48, 256 * 23),
-    ('BT9:1.RGS', PLC5, 11, 6000), ('MG9:1/TO', PLC5, 56, 585 * 56)])
+    ('BT9:1.RGS', PLC5, 11, 12000), ('MG9:1/TO', PLC5, 56, 585 * 56)])
 def test_offset_counts_words(text: str, family: PlcType, offset: int, size: int) -> None:
     address = parse_address(text, family)
     assert (address.offset, address.area_size) == (offset, size)

@@ -75,8 +75,8 @@ def test_command_says_whether_a_row_reads_and_writes(text: str, reads: bool, wri
      'be one of PLC2, PLC3, PLC5, SLC; a MicroLogix is SLC'),
     ({'Address': 'N7'}, '3 (Address): 2503 ERR_ADDRESS_SYNTAX: Item: 1, Invalid Address Syntax '
      '(N7); an element is missing, as in N7:0'),
-    ({'Address': 'N7:1000'}, '3 (Address): 2504 ERR_ADDRESS_RANGE: Item: 1, Address is out of '
-     'range (N7:1000, len=1); elements of N run from 0 to 999'),
+    ({'Address': 'N7:2000'}, '3 (Address): 2504 ERR_ADDRESS_RANGE: Item: 1, Address is out of '
+     'range (N7:2000, len=1); elements of N run from 0 to 1999'),
     ({'Address': '018', 'PLC_Type': 'PLC2'}, '3 (Address): 2503 ERR_ADDRESS_SYNTAX: Item: 1, '
      'Invalid Address Syntax (018); PLC-2 words and bits are octal, as in 020 or 110/17'),
     ({'Command': 'Poll'}, '2 (Command): Item: 1, Command = "Poll" should be one of '
@@ -158,10 +158,10 @@ def test_fault_is_told_word_for_word(cells: dict[str, str], expected: str) -> No
 
 
 @for_all(('cells', 'length', 'last'), [
-    ({'Address': 'N7:990'}, 10, 'N7:999'), ({'Address': 'F8:999'}, 1, 'F8:999'),
+    ({'Address': 'N7:1990'}, 10, 'N7:1999'), ({'Address': 'F8:1999'}, 1, 'F8:1999'),
     ({'Address': 'N7:250', 'PLC_Type': 'SLC'}, 6, 'N7:255'),
-    ({'Address': 'T4:999', 'Command': 'Read'}, 3, 'T4:999.ACC'),
-    ({'Address': 'B3:998/1'}, 31, 'B3:999'), ({'Address': 'S:127'}, 1, 'S2:127'),
+    ({'Address': 'T4:1999', 'Command': 'Read'}, 3, 'T4:1999.ACC'),
+    ({'Address': 'B3:1998/1'}, 31, 'B3:1999'), ({'Address': 'S:127'}, 1, 'S2:127'),
     ({'Address': 'I:277', 'Command': 'Read'}, 1, 'I:277'),
     ({'Address': 'I:30.255', 'PLC_Type': 'SLC'}, 1, 'I:30.255'),
     ({'Address': '077777', 'PLC_Type': 'PLC2'}, 1, '077777')])

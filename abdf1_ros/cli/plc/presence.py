@@ -28,7 +28,14 @@ from abdf1_ros.cli.terminal import colour, GREEN, RED, YELLOW
 from abdf1_ros.counters import Counters
 from abdf1_ros.df1.echo import COMES_BACK
 from abdf1_ros.df1.packet import is_local_status
-from abdf1_ros.errors import Abdf1Error, FormatError, LinkError, PortLost, RemoteError, StationInactive
+from abdf1_ros.errors import (
+    Abdf1Error,
+    FormatError,
+    LinkError,
+    PortLost,
+    RemoteError,
+    StationInactive,
+)
 from abdf1_ros.pccc.access import Access
 from abdf1_ros.pccc.dialect import Steps
 from abdf1_ros.pccc.families import dialect_of, FAMILIES, parse_address

@@ -53,7 +53,10 @@ _SLC_IO = re.compile(r'[#$]?[IO]\d?[:;]\d+\.\d+(?:/\d+)?', re.ASCII)
 _LAST = {
     FileType.OUTPUT: 0o277, FileType.INPUT: 0o277, FileType.STATUS: 127, FileType.STRING: 779,
     FileType.PID: 398, FileType.MESSAGE: 584}
-_LAST_ELEMENT = 999
+_LAST_ELEMENT = 1999
+
+USUAL_LAST_ELEMENT = 999
+"""Three sources end files here, two let those of a PLC-5/40 to 5/80 run to 1999."""
 
 
 class _Plc5Addressing(FileAddressing):
