@@ -41,6 +41,7 @@ from abdf1_ros.ports.link_thread import LinkThread
 from abdf1_ros.ports.opening import name_port, open_port
 from abdf1_ros.ports.ownership import line_of
 from abdf1_ros.ports.settings import PortSettings
+from abdf1_ros.problems import ConfigurationError, Problem
 from abdf1_ros.text import shown
 
 if TYPE_CHECKING:
@@ -129,6 +130,10 @@ class OpenLine:
                  absent: Sequence[int] = (), routes: Mapping[int, int] | None = None,
                  plc_type: PlcType = PlcType.PLC5, trace: str | None = None,
                  logger: logging.Logger = LOG) -> None:
+        if mode.only_listens:
+            raise ConfigurationError([Problem('Mode', (
+                f'in Mode {mode.name} nothing may be sent on this line; "sniff" shows what others '
+                'send'))])
         self.log = logger
         self._mode, self._settings = mode, line
         self.stations = ActiveStationList(absent, routes=routes)

@@ -133,7 +133,7 @@ MESSAGES: dict[Message, Cause] = {
         'Station of the net file is not a whole number from 0 to 254.',
         'An address of our own that no PLC on the line has.'),
     Message.CRT_BAD_DRIVER_MODE: Cause(
-        'Mode of the net file is none of Master, Slave, Peer and Radio.',
+        'Mode of the net file is none of Master, Slave, Peer, Radio and Listen.',
         'Master for half duplex, Peer for full duplex.'),
     Message.CRT_UNSUPPORTED_MODE: Cause(
         'Mode is known, but this version does not have it. This version has all of them.',

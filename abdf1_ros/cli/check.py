@@ -198,7 +198,8 @@ def _summary(name: str, found: Findings, report: Report | None) -> str:
     text = (f'{printable(name)}: {counted(len(found.mappings), "row")}, port '
             f'{printable(report.network.port)}, '
             + (f'poll cycle {report.poll_cycle * 1000:.0f} ms, ' if report.is_timed else '')
-            + f'load {report.load:.0%}')
+            + ('nothing is sent' if report.network.line_mode.only_listens
+               else f'load {report.load:.0%}'))
     if warnings := len(report.remarks()):
         text += colour(f', {counted(warnings, "warning")}', YELLOW, sys.stdout)
     return '\n'.join([*errors, text])
@@ -235,8 +236,9 @@ def _text(found: Findings, report: Report | None) -> str:
     parts += [colour(f'warning: {printable(remark.text)}', YELLOW, sys.stdout)
               for remark in remarks]
     if found.mappings:
-        parts += ['', _line_text(report), '', _folded(_rows_text(report)), '',
-                  _folded(_plan_text(report)), '', _times_text(report)]
+        parts += ['', _line_text(report), '', _folded(_rows_text(report))]
+        if not report.network.line_mode.only_listens:
+            parts += ['', _folded(_plan_text(report)), '', _times_text(report)]
     parts += [f'note: {printable(note)}' for note in report.notes()]
     if not found.problems and not remarks:
         parts.append(colour('no errors, no warnings', GREEN, sys.stdout))
@@ -257,11 +259,22 @@ def _folded(text: str) -> str:
 def _line_text(report: Report) -> str:
     network = report.network
     mappings, blocks = len(report.mappings.repeated), len(report.blocks)
+    if network.line_mode.only_listens:
+        return _listening_text(report)
     return (f'{printable(network.port)}: Mode {network.mode}, {network.baud} baud, '
             f'{network.data_bits} data bits, parity {network.parity}, {network.stop_bits} stop, '
             f'{network.error_code}; our own Station is {network.station}\n'
             f'{mappings} {"mapping is" if mappings == 1 else "mappings are"} read with '
             f'{counted(blocks, "block")}')
+
+
+def _listening_text(report: Report) -> str:
+    network, count = report.network, len(report.mappings)
+    ports = ' and '.join(filter(None, (network.port, network.second_port)))
+    return (f'{printable(ports)}: Mode Listen, {network.baud} baud, {network.data_bits} data '
+            f'bits, parity {network.parity}, {network.stop_bits} stop, {network.error_code}; '
+            f'nothing is sent\n{counted(count, "row")} to be filled from what another master '
+            'reads')
 
 
 def _rows_text(report: Report) -> str:

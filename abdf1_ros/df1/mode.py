@@ -72,6 +72,9 @@ class LineMode:
     waits_for_acks: ClassVar[bool] = False
     """Each of our messages waits Timeout for its response."""
 
+    only_listens: ClassVar[bool] = False
+    """Nothing is sent: rows are filled from what other nodes say."""
+
     takes_turns: ClassVar[bool] = False
     """Stations are polled one after the other, whoever has a command."""
 

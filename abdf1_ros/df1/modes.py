@@ -16,6 +16,7 @@
 
 from __future__ import annotations
 
+from abdf1_ros.df1.listen import LISTEN
 from abdf1_ros.df1.master import MASTER
 from abdf1_ros.df1.mode import LineMode
 from abdf1_ros.df1.peer import PEER
@@ -23,7 +24,7 @@ from abdf1_ros.df1.polling import STANDARD
 from abdf1_ros.df1.radio import RADIO
 from abdf1_ros.df1.slave_link import SLAVE
 
-MODES: list[LineMode] = [MASTER, STANDARD, SLAVE, PEER, RADIO]
+MODES: list[LineMode] = [MASTER, STANDARD, SLAVE, PEER, RADIO, LISTEN]
 
 
 def mode_of(name: str, polling: str) -> LineMode:

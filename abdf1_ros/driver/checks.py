@@ -246,6 +246,12 @@ class Checks:
             is_answer = known.told is not None and known.told >= check.begun
             self._told(check.station, known.identity if is_answer else None, check.begun)
 
+    def heard(self, station: int, identity: Identity, asked: float) -> None:
+        """Take the answer to a question that another node has asked at a clock value (s)."""
+        self._known[station] = replace(
+            self.known(station), processor=str(identity), identity=identity, told=self._line.now)
+        self._told(station, identity, asked)
+
     def _take_refusal(self, check: Check, reason: str) -> None:
         if check.kind is CheckKind.STATUS:
             self._known[check.station] = replace(

@@ -45,6 +45,7 @@ from typing import Protocol
 
 from abdf1_ros.counters import Counters
 from abdf1_ros.df1.frames import Duplex
+from abdf1_ros.df1.listen import ListeningMachine
 from abdf1_ros.df1.machine import Procedure
 from abdf1_ros.df1.packet import Packet
 from abdf1_ros.df1.stations import ActiveStationList, Station
@@ -56,6 +57,7 @@ from abdf1_ros.driver.guests import GuestQueue
 from abdf1_ros.driver.inbox import Inbox
 from abdf1_ros.driver.interlocks.queue import Interlocks
 from abdf1_ros.driver.job_tasks import JobTasks
+from abdf1_ros.driver.overheard import Overheard
 from abdf1_ros.driver.reads.demands import Demand, ReadAnswer
 from abdf1_ros.driver.reads.readings import Readings, ValueListener
 from abdf1_ros.driver.record import WriteRecord
@@ -121,6 +123,10 @@ class Driver:
         self._make_queues()
         self.link = network.line_mode.make_link(
             self.machine, network.link(settings), self.stations, self._serve, listener.happened)
+        self.overheard: Overheard | None = None
+        if isinstance(self.machine, ListeningMachine):
+            self.overheard = self.machine.listener = Overheard(
+                network, self.mappings, self.readings, self.stations, self.checks, self.tasks)
 
     def _make_queues(self) -> None:
         """Make the queues of jobs, and who decides between them."""
@@ -200,7 +206,9 @@ class Driver:
         May be called from any thread, followed by ``LinkThread.wake``. Exactly one ``answer``
         follows, mostly in the link thread.
         """
-        if self.interlocks.is_ending:
+        if self.overheard is not None:
+            answer(ReadAnswer(error=f'Mode {self.network.mode}: nothing is sent'))
+        elif self.interlocks.is_ending:
             answer(ReadAnswer(error=ENDS))
         elif not self._demands.inbox.put(Demand(mapping, now, answer)):
             answer(ReadAnswer(error=_NOT_OPEN))
@@ -329,6 +337,8 @@ class Driver:
     def _run(self) -> Procedure:
         """Begin to work, as long as there is a port."""
         self._connect()
+        if self.overheard is not None:
+            self.overheard.begin(self.machine.now)
         self.readings.reads.begin(self.machine.now)
         self.checks.begin(self.machine.now)
         self.interlocks.begin(self.machine.now)

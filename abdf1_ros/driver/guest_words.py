@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Which words of a PLC a guest's command writes."""
+"""Which words of a PLC another node's command writes."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ from abdf1_ros.settings.mapping import Mapping
 from abdf1_ros.settings.rows import Rows
 
 
-class _NotedTable(DataTable):
+class NotedTable(DataTable):
     """
     The files of some rows, each without end; what is written is noted, and not kept.
 
@@ -67,7 +67,7 @@ def written_extents(command: Packet, station: int,
             if station in (mapping.station, BROADCAST)]
     found: list[Extent] = []
     for number, plc_type in {(row.station, row.plc_type): None for row in rows}:
-        table = _NotedTable(plc_type, [row for row in rows if row.station == number])
+        table = NotedTable(plc_type, [row for row in rows if row.station == number])
         reply = Server(table).serve(command)
         if reply.sts and not table.is_elsewhere:
             return None

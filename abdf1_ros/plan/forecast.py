@@ -108,17 +108,19 @@ def longest_wait(blocks: Iterable[Block], response_time: float = USUAL_RESPONSE_
 
 
 def stale_times(blocks: Iterable[Block], default_period: float, stale_after: float,
-                own: Iterable[tuple[float, float]] = ()) -> dict[Mapping, float]:
+                own: Iterable[tuple[float, float]] = (), *,
+                is_heard: bool = False) -> dict[Mapping, float]:
     """
     Return after how many seconds a value of each mapping that is read counts as lost.
 
     Topics promise this time: ``stale_after`` times the expected interval, plus the longest wait
     for the line. ``default_period`` is in seconds; ``own`` is described at ``intervals``.
+    What ``is_heard`` is read by another master, at least once in a Period.
     """
     blocks = list(blocks)
-    expected, wait = intervals(blocks, own), longest_wait(blocks)
+    expected, wait = ({}, 0.0) if is_heard else (intervals(blocks, own), longest_wait(blocks))
     return {mapping: stale_after * max(period_of(mapping, default_period),
-                                       expected[block.period]) + wait
+                                       expected.get(block.period, 0.0)) + wait
             for block in blocks for mapping in block.mappings if mapping.polls}
 
 

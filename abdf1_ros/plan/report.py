@@ -123,7 +123,8 @@ class Report:
         # The node promises the same time, however long a PLC really takes to answer.
         stale = forecast.stale_times(
             self.blocks, self.default_period, forecast.USUAL_STALE_AFTER, bounds.own_work(
-                forecast.line_model(self.network), self.mappings, self.default_period))
+                forecast.line_model(self.network), self.mappings, self.default_period),
+            is_heard=self.network.line_mode.only_listens)
         return {mapping: promise for mapping, time in stale.items()
                 if math.isfinite(promise := mapping.promise(time))}
 
@@ -181,12 +182,15 @@ class Report:
             text = 'the map has no usable row: nothing is read or written'
             return [*found, Remark(RemarkKind.MAP, text)]
         times = bounds.remarks(self.network, self.mappings, self.response_time)
+        if self.network.line_mode.only_listens:
+            return found
         return [*found, *self.load_remarks(), *_gap_remarks(self),
                 *(Remark(RemarkKind.INTERLOCK, text) for text in times)]
 
     def load_remarks(self) -> list[Remark]:
         """Return the remarks on periods that the line cannot keep."""
-        return [*_load_remarks(self), *_period_remarks(self)]
+        return [] if self.network.line_mode.only_listens else [
+            *_load_remarks(self), *_period_remarks(self)]
 
 
 def _unprotected(mappings: Rows) -> Iterator[str]:
@@ -289,7 +293,7 @@ def _station_remarks(network: Network, rows: Sequence[Mapping]) -> Iterator[Rema
         if not mapping.serves and mapping.station != BROADCAST:
             stations[mapping.station].append(mapping)
     for station, mappings in sorted(stations.items()):
-        if station == network.station:
+        if station == network.station and not network.line_mode.only_listens:
             yield Remark(RemarkKind.STATION, (
                 f'station {station} of {_tags(mappings)} is our own Station in the net file; '
                 'two nodes of one address cannot communicate'), station)

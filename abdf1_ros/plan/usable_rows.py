@@ -20,13 +20,14 @@ from collections.abc import Iterable
 from dataclasses import replace
 
 from abdf1_ros.df1.packet import BROADCAST
+from abdf1_ros.pccc.access import Access
 from abdf1_ros.pccc.data_table import DataTable, NoSuchFile
 from abdf1_ros.pccc.file_types import PlcType
 from abdf1_ros.plan.bounds import guard_faults
 from abdf1_ros.plan.forecast import line_model
 from abdf1_ros.problems import Problem
 from abdf1_ros.settings.map_file import broken_links
-from abdf1_ros.settings.mapping import Mapping
+from abdf1_ros.settings.mapping import Command, Mapping
 from abdf1_ros.settings.network import Network
 from abdf1_ros.settings.rows import Rows
 
@@ -38,6 +39,12 @@ def line_problems(mappings: Iterable[Mapping], network: Network) -> list[tuple[M
     table = DataTable(PlcType(network.plc_type))
     for mapping in mappings:
         text = None
+        if mode.only_listens:
+            if fault := _listen_fault(mapping):
+                column, text = fault
+                where = replace(mapping.place, column=column)
+                found.append((mapping, Problem(where, f'Item: {mapping.item}, {text}')))
+            continue
         if mapping.serves:
             text = _fault(mapping, network, table)
         elif mapping.station == BROADCAST and mode.has_one_plc:
@@ -72,6 +79,24 @@ def usable_rows(mappings: Rows, network: Network,
         left = left.without(mapping for mapping, _ in faults)
         faults = [*broken_links(left)]
     return left, problems
+
+
+def _listen_fault(mapping: Mapping) -> tuple[str, str] | None:
+    """Return the column and the fault of a row that no traffic can fill, None for none."""
+    most = mapping.dialect.max_read(mapping.address.file_type)
+    if mapping.command is not Command.READ:
+        return 'Command', (f'{mapping.command.value} sends commands, and Mode Listen sends '
+                           'nothing; only Read rows are possible')
+    if not mapping.period or mapping.is_on_demand:
+        return 'Period', ('Mode Listen needs a Period above 0: in how many ms the other master '
+                          'reads these words at least once')
+    if mapping.access in (Access.CIF, Access.FLAT):
+        return 'Access', (f'Mode Listen does not understand reads with Access '
+                          f'{mapping.access.value}')
+    if mapping.codec.words > most:
+        return 'Length', (f'{mapping.codec.words} words never come in one reply, which has '
+                          f'{most} at most; divide the row')
+    return None
 
 
 def _fault(mapping: Mapping, network: Network, table: DataTable) -> str | None:

@@ -20,6 +20,7 @@ from collections.abc import Callable
 from errno import EIO
 from importlib import import_module
 
+from abdf1_ros.ports import listening
 from abdf1_ros.ports.descriptor import Port
 from abdf1_ros.ports.serial_device import open_device
 from abdf1_ros.ports.settings import PortSettings
@@ -39,6 +40,8 @@ def open_port(settings: PortSettings, tell: Callable[[str], None] = lambda text:
     A URL is opened by the module of its scheme, where there is one. ``tell`` is called with
     settings that the port does not support, which is not an error. Raises OSError.
     """
+    if settings.listens:
+        return listening.open_port(settings)
     scheme, separator, _ = settings.name.lower().partition('://')
     if not separator:
         return open_device(settings, tell)

@@ -40,7 +40,8 @@ import serial
 import serial.rs485
 
 # Our own words, where those of the operating system tell too little.
-_REASONS = {errno.EAGAIN: BUSY, errno.EBUSY: BUSY, errno.ENOTTY: 'this is not a serial port'}
+NOT_SERIAL = 'this is not a serial port'
+_REASONS = {errno.EAGAIN: BUSY, errno.EBUSY: BUSY, errno.ENOTTY: NOT_SERIAL}
 
 _PARITIES = {'None': serial.PARITY_NONE, 'Even': serial.PARITY_EVEN, 'Odd': serial.PARITY_ODD}
 

@@ -33,7 +33,8 @@ class PortSettings:
     These are the columns of the net CSV about the port. With ``low_latency`` a USB adapter passes
     bytes on at once, instead of collecting them for up to 16 ms. ``rs485`` switches the
     transmitter of an RS-485 port on and off with RTS. A port that supports neither is opened all
-    the same.
+    the same. Where it ``listens``, the port is opened for reading only, and ``second`` is the
+    other one of a line that is heard on two.
     """
 
     name: str
@@ -44,13 +45,16 @@ class PortSettings:
     handshake: bool = False
     low_latency: bool = True
     rs485: bool = False
+    listens: bool = False
+    second: str = ''
 
     @classmethod
     def of(cls, network: Network, name: str = '', *, low_latency: bool = True,
            rs485: bool = False) -> PortSettings:
         """Return the settings of a net CSV, with ``name`` in place of its Com_Port."""
         return cls(name or network.port, network.baud, network.data_bits, network.parity,
-                   network.stop_bits, network.handshake, low_latency, rs485)
+                   network.stop_bits, network.handshake, low_latency, rs485,
+                   network.line_mode.only_listens, network.second_port)
 
     @property
     def char_time(self) -> float:

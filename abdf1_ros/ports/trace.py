@@ -24,6 +24,7 @@ from queue import SimpleQueue
 import threading
 import time
 
+from abdf1_ros.df1.listen import SecondPort
 from abdf1_ros.df1.packet import Packet
 from abdf1_ros.ports.descriptor import Port, PortAround
 from abdf1_ros.ports.opening import open_port
@@ -98,11 +99,17 @@ class Trace:
 
 
 class TracedPort(PortAround):
-    """A port whose bytes go into ``trace`` as well, with the seconds since ``begun``."""
+    """
+    A port whose bytes go into ``trace`` as well, with the seconds since ``begun``.
+
+    What is read is ``first`` there, but for what comes from a second port.
+    """
 
     def __init__(self, port: Port, trace: Trace, begun: float,
-                 clock: Callable[[], float] = time.monotonic) -> None:
+                 clock: Callable[[], float] = time.monotonic,
+                 first: Direction = Direction.IN) -> None:
         super().__init__(port)
+        self._first = first
         self._trace = trace
         self._begun = begun
         self._clock = clock
@@ -110,7 +117,7 @@ class TracedPort(PortAround):
     def read(self, timeout: float | None, wake: int) -> bytes:
         data = self._port.read(timeout, wake)
         if data:
-            self._note(Direction.IN, data)
+            self._note(Direction.IN if isinstance(data, SecondPort) else self._first, data)
         return data
 
     def write(self, data: bytes) -> None:
@@ -165,7 +172,11 @@ class PortOpener:
     def open(self) -> Port:  # noqa: A003
         """Open the port; raises OSError."""
         self._port = port = open_port(self._settings, self._tell)
-        return port if self._trace is None else TracedPort(port, self._trace, self._begun)
+        if self._trace is None:
+            return port
+        first = Direction.IN if not self._settings.listens else \
+            Direction.OUT if self._settings.second else Direction.UNKNOWN
+        return TracedPort(port, self._trace, self._begun, first=first)
 
     def close(self) -> None:
         """End the capture."""

@@ -32,6 +32,7 @@ from abdf1_ros.df1.modes import mode_of, MODES
 from abdf1_ros.df1.packet import BROADCAST
 from abdf1_ros.df1.settings import LinkOptions, LinkSettings
 from abdf1_ros.df1.stations import MAX_STATION
+from abdf1_ros.line_names import device_of
 from abdf1_ros.messages import Message
 from abdf1_ros.numbers import is_digits, Kind, one_of, TEXT, whole, whole_number
 from abdf1_ros.pccc.families import FAMILIES
@@ -154,6 +155,9 @@ class Network:
     collision_avoidance: bool = _net(
         'Collision_Avoidance', False, 'Mode Radio, Yes: radios avoid collisions and buffer both '
         'directions, so commands to several stations may be under way', _YES)
+    listen_port: str = _net(
+        'Listen_Port', '', 'Mode Listen: a second device, where each direction of the line has a '
+        'wire of its own')
     # Remarks about the way the file is written.
     remarks: tuple[Problem, ...] = field(default=(), compare=False)
 
@@ -195,9 +199,12 @@ class Network:
     @property
     def port(self) -> str:
         """Return the device path or URL that Com_Port stands for."""
-        if self.com_port.isdigit():
-            return f'/dev/ttyS{int(self.com_port) - 1}'
-        return self.com_port
+        return _device(self.com_port)
+
+    @property
+    def second_port(self) -> str:
+        """Return the device path that Listen_Port stands for, empty for none."""
+        return _device(self.listen_port)
 
     @property
     def timing(self) -> LineTiming:
@@ -205,6 +212,10 @@ class Network:
         return LineTiming(
             character_time(self.baud, self.data_bits, self.parity, self.stop_bits),
             self.tx_delay / 1000)
+
+
+def _device(text: str) -> str:
+    return f'/dev/ttyS{int(text) - 1}' if text.isdigit() else text
 
 
 FIELDS: dict[str, NetField] = {
@@ -269,7 +280,13 @@ def make_network(values: MappingType[str, tuple[str, Place | str]],
             if fault := _FAULTS[name](checked[name]) if name in _FAULTS else '':
                 problems.append(Problem(where, fault))
     share = values.get('share', ('', 'Share'))[1]
-    why_unshared = mode_of(checked['mode'], checked['polling']).why_unshared
+    mode = mode_of(checked['mode'], checked['polling'])
+    if mode.only_listens and not problems:
+        column, fault = _listen_fault(checked['com_port'], checked['listen_port'])
+        if fault:
+            problems.append(Problem(
+                values.get(column.lower(), ('', column))[1], f'{column}: {fault}'))
+    why_unshared = mode.why_unshared
     if checked['share'] and why_unshared:
         problems.append(Problem(share, f'Share needs Mode Master or Peer: {why_unshared}'))
     if problems:
@@ -301,6 +318,23 @@ def _port_fault(text: str) -> str:
             f'/dev/ttyUSB0, {URLS}; {advice}')
 
 
+def _second_fault(text: str) -> str:
+    return '' if text.startswith('/') or text.isdigit() or not text else (
+        f'Listen_Port = "{shown(text)}" should be a device path such as /dev/ttyUSB1')
+
+
+def _listen_fault(first: str, second: str) -> tuple[str, str]:
+    """Return the column and the fault of ports that are to be listened to, empty for none."""
+    if first.lower().startswith('rfc2217:'):
+        return 'Com_Port', ('RFC 2217 sets the lines of the far port, and Mode Listen sets none; '
+                            'write socket:// where the server has raw TCP')
+    if second and '://' in first:
+        return 'Listen_Port', 'both ports have to be devices of this machine'
+    if second and device_of(_device(first)) == device_of(_device(second)):
+        return 'Listen_Port', f'{shown(second)} is Com_Port, too'
+    return '', ''
+
+
 def _share_fault(text: str) -> str:
     try:
         share_places(text)
@@ -315,7 +349,8 @@ def _nodes_fault(text: str) -> str:
 
 
 # What is wrong with the text of a field, empty for nothing.
-_FAULTS = {'com_port': _port_fault, 'share': _share_fault, 'store_forward': _nodes_fault}
+_FAULTS = {'com_port': _port_fault, 'listen_port': _second_fault, 'share': _share_fault,
+           'store_forward': _nodes_fault}
 
 
 def _is_host(name: str) -> bool:

@@ -62,7 +62,8 @@ def network_remarks(network: Network) -> Iterator[str]:
     for column, is_idle, right in (
             ('Polling', not mode.is_master and network.polling != Network().polling, 'Master'),
             ('Store_Forward', not is_radio and network.store_forward, 'Radio'),
-            ('Collision_Avoidance', not is_radio and network.collision_avoidance, 'Radio')):
+            ('Collision_Avoidance', not is_radio and network.collision_avoidance, 'Radio'),
+            ('Listen_Port', not mode.only_listens and network.listen_port, 'Listen')):
         if is_idle:
             yield f'{column} is for Mode {right}; in Mode {network.mode} it does nothing'
     if is_radio and network.station in network.line.store_forward:

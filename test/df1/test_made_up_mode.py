@@ -81,7 +81,7 @@ def main() -> None:
             return [str(problem) for problem in examine(str(net), str(plan)).problems]
 
         fault, = faults('Mode,Com_Port\nDial-up,1\n')
-        assert 'should be one of Master, Slave, Peer, Radio, or Modem; "Dial-up" is Modem' in fault
+        assert 'one of Master, Slave, Peer, Radio, Listen, or Modem; "Dial-up" is Modem' in fault
         fault, = faults('Mode,Com_Port,Share\nModem,1,tcp:6000\n')
         assert fault.endswith(': a modem has one caller')
         assert faults('Mode,Com_Port,Baud\nmodem,1,19200\n') == []

@@ -14,6 +14,7 @@
 
 """Rows that do not fit the line or each other."""
 
+from abdf1_ros.plan.report import make_report
 from abdf1_ros.plan.usable_rows import line_problems, usable_rows
 from abdf1_ros.settings.heartbeats import While
 from abdf1_ros.settings.mapping import Mapping
@@ -101,3 +102,32 @@ def test_rule_15_row_that_does_not_fit_the_line_takes_along_what_depends_on_it()
 def test_problems_go_with_their_rows() -> None:
     good, bad = row('N7:0'), make_mapping('N7:50', 'Serve', station=1)
     assert [mapping for mapping, _ in line_problems([good, bad], PEER)] == [bad]
+
+
+@pytest.mark.parametrize(('mapping', 'text'), [
+    (make_mapping(command='Write', period=100), 'Command): Item: 1, Write sends commands, and '
+     'Mode Listen sends nothing; only Read rows are possible'),
+    (make_mapping(command='Serve', station=5, period=100), 'Command): Item: 1, Serve sends '
+     'commands, and Mode Listen sends nothing; only Read rows are possible'),
+    (make_mapping(), 'Period): Item: 1, Mode Listen needs a Period above 0: in how many ms the '
+     'other master reads these words at least once'),
+    (make_mapping(period=0), 'Period): Item: 1, Mode Listen needs a Period above 0: in how many '
+     'ms the other master reads these words at least once'),
+    (make_mapping('I:1', plc='SLC', access='Flat', period=100), 'Access): Item: 1, Mode Listen '
+     'does not understand reads with Access Flat'),
+    (make_mapping(length=200, period=100), 'Length): Item: 1, 200 words never come in one reply, '
+     'which has 110 at most; divide the row'),
+    (make_mapping(station=5, period=100), '')])  # our own Station means nothing
+def test_rows_that_no_traffic_can_fill(mapping: Mapping, text: str) -> None:
+    found = texts(mapping, network=Network(mode='Listen'))
+    assert found == ([f'map.csv:2 ({text}'] if text else [])
+
+
+def test_rows_in_mode_listen_promise_what_their_period_says() -> None:
+    """However slow the line is: another master reads, and not we."""
+    mappings = [make_mapping(f'N{file}:0', length=100, period=100) for file in range(10, 20)]
+    heard = make_report(Network(mode='Listen', baud=1200), mappings, 0.1)
+    assert [*heard.promises().values()] == [pytest.approx(0.3)] * 10
+    assert heard.remarks() == []
+    ours = make_report(Network(baud=1200), mappings, 0.1)
+    assert min(ours.promises().values()) > 1.0

@@ -227,10 +227,11 @@ PORT = ('should be a number from 1, a device path such as /dev/ttyUSB0, socket:/
         'tcp:ADDRESS:PORT, with the address of an interface']),
     ('Com_Port,Mode\n1,Half\n', [
         '!2:2 (Mode): 2553 CRT_BAD_DRIVER_MODE: Invalid Driver Mode (Half), should be one of '
-        'Master, Slave, Peer, or Radio']),
+        'Master, Slave, Peer, Radio, or Listen']),
     ('Com_Port,Mode\n1,Peеr\n', [
         '!2:2 (Mode): 2553 CRT_BAD_DRIVER_MODE: Invalid Driver Mode (Peеr), should be one of '
-        'Master, Slave, Peer, or Radio; character 3 is U+0435 CYRILLIC SMALL LETTER IE, not "e"']),
+        'Master, Slave, Peer, Radio, or Listen; character 3 is U+0435 CYRILLIC SMALL LETTER IE, '
+        'not "e"']),
 ])
 def test_what_is_told_of_a_net_file(tmp_path: Path, text: str, expected: list[str]) -> None:
     assert told_of_net(tmp_path, text) == expected

@@ -80,7 +80,7 @@ def test_columns_are_those_of_the_specification_polling_and_radio() -> None:
         'Station', 'Mode', 'PLC_Type', 'Error_Code', 'NAK_Retries', 'ENQ_Retries',
         'Cmd_Timeout', 'Com_Port', 'Baud', 'Data_Bits', 'Stop_Bits', 'Parity', 'Timeout',
         'TX_Delay', 'Handshake', 'Polling', 'Share', 'Share_Access', 'Store_Forward',
-        'Collision_Avoidance']
+        'Collision_Avoidance', 'Listen_Port']
 
 
 @for_all(('column', 'field', 'default', 'good', 'bad'), NUMBERS)
@@ -120,7 +120,7 @@ def test_left_out_is_as_empty(path: Path) -> None:
      'Station = "abc" should be a whole number from 0 to 254'),
     ('Mode', 'Boss',
      '2553 CRT_BAD_DRIVER_MODE: Invalid Driver Mode (Boss), should be one of Master, Slave, '
-     'Peer, or Radio'),
+     'Peer, Radio, or Listen'),
     ('PLC_Type', 'PLC4',
      '2555 CRT_BAD_PLC_TYPE: Invalid or Unsupported PLC Type (PLC4) should be one of PLC2, '
      'PLC3, PLC5, SLC'),
@@ -176,7 +176,7 @@ def test_mode_in_the_words_of_other_programs_is_translated(
         path: Path, mode: str, meant: str) -> None:
     problem, = faults(path, 'Mode', mode)
     assert problem.startswith('FILE:2:1 (Mode): 2553 CRT_BAD_DRIVER_MODE: ')
-    assert problem.endswith(f'Peer, or Radio; "{mode}" is {meant}')
+    assert problem.endswith(f'Peer, Radio, or Listen; "{mode}" is {meant}')
 
 
 def test_all_faults_are_reported_at_once_each_in_its_place(path: Path) -> None:
@@ -371,3 +371,33 @@ def test_every_fault_is_told() -> None:
     stations, faults = parse_stations('a,1,b')
     assert stations == (1,)
     assert len(faults) == 2
+
+
+LISTENING = {'Com_Port': '/dev/ttyS0', 'Mode': 'Listen'}
+
+
+@pytest.mark.parametrize(('cells', 'text'), [
+    ({'Listen_Port': 'COM4'}, 'net.csv:2:3 (Listen_Port): Listen_Port = "COM4" should be a device '
+     'path such as /dev/ttyUSB1'),
+    ({'Listen_Port': '1'}, 'Listen_Port: 1 is Com_Port, too'),
+    ({'Com_Port': 'rfc2217://h:1'}, 'RFC 2217 sets the lines of the far port'),
+    ({'Com_Port': 'socket://h:1', 'Listen_Port': '/dev/ttyS1'},
+     'both ports have to be devices of this machine'),
+    ({'Share': 'tcp:6000'}, 'Share needs Mode Master or Peer: in Mode Listen nothing is sent')])
+def test_ports_that_cannot_be_listened_to(tmp_path: Path, cells: dict[str, str],
+                                          text: str) -> None:
+    columns = LISTENING | cells
+    path = tmp_path / 'net.csv'
+    path.write_text(f'{",".join(columns)}\n{",".join(columns.values())}\n', encoding='utf-8')
+    with pytest.raises(ConfigurationError) as error:
+        load_network(str(path))
+    assert text in str(error.value), str(error.value)
+    assert 'net.csv:2' in str(error.value)
+
+
+def test_second_port_is_for_mode_listen() -> None:
+    network = Network(listen_port='2', com_port='/dev/ttyS0')
+    assert network.second_port == '/dev/ttyS1'
+    assert 'Listen_Port is for Mode Listen; in Mode Master it does nothing' in [
+        *network_remarks(network)]
+    assert not [*network_remarks(replace(network, mode='Listen'))]

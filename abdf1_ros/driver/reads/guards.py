@@ -114,9 +114,8 @@ class Guards:
         if station in self._runs:
             self._runs[station].told(identity, asked)
 
-    def values_read(self, points: dict[ReadPoint, slice], data: bytes, now: float) -> None:
-        """Give the counters among the words that were read to their guards."""
-        for point, place in points.items():
-            counter = self.counters.get(point.mapping.tag)
-            if counter is not None:
-                counter.read(data[place], now)
+    def value_read(self, point: ReadPoint, words: bytes, now: float) -> None:
+        """Give the words of a counter to its guard."""
+        counter = self.counters.get(point.mapping.tag)
+        if counter is not None:
+            counter.read(words, now)

@@ -17,6 +17,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
+from collections.abc import Mapping as MappingType
 import math
 from typing import Protocol
 
@@ -89,7 +90,8 @@ class Readings:
         times = settings.default_period, settings.stale_after
         self.mode_periods = mode_periods(mappings, *times)
         self.points = _points(mappings, blocks, settings, self.guards,
-                              own_work(self.planner.line_model, mappings, *times))
+                              own_work(self.planner.line_model, mappings, *times),
+                              is_heard=network.line_mode.only_listens)
         self.reads = Reads(stations)
         self.demands = Demands(settings.write_timeout)
         self.expected_poll_cycle = poll_cycle(blocks, answer_time(network, blocks))
@@ -170,7 +172,8 @@ class Readings:
         for reader in self._record.readers:
             reader.words_read(job.block, data, job.started)
         if self.guards.counters:
-            self.guards.values_read(job.points, data, now)
+            for point, place in job.points.items():
+                self.guards.value_read(point, data[place], now)
         has_recovered, period = False, job.block.period
         is_refresh = job.refreshed > -math.inf or job.wanted > -math.inf
         for point, place in job.points.items():
@@ -178,21 +181,37 @@ class Readings:
             is_rare = point.period > period and not is_refresh  # others are for every read
             if is_rare and not point.is_due(now, period):
                 continue
-            guard = point.guard
-            if guard is not None and (reason := guard.why_not(point, job.started, now)):
-                if point.mapping.is_on_demand:  # its call has the reason
-                    point.withheld = reason
-                else:
-                    self._withhold(point, guard, reason)
-            elif guard is not None and point in guard.withheld:
-                self._release(point, guard, data[place])
-            else:
+            if point.guard is None:
                 self._update(point, data[place])
+            else:
+                self._guarded(point, point.guard, data[place], job.started)
         job.done(now)
         if has_recovered:
             self._change(self._refusals.recovered(job.block, self.blocks))
         elif self._refusals.recovering:
             self._change(self._refusals.read_again(job.block, self.blocks))
+
+    def _guarded(self, point: ReadPoint, guard: Guard, words: bytes, started: float) -> None:
+        """Update a point with words that were read from ``started`` on, unless it is withheld."""
+        if reason := guard.why_not(point, started, self._line.now):
+            if point.mapping.is_on_demand:  # its call has the reason
+                point.withheld = reason
+            else:
+                self._withhold(point, guard, reason)
+        elif point in guard.withheld:
+            self._release(point, guard, words)
+        else:
+            self._update(point, words)
+
+    def heard(self, found: MappingType[ReadPoint, bytes], started: float) -> None:
+        """Update points with the words of one read of another node."""
+        for point, words in found.items():
+            self.guards.value_read(point, words, self._line.now)
+        for point, words in found.items():
+            if point.guard is None:
+                self._update(point, words)
+            else:
+                self._guarded(point, point.guard, words, started)
 
     def _withhold(self, point: ReadPoint, guard: Guard, reason: str) -> None:
         """Withhold a value; reported once for all rows that depend on the same (rule 15)."""
@@ -217,12 +236,13 @@ class Readings:
         try:
             values = point.update(words, self._line.now)
         except FormatError as error:
-            self._unreadable(point, str(error))
+            self.unreadable(point, str(error))
         else:
             if values is not None:
                 self._listener.read(point.mapping, values)
 
-    def _unreadable(self, point: ReadPoint, reason: str) -> None:
+    def unreadable(self, point: ReadPoint, reason: str) -> None:
+        """Take note why a row has no value, and report a new reason."""
         if point.fail(reason):
             self._listener.unreadable(point.mapping, reason)
 
@@ -242,7 +262,7 @@ class Readings:
             if is_divided:
                 point.fail(f'{reason} (or another address read with it has this fault)')
             else:
-                self._unreadable(point, reason)
+                self.unreadable(point, reason)
         self._change(change)
 
     def _change(self, change: Change | None) -> None:
@@ -290,10 +310,11 @@ class Readings:
 
 
 def _points(mappings: Rows, blocks: Sequence[Block], settings: DriverSettings, guards: Guards,
-            own: Sequence[tuple[float, float]]) -> dict[Mapping, ReadPoint]:
+            own: Sequence[tuple[float, float]], *,
+            is_heard: bool) -> dict[Mapping, ReadPoint]:
     """Return the points of all mappings that are published, in their order."""
     default = settings.default_period
-    stale = stale_times(blocks, default, settings.stale_after, own)
+    stale = stale_times(blocks, default, settings.stale_after, own, is_heard=is_heard)
     # What is read on demand is never stale; the mode that While RUN asks for may be.
     stale |= {mapping: settings.stale_after * period_of(mapping, default)
               for mapping in mappings.on_demand}

@@ -52,6 +52,7 @@ from abdf1_ros.ros.parameters.shown import ShownFiles
 from abdf1_ros.ros.topics.messages import latched_qos
 from abdf1_ros.ros.topics.writes import WriteTopics
 from abdf1_ros.settings.heartbeats import HAND_OVER, LONGEST_END
+from abdf1_ros.settings.network import Network
 from abdf1_ros.text import printable
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from rclpy.callback_groups import MutuallyExclusiveCallbackGroup
@@ -131,7 +132,7 @@ class BridgeNode(AnsweringNode):
         if parameters.trace_file:
             opener.trace(
                 parameters.trace_file, parameters.trace_limit * 1e6,
-                {'check': network.checksum.value, 'duplex': network.duplex.name.lower()},
+                _head(network),
                 lambda text: self.get_logger().error(f'trace_file: {printable(text)}'))
         return opener
 
@@ -325,6 +326,12 @@ def _port_settings(configuration: Configuration) -> PortSettings:
     return PortSettings.of(
         configuration.network, configuration.port, low_latency=parameters.low_latency,
         rs485=parameters.rs485)
+
+
+def _head(network: Network) -> dict[str, str]:
+    """Return what the head of a capture says of a line; sniff finds out what is not known."""
+    duplex = {} if network.line_mode.only_listens else {'duplex': network.duplex.name.lower()}
+    return {'check': network.checksum.value, **duplex}
 
 
 def end_together(nodes: Sequence[BridgeNode], patience: float = _LAST_WORDS) -> None:

@@ -18,6 +18,7 @@ from __future__ import annotations
 
 from collections import defaultdict
 from collections.abc import Iterable, Sequence
+from operator import attrgetter
 from statistics import fmean
 
 from abdf1_ros.df1.frames import Duplex
@@ -37,6 +38,7 @@ _LONGEST_UNPOLLED = 5.0
 
 LOAD_BY_TOPIC = 'line load by topic'
 _MOST_TOPICS = 40  # a map may have thousands
+_MOST_CARRIED = 30  # reads of other nodes, those that were heard last
 
 
 class LinkStatus:
@@ -75,6 +77,8 @@ class LinkStatus:
         if deaf := len(self._line.deaf_stations(now)):
             return WARN, f'port open, but {deaf} of {total} stations answer polls and no command'
         if total and not active:
+            if self._line.driver.overheard is not None:
+                return ERROR, f'port open, but nothing is heard of any of {total} stations'
             return ERROR, f'port open, but none of {total} stations answers' + (
                 ', or the device server lets this connection wait' if '://' in self.hardware_id
                 else '')
@@ -111,6 +115,7 @@ class LinkStatus:
             **_paces(driver.points.values()),
             **_poll_scans(driver),
             **_unnumbered_counts(driver),
+            **_carried(driver, now),
             **{f'refused: {text}': f'{count} times'
                for text, count in driver.refused.counted().items()},
             **{name: str(count) for name, count in (opener.errors() if opener else {}).items()},
@@ -214,6 +219,16 @@ def _unnumbered_counts(driver: Driver) -> dict[str, str]:
     counters = driver.counters
     return {} if driver.network.duplex is not Duplex.RADIO else {
         UNSENT: str(counters.unsent_messages), NO_MEMORY: str(counters.refused_for_memory)}
+
+
+def _carried(driver: Driver, now: float) -> dict[str, str]:
+    """Return what other nodes read, on a line that is only listened to."""
+    if driver.overheard is None:
+        return {}
+    known = sorted(driver.overheard.carried.values(), key=attrgetter('last'))[-_MOST_CARRIED:]
+    return {f'heard of station {read.station}: {read.text}':
+            f'{read.count} times, last {now - read.last:.1f} s ago'
+            for read in sorted(known, key=attrgetter('station', 'text'))}
 
 
 def _poll_scans(driver: Driver) -> dict[str, str]:

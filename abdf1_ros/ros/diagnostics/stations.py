@@ -130,6 +130,9 @@ class LinkCounterService:
     async def answer(self, request: Trigger.Request,
                      response: Trigger.Response) -> Trigger.Response:
         """Request the counters, wait, and fill in the response."""
+        if self._driver.network.line_mode.only_listens:
+            response.success, response.message = False, 'Mode Listen: nothing is sent'
+            return response
         self._asked = [station.number for station in self._driver.stations if station.active]
         if not self._driver.is_online or not self._asked:
             what = 'no station is active' if self._driver.is_online else 'the port is not open'

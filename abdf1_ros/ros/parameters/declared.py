@@ -155,7 +155,8 @@ class Configuration:
     @property
     def held(self) -> tuple[str, ...]:
         """Return the port and the places of Share, which no other line may have."""
-        return self.port, *self.network.share.split()
+        second = self.network.second_port
+        return self.port, *self.network.share.split(), *([second] if second else [])
 
     def driver_settings(self) -> DriverSettings:
         """Return parameters of the same names, and what follows from others."""

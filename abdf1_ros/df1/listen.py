@@ -1,0 +1,121 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+A line on which another master works: it is heard, and nothing is ever sent.
+
+The mode stands beside those of the specification. What is heard is made use of by
+``driver.overheard``.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+import math
+from typing import Protocol
+
+from abdf1_ros.counters import Counters
+from abdf1_ros.df1.link import Link
+from abdf1_ros.df1.machine import Background, Listen, Machine, MOST_LATE, Procedure
+from abdf1_ros.df1.mode import LineMode
+from abdf1_ros.df1.packet import Packet
+from abdf1_ros.df1.settings import LinkSettings
+from abdf1_ros.df1.stations import ActiveStationList
+from abdf1_ros.df1.tasks import TaskSource
+from abdf1_ros.messages import Event
+
+_LOOK = 0.1  # s; how long a pause of this process can stay unnoticed, besides MOST_LATE
+
+# For so long (s) after a pause what is read may have lain in a buffer.
+_OLD = 0.5
+
+
+class SecondPort(bytes):
+    """Bytes of the second port of a line that is heard on two."""
+
+
+class Listener(Protocol):
+    """What makes use of the bytes of a line."""
+
+    def hear(self, data: bytes, now: float) -> None:
+        """Take bytes, read at a clock value (s)."""
+
+    def forget(self, now: float) -> None:
+        """Take note that what was heard before is not complete any more."""
+
+    def look(self, now: float) -> None:
+        """Do what is due."""
+
+
+class ListeningMachine(Machine):
+    """
+    Give all bytes to ``listener``, and send none.
+
+    After a pause of this process the age of what is read first is not known: it is dropped.
+    """
+
+    listener: Listener
+    _old_until = -math.inf
+
+    def receive_data(self, data: bytes, now: float) -> None:
+        """Take bytes from the line."""
+        self.now = now
+        self.counters.chars_received += len(data)
+        if now >= self._old_until:
+            self.listener.hear(data, now)
+
+    def handle_timeout(self, now: float) -> None:
+        """Take note that the clock reads ``now``."""
+        is_late = self.deadline is not None and now - self.deadline > MOST_LATE
+        super().handle_timeout(now)
+        if is_late:
+            self._old_until = now + _OLD
+            self.listener.forget(now)
+        self.listener.look(now)
+
+    def data_to_send(self) -> bytes:
+        """Return nothing."""
+        return b''
+
+
+class ListeningLink(Link):
+    """It has nothing to do but to let time pass."""
+
+    def __init__(self, machine: Machine, settings: LinkSettings, stations: ActiveStationList,
+                 serve: Callable[[Packet], Packet], report: Callable[[Event], None]) -> None:
+        self._machine = machine
+
+    def run(self, source: TaskSource) -> Procedure:
+        """Look at the clock again and again; no task is ever asked for."""
+        while True:
+            yield Listen(_LOOK)
+
+
+class ListenMode(LineMode):
+    """Another master asks, and we only listen."""
+
+    name = 'Listen'
+    link = ListeningLink
+    only_listens = True
+    is_polled = True
+    why_unshared = 'in Mode Listen nothing is sent'
+
+    def make_machine(self, line: LinkSettings, run: Callable[[], Procedure], counters: Counters,
+                     background: Background | None = None) -> Machine:
+        """Return the machine, whose ``listener`` is still to be set."""
+        return ListeningMachine(lambda machine: run(), checksum=line.checksum, timing=line.timing,
+                                counters=counters, background=background)
+
+
+LISTEN = ListenMode()

@@ -1,0 +1,276 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+Values from the traffic of another master, on a line where we send nothing.
+
+A reply counts only with its command: heard undamaged, with nothing damaged in between, and not
+longer ago than Cmd_Timeout. It fills each row whose words it has all. Where another node writes
+words of a row, these are not known until a read that began after that.
+"""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from dataclasses import dataclass, field
+import math
+from operator import attrgetter
+from typing import NamedTuple
+
+from abdf1_ros.df1.frames import Damaged
+from abdf1_ros.df1.listen import SecondPort
+from abdf1_ros.df1.packet import BROADCAST, is_local_status, Packet
+from abdf1_ros.df1.stations import ActiveStationList
+from abdf1_ros.driver.checks import Checks
+from abdf1_ros.driver.guest_words import written_extents
+from abdf1_ros.driver.heard_words import ReplyWords, uses_common_file, words_in_reply
+from abdf1_ros.driver.job_tasks import JobTasks
+from abdf1_ros.driver.reads.point import ReadPoint
+from abdf1_ros.driver.reads.readings import Readings
+from abdf1_ros.errors import FormatError
+from abdf1_ros.pccc import diagnostics
+from abdf1_ros.pccc.describe import describe, effect_of
+from abdf1_ros.pccc.families import decode_identity
+from abdf1_ros.pccc.file_types import PlcType
+from abdf1_ros.pccc.notation import Effect
+from abdf1_ros.settings.mapping import Mapping
+from abdf1_ros.settings.network import Network
+from abdf1_ros.settings.rows import Rows
+from abdf1_ros.sniffer.capture import Chunk, Direction
+from abdf1_ros.sniffer.entries import Entry, Kind
+from abdf1_ros.sniffer.traffic import TrafficDecoder
+
+# A station that has said nothing for so long (s) does not answer.
+_SILENT = 10.0
+
+# So many bytes outside of frames are left of one; fewer come when a transmitter is switched on.
+_REST_OF_FRAME = 3
+
+_MOST_CARRIED = 200  # different reads that are kept
+
+_STATUS = bytes((diagnostics.STATUS,))
+
+
+@dataclass(slots=True)
+class Carried:
+    """A read of another node: how often it was answered, and when last (clock value, s)."""
+
+    station: int
+    text: str
+    count: int = 0
+    last: float = -math.inf
+
+
+class _Path(NamedTuple):
+    """Whose command, to which station, with which number."""
+
+    src: int
+    dst: int
+    tns: int
+
+
+@dataclass(slots=True)
+class _ValidFrom:
+    """
+    From when on (clock value, s) a read has to have begun for its reply to count.
+
+    ``sound`` is for all, after damage; ``written`` for the points whose words were written.
+    """
+
+    sound: float
+    written: dict[ReadPoint, float] = field(default_factory=dict)
+
+
+class Overheard:
+    """
+    Fill the points of ``readings`` from what is heard.
+
+    ``carried`` are the reads that the line has, by station and text. Only the thread of the link
+    changes anything; others may look.
+    """
+
+    def __init__(self, network: Network, mappings: Rows, readings: Readings,
+                 stations: ActiveStationList, checks: Checks, tasks: JobTasks) -> None:
+        self.carried: dict[tuple[int, str], Carried] = {}
+        self._network = network
+        self._readings = readings
+        self._stations = stations
+        self._checks = checks
+        self._tasks = tasks
+        self._rows = _by_type(mappings)
+        self._mappings = mappings
+        self._begun = math.inf
+        self._parts: dict[ReadPoint, str] = {}
+        self._unread: set[ReadPoint] = set()  # since the port was opened
+        self._told: set[ReadPoint] = set()
+        self._valid_from = _ValidFrom(-math.inf)
+        self._last: dict[_Path, Packet] = {}
+        self._ambiguous: set[_Path] = set()
+        self._traffic = self._decoder()
+
+    def _decoder(self) -> TrafficDecoder:
+        return TrafficDecoder(self._network.checksum)
+
+    def begin(self, now: float) -> None:
+        """Take note that a port has been opened: what was heard before is not continued."""
+        self._begun = now
+        self._unread, self._told = {*self._readings.points.values()}, set()
+        self.forget(now)
+
+    def forget(self, now: float) -> None:
+        """Begin anew: bytes are missing."""
+        self._traffic = self._decoder()
+        self._valid_from.sound = now
+
+    def hear(self, data: bytes, now: float) -> None:
+        """Take bytes, read at a clock value (s)."""
+        if isinstance(data, Damaged):
+            self.forget(now)
+            return
+        direction = Direction.UNKNOWN if not self._network.listen_port else (
+            Direction.IN if isinstance(data, SecondPort) else Direction.OUT)
+        for entry in self._traffic.feed(Chunk(now, direction, data)):
+            self._take(entry, now)
+
+    def look(self, now: float) -> None:
+        """Find stations that are not heard any more, and rows that no node reads."""
+        for station in self._stations:
+            heard = self._begun if station.last_heard is None else station.last_heard
+            if station.active and now - max(heard, self._begun) > _SILENT:
+                self._stations.lost(station.number, now)
+        for point in self._unread - self._told:
+            if now - self._begun > max(_SILENT, point.stale_time):
+                self._told.add(point)
+                self._readings.unreadable(point, self._why_unread(point))
+
+    def _why_unread(self, point: ReadPoint) -> str:
+        part = self._parts.get(point)
+        return 'no other node reads it' if part is None else (
+            f'no reply has all of its words; "{part}" has a part of them')
+
+    def _take(self, entry: Entry, now: float) -> None:
+        is_rest = entry.kind is Kind.NOISE and entry.size >= _REST_OF_FRAME
+        if is_rest or entry.valid is False or entry.kind in (Kind.DAMAGED, Kind.UNKNOWN):
+            self._valid_from.sound = now
+        elif entry.kind is Kind.EOT and entry.station is not None \
+                and entry.station in self._stations:
+            self._stations.heard(entry.station, now)  # it answers polls
+        elif entry.packet is not None and entry.kind is Kind.COMMAND:
+            self._command(entry.packet, now)
+        elif entry.packet is not None and entry.kind is Kind.REPLY:
+            self._reply(entry, entry.packet, now)
+
+    def _command(self, command: Packet, now: float) -> None:
+        """Note what a command changes, and whether its number tells which command it is."""
+        path = _Path(command.src, command.dst, command.tns)
+        before = self._last.pop(path, command)
+        self._last[path] = command
+        if len(self._last) > _MOST_CARRIED:
+            self._ambiguous.discard(oldest := next(iter(self._last)))
+            del self._last[oldest]
+        # On two ports a reply may be read after the command that follows it.
+        if self._network.listen_port and before != command:
+            self._ambiguous.add(path)
+        self._written(command, now)
+
+    def _reply(self, entry: Entry, reply: Packet, now: float) -> None:
+        command = entry.request
+        if command is None or not command.is_sound:
+            return
+        self._written(command, now)
+        if entry.latency is None:
+            return  # said before
+        if not is_local_status(reply.sts):
+            self._heard(command.dst, now)
+        asked = now - entry.latency
+        path = _Path(command.src, command.dst, command.tns)
+        if asked <= self._valid_from.sound or entry.latency > self._network.cmd_timeout / 1000 \
+                or path in self._ambiguous or reply.sts:
+            return
+        if command.cmd == diagnostics.CMD and command.data == _STATUS:
+            self._identity(command.dst, reply, asked)
+        elif effect_of(command) is Effect.READS:
+            self._values(command, reply, asked, now)
+
+    def _heard(self, station: int, now: float) -> None:
+        """Take note of a reply of a station."""
+        if station in self._stations:
+            self._stations.heard(station, now)
+            self._stations[station].replies += 1
+        self._tasks.transactions += 1
+
+    def _identity(self, station: int, reply: Packet, asked: float) -> None:
+        try:
+            identity = decode_identity(reply.data)
+        except FormatError:
+            return
+        if station in self._stations:
+            self._checks.heard(station, identity, asked)
+
+    def _values(self, command: Packet, reply: Packet, asked: float, now: float) -> None:
+        """Fill the rows whose words a reply has all."""
+        text = describe(command)
+        self._carry(command.dst, text, now)
+        found: dict[ReadPoint, bytes] = {}
+        for rows in self._rows.get(command.dst, ()):
+            words = words_in_reply(command, reply, rows)
+            for mapping in rows if words else ():
+                point = self._readings.points[mapping]
+                here = _words_of(mapping, words)
+                if len(here) == mapping.codec.words:
+                    if asked > self._valid_from.written.get(point, -math.inf):
+                        found[point] = b''.join(here)
+                elif here:
+                    self._parts[point] = text
+        self._unread.difference_update(found)
+        self._readings.heard(found, asked)
+
+    def _carry(self, station: int, text: str, now: float) -> None:
+        known = self.carried.get((station, text))
+        if known is None:  # another object each time: others may be looking at the one before
+            kept = sorted(self.carried.values(), key=attrgetter('last'))[1 - _MOST_CARRIED:]
+            known = Carried(station, text)
+            self.carried = {(each.station, each.text): each for each in (*kept, known)}
+        known.count, known.last = known.count + 1, now
+
+    def _written(self, command: Packet, now: float) -> None:
+        """Take note that a command, or its execution, may have changed words of rows."""
+        effect = effect_of(command)
+        if effect is Effect.READS:
+            return
+        extents = written_extents(command, command.dst, self._mappings) \
+            if effect is Effect.WRITES else None
+        what = describe(command).partition(' = ')[0]
+        for mapping, point in self._readings.points.items():
+            is_there = command.dst in (mapping.station, BROADCAST)
+            if is_there and (extents is None or uses_common_file(command, mapping.plc_type)
+                             or any(extent.meets(mapping.extent) for extent in extents)):
+                self._valid_from.written[point] = now
+                point.fail(f'not read since station {command.src} has sent "{what}"')
+
+
+def _words_of(mapping: Mapping, words: ReplyWords) -> list[bytes]:
+    """Return the words of a row that are there."""
+    extent = mapping.extent
+    return [word for offset in range(extent.first, extent.end)
+            if (word := words.get((extent.area, offset))) is not None]
+
+
+def _by_type(mappings: Rows) -> dict[int, list[list[Mapping]]]:
+    """Return the rows of each station, those of one PLC type together."""
+    found: defaultdict[int, defaultdict[PlcType, list[Mapping]]] = defaultdict(
+        lambda: defaultdict(list))
+    for mapping in mappings:
+        found[mapping.station][mapping.plc_type].append(mapping)
+    return {station: [*types.values()] for station, types in found.items()}
