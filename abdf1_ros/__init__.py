@@ -41,11 +41,11 @@ The rooms, from the wire up. Each imports from those above it only; each ``__ini
 - ``df1``: the link. Bytes and time in, bytes and a deadline out
 - ``pccc``: commands, addresses, values, and a folder for each family of PLCs
 - ``settings``: both CSV files, every fault with its place
-- ``plan``: what is read together, and what the line can do
-- ``driver``: who has the line next, and what comes of it
+- ``plan``: which words are read together, and the times of the line
+- ``driver``: which job has the line next, and its result
 - ``ports``: serial ports, and the thread that runs a link on one
 - ``share``: other programs on the same port
-- ``simulator``, ``sniffer``, ``conform``: the other end, recorded bytes, and cases of the manual
+- ``simulator``, ``sniffer``, ``conform``: PLCs, recorded bytes, and cases of the manual
 - ``client``: the library; ``ros``: the node; ``cli``: the commands
 """
 

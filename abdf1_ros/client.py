@@ -26,7 +26,7 @@ A blocking client, without ROS: read and write a PLC from any program.
         plant.read('line_speed')
 
 docs/library.md has more. Times are seconds, as in Python's own modules (the files have
-milliseconds). Errors are those of ``abdf1_ros.errors``.
+milliseconds). Errors come from ``abdf1_ros.errors``.
 """
 
 from __future__ import annotations
@@ -78,7 +78,7 @@ _T = TypeVar('_T')
 
 class Client(OpenLine):
     """
-    The PLC at the other end of a line, or in half duplex the PLCs on it.
+    The PLC at the far end of a line, or in half duplex the PLCs on it.
 
     ``port`` is a device path, ``socket://host:port`` or ``rfc2217://host:port``. ``duplex`` is
     full, half with us as the master, or slave, which another master polls; ``station`` is the PLC
@@ -193,7 +193,7 @@ class Client(OpenLine):
         They are not of one instant: each packet is a transaction of its own. The result is by
         address, in their order; of a range it is a list.
         """
-        from abdf1_ros.plan.planner import Planner  # a program that reads one by one does without
+        from abdf1_ros.plan.planner import Planner  # not needed for single reads
         from abdf1_ros.plan.reading import read_planned
         number = self._of(station)
         rows = [self._row(text, item, number)

@@ -27,8 +27,8 @@ from abdf1_ros.numbers import is_digits, whole_number
 LOOPBACK = '127.0.0.1'
 
 
-# Major numbers of pseudo-terminals (Linux, admin-guide/devices.txt). Each mount of devpts, such as
-# that of a container, has numbers of its own below them.
+# Major numbers of pseudo-terminals (Linux, admin-guide/devices.txt). Each mount of devpts, for
+# example of a container, has numbers of its own below them.
 _PSEUDO_TERMINALS = range(136, 144)
 
 

@@ -49,13 +49,13 @@ def is_digits(text: str) -> bool:
 
 
 def decimal_number(text: str) -> float | None:
-    """Return the number that ``text`` stands for, None for others and too large ones."""
+    """Return the number that ``text`` stands for, None for other texts and too large numbers."""
     value = float(text) if _DECIMAL.fullmatch(text) else math.inf
     return value if math.isfinite(value) else None
 
 
 def two_readings(text: str) -> str:
-    """Return what to write instead of "1,000", which may be 1 or 1000; otherwise empty."""
+    """Return the advice for "1,000", which may be 1 or 1000; empty for other texts."""
     if not _COMMA_AND_THREE.fullmatch(text):
         return ''
     return f'{text.replace(",", "")} or {text.replace(",", ".")}'
@@ -64,10 +64,10 @@ def two_readings(text: str) -> str:
 @dataclass(frozen=True, slots=True)
 class Kind(Generic[_Meaning_co]):
     """
-    What may stand in a cell, an option or an argument.
+    The kind of value of a cell, an option or an argument.
 
-    ``read`` returns what a text means, None where it should be something else: ``right``. A
-    number lies from ``low`` to ``high``. ``why_not`` may know better what is wrong with a text.
+    ``read`` returns the value of a text, or None for a fault; ``right`` then says what it should
+    be. A number lies from ``low`` to ``high``. ``why_not`` may give a more precise fault.
     """
 
     read: Callable[[str], _Meaning_co | None]
@@ -78,7 +78,7 @@ class Kind(Generic[_Meaning_co]):
     why_not: Callable[[str], str] | None = None
 
     def fault(self, text: str) -> str:
-        """Return what to say after a text that was not read."""
+        """Return the fault that follows a text that was not read."""
         return (self.why_not and self.why_not(text)) or f'should be {self.right}'
 
 

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""An open line: requests of one program, each with its result, and what goes with that."""
+"""An open line: requests of one program, each with its result."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ if TYPE_CHECKING:
     from abdf1_ros.plan.line_model import LineModel
     from abdf1_ros.ports.trace import Trace
 
-_GLANCE = 0.2  # s; while waiting, look so often whether the thread of the link still runs
+_GLANCE = 0.2  # s; interval of looks whether the thread of the link still runs
 
 LOG = logging.getLogger('abdf1_ros')
 """The logger where no other is given: requests with their times, and what happens on the line."""
@@ -62,7 +62,7 @@ def opened(settings: PortSettings) -> Callable[[], Port]:
     """
     Open a port; return a function that returns it, and later opens it again.
 
-    So a port that does not exist is an OSError here, not a state of a thread.
+    A port that does not exist then raises OSError here, in the caller.
     """
     try:
         ports = [open_port(settings)]
@@ -76,10 +76,10 @@ def opened(settings: PortSettings) -> Callable[[], Port]:
 
 class Pending(Generic[_Result]):
     """
-    What a request comes to, made in the thread of the link.
+    The result of a request, set by the thread of the link.
 
-    Not a Future: its lock stays taken for ever when a KeyboardInterrupt comes between taking it
-    and the block that gives it back, and then the thread of the link never ends.
+    It is not a Future. The lock of a Future stays taken for ever if a KeyboardInterrupt comes
+    after taking the lock, before its ``with`` block. The thread of the link would then never end.
     """
 
     def __init__(self) -> None:
@@ -118,12 +118,12 @@ class Pending(Generic[_Result]):
 
 class OpenLine:
     """
-    A line on which one request is carried out after the other, from here to the end of ``with``.
+    A line that carries out one request at a time, from here to the end of ``with``.
 
     ``absent`` stations get one try; ``routes`` gives the gateways of stations that are behind one.
-    To a PLC that asks us we are a ``plc_type``. ``counters`` are those of the line, ``stations``
-    what is known of each station. All bytes go into the file ``trace``, for ``sniff``. Raises
-    OSError when the port cannot be opened or the file not be written.
+    To a PLC that asks us we are a ``plc_type``. ``counters`` counts on the whole line,
+    ``stations`` has the state of each station. All bytes go into the file ``trace``, for
+    ``sniff``. Raises OSError when the port cannot be opened or the file not be written.
     """
 
     def __init__(self, mode: LineMode, line: LinkSettings, port: PortSettings,
@@ -181,21 +181,21 @@ class OpenLine:
 
     def start(self, station: int, work: Steps[_Result],
               pending: Pending[_Result] | None = None) -> Pending[_Result]:
-        """Begin to carry out a request; ``pending`` is where its result goes."""
+        """Begin to carry out a request; ``pending`` gets its result."""
         pending = pending or Pending()
         self._requests.add(station, work, pending.succeed, pending.fail)
         self._link.wake()
         return pending
 
     def wait(self, pending: Pending[_Result]) -> _Result:
-        """Return the result of a request; raises what it raises, PortLost at the latest."""
+        """Return the result of a request; raises its error, PortLost at the latest."""
         while not pending.wait(_GLANCE):
             if not self._link.is_alive() and not pending.is_done:
                 raise PortLost(self._link.state.text)
         return pending.result()
 
     def close(self) -> None:
-        """End what is under way and close the port; every request has ended after this."""
+        """End all requests that are under way, and close the port."""
         self._link.stop()
         self._requests.close()
         if self._trace is not None:
@@ -211,7 +211,7 @@ class OpenLine:
 
     @contextmanager
     def naming(self, place: str) -> Iterator[None]:
-        """Let errors in the block say what they are about; log how long it took."""
+        """Add the subject to errors of the block; log how long the block took."""
         begun = time.monotonic()
         try:
             yield
@@ -227,7 +227,7 @@ class OpenLine:
 
     def _traced(self, path: str, port: PortSettings,
                 open_it: Callable[[], Port]) -> Callable[[], Port]:
-        """Begin the trace; return what opens the port whose bytes go into it."""
+        """Begin the trace; return the function that opens the port whose bytes go into it."""
         from abdf1_ros.ports.trace import begun_now, Trace, TracedPort
         trace = self._trace = Trace(path, {
             'begun': begun_now(), 'port': port.name, 'baud': str(port.baud),
@@ -242,7 +242,7 @@ def _nothing() -> Steps[None]:
 
 
 def single(values: list[float] | str, is_one: bool) -> float | str | list[float]:
-    """Return the only value where one is meant."""
+    """Return the value itself if only one is meant."""
     return values[0] if is_one and not isinstance(values, str) else values
 
 
@@ -254,7 +254,7 @@ def plain(values: Values, kind: ValueType) -> list[float] | str:
 
 
 def values_of(values: Any) -> Sequence[float] | str:
-    """Return what is to be written; arrays and numbers of numpy become Python's."""
+    """Return the values to write; arrays and numbers of numpy become Python's."""
     found = values.tolist() if hasattr(values, 'tolist') else values
     found = [found] if isinstance(found, Real) else found
     if isinstance(found, str) or (

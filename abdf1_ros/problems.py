@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Faults in what users write: files, parameters, options."""
+"""Faults of users' files, parameters and options."""
 
 from __future__ import annotations
 
@@ -47,10 +47,10 @@ class Problem(Abdf1Error):
     """
     One fault in a file or parameter that a user wrote.
 
-    ``place`` is where it stands, ``text`` what is wrong and what would be right, ``message`` its
-    numbered entry, or None where the specification has none. Without ``args`` the words of the
-    entry would be false, so only its number is shown; without ``text`` they say all. What it shows
-    is one visible line, whatever stands in the file.
+    ``place`` is its place, ``text`` says what is wrong and what would be right. ``message`` is its
+    numbered entry, None if the specification has none. Without ``args`` the words of the entry
+    would be false, so only its number is shown. Without ``text`` the words of the entry say all. A
+    problem is shown as one visible line, whatever the file contains.
     """
 
     def __init__(self, where: Place | str, text: str, message: Message | None = None,

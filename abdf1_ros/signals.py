@@ -26,7 +26,7 @@ from typing import Self
 
 class EndRequest(threading.Event):
     """
-    Is set when a signal asks this process to end; a context manager of the main thread.
+    An event that is set by a signal to end; a context manager of the main thread.
 
     A handler in Python runs between any two steps of the main thread, also of a handler. One that
     takes a lock, as an event does, may wait for itself for ever. So the handler does nothing. The
@@ -53,7 +53,7 @@ class EndRequest(threading.Event):
         return self
 
     def __exit__(self, *exception: object) -> None:
-        """Leave the handlers: a signal disturbs the rest of the process neither."""
+        """Keep the empty handlers: a late signal must not kill the process during its end."""
         signal.set_wakeup_fd(-1)
         os.close(self._writer)
 

@@ -42,10 +42,10 @@ class TaggedClient(OpenLine):
     """
     The line of a net CSV, whose words are read and written by the tags of a map CSV.
 
-    ``rows`` are its Read, Write and ReadWrite rows by tag. Values are those of the topics: scaled,
-    and written within Min and Max. Nothing is done by itself: no heartbeat, no fallback, and no
-    value is withheld. Errors are those of ``Client``, at the start ConfigurationError with every
-    fault of the files.
+    ``rows`` are its Read, Write and ReadWrite rows by tag. Values are the same as on the topics:
+    scaled, and written within Min and Max. This class does nothing by itself: it has no heartbeat
+    and no fallback, and withholds no value. Errors are the same as in ``Client``; the constructor
+    raises ConfigurationError with every fault of the files.
     """
 
     def __init__(self, net_file: str, map_file: str, trace: str | None = None,
@@ -71,8 +71,8 @@ class TaggedClient(OpenLine):
         """
         Return the value of a Read or ReadWrite row; a list where its Length is above 1.
 
-        Of several tags the values by tag, read in as few packets as it takes. They are not of one
-        instant: each packet is a transaction of its own.
+        For several tags it returns the values by tag, read in as few packets as possible. The
+        values do not belong to one instant: each packet is a transaction of its own.
         """
         if isinstance(tag, str):
             row = self._row(tag, 'read', lambda row: row.polls)

@@ -13,7 +13,7 @@
 # limitations under the License.
 
 """
-Tests of a cell without its PLCs: simulated PLCs, a bridge on their line, and who looks at both.
+Tests of a cell without its PLCs: simulated PLCs, a bridge on their line, and an observer.
 
 ``pytest_plugins = ['abdf1_ros.testing']`` in a conftest.py brings the fixture ``abdf1_cell``; see
 docs/tutorials/testing.md. Importing this keeps all topics on this machine, in a ROS domain that no
@@ -61,7 +61,7 @@ _Result = TypeVar('_Result')
 
 
 def _claim_domain() -> tuple[int, socket.socket]:
-    """Return a domain that no other session on this machine has, and what keeps it ours."""
+    """Return a domain that no other session on this machine has, and the lock that keeps it."""
     claim = socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM)
     for number in range(os.getpid(), os.getpid() + 100):
         with suppress(OSError):  # another session has it
@@ -97,7 +97,7 @@ class Messages(list[Any]):
 
 
 class Bridge:
-    """A bridge as a process, and what it says, in the file ``log``."""
+    """A bridge as a process, with its output in the file ``log``."""
 
     def __init__(self, assignments: Sequence[str], log: Path) -> None:
         self._words = [word for text in assignments for word in ('-p', text)]
@@ -138,7 +138,7 @@ class Bridge:
 
 class Observer(observer.Observer):
     """
-    A ROS node that looks at others from outside; also runs nodes that are added to it.
+    A ROS node that observes other nodes from outside; it also runs nodes that are added.
 
     While it waits it checks that ``bridge`` still runs. It ends a context that it has made.
     """
@@ -163,7 +163,7 @@ class Observer(observer.Observer):
         return result
 
     def listen(self, message_type: Any, topic: str, qos: QoSProfile | None = None) -> Messages:
-        """Subscribe; the default profile also gets what has been published before."""
+        """Subscribe; the default profile also gets messages that were published before."""
         inbox = Messages(self, topic)
         inbox.subscription = self.node.create_subscription(
             message_type, topic, inbox.append, qos or latched_qos())
@@ -180,8 +180,9 @@ class Observer(observer.Observer):
         """
         Wait until a node knows all publishers and subscriptions that were made here before.
 
-        To have found the node is not enough: what it publishes before it has found us is lost. DDS
-        announces endpoints in their order, so a node that answers knows those before the client.
+        Finding the node is not enough: messages that it publishes before it has found us are lost.
+        DDS announces endpoints in their order, so a node that answers knows those before the
+        client.
         """
         client = self.node.create_client(GetParameters, f'{node}/get_parameters')
         self.until(client.service_is_ready, f'the parameters of {node}')
@@ -202,7 +203,7 @@ class Plcs:
     """
     Simulated PLCs in this process, on a pseudo-terminal; ``data`` is a simulator CSV.
 
-    Its name goes away with it. The number of a terminal is soon another test's.
+    Its name disappears with it. The number of a terminal is soon used by another test.
     """
 
     def __init__(self, data: Path, ladders: Sequence[int] = ()) -> None:
@@ -258,7 +259,7 @@ class Plcs:
 
 class SimulatedCell:
     """
-    Simulated PLCs, a bridge on their line as a process, and ``ros``, who looks at its topics.
+    Simulated PLCs, a bridge on their line as a process, and ``ros``, which observes its topics.
 
     ``data``, ``rows`` and ``net`` are the texts of a simulator CSV, a map CSV and a net CSV, which
     go into ``folder``. ``ladders`` are stations with the program of docs/tutorials/heartbeats.md.
@@ -284,7 +285,7 @@ class SimulatedCell:
         self.ros = self.observer(context=context, bridge=self._bridge)
 
     def __enter__(self) -> SimulatedCell:
-        with ExitStack() as stack:  # what fails here, or at the end, leaves no thread and no node
+        with ExitStack() as stack:  # a failure here, or at the end, leaves no thread and no node
             stack.enter_context(self.ros)
             stack.enter_context(self.plcs)
             stack.callback(self.end)
@@ -318,7 +319,7 @@ class SimulatedCell:
 @pytest.fixture
 def abdf1_cell(tmp_path: Path) -> Iterator[Callable[..., SimulatedCell]]:
     """
-    Return what makes a ``SimulatedCell`` of texts; it ends with the test.
+    Return a function that makes a ``SimulatedCell`` of texts; the cell ends with the test.
 
     Its context is the default one, so a node of the test needs no context as an argument.
     """

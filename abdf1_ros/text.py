@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Text from outside, made safe to show, and values as text."""
+"""Foreign text, made safe to show, and values as text."""
 
 from __future__ import annotations
 

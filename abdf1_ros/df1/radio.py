@@ -259,7 +259,7 @@ class RadioNode(EqualNode):
             self._hear((yield Listen(left)))
 
     def _wait_for_quiet(self, size: int, command: _Command | None) -> Procedure:
-        """Wait until a frame of ``characters`` may go, or its command has had its reply."""
+        """Wait until a frame of ``size`` characters may go, or its command has had its reply."""
         machine = self._machine
         if self._settings.avoids_collisions:
             return

@@ -39,7 +39,7 @@ _WRITE_TIMEOUT = 2.0
 
 
 class NoClient(OSError):
-    """Our end of a line is there, but no program has the other one open."""
+    """Our end of a line exists, but no program has opened the far end."""
 
     def __init__(self) -> None:
         super().__init__('waiting for a client')
@@ -49,8 +49,8 @@ class Port(Protocol):
     """
     An open line. Every method raises OSError when the line is gone.
 
-    ``has_more`` tells that the last ``read`` has not taken all that was there. A port that
-    ``is_terminal`` is a device of this machine, not a connection.
+    ``has_more`` tells that the last ``read`` has left bytes unread. A port that ``is_terminal`` is
+    a device of this machine, not a connection.
     """
 
     @property
@@ -66,14 +66,14 @@ class Port(Protocol):
         """Hand all of ``data`` to the operating system."""
 
     def unsent(self) -> int:
-        """Return how many written bytes have not been sent yet, 0 where that is not known."""
+        """Return how many written bytes have not been sent yet, 0 if unknown."""
 
     def close(self) -> None:
         """Give the line back."""
 
 
 class PortAround:
-    """A port that does something to what another one brings or gets."""
+    """A port that changes or watches the bytes of another port."""
 
     def __init__(self, port: Port) -> None:
         self._port = port
@@ -123,7 +123,7 @@ class DescriptorPort:
         return b''
 
     def _take(self) -> bytes:
-        """Read what has come."""
+        """Read the bytes that have come."""
         try:
             data = os.read(self._descriptor, READ_SIZE)
         except BlockingIOError:
@@ -154,7 +154,7 @@ class DescriptorPort:
         """Return how many bytes the operating system still has."""
         try:
             answer = fcntl.ioctl(self._descriptor, termios.TIOCOUTQ, bytes(_INT.size))
-        except OSError:  # a device whose driver does not tell
+        except OSError:  # the driver of this device does not know it
             return 0
         count: int = _INT.unpack(answer)[0]
         return count

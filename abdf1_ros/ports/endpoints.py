@@ -37,11 +37,11 @@ _PTYS = '/dev/pts/'
 
 _GLANCE = 0.2  # for a client (s)
 
-# A client that has said nothing for so long (s) gives its place to the next one.
+# A client that has sent nothing for this time (s) loses its place to the next client.
 _SILENT = 30.0
 
-# One that has vanished without a word is asked after 4 s, then every 2 s; the third time it is
-# gone. What it has been sent has to arrive within the same 10 s.
+# TCP asks a client that has vanished after 4 s, then every 2 s. After the third question the
+# client is gone. Bytes sent to it have to arrive within the same 10 s.
 _TCP = socket.IPPROTO_TCP
 _OPTIONS = ((_TCP, socket.TCP_NODELAY, 1), (socket.SOL_SOCKET, socket.SO_KEEPALIVE, 1),
             (_TCP, socket.TCP_KEEPIDLE, 4), (_TCP, socket.TCP_KEEPINTVL, 2),
@@ -52,7 +52,8 @@ class Endpoint(Protocol):
     """
     The end of a line that a link opens as its port, and opens again when it was lost.
 
-    ``name`` is the name for others. The constructor raises OSError where it is not available.
+    ``name`` is the name that other programs use. The constructor raises OSError where it is not
+    available.
     """
 
     name: str
@@ -66,9 +67,9 @@ class Endpoint(Protocol):
 
 class PtyEndpoint:
     """
-    A pseudo-terminal; ``link`` is a name for its other end.
+    A pseudo-terminal; ``link`` is a name for its far end.
 
-    A link that an earlier run has left is replaced; OSError where anything else has the name.
+    A link that an earlier run has left is replaced; OSError if another file has the name.
     """
 
     def __init__(self, link: str | None) -> None:
@@ -109,19 +110,19 @@ class PtyEndpoint:
 
 class PtyPlace(PtyEndpoint):
     """
-    A pseudo-terminal for one program after the other: what one has left is gone with it.
+    A pseudo-terminal for one program at a time; bytes that a program leaves behind are dropped.
 
-    That is what it has not read, and what it has written shortly before it went.
+    These are bytes that the program has not read, and bytes written shortly before its end.
     """
 
     def __init__(self, link: str) -> None:
         super().__init__(link)
-        os.close(self._theirs)  # so that our end tells when no program has the other open
+        os.close(self._theirs)  # so that our end shows when no program has opened the far end
         self._hangs_up = select.poll()
         self._hangs_up.register(self._ours, 0)
 
     def open(self) -> Port:  # noqa: A003
-        """Return our end when a program has opened the other one; OSError while none has."""
+        """Return our end when a program has opened the far end; OSError while none has."""
         if self._hangs_up.poll(0):
             self._forget()
             raise NoClient
@@ -134,7 +135,7 @@ class PtyPlace(PtyEndpoint):
         return DescriptorPort(descriptor, close)
 
     def _forget(self) -> None:
-        """Drop what is in both directions."""
+        """Drop the bytes of both directions."""
         termios.tcflush(self._ours, termios.TCIFLUSH)
         theirs = os.open(self._target, os.O_RDWR | os.O_NOCTTY)
         termios.tcflush(theirs, termios.TCIFLUSH)
@@ -153,7 +154,7 @@ def _own(link: Path) -> socket.socket:
 
 
 def _remove_left_over(link: Path) -> None:
-    """Remove what an earlier run has left."""
+    """Remove the link of an earlier run."""
     if _target_of(link).startswith(_PTYS):
         link.unlink()
 
@@ -181,8 +182,8 @@ class _Client(DescriptorPort):
     """
     The connection of the one client of a listening port.
 
-    ``look`` is called after each read with whether that has brought something; it raises OSError
-    where another client has taken the place.
+    ``look`` is called after each read; its argument tells whether the read has brought bytes. It
+    raises OSError where another client has taken the place.
     """
 
     def __init__(self, client: socket.socket, listener: socket.socket,
@@ -198,7 +199,7 @@ class _Client(DescriptorPort):
 
 
 def _has_left(client: socket.socket) -> bool:
-    """Tell whether the other end has closed, also where we have not read all that it said."""
+    """Tell whether the client has closed, even if we have not read all its bytes."""
     closed = select.poll()
     closed.register(client, select.POLLRDHUP)
     return bool(closed.poll(0))
@@ -208,9 +209,9 @@ class TcpEndpoint:
     """
     A listening TCP port, any that is free for 0; one client at a time is the line.
 
-    Another one is closed at once, and ``tell`` is called with its address; but it takes the place
-    of a client that has said nothing for 30 s. One that has vanished is missed within 10 s.
-    ``open`` waits for a client for ``glance`` seconds.
+    A second client is closed at once, and ``tell`` is called with its address. But it takes the
+    place of a client that has sent nothing for 30 s. A client that has vanished is missed within
+    10 s. ``open`` waits for a client for ``glance`` seconds.
     """
 
     def __init__(self, host: str, port: int, tell: Callable[[str], None] = lambda other: None,
@@ -266,12 +267,12 @@ class TcpEndpoint:
 
 
 class SerialEndpoint:
-    """A serial port, or one of a device server."""
+    """A serial port, of this machine or of a device server."""
 
     def __init__(self, settings: PortSettings) -> None:
         self.name = settings.name
         self._settings = settings
-        # Opened at once: a port that is lost is waited for, one that never existed is a mistake.
+        # Opened at once: a lost port is waited for, but a port that never existed is a mistake.
         self._first: Port | None = open_port(settings)
 
     def open(self) -> Port:  # noqa: A003

@@ -40,11 +40,11 @@ _FAULT_WINDOW = 60.0
 
 _POLL_STEP = 0.001  # poll(2) counts milliseconds
 
-_PORTION = 64  # bytes worked on at a time, where they come too fast
+_PORTION = 64  # bytes of one step of work, if they come too fast
 
 
 class PortKind(Enum):
-    """Why a port is not open."""
+    """The reason why a port is not open."""
 
     NO_CLIENT = 'our end is there, and no program at the other one'
     UNAVAILABLE = 'it cannot be opened'
@@ -62,7 +62,7 @@ class PortState:
 
 RELEASED = 'the port is left to others: polling is off'
 
-# The error for all that is under way when files are read again.
+# The error for all commands that are under way when files are read again.
 _READ_AGAIN = 'the files have been read again'
 _EXCHANGE_LIMIT = 5.0
 _GLANCE = 0.1
@@ -132,10 +132,10 @@ class LinkThread(threading.Thread):
     Run ``machine`` on the port that ``open_port`` opens; open it again when it is lost.
 
     ``on_state`` is called when the port opens, is lost, or cannot be opened (in this thread);
-    attempts to open it are ``retry_period`` seconds apart. What is being received came after the
-    clock value ``came_after`` (s), where nothing was left to read: about ``longest_wait`` s ago,
-    as no wait takes longer. ``while_sending`` is called whenever all bytes to send have been given
-    to the port: work done then delays nothing on the line. ``on_fault`` is called with an
+    attempts to open it are ``retry_period`` seconds apart. The bytes of this call came after the
+    clock value ``came_after`` (s), when nothing was left to read. That is about ``longest_wait`` s
+    ago, as no wait takes longer. ``while_sending`` is called whenever all bytes to send have been
+    given to the port: work done then delays nothing on the line. ``on_fault`` is called with an
     exception that is a bug; the machine starts again after it. Three within a minute end the
     thread, and ``has_failed`` tells so.
 
@@ -310,7 +310,7 @@ class LinkThread(threading.Thread):
         finally:
             self._machine.stop(PortLost(end))
             port.close()
-            self._while_sending()  # work that waited for the next frame, which did not come
+            self._while_sending()  # work that waited for the next frame; no frame came
         return False
 
     def _serve(self, port: Port) -> None:
@@ -327,7 +327,7 @@ class LinkThread(threading.Thread):
             if data:
                 port.write(data)
             self._while_sending()
-            # A connection is read as its bytes come: they may be here before their time.
+            # Bytes of a connection are read at once: they may come earlier than on a serial line.
             if port.is_terminal and (spare_time := machine.spare_time):
                 self._pause(spare_time)
             deadline, asked = machine.next_call, clock()
@@ -360,11 +360,11 @@ class LinkThread(threading.Thread):
         self._wake.take()
 
     def _take_portion(self, data: bytes, now: float) -> bytes:
-        """Work on some of what comes too fast, then rest; return what is left."""
+        """Work on some of the bytes that come too fast, then rest; return the bytes left."""
         machine, portion = self._machine, data[:_PORTION]
         if portion:
             machine.receive_data(portion, now)
-        # Nothing is left where all of it were commands of a device server.
+        # Nothing is left if all bytes were commands of a device server.
         count = len(portion) or READ_SIZE
         self._rest(self._pace.rest_after(count, machine.timing.char_time, now))
         self._pace.go_on()
@@ -373,7 +373,7 @@ class LinkThread(threading.Thread):
         return data[_PORTION:]
 
     def _rest(self, seconds: float) -> None:
-        """Leave the processor to others, up to a deadline or a wake."""
+        """Leave the processor to other threads, up to a deadline or a wake."""
         deadline = self._machine.next_call
         if deadline is not None:
             seconds = max(0.0, min(seconds, deadline - self._clock()))

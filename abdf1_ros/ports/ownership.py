@@ -37,7 +37,7 @@ _LOCK = '\0abdf1_ros.port.'
 
 def line_of(port: str) -> str:
     """
-    Return the same text for all names of one port, as far as no name server has to be asked.
+    Return the same text for all names of one port, without asking a name server.
 
     A device is known by its number, a device server by address and port, whatever the scheme.
     """

@@ -12,15 +12,16 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""How long a connection is left alone that brings bytes faster than they can be worked on."""
+"""Pauses for a connection that brings bytes faster than they can be worked on."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 import math
 
-# Symbols of no use take up to 18 us a byte. The other lines have so many times as long as a
-# portion took of the processor, but no longer than the line would have needed for its bytes.
+# A useless symbol costs up to 18 us a byte. After a portion, other lines have the processor for
+# this many times as long as the portion took, at most as long as the line would have needed for
+# its bytes.
 _OTHERS = 19
 
 _FASTEST = 10 / 115200  # s a character, where the line has no speed
@@ -30,10 +31,10 @@ class Pace:
     """
     The rests between the portions of a burst.
 
-    No line does that. But a connection can, to a server that is broken or means harm: it would
-    take a whole processor, and keep the interpreter lock from the other lines of this process.
-    A burst that ends is worked off in the time that it would have taken on the line: that is over
-    at ``line_until`` (clock value, s), minus infinity where there is no burst.
+    No serial line brings such a burst, but a connection to a broken or hostile server can. It
+    would take a whole processor, and keep the interpreter lock from the other lines of this
+    process. A burst that ends is worked off in the time that it would have taken on the line,
+    until ``line_until`` (clock value, s; minus infinity for no burst).
     """
 
     def __init__(self, clock: Callable[[], float], processor_clock: Callable[[], float]) -> None:

@@ -93,7 +93,7 @@ def open_port(settings: PortSettings) -> DescriptorPort:
 
 
 class Rfc2217Port(DescriptorPort):
-    """The port of a device server; ``negotiate`` sets it and comes before all else."""
+    """The port of a device server; call ``negotiate`` first, which sets it."""
 
     def __init__(self, connection: socket.socket) -> None:
         super().__init__(connection.fileno(), connection.close)
@@ -137,7 +137,7 @@ class Rfc2217Port(DescriptorPort):
         """
         Take commands of the server until ``condition``; data before that are dropped.
 
-        Raises OSError with ``failure`` after 3 s, or with ``silence`` where nothing came at all.
+        Raises OSError with ``failure`` after 3 s, or with ``silence`` if nothing came at all.
         """
         has_come = False
         give_up = time.monotonic() + _NEGOTIATION_TIMEOUT

@@ -39,7 +39,7 @@ from abdf1_ros.ports.settings import PortSettings
 import serial
 import serial.rs485
 
-# Our own words, where those of the operating system tell too little.
+# Our own texts for errors whose system text says too little.
 NOT_SERIAL = 'this is not a serial port'
 _REASONS = {errno.EAGAIN: BUSY, errno.EBUSY: BUSY, errno.ENOTTY: NOT_SERIAL}
 
@@ -56,10 +56,10 @@ _PSEUDO_TERMINALS = '/dev/pts/'
 _LAST_BYTES = 1.0
 _LOOK = 0.005
 
-# How often (s) it is looked at whether another program has changed the settings.
+# Interval (s) of looks whether another program has changed the settings.
 _SETTINGS_LOOK = 1.0
 
-# What the system puts before a damaged character, and doubles where it is one itself (PARMRK).
+# The byte that the system puts before a damaged character, and doubles if it is data (PARMRK).
 _MARK = 0xFF
 
 
@@ -82,7 +82,7 @@ def open_device(settings: PortSettings, tell: Callable[[str], None]) -> SerialDe
         stack.callback(port.close)
         if number_of(os.fstat(port.fileno())) != number:
             raise OSError(f'{settings.name} leads to another device by now')
-        if not is_pseudo_terminal(settings.name):  # theirs lasts as long as the other end
+        if not is_pseudo_terminal(settings.name):  # a pseudo-terminal lasts as long as its far end
             fcntl.ioctl(port.fileno(), termios.TIOCEXCL)
         _set_options(port, settings, tell)
         has_parity = settings.parity != 'None'

@@ -35,7 +35,7 @@ from abdf1_ros.ports.settings import PortSettings
 # An attempt to connect ends after this many seconds, so a network that heals is seen soon.
 _CONNECT_TIMEOUT = 1.0
 
-# After so many seconds without an answer from the far host a TCP connection counts as lost. The
+# Seconds without an answer from the far host after which a TCP connection counts as lost. The
 # limit of the operating system is a quarter of an hour.
 _SILENCE_LIMIT = 5
 
@@ -91,7 +91,7 @@ def _connection_from(local: int, family: int, address: tuple[Any, ...]) -> socke
         connection.settimeout(_CONNECT_TIMEOUT)
         connection.connect(address)
         # Without the first option a short frame waits until the one before it has been
-        # acknowledged by TCP. The last one is for bytes that we send, the others are for a line
+        # acknowledged by TCP. The last option is for bytes that we send, all others are for a line
         # on which we only listen.
         for option, value in (
                 (socket.TCP_NODELAY, 1), (socket.TCP_KEEPIDLE, _SILENCE_LIMIT),

@@ -64,7 +64,7 @@ class _TapReader(threading.Thread):
                     if self._onward is not None:
                         self._onward.write(data)
         except OSError as error:
-            # As another error: a broken pipe would be taken for that of standard output.
+            # As another error: a broken pipe would look like the broken pipe of standard output.
             self._heard.put(OSError(error.strerror or str(error)))
 
 
@@ -72,8 +72,8 @@ class Tap:
     """
     One port to listen on, or two to stand between; open while the ``with`` block runs.
 
-    A name is that of a port with these ``settings``, or "pty" or "pty:NAME" for a new
-    pseudo-terminal; ``names`` are the names for others. Raises OSError when one cannot be opened.
+    A name names a port with these ``settings``; "pty" or "pty:NAME" makes a new pseudo-terminal.
+    ``names`` are the names that other programs use. Raises OSError when one cannot be opened.
     """
 
     def __init__(self, names: Sequence[str], settings: PortSettings) -> None:

@@ -132,8 +132,8 @@ class PortOpener:
     """
     Open a port, again after each loss.
 
-    ``tell`` is that of ``open_port``. After ``trace`` all bytes of the port go into a capture. An
-    error of that is given to ``on_error`` and has no effect on the port.
+    ``tell`` is passed to ``open_port``. After ``trace`` all bytes of the port go into a capture.
+    An error of that is given to ``on_error`` and has no effect on the port.
     """
 
     def __init__(self, settings: PortSettings,
@@ -165,7 +165,7 @@ class PortOpener:
             on_error(f'{error}; nothing is recorded')
 
     def note_guest(self, place: str, command: Packet) -> None:
-        """Take note in the capture that a command which is sent now is a guest's."""
+        """Record in the capture that the command sent now is a guest's."""
         if self._trace is not None:
             self._trace.write(setting_line('guest', f'{command.tns:04X} {place}'))
 

@@ -73,11 +73,11 @@ class Column:
     """
     One column of the map CSV.
 
-    ``default`` says what an empty cell means; it is None where the cell must not be empty. A
-    mapping has the value as ``attribute``, its own name in small letters unless told. With
-    ``kind`` the cell alone says the value; otherwise other cells decide, too. The column is for
-    rows with one of ``commands``. In rows with one of ``idle`` it has no effect, which is a
-    remark and no fault.
+    - ``default``: meaning of an empty cell; None if the cell must not be empty.
+    - ``attribute``: attribute of a mapping with the value, by default the name in small letters.
+    - ``kind``: set if the cell alone gives the value; otherwise other cells decide, too.
+    - ``commands``: the rows that may have the column.
+    - ``idle``: the rows in which it has no effect, which is a remark and not a fault.
     """
 
     name: str

@@ -40,7 +40,7 @@ from abdf1_ros.settings.limits import raw_values
 from abdf1_ros.settings.mapping import Mapping, ON_DEMAND, Publish
 from abdf1_ros.text import counted, shown
 
-# What was read of the cells of a row that are not empty, by column.
+# The values of the cells of a row that are not empty, by column.
 Cells: TypeAlias = MappingType[str, Any]
 
 _PERIODS = milliseconds_from(100, 60_000)
@@ -52,7 +52,7 @@ _NO_COUNTING = (FileType.STATUS, FileType.INPUT, FileType.OUTPUT)
 
 
 class ReportFault(Protocol):
-    """Takes the fault of a cell."""
+    """Report the fault of a cell."""
 
     def __call__(self, column: str, text: str, *, is_superfluous: bool = False) -> None: ...
 
@@ -102,7 +102,7 @@ def _needed(values: Cells, column: str, fault: ReportFault) -> int | None:
 
 
 def _check_heartbeat(row: Row, mapping: Mapping, fault: ReportFault) -> None:
-    """Check what a row with Command Heartbeat asks for (rules 1 and 4)."""
+    """Check the cells of a row with Command Heartbeat (rules 1 and 4)."""
     if row.get('Period') and _PERIODS.read(row.get('Period')) is None:
         fault('Period', f'Period = "{row.get("Period")}" should be {_PERIODS.right}')
     if mapping.length != 1:
@@ -162,7 +162,7 @@ def _fallback_values(texts: Sequence[str], mapping: Mapping,
 
 
 def _condition(cells: Cells, mapping: Mapping, fault: ReportFault) -> While | None:
-    """Return what has to hold for a row, None for nothing (rules 3, 13 and 14)."""
+    """Return the condition of a row, None for none (rules 3, 13 and 14)."""
     text, timeout = cells.get('While', ''), cells.get('While_Timeout')
     if not text:
         if timeout:

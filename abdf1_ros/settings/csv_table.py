@@ -44,11 +44,11 @@ _DELIMITERS = {',': 'comma', ';': 'semicolon', '\t': 'tab'}
 _BLANK = ''.join(_DELIMITERS) + ' \r\n'
 _SEPARATOR_LINE = re.compile(r'"?sep=\W*', re.IGNORECASE)
 
-# Far more than a file with one row for each word of a PLC needs.
+# Most bytes of a file: far more than one row for each word of a PLC needs.
 _LARGEST = 10_000_000
 # The limit of csv.reader for one cell.
 _LONGEST_LINE = 131_072
-# From which similarity (0 to 1) on a wrong name is taken for a mistyped column.
+# Similarity (0 to 1) from which a wrong name counts as a mistyped column.
 _ALIKE = 0.7
 # The first bytes of other files that were renamed to .csv: zip archives, old Excel files.
 _WORKBOOKS = (b'PK\x03\x04', bytes.fromhex('D0CF11E0A1B11AE1'))
@@ -82,7 +82,7 @@ class Table:
     """
     The rows whose cells fit the columns, and the faults of the file.
 
-    ``faults`` are of the file as a whole, ``row_faults`` of single rows, which ``rows`` has not.
+    ``faults`` concern the whole file, ``row_faults`` single rows, which are not in ``rows``.
     """
 
     rows: list[Row]
@@ -91,7 +91,7 @@ class Table:
 
     @property
     def is_usable(self) -> bool:
-        """Tell whether its rows can be trusted; where most are bad the others may be shifted."""
+        """Tell whether its rows can be trusted; if most are bad, the good ones may be shifted."""
         return not self.faults and len(self.row_faults) <= len(self.rows)
 
 
@@ -112,9 +112,9 @@ def read_table(path: str, known: Sequence[str], needed: Collection[str] = (),
     """
     Read a file whose header uses ``known`` column names, the ``needed`` ones among them.
 
-    Raises ConfigurationError where there is no header. Where a needed column is missing there are
-    no rows: each would lack the same. Columns that were ``renamed``, and their cells, are faults
-    that say the new name.
+    Raises ConfigurationError if there is no header. If a needed column is missing, there are no
+    rows: each would lack the same cell. Columns that were ``renamed``, and their cells, are faults
+    that give the new name.
     """
     try:
         (first, header), *others = _read_lines(path, known)

@@ -17,8 +17,8 @@ Heartbeats, fallback values and reads that depend on a running PLC, as a map CSV
 
 A heartbeat tells the PLC that the bridge is alive, and that messages of the topics in While still
 come. A fallback value is written when no message comes any more. While withholds values of a PLC
-whose program does not run. None of them is a safety function. The numbers of rules
-are those of docs/heartbeats.md.
+whose program does not run. None of them is a safety function. The rules have the numbers of
+docs/heartbeats.md.
 """
 
 from __future__ import annotations
@@ -69,11 +69,11 @@ class Fallback:
 @dataclass(frozen=True, slots=True)
 class While:
     """
-    What has to hold for values to be published, or for a heartbeat to count.
+    A condition for values to be published, or for a heartbeat to count.
 
-    ``names`` has RUN, or the tag of a counter in the PLC's program (rules 13 to 15); of a
-    heartbeat write topics (rule 3). ``timeout`` (ms) is how long the counter may stay unchanged,
-    and how old the last message of each topic may be; None for RUN.
+    ``names`` holds RUN, or the tag of a counter in the PLC's program (rules 13 to 15); for a
+    heartbeat it holds write topics (rule 3). ``timeout`` (ms) is the longest time that the counter
+    may stay unchanged, and the oldest age of the last message of each topic; None for RUN.
     """
 
     names: tuple[str, ...]
@@ -81,7 +81,7 @@ class While:
 
     @property
     def is_run(self) -> bool:
-        """Tell whether it is the mode of the processor."""
+        """Tell whether the condition is the mode of the processor."""
         return self.names == (RUN,)
 
 

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""What a cell or a first row may be that cannot be used: look-alikes, and of which programs."""
+"""Explanations of cells and first rows that cannot be used: look-alikes, foreign programs."""
 
 from __future__ import annotations
 
@@ -38,12 +38,12 @@ _LIKE_AN_ADDRESS = re.compile(r'[A-Z]{1,3}\d*:\d+\S*', re.ASCII)
 
 
 def is_spreadsheet_error(text: str) -> bool:
-    """Tell whether a cell is what a spreadsheet writes where it has no value, such as #N/A."""
+    """Tell whether a cell is a spreadsheet's mark for a missing value, such as #N/A."""
     return _ERROR.fullmatch(text) is not None
 
 
 def hint(text: str) -> str:
-    """Return what to put after the fault of a cell with this content, empty for no hint."""
+    """Return the hint that follows the fault of a cell with this content, empty for none."""
     for number, character in enumerate(text, 1):
         if not ' ' <= character <= '~':
             return f'; character {number} is {_name(character)}'
@@ -70,18 +70,18 @@ def looks_like_address(text: str) -> bool:
 
 
 def is_export_of_kepserver(names: Sequence[str]) -> bool:
-    """Tell whether a first row is that of an export of tags from KEPServerEX."""
+    """Tell whether a first row begins an export of tags from KEPServerEX."""
     return {'tag name', 'address', 'client access'} <= {name.lower() for name in names}
 
 
 def export_fault(path: str, names: Sequence[str]) -> str:
-    """Return what a file is where its first row is one that other programs write."""
+    """Return the kind of a file whose first row comes from another program."""
     return f'is an export of KEPServerEX; "plc import {path}" makes a map of it' \
         if is_export_of_kepserver(names) else ''
 
 
 def row_hint(names: Sequence[str]) -> str:
-    """Return what a first row seems to be that names no column."""
+    """Return an explanation of a first row that names no column."""
     if names[0].startswith('//'):
         return ', and a comment begins with #'
     if any(map(looks_like_address, names)):

@@ -26,7 +26,7 @@ from abdf1_ros.settings.mapping import Mapping
 from abdf1_ros.settings.scaling import float32_step, Scaling
 from abdf1_ros.text import value_text
 
-# A raw value may be so much of a step outside of a limit: what double precision loses of 32 bits.
+# Tolerance at a limit, in raw steps: the loss of double precision with 32 bits.
 _EXACT = 1e-6
 
 _UNSCALED = Scaling()
@@ -37,8 +37,8 @@ def raw_values(mapping: Mapping, values: Sequence[float] | str) -> Sequence[floa
     """
     Return the raw values to write; FormatError where a limit or the type forbids one.
 
-    No raw value is outside of Min and Max. A float32 can be the nearest one to a limit, and
-    outside: then it stands for the limit, and the nearest raw value inside is written.
+    No raw value is outside of Min and Max. The float32 nearest to a limit can lie outside: it then
+    stands for the limit, and the nearest raw value inside is written.
     """
     codec, scaling = mapping.codec, mapping.scaling
     raw = values if isinstance(values, str) or scaling is None \

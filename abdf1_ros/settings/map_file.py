@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The map CSV as a whole: all good rows, and every fault of the others."""
+"""The map CSV as a whole: all good rows, and every fault of the bad rows."""
 
 from __future__ import annotations
 
@@ -67,7 +67,8 @@ def broken_links(mappings: Rows) -> Iterator[tuple[Mapping, CellFault]]:
     """
     Yield the rows that depend on a missing row, with the fault.
 
-    A row that was left out takes the rows that depend on it along (docs/heartbeats.md, rule 15).
+    If a row was left out, the rows that depend on it are left out, too (docs/heartbeats.md, rule
+    15).
     """
     tags = {mapping.tag: mapping for mapping in mappings}
     runs = {mapping.tag.upper(): mapping for mapping in mappings if mapping.tag.upper() == RUN}
@@ -94,7 +95,7 @@ def broken_links(mappings: Rows) -> Iterator[tuple[Mapping, CellFault]]:
 
 
 def _two_meanings(name: str, row: Mapping, topics: Collection[str]) -> str:
-    """Return what else than the tag of ``row`` a name in While may mean, empty for nothing."""
+    """Return the second meaning of a name in While besides the tag of ``row``, empty for none."""
     its_tag = f'the tag of item {row.item} (line {row.place.line})'
     if name == RUN:
         return f'is the mode of the PLC, and {its_tag}; give that row another tag'
@@ -217,7 +218,7 @@ class _Clashes:
         return faults
 
     def _check_route(self, mapping: Mapping, clash: Clash) -> None:
-        """Find a station with two routes: replies tell only the number of the station."""
+        """Find a station with two routes: replies have only the number of the station."""
         if mapping.serves:
             return
         if (other := self._routed.get(mapping.station)) and other.via != mapping.via:
@@ -243,7 +244,7 @@ class _Clashes:
 
 
 def _why_same(mapping: Mapping, other: Mapping) -> str:
-    """Return why words that two rows call by different names are the same."""
+    """Return why words with different names in two rows are the same."""
     if mapping.station != other.station:
         return ' (a broadcast has the words of every station)'
     if mapping.address.area != other.address.area:

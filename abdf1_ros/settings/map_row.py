@@ -52,7 +52,7 @@ class CellFault:
     """
     The fault of a cell, in parts, as a row may come from a file or a command line.
 
-    ``text`` is the whole fault, or what follows the ``value`` in ``column``: "should be one of
+    ``text`` is the whole fault, or the words after the ``value`` in ``column``: "should be one of
     Low, High". With ``is_superfluous`` the cell should be empty. ``args`` fill the numbered
     ``message``, except for the item.
     """
@@ -110,9 +110,9 @@ class RowReader:
         return replace(mapping, remarks=remarks) if remarks else mapping
 
     def _values(self) -> dict[str, Any]:
-        """Return by column what the cells say that are not empty."""
+        """Return the values of the cells that are not empty, by column."""
         command = self._value('Command', member_of(Command))
-        # 255 is a broadcast: all stations take it, and none answers.
+        # 255 is a broadcast: all stations take the command, and no station answers.
         last_station = BROADCAST if command is Command.WRITE else MAX_STATION
         station = self._value('Station', whole(0, last_station),
                               Message.ERR_BAD_STATION, MAX_STATION + 1)
@@ -216,7 +216,7 @@ class RowReader:
         return access
 
     def _is_read_only(self, command: Command | None) -> bool:
-        """Tell whether the other end may only read the words of a Serve row."""
+        """Tell whether a PLC may only read the words of a Serve row."""
         return command is Command.SERVE and self._row.get('Access').lower() == READ_ONLY.lower()
 
     def _processor(self, plc_type: PlcType | None, address: Address | None) -> Processor | None:
@@ -247,7 +247,7 @@ class RowReader:
 
     def _length_of(self, place: AddressRange, kind: ValueType | None,
                    given: int | None) -> int | None:
-        """Return the Length of a range, with which a Length that is given has to agree."""
+        """Return the Length of a range; a cell Length beside it has to agree."""
         try:
             length = place.length(kind)
         except AddressSyntaxError as error:
@@ -259,7 +259,7 @@ class RowReader:
         return length
 
     def _check(self, mapping: Mapping) -> None:
-        """Check what depends on more than one column."""
+        """Check cells that depend on other columns."""
         self._check_type(mapping)
         if self.faults:
             return
@@ -280,7 +280,7 @@ class RowReader:
             self._fault('Length', 'a string mapping has Length 1')
 
     def _check_values(self, mapping: Mapping) -> None:
-        """Check how raw values become those of the topic."""
+        """Check the conversion of raw values to values of the topic."""
         if mapping.word_order is WordOrder.HIGH and (
                 mapping.type.words != 2 or _natural_type(mapping.address).words != 1):
             self._fault('Word_Order', 'Word_Order High is for int32, uint32 and float32 over '

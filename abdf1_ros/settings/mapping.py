@@ -34,7 +34,7 @@ from abdf1_ros.settings.alarms import Alarm
 from abdf1_ros.settings.heartbeats import Fallback, While
 from abdf1_ros.settings.scaling import Scaling
 
-# Access of a Serve row whose words the other end may only read.
+# Access of a Serve row whose words a PLC may only read.
 READ_ONLY = 'Read'
 
 # Period of a row that is read only when a call asks for it.
@@ -42,7 +42,7 @@ ON_DEMAND = 'on demand'
 
 
 class Command(Enum):
-    """What a mapping does."""
+    """The command of a mapping: read, write, serve or count."""
 
     READ = 'Read'
     WRITE = 'Write'
@@ -51,14 +51,14 @@ class Command(Enum):
     HEARTBEAT = 'Heartbeat'
 
 
-# Rows whose words we read to publish them, whose values are published, and which take messages.
+# Commands of rows that we poll, of rows that are published, and of rows that take messages.
 POLLED = (Command.READ, Command.READ_WRITE)
 PUBLISHED = (*POLLED, Command.SERVE)
 MESSAGES = (Command.WRITE, Command.READ_WRITE, Command.SERVE)
 
 
 class Publish(Enum):
-    """When a read value is published."""
+    """The moment when a read value is published."""
 
     ALWAYS = 'Always'
     CHANGE = 'Change'
@@ -69,18 +69,19 @@ class Mapping:
     """
     One checked row; no two are equal, so a row can be a key.
 
-    ``item`` counts data rows from 1, ``place`` is file and line. ``name`` is the tag and
-    ``topic`` the topic as ROS takes them. ``period`` is ms between reads, 0 for as often as the
-    line allows, None for the node's default. A row that ``is_on_demand`` has none: it is read when
-    it is asked for. ``minimum`` and ``maximum`` bound what is written,
-    in the unit of the topic: where ``scaling`` is given, that of the engineering values. ``via``
-    is the gateway to the station, None for a station of the line itself. With
-    ``is_read_only`` the words of a Serve row may not be written by the other end.
-    ``alarm``, ``fallback`` and ``condition`` are there where the row has them.
-    A row that publishes changes ignores differences up to ``deadband``, in the unit of the topic,
-    and repeats its value after ``max_silence`` ms.
-    ``confirms`` is the tag of the heartbeat whose control the bit tells, empty for none.
-    ``description`` is to be read. ``remarks`` say what is odd about the row.
+    - ``item``: number of the data row, from 1; ``place``: file and line.
+    - ``name``: the tag as ROS takes it; ``topic``: the topic as ROS takes it.
+    - ``period``: ms between reads, 0 for as often as the line allows, None for the node's default.
+    - ``is_on_demand``: the row has no period, and is read only by its service.
+    - ``minimum``, ``maximum``: limits of written values, in the unit of the topic.
+    - ``via``: gateway to the station, None for a station of the line itself.
+    - ``is_read_only``: a PLC must not write the words of this Serve row.
+    - ``alarm``, ``fallback``, ``condition``: None where the row has none.
+    - ``deadband``: largest difference that is not published, in the unit of the topic.
+    - ``max_silence``: ms after which an unchanged value is published again.
+    - ``confirms``: tag of the heartbeat whose control the bit confirms, empty for none.
+    - ``description``: free text.
+    - ``remarks``: unusual settings of the row.
     """
 
     item: int
@@ -225,7 +226,7 @@ class Mapping:
         if self.serves != other.serves or self.station != other.station \
                 and BROADCAST not in (self.station, other.station):
             return False
-        # Where they count in other ways it is unknown which words they are.
+        # If the rows count words in different ways, it is unknown which words they share.
         return any(not mine.counts_like(theirs) or self._meets(other)
                    for mine in self._places(other) for theirs in other._places(self)
                    if mine.may_share_file(theirs))

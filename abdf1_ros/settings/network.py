@@ -58,9 +58,9 @@ class NetField:
     """
     One field of the net CSV.
 
-    A bad value is reported with ``message``, whose places after the value are filled from
-    ``message_args``; its words are true of numbers and choices. ``other_words`` are names of
-    choices in other programs, in lower case, with the choice to advise.
+    A bad value is reported with ``message``; ``message_args`` fill its places after the value. Its
+    words are true of numbers and choices. ``other_words`` are names of choices in other programs,
+    in lower case, with the choice that we advise.
     """
 
     column: str
@@ -162,7 +162,7 @@ class Network:
     remarks: tuple[Problem, ...] = field(default=(), compare=False)
 
     def cells(self) -> dict[str, int | str]:
-        """Return what would stand in the file, by field."""
+        """Return the cells of a file with these values, by field."""
         values = {name: getattr(self, name) for name in FIELDS}
         return {name: ('No', 'Yes')[value] if isinstance(value, bool) else value
                 for name, value in values.items()}
@@ -249,7 +249,7 @@ def load_network(path: str) -> Network:
 
 
 def _row_remarks(row: Row) -> Iterator[Problem]:
-    """Yield what is odd about the way the data row is written."""
+    """Yield remarks on the spelling of the data row."""
     yield from octal_remarks(row)
     absent = [column for column in row.columns if column not in row.cells]
     if absent:
@@ -348,7 +348,7 @@ def _nodes_fault(text: str) -> str:
     return f'Store_Forward = {faults[0]}' if faults else ''
 
 
-# What is wrong with the text of a field, empty for nothing.
+# Functions that return the fault of the text of a field, empty for none.
 _FAULTS = {'com_port': _port_fault, 'listen_port': _second_fault, 'share': _share_fault,
            'store_forward': _nodes_fault}
 

@@ -38,10 +38,10 @@ from abdf1_ros.settings.station_lists import octal_remarks
 from abdf1_ros.text import shown
 
 _ACK_SIZE = 2
-_SHORT_PERIOD = 10  # ms; what is less was meant as seconds
+_SHORT_PERIOD = 10  # ms; a smaller number was probably meant as seconds
 _LONG_TIMEOUT = 10_000  # ms
 
-# What comes of a write; of timers and counters to a bit.
+# The effect of a write; for timers and counters of a write to a bit.
 _WRITTEN = {
     FileType.INPUT: 'is an input: the PLC overwrites what is written there with its next scan',
     FileType.STATUS: 'is in the status file: a write may change how the processor runs',
@@ -50,7 +50,7 @@ _WRITTEN = {
 
 
 def network_remarks(network: Network) -> Iterator[str]:
-    """Yield what is odd about the settings of a line."""
+    """Yield remarks on the settings of a line."""
     yield from map(str, network.remarks)
     if network.data_bits < 8:
         yield (f'Data_Bits {network.data_bits}: DF1 sends bytes of 8 bits; with less the check of '
@@ -93,7 +93,7 @@ def _time_remarks(network: Network) -> Iterator[str]:
 
 
 def row_remarks(row: Row, mapping: Mapping) -> Iterator[Problem]:
-    """Yield what is odd about a row of the map, each with its place."""
+    """Yield remarks on a row of the map, each with its place."""
     yield from octal_remarks(row)
     yield from _name_remarks(row, mapping)
     yield from _useless_cells(row, mapping)
@@ -152,7 +152,7 @@ def _name_remarks(row: Row, mapping: Mapping) -> Iterator[Problem]:
 
 
 def _useless_cells(row: Row, mapping: Mapping) -> Iterator[Problem]:
-    """Yield cells that have no effect, or another one than a newcomer expects."""
+    """Yield cells that have no effect, or an effect that a newcomer does not expect."""
     for column in MAP_COLUMNS:
         name = column.name
         if mapping.command in column.idle and row.get(name) \

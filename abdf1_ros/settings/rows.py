@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The rows of a map, and the groups of them that others ask for."""
+"""The rows of a map, in the groups that the rest of the package asks for."""
 
 from __future__ import annotations
 
@@ -28,12 +28,12 @@ class Rows(tuple[Mapping, ...]):
 
     @cached_property
     def served(self) -> Rows:
-        """Return those whose words are ours."""
+        """Return the rows of our own data table."""
         return Rows(row for row in self if row.serves)
 
     @cached_property
     def of_plcs(self) -> Rows:
-        """Return those whose words a PLC has."""
+        """Return the rows of the PLCs."""
         return Rows(row for row in self if not row.serves)
 
     @cached_property
@@ -44,7 +44,7 @@ class Rows(tuple[Mapping, ...]):
 
     @cached_property
     def published(self) -> Rows:
-        """Return those whose values are published."""
+        """Return the rows whose values are published."""
         return Rows(row for row in self if row.reads)
 
     @cached_property
@@ -59,32 +59,32 @@ class Rows(tuple[Mapping, ...]):
 
     @cached_property
     def messages(self) -> Rows:
-        """Return those that take messages."""
+        """Return the rows that take messages."""
         return Rows(row for row in self if row.writes)
 
     @cached_property
     def written(self) -> Rows:
-        """Return those that we write to a PLC, for messages or by ourselves."""
+        """Return the rows that we write to a PLC, for messages or by ourselves."""
         return Rows(row for row in self.of_plcs if row.changes)
 
     @cached_property
     def own(self) -> Rows:
-        """Return those that we write to a PLC by ourselves."""
+        """Return the rows that we write to a PLC by ourselves."""
         return Rows(row for row in self if row.is_own)
 
     @cached_property
     def heartbeats(self) -> Rows:
-        """Return those that count."""
+        """Return the Heartbeat rows."""
         return Rows(row for row in self if row.is_heartbeat)
 
     @cached_property
     def fallbacks(self) -> Rows:
-        """Return those with a Fallback."""
+        """Return the rows with a Fallback."""
         return Rows(row for row in self if row.fallback)
 
     @cached_property
     def guarded(self) -> Rows:
-        """Return those whose values are published only while a condition holds."""
+        """Return the rows whose values are published only while a condition holds."""
         return Rows(row for row in self if row.is_guarded)
 
     def without(self, others: Iterable[Mapping]) -> Rows:

@@ -39,7 +39,7 @@ class SharePlace:
     """
     A place: ``text`` as it is written, ``kind`` pty, tcp or serial, ``name`` of link or device.
 
-    ``host`` and ``port`` are those of tcp. What is None is as on the line.
+    ``host`` and ``port`` belong to tcp. A setting that is None is the same as on the line.
     """
 
     text: str
@@ -110,7 +110,7 @@ def _place(text: str) -> SharePlace:
 
 
 def _host_and_port(name: str, text: str) -> tuple[str, int]:
-    """Return what stands after "tcp:"; a name of a host may stand for any interface."""
+    """Return host and port after "tcp:"; the name of a host may stand for any interface."""
     with suppress(ValueError):
         host, port = host_and_port(name, '') if ':' in name else host_and_port(f':{name}')
         if port:

@@ -52,6 +52,6 @@ def octal_remarks(row: Row) -> Iterator[Problem]:
 
 
 def octal_of(text: str) -> int | None:
-    """Return what a number with a leading zero is in octal, None where that is the same."""
+    """Return the octal value of a number with a leading zero, None if it is the same."""
     octal = int(text, 8) if _LEADING_ZERO.fullmatch(text) else None
     return None if octal is None or octal == int(text) else octal
