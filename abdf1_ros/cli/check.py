@@ -31,6 +31,7 @@ import shutil
 import sys
 from typing import Any
 
+from abdf1_ros.cli.overhearing import overheard
 from abdf1_ros.cli.terminal import (
     colour,
     command_parser,
@@ -55,7 +56,7 @@ from abdf1_ros.problems import ConfigurationError, Problem
 from abdf1_ros.settings.columns import MAX_PERIOD
 from abdf1_ros.settings.heartbeats import LONGEST_END
 from abdf1_ros.settings.map_file import load_mappings
-from abdf1_ros.settings.mapping import Mapping
+from abdf1_ros.settings.mapping import Command, Mapping
 from abdf1_ros.settings.network import load_network, Network
 from abdf1_ros.settings.rows import Rows
 from abdf1_ros.settings.scaling import Scaling
@@ -121,8 +122,35 @@ def _pair(options: argparse.Namespace) -> tuple[str, bool]:
     """Return the output for two files, and whether they have no error."""
     found = examine(options.net, options.map, options.default_period / 1000)
     report = _report(found, options)
-    text = json.dumps(_content(found, report), indent=2) if options.json else _text(found, report)
-    return text, not found.problems
+    heard = _heard(found, options.heard) if options.heard else None
+    if options.json:
+        content = _content(found, report)
+        return json.dumps(content | ({'heard': heard} if heard else {}), indent=2), \
+            not found.problems
+    return _text(found, report) + ('' if heard is None else _heard_text(heard)), \
+        not found.problems
+
+
+def _heard(found: Findings, files: Sequence[str]) -> dict[str, Any]:
+    """Return which rows recordings fill in Mode Listen, and what other nodes read there."""
+    network = found.network or Network()
+    rows = Rows(row for row in found.mappings if row.command is Command.READ)
+    try:
+        carried, unread = overheard(network, rows, files)
+    except (Problem, OSError) as error:
+        found.problems.append(error if isinstance(error, Problem) else Problem(
+            error.filename, error.strerror or str(error)))
+        return {}
+    return {'rows': {row.tag: unread.get(row, '') for row in rows}, 'reads': carried}
+
+
+def _heard_text(heard: dict[str, Any]) -> str:
+    rows = heard.get('rows', {})
+    texts = [f'warning: {printable(tag)} is not filled: {why}' for tag, why in rows.items() if why]
+    filled = sum(not why for why in rows.values())
+    return '\n'.join(['', '', *(colour(text, YELLOW, sys.stdout) for text in texts),
+                      f'the recording fills {filled} of {counted(len(rows), "row")}; it has:',
+                      *(f'  {printable(text)}' for text in heard.get('reads', []))])
 
 
 def _report(found: Findings, options: argparse.Namespace) -> Report | None:
@@ -219,7 +247,12 @@ def _parse(args: Sequence[str] | None) -> argparse.Namespace:
     parser.add_argument('--response-time', type=duration, metavar='MS',
                         default=USUAL_RESPONSE_TIME * 1000,
                         help='ms that a PLC takes for each answer (default: %(default)g)')
+    parser.add_argument('--heard', metavar='FILE', action='append', default=[],
+                        help='a recording of the line ("sniff --save"): tell which rows it would '
+                        'fill in Mode Listen; may be repeated')
     options = parser.parse_args(args)
+    if options.map is None and options.heard:
+        parser.error('--heard is for one line: name its two files')
     if options.map is None and not Path(options.net).is_dir():
         parser.error(f'{printable(options.net)} is not a folder, so a map CSV has to follow')
     return options

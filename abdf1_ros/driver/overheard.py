@@ -64,12 +64,18 @@ _STATUS = bytes((diagnostics.STATUS,))
 
 @dataclass(slots=True)
 class Carried:
-    """A read of another node: how often it was answered, and when last (clock value, s)."""
+    """
+    A read of another node, in words, and its last ``command``.
+
+    ``count`` tells how often it was answered, from ``first`` to ``last`` (clock values, s).
+    """
 
     station: int
     text: str
-    count: int = 0
+    command: Packet
+    first: float
     last: float = -math.inf
+    count: int = 0
 
 
 class _Path(NamedTuple):
@@ -152,9 +158,10 @@ class Overheard:
         for point in self._unread - self._told:
             if now - self._begun > max(_SILENT, point.stale_time):
                 self._told.add(point)
-                self._readings.unreadable(point, self._why_unread(point))
+                self._readings.unreadable(point, self.why_unread(point))
 
-    def _why_unread(self, point: ReadPoint) -> str:
+    def why_unread(self, point: ReadPoint) -> str:
+        """Return why a row has no value though the line is heard."""
         part = self._parts.get(point)
         return 'no other node reads it' if part is None else (
             f'no reply has all of its words; "{part}" has a part of them')
@@ -221,7 +228,7 @@ class Overheard:
     def _values(self, command: Packet, reply: Packet, asked: float, now: float) -> None:
         """Fill the rows whose words a reply has all."""
         text = describe(command)
-        self._carry(command.dst, text, now)
+        self._carry(command, text, now)
         found: dict[ReadPoint, bytes] = {}
         for rows in self._rows.get(command.dst, ()):
             words = words_in_reply(command, reply, rows)
@@ -236,11 +243,11 @@ class Overheard:
         self._unread.difference_update(found)
         self._readings.heard(found, asked)
 
-    def _carry(self, station: int, text: str, now: float) -> None:
-        known = self.carried.get((station, text))
+    def _carry(self, command: Packet, text: str, now: float) -> None:
+        known = self.carried.get((command.dst, text))
         if known is None:  # another object each time: others may be looking at the one before
             kept = sorted(self.carried.values(), key=attrgetter('last'))[1 - _MOST_CARRIED:]
-            known = Carried(station, text)
+            known = Carried(command.dst, text, command, now)
             self.carried = {(each.station, each.text): each for each in (*kept, known)}
         known.count, known.last = known.count + 1, now
 

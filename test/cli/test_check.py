@@ -25,6 +25,7 @@ from abdf1_ros.cli.check import main
 from abdf1_ros.paths import config_file
 import pytest
 from support.ros import write_csv
+from support.vectors import VECTOR_FOLDER
 
 NET_HEADER = 'Station,Mode,Baud,Cmd_Timeout,Timeout,Com_Port'
 MAP_HEADER = 'Tag,Command,Address,Station,PLC_Type,Length,Period'
@@ -373,3 +374,30 @@ def test_folder_of_this_place_has_its_own_name(
     monkeypatch.chdir(tmp_path)
     main(['.'])
     assert capsys.readouterr().out.startswith(f'{tmp_path.name}: 1 row, port /dev/ttyUSB0')
+
+
+def test_rows_that_a_recording_fills_are_told(tmp_path: Path,
+                                              capsys: pytest.CaptureFixture[str]) -> None:
+    net, rows = tmp_path / 'net.csv', tmp_path / 'map.csv'
+    net.write_text('Mode,Com_Port\nListen,/dev/ttyUSB0\n', encoding='utf-8')
+    rows.write_text(
+        'Tag,Command,Address,Station,PLC_Type,Length,Period\n'
+        'read,Read,N7:8,2,PLC5,2,500\nlonger,Read,N7:8,2,PLC5,3,500\n'
+        'unread,Read,N10:0,2,PLC5,1,500\n', encoding='utf-8')
+    for capture in ('libplctag_client_crc_plc5', 'libplctag_client_crc_plc5_half_duplex'):
+        heard = VECTOR_FOLDER / 'captures' / f'{capture}.cap'
+        assert main([str(net), str(rows), '--heard', str(heard)]) == 0
+        said = capsys.readouterr().out
+        assert 'warning: unread is not filled: no other node reads it' in said
+        assert 'warning: longer is not filled: no reply has all of its words; "word range read' \
+            in said
+        assert 'warning: read is' not in said
+        assert 'the recording fills 1 of 3 rows; it has:' in said
+        assert 'station 2: word range read N7:7, 3 words: ' in said
+    assert main([str(net), str(rows), '--json', '--heard', str(heard)]) == 0
+    content = json.loads(capsys.readouterr().out)['heard']
+    assert content['rows']['read'] == ''
+    assert content['rows']['unread'] == 'no other node reads it'
+    assert any('word range read N7:7, 3 words' in text for text in content['reads'])
+    assert main([str(net), str(rows), '--heard', str(tmp_path / 'none.cap')]) == 2
+    assert 'No such file' in capsys.readouterr().out

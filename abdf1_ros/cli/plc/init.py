@@ -92,6 +92,14 @@ def net_csv(network: Network, found: Found, stations: Collection[int]) -> str:
             + ','.join(map(str, row)))
 
 
+def listening_csv(network: Network) -> str:
+    """Return a net CSV that only listens."""
+    row = ('Listen', network.error_code, network.com_port, network.listen_port, network.baud,
+           network.parity)
+    return ('Mode,Error_Code,Com_Port,Listen_Port,Baud,Parity\n'
+            + ','.join(map(str, row)) + '\n')
+
+
 def map_rows(stations: Iterable[Presence],
              listed: Mapping[int, Sequence[DataFile]]) -> Iterable[str]:
     """Yield a row that works and some rows as comments, for each station and its files."""

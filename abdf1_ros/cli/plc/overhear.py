@@ -21,12 +21,19 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 import time
 
+from abdf1_ros.cli.overhearing import Overhearing
 from abdf1_ros.cli.plc.session import opened
 from abdf1_ros.df1.checksum import Checksum
 from abdf1_ros.df1.frames import Poll
+from abdf1_ros.df1.listen import SecondPort
 from abdf1_ros.df1.listener import LineKind, ListeningDecoder
+from abdf1_ros.driver.overheard import Carried
 from abdf1_ros.ports.wake import Wake
 from abdf1_ros.settings.network import Network
+from abdf1_ros.sniffer.capture import Chunk, Direction
+
+LISTENED_FOR_READS = 10.0
+"""For a map of what another master reads (s)."""
 
 LISTENED = 1.0
 """At each speed (s); masters poll a few times a second."""
@@ -60,12 +67,33 @@ def overhear(network: Network, bauds: Sequence[int],
     """
     for baud in bauds:
         show(f'listening at {baud} baud')
-        characters, polls, check = _heard(replace(network, baud=baud))
+        characters, polls, check = _heard(replace(silent(network), baud=baud))
         if polls.total() >= _SURE_POLLS:
             return ForeignMaster(baud, sorted(polls), check)
         if not characters:
             return None
     return None
+
+
+def silent(network: Network) -> Network:
+    """Return the line with a port that is opened for reading only, where that can be."""
+    return network if network.port.startswith('rfc2217:') else replace(network, mode='Listen')
+
+
+def heard_reads(network: Network, seconds: float) -> list[Carried]:
+    """Listen for so long; return what other nodes read, of which replies came. Raises OSError."""
+    overhearing = Overhearing(network)
+    port, wake = opened(network)(), Wake()
+    try:
+        begun = time.monotonic()
+        while (now := time.monotonic() - begun) < seconds:
+            data = port.read(seconds - now, wake.descriptor)
+            direction = Direction.IN if isinstance(data, SecondPort) else Direction.UNKNOWN
+            overhearing.hear(Chunk(time.monotonic() - begun, direction, data))
+    finally:
+        port.close()
+        wake.close()
+    return overhearing.carried
 
 
 def _heard(network: Network) -> tuple[int, Counter[int], Checksum | None]:

@@ -27,13 +27,13 @@ import shlex
 import sys
 from typing import Any
 
-from abdf1_ros.cli.plc import data, detect, files, init, presence
+from abdf1_ros.cli.overhearing import map_of, texts_of
+from abdf1_ros.cli.plc import data, detect, files, init, overhear, presence
 from abdf1_ros.cli.plc.clock import Clock, TAKEN, told
 from abdf1_ros.cli.plc.exports.form import Wanted
 from abdf1_ros.cli.plc.exports.imported import import_map
 from abdf1_ros.cli.plc.line import free_station, MODES, network_of
 from abdf1_ros.cli.plc.options import COLUMN_ROLES, DEFAULT_STATION, RADIXES
-from abdf1_ros.cli.plc.overhear import overhear
 from abdf1_ros.cli.plc.session import Session
 from abdf1_ros.cli.plc.targets import no_value, rows_of_map, Targets, to_read, to_write
 from abdf1_ros.cli.plc.watch import Watch
@@ -336,6 +336,8 @@ def _scan(options: argparse.Namespace) -> int:
 def _detect(options: argparse.Namespace) -> int:
     network = network_of(options)
     found = _found(options, network)
+    if isinstance(found, overhear.ForeignMaster):
+        return _only_heard(found, '"plc init" writes files that only listen to it')
     if found is None:
         return EXIT_FAILED
     there = found.presence
@@ -353,8 +355,9 @@ def _detect(options: argparse.Namespace) -> int:
     return 0
 
 
-def _found(options: argparse.Namespace, network: Network) -> detect.Found | None:
-    """Return the settings that work; where none do, tell what was received."""
+def _found(options: argparse.Namespace,
+           network: Network) -> detect.Found | overhear.ForeignMaster | None:
+    """Return the settings that work, or who else asks; where none do, tell what was received."""
     if options.duplex == 'slave':
         raise ConfigurationError([Problem(
             '--duplex', 'a slave cannot try settings; without it detect listens first')])
@@ -363,13 +366,10 @@ def _found(options: argparse.Namespace, network: Network) -> detect.Found | None
         else detect.BAUD_RATES
     modes = [MODES[options.duplex]] if options.duplex else [MODES['full'], MODES['half']]
     checks = [network.error_code] if options.check else detect.CHECKS
-    master = overhear(network, bauds, progress.show)
+    master = overhear.overhear(network, bauds, progress.show)
     if master is not None:
         progress.clear()
-        _complain(f'{master}: nothing was sent. "plc --slave --own-station N" asks through it if '
-                  'it polls N and no PLC has that number, as a node of Mode Slave does; "sniff" '
-                  'shows what it reads')
-        return None
+        return master
     search = detect.Search(network, options.stations, progress.show)
     found = search.run(bauds, modes, checks)
     progress.clear()
@@ -392,8 +392,11 @@ def _init(options: argparse.Namespace) -> int:
     if not options.port and not options.net:
         options.port = _only_port()
     network = network_of(options)
-    found = _found(options, network)
-    if found is None:
+    found = None if network.line_mode.only_listens else _found(options, network)
+    master = found if isinstance(found, overhear.ForeignMaster) else None
+    if master is not None or network.line_mode.only_listens:
+        return _init_listening(network, master, target)
+    if found is None or isinstance(found, overhear.ForeignMaster):
         return EXIT_FAILED
     print(f'{colour(str(found.settings), GREEN, sys.stdout)}')
     # A full-duplex port mostly answers to every station, and 0 is the one to avoid (see "check").
@@ -413,6 +416,37 @@ def _init(options: argparse.Namespace) -> int:
           f'{presence.type_to_say(there[0])} --net {net}\n'
           f'  {called("check")} {net} {map_file}\n'
           f'  {called("node")} --ros-args -p net_file:={net} -p map_file:={map_file}')
+    return 0
+
+
+def _only_heard(master: overhear.ForeignMaster | None, what: str) -> int:
+    """Tell what can be done on a line of another master; return the status."""
+    _complain(what if master is None else (
+        f'{master}: nothing was sent. "plc --slave --own-station N" asks through it if it polls N '
+        'and no PLC has that number, as a node of Mode Slave does; "sniff" shows what it reads; '
+        f'{what}'))
+    return EXIT_FAILED
+
+
+def _init_listening(network: Network, master: overhear.ForeignMaster | None,
+                    target: init.NewFiles) -> int:
+    """Write files that only listen, with what another master reads."""
+    if master is not None:
+        print(f'{master}: nothing is sent')
+        check = network.error_code if master.check is None else master.check.value
+        network = replace(overhear.silent(network), baud=master.baud, error_code=check)
+    progress = Progress()
+    progress.show(f'listening for {overhear.LISTENED_FOR_READS:.0f} s')
+    reads = overhear.heard_reads(network, overhear.LISTENED_FOR_READS)
+    progress.clear()
+    if not reads:
+        return _only_heard(master, 'no read with its reply was heard, so nothing was written')
+    for text in texts_of(reads):
+        print(text)
+    target.write(init.listening_csv(network), map_of(reads))
+    net, map_file = (shlex.quote(str(path)) for path in target.paths)
+    print(f'written: {", ".join(map(str, target.paths))}\n'
+          f'how to go on: {called("check")} {net} {map_file}')
     return 0
 
 

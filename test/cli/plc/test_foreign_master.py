@@ -18,9 +18,11 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 import os
 from pathlib import Path
+import select
 import threading
 
 from abdf1_ros import client
+from abdf1_ros.cli import check
 from abdf1_ros.cli.plc import overhear
 from abdf1_ros.cli.plc.command import main
 from abdf1_ros.cli.plc.overhear import ForeignMaster
@@ -102,7 +104,8 @@ def master_on(path: Path, *stations: int) -> Iterator[tuple[str, Master]]:
 
 @pytest.mark.parametrize('command', ['detect', 'init'])
 def test_line_that_has_a_master_is_only_listened_to(
-        tmp_path: Path, capsys: Output, command: str) -> None:
+        tmp_path: Path, capsys: Output, command: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(overhear, 'LISTENED_FOR_READS', 0.2)
     into = ['--into', str(tmp_path / 'new')] if command == 'init' else []
     with master_on(tmp_path / 'line', 1, 3, 7) as (port, master):
         assert main([command, '--port', port, *into]) == 1
@@ -151,3 +154,52 @@ def test_slave_that_nobody_polls_says_so(
 def test_slave_that_searches_is_refused(capsys: Output) -> None:
     assert main(['detect', '--port', '/dev/ttyS0', '--slave']) == 2
     assert 'a slave cannot try settings' in capsys.readouterr().err
+
+
+def test_init_offers_a_map_of_what_another_master_reads(
+        tmp_path: Path, capsys: Output, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(overhear, 'LISTENED_FOR_READS', 2.0)
+    monkeypatch.setattr(overhear, 'LISTENED', 0.3)
+    line, new = Pty(tmp_path / 'line'), tmp_path / 'new'
+    # The same line has its PLC on it: what a master says is heard like what the PLC says.
+    master = Asking(line)
+    master.start()
+    try:
+        assert main(['init', '--port', str(line.name), '--into', str(new)]) == 0
+    finally:
+        master.over.set()
+        master.join()
+    said = capsys.readouterr().out
+    assert 'station 1: protected typed logical read N7:0, 2 words: ' in said
+    assert (new / 'net.csv').read_text('utf-8').splitlines() == [
+        'Mode,Error_Code,Com_Port,Listen_Port,Baud,Parity', f'Listen,CRC,{line.name},,19200,None']
+    rows = [row for row in (new / 'map.csv').read_text('utf-8').splitlines() if row[0] != '#']
+    assert rows == ['Tag,Command,Address,Station,PLC_Type,Length,Period',
+                    'n7_0_2_of_1,Read,N7:0,1,SLC,2,200']
+    assert check.main([str(new / 'net.csv'), str(new / 'map.csv')]) == 0
+    assert not select.select([line.fileno()], [], [], 0.1)[0]
+    # By the files themselves, as a full-duplex line needs: they name both ports.
+    assert main(['init', '--net', str(new / 'net.csv'), '--into', str(tmp_path / 'again')]) == 1
+    assert 'no read with its reply was heard, so nothing was written' in capsys.readouterr().err
+    line.close()
+
+
+class Asking(threading.Thread):
+    """A master that reads N7:0 and N7:1 of station 1, and that PLC, on a line that we hear."""
+
+    def __init__(self, line: Pty) -> None:
+        super().__init__(daemon=True)
+        self._line = line
+        self.over = threading.Event()
+
+    def run(self) -> None:
+        tns = 0x20
+        while not self.over.wait(0.05):
+            tns = tns % 90 + 0x21
+            ask = bytes((1, 0, 0x0F, 0, tns, 0, 0xA2, 4, 7, 0x89, 0, 0))
+            answer = bytes((0, 1, 0x4F, 0, tns, 0, 42, 0, 43, 0))
+            for said in (b'\x10\x01\x01\x10\x02' + ask + b'\x10\x03'
+                         + crc(b'\x01\x02' + ask + b'\x03'), b'\x10\x06', b'\x10\x05\x01\xFF',
+                         b'\x10\x02' + answer + b'\x10\x03' + crc(answer + b'\x03'),
+                         b'\x10\x06'):
+                self._line.write(said)
