@@ -65,7 +65,7 @@ _DETECT_DEFAULTS = LineDefaults(
 
 
 def _complete_import(command: argparse.ArgumentParser) -> None:
-    command.add_argument('file', metavar='FILE', help='the export or list, a CSV file')
+    command.add_argument('file', metavar='FILE', help='the export or list: CSV, of Ignition JSON')
     _add_folder(command, 'map.csv is')
     command.add_argument('--station', metavar='LIST', type=_stations, dest='stations',
                          default=(DEFAULT_STATION,),

@@ -70,7 +70,7 @@ _COMMANDS = {
              'init --into line1', 'init --port /dev/ttyUSB0 --stations 1-4'),
     'files': ('tell which data files a PLC has and how long they are', 'files 1 --net net.csv',
               'files 1 --map --net net.csv', 'files 1 --map map.csv --net net.csv'),
-    'import': ('make map.csv of tags of RSLogix, KEPServerEX, RSView, InTouch, or of any list',
+    'import': ('make map.csv of tags of RSLogix, KEPServer, RSView, InTouch, Ignition, or lists',
                'import plant.csv --station 2 --plc-type SLC',
                'import plant.csv --station 1-4 --read-only --period 1000'),
     'clock': ("tell a PLC's time and its drift, or set it", 'clock 1 --net net.csv',

@@ -404,3 +404,59 @@ def test_export_in_place_of_a_map_or_net_file_is_told(tmp_path: Path) -> None:
     path.write_text(RSLOGIX, encoding='utf-8')
     with pytest.raises(ConfigurationError, match='export of symbols from RSLogix .*plc import'):
         load_mappings(str(path))
+
+
+IGNITION = """\
+{"name": "", "tagType": "Provider", "tags": [
+  {"name": "Line 1", "tagType": "Folder", "tags": [
+    {"name": "Speed", "tagType": "AtomicTag", "valueSource": "opc", "dataType": "Int4",
+     "opcServer": "Ignition OPC UA Server", "opcItemPath": "ns=1;s=[MLX]N7:0", "readOnly": false,
+     "documentation": "Conveyor", "engUnit": "m/min", "scaleMode": "Linear", "rawLow": 0,
+     "rawHigh": 100, "scaledLow": 0.0, "scaledHigh": 10.0},
+    {"name": "Shown", "tagType": "AtomicTag", "valueSource": "memory", "value": 1},
+    {"name": "Wait", "valueSource": "opc", "opcItemPath": "[MLX]T4:1.ACC"}]},
+  {"name": "Root", "valueSource": "opc", "scaleMode": "SquareRoot", "opcItemPath": "[MLX]N7:1"},
+  {"name": "Any", "valueSource": "opc", "opcItemPath": {"bindType": "parameter"}}]}
+"""
+
+
+def test_tags_of_ignition(tmp_path: Path) -> None:
+    (speed, wait), left_out = imported(tmp_path, IGNITION)
+    assert [cell_of(speed, column) for column in (
+        'Tag', 'Command', 'Address', 'Type', 'Scale', 'Offset', 'Description')] == [
+            'Line 1/Speed', 'ReadWrite', 'N7:0', 'int16', '0.1', '0', 'Conveyor [m/min]']
+    assert [cell_of(wait, column) for column in ('Tag', 'Command', 'Address')] == [
+        'Line 1/Wait', 'Read', 'T4:1.ACC']
+    assert left_out == [
+        '9: Root: scaleMode SquareRoot has no counterpart; Linear has',
+        '10: Any: opcItemPath {"bindType": "parameter"} has no address, as in ns=1;s=[PLC]N7:0']
+    result = import_map(str(tmp_path / 'export.csv'), STATION_2)
+    assert +result.ignored == {'tags that are not of a PLC': 1}
+    assert +result.remarks == {'readOnly is not in the file: made Read rows': 1}
+
+
+def test_json_of_something_else_is_no_file_of_ignition(tmp_path: Path) -> None:
+    for text in ('{"opcItemPath"', '[' * 100_000 + '"opcItemPath"', '{"tags": []}'):
+        with pytest.raises(ConfigurationError, match='is none of these'):
+            imported(tmp_path, text)
+
+
+def test_list_with_comments_and_whole_timers(tmp_path: Path) -> None:
+    rows, left_out = imported(tmp_path, (
+        '; of the press\nSymbol,Address,Description,DataType,Scope\n# global\n'
+        'SPEED,N7:0,Conveyor,INT,Global\nMIX,T4:0,,TIMER,Global\nWAIT,T4:1.ACC,,,\n'))
+    assert left_out == [] and [
+        (row.tag, str(row.address), row.length) for row in rows] == [
+            ('SPEED', 'N7:0', 1), ('MIX', 'T4:0', 3), ('WAIT', 'T4:1.ACC', 1)]
+
+
+@pytest.mark.parametrize('text, told', [
+    ('N7:35,Speed of line\nB3:0/0,Start\n', '; it has addresses, but no first row with names: '
+                                            'write one, such as Address,Tag'),
+    ('remark,"CSV-Import-Export"\n0.3\nTYPE,SCOPE,NAME\nTAG,,Speed\n',
+     'has tags of a Logix controller, which are no addresses')])
+def test_file_that_is_not_known_is_told_with_a_cure(
+        tmp_path: Path, text: str, told: str) -> None:
+    with pytest.raises(ConfigurationError) as caught:
+        imported(tmp_path, text)
+    assert told in str(caught.value)

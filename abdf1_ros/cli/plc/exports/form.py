@@ -21,7 +21,9 @@ from dataclasses import dataclass, field
 import re
 
 from abdf1_ros.cli.plc.exports.records import Record
+from abdf1_ros.errors import FormatError
 from abdf1_ros.numbers import decimal_number
+from abdf1_ros.pccc.families import parse_address
 from abdf1_ros.pccc.file_types import PlcType
 from abdf1_ros.text import shown
 
@@ -101,6 +103,19 @@ class Format:
 def cells_of(**texts: str) -> Cells:
     """Return the cells of a row that are not empty."""
     return {column: text for column, text in texts.items() if text}
+
+
+def whole_length(address: str, plc_type: PlcType) -> str:
+    """Return the Length of all words where an address is a whole timer or the like, else empty."""
+    if re.search('[./-]', address):
+        return ''
+    try:
+        place = parse_address(address, plc_type)
+    except FormatError:
+        return ''
+    is_plain = place.file_type.is_structure and all(
+        member.words == 1 for member in place.layout.members.values())
+    return str(place.layout.words) if is_plain else ''
 
 
 def command_of(text: str, column: str = '') -> str | None:

@@ -22,16 +22,25 @@ import csv
 from dataclasses import dataclass, field
 import io
 
-from abdf1_ros.cli.plc.exports import factorytalk, intouch, kepserver, listing, rslogix
+from abdf1_ros.cli.plc.exports import (
+    factorytalk,
+    ignition,
+    intouch,
+    kepserver,
+    listing,
+    rslogix,
+)
 from abdf1_ros.cli.plc.exports.form import Cells, FoundRow, Ignored, Unusable, Wanted
-from abdf1_ros.cli.plc.exports.records import read_records, Record
+from abdf1_ros.cli.plc.exports.records import read_records, Record, text_of
 from abdf1_ros.problems import ConfigurationError, Place, Problem
 from abdf1_ros.settings.columns import NEEDED
 from abdf1_ros.settings.csv_table import Row
+from abdf1_ros.settings.hints import looks_like_address
 from abdf1_ros.settings.map_row import RowReader
 from abdf1_ros.text import printable, shown
 
-FORMATS = (kepserver.FORMAT, factorytalk.FORMAT, intouch.FORMAT, listing.FORMAT, rslogix.FORMAT)
+FORMATS = (kepserver.FORMAT, factorytalk.FORMAT, intouch.FORMAT, ignition.FORMAT, listing.FORMAT,
+           rslogix.FORMAT)
 """The first that takes a file reads it."""
 
 _COLUMNS = (*NEEDED, 'Length', 'Type', 'Period', 'Scale', 'Offset', 'Min', 'Max', 'Description')
@@ -63,11 +72,10 @@ def import_map(path: str, wanted: Wanted) -> Import:
 
     Raises ConfigurationError where the file cannot be read, or is of no form that is known.
     """
-    records = read_records(path)
+    records = ignition.records_of(text_of(path)) or read_records(path)
     reader = next(filter(None, (entry.reader(path, records, wanted) for entry in FORMATS)), None)
     if reader is None:
-        raise ConfigurationError([Problem(path, 'is none of these: ' + '; '.join(
-            entry.title for entry in FORMATS))])
+        raise ConfigurationError([Problem(path, _not_known(records))])
     read: list[tuple[Record, FoundRow | Ignored | Unusable]] = []
     for record in records:
         try:
@@ -86,6 +94,17 @@ def import_map(path: str, wanted: Wanted) -> Import:
         else:
             _add(result, seen, path, record, found, wanted)
     return result
+
+
+def _not_known(records: Sequence[Record]) -> str:
+    """Return why records cannot be read, and what would help."""
+    if any(record.first.lower() == 'remark' for record in records[:1]):
+        return ('has tags of a Logix controller, which are no addresses; over DF1 it has those of '
+                'its "Map PLC/SLC Messages", which are rows to be written by hand')
+    text = 'is none of these: ' + '; '.join(entry.title for entry in FORMATS)
+    if any(looks_like_address(cell) for record in records for cell in record.cells):
+        text += '; it has addresses, but no first row with names: write one, such as Address,Tag'
+    return text
 
 
 def _check_node(path: str, rows: Sequence[FoundRow], wanted: Wanted) -> None:

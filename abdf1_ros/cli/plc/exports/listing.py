@@ -34,6 +34,7 @@ from abdf1_ros.cli.plc.exports.form import (
     Reader,
     Unusable,
     Wanted,
+    whole_length,
 )
 from abdf1_ros.cli.plc.exports.records import Record
 from abdf1_ros.problems import ConfigurationError, Place, Problem
@@ -56,12 +57,14 @@ _TYPES = {
     'uint': 'uint16', 'uint16': 'uint16', 'long': 'int32', 'dint': 'int32', 'int32': 'int32',
     'dword': 'uint32', 'udint': 'uint32', 'uint32': 'uint32', 'float': 'float32',
     'real': 'float32', 'float32': 'float32', 'single': 'float32', 'bcd': 'bcd16',
-    'bcd16': 'bcd16', 'string': 'string'}
+    'bcd16': 'bcd16', 'string': 'string', 'timer': '', 'counter': '', 'control': '', 'pid': '',
+    'message': ''}
+_COMMENTS = ('#', ';', 'sep=')
 _OURS = {'tag', 'command', 'address', 'station', 'plc_type'}
 
 
 def _reader(path: str, records: Sequence[Record], wanted: Wanted) -> Reader | None:
-    head = next((record for record in records if not record.first.startswith(('#', 'sep='))), None)
+    head = next((record for record in records if not record.first.startswith(_COMMENTS)), None)
     if head is None or any(map(looks_like_address, head.cells)):
         return None
     names = [name.lower() for name in head.cells]
@@ -74,7 +77,7 @@ def _reader(path: str, records: Sequence[Record], wanted: Wanted) -> Reader | No
         if 'description' not in columns else [columns['description']]
 
     def read(record: Record) -> FoundRow | Ignored:
-        if record.line <= head.line or record.first.startswith('#'):
+        if record.line <= head.line or record.first.startswith(_COMMENTS):
             return Ignored()
         cells = dict(enumerate(record.cells))
         texts = {role: cells.get(column, '') for role, column in columns.items()}
@@ -124,7 +127,8 @@ def _found(texts: Cells, access: str, description: str, wanted: Wanted) -> Found
                            f'{", ".join(filter(None, _TYPES))}')
         return FoundRow(cells_of(
             Tag=tag, Command=limited(command, wanted), Address=texts['address'],
-            Type=_TYPES[kind], Period=str(wanted.period or ''), Description=description),
+            Length=whole_length(texts['address'], wanted.plc_type), Type=_TYPES[kind],
+            Period=str(wanted.period or ''), Description=description),
             remark='' if wanted.read_only else remark)
     except Unusable as error:
         raise Unusable(str(error), tag) from None

@@ -45,12 +45,11 @@ class Record:
 
 
 def read_records(path: str) -> list[Record]:
-    """Return the records of a file that are not empty; ConfigurationError if it has none."""
-    return list(_records(path))
+    """Return the records of a CSV file that are not empty; ConfigurationError if it is none."""
+    return list(_records(path, text_of(path)))
 
 
-def _records(path: str) -> Iterator[Record]:
-    text = _text(path)
+def _records(path: str, text: str) -> Iterator[Record]:
     reader = csv.reader(io.StringIO(text, newline=None), delimiter=_delimiter(text),
                         skipinitialspace=True)
     line = 1
@@ -64,7 +63,8 @@ def _records(path: str) -> Iterator[Record]:
         raise ConfigurationError([Problem(Place(path, line), str(error))]) from None
 
 
-def _text(path: str) -> str:
+def text_of(path: str) -> str:
+    """Return the text of a file, in the encodings of Windows too."""
     try:
         raw = Path(path).read_bytes()
     except OSError as error:

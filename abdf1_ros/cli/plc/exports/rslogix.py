@@ -32,6 +32,7 @@ from abdf1_ros.cli.plc.exports.form import (
     Reader,
     Unusable,
     Wanted,
+    whole_length,
 )
 from abdf1_ros.cli.plc.exports.records import Record
 from abdf1_ros.errors import FormatError
@@ -63,15 +64,13 @@ def _found(record: Record, wanted: Wanted) -> FoundRow | Ignored:
         return Ignored(f'{match["what"].upper()} rows')
     if not address:
         raise Unusable('Address is missing', symbol)
-    length = ''
     try:
         place = parse_address(address, wanted.plc_type)
     except FormatError as error:
         raise Unusable(str(error), symbol or address) from None
     if place.file_type is FileType.STATUS and not symbol and not wanted.has_status:
         return Ignored('rows of the status file without a symbol (--status takes them)')
-    if place.file_type.is_structure and not re.search('[./]', address):
-        length = str(place.layout.words)  # a symbol of a whole timer: all of its words
     return FoundRow(cells_of(
-        Tag=symbol or sanitise(address), Command=READ, Address=address, Length=length,
+        Tag=symbol or sanitise(address), Command=READ, Address=address,
+        Length=whole_length(address, wanted.plc_type),
         Period=str(wanted.period or ''), Description=' '.join(filter(None, descriptions[:5]))))
