@@ -56,6 +56,42 @@ _QUICK_QUESTIONS = 10
 QUESTION_PERIOD = 1.0
 
 
+class _GuestShare:
+    """
+    What guests have of the line beside our checks and reads.
+
+    No command of theirs goes out before ``begins`` (clock value in s).
+    """
+
+    def __init__(self, stations: ActiveStationList, guests: GuestQueue, tasks: JobTasks) -> None:
+        self.begins = -math.inf
+        self.owed = 0.0  # seconds of the line for checks and reads, before the next guest
+        self.counted: list[Job] = []  # under way: of guests, and of ours while that is so
+        self._stations = stations
+        self._line = guests.line
+        self._tasks = tasks
+
+    @property
+    def is_turn(self) -> bool:
+        """Tell whether a guest goes before checks and reads that are due."""
+        return self.owed <= 0 and not any(isinstance(job, GuestJob) for job in self.counted)
+
+    def settle(self, now: float) -> None:
+        """Count the time that commands which have ended have had, of guests and of ours."""
+        for job in [job for job in self.counted if job not in self._tasks.under_way]:
+            self.counted.remove(job)
+            took = self._line.took(job.taken, now)
+            if isinstance(job, GuestJob):
+                # What ours had too much counts; what guests had while we rested does not add up.
+                owed = min(self.owed, 0.0) + OURS_BESIDE_GUESTS * took
+                self.owed = max(self.owed, owed)
+                if job.has_failed and job.station in self._stations:
+                    # The next one may fail, too, and hold up what becomes due meanwhile.
+                    self.begins = now + OURS_BESIDE_GUESTS * took
+            else:
+                self.owed -= took
+
+
 class Agenda:
     """
     Decide which job has the line next: one of a queue, or one under way.
@@ -72,10 +108,8 @@ class Agenda:
         self._checks = checks
         self._reads = reads
         self._guests = guests
-        self._owed = 0.0  # seconds of the line for checks and reads, before the next guest
-        self._guests_from = -math.inf  # no command of a guest before (clock value in s)
-        self._held_until = math.inf  # the same, while one waits for that
-        self._counted: list[Job] = []  # under way: of guests, and of ours while that is so
+        self._share = _GuestShare(stations, guests, tasks)
+        self._held_until = math.inf  # a guest that waits for its share (clock value in s)
         self._tasks = tasks
         self._own_in_a_row = 0
         self._was_silent = False  # the station of the last of them
@@ -89,8 +123,8 @@ class Agenda:
 
     def next(self, now: float, busy: Container[int] = ()) -> Job | None:  # noqa: A003
         """Return what has the line next, None for nothing; stations in ``busy`` have to wait."""
-        if self._counted:
-            self._settle(now)
+        if self._share.counted:
+            self._share.settle(now)
         if not self._tasks.is_heard:
             job = self._unheard(now, busy)
         else:
@@ -116,21 +150,6 @@ class Agenda:
             self._questions += 1
             self._next_question = now + QUESTION_PERIOD
         return job
-
-    def _settle(self, now: float) -> None:
-        """Count the time that commands which have ended have had, of guests and of ours."""
-        for job in [job for job in self._counted if job not in self._tasks.under_way]:
-            self._counted.remove(job)
-            took = self._guests.line.took(job.taken, now)
-            if isinstance(job, GuestJob):
-                # What ours had too much counts; what guests had while we rested does not add up.
-                owed = min(self._owed, 0.0) + OURS_BESIDE_GUESTS * took
-                self._owed = max(self._owed, owed)
-                if job.has_failed and job.station in self._stations:
-                    # The next one may fail, too, and hold up what becomes due meanwhile.
-                    self._guests_from = now + OURS_BESIDE_GUESTS * took
-            else:
-                self._owed -= took
 
     def _own_first(self, now: float, busy: Container[int]) -> Job | None:
         """Return a heartbeat or fallback if there is one: no write in a row (rule 11)."""
@@ -167,19 +186,17 @@ class Agenda:
         guests = self._guests
         # A guest could write over a fallback that the end has confirmed already.
         has_guests = (guests.inbox.items or guests.waiting) and not self._interlocks.is_ending
-        is_held = has_guests and now < self._guests_from
-        self._held_until = self._guests_from if is_held else math.inf
+        is_held = has_guests and now < self._share.begins
+        self._held_until = self._share.begins if is_held else math.inf
         has_guests = has_guests and not is_held
-        is_guests_turn = self._owed <= 0 and not any(
-            isinstance(job, GuestJob) for job in self._counted)
-        if has_guests and is_guests_turn and (guest := self._guest(now, busy)):
+        if has_guests and self._share.is_turn and (guest := self._guest(now, busy)):
             return guest
         if self._stations.probes.died_at > -math.inf and (late := self._after_death(now, busy)):
             return late
         job = self._checks.find_due(now) and self._check(now, busy) \
             or self._has_own and self._refresh(now, busy) or self._read(now, busy)
-        if job and self._owed > 0:
-            self._counted.append(job.start(self._tasks, now))
+        if job and self._share.owed > 0:
+            self._share.counted.append(job.start(self._tasks, now))
         return job or has_writes and self._write(now, busy) \
             or has_guests and self._guest(now, busy) or None
 
@@ -201,7 +218,7 @@ class Agenda:
         if job is None:
             return None
         self._writes_in_a_row = 0
-        self._counted.append(job.start(self._tasks, now))
+        self._share.counted.append(job.start(self._tasks, now))
         guest = job.asked.guest
         guest.listener.sends(guest, job.command)
         return job

@@ -66,6 +66,11 @@ class Conditions:
     is_ending: bool = False
     ended: float = math.inf
 
+    @property
+    def are_all_due(self) -> bool:
+        """Tell whether the end has begun."""
+        return self.ended < math.inf
+
 
 class Plc:
     """
@@ -214,7 +219,7 @@ class Plc:
     @property
     def _has_last_try(self) -> bool:
         """Tell whether this is the end, and the PLC silent."""
-        return self._conditions.ended < math.inf and not self.is_active
+        return self._conditions.are_all_due and not self.is_active
 
     @property
     def _free_from(self) -> float:

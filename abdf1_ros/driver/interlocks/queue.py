@@ -122,11 +122,6 @@ class Interlocks(WriteListener):
         """Tell whether all is to end."""
         return self._conditions.is_ending
 
-    @property
-    def _are_all_due(self) -> bool:
-        """Tell whether the end has begun."""
-        return self._conditions.ended < math.inf
-
     # What happens
 
     def executor_ran(self, now: float) -> None:
@@ -155,7 +150,7 @@ class Interlocks(WriteListener):
 
         The stations that answered at ``wind_down`` have confirmed it; silent ones have had it.
         """
-        return not self._plc_of or self._are_all_due and not any(
+        return not self._plc_of or self._conditions.are_all_due and not any(
             row.mapping.station in self._awaited or row.is_under_way
             or row.tried < self._conditions.ended
             for row in self._plc_of if not row.is_confirmed)
@@ -213,7 +208,7 @@ class Interlocks(WriteListener):
     def is_overruled(self, write: Write) -> bool:
         """Tell whether a message comes after the end, or before a fallback of its row (5, 9)."""
         row = self._by_mapping.get(write.mapping)
-        return row is not None and (self._are_all_due or write.requested <= row.sent)
+        return row is not None and (self._conditions.are_all_due or write.requested <= row.sent)
 
     def is_put_off(self, write: Write) -> bool:
         """
@@ -238,7 +233,7 @@ class Interlocks(WriteListener):
         for row in rows:
             row.write_ended(claim, now)
             if isinstance(row, FallbackRow):
-                if not row.stands and self._are_all_due:
+                if not row.stands and self._conditions.are_all_due:
                     row.make_due(FallbackCause.END, now)
                 elif row.stands and row.refresh_at <= now:
                     self._plan_refresh(row, now)
@@ -258,7 +253,8 @@ class Interlocks(WriteListener):
              only_active: bool = False) -> OwnWrite | None:
         """Return what has to be written next, maybe ``only_active`` PLCs; None for nothing."""
         self.expire(now)
-        if self._are_all_due:  # there is no later for silent PLCs, but those that answer go first
+        if self._conditions.are_all_due:
+            # There is no later for silent PLCs, but those that answer go first.
             only_active |= any(row.is_under_way and plc.is_active
                                for row, plc in self._plc_of.items())
             self._writing.stations.probes.none_waits(now)
@@ -290,7 +286,7 @@ class Interlocks(WriteListener):
         row.due = math.inf
         plc.plan()
         return OwnWrite(row, write, self._writing, self, expires, is_free=is_first,
-                        is_last=self._are_all_due and not plc.is_active)
+                        is_last=self._conditions.are_all_due and not plc.is_active)
 
     def refresh(self, now: float, busy: Container[int] = ()) -> OwnWrite | None:
         """
@@ -356,7 +352,7 @@ class Interlocks(WriteListener):
         """Do what needs no line: begin the end, store overdue fallbacks of our own table."""
         if not self._has_begun:
             return
-        if self.is_ending and not self._are_all_due:
+        if self.is_ending and not self._conditions.are_all_due:
             self._make_all_due(now)
         if now < self.ours.due:
             return

@@ -39,6 +39,43 @@ class Freshness(Enum):
     WITHHELD = 'withheld'
     WAITING = 'waiting for the first read'
 
+    @property
+    def is_usable(self) -> bool:
+        """Tell whether the last value counts as what the PLC has now."""
+        return self in (Freshness.FRESH, Freshness.LATE)
+
+
+class _Changes:
+    """Keeps values back that differ too little from the published ones (Publish Change)."""
+
+    def __init__(self, mapping: Mapping) -> None:
+        scale = 1.0 if mapping.scaling is None else abs(mapping.scaling.scale)
+        self._deadband = (mapping.deadband or 0.0) / scale * (1 + _ROUNDING)
+        silence = mapping.max_silence
+        self._max_silence = math.inf if silence is None else silence / 1000
+        self._published: Values | None = None
+        self._published_at = -math.inf
+
+    def keeps_back(self, values: Values, now: float, *, is_due: bool) -> bool:
+        """Tell whether values are not published: nothing has changed, and it is not time again."""
+        if not is_due and now - self._published_at < self._max_silence \
+                and not self._is_change(values):
+            return True
+        self._published, self._published_at = values, now
+        return False
+
+    def _is_change(self, values: Values) -> bool:
+        """Tell whether any value differs from the published one by more than the deadband."""
+        before = self._published
+        # Compare bytes of values: other bits of the same words are not a change, and a NaN equals
+        # itself.
+        if before is None or _content(values) == _content(before):
+            return before is None
+        if not self._deadband or isinstance(values, str) or isinstance(before, str):
+            return True
+        return not all(abs(new - old) <= self._deadband
+                       for new, old in zip(values, before, strict=True))
+
 
 class ReadPoint:
     """
@@ -77,13 +114,8 @@ class ReadPoint:
         self._decode = mapping.codec.decoder()
         self._scaling = mapping.scaling
         self._usual_age = min(max(1.5 * period, stale_time / 2), stale_time)
-        self._is_on_change = mapping.publish is Publish.CHANGE
-        scale = 1.0 if mapping.scaling is None else abs(mapping.scaling.scale)
-        self._deadband = (mapping.deadband or 0.0) / scale * (1 + _ROUNDING)
-        silence = mapping.max_silence
-        self._max_silence = math.inf if silence is None else silence / 1000
-        self._published: Values | None = None
-        self._published_at = -math.inf
+        is_on_change = mapping.publish is Publish.CHANGE
+        self._changes = _Changes(mapping) if is_on_change else None
 
     def update(self, words: bytes, now: float) -> Values | None:
         """
@@ -92,7 +124,8 @@ class ReadPoint:
         Raises FormatError when the words are no value of the mapping's type.
         """
         values = self._decode(words)
-        is_same = self._is_on_change and self._is_kept_back(values, now)
+        is_same = self._changes is not None and self._changes.keeps_back(
+            values, now, is_due=self.error is not None)
         before, self.interval = self.interval, None
         if self.last_good is not None and self.error is None and not self.withheld:
             self.interval = now - self.last_good
@@ -115,26 +148,6 @@ class ReadPoint:
         if self._scaling is None or isinstance(values, str):
             return values
         return self._scaling.publish(values)
-
-    def _is_kept_back(self, values: Values, now: float) -> bool:
-        """Tell whether values are not published: nothing has changed, and it is not time again."""
-        if self.error is None and now - self._published_at < self._max_silence \
-                and not self._is_change(values):
-            return True
-        self._published, self._published_at = values, now
-        return False
-
-    def _is_change(self, values: Values) -> bool:
-        """Tell whether any value differs from the published one by more than the deadband."""
-        before = self._published
-        # Compare bytes of values: other bits of the same words are not a change, and a NaN equals
-        # itself.
-        if before is None or _content(values) == _content(before):
-            return before is None
-        if not self._deadband or isinstance(values, str) or isinstance(before, str):
-            return True
-        return not all(abs(new - old) <= self._deadband
-                       for new, old in zip(values, before, strict=True))
 
     def fail(self, error: str) -> bool:
         """Take note that a read gave no value; return whether the reason is a new one."""
