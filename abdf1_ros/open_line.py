@@ -16,7 +16,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 import logging
 from numbers import Real
@@ -120,15 +120,14 @@ class OpenLine:
     """
     A line that carries out one request at a time, from here to the end of ``with``.
 
-    ``absent`` stations get one try; ``routes`` gives the gateways of stations that are behind one.
-    To a PLC that asks us we are a ``plc_type``. ``counters`` counts on the whole line,
-    ``stations`` has the state of each station. All bytes go into the file ``trace``, for
+    Inactive ``stations`` get one try each until they answer. To a PLC that asks us we are a
+    ``plc_type``. ``counters`` counts on the whole line. All bytes go into the file ``trace``, for
     ``sniff``. Raises OSError when the port cannot be opened or the file not be written.
     """
 
     def __init__(self, mode: LineMode, line: LinkSettings, port: PortSettings,
-                 absent: Sequence[int] = (), routes: Mapping[int, int] | None = None,
-                 plc_type: PlcType = PlcType.PLC5, trace: str | None = None,
+                 stations: ActiveStationList | None = None, plc_type: PlcType = PlcType.PLC5,
+                 trace: str | None = None,
                  logger: logging.Logger = LOG) -> None:
         if mode.only_listens:
             raise ConfigurationError([Problem('Mode', (
@@ -136,9 +135,7 @@ class OpenLine:
                 'send'))])
         self.log = logger
         self._mode, self._settings = mode, line
-        self.stations = ActiveStationList(absent, routes=routes)
-        for number in absent:
-            self.stations.lost(number, 0.0)
+        self.stations = ActiveStationList() if stations is None else stations
         self._requests = Requests(mode, line, self.stations, random.randrange(0x10000), plc_type,
                                   self._told, may_store='://' in port.name)
         self.counters = self._requests.counters

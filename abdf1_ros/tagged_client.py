@@ -20,7 +20,7 @@ from collections.abc import Callable, Iterable, Sequence
 import logging
 from typing import Any, overload
 
-from abdf1_ros.df1.stations import MAX_STATION
+from abdf1_ros.df1.stations import ActiveStationList, MAX_STATION
 from abdf1_ros.errors import FormatError
 from abdf1_ros.open_line import LOG, OpenLine, plain, single, text_of, values_of
 from abdf1_ros.pccc import steps
@@ -57,9 +57,10 @@ class TaggedClient(OpenLine):
             raise ConfigurationError(problems)
         self.rows = {row.tag: row for row in mappings.of_plcs
                      if (row.polls or row.writes) and row.station <= MAX_STATION}
-        super().__init__(network.line_mode, network.line, PortSettings.of(network), routes={
-            row.station: row.via for row in mappings if row.via is not None},
-            trace=trace, logger=logger)
+        super().__init__(network.line_mode, network.line, PortSettings.of(network),
+                         ActiveStationList(routes={row.station: row.via for row in mappings
+                                                   if row.via is not None}),
+                         trace=trace, logger=logger)
 
     @overload
     def read(self, tag: str) -> Any: ...

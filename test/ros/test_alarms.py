@@ -36,15 +36,15 @@ class Bench:
         row = one(Command='Read', Address='B3:0/3', Length='2', Alarm=alarm, **cells)
         self.now = 100.0
         self.point = ReadPoint(row, 0.2, STALE)
-        self._alarms = Alarms([self.point], '/dev/plc', lambda: self.now)
+        self.alarms = Alarms([self.point], '/dev/plc', lambda: self.now)
         self.status: AlarmStatus
-        self.status, = self._alarms.statuses
+        self.status, = self.alarms.statuses
 
     def read(self, *bits: int, after: float = 0.1) -> None:
         """Read the row ``after`` so many seconds."""
         self.now += after
         self.point.update(bytes([bits[0] << 3 | bits[1] << 4, 0]), self.now)
-        self._alarms.read(self.point.mapping, array('B', bits))
+        self.alarms.read(self.point.mapping, array('B', bits))
 
     def says(self) -> tuple[bytes, str]:
         """Return level and text."""
@@ -71,6 +71,8 @@ def test_alarm_between_two_statuses_is_shown_once() -> None:
         bench.read(0, 0)
     assert bench.says() == (WARN, 'B3:0/3 3 times, gone 0.0 s ago')
     assert bench.status.values(bench.now)['B3:0/3'] == '3 times, gone 0.0 s ago'
+    assert bench.says()[0] == WARN  # whoever looks changes nothing
+    bench.alarms.forget()
     assert bench.says() == (OK, 'no alarm')
 
 

@@ -83,7 +83,7 @@ class Bench:
         self.driver = Driver(Network(mode=mode), mappings, DriverSettings(), self.events)
         self.link = LinkThread(self.driver.machine, lambda: pytest.fail('no port here'))
         self.diagnostics = Diagnostics(
-            'line_a', self.driver, PORT, self.seen, self.events.writes, left_out)
+            'line_a', self.driver, PORT, self.events, left_out)
         self.opener = PortOpener(PortSettings.of(Network(), PORT))
         self.diagnostics.line.attach(self.link, self.opener)
         self.set_port(True, 'open')
@@ -173,7 +173,7 @@ def test_names_and_hardware_ids(bench: Bench) -> None:
 
 
 def test_link_before_there_is_one(bench: Bench) -> None:
-    unattached = Diagnostics('line_a', bench.driver, PORT, Seen(), bench.events.writes)
+    unattached = Diagnostics('line_a', bench.driver, PORT, bench.events)
     link = unattached.statuses(NOW)[0]
     assert (link.level, link.message) == (ERROR, 'ERROR: not started yet')
     assert details(link)['port'] == 'closed'

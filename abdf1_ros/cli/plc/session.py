@@ -22,7 +22,7 @@ import time
 
 from abdf1_ros import open_line
 from abdf1_ros.cli.terminal import NoPort, tell
-from abdf1_ros.df1.stations import MAX_STATION
+from abdf1_ros.df1.stations import ActiveStationList, MAX_STATION
 from abdf1_ros.pccc.file_types import PlcType
 from abdf1_ros.ports.descriptor import Port
 from abdf1_ros.ports.settings import PortSettings
@@ -65,8 +65,11 @@ class Session(open_line.OpenLine):
         self.said: set[str] = set()
         self.is_silent = False
         through = {} if via is None else dict.fromkeys(range(MAX_STATION + 1), via)
+        stations = ActiveStationList(absent, routes={**through, **(routes or {})})
+        for number in absent:
+            stations.lost(number, 0.0)
         try:
-            super().__init__(network.line_mode, network.line, PortSettings.of(network), absent,
-                             {**through, **(routes or {})}, PlcType(network.plc_type), record)
+            super().__init__(network.line_mode, network.line, PortSettings.of(network), stations,
+                             PlcType(network.plc_type), record)
         except OSError as error:
             raise NoPort(network.port, error) from None

@@ -116,10 +116,10 @@ class Session:
         node, parameters = surroundings.node, configuration.parameters
         network, mappings = configuration.network, configuration.mappings
         self.reads = ReadTopics(node, surroundings.published)
-        self._seen = Seen(lambda: surroundings.names.text, latest=self.reads.latest)
+        seen = Seen(lambda: surroundings.names.text, latest=self.reads.latest)
         self._events = LineEvents(
             node.get_logger(), self.port, stations_of(mappings),
-            scans=not network.line_mode.has_one_plc, seen=self._seen, read=self._reader(),
+            scans=not network.line_mode.has_one_plc, seen=seen, read=self._reader(),
             results=surroundings.results, table_changed=self._publish_active,
             answer=surroundings.services.take)
         self.driver = Driver(network, mappings, configuration.driver_settings(), self._events)
@@ -132,14 +132,13 @@ class Session:
         self.guests = GuestPlaces(configuration, self.driver, surroundings.opener,
                                   self._events.notes, self._wake_link)
         self.diagnostics = Diagnostics(
-            node.get_fully_qualified_name().lstrip('/'), self.driver, self.port, self._seen,
-            self._events.writes, configuration.map_problems, self.guests.lines,
-            self._alarms.statuses)
+            node.get_fully_qualified_name().lstrip('/'), self.driver, self.port,
+            self._events, configuration.map_problems, self.guests.lines, self._alarms.statuses)
         self._interlocks = InterlockWatch(node, self.driver)
         self._watches: list[Watch] = [
             surroundings.names,
             TypeWatch(surroundings.graph, node.resolve_topic_name, mappings),
-            *watches_of(self.diagnostics.line, self.port, self._seen, self.guests.lines,
+            *watches_of(self.diagnostics.line, self.port, seen, self.guests.lines,
                         configuration.files.changed, self._interlocks.look)]
         self.link_counters = LinkCounterService(
             self.driver, self._wake_link, surroundings.wake_executor)
@@ -300,9 +299,10 @@ class Session:
         """Publish all statuses at the clock value ``now`` (s)."""
         period = self.configuration.parameters.diagnostics_period
         self._next_diagnostics = now + period - (now - self._phase) % period
-        self._publish(self._surroundings.diagnostics,
-                      DiagnosticArray(status=self.diagnostics.statuses(
-                          now, is_waiting=self.is_waiting)))
+        statuses = self.diagnostics.statuses(now, is_waiting=self.is_waiting)
+        if not self.is_waiting:
+            self._alarms.forget()
+        self._publish(self._surroundings.diagnostics, DiagnosticArray(status=statuses))
 
     def _publish_snapshot(self, now: float) -> None:
         """Publish all values where that is due and there is a subscriber."""

@@ -23,18 +23,15 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 
-from abdf1_ros.driver.reads.point import Freshness, ReadPoint
+from abdf1_ros.driver.reads.point import ReadPoint
 from abdf1_ros.pccc.values import Values
+from abdf1_ros.ros.diagnostics.mappings import FRESHNESS_LEVELS
 from abdf1_ros.ros.diagnostics.status import ERROR, Judgement, OK, WARN
 from abdf1_ros.settings.alarms import Severity
 from abdf1_ros.settings.mapping import Mapping
 from abdf1_ros.text import counted, first
 
 _LEVELS = {Severity.WARN: WARN, Severity.ERROR: ERROR}
-
-# Rows whose bits are not what the PLC has now.
-_UNKNOWN = {Freshness.STALE: ERROR, Freshness.FAILED: ERROR, Freshness.WITHHELD: ERROR,
-            Freshness.WAITING: WARN}
 
 
 @dataclass(slots=True)
@@ -86,8 +83,8 @@ class AlarmStatus:
 
     def judge(self, now: float) -> Judgement:
         state = self._point.freshness(now)
-        if state in _UNKNOWN:
-            return _UNKNOWN[state], f'unknown: its row is {state.value}{self._description}'
+        if not state.is_usable:
+            return FRESHNESS_LEVELS[state], f'unknown: its row is {state.value}{self._description}'
         shown = [f'{bit.place} {bit.text(now)}' for bit in self._bits if bit.is_on or bit.is_news]
         if not shown:
             return OK, f'no alarm{self._description}'
@@ -98,10 +95,12 @@ class AlarmStatus:
         return f': {self._mapping.description}' if self._mapping.description else ''
 
     def values(self, now: float) -> dict[str, str]:
-        """Return each bit; what it was between two statuses has been shown then."""
+        return {bit.place: bit.text(now) for bit in self._bits}
+
+    def forget(self) -> None:
+        """Take note that a status has shown what a bit was since the one before."""
         for bit in self._bits:
             bit.is_news = False
-        return {bit.place: bit.text(now) for bit in self._bits}
 
 
 class Alarms:
@@ -121,3 +120,8 @@ class Alarms:
         """Take the values of a good read, of any row."""
         if status := self._by_mapping.get(mapping):
             status.take(values, self._clock())
+
+    def forget(self) -> None:
+        """Take note that all statuses have been shown."""
+        for status in self._by_mapping.values():
+            status.forget()

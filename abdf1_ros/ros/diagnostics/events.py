@@ -61,7 +61,7 @@ class LineEvents:
         self._port = port
         self._stations = stations
         self._scans = scans
-        self._seen = seen
+        self.seen = seen
         self._results, self._answer = results, answer
         self._table_changed = table_changed
         # A station may have a reply ready for a command from before.
@@ -92,7 +92,7 @@ class LineEvents:
         now, mapping = self._clock(), result.mapping
         self.writes.add(result, now)
         if result.outcome is Outcome.FALLBACK:
-            self._seen.last_fallbacks[mapping.station] = f'{mapping.tag}: {result.detail}', now
+            self.seen.last_fallbacks[mapping.station] = f'{mapping.tag}: {result.detail}', now
         level = _RESULT_LEVELS.get(result.outcome, ERROR)
         if level == ERROR or result.outcome is Outcome.FALLBACK:
             tell = self.notes.info if is_usual_fallback(result) else self.notes.warning
@@ -116,7 +116,7 @@ class LineEvents:
         """Log that a heartbeat is not the one that we have written (rule 19)."""
         log = self.notes.error if is_conflict else self.notes.warning
         if is_conflict:
-            self._seen.conflicts[mapping.tag] = f'{mapping.address}: {text}'
+            self.seen.conflicts[mapping.tag] = f'{mapping.address}: {text}'
         log(mapping.tag, f'{where(mapping)}: {text}')
 
     def happened(self, event: Event) -> None:
@@ -130,9 +130,9 @@ class LineEvents:
         if event.message is not Message.NTC_REPLY_MSG_RCVD:
             moment = event, self._clock()
             if not is_inactive:  # it has values of its own, but the reason is only in the event
-                self._seen.last_events[event.station] = moment
+                self.seen.last_events[event.station] = moment
             if event.message.severity is not Severity.NOTICE:
-                self._seen.last_error = moment
+                self.seen.last_error = moment
         if not (is_inactive and event.station in self._stations):  # logged by station_changed
             self._log.add(event)
 

@@ -22,7 +22,7 @@ from operator import itemgetter
 from abdf1_ros.driver.driver import Driver
 from abdf1_ros.driver.interlocks.fallback import FallbackRow, FallbackState
 from abdf1_ros.driver.interlocks.heartbeat import BeatState, HeartbeatRow
-from abdf1_ros.driver.reads.point import Freshness, ReadPoint
+from abdf1_ros.driver.reads.point import ReadPoint
 from abdf1_ros.plan.bounds import Bound, Times
 from abdf1_ros.ros.diagnostics.stations import processor_fault
 from abdf1_ros.ros.diagnostics.status import ERROR, Judgement, OK, Seen, WARN, with_age
@@ -101,7 +101,7 @@ class InterlockStatus:
         """Return what a bit says of a heartbeat that counts since ``begun``, and why."""
         tag, freshness = point.mapping.tag, point.freshness(now)
         bit, why = self._watched.latest.get(point.mapping.topic), point.error or point.withheld
-        if bit is None or freshness not in (Freshness.FRESH, Freshness.LATE):
+        if bit is None or not freshness.is_usable:
             return _Control.UNKNOWN, f'unknown: {tag} is {freshness.value}' + (
                 f': {why}' if why else '')
         if (point.last_good or 0.0) < begun:

@@ -18,7 +18,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
-from abdf1_ros.driver.reads.point import Freshness, ReadPoint
+from abdf1_ros.driver.reads.point import ReadPoint
 from abdf1_ros.plan.report import PERIOD_STEPS
 from abdf1_ros.text import first, milliseconds
 
@@ -56,8 +56,7 @@ class SlowRows:
 
     def _look(self, now: float) -> dict[ReadPoint, float]:
         return {point: point.kept for point in self._points
-                if point.kept is not None and point.freshness(now) in (
-                    Freshness.FRESH, Freshness.LATE)
+                if point.kept is not None and point.freshness(now).is_usable
                 and point.kept > point.period * (_STILL_SLOW if point in self._slow else _SLOW)}
 
     def _advice(self) -> str:

@@ -28,7 +28,7 @@ from abdf1_ros.text import counted
 # So many faults of rows that were left out are repeated with every status; check has them all.
 _MOST_LEFT_OUT = 20
 
-_FRESHNESS_LEVELS = {
+FRESHNESS_LEVELS = {
     Freshness.FRESH: OK, Freshness.LATE: WARN, Freshness.WAITING: WARN,
     Freshness.STALE: ERROR, Freshness.FAILED: ERROR, Freshness.WITHHELD: ERROR}
 
@@ -59,7 +59,7 @@ class MappingsStatus:
         if not found:
             return OK, 'no mapping reads'
         states = [f'{count} {state.value}' for state, count in found.items()]
-        return (max(_FRESHNESS_LEVELS[state] for state in found),
+        return (max(FRESHNESS_LEVELS[state] for state in found),
                 f'of {sum(found.values())} mappings {", ".join(sorted(states))}')
 
     def _freshness(self, now: float) -> dict[Freshness, int]:

@@ -20,6 +20,7 @@ from collections.abc import Sequence
 
 from abdf1_ros.driver.driver import Driver
 from abdf1_ros.problems import Problem
+from abdf1_ros.ros.diagnostics.events import LineEvents
 from abdf1_ros.ros.diagnostics.guests import GuestsStatus
 from abdf1_ros.ros.diagnostics.interlocks import InterlockStatus
 from abdf1_ros.ros.diagnostics.line import LineView
@@ -27,8 +28,7 @@ from abdf1_ros.ros.diagnostics.link import CountersStatus, LinkStatus
 from abdf1_ros.ros.diagnostics.mappings import MappingsStatus
 from abdf1_ros.ros.diagnostics.standby import StandbyStatus
 from abdf1_ros.ros.diagnostics.stations import StationStatus
-from abdf1_ros.ros.diagnostics.status import message_of, Seen, Status, WORDS
-from abdf1_ros.ros.diagnostics.writes import WriteLog
+from abdf1_ros.ros.diagnostics.status import message_of, Status, WORDS
 from abdf1_ros.share.guest_line import GuestLine
 from diagnostic_msgs.msg import DiagnosticStatus
 
@@ -38,20 +38,22 @@ class Diagnostics:
     All statuses of one node, named ``<node>: <status>``.
 
     ``node_name`` is the full name, or nodes of one name in two namespaces would be one here.
+    ``events`` is the listener of the driver.
     ``left_out`` are the faults of the rows that the map was read without, ``guests`` are the
     places of other programs, ``alarms`` the statuses of rows with an alarm.
     """
 
     def __init__(self, node_name: str, driver: Driver, port: str,
-                 seen: Seen, writes: WriteLog, left_out: Sequence[Problem] = (),
+                 events: LineEvents, left_out: Sequence[Problem] = (),
                  guests: Sequence[GuestLine] = (), alarms: Sequence[Status] = ()) -> None:
         self._node_name = node_name
+        seen = events.seen
         self.line = LineView(driver)
         self.counters = CountersStatus(self.line, port)
         self._statuses: list[Status] = [
             LinkStatus(self.line, port, seen), self.counters,
             *(StationStatus(self.line, station, port, seen) for station in driver.stations),
-            MappingsStatus(driver, port, left_out), writes, *alarms]
+            MappingsStatus(driver, port, left_out), events.writes, *alarms]
         if driver.interlocks.heartbeats or driver.interlocks.fallbacks:
             self._statuses.append(InterlockStatus(driver, port, seen))
         if guests:

@@ -129,7 +129,7 @@ class FaultyLine:
         self.driver = Driver(
             _network(mode), self._mappings, DriverSettings(max_outstanding=3), self.ear)
         self._diagnostics = Diagnostics(
-            'soak', self.driver, 'line', self.ear.seen, self.ear.writes)
+            'soak', self.driver, 'line', self.ear)  # type: ignore[arg-type]
         self._plcs = [
             simulated_plc(PLC, 'PLC5', self.clock, ('N7:0', 100)),
             simulated_plc(SLC, 'SLC', self.clock, ('N7:0', 100), ('B3:0', 20))]
