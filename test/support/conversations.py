@@ -35,6 +35,7 @@ from support.peers import CommandTask
 from support.vectors import load_json
 
 Line = dict[str, Any]
+_NO_LINE: Line = {}
 
 _MS = ('timeout', 'cmd_timeout', 'poll_pause', 'poll_timeout')
 _OF_THE_RUN = ('char_time', 'tx_delay', 'inactive', 'routes', 'running')
@@ -79,12 +80,14 @@ class Conversation:
 
     def link_settings(self) -> LinkSettings:
         """Return the settings of the link."""
-        given = {name: value / 1000 if name in _MS else value
-                 for name, value in self.settings.items() if name not in _OF_THE_RUN}
+        given: dict[str, Any] = {
+            name: value / 1000 if name in _MS else value
+            for name, value in self.settings.items() if name not in _OF_THE_RUN}
         polling = given.pop('polling', None)
         if polling is not None:
-            polling = PollingSettings(**{name: tuple(value) if isinstance(value, list) else value
-                                         for name, value in polling.items()})
+            lists: dict[str, Any] = {name: tuple(value) if isinstance(value, list) else value
+                                     for name, value in polling.items()}
+            polling = PollingSettings(**lists)
         return LinkSettings(
             **given, polling=polling, checksum=self.checksum,
             timing=LineTiming(self.settings.get('char_time', 0.0) / 1000,
@@ -142,7 +145,7 @@ class Player(CommandTasks):
                 self.done.append(line)
                 self._do(line)
                 self._take()
-        self._pass_time(entry.get('until', lines[-1].get('by', lines[-1]['at'])))
+        self._pass_time(end_of(lines[-1]) if 'until' not in entry else entry['until'])
 
     def _do(self, line: Line) -> None:
         if 'they' in line:
@@ -210,14 +213,19 @@ class Player(CommandTasks):
     def story(self) -> list[Line]:
         """Return what was done and is to be compared, with the times of the conversation."""
         return [self._compared(done, line) for done, line in zip_longest(
-            self.done, expected(self._conversation), fillvalue={}) if done]
+            self.done, expected(self._conversation), fillvalue=_NO_LINE) if done]
 
     @staticmethod
     def _compared(done: Line, line: Line) -> Line:
-        at, by = done['at'], line.get('by', line.get('at'))
+        at, by = done['at'], end_of(line) if line else 0.0
         if line and line['at'] - _PRECISION <= at <= by + _PRECISION:
             done = {**done, **{name: line[name] for name in ('at', 'by') if name in line}}
         return {name: value for name, value in done.items() if name != 'says'}
+
+
+def end_of(line: Line) -> float:
+    """Return when the last moment of a line is."""
+    return float(line['by'] if 'by' in line else line['at'])
 
 
 def played(name: str) -> Player:

@@ -66,7 +66,7 @@ class DeviceServer:
         self.connection, _ = self._listener.accept()
         with self.connection:
             self.connection.settimeout(0.01)
-            manager = serial.rfc2217.PortManager(self._line, self)
+            manager = serial.rfc2217.PortManager(self._line, self)  # type: ignore[arg-type]
             while self._is_open:
                 try:
                     data = self.connection.recv(1024)

@@ -44,13 +44,15 @@ from support.virtual_line import VirtualLine
 
 _WHOLE_FRAMES = 1000
 
+Kept = str | list[float]
+
 
 class Recorder:
     """A listener that keeps everything, with the time it came."""
 
     def __init__(self, clock: Callable[[], float]) -> None:
         self._clock = clock
-        self.reads: list[tuple[float, Mapping, Values]] = []
+        self.reads: list[tuple[float, Mapping, Kept]] = []
         self.results: list[WriteResult] = []
         self.reasons: list[tuple[str, str]] = []
         self.ends: list[tuple[str, float]] = []
@@ -87,7 +89,7 @@ class Recorder:
         """Keep that a station has come or gone."""
         self.changes.append((station.number, station.active))
 
-    def values(self, mapping: Mapping) -> list[Values]:
+    def values(self, mapping: Mapping) -> list[Kept]:
         """Return all that was published of a mapping."""
         return [values for _, which, values in self.reads if which is mapping]
 
@@ -198,7 +200,7 @@ class DriverBench:
         self._stations: list[Responder] = []
         self.far = far or FarEnd(self._stations, self.network)
         self.line = VirtualLine(self.driver.machine, self.far, baud=self.network.baud, chunk=chunk)
-        self._actions: list[tuple[float, int, Callable[[], None]]] = []
+        self._actions: list[tuple[float, int, Callable[[], object]]] = []
         self._count = itertools.count()
         self._mappings, self._settings = mappings, settings or DriverSettings()
         self.is_alive = True
@@ -251,7 +253,7 @@ class DriverBench:
         """Lose the port."""
         self.driver.machine.stop(PortLost(reason))
 
-    def at(self, when: float, action: Callable[[], None]) -> None:
+    def at(self, when: float, action: Callable[[], object]) -> None:
         """Do something at a moment of the clock, while ``run`` lets time pass."""
         heapq.heappush(self._actions, (when, next(self._count), action))
 

@@ -23,6 +23,7 @@ from pathlib import Path
 from queue import Empty, SimpleQueue
 import select
 import threading
+from typing import Self
 
 from abdf1_ros.ports.descriptor import DescriptorPort
 from abdf1_ros.ports.opening import open_port
@@ -52,7 +53,7 @@ class FaultBox:
         self._is_working = True
         self._thread = threading.Thread(target=self._run, name='fault box')
 
-    def __enter__(self) -> FaultBox:
+    def __enter__(self) -> Self:
         self._thread.start()
         return self
 

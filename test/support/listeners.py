@@ -61,7 +61,7 @@ def _word(symbol: Symbol) -> str:
     if symbol.kind is SymbolKind.POLL:
         return 'poll' if symbol.is_good else 'damaged poll'
     if symbol.kind not in (SymbolKind.MESSAGE, SymbolKind.MASTER_MESSAGE):
-        return symbol.kind.value
+        return str(symbol.kind.value)
     if not symbol.is_good:
         return 'damaged'
     if not codec.HEADER_SIZE <= len(symbol.data) <= MAX_LINK_DATA:

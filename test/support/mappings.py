@@ -27,8 +27,11 @@ from abdf1_ros.problems import Place, Problem
 from abdf1_ros.settings.columns import BY_NAME, COLUMNS
 from abdf1_ros.settings.map_file import load_mappings
 from abdf1_ros.settings.mapping import Command, Mapping, Publish
+from abdf1_ros.settings.rows import Rows
 
 HEADER = ','.join(COLUMNS)
+
+_TYPES = {kind.value: kind for kind in ValueType}
 
 
 def make_mapping(text: str = 'N7:0', command: str = 'Read', *, station: int = 1,
@@ -47,7 +50,7 @@ def make_mapping(text: str = 'N7:0', command: str = 'Read', *, station: int = 1,
     return Mapping(
         item=item, place=Place('map.csv', item + 1), tag=name, name=name, command=Command(command),
         address=address, station=station, plc_type=PlcType(plc), length=length,
-        type=ValueType(kind) if kind else types_of(address)[0], topic=topic or name,
+        type=_TYPES[kind] if kind else types_of(address)[0], topic=topic or name,
         publish=Publish(publish), word_order=WordOrder(word_order), access=way,
         processor=Processor(processor) if processor else None, **others)
 
@@ -57,7 +60,7 @@ def cell_of(mapping: Mapping, column: str) -> str:
     return BY_NAME[column].text(mapping)
 
 
-def load_text(text: str | bytes, name: str = 'map.csv') -> tuple[list[Mapping], list[Problem]]:
+def load_text(text: str | bytes, name: str = 'map.csv') -> tuple[Rows, list[Problem]]:
     """Return what ``load_mappings`` makes of a file with this content."""
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder, name)
@@ -65,7 +68,7 @@ def load_text(text: str | bytes, name: str = 'map.csv') -> tuple[list[Mapping], 
         return load_mappings(str(path))
 
 
-def load_rows(*rows: str) -> tuple[list[Mapping], list[Problem]]:
+def load_rows(*rows: str) -> tuple[Rows, list[Problem]]:
     """Return what ``load_mappings`` makes of data rows with all columns in their order."""
     return load_text('\n'.join([HEADER, *rows]))
 

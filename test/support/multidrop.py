@@ -17,6 +17,7 @@
 from collections import Counter, deque
 from collections.abc import Callable, Container, Iterable
 from dataclasses import replace
+from typing import Any
 
 from abdf1_ros.df1 import frames
 from abdf1_ros.df1.frames import Control, Duplex, Frame, FrameDecoder, Poll, Symbol
@@ -25,7 +26,7 @@ from abdf1_ros.df1.master import HalfDuplexMaster
 from abdf1_ros.df1.packet import Packet
 from abdf1_ros.df1.polling import StandardPollingMaster
 from abdf1_ros.df1.settings import LinkSettings, PollingSettings
-from abdf1_ros.df1.slave import HalfDuplexSlave, multidrop
+from abdf1_ros.df1.slave import HalfDuplexSlave, Initiator, multidrop
 from abdf1_ros.df1.slave_link import SlaveLink
 from abdf1_ros.df1.stations import ActiveStationList
 from abdf1_ros.errors import LinkError
@@ -98,6 +99,8 @@ def _text(symbol: Symbol) -> str:
 class MasterNode(CommandTasks):
     """A master with message-based polling, or with the standard one where ``polling`` is given."""
 
+    machine: Told
+
     def __init__(self, settings: LinkSettings, clock: Callable[[], float],
                  polling: PollingSettings | None = None, *, numbers: Iterable[int] = (),
                  timing: LineTiming | None = None, serve: Serve | None = Packet.reply) -> None:
@@ -131,7 +134,7 @@ class MasterNode(CommandTasks):
         return [when for when, entry in self.machine.log if entry == text]
 
 
-class Slave:
+class Slave(Initiator):
     """
     A station on the line of a test.
 
@@ -255,6 +258,7 @@ class SlaveNode(CommandTasks):
     def __init__(self, settings: LinkSettings, clock: Callable[[], float], *,
                  serve: Serve = Packet.reply, timing: LineTiming | None = None) -> None:
         super().__init__(clock)
+        assert settings.station is not None
         self.number = settings.station
         self.settings = settings
         self.served: list[Packet] = []
@@ -279,7 +283,7 @@ class SlaveBench(SlaveNode):
     """A slave whose line says what the test tells it."""
 
     def __init__(self, settings: LinkSettings, *, serve: Serve = Packet.reply,
-                 timing: LineTiming | None = None, **others: float) -> None:
+                 timing: LineTiming | None = None, **others: Any) -> None:
         self.now = 100.0
         super().__init__(
             replace(settings, **others), lambda: self.now, serve=serve, timing=timing)

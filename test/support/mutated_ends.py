@@ -33,7 +33,7 @@ from support.driver_bench import simulated_plc
 from support.vectors import VECTOR_FOLDER
 
 _VERIFY = runpy.run_path(str(VECTOR_FOLDER / 'verify.py'))
-_right_check = _VERIFY['right_check']
+_right_check: Callable[[str, int | None, bytes], bytes] = _VERIFY['right_check']
 
 _DLE, _SOH, _STX, _ETX, _EOT, _ENQ, _ACK, _NAK = 0x10, 1, 2, 3, 4, 5, 6, 0x15
 _LIMIT = 3  # of repetitions, and of enquiries
@@ -811,7 +811,7 @@ class MutatedClient(_FullDuplex):
 class _Radio(Wire):
     """What both radio modem nodes have in common (SLC 13-76 to 13-80): what is taken, sent on."""
 
-    number: int
+    own_number: int
 
     def __init__(self, check: str, habits: frozenset[Habit]) -> None:
         super().__init__(check, habits, is_half_duplex=False)
@@ -840,16 +840,16 @@ class _Radio(Wire):
                 len(data) < (5 if self.has(Habit.TAKES_SHORT) else 6):
             return self.refused(data)
         dst, src = data[:2]
-        if src == self.number:
+        if src == self.own_number:
             if self.has(Habit.SENDS_ON_OWN):
                 self.say(self.frame(data), 0.1)
             return
         is_new = data not in self._sent_on or self.has(Habit.SENDS_ON_AGAIN)
-        if dst != self.number and is_new and self.habits & {
+        if dst != self.own_number and is_new and self.habits & {
                 Habit.SENDS_ON, Habit.SENDS_ON_AGAIN}:
             self._sent_on.add(data)
             self.say(self.frame(data), 0.1)
-        self.taken(data, dst == self.number)
+        self.taken(data, dst == self.own_number)
 
 
 class MutatedRadioNode(_Radio):
@@ -857,7 +857,7 @@ class MutatedRadioNode(_Radio):
 
     def __init__(self, check: str, *habits: Habit, station: int = 1, family: str = 'SLC') -> None:
         super().__init__(check, frozenset(habits))
-        self.number = station
+        self.own_number = station
         self._plc = _Executor(self, station, family)
         self._replies: dict[bytes, bytes] = {}
         self._executed = 0
@@ -896,7 +896,7 @@ class MutatedRadioNode(_Radio):
 class MutatedRadioClient(_Radio):
     """A radio modem node that reads station 1, one command after the other."""
 
-    number = 5
+    own_number = 5
 
     def __init__(self, check: str, *habits: Habit) -> None:
         super().__init__(check, frozenset(habits))

@@ -113,7 +113,7 @@ class Process:
     @property
     def number(self) -> int:
         """Return the number that the operating system has for it."""
-        return self._process.pid
+        return int(self._process.pid)
 
     @property
     def is_running(self) -> bool:
@@ -201,7 +201,7 @@ class Process:
             reader.join()
         if self._process.stdin is not None:
             self._process.stdin.close()
-        return status
+        return int(status)
 
     def end(self, *numbers: signal.Signals) -> None:
         """End it by signals, and check that it ends as it should."""
@@ -332,7 +332,7 @@ def get_parameters(observer: Observer, *names: str, node: str = '/abdf1') -> lis
 
 def stamp(array: DiagnosticArray) -> float:
     """Return the time in the header of an array, in s."""
-    return array.header.stamp.sec + array.header.stamp.nanosec / 1e9
+    return float(array.header.stamp.sec + array.header.stamp.nanosec / 1e9)
 
 
 def find_status(array: DiagnosticArray, name: str) -> DiagnosticStatus:

@@ -28,6 +28,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from functools import partial
 import heapq
 from random import Random
 
@@ -135,7 +136,7 @@ class FaultyLine(VirtualLine):
             network, self.said[side])) for side in (0, 1))
 
 
-def _messages(network: Network, data: bytes) -> Iterator[tuple[int | None, bytes]]:
+def _messages(network: Network, data: bytes | bytearray) -> Iterator[tuple[int | None, bytes]]:
     """Yield the messages with a good check, from each beginning that there may be."""
     start = data.find(b'\x10')
     while start >= 0:
@@ -318,7 +319,7 @@ class Tally:
         self.name = f'{mode} {check} {kind}'
         self.singles = self.pairs = self.unseen = 0
         self.wrong: list[str] = []
-        self._make = lambda: Bench(mode, check, kind)
+        self._make = partial(Bench, mode, check, kind)
         self._bench = self._make()
 
     def all_singles(self) -> list[Fault]:

@@ -19,6 +19,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
+from functools import partial
 from itertools import count
 from pathlib import Path
 
@@ -156,9 +157,8 @@ class Line:
         """Let each end write to the other."""
         for writer, reader in ((self.master, self.slave), (self.slave, self.master)):
             value = self.observer.until(
-                lambda writer=writer: writer.write_one_of(self.values), 'a write')
-            self.observer.until(lambda reader=reader, value=value: reader.was_told(value),
-                                'what was written')
+                partial(writer.write_one_of, self.values), 'a write')
+            self.observer.until(partial(reader.was_told, value), 'what was written')
             assert reader.was_told(value) == 1
 
     def check(self) -> None:

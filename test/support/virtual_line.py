@@ -79,17 +79,21 @@ QUIET = Noise()
 
 
 class Wire:
-    """An outlet whose ``write`` and ``unsent`` a test may give."""
+    """An outlet; a test may say what ``write`` does, and what is ``unsent``."""
 
     def __init__(self, machine: Machine, write: Callable[[bytes], object] | None = None,
                  unsent: Callable[[], int] = lambda: 0) -> None:
         self._sender = machine.sender
-        self.write = write or self._keep
+        self._write = write or self._keep
         self.unsent = unsent
 
     def attach(self, now: float) -> None:
         """Be the outlet of a machine that runs."""
         self._sender.begin(now, self)
+
+    def write(self, data: bytes) -> None:
+        """Take what is written at once."""
+        self._write(data)
 
     def _keep(self, data: bytes) -> None:
         """Let what is written at once go out with what the machine has to send."""

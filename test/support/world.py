@@ -56,14 +56,13 @@ from abdf1_ros.errors import FormatError, PortLost
 from abdf1_ros.pccc.address import Address
 from abdf1_ros.pccc.emulated import Setting
 from abdf1_ros.pccc.families import dialect_of, parse_address
-from abdf1_ros.pccc.values import Values
 from abdf1_ros.plan.report import make_report
 from abdf1_ros.settings.heartbeats import Fallback, LONGEST_END, TIME_BASE, While
 from abdf1_ros.settings.mapping import Mapping
 from abdf1_ros.settings.network import Network
 from abdf1_ros.simulator.ladder import Ladder, Lamp
 from abdf1_ros.simulator.simulated_plc import SimulatedPlc
-from support.driver_bench import DriverBench
+from support.driver_bench import DriverBench, Kept
 from support.losses import AirLosses, Losses, Lost
 from support.mappings import make_mapping
 from support.multidrop import MasterNode
@@ -423,7 +422,7 @@ class World(DriverBench):
         return self.listener.results
 
     @property
-    def reads(self) -> list[tuple[float, Mapping, Values]]:
+    def reads(self) -> list[tuple[float, Mapping, Kept]]:
         """Return all that was published so far."""
         return self.listener.reads
 
@@ -488,7 +487,7 @@ class World(DriverBench):
                         word = dialect.read_data(place, 1, reply.data)
                         self.served.append((self.line.now, int.from_bytes(word, 'little')))
 
-                task.reply = take  # type: ignore[method-assign]
+                task.reply = take  # type: ignore[method-assign,assignment]
             self.at(self.line.now + 0.5, ask)
 
         ask()
@@ -527,7 +526,7 @@ class World(DriverBench):
 
         table.write = note  # type: ignore[method-assign]
         reply = serve(command)
-        del table.write  # type: ignore[attr-defined]
+        del table.write
         values = {value for tag, value, _ in written if not tag.startswith('beat')}
         is_message = any(value != SAFE and value not in GUESTS for value in values)
         if values and (watched.refuses or watched.refuses_messages and is_message):
