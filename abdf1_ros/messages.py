@@ -22,7 +22,7 @@ Messages". The texts are an interface: people search their logs for them.
 from __future__ import annotations
 
 from enum import Enum
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 _CHOICE = ', %s'
 
@@ -101,7 +101,7 @@ class Message(Enum):
         """Tell whether the text ends with a list."""
         return self.template.endswith(_CHOICE * 2)
 
-    def text(self, *args: Any) -> str:
+    def text(self, *args: object) -> str:
         """
         Return the text with ``args`` in its places.
 
@@ -114,7 +114,7 @@ class Message(Enum):
             text += _CHOICE * (len(args) - text.count('%s'))
         return text % args
 
-    def entry(self, *args: Any) -> str:
+    def entry(self, *args: object) -> str:
         """Return number, mnemonic and text, as logs and diagnostics show them."""
         return f'{self.number} {self.name}: {self.text(*args)}'
 
@@ -127,7 +127,7 @@ class Event(NamedTuple):
     """
 
     message: Message
-    args: tuple[Any, ...] = ()
+    args: tuple[object, ...] = ()
     station: int | None = None
 
     def __str__(self) -> str:

@@ -27,7 +27,7 @@ from enum import Enum
 import functools
 import math
 import re
-from typing import Any, Generic, TypeVar
+from typing import Generic, TypeVar
 
 _T = TypeVar('_T')
 _Meaning_co = TypeVar('_Meaning_co', covariant=True)
@@ -93,7 +93,7 @@ def whole(low: int, high: int, unit: str = '') -> Kind[int]:
     return Kind(read, f'a whole number from {low} to {high} {unit}'.rstrip(), low, high)
 
 
-def one_of(known: Mapping[str, _T], spelled: Callable[[str], Any] = str.lower) -> Kind[_T]:
+def one_of(known: Mapping[str, _T], spelled: Callable[[str], object] = str.lower) -> Kind[_T]:
     """Return the kind of choices by name; two texts that are ``spelled`` alike are the same."""
     meanings = {spelled(name): meaning for name, meaning in known.items()}
     choices = tuple(filter(None, known))

@@ -25,7 +25,7 @@ from queue import Empty, SimpleQueue
 import random
 import time
 from types import TracebackType
-from typing import Any, Generic, Self, TYPE_CHECKING, TypeVar
+from typing import Generic, Self, TYPE_CHECKING, TypeVar
 
 from abdf1_ros.df1.mode import LineMode
 from abdf1_ros.df1.settings import LinkSettings
@@ -250,7 +250,7 @@ def plain(values: Values, kind: ValueType) -> list[float] | str:
     return [*map(bool, values)] if kind is ValueType.BOOL else [*values]
 
 
-def values_of(values: Any) -> Sequence[float] | str:
+def values_of(values: object) -> Sequence[float] | str:
     """Return the values to write; arrays and numbers of numpy become Python's."""
     found = values.tolist() if hasattr(values, 'tolist') else values
     found = [found] if isinstance(found, Real) else found
@@ -261,7 +261,7 @@ def values_of(values: Any) -> Sequence[float] | str:
     raise FormatError(f'{shown(repr(values))} should be a number, several, or a text')
 
 
-def text_of(name: str, value: Any) -> str:
+def text_of(name: str, value: object) -> str:
     if isinstance(value, os.PathLike):
         value = os.fspath(value)
     if not isinstance(value, str) or not value:

@@ -19,7 +19,6 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 import sys
-from typing import Any
 
 _PACKAGE = 'abdf1_ros'
 
@@ -41,7 +40,7 @@ class ShowVersion(argparse.Action):
         super().__init__(option_strings, argparse.SUPPRESS, nargs=0, default=argparse.SUPPRESS,
                          help="show program's version number and exit")
 
-    def __call__(self, parser: argparse.ArgumentParser, *_: Any) -> None:
+    def __call__(self, parser: argparse.ArgumentParser, *_: object) -> None:
         """Print the version and end."""
         print(f'abdf1_ros {package_version()}')
         parser.exit()

@@ -17,7 +17,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 from abdf1_ros.errors import Abdf1Error
 from abdf1_ros.messages import Message
@@ -54,7 +53,7 @@ class Problem(Abdf1Error):
     """
 
     def __init__(self, where: Place | str, text: str, message: Message | None = None,
-                 args: tuple[Any, ...] = ()) -> None:
+                 args: tuple[object, ...] = ()) -> None:
         entry = f'{message.number} {message.name}: ' if message else ''
         if message and args:
             entry = message.entry(*args) + ('; ' if text else '')

@@ -19,7 +19,6 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Mapping, Sequence
 import json
-from typing import Any
 
 from abdf1_ros.conform.case import CaseResult, Verdict
 
@@ -46,7 +45,7 @@ def summary_of(results: Sequence[CaseResult]) -> str:
         (Verdict.PASS, 'passed'), (Verdict.FAIL, 'failed'), (Verdict.SKIP, 'skipped')))
 
 
-def _entry(result: CaseResult) -> dict[str, Any]:
+def _entry(result: CaseResult) -> dict[str, object]:
     return {'case': result.case.name, 'verdict': result.verdict.value, 'rule': result.case.rule,
             'source': result.case.source, 'seconds': round(result.seconds, 3),
             'expected': result.expected, 'got': result.got,

@@ -29,7 +29,6 @@ import os
 import struct
 import termios
 import time
-from typing import Any
 
 from abdf1_ros.df1.frames import Damaged
 from abdf1_ros.line_names import device_of, number_of
@@ -104,7 +103,7 @@ def _opened(settings: PortSettings) -> serial.Serial:
         raise OSError(*_plain(error)) from error
 
 
-def _plain(error: Exception) -> tuple[Any, ...]:
+def _plain(error: Exception) -> tuple[object, ...]:
     """Return the text of the operating system, without the words that pyserial adds."""
     said = error.__context__ if isinstance(error, serial.SerialException) else error
     args = said.args if isinstance(said, OSError | termios.error) else error.args
@@ -155,7 +154,7 @@ class SerialDevice(DescriptorPort):
         self._settings = self._current_settings()
         self._next_look = 0.0
 
-    def _current_settings(self) -> list[Any]:
+    def _current_settings(self) -> list[object]:
         try:
             return termios.tcgetattr(self._descriptor)
         except (OSError, termios.error):  # gone, which is noticed elsewhere

@@ -25,7 +25,6 @@ from __future__ import annotations
 
 import errno
 import socket
-from typing import Any
 from urllib.parse import urlsplit
 
 from abdf1_ros.ports.descriptor import DescriptorPort
@@ -43,7 +42,7 @@ _SILENCE_LIMIT = 5
 _LOCAL_PORT_TAKEN = (errno.EADDRINUSE, errno.EADDRNOTAVAIL)
 
 # Our port of the last connection to each far address.
-_local_ports: dict[tuple[Any, ...], int] = {}
+_local_ports: dict[tuple[object, ...], int] = {}
 
 
 def open_port(settings: PortSettings) -> DescriptorPort:
@@ -68,7 +67,7 @@ def connected(url: str) -> socket.socket:
     raise errors[-1]
 
 
-def _connection(family: int, address: tuple[Any, ...]) -> socket.socket:
+def _connection(family: int, address: tuple[object, ...]) -> socket.socket:
     """Connect, from the local port of before where there is one."""
     local = _local_ports.get(address, 0)
     try:
@@ -81,7 +80,7 @@ def _connection(family: int, address: tuple[Any, ...]) -> socket.socket:
     return connection
 
 
-def _connection_from(local: int, family: int, address: tuple[Any, ...]) -> socket.socket:
+def _connection_from(local: int, family: int, address: tuple[object, ...]) -> socket.socket:
     """Connect from a local port; the system chooses one for 0."""
     connection = OwnedConnection(family, address)
     try:

@@ -28,7 +28,6 @@ import re
 import resource
 import threading
 import time
-from typing import Any
 
 from abdf1_ros.ports.clock import line_time
 from abdf1_ros.problems import ConfigurationError, Place, Problem
@@ -70,7 +69,7 @@ run, 1 after internal errors, and where ROS does not start (log directory, netwo
 """
 
 # The parameters of /lines, with what they are by default.
-OPTIONS: dict[str, Any] = {'lines': [], 'strict_lines': False}
+OPTIONS: dict[str, object] = {'lines': [], 'strict_lines': False}
 
 # A line that has ended by an internal error is started again after so long (s).
 _RESTART_AFTER = 2.0

@@ -18,7 +18,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 import json
-from typing import Any
 
 from abdf1_ros.df1.listener import LineKind
 from abdf1_ros.pccc.describe import command_name
@@ -67,7 +66,7 @@ def _shade(entry: Entry) -> str:
 
 def json_line(entry: Entry) -> str:
     """Return an entry as a JSON object; what is not known is left out."""
-    fields: dict[str, Any] = {
+    fields: dict[str, object] = {
         'time': None if entry.time is None else round(entry.time, 6),
         'direction': entry.direction.value, 'kind': entry.kind.value,
         'station': entry.station, 'text': entry.text or None, 'guest': entry.guest or None,
@@ -96,7 +95,7 @@ def summary_json(summary: Summary, kind: LineKind) -> str:
                      for station, counts in sorted(summary.stations.items())}})
 
 
-def _counts(counts: Counts) -> dict[str, Any]:
+def _counts(counts: Counts) -> dict[str, object]:
     return {
         'counts': {kind.value: counts.kinds[kind] for kind in Kind if counts.kinds[kind]},
         'marks': {mark.value: counts.marks[mark] for mark in Mark if counts.marks[mark]},
