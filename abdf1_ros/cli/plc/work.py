@@ -25,7 +25,7 @@ from functools import partial
 from pathlib import Path
 import shlex
 import sys
-from typing import Any
+from typing import TypeVar
 
 from abdf1_ros.cli.overhearing import map_of, texts_of
 from abdf1_ros.cli.plc import data, detect, files, init, overhear, presence
@@ -75,6 +75,8 @@ _ALL_TRIED_IN_VAIN = (
 _ONE_PLC_ANSWERS_TO_ALL = (
     'full duplex tells no addresses apart: most PLCs answer to every station, so these may be one')
 
+_Prepared = TypeVar('_Prepared')
+
 _UNCERTAIN = (Outcome.UNKNOWN, Outcome.PARTLY)
 
 
@@ -89,7 +91,7 @@ def _mappings(options: argparse.Namespace, session: Session, targets: Targets) -
         [entry] if isinstance(entry, Mapping) else data.mappings_of(entry, cells, item))]
 
 
-def _line(options: argparse.Namespace, prepared: Any) -> Network:
+def _line(options: argparse.Namespace, prepared: object) -> Network:
     """
     Return the line of a command for one station, and settle which station that is.
 
@@ -121,8 +123,8 @@ def _line(options: argparse.Namespace, prepared: Any) -> Network:
     return replace(network, station=free_station(network.station, [options.station]))
 
 
-def _asking(work: Callable[[argparse.Namespace, Session, Any], int],
-            prepare: Callable[[argparse.Namespace], Any] = lambda options: None,
+def _asking(work: Callable[[argparse.Namespace, Session, _Prepared], int],
+            prepare: Callable[[argparse.Namespace], _Prepared],
             ) -> Callable[[argparse.Namespace], int]:
     """
     Return a command that asks one station; it warns of a gateway that may be none.
@@ -584,11 +586,15 @@ def _extent(entry: DataFile) -> str:
     return f'{entry.elements:4} elements'
 
 
+def _nothing(options: argparse.Namespace) -> None:
+    """Prepare nothing."""
+
+
 COMMANDS: dict[str, Callable[[argparse.Namespace], int]] = {
     'read': _asking(_read, to_read), 'write': _asking(_write, to_write),
-    'watch': _asking(_watch, to_read), 'status': _asking(_status), 'ping': _asking(_ping),
-    'scan': _scan, 'detect': _detect, 'init': _init, 'ports': _ports,
-    'files': _asking(_files, lambda options: rows_of_map(options.map)),
-    'clock': _asking(_clock), 'import': _import}
+    'watch': _asking(_watch, to_read), 'status': _asking(_status, _nothing),
+    'ping': _asking(_ping, _nothing), 'scan': _scan, 'detect': _detect, 'init': _init,
+    'ports': _ports, 'files': _asking(_files, lambda options: rows_of_map(options.map)),
+    'clock': _asking(_clock, _nothing), 'import': _import}
 
 _complain = partial(tell, 'plc', code=RED)
