@@ -20,7 +20,6 @@ import itertools
 from abdf1_ros.df1.master_line import MAX_FORWARDS
 from abdf1_ros.df1.packet import Packet
 from abdf1_ros.df1.settings import LinkSettings, PollingSettings
-from abdf1_ros.df1.slave import multidrop
 import pytest
 from support.multidrop import MasterBench, Slave
 
@@ -31,11 +30,12 @@ BOTH = pytest.mark.parametrize('standard', [False, True], ids=['message', 'stand
 
 
 def bench(standard: bool, *numbers: int, dead: tuple[int, ...] = (),
-          settings: LinkSettings = SETTINGS, serves: bool = True) -> MasterBench:
+          settings: LinkSettings = SETTINGS, serves: bool = True,
+          retries: int = 3) -> MasterBench:
     """Return a master of either kind and its stations."""
     polling = PollingSettings(numbers) if standard else None
     return MasterBench(*numbers, settings=settings, polling=polling, dead=dead,
-                       serve=Packet.reply if serves else None)
+                       serve=Packet.reply if serves else None, retries=retries)
 
 
 def poll(rig: MasterBench, *numbers: int, times: int = 1) -> None:
@@ -87,8 +87,8 @@ def test_reply_that_cannot_be_passed_on_is_dropped(standard: bool) -> None:
 @pytest.mark.parametrize('dst', [8, MASTER])
 def test_no_ack_for_a_command_that_cannot_be_kept(dst: int) -> None:
     # Without the NAK, which would make the slave drop what it holds.
-    rig = bench(False, 7, 8, settings=replace(SETTINGS, nak_on_command_timeout=False))
-    rig[7].slave._settings = replace(rig[7].slave._settings, nak_retries=200)
+    rig = bench(False, 7, 8, settings=replace(SETTINGS, nak_on_command_timeout=False),
+                retries=200)
     for _ in range(MAX_FORWARDS + 1):
         rig.message(7, dst)
     rig[7].delay = 0.0
@@ -159,8 +159,7 @@ def test_messages_for_the_dead_do_not_slow_the_living(standard: bool, listed: bo
 @BOTH
 def test_station_is_brought_back_by_a_message_for_it(standard: bool) -> None:
     rig = bench(standard, 7)
-    rig.slaves[8] = type(rig[7])(8, rig.clock)  # on the line, and in no list
-    rig.far._make_procedure = multidrop(list(rig.slaves.values()))
+    rig.put(8)
     command = rig.message(7, 8)
     rig.start(8)
     poll(rig, 7)
@@ -174,8 +173,7 @@ def test_station_that_a_message_names_is_no_station_of_ours(
         standard: bool, is_there: bool) -> None:
     rig = bench(standard, 7)
     if is_there:
-        rig.slaves[8] = type(rig[7])(8, rig.clock)
-        rig.far._make_procedure = multidrop(list(rig.slaves.values()))
+        rig.put(8)
     for number in range(8, 255):
         rig.message(7, number)
     rig.start()

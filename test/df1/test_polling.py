@@ -26,7 +26,6 @@ from abdf1_ros.df1.frames import message_frame
 from abdf1_ros.df1.packet import BROADCAST, Packet
 from abdf1_ros.df1.polling import COMMANDS_BETWEEN_POLLS
 from abdf1_ros.df1.settings import LinkSettings, PollingSettings
-from abdf1_ros.df1.slave import multidrop
 from abdf1_ros.errors import CommandTimeout, PortLost, StationInactive
 import hypothesis
 from hypothesis import given, strategies
@@ -246,8 +245,7 @@ def test_reply_that_was_taken_late_is_acknowledged_when_it_comes_again() -> None
 @pytest.mark.parametrize('number', [3, 5])
 def test_command_to_a_station_that_is_never_polled_ends_by_the_clock(number: int) -> None:
     rig = bench(PollingSettings((1, 2, 5)))
-    rig.slaves[number] = type(rig[1])(number, rig.clock)  # another with our address, or unlisted
-    rig.far._make_procedure = multidrop(list(rig.slaves.values()))
+    rig.put(number)  # another with our address, or unlisted
     task = rig.ask(number)
     rig.start()
     rig.line.run(lambda: ended(task), 2.0)

@@ -205,13 +205,19 @@ class MasterBench:
             self.slaves[number].silent = True
         self.master = MasterNode(settings, self.clock, polling, numbers=numbers, serve=serve,
                                  timing=LineTiming(char_time(baud), tx_delay))
-        self.far = Machine(multidrop(list(self.slaves.values())), checksum=settings.checksum)
+        self._there = [*self.slaves.values()]
+        self.far = Machine(multidrop(self._there), checksum=settings.checksum)
         self.line = VirtualLine(self.master.machine, self.far, baud=baud, chunk=1000)
         self._tns = 0x0100
 
     def clock(self) -> float:
         """Return the time."""
         return self.line.now
+
+    def put(self, number: int) -> None:
+        """Put one more station on the line, which is in no list of the master."""
+        self.slaves[number] = Slave(number, self.clock)
+        self._there.append(self.slaves[number])
 
     def __getitem__(self, number: int) -> Slave:
         """Return a station."""
