@@ -81,7 +81,7 @@ class Recorded:
         """Take note that a station has come or gone."""
         self.changes.append((station.number, station.active))
 
-    def numbers(self) -> list[tuple[int, ...]]:
+    def numbers(self) -> list[tuple[object, ...]]:
         """Return number and arguments of every event so far."""
         return [(event.message.number, *event.args) for event in self.events]
 

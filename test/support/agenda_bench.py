@@ -1,0 +1,158 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""An agenda on a clock that the test moves, whose jobs are done by hand."""
+
+from __future__ import annotations
+
+from collections.abc import Container
+import math
+
+from abdf1_ros.df1.checksum import Checksum
+from abdf1_ros.df1.frames import Duplex
+from abdf1_ros.df1.machine import LineTiming
+from abdf1_ros.df1.stations import ActiveStationList
+from abdf1_ros.driver.agenda import Agenda
+from abdf1_ros.driver.checks import Checks
+from abdf1_ros.driver.guests import GuestQueue
+from abdf1_ros.driver.interlocks.queue import Interlocks
+from abdf1_ros.driver.job_tasks import JobTasks
+from abdf1_ros.driver.reads.job import ReadJob
+from abdf1_ros.driver.reads.point import ReadPoint
+from abdf1_ros.driver.reads.readings import Readings
+from abdf1_ros.driver.record import Claim, WriteRecord
+from abdf1_ros.driver.served import Served
+from abdf1_ros.driver.settings import DriverSettings
+from abdf1_ros.driver.write import Outcome, Write, WriteResult
+from abdf1_ros.driver.writes.queue import MessageJob, WriteQueue
+from abdf1_ros.driver.writes.under_way import WritesUnderWay
+from abdf1_ros.pccc.file_types import PlcType
+from abdf1_ros.plan.line_model import LineModel
+from abdf1_ros.plan.planner import Planner
+from abdf1_ros.settings.mapping import Mapping
+from abdf1_ros.settings.network import Network
+from abdf1_ros.settings.rows import Rows
+from support.driver_bench import Recorder
+from support.mappings import make_mapping
+
+PROBE_TIME = 0.5
+LINE = LineModel(Checksum.CRC, Duplex.HALF, LineTiming(0.001))
+
+
+class StillClock:
+    """The time of a line, which stands still."""
+
+    now = late = 0.0
+
+    def took(self, begun: float, now: float) -> float:
+        """Return the seconds between two clock values."""
+        return now - begun
+
+
+def make_job(text: str = 'N7:0', station: int = 1, period: int = 100) -> ReadJob:
+    mapping = make_mapping(text, station=station, period=period)
+    block, = Planner(LINE, 0.1).plan([mapping])
+    return ReadJob(block, [ReadPoint(mapping, period / 1000, 1.0)], StillClock(),
+                   lambda job, words, error: None, math.inf)
+
+
+def written(write: Write, now: float) -> Claim:
+    """Return a write that has been confirmed."""
+    claim = Claim(write.mapping.station, [write.mapping.extent], write)
+    claim.done = claim.lands_until = now
+    return claim
+
+
+class Bench:
+    """An agenda without checks, whose jobs are done by hand."""
+
+    def __init__(self, *jobs: ReadJob, write_timeout: float = 2.0) -> None:
+        self.results: list[WriteResult] = []
+        self.begun: dict[Write, MessageJob] = {}
+        self.stations = ActiveStationList([job.station for job in jobs], probe_time=PROBE_TIME)
+        self.tasks, line = JobTasks(5, 0), StillClock()
+        listener = Recorder(lambda: 0.0)
+        self.record = WriteRecord(line, 1.0)
+        readings = Readings(Network(), Rows(), DriverSettings(), self.stations, line, listener,
+                            self.record)
+        writing = WritesUnderWay(self.stations, self.record, readings, write_timeout,
+                                 self.results.append)
+        self.reads = readings.reads
+        self.writes = WriteQueue(self.stations, writing, write_timeout, self.results.append)
+        checks = Checks(self.stations, {job.station for job in jobs}, 0.0, line,
+                        readings.link_failed, lambda station, identity, asked: None)
+        checks.begin(0.0)
+        served = Served(PlcType.PLC5, Rows(), readings.served)
+        interlocks = Interlocks(Rows(), self.writes, writing, served, listener,
+                                lambda mapping, text, is_conflict: None)
+        guests = GuestQueue(self.stations, line, 1.0, lambda dst: dst,
+                            lambda command, station: [], self.record)
+        self.agenda = Agenda(
+            self.stations, interlocks, self.writes, checks, self.reads, guests, self.tasks)
+        self.reads.replace((), jobs, 0.0)
+
+    def next(self, now: float) -> object:  # noqa: A003
+        """Return who has the line next; a write ends at once."""
+        job = self.agenda.next(now)
+        if not isinstance(job, MessageJob):
+            return job
+        self.end(job)
+        return job.write
+
+    def end(self, job: MessageJob) -> None:
+        """Let a write end unsent."""
+        self.record.ended(job.claim, Outcome.NOT_SENT)
+
+    def begin_write(self, now: float, busy: Container[int] = ()) -> Write | None:
+        """Take the next write, which is under way from then on."""
+        job = self.writes.next(now, busy)
+        if job is not None:
+            self.begun[job.write] = job
+        return job.write if job is not None else None
+
+    def next_write(self, now: float) -> Write | None:
+        """Take the next write, which ends at once."""
+        write = self.begin_write(now)
+        if write is not None:
+            self.end(self.begun[write])
+        return write
+
+    def next_read(self, now: float, busy: Container[int] = ()) -> ReadJob | None:
+        """Take the next probe or read."""
+        job = self.agenda._read(now, busy)
+        assert job is None or isinstance(job, ReadJob)
+        return job
+
+    def read(self, now: float, took: float = 0.0) -> ReadJob | None:
+        """Take the next read and give it back done."""
+        job = self.next_read(now)
+        if job is not None:
+            self.finish(job, now, now + took)
+        return job
+
+    def finish(self, job: ReadJob, started: float, now: float) -> None:
+        """Give a read back that was made from ``started`` to ``now``."""
+        job.started = job.asked = started
+        self.reads.ended(job, now)
+
+    def write(self, mapping: Mapping, value: float, now: float) -> Write:
+        write = Write(mapping, [value], now)
+        self.add(write)
+        return write
+
+    def add(self, write: Write) -> None:
+        self.writes.add(write, write.requested)
+
+    def outcomes(self) -> list[Outcome]:
+        return [result.outcome for result in self.results]
