@@ -56,7 +56,7 @@ class ScanTimes:
 
 
 @dataclass(frozen=True, slots=True)
-class LinkStatus:
+class LinkState:
     """
     Details that only some kinds of links have.
 
@@ -71,7 +71,7 @@ class LinkStatus:
     scans: Mapping[str, ScanTimes] = field(default_factory=dict)
 
 
-NO_STATUS = LinkStatus()
+NO_STATUS = LinkState()
 
 # Pause, in characters, that ends a message that has broken off. The time that the equipment may
 # hold bytes back is added.
@@ -89,7 +89,7 @@ class Link(Protocol):
     def run(self, source: TaskSource) -> Procedure:
         """Carry out the tasks of ``source``, and serve commands that come, for ever."""
 
-    def status(self) -> LinkStatus:
+    def status(self) -> LinkState:
         """Return the details of this link; may be called from any thread."""
         return NO_STATUS
 

@@ -43,7 +43,7 @@ from itertools import chain
 import math
 
 from abdf1_ros.df1.frames import Control, Frame
-from abdf1_ros.df1.link import Link, LinkStatus, quiet_time, ScanTimes
+from abdf1_ros.df1.link import Link, LinkState, quiet_time, ScanTimes
 from abdf1_ros.df1.machine import Heard, Machine, Procedure, Rest, Step
 from abdf1_ros.df1.master import MasterMode
 from abdf1_ros.df1.master_line import is_good, MasterLine, MOST_QUEUED
@@ -131,10 +131,10 @@ class StandardPollingMaster:
         self._last_probed: _PollList | None = None
         self._slow_until: defaultdict[int, float] = defaultdict(lambda: -math.inf)  # of gateways
 
-    def status(self) -> LinkStatus:
+    def status(self) -> LinkState:
         """Return the scan times of the lists that have stations."""
         lists = {'normal': self._normal, 'priority': self._priority}
-        return LinkStatus(
+        return LinkState(
             scans={name: each.times for name, each in lists.items() if each.stations})
 
     def run(self, source: TaskSource) -> Procedure:

@@ -41,7 +41,7 @@ from random import Random
 from abdf1_ros.df1 import frames
 from abdf1_ros.df1.accounting import count_fault, wrong_message
 from abdf1_ros.df1.frames import Duplex, Frame, MAX_LINK_DATA
-from abdf1_ros.df1.link import EqualNode, LinkStatus
+from abdf1_ros.df1.link import EqualNode, LinkState
 from abdf1_ros.df1.machine import (
     Heard,
     HELD_BACK,
@@ -143,9 +143,9 @@ class RadioNode(EqualNode):
         self._same_number: float | None = None
         self._forget()
 
-    def status(self) -> LinkStatus:
+    def status(self) -> LinkState:
         """Return when another node with our number was heard."""
-        return LinkStatus(same_number=self._same_number)
+        return LinkState(same_number=self._same_number)
 
     def _forget(self) -> None:
         self._waiting: deque[bytes] = deque()  # link data to be sent

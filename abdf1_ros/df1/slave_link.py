@@ -26,7 +26,7 @@ from collections.abc import Callable
 import math
 
 from abdf1_ros.df1.accounting import Accounting
-from abdf1_ros.df1.link import Link, LinkStatus
+from abdf1_ros.df1.link import Link, LinkState
 from abdf1_ros.df1.machine import Machine, Procedure, Rest, Silence
 from abdf1_ros.df1.mode import LineMode
 from abdf1_ros.df1.packet import BROADCAST, is_local_status, Packet, STS_NOT_DELIVERED
@@ -62,9 +62,9 @@ class SlaveLink(Link, Initiator):
         self._outstanding: Outstanding | None = None
         self.last_poll = 0.0
 
-    def status(self) -> LinkStatus:
+    def status(self) -> LinkState:
         """Return when the master has polled us."""
-        return LinkStatus(last_poll=self.last_poll)
+        return LinkState(last_poll=self.last_poll)
 
     def run(self, source: TaskSource) -> Procedure:
         """Answer the master for ever."""

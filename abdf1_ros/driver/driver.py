@@ -23,7 +23,7 @@ virtual line.
 Where each fact lives:
 
 ==================================================  ============================================
-who writes which words, until when it may land      ``record.WriteRecord``, ``record.Words``
+who writes which words, until when it may land      ``record.WriteRecord``, ``record.OwnWords``
 messages that wait                                  ``writes.queue.WriteQueue.waiting``
 commands of guests that wait                        ``guests.Guest.waiting``
 calls that wait for a read                          ``reads.demands.Demands.waiting``

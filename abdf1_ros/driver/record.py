@@ -117,7 +117,7 @@ class WordsListener(Protocol):
         """Take the words of a block whose read ``started`` at that clock value (s)."""
 
 
-class Words:
+class OwnWords:
     """
     The words of a row that we write by ourselves, and what else may come to stand in them.
 
@@ -200,7 +200,7 @@ class WriteRecord:
         self.line = line
         self._settle_time = settle_time
         self._under_way: list[Claim] = []
-        self._words: dict[Mapping, Words] = {}
+        self._words: dict[Mapping, OwnWords] = {}
         self._listeners: tuple[WriteListener, ...] = ()
         self.readers: tuple[WordsListener, ...] = ()
 
@@ -209,9 +209,9 @@ class WriteRecord:
         """Tell ``listeners`` of all writes, and ``readers`` of all good reads, from now on."""
         self._listeners, self.readers = listeners, readers
 
-    def words_of(self, row: Mapping) -> Words:
+    def words_of(self, row: Mapping) -> OwnWords:
         """Return the words of a row that we write by ourselves; they are watched from now on."""
-        return self._words.setdefault(row, Words(row, self))
+        return self._words.setdefault(row, OwnWords(row, self))
 
     def opened(self) -> None:
         """Take note that the port is open: gateways may hold what was written before."""
@@ -248,7 +248,7 @@ class WriteRecord:
         for listener in self._listeners:
             listener.write_ended(claim)
 
-    def _concerned(self, claim: Claim) -> Iterable[Words]:
+    def _concerned(self, claim: Claim) -> Iterable[OwnWords]:
         """Return the words that a claim may have changed: those of its row, all of a guest's."""
         if claim.write is not None:
             return filter(None, (self._words.get(claim.write.mapping),))

@@ -22,7 +22,7 @@ from enum import Enum
 from abdf1_ros.numbers import Kind
 
 
-class Severity(Enum):
+class AlarmLevel(Enum):
     """How bad an alarm is, in the words of /diagnostics."""
 
     WARN = 'WARN'
@@ -33,16 +33,16 @@ class Severity(Enum):
 class Alarm:
     """The ``state`` of a bit, 0 or 1, that is an alarm, and how bad that is."""
 
-    severity: Severity
+    level: AlarmLevel
     state: int = 1
 
     def __str__(self) -> str:
-        return self.severity.value if self.state else f'{self.severity.value} 0'
+        return self.level.value if self.state else f'{self.level.value} 0'
 
 
 def _read(text: str) -> Alarm | None:
     known = {str(alarm): alarm for alarm in (
-        Alarm(severity, state) for severity in Severity for state in (0, 1))}
+        Alarm(level, state) for level in AlarmLevel for state in (0, 1))}
     return known.get(' '.join(text.upper().removesuffix(' 1').split()))
 
 

@@ -23,7 +23,7 @@ from __future__ import annotations
 from enum import Enum
 import math
 
-from abdf1_ros.driver.record import Claim, Words
+from abdf1_ros.driver.record import Claim, OwnWords
 from abdf1_ros.driver.write import Outcome, Write
 
 # A fallback value that the PLC refuses is written again after so many seconds.
@@ -64,7 +64,7 @@ class FallbackRow:
     tells what others may have written.
     """
 
-    def __init__(self, words: Words) -> None:
+    def __init__(self, words: OwnWords) -> None:
         mapping = words.row
         assert mapping.fallback is not None
         self.mapping = mapping

@@ -25,7 +25,7 @@ from enum import Enum
 import math
 from random import Random
 
-from abdf1_ros.driver.record import Claim, Words
+from abdf1_ros.driver.record import Claim, OwnWords
 from abdf1_ros.driver.write import Outcome, Write
 
 LARGEST = 32_767
@@ -109,7 +109,7 @@ class HeartbeatRow:
     written; ``dice`` are thrown to differ from another bridge.
     """
 
-    def __init__(self, words: Words, first: int, dice: Random) -> None:
+    def __init__(self, words: OwnWords, first: int, dice: Random) -> None:
         mapping = words.row
         assert mapping.period is not None
         self.mapping = mapping

@@ -27,11 +27,11 @@ from abdf1_ros.driver.reads.point import ReadPoint
 from abdf1_ros.pccc.values import Values
 from abdf1_ros.ros.diagnostics.mappings import FRESHNESS_LEVELS
 from abdf1_ros.ros.diagnostics.status import ERROR, Judgement, OK, WARN
-from abdf1_ros.settings.alarms import Severity
+from abdf1_ros.settings.alarms import AlarmLevel
 from abdf1_ros.settings.mapping import Mapping
 from abdf1_ros.text import counted, first
 
-_LEVELS = {Severity.WARN: WARN, Severity.ERROR: ERROR}
+_LEVELS = {AlarmLevel.WARN: WARN, AlarmLevel.ERROR: ERROR}
 
 
 @dataclass(slots=True)
@@ -88,7 +88,7 @@ class AlarmStatus:
         shown = [f'{bit.place} {bit.text(now)}' for bit in self._bits if bit.is_on or bit.is_news]
         if not shown:
             return OK, f'no alarm{self._description}'
-        return _LEVELS[self._alarm.severity], f'{first(shown)}{self._description}'
+        return _LEVELS[self._alarm.level], f'{first(shown)}{self._description}'
 
     @property
     def _description(self) -> str:

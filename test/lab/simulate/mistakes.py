@@ -46,7 +46,7 @@ from abdf1_ros.driver.interlocks.plc import Plc
 from abdf1_ros.driver.interlocks.queue import Interlocks, OwnWrite
 from abdf1_ros.driver.reads.guards import CounterGuard, RunGuard
 from abdf1_ros.driver.reads.point import ReadPoint
-from abdf1_ros.driver.record import Claim, Words
+from abdf1_ros.driver.record import Claim, OwnWords
 from abdf1_ros.driver.write import Outcome, Write, WriteResult
 from abdf1_ros.driver.writes.ages import RecentMax, Standstills
 from abdf1_ros.driver.writes.queue import MessageJob, WriteQueue
@@ -324,9 +324,9 @@ MISTAKES = (
     Mistake('14', 'the counter guards nothing', CounterGuard, 'why_not', _always('')),
     Mistake('18', 'read_only is ignored', Driver, '__init__', _writes_in_spite),
     Mistake('19', 'nobody looks for another writer', HeartbeatRow, 'read_back', _always('')),
-    Mistake('5', 'the end does not wait for what may land', Words, 'lands_until',
+    Mistake('5', 'the end does not wait for what may land', OwnWords, 'lands_until',
             lambda before: property(lambda self: -math.inf)),
-    Mistake('10', 'nothing is written again after what a gateway may hold', Words, 'plan_again',
+    Mistake('10', 'nothing is written again after what a gateway may hold', OwnWords, 'plan_again',
             _always(None)),
     Mistake('8', 'a guest over a fallback is not seen', FallbackRow, 'write_ended',
             _sees_no_guest),
