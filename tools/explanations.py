@@ -200,6 +200,9 @@ OUTCOMES: dict[Outcome, str] = {
     Outcome.WRITTEN: 'The PLC has confirmed it. Bits of an SLC without masked write (5/01, 5/02, '
                      'ML1000) are written `by reading the word and writing it back`, in three '
                      'commands; what the program changes in that word in between is lost.',
+    Outcome.STANDS: 'A row with [Write_Again](#values-that-need-not-be-written-again): the PLC '
+                    'holds the value, so it is not written again. When it was confirmed, and when '
+                    'a read showed it, follows.',
     Outcome.BROADCAST: 'Station 255. It counts as accepted only, as no station confirms it.',
     Outcome.SUPERSEDED: 'Words and floats: a newer message came while this one waited. Bits: '
                         'newer changes wait, and the line does not carry them all.',

@@ -66,6 +66,7 @@ from abdf1_ros.driver.served import Served
 from abdf1_ros.driver.settings import DriverSettings
 from abdf1_ros.driver.write import Outcome, show, Write, WriteResult
 from abdf1_ros.driver.writes.queue import MAX_WAITING_WRITES, WriteQueue
+from abdf1_ros.driver.writes.standing import Standing
 from abdf1_ros.driver.writes.under_way import WritesUnderWay
 from abdf1_ros.errors import FormatError, INTERNAL_ERROR, PortLost
 from abdf1_ros.messages import Event
@@ -142,6 +143,7 @@ class Driver:
         writing = WritesUnderWay(
             self.stations, record, self.readings, settings.write_timeout, report)
         self._read_backs = writing.read_backs
+        self.spent = writing.spent
         self._writes = WriteQueue(self.stations, writing, settings.write_timeout, report,
                                   network.timing.tx_delay)
         self.checks = Checks(
@@ -154,8 +156,12 @@ class Driver:
         self.guests = GuestQueue(self.stations, machine, network.cmd_timeout / 1000,
                                  self._station_of_guest, self._words_of_guest, record)
         compares = (self.interlocks,) if self.interlocks.heartbeats else ()
-        record.connect((self._read_backs, self.readings.reads, self.interlocks),
-                       (self._read_backs, *compares))
+        repeated = [row for row in self.mappings if row.write_again]
+        self._standing = Standing(repeated, settings.write_timeout, machine)
+        self._writes.leave_out = self._leave_out
+        stands = (self._standing,) if repeated else ()
+        record.connect((self._read_backs, self.readings.reads, self.interlocks, *stands),
+                       (self._read_backs, *compares, *stands))
         self.tasks = JobTasks(network.station, settings.first_tns, network.timing.char_time)
         self._agenda = Agenda(self.stations, self.interlocks, self._writes, self.checks,
                               self.readings.reads, self.guests, self.tasks)
@@ -264,6 +270,7 @@ class Driver:
                    self._demands.next_expiry)
 
     def _station_changed(self, station: Station) -> None:
+        self._standing.forget(station.number)
         if station.active:
             self.readings.reads.release(station.number, self.machine.now)
             self.interlocks.contact(station.number, self.machine.now)
@@ -311,6 +318,14 @@ class Driver:
                     write.mapping.station, (write.mapping.extent,), write), Outcome.WRITTEN)
                 self._end_write(write, Outcome.WRITTEN)
 
+    def _leave_out(self, write: Write, now: float) -> str:
+        """Return what shows that a message need not be written, empty for nothing."""
+        proof = self._standing.proof(write, now)
+        if not proof or not self.interlocks.may_stand(write):
+            return ''
+        self.interlocks.stands(write)
+        return f'{proof}; not written again'
+
     def _end_write(self, write: Write, outcome: Outcome, detail: str = '') -> None:
         self._listener.written(write.result(outcome, detail, self.machine.now))
 
@@ -353,6 +368,7 @@ class Driver:
         if not isinstance(error, PortLost):
             error = PortLost(INTERNAL_ERROR)
         self.is_online = False
+        self._standing.forget()
         self.tasks.fail(error)
         self.guests.end()
         self.checks.end(str(error))
@@ -370,6 +386,8 @@ class Driver:
     def _station_told(self, station: int, identity: Identity | None, asked: float) -> None:
         """Use what a station has answered: its mode, and which packets it takes."""
         if identity is not None and identity.is_running is not None:
-            self.interlocks.mode_seen(
-                station, identity.is_running and not identity.faults, self.machine.now)
+            is_running = identity.is_running and not identity.faults
+            if not is_running:  # a download may follow
+                self._standing.forget(station)
+            self.interlocks.mode_seen(station, is_running, self.machine.now)
         self.readings.told(station, identity, asked)

@@ -39,6 +39,7 @@ class Outcome(Enum):
     """How a write ended."""
 
     WRITTEN = 'written'
+    STANDS = 'stands in the PLC'
     BROADCAST = 'sent to all stations; no station confirms a broadcast'
     SUPERSEDED = 'not written: superseded by a newer value'
     REFUSED = 'not written: refused'

@@ -184,7 +184,7 @@ class Report:
         times = bounds.remarks(self.network, self.mappings, self.response_time)
         if self.network.line_mode.only_listens:
             return found
-        return [*found, *self.load_remarks(), *_gap_remarks(self),
+        return [*found, *self.load_remarks(), *_gap_remarks(self), *_again_remarks(self),
                 *(Remark(RemarkKind.INTERLOCK, text) for text in times)]
 
     def load_remarks(self) -> list[Remark]:
@@ -375,6 +375,26 @@ def _load_remarks(report: Report) -> Iterator[Remark]:
             'while guests (Share) ask, a quarter of the time may be theirs: the periods then need '
             f'{load * (1 + 1 / OURS_BESIDE_GUESTS):.0%} of the time that is left, and the '
             'poll cycle is up to a third longer'))
+
+
+def _again_remarks(report: Report) -> Iterator[Remark]:
+    """Find rows with Write_Again whose words are read too seldom to show what the PLC holds."""
+    expected = forecast.intervals(report.blocks)
+    for row in report.mappings:
+        if row.write_again is None:
+            continue
+        reads = [expected[block.period] for block in report.blocks
+                 if block.extent.holds(row.extent)]
+        least = min(row.write_again, row.fallback.after if row.fallback else math.inf)
+        which = 'Fallback_After' if least < row.write_again else 'Write_Again'
+        if not reads:
+            text = 'has no effect: no Read row has all of its words'
+        elif 2000 * min(reads) > least:
+            text = (f'has little effect: its words are read every {milliseconds(min(reads))}, and '
+                    f'that has to be well below {which}, {least} ms')
+        else:
+            continue
+        yield Remark(RemarkKind.SETTING, f'{row.tag}: Write_Again {text}', row.station)
 
 
 def _period_remarks(report: Report) -> Iterator[Remark]:

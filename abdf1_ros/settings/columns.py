@@ -210,6 +210,11 @@ MAP_COLUMNS = (
            'with Publish Change: ms after which a value is published again though it has not '
            'changed, 100-3600000; the topic then promises a deadline',
            kind=milliseconds_from(100, 3_600_000), commands=PUBLISHED),
+    Column('Write_Again', 'each message is written',
+           'of a Write or ReadWrite: ms, 100-3600000; while reads show that the PLC holds the '
+           'value of a message, it is written again only after so long',
+           kind=milliseconds_from(100, 3_600_000),
+           commands=(Command.WRITE, Command.READ_WRITE)),
 )
 
 BY_NAME = {column.name: column for column in MAP_COLUMNS}

@@ -74,6 +74,8 @@ def with_conditions(row: Row, values: Cells, mapping: Mapping, fault: ReportFaul
             fault(column, f'{column} is for rows with Publish Change')
     if mapping.deadband is not None and (mapping.deadband < 0 or mapping.type in _NO_NUMBERS):
         fault('Deadband', 'Deadband should be a number from 0 on, for values that are numbers')
+    if mapping.write_again is not None and mapping.station == BROADCAST:
+        fault('Write_Again', 'no station confirms what is written to 255', is_superfluous=True)
     if mapping.alarm is not None and mapping.type is not ValueType.BOOL:
         fault('Alarm', 'Alarm is for bits (bool), such as B3:0/0')
     return replace(mapping, fallback=_fallback(values, mapping, fault),

@@ -79,6 +79,7 @@ class Mapping:
     - ``alarm``, ``fallback``, ``condition``: None where the row has none.
     - ``deadband``: largest difference that is not published, in the unit of the topic.
     - ``max_silence``: ms after which an unchanged value is published again.
+    - ``write_again``: ms after which a value that the PLC holds is written again.
     - ``confirms``: tag of the heartbeat whose control the bit confirms, empty for none.
     - ``description``: free text.
     - ``remarks``: unusual settings of the row.
@@ -113,6 +114,7 @@ class Mapping:
     alarm: Alarm | None = None
     deadband: float | None = None
     max_silence: int | None = None
+    write_again: int | None = None
     remarks: tuple[Problem, ...] = ()
     # The codec and the dialect are made once: every read needs them.
     codec: Codec = field(init=False, repr=False)

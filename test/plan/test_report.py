@@ -309,3 +309,26 @@ def test_rows_promise_three_intervals_and_a_read() -> None:
     assert report_of(row, silent).promises() == {row: pytest.approx(3 + TWO_WORDS + ANSWERS)}
     # The node does not know how slow the PLC is, and so promises the same.
     assert report_of(row, response=0.1).promises() == report_of(row).promises()
+
+
+@pytest.mark.parametrize(('again', 'after', 'period', 'expected'), [
+    (1000, None, 200, ''), (1000, None, 800, 'read every 800 ms, and that has to be well below '
+                                             'Write_Again, 1000 ms'),
+    (5000, 1000, 800, 'read every 800 ms, and that has to be well below Fallback_After, 1000 ms'),
+    (1000, None, None, 'w: Write_Again has no effect: no Read row has all of its words')])
+def test_words_with_write_again_have_to_be_read_often(
+        again: int, after: int | None, period: int | None, expected: str) -> None:
+    rows = [make_mapping('N7:0', 'Write', tag='w', write_again=again,
+                         fallback=Fallback((0,), after) if after else None)]
+    if period:
+        rows.append(make_mapping('N7:0', tag='r', length=4, period=period))
+    found = [text for text in texts(report_of(*rows), RemarkKind.SETTING) if 'Write_Again' in text]
+    assert [expected in text for text in found] == [True] * bool(expected)
+
+
+def test_rows_on_demand_are_a_note_and_no_load() -> None:
+    report = report_of(make_mapping('N7:0', tag='recipe', length=100, is_on_demand=True),
+                       make_mapping('N9:0', tag='speed'))
+    assert [block.mappings[0].tag for block in report.blocks] == ['speed']
+    note, = [note for note in report.notes() if 'on demand' in note]
+    assert note.startswith('read on demand alone, by ~/read_now: recipe (')

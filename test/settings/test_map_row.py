@@ -324,3 +324,12 @@ def test_row_on_demand_is_no_counter() -> None:
                   While_Timeout='5000')
     told = faults(counter, guarded)
     assert [text for text in told if '"counter" is read only on demand' in text]
+
+
+@pytest.mark.parametrize(('cells', 'expected'), [
+    ({'Command': 'Read'}, 'a Read row has no Write_Again: it is for Write and ReadWrite rows'),
+    ({'Command': 'Heartbeat'}, 'a Heartbeat row has no Write_Again'),
+    ({'Command': 'Write', 'Station': '255'}, 'no station confirms what is written to 255'),
+    ({'Command': 'Write', 'Write_Again': '1'}, 'should be ms from 100 to 3600000')])
+def test_what_write_again_is_for(cells: dict[str, str], expected: str) -> None:
+    assert any(expected in text for text in faults(row(**{'Write_Again': '1000'} | cells)))

@@ -30,7 +30,7 @@ import math
 from operator import attrgetter
 from random import Random
 
-from abdf1_ros.driver.interlocks.fallback import FallbackCause, FallbackRow
+from abdf1_ros.driver.interlocks.fallback import FallbackCause, FallbackRow, FallbackState
 from abdf1_ros.driver.interlocks.heartbeat import BeatState, HeartbeatRow, LARGEST
 from abdf1_ros.driver.interlocks.plc import Conditions, OwnRow, Plc, TurnRank
 from abdf1_ros.driver.reads.readings import ValueListener
@@ -218,6 +218,17 @@ class Interlocks(WriteListener):
         """
         row = self._by_mapping.get(write.mapping)
         return row is not None and row.cause is not None and not self._plc_of[row].is_active
+
+    def may_stand(self, write: Write) -> bool:
+        """Tell whether a message of the row need not be written, as far as its fallback goes."""
+        row = self._by_mapping.get(write.mapping)
+        return row is None or row.state is FallbackState.MESSAGE and not row.is_under_way
+
+    def stands(self, write: Write) -> None:
+        """Take note of a message whose value the PLC holds: it refreshes its row (7)."""
+        if row := self._by_mapping.get(write.mapping):
+            row.message_ended(write.requested, Outcome.WRITTEN)
+            self._plc_of[row].look_again(row)
 
     def write_ended(self, claim: Claim) -> None:
         """Take note how a write ended, of whomever: fallbacks may wait for that (rules 7, 9)."""

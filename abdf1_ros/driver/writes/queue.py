@@ -65,7 +65,8 @@ class WriteQueue:
     They are in ``waiting``. ``report`` gets the results. ``tx_delay`` (s) comes before each
     transmission. A write to a silent station is a probe; one that ``stations.probes`` does not
     admit ends unsent. Another thread may only ask for the length. ``next_expiry`` is when
-    ``expire`` has something to do (clock value in s).
+    ``expire`` has something to do (clock value in s). ``leave_out`` returns why a write is not
+    needed that would have the line now, empty where it is.
     """
 
     def __init__(self, stations: ActiveStationList, writing: WritesUnderWay, patience: float,
@@ -77,6 +78,7 @@ class WriteQueue:
         # It does not count as waiting: it comes before a probe, and before the command.
         self._slack = 2 * tx_delay
         self.waiting: deque[Write] = deque()
+        self.leave_out: Callable[[Write, float], str] = lambda write, now: ''
         self._begun: dict[Mapping, float] = {}  # when a write of a row had the line last
         self._shared: dict[tuple[Mapping, Mapping], bool] = {}
         self.next_expiry = math.inf
@@ -140,6 +142,9 @@ class WriteQueue:
         """
         self.expire(now)
         while (write := self._first_free(busy)) is not None:
+            if write.mapping.write_again and (reason := self.leave_out(write, now)):
+                self._end(write, Outcome.STANDS, reason, now)
+                continue
             if not self._gives_way(write, now):
                 self.waiting.remove(write)
                 self._begun[write.mapping] = now

@@ -29,6 +29,7 @@ from abdf1_ros.driver.writes.packets import carry_out
 from abdf1_ros.driver.writes.read_backs import ReadBacks
 from abdf1_ros.errors import CommandExpired, INTERNAL_ERROR, PortLost, RemoteError
 from abdf1_ros.pccc.dialect import Steps
+from abdf1_ros.settings.mapping import Mapping
 
 
 class WriteJob(Job):
@@ -66,6 +67,7 @@ class WritesUnderWay:
         self.line = record.line
         self.stations = stations
         self._readings = readings
+        self.spent: dict[Mapping, float] = {}  # s of the line, by messages of a row
 
     def begin(self, write: Write) -> Claim:
         """Take note that a write is under way, until it has ``ended``."""
@@ -88,6 +90,9 @@ class WritesUnderWay:
             self.stations[station].remote_errors += 1
         elif result.error is not None and not isinstance(result.error, CommandExpired):
             self._readings.link_failed(station, result.error)
+        if not write.is_own:
+            took = self.line.took(job.claim.begun, self.line.now)
+            self.spent[write.mapping] = self.spent.get(write.mapping, 0.0) + took
         self.record.ended(job.claim, result.outcome, may_land=result.is_unconfirmed)
 
     def report(self, job: WriteJob) -> None:

@@ -31,7 +31,7 @@ from abdf1_ros.settings.mapping import Mapping
 from rclpy.impl.rcutils_logger import RcutilsLogger
 
 _RESULT_LEVELS = {
-    Outcome.WRITTEN: OK, Outcome.BROADCAST: WARN, Outcome.SUPERSEDED: WARN,
+    Outcome.WRITTEN: OK, Outcome.STANDS: OK, Outcome.BROADCAST: WARN, Outcome.SUPERSEDED: WARN,
     Outcome.FALLBACK: WARN}
 
 

@@ -12,14 +12,17 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Which rows are read less often than their Period says, because the line cannot do more."""
+"""Which rows the line cannot keep up with: rows to read, and those whose messages fill it."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable
+from collections.abc import Mapping as MappingType
+import math
 
 from abdf1_ros.driver.reads.point import ReadPoint
 from abdf1_ros.plan.report import PERIOD_STEPS
+from abdf1_ros.settings.mapping import Mapping
 from abdf1_ros.text import first, milliseconds
 
 # A row is slow from this many of its periods on, and stays slow down to the second number.
@@ -31,6 +34,39 @@ _MOST_NAMED = 3
 
 # With the Period that is advised, the line is busy for this part of the time at most.
 _ADVISED_LOAD = 0.8
+
+
+# Writes that have the line for this part of the time are reported. It is looked at so often (s).
+_FULL = 0.75
+_SPAN = 5.0
+
+
+class FullLine:
+    """The rows whose messages fill the line; ``spent`` has the seconds that each row has had."""
+
+    def __init__(self, spent: MappingType[Mapping, float]) -> None:
+        self._spent = spent
+        self._before: dict[Mapping, float] = {}
+        self._looked = -math.inf
+        self._text = ''
+
+    def text(self, now: float) -> str:
+        """Return which rows fill the line, empty while none do."""
+        if (passed := now - self._looked) >= _SPAN:
+            spent = {**self._spent}
+            parts = {row: (seconds - self._before.get(row, 0.0)) / passed
+                     for row, seconds in spent.items()}
+            self._before, self._looked, self._text = spent, now, _filled(parts)
+        return self._text
+
+
+def _filled(parts: MappingType[Mapping, float]) -> str:
+    if (whole := sum(parts.values())) < _FULL:
+        return ''
+    named = [f'{row.tag} ({parts[row]:.0%})' for row in sorted(parts, key=lambda row: -parts[row])]
+    advice = '; Write_Again leaves out unchanged values' \
+        if not any(row.write_again for row in parts) else ''
+    return f'messages fill {min(whole, 1.0):.0%} of the line: {first(named, _MOST_NAMED)}{advice}'
 
 
 class SlowRows:

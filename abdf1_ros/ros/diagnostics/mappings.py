@@ -21,7 +21,7 @@ from collections.abc import Sequence
 from abdf1_ros.driver.driver import Driver
 from abdf1_ros.driver.reads.point import Freshness, ReadPoint
 from abdf1_ros.problems import Problem
-from abdf1_ros.ros.diagnostics.load import SlowRows
+from abdf1_ros.ros.diagnostics.load import FullLine, SlowRows
 from abdf1_ros.ros.diagnostics.status import ERROR, Judgement, OK, WARN
 from abdf1_ros.text import counted
 
@@ -34,7 +34,11 @@ FRESHNESS_LEVELS = {
 
 
 class MappingsStatus:
-    """How many rows are fresh or slow, and why others are not; ``left_out``: faults of the map."""
+    """
+    How many rows are fresh or slow, which fill the line, and why others are not.
+
+    ``left_out`` are faults of the map.
+    """
 
     name = 'mappings'
 
@@ -43,11 +47,12 @@ class MappingsStatus:
         self._points = driver.points
         self._left_out = left_out
         self._slow = SlowRows(driver.points.values())
+        self._full = FullLine(driver.spent)
 
     def judge(self, now: float) -> Judgement:
         level, text = self._judge_reads(now)
-        if slow := self._slow.text(now):
-            level, text = max(level, WARN), f'{text}; {slow}'
+        for found in filter(None, (self._slow.text(now), self._full.text(now))):
+            level, text = max(level, WARN), f'{text}; {found}'
         if not self._left_out:
             return level, text
         rows = len({(problem.place.file, problem.place.line) for problem in self._left_out})

@@ -55,7 +55,8 @@ class WriteLog:
     def add(self, result: WriteResult, now: float) -> None:
         """Count a result."""
         self._counts[result.outcome] += 1
-        is_good = result.outcome in (Outcome.WRITTEN, Outcome.BROADCAST, Outcome.SUPERSEDED)
+        is_good = result.outcome in (
+            Outcome.WRITTEN, Outcome.STANDS, Outcome.BROADCAST, Outcome.SUPERSEDED)
         if not is_good and not is_usual_fallback(result):
             self._last_failure = f'{result.mapping.tag} {result}', now
 
@@ -75,7 +76,8 @@ class WriteLog:
     def judge(self, now: float) -> Judgement:
         """Return WARN for a while after a failed write, a lost message or a wrong clock."""
         total = self._messages()
-        summary = f'{self._counts[Outcome.WRITTEN]} of {total} writes confirmed'
+        counts = self._counts
+        summary = f'{counts[Outcome.WRITTEN] + counts[Outcome.STANDS]} of {total} writes confirmed'
         if self._last_failure and now - self._last_failure[1] < _WRITE_MEMORY:
             return WARN, f'{summary}; {self._last_failure[0]}'
         if self._last_loss and now - self._last_loss[1] < _WRITE_MEMORY:
@@ -90,6 +92,7 @@ class WriteLog:
         numbers = {
             'accepted': self._messages() - counts[Outcome.REFUSED],
             'confirmed': counts[Outcome.WRITTEN],
+            'not written again': counts[Outcome.STANDS],
             'failed': sum(counts[outcome] for outcome in _FAILURES),
             **{outcome.name.lower(): counts[outcome]
                for outcome in (Outcome.UNKNOWN, Outcome.SUPERSEDED, Outcome.REFUSED)},

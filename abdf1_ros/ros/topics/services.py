@@ -165,7 +165,7 @@ class RowServices:
         del self._calls[label]
         results: list[WriteResult] = call.results
         response.success = len(results) == len(rows) and all(
-            result.outcome is Outcome.WRITTEN for result in results)
+            result.outcome in (Outcome.WRITTEN, Outcome.STANDS) for result in results)
         response.message = '; '.join(
             printable(str(result) if len(rows) == 1 else f'{result.mapping.tag}: {result}')
             for result in results) or f'{Outcome.UNKNOWN.value}: no result has come'

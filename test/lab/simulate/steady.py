@@ -22,7 +22,7 @@ of a topic the words hold it, each message has one result, and that is true.
 from __future__ import annotations
 
 from collections import defaultdict
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import partial
 from itertools import groupby
 from random import Random
@@ -59,6 +59,10 @@ KINDS: dict[str, tuple[str, dict[str, object], tuple[Message, ...]]] = {
 }
 
 
+# What is read where rows have Write_Again.
+_READ = (('B3:0', 4), ('N7:0', 24), ('ST9:0', 1))
+
+
 @dataclass(slots=True)
 class Said:
     """A message to a row, and what came of it."""
@@ -79,7 +83,15 @@ class Steady(DriverBench):
             name: make_mapping(KINDS[name][0], tag=name, **(  # type: ignore[arg-type]
                 {'command': 'Write', 'plc': 'PLC5'} | KINDS[name][1])) for name in self._names}
         self._is_light = dice.random() < 0.5
-        super().__init__([*self._rows.values()], network=Network(
+        if dice.random() < 0.5:  # an unchanged value is written again only now and then
+            again, period = dice.choice([300, 1000, 60_000]), dice.choice([50, 200])
+            self._rows = {
+                name: replace(row, write_again=again) for name, row in self._rows.items()}
+            reads = [make_mapping(place, length=length, tag=place, period=period)
+                     for place, length in _READ]
+        else:
+            reads = []
+        super().__init__([*self._rows.values(), *reads], network=Network(
             baud=dice.choice([9600, 19200]), timeout=200, **mode),  # type: ignore[arg-type]
             settings=DriverSettings(processor_period=0.0, write_timeout=PATIENCE))
         areas = ('B3:0', 4), ('N7:0', 24), ('F8:0', 4), ('ST9:0', 42)
@@ -162,6 +174,11 @@ class Steady(DriverBench):
                            for when, words in self.held[name])
             if result.outcome is Outcome.WRITTEN and not was_held:
                 return f'{name}: {result} at {ended:.3f} s, but nothing was executed'
+            if result.outcome is Outcome.STANDS:
+                last = [words for when, words in self.held[name] if when <= ended][-1:]
+                if last != [self._wanted(name, each.message)]:
+                    return f'{name}: {result} at {ended:.3f} s, but the PLC holds another value'
+                continue
             may_give_way = not self._is_light or self._rows[name].address.bit is None
             if result.outcome is not Outcome.WRITTEN and not (
                     result.outcome is Outcome.SUPERSEDED and may_give_way):

@@ -1,0 +1,252 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Write_Again: a message is not written again while reads show that its value stands."""
+
+from collections.abc import Sequence
+from itertools import pairwise
+
+from abdf1_ros.df1.packet import Packet
+from abdf1_ros.driver.settings import DriverSettings
+from abdf1_ros.driver.write import Outcome
+from abdf1_ros.pccc.emulated import Setting
+from abdf1_ros.settings.heartbeats import Fallback
+from abdf1_ros.settings.mapping import Mapping
+from abdf1_ros.settings.network import Network
+import pytest
+from support.driver_bench import DriverBench, store, stored
+from support.interlocks import Cell
+from support.mappings import make_mapping
+
+WORD = make_mapping('N7:0', 'Write', write_again=1000)
+READ = make_mapping('N7:0', length=4, period=100)
+WRITTEN, STANDS = Outcome.WRITTEN, Outcome.STANDS
+
+
+class Line(DriverBench):
+    """A driver of some rows and a PLC-5; ``executed`` has the time of each write to it."""
+
+    def __init__(self, *rows: Mapping) -> None:
+        super().__init__(rows, network=Network(baud=19200, timeout=200),
+                         settings=DriverSettings(processor_period=0.0))
+        self.there = self.plc(1, 'PLC5', ('N7:0', 40), ('B3:0', 4), ('ST9:0', 84))
+        self.executed: list[float] = []
+        serve = self.there.slave._serve  # type: ignore[attr-defined]
+
+        def watch(command: Packet) -> Packet:
+            reply: Packet = serve(command)
+            if command.cmd == 0x0F and not reply.data:
+                self.executed.append(self.clock())
+            return reply
+
+        self.there.slave._serve = watch  # type: ignore[attr-defined]
+        self.run(1.0)
+
+    def say(self, row: Mapping, values: Sequence[float] | str, run: float = 0.0) -> None:
+        self.driver.write([row], values, self.clock())
+        self.line.wake(self.driver.machine)
+        self.run(run)
+
+    def keep_saying(self, row: Mapping, values: Sequence[float] | str, seconds: float,
+                    rate: float = 50.0) -> None:
+        for number in range(int(rate * seconds)):
+            self.at(self.clock() + number / rate, lambda: self.say(row, values))
+
+    def load(self, seconds: float) -> float:
+        """Let time pass; return the part of it in which characters were on the line."""
+        counters = self.driver.counters
+        before = counters.chars_sent + counters.chars_received
+        self.run(seconds)
+        after = counters.chars_sent + counters.chars_received
+        return (after - before) * self.network.timing.char_time / seconds
+
+    @property
+    def outcomes(self) -> list[Outcome]:
+        return self.listener.outcomes()
+
+
+def test_unchanged_value_is_written_again_after_its_time_only() -> None:
+    line = Line(WORD, READ)
+    line.keep_saying(WORD, [7], 10.0)
+    line.run(10.2)
+    assert len(line.outcomes) == 500
+    assert {*line.outcomes} == {WRITTEN, STANDS}
+    # The first few until a read has shown the value, then one a second.
+    assert 10 <= line.outcomes.count(WRITTEN) <= 25
+    gaps = [later - earlier for earlier, later in pairwise(line.executed[-5:])]
+    assert all(1.0 <= gap < 1.2 for gap in gaps), gaps
+    text = str(line.listener.results[-1])
+    assert text.startswith('stands in the PLC: confirmed ')
+    assert text.endswith(' s ago; not written again')
+
+
+@pytest.mark.parametrize(('again', 'most'), [(None, 1.1), (1000, 0.55), (5000, 0.4)])
+def test_four_words_at_50_hz_leave_the_line_to_others(again: int | None, most: float) -> None:
+    rows = [make_mapping(f'N7:{number}', 'Write', write_again=again, tag=f'w{number}')
+            for number in range(4)]
+    line = Line(*rows, READ)
+    for row in rows:
+        line.keep_saying(row, [5], 12.0)
+    line.run(2.0)
+    load = line.load(10.0)
+    print(f'load with Write_Again {again}: {load:.2f}')
+    assert load < most
+    assert again is not None or load > 0.7
+
+
+def test_change_goes_at_once() -> None:
+    line = Line(WORD, READ)
+    line.keep_saying(WORD, [7], 3.0)
+    line.run(3.0)
+    assert line.outcomes[-1] is STANDS
+    begun = line.clock()
+    line.say(WORD, [8], run=0.2)
+    assert line.outcomes[-1] is WRITTEN
+    assert line.executed[-1] - begun < 0.1
+    line.say(WORD, [7], run=0.2)
+    assert line.outcomes[-1] is WRITTEN
+
+
+def test_word_that_the_plc_clears_is_back_within_one_read() -> None:
+    line = Line(make_mapping('N7:0', 'Write', write_again=60_000), READ)
+    row = line._mappings[0]
+    line.keep_saying(row, [7], 6.0)
+    line.run(3.0)
+    store(line.there, 'N7:0', [0])
+    line.run(0.3)
+    assert stored(line.there, 'N7:0') == b'\x07\x00'
+    assert line.executed[-1] > line.clock() - 0.3
+
+
+def test_without_a_read_every_message_is_written() -> None:
+    line = Line(WORD)
+    line.keep_saying(WORD, [7], 1.0, rate=10)
+    line.run(1.2)
+    assert line.outcomes == [WRITTEN] * 10
+
+
+def test_read_that_is_too_old_proves_nothing() -> None:
+    row = make_mapping('N7:0', 'Write', write_again=60_000)
+    line = Line(row, make_mapping('N7:0', length=4, period=10_000))  # write_timeout is 2 s
+    line.keep_saying(row, [7], 9.0, rate=10)
+    line.run(9.2)
+    # The read after each write holds for 2 s.
+    gaps = [later - earlier for earlier, later in pairwise(line.executed)]
+    assert len(gaps) >= 3 and max(gaps) < 2.3, gaps
+    assert line.outcomes.count(STANDS) > 60
+
+
+@pytest.mark.parametrize('how', ['another row', 'broadcast', 'block'])
+def test_other_write_of_the_words_ends_it(how: str) -> None:
+    others = {
+        'another row': make_mapping('N7:0', 'Write', tag='o'),
+        'broadcast': make_mapping('N7:0', 'Write', station=255, tag='o'),
+        'block': make_mapping('N7:0', 'Write', length=3, tag='o')}
+    other = others[how]
+    line = Line(WORD, other, READ)
+    line.keep_saying(WORD, [7], 1.0)
+    line.run(1.1)
+    assert line.outcomes[-1] is STANDS
+    line.say(other, [9] * other.length)
+    line.say(WORD, [7], run=0.5)
+    assert line.outcomes[-1] is WRITTEN
+    assert stored(line.there, 'N7:0') == b'\x07\x00'
+
+
+def test_neighbour_bits_do_not_disturb_each_other() -> None:
+    rows = [make_mapping(f'B3:0/{bit}', 'Write', write_again=60_000, tag=f'b{bit}')
+            for bit in range(2)]
+    line = Line(*rows, make_mapping('B3:0', period=100))
+    line.keep_saying(rows[0], [1], 4.0)
+    line.keep_saying(rows[1], [0], 2.0)
+    line.run(2.0)
+    del line.listener.results[:]
+    line.say(rows[1], [1], run=0.5)
+    assert [result.outcome for result in line.listener.results if result.mapping is rows[0]][
+        5:] == [STANDS] * (len(line.listener.results) - 6)
+
+
+def test_unconfirmed_write_and_what_follows_prove_nothing() -> None:
+    line = Line(WORD, READ)
+    line.keep_saying(WORD, [7], 1.0)
+    line.run(1.1)
+    serve = line.there.slave._serve  # type: ignore[attr-defined]
+    line.there.slave._serve = lambda command: (  # type: ignore[attr-defined]
+        serve(command), None)[1]
+    line.say(WORD, [8], run=2.5)
+    line.there.slave._serve = serve  # type: ignore[attr-defined]
+    line.run(2.0)
+    del line.listener.results[:]
+    line.say(WORD, [8], run=0.3)
+    assert line.outcomes == [WRITTEN]
+
+
+def test_station_that_was_away_gets_the_value_again() -> None:
+    line = Line(make_mapping('N7:0', 'Write', write_again=60_000), READ)
+    row = line._mappings[0]
+    line.keep_saying(row, [7], 1.0)
+    line.run(1.1)
+    line.there.faults.silent = True
+    line.run(5.0)
+    line.there.faults.silent = False
+    line.run(10.0)
+    del line.listener.results[:]
+    line.say(row, [7], run=0.5)
+    assert line.outcomes == [WRITTEN]
+
+
+def test_text_and_read_write_rows_stand_too() -> None:
+    text = make_mapping('ST9:0', 'ReadWrite', write_again=60_000, period=100)
+    line = Line(text)
+    line.keep_saying(text, 'on', 2.0)
+    line.run(2.1)
+    assert line.outcomes[-1] is STANDS
+    line.say(text, 'off', run=0.5)
+    assert line.outcomes[-1] is WRITTEN
+
+
+def test_message_that_stands_feeds_its_fallback() -> None:
+    row = make_mapping('N7:0', 'Write', write_again=60_000, fallback=Fallback((0,), 1000))
+    cell = Cell(row, READ, run=3.0)
+    bench = cell.bench
+    store(cell.plc, 'N7:0', [0])
+    begun = cell.now
+    for number in range(50):
+        bench.at(begun + number / 10, lambda: bench.write(row, [7]))
+    cell.run(5.0)
+    assert bench.listener.outcomes().count(STANDS) > 35
+    assert stored(cell.plc, 'N7:0') == b'\x07\x00'
+    cell.run(1.5)  # the last message was published at 4.9 s
+    assert bench.listener.results[-1].outcome is Outcome.FALLBACK
+    assert stored(cell.plc, 'N7:0') == b'\x00\x00'
+    bench.write(row, [7], run=0.5)
+    assert bench.listener.outcomes()[-1] is WRITTEN
+
+
+def test_stopped_program_and_lost_port_end_it() -> None:
+    row = make_mapping('N7:0', 'Write', write_again=60_000, fallback=Fallback((0,), 5000))
+    for how in ('program', 'port'):
+        cell = Cell(row, READ, run=3.0)
+        bench = cell.bench
+        bench.write(row, [7], run=0.5)
+        bench.write(row, [7], run=0.5)
+        assert bench.listener.outcomes()[-1] is STANDS
+        if how == 'program':
+            cell.plc.processor.setting = Setting.PROGRAM
+            cell.run(2.5)
+        else:
+            bench.lose_port()
+            bench.open(run=0.5)
+        bench.write(row, [7], run=0.5)
+        assert bench.listener.outcomes()[-1] is not STANDS
