@@ -253,7 +253,7 @@ def _overlap_remarks(mappings: Sequence[Mapping]) -> Iterator[Remark]:
         read = [other for other in others if other.command is Command.READ]
         written = [other for other in others if other.writes and other.item < mapping.item]
         about = f'{mapping.place}: {mapping.tag} writes {mapping.address}'
-        if read and mapping.command is Command.WRITE:
+        if read and mapping.command is Command.WRITE and not mapping.write_again:
             yield Remark(RemarkKind.SETTING, (
                 f'{about}, which {_tags(read)} reads, so a message sets what the PLC is '
                 'to tell; ReadWrite in one row if that is meant, otherwise another address'),

@@ -241,3 +241,10 @@ def test_old_call_is_not_written_and_the_end_answers_who_waits(tmp_path: Path) -
         observer.until(lambda: all(future.done() for future in waiting), 'the last answers')
         assert [future.result().success for future in waiting] == [False, False]
         simulator.say('normal 2')
+
+
+def test_line_that_is_only_listened_to_has_no_services_of_rows(tmp_path: Path) -> None:
+    rows = (HEADER, 'speed,Read,N7:0,1,PLC5,2,,500,,,')
+    with Bench(tmp_path, DATA, '\n'.join(rows), 'Mode,Baud\nListen,115200') as bench:
+        bench.ros.until(lambda: bench.ros.node.count_publishers('/abdf1/read/speed'), 'the topic')
+        assert bench.node._surroundings.services._services == {}

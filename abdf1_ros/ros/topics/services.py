@@ -102,7 +102,8 @@ class RowServices:
         network = driver.network
         # A write waits for the line and for a read; in between it is under way.
         self._longest = 2 * (patience + network.line_mode.longest_transaction(network.line, 0.0))
-        self._rows = dict(_offered(driver.mappings, most))
+        self._rows = {} if network.line_mode.only_listens \
+            else dict(_offered(driver.mappings, most))
         self._retire()
         for name in self._rows:
             if name not in self._services:
