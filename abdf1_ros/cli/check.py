@@ -31,6 +31,8 @@ import shutil
 import sys
 from typing import Any
 
+from abdf1_ros.cli.check_picture import check_parts
+from abdf1_ros.cli.lanes import is_page, write_page
 from abdf1_ros.cli.overhearing import overheard
 from abdf1_ros.cli.terminal import (
     colour,
@@ -38,11 +40,14 @@ from abdf1_ros.cli.terminal import (
     EXIT_INTERRUPTED,
     EXIT_USAGE,
     GREEN,
+    may_replace,
     number_option,
     prepare_output,
+    reason_of,
     RED,
     run_command,
     table,
+    tell,
     YELLOW,
 )
 from abdf1_ros.driver.settings import DriverSettings
@@ -73,6 +78,7 @@ examples:
   check config/net.csv config/map.csv
   check --response-time 25 net.csv map.csv    the PLC needs 25 ms for each answer
   check --json net.csv map.csv | jq .load
+  check --html cycle.html net.csv map.csv     the poll cycle as a picture
   check nets/                                 a line of text for each pair in the folder
 """
 
@@ -123,12 +129,26 @@ def _pair(options: argparse.Namespace) -> tuple[str, bool]:
     found = examine(options.net, options.map, options.default_period / 1000)
     report = _report(found, options)
     heard = _heard(found, options.heard) if options.heard else None
+    is_drawn = not options.html or _draw(options, found, report)
     if options.json:
         content = _content(found, report)
         return json.dumps(content | ({'heard': heard} if heard else {}), indent=2), \
-            not found.problems
+            is_drawn and not found.problems
     return _text(found, report) + ('' if heard is None else _heard_text(heard)), \
-        not found.problems
+        is_drawn and not found.problems
+
+
+def _draw(options: argparse.Namespace, found: Findings, report: Report | None) -> bool:
+    """Write the page of --html; return whether that went well."""
+    facts = [] if report is None else [
+        *_line_text(report).splitlines(), *_times_text(report).splitlines()]
+    try:
+        write_page(options.html, f'The plan of {options.net} and {options.map}',
+                   check_parts(report, found.problems, facts))
+    except OSError as error:
+        tell('check', f'--html: {reason_of(options.html, error)}', RED)
+        return False
+    return True
 
 
 def _heard(found: Findings, files: Sequence[str]) -> dict[str, Any]:
@@ -240,6 +260,8 @@ def _parse(args: Sequence[str] | None) -> argparse.Namespace:
     parser.add_argument('map', metavar='MAP', nargs='?', help='the map CSV')
     parser.add_argument('--json', action='store_true',
                         help='print one JSON object, with every tag of every block')
+    parser.add_argument('--html', metavar='FILE',
+                        help='also draw the poll cycle, and what the Periods need, for a browser')
     duration = number_option(f'ms from 0 to {MAX_PERIOD}', 0, MAX_PERIOD)
     parser.add_argument('--default-period', type=duration, metavar='MS',
                         default=DriverSettings().default_period * 1000,
@@ -255,6 +277,11 @@ def _parse(args: Sequence[str] | None) -> argparse.Namespace:
         parser.error('--heard is for one line: name its two files')
     if options.map is None and not Path(options.net).is_dir():
         parser.error(f'{printable(options.net)} is not a folder, so a map CSV has to follow')
+    if options.html and options.map is None:
+        parser.error('--html is for one net CSV and one map CSV')
+    if options.html and not may_replace(options.html, is_page):
+        parser.error(f'{printable(options.html)} is there and was not made by --html; '
+                     'give another name')
     return options
 
 

@@ -37,6 +37,8 @@ import signal
 import sys
 import time
 
+from abdf1_ros.cli.lanes import is_page
+from abdf1_ros.cli.sniff_picture import Timeline
 from abdf1_ros.cli.sniff_report import is_bundle, ReportBundle
 from abdf1_ros.cli.terminal import (
     command_parser,
@@ -87,6 +89,7 @@ examples:
   sniff --json line.cap | jq 'select(.latency_ms > 100)'
   sniff --summary --binary recorded.bin
   sniff --pcapng line.pcapng line.cap        for Wireshark, with share/abdf1_ros/wireshark
+  sniff --html line.html line.cap            for a browser
   sniff --report line.zip line.cap --settings net.csv map.csv
 """
 
@@ -101,6 +104,7 @@ class _Output:
         self._bundle = ReportBundle(
             options.files, options.settings, options.conformance,
             options.anonymous) if options.report else None
+        self._timeline = Timeline(options.anonymous) if options.html else None
         self._packets = PcapngWriter(options.pcapng) if options.pcapng else None
         self.has_failed = False
         self._colour = sys.stdout.isatty() and 'NO_COLOR' not in os.environ
@@ -128,6 +132,8 @@ class _Output:
         if self._packets:
             self._packets.begin(settings.get('begun', ''))
         self._summary.take(chunk)
+        if self._timeline:
+            self._timeline.take(chunk, self._summary.baud, settings.get('begun', ''))
         for entry in session.feed(chunk):
             self._print(entry)
 
@@ -151,6 +157,18 @@ class _Output:
         self.sum_up()
         if self._bundle:
             self._write_bundle(self._bundle)
+        if self._timeline:
+            self._write_timeline(self._timeline)
+
+    def _write_timeline(self, timeline: Timeline) -> None:
+        """Write the page of --html."""
+        options = self._options
+        title = ', '.join(options.files or options.tap or [options.port])
+        try:
+            timeline.write(options.html, title, self._summary, self.begin({}).kind)
+        except OSError as error:
+            self.has_failed = True
+            _say(f'--html: {reason_of(options.html, error)}')
 
     def _write_bundle(self, bundle: ReportBundle) -> None:
         """Write the bundle of --report."""
@@ -175,8 +193,9 @@ class _Output:
 
     def _print(self, entry: Entry) -> None:
         self._summary.add(entry)
-        if self._bundle:
-            self._bundle.add(entry)
+        for picture in (self._bundle, self._timeline):
+            if picture:
+                picture.add(entry)
         if self._packets:
             try:
                 self._packets.write(entry)
@@ -234,6 +253,8 @@ def _parse(args: Sequence[str] | None) -> argparse.Namespace:
                         help='also write what a port or a tap hears into a capture')
     parser.add_argument('--pcapng', metavar='FILE',
                         help='also write what is heard as packets, for Wireshark')
+    parser.add_argument('--html', metavar='FILE',
+                        help='also draw the line as a timeline with its faults, for a browser')
     parser.add_argument('--report', metavar='ZIP',
                         help='make a bundle of captures for a report: bytes, words, summary, '
                              'processors, versions')
@@ -242,7 +263,7 @@ def _parse(args: Sequence[str] | None) -> argparse.Namespace:
     parser.add_argument('--conformance', metavar='FILE', nargs='+', default=[],
                         help='results of conform for the bundle')
     parser.add_argument('--anonymous', action='store_true',
-                        help='leave values, tags and topics out of the bundle')
+                        help='leave values and names out of the bundle and the timeline')
     parser.add_argument('--seconds', type=seconds_option, default=math.inf,
                         help='end after so many seconds')
     options = parser.parse_args(args)
@@ -261,8 +282,12 @@ def _parse(args: Sequence[str] | None) -> argparse.Namespace:
     if options.report and not may_replace(options.report, is_bundle):
         parser.error(f'--report: {options.report} is there and is not a bundle of --report; give '
                      'another name')
-    if not options.report and (options.settings or options.conformance or options.anonymous):
-        parser.error('--settings, --conformance and --anonymous are for --report')
+    if options.html and not may_replace(options.html, is_page):
+        parser.error(f'{options.html} is there and was not made by --html; give another name')
+    if not options.report and (options.settings or options.conformance):
+        parser.error('--settings and --conformance are for --report')
+    if options.anonymous and not (options.report or options.html):
+        parser.error('--anonymous is for --report and --html')
     return options
 
 

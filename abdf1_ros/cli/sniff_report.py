@@ -110,7 +110,7 @@ class ReportBundle:
             'processors.txt': '\n'.join(processors) or 'no diagnostic status was seen',
             'versions.json': json.dumps(_versions(), indent=1)}
         if self.is_anonymous:
-            texts['entries.json'] = '\n'.join(map(json_line, map(_without_data, self._entries)))
+            texts['entries.json'] = '\n'.join(map(json_line, map(without_data, self._entries)))
         else:
             texts['entries.txt'] = '\n'.join(map(text_line, self._entries))
             for name in self.captures:
@@ -175,7 +175,7 @@ def _release() -> str:
     return platform.release().partition('-')[0]
 
 
-def _without_data(entry: Entry) -> Entry:
+def without_data(entry: Entry) -> Entry:
     """Return an entry without its guest, its text, and the data of its message."""
     packet = entry.packet
     # The first byte of a command is its FNC.

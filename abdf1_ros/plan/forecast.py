@@ -80,8 +80,8 @@ def load(blocks: Iterable[Block], response_time: float = USUAL_RESPONSE_TIME) ->
     return sum(block_time(block, response_time) / block.period for block in blocks if block.period)
 
 
-def intervals(blocks: Iterable[Block],
-              own: Iterable[tuple[float, float]] = ()) -> dict[float, float]:
+def intervals(blocks: Iterable[Block], own: Iterable[tuple[float, float]] = (),
+              response_time: float = USUAL_RESPONSE_TIME) -> dict[float, float]:
     """
     Return the expected seconds between two reads of a block, by its period (s).
 
@@ -90,9 +90,9 @@ def intervals(blocks: Iterable[Block],
     the period of each heartbeat and each question for a mode: they go in between.
     """
     blocks, own = list(blocks), list(own)
-    once = poll_cycle(blocks)
-    needed = load(blocks) + sum(seconds / period for seconds, period in own)
-    unlimited = poll_cycle(block for block in blocks if not block.period)
+    once = poll_cycle(blocks, response_time)
+    needed = load(blocks, response_time) + sum(seconds / period for seconds, period in own)
+    unlimited = poll_cycle((block for block in blocks if not block.period), response_time)
     wanted = {block.period: block.period or PATIENCE * once for block in blocks}
     if unlimited and needed < 1:
         wanted[0.0] = min(wanted[0.0], unlimited / (1 - needed))

@@ -103,11 +103,18 @@ class Report:
     @property
     def load(self) -> float:
         """Return the part of the line's time that the periods need."""
-        own = bounds.own_work(
+        return forecast.load(self.blocks, self._answer_time) + sum(
+            seconds / period for seconds, period in self._own_work)
+
+    def intervals(self) -> dict[float, float]:
+        """Return the expected seconds between two reads of a block, by its period (s)."""
+        return forecast.intervals(self.blocks, self._own_work, self._answer_time)
+
+    @property
+    def _own_work(self) -> list[tuple[float, float]]:
+        return bounds.own_work(
             forecast.line_model(self.network), self.mappings, self.default_period,
             response_time=self._answer_time)
-        return forecast.load(self.blocks, self._answer_time) + sum(
-            seconds / period for seconds, period in own)
 
     @property
     def _answer_time(self) -> float:

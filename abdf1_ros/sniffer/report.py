@@ -35,13 +35,17 @@ def text_line(entry: Entry, colour: bool = False) -> str:
     """Return time, direction, station, kind, text, check, latency and marks of an entry."""
     time = '-' if entry.time is None else f'{entry.time:.6f}'
     station = '' if entry.station is None else str(entry.station)
-    guest = f'guest {entry.guest}' if entry.guest else ''
-    parts = [part for part in (entry.text, guest, _check(entry), _latency(entry)) if part]
-    parts += [mark.value.upper() for mark in entry.marks]
     line = (f'{time:>13} {entry.direction.value} {station:>3} {entry.kind.value:<8} '
-            f'{" | ".join(parts)}').rstrip()
+            f'{words(entry)}').rstrip()
     shade = _shade(entry) if colour else ''
     return f'{shade}{line}{_PLAIN}' if shade else line
+
+
+def words(entry: Entry) -> str:
+    """Return text, check, latency and marks of an entry."""
+    guest = f'guest {entry.guest}' if entry.guest else ''
+    parts = [part for part in (entry.text, guest, _check(entry), _latency(entry)) if part]
+    return ' | '.join([*parts, *(mark.value.upper() for mark in entry.marks)])
 
 
 def _check(entry: Entry) -> str:

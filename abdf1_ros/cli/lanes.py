@@ -1,0 +1,214 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+Pictures for a browser: blocks of time in lanes, as SVG in one HTML file.
+
+The file needs no network and runs no program: its own policy forbids both. All texts from outside
+go through ``text_of``.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass
+from enum import Enum
+from html import escape
+from itertools import accumulate
+import math
+from pathlib import Path
+
+from abdf1_ros.text import printable
+
+WIDTH = 1160  # pixels, of which the names of lanes take the first ones
+NAMES = 110
+_RIGHT = 20
+_GAP = 6
+_LETTER = 6.3  # pixels, in a bar
+_LEAST = 1.6  # pixels: what is shorter can still be seen
+_TICKS = 10
+_MARK = '<meta name="generator" content="abdf1_ros">'
+
+_STYLE = """
+:root { color-scheme: light; }
+body { font: 14px/1.45 system-ui, "DejaVu Sans", sans-serif; color: #1b1f24; background: #fff;
+  max-width: 1200px; margin: 1.5em auto; padding: 0 1em; }
+h1 { font-size: 1.4em; margin-bottom: .2em; } h2 { font-size: 1.1em; margin: 1.8em 0 .4em; }
+h3 { font-size: 1em; margin: 1.2em 0 0; font-weight: 600; }
+svg { display: block; max-width: 100%; height: auto; margin: .5em 0; }
+svg:target { outline: 3px solid #d9860a; outline-offset: 3px; }
+svg text { font: 11px "DejaVu Sans", system-ui, sans-serif; fill: #1b1f24; }
+svg .in { fill: #fff; pointer-events: none; }
+.lane { fill: #f2f4f7; } .grid { stroke: #d5dae1; } .limit { stroke: #111; stroke-width: 2; }
+svg rect { stroke: #fff; stroke-width: .6; } svg .lane, svg .small { stroke: none; }
+.ask { fill: #2f6db5; } .answer { fill: #2e8b57; } .small { fill: #9aa5b1; }
+.wait { fill: #c9dcf2; } .odd { fill: #d9860a; }
+.bad { fill: #c62828; stroke: #6d0f0f; } .missing { fill: #fbe3e1; stroke: #c62828; }
+table { border-collapse: collapse; margin: .6em 0; }
+td, th { padding: .15em .7em .15em 0; text-align: left; vertical-align: top;
+  border-bottom: 1px solid #e3e7ec; } td.number, th.number { text-align: right; }
+p { margin: .35em 0; } .verdict { font-size: 1.1em; font-weight: 600; } .is-bad { color: #b3261e; }
+.is-odd { color: #9a5b00; } .is-good { color: #1f6b41; } .quiet { color: #5a6572; }
+.key { display: inline-block; width: 1.1em; height: .8em; margin: 0 .35em 0 1em; }
+@media print { svg, tr { break-inside: avoid; } }
+"""
+
+
+class Look(Enum):
+    """What a bar is; the value is its class in the style."""
+
+    ASK = 'ask'
+    ANSWER = 'answer'
+    SMALL = 'small'
+    WAIT = 'wait'
+    ODD = 'odd'
+    BAD = 'bad'
+    MISSING = 'missing'
+
+
+@dataclass(frozen=True, slots=True)
+class Bar:
+    """
+    What lasts from ``start`` to ``end``, in a ``row`` of its lane.
+
+    ``title`` is shown by the mouse, and in the bar the first of ``labels`` that it has room for.
+    ``link`` is the name of a drawing.
+    """
+
+    start: float
+    end: float
+    look: Look
+    title: str
+    labels: Sequence[str] = ()
+    row: int = 0
+    link: str = ''
+
+
+@dataclass(frozen=True, slots=True)
+class Lane:
+    """Bars beside each other, in as many rows as they say."""
+
+    name: str
+    bars: Sequence[Bar]
+    rows: int = 1
+
+    @property
+    def row_height(self) -> int:
+        return 22 if self.rows == 1 else 14
+
+    @property
+    def height(self) -> int:
+        return self.rows * self.row_height
+
+
+def text_of(text: str) -> str:
+    """Return text from anywhere as HTML: all of it visible, nothing of it markup."""
+    return escape(printable(text))
+
+
+def drawing(lanes: Sequence[Lane], start: float, end: float, unit: str, limit: float | None = None,
+            name: str = '') -> str:
+    """
+    Return an SVG of lanes from ``start`` to ``end``, below them the axis with ``unit``.
+
+    At ``limit`` is a red line. ``name`` is what links lead to.
+    """
+    scale = (WIDTH - NAMES - _RIGHT) / ((end - start) or 1.0)
+    height = sum(lane.height + _GAP for lane in lanes)
+    parts = [f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {WIDTH} {height + 20}" '
+             f'width="{WIDTH}" height="{height + 20}" role="img"'
+             + (f' id="{text_of(name)}">' if name else '>')]
+    tops = [*accumulate((lane.height + _GAP for lane in lanes), initial=0)]
+    parts += [_ground(lane, top) for lane, top in zip(lanes, tops, strict=False)]
+    parts += _axis(start, end, scale, height, unit)
+    for lane, top in zip(lanes, tops, strict=False):
+        parts += _bars(lane, top, start, scale)
+    if limit is not None:
+        place = NAMES + (limit - start) * scale
+        parts.append(f'<line class="limit" x1="{place:.1f}" x2="{place:.1f}" y1="0" '
+                     f'y2="{height}"/>')
+    return '\n'.join([*parts, '</svg>'])
+
+
+def _ground(lane: Lane, top: int) -> str:
+    height = lane.height
+    return (f'<text x="0" y="{top + height / 2 + 4:.1f}">{text_of(lane.name)}</text>'
+            f'<rect class="lane" x="{NAMES}" y="{top}" width="{WIDTH - NAMES - _RIGHT}" '
+            f'height="{height}"/>')
+
+
+def _bars(lane: Lane, top: int, start: float, scale: float) -> Iterator[str]:
+    for bar in lane.bars:
+        left, width = NAMES + (bar.start - start) * scale, (bar.end - bar.start) * scale
+        above, height = top + bar.row * lane.row_height, lane.row_height
+        drawn = (f'<rect class="{bar.look.value}" x="{left:.1f}" y="{above + 1}" '
+                 f'width="{max(width, _LEAST):.1f}" height="{height - 2}">'
+                 f'<title>{text_of(bar.title)}</title></rect>')
+        yield f'<a href="#{text_of(bar.link)}">{drawn}</a>' if bar.link else drawn
+        label = next((text for text in bar.labels if len(text) * _LETTER + 6 < width), '')
+        if label:
+            yield (f'<text class="in" x="{left + 4:.1f}" y="{above + height / 2 + 4:.1f}">'
+                   f'{text_of(label)}</text>')
+
+
+def _axis(start: float, end: float, scale: float, top: int, unit: str) -> Iterator[str]:
+    step = _step((end - start) / _TICKS)
+    for number in range(math.ceil(start / step), math.floor(end / step + 1e-9) + 1):
+        place = NAMES + (number * step - start) * scale
+        yield (f'<line class="grid" x1="{place:.1f}" x2="{place:.1f}" y1="0" y2="{top + 4}"/>'
+               f'<text x="{place:.1f}" y="{top + 16}" text-anchor="middle">'
+               f'{number * step:.10g}</text>')
+    yield f'<text x="0" y="{top + 16}">{text_of(unit)}</text>'
+
+
+def _step(least: float) -> float:
+    """Return the next step of 1, 2 or 5 times a power of ten."""
+    power = 10.0 ** math.floor(math.log10(least)) if least > 0 else 1.0
+    return next(factor * power for factor in (1, 2, 5, 10) if factor * power >= least * 0.999)
+
+
+def key(entries: Iterable[tuple[Look, str]]) -> str:
+    """Return what the colours mean."""
+    return '<p class="quiet">' + ' '.join(
+        f'<svg class="key" viewBox="0 0 10 8"><rect class="{look.value}" width="10" height="8"/>'
+        f'</svg>{text_of(text)}' for look, text in entries) + '</p>'
+
+
+def cells(head: Sequence[str], rows: Iterable[Sequence[str]], right: Sequence[int] = ()) -> str:
+    """Return a table of HTML; the columns in ``right`` hold numbers."""
+    looks = [' class="number"' if number in right else '' for number in range(len(head))]
+
+    def line(tag: str, row: Sequence[str]) -> str:
+        return '<tr>' + ''.join(f'<{tag}{look}>{cell}</{tag}>'
+                                for look, cell in zip(looks, row, strict=True)) + '</tr>'
+    return '\n'.join(['<table>', line('th', head), *(line('td', row) for row in rows), '</table>'])
+
+
+def write_page(path: str, title: str, parts: Iterable[str]) -> None:
+    """Write a page of parts that are HTML; raises OSError."""
+    with open(path, 'w', encoding='utf-8') as file:
+        file.write('<!DOCTYPE html>\n<html lang="en">\n<head>\n<meta charset="utf-8">\n'
+                   f'{_MARK}\n<meta http-equiv="Content-Security-Policy" '
+                   'content="default-src \'none\'; style-src \'unsafe-inline\'">\n'
+                   f'<title>{text_of(title)}</title>\n<style>{_STYLE}</style>\n</head>\n<body>\n'
+                   f'<h1>{text_of(title)}</h1>\n')
+        for part in parts:
+            file.write(f'{part}\n')
+        file.write('</body>\n</html>\n')
+
+
+def is_page(path: Path) -> bool:
+    """Tell whether a file is one of these pages, so that a new one may replace it."""
+    with path.open('rb') as file:
+        return _MARK.encode() in file.read(1000)

@@ -1,0 +1,334 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+The picture of ``sniff --html``: a recorded line as a timeline, for a reader who was not there.
+
+First comes an overview with a lane for each station, then each strip of some seconds, to which
+the overview leads. Of a long recording the strips without a fault are only counted.
+"""
+
+from __future__ import annotations
+
+from collections import Counter, defaultdict
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass, field, replace
+from datetime import datetime, timedelta
+import math
+
+from abdf1_ros.cli.lanes import Bar, cells, drawing, key, Lane, Look, text_of, write_page
+from abdf1_ros.cli.sniff_report import without_data
+from abdf1_ros.df1.listener import LineKind
+from abdf1_ros.pccc.describe import command_name
+from abdf1_ros.sniffer.capture import Chunk, Direction
+from abdf1_ros.sniffer.entries import Entry, Kind, Mark
+from abdf1_ros.sniffer.report import summary_lines, words
+from abdf1_ros.sniffer.summary import BITS_PER_CHARACTER, Summary
+from abdf1_ros.text import counted
+
+_MOST_DRAWN = 20_000  # entries; of what follows only strips with faults are drawn, as many again
+_MOST_EPISODES = 200
+_PAUSE = 5.0  # s; the same fault after a longer pause is another episode
+_MOST_LANES = 40
+_BUCKETS = 260  # of the overview
+_CHARACTERS = 2000  # of a strip where the recording has no times
+
+_KEY = ((Look.ASK, 'command'), (Look.ANSWER, 'reply'), (Look.SMALL, 'poll, ACK, EOT'),
+        (Look.ODD, 'repeated, NAK, ENQ'), (Look.BAD, 'damaged, or an error'),
+        (Look.MISSING, 'no answer'))
+_LOOKS = {Kind.COMMAND: Look.ASK, Kind.REPLY: Look.ANSWER, Kind.NAK: Look.ODD, Kind.ENQ: Look.ODD,
+          Kind.DAMAGED: Look.BAD, Kind.UNKNOWN: Look.BAD, Kind.NOISE: Look.BAD,
+          Kind.SILENCE: Look.MISSING, Kind.UNANSWERED: Look.MISSING}
+_ASKING = (Kind.COMMAND, Kind.POLL, Kind.ENQ)
+_USUAL = {Mark.RELAYED, Mark.FORWARDED}  # as a master or a modem has to
+_RANKS = [Look.SMALL, Look.ASK, Look.ANSWER, Look.ODD, Look.MISSING, Look.BAD]
+_FAULTS = (Look.ODD, Look.MISSING, Look.BAD)
+
+
+@dataclass(slots=True)
+class _Strip:
+    """What was seen in one strip, by station."""
+
+    number: int
+    bars: defaultdict[int | None, list[Bar]] = field(default_factory=lambda: defaultdict(list))
+
+
+@dataclass(slots=True)
+class _Episode:
+    """A fault that came again and again, told by the ``words`` of the first; times are text."""
+
+    station: str
+    words: str
+    start: str
+    clock: str
+    latest: float
+    end: str = ''
+    count: int = 1
+
+    def cells(self) -> tuple[str, ...]:
+        """Return its row of the table."""
+        return self.start, self.end, self.clock, self.station, str(self.count), self.words
+
+
+@dataclass(slots=True)
+class _Recording:
+    """
+    What is drawn of times that go on; ``length`` is that of a strip, ``unit`` of what.
+
+    ``ends`` is until when the rows of each lane are taken. ``seen`` counts looks by station and
+    strip. ``strips`` are drawings by number, None for one that is not drawn.
+    """
+
+    number: int
+    length: float
+    unit: str = 's'
+    begun: datetime | None = None
+    ends: defaultdict[tuple[int | None, int], float] = field(
+        default_factory=lambda: defaultdict(float))
+    seen: defaultdict[tuple[int | None, int], Counter[Look]] = field(
+        default_factory=lambda: defaultdict(Counter))
+    strips: dict[int, str | None] = field(default_factory=dict)
+
+    def clock(self, place: float) -> str:
+        """Return the time of day, empty where it is not known."""
+        if self.begun is None or self.unit != 's':
+            return ''
+        return (self.begun + timedelta(seconds=place)).strftime('%H:%M:%S')
+
+    def name(self, strip: int) -> str:
+        """Return what links to a strip lead to."""
+        return f'r{self.number}s{strip}'
+
+
+class Timeline:
+    """Collect what ``sniff`` decodes, then write the page; ``is_anonymous`` leaves values out."""
+
+    def __init__(self, is_anonymous: bool = False) -> None:
+        self._is_anonymous = is_anonymous
+        self._recordings: list[_Recording] = []
+        self._episodes: list[_Episode] = []
+        self._latest: dict[tuple[object, ...], _Episode] = {}
+        self._count = self._drawn = self._characters = 0
+        self._last, self._character = -math.inf, 0.0
+        self._strip: _Strip | None = None
+
+    def take(self, chunk: Chunk, baud: int | None, begun: str) -> None:
+        """Take note of bytes before their entries come; where times go back, begin anew."""
+        time = -math.inf if chunk.time is None else chunk.time
+        if not self._recordings or time < self._last:
+            self._close()
+            length = min(16.0, max(0.5, 19200 / baud)) if baud else 1.0
+            self._recordings.append(_Recording(len(self._recordings) + 1, length))
+        recording = self._recordings[-1]
+        if chunk.time is None:
+            recording.length, recording.unit = _CHARACTERS, 'bytes'
+        recording.begun = recording.begun or _moment(begun)
+        self._character = BITS_PER_CHARACTER / baud if baud else 0.0
+        self._last = time
+
+    def add(self, entry: Entry) -> None:
+        """Draw an entry."""
+        recording = self._recordings[-1]
+        if entry.time is None:
+            place = begin = float(self._characters)
+            self._characters += len(entry.wire)
+            end = float(self._characters)
+        else:
+            place = min(entry.time, self._last)
+            size = len(entry.wire) * self._character
+            begin, end = (place, place + size) if entry.direction is Direction.OUT \
+                else (place - size, place)
+        number = int(place // recording.length)
+        if self._strip is None or number > self._strip.number:
+            self._close()
+            self._strip = _Strip(number)
+        self._draw(entry, self._strip, begin, end)
+
+    def _draw(self, entry: Entry, strip: _Strip, begin: float, end: float) -> None:
+        recording, look = self._recordings[-1], _look(entry)
+        station, row = entry.station, _row(entry)
+        start, ends = strip.number * recording.length, recording.ends
+        if entry.kind is Kind.SILENCE:
+            begin = min(ends[station, 0], end)
+        else:  # several symbols can come in one chunk, and have one time
+            at = max(begin, ends[station, row], start)
+            begin, end = at, at + end - begin
+            ends[station, row] = end
+        title = _told(entry.kind, self._words(entry))
+        if entry.time is not None:
+            title = f'{entry.time:.6f} {title}'
+        strip.bars[station].append(Bar(max(begin, start), end, look, title, row=row))
+        recording.seen[station, strip.number][look] += 1
+        if look in _FAULTS:
+            self._note_fault(entry, recording, strip.number, begin)
+
+    def _note_fault(self, entry: Entry, recording: _Recording, strip: int, place: float) -> None:
+        self._count += 1
+        what = recording.number, entry.station, entry.kind, entry.marks
+        time = f'{place:.3f} s' if recording.unit == 's' else f'byte {place:.0f}'
+        link = f'<a href="#{recording.name(strip)}">{time}</a>'
+        known = self._latest.get(what)
+        if known and (recording.unit != 's' or place - known.latest <= _PAUSE):
+            known.latest, known.end, known.count = place, link, known.count + 1
+            return
+        station = '' if entry.station is None else str(entry.station)
+        told = _told(entry.kind, self._words(entry))
+        episode = self._latest[what] = _Episode(
+            station, text_of(told), link, recording.clock(place), place)
+        if len(self._episodes) < _MOST_EPISODES:
+            self._episodes.append(episode)
+
+    def _words(self, entry: Entry) -> str:
+        if self._is_anonymous:
+            packet = entry.packet
+            known = command_name(packet) if packet and entry.kind is Kind.COMMAND else \
+                f'STS {packet.sts:02X}' if packet and packet.sts else ''
+            entry = replace(without_data(entry), text=known)
+        return words(entry)
+
+    def _close(self) -> None:
+        """Draw a strip to which nothing can come any more."""
+        strip, self._strip = self._strip, None
+        if strip is None:
+            return
+        recording = self._recordings[-1]
+        bars = [bar for found in strip.bars.values() for bar in found]
+        most = _MOST_DRAWN * (1 + any(bar.look in _FAULTS for bar in bars))
+        if self._drawn >= most:
+            recording.strips[strip.number] = None
+            return
+        self._drawn += len(bars)
+        lanes = [Lane(_name(station), strip.bars[station], 2)
+                 for station in _in_order(strip.bars)]
+        start = strip.number * recording.length
+        recording.strips[strip.number] = drawing(
+            lanes, start, start + recording.length, recording.clock(start) or recording.unit,
+            name=recording.name(strip.number))
+
+    def write(self, path: str, title: str, summary: Summary, kind: LineKind) -> None:
+        """Write the page; raises OSError."""
+        self._close()
+        shown = 'A recorded DF1 line' if self._is_anonymous else title
+        write_page(path, shown, self._page(summary, kind))
+
+    def _page(self, summary: Summary, kind: LineKind) -> Iterator[str]:
+        verdict = f'{counted(self._count, "fault")} on the line' if self._count else 'no fault'
+        yield f'<p class="verdict {"is-bad" if self._count else "is-good"}">{verdict}</p>'
+        for recording in self._recordings:
+            if recording.seen:
+                yield from _overview(recording)
+        if self._episodes:
+            yield '<h2>Faults</h2>'
+            rows = (episode.cells() for episode in self._episodes)
+            yield cells(('from', 'to', 'clock', 'station', 'times', 'the first of them'), rows,
+                        right=(0, 1, 3, 4))
+            if len(self._episodes) == _MOST_EPISODES:
+                yield '<p>and more</p>'
+        yield '<h2>In figures</h2>'
+        told = '\n'.join(map(text_of, summary_lines(summary, kind)))
+        yield f'<pre>{told}</pre>'
+        for recording in self._recordings:
+            yield from _strips(recording)
+
+
+def _overview(recording: _Recording) -> Iterator[str]:
+    """Yield the whole recording as one drawing, with the worst of each moment."""
+    numbers = [number for _, number in recording.seen]
+    least, most = min(numbers), max(numbers) + 1
+    step = math.ceil((most - least) / _BUCKETS)
+    seen: defaultdict[int | None, defaultdict[int, list[int]]] = defaultdict(
+        lambda: defaultdict(list))
+    for station, number in recording.seen:
+        seen[station][(number - least) // step].append(number)
+    stations = _in_order(seen)
+    lanes = [Lane(_name(station), [_moment_of(recording, station, found)
+                                   for found in seen[station].values()])
+             for station in stations[:_MOST_LANES]]
+    yield f'<h2>{f"Recording {recording.number}" if recording.number > 1 else "All of it"}</h2>'
+    yield key(_KEY)
+    start, end = (number * recording.length for number in (least, most))
+    yield drawing(lanes, start, end, recording.clock(start) or recording.unit)
+    if (more := len(stations) - _MOST_LANES) > 0:
+        yield f'<p>and {counted(more, "station")} more</p>'
+
+
+def _moment_of(recording: _Recording, station: int | None, numbers: list[int]) -> Bar:
+    """Return a bar for some strips of a station, which leads to the worst of them."""
+    looks = {number: recording.seen[station, number] for number in numbers}
+
+    def rank(number: int) -> int:
+        return max(map(_RANKS.index, looks[number]))
+    worst = max(numbers, key=rank)
+    counts = sum(looks.values(), Counter())
+    faults = sum(counts[look] for look in _FAULTS)
+    start, end = min(numbers) * recording.length, (max(numbers) + 1) * recording.length
+    title = (f'{_name(station)}, {start:g} to {end:g} {recording.unit} '
+             f'{recording.clock(start)}: {counts.total()} seen, {counted(faults, "fault")}')
+    link = recording.name(worst) if recording.strips.get(worst) else ''
+    return Bar(start, end, _RANKS[rank(worst)], title, link=link)
+
+
+def _strips(recording: _Recording) -> Iterator[str]:
+    yield '<h2>Every message</h2>'
+    yield key(_KEY)
+    yield ('<p class="quiet">The upper half of a lane is what is sent to the station, the lower '
+           'half what it sends. The mouse shows the words.</p>')
+    left_out = 0
+    for drawn in recording.strips.values():
+        if drawn is None:
+            left_out += 1
+            continue
+        yield from _note(left_out)
+        left_out = 0
+        yield drawn
+    yield from _note(left_out)
+
+
+def _note(left_out: int) -> Iterator[str]:
+    if left_out:
+        yield f'<p class="quiet">{counted(left_out, "strip")} not drawn</p>'
+
+
+def _look(entry: Entry) -> Look:
+    is_error = entry.kind is Kind.REPLY and entry.packet is not None and entry.packet.sts
+    if entry.valid is False or is_error:
+        return Look.BAD
+    look = _LOOKS.get(entry.kind, Look.SMALL)
+    return Look.ODD if look in (Look.ASK, Look.ANSWER) and {*entry.marks} - _USUAL else look
+
+
+def _row(entry: Entry) -> int:
+    """Return 0 for what is sent to a station, 1 for what it sends."""
+    if entry.direction is Direction.UNKNOWN:
+        return int(entry.kind not in _ASKING)
+    return int(entry.direction is Direction.IN)
+
+
+def _told(kind: Kind, said: str) -> str:
+    return f'{kind.value}: {said}' if said else kind.value
+
+
+def _name(station: int | None) -> str:
+    return 'line' if station is None else f'station {station}'
+
+
+def _in_order(stations: Iterable[int | None]) -> list[int | None]:
+    return sorted(stations, key=lambda station: -1 if station is None else station)
+
+
+def _moment(text: str) -> datetime | None:
+    try:
+        return datetime.fromisoformat(text)
+    except ValueError:
+        return None

@@ -1,0 +1,198 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+"""The timeline of a recorded line: bars, faults, overview; long recordings; no names in it."""
+
+from pathlib import Path
+
+from abdf1_ros.cli import sniff_picture
+from abdf1_ros.cli.sniff import main
+from abdf1_ros.df1 import frames
+from abdf1_ros.df1.checksum import Checksum
+from abdf1_ros.df1.packet import Packet
+import pytest
+from support import browser
+from support.commands import call
+
+Output = pytest.CaptureFixture[str]
+
+HEAD = '# abdf1_ros capture 1', '# begun: 2026-03-01T14:05:09.000+01:00', '# baud: 19200', \
+    '# check: CRC', '# duplex: half'
+EVIL = '<script>document.title=1</script>'
+
+
+Said = list[tuple[float, str, bytes]]
+
+
+def exchange(start: float, tns: int, station: int = 2, sts: int = 0) -> Said:
+    """Return a read that is answered."""
+    command = Packet(station, 5, 0x0F, 0, tns, bytes.fromhex('A2 04 07 89 00 00'))
+    reply = command.reply(b'' if sts else bytes.fromhex('34 12 FE FF'))._replace(sts=sts)
+    said = (('>', frames.master_frame(station, command.encode(), Checksum.CRC)),
+            ('<', frames.ACK), ('>', frames.poll_frame(station)),
+            ('<', frames.message_frame(reply.encode(), Checksum.CRC)), ('>', frames.ACK))
+    return [(start + 0.01 * count, *part) for count, part in enumerate(said)]
+
+
+def silence(start: float, station: int = 3) -> Said:
+    """Return a poll that is not answered."""
+    return [(start, '>', frames.poll_frame(station))]
+
+
+def capture(path: Path, *parts: Said) -> str:
+    lines = [f'{time:.6f} {way} {data.hex(" ")}' for part in parts for time, way, data in part]
+    path.write_text('\n'.join([*HEAD, *lines, '']), encoding='ascii')
+    return str(path)
+
+
+def drawn(tmp_path: Path, capsys: Output, *args: str) -> browser.Elements:
+    """Return the page of a recording."""
+    page = tmp_path / 'line.html'
+    said = call(main, capsys, '--summary', '--html', str(page), *args)
+    assert (said.status, said.err) == (0, '')
+    return browser.Elements(page.read_text(encoding='utf-8'))
+
+
+def test_each_message_is_a_bar_in_the_lane_of_its_station(tmp_path: Path, capsys: Output) -> None:
+    found = drawn(tmp_path, capsys, capture(
+        tmp_path / 'line.cap', exchange(0.1, 1), exchange(0.2, 2, station=7)))
+    assert found.bars('ask') == 2
+    assert found.bars('answer') == 2 + 2  # the overview has one for each station
+    assert found.bars('small') == 2 * 3
+    assert {'station 2', 'station 7', 'no fault'} <= {*found.texts}
+    assert '0.100000 command: 5 to 2, TNS 0001: protected typed logical read N7:0, 2 words ' \
+        '| CRC good' in found.texts
+
+
+def test_bar_begins_and_ends_as_its_bytes_did(tmp_path: Path, capsys: Output) -> None:
+    found = drawn(tmp_path, capsys, capture(tmp_path / 'line.cap', exchange(0.1, 1)))
+    (ask,), (_, answer) = ([rect for _, rect in found.found
+                            if rect.get('class') == look and 'x' in rect]
+                           for look in ('ask', 'answer'))
+    scale = sniff_picture.drawing.__globals__
+    second = scale['WIDTH'] - scale['NAMES'] - scale['_RIGHT']
+    # The command begins at 0.1 s, with 20 characters; the reply ends at 0.13 s.
+    assert float(ask['x']) == pytest.approx(scale['NAMES'] + 0.1 * second, abs=0.2)
+    assert float(answer['x']) + float(answer['width']) == pytest.approx(
+        scale['NAMES'] + 0.13 * second, abs=0.2)
+
+
+def test_faults_come_as_episodes_that_lead_to_their_strip(tmp_path: Path, capsys: Output) -> None:
+    found = drawn(tmp_path, capsys, capture(
+        tmp_path / 'line.cap', exchange(0.1, 1), silence(1.2), silence(1.4), silence(1.6),
+        exchange(2.0, 2, sts=0x10), silence(30.0), exchange(30.1, 3)))
+    assert '5 faults on the line' in found.texts
+    links = [attributes['href'] for tag, attributes in found.found if tag == 'a']
+    names = {attributes['id'] for tag, attributes in found.found
+             if tag == 'svg' and 'id' in attributes}
+    assert {link.removeprefix('#') for link in links} <= names
+    told = [text for text in found.texts if text.strip()]
+    at = told.index('the first of them')
+    assert told[at + 1:at + 7] == ['1.202 s', '1.602 s', '14:05:10', '3', '3',
+                                   'silence: no answer to the poll']
+    assert [text for text in told[at + 7:] if text.startswith('reply: ')][0].startswith(
+        'reply: 2 to 5, TNS 0002: STS 10')
+    assert told.count('silence: no answer to the poll') == 2
+
+
+def test_no_answer_is_drawn_as_long_as_it_was_waited_for(tmp_path: Path, capsys: Output) -> None:
+    found = drawn(tmp_path, capsys, capture(tmp_path / 'line.cap', silence(0.1), silence(0.6)))
+    widths = [float(rect['width']) for _, rect in found.found
+              if rect.get('class') == 'missing' and 'x' in rect]
+    assert max(widths[1:]) == pytest.approx(0.5 * 1030, rel=0.02)
+
+
+def test_long_recording_keeps_its_faults(
+        tmp_path: Path, capsys: Output, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(sniff_picture, '_MOST_DRAWN', 20)
+    parts = [exchange(float(second), second) for second in range(1, 30)]
+    found = drawn(tmp_path, capsys, capture(tmp_path / 'line.cap', *parts, silence(30.5),
+                                            *[exchange(31.0, 31)]))
+    assert found.bars('ask') == 4 + 1
+    assert any('strips not drawn' in text for text in found.texts)
+    assert found.bars('missing') == 2  # in its strip, and in the overview
+
+
+def test_recordings_one_after_the_other_and_without_times(tmp_path: Path, capsys: Output) -> None:
+    first = capture(tmp_path / 'line.cap.1', exchange(50.0, 1))
+    second = capture(tmp_path / 'line.cap', exchange(0.1, 2))
+    found = drawn(tmp_path, capsys, first, second)
+    assert {'All of it', 'Recording 2'} <= {*found.texts}
+    raw = tmp_path / 'raw'
+    raw.write_bytes(b''.join(data for _, _, data in exchange(0.0, 1)))
+    found = drawn(tmp_path, capsys, '--binary', str(raw))
+    assert 'bytes' in found.texts
+    assert found.bars('ask') == 1
+
+
+def test_names_are_text_and_nothing_else(tmp_path: Path, capsys: Output) -> None:
+    name = EVIL.replace('/', '')
+    found = drawn(tmp_path, capsys, capture(tmp_path / name, exchange(0.1, 1)))
+    assert 'script' not in found.tags()
+    assert any(name in text for text in found.texts)
+
+
+def test_anonymous_timeline_has_no_values_and_no_names(tmp_path: Path, capsys: Output) -> None:
+    path = tmp_path / 'secret.cap'
+    capture(path, exchange(0.1, 0x1234), silence(0.3), exchange(0.5, 0x1235, sts=0x10))
+    text = path.read_text(encoding='ascii')
+    path.write_text(text.replace('# baud', '# guest: 1234 pty:/home/me/hmi\n# ports: moxa:4001\n'
+                                 '# baud'), encoding='ascii')
+    drawn(tmp_path, capsys, str(path), '--anonymous')
+    page = (tmp_path / 'line.html').read_text(encoding='utf-8')
+    for name in ('secret', str(tmp_path), 'home', 'hmi', 'moxa', '4660', 'N7:0', '1234'):
+        assert name not in page, name
+    assert 'command: 0F/A2' in page
+    assert 'STS 10' in page
+
+
+def test_anonymous_without_a_file_for_others_is_refused(tmp_path: Path, capsys: Output) -> None:
+    said = call(main, capsys, '--anonymous', capture(tmp_path / 'line.cap', exchange(0.1, 1)))
+    assert said.status == 2
+    assert '--anonymous is for --report and --html' in said.err
+
+
+def test_file_of_another_program_is_not_replaced(tmp_path: Path, capsys: Output) -> None:
+    (tmp_path / 'line.html').write_text('mine', encoding='utf-8')
+    said = call(main, capsys, '--html', str(tmp_path / 'line.html'),
+                capture(tmp_path / 'line.cap', exchange(0.1, 1)))
+    assert said.status == 2
+    assert 'was not made by --html' in said.err
+
+
+def test_timeline_that_cannot_be_written_is_told(tmp_path: Path, capsys: Output) -> None:
+    said = call(main, capsys, '--html', str(tmp_path / 'no' / 'line.html'),
+                capture(tmp_path / 'line.cap', exchange(0.1, 1)))
+    assert said.status == 2
+    assert 'sniff: --html: ' in said.err
+
+
+def test_browser_shows_ten_thousand_frames_with_their_faults(
+        tmp_path: Path, capsys: Output) -> None:
+    parts = [exchange(0.06 * number, number, station=1 + number % 3) for number in range(2000)]
+    drawn(tmp_path, capsys, capture(tmp_path / 'line.cap', *parts, silence(121.0, station=9),
+                                    exchange(121.5, 1)))
+    page = tmp_path / 'line.html'
+    assert page.stat().st_size < 4_000_000
+    found = browser.dom(page, tmp_path)
+    assert found.bars('ask') == 2001
+    assert found.bars('missing') == 2
+    shown = browser.colours(page, tmp_path)
+    assert {(0xFB, 0xE3, 0xE1), (0x2E, 0x8B, 0x57)} <= shown
+
+
+def test_live_line_is_drawn_at_the_end(tmp_path: Path, capsys: Output) -> None:
+    page = tmp_path / 'live.html'
+    said = call(main, capsys, '--port', 'pty', '--seconds', '0.3', '--html', str(page))
+    assert said.status == 0, said
+    assert 'no fault' in page.read_text(encoding='utf-8')
