@@ -12,52 +12,81 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Pictures of terminals show what the command has printed, and only when it went well."""
+"""The picture of a run: the line, the screen of the monitor, and curves with their gaps."""
 
 from pathlib import Path
-import sys
 from xml.etree import ElementTree
 
+from abdf1_ros.cli.monitor.view import Reading, Snapshot, Status, Style, TextLine
 import pytest
 
 from tools import picture
+from tools.picture import Curve
 
-TEXT = '{http://www.w3.org/2000/svg}text'
-
-
-def lines(svg: str) -> list[str]:
-    """Return the lines of text in a picture."""
-    return [entry.text or '' for entry in ElementTree.fromstring(svg).iter(TEXT)]
+SVG = '{http://www.w3.org/2000/svg}'
+LINES = [TextLine('/abdf1  OK: <&>', Style.GOOD), TextLine('  b', Style.BAD), TextLine('')]
 
 
-def test_every_line_is_drawn_in_its_place() -> None:
-    svg = picture.picture('make demo', '1. Reads <&>\n\n    N7:0  5\n')
-    assert lines(svg) == ['$ make demo', '1. Reads <&>', '    N7:0  5']
-    heights = [int(entry.get('y', '')) for entry in ElementTree.fromstring(svg).iter(TEXT)]
-    assert [later - earlier for earlier, later in zip(heights, heights[1:])] == [16, 32]
+def texts(svg: str) -> list[str]:
+    """Return the texts in a picture."""
+    return [(entry.text or '').replace('\N{NO-BREAK SPACE}', ' ')
+            for entry in ElementTree.fromstring(svg).iter(f'{SVG}text')]
 
 
-def test_long_lines_are_cut() -> None:
-    assert lines(picture.picture('x', 'long ' * 40))[1] == ('long ' * 40)[:129] + '...'
+def snapshot(value: float, received: float, *statuses: Status) -> Snapshot:
+    reading = Reading('speed', [value], 'N7:0', received, 1.0)
+    return Snapshot('/abdf1', True, 0.0, statuses, [reading], None, [])
 
 
-def test_errors_have_a_colour_of_their_own() -> None:
-    svg = picture.picture('x', 'link ERROR: closed\nlink WARN: slow\n  plain')
-    fills = [entry.get('fill') for entry in ElementTree.fromstring(svg).iter(TEXT)]
-    assert len(set(fills)) == 4
+def drawn(*values: tuple[float, float, float]) -> ElementTree.Element:
+    """Return the picture of a curve of values; each is taken at a time and was received before."""
+    curve = Curve('speed', '/read/speed')
+    for now, value, received in values:
+        curve.take(snapshot(value, received), now)
+    return ElementTree.fromstring(picture.picture(LINES, [], [curve], 30.0))
 
 
-def test_what_a_command_prints_becomes_a_file(tmp_path: Path) -> None:
-    file = tmp_path / 'run.svg'
-    command = 'import os; print("hello", os.getcwd() + "/config/net.csv")'
-    assert picture.main([str(file), 'hello', sys.executable, '-c', command]) == 0
-    assert lines(file.read_text(encoding='utf-8')) == ['$ hello', 'hello config/net.csv']
+def test_screen_is_drawn_line_by_line_in_the_colours_of_the_terminal() -> None:
+    svg = picture.picture(LINES, ['1: PLC-5/40', '2: SLC 5/03'], [], 0.0)
+    assert {'/abdf1  OK: <&>', '  b', 'station 1', 'PLC-5/40', 'SLC 5/03'} <= {*texts(svg)}
+    fills = {(entry.text or '').split('\N{NO-BREAK SPACE}')[-1]: entry.get('fill') for entry in
+             ElementTree.fromstring(svg).iter(f'{SVG}text')}
+    assert fills['<&>'] != fills['b']
 
 
-def test_a_command_that_fails_leaves_no_picture(
-        tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    file = tmp_path / 'run.svg'
-    command = [sys.executable, '-c', 'print("no"); raise SystemExit(3)']
-    assert picture.main([str(file), 'hello', *command]) == 3
-    assert capsys.readouterr().out == 'no\n'
-    assert not file.exists()
+def test_curve_rises_to_the_right_and_ends_where_no_value_is_fresh() -> None:
+    svg = drawn((10.0, 0, 10.0), (11.0, 5, 11.0), (13.0, 5, 11.0), (20.0, 10, 20.0),
+                (21.0, 10, 21.0))
+    first, second = (
+        [tuple(map(float, place.split(','))) for place in line.get('points', '').split()]
+        for line in svg.iter(f'{SVG}polyline'))
+    assert (len(first), len(second)) == (2, 2)
+    assert first[0][0] < first[1][0] < second[0][0]
+    assert first[0][1] > first[1][1] > second[0][1]
+    assert [entry.text for entry in svg.iter(f'{SVG}text')].count('silent') == 1
+
+
+def test_curve_without_values_is_empty() -> None:
+    assert not [*drawn().iter(f'{SVG}polyline')]
+
+
+def test_stations_are_named_by_their_processors() -> None:
+    status = Status('station 2', Style.GOOD, 'OK', {'processor': 'SLC 5/03 series A, REM RUN'})
+    assert picture.stations_of(snapshot(1, 0, status)) == ['2: SLC 5/03']
+
+
+def test_run_of_a_bridge_becomes_a_file(
+        tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(picture, '_SHOT', 15.0)
+    monkeypatch.setattr(picture, '_STORY', ())
+    assert picture.main([str(tmp_path / 'run.svg')]) == 0
+    found = texts((tmp_path / 'run.svg').read_text(encoding='utf-8'))
+    assert any(text.startswith('/abdf1  ') for text in found)
+    assert any(text.startswith('  line_speed ') for text in found)
+    assert 'station 2' in found
+
+
+def test_picture_in_the_pages_shows_line_monitor_and_curves() -> None:
+    svg = (Path(__file__).parents[2] / 'docs' / 'demo.svg').read_text(encoding='utf-8')
+    assert {'station 1', 'bridge', 'silent'} <= {*texts(svg)}
+    assert len([*ElementTree.fromstring(svg).iter(f'{SVG}polyline')]) == 3
