@@ -25,6 +25,9 @@ _BIT_AFTER_DOT = re.compile(
 _LETTERS_O = re.compile(r'(?<=[:;./0-9-])O+(?![A-Z])', re.ASCII)
 
 
+# As an array of a Logix controller.
+_ARRAY = re.compile(r'(?P<file>[A-Z]+\d+)\[(?P<element>\d+)\]', re.ASCII)
+
 # In other programs bits of the status file count through it.
 _STATUS_BIT = re.compile(r'S2?/(?P<bit>\d{1,5})', re.ASCII)
 
@@ -35,6 +38,8 @@ def corrections(text: str) -> Iterator[tuple[str, str]]:
     if _LETTERS_O.search(text):
         yield ('that is the letter O where a digit should be',
                _LETTERS_O.sub(lambda match: '0' * len(match[0]), text))
+    if found := _ARRAY.fullmatch(text):
+        yield 'an element stands after ":"', f'{found["file"]}:{found["element"]}'
     if found := _STATUS_BIT.fullmatch(text):
         word, bit = divmod(int(found['bit']), 16)
         yield 'the word of the status file comes first', f'S:{word}/{bit}'

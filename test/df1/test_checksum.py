@@ -47,3 +47,11 @@ def test_crc_sees_every_error_burst_of_up_to_16_bits(data: bytes, place: int, bu
     damaged = number.to_bytes(len(data) + 3, 'little')[:len(data)]
     same = damaged == data
     assert (Checksum.CRC.of_message(damaged) == Checksum.CRC.of_message(data)) is same
+
+
+def test_frames_that_a_micrologix_1400_and_its_software_have_sent() -> None:
+    """From a question in a public forum; of the command the last byte is cut off there."""
+    reply = bytes.fromhex('00014F00FB6F00000000000000FFFF00000000000000FFFF')
+    command = bytes.fromhex('01000F00FB6FA3FFA84FFFAC51FFAE51FF9C4FFF9451FF9651')
+    assert Checksum.CRC.encode(Checksum.CRC.of_message(reply)) == b'\xBE\x07'
+    assert Checksum.CRC.encode(Checksum.CRC.of_message(command)) == b'\x4B\x01'

@@ -15,15 +15,31 @@
 """Odd but legal devices, played against the driver in every mode in which they can occur."""
 
 from abdf1_ros.driver.write import Outcome
+from abdf1_ros.settings.mapping import Mapping
 from abdf1_ros.settings.network import Network
+from abdf1_ros.simulator.simulated_plc import SimulatedPlc
 import pytest
-from support.devices import Device, DEVICES
+from support.devices import Device, DEVICES, symbol_by_symbol, WRONG
 from support.driver_bench import DriverBench, store, stored
 from support.guests import Program, READ_N7
 from support.mappings import make_mapping
 
 NETWORKS = {
-    'Message': {}, 'Standard': {'polling': 'Standard'}, 'Peer': {'mode': 'Peer'}}
+    'Message': {}, 'Standard': {'polling': 'Standard'}, 'Peer': {'mode': 'Peer'},
+    'Radio': {'mode': 'Radio'}}
+
+
+def bench_of(device: Device, mode: str, check: str, *rows: Mapping
+             ) -> tuple[DriverBench, SimulatedPlc]:
+    """Return a line with an SLC that behaves so, not opened yet."""
+    bench = DriverBench(rows, start=False, chunk=device.chunk, network=Network(
+        baud=19200, timeout=200, error_code=check, **NETWORKS[mode]))  # type: ignore[arg-type]
+    bench.line.propagation = device.propagation
+    plc = bench.plc(1, 'SLC', ('N7:0', 10))
+    store(plc, 'N7:0', [0x1010, 0x0310, -2])
+    bench.far.say = symbol_by_symbol(device.say())
+    bench.far.hear = symbol_by_symbol(device.hear())
+    return bench, plc
 
 
 @pytest.mark.parametrize(('device', 'mode'), [
@@ -33,11 +49,7 @@ def test_values_are_right_and_writes_are_told_as_they_ended(
         device: Device, mode: str, check: str) -> None:
     words = make_mapping('N7:0', plc='SLC', length=3)
     target = make_mapping('N7:5', 'Write', plc='SLC')
-    bench = DriverBench([words, target], start=False, network=Network(
-        baud=19200, timeout=200, error_code=check, **NETWORKS[mode]))  # type: ignore[arg-type]
-    plc = bench.plc(1, 'SLC', ('N7:0', 10))
-    store(plc, 'N7:0', [0x1010, 0x0310, -2])
-    bench.far.say, bench.far.hear = device.say(), device.hear()
+    bench, plc = bench_of(device, mode, check, words, target)
     bench.open(run=1.0)
     guest = Program(bench)
     guest.keep_asking(READ_N7)
@@ -55,6 +67,23 @@ def test_values_are_right_and_writes_are_told_as_they_ended(
     assert {reply.data for _, reply in guest.replies if not reply.sts} == {b'\x10\x10'}
 
 
+@pytest.mark.parametrize(('device', 'mode'), [
+    (device, mode) for device in WRONG for mode in device.modes], ids=str)
+def test_what_is_no_reply_is_no_value_and_confirms_nothing(
+        device: Device, mode: str) -> None:
+    words = make_mapping('N7:0', plc='SLC', length=3)
+    target = make_mapping('N7:5', 'Write', plc='SLC')
+    bench, _ = bench_of(device, mode, 'CRC', words, target)
+    bench.open(run=3.0)
+    bench.write(target, [7])
+    bench.run_until(lambda: bool(bench.listener.results), 20.0)
+    assert bench.listener.values(words) == []
+    assert bench.listener.outcomes()[0] in (Outcome.UNKNOWN, Outcome.NOT_SENT)
+    assert {2508, 2510} & bench.listener.numbers()
+    bench.far.say = bytes  # a usual device from now on
+    bench.run_until(lambda: bool(bench.listener.values(words)), 20.0)
+
+
 def test_every_device_has_a_source_and_a_name_of_its_own() -> None:
-    assert all(device.source and device.modes for device in DEVICES)
-    assert len({device.name for device in DEVICES}) == len(DEVICES)
+    assert all(device.source and device.modes for device in DEVICES + WRONG)
+    assert len({device.name for device in DEVICES + WRONG}) == len(DEVICES + WRONG)

@@ -62,6 +62,7 @@ from abdf1_ros.settings.mapping import Mapping
 from abdf1_ros.settings.network import Network
 from abdf1_ros.simulator.ladder import Ladder, Lamp
 from abdf1_ros.simulator.simulated_plc import SimulatedPlc
+from support.devices import Device, Filter, symbol_by_symbol
 from support.driver_bench import DriverBench, Kept
 from support.losses import AirLosses, Losses, Lost
 from support.mappings import make_mapping
@@ -94,6 +95,8 @@ GATEWAY = 5  # the station on the line, behind which the PLC is
 DAMAGED = b'ZZZZ'  # what the line does not carry: only guests send it
 
 # The words of each PLC: outputs, a row without Fallback after them, its program's own, heartbeat.
+USUAL: tuple[Filter, Filter] = bytes, bytes
+
 OUTPUTS, FREE, CLOCK, COUNTER, BEAT = 'N7:0', 'N7:20', 'N9:0', 'N9:4', 'N10:0'
 SERVED = 'N7:50'  # of our own table, for the master
 
@@ -349,6 +352,8 @@ class World(DriverBench):
     message was, by tag and value; a message may be older than the moment in which it comes.
     """
 
+    odd: tuple[Filter, Filter] = USUAL  # what PLCs hear, and say
+
     def __init__(self, plant: Plant, seed: int) -> None:
         self.plant, self.seed = plant, seed
         self.dice = Random(seed)
@@ -567,11 +572,12 @@ class World(DriverBench):
     def _hear(self, data: bytes) -> bytes:
         self.wire.update(b'%f>' % self.line.now + data)
         data = self.losses.hear(data) if self.losses else data
+        data = self.odd[0](data)
         return b'' if self.is_silent or self.is_queued else data.replace(DAMAGED, b'ZYZZ')
 
     def _say(self, data: bytes) -> bytes:
         self.wire.update(b'%f<' % self.line.now + data)
-        data = self.losses.say(data) if self.losses else data
+        data = self.odd[1](self.losses.say(data) if self.losses else data)
         return b'' if self.is_unheard else data
 
     def _breathe(self) -> None:
@@ -680,6 +686,10 @@ class World(DriverBench):
         self.line.pause(self.driver.machine, seconds)
         self.away = self.line.now + seconds
 
+    def behave_oddly(self, device: Device) -> None:
+        """Let all PLCs behave like an odd but legal device."""
+        self.odd = symbol_by_symbol(device.hear()), symbol_by_symbol(device.say())
+
     def lose_frames(self) -> None:
         """Let the line lose frames, but never more in a row than the settings repeat."""
         dice, network = self.dice, self.network
@@ -753,6 +763,7 @@ class World(DriverBench):
         self.deaf_since = math.inf
         self.line.noise = QUIET
         self.losses = None
+        self.odd = USUAL
         self.holds = self.clocks.lead = 0.0
         self.clocks.set(0.0, self.line.now)
 

@@ -42,8 +42,9 @@ from abdf1_ros.driver.write import Outcome
 from abdf1_ros.pccc.emulated import Setting
 from simulate.rules import Broken, Judge
 from simulate.steady import Steady
+from support.devices import DEVICES
 from support.virtual_line import QUIET
-from support.world import BEAT, FREE, GREAT, MODES, OUTPUTS, Plant, SAFE, SMALL, STEP, World
+from support.world import BEAT, FREE, GREAT, MODES, OUTPUTS, Plant, SAFE, SMALL, STEP, USUAL, World
 
 TURNS = 8  # troubles of a plant, with a calm after each
 RATES = (0.0, 0.0, 0.01, 0.05, 0.2)  # messages a step and row
@@ -104,7 +105,8 @@ class Story:
         world = self.world
         world.ill[station] = world.line.now
         if world.line.noise is not QUIET or world.line.now < world.away or not world.is_alive \
-                or not world.driver.is_online or world.is_unheard:
+                or not world.driver.is_online or world.is_unheard \
+                or world.odd is not USUAL:
             world.ill[0] = max(world.line.now, world.away)
 
     def publish_much(self) -> None:
@@ -356,6 +358,15 @@ def _other_bridge(story: Story, station: int) -> None:
         world.add_bridge(station)
 
 
+def _odd_device(story: Story, station: int) -> None:
+    """Let the PLCs behave like a device that somebody has met."""
+    mode = {'Gateway': 'Message', 'Standard gateway': 'Standard'}.get(
+        story.world.plant.mode, story.world.plant.mode)
+    devices = [device for device in DEVICES if mode in device.modes]
+    if devices:
+        story.world.behave_oddly(story.dice.choice(devices))
+
+
 _NO_EXCUSE = 'messages refused'
 # Which excuse nothing.
 _EXPECTED = ('guest', 'gateway holds', 'another network', 'frames lost')
@@ -367,7 +378,7 @@ _TROUBLES: dict[str, Callable[[Story, int], None]] = {
     'PROGRAM': _program, 'download': _download, 'killed': _kill, 'slow PLC': _slowness,
     'other writer': _other_writer, 'other bridge': _other_bridge, 'guest': _guest,
     'gateway holds': _gateway_holds, 'frames lost': _lost_frames, 'another network': _overwritten,
-    'receive wire broken': _broken_wire, 'queued': _queued}
+    'receive wire broken': _broken_wire, 'queued': _queued, 'odd device': _odd_device}
 
 
 @dataclass(slots=True)
