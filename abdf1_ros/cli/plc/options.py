@@ -53,6 +53,11 @@ COLUMN_ROLES = {
     'access': 'the column that says what may be written: RO, R/W; or yes and no under "Read Only"'}
 """What the columns of a list may be, for the options of ``plc import``."""
 
+# Names that the PLC's own software and its users have for types and families.
+_TYPES = {'int': 'int16', 'word': 'uint16', 'dint': 'int32', 'long': 'int32', 'dword': 'uint32',
+          'real': 'float32', 'float': 'float32', 'bit': 'bool'}
+_FAMILIES = {'SLC500': 'SLC', 'MICROLOGIX': 'SLC'}
+
 RADIXES = {'dec': Radix.DECIMAL, 'hex': Radix.HEXADECIMAL, 'oct': Radix.OCTAL, 'bin': Radix.BINARY}
 
 _LINE_DEFAULTS = LineDefaults()
@@ -94,7 +99,7 @@ def _add_station(parser: argparse.ArgumentParser) -> None:
 def _add_plc_type(parser: argparse._ActionsContainer,
                   text: str = 'default: the PLC is asked what it is',
                   default: str | None = None) -> None:
-    parser.add_argument('--plc-type', type=str.upper, choices=[kind.value for kind in FAMILIES],
+    parser.add_argument('--plc-type', type=_family, choices=[kind.value for kind in FAMILIES],
                         default=default, help=text)
 
 
@@ -147,7 +152,7 @@ def _complete_write(write: argparse.ArgumentParser) -> None:
     _add_data_options(write, f'needed in half duplex (default in full: {DEFAULT_STATION})')
     write.add_argument('address', metavar='ADDRESS',
                        help='such as N7:10, B3:0/5, F8:2; with --map a tag')
-    write.add_argument('values', metavar='VALUE', nargs='*',
+    write.add_argument('values', metavar='VALUE', nargs='+',
                        help='numbers, 0x and 0b too; 0 and 1 for bits; one text for a string')
     write.add_argument('--map', metavar='FILE',
                        help='a map CSV: a row is written by its tag, scaled, within Min and Max, '
@@ -207,7 +212,7 @@ def _add_data_options(parser: argparse.ArgumentParser,
     group = parser.add_argument_group('data')
     group.add_argument('--station', metavar='N', type=_station, help=f'address of the PLC {note}')
     _add_plc_type(group)
-    group.add_argument('--type', choices=[kind.value for kind in ValueType],
+    group.add_argument('--type', type=_type, choices=[kind.value for kind in ValueType],
                        help='default: what is natural for the file')
     group.add_argument('--word-order', choices=[order.value for order in WordOrder],
                        help='which word of 32 bits comes first')
@@ -230,6 +235,15 @@ def _add_addresses(parser: argparse.ArgumentParser) -> None:
                         help='keep all bytes of the line in a capture, for "sniff"')
     parser.add_argument('--radix', type=str.lower, choices=tuple(RADIXES), default='dec',
                         help='how whole numbers are written (default: %(default)s)')
+
+
+def _type(text: str) -> str:
+    return _TYPES.get(text.lower(), text.lower())
+
+
+def _family(text: str) -> str:
+    name = text.upper().replace('-', '').replace(' ', '')
+    return _FAMILIES.get(name, name)
 
 
 def _stations(text: str, right: str = '') -> tuple[int, ...]:

@@ -20,8 +20,11 @@ import argparse
 from collections.abc import Sequence
 import difflib
 from functools import partial
+import re
 
 from abdf1_ros.cli.terminal import command_parser
+
+_ASSIGNMENT = re.compile(r'[A-Z]{1,3}\d{0,3}:[^=]+=.+', re.ASCII | re.IGNORECASE)
 
 _STATUSES = """\
 exit status:
@@ -99,9 +102,12 @@ def _complete(name: str, parser: argparse.ArgumentParser) -> None:
 
 
 def help_asked(words: Sequence[str]) -> Sequence[str]:
-    """Return what to parse: the word "help" stands for the option, as in other programs."""
+    """Return what to parse: "help" stands for the option, N7:10=5 for two words."""
     if words[:1] == ['help']:
         return [*words[1:2], '--help']
+    if [*words[:1]] == ['write']:  # N7:10=5
+        words = [part for word in words for part in (
+            word.split('=', 1) if _ASSIGNMENT.fullmatch(word) else [word])]
     return [words[0], '--help'] if words[1:] == ['help'] else words
 
 

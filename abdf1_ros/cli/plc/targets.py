@@ -115,11 +115,6 @@ def to_read(options: argparse.Namespace) -> Targets:
 
 def to_write(options: argparse.Namespace) -> Targets:
     """Return what "plc write" writes; raises ConfigurationError where no PLC could take it."""
-    address, is_both, value = options.address.partition('=')
-    if is_both and not options.map:  # N7:10=5
-        options.address, options.values = address, [value] * bool(value) + options.values
-    if not options.values:
-        raise ConfigurationError([Problem('VALUE', 'say what to write, as in N7:10 5')])
     if options.map:
         mappings = rows_of_map(options.map)
         row = _row_to_write(mappings, options.map, options.address)

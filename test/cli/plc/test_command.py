@@ -414,8 +414,6 @@ def test_write_of_what_cannot_be_written(plc: Plc, args: tuple[str, ...], text: 
     (('watch', 'line_speed'), 'ADDRESS "line_speed": write type, file, ":", element, as in N7:0, '
                               'B3:1/5, T4:0.ACC or I:1.0/3\nplc: --map: if line_speed is a tag, '
                               'name its map with --map FILE'),
-    (('write', 'N7:0'), 'VALUE: say what to write, as in N7:10 5'),
-    (('write', 'N7:0='), 'VALUE: say what to write, as in N7:10 5'),
     (('write', 'B3:0/1=on'), 'B3:0/1: "on" is not a valid bool, 0 or 1'),
     (('read', 'N7:0', 'B3:O'), 'ADDRESS "B3:O": that is the letter O where a digit should be; '
                                'write B3:0'),

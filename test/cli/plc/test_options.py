@@ -50,6 +50,12 @@ def test_value_that_looks_like_an_option_goes_last() -> None:
     assert (options.values, options.yes, options.net) == (['-1.5e3'], True, 'x')
 
 
+def test_value_may_come_after_options() -> None:
+    for words in (['write', 'N7:10', '--station', '2', '5'], ['write', 'N7:10=5']):
+        options = parse(*help_asked(words))
+        assert (options.address, options.values) == ('N7:10', ['5'])
+
+
 def help_of(capsys: pytest.CaptureFixture[str], *args: str) -> str:
     with pytest.raises(SystemExit):
         parse(*args, '--help')
@@ -123,3 +129,14 @@ def test_help_is_also_a_word(words: list[str], parsed: list[str]) -> None:
 def test_no_time_for_an_answer_is_refused() -> None:
     with pytest.raises(ConfigurationError, match='--timeout: 0 ms leaves no time for an answer'):
         network_of(parse('read', 'N7:0', '--port', '/dev/x', '--timeout', '0'))
+
+
+@pytest.mark.parametrize('said, kind, family', [
+    ('INT SLC500', 'int16', 'SLC'), ('REAL PLC-5', 'float32', 'PLC5'),
+    ('DINT MicroLogix', 'int32', 'SLC'), ('uint16 plc2', 'uint16', 'PLC2')])
+def test_types_and_families_have_the_names_of_the_field(
+        said: str, kind: str, family: str) -> None:
+    words = said.split()
+    options = make_parser(None).parse_args([
+        'read', 'N7:0', '--type', words[0], '--plc-type', words[1]])
+    assert (options.type, options.plc_type) == (kind, family)
