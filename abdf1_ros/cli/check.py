@@ -140,8 +140,9 @@ def _pair(options: argparse.Namespace) -> tuple[str, bool]:
 
 def _draw(options: argparse.Namespace, found: Findings, report: Report | None) -> bool:
     """Write the page of --html; return whether that went well."""
-    facts = [] if report is None else [
-        *_line_text(report).splitlines(), *_times_text(report).splitlines()]
+    facts = [] if report is None else _line_text(report).splitlines()
+    if report is not None and not report.network.line_mode.only_listens:
+        facts += _times_text(report).splitlines()
     try:
         write_page(options.html, f'The plan of {options.net} and {options.map}',
                    check_parts(report, found.problems, facts))

@@ -51,7 +51,7 @@ def _plan(picture: _Picture, errors: int, facts: Sequence[str]) -> Iterator[str]
         if errors else []
     yield _sentence('; '.join([*found, picture.verdict()]),
                     f'verdict {"is-good" if is_good else "is-bad"}')
-    if picture.report.blocks:
+    if picture.report.blocks and not picture.report.network.line_mode.only_listens:
         yield from picture.drawings()
         yield '<h2>Reads</h2>'
         yield picture.table()
@@ -76,6 +76,8 @@ class _Picture:
 
     def verdict(self) -> str:
         report = self.report
+        if report.network.line_mode.only_listens:
+            return 'the bridge only listens: it sends nothing'
         if not report.is_timed:
             return f'the Periods need {report.load:.0%} of the line at least'
         kept = f'{len(self.late)} of {counted(len(report.blocks), "read")} cannot keep the ' \

@@ -99,6 +99,15 @@ def test_line_of_another_master_has_no_cycle(tmp_path: Path, capsys: Output) -> 
     assert found.bars('bad') == found.bars('wait') == 0
 
 
+def test_line_that_is_only_listened_to_has_no_reads(tmp_path: Path, capsys: Output) -> None:
+    said, page = drawn(tmp_path, capsys, ROWS, '5,Listen,9600,1')
+    assert said.status == 0
+    found = elements(page)
+    assert 'the bridge only listens: it sends nothing' in found.texts
+    assert 'svg' not in found.tags()
+    assert not any('of the line' in text for text in found.texts)
+
+
 def test_names_from_files_are_text_and_nothing_else(tmp_path: Path, capsys: Output) -> None:
     rows = [f'{EVIL},Read,N7:0,1,PLC5,2,1000,{EVIL}', f'b,Read,N7:x{EVIL},1,PLC5,,,']
     folder = tmp_path / '<b>&"\'>'
