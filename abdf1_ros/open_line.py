@@ -16,6 +16,7 @@
 
 from __future__ import annotations
 
+from collections import deque
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 import logging
@@ -51,7 +52,16 @@ if TYPE_CHECKING:
 _GLANCE = 0.2  # s; interval of looks whether the thread of the link still runs
 
 LOG = logging.getLogger('abdf1_ros')
-"""The logger where no other is given: requests with their times, and what happens on the line."""
+"""
+The logger where no other is given: requests with their times, and what happens on the line.
+
+That is logged by who asks: while a request is under way, with the next one, or at the end.
+"""
+
+# What happens on the line between two requests, at most.
+_MOST_ENTRIES = 1000
+
+_Entry = tuple[int, object, BaseException | None]
 
 _Result = TypeVar('_Result')
 
@@ -134,6 +144,8 @@ class OpenLine:
                 f'in Mode {mode.name} nothing may be sent on this line; "sniff" shows what others '
                 'send'))])
         self.log = logger
+        self._entries: deque[_Entry] = deque()
+        self._lost = 0  # entries
         self._mode, self._settings = mode, line
         self.stations = ActiveStationList() if stations is None else stations
         self._requests = Requests(mode, line, self.stations, random.randrange(0x10000), plc_type,
@@ -144,8 +156,8 @@ class OpenLine:
         if trace is not None:
             port_of = self._traced(trace, port, port_of)
         self._link = LinkThread(self._requests.machine, port_of,
-                                on_fault=lambda error: self.log.critical(
-                                    'internal error', exc_info=error))
+                                on_fault=lambda error: self._note(
+                                    logging.CRITICAL, 'internal error', error))
         self._link.daemon = True  # a KeyboardInterrupt before ``with`` leaves nothing to stop it
         self._line = line_of(port.name)
         _ours.add(self._line)
@@ -187,14 +199,17 @@ class OpenLine:
     def wait(self, pending: Pending[_Result]) -> _Result:
         """Return the result of a request; raises its error, PortLost at the latest."""
         while not pending.wait(_GLANCE):
+            self._log_entries()
             if not self._link.is_alive() and not pending.is_done:
                 raise PortLost(self._link.state.text)
+        self._log_entries()
         return pending.result()
 
     def close(self) -> None:
         """End all requests that are under way, and close the port."""
         self._link.stop()
         self._requests.close()
+        self._log_entries()
         if self._trace is not None:
             self._trace.close()
         _ours.discard(self._line)
@@ -220,7 +235,26 @@ class OpenLine:
 
     def _told(self, event: Event) -> None:
         is_error = event.message.severity is not Severity.NOTICE
-        self.log.log(logging.INFO if is_error else logging.DEBUG, '%s', event)
+        self._note(logging.INFO if is_error else logging.DEBUG, event)
+
+    def _note(self, level: int, text: object, error: BaseException | None = None) -> None:
+        """Keep an entry for the log: a handler may wait for a disk or a pipe, the link may not."""
+        if not self.log.isEnabledFor(level):
+            return
+        if len(self._entries) < _MOST_ENTRIES:
+            self._entries.append((level, text, error))
+        else:
+            self._lost += 1
+
+    def _log_entries(self) -> None:
+        """Log what the link has noted, in the thread of who asks."""
+        with suppress(IndexError):  # another thread that asks may take the last
+            while self._entries:
+                level, text, error = self._entries.popleft()
+                self.log.log(level, '%s', text, exc_info=error)
+        if lost := self._lost:
+            self._lost -= lost
+            self.log.warning('%d entries were lost here: nothing was asked meanwhile', lost)
 
     def _traced(self, path: str, port: PortSettings,
                 open_it: Callable[[], Port]) -> Callable[[], Port]:

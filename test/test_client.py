@@ -17,11 +17,13 @@
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, suppress
 from inspect import signature
+import logging
 import math
 from pathlib import Path
 import re
 import subprocess
 import sys
+import threading
 from threading import Thread
 import time
 from types import FrameType
@@ -164,6 +166,30 @@ def test_retries_trace_and_log_are_arguments(port: str, tmp_path: Path,
     assert sniff(['--summary', str(trace)]) == 0
     with pytest.raises(OSError, match='exists and is not a capture'):
         client_with(port, trace=__file__)
+
+
+def test_link_does_not_wait_for_a_handler_of_the_log(port: str) -> None:
+    """One that writes to a pipe that is full, as for journald, stopped the line."""
+    class Stuck(logging.Handler):
+        def emit(self, record: logging.LogRecord) -> None:
+            threads.add(threading.current_thread())
+
+    threads: set[threading.Thread] = set()
+    logger = logging.Logger('test', logging.DEBUG)
+    logger.addHandler(Stuck())
+    with Client(port, plc_type='SLC', duplex='half', baud=115200, timeout=0.1, retries=1,
+                logger=logger) as plc, pytest.raises(LinkError):
+        plc.read('N7:0', station=9)
+    assert threads == {threading.current_thread()}
+
+
+def test_entries_of_the_log_that_nothing_takes_are_counted(
+        port: str, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture) -> None:
+    monkeypatch.setattr('abdf1_ros.open_line._MOST_ENTRIES', 1)
+    caplog.set_level('DEBUG', 'abdf1_ros')
+    with client_with(port, timeout=0.05, retries=2) as plc, pytest.raises(LinkError):
+        plc.read('N7:0', station=9)
+    assert re.search(r'\d entries were lost here: nothing was asked meanwhile', caplog.text)
 
 
 def client_with(port: str, **more: Any) -> Client:

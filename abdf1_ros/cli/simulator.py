@@ -64,6 +64,7 @@ from abdf1_ros.ports.descriptor import Port, PortAround
 from abdf1_ros.ports.endpoints import Endpoint, PtyEndpoint, SerialEndpoint, TcpEndpoint
 from abdf1_ros.ports.link_thread import LinkThread, PortKind, PortState
 from abdf1_ros.ports.settings import PortSettings
+from abdf1_ros.ros.process.console import Sink
 from abdf1_ros.settings import BAUD_RATES
 from abdf1_ros.settings.network import make_network, Network, URLS
 from abdf1_ros.signals import EndRequest
@@ -83,6 +84,9 @@ examples:
   simulator --pty /tmp/plc --at '5 silent 2' --at '10 normal 2'
 """
 
+
+# How long (s) the last lines have to be printed.
+_LAST_LINES = 1.0
 
 # The lamps of a ladder that are reported; the others blink.
 _LAMPS = {Lamp.ALIVE: 'ROS alive', Lamp.IN_CONTROL: 'ROS in control',
@@ -152,34 +156,55 @@ def _run(options: argparse.Namespace) -> int:
     except (CommandError, ValueError) as error:
         tell('simulator', str(error))
         return EXIT_USAGE
+    # A thread prints: PLCs do not stand still, nor does the end wait, for a terminal or a pipe.
+    output = Sink(sys.stdout.fileno())
+    cast.say = lambda text: output.put(f'simulator: {text}\n'.encode(
+        sys.stdout.encoding, 'backslashreplace'))
+    output.start()
     try:
         cast.start()
         with EndRequest((signal.SIGINT, signal.SIGTERM)) as ended:
             _converse(cast, script, options, ended)
     finally:  # the thread would keep the process alive
         cast.close()
+        output.end()
+        output.join(_LAST_LINES)
     return EXIT_FAILED if cast.has_failed else 0
+
+
+def _print(text: str) -> None:
+    try:
+        print(f'simulator: {text}', flush=True)
+    except OSError:  # the reader has left; the PLCs go on
+        drop_output()
 
 
 class Cast:
     """
     PLCs that answer on a line from ``start`` to ``close``, as options of the simulator say.
 
-    ``on_lamp`` gets station, lamp and state of what their ladders report.
+    ``on_lamp`` gets station, lamp and state of what their ladders report, ``say`` prints a line;
+    both are called in the thread that answers.
     """
 
     def __init__(self, options: argparse.Namespace,
                  on_lamp: Callable[[str, Lamp, bool], None] = lambda *lamp: None) -> None:
-        self._plcs = _load(options, on_lamp)
+        self.say: Callable[[str], None] = _print
+        self._plcs = _load(options)
+        for station in options.ladder:
+            self._run_ladder(station, on_lamp)
         self._line = _make_line(options)
         self._is_full_duplex = options.full_duplex is not None
-        self._link = _make_thread(self._plcs, self._line, options)
+        self._link = _make_thread(self._plcs, self._line, options, self._tell)
         self._check = options.check
+
+    def _tell(self, text: str) -> None:
+        self.say(text)
 
     def start(self) -> None:
         """Say who plays, and begin."""
         names = ', '.join(f'{plc.station} ({plc.table.plc_type.value})' for plc in self._plcs)
-        _say(f'stations {names} on {self._line.name}, {self._check}')
+        self.say(f'stations {names} on {self._line.name}, {self._check}')
         self._link.start()
 
     @property
@@ -190,9 +215,9 @@ class Cast:
     def carry_out(self, line: str) -> None:
         """Carry out a command, and say what came of it."""
         try:
-            _say(execute(line, self._plcs, self._is_full_duplex, _say))
+            self.say(execute(line, self._plcs, self._is_full_duplex, self.say))
         except CommandError as error:
-            _say(str(error))
+            self.say(str(error))
         self._link.wake()
 
     def advance(self) -> None:
@@ -204,6 +229,21 @@ class Cast:
         """End the thread and the line."""
         self._link.stop()
         self._line.close()
+
+    def _run_ladder(self, station: str, on_lamp: Callable[[str, Lamp, bool], None]) -> None:
+        """Run the ladder program of a station; changes of its lamps are said."""
+        plc = _plc('--ladder', station, self._plcs)
+
+        def tell(at: float, lamp: Lamp, is_on: bool) -> None:
+            if lamp in _LAMPS:
+                self.say(f'station {station}: {_LAMPS[lamp]} {"on" if is_on else "off"}')
+                on_lamp(station, lamp, is_on)
+
+        try:
+            plc.run_ladder(Ladder(plc.table, on_lamp=tell))
+        except NoSuchFile as error:
+            raise ValueError(
+                f'--ladder {station}: {error}; it needs N10, N11, B12 and T13') from None
 
 
 def _try_out(script: TimedCommands, options: argparse.Namespace) -> None:
@@ -217,13 +257,10 @@ def _try_out(script: TimedCommands, options: argparse.Namespace) -> None:
             raise CommandError(f'--at: {error}') from None
 
 
-def _load(options: argparse.Namespace, on_lamp: Callable[[str, Lamp, bool], None]
-          = lambda *lamp: None) -> list[SimulatedPlc]:
+def _load(options: argparse.Namespace) -> list[SimulatedPlc]:
     """Return the PLCs of the data file, or the one that has a line for itself."""
     plcs = load_plcs(options.data or str(config_file('simulator.csv')),
                      Checksum(options.check), time.monotonic, threading.Lock)
-    for station in options.ladder:
-        _run_ladder(station, plcs, on_lamp)
     return plcs if options.full_duplex is None else [
         _plc('--full-duplex', options.full_duplex, plcs)]
 
@@ -237,24 +274,8 @@ def _plc(option: str, station: str, plcs: Sequence[SimulatedPlc]) -> SimulatedPl
     raise ValueError(f'{option}: name a station ({known})')
 
 
-def _run_ladder(station: str, plcs: Sequence[SimulatedPlc],
-                on_lamp: Callable[[str, Lamp, bool], None]) -> None:
-    """Run the ladder program of a station; changes of its lamps are printed."""
-    plc = _plc('--ladder', station, plcs)
-
-    def tell(at: float, lamp: Lamp, is_on: bool) -> None:
-        if lamp in _LAMPS:
-            _say(f'station {station}: {_LAMPS[lamp]} {"on" if is_on else "off"}')
-            on_lamp(station, lamp, is_on)
-
-    try:
-        plc.run_ladder(Ladder(plc.table, on_lamp=tell))
-    except NoSuchFile as error:
-        raise ValueError(f'--ladder {station}: {error}; it needs N10, N11, B12 and T13') from None
-
-
 def _make_thread(plcs: Sequence[SimulatedPlc], line: Endpoint,
-                 options: argparse.Namespace) -> LinkThread:
+                 options: argparse.Namespace, say: Callable[[str], None]) -> LinkThread:
     """Return the thread that plays ``plcs`` on ``line``."""
     checksum = Checksum(options.check)
     is_full_duplex = options.full_duplex is not None
@@ -271,12 +292,13 @@ def _make_thread(plcs: Sequence[SimulatedPlc], line: Endpoint,
         port: Port = _EchoingPort(line.open()) if options.echo else line.open()
         return _FaultyPort(port, plcs[0], checksum) if is_full_duplex else port
 
-    return LinkThread(machine, open_line, on_state=_announcer(),
-                      on_fault=traceback.print_exception)
+    return LinkThread(
+        machine, open_line, on_state=_announcer(say),
+        on_fault=lambda error: say(''.join(traceback.format_exception(error))))
 
 
-def _announcer() -> Callable[[PortState], None]:
-    """Return what prints the states of the line, each once, without the normal one."""
+def _announcer(say: Callable[[str], None]) -> Callable[[PortState], None]:
+    """Return what says the states of the line, each once, without the normal one."""
     last = ''
 
     def announce(state: PortState) -> None:
@@ -284,7 +306,7 @@ def _announcer() -> Callable[[PortState], None]:
         is_news = state.text != last and not state.is_open
         last = state.text
         if is_news and state.kind is not PortKind.NO_CLIENT:
-            _say(state.text)
+            say(state.text)
     return announce
 
 
@@ -418,10 +440,3 @@ def _input(descriptor: int) -> bytes:
         return os.read(descriptor, 4096)
     except OSError:  # EIO: we are in the background
         return b''
-
-
-def _say(text: str) -> None:
-    try:
-        print(f'simulator: {text}', flush=True)
-    except OSError:  # the reader has left; the PLCs go on
-        drop_output()

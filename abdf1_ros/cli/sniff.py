@@ -363,7 +363,7 @@ def _print_heard(tap: Tap, trace: Trace | None, output: _Output, settings: dict[
     def idle() -> None:
         output.show_progress('listening')
 
-    status = 0
+    status = told = 0
     chunks = tap.chunks(options.seconds, _PROGRESS_PERIOD, idle)
     while True:
         try:
@@ -386,10 +386,21 @@ def _print_heard(tap: Tap, trace: Trace | None, output: _Output, settings: dict[
                 break
             else:
                 _say('this output is no longer read; the bytes are passed on until Ctrl-C')
+        told = _tell_lost(tap, trace, told)
         idle()
     if trace:
         trace.close()
     return status
+
+
+def _tell_lost(tap: Tap, trace: Trace | None, told: int) -> int:
+    """Tell how many pieces were lost since ``told`` were; return how many now are told."""
+    if (lost := tap.lost) > told:
+        text = f'{lost - told} pieces of traffic were lost: this output was too slow for them'
+        _say(text)
+        if trace:
+            trace.write(f'# {text}')
+    return lost
 
 
 _say = partial(tell, 'sniff')

@@ -32,6 +32,9 @@ from abdf1_ros.sniffer.capture import Chunk, Direction
 
 _PTY = 'pty'
 
+# Chunks that wait for the output at most: some minutes of a busy line.
+_MOST_WAITING = 10_000
+
 _TapQueue = SimpleQueue[Chunk | OSError | None]
 
 
@@ -47,6 +50,7 @@ class _TapReader(threading.Thread):
                  wake: int) -> None:
         super().__init__(name=f'tap {direction.value}')
         self.stopping = False
+        self.lost = 0  # chunks
         self._port = port
         self._direction = direction
         self._onward = onward
@@ -60,7 +64,10 @@ class _TapReader(threading.Thread):
                 data = self._port.read(None, self._wake)
                 if data:
                     # Queued first, or an answer could be queued before it.
-                    self._heard.put(Chunk(time.monotonic(), self._direction, data))
+                    if self._heard.qsize() < _MOST_WAITING:
+                        self._heard.put(Chunk(time.monotonic(), self._direction, data))
+                    else:
+                        self.lost += 1
                     if self._onward is not None:
                         self._onward.write(data)
         except OSError as error:
@@ -105,6 +112,11 @@ class Tap:
             reader.join()
         self._wake.close()
         self._open_ports.close()
+
+    @property
+    def lost(self) -> int:
+        """Return how many chunks were lost: ``chunks`` was too slow for them."""
+        return sum(reader.lost for reader in self._readers)
 
     def stop(self) -> None:
         """End ``chunks``; may be called by a signal handler."""

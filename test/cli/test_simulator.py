@@ -22,7 +22,10 @@ from pathlib import Path
 import select
 import signal
 import socket
+import subprocess
+import sys
 import termios
+import time
 
 from abdf1_ros.cli.simulator import _input, main
 from abdf1_ros.df1 import frames
@@ -282,6 +285,30 @@ def test_simulator_goes_on_when_nobody_reads_it_and_ends_when_told(data: Path) -
     simulator.stdin.flush()
     assert simulator.stderr.read() == ''
     assert simulator.wait(PATIENCE) == 0
+
+
+def test_simulator_answers_and_ends_while_its_output_is_not_taken(
+        data: Path, tmp_path: Path, descriptor: Callable[[Path], int]) -> None:
+    """After Ctrl-S, or with ``| less``, its PLCs stood still, and SIGTERM had no effect."""
+    reader, writer = os.pipe()
+    os.set_blocking(writer, False)
+    with pytest.raises(BlockingIOError):
+        while True:
+            os.write(writer, bytes(4096))
+    os.set_blocking(writer, True)
+    name = tmp_path / 'plc'
+    with subprocess.Popen(
+            [sys.executable, '-m', 'abdf1_ros', 'simulator', '--data', str(data), '--pty',
+             str(name), '--at', '0 silent 1', '--at', '0 normal 1'],
+            stdin=subprocess.DEVNULL, stdout=writer) as simulator:
+        give_up = time.monotonic() + PATIENCE
+        while not name.is_symlink() and time.monotonic() < give_up:
+            time.sleep(0.01)
+        _converse(descriptor(name), Checksum.CRC)
+        simulator.terminate()
+        assert simulator.wait(PATIENCE) == 0
+    os.close(reader)
+    os.close(writer)
 
 
 def test_input_of_a_job_in_the_background_is_none(monkeypatch: pytest.MonkeyPatch) -> None:

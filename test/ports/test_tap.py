@@ -120,3 +120,15 @@ def test_silence_is_told(ptys: tuple[Pty, Pty]) -> None:
     ('ptys', False)])
 def test_word_pty_and_its_file_name_ask_for_a_pseudo_terminal(name: str, expected: bool) -> None:
     assert is_pty(name) is expected
+
+
+def test_what_nothing_takes_is_passed_on_and_counted(
+        ptys: tuple[Pty, Pty], monkeypatch: pytest.MonkeyPatch) -> None:
+    """After Ctrl-S it was all kept, without a bound."""
+    monkeypatch.setattr('abdf1_ros.ports.tap._MOST_WAITING', 3)
+    with tap(ptys[0].name, ptys[1].name) as listening:
+        for number in range(8):
+            ptys[0].write(bytes([number]))
+            assert ptys[1].read(1) == bytes([number])
+        assert listening.lost == 5
+        assert hear(listening, 3) == [Chunk(None, Direction.OUT, bytes([0, 1, 2]))]

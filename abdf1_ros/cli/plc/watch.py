@@ -25,10 +25,11 @@ import random
 import shutil
 import sys
 import textwrap
+from typing import NamedTuple
 
 from abdf1_ros.cli.plc.data import labels, Radix, rows, tag_of, Tags, value_texts
 from abdf1_ros.cli.plc.session import opened, recorded
-from abdf1_ros.cli.terminal import is_terminal, table
+from abdf1_ros.cli.terminal import is_terminal, table, tell
 from abdf1_ros.df1.stations import Station
 from abdf1_ros.driver.driver import Driver
 from abdf1_ros.driver.settings import DriverSettings
@@ -42,7 +43,7 @@ from abdf1_ros.text import cut, printable
 # Ages and errors are shown again so often (ms), also without new values.
 _GLANCE = 250
 
-# Values that wait to be shown; when more come, the older ones are dropped.
+# Values that wait to be shown; when more come, the older ones are lost, and counted.
 _MAX_NEWS = 1000
 
 # A PLC is asked for its mode so often (s).
@@ -65,6 +66,14 @@ class _NoValue:
     """Why there is none."""
 
     error: str
+
+
+class _News(NamedTuple):
+    """What has come of a read, and when."""
+
+    when: datetime
+    mapping: Mapping
+    what: Values | _NoValue
 
 
 class Watch:
@@ -98,7 +107,8 @@ class Watch:
         if record is not None:
             port, self._trace = recorded(network, port, record)
         self._link = LinkThread(self._driver.machine, port)
-        self._news: deque[tuple[Mapping, Values]] = deque(maxlen=_MAX_NEWS)
+        self._news: deque[_News] = deque(maxlen=_MAX_NEWS)
+        self._lost = self._told = 0  # of them
         self._has_news = Wake()  # an interrupt in an Event may leave its lock taken
         self._reads: Counter[Mapping] = Counter()
         self._shown: dict[Mapping, Values | _NoValue] = {}
@@ -134,7 +144,8 @@ class Watch:
 
     def read(self, mapping: Mapping, values: Values) -> None:
         """Take the values of a read; called in the link thread."""
-        self._news.append((mapping, values))
+        self._lost += len(self._news) == _MAX_NEWS
+        self._news.append(_News(datetime.now(), mapping, values))
         self._reads[mapping] += 1
         self._has_news.set()
 
@@ -155,34 +166,38 @@ class Watch:
                    for mapping in self._mappings)
 
     def _show(self) -> None:
-        changed: list[tuple[Mapping, Values | _NoValue]] = []
+        changed: list[_News] = []
         while self._news:
             changed.append(self._news.popleft())
+        is_live = is_terminal(sys.stdout) and not self._csv
+        if (lost := self._lost - self._told) and not is_live:
+            self._told += lost
+            tell('plc', f'{lost} reads were lost: this output was too slow for them')
         for mapping in self._mappings:
             error = self._driver.points[mapping].error
             if error is not None:
-                changed.append((mapping, _NoValue(error)))
+                changed.append(_News(datetime.now(), mapping, _NoValue(error)))
         if self._csv:
             self._print_csv(changed)
-        elif is_terminal(sys.stdout):
+        elif is_live:
             self._note_changes(changed)
             self._redraw()
         else:
             self._print(changed)
 
-    def _print(self, changed: Sequence[tuple[Mapping, Values | _NoValue]]) -> None:
+    def _print(self, changed: Sequence[_News]) -> None:
         """Print the rows of each mapping that has changed since the last time."""
-        for mapping, what in changed:
+        for when, mapping, what in changed:
             if mapping not in self._shown or self._shown[mapping] != what:
                 self._shown[mapping] = what
-                time = datetime.now().isoformat(timespec='milliseconds').partition('T')[2]
+                time = when.isoformat(timespec='milliseconds').partition('T')[2]
                 for address, text in self._rows(mapping):
                     print(f'{time}  {address}  {text}', flush=True)
 
-    def _print_csv(self, news: Sequence[tuple[Mapping, Values | _NoValue]]) -> None:
+    def _print_csv(self, news: Sequence[_News]) -> None:
         """Print each value with its time of day and address; empty for a read that has failed."""
-        for mapping, what in news:
-            time = datetime.now().isoformat(timespec='milliseconds')
+        for when, mapping, what in news:
+            time = when.isoformat(timespec='milliseconds')
             if isinstance(what, _NoValue) and self._shown.get(mapping) == what:
                 continue  # once is enough
             self._shown[mapping] = what
@@ -195,9 +210,9 @@ class Watch:
                     _quoted(tag_of(mapping, number, self._tags))]
                 print(time, mapping.station, place, *tag, text, sep=',', flush=True)
 
-    def _note_changes(self, news: Sequence[tuple[Mapping, Values | _NoValue]]) -> None:
+    def _note_changes(self, news: Sequence[_News]) -> None:
         """Keep what to show, and the time of its last change."""
-        for mapping, what in news:
+        for _, mapping, what in news:
             before = self._shown.get(mapping)
             if before is not None and before != what:
                 self._changed[mapping] = self._driver.machine.now

@@ -17,8 +17,10 @@
 from __future__ import annotations
 
 from array import array
+from collections import deque
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
+from datetime import datetime
 import io
 from math import inf, nan
 import os
@@ -107,6 +109,23 @@ def test_each_read_is_a_line_of_csv_for_each_value(
     told = [line.partition(',')[2] for line in lines]
     assert told.count(f'1,N7:0,{first}0') == told.count(f'1,N7:1,{other}0') >= 2
     assert f'1,ST9:0,{other}"a,""b"""' in told
+
+
+def test_reads_that_the_output_does_not_take_are_counted_and_others_keep_their_times(
+        plcs: Plcs, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr('abdf1_ros.cli.plc.watch._MAX_NEWS', 2)
+    watch = Watch(network_on(plcs), [SPEED], 0.01, csv=True)
+    watch._news = deque(maxlen=2)
+    for value in range(5):
+        watch.read(SPEED, array('h', [value]))
+    shown = datetime.now()
+    watch._show()
+    said, told = capsys.readouterr()
+    assert told == 'plc: 3 reads were lost: this output was too slow for them\n'
+    times, values = zip(*((line.split(',')[0], line.split(',')[-1])
+                          for line in said.splitlines()), strict=True)
+    assert values == ('3', '4')
+    assert max(map(datetime.fromisoformat, times)) <= shown
 
 
 def test_read_that_fails_is_a_line_of_csv_without_a_value(
