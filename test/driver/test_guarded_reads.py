@@ -100,6 +100,30 @@ def test_rule_13_questions_for_the_modes_of_many_plcs_have_their_share_of_a_full
     assert min(counts.values()) > 120.0 / planned > 0.6 * max(counts.values())
 
 
+def test_rule_13_guarded_rows_come_on_a_line_that_is_slower_than_their_stale_time() -> None:
+    """A round of reads takes longer: they were withheld for ever, as each answer was too old."""
+    guarded = [make_mapping(f'N{file}:0', period=1000, tag=f'guarded{file}',
+                            condition=While(('RUN',))) for file in (20, 21)]
+    others = [make_mapping(f'N{file}:0', period=1000, tag=f'other{file}')
+              for file in range(30, 46)]
+    bench = DriverBench([*others[:8], *guarded, *others[8:]], network=Network(baud=19200))
+    plc = bench.plc(1, 'PLC5', *((f'N{row.address.file}:0', 1) for row in (*guarded, *others)))
+    plc.faults.delay = 0.4
+    begun = 30.0
+    bench.run(begun + 60.0)
+    cycle = bench.driver.readings.reads.poll_cycle
+    assert cycle is not None
+    assert cycle > 2 * max(bench.driver.points[row].stale_time for row in guarded)
+    counts = {row: sum(when > begun for when in bench.listener.times(row))
+              for row in (*guarded, *others)}
+    assert min(counts.values()) >= 60.0 // cycle - 1 > 2
+    plc.processor.setting = Setting.PROGRAM
+    bench.run(cycle + 1.0)
+    since = bench.clock()
+    bench.run(3 * cycle)
+    assert not [row for row in guarded if bench.listener.times(row)[-1] > since]
+
+
 def counter_cell() -> tuple[Cell, Mapping]:
     """Return a cell whose rows depend on a counter, which stands still."""
     counter = make_mapping('N11:3', tag='alive', period=100)

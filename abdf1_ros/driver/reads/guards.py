@@ -36,8 +36,13 @@ class RunGuard(Guard):
         self._told = -math.inf
         self._state = 'its mode is not known'
 
-    def told(self, identity: Identity | None, asked: float) -> None:
-        """Take an answer about the mode, None for one that cannot be used."""
+    def told(self, identity: Identity | None, asked: float) -> set[ReadPoint]:
+        """
+        Take an answer about the mode, None for one that cannot be used.
+
+        Return the points for which the answer before is too old, if the program runs.
+        """
+        late = {point for point in self.points if asked - self._told > point.patience}
         is_running = identity is not None and bool(identity.is_running) and not identity.faults
         for limit, since in self._since.items():
             if not is_running:
@@ -53,6 +58,7 @@ class RunGuard(Guard):
             self._state = f'it is in {identity.mode_text}'
             if identity.faults:
                 self._state += f', {"; ".join(identity.faults)}'
+        return late if is_running else set()
 
     def why_not(self, point: ReadPoint, started: float, now: float) -> str:
         """Return why a value read from ``started`` on is not to be published, empty if it is."""
@@ -109,10 +115,14 @@ class Guards:
         tag, = mapping.condition.names  # it is there once in the map
         return self.counters.setdefault(tag, CounterGuard(tag))
 
-    def mode_told(self, station: int, identity: Identity | None, asked: float) -> None:
-        """Take what a station has reported of itself; it was ``asked`` at this clock value (s)."""
-        if station in self._runs:
-            self._runs[station].told(identity, asked)
+    def mode_told(self, station: int, identity: Identity | None, asked: float) -> set[ReadPoint]:
+        """
+        Take what a station has reported of itself; it was ``asked`` at this clock value (s).
+
+        Return the points that have to be read before this answer is too old.
+        """
+        guard = self._runs.get(station)
+        return set() if guard is None else guard.told(identity, asked)
 
     def value_read(self, point: ReadPoint, words: bytes, now: float) -> None:
         """Give the words of a counter to its guard."""

@@ -94,6 +94,11 @@ class ReadQueue:
             heap[:] = (entry for entry in heap if entry[1] == entry[2].ticket)
             heapq.heapify(heap)
 
+    def waiting(self) -> list[ReadJob]:
+        """Return the jobs that wait, due or not."""
+        return [job for heap in self._heaps.values() for _, ticket, job in heap
+                if ticket == job.ticket]
+
     def take(self, now: float) -> ReadJob | None:
         """Remove and return the job that goes next, None where none is due."""
         heap = self._next_heap(now)

@@ -273,7 +273,8 @@ class Readings:
 
     def told(self, station: int, identity: Identity | None, asked: float) -> None:
         """Use what a station has said to be since it was ``asked`` (clock value, s), if it did."""
-        self.guards.mode_told(station, identity, asked)
+        if late := self.guards.mode_told(station, identity, asked):
+            self.reads.go_first(late)
         if identity is not None:
             self._change(self._refusals.processor_told(station, identity.processor, self.blocks))
 

@@ -22,10 +22,12 @@ without replying in time. Now and then one of them is sent as a probe.
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Container, Iterable
+from collections.abc import Container, Iterable, Set
+import math
 
 from abdf1_ros.df1.stations import ActiveStationList
 from abdf1_ros.driver.reads.job import ReadJob
+from abdf1_ros.driver.reads.point import ReadPoint
 from abdf1_ros.driver.reads.queue import ReadQueue
 from abdf1_ros.driver.record import Claim, WriteListener
 
@@ -186,6 +188,12 @@ class Reads(WriteListener):
                 job.refreshed = now
                 if job.due > now:
                     self._due.put(job, now)
+
+    def go_first(self, points: Set[ReadPoint]) -> None:
+        """Let the waiting reads of these points go before all others."""
+        for job in self._due.waiting():
+            if not points.isdisjoint(job.points):
+                self._due.put(job, -math.inf)
 
     def release(self, station: int, now: float) -> None:
         """Make the reads of a station that were set aside due at once."""

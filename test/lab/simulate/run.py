@@ -40,6 +40,7 @@ if __name__ == '__main__':  # pytest has its own paths
 
 from abdf1_ros.driver.write import Outcome
 from abdf1_ros.pccc.emulated import Setting
+from abdf1_ros.settings.heartbeats import READS_IN_TIME
 from simulate.rules import Broken, Judge
 from simulate.steady import Steady
 from support.devices import DEVICES
@@ -152,7 +153,7 @@ class Story:
         """
         See that all is as at first when nothing is wrong any more: values, writes, beats.
 
-        On a line so full that reads are stale guarded rows may stay withheld: so are modes (13).
+        On a line so full that a counter is read too rarely, rows that depend on it stay withheld.
         """
         world = self.world
         self._rates.clear()
@@ -174,10 +175,9 @@ class Story:
             wanted -= {entry.tag for entry in world.executed[executed:]
                        if entry.tag.startswith('beat') and entry.value}
             wanted -= {mapping.tag for _, mapping, _ in world.reads[reads:]}
-        readings = world.driver.readings
-        if (readings.reads.poll_cycle or 0.0) > min(
-                point.stale_time for point in readings.points.values()):
-            wanted -= {row.tag for row in world.rows.values() if row.is_guarded}
+        cycle = world.driver.readings.reads.poll_cycle or 0.0
+        if READS_IN_TIME * cycle > world.plant.counts_within / 1000:
+            wanted -= {row.tag for row in world.rows.values() if row.tag.startswith('counted')}
         if wanted:
             raise Broken('Recovery', f'{sorted(wanted)} not back after {limit} s', world)
 
