@@ -171,6 +171,7 @@ def test_retries_trace_and_log_are_arguments(port: str, tmp_path: Path,
 def test_link_does_not_wait_for_a_handler_of_the_log(port: str) -> None:
     """One that writes to a pipe that is full, as for journald, stopped the line."""
     class Stuck(logging.Handler):
+
         def emit(self, record: logging.LogRecord) -> None:
             threads.add(threading.current_thread())
 
