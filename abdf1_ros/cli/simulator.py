@@ -47,6 +47,7 @@ from abdf1_ros.cli.terminal import (
     tell,
     whole_option,
 )
+from abdf1_ros.console import Sink
 from abdf1_ros.df1.checksum import Checksum
 from abdf1_ros.df1.frames import Control, Duplex, Frame, FrameDecoder, NAK
 from abdf1_ros.df1.machine import LineTiming, Machine, Procedure
@@ -64,7 +65,6 @@ from abdf1_ros.ports.descriptor import Port, PortAround
 from abdf1_ros.ports.endpoints import Endpoint, PtyEndpoint, SerialEndpoint, TcpEndpoint
 from abdf1_ros.ports.link_thread import LinkThread, PortKind, PortState
 from abdf1_ros.ports.settings import PortSettings
-from abdf1_ros.ros.process.console import Sink
 from abdf1_ros.settings import BAUD_RATES
 from abdf1_ros.settings.network import make_network, Network, URLS
 from abdf1_ros.signals import EndRequest

@@ -165,12 +165,21 @@ class Times:
         return Bound(mapping, after + at_most, after + undisturbed)
 
     def _preset(self, mapping: Mapping) -> float:
+        """Return how long a heartbeat that counts stands still at most, with the PLC's scan."""
         assert mapping.period is not None
-        period = mapping.period / 1000
-        beats = sum(_with_answers(self._written[other], self._response_time)
-                    for other in self._mappings.heartbeats)
-        # The response time stands for the scan of the PLC.
-        return max(3 * period, period + 2 * self.longest + beats + self._response_time)
+        period, turn = mapping.period / 1000, self._turn(mapping)
+        beats, fallbacks = (
+            [packet for own in rows if self._turn(own) == turn for packet in self._written[own]]
+            for rows in (self._mappings.heartbeats, [
+                own for own in self._mappings.fallbacks
+                if not own.serves and own.station != mapping.station]))
+        count = len(beats) + len(fallbacks)
+        reads = self._reads_between(count) if count > 1 else 0
+        # The transaction under way, the reads with a turn in between, all heartbeats, and the
+        # fallbacks of other PLCs. The response time stands for the scan of the PLC.
+        wait = (1 + reads) * self._at_most(self._any_frames) + sum(map(self._at_most, beats)) \
+            + sum(map(self._undisturbed, fallbacks)) + self._response_time
+        return max(3 * period, period + wait)
 
     @cached_property
     def end(self) -> float | None:
@@ -203,16 +212,24 @@ class Times:
         turns: defaultdict[int, list[float]] = defaultdict(list)
         for own in self._mappings.own:
             turns[self._turn(own)] += self._written[own]
-        # If other stations have turns, too, their writes may come between two reads.
-        is_apart = self._mode.most_under_way(self._line) > 1 or len(turns) > 1
         found = {}
         for turn, writes in turns.items():
-            reads = len(writes) if is_apart else 1 + (len(writes) - 1) // OWN_IN_A_ROW
+            reads = self._reads_between(len(writes))
             # The transaction under way, the reads with a turn in between, and all our own writes.
             at_most, usual = ((1 + reads) * time(self._any_frames) + sum(map(time, writes))
                               for time in (self._at_most, self._undisturbed))
             found[turn] = at_most, usual
         return found
+
+    def _reads_between(self, writes: int) -> int:
+        """Return how many reads have a turn between so many own writes at most (rule 11)."""
+        return writes if self._is_apart else 1 + (writes - 1) // OWN_IN_A_ROW
+
+    @cached_property
+    def _is_apart(self) -> bool:
+        """Tell whether other stations have turns, too: each own write may come between reads."""
+        return self._mode.most_under_way(self._line) > 1 or len(
+            {self._turn(own) for own in self._mappings.own}) > 1
 
     def _at_most(self, frames: float) -> float:
         """Return the most seconds of a transaction, with one reply of ours in between."""

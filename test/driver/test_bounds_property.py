@@ -280,6 +280,24 @@ class BoundBench:
             if mapping.fallback and (stations is None or mapping.station in stations):
                 self.bench.write(mapping, self.plant.length * [7])
 
+    def pauses(self) -> dict[str, tuple[float, float]]:
+        """Return preset and longest pause of each heartbeat, by tag, within a minute of losses."""
+        plant, bench = self.plant, self.bench
+        bench.run(3.0)
+        self.publish()
+        bench.run(1.0)
+        self._live_on()
+        self.losses.is_due = True
+        bench.line.propagation = plant.travel
+        for plc in self.plcs.values():
+            plc.faults.delay = plant.delay
+        bench.run(5.0)
+        self.gaps.clear()
+        bench.run(60.0)
+        return {bound.mapping.tag: (bound.seconds or 0.0, self.gaps[bound.mapping.tag])
+                for bound in make_report(plant.network, self.rows, 0.1).times.bounds()
+                if bound.mapping.is_heartbeat and bound.mapping.station in plant.alive}
+
     def _live_on(self) -> None:
         self.publish(self.plant.alive)
         self.bench.at(self.bench.clock() + 0.25, self._live_on)
@@ -439,6 +457,24 @@ def test_rule_16_nor_where_no_frame_gets_lost_than_is_told_for_that(
         stations, rows = 1, stations * rows if length == 1 else rows
     plant = Worst(mode, stations, rows, length=length, phase=0.07)
     assert late_of(BoundBench(plant).run(is_usual=True)) == {}
+
+
+SLOW = {'lost': 1.0, 'timeout': 200, 'delay': 0.34, 'travel': 0.09}
+
+
+@pytest.mark.parametrize('plant', [
+    Worst('Message', 8, 1, **SLOW, alive=frozenset(range(1, 9))),  # type: ignore[arg-type]
+    Worst('Message', 3, 1, **SLOW, alive=frozenset((1, 2, 3)), guests=3),  # type: ignore[arg-type]
+    Worst('Message', 3, 5, lost=1.0, alive=frozenset((1,))),
+    Worst('Peer', 1, 1, **SLOW, alive=frozenset((1,)), guests=3),  # type: ignore[arg-type]
+    Worst('Standard', 3, 1, **SLOW, alive=frozenset((1, 2, 3))),  # type: ignore[arg-type]
+    Worst('Radio', 3, 1, lost=1.0, alive=frozenset((1, 2, 3)))], ids=range(6))
+def test_rule_16_no_heartbeat_of_a_living_bridge_pauses_for_longer_than_its_preset(
+        plant: Worst) -> None:
+    """Of eight PLCs one stood still for 9.4 s, with a preset of 3.9 s."""
+    pauses = BoundBench(plant).pauses()
+    assert late_of(pauses) == {}
+    assert min(pause for _, pause in pauses.values()) > 0.9
 
 
 @pytest.mark.parametrize('mode', ['Message', 'Standard', 'Peer'])

@@ -24,7 +24,7 @@ import sys
 import termios
 from typing import Any
 
-from abdf1_ros.ros.process.console import Sink
+from abdf1_ros.console import Sink
 from abdf1_ros.testing import PATIENCE, Plcs
 import pytest
 from std_msgs.msg import Int16MultiArray

@@ -33,11 +33,11 @@ import threading
 import time
 from typing import Protocol
 
+from abdf1_ros.console import Console
 from abdf1_ros.paths import ShowVersion
 from abdf1_ros.problems import ConfigurationError, Problem
 from abdf1_ros.ros.diagnostics.log import bug_text
 from abdf1_ros.ros.parameters.files import usable_files
-from abdf1_ros.ros.process.console import Console
 from abdf1_ros.settings.heartbeats import LONGEST_END
 from abdf1_ros.signals import EndRequest
 from abdf1_ros.text import printable
