@@ -140,7 +140,7 @@ class Plant:
             dice.choice([4800, 4800, 9600] if 'Standard' in mode else
                         [19200, 38400] if mode == 'Slave' else [9600, 19200, 38400]),
             dice.choice([1, 2]), dice.choice([0.5, 2.0]), dice.random() < 0.06,
-            dice.choice([0, 0, 50, 100]), dice.random() < 0.25)
+            dice.choice([0, 0, 50, 100]), dice.random() < 0.4)
 
     @property
     def network(self) -> Network:

@@ -18,6 +18,12 @@ Make a mistake in each rule, and see how soon the simulation finds it.
 ``mistakes.py`` prints a row for each: the rule, the mistake, which check has found it, after how
 many plants, hours of line time and seconds of processor time. The status is 1 where one is not
 found within ``--seconds``.
+
+A simulated plant has no terminal, disk, ROS or device, and its reads are short. So mistakes there
+are for other tests: a log that the link waits for (test/ros/test_console.py,
+test/ports/test_trace.py), exceptions from outside (test/ros/test_node.py, test/ros/test_lines.py),
+two masters on one line (test/ports/test_serial_device.py), how long the process lets an end take
+(test/plan/test_plan_interlocks.py), and long replies (test/driver/test_slow_replies.py).
 """
 
 from __future__ import annotations

@@ -62,6 +62,8 @@ class Story:
         self.judge = Judge(self.world)
         self.troubles: Counter[str] = Counter()
         self._rates: dict[str, float] = {}
+        # Only such a port can be queued at, so it is more often.
+        self._likely = [_QUEUED] * 4 if self.world.plant.may_store else []
 
     def run(self) -> None:
         """Let it happen; raise Broken where a rule does not hold."""
@@ -72,7 +74,7 @@ class Story:
         for _ in range(self._turns):
             self._publish_anew()
             station = self.dice.randrange(1, self.world.plant.stations + 1)
-            name = self.dice.choice([*_TROUBLES])
+            name = self.dice.choice([*_TROUBLES, *self._likely])
             self.troubles[name] += 1
             _TROUBLES[name](self, station)
             if name == _NO_EXCUSE:  # for an output that stands
@@ -367,7 +369,7 @@ def _odd_device(story: Story, station: int) -> None:
         story.world.behave_oddly(story.dice.choice(devices))
 
 
-_NO_EXCUSE = 'messages refused'
+_NO_EXCUSE, _QUEUED = 'messages refused', 'queued'
 # Which excuse nothing.
 _EXPECTED = ('guest', 'gateway holds', 'another network', 'frames lost')
 _TROUBLES: dict[str, Callable[[Story, int], None]] = {
@@ -378,7 +380,7 @@ _TROUBLES: dict[str, Callable[[Story, int], None]] = {
     'PROGRAM': _program, 'download': _download, 'killed': _kill, 'slow PLC': _slowness,
     'other writer': _other_writer, 'other bridge': _other_bridge, 'guest': _guest,
     'gateway holds': _gateway_holds, 'frames lost': _lost_frames, 'another network': _overwritten,
-    'receive wire broken': _broken_wire, 'queued': _queued, 'odd device': _odd_device}
+    'receive wire broken': _broken_wire, _QUEUED: _queued, 'odd device': _odd_device}
 
 
 @dataclass(slots=True)
