@@ -394,7 +394,7 @@ def _print_heard(tap: Tap, trace: Trace | None, output: _Output, settings: dict[
 
 
 def _tell_lost(tap: Tap, trace: Trace | None, told: int) -> int:
-    """Tell how many pieces were lost since ``told`` were; return how many now are told."""
+    """Report pieces that were lost after the first ``told``; return how many were lost."""
     if (lost := tap.lost) > told:
         text = f'{lost - told} pieces of traffic were lost: this output was too slow for them'
         _say(text)
