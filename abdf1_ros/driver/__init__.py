@@ -13,13 +13,18 @@
 # limitations under the License.
 
 """
-What to read and write on one line, when, and what comes of it; without clock, thread, port or ROS.
+The reads and writes of one line: which, when, and their results; no clock, thread, port or ROS.
 
-Begin with ``driver``: its docstring says where each fact lives. ``agenda`` alone decides who has
-the line next. The queues yield jobs (``job_tasks``): ``interlocks`` has what the bridge writes
-by itself, ``writes`` the messages, ``checks`` the questions to a station, ``reads`` the planned
-reads, ``guests`` the commands of other programs. ``record`` knows who writes which
-words, ``served`` has the words that PLCs read and write, ``requests`` asks once, without a map.
+Begin with ``driver``: its docstring says where each fact lives. ``agenda`` alone decides which job
+has the line next. The queues yield jobs (``job_tasks``):
+
+- ``interlocks``: writes of the bridge itself.
+- ``writes``: the messages.
+- ``checks``: questions to a station.
+- ``reads``: the planned reads.
+- ``guests``: commands of other programs.
+``record`` knows who writes which words, ``served`` has the words that PLCs read and write,
+``requests`` asks once, without a map.
 
 Nothing here waits, and nothing looks at a clock: each call brings the time (s). Other threads come
 in through an ``inbox`` only.

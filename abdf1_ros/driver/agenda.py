@@ -13,7 +13,7 @@
 # limitations under the License.
 
 """
-Who has the line next: one place decides.
+The one place that decides which job has the line next.
 
 Heartbeats and fallbacks (``interlocks``) go first, but after ``OWN_IN_A_ROW`` of them, and after
 each to a silent station, a check or read has its turn. Then there are three queues:
@@ -21,17 +21,17 @@ each to a silent station, a check or read has its turn. Then there are three que
 - ``writes`` go first, but after ``MAX_WRITES_IN_A_ROW`` of their commands a check or read that is
   due has its turn.
 - ``checks``, such as the question for a station's mode, go before the reads. After a check, all
-  reads that were due when it began go before the next check. Where rows depend on the modes of
-  several stations, one read goes between two questions, and all of them before the same question.
+  reads that were due when it began go before the next check. If rows depend on several stations'
+  modes, one read goes between two questions, and every due read before a question is repeated.
 - ``reads`` go in the order of ``reads.queue``. Fallbacks that are written again take turns with
   them.
 
-``guests`` share what heartbeats, fallbacks and writes leave. After a command of theirs,
-checks and reads that are due have the line ``OURS_BESIDE_GUESTS`` times as long as it had,
-whatever became of it; and never a second one goes while anything of ours is due.
+``guests`` share the time that heartbeats, fallbacks and writes leave. After a guest's command, due
+checks and reads have the line ``OURS_BESIDE_GUESTS`` times as long as the command took, answered
+or not. No second guest command is sent while one of our jobs is due.
 
-A command that asks a silent station whether it is there again is a probe. ``df1.probes``
-says how much of the line's time probes get.
+A probe is a command that asks a silent station whether it answers again. ``df1.probes`` limits the
+line time of probes.
 """
 
 from __future__ import annotations
@@ -50,8 +50,8 @@ from abdf1_ros.plan.bounds import OURS_BESIDE_GUESTS, OWN_IN_A_ROW
 
 MAX_WRITES_IN_A_ROW = 4
 
-# On a connection that has not been heard so many questions go out without a pause, then one in so
-# many seconds.
+# On an unheard connection this many questions go out without a pause, then one in QUESTION_PERIOD
+# seconds.
 _QUICK_QUESTIONS = 10
 QUESTION_PERIOD = 1.0
 
@@ -66,7 +66,7 @@ class _GuestShare:
     def __init__(self, stations: ActiveStationList, guests: GuestQueue, tasks: JobTasks) -> None:
         self.begins = -math.inf
         self.owed = 0.0  # seconds of the line for checks and reads, before the next guest
-        self.counted: list[Job] = []  # under way: of guests, and of ours while that is so
+        self.counted: list[Job] = []  # jobs under way: of guests, and our own beside them
         self._stations = stations
         self._line = guests.line
         self._tasks = tasks
@@ -77,16 +77,17 @@ class _GuestShare:
         return self.owed <= 0 and not any(isinstance(job, GuestJob) for job in self.counted)
 
     def settle(self, now: float) -> None:
-        """Count the time that commands which have ended have had, of guests and of ours."""
+        """Count the time of ended commands, of guests and our own."""
         for job in [job for job in self.counted if job not in self._tasks.under_way]:
             self.counted.remove(job)
             took = self._line.took(job.taken, now)
             if isinstance(job, GuestJob):
-                # What ours had too much counts; what guests had while we rested does not add up.
+                # Time that our commands used beyond their share is kept as credit for guests.
+                # Guests' time on an idle line is not added up as debt.
                 owed = min(self.owed, 0.0) + OURS_BESIDE_GUESTS * took
                 self.owed = max(self.owed, owed)
                 if job.has_failed and job.station in self._stations:
-                    # The next one may fail, too, and hold up what becomes due meanwhile.
+                    # The next command may fail, too, and hold up jobs that become due meanwhile.
                     self.begins = now + OURS_BESIDE_GUESTS * took
             else:
                 self.owed -= took
@@ -112,9 +113,9 @@ class Agenda:
         self._held_until = math.inf  # a guest that waits for its share (clock value in s)
         self._tasks = tasks
         self._own_in_a_row = 0
-        self._was_silent = False  # the station of the last of them
+        self._was_silent = False  # the station of the last own write
         self._questions = 0  # on a connection that has not been heard
-        self._next_question = -math.inf  # after the first of them (clock value in s)
+        self._next_question = -math.inf  # after the quick questions (clock value in s)
         self._writes_in_a_row = 0
         self._has_begun_write = False
         self._last_check = -math.inf
@@ -122,7 +123,7 @@ class Agenda:
         self._last_probe_was_check = False
 
     def next(self, now: float, busy: Container[int] = ()) -> Job | None:  # noqa: A003
-        """Return what has the line next, None for nothing; stations in ``busy`` have to wait."""
+        """Return the next job for the line, None for none; stations in ``busy`` have to wait."""
         if self._share.counted:
             self._share.settle(now)
         if not self._tasks.is_heard:
@@ -136,10 +137,10 @@ class Agenda:
 
     def _unheard(self, now: float, busy: Container[int]) -> Job | None:
         """
-        Return what goes out on a connection that has not been heard.
+        Return the next job on a connection that has not been heard.
 
-        After the first questions it is one a second, as the port may store them. A 0 or a fallback
-        need not wait: late, it is still the value of rest.
+        After the first questions only one a second goes out, as the port may store them. A 0 or a
+        fallback need not wait: it is still the value of rest when it comes late.
         """
         is_limited = self._questions >= _QUICK_QUESTIONS and now < self._next_question
         if is_limited:
@@ -152,8 +153,8 @@ class Agenda:
         return job
 
     def _own_first(self, now: float, busy: Container[int]) -> Job | None:
-        """Return a heartbeat or fallback if there is one: no write in a row (rule 11)."""
-        if self._interlocks.is_ending:  # nothing that is read now would be of use
+        """Return a due heartbeat or fallback; it counts as no write in a row (rule 11)."""
+        if self._interlocks.is_ending:  # no value that is read now would be used
             self._own_in_a_row, self._was_silent = 0, False
         if self._own_in_a_row >= OWN_IN_A_ROW:
             self._own_in_a_row = 0
@@ -202,9 +203,9 @@ class Agenda:
 
     def _after_death(self, now: float, busy: Container[int]) -> Job | None:
         """
-        Return what has waited while a station died: a read of one that has replied, or a write.
+        Return a job that waited while a station died: a read of a proven station, or a write.
 
-        Otherwise stations that have never been there would die one after the other meanwhile.
+        Otherwise stations that have never answered would all be tried first.
         """
         probes = self._stations.probes
         if job := self._reads.next_proven(probes.died_at, busy):
@@ -254,7 +255,7 @@ class Agenda:
         return check
 
     def _refresh(self, now: float, busy: Container[int]) -> Job | None:
-        """Return a fallback that stands (rule 8); a read has its turn after it."""
+        """Return a fallback to be written again (rule 8); a read has its turn after it."""
         if self._is_reads_turn and self._reads.find_due(now):
             return None
         own = self._interlocks.refresh(now, busy)
@@ -265,7 +266,7 @@ class Agenda:
         """
         Return the clock value (s) from which a check may be a probe.
 
-        Where reads of silent stations wait as well, checks and reads take turns.
+        If reads of silent stations wait as well, checks and reads take turns.
         """
         probes = self._stations.probes
         is_reads_turn = self._last_probe_was_check and self._reads.has_silent
@@ -281,7 +282,7 @@ class Agenda:
         return job
 
     def next_due(self) -> float | None:
-        """Return when there is something to do next (clock value in s), None for never."""
+        """Return when the next job is due (clock value in s), None for never."""
         moments = [moment for moment in (self._reads.next_due(), self._checks.next_due())
                    if moment is not None]
         if self._held_until < math.inf:

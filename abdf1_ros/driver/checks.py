@@ -13,7 +13,7 @@
 # limitations under the License.
 
 """
-Slow jobs of a driver: what each station is, in which mode, and whether it still answers.
+Slow jobs of a driver: identity and mode of each station, and whether it still answers.
 
 A station is asked for its diagnostic status at the start, when it comes back, and every
 ``processor_period``. A station without reads gets an echo when it has not been heard for a while;
@@ -42,11 +42,11 @@ from abdf1_ros.pccc.link_counters import decode_counters
 from abdf1_ros.pccc.status import check_status
 from abdf1_ros.pccc.steps import echo, identify
 
-# A station gets an echo after so many seconds of silence, and the next one after as many.
+# Seconds of silence after which a station gets an echo, and between two echoes.
 ECHO_PERIOD = 2.0
 
-# After no reply to this question alone, the next one comes so many periods later: each such
-# question costs Cmd_Timeout, and in Mode Master mostly a DLE NAK.
+# Periods until the next question of a kind that alone got no reply. Each such question costs
+# Cmd_Timeout, and in Mode Master mostly a DLE NAK.
 _UNANSWERED = 30
 
 _NOT_ASKED = 'unknown (not asked yet)'
@@ -63,9 +63,9 @@ class Check(Job):
     """
     One slow job: ``due`` is the clock value (s) from which it wants the line.
 
-    It is infinite while the job is under way, which has ``begun`` then, and while there is no
-    station to ask. ``period`` is in seconds, infinite for a job that is done once. A check
-    that rows depend on ``is_planned``: the forecast of the line counts it.
+    ``due`` is infinite while the job is under way (since ``begun``), and while the station is
+    inactive. ``period`` is in seconds, infinite for a job that is done once. With ``is_planned``
+    rows depend on the check, and the forecast of the line counts it.
     """
 
     def __init__(self, checks: Checks, station: int, kind: CheckKind, period: float,
@@ -89,11 +89,11 @@ class Check(Job):
 @dataclass(frozen=True, slots=True)
 class StationHealth:
     """
-    What a station has reported of itself.
+    The reports of a station about itself.
 
-    ``processor`` is a text to be read, also where there is no ``identity``. ``told`` is the clock
-    value (s) of the last diagnostic status. ``counters`` are the link counters as last read;
-    ``no_counters`` is the reason where that read failed.
+    - ``processor``: a readable text, also without an ``identity``.
+    - ``told``: clock value (s) of the last diagnostic status.
+    - ``counters``: link counters as last read; ``no_counters``: why that read failed.
     """
 
     processor: str = _NOT_ASKED
@@ -105,14 +105,15 @@ class StationHealth:
 
 class Checks:
     """
-    The checks of all ``stations``; only those in ``read`` have reads as well.
+    The checks of all ``stations``; only stations in ``read`` have reads as well.
 
-    ``period`` is the seconds between two questions for the diagnostic status, 0 for never;
-    ``wanted`` has the longest period (s) of stations that have to be asked more often.
-    ``link_failed`` is called for a transaction without a reply, ``told`` when a station was asked
-    what it is: with its answer, None for none, and the clock value (s) of the question. What
-    ``known`` returns is never changed. Only ``request_counters`` may be called from another
-    thread.
+    - ``period``: seconds between two questions for the diagnostic status, 0 for never.
+    - ``wanted``: longest period (s) of each station that has to be asked more often.
+    - ``link_failed``: called for a transaction without a reply.
+    - ``told``: called after each question for the diagnostic status, with the answer, None for
+      none, and the clock value (s) of the question.
+    The objects that ``known`` returns never change. Only ``request_counters`` may be called from
+    another thread.
     """
 
     def __init__(self, stations: ActiveStationList, read: Container[int], period: float,
@@ -138,7 +139,7 @@ class Checks:
         self._next_due = 0.0
 
     def known(self, station: int) -> StationHealth:
-        """Return what a station has reported of itself."""
+        """Return the reports of a station about itself."""
         return self._known.get(station) or StationHealth(self._unknown(station, _NOT_ASKED))
 
     def _unknown(self, station: int, text: str) -> str:
@@ -149,8 +150,8 @@ class Checks:
         """
         Ask for the link counters of a station; may be called from any thread, then wake the link.
 
-        It is in ``counters_wanted`` until there is an answer, or none will come: without a port
-        nothing is asked.
+        The station is in ``counters_wanted`` until the request has ended. Without a port no
+        request begins.
         """
         self.counters_wanted.add(station)
         if not self._requests.put(station):
@@ -164,21 +165,21 @@ class Checks:
         self._plan()
 
     def end(self, reason: str) -> None:
-        """Forget what depends on the port, which is lost."""
+        """Forget all that depends on the port: it is lost."""
         for station in self._stations:
             self._forget(station.number, reason)
         for number in {*self._requests.close(), *tuple(self.counters_wanted)}:
             self._take_counters(number, {}, reason)
 
     def ask_status(self, station: int, due: float) -> None:
-        """Ask a station at a clock value (s): it may be another one, or in another mode."""
+        """Ask a station at a clock value (s): it may be a different PLC or in a different mode."""
         for check in self._checks:
             if check.kind is CheckKind.STATUS and check.station == station:
                 check.due = due
         self._plan()
 
     def went_away(self, station: int) -> None:
-        """Forget what a station has reported that does not answer any more."""
+        """Forget the reports of a station that does not answer any more."""
         self._forget(station, 'the station does not answer')
         self.ask_status(station, math.inf)
 
@@ -187,7 +188,7 @@ class Checks:
         return None if math.isinf(self._next_due) else self._next_due
 
     def find_due(self, now: float) -> bool:
-        """Take what was asked for; return whether a check is due."""
+        """Take new requests; return True if a check is due."""
         if self._requests.items:
             for station in self._requests.take():
                 self._add_request(station, now)
@@ -203,7 +204,7 @@ class Checks:
         due = [check for check in self._checks if check.due <= now]
         for check in filter(may_go, sorted(due, key=attrgetter('due'))):
             if check.station in busy:
-                return None  # no other check instead: after each of them the reads have their turn
+                return None  # no other check instead: the reads have their turn after each check
             check.due = self._wanted_from(check, probe_from)
             if check.due <= now:
                 check.due = math.inf
@@ -214,7 +215,7 @@ class Checks:
         return None
 
     def question(self, check: Check) -> Steps[None]:
-        """Return what is to be asked."""
+        """Return the question of a check."""
         station, known = check.station, self.known(check.station)
         if check.kind is CheckKind.ECHO:
             yield from echo(b'')
@@ -262,13 +263,13 @@ class Checks:
 
     def _take_counters(self, station: int, counters: Mapping[str, str],
                        reason: str = '') -> None:
-        """Keep the answer to a request, or why there is none."""
+        """Keep the answer to a request, or the reason why there is none."""
         self._known[station] = replace(
             self.known(station), counters=counters, no_counters=reason)
         self.counters_wanted.discard(station)
 
     def _finish(self, check: Check, next_due: float) -> None:
-        """Plan the next check of this kind; that of an absent station comes when it is back."""
+        """Plan the next check of this kind; an absent station gets it when it is back."""
         if check.kind is CheckKind.COUNTERS:
             self._checks.remove(check)
         elif self._stations[check.station].active:
@@ -296,7 +297,7 @@ class Checks:
             self._plan()
 
     def _forget(self, station: int, reason: str) -> None:
-        """Drop what a station has reported, and end the requests that it will not answer."""
+        """Drop the reports of a station, and end the requests that it will not answer."""
         known = self.known(station)
         self._known[station] = StationHealth(
             processor=self._unknown(station, f'unknown ({reason})'), counters=known.counters,

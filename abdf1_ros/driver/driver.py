@@ -85,16 +85,16 @@ TOO_MANY = 'too many writes are waiting'
 
 
 class Listener(ValueListener, Protocol):
-    """Gets what happens; called in the link thread, ``written`` also in that of ``write``."""
+    """A listener to all results, in the link thread; ``written`` also in ``write``'s caller."""
 
     def happened(self, event: Event) -> None:
         """Take a numbered error or notice."""
 
     def foreign_value(self, mapping: Mapping, text: str, is_conflict: bool) -> None:
-        """Take note that a heartbeat was read which we have not written, a second time or not."""
+        """Take a heartbeat value that we have not written, ``again`` if for the second time."""
 
     def station_changed(self, station: Station) -> None:
-        """Take note that a station has become active or inactive."""
+        """Take the news that a station has become active or inactive."""
 
 
 def _routes(network: Network, mappings: Iterable[Mapping]) -> dict[int, int]:
@@ -104,7 +104,7 @@ def _routes(network: Network, mappings: Iterable[Mapping]) -> dict[int, int]:
 
 
 class Driver:
-    """Read and write the mapped addresses over one line, and serve those that are ours."""
+    """Read and write the mapped addresses over one line, and serve the words of our own table."""
 
     def __init__(self, network: Network, mappings: Sequence[Mapping], settings: DriverSettings,
                  listener: Listener) -> None:
@@ -130,7 +130,7 @@ class Driver:
                 network, self.mappings, self.readings, self.stations, self.checks, self.tasks)
 
     def _make_queues(self) -> None:
-        """Make the queues of jobs, and who decides between them."""
+        """Make the queues of jobs, and the agenda that decides between them."""
         network, settings, machine = self.network, self._settings, self.machine
         report = self._listener.written
         self._record = record = WriteRecord(machine, 2 * network.cmd_timeout / 1000)
@@ -195,7 +195,7 @@ class Driver:
                 self.refuse([write.mapping], _NOT_OPEN, values, request)
 
     def _why_nothing_is_written(self, count: int) -> str:
-        """Return why no write of ``count`` mappings is taken now, empty where it is."""
+        """Return why no write of ``count`` mappings is taken now, empty if one is."""
         if self._settings.read_only:
             return 'this node is read_only'
         if not self.is_online:
@@ -241,17 +241,17 @@ class Driver:
     def next_task(self, now: float, busy: Container[int] = ()) -> Task | None:
         """Return the command that has the line next, not for a ``busy`` station."""
         if self._inbox.items:
-            self._sort_inbox(now)  # the machine has let expire what has waited too long
+            self._sort_inbox(now)  # the machine has expired jobs that have waited too long
         if self._demands.inbox.items:
             self._sort_demands(now)
         return self._agenda.next(now, busy)
 
     def next_due(self) -> float | None:
-        """Return when there is something to do next (clock value in s), None for never."""
+        """Return when the next job is due (clock value in s), None for never."""
         return self._agenda.next_due()
 
     def expire(self, now: float) -> None:
-        """Do what needs no line: store values that we serve, end what has waited too long."""
+        """Do the work that needs no line: store values that we serve, end expired jobs."""
         self._sort_inbox(now)
         if self._demands.inbox.items:
             self._sort_demands(now)
@@ -264,7 +264,7 @@ class Driver:
             self._demands.expire(now)
 
     def next_expiry(self) -> float:
-        """Return when ``expire`` has something to do (clock value in s), infinite for never."""
+        """Return when ``expire`` has work (clock value in s), infinite for never."""
         return min(self._writes.next_expiry, self.tasks.next_expiry, self.guests.next_expiry,
                    self.interlocks.ours.due, self._read_backs.next_expiry,
                    self._demands.next_expiry)
@@ -283,7 +283,7 @@ class Driver:
         self._listener.station_changed(station)
 
     def _station_of_guest(self, dst: int) -> int:
-        """Return whom a guest means; a peer has one PLC, whatever number others give it."""
+        """Return the station that a guest means; in Mode Peer it is the one PLC."""
         if not self.network.line_mode.has_one_plc:
             return dst
         return next((station.number for station in self.stations), dst)
@@ -330,7 +330,7 @@ class Driver:
         self._listener.written(write.result(outcome, detail, self.machine.now))
 
     def _serve(self, command: Packet) -> Packet:
-        """Execute a command of the other end, after all messages that came before it."""
+        """Execute a command of a PLC or master, after all messages that came before it."""
         self._sort_inbox(self.machine.now)
         reply = self._served.serve(command)
         if reply.sts:
@@ -341,7 +341,7 @@ class Driver:
         """
         Send no message until a reply comes: the port may store it for long.
 
-        A line where nothing could be asked is spared, and one where a master asks.
+        A line without stations to ask, and a line with a master, need no reply.
         """
         network = self.network
         if self._settings.may_store and not network.line_mode.is_polled \
@@ -364,7 +364,7 @@ class Driver:
         return self.link.run(self)
 
     def ended(self, error: Exception | None) -> None:
-        """Give everything a result, as there is no port; no old command is to be sent later."""
+        """Give every job a result, so that no old command is sent later: the port is gone."""
         if not isinstance(error, PortLost):
             error = PortLost(INTERNAL_ERROR)
         self.is_online = False
@@ -379,12 +379,12 @@ class Driver:
         self._read_backs.end(self.machine.now)
 
     def _foreign_value(self, mapping: Mapping, text: str, is_conflict: bool) -> None:
-        """Tell it, and ask for the mode at once: that of a PLC with a download is not RUN."""
+        """Report it, and ask for the mode at once: a PLC with a download is not in RUN."""
         self.checks.ask_status(mapping.station, self.machine.now)
         self._listener.foreign_value(mapping, text, is_conflict)
 
     def _station_told(self, station: int, identity: Identity | None, asked: float) -> None:
-        """Use what a station has answered: its mode, and which packets it takes."""
+        """Use the answer of a station: its mode, and the packets that it takes."""
         if identity is not None and identity.is_running is not None:
             is_running = identity.is_running and not identity.faults
             if not is_running:  # a download may follow

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Which words of a PLC another node's command writes."""
+"""Which words of a PLC a foreign command writes."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ from abdf1_ros.settings.rows import Rows
 
 class NotedTable(DataTable):
     """
-    The files of some rows, each without end; what is written is noted, and not kept.
+    The files of some rows, each without end; writes are noted, and their data dropped.
 
     ``is_elsewhere`` tells that a command named a file of no row.
     """
@@ -42,12 +42,12 @@ class NotedTable(DataTable):
         self.is_elsewhere = False
 
     def file_type(self, file: int) -> FileType:
-        """Return the type of a file, or take note that no row is in it."""
+        """Return the type of a file, or record that no row is in it."""
         self.is_elsewhere = file not in self._types
         return super().file_type(file)
 
     def find(self, address: Address, words: int) -> tuple[bytearray, int]:
-        """Return words that are forgotten."""
+        """Return a place for data, which are dropped."""
         return bytearray(2 * words), 0
 
     def write(self, address: Address, data: bytes) -> None:
@@ -60,8 +60,9 @@ def written_extents(command: Packet, station: int,
     """
     Return the words of the files of ``mappings`` that a command to a station writes.
 
-    None where unknown: it may write any. A server of the family says so: a PLC-5's address
-    does not tell the type of its file. What goes to all stations writes the words of each.
+    The result is None if the command may write any words. A server of the family executes the
+    command, because the address of a PLC-5 does not tell the type of its file. A command to all
+    stations writes the words of each station.
     """
     rows = [mapping for mapping in mappings.of_plcs
             if station in (mapping.station, BROADCAST)]

@@ -15,11 +15,11 @@
 """
 Commands of guests: programs that share the PLC's port with us, each at a place of its own.
 
-A guest's command waits here for its turn on the line and gets exactly one reply, in time: that of
-the PLC, or one with an STS of M 8-2 that says why there is none. What has not been sent gets 60
-(not allowed), 01 (no buffer, or too old to be sent), 04 (the port is not open) or 07 (the station
-is silent). What was sent and has no reply gets 02 (the station has become silent) or 05 (no reply
-in time): whether it was executed is then unknown.
+A guest's command waits here for its turn on the line and gets exactly one reply, in time: the
+reply of the PLC, or our reply with an STS of M 8-2. A command that has not been sent gets 60 (not
+allowed), 01 (no buffer, or too old to be sent), 04 (the port is not open) or 07 (the station is
+silent). A command that was sent and has no reply gets 02 (the station has become silent) or 05 (no
+reply in time). Whether it was executed is then unknown.
 """
 
 from __future__ import annotations
@@ -43,14 +43,14 @@ from abdf1_ros.pccc.dialect import Steps
 from abdf1_ros.pccc.extent import Extent
 from abdf1_ros.pccc.notation import Effect
 
-_MOST_WAITING = 16  # of a guest: AbDf1 sends as many before it waits for a reply
+_MOST_WAITING = 16  # commands of a guest; AbDf1 sends this many before it waits for a reply
 
 _NO_BUFFER, _NOT_ACKNOWLEDGED, _NOT_CONNECTED, _NO_REPLY, _OFF_LINE = 0x01, 0x02, 0x04, 0x05, 0x07
 _NOT_ALLOWED = 0x60
 
 
 class ShareAccess(Enum):
-    """What guests may do (column Share_Access)."""
+    """The rights of guests (column Share_Access)."""
 
     READ = 'Read'
     WRITE = 'Write'
@@ -64,22 +64,22 @@ class ShareAccess(Enum):
 
 
 class GuestListener:
-    """Gets notice of what guests do, in any thread; what is not overridden does nothing."""
+    """A listener to guests, in any thread; methods that are not overridden do nothing."""
 
     def sends(self, guest: Guest, command: Packet) -> None:
-        """Take note of a command on its way to the line, with our SRC and TNS."""
+        """Take a command that goes to the line, with our SRC and TNS."""
 
     def wrote(self, guest: Guest, command: Packet, station: int, words: list[Extent]) -> None:
-        """Take note of a command other than a read that a PLC may have executed."""
+        """Take a command, not a read, that a PLC may have executed."""
 
     def was_refused(self, guest: Guest, command: Packet) -> None:
-        """Take note of a command that is not allowed."""
+        """Take a command that was not allowed."""
 
     def was_unanswered(self, guest: Guest, command: Packet, sts: int) -> None:
-        """Take note of a command that got this STS of ours in place of a reply of the PLC."""
+        """Take a command that got an STS of ours in place of a reply of the PLC."""
 
     def turned_away(self, guest: Guest, other: str) -> None:
-        """Take note that a program at this address came to a place that another one has."""
+        """Take the address of a program that came to a place of another program."""
 
 
 @dataclass(slots=True, eq=False)
@@ -87,9 +87,11 @@ class Guest:
     """
     A guest and what it has done; ``name`` is its place.
 
-    ``refused`` counts commands that were not allowed, ``unanswered`` those for which the PLC has
-    given no reply, ``collisions`` writes to words that we write too; ``slowest`` is the longest
-    time (s) to a reply. ``is_connected`` is what its port says.
+    - ``refused``: number of commands that were not allowed.
+    - ``unanswered``: number of commands without a reply of the PLC.
+    - ``collisions``: number of writes to words that we write too.
+    - ``slowest``: longest time (s) to a reply.
+    - ``is_connected``: a program has the place.
     """
 
     name: str
@@ -106,7 +108,7 @@ class Guest:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class GuestCommand:
-    """A command as a guest has sent it, when (clock value in s), and who takes the reply."""
+    """A command of a guest, when it came (clock value in s), and the receiver of the reply."""
 
     guest: Guest
     packet: Packet
@@ -126,7 +128,7 @@ class GuestJob(Job):
         self.expires = queue.expiry(asked)
         self.claim = claim
         self.sts = 0  # of the reply
-        self.has_failed = False  # there was none
+        self.has_failed = False  # no reply came
         self._queue = queue
         self._begun = 0.0
 
@@ -147,8 +149,8 @@ class GuestQueue:
     The commands of all guests, in turns.
 
     ``put`` may be called from any thread. A command that has waited ``patience`` s is not sent any
-    more. ``station_of`` gives the station that a DST stands for, ``words`` what a command to a
-    station writes, where that is known. Each that may write is in the ``record``.
+    more. ``station_of`` returns the station for a DST, ``words`` the words that a command writes,
+    if known. Each command that may write is in the ``record``.
     """
 
     def __init__(self, stations: ActiveStationList, line: LineTime, patience: float,
@@ -161,9 +163,9 @@ class GuestQueue:
         self._station_of = station_of
         self._words = words
         self._record = record
-        self.inbox: Inbox[GuestCommand] = Inbox(is_open=False)  # what has come since
-        self.waiting: deque[Guest] = deque()  # who has commands, the next one first
-        self.next_expiry = math.inf  # when ``expire`` has something to do (clock value in s)
+        self.inbox: Inbox[GuestCommand] = Inbox(is_open=False)  # commands that came later
+        self.waiting: deque[Guest] = deque()  # guests with commands, the next one first
+        self.next_expiry = math.inf  # when ``expire`` has work (clock value in s)
 
     def put(self, command: GuestCommand) -> None:
         """Take a command, or refuse it at once; then wake the link."""
@@ -181,7 +183,7 @@ class GuestQueue:
         self.inbox.open()
 
     def end(self) -> None:
-        """Refuse all that waits, and all that comes: the port is lost."""
+        """Refuse all commands, waiting and new ones: the port is lost."""
         for command in self.inbox.close():
             self._give_up(command, _NOT_CONNECTED)
         for guest in self.waiting:
@@ -214,7 +216,7 @@ class GuestQueue:
         return None
 
     def _claim(self, packet: Packet, station: int) -> Claim | None:
-        """Take note of a command that may write; of a read there is nothing to note."""
+        """Record a command that may write; a read needs no record."""
         if effect_of(packet) is Effect.READS:
             return None
         return self._record.begin(station, self._words(packet, station))
@@ -224,7 +226,7 @@ class GuestQueue:
         return command.requested + self._patience
 
     def expire(self, now: float) -> None:
-        """Refuse what has waited too long."""
+        """Refuse the commands that have waited too long."""
         self._sort()
         for guest in list(self.waiting):
             while guest.waiting and now >= self.expiry(guest.waiting[0]):
@@ -240,7 +242,7 @@ class GuestQueue:
         command.answer(command.packet.reply(reply.data, reply.sts))
 
     def ended(self, job: GuestJob, begun: float, error: Exception | None) -> None:
-        """Refuse a command that has no reply; tell what it may have changed."""
+        """Refuse a command that has no reply; report what it may have changed."""
         command, station = job.asked, job.station
         job.has_failed = error is not None
         was_sent = error is None or getattr(error, 'sent', True)
@@ -258,7 +260,7 @@ class GuestQueue:
                              was_silent=not self._stations[station].replies_in_time)
 
     def _silent(self, station: int, now: float) -> None:
-        """Take a station for silent that only guests ask: there is no other sign."""
+        """Treat a station as silent that only guests ask: no other command shows it."""
         if station not in self._stations and station != BROADCAST:
             self._stations.lost(station, now)
 
@@ -268,7 +270,7 @@ class GuestQueue:
                                default=math.inf)
 
     def _sort(self) -> None:
-        """Put what has come with the others of its guest."""
+        """Sort new commands into the queues of their guests."""
         if not self.inbox.items:
             return
         for command in self.inbox.take():

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Which words of a PLC a reply to another node's command has."""
+"""Which words of a PLC a reply to a foreign command has."""
 
 from __future__ import annotations
 
@@ -37,14 +37,14 @@ _DIGIT = 64
 
 
 class _CodedTable(NotedTable):
-    """A table in which each word that is read is another one."""
+    """A table that returns a different code for each word."""
 
     def __init__(self, plc_type: PlcType, rows: Sequence[Mapping]) -> None:
         super().__init__(plc_type, rows)
         self.places: list[Address] = []
 
     def read(self, address: Address, words: int) -> bytes:
-        """Return the codes of words, and note where they are."""
+        """Return codes for words, and note their places."""
         first = len(self.places)
         if first + words > _DIGIT**2:
             raise FormatError('more words than there are codes')
@@ -59,10 +59,10 @@ def _code(number: int) -> bytes:
 
 def words_in_reply(command: Packet, reply: Packet, rows: Sequence[Mapping]) -> ReplyWords:
     """
-    Return the words of files of ``rows`` that a good reply has; none where they are not known.
+    Return the words of files of ``rows`` that a good reply has; none if unknown.
 
-    The rows are those of one PLC type of the station. A server of the family executes the
-    command: where its reply has the code of a word, the reply that was heard has its value.
+    The rows have one PLC type of the station. A server of the family executes the command: where
+    its reply has the code of a word, the heard reply has the value of this word.
     """
     if uses_common_file(command, rows[0].plc_type):
         return {}
@@ -83,11 +83,11 @@ def words_in_reply(command: Packet, reply: Packet, rows: Sequence[Mapping]) -> R
 
 
 def uses_common_file(command: Packet, plc_type: PlcType) -> bool:
-    """Tell whether it is for the common interface file of an SLC: which, and where, S:2/8 says."""
+    """Tell whether a command uses the common interface file of an SLC, as S:2/8 decides."""
     return plc_type == PlcType.SLC and command.cmd & ~PRIORITY_BIT != plc5.CMD
 
 
 def _same_form(command: Packet, data: bytes) -> bytes:
-    """Return the data of a reply, those of a typed read with the descriptors of our server."""
+    """Return the data of a reply; a typed read gets the descriptors of our server."""
     code = command.cmd & ~PRIORITY_BIT, *command.data[:1]
     return TypedData.decode(data).encode() if code == (plc5.CMD, plc5.TYPED_READ) else data

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The one way from other threads into that of the link."""
+"""The one way from other threads into the thread of the link."""
 
 from __future__ import annotations
 
@@ -25,10 +25,10 @@ _Item = TypeVar('_Item')
 
 class Inbox(Generic[_Item]):
     """
-    Hand items from any number of threads to the one that takes them, in their order, each once.
+    Hand items from any threads to one thread that takes them, in their order, each once.
 
-    ``items`` are those that wait. A closed inbox takes nothing. There is no lock: every step is
-    one atomic operation of a deque. The items are never copied and then cleared: an item that
+    ``items`` are the items that wait. A closed inbox takes nothing. There is no lock: every step
+    is one atomic operation of a deque. The items are never copied and then cleared: an item that
     another thread adds in between would be lost.
     """
 
@@ -54,7 +54,8 @@ class Inbox(Generic[_Item]):
         self.items.append(item)
         if self._is_open:
             return True
-        # It was closed before, or just now: then the other thread may have taken the item.
+        # The inbox was closed before, or just now. In the second case the closing thread may have
+        # taken the item.
         try:
             self.items.remove(item)
         except ValueError:
@@ -62,7 +63,7 @@ class Inbox(Generic[_Item]):
         return False
 
     def take(self) -> Iterator[_Item]:
-        """Yield and remove what waits, also what is added meanwhile."""
+        """Yield and remove the items that wait, also items that are added meanwhile."""
         while True:
             try:
                 yield self.items.popleft()

@@ -13,10 +13,10 @@
 # limitations under the License.
 
 """
-Jobs, and those of them that are under way: each is a task for the link.
+Jobs, and the jobs that are under way: each is a task for the link.
 
-What a job does is a generator that yields requests and is sent the replies; where there is none,
-the error is raised in it.
+The steps of a job are a generator: it yields requests and is sent the replies. Without a reply the
+error is raised in the generator.
 """
 
 from __future__ import annotations
@@ -45,19 +45,21 @@ class LineTime(Protocol):
 
 class Job:
     """
-    What is done with a station, one command after the other; each kind has a queue.
+    Work with a station, one command at a time; each kind of job has a queue.
 
-    It is a ``Task`` of the link, with its present ``command``, from ``start`` until it has
-    ``ended``; then it may be started again. ``taken`` is when the link took that command (clock
-    value in s). The reply to the first command has ``reply_size`` bytes after its header, 0 where
-    that is not known. That command must not be sent after ``expires``; each later one has
-    ``patience`` s after the command before it, without that command's own time on the line. The
-    link judges this for all kinds alike, when it sends. When that is, each kind says: a message
-    and a guest's command get old by the clock, a heartbeat when what it vouches for may no longer
-    be so, a 0 and a Fallback never. Queues end what has waited as long, for its result to come in
-    time.
-    ``is_probe`` tells that a silent station is asked whether it is there again, ``is_own`` that
-    no message has asked for it: a heartbeat or a fallback.
+    A job is a ``Task`` of the link, with its present ``command``, from ``start`` until it has
+    ``ended``; then it may be started again.
+
+    - ``taken``: when the link took that command (clock value in s).
+    - ``reply_size``: bytes after the header of the reply to the first command, 0 if unknown.
+    - ``expires``: the first command must not be sent after this clock value (s). Messages and
+      guests' commands expire by age. A heartbeat expires when its conditions may have ended. A 0
+      and a Fallback never expire. The link checks it for all kinds before it sends; the queues
+      also end expired jobs, so that their results are not late.
+    - ``patience``: a later command expires this many seconds after the command before it, not
+      counting that command's time on the line.
+    - ``is_probe``: a silent station is asked whether it answers again.
+    - ``is_own``: a heartbeat or a fallback, which no message has asked for.
     """
 
     station: int
@@ -75,11 +77,11 @@ class Job:
     _steps: Steps[None]
 
     def steps(self, now: float) -> Steps[None]:
-        """Return what is to be done from ``now`` on (clock value in s)."""
+        """Return the steps of the job from ``now`` on (clock value in s)."""
         raise NotImplementedError
 
     def ended(self, error: Exception | None) -> None:
-        """Take note, once, that it has ended, by an error that it has not handled or by itself."""
+        """React, once, to the end of the job: by an error not handled, or by itself."""
         raise NotImplementedError
 
     def start(self, tasks: JobTasks, now: float) -> Job:
@@ -106,7 +108,7 @@ class Job:
         """Raise ``error`` in the steps, unless they have ended."""
         if getgeneratorstate(self._steps) == GEN_CLOSED:  # closed by the garbage collector
             return
-        # One of its own: where the port is lost, all jobs are failed with the same.
+        # A copy of the error for this job: a lost port fails all jobs with the same error.
         self._advance(self._steps.throw, type(error)(*error.args, sent=self.sent))
 
     def _advance(self, resume: Callable[[_With], Request], what: _With) -> None:
@@ -134,11 +136,13 @@ class JobTasks:
     """
     All jobs under way, and the transaction numbers of their commands.
 
-    All are in ``under_way``; the next command of those in ``waiting`` waits to be sent.
-    ``station`` is our own, ``first_tns`` the number before the first. ``transactions`` counts the
-    replies. ``is_heard`` tells whether one has come on this connection, where that matters.
-    ``char_time`` is seconds a character. ``next_expiry`` is when a waiting command will have
-    waited too long (clock value in s), infinite for never.
+    - ``under_way``: all jobs; ``waiting``: the jobs whose next command waits to be sent.
+    - ``station``: our own; ``first_tns``: the number before the first.
+    - ``transactions``: number of replies.
+    - ``is_heard``: a reply has come on this connection, or none is needed (rule 26).
+    - ``char_time``: seconds of a character.
+    - ``next_expiry``: when the first waiting command expires (clock value in s), infinite for
+      never.
     """
 
     def __init__(self, station: int, first_tns: int, char_time: float = 0.0) -> None:
@@ -153,11 +157,11 @@ class JobTasks:
         self.next_expiry = math.inf
 
     def connect(self) -> None:
-        """Take note of a connection that has to be heard before anything is written."""
+        """Begin a connection that has to be heard before anything is written."""
         self.is_heard = False
 
     def first(self, busy: Container[int], is_own: bool = False) -> Job | None:
-        """Return the first that waits, but not for a ``busy`` station; only our own if asked."""
+        """Return the first waiting job, not for a ``busy`` station; only our own if asked."""
         return next((job for job in self.waiting if job.station not in busy
                      and (job.is_own or not is_own)), None)
 
@@ -188,7 +192,7 @@ class JobTasks:
         """
         Return the command for a request.
 
-        Its transaction number is never the one that this station had last.
+        Its transaction number differs from the last one of this station.
         """
         cmd, data = request
         self._tns = self._tns + 1 & 0xFFFF
@@ -198,6 +202,6 @@ class JobTasks:
         return Packet(station, self._station, cmd, 0, self._tns, data)
 
     def advanced(self, job: Job) -> None:
-        """Take note that a job has its next command ready."""
+        """Queue the next command of a job."""
         self.waiting.append(job)
         self.next_expiry = min(self.next_expiry, job.expires)

@@ -15,9 +15,9 @@
 """
 Values from the traffic of another master, on a line where we send nothing.
 
-A reply counts only with its command: heard undamaged, with nothing damaged in between, and not
-longer ago than Cmd_Timeout. It fills each row whose words it has all. Where another node writes
-words of a row, these are not known until a read that began after that.
+A reply counts only with its command: both heard undamaged, with nothing damaged in between, at
+most Cmd_Timeout apart. It fills each row if it has all words of the row. If another node writes
+words of a row, they are unknown until the next read that began later.
 """
 
 from __future__ import annotations
@@ -51,10 +51,11 @@ from abdf1_ros.sniffer.capture import Chunk, Direction
 from abdf1_ros.sniffer.entries import Entry, Kind
 from abdf1_ros.sniffer.traffic import TrafficDecoder
 
-# A station that has said nothing for so long (s) does not answer.
+# Seconds without a symbol of a station after which it does not answer.
 _SILENT = 10.0
 
-# So many bytes outside of frames are left of one; fewer come when a transmitter is switched on.
+# Number of bytes outside of frames that are treated as a damaged frame; fewer come when a
+# transmitter is switched on.
 _REST_OF_FRAME = 3
 
 _MOST_CARRIED = 200  # different reads that are kept
@@ -79,7 +80,7 @@ class Carried:
 
 
 class _Path(NamedTuple):
-    """Whose command, to which station, with which number."""
+    """Sender, station and transaction number of a command."""
 
     src: int
     dst: int
@@ -89,9 +90,9 @@ class _Path(NamedTuple):
 @dataclass(slots=True)
 class _ValidFrom:
     """
-    From when on (clock value, s) a read has to have begun for its reply to count.
+    The moment (clock value, s) before which no read may have begun for its reply to count.
 
-    ``sound`` is for all, after damage; ``written`` for the points whose words were written.
+    ``sound`` holds for all points, after damage; ``written`` for points whose words were written.
     """
 
     sound: float
@@ -100,10 +101,10 @@ class _ValidFrom:
 
 class Overheard:
     """
-    Fill the points of ``readings`` from what is heard.
+    Fill the points of ``readings`` from heard replies.
 
-    ``carried`` are the reads that the line has, by station and text. Only the thread of the link
-    changes anything; others may look.
+    ``carried`` are the reads of other nodes on the line, by station and text. Only the thread of
+    the link changes anything; any thread may read.
     """
 
     def __init__(self, network: Network, mappings: Rows, readings: Readings,
@@ -129,7 +130,7 @@ class Overheard:
         return TrafficDecoder(self._network.checksum)
 
     def begin(self, now: float) -> None:
-        """Take note that a port has been opened: what was heard before is not continued."""
+        """Begin on an opened port: earlier bytes are not continued."""
         self._begun = now
         self._unread, self._told = {*self._readings.points.values()}, set()
         self.forget(now)
@@ -179,7 +180,7 @@ class Overheard:
             self._reply(entry, entry.packet, now)
 
     def _command(self, command: Packet, now: float) -> None:
-        """Note what a command changes, and whether its number tells which command it is."""
+        """Record the words that a command changes, and whether its number is unique."""
         path = _Path(command.src, command.dst, command.tns)
         before = self._last.pop(path, command)
         self._last[path] = command
@@ -211,7 +212,7 @@ class Overheard:
             self._values(command, reply, asked, now)
 
     def _heard(self, station: int, now: float) -> None:
-        """Take note of a reply of a station."""
+        """Record a reply of a station."""
         if station in self._stations:
             self._stations.heard(station, now)
             self._stations[station].replies += 1
@@ -226,7 +227,7 @@ class Overheard:
             self._checks.heard(station, identity, asked)
 
     def _values(self, command: Packet, reply: Packet, asked: float, now: float) -> None:
-        """Fill the rows whose words a reply has all."""
+        """Fill the rows if a reply has all their words."""
         text = describe(command)
         self._carry(command, text, now)
         found: dict[ReadPoint, bytes] = {}
@@ -245,14 +246,14 @@ class Overheard:
 
     def _carry(self, command: Packet, text: str, now: float) -> None:
         known = self.carried.get((command.dst, text))
-        if known is None:  # another object each time: others may be looking at the one before
+        if known is None:  # a new object each time: another thread may be reading the old one
             kept = sorted(self.carried.values(), key=attrgetter('last'))[1 - _MOST_CARRIED:]
             known = Carried(command.dst, text, command, now)
             self.carried = {(each.station, each.text): each for each in (*kept, known)}
         known.count, known.last = known.count + 1, now
 
     def _written(self, command: Packet, now: float) -> None:
-        """Take note that a command, or its execution, may have changed words of rows."""
+        """Record that a command, or its execution, may have changed words of rows."""
         effect = effect_of(command)
         if effect is Effect.READS:
             return
@@ -268,14 +269,14 @@ class Overheard:
 
 
 def _words_of(mapping: Mapping, words: ReplyWords) -> list[bytes]:
-    """Return the words of a row that are there."""
+    """Return the words of a row, None if one is missing."""
     extent = mapping.extent
     return [word for offset in range(extent.first, extent.end)
             if (word := words.get((extent.area, offset))) is not None]
 
 
 def _by_type(mappings: Rows) -> dict[int, list[list[Mapping]]]:
-    """Return the rows of each station, those of one PLC type together."""
+    """Return the rows of each station, grouped by PLC type."""
     found: defaultdict[int, defaultdict[PlcType, list[Mapping]]] = defaultdict(
         lambda: defaultdict(list))
     for mapping in mappings:

@@ -13,12 +13,12 @@
 # limitations under the License.
 
 """
-Who writes which words of a PLC, and until when it may still land there: one record for all.
+One record of all writes: who writes which words of a PLC, and until when they may land.
 
 A word of a PLC can be written by a message, by ourselves (heartbeat, fallback), by a guest, by
 each of them to all stations at once, and by a copy that a gateway has kept. Each such write is a
-``Claim`` from the moment it has the line. The rules of docs/heartbeats.md ask here, whoever
-writes.
+``Claim`` from the moment it has the line. The rules of docs/heartbeats.md ask this record about
+all writers.
 """
 
 from __future__ import annotations
@@ -38,21 +38,22 @@ from abdf1_ros.settings.mapping import Mapping
 _CHANGED = (Outcome.WRITTEN, Outcome.PARTLY)
 
 
-# At an orderly end the second write of rule 10 comes after so many seconds: there are two in all.
+# Seconds after which the second write of rule 10 comes at an orderly end, which takes twice as
+# long.
 _SETTLE_AT_END = 1.0
 
 
 class _Writer(Enum):
-    """Who writes."""
+    """The writer of a claim."""
 
     MESSAGE = auto()
     OURS = auto()
     GUEST = auto()
     GUEST_SOMEWHERE = auto()  # by a command whose effect is not known
-    BEFORE = auto()  # whoever had the line before the port was opened
+    BEFORE = auto()  # another program that had the line before the port was opened
 
 
-# Who has written, and the values where they are ours.
+# The writer, and the values if they are ours.
 _Source = tuple[object, ...]
 
 
@@ -60,10 +61,15 @@ class Claim:
     """
     One write to words of a PLC, under way or done.
 
-    ``extents`` are its words, None where they are not known: any of the ``station``, which may be
-    BROADCAST. ``write`` is that of a message or of ours, None for a guest's. It had the line from
-    ``begun`` until it was ``done``, and lands up to ``lands_until`` (clock values in s): infinite
-    while it is under way, -inf where nothing was written. ``outcome`` is how it ended.
+    Times are clock values (s).
+
+    - ``station``: may be BROADCAST.
+    - ``extents``: its words, None if unknown: any words of the station.
+    - ``write``: the write of a message or of the bridge itself, None for a guest.
+    - ``begun``, ``done``: when it got the line, and when it ended.
+    - ``lands_until``: until when it may land. Infinite while it is under way, -inf if nothing was
+      written.
+    - ``outcome``: how it ended.
     """
 
     def __init__(self, station: int, extents: Sequence[Extent] | None,
@@ -75,68 +81,68 @@ class Claim:
         self.begun, self.done, self.lands_until = begun, -math.inf, math.inf
 
     def end(self, outcome: Outcome, now: float, may_land_for: float) -> None:
-        """Take note how it ended, and for how long (s) it may land: -inf where it cannot."""
+        """Record how the write ended, and for how long (s) it may land, -inf if it cannot."""
         self.outcome, self.done, self.lands_until = outcome, now, now + may_land_for
 
     @property
     def has_changed(self) -> bool:
-        """Tell whether it has ended, and words may be others by it, now or later."""
+        """Return True if it has ended and may have changed words, now or later."""
         return -math.inf < self.lands_until < math.inf
 
     def meets(self, extent: Extent) -> bool:
-        """Tell whether it may write some of these words."""
+        """Tell whether the write may change some of these words."""
         if self.extents is None:
             return self.station in (BROADCAST, extent.station)
         return any(extent.meets(other) for other in self.extents)
 
     @property
     def source(self) -> _Source:
-        """Return whose values it writes, and which if they are ours."""
+        """Return the writer, with the values if they are ours."""
         if self.write is None:
             return (_Writer.GUEST_SOMEWHERE if self.extents is None else _Writer.GUEST,)
         return (_Writer.OURS, *self.write.raw) if self.write.is_own else (_Writer.MESSAGE,)
 
 
 class WriteListener:
-    """Gets notice of all writes; what is not overridden does nothing."""
+    """A listener to all writes; methods that are not overridden do nothing."""
 
     def write_begins(self, claim: Claim) -> None:
-        """Take note that a write goes out."""
+        """Take a write that goes out."""
 
     def write_ended(self, claim: Claim) -> None:
-        """Take note that one has ended."""
+        """Take a write that has ended."""
 
     def write_expired(self, write: Write) -> None:
-        """Take note that a message was too old to have the line."""
+        """Take a message that was too old to have the line."""
 
 
 class WordsListener(Protocol):
-    """Gets the words of all good reads."""
+    """A listener to the words of all good reads."""
 
     def words_read(self, block: Block, data: bytes, started: float) -> None:
-        """Take the words of a block whose read ``started`` at that clock value (s)."""
+        """Take the words of a block; its read began at ``started`` (clock value, s)."""
 
 
 class OwnWords:
     """
-    The words of a row that we write by ourselves, and what else may come to stand in them.
+    The words of a row that the bridge writes by itself, and other writes that may change them.
 
-    That is what had not landed when the last write of the row began that was confirmed. What we
-    write is to be written once more at ``again_at`` (clock value in s): nothing older can land
-    then (rule 10).
+    It remembers writes that had not landed when our last confirmed write began. At ``again_at``
+    (clock value, s) none of them can land any more; then our value is written a second time (rule
+    10).
     """
 
     def __init__(self, row: Mapping, record: WriteRecord) -> None:
         self.row = row
         self.again_at = math.inf
-        self._latest = math.inf  # for that: at the end there is little time
+        self._latest = math.inf  # latest moment for ``again_at``; bounded at the end
         self._record = record
         self._lands_until: dict[_Source, float] = {}
         self._stands: _Source = ()
         self._guest_done = -math.inf
 
     def ended(self, claim: Claim) -> None:
-        """Take note how a claim of these words ended."""
+        """Record how a claim of these words ended."""
         if claim.has_changed:
             self.may_land(claim.source, claim.lands_until)
             if claim.source == (_Writer.GUEST,):
@@ -149,39 +155,39 @@ class OwnWords:
                                  if until > claim.begun}
 
     def plan_again(self, tried: float) -> None:
-        """Take note that what stands was sent at that clock value (s): is it written once more."""
+        """Plan the second write of our value, sent at ``tried`` (s), if older writes may land."""
         until = min(self.lands_until, self._latest)
         self.again_at = until if tried < until else math.inf
 
     def try_again(self, when: float, now: float) -> None:
-        """Write it once more then, unless a second write is planned: this one failed."""
+        """Plan to write once more, unless a second write is planned: this write failed."""
         if not now < self.again_at < math.inf:
             self.again_at = when
 
     def end(self, now: float) -> None:
-        """Take note that there is an end."""
+        """Bound the time of a second write: the bridge ends."""
         self._latest = now + _SETTLE_AT_END
 
     def resume(self) -> None:
-        """Take note that it was not the end."""
+        """Remove the bound of ``end``: the bridge goes on."""
         self._latest = math.inf
 
     def may_land(self, source: _Source, until: float) -> None:
-        """Take note that something of a writer may land up to then (clock value in s)."""
+        """Record until when a write of this writer may land (clock value in s)."""
         self._lands_until[source] = max(until, self._lands_until.get(source, -math.inf))
 
     @property
     def are_guests(self) -> bool:
-        """Tell whether what a guest has written may stand in them."""
+        """Tell whether a guest's value may stand in these words."""
         return self._guest_done > -math.inf
 
     def may_hold(self, value: int) -> bool:
-        """Tell whether it is a value of ours that may stand in them."""
+        """Tell whether ``value`` is ours and may stand in these words."""
         return (_Writer.OURS, value) in self._lands_until
 
     @property
     def lands_until(self) -> float:
-        """Return until when something else than stands may land (clock value in s)."""
+        """Return until when a foreign value may land here (clock value in s)."""
         if not self._record.may_begin(self.row):
             return math.inf
         return max((until for source, until in self._lands_until.items()
@@ -192,8 +198,8 @@ class WriteRecord:
     """
     All writes of a line.
 
-    What ends without an answer may land for ``settle_time`` s more, as a gateway may hold it.
-    Good reads are shown to ``readers``.
+    A write without an answer may land for ``settle_time`` s more, as a gateway may hold it.
+    ``readers`` get the words of good reads.
     """
 
     def __init__(self, line: LineTime, settle_time: float) -> None:
@@ -206,15 +212,15 @@ class WriteRecord:
 
     def connect(self, listeners: tuple[WriteListener, ...],
                 readers: tuple[WordsListener, ...]) -> None:
-        """Tell ``listeners`` of all writes, and ``readers`` of all good reads, from now on."""
+        """Send all writes to ``listeners``, and all good reads to ``readers``, from now on."""
         self._listeners, self.readers = listeners, readers
 
     def words_of(self, row: Mapping) -> OwnWords:
-        """Return the words of a row that we write by ourselves; they are watched from now on."""
+        """Return the words of a row that the bridge writes by itself; watch them from now on."""
         return self._words.setdefault(row, OwnWords(row, self))
 
     def opened(self) -> None:
-        """Take note that the port is open: gateways may hold what was written before."""
+        """Record that gateways may hold earlier writes: the port has been opened."""
         for words in self._words.values():
             if words.row.via is not None:
                 words.may_land((_Writer.BEFORE,), self.line.now + self._settle_time)
@@ -230,7 +236,7 @@ class WriteRecord:
 
     def begin(self, station: int, extents: Sequence[Extent] | None,
               write: Write | None = None) -> Claim:
-        """Take note that a write has the line, until it has ``ended``."""
+        """Record that a write has the line, until it has ``ended``."""
         claim = Claim(station, extents, write, begun=self.line.now)
         self._under_way.append(claim)
         for listener in self._listeners:
@@ -238,10 +244,10 @@ class WriteRecord:
         return claim
 
     def ended(self, claim: Claim, outcome: Outcome, *, may_land: bool = False) -> None:
-        """Take note how a write has ended, and whether some of it may land yet."""
+        """Record the end of a write; ``may_land`` tells whether some of it may still land."""
         self._under_way.remove(claim)
         landed = 0.0 if outcome in _CHANGED else -math.inf
-        may_land |= outcome is Outcome.BROADCAST  # which is not answered
+        may_land |= outcome is Outcome.BROADCAST  # no station answers it
         claim.end(outcome, self.line.now, self._settle_time if may_land else landed)
         for words in self._concerned(claim):
             words.ended(claim)
@@ -249,12 +255,12 @@ class WriteRecord:
             listener.write_ended(claim)
 
     def _concerned(self, claim: Claim) -> Iterable[OwnWords]:
-        """Return the words that a claim may have changed: those of its row, all of a guest's."""
+        """Return the words that a claim may have changed: of its row, or all for a guest."""
         if claim.write is not None:
             return filter(None, (self._words.get(claim.write.mapping),))
         return [words for row, words in self._words.items() if claim.meets(row.extent)]
 
     def expired(self, write: Write) -> None:
-        """Take note that a message was too old to have the line."""
+        """Pass on that a message was too old to have the line."""
         for listener in self._listeners:
             listener.write_expired(write)

@@ -25,7 +25,7 @@ from abdf1_ros.pccc.families import FAMILIES
 from abdf1_ros.pccc.file_types import PlcType
 from abdf1_ros.pccc.status import check_status
 
-# Different commands that are kept; a PLC with more has the same fault in all of them.
+# Most different commands that are kept; a PLC with more has the same fault in all of them.
 _MOST = 8
 
 _LATELY = 60.0  # s
@@ -41,7 +41,7 @@ class _Refused:
 
 class RefusedCommands:
     """
-    What was refused, by a text with station, address and reason.
+    Refused commands, by a text with station, address and reason.
 
     Only the thread of the link adds; any thread may ask.
     """
@@ -51,7 +51,7 @@ class RefusedCommands:
         self._found: dict[str, _Refused] = {}
 
     def add(self, command: Packet, reply: Packet, now: float) -> None:
-        """Keep what was refused; values that it would have written are left out."""
+        """Keep a refused command, without the values that it would have written."""
         try:
             check_status(reply, self._meanings)
         except RemoteError as error:
@@ -64,7 +64,7 @@ class RefusedCommands:
                 self._found[text] = _Refused(1, now)
 
     def lately(self, now: float) -> list[str]:
-        """Return what was refused within the last minute."""
+        """Return the commands that were refused within the last minute."""
         return [text for text, entry in [*self._found.items()] if now - entry.last < _LATELY]
 
     def counted(self) -> dict[str, int]:

@@ -13,7 +13,7 @@
 # limitations under the License.
 
 """
-Requests: what is asked of a station once, one after the other, without mappings or periods.
+Requests to stations, each carried out once, one at a time, without mappings or periods.
 
 They use the same links, with the same rules, as the driver.
 """
@@ -45,12 +45,12 @@ from abdf1_ros.pccc.steps import echo
 
 _Result = TypeVar('_Result')
 
-# A slave that is not polled for so long (s) ends its request: a person waits.
+# Seconds without a poll after which a slave ends its request, because a person waits.
 _LONGEST_UNPOLLED = 5.0
 
 
 class _RequestJob(Job):
-    """Steps with a station, and who wants to know how they end."""
+    """Steps with a station, and the callbacks for their end."""
 
     def __init__(self, station: int, work: Steps[Any], succeed: Callable[[Any], None],
                  fail: Callable[[Exception], None]) -> None:
@@ -82,7 +82,7 @@ class _Question(Job):
         return echo(b'')
 
     def ended(self, error: Exception | None) -> None:
-        """Let the job go on, or end."""
+        """Let the job start, or fail."""
         if isinstance(error, LinkError):
             self._job.fail(error)
         else:
@@ -95,11 +95,11 @@ class Requests(TaskSource):
 
     Inactive ``stations`` get one try each until they answer, all others every retry of the line.
     ``first_tns`` should be random, or a station may take our first command for a repetition.
-    Commands that come for us are refused, except an echo and the diagnostic status, which is that
-    of a ``plc_type``. ``stray`` tells the last reply that came and answers no command, empty for
-    none. ``report`` gets every numbered error and notice, in the link thread. Where the port
-    ``may_store`` what we send, nothing but reads goes out before an answer has come on this
-    connection, and after a request without one (rule 26 of docs/heartbeats.md).
+    Commands for us are refused, except an echo and the diagnostic status, which shows a
+    ``plc_type``. ``stray`` names the last reply that answers no command, empty for none.
+    ``report`` gets every numbered error and notice, in the link thread. If the port ``may_store``
+    our bytes, only reads go out before an answer has come on this connection, and after a request
+    without an answer (rule 26 of docs/heartbeats.md).
     """
 
     def __init__(self, mode: LineMode, line: LinkSettings, stations: ActiveStationList,
@@ -137,11 +137,11 @@ class Requests(TaskSource):
             _refuse(request, self._lost)
 
     def close(self) -> None:
-        """Refuse what waits, and all that comes; to be called when the link has ended."""
+        """Refuse all requests, waiting and new ones; to be called when the link has ended."""
         self._end(PortLost('closed by this program'))
 
     def next_task(self, now: float, busy: Container[int] = ()) -> Task | None:
-        """Return the next command of the request under way, or the first of the next one."""
+        """Return the next command of the request under way, or of the next request."""
         under_way = self._tasks.first(busy)
         if under_way is not None:
             return self._tasks.take(under_way, now)
@@ -151,7 +151,7 @@ class Requests(TaskSource):
         return None
 
     def _heard_first(self, job: Job, now: float) -> Job:
-        """Return a job that has started, or the question before one that may write."""
+        """Return a started job, or the question before a job that may write."""
         if self._tasks.is_heard or effect_of(job.command) is Effect.READS:
             return job
         return _Question(job).start(self._tasks, now)

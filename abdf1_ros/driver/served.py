@@ -33,10 +33,10 @@ from abdf1_ros.settings.rows import Rows
 
 class _MappedTable(DataTable):
     """
-    A data table that has only the mapped words, and remembers what was written.
+    A data table that has only the mapped words, and remembers writes.
 
-    ``changed`` has the address and the old data of each write. With ``is_guarded`` the words that
-    are protected cannot be written.
+    ``changed`` has the address and the old data of each write. With ``is_guarded`` no protected
+    word can be written.
     """
 
     def __init__(self, plc_type: PlcType) -> None:
@@ -67,7 +67,7 @@ class _MappedTable(DataTable):
         Tell whether these words are mapped.
 
         A command that moves whole elements of a structure cannot leave out single words. There one
-        mapped word of each element is enough; the others hold what the other end wrote, or 0.
+        mapped word of each element is enough. All other words hold what the PLC wrote, or 0.
         """
         known = self._mapped[address.area]
         mapped = [offset in known for offset in _offsets(address, words)]
@@ -77,7 +77,7 @@ class _MappedTable(DataTable):
         return all(any(mapped[at:at + size]) for at in range(0, words, size))
 
     def write(self, address: Address, data: bytes) -> None:
-        """Store whole words and remember what was there; Protected where that is forbidden."""
+        """Store whole words and remember the old ones; raise Protected where that is forbidden."""
         words = len(data) // 2
         if self.is_guarded and not self._read_only[address.area].isdisjoint(
                 _offsets(address, words)):
@@ -87,7 +87,7 @@ class _MappedTable(DataTable):
         self.changed.append((address, before))
 
     def take_back(self) -> None:
-        """Undo what has changed."""
+        """Undo all changes."""
         for address, before in reversed(self.changed):
             super().write(address, before)
         self.changed.clear()
@@ -102,8 +102,8 @@ class Served:
     """
     The served mappings, and the commands that come for them.
 
-    ``on_write`` is called with a mapping and its words after the other end has written any of
-    them; ``counters`` are what it reads as ours. All of it belongs to the link thread.
+    ``on_write`` is called with a mapping and its words after a PLC has written any of them.
+    ``counters`` are the link counters that a PLC reads. All of it belongs to the link thread.
     """
 
     def __init__(self, plc_type: PlcType, mappings: Rows,
@@ -142,7 +142,7 @@ class Served:
         return self._table.read(_first_word(mapping), mapping.codec.words)
 
     def store(self, mapping: Mapping, values: Sequence[float] | str) -> None:
-        """Store checked raw values where the other end reads them."""
+        """Store checked raw values where a PLC reads them."""
         mapping.codec.store(self._table, _first_word(mapping), values)
         self._table.changed.clear()  # our own writes are not reported
 

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""One write: what is to be done with a message, and how it ended."""
+"""One write: the values of a message, and its result."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ _SHOWN_CHARACTERS = 100  # more than a PLC string has
 
 
 class Outcome(Enum):
-    """How a write ended."""
+    """The outcome of a write."""
 
     WRITTEN = 'written'
     STANDS = 'stands in the PLC'
@@ -62,10 +62,11 @@ class WriteResult:
     """
     The one result of one message to one mapping.
 
-    ``detail`` is empty for a write that went well; that of an unconfirmed one says what a read has
-    found afterwards, or why there was none. ``latency`` is seconds from the request. ``request``
-    is what the requester calls it. ``packets_done`` of its packets were confirmed before ``error``
-    ended it.
+    - ``detail``: empty for a confirmed write. For an unconfirmed one it says what a later read has
+      found, or why there was no read.
+    - ``latency``: seconds from the request.
+    - ``request``: the name that the requester gave.
+    - ``packets_done``: number of its packets that were confirmed before ``error`` ended it.
     """
 
     mapping: Mapping
@@ -98,12 +99,16 @@ class Write:
     """
     Values on their way to one mapping.
 
-    Raises FormatError, saying what is wrong, when they cannot or must not be written.
-    ``value`` is their text, ``raw`` is what the PLC gets, ``commands`` are the requests that write
-    it. ``is_probe`` tells that the station was inactive when the write got the line, ``is_own``
-    that no message has asked for it. ``origins`` are the messages that it stands for, equal ones
-    in their order: the ``oldest`` and the youngest (``requested``) tell when they were published,
-    ``came`` when the first began to wait for the line (clock values in s).
+    Raises FormatError, saying what is wrong, if the values cannot or must not be written. Times
+    are clock values (s).
+
+    - ``value``: the values as text; ``raw``: the values for the PLC.
+    - ``commands``: the requests that write them.
+    - ``is_probe``: the station was inactive when the write got the line.
+    - ``is_own``: a heartbeat or fallback, which no message has asked for.
+    - ``origins``: the equal messages that it stands for, in their order.
+    - ``oldest``, ``requested``: when the oldest and the youngest of them were published.
+    - ``came``: when the first of them began to wait for the line.
     """
 
     def __init__(self, mapping: Mapping, values: Sequence[float] | str, now: float,
@@ -118,24 +123,24 @@ class Write:
             mapping.address, mapping.codec, self.raw, mapping.dialect)
 
     def equals(self, other: Write) -> bool:
-        """Tell whether both are for the same row with the same values, before anything is sent."""
+        """Tell whether both have the same row and values, and neither has been sent."""
         return self.mapping is other.mapping and self.commands == other.commands
 
     def stand_for(self, other: Write) -> None:
-        """Stand for the messages of an equal write, too."""
+        """Take over the messages of an equal write."""
         self.origins += other.origins
         self.requested = max(self.requested, other.requested)
         self.oldest = min(self.oldest, other.oldest)
 
     def give_up(self, until: float) -> list[Origin]:
-        """Stand no longer for the messages published up to then; return them. One is younger."""
+        """Remove and return the messages published up to ``until``; at least one is younger."""
         old = [origin for origin in self.origins if origin.published <= until]
         self.origins = [origin for origin in self.origins if origin.published > until]
         self.oldest = min(origin.published for origin in self.origins)
         return old
 
     def speak(self, dialect: Dialect) -> None:
-        """Keep to the packets of another dialect of the family, before anything has been sent."""
+        """Change to the packets of another dialect of the family, before anything is sent."""
         if dialect is not self.mapping.dialect:
             self.commands = write_requests(
                 self.mapping.address, self.mapping.codec, self.raw, dialect)
@@ -154,7 +159,7 @@ class Write:
 
     @property
     def is_pulse(self) -> bool:
-        """Tell whether each write counts by itself, not only the newest."""
+        """Tell whether each write counts, not only the newest."""
         return self.mapping.type is ValueType.BOOL
 
     def is_held(self, words: bytes) -> bool:

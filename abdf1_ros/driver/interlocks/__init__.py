@@ -13,9 +13,9 @@
 # limitations under the License.
 
 """
-What the bridge writes by itself: heartbeats and fallback values (docs/heartbeats.md).
+Writes of the bridge itself: heartbeats and fallback values (docs/heartbeats.md).
 
-``queue`` is asked at each turn of the line what has to be written; ``plc`` has the rows of one
-station and says which of them goes first; ``heartbeat`` and ``fallback`` are one row each, and
-the rules that they keep.
+- ``queue``: at each turn of the line it returns the write that is due.
+- ``plc``: the rows of one station, and which of them goes first.
+- ``heartbeat``, ``fallback``: one row each, with the rules that it keeps.
 """

@@ -13,9 +13,9 @@
 # limitations under the License.
 
 """
-Fallback values: what is written when messages no longer come (rules 7 to 12 and 17).
+Fallback values, which are written when messages no longer come (rules 7 to 12 and 17).
 
-The numbers of rules are those of docs/heartbeats.md.
+The rules have the numbers of docs/heartbeats.md.
 """
 
 from __future__ import annotations
@@ -26,15 +26,15 @@ import math
 from abdf1_ros.driver.record import Claim, OwnWords
 from abdf1_ros.driver.write import Outcome, Write
 
-# A fallback value that the PLC refuses is written again after so many seconds.
+# Seconds after which a refused fallback value is written again.
 _PAUSE_AFTER_REFUSAL = 1.0
 
-# One that stands is written again after so many seconds at least (rule 8).
+# Least seconds after which a fallback value that stands is written again (rule 8).
 _LEAST_REFRESH = 5.0
 
 
 class FallbackCause(Enum):
-    """Why a fallback value is due (rule 17)."""
+    """The reason why a fallback value is due (rule 17)."""
 
     TIMEOUT = 'timeout'
     START = 'start'
@@ -44,7 +44,7 @@ class FallbackCause(Enum):
 
 
 class FallbackState(Enum):
-    """What the PLC holds of a row: a message, or the fallback, as far as one knows."""
+    """The known contents of the PLC for a row: a message, or the fallback."""
 
     MESSAGE = 'a message stands'
     DUE = 'the fallback value is due'
@@ -54,14 +54,17 @@ class FallbackState(Enum):
 
 class FallbackRow:
     """
-    One row with Fallback, and what the PLC holds of it.
+    One row with Fallback, and the known contents of the PLC.
 
-    ``cause`` says why the fallback is due, None where it is not. ``refreshed`` is when the last
-    confirmed message was published, ``sent`` when the fallback was last sent: a message published
-    before that is not sent any more. ``due`` is when the row has to be looked at. All are clock
-    values (s). ``has_failed`` tells that a message has ended otherwise since the last that was
-    confirmed. ``refusal`` says why the last write of the fallback was not confirmed. ``words``
-    tells what others may have written.
+    Times are clock values (s).
+
+    - ``cause``: why the fallback is due, None if it is not.
+    - ``refreshed``: when the last confirmed message was published.
+    - ``sent``: when the fallback was last sent. No message published before it is sent any more.
+    - ``due``: when to look at the row next.
+    - ``has_failed``: a message after the last confirmed one was not confirmed.
+    - ``refusal``: why the last write of the fallback was not confirmed.
+    - ``words``: the writes of other writers to these words.
     """
 
     def __init__(self, words: OwnWords) -> None:
@@ -73,36 +76,36 @@ class FallbackRow:
         self.state = FallbackState.MESSAGE
         self.refreshed = -math.inf
         self.sent = -math.inf
-        self.tried = -math.inf  # like ``sent``, also when it is written again
+        self.tried = -math.inf  # like ``sent``, but also set when the fallback is written again
         self.tries = 0  # since it became due
         self.due = math.inf
         self.cause: FallbackCause | None = None
         self.refusal = ''
         self.is_under_way = False
-        # From when the time counts: the last confirmed message, or, after a fallback, the first
-        # whose outcome is unknown.
+        # Start of Fallback_After: the last confirmed message; after a fallback, the first message
+        # with an unknown outcome.
         self._counts_from = -math.inf
         self.has_failed = False
         self._values = mapping.fallback.values
         self._due_since = 0.0
         self._next_try = -math.inf
-        self.refresh_at = math.inf  # for what was not seen (rule 8)
+        self.refresh_at = math.inf  # against changes that were not seen (rule 8)
 
     @property
     def stands(self) -> bool:
-        """Tell whether the PLC holds the fallback, and no message was sent since."""
+        """Tell whether the PLC holds the fallback, and no message was sent after it."""
         return self.state is FallbackState.STANDS
 
     def make_due(self, cause: FallbackCause, now: float) -> None:
         """Make the fallback due at once; the first cause is the one that is reported."""
         if self.cause is None:
             self.cause, self._due_since = cause, now
-        self._due_since = min(self._due_since, now)  # a message may have put it off
+        self._due_since = min(self._due_since, now)  # a message may have delayed it
         self.state = FallbackState.DUE
         self._next_try = self.due = now
 
     def end(self, now: float) -> None:
-        """Take note that there is an end: write it unless nothing else can stand any more."""
+        """Write the fallback, except where it surely stands already: the bridge ends."""
         self.words.end(now)
         self.due = -math.inf
         if not self.stands or self.words.lands_until > -math.inf:
@@ -110,13 +113,13 @@ class FallbackRow:
 
     @property
     def is_confirmed(self) -> bool:
-        """Tell whether nothing is left to be written of what is due."""
+        """Tell whether all that was due has been written and confirmed."""
         is_left = self.stands and self.words.again_at < math.inf
         return self.cause is None and self.state is not FallbackState.OVERWRITTEN and not is_left
 
     @property
     def is_first_try(self) -> bool:
-        """Tell whether the fallback is due, or written over, and was not sent since."""
+        """Tell whether the fallback is due, or was written over, and has not been sent yet."""
         if self.state is FallbackState.OVERWRITTEN:
             return self.tried < self._due_since
         return self.cause is not None and self.sent < self._due_since
@@ -135,9 +138,9 @@ class FallbackRow:
         """
         Return when the fallback becomes due (clock value in s), infinite for never.
 
-        ``youngest`` is when the youngest message was published that waits or is under way. It is
-        waited for while all goes well: there is always one where they come faster than the PLC
-        refuses them.
+        ``youngest``: publication time of the youngest message not yet written. It delays the
+        fallback only while writes succeed. Otherwise a fast publisher whose messages the PLC
+        refuses would delay the fallback for ever.
         """
         if self.state is FallbackState.DUE:
             return self._due_since
@@ -176,10 +179,10 @@ class FallbackRow:
 
     def ended(self, outcome: Outcome, now: float) -> float | None:
         """
-        Take note how it ended; return the seconds that it was due, None where none is reported.
+        Record how the write ended; return for how long (s) it was due, None for no report.
 
-        It is written once more when nothing that a gateway may hold can land any more (rule 10),
-        and where it has become due since this write began.
+        The fallback is written once more when nothing that a gateway may hold can land any more
+        (rule 10). The same happens if it has become due again since this write began.
         """
         self.is_under_way = False
         self.due = now
@@ -198,13 +201,13 @@ class FallbackRow:
         return now - self._due_since if was_due else None
 
     def write_ended(self, claim: Claim, now: float) -> None:
-        """Take note how a write to these words ended, of a message or a guest."""
+        """Record how a write of a message or a guest to these words ended."""
         if claim.write is not None:
             if claim.write.mapping is self.mapping and not claim.write.is_own:
                 assert claim.outcome is not None
                 self.message_ended(claim.write.requested, claim.outcome)
         elif claim.has_changed and self.stands:
-            if claim.extents is None:  # it was hardly meant for these
+            if claim.extents is None:  # the guest hardly meant these words
                 self.refresh_at = now
             else:
                 self.state = FallbackState.OVERWRITTEN
@@ -218,7 +221,7 @@ class FallbackRow:
         return f'the fallback of {self.mapping.tag} is not confirmed' if self.cause else ''
 
     def message_ended(self, requested: float, outcome: Outcome) -> None:
-        """Take note how a message of the row ended that had the line (rule 7)."""
+        """Record the end of a message of the row that had the line (rule 7)."""
         self.due = -math.inf
         self.has_failed = outcome is not Outcome.WRITTEN
         if outcome is Outcome.WRITTEN:
@@ -227,7 +230,7 @@ class FallbackRow:
             if self.state in (FallbackState.STANDS, FallbackState.OVERWRITTEN):
                 self._counts_from = requested
             elif self.state is FallbackState.DUE and not self.is_first_try:
-                # It may have been written over a fallback that the PLC has not confirmed.
+                # The message may stand over a fallback that the PLC has not confirmed.
                 self._due_since = max(self._due_since, requested + self.after)
         else:
             return

@@ -15,7 +15,7 @@
 """
 Heartbeats: a word that we count up while all conditions hold (rules 1 to 6).
 
-The numbers of rules are those of docs/heartbeats.md.
+The rules have the numbers of docs/heartbeats.md.
 """
 
 from __future__ import annotations
@@ -32,17 +32,17 @@ LARGEST = 32_767
 
 _LEAST_LIFE_SIGN = 1.0  # s
 
-# 0 stands for so long (s) at least: a PLC sees a word once in a scan (rule 2).
+# Shortest time (s) that a 0 stands: a PLC sees a word once in a scan (rule 2).
 _LEAST_ZERO = 0.5
 
-# A 0 that the PLC has not confirmed is written again after so many seconds, or a Period.
+# Seconds, or a shorter Period, after which an unconfirmed 0 is written again.
 _REPEAT_ZERO = 1.0
 
-# A stopped executor does not wake the link, so the link looks by itself every so many seconds.
+# Interval (s) of the link's own looks at the executor: a stopped executor does not wake the link.
 _GLANCE = 0.1
 
-# A second value that is not ours within so many seconds, or Periods where that is longer, is
-# another writer, not a download.
+# Seconds, or Periods if that is longer, within which a second foreign value means another writer,
+# not a download.
 _CONFLICT_TIME = 60.0
 _CONFLICT_PERIODS = 20
 
@@ -51,7 +51,7 @@ _GOLDEN = 0.618  # its multiples lie evenly between whole numbers
 
 
 class BeatState(Enum):
-    """What the PLC is to see: 0, or a value that counts."""
+    """The value that the PLC is to see: 0, or a value that counts."""
 
     CONTACT = 'first contact: 0 has to be confirmed'
     SHOWN = '0 stands, for the PLC to see it'
@@ -62,51 +62,56 @@ class BeatState(Enum):
 
 class _OtherWriter:
     """
-    What one knows of another that writes the word of a heartbeat (rule 19).
+    Another bridge that writes our heartbeat word: what we know of it (rule 19).
 
-    It was ``seen`` last at that clock value (s).
+    ``seen`` is when its last value was read (clock value, s).
     """
 
     def __init__(self, period: float, dice: Random) -> None:
         self.seen = -math.inf
         self._period = period
         self._dice = dice
-        self._zeros = 0  # written again, where it goes on
+        self._zeros = 0  # 0s written again while the other bridge continues
         self._extra_zero = 0.0  # s
 
     def note_value(self, now: float) -> bool:
-        """Take note of a value that is not ours; return whether it is not the first for long."""
+        """Record a foreign value; return True if one was seen recently before."""
         before, self.seen = self.seen, now
         return now - before < max(_CONFLICT_TIME, _CONFLICT_PERIODS * self._period)
 
     def next_zero(self) -> float:
-        """Return after how long (s) 0 is written again, for it to see the 0 before it counts."""
-        self._zeros += 1  # at another moment of its period each time
+        """Return the seconds until 0 is written again, so that the other bridge reads our 0."""
+        self._zeros += 1  # at a different moment of the other bridge's period each time
         return self._period * (0.5 + self._zeros * _GOLDEN % 1)
 
     def differ(self) -> None:
         """
-        Let the next 0 stand longer than the other's.
+        Let the next 0 stand longer than the 0 of the other bridge.
 
-        If two bridges counted from 1 at the same time, neither would see the other any more.
+        If both bridges counted from 1 at the same time, neither would see foreign values any more.
         """
         self._extra_zero = self._period * self._dice.randint(1, _SHIFTS)
 
     def take_extra_zero(self) -> float:
-        """Return how much longer (s) the next 0 stands, once."""
+        """Return, once, the extra seconds that the next 0 stands."""
         extra, self._extra_zero = self._extra_zero, 0.0
         return extra
 
 
 class HeartbeatRow:
     """
-    One Heartbeat row, and what the PLC holds of it.
+    One Heartbeat row, and the known contents of the PLC.
 
-    ``value`` was sent last; ``confirmed`` is the clock value (s) of the last reply that confirmed
-    one. ``reason`` says why it does not count, empty while it does. ``refusal`` says why the last
-    write was not confirmed, ``tried`` when that was sent. ``due`` is when the row has to be looked
-    at (clock values in s). It counts from ``first`` on. ``words`` tells what others may have
-    written; ``dice`` are thrown to differ from another bridge.
+    Times are clock values (s).
+
+    - ``value``: the value sent last.
+    - ``confirmed``: when the last reply confirmed a value.
+    - ``reason``: why the heartbeat does not count, empty while it counts.
+    - ``refusal``: why the last write was not confirmed; ``tried``: when it was sent.
+    - ``due``: when to look at the row next.
+    - ``first``: the number from which the row counts.
+    - ``words``: the writes of other writers to this word.
+    - ``dice``: random numbers, so that two bridges differ.
     """
 
     def __init__(self, words: OwnWords, first: int, dice: Random) -> None:
@@ -121,9 +126,9 @@ class HeartbeatRow:
         self.reason = ''
         self.refusal = ''
         self.is_under_way = False
-        self.is_first_try = True  # of the 0 that has to be written
+        self.is_first_try = True  # whether the 0 to be written was never sent
         self.tried = -math.inf
-        self.tries = 0  # of what has to be written
+        self.tries = 0  # number of tries of the value to be written
         self.due = math.inf
         self.topics = mapping.condition.names if mapping.condition else ()
         self._timeout = (mapping.condition and mapping.condition.timeout or 0) / 1000
@@ -131,10 +136,10 @@ class HeartbeatRow:
         self._is_confirmed = False
         self._next = -math.inf
         self._other = _OtherWriter(self._period, dice)
-        self._holds_at = math.inf  # without a further message of one of ``topics``
+        self._holds_at = math.inf  # until when all ``topics`` have a message in time
 
     def why_not(self, now: float) -> str:
-        """Return why the PLC has no heartbeat that counts, empty if it has, or may have."""
+        """Return why no heartbeat counts in the PLC, empty if one counts or may count."""
         if self.reason or self.confirmed is None:
             return self.reason or self.refusal or 'the PLC has not confirmed it yet'
         if self.state is not BeatState.COUNTS:
@@ -152,21 +157,21 @@ class HeartbeatRow:
 
     @property
     def is_confirmed(self) -> bool:
-        """Tell whether 0 stands, and is not to be written again after what may still land."""
+        """Tell whether 0 stands, and no late write can land over it any more."""
         return self.is_at_rest and self.words.again_at == math.inf
 
     def begin(self, now: float, *, is_new: bool = False) -> None:
         """
-        Start again with 0: the PLC may be another one by now (rule 2).
+        Start again with 0: the station may be a different PLC by now (rule 2).
 
-        What another has written is forgotten where it ``is_new``: the port, or a change to RUN.
+        Foreign values are forgotten if the contact ``is_new``: an opened port, or a change to RUN.
         """
         if is_new or self.state is not BeatState.CONFLICT:
             self.state = BeatState.CONTACT
         self._write_zero(now)
 
     def ran(self, now: float) -> None:
-        """Take note of a change to RUN: whatever was foreign before came with a download."""
+        """Treat earlier foreign values as leftovers of a download: the PLC went to RUN."""
         self._other.seen = -math.inf
         self.begin(now, is_new=True)
 
@@ -175,19 +180,19 @@ class HeartbeatRow:
         self._next = self.due = now
 
     def end(self, now: float) -> None:
-        """Take note that there is an end: 0 is to be written."""
+        """Write 0: the bridge ends."""
         self.due = now
         self.words.end(now)
         if self.words.lands_until > -math.inf:
             self._write_zero(now)
 
     def write_ended(self, claim: Claim, now: float) -> None:
-        """Take note that a guest has written here: that is not a 0."""
+        """Record that a guest has written to this word: its value is not a 0."""
         if claim.write is None and claim.has_changed and claim.extents is not None:
             self.overwritten(now)
 
     def overwritten(self, now: float) -> None:
-        """Take note that something else may stand where 0 has to: it is written again at once."""
+        """Another value may stand in place of the 0: write the 0 again at once."""
         if self.state is BeatState.SHOWN:
             self.state = BeatState.CONTACT
         if self.state is not BeatState.COUNTS and self.value == 0:
@@ -197,32 +202,33 @@ class HeartbeatRow:
         """
         Return the first topic without a message in time, empty for none (rule 3 d).
 
-        ``messages`` tells when the last accepted message of each was published (clock value in s).
+        ``messages`` has the publication time of the last accepted message of each topic (clock
+        value, s).
         """
         return next((topic for topic in self.topics
                      if now >= messages.get(topic, -math.inf) + self._timeout), '')
 
     def why_missing(self, messages: MappingType[str, float], now: float) -> str:
-        """Return that a topic has had no message in time, empty where all have."""
+        """Return the text for a topic without a message in time, empty for none."""
         topic = self.missing(messages, now)
         return f'no message of {topic} in time' if topic else ''
 
     def topics_until(self, messages: MappingType[str, float]) -> float:
-        """Return until when it may count by rule 3 (d) without a further message."""
+        """Return until when the heartbeat may count by rule 3 (d) without a further message."""
         return min((messages.get(topic, -math.inf) + self._timeout
                     for topic in self.topics), default=math.inf)
 
     def executor_until(self, executor: float) -> float:
-        """Return until when it may count by rule 3 (c); ``executor`` is when that ran last."""
+        """Return until when rule 3 (c) lets it count; ``executor``: last run of the executor."""
         return executor + max(self._period, _LEAST_LIFE_SIGN)
 
     def judge(self, now: float, why_held: str, executor: float,
               messages: MappingType[str, float]) -> bool:
         """
-        Tell whether something is to be written now; plan when to look again if it is not.
+        Return True if a write is due now; otherwise plan the next look.
 
-        ``why_held`` says why it must not count (rule 3 b, d), empty where it may; ``executor`` is
-        when that ran last.
+        ``why_held`` is the reason why the heartbeat must not count (rule 3 b, d), empty if it may.
+        ``executor`` is when the executor ran last.
         """
         self.reason, self._holds_at = why_held, self.topics_until(messages)
         if self.state is BeatState.SHOWN and now >= self._next:
@@ -253,7 +259,7 @@ class HeartbeatRow:
         return self.due <= now and self.state is not BeatState.SHOWN
 
     def hold(self) -> None:
-        """Write 0 at once, if it counts (rule 3)."""
+        """Write 0 at once, if the heartbeat counts (rule 3)."""
         if self.state is BeatState.COUNTS:
             self.state = BeatState.HELD
             self.is_first_try = not self.is_at_rest
@@ -267,16 +273,16 @@ class HeartbeatRow:
 
     def read_back(self, value: int, started: float, now: float) -> str:
         """
-        Compare a value that was read from ``started`` on; return what is reported of another's.
+        Compare a value whose read began at ``started``; return the report of a foreign value.
 
-        Only between the confirmation of ours and the next count one knows what it has to be. The
-        first is taken for a download, a second one for another writer: 0 then stays, unless a
-        change to RUN shows that it was a download as well (rule 19).
+        The expected value is known only from the confirmation of our write until our next one. The
+        first foreign value is treated as a download, the second as another writer. Then 0 stays
+        until a change to RUN shows that the second was a download as well (rule 19).
         """
         is_known = self._is_confirmed and not self.is_under_way
         if not is_known or started < (self.confirmed or 0.0) or value == self.value:
             return ''
-        if self.words.may_hold(value):  # ours, which a gateway has held
+        if self.words.may_hold(value):  # our own value, which a gateway has held
             self.overwritten(now)
             return ''
         text = f'{value} was read where {self.value} was written'
@@ -295,7 +301,7 @@ class HeartbeatRow:
 
     @property
     def wants_zero(self) -> bool:
-        """Tell whether what is to be written is 0."""
+        """Tell whether the value to be written is 0."""
         return self.state is not BeatState.COUNTS
 
     def take(self, now: float) -> Write:
@@ -309,13 +315,13 @@ class HeartbeatRow:
         elif self._is_confirmed:  # otherwise the same value again (rule 3 a)
             before = self.value or self._before_first
             self.value, self._is_confirmed = before % LARGEST + 1, False
-        # Another writer has to see our 0 between two of its own.
+        # The other bridge has to see our 0 between two of its own values.
         is_urgent = self.wants_zero and self.state is not BeatState.CONFLICT
         self._next = now + (min(self._period, _REPEAT_ZERO) if is_urgent else self._period)
         return Write(self.mapping, [self.value], now)
 
     def ended(self, outcome: Outcome, now: float) -> None:
-        """Take note how it ended."""
+        """Record how the write ended."""
         self.is_under_way = False
         self.due = now
         if outcome is not Outcome.WRITTEN:

@@ -13,9 +13,9 @@
 # limitations under the License.
 
 """
-One PLC: the heartbeats and fallbacks that are written to it, and which of them goes first.
+One PLC: its heartbeats and fallbacks, and which of them goes first.
 
-The numbers of rules are those of docs/heartbeats.md.
+The rules have the numbers of docs/heartbeats.md.
 """
 
 from __future__ import annotations
@@ -33,16 +33,17 @@ from abdf1_ros.driver.record import Claim, WriteRecord
 from abdf1_ros.driver.write import Outcome
 from abdf1_ros.settings.mapping import Mapping
 
-# So often in a row a PLC has not answered that is taken as out of reach, though its station is
-# active: that of a gateway is.
+# After this many unanswered writes in a row we treat the PLC as out of reach. Its station may
+# still be active, because a gateway answers polls for it.
 _FAILURES = 2
 
-# Then it is left alone for so long (s) at least; others on the line of a gateway have that for
-# OTHERS_SHARE times as long as the last attempt took.
+# Shortest pause (s) before the next attempt. Behind a gateway the pause is also at least
+# OTHERS_SHARE times the length of the last attempt, so silent PLCs take at most an eighth of the
+# time.
 _LEAST_PAUSE = 1.0
 
-# A row that has just become due at a silent PLC may have been unlucky: it has so many tries before
-# those that had more.
+# Number of tries of a row at a silent PLC before rows that had more tries: its first tries may
+# have been unlucky.
 _QUICK_TRIES = 3
 
 _ANSWERED = (Outcome.WRITTEN, Outcome.PARTLY, Outcome.FAILED)
@@ -54,11 +55,13 @@ TurnRank = tuple[float, ...]
 @dataclass(slots=True)
 class Conditions:
     """
-    What all PLCs of a line depend on.
+    Conditions that all PLCs of a line depend on.
 
-    The ROS executor ran last at ``executor``, the last accepted message of each topic was
-    published at ``messages`` (clock values in s). ``is_ending`` tells of the end, which began at
-    ``ended``: infinite before it.
+    Times are clock values (s).
+
+    - ``executor``: when the ROS executor ran last.
+    - ``messages``: publication time of the last accepted message of each topic.
+    - ``is_ending``: the bridge ends; ``ended``: when the end began, infinite before it.
     """
 
     executor: float = -math.inf
@@ -74,11 +77,15 @@ class Conditions:
 
 class Plc:
     """
-    The rows of one station, and how it has answered our own writes.
+    The heartbeats and fallbacks of one station, and its answers to our own writes.
 
-    ``due`` is when its rows have to be looked at (clock value in s), ``first_due`` that for first
-    tries, which no pause holds up. ``failures`` counts those that it has not answered since it
-    answered a write of anybody; from the second on it is left alone up to ``pause_end``.
+    Times are clock values (s).
+
+    - ``due``: when to look at its rows next.
+    - ``first_due``: the same for rows never tried; a pause does not delay these.
+    - ``failures``: number of our own writes without an answer since the last answered write, also
+      of a guest.
+    - ``pause_end``: from the second failure on the PLC is left alone until then.
     """
 
     def __init__(self, station: int, rows: Iterable[OwnRow], stations: ActiveStationList,
@@ -98,7 +105,7 @@ class Plc:
 
     @property
     def is_lost(self) -> bool:
-        """Tell whether it is out of reach."""
+        """Tell whether the PLC is out of reach."""
         return self.failures >= _FAILURES
 
     @property
@@ -107,7 +114,7 @@ class Plc:
         return self._stations[self.station].active
 
     def plan(self) -> None:
-        """Look at its rows again when the first of them wants it."""
+        """Plan the next look at its rows, at the earliest ``due`` of them."""
         self.due = min([row.due for row in self.rows], default=math.inf)
         self.first_due = min([row.first_due for row in self.rows], default=math.inf)
 
@@ -120,18 +127,18 @@ class Plc:
     # What happens
 
     def contact(self, now: float, *, is_new: bool = False) -> None:
-        """Take note of a contact with it, the first with this port where it ``is_new`` (2, 8)."""
+        """Begin a contact; it ``is_new`` if it is the first with this port (rules 2, 8)."""
         for beat in self.heartbeats:
             beat.begin(now, is_new=is_new)
         for row in self.fallbacks:
             if not row.is_fresh(now):
                 row.make_due(FallbackCause.RETURN, now)
-            else:  # a message that it waits for may be gone with the port
+            else:  # the message that delays it may be gone with the port
                 row.due = -math.inf
         self.plan()
 
     def mode_seen(self, is_running: bool, now: float) -> None:
-        """Take note of its mode; a change to RUN is a first contact (rules 2, 8)."""
+        """Record its mode; a change to RUN is a first contact (rules 2, 8)."""
         was_running, self._is_running = self._is_running, is_running
         if not is_running or was_running is not False:
             return
@@ -142,17 +149,17 @@ class Plc:
         self.plan()
 
     def release(self) -> None:
-        """Let fallbacks go on that waited for a write of their words: one has ended (rule 9)."""
+        """Release fallbacks that waited for a write of their words (rule 9)."""
         self.look_again(*self._held_up)
         self._held_up.clear()
 
     def write_ended(self, claim: Claim, now: float) -> None:
         """
-        Take note how a write to it ended, of whomever, and whether it has answered.
+        Record how a write to this PLC ended, also of a guest, and whether the PLC has answered.
 
-        One that does not answer ours is left alone for a while, or it would take the whole line.
-        When one answers again that is behind a gateway, it is a first contact, as its station was
-        active all the time (rules 2, 8).
+        If the PLC does not answer our own writes, it is left alone for a while, or they would take
+        the whole line. A PLC behind a gateway that answers again has a first contact, because its
+        station was active all the time (rules 2, 8).
         """
         is_behind_gateway = self.rows[0].mapping.via is not None
         if claim.outcome in _ANSWERED:
@@ -169,18 +176,18 @@ class Plc:
     # Which goes first
 
     def ready(self, youngest: MappingType[Mapping, float], now: float) -> list[OwnRow]:
-        """Return the rows that want to write now; ``youngest`` is of messages by their row."""
+        """Return the rows with a due write; ``youngest`` has the youngest message of each row."""
         due = [row for row in self.fallbacks
                if row.due <= now and row.judge(now, youngest.get(row.mapping, -math.inf))]
         held_up = [row for row in due if not self._record.may_begin(row.mapping)]
-        for row in held_up:  # by a write that is under way (rule 9), whose end is reported
+        for row in held_up:  # a write of its words is under way (rule 9); its end is reported
             row.due = math.inf
         self._held_up += held_up
         why, conditions = self._why_held() if self.heartbeats else '', self._conditions
         beats = [beat for beat in self.heartbeats if beat.judge(
             now, why or beat.why_missing(conditions.messages, now), conditions.executor,
             conditions.messages)]
-        if not self.is_active:  # it gets no number but 0 (rule 4)
+        if not self.is_active:  # an inactive station gets only 0 (rule 4)
             for beat in beats:
                 if not beat.wants_zero:
                     beat.due = beat.first_due
@@ -189,19 +196,20 @@ class Plc:
         return [*beats, *(row for row in due if row not in held_up)]
 
     def _why_held(self) -> str:
-        """Return why no heartbeat may count, empty if it may (rules 3 b, 5)."""
+        """Return why no heartbeat may count, empty if they may (rules 3 b, 5)."""
         if self._conditions.is_ending:
             return 'the bridge ends'
         return next(filter(None, (row.why_held for row in self.fallbacks)), '')
 
     def rank(self, row: OwnRow, now: float) -> TurnRank | None:
         """
-        Return when a row has its turn, the least first; None where it has to wait (rules 10, 11).
+        Return the rank of a row, the least goes first; None if it has to wait (rules 10, 11).
 
-        First tries go at once: the PLC may well carry out what it does not answer. Those that
-        answer go before those that do not. Of these the one goes first that has had the fewest
-        tries, then the one that was tried the longest ago: a 0 that is due each second is not all.
-        They have the time for probes only. At the end a silent one has one try.
+        The order is (1) first tries, since a PLC may execute a write that it does not answer; (2)
+        PLCs that answer; (3) PLCs that do not. In (3) the row with the fewest tries goes first,
+        then the row whose last try is oldest, so that a 0 which is due each second does not take
+        all turns. Silent PLCs get only the time of probes. At the end a silent PLC has one try for
+        each row.
         """
         if self._has_last_try:
             return (1, 1, row.tried) if row.tried < self._conditions.ended else None
@@ -218,20 +226,20 @@ class Plc:
 
     @property
     def _has_last_try(self) -> bool:
-        """Tell whether this is the end, and the PLC silent."""
+        """Tell whether the bridge ends and the PLC is silent."""
         return self._conditions.are_all_due and not self.is_active
 
     @property
     def _free_from(self) -> float:
-        """Return from when on more than first tries may be written (clock value in s)."""
-        if self._conditions.is_ending:  # there is no later
+        """Return from when on other writes than first tries may go out (clock value in s)."""
+        if self._conditions.is_ending:  # the end leaves no later moment
             return -math.inf
         # Probes of an inactive station have their own pause.
         pause_end = self.pause_end if self.is_active else -math.inf
         return max(pause_end, self._stations.next_own(self.station))
 
     def next_due(self, least: float) -> float:
-        """Return when something may be written, if that is before ``least`` (clock values, s)."""
+        """Return when the next write may go out, if that is before ``least`` (clock values, s)."""
         if self.due >= least:
             return least
         if self._has_last_try:
@@ -240,7 +248,7 @@ class Plc:
         return min(least, self.first_due, max(self.due, self._free_from))
 
     def good_until(self, beat: HeartbeatRow, youngest: MappingType[Mapping, float]) -> float:
-        """Return until when a heartbeat may be sent (clock value in s): later it may be wrong."""
+        """Return until when a heartbeat may be sent (clock value in s), as its conditions end."""
         ends = [row.deadline(youngest.get(row.mapping, -math.inf)) for row in self.fallbacks]
         return min([beat.executor_until(self._conditions.executor),
                     beat.topics_until(self._conditions.messages), *ends])

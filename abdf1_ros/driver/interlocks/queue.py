@@ -13,12 +13,12 @@
 # limitations under the License.
 
 """
-What the driver writes without a message: heartbeats and fallback values, and in which order.
+The order of the driver's own writes, which no message has asked for: heartbeats, fallback values.
 
-At first contact the heartbeats of a PLC are written as 0. Then its fallback values follow that are
-due, and only then do its heartbeats count. The numbers of rules are those of docs/heartbeats.md.
-As everywhere in the driver ``now`` is an argument; it has to come from a clock that also counts
-while the host sleeps (rule 6). None of this is a safety function.
+At first contact the heartbeats of a PLC are written as 0. Then its due fallback values follow, and
+only then do its heartbeats count. The rules have the numbers of docs/heartbeats.md. As everywhere
+in the driver, ``now`` is an argument. It has to come from a clock that also counts while the host
+sleeps (rule 6). None of this is a safety function.
 """
 
 from __future__ import annotations
@@ -45,7 +45,7 @@ from abdf1_ros.settings.heartbeats import LAST_ANSWER
 from abdf1_ros.settings.mapping import Mapping
 from abdf1_ros.settings.rows import Rows
 
-_OURS = -1  # stands for our own table
+_OURS = -1  # means our own table
 _due_of = attrgetter('due')
 
 
@@ -53,8 +53,8 @@ class OwnWrite(WriteJob):
     """
     A write that no message has asked for.
 
-    It must not be sent after ``expires`` (clock value in s): its value may be wrong by then.
-    With ``is_last`` its PLC is silent, and there is no later.
+    It must not be sent after ``expires`` (clock value in s): its value may be wrong by then. With
+    ``is_last`` it is the only try at a silent PLC at the end.
     """
 
     is_own = True
@@ -66,7 +66,7 @@ class OwnWrite(WriteJob):
         super().__init__(write, writing)
         self.is_free = is_free
         self.answer_within = LAST_ANSWER if is_last else math.inf
-        # Of a fallback each packet goes out: the PLC may carry out what it does not answer.
+        # Each packet of a fallback goes out: the PLC may execute a packet that it does not answer.
         self.goes_on = isinstance(row, FallbackRow)
         self.row = row
         self.expires = expires
@@ -82,12 +82,14 @@ class Interlocks(WriteListener):
     """
     All heartbeats and fallbacks of a line.
 
-    ``writes`` are the messages that wait or are under way. ``served`` takes the fallback of a
-    Serve row; ``listener`` gets the result of each fallback that was written, and why
-    a PLC does not take one, ``warn`` that a heartbeat is not ours. ``seed`` is another number in
-    each bridge: two that began together would not see each other if both counted from 1.
-    ``ours`` has the rows of our own table: ``expire`` has something to do when it is due.
-    Only ``executor_ran``, ``wind_down`` and ``resume`` may be called from another thread.
+    - ``writes``: the messages that wait or are under way.
+    - ``served``: takes the fallback of a Serve row.
+    - ``listener``: gets the result of each written fallback, and the reason of each refused one.
+    - ``warn``: gets foreign heartbeat values.
+    - ``seed``: a different number in each bridge. Two bridges that began together would not see
+      each other if both counted from 1.
+    - ``ours``: the rows of our own table; ``expire`` has work when it is due. Only
+      ``executor_ran``, ``wind_down`` and ``resume`` may be called from another thread.
     """
 
     def __init__(self, mappings: Rows, writes: WriteQueue, writing: WritesUnderWay,
@@ -115,30 +117,31 @@ class Interlocks(WriteListener):
         self._refreshes: list[tuple[float, int, FallbackRow]] = []
         self._tickets = itertools.count()
         self._has_begun = False
-        self._awaited: frozenset[int] = frozenset()  # stations that answered when the end began
+        # stations that answered at the beginning of the end
+        self._awaited: frozenset[int] = frozenset()
 
     @property
     def is_ending(self) -> bool:
-        """Tell whether all is to end."""
+        """Tell whether the bridge is to end."""
         return self._conditions.is_ending
 
     # What happens
 
     def executor_ran(self, now: float) -> None:
-        """Take note that the executor runs: a hung process must not look alive (rule 3 c)."""
+        """Record that the executor runs: a hung process must not look alive (rule 3 c)."""
         self._conditions.executor = now
 
     def wind_down(self) -> None:
         """
-        Write heartbeats 0, then fallbacks, and let no more messages be taken (rule 5).
+        Write heartbeats 0, then fallbacks, and take no more messages (rule 5).
 
-        Wake the link then. ``is_over`` tells when all have been confirmed, ``unconfirmed`` which
-        have not.
+        The caller wakes the link then. ``is_over`` tells whether all have been confirmed;
+        ``unconfirmed`` has the rows that have not.
         """
         self._conditions.is_ending = True
 
     def resume(self) -> None:
-        """Go on after ``wind_down``: the next opening of the port is a first contact."""
+        """Continue after ``wind_down``: the next opening of the port is a first contact."""
         self._conditions.is_ending, self._conditions.ended = False, math.inf
         for row in self._plc_of:
             row.words.resume()
@@ -146,9 +149,10 @@ class Interlocks(WriteListener):
     @property
     def is_over(self) -> bool:
         """
-        Tell whether all is written that can be.
+        Tell whether all writes of the end are done.
 
-        The stations that answered at ``wind_down`` have confirmed it; silent ones have had it.
+        The stations that answered at ``wind_down`` have confirmed theirs, each silent station has
+        had its try.
         """
         return not self._plc_of or self._conditions.are_all_due and not any(
             row.mapping.station in self._awaited or row.is_under_way
@@ -156,7 +160,7 @@ class Interlocks(WriteListener):
             for row in self._plc_of if not row.is_confirmed)
 
     def unconfirmed(self) -> list[str]:
-        """Return the tags of the rows that are not confirmed at the end, or may not stay so."""
+        """Return the tags of rows that are not confirmed at the end, or may be overwritten."""
         now = self._writing.record.line.now
         held = {row.mapping.tag: row.words.lands_until - now for plc in self._plcs.values()
                 for row in plc.rows if row.is_confirmed and row.words.lands_until > now}
@@ -165,7 +169,7 @@ class Interlocks(WriteListener):
             for tag, seconds in held.items())]
 
     def begin(self, now: float) -> None:
-        """Take note that the port has been opened: a first contact with everybody (rule 2)."""
+        """Begin a first contact with each station: the port has been opened (rule 2)."""
         if not self._has_begun:
             self._writing.record.opened()
             for row in self.fallbacks:
@@ -176,12 +180,12 @@ class Interlocks(WriteListener):
         self.ours.plan()
 
     def contact(self, station: int, now: float) -> None:
-        """Take note that a station is active again (rules 2, 8)."""
+        """Begin a first contact with a station that is active again (rules 2, 8)."""
         if self._has_begun and station in self._plcs:
             self._plcs[station].contact(now)
 
     def mode_seen(self, station: int, is_running: bool, now: float) -> None:
-        """Take note of a station's mode; a change to RUN is a first contact (rules 2, 8)."""
+        """Record the mode of a station; a change to RUN is a first contact (rules 2, 8)."""
         if station in self._plcs:
             self._plcs[station].mode_seen(is_running, now)
 
@@ -196,12 +200,13 @@ class Interlocks(WriteListener):
                 self._plc_of[beat].plan()
 
     def message_came(self, write: Write) -> None:
-        """Take note of a message that was accepted (rule 3 d)."""
+        """Record an accepted message (rule 3 d)."""
         topic, messages = write.mapping.topic, self._conditions.messages
         for beat in self.heartbeats:
             if topic in beat.topics:
                 if beat.missing(messages, write.requested):
-                    beat.hold()  # before anybody looked: the line was busy all the time
+                    # the time-out passed before a look: the line was busy all the time
+                    beat.hold()
                 self._plc_of[beat].look_again(beat)
         messages[topic] = max(write.requested, messages.get(topic, -math.inf))
 
@@ -214,7 +219,7 @@ class Interlocks(WriteListener):
         """
         Tell whether a message comes while the fallback of its row is due at a silent PLC (4).
 
-        The PLC may carry out both: in turns, as long as messages come.
+        Otherwise the PLC might execute both in turns, as long as messages come.
         """
         row = self._by_mapping.get(write.mapping)
         return row is not None and row.cause is not None and not self._plc_of[row].is_active
@@ -231,7 +236,7 @@ class Interlocks(WriteListener):
             self._plc_of[row].look_again(row)
 
     def write_ended(self, claim: Claim) -> None:
-        """Take note how a write ended, of whomever: fallbacks may wait for that (rules 7, 9)."""
+        """Record how any write ended: fallbacks may wait for that (rules 7, 9)."""
         now = self._writing.record.line.now
         if claim.station in self._plcs:
             self._plcs[claim.station].write_ended(claim, now)
@@ -253,7 +258,7 @@ class Interlocks(WriteListener):
             plc.release()
 
     def write_expired(self, write: Write) -> None:
-        """Take note that a message was too old to have the line: it is no longer waited for."""
+        """Let no fallback wait for a message any more that was too old to have the line."""
         if write.mapping in self._by_mapping:
             row = self._by_mapping[write.mapping]
             self._plc_of[row].look_again(row)
@@ -303,7 +308,8 @@ class Interlocks(WriteListener):
         """
         Return a fallback that stands and is to be written again, None for none (rule 8).
 
-        It does not go before messages, and waits while one of its row does, if these are taken.
+        It does not go before messages. It waits while a message of its row waits, unless the
+        bridge takes no messages.
         """
         passed_over = []
         found = None
@@ -332,7 +338,7 @@ class Interlocks(WriteListener):
         heapq.heappush(self._refreshes, (when, next(self._tickets), row))
 
     def ended(self, own: OwnWrite) -> None:
-        """Take note how one of our writes ended."""
+        """Record how one of our own writes ended."""
         row, result, now = own.row, own.result, self._writing.line.now
         outcome = result.outcome
         plc = self._plc_of[row]
@@ -340,7 +346,7 @@ class Interlocks(WriteListener):
             row.ended(outcome, now)
         else:
             self._fallback_ended(row, own.write, outcome, now)
-        for beat in plc.heartbeats:  # they may depend on it (rule 3 b)
+        for beat in plc.heartbeats:  # they may depend on the fallback (rule 3 b)
             beat.due = min(beat.due, now)
         plc.plan()
         if outcome is not Outcome.NOT_SENT:
@@ -360,7 +366,7 @@ class Interlocks(WriteListener):
                 row.mapping, Outcome.FALLBACK, cause.value, write.value, seconds))
 
     def expire(self, now: float) -> None:
-        """Do what needs no line: begin the end, store overdue fallbacks of our own table."""
+        """Do the work that needs no line: begin the end, store due fallbacks of our own table."""
         if not self._has_begun:
             return
         if self.is_ending and not self._conditions.are_all_due:
@@ -388,7 +394,7 @@ class Interlocks(WriteListener):
             plc.plan()
 
     def next_due(self) -> float:
-        """Return when there is something to write (clock value in s), infinite for never."""
+        """Return when the next write is due (clock value in s), infinite for never."""
         due = self._refreshes[0][0] if self._refreshes else math.inf
         for plc in self._plcs.values():
             due = plc.next_due(due)

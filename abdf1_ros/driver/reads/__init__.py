@@ -13,9 +13,11 @@
 # limitations under the License.
 
 """
-What is read: which blocks are due, what comes of them, and what is withheld.
+The reads: which blocks are due, what their values become, and which are withheld.
 
-``readings`` takes the words of each block and gives them to the points of its rows (``point``);
-``job`` is one block, ``queue`` the order of all, ``silent`` the reads of stations that do not
-answer, ``guards`` withhold values while the program of a PLC does not run.
+- ``readings``: takes the words of each block and gives them to the points of its rows.
+- ``point``: the last value of one row, and its freshness.
+- ``job``: one block; ``queue``: the order of all blocks.
+- ``silent``: the reads of stations that do not answer.
+- ``guards``: withhold values while the program of a PLC does not run.
 """

@@ -12,10 +12,10 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 """
-Reads that are asked for: each call ends in one answer, and all calls of one row are one read.
+Reads on demand: each call ends in one answer, and all calls of one row share one read.
 
-A row that is read again and again is due at once. One with Period "on demand" has a read of its
-own, for as long as a call waits for it.
+A row that is read periodically is due at once. A row with Period "on demand" has a read of its own
+as long as a call waits for it.
 """
 
 from __future__ import annotations
@@ -51,8 +51,9 @@ class Demands:
     """
     The calls that wait for a read: ``patience`` s, and as long as the read itself may take.
 
-    ``inbox`` takes them from any thread. All else belongs to the link thread. Those of each row in
-    ``waiting`` have the clock value (s) up to which they wait; ``next_expiry`` is the first.
+    ``inbox`` takes calls from any thread. All else belongs to the link thread. ``waiting`` has the
+    calls of each row, each with the clock value (s) until which it waits. ``next_expiry`` is the
+    first of these.
     """
 
     def __init__(self, patience: float) -> None:

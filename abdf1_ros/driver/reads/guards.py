@@ -15,7 +15,7 @@
 """
 Guarded reads: values that are published only while the PLC's program runs (rules 13 to 15).
 
-The port of a PLC answers also while its program is stopped. The numbers of rules are those of
+The port of a PLC answers also while its program is stopped. The rules have the numbers of
 docs/heartbeats.md.
 """
 
@@ -100,7 +100,7 @@ class CounterGuard(Guard):
 
 
 class Guards:
-    """The guards of all rows with While; ``counters`` has those of counters, by tag."""
+    """The guards of all rows with While; ``counters`` has the guards of counters, by tag."""
 
     def __init__(self) -> None:
         self._runs: dict[int, RunGuard] = {}

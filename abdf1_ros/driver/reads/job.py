@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""A block that is read again and again, in as many packets as it takes."""
+"""A block that is read again and again, in one or more packets."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ class Intervals:
         self._since: float | None = None
 
     def good_read(self, now: float) -> None:
-        """Take note of a good read."""
+        """Record a good read."""
         if self._since is not None:
             self.last = now - self._since
             self.longest = max(self.last, self.longest or 0.0)
@@ -58,12 +58,12 @@ class Intervals:
         self._since = now
 
     def outage(self) -> None:
-        """Take note that a read has failed."""
+        """Record that a read has failed."""
         self.last = self._since = None
 
 
 class _PacketRead(NamedTuple):
-    """One request of a block, the size of its reply, and how to get the words out of that."""
+    """One request of a block, the size of its reply, and the way to decode the reply."""
 
     command: Request
     reply_size: int
@@ -74,15 +74,19 @@ class ReadJob(Job):
     """
     A block to be read again and again, and the ``points`` it serves: where their words are.
 
-    ``due`` is the clock value (s) from which it wants the line. ``refreshed`` is when a write has
-    changed words of the block, the last time before a read that has not come yet; otherwise minus
-    infinity. ``wanted`` is the same for the last call that asks for the block. ``started`` is when
-    the read under way or the last one began; its last packet was ``asked`` for. All
-    packets of a read have to come within ``longest_read`` seconds.
-    ``is_unfinished`` tells that there are packets already, and more to come, or that the last read
-    was too old. ``ticket`` is the number of its valid entry in the queue, 0 for none. ``take`` is
-    called at the end of each packet: with the words after the last one of a read, or with the
-    error.
+    Times are clock values (s).
+
+    - ``due``: when the block is due.
+    - ``refreshed``: when a write has changed words of the block last, until a read after it;
+      otherwise minus infinity.
+    - ``wanted``: the same for the last call that asks for the block.
+    - ``started``: when the read under way, or the last one, began.
+    - ``asked``: when its last packet was sent.
+    - ``longest_read``: seconds within which all packets of a read have to come.
+    - ``is_unfinished``: packets are still missing, or the last read was too old.
+    - ``ticket``: number of its valid entry in the queue, 0 for none.
+    - ``take``: called at the end of each packet, with the words after the last packet of a read,
+      or with the error.
     """
 
     def __init__(self, block: Block, points: Sequence[ReadPoint], line: LineTime,
@@ -113,8 +117,8 @@ class ReadJob(Job):
             self.started, self._late = now, self._line.late
         packet = self._packets[number]
         self._words.append(packet.words_in((yield packet.command)))
-        # Since its first command this process may have stood still, or other commands had the
-        # line for so long that words of one value differ too much in age.
+        # The process may have stood still since the first command, or other commands may have had
+        # the line too long. Then words of one value differ too much in age.
         stood_still, spent = self._line.late - self._late, self._line.now - self.started
         if stood_still > MOST_LATE:
             raise ReadTooOld(f'this process, or its host, stood still for {stood_still:.1f} s')
@@ -123,7 +127,7 @@ class ReadJob(Job):
                 f'its packets took {spent:.1f} s, more than {self.longest_read:.1f} s')
 
     def ended(self, error: Exception | None) -> None:
-        """Let the packet be made use of; after an error the next read begins anew."""
+        """Hand the packet on; after an error the next read begins anew."""
         words = None
         if error is None and len(self._words) == len(self._packets):
             words = b''.join(self._words)
@@ -134,13 +138,13 @@ class ReadJob(Job):
         self._take(self, words, error)
 
     def done(self, now: float) -> None:
-        """Take note of a good read."""
+        """Record a good read."""
         if self.started >= self.refreshed:
             self.refreshed = -math.inf
         self.intervals.good_read(now)
 
     def interrupted(self) -> None:
-        """Take note that a read has failed: the next one begins anew."""
+        """Record that a read has failed: the next one begins anew."""
         self.intervals.outage()
         self._words.clear()
         self.is_unfinished = False

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""What is known about a mapping that reads, and the guard that may withhold its values."""
+"""The state of a row that reads, and the guard that may withhold its values."""
 
 from __future__ import annotations
 
@@ -25,12 +25,12 @@ from abdf1_ros.settings.mapping import Mapping, Publish
 # 0.3 / 0.1 is a little less than 3.
 _ROUNDING = 1e-9
 
-# Weight of the newest of several intervals, where the usual one is wanted.
+# Weight of the newest interval in the usual interval.
 SMOOTHING = 0.125
 
 
 class Freshness(Enum):
-    """How good the last value of a point is."""
+    """The freshness of the last value of a point."""
 
     FRESH = 'fresh'
     LATE = 'late'
@@ -57,7 +57,7 @@ class _Changes:
         self._published_at = -math.inf
 
     def keeps_back(self, values: Values, now: float, *, is_due: bool) -> bool:
-        """Tell whether values are not published: nothing has changed, and it is not time again."""
+        """Tell whether values are kept back: nothing has changed, and Max_Silence is not over."""
         if not is_due and now - self._published_at < self._max_silence \
                 and not self._is_change(values):
             return True
@@ -79,17 +79,22 @@ class _Changes:
 
 class ReadPoint:
     """
-    What is known about one mapping that reads.
+    The state of one row that reads.
 
-    ``period`` and ``stale_time`` are in seconds. A value is late when it is older than one and a
-    half periods and older than half of ``stale_time``; it is stale when older than ``stale_time``.
-    ``interval`` is the seconds between the last two good reads, None if a failed or withheld one
-    was between them. ``kept`` is the usual interval (s), None before it is known; a single long
-    one, as when the port was left to others, does not count. ``error`` says why the last read
-    gave no value, ``withheld`` why its value was not published. Values are withheld since
-    ``withheld_since`` (clock value in s), and this is the ``withholdings``-th time. ``guard``
-    decides that, where the row has one; what its condition rests on may be as old as
-    ``patience``, in seconds.
+    A value is late if it is older than one and a half periods and older than half of
+    ``stale_time``. It is stale if it is older than ``stale_time``.
+
+    - ``period``, ``stale_time``: in seconds.
+    - ``interval``: seconds between the last two good reads, None if a failed or withheld read was
+      between them.
+    - ``kept``: usual interval (s), None before it is known. A single long interval does not count,
+      as when the port was left to another program.
+    - ``error``: why the last read gave no value.
+    - ``withheld``: why its value was not published; ``withheld_since``: since when (clock value,
+      s).
+    - ``withholdings``: how often values were withheld.
+    - ``guard``: the guard of the row, if it has one; ``patience``: oldest age (s) of the state
+      that its condition depends on.
     """
 
     def __init__(self, mapping: Mapping, period: float, stale_time: float,
@@ -143,14 +148,14 @@ class ReadPoint:
         return self._scaling.publish(values)
 
     def values_of(self, words: bytes) -> Values:
-        """Return the values that words stand for, as they are published."""
+        """Return the values of words, as they are published."""
         values = self._decode(words)
         if self._scaling is None or isinstance(values, str):
             return values
         return self._scaling.publish(values)
 
     def fail(self, error: str) -> bool:
-        """Take note that a read gave no value; return whether the reason is a new one."""
+        """Record that a read gave no value; return True if the reason is new."""
         is_news = error != self.error
         if self.guard is not None:
             self.guard.withheld.discard(self)
@@ -160,9 +165,9 @@ class ReadPoint:
 
     def withhold(self, reason: str, now: float) -> bool:
         """
-        Take note that a value is not published; return whether to report that, once a cause.
+        Record that a value is withheld; return True, once for each cause, to report it.
 
-        At the start nothing holds; that is reported when it has had its time to begin.
+        At the start every condition is still open. It is reported only after one stale time.
         """
         if not self.withheld:
             self.withheld_since, self._is_told = now, False
@@ -178,14 +183,14 @@ class ReadPoint:
 
     @property
     def is_withheld(self) -> bool:
-        """Tell whether its values are read and not published, and that has been reported."""
+        """Tell whether its values are withheld, and this has been reported."""
         return bool(self.withheld) and self._is_told and self.error is None
 
     def is_due(self, now: float, block_period: float) -> bool:
         """
-        Tell whether a read that is made now is for this point.
+        Tell whether a read made now is for this point.
 
-        Its block is read every ``block_period`` seconds, more often than it wants.
+        Its block is read every ``block_period`` seconds, more often than its Period asks.
         """
         if self.last_good is None or self.error is not None:
             return True
@@ -219,7 +224,7 @@ class Guard:
     """
     One condition of a station, and the ``points`` whose values may be published while it holds.
 
-    ``withheld`` are those of them that are withheld, which has been reported.
+    ``withheld`` are the points that are withheld and reported.
     """
 
     def __init__(self) -> None:
@@ -234,5 +239,5 @@ class Guard:
         self._since[point.patience] = math.inf
 
     def why_not(self, point: ReadPoint, started: float, now: float) -> str:
-        """Return why a value read from ``started`` on is not to be published, empty if it is."""
+        """Return why a value whose read began at ``started`` is withheld, empty if it is not."""
         raise NotImplementedError

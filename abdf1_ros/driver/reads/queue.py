@@ -20,14 +20,14 @@ each block is read within its period as long as the line is fast enough. When th
 and a read is late by more than its period, three of four turns go to the read that is the most
 periods late. So all periods become longer by about the same factor: many slow reads do not make
 the fast ones as slow as themselves. The fourth turn still goes to the earliest deadline: a period
-that no line can keep does not block the others.
+that no line can keep does not block other reads.
 
-A read that a call has asked for goes first. Then the others have the line three times as long as
-one of its packets takes, so calls get a quarter of a full line, however many there are.
+A read that a call has asked for goes first. Then all other reads have the line three times as long
+as one of its packets takes. So calls get a quarter of a full line, however many there are.
 
 A block of several packets is in the queue once for each packet, so other reads wait for one packet
-at most. A read without a period is due again as soon as it has begun. It gets the time that the
-others leave: its period counts as four times the time of reading everything once.
+at most. A read without a period is due again as soon as it has begun. It gets the time that all
+other reads leave: its period counts as four poll cycles.
 """
 
 from __future__ import annotations
@@ -52,9 +52,9 @@ _QueueEntry = tuple[float, int, ReadJob]
 
 class ReadQueue:
     """
-    All read jobs, those of one period in the order in which they are due.
+    All read jobs; the jobs of one period are in the order in which they are due.
 
-    ``jobs`` are all of them, also those that are set aside or under way.
+    ``jobs`` are all jobs, also jobs that are set aside or under way.
     """
 
     def __init__(self) -> None:
@@ -62,7 +62,7 @@ class ReadQueue:
         self._poll_cycle = 0.0
         self._wanted: list[_QueueEntry] = []
         self._heaps: dict[float, list[_QueueEntry]] = {_WANTED: self._wanted}
-        self._wanted_from = -math.inf  # where others are due (clock value in s)
+        self._wanted_from = -math.inf  # before it other due reads go first (clock value in s)
         self._tickets = itertools.count(1)
         self._turn = 0
 
@@ -90,7 +90,8 @@ class ReadQueue:
         heap = self._heaps.setdefault(_WANTED if is_wanted else job.block.period, [])
         heapq.heappush(heap, (due, job.ticket, job))
         if len(heap) > _MOST_ENTRIES * len(self.jobs):
-            # A refresh of a slow read leaves an old entry, which would stay until it had been due.
+            # A refresh of a slow read leaves an old entry, which would stay until its old due
+            # time.
             heap[:] = (entry for entry in heap if entry[1] == entry[2].ticket)
             heapq.heapify(heap)
 

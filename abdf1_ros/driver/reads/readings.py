@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""What comes of reads: values to publish, rows that fail, other blocks to be read instead."""
+"""The results of reads: values to publish, failed rows, other blocks to read instead."""
 
 from __future__ import annotations
 
@@ -51,34 +51,34 @@ from abdf1_ros.settings.mapping import Mapping
 from abdf1_ros.settings.network import Network
 from abdf1_ros.settings.rows import Rows
 
-# Other commands go between the packets of one read. On a busy line the read may take so many times
-# its own time.
+# Other commands go between the packets of one read. On a busy line the read may take this many
+# times its own time.
 _TURNS_OF_A_READ = 10
 
 
 class ValueListener(Protocol):
-    """Gets what was read; called in the link thread. What is not overridden does nothing."""
+    """A listener to reads, called in the link thread; methods not overridden do nothing."""
 
     def read(self, mapping: Mapping, values: Values) -> None:
         """Take the values of a good read that are to be published."""
 
     def unreadable(self, mapping: Mapping, reason: str) -> None:
-        """Take note that a station answers without a usable value; once for each reason."""
+        """Take a reply without a usable value; called once for each reason."""
 
     def written(self, result: WriteResult) -> None:
         """Take the one result of a write."""
 
     def published_again(self, mapping: Mapping, seconds: float) -> None:
-        """Take note that rows are no longer withheld, of which ``mapping`` was the last one."""
+        """Rows are no longer withheld; ``mapping`` was the last of them."""
 
 
 class Readings:
     """
     The ``points`` of all rows that are published, and the ``reads`` that serve them.
 
-    ``listener`` is notified, and ``record`` of all words. ``planner`` knows which packets each
-    station takes. ``mode_periods`` says which stations have to be asked for their mode, and how
-    often (s).
+    ``listener`` gets the values, ``record`` all words. ``planner`` knows the packets that each
+    station takes. ``mode_periods`` has the stations that have to be asked for their mode, with the
+    period (s).
     """
 
     def __init__(self, network: Network, mappings: Rows, settings: DriverSettings,
@@ -105,7 +105,7 @@ class Readings:
 
     @property
     def blocks(self) -> list[Block]:
-        """Return what is read again and again, together."""
+        """Return the blocks that are read again and again."""
         return [job.block for job in self.reads.jobs if not job.is_on_demand]
 
     def _job(self, block: Block) -> ReadJob:
@@ -115,7 +115,7 @@ class Readings:
         return ReadJob(block, points, self._line, self._packet_ended, longest)
 
     def want(self, demand: Demand, now: float) -> None:
-        """Read a row at once for a call; one for a silent station is answered without that."""
+        """Read a row at once for a call; a silent station's row is answered without a read."""
         mapping = demand.mapping
         station = self._stations[mapping.station]
         if not station.replies_in_time:
@@ -128,7 +128,7 @@ class Readings:
         self.reads.want(job, now)
 
     def _settle(self, job: ReadJob, words: bytes | None, error: Exception | None) -> None:
-        """Answer the calls for a read that has ended, unless it is made again."""
+        """Answer the calls for a read that has ended, unless it is repeated."""
         if job.is_unfinished or job not in self.reads.jobs:
             return
         waiting = self.demands.waiting
@@ -178,7 +178,8 @@ class Readings:
         is_refresh = job.refreshed > -math.inf or job.wanted > -math.inf
         for point, place in job.points.items():
             has_recovered |= point.error is not None
-            is_rare = point.period > period and not is_refresh  # others are for every read
+            # all other points are for every read
+            is_rare = point.period > period and not is_refresh
             if is_rare and not point.is_due(now, period):
                 continue
             if point.guard is None:
@@ -194,7 +195,7 @@ class Readings:
     def _guarded(self, point: ReadPoint, guard: Guard, words: bytes, started: float) -> None:
         """Update a point with words that were read from ``started`` on, unless it is withheld."""
         if reason := guard.why_not(point, started, self._line.now):
-            if point.mapping.is_on_demand:  # its call has the reason
+            if point.mapping.is_on_demand:  # the call gets the reason
                 point.withheld = reason
             else:
                 self._withhold(point, guard, reason)
@@ -214,7 +215,7 @@ class Readings:
                 self._guarded(point, point.guard, words, started)
 
     def _withhold(self, point: ReadPoint, guard: Guard, reason: str) -> None:
-        """Withhold a value; reported once for all rows that depend on the same (rule 15)."""
+        """Withhold a value; report it once for all rows with the same condition (rule 15)."""
         is_first = not guard.withheld
         if point.withhold(reason, self._line.now) and is_first:
             count = len(guard.points)
@@ -222,14 +223,14 @@ class Readings:
             self._listener.unreadable(point.mapping, f'withheld: {reason}{more}')
 
     def _release(self, point: ReadPoint, guard: Guard, words: bytes) -> None:
-        """Update a point whose values were withheld; reported with the last of the guard."""
+        """Update a withheld point; report it with the last point of the guard."""
         self._update(point, words)
         if not guard.withheld:
             self._listener.published_again(
                 point.mapping, self._line.now - point.withheld_since)
 
     def served(self, mapping: Mapping, words: bytes) -> None:
-        """Take words of ours that the other end has written."""
+        """Take words of our own table that a PLC has written."""
         self._update(self.points[mapping], words)
 
     def _update(self, point: ReadPoint, words: bytes) -> None:
@@ -242,7 +243,7 @@ class Readings:
                 self._listener.read(point.mapping, values)
 
     def unreadable(self, point: ReadPoint, reason: str) -> None:
-        """Take note why a row has no value, and report a new reason."""
+        """Record why a row has no value, and report a new reason."""
         if point.fail(reason):
             self._listener.unreadable(point.mapping, reason)
 
@@ -272,7 +273,7 @@ class Readings:
             self.reads.replace(old, map(self._job, change.new), self._line.now)
 
     def told(self, station: int, identity: Identity | None, asked: float) -> None:
-        """Use what a station has said to be since it was ``asked`` (clock value, s), if it did."""
+        """Use the processor that a station has named, if any, after ``asked`` (clock value, s)."""
         if late := self.guards.mode_told(station, identity, asked):
             self.reads.go_first(late)
         if identity is not None:
@@ -285,11 +286,11 @@ class Readings:
             return
         self._stations[station].failures += 1
         for point in self._affected(station, points):
-            if not point.mapping.is_on_demand:  # the call has the error
+            if not point.mapping.is_on_demand:  # the call gets the error
                 point.fail(str(error))
 
     def _affected(self, station: int, points: Iterable[ReadPoint]) -> Iterable[ReadPoint]:
-        """Return the points of a failed transaction, all of the station where it is silent."""
+        """Return the points of a failed transaction; for a silent station all its points."""
         if self._stations[station].replies_in_time:
             return points
         return [point for point in self.points.values() if point.mapping.station == station]
@@ -300,7 +301,7 @@ class Readings:
                            if mapping.station == station], str(StationInactive(station)))
 
     def port_lost(self, reason: str) -> None:
-        """Fail all that depends on the port."""
+        """Fail all points that depend on the port: it is lost."""
         self.demands.close(reason)
         self.reads.drop([job for job in self.reads.jobs if job.is_on_demand], self._line.now)
         for job in self.reads.jobs:
@@ -316,7 +317,7 @@ def _points(mappings: Rows, blocks: Sequence[Block], settings: DriverSettings, g
     """Return the points of all mappings that are published, in their order."""
     default = settings.default_period
     stale = stale_times(blocks, default, settings.stale_after, own, is_heard=is_heard)
-    # What is read on demand is never stale; the mode that While RUN asks for may be.
+    # A row on demand is never stale, but the mode for While RUN may be.
     stale |= {mapping: settings.stale_after * period_of(mapping, default)
               for mapping in mappings.on_demand}
     return {mapping: _served_point(mapping, settings) if mapping.serves
@@ -326,7 +327,7 @@ def _points(mappings: Rows, blocks: Sequence[Block], settings: DriverSettings, g
 
 
 def _served_point(mapping: Mapping, settings: DriverSettings) -> ReadPoint:
-    # Without a Period the other end may write at any time, or never.
+    # Without a Period a PLC may write at any time, or never.
     expected = mapping.period / 1000 if mapping.period else math.inf
     point = ReadPoint(mapping, expected, settings.stale_after * expected)
     point.last_good = None if mapping.period else 0.0

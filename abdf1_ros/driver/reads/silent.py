@@ -13,7 +13,7 @@
 # limitations under the License.
 
 """
-All reads of a line: those that wait in the order of ``queue``, and those set aside.
+All reads of a line: waiting ones in the order of ``queue``, and reads that are set aside.
 
 The reads of a station are set aside while it is inactive, or while it acknowledges commands
 without replying in time. Now and then one of them is sent as a probe.
@@ -33,7 +33,7 @@ from abdf1_ros.driver.record import Claim, WriteListener
 
 
 class Reads(WriteListener):
-    """Keep all read jobs; ``stations.probes`` says when one of a silent station may be sent."""
+    """Keep all read jobs; ``stations.probes`` decides when a silent station may be read."""
 
     def __init__(self, stations: ActiveStationList) -> None:
         self._stations = stations
@@ -58,7 +58,7 @@ class Reads(WriteListener):
 
     @property
     def longest_poll_cycle(self) -> float | None:
-        """Return the longest time (s) there has ever been between two good reads of a job."""
+        """Return the longest time (s) ever between two good reads of a job."""
         return max((job.intervals.longest for job in self.jobs
                     if job.intervals.longest is not None), default=None)
 
@@ -67,7 +67,7 @@ class Reads(WriteListener):
         self._due.replace(old, new, now)
 
     def want(self, job: ReadJob, now: float) -> None:
-        """Make a read due at once that a call has asked for, also one that was not there."""
+        """Make a read due at once that a call has asked for; add it if it is new."""
         job.wanted = now
         if job not in self._due.jobs:
             self._due.replace((), [job], now)
@@ -88,10 +88,10 @@ class Reads(WriteListener):
         """
         Return a probe if one may be sent, or else the next read that is due.
 
-        It is of a station that answers and is not ``busy``.
+        The read is for a station that answers and is not ``busy``.
         """
         if self._aside:
-            self.find_due(now)  # a station may have died in another way
+            self.find_due(now)  # a station may have become silent by another command
             if job := self._probe(now, busy):
                 return job
         passed_over = []
@@ -108,7 +108,7 @@ class Reads(WriteListener):
         return job
 
     def next_proven(self, due: float, busy: Container[int]) -> ReadJob | None:
-        """Return the next read that was due then, of a station that has replied; None for none."""
+        """Return the next read due at ``then`` of a station that has replied; None for none."""
         passed_over = []
         while (job := self._due.take(due)) is not None:
             station = self._stations.records[job.station]
@@ -135,11 +135,12 @@ class Reads(WriteListener):
         job = jobs.popleft()
         job.due, job.is_probe = now, True
         if jobs:
-            self._aside[station] = jobs  # to the end: the next probe goes to another station
+            # moved to the end, so that the next probe goes to another station
+            self._aside[station] = jobs
         return job
 
     def find_due(self, now: float) -> bool:
-        """Set reads of silent stations aside; return whether another one is due."""
+        """Set reads of silent stations aside; return True if another read is due."""
         while (job := self._due.first(now)) is not None:
             if self._stations[job.station].replies_in_time:
                 return True
@@ -179,7 +180,7 @@ class Reads(WriteListener):
             self._due.put(job, max(job.due + job.block.period, job.started))
 
     def write_ended(self, claim: Claim) -> None:
-        """Make the reads of all words that it may have changed due at once."""
+        """Make the reads of all words that the write may have changed due at once."""
         now = claim.done
         if not claim.has_changed or claim.write is not None and claim.write.mapping.is_heartbeat:
             return

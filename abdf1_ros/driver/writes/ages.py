@@ -13,10 +13,11 @@
 # limitations under the License.
 
 """
-How old a message is, as far as clocks can be trusted (rule 7 of docs/heartbeats.md).
+The age of a message, as far as clocks can be trusted (rule 7 of docs/heartbeats.md).
 
-Its stamp is of the clock of its publisher. Where that is ahead, an old message looks new; so it
-does where the clock here was set back, or where this process stood still and the message waited.
+The time stamp comes from the clock of the publisher. An old message looks new in three cases: the
+publisher's clock is ahead, our clock was set back, or this process stood still while the message
+waited.
 """
 
 from __future__ import annotations
@@ -27,22 +28,22 @@ import math
 from abdf1_ros.errors import FormatError
 from abdf1_ros.settings.mapping import Mapping
 
-# A stamp may be ahead by so many seconds, or by a quarter of the time after which a fallback or a
-# 0 is written.
+# A stamp may be ahead by this many seconds, or by a quarter of the time after which a fallback or
+# a 0 is written.
 MOST_AHEAD = 0.2
 _SHARE = 4
 
-# A clock that was ahead is remembered for so many seconds, twice that at most.
+# Seconds for which a clock that was ahead is remembered; at most twice that.
 _REMEMBERED = 5.0
 
-# The process looks at least so often (s). Where it has not, messages that come within so many
-# seconds after that may have waited all the time.
+# Longest time (s) between two looks of a running process, and seconds after a longer pause in
+# which messages may have waited all the time.
 _LOOKS = 0.25
 _DRAINED = 0.5
 
 
 def most_ahead(topic: str, mappings: Iterable[Mapping]) -> float | None:
-    """Return by how much (s) stamps may be ahead, None where no fallback or heartbeat depends."""
+    """Return by how much (s) stamps may be ahead, None if nothing depends on them."""
     times = [mapping.fallback.after for mapping in mappings
              if mapping.fallback and mapping.topic == topic]
     times += [mapping.condition.timeout or 0 for mapping in mappings
@@ -52,9 +53,9 @@ def most_ahead(topic: str, mappings: Iterable[Mapping]) -> float | None:
 
 class RecentMax:
     """
-    The greatest of the numbers that came in the last ``seconds``, twice that at most.
+    The greatest number that came in the last ``seconds``, at most twice that.
 
-    Nothing is forgotten while nothing comes.
+    It forgets only when a new number comes.
     """
 
     def __init__(self, seconds: float) -> None:
@@ -71,7 +72,7 @@ class RecentMax:
 
 
 class Standstills:
-    """Finds out that this process has stood still; ``look`` is to be called ten times a second."""
+    """A detector of pauses of this process; call ``look`` ten times a second."""
 
     def __init__(self) -> None:
         self._looked = math.inf
@@ -84,7 +85,7 @@ class Standstills:
         self._looked = now
 
     def least_age(self, now: float) -> float:
-        """Return how old (s) a message may be that comes now, whatever its stamp says."""
+        """Return the age (s) that a message received now may have, whatever its stamp."""
         self.look(now)
         return self._length if now < self._ended + _DRAINED else 0.0
 
@@ -94,7 +95,7 @@ class Ages:
     The ages of the messages of one topic, which have to be younger than ``patience`` (s).
 
     Stamps may be ahead by ``allowed`` s; None where no fallback or heartbeat depends on them.
-    ``lead`` is by how much they were ahead lately (s).
+    ``lead`` is by how much stamps were ahead lately (s).
     """
 
     def __init__(self, patience: float, standstills: Standstills, allowed: float | None) -> None:
@@ -112,10 +113,10 @@ class Ages:
 
     def of(self, stamps: Iterable[float], wall: float, now: float) -> float:
         """
-        Return how old (s) a message is that was published and received at these stamps (s).
+        Return the age (s) of a message with these times of publication and reception (s).
 
-        It is ``wall`` by the clock of stamps, and ``now`` by one that is never set. Raises
-        FormatError where it is too old, or where that is unknown.
+        ``wall`` is the present time of the clock of stamps, ``now`` of a clock that is never set.
+        Raises FormatError if the message is too old, or if its age is unknown.
         """
         ages = [wall - stamp for stamp in stamps]
         ahead = -min([0.0, *ages])

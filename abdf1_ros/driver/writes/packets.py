@@ -32,7 +32,7 @@ from abdf1_ros.pccc.fields import word
 from abdf1_ros.pccc.status import check_status, STS_ILLEGAL_COMMAND
 from abdf1_ros.pccc.steps import data_of
 
-# After these a station may carry out what comes next.
+# After these errors a station may execute the next packet.
 _TAKEN_OR_NOT = RemoteError, CommandTimeout, StationInactive
 
 REWRITTEN = ('by reading the word and writing it back; a change that the PLC made in between is '
@@ -44,8 +44,8 @@ def carry_out(write: Write, clock: Callable[[], float], *,
     """
     Send every packet of a write, as long as each is confirmed; ``clock`` gives seconds.
 
-    With ``goes_on`` also after one that was refused, or that the station has not answered: it may
-    carry out the others.
+    With ``goes_on`` it continues after a packet that was refused or not answered: the station may
+    execute the remaining packets.
     """
     done, detail, failed = 0, '', None
     for packet in range(len(write.commands)):

@@ -48,7 +48,7 @@ class MessageJob(WriteJob):
         super().__init__(write, writing)
         patience = queue.patience_of(write.mapping) + slack
         self.expires = write.requested + patience
-        # With a fallback all packets of a long write have to leave before it is due.
+        # If the row has a fallback, all packets of a long write have to leave before it is due.
         self.patience = 0.0 if write.mapping.fallback else patience
         self._queue = queue
 
@@ -62,11 +62,11 @@ class WriteQueue:
     """
     Keep writes until they have the line, for ``patience`` seconds at most.
 
-    They are in ``waiting``. ``report`` gets the results. ``tx_delay`` (s) comes before each
-    transmission. A write to a silent station is a probe; one that ``stations.probes`` does not
-    admit ends unsent. Another thread may only ask for the length. ``next_expiry`` is when
-    ``expire`` has something to do (clock value in s). ``leave_out`` returns why a write is not
-    needed that would have the line now, empty where it is.
+    Writes are in ``waiting``. ``report`` gets the results. ``tx_delay`` (s) comes before each
+    transmission. A write to a silent station is a probe; if ``stations.probes`` does not admit it,
+    it ends unsent. ``next_expiry`` is when ``expire`` has work (clock value in s). Another thread
+    may only ask for the length. ``leave_out`` returns why a write that would have the line now is
+    not needed, empty if it is.
     """
 
     def __init__(self, stations: ActiveStationList, writing: WritesUnderWay, patience: float,
@@ -75,7 +75,7 @@ class WriteQueue:
         self._writing = writing
         self._patience = patience
         self.report = report
-        # It does not count as waiting: it comes before a probe, and before the command.
+        # TX_Delay is not waiting time; it occurs twice: before the probe and before the command.
         self._slack = 2 * tx_delay
         self.waiting: deque[Write] = deque()
         self.leave_out: Callable[[Write, float], str] = lambda write, now: ''
@@ -84,16 +84,16 @@ class WriteQueue:
         self.next_expiry = math.inf
 
     def __len__(self) -> int:
-        """Return how many wait."""
+        """Return the number of writes that wait."""
         return len(self.waiting)
 
     def add(self, write: Write, now: float) -> None:
         """
-        Let a write wait, in the place of an older value of its mapping, or as one with an equal.
+        Let a write wait: in the place of an older value of its row, or merged with an equal one.
 
-        If it went to the end instead, a topic that is published again and again would never have
-        its turn. But it must not overtake a later write of another mapping to the same words. In
-        that case the older value is sent as well, or two such topics would delay each other for
+        At the end of the queue, a topic that is published again and again would never have its
+        turn. But the write must not overtake a later write of another mapping to the same words.
+        In that case the older value is sent as well, or two such topics would delay each other for
         ever.
         """
         write.came = now
@@ -118,7 +118,7 @@ class WriteQueue:
             self.waiting.insert(len(self.waiting) if is_overlapped else at, write)
 
     def _append(self, write: Write, now: float) -> None:
-        """Let a write wait after all others; of too many the oldest of the fullest row ends."""
+        """Let a write wait after all others; of too many, the oldest of the fullest row ends."""
         self.waiting.append(write)
         if len(self.waiting) > MAX_WAITING_WRITES:
             (row, count), = Counter(each.mapping for each in self.waiting).most_common(1)
@@ -127,7 +127,7 @@ class WriteQueue:
                 self._end(oldest, Outcome.SUPERSEDED, '', now)
 
     def _share_words(self, one: Mapping, other: Mapping) -> bool:
-        """Tell whether two rows write the same words, or bits; that takes long to find out."""
+        """Tell whether two rows write the same words, or bits; the result is cached."""
         known = self._shared.get((one, other))
         if known is None:
             known = self._shared[one, other] = one.shares_words(other)
@@ -153,7 +153,7 @@ class WriteQueue:
         return None
 
     def _gives_way(self, write: Write, now: float) -> bool:
-        """Tell whether a change is left out, as the line does not carry all of its row."""
+        """Tell whether a change is superseded, as the line does not carry all of its row."""
         within = min(CARRIED_WITHIN, self.patience_of(write.mapping) / 2)
         return now > write.came + within \
             and self._begun.get(write.mapping, -math.inf) > write.came \
@@ -174,7 +174,7 @@ class WriteQueue:
         return None
 
     def youngest(self) -> dict[Mapping, float]:
-        """Return when the youngest message that waits or is under way was published, by row."""
+        """Return, by row, when the youngest message that waits or is under way was published."""
         found: dict[Mapping, float] = {}
         for write in itertools.chain(self.waiting, self._writing.record.messages()):
             if write.mapping.fallback is not None:
@@ -183,7 +183,7 @@ class WriteQueue:
         return found
 
     def expire(self, now: float) -> None:
-        """End the writes, and messages, that are not to be sent any more."""
+        """End the writes and messages that must not be sent any more."""
         self.next_expiry = math.inf
         for write in list(self.waiting):
             if reason := self._reject_reason(write, now):
@@ -199,7 +199,7 @@ class WriteQueue:
             self.next_expiry = min(self.next_expiry, write.oldest + patience)
 
     def patience_of(self, mapping: Mapping) -> float:
-        """Return how long (s) a message may wait: less where a fallback is due before (rule 7)."""
+        """Return how long (s) a message may wait: less if a fallback is due earlier (rule 7)."""
         after = mapping.fallback.after / 1000 if mapping.fallback else math.inf
         return min(self._patience, after)
 
@@ -216,7 +216,7 @@ class WriteQueue:
 
     def _tell(self, write: Write, origins: Iterable[Origin], outcome: Outcome, detail: str,
               now: float) -> None:
-        """Report the same result for messages of a write that waits, or did."""
+        """Report the same result for several messages of a write."""
         for result in write.result(outcome, detail, now).of(origins, now):
             self.report(result)
 
@@ -225,13 +225,13 @@ class WriteQueue:
         return write.requested + self.patience_of(write.mapping)
 
     def why_too_old(self, write: Write, now: float) -> str:
-        """Return that a message has waited too long to be written, empty if it has not."""
+        """Return the reason if a message has waited too long to be written, otherwise empty."""
         if now < self._expiry(write):
             return ''
         return _WAITED_LONGER % self.patience_of(write.mapping)
 
     def _reject_reason(self, write: Write, now: float) -> str:
-        """Return why a write is not to be sent any more, empty if it is."""
+        """Return why a write must not be sent any more, empty if it may."""
         if reason := self.why_too_old(write, now):
             return reason
         station = write.mapping.station

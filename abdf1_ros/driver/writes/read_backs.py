@@ -13,10 +13,9 @@
 # limitations under the License.
 
 """
-Unconfirmed writes: the next read of the words shows what the PLC holds.
+Unconfirmed writes: the next read of their words shows what the PLC holds.
 
-The results of such a write wait for that read, but not longer than a write may wait for the
-line.
+The results of such a write wait for that read, at most as long as a write may wait for the line.
 """
 
 from __future__ import annotations
@@ -44,9 +43,9 @@ class ReadBacks(WriteListener):
     """
     The writes that wait to be read back, for ``patience`` seconds at most.
 
-    ``report`` gets their results, ``line`` tells the time. ``next_expiry`` is when the first
-    will have waited too long (clock value in s), infinite for never. All of it belongs to the
-    link thread.
+    ``report`` gets their results, ``line`` has the time. ``next_expiry`` is when the first write
+    will have waited too long (clock value in s), infinite for never. All of it belongs to the link
+    thread.
     """
 
     def __init__(self, line: LineTime, patience: float,
@@ -59,7 +58,7 @@ class ReadBacks(WriteListener):
 
     def add(self, write: Write, result: WriteResult, blocks: Iterable[Block],
             now: float) -> None:
-        """Take an unconfirmed write; report at once where none of ``blocks`` reads its words."""
+        """Take an unconfirmed write; report at once if none of ``blocks`` reads its words."""
         entry = _UnconfirmedWrite(write, result, now)
         if any(block.extent.holds(write.mapping.extent) for block in blocks):
             self._waiting.append(entry)
@@ -68,7 +67,7 @@ class ReadBacks(WriteListener):
             self._tell(entry, 'not read back: no row reads all of these words', now)
 
     def words_read(self, block: Block, data: bytes, started: float) -> None:
-        """Compare the data of a block whose read ``started`` at that clock value (s)."""
+        """Compare the data of a block; its read began at ``started`` (clock value, s)."""
         for entry in self._waiting[:]:
             mapping = entry.write.mapping
             if started >= entry.since and block.extent.holds(mapping.extent):
@@ -77,20 +76,20 @@ class ReadBacks(WriteListener):
                 self._end(entry, f'read back: the PLC holds {which}', self._line.now)
 
     def write_begins(self, claim: Claim) -> None:
-        """End those whose words a newer write changes, which is sent now."""
+        """End the writes whose words a newer write changes; it is sent now."""
         for entry in self._waiting[:]:
             if claim.meets(entry.write.mapping.extent):
                 self._end(entry, 'not read back: a newer write of these words has gone out',
                           claim.begun)
 
     def expire(self, now: float) -> None:
-        """End those that have waited too long."""
+        """End the writes that have waited too long."""
         for entry in self._waiting[:]:
             if now >= entry.since + self._patience:
                 self._end(entry, f'not read back within {self._patience:g} s', now)
 
     def end(self, now: float) -> None:
-        """End all: the port is lost."""
+        """End all writes: the port is lost."""
         for entry in self._waiting[:]:
             self._end(entry, 'not read back before the line went down', now)
 

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""What all writes have in common, whoever asked for them: packets, retries of bits, their end."""
+"""The common part of all writes, of messages and our own: packets, retries of bits, their end."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ class WriteJob(Job):
     """
     A write that has the line; ``result`` is there when it has ended.
 
-    With ``is_free`` what it takes of a silent station is not its probes'.
+    With ``is_free`` its time at a silent station does not count as time of probes.
     """
 
     result: WriteResult
@@ -45,19 +45,20 @@ class WriteJob(Job):
     def __init__(self, write: Write, writing: WritesUnderWay) -> None:
         self.write = write
         self.station = write.mapping.station
-        self.goes_on = False  # also after a packet that is not confirmed
+        self.goes_on = False  # continue after a packet that is not confirmed
         self._writing = writing
         self.claim = writing.begin(write)
 
     def steps(self, now: float) -> Steps[None]:
         """Send every packet."""
-        bug = PortLost(INTERNAL_ERROR)  # where nothing else comes: it ends the use of the port
+        # the result if no other comes: a bug ends the use of the port
+        bug = PortLost(INTERNAL_ERROR)
         self.result = self.write.result(Outcome.UNKNOWN, str(bug), now, error=bug)
         self.result = yield from self._writing.carry_out(self.write, self.goes_on)
 
 
 class WritesUnderWay:
-    """Carries out writes, and takes their ends: in ``record``, of stations, and of reads."""
+    """Carry out writes, and report their ends to ``record``, to stations and to reads."""
 
     def __init__(self, stations: ActiveStationList, record: WriteRecord, readings: Readings,
                  patience: float, report: Callable[[WriteResult], None]) -> None:
@@ -70,18 +71,18 @@ class WritesUnderWay:
         self.spent: dict[Mapping, float] = {}  # s of the line, by messages of a row
 
     def begin(self, write: Write) -> Claim:
-        """Take note that a write is under way, until it has ``ended``."""
+        """Record that a write is under way, until it has ``ended``."""
         station = write.mapping.station
         write.is_probe = station != BROADCAST and not self.stations[station].replies_in_time
         return self.record.begin(station, (write.mapping.extent,), write)
 
     def carry_out(self, write: Write, goes_on: bool) -> Steps[WriteResult]:
-        """Send every packet of a write, in the packets that its station takes."""
+        """Send a write in the packets that its station takes."""
         write.speak(self._readings.planner.dialect(write.mapping))
         return (yield from carry_out(write, lambda: self.line.now, goes_on=goes_on))
 
     def ended(self, job: WriteJob) -> None:
-        """Take note of the end of a write."""
+        """Record the end of a write."""
         write, result, station = job.write, job.result, job.station
         if station != BROADCAST and not (job.is_free and write.is_probe):
             self.stations.tried(station, job.claim.begun, self.line.now, was_silent=write.is_probe,
@@ -96,7 +97,7 @@ class WritesUnderWay:
         self.record.ended(job.claim, result.outcome, may_land=result.is_unconfirmed)
 
     def report(self, job: WriteJob) -> None:
-        """Report the result of each message, after a read where it is unconfirmed."""
+        """Report the result of each message; an unconfirmed result waits for a read."""
         if job.result.is_unconfirmed:
             self.read_backs.add(job.write, job.result, self._readings.blocks, self.line.now)
         else:
