@@ -13,9 +13,9 @@
 # limitations under the License.
 
 """
-What the node adds to heartbeats and fallback values: the executor, and other publishers.
+What only the node can watch for heartbeats and fallbacks: the executor, and the publishers.
 
-The numbers of rules are those of docs/heartbeats.md.
+docs/heartbeats.md has the numbered rules.
 """
 
 from __future__ import annotations
@@ -27,18 +27,19 @@ from rclpy.clock import Clock, ClockType
 from rclpy.node import Node
 from rclpy.timer import Timer
 
-# How often (s) the executor tells that it runs: well within the shortest period of a heartbeat.
-_LIFE_SIGN = 0.1
+# Seconds between two signs of life of the executor: well within the shortest heartbeat period.
+_LIFE_SIGN_PERIOD = 0.1
 
-# How often (s) publishers to topics with a Fallback are counted.
-_LOOK = 2.0
+# Seconds between two counts of the publishers to topics with a Fallback.
+_COUNT_PERIOD = 2.0
 
 
 class InterlockWatch:
     """
-    Watches over the heartbeats and fallbacks of a driver.
+    Watches the executor and the publishers for a driver with heartbeats or fallbacks.
 
-    The timer by which the link knows of the executor exists only while there are heartbeats.
+    A timer in the executor proves to the link that the executor runs. It exists only where the map
+    has heartbeats.
     """
 
     def __init__(self, node: Node, driver: Driver) -> None:
@@ -47,18 +48,20 @@ class InterlockWatch:
         self._next_look = 0.0
         self._crowded: tuple[str, ...] = ()
         self._timer: Timer | None = None
-        self._tell()
+        self._report_executor()
         if self._interlocks.heartbeats:
-            # Not the node's clock, which may be a simulated one that stands still.
+            # The node's clock may be simulated and stand still, so the timer has a clock of its
+            # own.
             self._timer = node.create_timer(
-                _LIFE_SIGN, self._tell, clock=Clock(clock_type=ClockType.STEADY_TIME))
+                _LIFE_SIGN_PERIOD, self._report_executor,
+                clock=Clock(clock_type=ClockType.STEADY_TIME))
 
     def end(self) -> None:
         """End the timer."""
         if self._timer is not None:
             self._node.destroy_timer(self._timer)
 
-    def _tell(self) -> None:
+    def _report_executor(self) -> None:
         """Tell the driver that the executor runs (rule 3 c)."""
         self._interlocks.executor_ran(line_time())
 
@@ -66,10 +69,10 @@ class InterlockWatch:
         """
         Return the topics of Fallback rows that two or more publishers and callers feed (rule 17).
 
-        They are counted every now and then.
+        Between two counts it returns the last result.
         """
         if now >= self._next_look:
-            self._next_look = now + _LOOK
+            self._next_look = now + _COUNT_PERIOD
             topics = dict.fromkeys(row.mapping.topic for row in self._interlocks.fallbacks)
             self._crowded = tuple(
                 topic for topic in topics if count_owners(self._node, topic) > 1)

@@ -34,9 +34,9 @@ MESSAGES: dict[ValueType, Any] = {kind: getattr(std_msgs, kind.message) for kind
 
 ACTIVE_LAYOUT = MultiArrayLayout(dim=[MultiArrayDimension(
     label='station n is active where bit n % 16 of word n / 16 is 1', size=16, stride=16)])
-"""The layout of ~/active_stations, which explains the words to readers of an echo."""
+"""The layout of ~/active_stations; its label explains the words to a reader of the topic."""
 
-# Bits are written one by one, so a burst of them has to fit; unused places take no memory.
+# Publishers send bits one by one, so a burst of messages has to fit. Unused places take no memory.
 _WRITE_DEPTH = 1000
 
 
@@ -59,8 +59,8 @@ def encoder(mapping: Mapping) -> Callable[[Values], Any]:
     """
     Return a function that encodes values of ``mapping`` for its publisher.
 
-    Only the numbers of an array change, and they come last. So all bytes before them are encoded
-    once, which saves a fifth of the processor time of publishing (`node_cpu.py` of test/lab).
+    Only the numbers of an array change, and they come last. All bytes before them are encoded
+    once: this saves a fifth of the processor time of publishing (`node_cpu.py` of test/lab).
     """
     message = new_message(mapping)
     if mapping.message_type is ValueType.STRING:
@@ -74,7 +74,7 @@ def encoder(mapping: Mapping) -> Callable[[Values], Any]:
 
 
 def values_of(message: Any) -> Values:
-    """Return the values of a message to be written; FormatError when they do not start at 0."""
+    """Return the values of a message to be written; FormatError if its data_offset is not 0."""
     if isinstance(message, String):
         return str(message.data)
     if message.layout.data_offset:
@@ -87,10 +87,10 @@ def read_qos(mapping: Mapping, stale_time: float) -> QoSProfile:
     """
     Return the QoS of a read topic.
 
-    A late subscriber gets the last value, but never one older than the row promises where values
-    are read every ``stale_time`` s at least. A subscriber with deadline or liveliness QoS gets an
-    event that values have stopped. A topic that is published when a PLC writes, or on change
-    without Max_Silence, cannot promise this.
+    A row promises a longest time between two values, if it is read at least every ``stale_time``
+    seconds. A late subscriber gets the last value, unless it is older than the promised time. A
+    subscriber with deadline or liveliness QoS gets an event when values stop. A topic promises
+    nothing if it is published when a PLC writes, or on change without Max_Silence.
     """
     profile = latched_qos()
     if math.isfinite(promise := mapping.promise(stale_time)):

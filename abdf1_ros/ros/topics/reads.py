@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The read topics of one map: a publisher each, kept where the next map has the same row."""
+"""The read topics of one map: one publisher for each, kept if the next map has the same row."""
 
 from __future__ import annotations
 
@@ -30,21 +30,23 @@ from abdf1_ros.settings.mapping import Mapping
 from rclpy.event_handler import PublisherEventCallbacks
 from rclpy.node import Node
 
-# So many values of a reply are published while its ACK is on the line (two characters), the
-# others while the next command is sent: publishing a hundred would delay the line by 3 ms.
+# Number of values published at once, while the ACK (two characters) is on the line. The rest of a
+# reply is published during the next command: a hundred values would delay the line by 3 ms.
 _VALUES_AT_ONCE = 4
 
-# A publisher is kept while the new time is at most so many times the one that it has promised: a
-# deadline that is a little short gives no false alarm.
+# A publisher is kept if the new row promises at most this multiple of its old time. A deadline
+# that is a little too short gives no false alarm.
 _MARGIN = 1.5
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ReadTopic:
     """
-    A publisher, and what it was made for.
+    A publisher, with the properties of the row that it was made for.
 
-    ``promise`` is the time (s) after which values count as stopped, infinite where there is none.
+    - ``encode``: turns values into a message
+    - ``shape``: message type, address and length of the row
+    - ``promise``: longest time (s) between two values; infinite if the row promises none
     """
 
     publisher: Any
@@ -53,18 +55,18 @@ class ReadTopic:
     promise: float
 
     def is_fit_for(self, shape: tuple[object, ...], promise: float) -> bool:
-        """Tell whether subscribers of a row notice no difference."""
+        """Return True if a row can use this publisher and subscribers notice no difference."""
         return shape == self.shape and promise <= _MARGIN * self.promise and \
             math.isinf(promise) is math.isinf(self.promise)
 
 
 class ReadTopics:
     """
-    Publish values in the link thread; made and ended in the thread of the executor.
+    The publishers of one map. The executor's thread makes them, the link thread publishes.
 
-    ``open`` has to come before the driver runs; what is ``published`` before is used again where
-    it fits. ``take_over`` comes when the driver of before does not run any more. ``latest`` are
-    the last values by topic.
+    At a reload, call ``open`` before the new driver runs, and ``take_over`` after the old driver
+    has stopped. Publishers of the old map (``published``) are used again where they fit.
+    ``latest``: the last values, by topic.
     """
 
     def __init__(self, node: Node, published: dict[str, ReadTopic]) -> None:
@@ -77,12 +79,12 @@ class ReadTopics:
         self._to_come: list[tuple[Mapping, ReadPoint]] = []
 
     def offer(self, points: MappingType[Mapping, ReadPoint]) -> None:
-        """Make all publishers while the driver runs, and publish what it has read."""
+        """Make all publishers while the driver runs, and publish the values it has read so far."""
         self._to_come = list(points.items())
         self.take_over()
 
     def withdraw(self) -> None:
-        """Close all publishers; the port is closed, so nothing is being read."""
+        """Close all publishers. The port is closed, so no read is under way."""
         self._topics.clear()
         self._later.clear()
         self.latest.clear()
@@ -91,24 +93,25 @@ class ReadTopics:
         self._published.clear()
 
     def open(self, points: MappingType[Mapping, ReadPoint]) -> None:  # noqa: A003
-        """Have a publisher for each mapping that is read."""
+        """Get a publisher for each row that is read: an old one, or a new one."""
         for mapping, point in points.items():
             earlier = self._published.get(mapping.topic)
-            # DDS has one type for a topic, so a publisher of another one has to end first.
+            # DDS allows one type for a topic, so the old publisher with another type has to end
+            # first.
             if earlier is not None and earlier.shape[0] is not mapping.message_type:
                 self._to_come.append((mapping, point))
             else:
                 self._topics[mapping.topic] = self._topic(mapping, point, earlier)
 
     def take_over(self) -> None:
-        """Close the publishers that are not used any more, and make those that wait for it."""
+        """Close the unused publishers of the old map; then make those that waited for that."""
         kept = set(self._topics.values())
         for topic in self._published.values():
             if topic not in kept:
                 self._node.destroy_publisher(topic.publisher)
         for mapping, point in self._to_come:
             topic = self._topics[mapping.topic] = self._topic(mapping, point, None)
-            if mapping.topic in self.latest:  # it may come twice
+            if mapping.topic in self.latest:  # a subscriber may get it twice
                 topic.publisher.publish(topic.encode(self.latest[mapping.topic]))
         self._to_come.clear()
         self._published.clear()
@@ -127,11 +130,11 @@ class ReadTopics:
         return ReadTopic(publisher, encoder(mapping), shape, promise)
 
     def read(self, mapping: Mapping, values: Values) -> None:
-        """Publish the values of a good read, at once or as soon as the line is busy again."""
+        """Publish the values of a good read: at once, or when the next command is on the line."""
         self.latest[mapping.topic] = values
         topic = self._topics.get(mapping.topic)
         if topic is None:
-            return  # ``take_over`` publishes it
+            return  # ``take_over`` publishes the value later
         if self._at_once:
             self._at_once -= 1
             topic.publisher.publish(topic.encode(values))
@@ -139,7 +142,7 @@ class ReadTopics:
             self._later.append((topic.publisher, topic.encode(values)))
 
     def publish_later_values(self) -> None:
-        """Publish the values that were put off; the line is busy now."""
+        """Publish the postponed values; a command is on the line now."""
         self._at_once = _VALUES_AT_ONCE
         while self._later:
             publisher, values = self._later.popleft()

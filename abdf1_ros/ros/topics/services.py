@@ -12,10 +12,10 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 """
-The services of rows: ~/set/<topic> of one bit, and ~/read_now/<topic> of what a PLC has.
+The services of rows: ~/set/<topic> writes a bit, ~/read_now/<topic> reads a row at once.
 
-A call of ~/set is a message to the write topic, under the same rules, with the same result. No
-callback waits: it goes on when the link has the answer (rule 3 c of docs/heartbeats.md).
+A call of ~/set is handled like a message to the write topic, with the same rules and result. A
+callback never blocks the executor while it waits for the link (rule 3 c of docs/heartbeats.md).
 """
 
 from __future__ import annotations
@@ -45,9 +45,9 @@ from std_msgs.msg import MultiArrayDimension, MultiArrayLayout, UInt8MultiArray
 from std_srvs.srv import SetBool, Trigger
 
 MOST_CALLS = 100
-"""So many calls wait at a time; more are refused at once: each costs every turn of rclpy."""
+"""Most calls that may wait; more are refused, as each slows down every turn of rclpy."""
 
-# What comes at the same moment has to fit; unused places take no memory.
+# Calls that arrive at the same moment have to fit. Unused places take no memory.
 _DEPTH = 1000
 
 _TOO_MANY = f'{MOST_CALLS} calls wait already'
@@ -55,7 +55,7 @@ _GONE = 'the map has no such row any more'
 
 
 class _Call:
-    """A call that waits for so many ``results``, up to a clock value (s)."""
+    """A call that waits for ``count`` results, at the longest until a clock value (s)."""
 
     def __init__(self, count: int, until: float, wake: Callable[[], None]) -> None:
         self.results: list[Any] = []
@@ -71,7 +71,7 @@ class _Call:
             self.end()
 
     def end(self) -> None:
-        """Let the callback go on."""
+        """Let the callback continue, with the results that have come."""
         if not self.done.done():
             self.done.set_result(None)
             self._wake()
@@ -79,9 +79,12 @@ class _Call:
 
 class RowServices:
     """
-    All services of rows; ``take`` may be called in any thread, ``look`` ten times a second in one.
+    All services of rows.
 
-    The rest belongs to the thread of the executor, which ``wake_executor`` has look for answers.
+    - ``take``: may be called in any thread
+    - ``look``: is called ten times a second, always by the same thread
+    - all else: only in the thread of the executor
+    - ``wake_executor``: makes the executor continue calls that have their results
     """
 
     def __init__(self, node: AnsweringNode, writes: WriteTopics,
@@ -97,10 +100,10 @@ class RowServices:
 
     def open(self, driver: Driver, most: int, patience: float,  # noqa: A003
              wake_link: Callable[[], None]) -> None:
-        """Offer the services of the rows of a driver; services that are, stay."""
+        """Offer the services of the rows of a driver; keep those that exist already."""
         self._driver, self._wake_link = driver, wake_link
         network = driver.network
-        # A write waits for the line and for a read; in between it is under way.
+        # A write waits for the line, and after it for a read. A transaction follows each wait.
         self._longest = 2 * (patience + network.line_mode.longest_transaction(network.line, 0.0))
         self._rows = {} if network.line_mode.only_listens \
             else dict(_offered(driver.mappings, most))
@@ -120,17 +123,17 @@ class RowServices:
         self._retire()
 
     def end(self) -> None:
-        """Let all calls have their answer: nothing more comes from the link."""
+        """Answer all calls now: no more results come from the link."""
         for call in [*self._calls.values()]:
             call.end()
 
     def take(self, result: WriteResult) -> None:
-        """Take the result of a write; a call may wait for it."""
+        """Hand the result of a write to the call that waits for it, if any."""
         if call := self._calls.get(result.request):
             call.take(result)
 
     def look(self, now: float) -> None:
-        """End calls that have waited too long, and close services that no call waits for."""
+        """End calls that have waited too long; close retired services once no call waits."""
         for call in [*self._calls.values()]:
             if now >= call.until:
                 call.end()
@@ -138,7 +141,7 @@ class RowServices:
             self._node.executor.create_task(self._close_retired)
 
     def _retire(self) -> None:
-        """Have the services closed that no row has any more, when all calls are answered."""
+        """Mark services without a row; they are closed once all calls are answered."""
         self._retired += [self._services.pop(name) for name in [*self._services]
                           if name not in self._rows]
 
@@ -155,7 +158,7 @@ class RowServices:
         until = line_time() + self._longest
         if (call := self._new(len(rows), until, response)) is None:
             return response
-        label = f'set {uuid.uuid4()}'  # no publisher has the same
+        label = f'set {uuid.uuid4()}'  # unique: no publisher uses the same label
         self._calls[label] = call
         self._writes.take(rows[0].topic, UInt8MultiArray(
             layout=MultiArrayLayout(dim=[MultiArrayDimension(label=label)]),
@@ -174,9 +177,10 @@ class RowServices:
 
     async def _read(self, name: str, request: Trigger.Request,
                     response: Trigger.Response) -> Trigger.Response:
-        """Have a row read and published, and answer with what was read."""
+        """Read a row at once, publish it, and answer with its values."""
         rows = self._rows.get(name, ())
-        if (call := self._new(len(rows), math.inf, response)) is None:  # the driver has bounds
+        # the driver ends it in time
+        if (call := self._new(len(rows), math.inf, response)) is None:
             return response
         self._calls[label := f'read {uuid.uuid4()}'] = call
         self._driver.read_now(rows[0], line_time(), call.take)
@@ -190,7 +194,7 @@ class RowServices:
         return response
 
     def _new(self, count: int, until: float, response: Any) -> _Call | None:
-        """Return a call that waits for so many results; None where it is refused."""
+        """Return a call that waits for ``count`` results; None if it is refused."""
         if not count or len(self._calls) >= MOST_CALLS:
             response.message = f'refused: {_TOO_MANY if count else _GONE}'
             return None
@@ -201,8 +205,8 @@ def _offered(mappings: Rows, most: int) -> Iterator[tuple[str, tuple[Mapping, ..
     """
     Yield the services of a map, and the rows of each.
 
-    Those of rows on demand are always there. Of ~/set, then of ~/read_now there are all or none,
-    as long as there are at most so many.
+    Rows on demand always have theirs. All ~/set services are offered if they are at most ``most``,
+    otherwise none. The same then holds for ~/read_now, with what is left of ``most``.
     """
     bits: dict[str, tuple[Mapping, ...]] = {}
     for row in mappings.messages:
@@ -228,6 +232,6 @@ def _text(values: Values) -> str:
 
 
 def _moment(read: float) -> str:
-    """Return a clock value (s) in UTC."""
+    """Return a clock value (s) as a time in UTC."""
     seconds = time.time() - line_time() + read
     return datetime.fromtimestamp(seconds, UTC).isoformat(timespec='milliseconds')

@@ -29,7 +29,7 @@ from abdf1_ros.settings.mapping import Mapping
 from abdf1_ros.text import printable, value_text
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 
-# Longer arrays are one text, and cut short.
+# Arrays with more values are shown as one text, cut short.
 _MOST_KEYS = 32
 
 _LEVELS = {
@@ -40,9 +40,9 @@ _LEVELS = {
 
 class Snapshot:
     """
-    The last values of ``points``, which ``latest`` holds by topic, as one message.
+    One message with the last values of all ``points``; ``latest`` has the values by topic.
 
-    Texts that do not change are made once: five thousand rows are many.
+    Texts that never change are made once: a map may have five thousand rows.
     """
 
     def __init__(self, points: MappingType[Mapping, ReadPoint],
@@ -53,14 +53,14 @@ class Snapshot:
         self._latest = latest
 
     def message(self, now: float) -> DiagnosticArray:
-        """Return the values at the clock value ``now`` (s); its stamp is for the caller."""
+        """Return the values at the clock value ``now`` (s); the caller sets the stamp."""
         begun = time.time() - now
         return DiagnosticArray(status=[
             row.status(self._latest.get(row.topic), now, begun) for row in self._rows])
 
 
 class _ValueRow:
-    """A row of the snapshot; ``names`` are tags of single values by station and address."""
+    """A row of the snapshot; ``names``: tags of single-value rows by station and address."""
 
     def __init__(self, mapping: Mapping, point: ReadPoint,
                  names: MappingType[tuple[int, str], str]) -> None:
@@ -74,7 +74,7 @@ class _ValueRow:
             ('topic', mapping.topic), ('description', mapping.description))]
 
     def status(self, values: Values | None, now: float, begun: float) -> DiagnosticStatus:
-        """Return its status; the clock of ``now`` began at the time ``begun`` (s since 1970)."""
+        """Return the row's status; the clock of ``now`` was 0 at ``begun`` (s since 1970)."""
         point = self._point
         freshness = point.freshness(now)
         level, read = _LEVELS[freshness], point.last_good
@@ -109,7 +109,7 @@ def _moment(seconds: float) -> str:
 
 
 def _keys(mapping: Mapping, names: MappingType[tuple[int, str], str]) -> Sequence[str]:
-    """Return a key for each value; none for what is shown as one text."""
+    """Return a key for each value; no keys if the row is shown as one text."""
     if mapping.type is ValueType.STRING or mapping.length > _MOST_KEYS:
         return ()
     if mapping.length == 1:

@@ -13,11 +13,11 @@
 # limitations under the License.
 
 """
-Write topics: from a message to the driver, and what DDS has dropped before it came to us.
+Write topics: hand messages to the driver, and notice messages that DDS has dropped.
 
-Messages are numbered by their publisher (Fast DDS does it, others may not). Where a number is
-missing, a message was dropped: the executor was slower than the publisher, and the history of
-either end was full. There is no other sign: Fast DDS 2.14 has no message-lost event for it.
+With Fast DDS, a publisher numbers its messages; another DDS may not. If a number is missing, a
+message was dropped: the executor was slower than the publisher, and a queue was full. There is no
+other sign: Fast DDS 2.14 has no message-lost event for it.
 """
 
 from __future__ import annotations
@@ -43,20 +43,23 @@ from std_msgs.msg import String
 
 _LONGEST_LABEL = 100
 
-# A clock that is ahead is reported every so many seconds at most.
-_LOOK = 2.0
+# Shortest time (s) between two reports of a clock that is ahead.
+_REPORT_PERIOD = 2.0
 
-# Publishers of one topic whose numbers are followed at a time.
+# Most publishers of one topic whose message numbers are followed.
 _MOST_PUBLISHERS = 16
 
 
 class LossCounter:
     """
-    Tell how many messages of a topic never came.
+    Counts the messages of a topic that never came.
 
-    rclpy does not tell the publisher of a number. A number that follows the last one of a known
-    publisher belongs to that publisher. Otherwise it belongs to a new one, as long as
-    ``count_publishers`` gives more than are known. Otherwise messages before it were lost.
+    rclpy does not show which publisher sent a number. We decide in this order:
+
+    - The number follows the last number of a known publisher: it is from this publisher.
+    - All known numbers are higher, or ``count_publishers`` gives more publishers than are known:
+      it is from a new publisher.
+    - Otherwise the messages before it were lost.
     """
 
     def __init__(self, count_publishers: Callable[[], int]) -> None:
@@ -64,7 +67,7 @@ class LossCounter:
         self._latest: list[int] = []  # number of the latest message of each publisher
 
     def lost_before(self, number: int | None) -> int:
-        """Take the number of a message, None where it has none; return the number of lost ones."""
+        """Record a message's number (None: it has none); return how many were lost before it."""
         if number is None:
             return 0
         latest = self._latest
@@ -84,10 +87,10 @@ class LossCounter:
 
 def _request(message: Any, info: Any) -> str:
     """
-    Return the name of a message for its result, different from all others of its topic.
+    Return the name of a message for its result, unique in its topic.
 
-    That is the label which its publisher has put into the layout, or else the time when it was
-    published (ns): rclpy does not tell the publisher.
+    The name is the label in the message's layout, if the publisher has set one. Otherwise it is
+    the time of publication (ns), because rclpy does not show the publisher.
     """
     if not isinstance(message, String) and message.layout.dim and message.layout.dim[0].label:
         return printable(message.layout.dim[0].label[:_LONGEST_LABEL])
@@ -95,22 +98,23 @@ def _request(message: Any, info: Any) -> str:
 
 
 class WriteTopicListener(Protocol):
-    """Gets what is wrong with the messages of a topic."""
+    """Is called when something is wrong with the messages of a topic."""
 
     def lost(self, topic: str, count: int) -> None:
-        """Take note that so many messages were dropped on their way to us."""
+        """Report ``count`` messages that DDS has dropped."""
 
     def ahead(self, topic: str, seconds: float, nodes: Sequence[str]) -> None:
-        """Take note that the clock of a node that publishes is ahead of ours by so much."""
+        """Report that the clock of a publisher among ``nodes`` is ahead by ``seconds``."""
 
 
 class WriteTopic:
     """
-    The mappings that one topic writes to; ``take`` is the callback of its subscription.
+    The mappings that one topic writes to; ``take`` handles one message.
 
-    ``listener`` gets what is wrong: messages that were dropped on their way to us, and nodes among
-    ``publishers`` with a clock that is ahead. ``wake`` is called when the link has something to
-    do. What is too old by its ``ages`` is refused.
+    - ``ages``: finds the age of a message; a message that is too old is refused
+    - ``listener``: gets lost messages, and publishers whose clock is ahead
+    - ``publishers``: returns the names of the nodes that publish now
+    - ``wake``: is called when the link has something to do
     """
 
     def __init__(self, topic: str, mappings: Sequence[Mapping], driver: Driver, ages: Ages,
@@ -127,7 +131,7 @@ class WriteTopic:
         self._next_ahead = -math.inf
 
     def arrived(self, info: Any) -> None:
-        """Tell what was lost before a message that has come."""
+        """Report the messages that were lost before this message."""
         if lost := self._losses.lost_before(info['publication_sequence_number']):
             self._listener.lost(self._topic, lost)
 
@@ -140,7 +144,7 @@ class WriteTopic:
         try:
             if reject_reason:
                 raise FormatError(reject_reason)
-            # It may have waited while this process was paused or the network was down.
+            # The message may have waited while this process was paused or the network was down.
             waited = self._ages.of(stamps, wall, now)
             values = values_of(message)
         except FormatError as error:
@@ -149,16 +153,17 @@ class WriteTopic:
             self._driver.write(self._mappings, values, now - waited, request)
             self._wake()
         if self._ages.is_ahead and now >= self._next_ahead:
-            self._next_ahead = now + _LOOK
+            self._next_ahead = now + _REPORT_PERIOD
             self._listener.ahead(self._topic, self._ages.lead, self._publishers())
 
 
 class WriteTopics:
     """
-    The subscriptions of a node; ``open`` may be called again, in the thread of the executor.
+    The subscriptions of a node; all methods but ``begin`` run in the executor's thread.
 
-    Messages wait here until ``begin``, and go where ``give_to`` says; ``taken`` counts those.
-    ``standstills`` is to look ten times a second.
+    Messages wait here until ``begin``; then they go to the topics set by ``give_to``. ``open`` may
+    be called again at a reload. ``taken`` counts the messages handed on. The owner calls
+    ``standstills.look`` ten times a second.
     """
 
     def __init__(self, node: AnsweringNode) -> None:
@@ -171,7 +176,7 @@ class WriteTopics:
         self.taken = 0
 
     def begin(self) -> None:
-        """Have messages taken from now on, those that wait first; may be called in any thread."""
+        """Hand messages on from now on, waiting ones first; may be called in any thread."""
         if not self._has_begun and self._node.executor is not None:
             self._has_begun = True
             self._node.executor.create_task(self._take_waiting)
@@ -182,14 +187,14 @@ class WriteTopics:
         for topic, message, info in waiting:
             self.taken += 1
             try:
-                if topic in self._topics:  # a reload may have taken its rows away
+                if topic in self._topics:  # a reload may have removed its rows
                     self._topics[topic].take(message, info)
-            except Exception as error:  # the others are taken
+            except Exception as error:  # go on with the other messages
                 self._node.tell_failure(f'a message on {_name(topic)}', error)
 
     def open(self, driver: Driver, patience: float,  # noqa: A003
              listener: WriteTopicListener, wake: Callable[[], None]) -> dict[str, WriteTopic]:
-        """Subscribe to the topics of a driver, and return them; subscriptions that are, stay."""
+        """Subscribe to a driver's topics and return them; keep existing subscriptions."""
         wanted: defaultdict[str, list[Mapping]] = defaultdict(list)
         for mapping in driver.mappings:
             if mapping.writes:
@@ -217,7 +222,7 @@ class WriteTopics:
         self._subscriptions.clear()
 
     def give_to(self, topics: dict[str, WriteTopic]) -> None:
-        """Give messages to these from now on."""
+        """Hand messages to these topics from now on."""
         self._topics = topics
 
     def _publishers(self, topic: str) -> list[str]:
@@ -225,7 +230,7 @@ class WriteTopics:
                 for end in self._node.get_publishers_info_by_topic(_name(topic))]
 
     def take(self, topic: str, message: Any, info: Any) -> None:
-        """Take a message, in the thread of the executor."""
+        """Count what was lost before a message, then hand it on or let it wait."""
         self._topics[topic].arrived(info)
         reject_reason = '' if self._is_open else TOO_MANY
         if reject_reason and len(self._waiting) < MAX_WAITING_WRITES:
@@ -240,7 +245,7 @@ class WriteTopics:
 
 
 def count_publishers(node: Node, topic: str) -> int:
-    """Return how many publishers a write topic has; rclpy does not remap what it is asked."""
+    """Return how many publishers a write topic has; its name is remapped here, not by rclpy."""
     return node.count_publishers(node.resolve_topic_name(_name(topic)))
 
 
