@@ -13,13 +13,13 @@
 # limitations under the License.
 
 """
-What the process says on its terminal, pipe or journal, and in its log file: nothing waits for it.
+Output of the process to terminal, pipe, journal and log file: nothing waits for it.
 
 rclpy's log call holds the interpreter's lock while it writes, and rcl, DDS and faulthandler write
 to the same descriptors. So standard output and standard error become pipes of ours, whose write
 ends never block, and a process of its own passes on what it reads from them. Where a terminal
-stands still (Ctrl-S), a pipe is full or a disk hangs, that process waits. What it cannot keep any
-longer is lost, counted, and reported as soon as its sink goes on.
+stands still (Ctrl-S), a pipe is full or a disk hangs, that process waits. Output that it cannot
+keep is lost, counted, and reported as soon as its sink takes bytes again.
 
 This file is the program of that process, too: it starts without the package.
 """
@@ -42,10 +42,11 @@ import time
 # Bytes that wait for each sink: some 10,000 entries.
 _MOST_WAITING = 1 << 20
 
-# What our own pipes hold: the process that reads them may not get to run for a while.
+# Size of our own pipes: the process that reads them may not get to run for a while.
 _PIPE_SIZE = 1 << 20
 
-# How long (s) the last entries have after the end of the process, and how long that waits for it.
+# Seconds for the last entries after the end of the process, and seconds that the process waits for
+# it.
 _LAST_ENTRIES = 1.0
 _PATIENCE = 0.5
 
@@ -79,7 +80,7 @@ class Sink(threading.Thread):
             self._news.notify()
 
     def end(self) -> None:
-        """Have the thread end when all is written."""
+        """End the thread when all lines are written."""
         with self._news:
             self._is_ended = True
             self._news.notify()
@@ -109,7 +110,7 @@ class Sink(threading.Thread):
         while data:
             try:
                 data = data[os.write(self._descriptor, data):]
-            except BlockingIOError:  # another process that has the terminal has asked for that
+            except BlockingIOError:  # another process of this terminal has made it non-blocking
                 select.select([], [self._descriptor], [])
 
 
@@ -131,12 +132,13 @@ def pass_on(source: int, sinks: Sequence[Sink]) -> None:
 
 def relay(routes: Sequence[str]) -> None:
     """
-    Pass on what comes from descriptors, as long as something has their other ends open.
+    Pass lines on from descriptors, as long as a process has their far ends open.
 
     A route is ``source:sink`` or ``source:sink,sink``; from the second one on they get no colours.
     """
     for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGTTOU):
-        signal.signal(number, signal.SIG_IGN)  # the last words of the other process are to come
+        # the last lines of the main process are still to come
+        signal.signal(number, signal.SIG_IGN)
     threads: list[threading.Thread] = []
     sinks: list[Sink] = []
     for route in routes:
@@ -158,7 +160,7 @@ class Console:
     """
     Give standard output and standard error to a process that may wait for them; a context manager.
 
-    ``log`` is the descriptor of a file that gets all that goes where rclpy writes its log.
+    ``log`` is the descriptor of a file that gets all output of rclpy's log.
     """
 
     def __init__(self, log: int | None = None) -> None:
@@ -177,7 +179,8 @@ class Console:
             log = '' if self._log is None or number != logged else f',{self._log}'
             routes.append(f'{reader}:{before}{log}')
         if logged in self._before and os.isatty(self._before[logged]):
-            os.environ.setdefault('RCUTILS_COLORIZED_OUTPUT', '1')  # it cannot see that any more
+            # rcutils cannot see the terminal any more
+            os.environ.setdefault('RCUTILS_COLORIZED_OUTPUT', '1')
         kept = [*reads, *self._before.values(), *([] if self._log is None else [self._log])]
         self._process = subprocess.Popen(
             [sys.executable, '-I', '-S', __file__, *routes], pass_fds=kept,
@@ -185,7 +188,7 @@ class Console:
         for number in (*reads, *([] if self._log is None else [self._log])):
             os.close(number)
         for number, writer in writes.items():
-            with suppress(OSError):  # more than a user may have: it stays as it is
+            with suppress(OSError):  # more than a user may have: the size stays as it is
                 fcntl.fcntl(writer, fcntl.F_SETPIPE_SZ, _PIPE_SIZE)
             os.set_blocking(writer, False)  # ours alone: no other process has it
             _flush()
@@ -194,7 +197,7 @@ class Console:
         return self
 
     def __exit__(self, *exception: object) -> None:
-        """Give both back; where the process still waits, nothing more is written to them."""
+        """Restore both; if the relay still waits, nothing more is written to them."""
         _flush()
         for number, before in self._before.items():
             os.dup2(before, number)

@@ -58,7 +58,7 @@ The logger where no other is given: requests with their times, and what happens 
 That is logged by who asks: while a request is under way, with the next one, or at the end.
 """
 
-# What happens on the line between two requests, at most.
+# Most events on the line between two requests.
 _MOST_ENTRIES = 1000
 
 _Entry = tuple[int, object, BaseException | None]

@@ -17,8 +17,8 @@ The conformance kit: it plays one end of a line and checks the target at the far
 
 ``codec`` makes and reads bytes, ``wire`` sends and receives them, ``case`` defines and runs a
 case, ``ends`` are the parts that we play. ``slave``, ``master``, ``peer``, ``client`` and
-``radio`` hold the cases, named after the other end; ``data``, ``duplicates``, ``damage`` and
-``asking`` hold those that are the same for several; ``cases`` has them all. ``report`` writes the
+``radio`` hold the cases, named after the target. ``data``, ``duplicates``, ``damage`` and
+``asking`` hold cases for several targets. ``cases`` has all of them. ``report`` writes the
 results.
 
 The codec is a second one on purpose, written from the manual and not from ``df1``: with the same

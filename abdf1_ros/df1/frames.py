@@ -126,7 +126,7 @@ class Unknown:
 
     @property
     def is_misplaced(self) -> bool:
-        """Tell whether it is a symbol of the other duplex (S0, message 2514)."""
+        """Tell whether it is a symbol of the opposite duplex (S0, message 2514)."""
         return self.byte in _CODES
 
 

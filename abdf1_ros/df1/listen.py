@@ -13,10 +13,9 @@
 # limitations under the License.
 
 """
-A line on which another master works: it is heard, and nothing is ever sent.
+A line with another master: we hear it, and never send anything.
 
-The mode stands beside those of the specification. What is heard is made use of by
-``driver.overheard``.
+The specification does not have this mode. ``driver.overheard`` uses the bytes that are heard.
 """
 
 from __future__ import annotations
@@ -35,9 +34,9 @@ from abdf1_ros.df1.stations import ActiveStationList
 from abdf1_ros.df1.tasks import TaskSource
 from abdf1_ros.messages import Event
 
-_LOOK = 0.1  # s; how long a pause of this process can stay unnoticed, besides MOST_LATE
+_LOOK = 0.1  # s; longest pause of this process that stays unnoticed, besides MOST_LATE
 
-# For so long (s) after a pause what is read may have lain in a buffer.
+# Seconds after a pause in which bytes may have lain in a buffer.
 _OLD = 0.5
 
 
@@ -46,13 +45,13 @@ class SecondPort(bytes):
 
 
 class Listener(Protocol):
-    """What makes use of the bytes of a line."""
+    """A user of the bytes of a line."""
 
     def hear(self, data: bytes, now: float) -> None:
         """Take bytes, read at a clock value (s)."""
 
     def forget(self, now: float) -> None:
-        """Take note that what was heard before is not complete any more."""
+        """Record that bytes are missing from here on."""
 
     def look(self, now: float) -> None:
         """Do what is due."""
@@ -62,7 +61,7 @@ class ListeningMachine(Machine):
     """
     Give all bytes to ``listener``, and send none.
 
-    After a pause of this process the age of what is read first is not known: it is dropped.
+    After a pause of this process the age of the first bytes is unknown: they are dropped.
     """
 
     listener: Listener
@@ -76,7 +75,7 @@ class ListeningMachine(Machine):
             self.listener.hear(data, now)
 
     def handle_timeout(self, now: float) -> None:
-        """Take note that the clock reads ``now``."""
+        """Do what is due when the clock reads ``now``."""
         is_late = self.deadline is not None and now - self.deadline > MOST_LATE
         super().handle_timeout(now)
         if is_late:
@@ -90,7 +89,7 @@ class ListeningMachine(Machine):
 
 
 class ListeningLink(Link):
-    """It has nothing to do but to let time pass."""
+    """The link of a line that we only hear; it does nothing."""
 
     def __init__(self, machine: Machine, settings: LinkSettings, stations: ActiveStationList,
                  serve: Callable[[Packet], Packet], report: Callable[[Event], None]) -> None:
@@ -103,7 +102,7 @@ class ListeningLink(Link):
 
 
 class ListenMode(LineMode):
-    """Another master asks, and we only listen."""
+    """The mode in which another master asks, and we only listen."""
 
     name = 'Listen'
     link = ListeningLink

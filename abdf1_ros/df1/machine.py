@@ -390,7 +390,7 @@ class Machine:
         self._deliver_symbols()
 
     def took(self, begun: float, now: float) -> float:
-        """Return the seconds from a clock value to now, but for the last pause."""
+        """Return the seconds from a clock value to now, without the last pause."""
         end, seconds = self._last_pause
         return now - begun - (seconds if end > begun else 0.0)
 

@@ -168,7 +168,7 @@ class RadioNode(EqualNode):
 
     def _work(self, source: TaskSource) -> Procedure:
         while True:
-            # In turns, or one kind could keep the others waiting for ever.
+            # In turns, or one kind could keep the rest waiting for ever.
             if self._waiting:
                 yield from self._send(self._waiting.popleft())
             if (command := self._overdue()) is not None:

@@ -42,10 +42,10 @@ class SlaveLink(Link, Initiator):
     """
     Serve the master on the line of ``machine``, and send the commands of a source.
 
-    A command waits Cmd_Timeout for its reply after the master has taken it, or before that for the
-    next poll. ``serve`` and ``report`` are the same as in every link. The link is the
-    ``Initiator`` of its own slave. ``last_poll`` is the clock value (s) of the last poll, or of
-    the start.
+    After the master has taken a command, the link waits Cmd_Timeout for its reply. Before that the
+    command waits for the next poll. ``serve`` and ``report`` are the same as in every link. The
+    link is the ``Initiator`` of its own slave. ``last_poll`` is the clock value (s) of the last
+    poll, or of the start.
     """
 
     def __init__(self, machine: Machine, settings: LinkSettings, stations: ActiveStationList,

@@ -227,7 +227,7 @@ class ActiveStationList:
 
     def is_new(self, number: int) -> bool:
         """
-        Tell whether a station has never replied to a command, though another one has.
+        Tell whether a station has never replied to a command, though another station has.
 
         It may be absent, so it gets one try at a time: other stations would wait for all retries.
         """

@@ -198,7 +198,7 @@ class Overheard:
             return
         self._written(command, now)
         if entry.latency is None:
-            return  # said before
+            return  # reported before
         if not is_local_status(reply.sts):
             self._heard(command.dst, now)
         asked = now - entry.latency

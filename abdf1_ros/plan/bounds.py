@@ -15,8 +15,8 @@
 """
 What heartbeats, fallback values and guarded reads cost, and which times they can keep.
 
-The numbers of rules are those of docs/heartbeats.md. T is the longest transaction that the
-settings allow, with all repetitions. Times are in seconds.
+The rules have the numbers of docs/heartbeats.md. T is the longest transaction that the settings
+allow, with all repetitions. Times are in seconds.
 """
 
 from __future__ import annotations
@@ -222,7 +222,7 @@ class Times:
         return found
 
     def _reads_between(self, writes: int) -> int:
-        """Return how many reads have a turn between so many own writes at most (rule 11)."""
+        """Return how many reads at most have a turn between ``writes`` own writes (rule 11)."""
         return writes if self._is_apart else 1 + (writes - 1) // OWN_IN_A_ROW
 
     @cached_property

@@ -38,7 +38,7 @@ ANSWERS = LineMode.answers
 # turn in this number of poll cycles.
 PATIENCE = 4
 
-# What depends on a row that is read on demand is asked as if it were read so often (s).
+# Period (s) that the forecast assumes for a row that is read on demand.
 _ON_DEMAND = 1.0
 
 

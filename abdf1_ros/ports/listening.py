@@ -13,7 +13,7 @@
 # limitations under the License.
 
 """
-Ports that are only listened to: devices opened for reading, and pairs of them.
+Ports for listening only: devices opened for reading, and pairs of them.
 
 No line signal is set here. The system itself raises RTS and DTR when a serial port is opened, for
 whatever program; docs/listening.md says what follows for the cable.
@@ -45,11 +45,11 @@ from abdf1_ros.ports.socket_port import open_port as open_socket
 
 _SIZES = {5: termios.CS5, 6: termios.CS6, 7: termios.CS7, 8: termios.CS8}
 _PARITY = termios.PARENB | termios.PARODD
-_KEPT = termios.HUPCL  # what the end of a program does to RTS and DTR stays as it was
+_KEPT = termios.HUPCL  # the effect of a program's end on RTS and DTR stays as it was
 
 
 class _SilentPort:
-    """A port to which nothing is written."""
+    """A port to which no byte is written."""
 
     def write(self, data: bytes) -> None:
         """Refuse: no caller may come here."""
@@ -64,7 +64,7 @@ class ListeningDevice(_SilentPort, SerialDevice):
 
 
 class TwoPorts(_SilentPort):
-    """Two ports as one; what comes from the second one is ``SecondPort``."""
+    """Two ports as one; bytes of the second one are ``SecondPort``."""
 
     is_terminal = True
     has_more = False
@@ -126,10 +126,10 @@ def open_device(settings: PortSettings) -> ListeningDevice:
 
 
 def _set_up(descriptor: int, settings: PortSettings) -> None:
-    """Keep others away, and set speed and character format."""
+    """Keep other programs away, and set speed and character format."""
     try:
         fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        if not is_pseudo_terminal(settings.name):  # theirs lasts as long as the other end
+        if not is_pseudo_terminal(settings.name):  # a pseudo-terminal lasts as long as its far end
             fcntl.ioctl(descriptor, termios.TIOCEXCL)
         attributes = termios.tcgetattr(descriptor)
         speed, flags = getattr(termios, f'B{settings.baud}'), _flags(settings)

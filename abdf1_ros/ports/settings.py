@@ -33,8 +33,8 @@ class PortSettings:
     These are the columns of the net CSV about the port. With ``low_latency`` a USB adapter passes
     bytes on at once, instead of collecting them for up to 16 ms. ``rs485`` switches the
     transmitter of an RS-485 port on and off with RTS. A port that supports neither is opened all
-    the same. Where it ``listens``, the port is opened for reading only, and ``second`` is the
-    other one of a line that is heard on two.
+    the same. With ``listens`` the port is opened for reading only. ``second`` is the second port
+    of a line that is heard on two ports.
     """
 
     name: str

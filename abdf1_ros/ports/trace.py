@@ -102,7 +102,7 @@ class TracedPort(PortAround):
     """
     A port whose bytes go into ``trace`` as well, with the seconds since ``begun``.
 
-    What is read is ``first`` there, but for what comes from a second port.
+    Bytes that are read go in direction ``first``; bytes of a second port go in the opposite one.
     """
 
     def __init__(self, port: Port, trace: Trace, begun: float,
