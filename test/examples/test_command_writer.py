@@ -123,9 +123,9 @@ def answered(write: Write) -> Iterator[Answered]:
     with Observer() as observer:
         results = observer.node.create_publisher(DiagnosticStatus, '/fake/write_results', 10)
         diagnostics = observer.node.create_publisher(DiagnosticArray, '/diagnostics', 10)
-        stations = {'station 1': 'heartbeat counts since 2.0 s',
+        stations = {'station 1': 'heartbeat counts (for 2.0 s)',
                     'station 2': 'not in control: no message of speed in time',
-                    'station 4': 'in control since 1.0 s',
+                    'station 4': 'in control for 1.0 s',
                     'station 5': 'unknown: in_control is stale'}
         status = DiagnosticStatus(name='fake: interlocks', values=[
             KeyValue(key=key, value=value) for key, value in stations.items()])

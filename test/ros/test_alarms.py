@@ -57,11 +57,11 @@ def test_bits_are_alarms_each_for_itself() -> None:
     assert bench.says() == (OK, 'no alarm: Guard doors')
     bench.read(0, 1)
     bench.read(0, 1, after=0.4)
-    assert bench.says() == (ERROR, 'B3:0/4 since 0.4 s, 1 time: Guard doors')
+    assert bench.says() == (ERROR, 'B3:0/4 for 0.4 s, 1 time: Guard doors')
     assert bench.status.values(bench.now) == {
-        'B3:0/3': 'never', 'B3:0/4': 'since 0.4 s, 1 time'}
+        'B3:0/3': 'never', 'B3:0/4': 'for 0.4 s, 1 time'}
     bench.read(1, 1)
-    assert bench.says()[1].startswith('B3:0/3 since 0.0 s, 1 time, B3:0/4 since 0.5 s, 1 time')
+    assert bench.says()[1].startswith('B3:0/3 for 0.0 s, 1 time, B3:0/4 for 0.5 s, 1 time')
 
 
 def test_alarm_between_two_statuses_is_shown_once() -> None:
@@ -80,7 +80,7 @@ def test_alarm_between_two_statuses_is_shown_once() -> None:
 def test_zero_may_be_the_alarm(alarm: str) -> None:
     bench = Bench(alarm)
     bench.read(1, 0)
-    assert bench.says() == (WARN, 'B3:0/4 since 0.0 s, 1 time')
+    assert bench.says() == (WARN, 'B3:0/4 for 0.0 s, 1 time')
 
 
 def test_what_is_not_known_is_never_well() -> None:

@@ -171,7 +171,7 @@ def test_silent_station_is_seen_by_every_means(bridge: Bridge) -> None:
         bridge.active.values([0b010] + 15 * [0])
         status = until_status(bridge.diagnostics, 'station 2', ERROR)
         assert re.fullmatch(
-            r'ERROR: station 2 inactive since \d+\.\d s', status.message), status.message
+            r'ERROR: station 2 inactive for \d+\.\d s', status.message), status.message
         assert details(status)['active'] == 'no'
         status = until_status(bridge.diagnostics, 'link', WARN)
         assert status.message == 'WARN: port open, 1 of 2 stations do not answer'

@@ -367,7 +367,7 @@ def test_station_that_is_silent(bench: Bench) -> None:
     bench.driver.stations.lost(2, NOW - 12.3)
     bench.happened(Message.NTC_ENQ_LIMIT_EXCEEDED, (3,), 2, NOW - 12.3)
     bench.happened(Message.ERR_INACTIVE_STATION, (2,), 2, NOW - 12.3)
-    assert bench.says('station 2') == (ERROR, 'ERROR: station 2 inactive since 12.3 s')
+    assert bench.says('station 2') == (ERROR, 'ERROR: station 2 inactive for 12.3 s')
     values = details(bench.status('station 2'))
     assert (values['active'], values['last answer']) == ('no', '20.0 s ago')
     assert values['last event'] == (  # what it has become inactive by
@@ -387,7 +387,7 @@ def test_station_that_answers_polls_and_no_command(bench: Bench) -> None:
         WARN, 'WARN: port open, but 1 of 2 stations answer polls and no command')
     stations.lost(1, NOW)  # it comes and goes
     assert bench.says('station 1') == told
-    assert bench.says('station 1', NOW + 11) == (ERROR, 'ERROR: station 1 inactive since 11.0 s')
+    assert bench.says('station 1', NOW + 11) == (ERROR, 'ERROR: station 1 inactive for 11.0 s')
     stations.heard(1, NOW + 12)
     stations[1].returns = 0  # by a reply
     assert bench.says('station 1', NOW + 12)[0] == OK
@@ -429,7 +429,7 @@ def test_refused_command_of_a_plc_is_told_for_a_minute(bench: Bench) -> None:
     text = ('station 1: protected typed logical write N7:10: STS 10: illegal command, format or '
             'length, or the file does not exist')
     assert bench.says('link', NOW + 61.0) == (
-        WARN, f'WARN: port open, but refused is a command of {text}')
+        WARN, f'WARN: port open, but it has refused a command of {text}')
     assert bench.says('link', NOW + 62.1)[0] == OK
     assert details(bench.status('link', NOW + 62.1))[f'refused: {text}'] == '3 times'
 
@@ -533,7 +533,7 @@ def test_withheld_mapping_tells_why_since_when_and_how_often(bench: Bench) -> No
     speed.withhold('not in RUN', NOW + 2)
     assert bench.says('mappings', NOW + 2)[0] == ERROR
     assert details(bench.status('mappings', NOW + 5))['speed'] == (
-        'withheld: N7:0 at station 1, last read 4.0 s ago; not in RUN, since 3.0 s; '
+        'withheld: N7:0 at station 1, last read 4.0 s ago; not in RUN, for 3.0 s; '
         'times withheld: 2')
 
 
@@ -630,7 +630,7 @@ def test_heartbeat_that_the_plc_does_not_confirm_does_not_count(
     beat.confirmed, beat.state, beat.value = NOW, BeatState.COUNTS, 1
     assert bench.says('interlocks', NOW) == (OK, 'OK: 1 of 1 heartbeats count')
     assert details(bench.status('interlocks', NOW + 1.5))['station 1'] == \
-        'heartbeat counts since 1.5 s'
+        'heartbeat counts (for 1.5 s)'
     assert bench.says('interlocks', NOW + 1.6)[0] == WARN
     values = details(bench.status('interlocks', NOW + 4))
     assert values['alive'] == 'heartbeat 1, 4.0 s ago; does not count: not confirmed for 4.0 s'
@@ -656,22 +656,22 @@ def test_bit_of_the_plc_confirms_control_while_it_is_fresh_and_1(
     beat.confirmed, beat.state, beat.value = NOW, BeatState.COUNTS, 1
     assert station(None, NOW) == (
         WARN, 'unknown: ruled has not been read since the heartbeat counts')
-    assert station(1, NOW + 1) == (OK, 'in control since 0.0 s')
-    assert station(1, NOW + 2.5) == (OK, 'in control since 1.5 s')
+    assert station(1, NOW + 1) == (OK, 'in control for 0.0 s')
+    assert station(1, NOW + 2.5) == (OK, 'in control for 1.5 s')
     assert station(0, NOW + 3) == (
         WARN, 'not in control: the heartbeat counts, but ruled is 0: a person has to press reset '
         '(docs/tutorials/heartbeats.md)')
     assert bench.says('interlocks', NOW + 3)[1] == (
         'WARN: 1 of 1 heartbeats count; alive: the PLC does not confirm that ROS is in control')
-    assert station(1, NOW + 4) == (OK, 'in control since 0.0 s')
+    assert station(1, NOW + 4) == (OK, 'in control for 0.0 s')
     assert station(None, NOW + 30) == (WARN, 'unknown: ruled is stale')
     bit.fail('no reply')
     assert station(None, NOW + 30) == (WARN, 'unknown: ruled is failed: no reply')
-    assert station(1, NOW + 31) == (OK, 'in control since 0.0 s')
+    assert station(1, NOW + 31) == (OK, 'in control for 0.0 s')
     beat.reason = 'no message'
     assert station(None, NOW + 31) == (WARN, 'not in control: no message')
     beat.reason = ''
-    assert station(1, NOW + 32) == (OK, 'in control since 0.0 s')
+    assert station(1, NOW + 32) == (OK, 'in control for 0.0 s')
     stopped = Identity(PlcType.PLC5, 'PLC-5/40', mode=Mode.REMOTE_PROGRAM, mode_text='REM PROG')
     bench.driver.checks._known[1] = StationHealth('PLC-5/40', stopped, NOW + 33)
     assert station(1, NOW + 33) == (
@@ -700,7 +700,7 @@ def test_station_is_told_by_the_worst_of_its_heartbeats(make_bench: Callable[...
         beat.confirmed, beat.state, beat.value = NOW, BeatState.COUNTS, 1
     assert details(bench.status('interlocks'))['station 1'].startswith('not in control: ')
     beats[1].confirmed, beats[1].state, beats[1].value = NOW, BeatState.COUNTS, 1
-    assert details(bench.status('interlocks'))['station 1'].startswith('heartbeat counts since ')
+    assert details(bench.status('interlocks'))['station 1'].startswith('heartbeat counts (for ')
 
 
 def test_heartbeat_that_another_program_writes_is_an_error_with_what_it_wrote(

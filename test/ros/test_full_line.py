@@ -25,7 +25,7 @@ def test_rows_whose_messages_fill_the_line_are_named_the_fullest_first() -> None
     spent[rows[0]], spent[rows[1]] = 2.0, 7.0
     assert line.text(104.0) == ''  # it is not looked at all the time
     assert line.text(110.0) == (
-        'messages fill 90% of the line: w1 (70%), w0 (20%); Write_Again leaves out unchanged '
-        'values')
+        'messages fill 90% of the line: w1 (70%), w0 (20%); set Write_Again to leave out '
+        'unchanged values')
     spent[rows[1]] = 9.0
     assert line.text(120.0) == ''

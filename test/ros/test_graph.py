@@ -69,8 +69,8 @@ def test_other_type_is_told_once_and_again_when_it_comes_back(
     domain.topics = {'/cell/abdf1/read/door': [BITS], '/cell/abdf1/read/n': [WORDS],
                      '/cell/abdf1/write/door': ['std_msgs/msg/Bool', BITS],
                      '/other/read/door': [BITS, WORDS]}
-    told = [f'/cell/abdf1/write/door is {BITS}; a node uses it as std_msgs/msg/Bool, and DDS '
-            'connects different types to nothing']
+    told = [f'/cell/abdf1/write/door is {BITS}; another node uses it as std_msgs/msg/Bool, '
+            'and DDS does not connect different types']
     assert [texts(watch.look(now)) for now in (10.0, 20.0)] == [told, []]
     domain.topics['/cell/abdf1/write/door'] = [BITS]
     assert watch.look(30.0) == []

@@ -387,4 +387,4 @@ def test_rule_22_status_says_whether_ros_is_in_control_and_what_is_missing(cell:
 
     cell.until(is_in_control, 'a reset that is accepted')
     until_status(cell.diagnostics, 'interlocks', OK,
-                 lambda status: details(status)['station 1'].startswith('in control since'))
+                 lambda status: details(status)['station 1'].startswith('in control for'))

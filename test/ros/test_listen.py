@@ -128,7 +128,7 @@ def listen(ros: Observer, tmp_path: Path, ptys: list[Pty], *, is_full: bool) -> 
                      lambda status: details(status).get('levels', '').startswith('stale'))
         if not is_full:  # it takes 10 s
             until_status(diagnostics, 'link', ERROR, lambda status:
-                         'nothing is heard of any of 1 stations' in status.message)
+                         'none of 1 stations is heard' in status.message)
         answer = ros.call(SetBool, '/abdf1/polling', SetBool.Request(data=False))
         assert answer.success
     finally:

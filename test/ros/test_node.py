@@ -222,7 +222,7 @@ def test_reply_to_a_command_of_an_earlier_run_is_no_error(
         bench.node.session._events.happened(left_over)
     lines = [line.partition('[abdf1]: ')[2] for line in ''.join(capfd.readouterr()).splitlines()]
     told = str(left_over)
-    assert f'{told}; it may answer a command from before the port was opened' in lines
+    assert f'{told}; it may answer a command sent before the port was opened' in lines
     assert told.startswith('2510') and lines.count(told) == 1
 
 
@@ -486,7 +486,7 @@ def test_end_of_another_type_on_a_topic_is_told(
         bench.ros.until(is_told, 'a line of the log')
     (line,) = [line for line in said[0].splitlines() if 'std_msgs/msg/Bool' in line]
     assert line.startswith('[WARN] ')
-    assert '/abdf1/read/speed is std_msgs/msg/Int16MultiArray; a node uses it as' in line
+    assert '/abdf1/read/speed is std_msgs/msg/Int16MultiArray; another node uses it as' in line
 
 
 def test_two_writers_of_a_topic_can_tell_their_results_apart(make_bench: Benches) -> None:

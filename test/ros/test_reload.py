@@ -303,7 +303,7 @@ def test_file_that_has_changed_is_told_once(
     link = until_status(bench.diagnostics, 'link', OK)
     assert details(link)['files'] == 'as read'
     bench.write_map(SPEED)
-    text = 'map.csv changed since read; ~/reload takes it'
+    text = 'map.csv changed since read; call ~/reload to read again'
     until_status(bench.diagnostics, 'link', OK, lambda status: details(status)['files'] == text)
     bench.diagnostics.clear()
     for _ in range(2):  # it has been looked at several times more

@@ -48,7 +48,7 @@ def test_hmi_reads_and_writes_through_the_node(
             node.wait_for('[WARN] ', f'guest pty:{place} has sent to station 2: protected typed '
                           'logical write F8:4 = 30.5, words of setpoint')
             until_status(diagnostics, 'guests', WARN,
-                         lambda status: '1 write to words of ours' in status.message)
+                         lambda status: '1 write to words of this bridge' in status.message)
         with Client(str(place), plc_type='PLC5', station=1, timeout=3.0, cmd_timeout=3.0) as hmi:
             hmi.write('A10:0', [1, 2, 3])
         node.wait_for('[WARN] ', 'typed write A10:0 = 0001 0002 0003, words of label')

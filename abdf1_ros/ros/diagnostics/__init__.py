@@ -12,4 +12,4 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""What people read: statuses of /diagnostics, and entries of the log."""
+"""The statuses of /diagnostics, and the entries of the log."""

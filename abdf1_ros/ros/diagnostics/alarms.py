@@ -15,7 +15,7 @@
 """
 Statuses of alarms: bits of the PLC that mean a fault of the plant.
 
-A bit that was seen between two statuses is shown once, though it has gone again.
+A bit that came and went between two statuses is still shown once.
 """
 
 from __future__ import annotations
@@ -37,9 +37,12 @@ _LEVELS = {AlarmLevel.WARN: WARN, AlarmLevel.ERROR: ERROR}
 @dataclass(slots=True)
 class Bit:
     """
-    One bit: whether it is an alarm, since when (clock value, s), and how often that began.
+    One bit of an alarm row, and its history.
 
-    ``is_news`` tells that it was an alarm at some time since the last status.
+    - ``is_on``: the bit is an alarm now
+    - ``since``: clock value (s) of its last change; None if it never changed
+    - ``times``: how often the alarm began
+    - ``is_news``: it was an alarm at some time since the last status
     """
 
     place: str
@@ -49,23 +52,23 @@ class Bit:
     is_news: bool = False
 
     def take(self, is_on: bool, now: float) -> None:
-        """Take what was read."""
+        """Record whether the bit, as read at ``now``, is an alarm."""
         if is_on is not self.is_on:
             self.is_on, self.since = is_on, now
             self.times += is_on
         self.is_news |= is_on
 
     def text(self, now: float) -> str:
-        """Return what is known of it."""
+        """Return the history of the bit as a text."""
         if self.since is None:
             return 'never'
         times = counted(self.times, 'time')
-        return f'since {now - self.since:.1f} s, {times}' if self.is_on else \
+        return f'for {now - self.since:.1f} s, {times}' if self.is_on else \
             f'{times}, gone {now - self.since:.1f} s ago'
 
 
 class AlarmStatus:
-    """The alarms of one row, whose bits are read as ``point`` says."""
+    """The status of one row with an alarm; ``point`` knows how fresh its bits are."""
 
     def __init__(self, point: ReadPoint, port: str) -> None:
         mapping = self._mapping = point.mapping
@@ -77,7 +80,7 @@ class AlarmStatus:
         self._bits = [Bit(str(mapping.place_of(number))) for number in range(mapping.length)]
 
     def take(self, values: Values, now: float) -> None:
-        """Take the values of a good read."""
+        """Record the values of a good read."""
         for bit, value in zip(self._bits, values, strict=True):
             bit.take(value == self._alarm.state, now)
 
@@ -98,13 +101,13 @@ class AlarmStatus:
         return {bit.place: bit.text(now) for bit in self._bits}
 
     def forget(self) -> None:
-        """Take note that a status has shown what a bit was since the one before."""
+        """Forget the bits that have gone: a status has shown them now."""
         for bit in self._bits:
             bit.is_news = False
 
 
 class Alarms:
-    """The statuses of all rows with an alarm; ``read`` gets values in the thread of the link."""
+    """The statuses of all rows with an alarm; ``read`` runs in the thread of the link."""
 
     def __init__(self, points: Iterable[ReadPoint], port: str,
                  clock: Callable[[], float]) -> None:
@@ -117,11 +120,11 @@ class Alarms:
         return [*self._by_mapping.values()]
 
     def read(self, mapping: Mapping, values: Values) -> None:
-        """Take the values of a good read, of any row."""
+        """Record the values of a good read, if the row has an alarm."""
         if status := self._by_mapping.get(mapping):
             status.take(values, self._clock())
 
     def forget(self) -> None:
-        """Take note that all statuses have been shown."""
+        """Forget the bits that have gone, in all rows: the statuses have shown them."""
         for status in self._by_mapping.values():
             status.forget()

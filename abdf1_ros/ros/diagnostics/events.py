@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""What the driver tells: results on their topic, the rest in the log and in the statuses."""
+"""Show the driver's events: results on their topic, the rest in log and statuses."""
 
 from __future__ import annotations
 
@@ -40,11 +40,14 @@ _SHOWN_NODES = 4
 
 class LineEvents:
     """
-    The listener of a driver.
+    The listener of a driver: it publishes, logs, and keeps events for the statuses.
 
-    ``read`` gets values, ``results`` publishes what came of writes, ``answer`` gets that too.
-    ``table_changed`` is called when a station has come or gone. ``stations`` are those that we
-    talk to; ``scans`` where "plc scan" finds others.
+    - ``stations``: the stations that the map names
+    - ``scans``: True if "plc scan" works on this line
+    - ``read``: is called with the values of each good read
+    - ``results``: publisher for the results of writes
+    - ``answer``: is called with each result too
+    - ``table_changed``: is called when a station has become active or inactive
     """
 
     def __init__(self, logger: RcutilsLogger, port: str, stations: Collection[int], *,
@@ -64,23 +67,23 @@ class LineEvents:
         self.seen = seen
         self._results, self._answer = results, answer
         self._table_changed = table_changed
-        # A station may have a reply ready for a command from before.
+        # These stations may still hold a reply to a command of an earlier run.
         self._may_have_left_over = set(stations)
         self._has_told_tools = False
 
     def port_changed(self) -> None:
-        """Take note that stations may answer commands from before."""
+        """Expect that stations may answer commands sent on the old port."""
         self._may_have_left_over = set(self._stations)
 
     def lost(self, topic: str, count: int) -> None:
-        """Tell of messages to a write topic that never came."""
+        """Log messages to a write topic that DDS has dropped."""
         self.writes.lost(topic, count, self._clock())
         self.notes.warning(f'lost writes to {topic}', f'~/write/{topic}: {count} messages were '
-                           'lost on their way here, and have no result: they come faster than '
-                           'they can be taken, or the network was cut')
+                           'lost on their way here and have no result: the publisher is too '
+                           'fast for this node, or the network was cut')
 
     def ahead(self, topic: str, seconds: float, nodes: Sequence[str]) -> None:
-        """Tell of nodes that publish of which the clock of one is ahead of ours."""
+        """Log that the clock of one of these publishers is ahead of ours."""
         shown = ' or '.join(nodes[:_SHOWN_NODES]) or 'a node that is gone'
         text = f'the clock of {shown} is {seconds:.2f} s ahead of the clock here'
         self.writes.ahead(f'~/write/{topic}: {text}', self._clock())
@@ -88,7 +91,7 @@ class LineEvents:
             f'clock of {topic}', f'~/write/{topic}: {text}, so old messages look new')
 
     def written(self, result: WriteResult) -> None:
-        """Publish the result of a write."""
+        """Publish the result of a write; log it if the write failed or was a fallback."""
         now, mapping = self._clock(), result.mapping
         self.writes.add(result, now)
         if result.outcome is Outcome.FALLBACK:
@@ -104,16 +107,16 @@ class LineEvents:
         self._answer(result)
 
     def unreadable(self, mapping: Mapping, reason: str) -> None:
-        """Have it logged why a read of a station that answers has no value."""
+        """Collect for the log why a row has no value although its station answers."""
         self.unreadable_rows.add(line_time(), mapping, reason)
 
     def published_again(self, mapping: Mapping, seconds: float) -> None:
-        """Log that a row is not withheld any more, nor are those that depend on the same."""
+        """Log that a row is published again; first log the rows that still have no value."""
         self.unreadable_rows.tell()
         self.notes.info(mapping.tag, f'{where(mapping)}: published again after {seconds:.1f} s')
 
     def foreign_value(self, mapping: Mapping, text: str, is_conflict: bool) -> None:
-        """Log that a heartbeat is not the one that we have written (rule 19)."""
+        """Log that a heartbeat word holds a value that we have not written (rule 19)."""
         log = self.notes.error if is_conflict else self.notes.warning
         if is_conflict:
             self.seen.conflicts[mapping.tag] = f'{mapping.address}: {text}'
@@ -124,20 +127,21 @@ class LineEvents:
         if self._took_left_over(event):
             self.notes.info(
                 f'station {event.station}',
-                f'{event}; it may answer a command from before the port was opened')
+                f'{event}; it may answer a command sent before the port was opened')
             return
         is_inactive = event.message is Message.ERR_INACTIVE_STATION
         if event.message is not Message.NTC_REPLY_MSG_RCVD:
             moment = event, self._clock()
-            if not is_inactive:  # it has values of its own, but the reason is only in the event
+            # An inactive station has a status of its own; its last event still says why.
+            if not is_inactive:
                 self.seen.last_events[event.station] = moment
             if event.message.severity is not Severity.NOTICE:
                 self.seen.last_error = moment
-        if not (is_inactive and event.station in self._stations):  # logged by station_changed
+        if not (is_inactive and event.station in self._stations):  # station_changed logs this
             self._log.add(event)
 
     def _took_left_over(self, event: Event) -> bool:
-        """Tell whether a station gives us, first of all, what it had ready for an earlier run."""
+        """Return True if the first message of a station is a reply to an earlier run's command."""
         is_wrong = event.message is Message.ERR_WRONG_MESSAGE
         if event.station not in self._may_have_left_over or not (
                 is_wrong or event.message is Message.NTC_REPLY_MSG_RCVD):
@@ -149,7 +153,7 @@ class LineEvents:
         """Publish the Active Node Table and log the change."""
         self._table_changed()
         if station.takes_no_commands:
-            return  # it comes and goes, and that is reported once
+            return  # such a station comes and goes; DeafStations reports it once
         self._log.forget(station.number)
         about = f'station {station.number}'
         if station.active:
@@ -160,11 +164,11 @@ class LineEvents:
                 self._tell_tools(about)
 
     def _tell_tools(self, about: str) -> None:
-        """Name, once, what finds out why a station has never been heard."""
+        """Name, once, the tools that find out why a station was never heard."""
         if self._has_told_tools:
             return
         self._has_told_tools = True
-        scan = ', "plc scan" which stations answer' if self._scans else ''
+        scan = ', or "plc scan" to find the stations that answer' if self._scans else ''
         self.notes.info(about, (
-            f'{about} has never been heard: with the node stopped, "plc detect" finds the '
+            f'{about} has never been heard: stop the node and run "plc detect" to find the '
             f'settings of the line{scan}'))

@@ -13,11 +13,11 @@
 # limitations under the License.
 
 """
-What other nodes do that concerns ours: they have its name, or its topics with other types.
+Find other nodes that have our name, or that use our topics with other types.
 
-DDS has no event for either, so the graph is looked at. That costs some microseconds a topic of the
-whole domain, and a process may have a hundred nodes: they share one ``Graph``, which looks for all
-of them, and seldom where a look is long.
+DDS has no event for either case, so we query the graph now and then. A query takes some
+microseconds for each topic of the domain, and a process may have a hundred nodes. So all its nodes
+share one ``Graph``. The longer a query takes, the longer is the pause after it.
 """
 
 from __future__ import annotations
@@ -31,23 +31,24 @@ from abdf1_ros.ros.diagnostics.log import INFO, News, WARN
 from abdf1_ros.settings.mapping import Mapping
 from rclpy.node import Node
 
-# s; a node of our name is to be reported before it has taken many of our messages.
+# Seconds; short, to report a node with our name before it has taken many of our messages.
 _NAMES_PERIOD = 0.25
 
-# After a start others are found in so long (s), mostly in a fifth of that.
+# Seconds until a new node has found the nodes that run already; mostly it takes a fifth of this.
 DISCOVERY = 0.5
 
-# Between two looks at topics (s): at least, and as a multiple of the processor time of one.
+# Pause between two queries for topics: at least ``_LEAST`` s, and at least ``_MULTIPLE`` times the
+# processor time of a query.
 _LEAST = 2.0
 _MULTIPLE = 2000
 
-# A node that was killed stays visible for up to 20 s, the lease of its DDS participant. A node of
-# our name that is seen for longer (s) is not an earlier run of ours.
+# A killed node stays visible for up to 20 s, the lease of its DDS participant. A node with our
+# name that is seen for longer than this (s) is not an earlier run of ours.
 _KILLED_IS_SEEN = 30.0
 
 
 class Graph:
-    """The nodes and topics of the domain, as ``source`` sees them; used by one thread."""
+    """The nodes and topics of the domain, as the node ``source`` sees them; for one thread."""
 
     def __init__(self, source: Node) -> None:
         self._source = source
@@ -56,14 +57,14 @@ class Graph:
         self._next_names = self._next_topics = 0.0
 
     def nodes(self, name: str, namespace: str, now: float) -> int:
-        """Return how many nodes are called so, at the clock value ``now`` (s)."""
+        """Return how many nodes have this name, at the clock value ``now`` (s)."""
         if now >= self._next_names:
             self._next_names = now + _NAMES_PERIOD
             self._nodes = Counter(self._source.get_node_names_and_namespaces())
         return self._nodes[name, namespace]
 
     def clashes(self, now: float) -> MappingType[str, list[str]]:
-        """Return the topics that have more than one type, the same object until the next look."""
+        """Return the topics with more than one type: the same object until the next query."""
         if now >= self._next_topics:
             begun = thread_time()
             self._clashes = {topic: types for topic, types
@@ -74,12 +75,15 @@ class Graph:
 
 class NameWatch:
     """
-    Find out when another node has our name, so that topics and services of both are one.
+    Report that another node has our name: both then have the same topics and services.
 
-    ``count`` tells how many nodes of the name there are; ours is one of them. That is said as soon
-    as it is seen, before it is known whether it is an earlier run: both may take the next command.
-    The first look is at the clock value ``first_look`` (s); ``has_looked`` is true from then on.
-    ``renaming`` is the argument that gives another name.
+    Such a node is reported at once, even if it may be an earlier run that was killed: both nodes
+    may take the next command.
+
+    - ``count``: returns the number of nodes with our name, our own included
+    - ``first_look``: clock value (s) of the first look
+    - ``has_looked``: True after the first look
+    - ``renaming``: the argument that gives our node another name
     """
 
     def __init__(self, name: str, count: Callable[[float], int], first_look: float = 0.0,
@@ -93,7 +97,7 @@ class NameWatch:
         self._next_look = first_look
 
     def look(self, now: float) -> Iterator[News]:
-        """Look now and then; tell when it comes, stays, and goes."""
+        """Look if it is time; yield news if such a node has come, stays, or has gone."""
         if now < self._next_look:
             return
         self._next_look = now + _NAMES_PERIOD
@@ -103,8 +107,8 @@ class NameWatch:
             stays = now - self._since >= _KILLED_IS_SEEN
             text = f'another node is called {self._name} too' + (
                 '' if stays else ', or an earlier run of it was killed less than 20 s ago')
-            news = News(WARN, 'the name', f'{text}: both publish and take the same topics; give '
-                        f'one another name, as in {self._renaming}')
+            news = News(WARN, 'the name', f'{text}: both use the same topics; rename one of '
+                        f'them, as in {self._renaming}')
         else:
             self._since, text = None, ''
             news = News(INFO, 'the name', f'no other node is called {self._name} any more')
@@ -115,9 +119,9 @@ class NameWatch:
 
 class TypeWatch:
     """
-    Watches the topics of a map for ends that DDS connects to nothing.
+    Watches the topics of a map for nodes that use another type: DDS does not connect them.
 
-    ``resolve`` makes the full name of a topic.
+    ``resolve`` returns the full name of a topic.
     """
 
     def __init__(self, graph: Graph, resolve: Callable[[str], str],
@@ -131,7 +135,7 @@ class TypeWatch:
         self._told: set[tuple[str, str]] = set()
 
     def look(self, now: float) -> list[News]:
-        """Return what is new at the clock value ``now`` (s), each once."""
+        """Return the wrong types that are new at the clock value ``now`` (s), each once."""
         clashes = self._graph.clashes(now)
         if clashes is self._seen:
             return []
@@ -140,5 +144,5 @@ class TypeWatch:
                  for kind in clashes[topic] if kind != self._own[topic]}
         news, self._told = found - self._told, found
         return [News(WARN, 'types of topics', (
-            f'{topic} is {self._own[topic]}; a node uses it as {kind}, and DDS connects '
-            'different types to nothing')) for topic, kind in sorted(news)]
+            f'{topic} is {self._own[topic]}; another node uses it as {kind}, and DDS does not '
+            'connect different types')) for topic, kind in sorted(news)]

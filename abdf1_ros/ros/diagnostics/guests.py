@@ -24,7 +24,7 @@ from abdf1_ros.text import counted, milliseconds
 
 
 class GuestsStatus:
-    """Which places are open, and what has come from there."""
+    """Which places have a guest, and what these guests have sent."""
 
     name = 'guests'
 
@@ -37,7 +37,8 @@ class GuestsStatus:
         connected = sum(guest.is_connected for guest in guests)
         notes = [f'{counted(count, what)} {why}' for count, what, why in (
             (sum(guest.refused for guest in guests), 'command', 'not allowed'),
-            (sum(guest.collisions for guest in guests), 'write', 'to words of ours')) if count]
+            (sum(guest.collisions for guest in guests), 'write', 'to words of this bridge'))
+            if count]
         text = f'{connected} of {len(guests)} places are open'
         faults = [f'{line.guest.name}: {line.fault}' for line in self._lines if line.fault]
         if faults:

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The status ``interlocks``: which PLC is under control of ROS, and why another is not."""
+"""The status ``interlocks``: which PLCs ROS controls, and why it does not control the rest."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ from abdf1_ros.text import milliseconds
 
 
 class _Control(IntEnum):
-    """Whether ROS is in control of a PLC, as far as one heartbeat tells; the worst comes first."""
+    """Whether ROS controls a PLC, as far as one heartbeat shows; the worst state comes first."""
 
     NOT_IN_CONTROL = 0
     UNKNOWN = 1
@@ -39,7 +39,7 @@ class _Control(IntEnum):
 
 
 class InterlockStatus:
-    """What is said of the heartbeats and fallbacks of a driver; asked ten times a second."""
+    """The status of the heartbeats and fallbacks of a driver; judged ten times a second."""
 
     name = 'interlocks'
 
@@ -50,12 +50,13 @@ class InterlockStatus:
         self._fallbacks = driver.interlocks.fallbacks
         self._checks = driver.checks
         self._bounds = [*Times(driver.network, driver.mappings, driver.readings.blocks).bounds()]
-        # By tag of the heartbeat, and all others at ''.
+        # Rows that confirm a heartbeat, by its tag. All other rows share the key ''.
         self._bits = {point.mapping.confirms: point for point in driver.points.values()}
-        self._since: dict[str, float] = {}  # by tag of a heartbeat that counts, a bit that is 1
+        # Clock values (s), by tag: since when a heartbeat counts, or a bit is 1.
+        self._since: dict[str, float] = {}
 
     def judge(self, now: float) -> Judgement:
-        """Return WARN where ROS is not in control, ERROR where another program writes."""
+        """Return WARN if ROS is not in control, ERROR if another program writes a heartbeat."""
         at_rest = [beat.mapping.tag for beat in self._beats if self._why_not(beat, now)]
         unconfirmed = [beat.mapping.tag for beat in self._beats if beat.mapping.tag not in at_rest
                        and self._control(beat, now)[0] <= _Control.UNKNOWN]
@@ -87,18 +88,18 @@ class InterlockStatus:
             self._since.pop(tag, None)
 
     def _control(self, beat: HeartbeatRow, now: float) -> tuple[_Control, str]:
-        """Return since when ROS is in control, or why not, as far as one heartbeat tells."""
+        """Return how long ROS has been in control, or why it is not, as one heartbeat shows."""
         if reason := self._why_not(beat, now):
             return _Control.NOT_IN_CONTROL, f'not in control: {reason}'
         begun, point = self._since[beat.mapping.tag], self._bits.get(beat.mapping.tag)
         if point is None:
-            return _Control.COUNTS, f'heartbeat counts since {now - begun:.1f} s'
+            return _Control.COUNTS, f'heartbeat counts (for {now - begun:.1f} s)'
         tag, (control, reason) = point.mapping.tag, self._confirmed(point, begun, now)
         self._seen(tag, control is _Control.IN_CONTROL, now)
-        return control, reason or f'in control since {now - max(begun, self._since[tag]):.1f} s'
+        return control, reason or f'in control for {now - max(begun, self._since[tag]):.1f} s'
 
     def _confirmed(self, point: ReadPoint, begun: float, now: float) -> tuple[_Control, str]:
-        """Return what a bit says of a heartbeat that counts since ``begun``, and why."""
+        """Return what a bit confirms of a heartbeat that counts since ``begun`` (s), and why."""
         tag, freshness = point.mapping.tag, point.freshness(now)
         bit, why = self._watched.latest.get(point.mapping.topic), point.error or point.withheld
         if bit is None or not freshness.is_usable:
@@ -117,7 +118,7 @@ class InterlockStatus:
 
     def values(self, now: float) -> dict[str, str]:
         """Return the state of each PLC, of each heartbeat and fallback, and their bounds."""
-        stations: dict[int, tuple[_Control, str]] = {}  # of each the worst of its heartbeats
+        stations: dict[int, tuple[_Control, str]] = {}  # the worst of each station's heartbeats
         for beat in self._beats:
             control, number = self._control(beat, now), beat.mapping.station
             stations[number] = min(stations.get(number, control), control, key=itemgetter(0))

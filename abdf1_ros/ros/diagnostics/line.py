@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""What is wrong on a line: an echo, our number, stations that take no commands, other PLCs."""
+"""Faults of a line: an echo, our number twice, stations that take no commands, wrong PLCs."""
 
 from __future__ import annotations
 
@@ -31,18 +31,18 @@ from abdf1_ros.ports.link_thread import LinkThread
 from abdf1_ros.ports.trace import PortOpener
 from abdf1_ros.settings.mapping import Mapping
 
-# For so long (s) another node with our number is reported after its last packet.
+# Another node with our number is reported until this many seconds after its last packet.
 _SAME_NUMBER_TOLD = 60.0
 
-# A station that takes no commands and has not been heard for so long (s) is silent.
+# A station that takes no commands is silent after this time (s) without a sign of life.
 _HEARD_LATELY = 10.0
 
 
 class LineView:
     """
-    What is wrong on the line of a driver, for statuses and watches.
+    The faults on the line of a driver, for statuses and watches.
 
-    ``link`` and ``opener`` are there once the driver is on the line.
+    ``link`` and ``opener`` are None until the driver is on the line.
     """
 
     def __init__(self, driver: Driver) -> None:
@@ -52,7 +52,7 @@ class LineView:
         self._rows_by_type = _rows_by_type(driver.mappings)
 
     def attach(self, link: LinkThread, opener: PortOpener) -> None:
-        """Set the thread whose port is reported, and what opens it."""
+        """Set the thread whose port is reported, and the opener of this port."""
         self.link, self.opener = link, opener
 
     @property
@@ -60,13 +60,13 @@ class LineView:
         return self.link is not None and self.link.state.is_open
 
     def fault(self, now: float) -> str:
-        """Return what is wrong with who is on the line, mostly nothing: an echo, or our number."""
+        """Return the fault of the line: our number twice, or an echo; empty if there is none."""
         driver = self.driver
         told = driver.link.status().same_number
         if told is not None and now - told < _SAME_NUMBER_TOLD:
             return (f'another node on the air has our number, {driver.network.station}: its '
                     'replies and ours cannot be distinguished; give each node its own Station')
-        # By radio a node that sends on gives our packets back.
+        # By radio an echo is normal: a node that passes packets on returns ours.
         duplex = driver.network.duplex
         nobody_answers = not any(station.active for station in driver.stations)
         does_harm = driver.machine.echoes and duplex is not Duplex.RADIO and (
@@ -74,7 +74,7 @@ class LineView:
         return COMES_BACK if does_harm else ''
 
     def deaf_stations(self, now: float) -> list[int]:
-        """Return the stations of a master that are heard, but not with replies to commands."""
+        """Return the stations of a master that answer polls, but no commands."""
         return [station.number for station in self.driver.stations if self.is_deaf(station, now)]
 
     def is_deaf(self, station: Station, now: float) -> bool:
@@ -83,7 +83,7 @@ class LineView:
                 and self.driver.network.line_mode.is_master)
 
     def wrong_types(self) -> list[str]:
-        """Return which PLCs are of another family than the map says."""
+        """Return which PLCs are not of the family, or the processor, that the map says."""
         found = (self.wrong_type(station.number) for station in self.driver.stations)
         return [text for text in found if text is not None]
 
@@ -94,10 +94,10 @@ class LineView:
 
 def wrong_type(station: int, identity: Identity | None, rows: Iterable[Mapping]) -> str | None:
     """
-    Return that a PLC is not what a row of the map says, None when it is.
+    Return a text if a PLC is not what a row of the map says, otherwise None.
 
-    That is of another PLC_Type, or another Processor. Rows of type PLC2 are right for any PLC: all
-    families know these commands.
+    Its PLC_Type or its Processor may differ. A row of type PLC2 fits any PLC, because all families
+    know the commands of the PLC-2.
     """
     if identity is None or identity.plc_type is None:
         return None
@@ -124,11 +124,11 @@ def _rows_by_type(mappings: Iterable[Mapping]) -> dict[int, dict[PlcType, Mappin
 
 
 def takes_in_silence(station: Station) -> bool:
-    """Tell whether a station takes commands and does not reply to them, or too late."""
+    """Return True if a station takes commands, but replies too late or not at all."""
     return station.active and (not station.replies_in_time or station.has_no_replies)
 
 
 def deaf_text(station: int) -> str:
-    """Return what is wrong with a station that is heard, but not with replies to commands."""
+    """Return the text for a station that answers polls, but no commands."""
     return f'station {station} answers polls, but no command: is Error_Code right, ' \
         'and Cmd_Timeout long enough?'

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The statuses ``link``, how fast the line works in figures, and ``counters``."""
+"""The statuses ``link`` (with the speed and load of the line) and ``counters``."""
 
 from __future__ import annotations
 
@@ -33,16 +33,16 @@ from abdf1_ros.ros.diagnostics.status import ERROR, Judgement, OK, Seen, WARN, w
 from abdf1_ros.settings.network import Network
 from abdf1_ros.text import counted, milliseconds
 
-# After so many seconds without a poll of the master there is a warning.
+# The status warns after this many seconds without a poll of the master.
 _LONGEST_UNPOLLED = 5.0
 
 LOAD_BY_TOPIC = 'line load by topic'
 _MOST_TOPICS = 40  # a map may have thousands
-_MOST_CARRIED = 30  # reads of other nodes, those that were heard last
+_MOST_CARRIED = 30  # most reads of other nodes that are shown: the latest
 
 
 class LinkStatus:
-    """The port, who answers on it, and how busy the line is."""
+    """The port, the stations that answer on it, and the load of the line."""
 
     name = 'link'
 
@@ -78,9 +78,9 @@ class LinkStatus:
             return WARN, f'port open, but {deaf} of {total} stations answer polls and no command'
         if total and not active:
             if self._line.driver.overheard is not None:
-                return ERROR, f'port open, but nothing is heard of any of {total} stations'
+                return ERROR, f'port open, but none of {total} stations is heard'
             return ERROR, f'port open, but none of {total} stations answers' + (
-                ', or the device server lets this connection wait' if '://' in self.hardware_id
+                ', or the device server keeps this connection waiting' if '://' in self.hardware_id
                 else '')
         unreached = sum(station.active and station.local_status != 0 for station in stations)
         silent = sum(map(takes_in_silence, stations))
@@ -95,7 +95,7 @@ class LinkStatus:
             return WARN, f'port open, {silent} of {total} stations take commands and do not reply'
         heard = sum(station.last_heard is not None for station in stations)
         if refused := self._line.driver.refused.lately(now):
-            return WARN, f'port open, but refused is a command of {refused[-1]}'
+            return WARN, f'port open, but it has refused a command of {refused[-1]}'
         return OK, f'port open, {heard} of {total} stations have answered'
 
     def values(self, now: float) -> dict[str, str]:
@@ -140,7 +140,8 @@ class CountersStatus:
         self._baseline = self._counters.by_mnemonic()
 
     def judge(self, now: float) -> Judgement:
-        # Asked for ten times a second: to look at all counters takes twenty times as long.
+        # This runs ten times a second, so it reads two counters: all of them take 20 times as
+        # long.
         counters, before = self._counters, self._baseline
         sent = counters.commands_sent - before['CNT_CMD_MSGS_SENT']
         received = counters.replies_received - before['CNT_REPLY_MSGS_RCVD']
@@ -157,12 +158,12 @@ def _settings(network: Network) -> str:
 
 
 def changed_text(names: Sequence[str]) -> str:
-    """Return a text about files that have changed, empty where none has."""
-    return f'{", ".join(names)} changed since read; ~/reload takes it' if names else ''
+    """Return a text that names changed files, empty if none has changed."""
+    return f'{", ".join(names)} changed since read; call ~/reload to read again' if names else ''
 
 
 class _LoadMeter:
-    """Transactions a second and line load since the last look."""
+    """Transactions per second and line load since the last status."""
 
     def __init__(self) -> None:
         self.transactions = 0.0
@@ -182,9 +183,9 @@ class _LoadMeter:
 
 def load_by_topic(jobs: Iterable[ReadJob]) -> str:
     """
-    Return which part of the time is for the reads of each topic, the largest first.
+    Return the share of the line time that the reads of each topic take, largest first.
 
-    Rows that are read together have the part of their words.
+    Rows that are read together share the time by their number of words.
     """
     loads: defaultdict[str, float] = defaultdict(float)
     for job in jobs:
@@ -198,7 +199,7 @@ def load_by_topic(jobs: Iterable[ReadJob]) -> str:
 
 
 def _paces(points: Iterable[ReadPoint]) -> dict[str, str]:
-    """Return how late the reads of each period are; Serve rows do not count."""
+    """Return the wanted and the real time between reads, by period; without Serve rows."""
     found: defaultdict[float, list[float]] = defaultdict(list)
     for point in points:
         if point.mapping.polls and not point.mapping.is_on_demand:
@@ -215,14 +216,14 @@ def _pace(period: float, intervals: Sequence[float]) -> str:
 
 
 def _unnumbered_counts(driver: Driver) -> dict[str, str]:
-    """Return what a radio modem node counts besides the numbered counters, by its name."""
+    """Return the counts of a radio modem node that have no number, by name."""
     counters = driver.counters
     return {} if driver.network.duplex is not Duplex.RADIO else {
         UNSENT: str(counters.unsent_messages), NO_MEMORY: str(counters.refused_for_memory)}
 
 
 def _carried(driver: Driver, now: float) -> dict[str, str]:
-    """Return what other nodes read, on a line that is only listened to."""
+    """Return the reads of other nodes, if the bridge only listens."""
     if driver.overheard is None:
         return {}
     known = sorted(driver.overheard.carried.values(), key=attrgetter('last'))[-_MOST_CARRIED:]
@@ -232,7 +233,7 @@ def _carried(driver: Driver, now: float) -> dict[str, str]:
 
 
 def _poll_scans(driver: Driver) -> dict[str, str]:
-    """Return last and longest poll cycles of the poll lists, where there are any."""
+    """Return the last and longest poll cycle of each poll list, if any."""
     return {
         f'{name} poll scan': f'last {milliseconds(times.last)}, '
                              f'longest {milliseconds(times.longest)}'

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Which rows the line cannot keep up with: rows to read, and those whose messages fill it."""
+"""Rows that are too much for the line: reads slower than their Period, and many writes."""
 
 from __future__ import annotations
 
@@ -25,24 +25,24 @@ from abdf1_ros.plan.report import PERIOD_STEPS
 from abdf1_ros.settings.mapping import Mapping
 from abdf1_ros.text import first, milliseconds
 
-# A row is slow from this many of its periods on, and stays slow down to the second number.
+# A row is slow if its reads take more than 1.5 periods, and until they take 1.25 or less.
 _SLOW, _STILL_SLOW = 1.5, 1.25
 
 _LOOK_PERIOD = 1.0  # s
 
 _MOST_NAMED = 3
 
-# With the Period that is advised, the line is busy for this part of the time at most.
+# The advised Period keeps the line busy for at most this part of the time.
 _ADVISED_LOAD = 0.8
 
 
-# Writes that have the line for this part of the time are reported. It is looked at so often (s).
+# Writes that take at least this part of the line time are reported; measured over ``_SPAN`` s.
 _FULL = 0.75
 _SPAN = 5.0
 
 
 class FullLine:
-    """The rows whose messages fill the line; ``spent`` has the seconds that each row has had."""
+    """The rows whose messages fill the line; ``spent``: seconds of line time, by row."""
 
     def __init__(self, spent: MappingType[Mapping, float]) -> None:
         self._spent = spent
@@ -51,7 +51,7 @@ class FullLine:
         self._text = ''
 
     def text(self, now: float) -> str:
-        """Return which rows fill the line, empty while none do."""
+        """Return the rows that fill the line as a text, empty if none do."""
         if (passed := now - self._looked) >= _SPAN:
             spent = {**self._spent}
             parts = {row: (seconds - self._before.get(row, 0.0)) / passed
@@ -64,13 +64,13 @@ def _filled(parts: MappingType[Mapping, float]) -> str:
     if (whole := sum(parts.values())) < _FULL:
         return ''
     named = [f'{row.tag} ({parts[row]:.0%})' for row in sorted(parts, key=lambda row: -parts[row])]
-    advice = '; Write_Again leaves out unchanged values' \
+    advice = '; set Write_Again to leave out unchanged values' \
         if not any(row.write_again for row in parts) else ''
     return f'messages fill {min(whole, 1.0):.0%} of the line: {first(named, _MOST_NAMED)}{advice}'
 
 
 class SlowRows:
-    """The rows that do not keep their Period, as they are read and not as the plan has it."""
+    """The rows whose reads do not keep their Period, as measured and not as planned."""
 
     def __init__(self, points: Iterable[ReadPoint]) -> None:
         self._points = [point for point in points if point.mapping.polls and point.period
@@ -79,7 +79,7 @@ class SlowRows:
         self._next_look = 0.0
 
     def text(self, now: float) -> str:
-        """Return which rows suffer most, and which Period would do; empty while all is well."""
+        """Return the slowest rows and a Period that can be kept; empty if no row is slow."""
         if now >= self._next_look:
             self._next_look = now + _LOOK_PERIOD
             self._slow = self._look(now)
@@ -96,7 +96,8 @@ class SlowRows:
                 and point.kept > point.period * (_STILL_SLOW if point in self._slow else _SLOW)}
 
     def _advice(self) -> str:
-        # What is read now fits the line. So all rows fit that are read as rarely as the rarest.
+        # The line carries the present reads. So it carries all rows at the pace of the slowest
+        # row.
         needed = max(self._slow.values()) / _ADVISED_LOAD * 1000
         period = next((step for step in PERIOD_STEPS if step >= needed), None)
         return '' if period is None else f'; Period {period} would do'

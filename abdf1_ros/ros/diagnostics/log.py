@@ -13,12 +13,11 @@
 # limitations under the License.
 
 """
-The entries of the node in the ROS log: all characters visible, and a limited number of entries.
+The node's entries in the ROS log: all characters are visible, the number of entries is limited.
 
-A numbered event is logged once for each cause, and its repetitions are counted. While a cause
-lasts, or a station comes and goes with it, there is an entry now and then. Other entries are
-limited to a few a minute about one subject, so that neither a PLC nor a publisher can fill the
-disk.
+A numbered event is logged once for each cause, and its repetitions are counted. While the cause
+lasts or comes and goes, an entry now and then repeats it. All other entries are limited to a few
+per minute about one subject. So neither a PLC nor a publisher can fill the disk.
 """
 
 from __future__ import annotations
@@ -37,28 +36,29 @@ from abdf1_ros.text import first, printable
 from rclpy.impl.logging_severity import LoggingSeverity
 from rclpy.impl.rcutils_logger import RcutilsLogger
 
-# A cause is logged again at once when it comes back after so many seconds.
+# A cause that comes back after this many quiet seconds is logged at once.
 _QUIET = 60.0
 
-# A lasting cause is logged again after so many seconds, so that each day's log shows it.
+# A lasting cause is logged again after this many seconds, so that each day's log shows it.
 _REMINDER = 600.0
 
-# Causes remembered at a time, which is several for each of 254 stations. Only messages with wrong
-# senders can cause more; those are not logged while all remembered ones are recent.
+# Most causes remembered: several for each of 254 stations. Only messages with wrong senders can
+# cause more. New causes are not logged while all remembered causes are recent.
 MOST_CAUSES = 1000
 
-# Entries about one subject in a minute.
+# Most entries about one subject in a minute.
 MOST_ENTRIES = 10
 _MINUTE = 60.0
 
-# Rows of a file that fail one after the other are logged together after so many seconds.
+# Rows without a value are logged together: ``_PAUSE`` s after the last row has come, or
+# ``_LONGEST`` s after the first.
 _PAUSE = 1.0
 _LONGEST = 10.0
 
-# So many wait to be reported at most; what is in none of them is in /diagnostics.
+# Most rows that wait for the log; /diagnostics shows the rest too.
 _MOST_ROWS = 10_000
 
-# Events of every transaction, and those that come with another event that is logged.
+# Events of every transaction, and events that come with another event that is logged.
 _ROUTINE = (
     Message.NTC_REPLY_MSG_RCVD, Message.NTC_NAK_RETRY, Message.NTC_ENQ_RETRY,
     Message.NTC_ACK_EXPECTED, Message.NTC_EOT_STX_EXPECTED)
@@ -78,7 +78,7 @@ _WRITE: dict[LoggingSeverity, Callable[[RcutilsLogger, str], object]] = {
 
 
 class News(NamedTuple):
-    """Something to be logged: how bad it is, what it is about, and what to say."""
+    """Something to be logged: its severity, its subject, and its text."""
 
     severity: LoggingSeverity
     about: str
@@ -91,20 +91,20 @@ def where(mapping: Mapping) -> str:
 
 
 def bug_text(error: Exception) -> str:
-    """Return what to log of an error that is a bug: a line, and the traceback."""
+    """Return the log text of an internal error: a line, and the traceback."""
     lines = ''.join(traceback.format_exception(error)).splitlines()
     return '\n'.join([f'{printable(repr(error))}; please report it', *map(printable, lines)])
 
 
 @dataclass(slots=True)
 class _Subject:
-    """A subject: when (s) its latest entries were written, and how many were left out."""
+    """A subject: clock values (s) of its latest entries, and the number of entries left out."""
 
     written: deque[float] = field(default_factory=lambda: deque(maxlen=MOST_ENTRIES))
     left_out: int = 0
 
     def has_enough(self, now: float) -> bool:
-        """Tell whether this minute has had all its entries."""
+        """Return True if no more entries are allowed in this minute."""
         return len(self.written) == MOST_ENTRIES and now - self.written[0] < _MINUTE
 
 
@@ -114,7 +114,7 @@ class _LoggedCause(_Subject):
     is_news: bool = True
 
     def is_due(self, now: float) -> bool:
-        """Tell whether its next event is to be logged."""
+        """Return True if an event with this cause is to be logged now."""
         return not self.has_enough(now) and (
             self.is_news or now - self.last >= _QUIET or now - self.written[-1] >= _REMINDER)
 
@@ -152,7 +152,7 @@ class EventLog:
         _WRITE[_SEVERITIES[event.message.severity]](self._logger, str(event) + again)
 
     def _has_room(self, now: float) -> bool:
-        """Tell whether one more cause can be remembered; quiet ones make room."""
+        """Return True if one more cause can be remembered; forget quiet causes if needed."""
         if len(self._causes) >= MOST_CAUSES:
             self._causes = {key: cause for key, cause in self._causes.items()
                             if now - cause.last < _QUIET}
@@ -200,33 +200,33 @@ class LimitedLog:
 
 class UnreadableRows:
     """
-    Why rows have no value: one entry of ``log`` for those of a file with one reason.
+    Logs why rows have no value: one entry for all rows of a file with the same reason.
 
-    A PLC that lacks a file refuses its rows one after the other, because what it refuses is
-    divided and asked for again. ``add`` is called in the thread of the link, ``tell`` in any.
+    A PLC that lacks a file refuses its rows one by one, because we divide a refused block and ask
+    again. Only the thread of the link calls ``add``; any thread may call ``tell``.
     """
 
     def __init__(self, log: LimitedLog) -> None:
         self._log = log
-        self._rows: dict[tuple[Mapping, str], None] = {}  # and reasons, in their order
+        self._rows: dict[tuple[Mapping, str], None] = {}  # with reasons, oldest first
         self._first = self._last = 0.0
 
     def add(self, now: float, mapping: Mapping, reason: str) -> None:
-        """Take note of a row without a value at the clock value ``now`` (s)."""
+        """Record a row without a value at the clock value ``now`` (s)."""
         if len(self._rows) < _MOST_ROWS:
             self._last = now
             self._first = self._first if self._rows else now
             self._rows[mapping, reason] = None
 
     def look(self, now: float) -> None:
-        """Tell when no row has come for a while, or the first has waited for long."""
+        """Write the entries if no row has come for a while, or the first has waited for long."""
         if self._rows and (now - self._last >= _PAUSE or now - self._first >= _LONGEST):
             self.tell()
 
     def tell(self) -> None:
         """Write the entries."""
         found = []
-        with suppress(KeyError):  # until it is empty; another thread may do the same
+        with suppress(KeyError):  # until it is empty; another thread may empty it too
             while True:
                 found.append(self._rows.popitem()[0])
         groups: defaultdict[tuple[int, Area, str], list[Mapping]] = defaultdict(list)

@@ -25,7 +25,7 @@ from abdf1_ros.ros.diagnostics.load import FullLine, SlowRows
 from abdf1_ros.ros.diagnostics.status import ERROR, Judgement, OK, WARN
 from abdf1_ros.text import counted
 
-# So many faults of rows that were left out are repeated with every status; check has them all.
+# Most faults of left-out rows that each status repeats; ``check`` shows them all.
 _MOST_LEFT_OUT = 20
 
 FRESHNESS_LEVELS = {
@@ -35,9 +35,9 @@ FRESHNESS_LEVELS = {
 
 class MappingsStatus:
     """
-    How many rows are fresh or slow, which fill the line, and why others are not.
+    How many rows are fresh; which are not, and why; which are slow, or fill the line.
 
-    ``left_out`` are faults of the map.
+    ``left_out``: the faults of rows that the map was read without.
     """
 
     name = 'mappings'
@@ -69,7 +69,7 @@ class MappingsStatus:
 
     def _freshness(self, now: float) -> dict[Freshness, int]:
         """Return the number of mappings in each state."""
-        # Called ten times a second: counting in a list takes a third of the time of a Counter.
+        # This runs ten times a second: ``list.count`` takes a third of the time of a Counter.
         states = [point.freshness(now) for point in self._points.values()]
         return {state: states.count(state) for state in Freshness if state in states}
 
@@ -95,6 +95,6 @@ def _describe(point: ReadPoint, now: float) -> str:
            f'{point.mapping.station}'
     text += ', never read' if age is None else f', last read {age:.1f} s ago'
     if point.withheld:
-        text += f'; {point.withheld}, since {now - point.withheld_since:.1f} s; ' \
+        text += f'; {point.withheld}, for {now - point.withheld_since:.1f} s; ' \
                 f'times withheld: {point.withholdings}'
     return f'{text}; {point.error}' if point.error else text

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The status ``standby``: all that a spare says while another bridge has the line."""
+"""The status ``standby``: a spare shows only this while another bridge has the line."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from abdf1_ros.ros.diagnostics.status import Judgement, OK, Seen, WARN
 
 
 class StandbyStatus:
-    """Why a spare waits, and whether it could take the line over as its files are now."""
+    """Why a spare waits, and whether its files have changed since it read them."""
 
     name = 'standby'
 
@@ -38,7 +38,7 @@ class StandbyStatus:
             'answered' if link.state.is_open else link.state.text
         text = f'waits on {socket.gethostname()} for the line: {state}'
         if changed := self._seen.changed_files:
-            return WARN, f'{text}; {", ".join(changed)} changed since read; start it again'
+            return WARN, f'{text}; {", ".join(changed)} changed since read; restart this bridge'
         return OK, text
 
     def values(self, now: float) -> dict[str, str]:

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The status of each station: mode, faults and counters of its PLC; ~/read_link_counters."""
+"""The status of each station, with data of its PLC; the service ~/read_link_counters."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ _PATIENCE = 5.0
 
 
 def processor_fault(identity: Identity | None) -> str | None:
-    """Return the fault of a processor that answers but does not run, None where none is known."""
+    """Return the fault of a processor that answers but does not run; None if none is known."""
     if identity is None:
         return None
     if identity.faults:
@@ -45,7 +45,7 @@ def processor_fault(identity: Identity | None) -> str | None:
 
 
 def health_values(health: StationHealth, now: float) -> dict[str, str]:
-    """Return what is shown of a station at the clock value ``now`` (s)."""
+    """Return the values that the PLC has reported, at the clock value ``now`` (s)."""
     values = {'processor': health.processor, 'mode': 'unknown', 'faults': 'unknown'}
     identity = health.identity
     if identity is not None and health.told is not None:
@@ -57,7 +57,7 @@ def health_values(health: StationHealth, now: float) -> dict[str, str]:
 
 
 class StationStatus:
-    """Whether a station answers, and what it has reported of itself."""
+    """Whether a station answers, and what its PLC has reported."""
 
     def __init__(self, line: LineView, station: Station, port: str, seen: Seen) -> None:
         self.name = f'station {station.number}'
@@ -77,7 +77,7 @@ class StationStatus:
             via = line.driver.stations.via(station.number)
             is_passed_on = via != station.number and line.driver.stations[via].active
             but = f'; its gateway, station {via}, answers' if is_passed_on else ''
-            return ERROR, f'station {station.number} inactive since {since:.1f} s{but}'
+            return ERROR, f'station {station.number} inactive for {since:.1f} s{but}'
         if station.local_status:
             return WARN, f'commands do not get to station {station.number}: ' \
                          f'{status_text(station.local_status)}'
@@ -112,9 +112,9 @@ class LinkCounterService:
     """
     Ask every active station for the counters of its port; ~/read_link_counters.
 
-    ``answer`` is the callback. It waits without holding up the executor, in a callback group of
-    its own, and goes on when ``check`` finds that all have answered, or after five seconds.
-    ``check`` may be called by another thread; it calls ``wake_executor`` then.
+    ``answer`` is the callback. It has a callback group of its own and does not block the executor.
+    It continues when ``check`` finds that all stations have answered, or after five seconds. Any
+    thread may call ``check``, which then calls ``wake_executor``.
     """
 
     def __init__(self, driver: Driver, wake_link: Callable[[], None],
@@ -150,7 +150,7 @@ class LinkCounterService:
         return response
 
     def check(self, now: float) -> None:
-        """End the waiting when there is nothing more to wait for."""
+        """End the waiting if all stations have answered, the port is closed, or time is over."""
         if now >= self._give_up or not self._driver.is_online \
                 or self._checks.counters_wanted.isdisjoint(self._asked):
             self.end()

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""What the statuses of /diagnostics are made of: levels, and texts of times."""
+"""The parts of each status of /diagnostics: levels, and texts of times."""
 
 from __future__ import annotations
 
@@ -32,11 +32,11 @@ Judgement = tuple[bytes, str]
 """Level and text of a status."""
 
 Moment = tuple[Event | str, float]
-"""What has happened, and when (clock value in s)."""
+"""An event, and its clock value (s)."""
 
 
 class Status(Protocol):
-    """One status of a node: its level and text are cheap to ask for, the details are not."""
+    """One status of a node; ``judge`` is cheap, ``values`` is not."""
 
     name: str
     hardware_id: str
@@ -50,28 +50,28 @@ class Status(Protocol):
 
 @dataclass(slots=True)
 class Seen:
-    """What watches and the events of the line have shown, for the statuses."""
+    """Findings of the watches and events of the line, for the statuses to show."""
 
     duplicate_name: Callable[[], str] = str
-    """Tells that another node has our name, empty while none has."""
+    """Returns a text if another node has our name, otherwise an empty text."""
     changed_files: Sequence[str] = ()
     """Names of files that have changed since they were read."""
     crowded: Sequence[str] = ()
     """Topics with a Fallback and more than one publisher."""
     conflicts: dict[str, str] = field(default_factory=dict)
-    """What another program has written over a heartbeat, by its tag."""
+    """Text on what another program has written over a heartbeat, by tag of the heartbeat."""
     latest: Mapping[str, Values] = field(default_factory=dict)
     """The last values that were published, by topic."""
     last_error: Moment | None = None
     last_events: dict[int | None, Moment] = field(default_factory=dict)
-    """The last thing unusual at each station."""
+    """The last unusual event of each station."""
     last_fallbacks: dict[int, Moment] = field(default_factory=dict)
     """The last fallback value of each station."""
 
 
 def message_of(name: str, level: bytes, text: str, place: str,
                values: Mapping[str, str]) -> DiagnosticStatus:
-    """Return a status as a message, in which all characters are visible."""
+    """Return a status as a message; unprintable characters are made visible."""
     return DiagnosticStatus(
         level=level, name=printable(name), message=printable(text), hardware_id=printable(place),
         values=[KeyValue(key=printable(key), value=printable(value))
@@ -79,5 +79,5 @@ def message_of(name: str, level: bytes, text: str, place: str,
 
 
 def with_age(moment: Moment | None, now: float) -> str:
-    """Return the last event, and how long ago it was."""
+    """Return an event, and how long ago it happened."""
     return 'none' if moment is None else f'{moment[0]} ({now - moment[1]:.1f} s ago)'

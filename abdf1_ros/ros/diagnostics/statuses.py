@@ -37,10 +37,11 @@ class Diagnostics:
     """
     All statuses of one node, named ``<node>: <status>``.
 
-    ``node_name`` is the full name, or nodes of one name in two namespaces would be one here.
-    ``events`` is the listener of the driver.
-    ``left_out`` are the faults of the rows that the map was read without, ``guests`` are the
-    places of other programs, ``alarms`` the statuses of rows with an alarm.
+    - ``node_name``: the full name, so that equal names in two namespaces stay apart
+    - ``events``: the listener of the driver
+    - ``left_out``: faults of the rows that the map was read without
+    - ``guests``: the places of other programs
+    - ``alarms``: the statuses of rows with an alarm
     """
 
     def __init__(self, node_name: str, driver: Driver, port: str,
@@ -61,11 +62,11 @@ class Diagnostics:
         self._waiting: list[Status] = [StandbyStatus(self.line, port, seen)]
 
     def levels(self, now: float, *, is_waiting: bool = False) -> list[bytes]:
-        """Return the level of every status; that of a spare alone while it waits."""
+        """Return the level of each status; a waiting spare has only the status ``standby``."""
         return [status.judge(now)[0] for status in self._shown(is_waiting)]
 
     def statuses(self, now: float, *, is_waiting: bool = False) -> list[DiagnosticStatus]:
-        """Return every status; that of a spare alone while it waits."""
+        """Return each status; a waiting spare has only the status ``standby``."""
         return [self._message(status, now) for status in self._shown(is_waiting)]
 
     def _shown(self, is_waiting: bool) -> Sequence[Status]:

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""What is looked at ten times a second, and what of it is news for the log."""
+"""Watches: they look ten times a second for faults, and return news for the log."""
 
 from __future__ import annotations
 
@@ -28,14 +28,14 @@ from rclpy.impl.logging_severity import LoggingSeverity
 
 
 class Watch(Protocol):
-    """Something that is looked at."""
+    """Something that looks for news again and again."""
 
     def look(self, now: float) -> Iterable[News]:
-        """Return what is new at the clock value ``now`` (s)."""
+        """Return the news at the clock value ``now`` (s)."""
 
 
 class Standing:
-    """What is wrong as long as ``find`` returns it, and is reported when it begins."""
+    """Reports each fault when ``find`` begins to return its text."""
 
     def __init__(self, severity: LoggingSeverity, about: str,
                  find: Callable[[float], Sequence[str]]) -> None:
@@ -45,26 +45,26 @@ class Standing:
         self._told: Sequence[str] = ()
 
     def look(self, now: float) -> list[News]:
-        """Return what was not there at the last look."""
+        """Return the faults that were not there at the last look."""
         texts, before = self._find(now), self._told
         self._told = texts
         return [News(self._severity, self._about, text) for text in texts if text not in before]
 
 
 class DeafStations:
-    """Stations that take no commands: each is reported once, and once that it does again."""
+    """Reports once that a station takes no commands, and once that it takes commands again."""
 
     def __init__(self, line: LineView) -> None:
         self._line = line
         self._told: list[int] = []
 
     def look(self, now: float) -> list[News]:
-        """Return which have begun, and which answer commands again."""
+        """Return the stations that stopped answering commands, or answer them again."""
         before, deaf = self._told, self._line.deaf_stations(now)
         self._told = deaf
         return [
-            *(News(WARN, f'commands to {number}', f'{deaf_text(number)} "plc detect" finds it, '
-                   'with the node stopped') for number in deaf if number not in before),
+            *(News(WARN, f'commands to {number}', f'{deaf_text(number)} Stop the node and run '
+                   '"plc detect" to find out') for number in deaf if number not in before),
             *(News(INFO, f'commands to {station.number}',
                    f'station {station.number} answers commands')
               for station in self._line.driver.stations
@@ -74,7 +74,7 @@ class DeafStations:
 def watches_of(line: LineView, port: str, seen: Seen, guests: Sequence[GuestLine],
                changed_files: Callable[[float], Sequence[str]],
                crowded_topics: Callable[[float], Sequence[str]]) -> list[Watch]:
-    """Return the watches of a session; ``seen`` gets what statuses need of it."""
+    """Return the watches of a session; they put into ``seen`` what statuses show."""
     def changed(now: float) -> list[str]:
         seen.changed_files = changed_files(now)
         return [changed_text(seen.changed_files)] if seen.changed_files else []

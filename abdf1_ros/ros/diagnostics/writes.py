@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""What has become of the writes of a node."""
+"""The status ``writes``: how the writes of a node ended."""
 
 from __future__ import annotations
 
@@ -29,17 +29,17 @@ _FAILURES = Outcome.FAILED, Outcome.NOT_SENT, Outcome.PARTLY
 
 
 def is_usual_fallback(result: WriteResult) -> bool:
-    """Tell whether a fallback value was written for a start or an end, as always."""
+    """Return True for a fallback value written at a start or an end, which is normal."""
     return result.outcome is Outcome.FALLBACK and \
         result.detail in (FallbackCause.START.value, FallbackCause.END.value)
 
 
 class WriteLog:
     """
-    Counts of writes by how they ended.
+    Counts writes by their outcome.
 
-    Refusals and lost messages are counted in the thread of the requests, all others in that of
-    the link, so no count has two writers.
+    Each count has one writer: the executor's thread counts refusals and lost messages, the link
+    thread counts all else.
     """
 
     name = 'writes'
@@ -61,12 +61,12 @@ class WriteLog:
             self._last_failure = f'{result.mapping.tag} {result}', now
 
     def lost(self, topic: str, count: int, now: float) -> None:
-        """Count messages that never came."""
+        """Count messages that DDS has dropped."""
         self._lost += count
         self._last_loss = f'{count} to ~/write/{topic}', now
 
     def ahead(self, text: str, now: float) -> None:
-        """Take note of a publisher whose clock is ahead."""
+        """Record that the clock of a publisher is ahead."""
         self._last_lead = text, now
 
     def _messages(self) -> int:

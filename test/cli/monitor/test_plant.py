@@ -30,7 +30,7 @@ NOW = 1000.0
 LINK = Status('link', Style.GOOD, 'OK: port open',
               {'line load': '93 %', 'poll cycle with Periods': '34 ms'})
 FRESH = Status('mappings', Style.GOOD, 'OK: of 10 mappings 10 fresh')
-SILENT = Status('station 3', Style.BAD, 'ERROR: station 3 inactive since 4.0 s')
+SILENT = Status('station 3', Style.BAD, 'ERROR: station 3 inactive for 4.0 s')
 REFUSED = Status('writes', Style.WARNING, 'WARN: 3 of 4 writes confirmed')
 
 
@@ -45,7 +45,7 @@ def texts(*lines: LineState, width: int = 80) -> list[str]:
 def test_worst_come_first_and_say_why() -> None:
     assert texts(line('/a'), line('/b', SILENT, REFUSED), line('/c', REFUSED), line('/0')) == [
         '4 lines: 2 OK, 1 WARN, 1 ERROR', 'line state load cycle',
-        '/b ERROR 93 % 34 ms station 3: station 3 inactive since 4.0 s',
+        '/b ERROR 93 % 34 ms station 3: station 3 inactive for 4.0 s',
         '/c WARN 93 % 34 ms writes: 3 of 4 writes confirmed',
         '/0 OK 93 % 34 ms of 10 mappings 10 fresh', '/a OK 93 % 34 ms of 10 mappings 10 fresh']
 
