@@ -209,8 +209,9 @@ def test_points_have_failed_when_the_port_is_lost_and_the_first_read_is_publishe
 
 
 def test_every_write_ends_once_on_a_line_that_fails_in_every_way() -> None:
-    mappings = [make_mapping(text, 'ReadWrite', length=length) for text, length in (
-        ('N7:0', 1), ('N7:10', 150), ('B3:0/3', 2), ('F8:2', 1))]
+    mappings = [
+        make_mapping(text, 'ReadWrite', length=length, write_again=5000) for text, length in (
+            ('N7:0', 1), ('N7:10', 150), ('B3:0/3', 2), ('F8:2', 1))]
     bench, plc = make_bench(*mappings, write_timeout=0.4)
     dice = random.Random(7)
     asked = 0
