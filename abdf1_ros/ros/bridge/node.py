@@ -37,6 +37,7 @@ from abdf1_ros.ros.bridge.offer import OfferedPublisher
 from abdf1_ros.ros.bridge.port_owners import PortOwners
 from abdf1_ros.ros.bridge.reload import changes, refuse_harm
 from abdf1_ros.ros.bridge.session import Session, Surroundings, tell_plcs
+from abdf1_ros.ros.bridge.standby import Service, Standby
 from abdf1_ros.ros.callbacks import AnsweringNode
 from abdf1_ros.ros.diagnostics.graph import DISCOVERY, Graph, NameWatch
 from abdf1_ros.ros.diagnostics.log import bug_text
@@ -60,8 +61,6 @@ from rclpy.duration import Duration
 from std_msgs.msg import UInt16MultiArray
 from std_srvs.srv import SetBool, Trigger
 
-_POLLING = '~/polling'
-
 # Of the end (s): until when, counted from its beginning, writes that have come are waited for and
 # last diagnostics are begun; how long these may take, where a subscriber is stuck.
 _LATEST_WRITES = LONGEST_END + 1.0
@@ -83,8 +82,7 @@ class BridgeNode(AnsweringNode):
                  port_owners: PortOwners | None = None,
                  arguments: Arguments = NO_ARGUMENTS, **kwargs: Any) -> None:
         super().__init__(name, automatically_declare_parameters_from_overrides=True, **kwargs)
-        self._is_stuck = self._is_ending = self._is_changing = False
-        self._offered_services: dict[str, Any] = {}
+        self._is_stuck = self._is_ending = False
         self._hold_ports = partial(
             (port_owners or PortOwners()).hold, self.get_fully_qualified_name())
         try:
@@ -112,10 +110,16 @@ class BridgeNode(AnsweringNode):
             OfferedPublisher(self, UInt16MultiArray, '~/active_stations', latched_qos(), most=1),
             self.create_publisher(DiagnosticArray, '/diagnostics', 10),
             OfferedPublisher(self, DiagnosticArray, '~/snapshot', 1, most=1), self.writes)
+        self._standby = Standby(self._surroundings, lambda: self.session, (
+            Service('~/reset_counters', Trigger, self._reset_counters),
+            Service('~/reload', Trigger, self._reload),
+            Service('~/polling', SetBool, self._set_polling, stays=True),
+            Service('~/read_link_counters', Trigger, self._read_link_counters,
+                    MutuallyExclusiveCallbackGroup())))
         if configuration.parameters.standby:
             self.get_logger().info('waits for the line, and is silent until it has it')
         else:
-            self._offer()
+            self._standby.offer()
         self.session = Session(self._surroundings, configuration)
         self.writes.give_to(self.session.writers)
         self.link = self._surroundings.link = LinkThread(
@@ -144,56 +148,6 @@ class BridgeNode(AnsweringNode):
             self.get_fully_qualified_name(),
             lambda now: 1 if is_spare else graph.nodes(name, namespace, now),
             line_time() + DISCOVERY)
-
-    @property
-    def _offered_topics(self) -> tuple[OfferedPublisher, ...]:
-        """Return those that a spare does not have."""
-        there = self._surroundings
-        return there.results, there.active_stations, there.snapshot
-
-    def _offer(self) -> None:
-        """Make all topics and services that are not those of the map."""
-        self._surroundings.is_offered = True
-        for publisher in self._offered_topics:
-            publisher.offer()
-        for name, kind, answer, group in (
-                ('~/reset_counters', Trigger, self._reset_counters, None),
-                ('~/reload', Trigger, self._reload, None),
-                (_POLLING, SetBool, self._set_polling, None),
-                ('~/read_link_counters', Trigger, self._read_link_counters,
-                 MutuallyExclusiveCallbackGroup())):
-            if name not in self._offered_services:
-                self._offered_services[name] = self.create_service(
-                    kind, name, answer, callback_group=group)
-
-    def _look_for_line(self) -> None:
-        """Begin to offer, or to wait, where the line has become ours, or is not ours any more."""
-        has_line, is_offered = self.session.has_line, self._surroundings.is_offered
-        if has_line is is_offered or self._is_changing or self._is_ending \
-                or self.executor is None:
-            return
-        self._is_changing = True
-        self.executor.create_task(self._take_line if has_line else self._leave_line)
-
-    def _take_line(self) -> None:
-        """Offer everything: the line is ours."""
-        self.get_logger().info('has the line: it begins to publish and to take writes')
-        self._offer()
-        self.session.offer()
-        self._is_changing = False
-
-    def _leave_line(self) -> None:
-        """Withdraw everything but what takes a line that was left: another may have it."""
-        self.get_logger().warning('has lost the line: it waits, and is silent')
-        self._surroundings.is_offered = False
-        for name in [*self._offered_services]:
-            if name != _POLLING or not self.link.is_released:
-                self.destroy_service(self._offered_services.pop(name))
-        self.session.withdraw()
-        for publisher in self._offered_topics:
-            publisher.withdraw()
-            publisher.forget()
-        self._is_changing = False
 
     @property
     def has_failed(self) -> bool:
@@ -230,8 +184,8 @@ class BridgeNode(AnsweringNode):
     def check(self) -> None:
         """Publish what is due; take writes after the first look for a node of our name."""
         self.session.check()
-        if self.session.configuration.parameters.standby:
-            self._look_for_line()
+        if self.session.configuration.parameters.standby and not self._is_ending:
+            self._standby.look()
         if self._surroundings.names.has_looked:
             self.writes.begin()
 

@@ -50,12 +50,9 @@ class OfferedPublisher:
         self._publish_waiting()
 
     def withdraw(self) -> None:
-        """Close the publisher."""
+        """Close the publisher, and drop what waits: the line is not ours any more."""
         publisher, self._publisher = self._publisher, None
         self._node.destroy_publisher(publisher)
-
-    def forget(self) -> None:
-        """Drop what waits: the line was not ours."""
         self._waiting.clear()
 
     def publish(self, message: Any) -> None:

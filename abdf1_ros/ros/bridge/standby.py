@@ -1,0 +1,90 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""When a bridge offers its topics and services: a spare does not before it has the line."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import Any, NamedTuple
+
+from abdf1_ros.ros.bridge.session import Session, Surroundings
+from rclpy.callback_groups import CallbackGroup
+
+
+class Service(NamedTuple):
+    """A service of the node; ``stays`` while the line is left, as only it takes the line again."""
+
+    name: str
+    kind: type
+    answer: Callable[..., Any]
+    group: CallbackGroup | None = None
+    stays: bool = False
+
+
+class Standby:
+    """
+    Makes and closes what the bridge offers, all but the topics of the map, which ``session`` has.
+
+    ``look`` is to be called ten times a second where the bridge is a spare.
+    """
+
+    def __init__(self, surroundings: Surroundings, session: Callable[[], Session],
+                 services: Sequence[Service]) -> None:
+        self._surroundings = surroundings
+        self._session = session
+        self._services = services
+        self._publishers = (
+            surroundings.results, surroundings.active_stations, surroundings.snapshot)
+        self._made: dict[Service, Any] = {}
+        self._is_changing = False
+
+    def offer(self) -> None:
+        """Make all topics and services that are not those of the map."""
+        self._surroundings.is_offered = True
+        for publisher in self._publishers:
+            publisher.offer()
+        for service in self._services:
+            if service not in self._made:
+                self._made[service] = self._surroundings.node.create_service(
+                    service.kind, service.name, service.answer, callback_group=service.group)
+
+    def look(self) -> None:
+        """Begin to offer, or to wait, where the line has become ours, or is not ours any more."""
+        has_line, executor = self._session().has_line, self._surroundings.node.executor
+        if has_line is self._surroundings.is_offered or self._is_changing or executor is None:
+            return
+        self._is_changing = True
+        executor.create_task(self._take_line if has_line else self._leave_line)
+
+    def _take_line(self) -> None:
+        """Offer everything: the line is ours."""
+        self._surroundings.node.get_logger().info(
+            'has the line: it begins to publish and to take writes')
+        self.offer()
+        self._session().offer()
+        self._is_changing = False
+
+    def _leave_line(self) -> None:
+        """Withdraw everything but what takes a line that was left: another may have it."""
+        node = self._surroundings.node
+        node.get_logger().warning('has lost the line: it waits, and is silent')
+        self._surroundings.is_offered = False
+        for service in [*self._made]:
+            if not service.stays or not self._surroundings.link.is_released:
+                node.destroy_service(self._made.pop(service))
+        self._session().withdraw()
+        for publisher in self._publishers:
+            publisher.withdraw()
+        self._is_changing = False
