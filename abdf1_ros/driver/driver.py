@@ -145,7 +145,7 @@ class Driver:
         self._read_backs = writing.read_backs
         self.spent = writing.spent
         self._writes = WriteQueue(self.stations, writing, settings.write_timeout, report,
-                                  network.timing.tx_delay)
+                                  self._leave_out, network.timing.tx_delay)
         self.checks = Checks(
             self.stations, {block.station for block in self.readings.blocks},
             settings.processor_period, machine, self.readings.link_failed,
@@ -158,7 +158,6 @@ class Driver:
         compares = (self.interlocks,) if self.interlocks.heartbeats else ()
         repeated = [row for row in self.mappings if row.write_again]
         self._standing = Standing(repeated, settings.write_timeout, machine)
-        self._writes.leave_out = self._leave_out
         stands = (self._standing,) if repeated else ()
         record.connect((self._read_backs, self.readings.reads, self.interlocks, *stands),
                        (self._read_backs, *compares, *stands))
@@ -243,7 +242,7 @@ class Driver:
         if self._inbox.items:
             self._sort_inbox(now)  # the machine has expired jobs that have waited too long
         if self._demands.inbox.items:
-            self._sort_demands(now)
+            self.readings.take_demands(now)
         return self._agenda.next(now, busy)
 
     def next_due(self) -> float | None:
@@ -253,8 +252,7 @@ class Driver:
     def expire(self, now: float) -> None:
         """Do the work that needs no line: store values that we serve, end expired jobs."""
         self._sort_inbox(now)
-        if self._demands.inbox.items:
-            self._sort_demands(now)
+        self.readings.take_demands(now)
         self.interlocks.expire(now)
         self._writes.expire(now)
         self.tasks.expire(now)
@@ -291,10 +289,6 @@ class Driver:
     def _words_of_guest(self, command: Packet, station: int) -> list[Extent] | None:
         # A PLC-5 has words for each number that writes as to a PLC-2; on the line it is ours.
         return written_extents(command._replace(src=self.network.station), station, self.mappings)
-
-    def _sort_demands(self, now: float) -> None:
-        for demand in self._demands.inbox.take():
-            self.readings.want(demand, now)
 
     def _sort_inbox(self, now: float) -> None:
         """Store messages of Serve rows in our table; let all others wait for the line."""

@@ -89,7 +89,8 @@ class Bench:
         writing = WritesUnderWay(self.stations, self.record, readings, write_timeout,
                                  self.results.append)
         self.reads = readings.reads
-        self.writes = WriteQueue(self.stations, writing, write_timeout, self.results.append)
+        self.writes = WriteQueue(self.stations, writing, write_timeout, self.results.append,
+                                 lambda write, now: '')
         checks = Checks(self.stations, {job.station for job in jobs}, 0.0, line,
                         readings.link_failed, lambda station, identity, asked: None)
         checks.begin(0.0)

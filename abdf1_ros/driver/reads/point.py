@@ -141,15 +141,13 @@ class ReadPoint:
         if self.withheld and self.guard is not None:
             self.guard.withheld.discard(self)
         self.last_good, self.error, self.withheld = now, None, ''
-        if is_same:
-            return None
-        if self._scaling is None or isinstance(values, str):
-            return values
-        return self._scaling.publish(values)
+        return None if is_same else self._published(values)
 
     def values_of(self, words: bytes) -> Values:
         """Return the values of words, as they are published."""
-        values = self._decode(words)
+        return self._published(self._decode(words))
+
+    def _published(self, values: Values) -> Values:
         if self._scaling is None or isinstance(values, str):
             return values
         return self._scaling.publish(values)

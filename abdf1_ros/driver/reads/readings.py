@@ -114,7 +114,12 @@ class Readings:
         points = [self.points[mapping] for mapping in block.mappings if mapping.reads]
         return ReadJob(block, points, self._line, self._packet_ended, longest)
 
-    def want(self, demand: Demand, now: float) -> None:
+    def take_demands(self, now: float) -> None:
+        """Take the rows that other threads want to be read at once."""
+        for demand in self.demands.inbox.take():
+            self._want(demand, now)
+
+    def _want(self, demand: Demand, now: float) -> None:
         """Read a row at once for a call; a silent station's row is answered without a read."""
         mapping = demand.mapping
         station = self._stations[mapping.station]

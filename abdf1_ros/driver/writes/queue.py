@@ -70,15 +70,16 @@ class WriteQueue:
     """
 
     def __init__(self, stations: ActiveStationList, writing: WritesUnderWay, patience: float,
-                 report: Callable[[WriteResult], None], tx_delay: float = 0.0) -> None:
+                 report: Callable[[WriteResult], None],
+                 leave_out: Callable[[Write, float], str], tx_delay: float = 0.0) -> None:
         self._stations = stations
         self._writing = writing
         self._patience = patience
         self.report = report
+        self._leave_out = leave_out
         # TX_Delay is not waiting time; it occurs twice: before the probe and before the command.
         self._slack = 2 * tx_delay
         self.waiting: deque[Write] = deque()
-        self.leave_out: Callable[[Write, float], str] = lambda write, now: ''
         self._begun: dict[Mapping, float] = {}  # when a write of a row had the line last
         self._shared: dict[tuple[Mapping, Mapping], bool] = {}
         self.next_expiry = math.inf
@@ -142,7 +143,7 @@ class WriteQueue:
         """
         self.expire(now)
         while (write := self._first_free(busy)) is not None:
-            if write.mapping.write_again and (reason := self.leave_out(write, now)):
+            if write.mapping.write_again and (reason := self._leave_out(write, now)):
                 self._end(write, Outcome.STANDS, reason, now)
                 continue
             if not self._gives_way(write, now):

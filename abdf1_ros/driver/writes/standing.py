@@ -65,19 +65,22 @@ class Standing(WriteListener):
     def write_ended(self, claim: Claim) -> None:
         """Take the value of a confirmed message; forget all that the write may have changed."""
         for row in self._disturbed(claim):
-            self._values.pop(row, None)
-            self._settled[row] = max(claim.lands_until, self._settled.get(row, -math.inf))
+            self._unsettle(row, claim)
         write, now = claim.write, self._line.now
         if write is None or write.is_own or write.mapping not in self._patience:
             return
         row = write.mapping
         if claim.outcome is not Outcome.WRITTEN:
-            self._values.pop(row, None)
-            self._settled[row] = max(claim.lands_until, self._settled.get(row, -math.inf))
+            self._unsettle(row, claim)
         elif row in self._values:
             self._values[row].confirmed = now
         elif claim.begun >= self._settled.get(row, -math.inf):
             self._values[row] = _Value(write, now, now)
+
+    def _unsettle(self, row: Mapping, claim: Claim) -> None:
+        """Forget the value of a row; take no other before the write has landed for certain."""
+        self._values.pop(row, None)
+        self._settled[row] = max(claim.lands_until, self._settled.get(row, -math.inf))
 
     def _disturbed(self, claim: Claim) -> list[Mapping]:
         """Return the rows that a write may change to something else than what stands."""
