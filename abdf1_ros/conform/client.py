@@ -26,7 +26,7 @@ from abdf1_ros.conform.ends import (
     PATIENCE,
     ServerEnd,
 )
-from abdf1_ros.conform.wire import Failed
+from abdf1_ros.conform.wire import expect_same, Failed
 
 _CLIENT = Target.CLIENT
 
@@ -36,8 +36,7 @@ def nak_repeated(end: ServerEnd) -> None:
     first = end.next_command()
     end.wire.send(codec.NAK)
     second = end.next_command('the message again')
-    if second.data != first.data:
-        raise Failed(f'the same message: {first.data.hex(" ")}', second.data.hex(' '))
+    expect_same(first.data, second.data)
     end.finish(second)
 
 
@@ -71,8 +70,7 @@ def enquiry_nak_repeated(end: ServerEnd) -> None:
     end.wire.expect(SymbolKind.ENQ, within=PATIENCE)
     end.wire.send(codec.NAK)
     again = end.wire.expect(SymbolKind.MESSAGE, 'the message again')
-    if again.data != command.data:
-        raise Failed('the same message', again.data.hex(' '))
+    expect_same(command.data, again.data)
     end.finish(again)
 
 

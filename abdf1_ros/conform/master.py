@@ -20,7 +20,7 @@ from abdf1_ros.conform import codec
 from abdf1_ros.conform.case import case, Target
 from abdf1_ros.conform.codec import Symbol, SymbolKind
 from abdf1_ros.conform.ends import PATIENCE, SlaveEnd
-from abdf1_ros.conform.wire import Failed
+from abdf1_ros.conform.wire import expect_same, Failed
 
 _MASTER = Target.MASTER
 _COMMANDS = 4
@@ -35,8 +35,7 @@ def poll_form(end: SlaveEnd) -> None:
 def no_ack_repeated(end: SlaveEnd) -> None:
     first = end.next_command()
     second = end.next_command('the message again')
-    if second.data != first.data:
-        raise Failed(f'the same message: {first.data.hex(" ")}', second.data.hex(' '))
+    expect_same(first.data, second.data)
     end.finish(second)
 
 

@@ -25,7 +25,7 @@ from abdf1_ros.conform.ends import (
     expect_end_of_naks,
     PeerEnd,
 )
-from abdf1_ros.conform.wire import Failed
+from abdf1_ros.conform.wire import expect_same, Failed
 
 _PEER = Target.PEER
 # How long (s) a node may wait for the response to its message before it asks: 1 to 4.4 s are the
@@ -95,8 +95,7 @@ def reply_repeated_after_nak(end: PeerEnd) -> None:
     first = end.collect(acknowledge=False)
     end.wire.send(codec.NAK)
     second = end.collect()
-    if second != first:
-        raise Failed(f'the same message again: {first.hex(" ")}', second.hex(' '))
+    expect_same(first, second)
 
 
 @case('A message that is always answered with DLE NAK is given up.', 'M 4-5', _PEER)

@@ -24,12 +24,18 @@ from abdf1_ros.conform import codec
 from abdf1_ros.conform.case import case, Permission, Target
 from abdf1_ros.conform.codec import SymbolKind
 from abdf1_ros.conform.ends import check_reply, HIGHEST_LIMIT, MasterEnd
-from abdf1_ros.conform.wire import Failed, Skipped
+from abdf1_ros.conform.wire import expect_same, Failed, Skipped
 
 _SLAVE = Target.SLAVE
 # Commands that are sent without a poll in between, to fill a slave's buffers.
 _BURST = 8
 _PAUSE = 0.1  # s
+
+
+def _expect_nothing_held(end: MasterEnd) -> None:
+    symbol = end.poll()
+    if symbol is not None and symbol.kind is not SymbolKind.EOT:
+        raise Failed('DLE EOT', str(symbol))
 
 
 @case('A slave that has nothing to send answers a poll with DLE EOT.', 'KF2 4-31', _SLAVE)
@@ -93,17 +99,14 @@ def unacknowledged_again(end: MasterEnd) -> None:
     end.deliver(end.command(body=b'\x00again'))
     first = end.collect(acknowledge=False)
     second = end.collect()
-    if second != first:
-        raise Failed(f'the same message again: {first.hex(" ")}', second.hex(' '))
+    expect_same(first, second)
 
 
 @case('A reply that was acknowledged is not sent again.', 'KF2 4-31', _SLAVE)
 def acknowledged_dropped(end: MasterEnd) -> None:
     end.deliver(end.command())
     end.collect()
-    symbol = end.poll()
-    if symbol is not None and symbol.kind is not SymbolKind.EOT:
-        raise Failed('DLE EOT', str(symbol))
+    _expect_nothing_held(end)
 
 
 @case('A message that is never acknowledged is dropped after some polls.', 'KF2 4-31', _SLAVE)
@@ -155,8 +158,7 @@ def other_ack_ignored(end: MasterEnd) -> None:
     symbol = end.further(end.wire.answer_time)
     if symbol is None:
         raise Skipped('a reply that was sent is dropped at any DLE ACK, as KF2 4-31 has it')
-    if end.taken(symbol) != first:
-        raise Failed(f'the same message again: {first.hex(" ")}', symbol.data.hex(' '))
+    expect_same(first, end.taken(symbol))
 
 
 @case('A message to station 255 is neither acknowledged nor answered.', 'M 3-4', _SLAVE)
@@ -176,6 +178,4 @@ def nak_resets(end: MasterEnd) -> None:
     end.collect(acknowledge=False)
     end.wire.send(codec.NAK)
     end.wire.expect_silence('DLE NAK has no answer')
-    symbol = end.poll()
-    if symbol is not None and symbol.kind is not SymbolKind.EOT:
-        raise Failed('DLE EOT', str(symbol))
+    _expect_nothing_held(end)

@@ -60,6 +60,12 @@ class Failed(Exception):
         self.got = got
 
 
+def expect_same(first: bytes, second: bytes) -> None:
+    """Fail where a message that was to come again has come with other bytes."""
+    if second != first:
+        raise Failed(f'the same message again: {first.hex(" ")}', second.hex(' '))
+
+
 class Skipped(Exception):
     """The rule was not tried, or cannot be judged here; the text says why."""
 
