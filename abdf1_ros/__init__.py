@@ -51,8 +51,7 @@ The rooms, from the wire up. Each imports from those above it only; each ``__ini
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
+TYPE_CHECKING = False  # mypy takes it as true; the module typing takes long to import
 if TYPE_CHECKING:
     from abdf1_ros.client import Client
 

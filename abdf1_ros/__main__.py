@@ -16,13 +16,10 @@
 
 from __future__ import annotations
 
-from difflib import get_close_matches
-from pathlib import Path
+import os
 import sys
 
 from abdf1_ros.cli.main import COMMANDS, run
-from abdf1_ros.paths import package_version
-from abdf1_ros.text import printable
 
 _HELP = ('-h', '--help', 'help')
 _TEXTS = {
@@ -36,11 +33,19 @@ _TEXTS = {
 
 def main() -> int:
     """Run the command that the first argument names; return its exit status, 2 for none."""
-    program, name = Path(sys.argv[0]).name, ''.join(sys.argv[1:2])
+    program, name = os.path.basename(sys.argv[0]), ''.join(sys.argv[1:2])
     if name in COMMANDS:
         sys.argv[:2] = [name]
         return run(name)
-    called = 'abdf1' if program == 'abdf1' else 'python3 -m abdf1_ros'
+    return _help(name, 'abdf1' if program == 'abdf1' else 'python3 -m abdf1_ros')
+
+
+def _help(name: str, called: str) -> int:
+    """Print what the words before any command ask for; return the exit status."""
+    from difflib import get_close_matches  # commands do without
+
+    from abdf1_ros.paths import package_version
+    from abdf1_ros.text import printable
     if name == '--version':
         print(f'abdf1_ros {package_version()}')
         return 0

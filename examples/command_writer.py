@@ -159,7 +159,7 @@ def hint() -> str:
 
 def judge(message: str) -> int:
     """Return the exit status that the text of a result stands for."""
-    if message == 'written' or message.startswith('stands'):
+    if message.startswith(('written', 'stands')):
         return WRITTEN
     return NOT_WRITTEN if message.startswith('not written') else UNKNOWN
 

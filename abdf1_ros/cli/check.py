@@ -31,9 +31,6 @@ import shutil
 import sys
 from typing import Any
 
-from abdf1_ros.cli.check_picture import check_parts
-from abdf1_ros.cli.lanes import is_page, write_page
-from abdf1_ros.cli.overhearing import overheard
 from abdf1_ros.cli.terminal import (
     colour,
     command_parser,
@@ -140,6 +137,8 @@ def _pair(options: argparse.Namespace) -> tuple[str, bool]:
 
 def _draw(options: argparse.Namespace, found: Findings, report: Report | None) -> bool:
     """Write the page of --html; return whether that went well."""
+    from abdf1_ros.cli.check_picture import check_parts
+    from abdf1_ros.cli.lanes import write_page
     facts = [] if report is None else _line_text(report).splitlines()
     if report is not None and not report.network.line_mode.only_listens:
         facts += _times_text(report).splitlines()
@@ -154,6 +153,7 @@ def _draw(options: argparse.Namespace, found: Findings, report: Report | None) -
 
 def _heard(found: Findings, files: Sequence[str]) -> dict[str, Any]:
     """Return which rows recordings fill in Mode Listen, and what other nodes read there."""
+    from abdf1_ros.cli.overhearing import overheard
     network = found.network or Network()
     rows = Rows(row for row in found.mappings if row.command is Command.READ)
     try:
@@ -280,10 +280,15 @@ def _parse(args: Sequence[str] | None) -> argparse.Namespace:
         parser.error(f'{printable(options.net)} is not a folder, so a map CSV has to follow')
     if options.html and options.map is None:
         parser.error('--html is for one net CSV and one map CSV')
-    if options.html and not may_replace(options.html, is_page):
+    if options.html and not may_replace(options.html, _is_page):
         parser.error(f'{printable(options.html)} is there and was not made by --html; '
                      'give another name')
     return options
+
+
+def _is_page(path: Path) -> bool:
+    from abdf1_ros.cli.lanes import is_page
+    return is_page(path)
 
 
 def _text(found: Findings, report: Report | None) -> str:

@@ -17,21 +17,21 @@ The commands by their names, for the executables and for ``python3 -m abdf1_ros`
 
 The imports of a command take a while. Until its ``main`` handles signals, Ctrl-C and SIGTERM end
 it with the same status as later, at once and without a traceback. Nothing has to be closed at that
-time.
+time. So this module imports little: before it has run, Ctrl-C brings a traceback.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager, suppress
-from functools import partial
 from importlib import import_module
 import os
-from pathlib import Path
 import signal
 import sys
-from types import FrameType
-from typing import NoReturn
+
+TYPE_CHECKING = False  # mypy takes it as true; the module typing takes long to import
+if TYPE_CHECKING:
+    from collections.abc import Callable
+    from types import FrameType
+    from typing import NoReturn
 
 _NOT_INSTALLED = 2
 _INTERRUPTED = 130  # of the commands whose exit status tells success or failure
@@ -59,8 +59,14 @@ _LEAVING = ('node', 'lines', 'simulator')
 def run(name: str) -> int:
     """Run a command with the arguments of this process; return its exit status."""
     _end_quietly(_INTERRUPTED if name in _TELLING else 0)
-    with _missing_is_named():
-        status = import_module(COMMANDS[name]).main()
+    try:
+        status: int = import_module(COMMANDS[name]).main()
+    except ModuleNotFoundError as error:  # also one that a command imports when it needs it
+        if error.name is None or error.name.startswith('abdf1_ros'):
+            raise
+        print(f'{os.path.basename(sys.argv[0])}: the Python module {error.name} is missing; '
+              f'{_cure(error.name)}', file=sys.stderr)
+        return _NOT_INSTALLED
     if name in _LEAVING:
         _leave(status)
     return _ended(status)
@@ -70,7 +76,7 @@ def __getattr__(name: str) -> Callable[[], int]:
     """Return what the executable of this name calls."""
     if name not in COMMANDS:
         raise AttributeError(name)
-    return partial(run, name)
+    return lambda: run(name)
 
 
 def _end_quietly(status: int) -> None:
@@ -80,19 +86,6 @@ def _end_quietly(status: int) -> None:
 
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, leave)
-
-
-@contextmanager
-def _missing_is_named() -> Iterator[None]:
-    """Name a module that is missing, also one that a command imports when it needs it."""
-    try:
-        yield
-    except ModuleNotFoundError as error:
-        if error.name is None or error.name.startswith('abdf1_ros'):
-            raise
-        print(f'{Path(sys.argv[0]).name}: the Python module {error.name} is missing; '
-              f'{_cure(error.name)}', file=sys.stderr)
-        sys.exit(_NOT_INSTALLED)
 
 
 def _cure(module: str) -> str:
@@ -113,6 +106,8 @@ def _ended(status: int) -> int:
 def _leave(status: int) -> NoReturn:
     """End the process at once; what it has said is not lost."""
     for stream in (sys.stdout, sys.stderr):
-        with suppress(OSError, ValueError):  # the reader has left
+        try:
             stream.flush()
+        except (OSError, ValueError):  # the reader has left
+            pass
     os._exit(status)

@@ -36,10 +36,8 @@ from pathlib import Path
 import signal
 import sys
 import time
+from typing import TYPE_CHECKING
 
-from abdf1_ros.cli.lanes import is_page
-from abdf1_ros.cli.sniff_picture import Timeline
-from abdf1_ros.cli.sniff_report import is_bundle, ReportBundle
 from abdf1_ros.cli.terminal import (
     command_parser,
     EXIT_FAILED,
@@ -72,6 +70,10 @@ from abdf1_ros.sniffer.report import json_line, summary_json, summary_lines, tex
 from abdf1_ros.sniffer.summary import Summary
 from abdf1_ros.sniffer.traffic import TrafficDecoder
 
+if TYPE_CHECKING:
+    from abdf1_ros.cli.sniff_picture import Timeline
+    from abdf1_ros.cli.sniff_report import ReportBundle
+
 _AUTO = 'auto'
 _CHECKS = {check.value.lower(): check for check in Checksum}
 _DUPLEX = {duplex.name.lower(): duplex for duplex in Duplex}
@@ -101,10 +103,8 @@ class _Output:
         self._options = options
         self._session: TrafficDecoder | None = None
         self._summary = Summary(options.baud)
-        self._bundle = ReportBundle(
-            options.files, options.settings, options.conformance,
-            options.anonymous) if options.report else None
-        self._timeline = Timeline(options.anonymous) if options.html else None
+        self._bundle = _bundle(options) if options.report else None
+        self._timeline = _timeline(options) if options.html else None
         self._packets = PcapngWriter(options.pcapng) if options.pcapng else None
         self.has_failed = False
         self._colour = sys.stdout.isatty() and 'NO_COLOR' not in os.environ
@@ -209,6 +209,27 @@ class _Output:
             print(text_line(entry, self._colour))
 
 
+# What only a few calls need is imported there: it takes as long as the rest.
+def _bundle(options: argparse.Namespace) -> ReportBundle:
+    from abdf1_ros.cli.sniff_report import ReportBundle
+    return ReportBundle(options.files, options.settings, options.conformance, options.anonymous)
+
+
+def _timeline(options: argparse.Namespace) -> Timeline:
+    from abdf1_ros.cli.sniff_picture import Timeline
+    return Timeline(options.anonymous)
+
+
+def _is_bundle(path: Path) -> bool:
+    from abdf1_ros.cli.sniff_report import is_bundle
+    return is_bundle(path)
+
+
+def _is_page(path: Path) -> bool:
+    from abdf1_ros.cli.lanes import is_page
+    return is_page(path)
+
+
 def main(args: Sequence[str] | None = None) -> int:
     """
     Decode until the end of the file, SIGINT, SIGTERM or --seconds.
@@ -279,10 +300,10 @@ def _parse(args: Sequence[str] | None) -> argparse.Namespace:
         parser.error('--binary is for files')
     if options.report and (not options.files or options.binary):
         parser.error('--report is for captures: record one with --save, or trace_file of the node')
-    if options.report and not may_replace(options.report, is_bundle):
+    if options.report and not may_replace(options.report, _is_bundle):
         parser.error(f'--report: {options.report} is there and is not a bundle of --report; give '
                      'another name')
-    if options.html and not may_replace(options.html, is_page):
+    if options.html and not may_replace(options.html, _is_page):
         parser.error(f'{options.html} is there and was not made by --html; give another name')
     if not options.report and (options.settings or options.conformance):
         parser.error('--settings and --conformance are for --report')

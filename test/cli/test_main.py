@@ -20,6 +20,7 @@ from pathlib import Path
 import signal
 import subprocess
 import sys
+import sysconfig
 from types import SimpleNamespace
 from typing import NoReturn
 
@@ -68,6 +69,30 @@ def test_signal_during_the_imports_ends_quietly(tmp_path: Path, name: str) -> No
         process.send_signal(signal.SIGINT)
         output, errors = process.communicate(timeout=PATIENCE)
     assert (process.returncode, output, errors) == (NAMES[name][1], '', '')
+
+
+def imported_by(call: str) -> set[str]:
+    """Return the modules that a call of a fresh interpreter has imported, without its site."""
+    path = [str(Path(commands.__file__).parents[2]), sysconfig.get_path('purelib')]
+    program = (f'import sys; sys.path[:0] = {path}\ntry:\n    {call}\n'
+               'finally:\n    print(*sys.modules, file=sys.stderr)')
+    done = subprocess.run([sys.executable, '-S', '-c', program], stdout=subprocess.DEVNULL,
+                          stderr=subprocess.PIPE, text=True, timeout=PATIENCE, check=True)
+    return set(done.stderr.split())
+
+
+def test_until_signals_are_handled_little_is_imported() -> None:
+    """Before that Ctrl-C brings a traceback."""
+    slow = {'contextlib', 'difflib', 'pathlib', 're', 'typing'}
+    assert not imported_by('import abdf1_ros.__main__') & slow
+
+
+@pytest.mark.parametrize('name', ['check', 'sniff'])
+def test_pictures_are_imported_where_they_are_drawn(name: str) -> None:
+    pictures = {f'abdf1_ros.cli.{module}' for module in (
+        'lanes', 'check_picture', 'overhearing', 'sniff_picture', 'sniff_report')}
+    assert not imported_by(f'from abdf1_ros.cli.main import {name}; '
+                           f'sys.argv[1:] = ["--help"]; {name}()') & pictures
 
 
 @pytest.mark.parametrize('name', COMMANDS)

@@ -19,6 +19,7 @@ import runpy
 import sys
 import threading
 
+from abdf1_ros.driver.writes.packets import REWRITTEN
 from abdf1_ros.ros.observer import graph_hint
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 import pytest
@@ -173,6 +174,7 @@ def test_every_mapping_of_the_topic_has_to_be_written(answered: Answered) -> Non
 
 @pytest.mark.parametrize(('message', 'status'), [
     ('written', 0),
+    (f'written: {REWRITTEN}', 0),
     ('not written: superseded by a newer value', 1),
     ('not written: the PLC refused it: STS 10', 1),
     ('only partly written: ...', 3),
