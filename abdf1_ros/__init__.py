@@ -29,9 +29,9 @@ repeats what gets lost on the line:
         print(plc.identify())
 
 Its errors are in ``abdf1_ros.errors``. ``Client.from_files`` takes the two files of the node, and
-reads and writes by tag. The node itself (``abdf1 node``, or ``ros2 run abdf1_ros node``) makes
-topics of the rows of a map, polls them, and writes heartbeats and fallback values; for a machine
-take the node.
+reads and writes by tag. For a machine take the node (``abdf1 node``, or ``ros2 run abdf1_ros
+node``). It makes topics of the rows of a map, polls them, and writes heartbeats and fallback
+values.
 
 Importing this package imports nothing else: a name is looked up when it is used, and only
 ``abdf1_ros.ros`` and a few commands need ROS.

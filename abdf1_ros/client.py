@@ -85,10 +85,10 @@ class Client(OpenLine):
     that is meant where a call names no other, ``own_station`` our address. Without ``plc_type``
     (SLC, PLC5, PLC3, PLC2) a PLC is asked what it is. ``timeout`` and ``cmd_timeout`` are seconds:
     for each answer, and for a reply; ``retries`` are repetitions of what is not acknowledged or
-    answered. ``trace`` is a file for all bytes, which ``sniff`` reads. All calls block, may come
-    from any thread, and raise RemoteError where the PLC refuses, LinkError where it does not
-    answer (``sent`` tells whether it may have executed the command), and FormatError for what is
-    wrong in the call, before anything is sent.
+    answered. ``trace`` is a file for all bytes, which ``sniff`` reads. All calls block, and may
+    come from any thread. They raise RemoteError if the PLC refuses, and LinkError if it does not
+    answer: ``sent`` then tells whether it may have executed the command. A wrong call raises
+    FormatError before anything is sent.
     """
 
     def __init__(self, port: str | os.PathLike[str], *, plc_type: str | None = None,

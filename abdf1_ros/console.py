@@ -17,9 +17,9 @@ Output of the process to terminal, pipe, journal and log file: nothing waits for
 
 rclpy's log call holds the interpreter's lock while it writes, and rcl, DDS and faulthandler write
 to the same descriptors. So standard output and standard error become pipes of ours, whose write
-ends never block, and a process of its own passes on what it reads from them. Where a terminal
-stands still (Ctrl-S), a pipe is full or a disk hangs, that process waits. Output that it cannot
-keep is lost, counted, and reported as soon as its sink takes bytes again.
+ends never block. A process of its own passes their lines on. Where a terminal stands still
+(Ctrl-S), a pipe is full or a disk hangs, that process waits. Output that it cannot keep is lost,
+counted, and reported as soon as its sink takes bytes again.
 
 This file is the program of that process, too: it starts without the package.
 """

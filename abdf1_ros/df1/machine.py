@@ -139,8 +139,8 @@ QUIET_CHARACTERS = 20
 MOMENT = 0.0001
 
 # A message that has begun may take this many times the time of its bytes at the set speed, plus
-# two pauses, at most the time of the longest message. Without a limit a station that dribbles, or
-# never ends, would keep the line from all other stations.
+# two pauses. It may take no longer than the longest message. Without a limit a station that
+# dribbles, or never ends, would keep the line from all other stations.
 _SLOWEST = 4
 _LONGEST = 2 * MAX_LINK_DATA
 

@@ -50,9 +50,10 @@ class Packet(NamedTuple):
     """
     A message: DST SRC CMD STS TNS and the bytes after them (M 6-3).
 
-    ``dst`` and ``src`` are station addresses (0-255), ``cmd`` has bit 6 set in a reply (M 6-5),
-    ``tns`` is the 16-bit transaction number, low byte first on the line (M 6-7). ``data`` is
-    all that follows: FNC and parameters of a command, EXT STS or data of a reply.
+    - ``dst``, ``src``: station addresses (0-255).
+    - ``cmd``: bit 6 is set in a reply (M 6-5).
+    - ``tns``: 16-bit transaction number, low byte first on the line (M 6-7).
+    - ``data``: the rest, which is FNC and parameters of a command, EXT STS or data of a reply.
     """
 
     dst: int

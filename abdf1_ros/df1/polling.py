@@ -28,10 +28,9 @@ own address comes up in the list ("in sequence"). It completes when its station 
 has the reply ready. So several stations work on their replies at the same time, and commands
 complete in the order of the poll list.
 
-A station that does not answer is polled again up to ENQ_Retries, then becomes inactive; any
-answer makes it active. A dead station costs a whole Timeout, so inactive ones are polled once a
-scan at most, and never for more than an eighth of the line's time, so that active stations do
-not wait for them.
+A station that does not answer is polled again up to ENQ_Retries, then becomes inactive; any answer
+makes it active. A dead station costs a whole Timeout, and active stations must not wait for it. So
+inactive stations are polled once a scan at most, and for at most an eighth of the line's time.
 """
 
 from __future__ import annotations
@@ -122,8 +121,8 @@ class StandardPollingMaster:
         stations.add(self._polled, are_polled=True)
         # Stations that got a command of another station and have not replied, with the time (clock
         # value, s) until which they may reply. Until then the master passes no second command on
-        # to them. Several senders would soon fill the message sink of the station, a poll empties
-        # it by one message only, and our own commands would find no room.
+        # to them. Several senders would soon fill the message sink of the station, as a poll takes
+        # only one message out. Our own commands would find no room.
         self._given: dict[int, float] = {}
         # Stations that have answered a probe, but no command since. Their time on the line counts
         # as time of probes: otherwise a station that takes no commands would come back at once.

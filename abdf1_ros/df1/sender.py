@@ -49,7 +49,7 @@ class Sender:
     - ``position``: number of bytes given out so far.
     - ``free_at``: when they have left, by their number (clock value in s).
     - ``embeds``: the far end embeds responses. A long message is then given out in portions, and a
-      response goes between two of them (M 4-3), as in products with Embedded Responses =
+      response goes between two of them (M 4-3). Products do the same with Embedded Responses =
       Auto-detect.
     - ``send_before``: clock value (s) after which ``withdraw`` is due in place of
       ``data_to_send``.

@@ -16,10 +16,12 @@
 Commands of guests: programs that share the PLC's port with us, each at a place of its own.
 
 A guest's command waits here for its turn on the line and gets exactly one reply, in time: the
-reply of the PLC, or our reply with an STS of M 8-2. A command that has not been sent gets 60 (not
-allowed), 01 (no buffer, or too old to be sent), 04 (the port is not open) or 07 (the station is
-silent). A command that was sent and has no reply gets 02 (the station has become silent) or 05 (no
-reply in time). Whether it was executed is then unknown.
+reply of the PLC, or our reply with an STS of M 8-2.
+
+- Not sent: 60 (not allowed), 01 (no buffer, or too old to be sent), 04 (the port is not open), 07
+  (the station is silent).
+- Sent, without a reply: 02 (the station has become silent), 05 (no reply in time). Whether it was
+  executed is then unknown.
 """
 
 from __future__ import annotations

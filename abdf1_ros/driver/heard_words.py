@@ -31,8 +31,8 @@ from abdf1_ros.settings.mapping import Mapping
 ReplyWords = dict[tuple[Area, int], bytes]
 """Words by area and offset."""
 
-# A word of the coded table has its number in both bytes, the low one from 80 to BF and the high
-# one from C0 to FF. So no code can be found across two of them, nor in a descriptor.
+# A word of the coded table has its number in both bytes: the low byte from 80 to BF, the high byte
+# from C0 to FF. So no code can be found across two of them, nor in a descriptor.
 _DIGIT = 64
 
 

@@ -15,10 +15,10 @@
 """
 One record of all writes: who writes which words of a PLC, and until when they may land.
 
-A word of a PLC can be written by a message, by ourselves (heartbeat, fallback), by a guest, by
-each of them to all stations at once, and by a copy that a gateway has kept. Each such write is a
-``Claim`` from the moment it has the line. The rules of docs/heartbeats.md ask this record about
-all writers.
+A word of a PLC can be written by a message, by the bridge itself (heartbeat, fallback), by a
+guest, and by a copy that a gateway has kept. Each of them may also write to all stations at once.
+Each such write is a ``Claim`` from the moment it has the line. The rules of docs/heartbeats.md ask
+this record about all writers.
 """
 
 from __future__ import annotations

@@ -98,8 +98,8 @@ class Requests(TaskSource):
     Commands for us are refused, except an echo and the diagnostic status, which shows a
     ``plc_type``. ``stray`` names the last reply that answers no command, empty for none.
     ``report`` gets every numbered error and notice, in the link thread. If the port ``may_store``
-    our bytes, only reads go out before an answer has come on this connection, and after a request
-    without an answer (rule 26 of docs/heartbeats.md).
+    our bytes, only reads go out until an answer has come on this connection. The same holds after
+    a request without an answer (rule 26 of docs/heartbeats.md).
     """
 
     def __init__(self, mode: LineMode, line: LinkSettings, stations: ActiveStationList,

@@ -105,10 +105,10 @@ class Address:
     """
     One place in a data table.
 
-    ``element`` is the element number (for PLC-5 I/O rack x 8 + group, for SLC I/O the slot),
-    ``word`` the word inside the element or slot, ``bit`` 0-15 or None for a whole word. The
-    one stretch of words that a PLC-2 has counts as file 0 of type B. ``is_flat`` is for SLC I/O
-    whose ``element`` is the word in the whole image.
+    ``element`` is the element number; for PLC-5 I/O it is rack x 8 + group, for SLC I/O the slot.
+    ``word`` is the word inside the element or slot, ``bit`` 0-15 or None for a whole word. The one
+    stretch of words that a PLC-2 has counts as file 0 of type B. ``is_flat`` is for SLC I/O whose
+    ``element`` is the word in the whole image.
     """
 
     addressing: Addressing

@@ -94,8 +94,9 @@ PLC5_PID = _read_only(
 
 # Function files of a MicroLogix; no manual that gives the order of their words was at hand. A
 # recording of a 1400 confirms HIP, LOP, OVF and UNF, by the limits of its six counters (7FFFFFFF,
-# 80000000), and IS of EII, by the inputs 0 to 7 of its interrupts. The places of all other members
-# are not confirmed here. Where the bits lie is not known, so words 2 and 3 have numbers only.
+# 80000000). It confirms IS of EII by the inputs 0 to 7 of its interrupts. The places of all other
+# members are not confirmed here. Where the bits lie is not known, so words 2 and 3 have numbers
+# only.
 HSC = _read_only(_values(0, 'PFN', 'ER') | _values(4, 'MOD')
                  | _values(5, 'ACC', 'HIP', 'LOP', 'OVF', 'UNF', words=2)
                  | _values(15, 'OMB', 'HPO', 'LPO'))

@@ -40,11 +40,12 @@ class ValueType(Enum):
     """
     What a mapping's Type column may say.
 
-    ``words`` are what one element takes in a PLC, 0 for a bit; ``message`` is the name of the
-    message in std_msgs that carries such values, ``array_code`` the type code of the
-    ``array.array`` that holds them, ``range`` the least and the greatest of them. A word of a
-    ``bcd12`` has three digits in its lower 12 bits: the upper four are status bits of a PLC-2
-    (1772-6.8.3 p. 5-1), and a write leaves them alone.
+    - ``words``: words of one element in a PLC, 0 for a bit.
+    - ``message``: name of the message in std_msgs that carries such values.
+    - ``array_code``: type code of the ``array.array`` that holds them.
+    - ``range``: least and greatest value. A word of a ``bcd12`` has three digits in its lower 12
+      bits: the upper four are status bits of a PLC-2 (1772-6.8.3 p. 5-1), and a write leaves them
+      alone.
     """
 
     words: int

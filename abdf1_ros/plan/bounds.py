@@ -65,7 +65,7 @@ OWN_IN_A_ROW = 7
 OURS_BESIDE_GUESTS = 3
 
 # The line may not carry all changes of a row. After this wait (s), or half its patience, a change
-# gives way to a newer one if another write of the row has gone out meanwhile.
+# gives way to a newer change. But first another write of the row has to go out meanwhile.
 CARRIED_WITHIN = 1.0
 
 # Default of the parameter write_timeout (s), which is not in the files.

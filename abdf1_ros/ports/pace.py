@@ -20,8 +20,8 @@ from collections.abc import Callable
 import math
 
 # A useless symbol costs up to 18 us a byte. After a portion, other lines have the processor for
-# this many times as long as the portion took, at most as long as the line would have needed for
-# its bytes.
+# this many times as long as the portion took. The pause is at most as long as the line would have
+# needed for its bytes.
 _OTHERS = 19
 
 _FASTEST = 10 / 115200  # s a character, where the line has no speed

@@ -31,8 +31,8 @@ class Scaling:
     Engineering value = raw value * ``scale`` + ``offset``.
 
     It is computed in double precision and published as float32. The way back takes the raw value
-    nearest to (value - ``offset``) / ``scale``, of two equally near ones the even one, as IEEE 754
-    does it. Both are finite, ``scale`` is not 0.
+    nearest to (value - ``offset``) / ``scale``. Of two equally near values it takes the even one,
+    as IEEE 754 does. Both are finite, ``scale`` is not 0.
     """
 
     scale: float = 1.0

@@ -15,10 +15,9 @@
 """
 Read recorded bytes from files of several kinds: captures, packets, dumps, logs, raw bytes.
 
-A hex dump is bytes in hexadecimal, with or without spaces, and with or without the offsets and
-characters that ``xxd`` and ``hexdump -C`` put beside them. It has neither times nor directions.
-``hexdump`` and ``od -x`` alone write words of two bytes, the low one last. All other lines are
-read by ``logs``.
+A hex dump is bytes in hexadecimal, with or without spaces. It may have the offsets and characters
+of ``xxd`` and ``hexdump -C``. It has neither times nor directions. ``hexdump`` and ``od -x`` alone
+write words of two bytes, the low one last. All other lines are read by ``logs``.
 """
 
 from __future__ import annotations

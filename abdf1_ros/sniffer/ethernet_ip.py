@@ -15,10 +15,10 @@
 """
 Traffic out of recorded packets: DF1 that ``sniff`` has written, and PCCC inside EtherNet/IP.
 
-PCCC goes through TCP port 44818 in CIP service 4B (Execute PCCC) of the PCCC object (class 67), as
-it is or inside of an Unconnected Send (52). It has no frame, check, DST and SRC: the last numbers
-of the IP addresses stand for these two, for a second address with the same last number one that
-is free. A response names no class: it is PCCC where its request was seen.
+PCCC goes through TCP port 44818 in CIP service 4B (Execute PCCC) of the PCCC object (class 67).
+The service may stand inside of an Unconnected Send (52). It has no frame, check, DST and SRC: the
+last numbers of the IP addresses stand for these two, for a second address with the same last
+number one that is free. A response names no class: it is PCCC where its request was seen.
 """
 
 from __future__ import annotations

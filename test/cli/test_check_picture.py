@@ -11,6 +11,7 @@
 # WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
 # See the License for the specific language governing permissions and
 # limitations under the License.
+
 """The picture of a plan: what is drawn, in a real browser too, and what cannot get into it."""
 
 from pathlib import Path

@@ -11,6 +11,7 @@
 # WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
 # See the License for the specific language governing permissions and
 # limitations under the License.
+
 """The timeline of a recorded line: bars, faults, overview; long recordings; no names in it."""
 
 from pathlib import Path

@@ -11,6 +11,7 @@
 # WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
 # See the License for the specific language governing permissions and
 # limitations under the License.
+
 """Reads that calls ask for, on a virtual line: at once, answered once, and no row starves."""
 
 from functools import partial

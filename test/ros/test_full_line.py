@@ -11,6 +11,7 @@
 # WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
 # See the License for the specific language governing permissions and
 # limitations under the License.
+
 """Which rows are named because their messages fill the line."""
 
 from abdf1_ros.ros.diagnostics.load import FullLine

@@ -11,6 +11,7 @@
 # WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
 # See the License for the specific language governing permissions and
 # limitations under the License.
+
 """The threads of callbacks, and the one sequence of an end, for one bridge or many."""
 
 from collections.abc import Callable, Iterator

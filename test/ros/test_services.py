@@ -11,6 +11,7 @@
 # WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
 # See the License for the specific language governing permissions and
 # limitations under the License.
+
 """Services of rows over DDS: ~/set/<topic> and ~/read_now/<topic>."""
 
 from collections.abc import Iterator

@@ -38,8 +38,7 @@ from abdf1_ros.settings.mapping import Mapping
 _FAILURES = 2
 
 # Shortest pause (s) before the next attempt. Behind a gateway the pause is also at least
-# OTHERS_SHARE times the length of the last attempt, so silent PLCs take at most an eighth of the
-# time.
+# OTHERS_SHARE times the last attempt, so that silent PLCs take an eighth of the time.
 _LEAST_PAUSE = 1.0
 
 # Number of tries of a row at a silent PLC before rows that had more tries: its first tries may
@@ -207,8 +206,8 @@ class Plc:
 
         The order is (1) first tries, since a PLC may execute a write that it does not answer; (2)
         PLCs that answer; (3) PLCs that do not. In (3) the row with the fewest tries goes first,
-        then the row whose last try is oldest, so that a 0 which is due each second does not take
-        all turns. Silent PLCs get only the time of probes. At the end a silent PLC has one try for
+        then the row whose last try is oldest. Otherwise a 0 that is due each second would take all
+        turns. Silent PLCs get only the time of probes. At the end a silent PLC has one try for
         each row.
         """
         if self._has_last_try:

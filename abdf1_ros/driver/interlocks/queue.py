@@ -230,7 +230,7 @@ class Interlocks(WriteListener):
         return row is None or row.state is FallbackState.MESSAGE and not row.is_under_way
 
     def stands(self, write: Write) -> None:
-        """Take note of a message whose value the PLC holds: it refreshes its row (7)."""
+        """Record a message whose value the PLC holds already: it refreshes its row (7)."""
         if row := self._by_mapping.get(write.mapping):
             row.message_ended(write.requested, Outcome.WRITTEN)
             self._plc_of[row].look_again(row)

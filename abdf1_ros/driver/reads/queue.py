@@ -16,8 +16,8 @@
 Which reads are due, and which of them goes first.
 
 The read with the earliest deadline goes first; the deadline is the due time plus one period. So
-each block is read within its period as long as the line is fast enough. When the line is too slow,
-and a read is late by more than its period, three of four turns go to the read that is the most
+each block is read within its period as long as the line is fast enough. If the line is too slow, a
+read is late by more than its period. Then three of four turns go to the read that is the most
 periods late. So all periods become longer by about the same factor: many slow reads do not make
 the fast ones as slow as themselves. The fourth turn still goes to the earliest deadline: a period
 that no line can keep does not block other reads.

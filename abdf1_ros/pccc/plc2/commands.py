@@ -15,8 +15,8 @@
 """
 The commands of a PLC-2, which have no FNC (M 7-15, 7-19, 7-30..7-40).
 
-PLC-3 and PLC-5 execute them on a compatibility file, an SLC or MicroLogix on its common
-interface file, which is 9, or 7 on a MicroLogix 1000 (M 7-31). ``address`` counts bytes, two for
+PLC-3 and PLC-5 execute them on a compatibility file. An SLC or MicroLogix executes them on its
+common interface file: 9, or 7 on a MicroLogix 1000 (M 7-31). ``address`` counts bytes, two for
 each word, low byte first; only an SLC may be set to count words.
 """
 

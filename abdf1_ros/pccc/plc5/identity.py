@@ -15,8 +15,8 @@
 """
 What a PLC-5 says of itself (M 10-20..10-22).
 
-The oldest have no expansion byte, so what follows the type stands one byte earlier, and the
-reply of a 5/12, 5/15 or 5/25 ends with the byte about its RAM.
+The oldest have no expansion byte, so the fields after the type stand one byte earlier. The reply
+of a 5/12, 5/15 or 5/25 ends with the byte about its RAM.
 """
 
 from __future__ import annotations

@@ -37,9 +37,9 @@ class WordRangeDialect(Dialect):
     Word range read and write; several packets of one transfer carry their offset in it.
 
     Structures are the words they are stored as, floats travel high word first (M 13-17). The
-    families differ in ``files``, ``address_size`` (bytes of the longest address), how an address
-    stands in a command, and the bit write, which is FNC and parameters for a word and the bits to
-    set and to reset.
+    families differ in ``files``, ``address_size`` (bytes of the longest address), the form of an
+    address in a command, and the bit write. The bit write has FNC and parameters for a word and
+    the bits to set and to reset.
     """
 
     files: Mapping[FileType, Layout]

@@ -11,6 +11,7 @@
 # WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
 # See the License for the specific language governing permissions and
 # limitations under the License.
+
 """
 The services of rows: ~/set/<topic> writes a bit, ~/read_now/<topic> reads a row at once.
 
