@@ -15,9 +15,13 @@
 """
 The ROS node: parameters, messages, diagnostics, log.
 
-``node`` and ``lines`` are the commands; ``process`` has signals, threads and the end. ``bridge``
-is one line: its node outlives the ``session`` of a pair of files. ``parameters`` come in,
-``topics`` go both ways, ``diagnostics`` is what goes out to be read.
+- ``node``, ``lines``: the two commands
+- ``process``: signals, threads, and the end of the process
+- ``bridge``: one line; its node stays when new files bring a new ``session``
+- ``parameters``: settings that come in
+- ``topics``: values in both directions
+- ``diagnostics``: statuses and log
 
-What is decided on the line is decided in ``driver``. Here values get names, types and a QoS.
+The room ``driver`` decides what happens on the line. This room gives values names, types and a
+QoS.
 """

@@ -13,10 +13,10 @@
 # limitations under the License.
 
 """
-The callbacks of a node take what comes from outside: none of it ends the node or its line.
+Callbacks of a node: a bad message or call from outside never ends the node or its line.
 
-Where rclpy or a callback of ours fails on a message or a call, only that one ends, with an entry
-in the log. A call is answered.
+If rclpy or one of our callbacks fails on a message or a call, only this callback ends, with an
+entry in the log. A call is answered.
 """
 
 from __future__ import annotations
@@ -38,7 +38,8 @@ from rclpy.executors import (
 from rclpy.impl.implementation_singleton import rclpy_implementation
 from rclpy.node import Node
 
-# An executor that cannot wait for callbacks tries again after a pause (s), at most this often.
+# An executor that fails while it waits for callbacks tries again after a pause (s). This many
+# failures in a row end it.
 _MOST_FAILED_WAITS = 3
 _PAUSE = 0.1
 
@@ -51,10 +52,10 @@ def failure_text(error: BaseException) -> str:
 
 class AnsweringNode(Node):
     """
-    A node whose services answer each call, without success where the callback fails.
+    A node whose services answer each call: without success if the callback fails.
 
-    At its beginning a callback finds in ``call_stamps`` when its call was sent and received (ns),
-    0 where that is not known.
+    When a callback begins, ``call_stamps`` has the times when its call was sent and received (ns);
+    0 means unknown.
     """
 
     def __init__(self, name: str, **options: Any) -> None:
@@ -64,24 +65,24 @@ class AnsweringNode(Node):
 
     def create_service(self, srv_type: Any, srv_name: str, callback: Callable[..., Any],
                        **options: Any) -> Any:
-        """Create a service; rclpy creates those of parameters with it."""
+        """Create a service; rclpy uses this method for the services of parameters too."""
         async def answer(request: Any, response: Any) -> Any:
             try:
                 return await await_or_execute(callback, request, response)
-            except Exception as error:  # the caller caused it
+            except Exception as error:  # a call from outside caused it
                 self.tell_failure(f'a call of {srv_name}', error)
                 return _refusal(srv_type, request, f'refused: {error!r}')
 
         return super().create_service(srv_type, srv_name, answer, **options)
 
     def tell_failure(self, what: str, error: BaseException) -> None:
-        """Log that something has failed that came from outside."""
+        """Log that a message or call from outside has failed."""
         self._failures.error('what comes from outside', (
-            f'{what} has failed and was ended, all else goes on: {failure_text(error)}'))
+            f'{what} has failed, all else goes on: {failure_text(error)}'))
 
 
 def _refusal(srv_type: Any, request: Any, reason: str) -> Any:
-    """Return the response to a call that has failed, with the reason where it has room for it."""
+    """Return the response to a failed call, with the reason if the type has a field for it."""
     response = srv_type.Response()
     if hasattr(response, 'message'):
         response.message = reason
@@ -94,9 +95,9 @@ def _refusal(srv_type: Any, request: Any, reason: str) -> Any:
 
 class Executor(SingleThreadedExecutor):
     """
-    Run callbacks of ``node``; one that fails ends alone.
+    Runs callbacks of ``node``; a callback that fails ends alone.
 
-    ``spin_once`` raises only what keeps it from waiting for callbacks at all.
+    ``spin_once`` raises an error only if it cannot wait for callbacks at all.
     """
 
     def __init__(self, node: AnsweringNode) -> None:
@@ -117,7 +118,7 @@ class Executor(SingleThreadedExecutor):
             self._node.tell_failure(f'a message on {name}' if name else 'a callback', error)
 
     def _take_service(self, srv: Any) -> Callable[[], Any] | None:
-        """Take a call as rclpy does, and keep its stamps for the callback."""
+        """Take a call as rclpy does, but keep its stamps for the callback."""
         try:
             with srv.handle:
                 request, header = srv.handle.service_take_request(srv.srv_type.Request)
@@ -134,14 +135,14 @@ class Executor(SingleThreadedExecutor):
 
 
 def _give_back(entity: Any) -> None:
-    """Have an entity waited for again; where its message cannot be taken, rclpy forgets that."""
+    """Wait for an entity again: rclpy forgets this if it cannot take the entity's message."""
     if entity is not None and entity._executor_event:  # noqa: SLF001
         entity._executor_event = False  # noqa: SLF001
         entity.callback_group.ending_execution(entity)
 
 
 class Callbacks(threading.Thread):
-    """Run the callbacks of a node until ``end``; ``error`` says why none can be taken any more."""
+    """Runs the callbacks of a node until ``end``; ``error``: what has ended it before."""
 
     def __init__(self, node: AnsweringNode) -> None:
         super().__init__(name='callbacks', daemon=True)
@@ -157,20 +158,20 @@ class Callbacks(threading.Thread):
             try:
                 self._executor.spin_once()
                 failures = 0
-            except Exception as error:  # it must not end the other lines
+            except Exception as error:  # an error must not end the lines of other bridges
                 failures += 1
                 if failures == _MOST_FAILED_WAITS:
                     self.error = error
                 time.sleep(_PAUSE)
 
     def wake(self) -> None:
-        """Have a callback that shows that it goes on."""
+        """Queue a callback that sets ``has_turned``."""
         self._executor.create_task(setattr, self, 'has_turned', True)
 
     def end(self, give_up: float) -> None:
-        """Take no more callbacks; wait for the one that runs up to a monotonic clock value."""
+        """Run no more callbacks; wait for a running one, at most to a monotonic clock value."""
         self._ends = True
         self.wake()
         self.join(max(0.0, give_up - time.monotonic()))
-        if not self.is_alive():  # before that it may wait with what would be destroyed
+        if not self.is_alive():  # while the thread lives, it may wait on what a shutdown destroys
             self._executor.shutdown()

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""What the launch files take, beside what is theirs alone; ROS drops what a file does not know."""
+"""Arguments of the launch files: the node's parameters; a check for unknown names."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ def parameter_types() -> dict[str, type]:
 
 
 def descriptions() -> dict[str, str]:
-    """Return what each of the node's own parameters is, with its default."""
+    """Return the description of each of the node's own parameters, with its default."""
     return {entry.name: entry.metadata['description']
             + (f'; default: {entry.default}' if entry.default != '' else '')
             for entry in fields(Parameters)}
@@ -38,10 +38,11 @@ def descriptions() -> dict[str, str]:
 
 def unknown_arguments(file: str, known: Iterable[str], argv: Sequence[str]) -> list[str]:
     """
-    Return what is wrong with the arguments ``name:=value`` of ``ros2 launch``, in words.
+    Return faults of the arguments ``name:=value`` of ``ros2 launch``.
 
-    ``file`` is the launch file, ``known`` what it takes, ``argv`` the command line. A file that
-    others include gets none of their arguments, so nothing is wrong with them.
+    ROS silently drops an argument that a launch file does not know. ``file``: the launch file;
+    ``known``: its arguments; ``argv``: the command line. If another launch file includes this one,
+    there is nothing to check.
     """
     if Path(file).name not in [Path(text).name for text in argv]:
         return []

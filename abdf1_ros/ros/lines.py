@@ -15,8 +15,8 @@
 """
 Many lines in one process: ``lines``.
 
-Each line is a node as ``node`` has it, in one ROS context: one DDS participant for all. What goes
-wrong with one line stays with it.
+Each line is a node as in the command ``node``. All share one ROS context, so one DDS participant.
+A fault of a line stays in this line.
 """
 
 from __future__ import annotations
@@ -61,31 +61,33 @@ Run many bridges in one process, a node for each section of the parameter file.
   lines --ros-args --params-file lines.yaml
   lines --ros-args --params-file lines.yaml -p 'lines:=[/press/abdf1, /paint/abdf1]'
 
-A line whose files have faults is named and left out; -p strict_lines:=true ends the process then.
-A line that ends by an internal error is started again, the others notice nothing.
+A line whose files have faults is reported and left out; with -p strict_lines:=true the process
+ends instead. After an internal error a line is started again, while all other lines go on.
 
-exit status: 0 after Ctrl-C, SIGTERM or SIGHUP, 2 for faulty parameters or where no line can
-run, 1 after internal errors, and where ROS does not start (log directory, network)
+exit status: 0 after Ctrl-C, SIGTERM or SIGHUP, 2 if parameters are faulty or no line can run,
+1 after internal errors, or if ROS does not start (log directory, network)
 """
 
-# The parameters of /lines, with what they are by default.
+# The parameters of /lines, with their defaults.
 OPTIONS: dict[str, object] = {'lines': [], 'strict_lines': False}
 
-# A line that has ended by an internal error is started again after so long (s).
+# Pause (s) before a line is started again after an internal error.
 _RESTART_AFTER = 2.0
 
 _STATUS_PERIOD = 1.0
 
-# Without this service, which is not needed, a hundred nodes take 13 MiB of 264 less.
+# We do not need this service; without it, a hundred nodes take 251 instead of 264 MiB.
 _NO_TYPE_DESCRIPTIONS = Parameter('start_type_description_service', value=False)
 
 
 class RestartedLine(Line):
     """
-    A line that begins again after an internal error, while the others go on.
+    A line that is started again after an internal error, while all other lines go on.
 
-    ``faults`` say why it does not run; ``restarts`` counts internal errors that ended it.
-    ``name`` is the full one, ``make`` makes its node.
+    - ``name``: the full name of the node
+    - ``make``: makes the node
+    - ``faults``: why the line cannot run; empty if it can
+    - ``restarts``: number of internal errors that have ended the line
     """
 
     def __init__(self, name: str, make: Callable[[], BridgeNode]) -> None:
@@ -105,7 +107,7 @@ class RestartedLine(Line):
         self.open_port()
 
     def make(self) -> None:
-        """Make the node: none with faulty files, or with the port of another line."""
+        """Make the node, if its files have no faults and no other line has its port."""
         self.faults = ()
         try:
             self.node = self._make()
@@ -119,10 +121,10 @@ class RestartedLine(Line):
             self._logger.fatal(printable(fault))
 
     def check(self) -> None:
-        """Publish what is due; begin again after an internal error."""
+        """Publish what is due; restart the line after an internal error."""
         try:
             super().check()
-        except Exception as error:  # a bug ends this line, not the others
+        except Exception as error:  # a bug ends only this line
             self._begin_again(error)
         is_closing = self._closing is not None and self._closing.is_alive()
         if self._again is not None and time.monotonic() >= self._again and not is_closing:
@@ -130,10 +132,10 @@ class RestartedLine(Line):
             self.start()
 
     def _begin_again(self, error: Exception) -> None:
-        """End the node, which may take seconds that the other lines do not have."""
+        """End the node in a thread, as this may take seconds; plan its restart."""
         self.restarts += 1
         text = printable(str(error)) if isinstance(error, LinkFailed) else bug_text(error)
-        self._logger.error(f'ends by an internal error and begins again: {text}')
+        self._logger.error(f'has ended by an internal error and is started again: {text}')
         self._again = time.monotonic() + _RESTART_AFTER
         if self.node is not None:
             gone = Line(self.node, self._callbacks)
@@ -142,14 +144,14 @@ class RestartedLine(Line):
             self._closing.start()
 
     def end_callbacks(self, give_up: float) -> None:
-        """Wait for a node that is being closed, too."""
+        """End the callbacks; wait also for an old node that is being closed."""
         if self._closing is not None:
             self._closing.join(max(0.0, give_up - time.monotonic()))
         super().end_callbacks(give_up)
 
 
 def _options(node: Node, arguments: Arguments) -> tuple[list[str], bool]:
-    """Return which lines are wanted, and whether all have to run; raises ConfigurationError."""
+    """Return the wanted lines, and whether all have to run; raises ConfigurationError."""
     problems = wrong_names(node, take_given(node), arguments, OPTIONS, NODE_NAME)
     anything = ParameterDescriptor(dynamic_typing=True)
     wanted, is_strict = (node.declare_parameter(name, default, anything).value
@@ -166,7 +168,7 @@ def _options(node: Node, arguments: Arguments) -> tuple[list[str], bool]:
 
 
 class LinesNode(AnsweringNode):
-    """Tell of all lines on /diagnostics; ``~/reload`` tries those again that do not run."""
+    """Shows all lines on /diagnostics; ``~/reload`` starts faulty lines again."""
 
     def __init__(self, arguments: Arguments) -> None:
         super().__init__(NODE_NAME, automatically_declare_parameters_from_overrides=True)
@@ -187,12 +189,12 @@ class LinesNode(AnsweringNode):
         return response
 
     def look(self) -> None:
-        """Look for another process of the same name: one call of a service would reach both."""
+        """Look for another node with our name: it would answer calls meant for us."""
         for news in self._names.look(line_time()):
             self._notes.tell(news)
 
     def publish(self, lines: Sequence[RestartedLine]) -> None:
-        """Publish which lines run, and why others do not."""
+        """Publish which lines run, and why the rest do not."""
         faulty = [line for line in lines if line.node is None]
         level, text = (ERROR, f'{len(faulty)} of {len(lines)} lines do not run') \
             if faulty else (OK, f'{len(lines)} of {len(lines)} lines run')
@@ -200,7 +202,7 @@ class LinesNode(AnsweringNode):
             level, text = max(level, WARN), f'{text}; {self._names.text}'
         values = {'lines': str(len(lines)), 'running': str(len(lines) - len(faulty)),
                   'restarts': str(sum(line.restarts for line in lines))}
-        values |= {line.name: '; '.join(line.faults) or 'begins again' for line in faulty}
+        values |= {line.name: '; '.join(line.faults) or 'is started again' for line in faulty}
         name = f'{self.get_fully_qualified_name().lstrip("/")}: lines'
         message = DiagnosticArray(status=[
             message_of(name, level, f'{WORDS[level]}: {text}', '', values)])
@@ -209,7 +211,7 @@ class LinesNode(AnsweringNode):
 
 
 class Lines:
-    """All lines, from their start to their end."""
+    """The program ``lines``: all lines, from their start to their end."""
 
     def __init__(self, names: Sequence[str], node: LinesNode, arguments: Arguments) -> None:
         port_owners = PortOwners()
@@ -234,13 +236,13 @@ class Lines:
         return self._runner.run(ended)
 
     def _look(self) -> None:
-        """Take requests to the process, and tell of all lines."""
+        """Answer calls to the process; publish the status of all lines."""
         now = time.monotonic()
         try:
             self._node.look()
             self._executor.spin_once(timeout_sec=0)
-        except Exception as error:  # the lines have executors of their own
-            self._node.tell_failure('a look at the network', error)
+        except Exception as error:  # the lines go on: they have executors of their own
+            self._node.tell_failure('the search for other nodes', error)
         if self._node.is_asked_again:
             self._node.is_asked_again = False
             for line in self._lines:
@@ -251,7 +253,7 @@ class Lines:
             self._node.publish(self._lines)
 
     def destroy(self) -> None:
-        """Destroy all nodes that are no longer used."""
+        """Destroy all nodes, unless a callback still uses them."""
         self._executor.shutdown()
         self._node.destroy_node()
         self._runner.destroy()
@@ -259,11 +261,11 @@ class Lines:
 
 def sections(path: str, own_name: str = NODE_NAME) -> list[str]:
     """
-    Return the full names of the lines that a parameter file has a section for.
+    Return the full names of the lines in a parameter file: each line has a section.
 
-    A section with a wildcard is none, nor is that of the process, which is called ``own_name``.
-    Raises ConfigurationError where there is none that can be read, and where one comes twice:
-    only one of them would run.
+    A section with a wildcard is not a line, nor is the section of the process (``own_name``).
+    Raises ConfigurationError if the file cannot be read, or if a section comes twice: only one of
+    the two would run.
     """
     found: dict[str, int] = {}
     problems = []
@@ -273,8 +275,8 @@ def sections(path: str, own_name: str = NODE_NAME) -> list[str]:
         first = found.setdefault(name, line)
         if first != line:
             problems.append(Problem(Place(path, line), (
-                f'{printable(name)} has a section in line {first} already; '
-                'each line needs a name of its own')))
+                f'{printable(name)} has a section already, in line {first}; '
+                'give each DF1 line a name of its own')))
     if problems:
         raise ConfigurationError(problems)
     return [*found]
@@ -282,16 +284,16 @@ def sections(path: str, own_name: str = NODE_NAME) -> list[str]:
 
 def chosen(names: Sequence[str], wanted: Sequence[str]) -> list[str]:
     """
-    Return the lines that are wanted, by name or full name; all where nothing is.
+    Return the wanted lines, by name or full name; all lines if ``wanted`` is empty.
 
-    A part of a full name will do where only one line has it.
+    A part of a full name is enough, if only one line has this part.
 
-    Raises ConfigurationError for a name that no section has, and where there is no line at all.
+    Raises ConfigurationError for a name without a section, or if there is no line at all.
     """
     if not names:
         raise ConfigurationError([Problem(
-            'arguments', 'no line to run: give a parameter file with a section for each, as in '
-            '--ros-args --params-file lines.yaml; config/three_lines.yaml is an example')])
+            'arguments', 'no line to run: give a parameter file with a section for each line, '
+            'as in --ros-args --params-file lines.yaml; config/three_lines.yaml is an example')])
     if not wanted:
         return list(names)
     meant = {text: [name for name in names if text in (name, _short(name))] for text in wanted}
@@ -300,8 +302,8 @@ def chosen(names: Sequence[str], wanted: Sequence[str]) -> list[str]:
         meant[text] = parts if len(parts) == 1 else []
     if missing := [text for text, found in meant.items() if not found]:
         raise ConfigurationError([Problem(
-            'parameter lines', f'no section is called {printable(", ".join(missing))}; there are '
-            + printable(', '.join(names)))])
+            'parameter lines', f'no section is called {printable(", ".join(missing))}; the '
+            'sections are ' + printable(', '.join(names)))])
     return [name for name in names if any(name in found for found in meant.values())]
 
 
@@ -313,21 +315,21 @@ def main(args: Sequence[str] | None = None) -> int:
     """
     Run the lines until SIGINT, SIGTERM or SIGHUP.
 
-    Returns 0 after a signal, 2 when parameters are faulty or no line can run, 1 after internal
-    errors and where ROS does not start for a reason that may pass.
+    Returns 0 after a signal, 2 if parameters are faulty or no line can run. Returns 1 after
+    internal errors, or if ROS does not start for a reason that may pass.
     """
     return run_ros(NODE_NAME, make_parser(_USAGE, _HELP), _make, args, leaves_out=True)
 
 
 def _allow_files() -> None:
-    """Let this process open as many files as it may: a line takes 7, and 1024 is usual."""
+    """Raise the limit of open files: a line needs 7, and the usual limit is 1024."""
     _, most = resource.getrlimit(resource.RLIMIT_NOFILE)
-    with suppress(OSError, ValueError):  # then it stays as it is
+    with suppress(OSError, ValueError):  # then the limit stays as it is
         resource.setrlimit(resource.RLIMIT_NOFILE, (most, most))
 
 
 def _own_name(given: Sequence[str]) -> str:
-    """Return how the process is called; raises ConfigurationError for a name for all nodes."""
+    """Return the name of the process; raises ConfigurationError for a name for all nodes."""
     own = NODE_NAME
     for text in given:
         if renamed := re.fullmatch(rf'/?{NODE_NAME}:__(?:node|name):=(\w+)', text):

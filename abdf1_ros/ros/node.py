@@ -30,16 +30,16 @@ _HELP = """\
 Read and write the data tables of PLCs over DF1, and show them as topics.
 
 parameters, after --ros-args (docs/reference/parameters.md has all of them):
-  -p net_file:=PATH   the line, needed
-  -p map_file:=PATH   what is read and written, needed
-  -p port:=DEVICE     a device path or URL instead of the file's Com_Port
+  -p net_file:=PATH   CSV with the settings of the line, needed
+  -p map_file:=PATH   CSV with the rows to read and write, needed
+  -p port:=DEVICE     a device path or URL instead of Com_Port in the net file
 
 examples:
   node --ros-args -p net_file:=net.csv -p map_file:=map.csv
   node --ros-args --params-file line_1.yaml -r __node:=line_1
 
 exit status: 0 after Ctrl-C, SIGTERM or SIGHUP, 2 for faulty files or parameters,
-1 after internal errors, and where ROS does not start (log directory, network)
+1 after internal errors, or if ROS does not start (log directory, network)
 """
 
 
@@ -47,8 +47,8 @@ def main(args: Sequence[str] | None = None) -> int:
     """
     Run the node until SIGINT, SIGTERM or SIGHUP.
 
-    Returns 0 after a signal, 2 when parameters or files are faulty, 1 after internal errors and
-    where ROS does not start for a reason that may pass.
+    Returns 0 after a signal, 2 if parameters or files are faulty. Returns 1 after internal errors,
+    or if ROS does not start for a reason that may pass.
     """
     return run_ros(NODE_NAME, make_parser(_USAGE, _HELP), _make, args)
 

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""A node that looks at others: what tests, the demo and the monitor have in common."""
+"""A node that observes other nodes, for tests, the demo and the monitor."""
 
 from __future__ import annotations
 
@@ -31,9 +31,9 @@ _Result = TypeVar('_Result')
 
 def graph_hint() -> str:
     """
-    Return why the topics of other nodes may not be seen, empty where nothing is known.
+    Return why we may not see topics of other nodes; empty if we know no reason.
 
-    A client of a discovery server learns only of the endpoints that match its own.
+    A client of a discovery server learns only of endpoints that match its own endpoints.
     """
     is_client = os.environ.get('ROS_DISCOVERY_SERVER') \
         and os.environ.get('ROS_SUPER_CLIENT', '').upper() != 'TRUE'
@@ -42,9 +42,9 @@ def graph_hint() -> str:
 
 class Observer:
     """
-    A node with an executor of its own; it also runs nodes that are added to that.
+    A node with an executor of its own; nodes that are added to the executor run too.
 
-    It ends a context that it has made of ``args``. ``options`` are the node's.
+    Without ``context`` it makes one from ``args``, and ends it. ``options``: of the node.
     """
 
     def __init__(self, name: str, context: Context | None = None, args: Sequence[str] = (),
@@ -62,12 +62,11 @@ class Observer:
 
     def __exit__(self, *exception: object) -> None:
         """
-        End what spins, then the node, then the context, whatever fails on the way.
+        End the executor, then the node, then the context, even if one of these steps fails.
 
-        The executor keeps a wait set with what its nodes have until it is shut down; rclpy should
-        not have to take away what something still waits for. What is left is a race of Fast DDS
-        2.14 with its own thread of discovery, which finds the listener of a reader gone (issue
-        3303 there).
+        Until its shutdown the executor has a wait set with the parts of its nodes. So the executor
+        ends before rclpy destroys these parts. One race remains, inside Fast DDS 2.14: its
+        discovery thread may use the listener of a deleted reader (issue 3303 there).
         """
         with ExitStack() as stack:
             if self._owns_context:
@@ -78,11 +77,11 @@ class Observer:
                 self.executor.remove_node(node)
 
     def spin_once(self, seconds: float) -> None:
-        """Take one message, or wait so long."""
+        """Take one message, or wait at most ``seconds``."""
         self.executor.spin_once(timeout_sec=seconds)
 
     def published(self, name: str) -> list[tuple[str, list[str]]] | None:
-        """Return what the node ``name`` publishes, with types; None where it is not known yet."""
+        """Return the topics and types of the node ``name``; None if it is not known yet."""
         namespace, _, base = name.rpartition('/')
         try:
             return self.node.get_publisher_names_and_types_by_node(base, namespace or '/')
@@ -90,7 +89,7 @@ class Observer:
             return None
 
     def wait(self, condition: Callable[[], _Result | None], seconds: float) -> _Result | None:
-        """Spin until ``condition`` gives something true, or so long; return what it gives."""
+        """Spin until ``condition`` returns a true value, or for ``seconds``; return its result."""
         end = time.monotonic() + seconds
         while not (result := condition()) and (left := end - time.monotonic()) > 0:
             self.spin_once(min(left, 0.05))

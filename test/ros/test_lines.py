@@ -86,7 +86,8 @@ def test_two_sections_of_one_name_are_a_fault(tmp_path: Path) -> None:
     with pytest.raises(ConfigurationError) as error:
         sections(path)
     assert str(error.value) == (
-        f'{path}:7: /hall/a has a section in line 1 already; each line needs a name of its own')
+        f'{path}:7: /hall/a has a section already, in line 1; give each DF1 line a name '
+        'of its own')
 
 
 @pytest.mark.parametrize('text', [None, '{', '\x00'])
@@ -103,16 +104,16 @@ def test_parameter_file_that_cannot_be_read(tmp_path: Path, text: str | None) ->
      ':3: "hall/press-plc" cannot name a node: letters, digits and underscores, as in '
      'hall/press_plc'),
     ('a: &x\n  ros__parameters: {}\nb: *x\n',
-     ':3:4: an alias, *x, which ROS does not take: write the values out'),
-    ('a: &x\n  b: *x\n', ':2:6: an alias, *x, which ROS does not take: write the values out'),
+     ':3:4: an alias, *x: ROS does not accept it; write the values out'),
+    ('a: &x\n  b: *x\n', ':2:6: an alias, *x: ROS does not accept it; write the values out'),
     ('a:\n  ros__parameters: {b: ' + 600 * '[',
-     ':2:41: more than 20 levels, one within the other'),
+     ':2:41: more than 20 levels inside each other'),
     (''.join(f'{number * " "}a:\n' for number in range(600)) + 600 * ' ' + 'a: 1\n',
-     ':21:21: more than 20 levels, one within the other'),
-    ('a:\n  ros__parameters: !foo {}\n', ':2:20: the tag !foo, which ROS does not know: leave it '
+     ':21:21: more than 20 levels inside each other'),
+    ('a:\n  ros__parameters: !foo {}\n', ':2:20: the tag !foo: ROS does not know it; leave it '
      'out'),
     ('a:\n  ros__parameters: {b: !!python/name:os.system x}\n',
-     ':2:24: the tag tag:yaml.org,2002:python/name:os.system, which ROS does not know: leave it '
+     ':2:24: the tag tag:yaml.org,2002:python/name:os.system: ROS does not know it; leave it '
      'out'),
     ('? [a]\n: {ros__parameters: {}}\n',
      ':1:3: a list or mapping as a name: a name should be one word')])
@@ -164,7 +165,7 @@ def test_lines_are_chosen_by_name() -> None:
 
 
 def test_line_that_is_not_there_is_named() -> None:
-    with pytest.raises(ConfigurationError, match='no section is called glue; there are /press/'):
+    with pytest.raises(ConfigurationError, match='called glue; the sections are /press/'):
         chosen([PRESS, PAINT], ['press_plc', 'glue'])
 
 
@@ -387,7 +388,7 @@ def test_internal_error_at_the_start_of_a_line(
     plant.start(reads='abc')
     assert made[1] - made[0] >= 0.5
     assert line_status(plant, OK)['restarts'] == '1'
-    assert "begins again: AttributeError('a bug')" in capfd.readouterr().err
+    assert "is started again: AttributeError('a bug')" in capfd.readouterr().err
 
 
 def test_internal_error_restarts_its_line_only_and_its_slow_end_holds_up_no_other(
@@ -406,13 +407,13 @@ def test_internal_error_restarts_its_line_only_and_its_slow_end_holds_up_no_othe
     plant.fail('b')
     plant.observer.until(slow.is_set, 'the end of a line')
     assert until_status(plant.observer.diagnostics(plant.plcs['a'].port), 'link', OK)
-    assert line_status(plant, ERROR)['/hall/b'] == 'begins again'
+    assert line_status(plant, ERROR)['/hall/b'] == 'is started again'
     ended.set()
     assert plant.speeds('b') == [7, ord('b')]
     assert {name for name in 'abc' if not before[name].link.is_alive()} == {'b'}
     assert line_status(plant, OK)['restarts'] == '1'
     said = capfd.readouterr().err
-    assert 'ends by an internal error and begins again' in said
+    assert 'has ended by an internal error and is started again' in said
     assert 'Traceback' in said
 
 
@@ -462,7 +463,7 @@ def test_argument_that_is_not_of_ros_is_refused(capsys: pytest.CaptureFixture[st
     assert ending.value.code == 2
     told = capsys.readouterr().err
     assert 'usage: lines --ros-args --params-file lines.yaml' in told
-    assert 'map.csv: not known here; parameters follow --ros-args' in told
+    assert 'map.csv: unknown argument; write parameters after --ros-args' in told
 
 
 def test_one_name_for_all_lines_is_refused(capfd: pytest.CaptureFixture[str]) -> None:

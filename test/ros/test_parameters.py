@@ -336,9 +336,9 @@ def test_parameter_file_sets_parameters_of_node_and_net(
 @pytest.mark.parametrize(('name', 'right'), [
     ('net.buad', 'did you mean net.baud?'), ('baud', 'did you mean net.baud?'),
     ('Com_Port', 'did you mean net.com_port?'),
-    ('map.recipe.addres', 'map.* repeats the columns of the map file, which alone counts'),
+    ('map.recipe.addres', 'map.* only shows the map file: change the file'),
     ('qos_overrides./parameters/read/door.publisher.depth', 'the QoS of our topics follows'),
-    ('net.speed', 'net.* are its columns'),
+    ('net.speed', 'net.* has the columns of the net file'),
     ('prot', 'did you mean port?'), ('map_fil', 'did you mean map_file?')])
 def test_misspelt_parameter_is_an_error(
         make_node: Nodes, files: dict[str, str], name: str, right: str) -> None:

@@ -153,7 +153,7 @@ def test_user_without_a_home_is_told_what_to_set(monkeypatch: pytest.MonkeyPatch
         monkeypatch.delenv(name)
     (line,) = refused_start()
     assert fatal(line) == ('environment: HOME is not set, so there is no directory for the log; '
-                           'set ROS_LOG_DIR to one that this user may write to')
+                           'set ROS_LOG_DIR to a directory that this user may write to')
 
 
 def test_trace_that_cannot_be_written_is_an_error_and_no_stop(

@@ -12,4 +12,4 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Parameters of the node: declared, read from files, and shown."""
+"""The node's parameters: find them in arguments and files, declare them, and show them."""

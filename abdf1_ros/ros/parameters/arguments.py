@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The parameters that a process was given, and for which node each of them is."""
+"""The parameters that a process was given, and the node that each of them is for."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ from abdf1_ros.problems import Place, Problem
 from abdf1_ros.ros.parameters.files import names_in, node_sections, parameter_files, parameter_tree
 from abdf1_ros.text import first, printable
 
-# Parameters of ours that nodes of other packages have too.
+# Names of our parameters that nodes of other packages use too.
 _USUAL_NAMES = frozenset((
     'port', 'lines', 'low_latency', 'rs485', 'diagnostics_period', 'write_timeout', 'use_sim_time',
     'start_type_description_service'))
@@ -32,23 +32,25 @@ _USUAL_NAMES = frozenset((
 
 @dataclass(frozen=True, slots=True)
 class Typed:
-    """A parameter of the command line; ``node`` is the name before it, if there is one."""
+    """A parameter of the command line; ``node``: the node name before it, or empty."""
 
     node: str
     name: str
     value: str
 
     def is_for(self, full_name: str) -> bool:
-        """Tell whether ROS gives it to a node."""
+        """Return True if ROS gives the parameter to this node."""
         return self.node in ('', full_name.lstrip('/'))
 
 
 @dataclass(frozen=True, slots=True)
 class Arguments:
     """
-    What a process was given, for any of its nodes.
+    The parameters that a process was given, for all of its nodes.
 
-    ``files`` are paths of parameter files; ``others`` are full names of its other nodes.
+    - ``files``: paths of parameter files
+    - ``typed``: parameters of the command line
+    - ``others``: full names of all nodes of the process, if it has several
     """
 
     files: Sequence[str] = ()
@@ -57,7 +59,7 @@ class Arguments:
 
     @classmethod
     def of(cls, args: Sequence[str]) -> Arguments:
-        """Return what is in the arguments of a process with one node."""
+        """Return the parameters in the arguments of a process with one node."""
         rules = [rule.partition(':=') for option, rule in zip(args, args[1:], strict=False)
                  if option in ('-p', '--param')]
         typed = []
@@ -67,16 +69,16 @@ class Arguments:
         return cls(parameter_files(args), typed)
 
     def typed_for(self, full_name: str) -> dict[str, str]:
-        """Return the typed parameters of a node, as they are written."""
+        """Return the command line's parameters for a node, as text."""
         return {typed.name: typed.value for typed in self.typed if typed.is_for(full_name)}
 
     def misdirected(self, full_name: str, usual_name: str,
                     known: Collection[str]) -> Iterator[Problem]:
         """
-        Yield what seems to be meant for a node, and what ROS gives to another one.
+        Yield parameters that seem to be meant for this node but go to another name.
 
-        ``usual_name`` is the node's name without remapping, ``known`` are its parameters. In a
-        file with a section of the node's own, the other sections are for other nodes.
+        ``usual_name``: the node's name without remapping; ``known``: its parameters. If a file has
+        a section for this node, we treat all its other sections as meant for other nodes.
         """
         for path in self.files:
             yield from self._of_others(path, full_name, usual_name, {*known} - _USUAL_NAMES)
@@ -87,7 +89,7 @@ class Arguments:
 
     def _of_others(self, path: str, full_name: str, usual_name: str,
                    ours: Collection[str]) -> Iterator[Problem]:
-        """Yield the first section of a file that seems to be meant for the node and is not."""
+        """Yield the first section that seems to be meant for this node but has another name."""
         sections = [*node_sections(parameter_tree(path))]
         if any(name == full_name for name, _, _ in sections):
             return
@@ -101,7 +103,7 @@ class Arguments:
 
 
 def is_for(section: str, full_name: str) -> bool:
-    """Tell whether ROS gives the parameters of a section to a node, wildcards considered."""
+    """Return True if ROS gives the parameters of a section to a node; mind wildcards."""
     pattern = re.escape(section).replace(r'/\*\*', r'(/\w+)*').replace(r'/\*', r'/\w+')
     return re.fullmatch(pattern, full_name) is not None
 

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The node's parameters: one table, their declaration, and the configuration made of them."""
+"""The node's parameters: their table, their declaration, and the resulting configuration."""
 
 from __future__ import annotations
 
@@ -54,19 +54,19 @@ def _parameter(default: bool | float | str, description: str, low: float | None 
 
 @dataclass(frozen=True, slots=True)
 class Parameters:
-    """The node's own parameters; those of the link (``net.*``) are the fields of Network."""
+    """The node's own parameters; the parameters ``net.*`` are the fields of Network."""
 
     net_file: str = _parameter('', 'path of the net CSV, needed')
     map_file: str = _parameter('', 'path of the map CSV, needed')
     port: str = _parameter('', f'device path, {URLS} to use instead of Com_Port')
     low_latency: bool = _parameter(
-        True, 'ask the driver of the port to hand on bytes at once, where it can')
+        True, 'ask the port driver to pass on each byte at once, if it can')
     rs485: bool = _parameter(
-        False, 'let the kernel switch an RS-485 transmitter with RTS, where it can')
+        False, 'let the kernel switch an RS-485 transmitter with RTS, if it can')
     strict_map: bool = _parameter(False, 'a bad row in the map ends the process')
     read_only: bool = _parameter(False, 'refuse every write')
     standby: bool = _parameter(
-        False, 'be silent on all topics and services until the line is ours; for each of two '
+        False, 'offer no topics and services until this bridge has the line; set it on both '
         'hosts that share a line')
     default_period: int = _parameter(
         100, 'ms between reads of a mapping without Period; 0: as often as the line allows',
@@ -83,16 +83,17 @@ class Parameters:
     nak_on_command_timeout: bool = _parameter(
         True, 'send DLE NAK, which resets all slaves, when a reply does not come in time')
     max_outstanding: int = _parameter(
-        1, 'commands that may wait for their reply at a time, Mode Peer only', 1, 16)
+        1, 'most commands that wait for a reply at the same time, Mode Peer only', 1, 16)
     accept_slave_messages: bool = _parameter(
-        True, 'serve or pass on what slaves send by themselves; false: acknowledge and drop it')
+        True, 'serve or pass on messages that slaves send on their own; false: acknowledge and '
+        'drop them')
     poll_list: str = _parameter(
         '', 'stations to poll with Polling Standard, as in 1,3-5; empty: all mapped ones')
     priority_poll_list: str = _parameter('', 'stations to poll first in every scan')
     poll_group_size: int = _parameter(
         0, 'stations of poll_list polled in each scan; 0: all', 0, 255)
     poll_multiple: bool = _parameter(
-        False, 'poll a station until it has nothing more; false: one message a scan')
+        False, 'poll a station until it has no more messages; false: one message per scan')
     send_in_sequence: bool = _parameter(
         False, 'send commands when our own station comes up in the list; false: between polls')
     eot_suppression: bool = _parameter(False, 'Mode Slave: stay silent instead of answering EOT')
@@ -102,19 +103,19 @@ class Parameters:
         60.0, 'Mode Slave: s without a poll after which own commands fail; 0: never', 0.0,
         3600.0)
     most_services: int = _parameter(
-        100, 'services ~/set of bits, then ~/read_now of rows with a Period, as long as there are '
-        'at most so many: a service costs as much as three topics', 0, 10_000)
+        100, 'most services: ~/set of all bits if these fit, then ~/read_now of all rows with a '
+        'Period if these fit too; a service costs as much as three topics', 0, 10_000)
     expose_map_parameters: bool = _parameter(
-        True, 'show every mapping as read-only parameters map.<tag>.<column>; where this is not '
-        f'given, of maps of up to {MOST_SHOWN_ROWS} rows')
+        True, 'show every mapping as read-only parameters map.<tag>.<column>; if this is not '
+        f'set, only for maps of up to {MOST_SHOWN_ROWS} rows')
     trace_file: str = _parameter(
-        '', 'path of a capture of all that passes the port, for sniff; empty: none')
+        '', 'path of a capture of all bytes on the port, for sniff; empty: no capture')
     trace_limit: float = _parameter(
-        10.0, 'MB that the capture takes on the disk at most', 0.01, 10_000.0)
+        10.0, 'most MB that the capture takes on the disk', 0.01, 10_000.0)
 
 
 Given = MappingType[str, Any]
-"""What the user has set, by name of the parameter."""
+"""The values that the user has set, by name of the parameter."""
 
 NO_ARGUMENTS = Arguments()
 
@@ -129,7 +130,7 @@ _MAP_NAMES = {column.lower() for column in COLUMNS}
 
 _STATION_LISTS = 'poll_list', 'priority_poll_list'
 
-# Shown as resolved paths, because a relative one does not tell which file it is.
+# Shown as absolute paths, because a relative path does not say which file it is.
 _PATHS = ('net_file', 'map_file')
 
 
@@ -138,8 +139,9 @@ class Configuration:
     """
     All that the node needs to know.
 
-    ``map_problems`` are those of rows left out; ``given`` is what the user has set, ``ignored``
-    are names in it without effect.
+    - ``map_problems``: faults of rows that were left out
+    - ``given``: the parameters that the user has set
+    - ``ignored``: names in ``given`` without effect
     """
 
     parameters: Parameters
@@ -154,12 +156,12 @@ class Configuration:
 
     @property
     def held(self) -> tuple[str, ...]:
-        """Return the port and the places of Share, which no other line may have."""
+        """Return the ports and the places of Share: no other line may use them."""
         second = self.network.second_port
         return self.port, *self.network.share.split(), *([second] if second else [])
 
     def driver_settings(self) -> DriverSettings:
-        """Return parameters of the same names, and what follows from others."""
+        """Return the driver's settings: parameters of equal name, or derived from parameters."""
         own = {entry.name for entry in fields(Parameters)}
         same = {entry.name: getattr(self.parameters, entry.name)
                 for entry in fields(DriverSettings) if entry.name in own}
@@ -169,12 +171,12 @@ class Configuration:
             polling=self.polling, first_tns=random.randrange(0x10000))
 
     def shown_rows(self) -> Sequence[Mapping]:
-        """Return the rows to be shown as parameters: all or none."""
+        """Return the rows to show as parameters: all or none."""
         is_few = len(self.mappings) <= MOST_SHOWN_ROWS or 'expose_map_parameters' in self.given
         return self.mappings if is_few and self.parameters.expose_map_parameters else ()
 
     def __str__(self) -> str:
-        """Return one line that tells what the node runs with."""
+        """Return one line of text with the files, the port, and the number of rows and topics."""
         network, parameters = self.network, self.parameters
         read = len(self.mappings.published)
         written = len({mapping.topic for mapping in self.mappings.messages})
@@ -187,10 +189,10 @@ class Configuration:
 
 def take_given(node: Node) -> Given:
     """
-    Return what the user has set, by name, and leave it to be declared.
+    Return the parameters that the user has set, and undeclare them.
 
-    The node is to be made with ``automatically_declare_parameters_from_overrides``: otherwise
-    rclpy drops in silence what is not declared.
+    Make the node with ``automatically_declare_parameters_from_overrides``: otherwise rclpy
+    silently drops a parameter that is not declared.
     """
     declared: Any = node.get_parameters_by_prefix('')
     given = {name: parameter.value for name, parameter in declared.items()
@@ -202,10 +204,10 @@ def take_given(node: Node) -> Given:
 
 def configure(node: Node, arguments: Arguments = NO_ARGUMENTS) -> Configuration:
     """
-    Declare the node's own parameters and read both files; ``ShownFiles`` shows what is in these.
+    Declare the node's own parameters and read both files.
 
-    ``arguments`` are those of the process. Raises ConfigurationError with every fault that keeps
-    the node from running.
+    Raises ConfigurationError with all faults that prevent the node from running. ``ShownFiles``
+    shows the contents of the files.
     """
     given = take_given(node)
     known = [entry.name for entry in fields(Parameters)]
@@ -219,8 +221,8 @@ def read_again(before: Configuration) -> Configuration:
     """
     Read both files again.
 
-    Raises ConfigurationError with every fault, also of single rows: a running node is not stopped
-    for a mistake in a file.
+    Raises ConfigurationError with all faults, even of single rows: the node then goes on with the
+    old files.
     """
     return _from_files(before.given, before.parameters, [], is_strict=True)
 
@@ -261,24 +263,24 @@ def _from_files(given: Given, parameters: Parameters, problems: list[Problem], *
 
 
 def _overridden(given: Given, network: Network) -> Network:
-    """Return the network with what overrides it."""
+    """Return the network with the values of parameters ``net.*`` in place of the file's."""
     texts = {name: text_of(given[entry.parameter]) for name, entry in FIELDS.items()
              if entry.parameter in given}
     cells = network.cells()
-    return make_network({  # as text: 5.0 equals 5, but is not a station
+    return make_network({  # compare as text: 5.0 equals 5, but is not a valid station
         name: (text, f'parameter {FIELDS[name].parameter}') for name, text in texts.items()
         if text != str(cells[name])}, network)
 
 
 def _needed(name: str, path: str, problems: list[Problem]) -> str:
-    """Return the path of a file; raises ConfigurationError that tells how to start."""
+    """Return the path of a file; raises ConfigurationError if it is missing."""
     if '$(' in path:
         raise ConfigurationError([Problem(
             f'parameter {name}', f'{path}: $(...) is for launch files; write the path')])
     if path:
         return path
     if any(problem.place.file == f'parameter {name}' for problem in problems):
-        raise ConfigurationError([])  # it is given, but not as a text
+        raise ConfigurationError([])  # the user gave it, but not as text: reported already
     raise ConfigurationError([Problem(
         f'parameter {name}', f'which file? Start with --ros-args -p net_file:=net.csv -p '
         f'map_file:=map.csv; examples are in {config_file("net.csv").parent}, and "ros2 launch '
@@ -292,12 +294,12 @@ def _resolved(path: str) -> str:
 def wrong_names(node: Node, given: Given, arguments: Arguments, known: Collection[str],
                 usual_name: str, begins: str = ' ') -> list[Problem]:
     """
-    Return the parameters that a user has given and that do not exist, or are for another node.
+    Return faults of parameters that do not exist, are for another node, or are octal.
 
-    In a section of a parameter file that names the node, all are meant for it, and those that are
-    typed. Others may belong to other nodes, so only those are found whose names look like ours,
-    or begin so. ``map.*`` may come back from a dump of our parameters, see ``_ignored``. Of YAML
-    a number with a leading zero is octal, which is never meant.
+    Every name is checked in sections that name this node, and on the command line. Elsewhere, only
+    names are checked that resemble ours or start with ``begins``: the rest may belong to other
+    nodes. ``map.*`` is allowed, because a dump of our parameters contains it; see ``_ignored``.
+    Numbers with a leading zero are reported, because YAML reads them as octal.
     """
     full_name = node.get_fully_qualified_name()
     problems = [*arguments.misdirected(full_name, usual_name, known)]
@@ -336,18 +338,18 @@ def _nearest(name: str, known: Collection[str], begins: str, likeness: float) ->
     if name.startswith('qos_overrides.'):
         return 'the QoS of our topics follows from the files'
     if name.startswith('map.'):
-        return 'map.* repeats the columns of the map file, which alone counts'
+        return 'map.* only shows the map file: change the file'
     in_net = f'net.{name.lower()}'
     close = [in_net] if in_net in known else difflib.get_close_matches(name, known, 1, likeness)
     if close:
         return f'did you mean {close[0]}?'
     if name.startswith(begins):
-        return f'{begins}* are its columns'
+        return f'{begins}* has the columns of the net file'
     return 'another version may have it' if likeness < 0.75 else ''
 
 
 def _ignored(given: Given, mappings: Rows) -> list[str]:
-    """Return the names of ``map.*`` that say something else than the map."""
+    """Return the names of ``map.*`` whose values differ from the map."""
     texts = {name: text_of(value) for name, value in given.items() if name.startswith('map.')}
     repeated = {name for name, value, _ in map_cells(mappings) if texts.get(name) == value} \
         if texts else set()
@@ -356,7 +358,7 @@ def _ignored(given: Given, mappings: Rows) -> list[str]:
 
 def _polling(parameters: Parameters, mappings: Rows,
              problems: list[Problem]) -> PollingSettings:
-    """Return how a master with standard polling polls."""
+    """Return the settings of standard polling."""
     priority = _stations('priority_poll_list', parameters.priority_poll_list, problems)
     normal = _stations('poll_list', parameters.poll_list, problems)
     routes = {mapping.station: mapping.via for mapping in mappings if mapping.via is not None}
@@ -381,13 +383,13 @@ def _stations(name: str, text: str, problems: list[Problem]) -> tuple[int, ...]:
 def _declare(node: Node, given: Given, name: str, default: Any,
              descriptor: ParameterDescriptor) -> Any:
     """
-    Declare a parameter and return its value, whatever the user has given.
+    Declare a parameter and return its value, even if that has a wrong type or range.
 
-    rclpy shows types and ranges to the user, but we check them, with better messages. A path is
-    shown resolved and returned as it was given.
+    rclpy only shows types and ranges; we check them, with better messages. A path is shown
+    resolved, but returned as the user gave it.
     """
     if name in _PATHS and isinstance(value := given.get(name), str):
-        path = os.path.expanduser(value)  # in net_file:=~/net.csv the shell leaves it
+        path = os.path.expanduser(value)  # the shell does not expand net_file:=~/net.csv
         descriptor.dynamic_typing = False
         node.declare_parameter(name, _resolved(path), descriptor, ignore_override=True)
         return path
@@ -410,7 +412,7 @@ def _declare_own(node: Node, given: Given, problems: list[Problem]) -> Parameter
             value = float(value)
         if kind is str and isinstance(value, int | float):
             value = str(value)
-        if entry.name in _STATION_LISTS and isinstance(value, list):  # of YAML: [1, 2]
+        if entry.name in _STATION_LISTS and isinstance(value, list):  # a YAML list: [1, 2]
             value = ','.join(map(str, value))
         if type(value) is not kind or (low is not None and not low <= value <= high):
             right = _KINDS[kind]

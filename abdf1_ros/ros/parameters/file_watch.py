@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Find out that a file has changed since it was read."""
+"""Find files that have changed since they were read."""
 
 from __future__ import annotations
 
@@ -21,11 +21,11 @@ from pathlib import Path
 
 _Stamp = tuple[int, int, int]
 
-_PERIOD = 2.0  # s, from one look to the next
+_PERIOD = 2.0  # s between two looks
 
 
 class FileWatch:
-    """Files as they are now; to be made before they are read."""
+    """Remembers the state of files, to notice changes; make it before you read the files."""
 
     def __init__(self, paths: Iterable[str] = ()) -> None:
         self._stamps = {path: _stamp(path) for path in paths}
@@ -33,7 +33,7 @@ class FileWatch:
         self._next_look = 0.0
 
     def changed(self, now: float) -> list[str]:
-        """Look now and then; return the names of the files that are different by then, or gone."""
+        """Return the names of files that have changed or gone, as of the last look."""
         if now >= self._next_look:
             self._next_look = now + _PERIOD
             self._changed = [Path(path).name for path, stamp in self._stamps.items()

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Parameter files, looked at before ROS reads them: its own errors hardly name a line."""
+"""Check parameter files before ROS reads them, because ROS's errors rarely name a line."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ import yaml
 _PARAMETERS = 'ros__parameters'
 _MOST_LEVELS = 20
 _TAGS = ('!', *(f'tag:yaml.org,2002:{kind}' for kind in ('bool', 'float', 'int', 'null', 'str')))
-# Namespaces, a node, and wildcards for either.
+# Namespaces, a node name, and wildcards for both.
 _NAME = re.compile(r'[\w/*]+', re.ASCII)
 
 
@@ -41,9 +41,9 @@ def parameter_files(args: Sequence[str]) -> list[str]:
 
 def parameter_tree(path: str) -> yaml.Node | None:
     """
-    Return the nodes of YAML in a parameter file.
+    Return the YAML nodes of a parameter file.
 
-    Raises ConfigurationError where it is not YAML, or more of it than a parameter file needs.
+    Raises ConfigurationError if the file is not YAML, or uses YAML features that ROS refuses.
     """
     try:
         text = Path(path).read_text(encoding='utf-8')
@@ -60,8 +60,8 @@ def parameter_tree(path: str) -> yaml.Node | None:
 
 
 def _check_events(path: str, events: Iterable[yaml.Event]) -> None:
-    """Raise ConfigurationError for what ROS does not take, and what would not end here."""
-    keys: list[bool | None] = []  # of each open mapping whether a key is next, None of a list
+    """Raise ConfigurationError for features that ROS refuses, and for endless nesting."""
+    keys: list[bool | None] = []  # for each open mapping: is a key next? For a list: None
     for event in events:
         if isinstance(event, yaml.CollectionEndEvent):
             keys.pop()
@@ -77,31 +77,32 @@ def _check_events(path: str, events: Iterable[yaml.Event]) -> None:
 
 
 def _fault_of(event: yaml.NodeEvent, depth: int, *, is_key: bool) -> str:
-    """Return what is wrong with the beginning of a node, nothing where that is right."""
+    """Return the fault of an event that begins a node; empty if it has none."""
     if isinstance(event, yaml.AliasEvent):
-        return f'an alias, *{event.anchor}, which ROS does not take: write the values out'
+        return f'an alias, *{event.anchor}: ROS does not accept it; write the values out'
     if event.tag and event.tag not in _TAGS:
-        return f'the tag {event.tag}, which ROS does not know: leave it out'
+        return f'the tag {event.tag}: ROS does not know it; leave it out'
     if isinstance(event, yaml.CollectionStartEvent):
         if is_key:
             return 'a list or mapping as a name: a name should be one word'
         if depth >= _MOST_LEVELS:
-            return f'more than {_MOST_LEVELS} levels, one within the other'
+            return f'more than {_MOST_LEVELS} levels inside each other'
     return ''
 
 
 @contextmanager
 def usable_files(args: Sequence[str], leaves_out: bool) -> Iterator[list[str]]:
     """
-    Give arguments with parameter files that ROS takes: all of a file or nothing.
+    Yield the arguments, with parameter files that ROS accepts as a whole.
 
-    With ``leaves_out`` sections whose names it refuses are left out, in copies of the files.
-    Raises ConfigurationError for such names otherwise, and for files that are not YAML.
+    ROS refuses some section names. With ``leaves_out``, copies of the files leave out these
+    sections; otherwise ConfigurationError is raised. ConfigurationError is also raised for a file
+    that is not YAML.
     """
     usable, problems = list(args), []
-    with ExitStack() as copies:  # a folder only where it is needed: the disk may be read-only
+    with ExitStack() as copies:  # make a folder only if needed: the disk may be read-only
         for number, path in enumerate(parameter_files(args)):
-            if not Path(path).is_file():  # ROS says why it cannot be read
+            if not Path(path).is_file():  # ROS reports why it cannot read the file
                 continue
             tree = parameter_tree(path)
             bad = [(name, line) for name, line in _sections(tree)
@@ -112,7 +113,7 @@ def usable_files(args: Sequence[str], leaves_out: bool) -> Iterator[list[str]]:
             if bad and leaves_out:
                 try:
                     folder = copies.enter_context(TemporaryDirectory(prefix='abdf1_'))
-                except OSError:  # no folder for files: the names have to be put right
+                except OSError:  # no folder for copies: the user has to correct the names
                     raise ConfigurationError(problems) from None
                 copy = Path(folder, f'{number}.yaml')
                 _leave_out_bad_names(tree)
@@ -132,7 +133,7 @@ def _leave_out_bad_names(tree: yaml.Node | None) -> None:
 
 
 def _sections(tree: yaml.Node | None) -> Iterator[tuple[str, int]]:
-    """Yield the names above parameters, each with its line."""
+    """Yield the names above ``ros__parameters``, each with its line."""
     for key, below in tree.value if isinstance(tree, yaml.MappingNode) else ():
         if key.value != _PARAMETERS:
             yield str(key.value), key.start_mark.line + 1
@@ -142,9 +143,9 @@ def _sections(tree: yaml.Node | None) -> Iterator[tuple[str, int]]:
 def node_sections(tree: yaml.Node | None, above: str = '', line: int = 1,
                   ) -> Iterator[tuple[str, int, yaml.Node]]:
     """
-    Yield the sections of a parameter file: full name of the node, line, and its parameters.
+    Yield the sections of a parameter file: full node name, line, and parameters.
 
-    Those with wildcards in their names are for several nodes.
+    A name with wildcards stands for several nodes.
     """
     for key, below in tree.value if isinstance(tree, yaml.MappingNode) else ():
         name, number = str(key.value).strip('/'), key.start_mark.line + 1
@@ -155,7 +156,7 @@ def node_sections(tree: yaml.Node | None, above: str = '', line: int = 1,
 
 
 def parameters_in(files: Iterable[str]) -> Iterator[tuple[str, str, Place, str]]:
-    """Yield each parameter: section, name, where it stands, and a number as it is written."""
+    """Yield each parameter: section, name, place, and its text if it is a whole number."""
     for path in files:
         for section, _, parameters in node_sections(parameter_tree(path)):
             for name, key, value in _parameters(parameters):

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""What is in both files, shown as parameters; ``~/reload`` shows it anew."""
+"""Show the contents of both files as parameters; ``~/reload`` renews them."""
 
 from __future__ import annotations
 
@@ -31,17 +31,17 @@ from rcl_interfaces.msg import (
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 
-# rclpy sends an event for every parameter: 120,000 for 5000 rows, in 12 s.
+# rclpy sends an event for each parameter: 120,000 events for 5000 rows take 12 s.
 MOST_SHOWN_ROWS = 100
 
 _Cell = tuple[str, Any, ParameterDescriptor]
 
-_REASON = 'read-only: it shows what the files say; ~/reload takes new files'
+_REASON = 'read-only: it shows the files; change the files and call ~/reload'
 
 
 def descriptor_of(default: bool | float | str, description: str, low: float | None = None,
                   high: float | None = None, *, read_only: bool = False) -> ParameterDescriptor:
-    """Return the descriptor of a parameter that takes any type: we check types, rclpy does not."""
+    """Return a descriptor that allows any type, because we check types ourselves."""
     descriptor = ParameterDescriptor(
         description=description, read_only=read_only, dynamic_typing=True)
     if low is not None and high is not None:
@@ -54,7 +54,7 @@ def descriptor_of(default: bool | float | str, description: str, low: float | No
 
 
 def text_of(value: Any) -> str:
-    """Return a value as a CSV would hold it; YAML makes a bool of Yes and No."""
+    """Return a value as a CSV cell has it; YAML turns Yes and No into bools."""
     if isinstance(value, bool):
         return 'Yes' if value else 'No'
     return str(value)
@@ -80,7 +80,8 @@ class ShownFiles:
     """
     The parameters ``net.*`` and ``map.*`` of a node.
 
-    Others cannot set them. They are not read-only for rclpy, which would never undeclare them.
+    A call from outside cannot set them. They are not read-only for rclpy, because rclpy never
+    undeclares a read-only parameter.
     """
 
     def __init__(self, node: Node) -> None:
@@ -90,7 +91,7 @@ class ShownFiles:
         node.add_on_set_parameters_callback(self._judge)
 
     def show(self, network: Network, mappings: Iterable[Mapping]) -> None:
-        """Show the settings of the link, and these rows, instead of those before."""
+        """Show these settings and rows in place of the old ones."""
         for name in self._shown:
             self._node.undeclare_parameter(name)
         cells: Any = [*_net_cells(network), *(

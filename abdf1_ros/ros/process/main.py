@@ -15,7 +15,7 @@
 """
 The process of a node: signals, arguments, a ROS context, and the exit status.
 
-It serves ``node`` and ``lines``.
+Both commands, ``node`` and ``lines``, run in it.
 """
 
 from __future__ import annotations
@@ -51,33 +51,33 @@ from rclpy.utilities import remove_ros_args
 EXIT_CONFIGURATION = 2
 EXIT_FAULT = 1
 
-# After a signal the process is gone within so many seconds, and nodes are taken off the network
-# for so long. What comes before takes 8 s at most: PLCs, writes that have come, last words. In
-# all it is less than the 10 s after which systemd, launch and Docker kill.
+# Limits after a signal (s, from the signal on): the process has ended; its nodes have left the
+# network. PLCs, pending writes and the last diagnostics take at most 8 s before that. All is less
+# than the 10 s after which systemd, launch and Docker kill.
 _END_LIMIT = LONGEST_END + 3.0
 _DESTRUCTION_LIMIT = LONGEST_END + 2.5
 
-# What rclpy raises for names, parameters and arguments, and where ROS does not start. Other errors
-# are bugs.
+# Errors of rclpy for bad names, parameters and arguments, or if ROS does not start. All other
+# errors are bugs.
 REFUSALS = (NameValidationException, ParameterException, rclpy_implementation.RCLError,
             rclpy_implementation.UnknownROSArgsError)
 
-# The beginnings of rclpy's errors about the log directory.
+# How rclpy's errors about the log directory begin.
 _LOG_FAILURES = re.compile('.*Failed to create log directory|Failed opening file')
 
-# Arguments of ROS about the log file.
+# ROS arguments about the log file.
 _NO_LOG_FILE, _LOG_FILE_NAME = '--disable-external-lib-logs', '--log-file-name'
 
-# Words in rclpy's errors about arguments.
+# Words in rclpy's errors about bad arguments.
 _BAD_ARGUMENTS = re.compile("Couldn't parse|should not exceed")
 
-# What to say before such an error.
+# Hints to put before an error: a pattern of the error, and the hint.
 _ADVICE = (
     (r"^\['(?:__|~|/)[^']*:=", '-r is missing before '),
     (r"^\['[^']*:=", '-p is missing before '),
     (r"parameter override rule: '-p \w+=", 'a parameter is NAME:=VALUE, with a colon; '),
-    (r"override rule: '-p [\w.]+:=\[", 'a text with [ or : stands in quotes of its own; '),
-    (r"^\['--?[hv]", 'before --ros-args belongs '),
+    (r"override rule: '-p [\w.]+:=\[", 'put quotes around a text with [ or :; '),
+    (r"^\['--?[hv]", 'write this before --ros-args: '),
     (r'remap rule: .*__ns:=', 'a namespace begins with "/"; '),
     (r'remap rule: .*__(?:node|name):=', 'a node name has letters, digits and underscores; '))
 
@@ -92,17 +92,17 @@ def make_parser(usage: str, description: str) -> argparse.ArgumentParser:
 
 
 class Program(Protocol):
-    """What a process runs, once it is made."""
+    """A program that a process makes first and then runs."""
 
     def run(self, ended: EndRequest) -> int:
         """
-        Return the exit status soon after ``ended``, when PLCs and the results of writes are done.
+        Run until ``ended``, inform the PLCs, publish results of writes; return the exit status.
 
-        It sets that itself where it ends for another reason.
+        It sets ``ended`` itself if it ends for another reason.
         """
 
     def destroy(self) -> None:
-        """Do what may be left to the end of the process."""
+        """Destroy the nodes; the end of the process may skip this."""
 
 
 def run_ros(name: str, parser: argparse.ArgumentParser,
@@ -111,16 +111,16 @@ def run_ros(name: str, parser: argparse.ArgumentParser,
     """
     Run in a ROS context until SIGINT, SIGTERM or SIGHUP, and return the exit status.
 
-    ``make`` gets the arguments of the process (``args``, by default its own) and opens no port
-    yet. What keeps it from making a program is reported as ``name``: EXIT_CONFIGURATION where
-    arguments, parameters or files have to be changed, EXIT_FAULT for a reason that may pass. An
-    error while the program runs is a bug, with a traceback and EXIT_FAULT. With ``leaves_out``
-    sections of parameter files whose names ROS refuses are not given to it.
+    ``make`` gets the arguments (``args``, by default from the command line); it opens no port.
+    With ``leaves_out``, sections of parameter files are left out if ROS refuses their names. If
+    ``make`` fails, the reason is logged under ``name``. The exit status is EXIT_CONFIGURATION if
+    the user has to change arguments, parameters or files. It is EXIT_FAULT for a reason that may
+    pass. An error while the program runs is a bug: a traceback, and EXIT_FAULT.
     """
     program: Program | None = None
 
     def begin_end() -> None:
-        if program is None:  # no port is open, no PLC has to hear of it
+        if program is None:  # no port is open yet, so no PLC has to be informed
             os._exit(0)
         _end_by_the_clock()
 
@@ -154,23 +154,23 @@ def run_ros(name: str, parser: argparse.ArgumentParser,
 
 def _ending_signals() -> Iterator[signal.Signals]:
     yield from (signal.SIGINT, signal.SIGTERM)
-    if signal.getsignal(signal.SIGHUP) is not signal.SIG_IGN:  # it is under nohup
+    if signal.getsignal(signal.SIGHUP) is not signal.SIG_IGN:  # it is ignored under nohup
         yield signal.SIGHUP
 
 
 def _check_arguments(parser: argparse.ArgumentParser, given: list[str]) -> None:
-    """End the process where there are arguments that are not for ROS."""
+    """End the process if there are arguments that are not for ROS."""
     if unknown := parser.parse_known_args(remove_ros_args(given)[1:])[1]:
-        parser.error(f'{printable(" ".join(unknown))}: not known here; parameters follow '
+        parser.error(f'{printable(" ".join(unknown))}: unknown argument; write parameters after '
                      '--ros-args')
 
 
 def _log_file(name: str, given: Sequence[str]) -> int | None:
     """
-    Return the descriptor of a new log file, None where none is wanted.
+    Return the descriptor of a new log file; None if the user wants no log file.
 
-    It has the name that rclpy would give it. What rclpy writes itself holds the interpreter's lock
-    for as long as the disk likes.
+    The file has the name that rclpy would give it. We write it ourselves, because rclpy holds the
+    GIL while it waits for the disk.
     """
     if _NO_LOG_FILE in given:
         return None
@@ -195,7 +195,8 @@ def _begin(given: list[str]) -> None:
     except RuntimeError as error:
         if isinstance(error, REFUSALS):
             raise
-        raise rclpy_implementation.RCLError(str(error)) from error  # of the log, for instance
+        # for example an error of the log
+        raise rclpy_implementation.RCLError(str(error)) from error
 
 
 def _made(make: Callable[[Sequence[str]], Program], given: list[str]) -> Program:
@@ -207,17 +208,17 @@ def _made(make: Callable[[Sequence[str]], Program], given: list[str]) -> Program
 
 
 def _end_by_the_clock() -> None:
-    """Have the process ended, whatever holds it up; its threads are shown then."""
-    # Not a thread in Python: code in C that does not come back may hold the interpreter lock.
+    """Set a timer that ends the process even if it hangs; it then prints all threads."""
+    # A Python thread could not do it: C code that hangs may hold the GIL.
     faulthandler.dump_traceback_later(_END_LIMIT, exit=True, file=2)
 
 
 def _destroy(program: Program, give_up: float) -> None:
     """
-    Take the nodes off the network, if that is done at a monotonic clock value.
+    Take the nodes off the network; give up at a monotonic clock value.
 
-    With thousands of topics it takes seconds. Otherwise others find them gone when the lease of
-    the participant is over.
+    With thousands of topics this takes seconds. If it is given up, other nodes still see ours
+    until the lease of the participant ends.
     """
     def destroy() -> None:
         program.destroy()
@@ -229,19 +230,19 @@ def _destroy(program: Program, give_up: float) -> None:
 
 
 def _check_log_directory() -> None:
-    """Raise ConfigurationError where rclpy would find none; its own errors are unclear."""
+    """Raise ConfigurationError if rclpy would find none; rclpy's own error is unclear."""
     if not any(os.environ.get(name) for name in ('ROS_LOG_DIR', 'ROS_HOME', 'HOME')):
         raise ConfigurationError([Problem('environment', (
-            'HOME is not set, so there is no directory for the log; set ROS_LOG_DIR to one that '
-            'this user may write to'))])
+            'HOME is not set, so there is no directory for the log; set ROS_LOG_DIR to a '
+            'directory that this user may write to'))])
 
 
 def _refusal(error: Exception) -> tuple[int, str]:
     """
-    Return exit status and text for what rclpy does not take.
+    Return the exit status and a text for an error of rclpy.
 
-    Wrong arguments stay wrong. Other reasons may pass, such as a disk or a network that is not
-    ready yet while the machine starts: then a supervisor should try again.
+    Wrong arguments stay wrong. Other reasons may pass: while the machine starts, a disk or a
+    network may not be ready. Then a supervisor should try again.
     """
     text = printable(' '.join(str(error).split()))
     if _LOG_FAILURES.match(text):

@@ -13,11 +13,12 @@
 # limitations under the License.
 
 """
-What runs bridges until the end of their process: ``node`` has one, ``lines`` many.
+Run bridges until the process ends: one bridge for ``node``, many for ``lines``.
 
-Each has two threads, for its link and for its callbacks, and the main thread looks after all. One
-executor for all would need 17 ms for every message to a hundred nodes, in which no link gets on
-(`many_lines.py` of test/lab); an executor a line needs 1.3 ms.
+Each bridge has a thread for its link and a thread for its callbacks; the main thread checks all
+bridges. With one executor for a hundred nodes, each message would take 17 ms, and meanwhile all
+links would wait. With an executor for each line, a message takes 1.3 ms (`many_lines.py` of
+test/lab).
 """
 
 from __future__ import annotations
@@ -32,26 +33,26 @@ from abdf1_ros.ros.process.main import EXIT_FAULT
 from abdf1_ros.ros.process.supervisor import Supervisor, Works
 from abdf1_ros.signals import EndRequest
 
-# How often (s) levels are compared, so that a change of one is published at once.
+# Seconds between two checks of a line; a changed level is then published at once.
 _LEVEL_CHECK_PERIOD = 0.1
 
-# Lines are looked at in so many groups, one after the other: to look at a hundred at once would
-# keep the interpreter lock from their links for a tenth of a second.
+# Number of groups of lines; the groups are checked in turn. A check of a hundred lines in one go
+# would hold the GIL for a tenth of a second, and their links would wait.
 _GROUPS = 10
 
-# How long (s) callbacks that run are waited for at the end.
+# Longest wait (s) at the end for callbacks that still run.
 _LAST_CALLBACKS = 0.5
 
 
 class LinkFailed(Exception):
-    """The link of a bridge is broken; the argument says how, and the log has it."""
+    """The link of a bridge is broken; the argument says how. It has been logged."""
 
 
 class Line:
     """
     A bridge with the thread of its callbacks.
 
-    All is called by one thread. ``node`` is None while it does not run.
+    One thread calls all methods. ``node`` is None while the bridge does not run.
     """
 
     def __init__(self, node: BridgeNode | None = None,
@@ -60,18 +61,18 @@ class Line:
         self._callbacks = callbacks
 
     def take_callbacks(self) -> None:
-        """Begin to take callbacks, if there is a node."""
+        """Begin to run callbacks, if there is a node."""
         if self.node is not None:
             self._callbacks = Callbacks(self.node)
             self._callbacks.start()
 
     def open_port(self) -> None:
-        """Begin to read and write, if there is a node."""
+        """Open the port and begin to read and write, if there is a node."""
         if self.node is not None:
             self.node.start()
 
     def check(self) -> None:
-        """Publish what is due; raises LinkFailed, and why no callbacks can be taken any more."""
+        """Publish what is due; raises LinkFailed, or the error that has ended the callbacks."""
         if self.node is None:
             return
         if self.node.has_failed:
@@ -81,32 +82,32 @@ class Line:
         self.node.check()
 
     def threads(self) -> list[Works]:
-        """Return what has to go on, for the supervisor of the process."""
+        """Return the threads that the supervisor of the process has to watch."""
         if self.node is None or self._callbacks is None:
             return []
         return [self.node.link, self._callbacks]
 
     def end_callbacks(self, give_up: float) -> None:
-        """Take no more callbacks; wait for one that runs up to a monotonic clock value."""
+        """Run no more callbacks; wait for a running one, at most to a monotonic clock value."""
         if self._callbacks is not None:
             self._callbacks.end(give_up)
 
     def close(self) -> None:
-        """End the line, alone."""
+        """End this line only."""
         if self.node is not None:
             end_together([self.node])
         self.end_callbacks(time.monotonic() + _LAST_CALLBACKS)
         self.destroy()
 
     def destroy(self) -> None:
-        """Destroy the node, if it is no longer used."""
+        """Destroy the node, unless a callback still uses it."""
         is_used = self._callbacks is not None and self._callbacks.is_alive()
         if self.node is not None and not is_used:
             self.node.destroy_node()
 
 
 class Runner:
-    """All lines of a process; ``look`` is called ten times a second."""
+    """Runs all lines of a process; ``look`` is called ten times a second."""
 
     def __init__(self, lines: Sequence[Line], look: Callable[[], None] = lambda: None) -> None:
         self._lines = lines
@@ -116,9 +117,9 @@ class Runner:
         """
         Run all lines until the end; return the exit status.
 
-        All nodes have been made before: lines that run would have the interpreter lock most of the
-        time that the others need: a hundred nodes took four times as long, and their threads half
-        as long again. Threads that take callbacks would wake up at each node that is made.
+        All nodes exist before the first line starts. Running lines hold the GIL most of the time:
+        they made the start of a hundred nodes four times slower. The threads of callbacks start
+        late too, because each new node would wake them all.
         """
         try:
             for line in self._lines:
@@ -149,6 +150,6 @@ class Runner:
                 supervisor.look([thread for line in self._lines for thread in line.threads()])
 
     def destroy(self) -> None:
-        """Destroy all nodes that are no longer used."""
+        """Destroy all nodes, unless a callback still uses them."""
         for line in self._lines:
             line.destroy()

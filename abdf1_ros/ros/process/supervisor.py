@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""systemd as the supervisor: a process that stands still is started anew (sd_notify)."""
+"""Signs of life for systemd, which restarts a process that hangs (sd_notify)."""
 
 from __future__ import annotations
 
@@ -25,35 +25,35 @@ from typing import Protocol
 
 
 class Works(Protocol):
-    """A thread that shows that it goes on."""
+    """A thread that proves that it still runs: ``has_turned`` becomes True at each turn."""
 
     has_turned: bool
 
     def is_alive(self) -> bool:
-        """Tell whether the thread has not ended; an end is noticed elsewhere."""
+        """Return True until the thread ends; its end is noticed elsewhere."""
 
     def wake(self) -> None:
-        """Have it turn soon."""
+        """Make the thread turn soon."""
 
 
 class Supervisor:
     """
-    Gets a sign of life of this process, if it has set NOTIFY_SOCKET and WATCHDOG_USEC.
+    Sends signs of life to systemd, if systemd has set NOTIFY_SOCKET and WATCHDOG_USEC.
 
-    The sign comes from the main thread, and only if each link and each thread of callbacks has
-    turned since the last one: so it is missing where one of them hangs.
+    The main thread sends the sign only if each link and each thread of callbacks has turned since
+    the last sign. So the sign is missing if any of them hangs.
     """
 
     def __init__(self) -> None:
         address = os.environ.get('NOTIFY_SOCKET', '')
         self._address = '\0' + address[1:] if address.startswith('@') else address
-        # A third: a sign that is lost, or a slow host, does not end the process.
+        # A third, so that a lost sign or a slow host does not end the process.
         self._period = int(os.environ.get('WATCHDOG_USEC', '0')) / 3e6
         self._next = 0.0
         self.say('READY=1')
 
     def look(self, links: Collection[Works]) -> None:
-        """Give the sign when it is due."""
+        """Send the sign if it is due and all threads have turned."""
         now = time.monotonic()
         if not self._period or now < self._next:
             return
@@ -68,5 +68,5 @@ class Supervisor:
         """Send a line of sd_notify(3)."""
         if self._address:
             with suppress(OSError), socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as sender:
-                sender.setblocking(False)  # a supervisor that stands still ends us anyway
+                sender.setblocking(False)  # if systemd hangs, we do not wait for it
                 sender.sendto(state.encode(), self._address)
