@@ -61,6 +61,9 @@ class Recorder:
     def stop(self) -> None:
         self._record('stop link')
 
+    def end_calls(self) -> None:
+        self._record('answer calls')
+
     def say_last_words(self, give_up: float) -> None:
         self._record('last words')
 
@@ -85,7 +88,8 @@ def test_all_plcs_are_told_before_a_link_stops_and_results_come_before_the_last_
     monkeypatch.setattr('abdf1_ros.ros.bridge.node.take_last_writes', take)
     end_together(nodes)
     assert order(calls) == [
-        'begin', 'PLCs: ends', 'ask link', 'stop link', '3 last writes', 'last words']
+        'begin', 'PLCs: ends', 'ask link', *('stop link', 'answer calls') * 3, '3 last writes',
+        'last words']
     assert calls.count('stop link') == calls.count('last words') == 3
 
 
