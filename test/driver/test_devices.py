@@ -19,10 +19,11 @@ from abdf1_ros.settings.mapping import Mapping
 from abdf1_ros.settings.network import Network
 from abdf1_ros.simulator.simulated_plc import SimulatedPlc
 import pytest
-from support.devices import Device, DEVICES, symbol_by_symbol, WRONG
+from support.devices import Device, DEVICES, WRONG
 from support.driver_bench import DriverBench, store, stored
 from support.guests import Program, READ_N7
 from support.mappings import make_mapping
+from support.odd_device import OddDevice, Wiring
 
 NETWORKS = {
     'Message': {}, 'Standard': {'polling': 'Standard'}, 'Peer': {'mode': 'Peer'},
@@ -37,8 +38,7 @@ def bench_of(device: Device, mode: str, check: str, *rows: Mapping
     bench.line.propagation = device.propagation
     plc = bench.plc(1, 'SLC', ('N7:0', 10))
     store(plc, 'N7:0', [0x1010, 0x0310, -2])
-    bench.far.say = symbol_by_symbol(device.say())
-    bench.far.hear = symbol_by_symbol(device.hear())
+    bench.far.hear, bench.far.say = device.filters()
     return bench, plc
 
 
@@ -82,6 +82,46 @@ def test_what_is_no_reply_is_no_value_and_confirms_nothing(
     assert {2508, 2510} & bench.listener.numbers()
     bench.far.say = bytes  # a usual device from now on
     bench.run_until(lambda: bool(bench.listener.values(words)), 20.0)
+
+
+def odd_bench(mode: str, device: OddDevice, *rows: Mapping) -> DriverBench:
+    """Return a line with a device that shares no code with the package, not opened yet."""
+    return DriverBench(rows, start=False, far=device, network=Network(
+        baud=19200, timeout=200, **NETWORKS[mode]))  # type: ignore[arg-type]
+
+
+WIRINGS = {'Message': Wiring.HALF, 'Standard': Wiring.HALF, 'Peer': Wiring.FULL,
+           'Radio': Wiring.RADIO}
+
+
+@pytest.mark.parametrize('mode', ['Message', 'Standard'])
+def test_reply_of_a_slave_that_waits_for_no_poll_is_taken(mode: str) -> None:
+    device = OddDevice(Wiring.HALF)
+    device.waits_for_poll = False  # home-made slaves
+    words, target = make_mapping('N7:0', plc='SLC'), make_mapping('N7:5', 'Write', plc='SLC')
+    device.words[1, 7, 0] = 1234
+    bench = odd_bench(mode, device, words, target)
+    bench.open(run=1.0)
+    bench.write(target, [7])
+    bench.run(1.0)
+    assert {tuple(values) for values in bench.listener.values(words)} == {(1234,)}
+    assert (bench.listener.outcomes(), device.words[1, 7, 5]) == ([Outcome.WRITTEN], 7)
+
+
+@pytest.mark.parametrize('mode', NETWORKS)
+def test_controller_that_knows_no_command_is_told_as_it_is(mode: str) -> None:
+    """A Micro800 takes DF1 frames, and no PCCC in them: STS 10 to each command."""
+    device = OddDevice(WIRINGS[mode])
+    device.knows_commands = False
+    words, target = make_mapping('N7:0', plc='SLC'), make_mapping('N7:5', 'Write', plc='SLC')
+    bench = odd_bench(mode, device, words, target)
+    bench.open(run=1.0)
+    bench.write(target, [7])
+    bench.run(2.0)
+    assert bench.listener.values(words) == []
+    assert bench.listener.outcomes() == [Outcome.FAILED]
+    assert 'STS 10' in str(bench.listener.results[0])
+    assert bench.driver.stations[1].active
 
 
 def test_every_device_has_a_source_and_a_name_of_its_own() -> None:

@@ -13,11 +13,12 @@
 # limitations under the License.
 
 """
-Odd but legal devices, each a small function with its source.
+Odd devices, each a small function with its source.
 
 A function changes what comes through of a frame, in bytes. Whatever a device of ``DEVICES`` does,
 the values that are read have to be right, and a write has to be told as it ended. What those of
-``WRONG`` say is no reply of theirs, and has to be taken for none. A new report costs one function.
+``WRONG`` say is not a reply of theirs, and has to be taken for none. A new report costs one
+function. Those that break a rule of the manual name the case of ``conform`` that has to find it.
 """
 
 from collections.abc import Callable
@@ -27,9 +28,20 @@ from typing import Any
 
 from support.odd_device import crc
 
-ACK, NAK, ENQ, EOT, STX = (bytes((0x10, code)) for code in (0x06, 0x15, 0x05, 0x04, 0x02))
+ACK, NAK, ENQ, EOT, STX, SOH = (
+    bytes((0x10, code)) for code in (0x06, 0x15, 0x05, 0x04, 0x02, 0x01))
 
 Filter = Callable[[bytes], bytes]
+
+
+def symbol_by_symbol(change: Filter) -> Filter:
+    """Return a filter that gets what goes out together in parts: each symbol, then a message."""
+    def filtered(data: bytes) -> bytes:
+        result = b''
+        while data[:2] in (ACK, NAK, ENQ, EOT) and data[:2] != data:
+            result, data = result + change(data[:2]), data[2:]
+        return result + change(data)
+    return filtered
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,17 +49,18 @@ class Device:
     """
     A device in some modes of the line.
 
-    ``say`` makes what stands in the line from the device to us, ``hear`` what stands in the
-    other direction. ``chunk`` bytes come together, each travels ``propagation`` seconds.
+    ``filters`` makes what stands in the line: from us to the device, and from the device to us.
+    ``chunk`` bytes come together, each travels ``propagation`` seconds. ``breaks`` is the case of
+    ``conform`` that has to find it, empty for a device that keeps the rules.
     """
 
     name: str
     source: str
     modes: tuple[str, ...]
-    say: Callable[[], Filter] = lambda: bytes
-    hear: Callable[[], Filter] = lambda: bytes
+    filters: Callable[[], tuple[Filter, Filter]] = lambda: (bytes, bytes)
     chunk: int = 1000
     propagation: float = 0.0
+    breaks: str = ''
 
     def __str__(self) -> str:
         """Return its name, for the names of tests."""
@@ -61,27 +74,38 @@ ALL = WIRED + RADIO
 DEVICES: list[Device] = []
 WRONG: list[Device] = []
 
+Maker = Callable[[], Filter]
 
-def says(source: str, modes: tuple[str, ...]) -> Callable[[Callable[[], Filter]], Any]:
-    """Register what makes the filter of a device that says things in an odd way."""
-    def register(make: Callable[[], Filter]) -> Callable[[], Filter]:
-        DEVICES.append(Device(make.__name__, source, modes, say=make))
+
+def says(source: str, modes: tuple[str, ...], breaks: str = '',
+         devices: list[Device] = DEVICES) -> Callable[[Maker], Maker]:
+    """Register what makes the filter of a device that says symbols in an odd way."""
+    def register(make: Maker) -> Maker:
+        devices.append(Device(make.__name__, source, modes, breaks=breaks,
+                              filters=lambda: (bytes, symbol_by_symbol(make()))))
         return make
     return register
 
 
-def lies(source: str, modes: tuple[str, ...]) -> Callable[[Callable[[], Filter]], Any]:
+def lies(source: str, modes: tuple[str, ...], breaks: str = 'read-words'
+         ) -> Callable[[Maker], Maker]:
     """Register what makes the filter of a device whose replies are none."""
-    def register(make: Callable[[], Filter]) -> Callable[[], Filter]:
-        WRONG.append(Device(make.__name__, source, modes, say=make))
+    return says(source, modes, breaks, WRONG)
+
+
+def hears(source: str, modes: tuple[str, ...], breaks: str = '') -> Callable[[Maker], Maker]:
+    """Register what makes the filter of a device that hears symbols in an odd way."""
+    def register(make: Maker) -> Maker:
+        DEVICES.append(Device(make.__name__, source, modes, breaks=breaks,
+                              filters=lambda: (symbol_by_symbol(make()), bytes)))
         return make
     return register
 
 
-def hears(source: str, modes: tuple[str, ...]) -> Callable[[Callable[[], Filter]], Any]:
-    """Register what makes the filter of a device that hears things in an odd way."""
-    def register(make: Callable[[], Filter]) -> Callable[[], Filter]:
-        DEVICES.append(Device(make.__name__, source, modes, hear=make))
+def acts(source: str, modes: tuple[str, ...], breaks: str = '') -> Callable[[Any], Any]:
+    """Register what makes both filters of a device, which get all that goes out together."""
+    def register(make: Callable[[], tuple[Filter, Filter]]) -> Any:
+        DEVICES.append(Device(make.__name__, source, modes, make, breaks=breaks))
         return make
     return register
 
@@ -101,31 +125,12 @@ def changed(message: bytes, change: Callable[[bytes], bytes]) -> bytes:
     return message_like(message, change(message[2:end].replace(b'\x10\x10', b'\x10')))
 
 
-def symbol_by_symbol(change: Filter) -> Filter:
-    """Return a filter that gets what goes out together in parts: each symbol, then a message."""
-    def filtered(data: bytes) -> bytes:
-        result = b''
-        while data[:2] in (ACK, NAK, ENQ, EOT) and data[:2] != data:
-            result, data = result + change(data[:2]), data[2:]
-        return result + change(data)
-    return filtered
+@acts('M 4-13: the reply overtakes the ACK', FULL)
+def reply_before_ack() -> tuple[Filter, Filter]:
+    return bytes, lambda data: data[2:] + ACK if data.startswith(ACK + STX) else data
 
 
-@says('M 4-13', FULL)
-def reply_before_ack() -> Filter:
-    held = []
-
-    def say(data: bytes) -> bytes:
-        if data == ACK:
-            held.append(data)
-            return b''
-        if data.startswith(STX) and held:
-            return data + held.pop()
-        return data
-    return say
-
-
-@says('pydf1: a device that never acknowledges', FULL)
+@says('pydf1: a device that never acknowledges', FULL, 'message-acknowledged')
 def no_ack() -> Filter:
     return lambda data: b'' if data == ACK else data
 
@@ -140,17 +145,22 @@ def byte_after_eot() -> Filter:
     return lambda data: data + b'\x00' if data == EOT else data
 
 
-@says('M 7-25: DLE ENQ after a reply that we have acknowledged', FULL)
+@says('M 7-25: DLE ENQ after a reply that we have acknowledged', FULL, 'no-needless-enquiry')
 def enq_after_reply() -> Filter:
     return lambda data: data + 6 * ENQ if data.startswith(STX) else data
 
 
-@says('M 3-15: our ACK came too late, so the reply comes twice', ALL)
+@says('M 3-15: our ACK came too late, so the reply comes twice', WIRED, 'check-not-doubled')
 def reply_twice() -> Filter:
     return lambda data: data + data if data.startswith(STX) else data
 
 
-@says('home-made drivers: NAK is 10 0F, as M 2-6 prints it', FULL)
+@says('ML11 517 to 522: a node sends on what it has heard, so the reply comes twice', RADIO)
+def reply_sent_on() -> Filter:
+    return lambda data: data + data if data.startswith(STX) else data
+
+
+@says('home-made drivers: NAK is 10 0F, as M 2-6 prints it', FULL, 'bad-check-refused')
 def nak_as_printed() -> Filter:
     return lambda data: b'\x10\x0f' if data == NAK else data
 
@@ -164,7 +174,7 @@ def refuses_twice() -> Filter:
         if not data.startswith(STX):
             return data
         count += 1
-        return data if count % 3 == 0 else data[:-1] + bytes((data[-1] ^ 1,))
+        return data if count % 3 == 0 else data[:-1] + bytes((data[-1] ^ 0x80,))
     return hear
 
 
@@ -174,7 +184,7 @@ def ignores_every_second_message() -> Filter:
 
     def hear(data: bytes) -> bytes:
         nonlocal count
-        if b'\x10\x01' not in data[:4]:
+        if not data.startswith(SOH) or b'\x10\x03' not in data[-4:-1]:
             return data
         count += 1
         return b'' if count % 2 else data
@@ -192,16 +202,10 @@ def loses_every_third_answer() -> Filter:
     return say
 
 
-@says('M 4-10: the ACK stands inside the reply (embedded responses on)', FULL)
-def embedded_ack() -> Filter:
-    held = []
-
-    def say(data: bytes) -> bytes:
-        if data == ACK:
-            held.append(data)
-            return b''
-        return data[:4] + held.pop() + data[4:] if data.startswith(STX) and held else data
-    return say
+@acts('M 4-10: the ACK stands inside the reply (embedded responses on)', FULL)
+def embedded_ack() -> tuple[Filter, Filter]:
+    return bytes, lambda data: (
+        data[2:6] + ACK + data[6:] if data.startswith(ACK + STX) and data[4] != 0x10 else data)
 
 
 @says('a PLC with a long scan: the reply is ready at the fourth poll', HALF)
@@ -210,28 +214,57 @@ def reply_at_the_fourth_poll() -> Filter:
     return lambda data: EOT if data.startswith(STX) and next(polls) % 4 else data
 
 
-def _with_messages(change: Callable[[bytes, bytes], bytes]) -> Filter:
-    """Return what puts a MSG of the PLC to us, each with a TNS of its own, beside each reply."""
+def _message_of(reply: bytes, tns: int, dst: int | None = None) -> bytes:
+    """Return a MSG of the PLC that has sent a reply, to ``dst`` or to whom the reply is for."""
+    to = reply[2:3] if dst is None else bytes((dst,))
+    return message_like(reply, to + reply[3:4] + b'\x0f\x00' + tns.to_bytes(2, 'little')
+                        + b'\xaa\x02\x07\x89\x00\x00\x39\x30')
+
+
+# By wire that is a second message before the first has its response.
+@says('MSG instructions of a PLC without a condition', FULL, 'silence-is-enquired')
+def message_after_each_reply() -> Filter:
     numbers = itertools.count(0x1000)
+    return lambda data: (
+        data + _message_of(data, next(numbers)) if data.startswith(STX) else data)
+
+
+@says('the same by radio', RADIO)
+def packet_after_each_reply() -> Filter:
+    return message_after_each_reply()
+
+
+@acts('MSG instructions in a slave: to us, to 0, to another slave, before each second reply', HALF)
+def messages_before_the_reply() -> tuple[Filter, Filter]:
+    numbers, to = itertools.count(0x1000), itertools.cycle((None, 0, 3, -1, -1))
+    is_asked = False  # the next ACK is for a message
 
     def say(data: bytes) -> bytes:
+        nonlocal is_asked
         if not data.startswith(STX):
             return data
-        tns = next(numbers).to_bytes(2, 'little')
-        return change(data, message_like(data, (
-            data[2:4] + b'\x0f\x00' + tns + b'\xaa\x02\x07\x89\x00\x00\x39\x30')))
-    return say
+        dst = next(to)
+        is_asked = dst != -1
+        return _message_of(data, next(numbers), dst) if is_asked else data
+
+    def hear(data: bytes) -> bytes:
+        nonlocal is_asked
+        if not data.startswith(ACK) or not is_asked:
+            return data
+        is_asked = False
+        return data[2:]
+    return hear, say
 
 
-@says('MSG instructions of a PLC without a condition: one after each reply', FULL + RADIO)
-def message_after_each_reply() -> Filter:
-    return _with_messages(lambda reply, message: reply + message)
+def refused(reply: bytes) -> bytes:
+    """Return the link data of a reply with STS 10: the command is not known (M 8-2)."""
+    return reply[:3] + b'\x10' + reply[4:6]
 
 
-@says('MSG instructions in a slave: a poll brings them before the reply', HALF)
-def message_before_the_reply() -> Filter:
-    count = itertools.count(1)
-    return _with_messages(lambda reply, message: message if next(count) % 2 else reply)
+@says('ProSoft DFCM, FieldServer, AbDf1 as server: no diagnostic commands', ALL, 'identity')
+def no_diagnostics() -> Filter:
+    return lambda data: changed(
+        data, lambda link: refused(link) if link[2] & 0x4F == 0x46 else link)
 
 
 DEVICES += [
@@ -255,11 +288,22 @@ def low_byte_of_tns() -> Filter:
     return lambda data: changed(data, lambda link: link[:5] + bytes((link[5] ^ 1,)) + link[6:])
 
 
-@lies('a modem, or another protocol in DF1 frames: ACK, and no reply ever', WIRED)
+@lies('a modem, or another protocol in DF1 frames: ACK, and no reply ever', HALF)
 def only_ack() -> Filter:
     return lambda data: EOT if data.startswith(STX) else data
+
+
+@lies('the same in full duplex', FULL)
+def only_ack_by_wire() -> Filter:
+    return lambda data: b'' if data.startswith(STX) else data
 
 
 @lies('ABKF2 and kin: SRC and DST of each reply are 0', ALL)
 def no_addresses() -> Filter:
     return lambda data: changed(data, lambda link: b'\x00\x00' + link[2:])
+
+
+@lies('converters: DLE EOT where DLE ACK is due, the reply at the next poll', HALF,
+      'message-acknowledged')
+def eot_in_place_of_ack() -> Filter:
+    return lambda data: EOT if data == ACK else data

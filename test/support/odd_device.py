@@ -80,6 +80,8 @@ class OddDevice:
         self.wiring, self.station = wiring, station
         self.nodes = frozenset(nodes or {station})
         self.executes_diagnostics = False  # for all nodes
+        self.waits_for_poll = True  # with its replies, in half duplex
+        self.knows_commands = True
         self.words: dict[tuple[int, int, int], int] = {}
         self.takes: Callable[[bytes], Answer] = lambda data: Answer.ACK
         self.hear: Callable[[bytes], bytes] = bytes
@@ -176,7 +178,7 @@ class OddDevice:
     def _execute(self, data: bytes, is_refused: bool) -> None:
         self.executed.append(data)
         status, result = (_NOT_DELIVERED, b'')
-        if is_refused:
+        if is_refused or not self.knows_commands:
             status = _ILLEGAL
         elif data[0] in self.nodes | {self.station} or (
                 self.executes_diagnostics and data[2] == _ECHO):
@@ -184,6 +186,8 @@ class OddDevice:
         reply = bytes((data[1], data[0], data[2] | _REPLY, status)) + data[4:6] + result
         if self.wiring is Wiring.HALF:
             self._replies.append(reply)
+            if not self.waits_for_poll:
+                self._polled()
         else:
             self._out += frame(reply)
 

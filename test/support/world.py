@@ -62,7 +62,7 @@ from abdf1_ros.settings.mapping import Mapping
 from abdf1_ros.settings.network import Network
 from abdf1_ros.simulator.ladder import Ladder, Lamp
 from abdf1_ros.simulator.simulated_plc import SimulatedPlc
-from support.devices import Device, Filter, symbol_by_symbol
+from support.devices import Device, Filter
 from support.driver_bench import DriverBench, Kept
 from support.losses import AirLosses, Losses, Lost
 from support.mappings import make_mapping
@@ -688,7 +688,8 @@ class World(DriverBench):
 
     def behave_oddly(self, device: Device) -> None:
         """Let all PLCs behave like an odd but legal device."""
-        self.odd = symbol_by_symbol(device.hear()), symbol_by_symbol(device.say())
+        self.odd = device.filters()
+        self.line.chunks[0] = min(device.chunk, _FIFO)
 
     def lose_frames(self) -> None:
         """Let the line lose frames, but never more in a row than the settings repeat."""
@@ -764,6 +765,7 @@ class World(DriverBench):
         self.line.noise = QUIET
         self.losses = None
         self.odd = USUAL
+        self.line.chunks[0] = _FIFO
         self.holds = self.clocks.lead = 0.0
         self.clocks.set(0.0, self.line.now)
 

@@ -364,7 +364,8 @@ def _odd_device(story: Story, station: int) -> None:
     """Let the PLCs behave like a device that somebody has met."""
     mode = {'Gateway': 'Message', 'Standard gateway': 'Standard'}.get(
         story.world.plant.mode, story.world.plant.mode)
-    devices = [device for device in DEVICES if mode in device.modes]
+    # One that is far away needs a longer Timeout than a plant has.
+    devices = [device for device in DEVICES if mode in device.modes and not device.propagation]
     if devices:
         story.world.behave_oddly(story.dice.choice(devices))
 
