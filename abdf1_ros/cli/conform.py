@@ -187,6 +187,9 @@ def _judge(options: argparse.Namespace, target: Target, cases: Sequence[Case], w
         print(as_issue(facts, results))
     else:
         print(summary_of(results))
+    if wire.noise:
+        tell('conform', f'{wire.noise} bytes outside of any symbol were ignored: noise, or a '
+             'wrong speed or parity?')
     if not wire.has_heard:
         tell('conform', _NOBODY)
         return EXIT_FAILED

@@ -154,6 +154,12 @@ def is_command(symbol: Symbol) -> bool:
         and len(symbol.data) >= HEADER_SIZE and not symbol.data[2] & REPLY_BIT
 
 
+def is_reply(symbol: Symbol) -> bool:
+    """Tell whether a symbol is a good message with a reply (M 6-3)."""
+    return symbol.kind is SymbolKind.MESSAGE and symbol.is_good \
+        and len(symbol.data) >= HEADER_SIZE and bool(symbol.data[2] & REPLY_BIT)
+
+
 def next_symbol(buffer: bytes, check: BlockCheck, is_half_duplex: bool) -> Symbol | None:
     """Return the symbol at the beginning of ``buffer``; None where more bytes are needed."""
     if not buffer:

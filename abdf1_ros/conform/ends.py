@@ -54,7 +54,7 @@ def expect_end_of_enquiries(wire: Wire, patience: float) -> Symbol | None:
                  'products', 'DLE ENQ once more')
 
 
-_MOST_TRIES = 3  # of what a full sink may refuse, and of what is asked of a driver
+MOST_TRIES = 3  # of what a full sink may refuse, and of what is asked of a driver
 _MOST_COMMANDS = 20  # in a row that a slave asks by itself
 
 # Longest time of a reply, in answer times.
@@ -148,7 +148,7 @@ class AskingEnd(ABC):
         A sink may be full: a slave is silent then (KF2 4-31), and a full-duplex node answers DLE
         NAK (M 4-8), so the message is sent again.
         """
-        for _ in range(_MOST_TRIES):
+        for _ in range(MOST_TRIES):
             before()
             symbol = self.offer(command)
             is_full = symbol is None if self.wire.is_half_duplex else (
@@ -242,9 +242,29 @@ class MasterEnd(AskingEnd):
 
 
 class PeerEnd(AskingEnd):
-    """A full-duplex node that sends commands to another, ``station``."""
+    """
+    A full-duplex node that sends commands to another, ``station``.
+
+    A reply may overtake the ACK of its command, as the two are sent independently (M 4-13).
+    """
+
+    _early: Symbol | None = None  # a reply that came before its ACK
+
+    def offer(self, command: bytes) -> Symbol | None:
+        symbol = super().offer(command)
+        if symbol is None or symbol.kind is not SymbolKind.MESSAGE \
+                or symbol.data[4:6] != command[4:6]:
+            return symbol
+        acknowledgement = self.wire.hear()
+        if acknowledgement is None or acknowledgement.kind is not SymbolKind.ACK:
+            return symbol
+        self.owed.add(command[4:6])
+        self._early = symbol
+        return acknowledgement
 
     def settle(self) -> None:
+        if self._early is not None:
+            self.collect()
         end = self.wire.now + 2 * _REPLY_TIMES * self.wire.answer_time
         while self.wire.now < end:
             symbol = self.wire.hear((_REPLY_TIMES if self.owed else 1) * self.wire.answer_time)
@@ -255,12 +275,17 @@ class PeerEnd(AskingEnd):
         self.owed.clear()
 
     def collect(self, acknowledge: bool = True) -> bytes:
-        symbol = self.wire.expect(SymbolKind.MESSAGE, 'the reply',
-                                  _REPLY_TIMES * self.wire.answer_time)
+        symbol, self._early = self._early, None
+        if symbol is None:
+            symbol = self.wire.expect(SymbolKind.MESSAGE, 'the reply',
+                                      _REPLY_TIMES * self.wire.answer_time)
+        elif not symbol.is_good:
+            raise Failed('the reply', str(symbol))
         return self.taken(symbol, acknowledge)
 
     def further(self, seconds: float) -> Symbol | None:
-        return self.wire.hear(seconds)
+        symbol, self._early = self._early, None
+        return symbol or self.wire.hear(seconds)
 
 
 class RadioEnd(PeerEnd):
@@ -293,7 +318,7 @@ class AnsweringEnd(ABC):
 
     def settle(self) -> None:
         """Answer one command, so that no case begins with an end that counts us as inactive."""
-        for _ in range(_MOST_TRIES):
+        for _ in range(MOST_TRIES):
             try:
                 self.finish(self.next_command())
             except Failed:  # the case will show it; the target may still be busy

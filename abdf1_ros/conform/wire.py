@@ -31,6 +31,7 @@ _LONGEST_FRAME = 1000  # bytes; twice the largest packet, if every byte of it is
 
 _MOST_UNREAD = 65536
 _QUIET = 0.2  # s without a byte
+_DLE = b'\x10'
 
 
 class RawLine(Protocol):
@@ -80,7 +81,9 @@ class Wire:
     order; ``has_heard`` tells whether any byte came. A response inside a message is heard before
     that message. ``enquired_after`` is the shortest time (s) from a message of the target to its
     DLE ENQ. With ``passes_commands`` a command of the target itself, such as a MSG of its program,
-    is acknowledged and ignored.
+    is acknowledged and ignored. Bytes outside of any symbol are ignored, as M 4-7 to 4-9 has it,
+    and counted in ``noise``; DLE with a code that no symbol has is an answer. By radio a reply
+    that comes again, as a node has sent it on, is ignored too (ML11 517 to 522).
     """
 
     def __init__(self, line: RawLine, check: BlockCheck, clock: Callable[[], float], *,
@@ -94,6 +97,7 @@ class Wire:
         self.answer_time = answer_time
         self.transcript: list[Sent | Symbol] = []
         self.has_heard = False
+        self.noise = 0
         self._line = line
         self._clock = clock
         self._char_time = char_time
@@ -101,6 +105,7 @@ class Wire:
         self._embedded: deque[Symbol] = deque()
         self._sent_until = 0.0
         self._response = codec.NAK
+        self._last_reply = b''
         self._message_at = math.inf
         self.enquired_after = math.inf
 
@@ -141,7 +146,13 @@ class Wire:
         return symbol
 
     def _has_passed(self, symbol: Symbol, answers: bool) -> bool:
-        """Answer a DLE ENQ or a command of the target; return True if it was one of them."""
+        """Return True for what is ignored; answer a DLE ENQ or a command of the target."""
+        if symbol.kind is SymbolKind.NOISE and symbol.raw[:1] != _DLE:
+            self.noise += len(symbol.raw)
+            return True
+        if self._is_radio and codec.is_reply(symbol):
+            before, self._last_reply = self._last_reply, symbol.data
+            return symbol.data == before
         if answers and not self._is_radio and symbol.kind is SymbolKind.ENQ:
             self.send(self._response)
             return True
@@ -197,10 +208,10 @@ class Wire:
 
     def expect(self, kind: SymbolKind, what: str = '', within: float | None = None) -> Symbol:
         """Return the next symbol if it is of ``kind`` and good; raises Failed."""
-        expected = what or kind.value
+        expected, noise = what or kind.value, self.noise
         symbol = self.hear(within, answers=kind is not SymbolKind.ENQ)
         if symbol is None:
-            raise Failed(expected, 'silence')
+            raise Failed(expected, 'silence' if noise == self.noise else SymbolKind.NOISE.value)
         if symbol.kind is not kind or not symbol.is_good:
             raise Failed(expected, str(symbol))
         return symbol

@@ -157,7 +157,7 @@ def reply_twice() -> Filter:
 
 @says('ML11 517 to 522: a node sends on what it has heard, so the reply comes twice', RADIO)
 def reply_sent_on() -> Filter:
-    return lambda data: data + data if data.startswith(STX) else data
+    return lambda data: data + data if data.startswith(STX) and data[4] & 0x40 else data
 
 
 @says('home-made drivers: NAK is 10 0F, as M 2-6 prints it', FULL, 'bad-check-refused')
@@ -210,8 +210,17 @@ def embedded_ack() -> tuple[Filter, Filter]:
 
 @says('a PLC with a long scan: the reply is ready at the fourth poll', HALF)
 def reply_at_the_fourth_poll() -> Filter:
-    polls = itertools.count(1)
-    return lambda data: EOT if data.startswith(STX) and next(polls) % 4 else data
+    last, early = b'', 0
+
+    def say(data: bytes) -> bytes:
+        nonlocal last, early
+        if not data.startswith(STX):
+            return data
+        if data != last:
+            last, early = data, 3
+        early -= 1
+        return data if early < 0 else EOT
+    return say
 
 
 def _message_of(reply: bytes, tns: int, dst: int | None = None) -> bytes:
