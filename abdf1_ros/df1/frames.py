@@ -215,8 +215,9 @@ class FrameDecoder:
     Turn bytes into symbols.
 
     ``feed`` takes bytes, ``next_symbol`` gives the symbols one by one, ``reset`` forgets
-    everything heard. - ``waiting``: bytes that are still to be read.
+    everything heard.
 
+    - ``waiting``: bytes that are still to be read.
     - ``noise``: number of bytes outside of any symbol.
     - ``last_byte``: the last byte heard, for reports.
     - ``link_data``: link data of the message that is coming in, as far as it has come.
