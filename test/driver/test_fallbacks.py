@@ -159,6 +159,17 @@ def test_rule_8_change_to_run_is_a_first_contact() -> None:
     assert cell.results()[-1] == RUN
 
 
+def test_rule_8_change_to_run_is_a_first_contact_without_a_heartbeat() -> None:
+    speed = speed_row(Fallback((7,), 60_000))
+    cell = Cell(speed, run=1.0)
+    cell.publish(speed, 3, run=1.0)
+    for setting in (Setting.PROGRAM, Setting.RUN):
+        cell.plc.processor.setting = setting
+        cell.run(2 * MODE_PERIOD)
+    assert cell.written('N7:0') == [7, 3, 7]
+    assert cell.results()[-1] == RUN
+
+
 def test_rule_8_row_is_fresh_by_a_confirmed_message_only() -> None:
     one = OneRow()
     row = one.row

@@ -21,6 +21,7 @@ from typing import NamedTuple
 from abdf1_ros.df1.frames import Damaged
 from abdf1_ros.driver.reads.demands import ReadAnswer
 from abdf1_ros.driver.reads.point import Freshness
+from abdf1_ros.errors import PortLost
 from abdf1_ros.settings.heartbeats import While
 from abdf1_ros.settings.mapping import Mapping
 import pytest
@@ -325,6 +326,17 @@ def test_port_that_was_lost_begins_anew() -> None:
     bench.machine.start(bench.now)
     bench.hear(frame(reply(7, VALUES)))
     assert bench.values(mapping) == []
+
+
+def test_row_that_no_node_reads_is_named_after_each_opening() -> None:
+    mapping = row()
+    bench = ListeningBench([mapping])
+    for _ in range(2):
+        bench.run(30.0)
+        assert bench.driver.points[mapping].error == 'no other node reads it'
+        bench.driver.ended(PortLost('unplugged'))
+        assert bench.driver.points[mapping].error == 'port lost: unplugged'
+        bench.machine.start(bench.now)
 
 
 # What stands in an address of a command, by hand: letters of a file type, and words of an element.

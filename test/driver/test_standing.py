@@ -234,6 +234,19 @@ def test_message_that_stands_feeds_its_fallback() -> None:
     assert bench.listener.outcomes()[-1] is WRITTEN
 
 
+def test_message_that_stands_feeds_its_fallback_from_when_it_was_published() -> None:
+    row = make_mapping('N7:0', 'Write', write_again=60_000, fallback=Fallback((0,), 1000))
+    cell = Cell(row, READ, run=3.0)
+    bench = cell.bench
+    bench.write(row, [7], run=0.5)
+    bench.driver.write([row], [7], cell.now - 0.4)
+    bench.line.wake(bench.driver.machine)
+    cell.run(0.5)
+    assert bench.listener.outcomes()[-1] is STANDS
+    cell.run(0.2)
+    assert bench.listener.outcomes()[-1] is Outcome.FALLBACK
+
+
 def test_stopped_program_and_lost_port_end_it() -> None:
     row = make_mapping('N7:0', 'Write', write_again=60_000, fallback=Fallback((0,), 5000))
     for how in ('program', 'port'):
