@@ -96,6 +96,14 @@ def test_row_that_is_read_seldom_is_read_at_once() -> None:
     assert line.listener.reads[-1][2] == [77]
 
 
+def test_row_that_was_asked_for_keeps_its_period_afterwards() -> None:
+    line = Line(SPEED, make_mapping('N12:1', period=500), run=6.2)
+    before = len(line.listener.values(SPEED))
+    line.ask(SPEED)
+    line.run(4.5)
+    assert len(line.listener.values(SPEED)) - before == 1
+
+
 def test_answer_is_never_older_than_the_call() -> None:
     """A read that had begun does not count: the value may have changed since."""
     line = Line(SPEED, run=6.0)

@@ -18,8 +18,10 @@ from collections.abc import Sequence
 from itertools import pairwise
 
 from abdf1_ros.df1.packet import Packet
+from abdf1_ros.driver.record import Claim
 from abdf1_ros.driver.settings import DriverSettings
-from abdf1_ros.driver.write import Outcome
+from abdf1_ros.driver.write import Outcome, Write
+from abdf1_ros.driver.writes.standing import Standing
 from abdf1_ros.pccc.emulated import Setting
 from abdf1_ros.settings.heartbeats import Fallback
 from abdf1_ros.settings.mapping import Mapping
@@ -74,6 +76,16 @@ class Line(DriverBench):
     @property
     def outcomes(self) -> list[Outcome]:
         return self.listener.outcomes()
+
+
+class OneClock:
+    """A clock of a line on which nothing else happens."""
+
+    now = late = 0.0
+
+    def took(self, begun: float, now: float) -> float:
+        """Return the time between two clock values."""
+        return now - begun
 
 
 def test_unchanged_value_is_written_again_after_its_time_only() -> None:
@@ -190,6 +202,28 @@ def test_unconfirmed_write_and_what_follows_prove_nothing() -> None:
     del line.listener.results[:]
     line.say(WORD, [8], run=0.3)
     assert line.outcomes == [WRITTEN]
+
+
+def test_unconfirmed_write_may_land_over_the_confirmed_one_that_follows() -> None:
+    block, = Line(WORD, READ).driver.readings.blocks
+    clock = OneClock()
+    standing = Standing([WORD], 2.0, clock)
+
+    def end(value: int, begun: float, outcome: Outcome, may_land_for: float) -> Write:
+        write = Write(WORD, [value], begun)
+        claim = Claim(1, [WORD.extent], write, begun)
+        standing.write_begins(claim)
+        clock.now = begun + 0.1
+        claim.end(outcome, clock.now, may_land_for)
+        standing.write_ended(claim)
+        standing.words_read(block, bytes((value, *7 * [0])), clock.now + 0.01)
+        return write
+
+    end(8, 1.0, Outcome.UNKNOWN, 1.0)
+    early = end(9, 1.2, WRITTEN, 0.0)
+    assert not standing.proof(early, 1.4)
+    late = end(9, 2.2, WRITTEN, 0.0)
+    assert standing.proof(late, 2.4)
 
 
 def test_station_that_was_away_gets_the_value_again() -> None:
