@@ -148,7 +148,9 @@ def test_station_that_comes_back_is_asked_at_once(network: Network) -> None:
     bench.run(1.0)
     plc.faults = InjectedFaults(silent=True)
     bench.run_until(lambda: (1, False) in bench.listener.changes)
-    assert bench.driver.checks.known(1).processor == 'unknown (the station does not answer)'
+    known = bench.driver.checks.known(1)
+    assert known.processor == 'unknown (the station does not answer)'
+    assert (known.identity, known.told) == (None, None)
     plc.processor.setting = Setting.RUN
     bench.run(10.0)
     assert len(ears.times(STATUS)) == 1

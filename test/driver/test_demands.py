@@ -270,6 +270,19 @@ def test_withheld_row_answers_withheld_and_publishes_nothing() -> None:
     assert line.listener.ends[-1][0] == 'often'
 
 
+def test_that_a_row_on_demand_is_withheld_is_told_to_its_calls_alone() -> None:
+    row = make_mapping('N7:0', is_on_demand=True, condition=While(('RUN',)))
+    line = Line(row)
+    line.there.processor.setting = Setting.PROGRAM
+    for _ in range(2):
+        line.run(20.0)
+        line.ask(row)
+    line.run(0.5)
+    assert [error.partition(':')[0] for error in line.errors] == ['withheld'] * 2
+    assert not line.listener.reasons
+    assert line.driver.points[row].freshness(line.clock()) is Freshness.FRESH
+
+
 def test_lost_port_and_the_end_answer_every_call() -> None:
     line = Line(RECIPE, SPEED)
     line.ask(RECIPE)

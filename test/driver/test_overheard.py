@@ -312,7 +312,7 @@ def test_what_lay_in_a_buffer_while_the_process_stood_still_is_dropped() -> None
     bench.machine.handle_timeout(bench.now)
     bench.machine.receive_data(frame(reply(7, VALUES)), bench.now)
     for said in (frame(command(8, READ_N7_0), 1), frame(reply(8, VALUES))):
-        bench.machine.receive_data(said, bench.now)
+        bench.hear(said, after=0.05)
     assert bench.values(mapping) == []
     bench.run(0.6)
     exchange(bench, 9, READ_N7_0, VALUES)

@@ -137,6 +137,13 @@ def test_line_that_is_left_goes_to_the_spare(pair: Pair) -> None:
     pair.publish(3)
     assert pair.node.link.is_released
     pair.ros.call(Trigger, '/abdf1/reset_counters', Trigger.Request())
+    pair.node._set_polling(SetBool.Request(data=True), SetBool.Response())
+    pair.ros.end(pair.spare)
+    pair.spare = None
+    pair.ros.until(lambda: pair.counts == (1, 1), 'the first bridge to have the line again')
+    pair.ros.until(lambda: pair.results[-1].name == 'motor', 'the fallback')
+    pair.publish(3)
+    assert pair.services() == dict.fromkeys(SERVICES, 1)
 
 
 def test_spare_says_that_its_files_have_changed(pair: Pair) -> None:
