@@ -15,7 +15,7 @@
 """Commands and replies in words."""
 
 from abdf1_ros.df1.packet import Packet
-from abdf1_ros.pccc.describe import command_name, describe
+from abdf1_ros.pccc.describe import command_name, describe, Effect, effect_of
 from hypothesis import given, strategies
 import pytest
 from support.cases import for_all
@@ -95,6 +95,18 @@ def test_data_table_commands(data: str, text: str) -> None:
     (0x0F, '', 'command 0F'), (0x0E, '01 02', 'command 0E 01 02')])
 def test_command_without_fnc_is_described(cmd: int, data: str, text: str) -> None:
     assert describe(command(data, cmd)) == text
+
+
+@pytest.mark.parametrize(('cmd', 'effect', 'functions'), [
+    (0x06, Effect.READS, '00 01 03'), (0x06, Effect.WRITES, ''),
+    (0x07, Effect.READS, ''), (0x07, Effect.WRITES, ''),
+    (0x0F, Effect.READS, '01 04 29 68 94 A1 A2 A3'),
+    (0x0F, Effect.WRITES, '00 02 03 26 67 79 A9 AA AB')])
+def test_no_other_command_counts_as_a_read_or_as_a_write_alone(
+        cmd: int, effect: Effect, functions: str) -> None:
+    """What reads only may pass where writes must not; of all others anything may change."""
+    assert [fnc for fnc in range(256) if effect_of(command(f'{fnc:02X} 00 00', cmd)) is effect] \
+        == [*bytes.fromhex(functions)]
 
 
 def test_areas_of_a_plc5_beside_the_data_table_are_whole() -> None:
