@@ -1,0 +1,302 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""When the link thread looks at its port, and when it leaves the port alone."""
+
+from collections.abc import Iterator, Sequence
+import math
+from pathlib import Path
+import socket
+import time
+
+from abdf1_ros.df1.checksum import Checksum
+from abdf1_ros.df1.frames import ACK, Frame, message_frame
+from abdf1_ros.df1.machine import (
+    LineTiming,
+    Listen,
+    Machine,
+    Rest,
+    Send,
+)
+from abdf1_ros.df1.packet import Packet
+from abdf1_ros.ports.descriptor import DescriptorPort, READ_SIZE
+from abdf1_ros.ports.link_thread import LinkThread
+from abdf1_ros.ports.settings import PortSettings
+from abdf1_ros.ports.trace import PortOpener
+import pytest
+from support.link_threads import Impatient, NoLine, READY, Script
+from support.ptys import PATIENCE, Pty, wait_until
+
+
+class Paused(NoLine):
+    """A port whose first answer lies in the buffer while the process does not run for 6 s."""
+
+    def __init__(self) -> None:
+        self.now = 0.0
+
+    def clock(self) -> float:
+        """Return the time."""
+        return self.now
+
+    def read(self, timeout: float | None, wake: int) -> bytes:
+        """Bring an ACK after the pause, then nothing any more."""
+        if self.now:
+            raise OSError('the end')
+        self.now = 6.0
+        return ACK
+
+
+def test_time_that_is_up_goes_before_bytes_that_lie_in_the_buffer() -> None:
+    script, port = Script(Send(b'command', 1.0)), Paused()
+    thread = Impatient(script.machine, lambda: port, 1, clock=port.clock)
+    thread.run_out()
+    assert script.next() is None
+
+
+class SlowLine(NoLine):
+    """A device whose frame comes at so many seconds a character, on a clock of its own."""
+
+    is_terminal = True
+
+    def __init__(self, frame: bytes, char_time: float) -> None:
+        self.now = 0.0
+        self._frame = frame
+        self._char_time = char_time
+        self._taken = 0
+
+    def clock(self) -> float:
+        """Return the time."""
+        return self.now
+
+    def read(self, timeout: float | None, wake: int) -> bytes:
+        """Return what has come, or wait for the next character."""
+        if self._taken == len(self._frame):
+            raise OSError('the end')
+        begun, self._taken = self._taken, max(self._taken + 1, int(self.now / self._char_time))
+        self.now = max(self.now, self._taken * self._char_time)
+        return self._frame[begun:self._taken]
+
+
+class Late(LinkThread):
+    """A link thread on a host that lets it run 20 ms after each pause."""
+
+    def __init__(self, machine: Machine, port: SlowLine) -> None:
+        super().__init__(machine, lambda: port, clock=port.clock)
+        self._port = port
+
+    def _pause(self, seconds: float) -> None:
+        self._port.now += seconds + 0.02
+
+
+@pytest.mark.parametrize('char_time', [0.0083, 0.0042, 0.0021, 0.001])
+def test_long_reply_at_a_low_speed_is_heard_to_its_end(char_time: float) -> None:
+    packet = Packet(1, 5, 0x0F, 0, 7).reply(bytes(234))
+    script = Script(Send(b'?', 0.3, reply_size=234), timing=LineTiming(char_time=char_time))
+    port = SlowLine(message_frame(packet.encode(), Checksum.CRC), char_time)
+    thread = Late(script.machine, port)
+    assert not thread._run_on(port)
+    assert isinstance(script.next(), Frame)
+    thread.stop()
+
+
+def test_process_that_stops_just_before_it_writes_sends_no_old_command() -> None:
+    """The clock is looked at again after all that Python does, right before the write."""
+    script, written = Script(Send(b'command', 1.0, expires=2.0)), list[bytes]()
+    port = Paused()
+    port.write = written.append  # type: ignore[method-assign]
+    looks = iter([1.0])  # at the start; then the process does not run for a while
+    thread = Impatient(script.machine, lambda: port, 1, clock=lambda: next(looks, 60.0))
+    thread.run_out()
+    assert 'CommandExpired' in script.end()
+    assert written == [READY]
+
+
+class Diary(NoLine):
+    """A port that notes what becomes of it, and is lost at the second wait."""
+
+    def __init__(self) -> None:
+        self.notes: list[str] = []
+
+    def read(self, timeout: float | None, wake: int) -> bytes:
+        """Bring an ACK, then nothing any more."""
+        self.notes.append('wait')
+        if self.notes.count('wait') == 2:
+            raise OSError('the cable is gone')
+        return ACK
+
+    def write(self, data: bytes) -> None:
+        """Note the bytes."""
+        self.notes.append(data.decode('ascii'))
+
+    def close(self) -> None:
+        """Note the end."""
+        self.notes.append('close')
+
+
+def test_work_that_can_wait_is_done_when_all_is_sent_and_never_left_undone() -> None:
+    script = Script(Send(b'question', PATIENCE), Send(b'thanks'), Send(b'next', PATIENCE))
+    diary = Diary()
+    thread = Impatient(script.machine, lambda: diary, 1,
+                       while_sending=lambda: diary.notes.append('work'))
+    thread.start()
+    thread.join()
+    assert diary.notes == [
+        'ready', 'question', 'work', 'wait', 'thanks', 'next', 'work', 'wait', 'close', 'work']
+
+
+def _script_of_a_reply() -> tuple[Script, bytes]:
+    """Return a script that waits for a reply of 100 bytes, and the frame of that."""
+    script = Script(Send(b'?', PATIENCE, reply_size=100), timing=LineTiming(char_time=0.001))
+    packet = Packet(1, 5, 0x0F, 0, 7).reply(bytes(100))
+    return script, message_frame(packet.encode(), Checksum.CRC)
+
+
+@pytest.mark.parametrize('is_traced', [False, True])
+def test_serial_port_is_not_looked_at_before_a_reply_can_be_complete(
+        pty: Pty, is_traced: bool, tmp_path: Path) -> None:
+    script, frame = _script_of_a_reply()
+    opener = PortOpener(PortSettings(str(pty.name)))
+    if is_traced:
+        opener.trace(str(tmp_path / 'trace'), math.inf, {}, pytest.fail)
+    thread = Impatient(script.machine, opener.open, 3)
+    thread.start()
+    assert pty.read(5) == READY
+    began = time.monotonic()
+    wait_until(lambda: time.monotonic() > began + 0.02)  # a line of that speed is not faster
+    pty.write(frame[:8])
+    wait_until(lambda: bool(thread.pauses))
+    pty.write(frame[8:])
+    assert isinstance(script.next(), Frame)
+    assert thread.pauses[0] == pytest.approx(0.084)  # 16 of the 100 bytes are waited for
+    thread.stop()
+    opener.close()
+
+
+@pytest.fixture
+def sockets() -> Iterator[tuple[DescriptorPort, socket.socket]]:
+    ours, theirs = socket.socketpair()
+    yield DescriptorPort(ours.fileno(), ours.close), theirs
+    theirs.close()
+    ours.close()
+
+
+def test_bytes_of_a_connection_are_read_as_they_come(
+        sockets: tuple[DescriptorPort, socket.socket]) -> None:
+    ours, theirs = sockets
+    script, frame = _script_of_a_reply()
+    thread = Impatient(script.machine, lambda: ours, 1)
+    thread.start()
+    assert theirs.recv(5) == READY
+    theirs.send(frame[:8])
+    wait_until(lambda: script.machine.decoder.in_message)
+    theirs.send(frame[8:])
+    assert isinstance(script.next(), Frame)
+    assert thread.pauses == []
+    thread.stop()
+
+
+class Babbler(NoLine):
+    """A connection with bytes at every read but the last; what it costs is told to its clocks."""
+
+    def __init__(self, data: bytes, reads: int, *, has_more: bool = True) -> None:
+        self.now = 100.0
+        self.worked = 0.0
+        self.has_more = has_more
+        self._data = data
+        self._reads = reads
+
+    def clock(self) -> float:
+        """Return the time."""
+        return self.now
+
+    def read(self, timeout: float | None, wake: int) -> bytes:
+        """Return so many bytes."""
+        self._reads -= 1
+        if not self._reads:
+            raise OSError('the end')
+        return self._data
+
+
+class Restful(Impatient):
+    """A link thread that tells how much it has taken, and how long it leaves the port alone."""
+
+    def __init__(self, script: Script, port: Babbler, *, work: float = 0.0, host: float = 0.0,
+                 late: Sequence[float] = (), **options: object) -> None:
+        super().__init__(script.machine, lambda: port, 1, clock=port.clock,
+                         processor_clock=lambda: port.worked, **options)
+        self.rests: list[float] = []
+        self.taken: list[int] = []
+        self._babbler = port
+        self._late = iter(late)
+        receive = script.machine.receive_data
+
+        def take(data: bytes, now: float) -> None:
+            self.taken.append(len(data))
+            receive(data, now)
+            port.worked += work
+            port.now += work + host
+
+        script.machine.receive_data = take  # type: ignore[method-assign]
+
+    def _rest(self, seconds: float) -> None:
+        self.rests.append(seconds)
+        self._babbler.now += seconds + next(self._late, 0.0)
+
+
+@pytest.mark.parametrize(('work', 'host', 'rest'), [
+    (0.001, 0.0, 0.019),  # 19 times as long as it took
+    (0.001, 0.01, 0.019),  # of the processor, not of the clock
+    (0.004, 0.0, 0.060)])  # up to the 64 ms that these bytes take on the line
+def test_connection_that_babbles_leaves_time_to_others(
+        work: float, host: float, rest: float) -> None:
+    script = Script(Listen(None), timing=LineTiming(0.001))
+    thread = Restful(script, Babbler(bytes(READ_SIZE), 11), work=work, host=host)
+    thread.run_out()
+    assert thread.taken == [64] * 10 * 8
+    assert thread.rests == [pytest.approx(rest)] * 10 * 8
+
+
+def test_burst_beside_load_takes_the_time_of_the_line() -> None:
+    """Some portions wait long for the processor; the others make up for it."""
+    script = Script(Listen(None), timing=LineTiming(0.001))
+    port = Babbler(bytes(READ_SIZE), 11)
+    thread = Restful(script, port, work=0.01, late=[0.3] * 10)
+    thread.run_out()
+    assert port.now - 100.0 == pytest.approx(10 * READ_SIZE * 0.001)
+
+
+def test_commands_of_a_device_server_alone_are_rested_after_too() -> None:
+    script = Script(Listen(None), timing=LineTiming(0.001))
+    port = Babbler(b'', 11)
+    thread = Restful(script, port)
+    port.worked = 1.0
+    thread.run_out()
+    assert thread.taken == []
+    assert thread.rests[0] == pytest.approx(0.001 * READ_SIZE)
+
+
+def test_connection_that_babbles_does_not_keep_a_request_from_the_machine() -> None:
+    script = Script(Rest(), Send(b'awake', None))
+    thread = Restful(script, Babbler(bytes(READ_SIZE), 11),
+                     on_state=lambda state: thread.wake())  # as soon as the port is open
+    thread.run_out()
+    assert script.next() is None
+
+
+def test_line_is_not_left_alone_after_a_frame() -> None:
+    script = Script(Listen(None))
+    thread = Restful(script, Babbler(bytes(READ_SIZE - 1), 11, has_more=False))
+    thread.run_out()
+    assert script.machine.counters.chars_received == 10 * (READ_SIZE - 1)
+    assert not thread.rests
