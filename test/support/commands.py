@@ -22,6 +22,9 @@ import signal
 import pytest
 from support.ros import Process
 
+FAST = ('--timeout', '250')  # ms; for who is silent
+PATIENT = ('--timeout', '3000')  # for who is there, but may be late on a busy host
+
 
 @dataclass(frozen=True, slots=True)
 class Said:
@@ -41,6 +44,9 @@ class Said:
         """Return the lines of a command that has to have ended well, without a warning."""
         assert (self.status, self.err) == (0, '')
         return self.lines
+
+
+Plc = Callable[..., Said]
 
 
 def call(main: Callable[[Sequence[str]], int], capsys: pytest.CaptureFixture[str],

@@ -12,13 +12,18 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""What tests of a search for settings have in common."""
+"""A simulated line for tests of ``plc``, and a search for settings that is soon over."""
 
+from collections.abc import Iterator
 from dataclasses import replace
 
+from abdf1_ros.cli.plc.command import main
 from abdf1_ros.cli.plc.detect import LineSettings
 from abdf1_ros.settings.network import Network
 import pytest
+from support.commands import call, PATIENT, Plc
+from support.ros import Process
+from support.simulator_process import Files, make_files
 
 
 @pytest.fixture
@@ -31,3 +36,27 @@ def half_duplex_only(monkeypatch: pytest.MonkeyPatch) -> None:
         return replace(network, timeout=50, cmd_timeout=50) if settings.mode == 'Peer' else network
 
     monkeypatch.setattr(LineSettings, 'on', brief)
+
+
+@pytest.fixture(scope='module')
+def files(tmp_path_factory: pytest.TempPathFactory) -> Files:
+    return make_files(tmp_path_factory.mktemp('line'))
+
+
+@pytest.fixture(scope='module')
+def simulator(files: Files) -> Iterator[Process]:
+    with files.start_simulator() as process:
+        yield process
+
+
+@pytest.fixture
+def line(simulator: Process, files: Files) -> str:
+    """Return the port of a line on which every station works."""
+    for station in (1, 2):
+        simulator.say(f'normal {station}')
+    return str(files.port)
+
+
+@pytest.fixture
+def plc(line: str, capsys: pytest.CaptureFixture[str]) -> Plc:
+    return lambda command, *args: call(main, capsys, command, '--port', line, *PATIENT, *args)
