@@ -44,7 +44,7 @@ class SecondPort(bytes):
     """Bytes of the second port of a line that is heard on two."""
 
 
-class Listener(Protocol):
+class ByteListener(Protocol):
     """A user of the bytes of a line."""
 
     def hear(self, data: bytes, now: float) -> None:
@@ -64,7 +64,7 @@ class ListeningMachine(Machine):
     After a pause of this process the age of the first bytes is unknown: they are dropped.
     """
 
-    listener: Listener
+    listener: ByteListener
     _old_until = -math.inf
 
     def receive_data(self, data: bytes, now: float) -> None:

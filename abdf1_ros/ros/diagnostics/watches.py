@@ -34,7 +34,7 @@ class Watch(Protocol):
         """Return the news at the clock value ``now`` (s)."""
 
 
-class Standing:
+class NewFaults:
     """Reports each fault when ``find`` begins to return its text."""
 
     def __init__(self, severity: LoggingSeverity, about: str,
@@ -90,12 +90,12 @@ def watches_of(line: LineView, port: str, seen: Seen, guests: Sequence[GuestLine
         return [f'{port}: {text}'] if text else []
 
     return [
-        Standing(WARN, 'the files', changed),
-        Standing(WARN, 'publishers', crowded),
-        Standing(ERROR, 'guests', lambda now: [
+        NewFaults(WARN, 'the files', changed),
+        NewFaults(WARN, 'publishers', crowded),
+        NewFaults(ERROR, 'guests', lambda now: [
             f'guest {guest.guest.name}: {guest.fault}' for guest in guests if guest.fault]),
-        Standing(WARN, 'commands to us', lambda now: [
+        NewFaults(WARN, 'commands to us', lambda now: [
             f'refused a command of {text}' for text in line.driver.refused.lately(now)]),
-        Standing(WARN, 'types of PLCs', lambda now: line.wrong_types()),
+        NewFaults(WARN, 'types of PLCs', lambda now: line.wrong_types()),
         DeafStations(line),
-        Standing(ERROR, 'line', fault)]
+        NewFaults(ERROR, 'line', fault)]
