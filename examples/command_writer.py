@@ -16,22 +16,22 @@
 """
 Write values to a PLC and wait for the result.
 
-For one bit nothing of this is needed: the service ~/set/<topic> answers with the same result.
+For one bit you do not need this program: the service ~/set/<topic> gives the same result.
 
-The bridge answers every message to ~/write/<topic> with exactly one result for each mapping of
-that topic on ~/write_results. It repeats the label of the message as "request", so that several
-writers to one topic can tell their results apart. A text has no label: this program takes the
-first result that has its tag. So give a topic of texts one writer.
+For each message to ~/write/<topic> the bridge publishes exactly one result for each mapping of the
+topic, on ~/write_results. The result repeats the label of the message as "request": so each of
+several writers finds its own results. A text has no label: this program takes the first result
+with its tag. So let only one program write to a topic of texts.
 
-With --station the command is sent only while the bridge says, in the status "interlocks" of
-/diagnostics, that it is in control of that station; else the reason is printed. Where no row of
-the map Confirms that, a heartbeat that counts has to do: the PLC may still wait for a reset.
+With --station the command is sent only if the bridge is in control of this station; otherwise the
+reason is printed. The status "interlocks" of /diagnostics shows this. If no row of the map
+Confirms the control, a counting heartbeat is enough: the PLC may still wait for a reset.
 
-A command whose result does not come is neither done nor not done. Look at the read topic before
-you send it again; for a pulse, a second one may be the wrong one.
+If no result comes, it is unknown whether the command was executed. Look at the read topic before
+you send it again: a second pulse may do harm.
 
-Exit status: 0 written, 1 not written, 2 bad arguments, 3 unknown whether written (or only partly,
-or sent to all stations, which no station confirms).
+Exit status: 0 written, 1 not written, 2 bad arguments, 3 unknown whether written. 3 also means:
+written only partly, or sent to all stations, which no station confirms.
 """
 
 from __future__ import annotations
@@ -67,7 +67,7 @@ examples:
 
 
 class CommandWriter(Node):
-    """Writes to one topic of the bridge ``bridge``, whose mappings have ``tags``."""
+    """Writes to one topic of the node ``bridge``; ``tags``: of the topic's mappings."""
 
     def __init__(self, bridge: str, topic: str, tags: list[str]) -> None:
         super().__init__('command_writer')
@@ -82,7 +82,7 @@ class CommandWriter(Node):
         self._control: dict[str, str] = {}
 
     def why_not_in_control(self, station: int, timeout: float) -> str:
-        """Return why ROS is not in control of a station, empty where it is."""
+        """Return why ROS is not in control of a station; empty if it is."""
         told = self.create_subscription(DiagnosticArray, '/diagnostics', self._take_control, 10)
         self._spin_until(lambda: self._control, timeout)
         self.destroy_subscription(told)
@@ -96,7 +96,7 @@ class CommandWriter(Node):
                 self._control = {pair.key: pair.value for pair in status.values}
 
     def connect(self, timeout: float) -> bool:
-        """Find the bridge; whether it listens and we hear its results."""
+        """Find the bridge; return True if it listens and we hear its results."""
         if not self._spin_until(self._type, timeout):
             return False
         # Volatile, so that a bridge that starts later does not execute an old command.
@@ -109,7 +109,7 @@ class CommandWriter(Node):
         return self._listener.get_publisher_count() > 0
 
     def write(self, words: list[str], timeout: float) -> bool:
-        """Send the values once; whether all results have come."""
+        """Send the values once; return True if all results have come."""
         message = self._type()()
         if isinstance(message, std_msgs.msg.String):
             message.data = ' '.join(words)
@@ -119,14 +119,14 @@ class CommandWriter(Node):
             message.data = [number(lambda text: int(text, 0), word, 'a whole number')
                             for word in words]
         if not isinstance(message, std_msgs.msg.String):
-            # The result repeats it, so that ours is not taken for that of another writer.
+            # The result repeats the label, so that we know our own result.
             self._request = f'{self.get_fully_qualified_name()} {uuid.uuid4()}'
             message.layout.dim = [std_msgs.msg.MultiArrayDimension(label=self._request)]
         self._publisher.publish(message)
         return self._spin_until(lambda: len(self.results) == len(self._tags), timeout)
 
     def _type(self) -> Any:
-        """Return the message type that the bridge takes, None before it has been found."""
+        """Return the message type of the write topic; None until the bridge is found."""
         found = self.get_subscriptions_info_by_topic(self._topic)
         return getattr(std_msgs.msg, found[0].topic_type.split('/')[-1]) if found else None
 
@@ -143,7 +143,7 @@ class CommandWriter(Node):
 
 
 def number(convert: Callable[[str], Any], text: str, what: str) -> Any:
-    """Return a value; ValueError, in words, when it is none."""
+    """Return a value; raise ValueError with a clear text if it is not valid."""
     try:
         return convert(text)
     except ValueError:
@@ -151,21 +151,21 @@ def number(convert: Callable[[str], Any], text: str, what: str) -> Any:
 
 
 def hint() -> str:
-    """Return why a bridge may not be seen, empty where nothing is known."""
+    """Return why we may not see a bridge; empty if we know no reason."""
     is_client = os.environ.get('ROS_DISCOVERY_SERVER') \
         and os.environ.get('ROS_SUPER_CLIENT', '').upper() != 'TRUE'
     return '; ROS_DISCOVERY_SERVER is set: set ROS_SUPER_CLIENT=TRUE too' if is_client else ''
 
 
 def judge(message: str) -> int:
-    """Return the exit status that the text of a result stands for."""
+    """Return the exit status for the text of a result."""
     if message.startswith(('written', 'stands')):
         return WRITTEN
     return NOT_WRITTEN if message.startswith('not written') else UNKNOWN
 
 
 def run(node: CommandWriter, options: argparse.Namespace) -> int:
-    """Write and tell the results; return the exit status."""
+    """Write, print the results, and return the exit status."""
     if not node.connect(options.timeout):
         print(f'not written: {options.node} does not listen to write/{options.topic}'
               if node.has_bridge else f'not written: there is no node {options.node}{hint()}')
@@ -193,15 +193,15 @@ def main() -> int:
     parser.add_argument('topic', help='name below ~/write/')
     parser.add_argument('values', nargs='+', help='all values of the mapping; for bits 0 and 1')
     parser.add_argument('--node', default='/abdf1', help='the bridge (default: %(default)s)')
-    parser.add_argument('--tags', nargs='+', help='of the mappings (default: the topic)')
+    parser.add_argument('--tags', nargs='+', help='tags of the mappings (default: the topic)')
     parser.add_argument('--station', type=int,
                         help='write only while ROS is in control of this station')
     parser.add_argument('--timeout', type=float, default=6.0,
                         help='seconds to wait for the bridge, then for the result; longer than '
-                             'twice its write_timeout, for a write that is read back '
+                             'twice the write_timeout of the bridge, which may read back a write '
                              '(default: %(default)g)')
     options = parser.parse_args(remove_ros_args(sys.argv)[1:])
-    # rclpy's own handlers would leave nothing to say what became of the write.
+    # With rclpy's own handlers we could not print that the result is unknown.
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, signal.default_int_handler)
     rclpy.init(signal_handler_options=SignalHandlerOptions.NO)

@@ -14,26 +14,26 @@
 # limitations under the License.
 
 """
-Have the PLC do a job once, and know whether it has.
+Let the PLC do a job once, and know whether it has done it.
 
-A handshake of three numbers, each an int16 word. ROS writes REQUEST, the number of the job; the
-program of the PLC copies it to BUSY when it begins and to DONE when it has finished::
+The handshake has three numbers, each an int16 word. ROS writes REQUEST, the number of the job. The
+program of the PLC copies this number to BUSY when the job begins, and to DONE when it has
+finished::
 
     EQU busy done  NEQ request done  GRT request 0   MOV request busy, begin the job
     (the job has finished)                           MOV busy done
 
-The race that people build without it: a bit "start" is set, and a bit "done" is waited for. Done
-is still set from the job before, so the robot drives on before this job has begun. A number that
-was never used before cannot be mistaken for an old one. The same race waits at the other end: a
-job that has not begun in time is given up, and begins afterwards, with no robot there. So the
-request is taken back, which has to be confirmed on ~/write_results, and only what is read after it
-counts.
+Without numbers there is a race: a robot sets a bit "start" and waits for a bit "done". "Done" is
+still set by the job before, so the robot goes on before this job has begun. A new number cannot be
+confused with an old one. There is a second race at the end. The robot gives up a job that has not
+begun in time, and the job begins later without a robot. So the request is taken back, and
+~/write_results has to confirm this. Only a state that was read after that counts.
 
-Needs a Write row ``job_request`` and a Read row ``job_state`` of two words, busy and done, with
-these tags. The request is published at a steady rate while the job runs, so the row may have a
-Fallback of 0: then the PLC also learns when this program dies. With ``--control TAG`` a Read row
-of one bit says whether the PLC uses what ROS writes (rung 7 of the tutorial on heartbeats):
-without it no job is asked for, and none is waited for.
+The map needs a Write row ``job_request`` and a Read row ``job_state`` of two words, busy and done.
+The request is published at a steady rate while the job runs. So its row may have a Fallback of 0:
+then the PLC also learns when this program dies. With ``--control TAG`` a Read row of one bit shows
+whether the PLC uses the values from ROS (rung 7 of the tutorial on heartbeats). While this bit is
+0, the program neither requests a job nor waits for one.
 
 Exit status: 0 done, 1 not done and not begun, 3 unknown.
 """
@@ -62,7 +62,7 @@ _PERIOD = 0.2  # s between two messages of a request; the first comes at once
 
 
 class Step(Enum):
-    """Where a job is."""
+    """The progress of a job."""
 
     WAITING = 'the PLC has not begun'
     BUSY = 'the PLC is busy with it'
@@ -70,7 +70,7 @@ class Step(Enum):
 
 
 def next_number(busy: int, done: int) -> int:
-    """Return a number that neither the job under way nor the last one has."""
+    """Return a number that differs from the running job's and the last job's."""
     number = max(busy, done, 0) % _LAST_NUMBER + 1
     while number in (busy, done):
         number = number % _LAST_NUMBER + 1
@@ -78,7 +78,7 @@ def next_number(busy: int, done: int) -> int:
 
 
 def step_of(number: int, busy: int, done: int) -> Step:
-    """Return where job ``number`` is, from what the PLC says."""
+    """Return the progress of job ``number``, from the PLC's words."""
     if done == number:
         return Step.DONE
     return Step.BUSY if busy == number else Step.WAITING
@@ -89,10 +89,10 @@ class Handshake(Node):
 
     def __init__(self, bridge: str, control: str = '') -> None:
         super().__init__('handshake')
-        # The last value at once, but none that is older than the bridge's stale time.
+        # A late subscriber gets the last value, unless it is older than the bridge's stale time.
         qos = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
         self._state: tuple[int, int] | None = None
-        self._states = 0  # how many have come
+        self._states = 0  # number of received states
         self._result = 'no result has come'
         self._is_at_rest = False  # a 0 has been confirmed
         self.create_subscription(
@@ -105,7 +105,7 @@ class Handshake(Node):
         self._requests = self.create_publisher(Int16MultiArray, f'{bridge}/write/job_request', 1)
 
     def run(self, begin_within: float, done_within: float) -> int:
-        """Have one job done; times in seconds. Returns the exit status."""
+        """Let one job be done (times in s); return the exit status."""
         if not self._spin(lambda: self._state is not None
                           and self._requests.get_subscription_count() > 0, begin_within):
             print('not begun: no job_state from the PLC, or no bridge takes job_request')
@@ -134,7 +134,7 @@ class Handshake(Node):
         return {Step.DONE: DONE, Step.WAITING: NOT_BEGUN, Step.BUSY: UNKNOWN}[step]
 
     def _request(self, number: int, seconds: float, is_enough: Callable[[Step], bool]) -> Step:
-        """Ask for job ``number`` until its step is enough."""
+        """Request job ``number`` until ``is_enough`` accepts its step."""
         def step() -> Step:
             assert self._state is not None
             return step_of(number, *self._state)
@@ -146,16 +146,16 @@ class Handshake(Node):
         return step()
 
     def _take_back(self, seconds: float) -> bool:
-        """Write 0; whether that has been confirmed, and the state been read after it."""
+        """Write 0; return True if it was confirmed and a state has been read after it."""
         self._is_at_rest = False
         if not self._publish_until(0, lambda: self._is_at_rest, seconds):
             return False
-        # The first that comes may have been read before; it is on its way already.
+        # The first state may have been read before: it was already on its way.
         states = self._states
         return self._spin(lambda: self._states >= states + 2, seconds)
 
     def _publish_until(self, value: int, condition: Callable[[], bool], seconds: float) -> bool:
-        """Publish at a steady rate until the condition holds; whether it does in time."""
+        """Publish at a steady rate until the condition holds; return False if it is too late."""
         end, due = time.monotonic() + seconds, 0.0
         while not condition() and time.monotonic() < end:
             if time.monotonic() >= due:
@@ -188,16 +188,16 @@ class Handshake(Node):
 
 
 def main() -> int:
-    """Parse the arguments and have one job done."""
+    """Parse the arguments and let one job be done."""
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument('--node', default='/abdf1', help='the bridge (default: %(default)s)')
     parser.add_argument('--begin-within', type=float, default=5.0, metavar='S',
-                        help='s until the PLC has to begin (default: %(default)g)')
+                        help='the PLC has to begin within this time (s) (default: %(default)g)')
     parser.add_argument('--done-within', type=float, default=60.0, metavar='S',
-                        help='s until the job has to be done (default: %(default)g)')
+                        help='the job has to be done within this time (s) (default: %(default)g)')
     parser.add_argument('--control', default='', metavar='TAG',
-                        help='a Read row of one bit: whether ROS is in control of the PLC')
+                        help='tag of a Read row of one bit: 1 if ROS is in control of the PLC')
     options = parser.parse_args(remove_ros_args(sys.argv)[1:])
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, signal.default_int_handler)

@@ -14,15 +14,15 @@
 # limitations under the License.
 
 """
-A robot cell that reads interlock bits and decides "not permitted" unless it knows better.
+A robot cell that permits motion only while interlock bits are fresh and 1.
 
 Run it beside the bridge; it prints every change of its decision::
 
     python3 examples/interlock_consumer.py --topic /abdf1/read/cell_interlocks --bits 0,1,2
     ros2 service call /interlock_consumer/reset std_srvs/srv/Trigger
 
-All bits have to be 1. At the start, and whenever values have stopped, a person has to reset; with
---latch also after a bit has been 0. It is not a safety function: emergency stops and guards stay
+All bits have to be 1. A person has to reset at the start, and each time after values have stopped;
+with --latch also after a bit was 0. This is not a safety function: emergency stops and guards stay
 hard-wired or safety-rated.
 
 Exit status: 0 after Ctrl-C or SIGTERM, 2 for bad arguments.
@@ -52,12 +52,13 @@ from std_srvs.srv import Trigger
 
 class InterlockConsumer(Node):
     """
-    Permit motion only while fresh values say so, and a person has reset since values stopped.
+    Permits motion only while values are fresh and 1, after a person has pressed reset.
 
-    All of ``bits`` of the array have to be 1; with ``latches`` a 0 takes a reset as well.
-    ``address`` is where in the PLC the topic has to come from, where that is given. ``patience``
-    (s) is what the cell can live without a value; it is at least the stale time that the bridge
-    promises (``check`` prints it), or nothing is received at all.
+    - ``bits``: indexes in the array; all these bits have to be 1
+    - ``latches``: a person has to reset also after a bit was 0
+    - ``address``: address in the PLC that the topic has to come from; empty: any
+    - ``patience``: longest time (s) that the cell accepts without a value. It has to be at least
+      the stale time that ``check`` prints; otherwise DDS delivers no value at all.
     """
 
     def __init__(self, topic: str, bits: Sequence[int], patience: float, *, latches: bool = False,
@@ -70,7 +71,7 @@ class InterlockConsumer(Node):
         self._text = ''
         self._is_fresh = False
         self._is_reset = False
-        self._why_not = 'no value yet'  # what the PLC has against it, empty for nothing
+        self._why_not = 'no value yet'  # why the PLC does not permit motion; empty if it does
         self.permitted = False
         time = Duration(seconds=patience)
         qos = QoSProfile(
@@ -81,10 +82,10 @@ class InterlockConsumer(Node):
             self._subscribe(topic, qos, SubscriptionEventCallbacks(
                 deadline=lambda event: self._stopped(), liveliness=self._liveliness,
                 incompatible_qos=self._incompatible))
-        except UnsupportedEventTypeError:  # rmw_zenoh has neither event
+        except UnsupportedEventTypeError:  # rmw_zenoh lacks these events
             self._subscribe(topic, qos, SubscriptionEventCallbacks())
-        # DDS reports no missed deadline before the first value, and not every RMW does so later.
-        # The node's own clock may be a simulation's, which need not run.
+        # DDS reports no missed deadline before the first value, and some RMWs never do. The node's
+        # own clock may be simulated and stand still, so the timer has its own.
         self._silence = self.create_timer(
             patience, self._silent, clock=Clock(clock_type=ClockType.STEADY_TIME))
         self.create_service(Trigger, '~/reset', self._reset)
@@ -107,7 +108,7 @@ class InterlockConsumer(Node):
             self._decide(True, 'the PLC permits')
 
     def _missing_in(self, message: UInt8MultiArray) -> str:
-        """Return why a message is not a permit, empty where it is one."""
+        """Return why a message does not permit motion; empty if it does."""
         address = message.layout.dim[0].label if message.layout.dim else ''
         if self._address and address != self._address:
             return f'the topic comes from {address or "nowhere"}, not from {self._address}'
@@ -123,12 +124,12 @@ class InterlockConsumer(Node):
             self._stopped()
 
     def _stopped(self) -> None:
-        """Withdraw the permit until a person resets; events and timer come for one silence."""
+        """Withdraw the permit until a person resets; may be called twice for one silence."""
         self._is_fresh = self._is_reset = False
         self._decide(False, 'values have stopped')
 
     def _incompatible(self, event: Any) -> None:
-        # Another publisher of the topic may be meant: its values change nothing.
+        # The event may be about a second publisher; it does not change a fresh value.
         if not self._is_fresh:
             self._decide(False, f'the bridge does not promise a value every {self._patience:g} s')
 
@@ -141,9 +142,9 @@ class InterlockConsumer(Node):
 
     def _reset(self, request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
         """
-        Take the reset of a person, who sees the cell; it counts from the next value on.
+        Accept the reset of a person who sees the cell; it holds from the next value on.
 
-        Before all bits are 1 it is refused, or the cell would start later by itself.
+        It is refused until all bits are 1: otherwise the cell would start later by itself.
         """
         response.success = self._is_reset = self._is_fresh and not self._why_not
         response.message = '' if response.success else f'not reset: {self._text}'
@@ -156,7 +157,7 @@ class InterlockConsumer(Node):
 
 
 def indexes(text: str) -> list[int]:
-    """Return indexes; Python would take -1 for the last bit."""
+    """Return the indexes in a text; -1 is refused, as Python would use the last bit."""
     if not all(part.isdecimal() for part in text.split(',')):
         raise argparse.ArgumentTypeError(f'"{text}" should be whole numbers from 0, as in 0,1,2')
     return [int(part) for part in text.split(',')]
@@ -180,14 +181,15 @@ def main() -> int:
     parser.add_argument('--topic', default='/abdf1/read/cell_interlocks')
     parser.add_argument('--bits', type=indexes, default=[0],
                         help='indexes in the array, from 0, as in 0,1,2')
-    parser.add_argument('--address', default='', help='where the topic has to come from: B3:0/0')
+    parser.add_argument('--address', default='',
+                        help='address that the topic has to come from, as in B3:0/0')
     parser.add_argument('--latch', action='store_true',
-                        help='a person has to reset also after a bit has been 0')
+                        help='a person has to reset also after a bit was 0')
     parser.add_argument('--patience', type=seconds, default=2.0,
                         help='seconds without a value after which motion is not permitted')
     options = parser.parse_args(remove_ros_args(sys.argv)[1:])
-    # rclpy's own handlers take the ground from under a spin that is under way.
-    ended: list[int] = []  # an event may deadlock when a second signal interrupts its set()
+    # rclpy's own handlers would destroy the context while we spin.
+    ended: list[int] = []  # not a threading.Event: a second signal during its set() may deadlock
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, lambda number, _: ended.append(number))
     rclpy.init(signal_handler_options=SignalHandlerOptions.NO)

@@ -16,12 +16,11 @@
 """
 Record what a bridge reads from the PLCs into a CSV file that a spreadsheet opens.
 
-A row is one message: the time of its publishing (UTC), the topic below ~/read/, the PLC address,
-and the values. For more than a table (replay, plots, other nodes' topics) use rosbag2; the
-commands are in docs/recording.md.
+A row is one message: time of publication (UTC), topic below ~/read/, PLC address, and values. For
+replay, plots, or topics of other nodes use rosbag2: docs/recording.md has the commands.
 
-Exit status: 0 after Ctrl-C or --seconds, 1 when the bridge is not found, 2 for bad arguments or
-a file that cannot be written.
+Exit status: 0 after Ctrl-C or --seconds, 1 if the bridge is not found, 2 for bad arguments or a
+file that cannot be written.
 """
 
 from __future__ import annotations
@@ -52,7 +51,7 @@ examples:
 
 _PROGRESS_PERIOD = 2.0
 
-# The bridge keeps one value for late subscribers; this much may wait here while the disk is busy.
+# The bridge keeps one value for late subscribers. 100 values may wait here while the disk is busy.
 _QOS = QoSProfile(depth=100, reliability=ReliabilityPolicy.RELIABLE,
                   durability=DurabilityPolicy.TRANSIENT_LOCAL)
 
@@ -101,7 +100,7 @@ class Recorder(Node):
 
 
 def record(node: Recorder, seconds: float, wait: float, ended: list[int]) -> bool:
-    """Spin until the time is up or a signal has come; whether the bridge was there."""
+    """Spin until time is over or a signal comes; return True if the bridge was found."""
     begin = said = time.monotonic()
     while time.monotonic() < begin + seconds:
         if ended:
@@ -120,14 +119,15 @@ def main() -> int:
     parser = argparse.ArgumentParser(
         description=__doc__, epilog=_EXAMPLES,
         formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument('file', help='CSV file to write; one that exists is left alone')
+    parser.add_argument('file', help='CSV file to write; must not exist yet')
     parser.add_argument('--node', default='/abdf1', help='the bridge (default: %(default)s)')
-    parser.add_argument('--seconds', type=float, default=math.inf, help='end after so many')
+    parser.add_argument('--seconds', type=float, default=math.inf,
+                        help='end after this many seconds')
     parser.add_argument('--wait', type=float, default=10.0,
                         help='seconds to look for the bridge (default: %(default)g)')
     options = parser.parse_args(remove_ros_args(sys.argv)[1:])
-    # rclpy's own handlers would not let the file be closed cleanly.
-    ended: list[int] = []  # an event may deadlock when a second signal interrupts its set()
+    # With rclpy's own handlers the file would not be closed cleanly.
+    ended: list[int] = []  # not a threading.Event: a second signal during its set() may deadlock
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, lambda number, _: ended.append(number))
     try:
@@ -148,14 +148,14 @@ def run(options: argparse.Namespace, file: TextIO, ended: list[int]) -> int:
         node.destroy_node()
         rclpy.try_shutdown()
     if not found:
-        os.unlink(options.file)  # nothing is in it, and it would be in the way of the next try
+        os.unlink(options.file)  # the file has no rows, and would block the next try
     print(f'{node.rows} messages in {options.file}' if found else
           f'{options.node} is not there, or has no read topic{hint()}')
     return 0 if found else 1
 
 
 def hint() -> str:
-    """Return why a bridge may not be seen, empty where nothing is known."""
+    """Return why we may not see a bridge; empty if we know no reason."""
     is_client = os.environ.get('ROS_DISCOVERY_SERVER') \
         and os.environ.get('ROS_SUPER_CLIENT', '').upper() != 'TRUE'
     return '; ROS_DISCOVERY_SERVER is set: set ROS_SUPER_CLIENT=TRUE too' if is_client else ''

@@ -15,9 +15,9 @@
 """
 Start the bridge.
 
-Every parameter of the node is an argument here. One left empty is not passed on, so that the
-default of the node, or what a parameter file says, holds. An argument that does not exist ends the
-launch. ``ros2 launch abdf1_ros bridge.launch.py --show-args`` lists them all.
+Every parameter of the node is an argument here. An empty argument is not passed on: then the
+parameter file or the node's default decides. An unknown argument ends the launch. ``ros2 launch
+abdf1_ros bridge.launch.py --show-args`` lists all arguments.
 """
 
 import sys
@@ -40,8 +40,8 @@ OWN = ('params_file', 'namespace', 'name', 'log_level', 'respawn')
 
 
 def start_node(context: LaunchContext) -> list[LaunchDescriptionEntity]:
-    """Return the node, with the arguments that were given."""
-    # A copy: when the node ends, those of the context may be others.
+    """Return the node, with the given arguments."""
+    # A copy, because the context may have changed when the node ends.
     arguments = dict(context.launch_configurations)
     problems = unknown_arguments(__file__, [*OWN, *parameter_types()], sys.argv)
     if not arguments['params_file']:
@@ -53,21 +53,22 @@ def start_node(context: LaunchContext) -> list[LaunchDescriptionEntity]:
 
 
 def bridge(arguments: dict[str, str]) -> Node:
-    """Return a bridge that starts again as ``arguments`` say, unless it has refused them."""
+    """Return a bridge that is started again if ``arguments`` say so and have no faults."""
     def started_again(event: ProcessExited,
                       context: LaunchContext) -> list[LaunchDescriptionEntity]:
         if arguments['respawn'] not in YES or context.is_shutdown:
             return []
         if event.returncode == FAULTY:
-            return [LogInfo(msg=f'{event.process_name}: not started again after status {FAULTY}, '
-                                'which is for faulty files or parameters')]
+            return [LogInfo(msg=f'{event.process_name}: not started again after status {FAULTY}: '
+                                'faulty files or parameters')]
         return [LogInfo(msg=f'{event.process_name}: to be started again in {RESPAWN_DELAY:g} s'),
                 TimerAction(period=RESPAWN_DELAY, actions=[bridge(arguments)])]
 
-    # Typed, because a bare string that reads like a number would become one.
+    # With types: otherwise launch turns a text that looks like a number into a number.
     given = {name: ParameterValue(TextSubstitution(text=arguments[name]), value_type=kind)
              for name, kind in parameter_types().items() if arguments[name]}
-    # Later ones win: an argument beats the file, in which $(find-pkg-share ...) may stand.
+    # The last entry wins, so arguments come after the file. The file may contain $(find-pkg-share
+    # ...).
     parameters: list[ParameterFile | dict[str, ParameterValue]] = []
     if arguments['params_file']:
         parameters.append(ParameterFile(arguments['params_file'], allow_substs=True))
@@ -87,7 +88,7 @@ def bridge(arguments: dict[str, str]) -> Node:
 
 
 def logger(arguments: dict[str, str]) -> str:
-    """Return the name of the node's logger; a level without one is also that of rcl and rmw."""
+    """Return the name of the node's logger; without a name, a level also holds for rcl and rmw."""
     namespace = make_namespace_absolute(
         prefix_namespace(arguments.get('ros_namespace'), arguments['namespace']))
     parts = [*(namespace or '').split('/'), arguments['name']]
@@ -101,18 +102,18 @@ def generate_launch_description() -> LaunchDescription:
           for name, text in descriptions().items()),
         DeclareLaunchArgument(
             'params_file', default_value='',
-            description='YAML file of further parameters; empty: none. Launch fills in $(...) '
-                        'everywhere in it, also in comments'),
+            description='YAML file with more parameters; empty: none. Launch replaces $(...) '
+                        'everywhere in it, even in comments'),
         DeclareLaunchArgument(
             'namespace', default_value='', description='namespace of the node'),
         DeclareLaunchArgument('name', default_value='abdf1', description='name of the node'),
         DeclareLaunchArgument(
             'log_level', default_value='info',
             choices=['debug', 'info', 'warn', 'error', 'fatal'],
-            description='least severity that the node logs; that of rcl and rmw stays as it is'),
+            description='lowest severity that the node logs; rcl and rmw keep their own levels'),
         DeclareLaunchArgument(
             'respawn', default_value='false', choices=[*YES, *NO],
-            description='start the node again, after 2 s, when it ends; not after status 2, '
-                        'faulty files or parameters'),
+            description='start the node again 2 s after it has ended; not after status 2 (faulty '
+                        'files or parameters)'),
         OpaqueFunction(function=start_node),
     ])

@@ -13,10 +13,10 @@
 # limitations under the License.
 
 """
-Start a simulated PLC on a pseudo-terminal, and the bridge on that: no hardware needed.
+Start a simulated PLC on a pseudo-terminal, and a bridge to this PLC: no hardware needed.
 
-What is given beside the port, for instance log_level:=debug, is passed on to the bridge. An
-argument that the bridge does not take ends the launch.
+All arguments, for instance log_level:=debug, are passed on to the bridge. The launch file sets the
+port itself. An unknown argument ends the launch.
 """
 
 import sys
@@ -41,7 +41,7 @@ DEFAULTS = {'params_file': '', 'namespace': '', 'name': 'abdf1', 'log_level': 'i
 
 
 def refuse_unknown(context: LaunchContext) -> None:
-    """Raise RuntimeError where the bridge does not take what was given."""
+    """Raise RuntimeError if the bridge does not know an argument."""
     problems = unknown_arguments(__file__, [*DEFAULTS, *parameter_types()], sys.argv)
     if problems:
         raise RuntimeError('; '.join(problems))

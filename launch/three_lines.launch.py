@@ -15,9 +15,9 @@
 """
 Start the bridges of a cell with three serial lines, each in the namespace of its machine.
 
-What differs between them stands in config/three_lines.yaml; copy both files and change them. A
+config/three_lines.yaml has the parameters of each bridge; copy both files and change them. A
 bridge that ends by itself is started again, unless its files or parameters are faulty. With
-one_process:=true all of them run in one process, the command "lines". Any other argument ends the
+one_process:=true all bridges run in one process, the command "lines". An unknown argument ends the
 launch.
 """
 
@@ -48,7 +48,7 @@ FAULTY = 2
 
 
 def line(namespace: str) -> GroupAction:
-    """Return one bridge, in a scope of its own so that no argument reaches the next."""
+    """Return one bridge, in a scope of its own: its arguments do not reach the next bridge."""
     bridge = PathJoinSubstitution([ThisLaunchFileDir(), 'bridge.launch.py'])
     arguments = {'namespace': namespace, 'respawn': 'true',
                  'params_file': LaunchConfiguration('lines_file')}
@@ -58,7 +58,7 @@ def line(namespace: str) -> GroupAction:
 
 
 def started_again(event: ProcessExited, context: LaunchContext) -> list[TimerAction]:
-    """Return what starts all of them again, after anything but a refusal of their settings."""
+    """Return the actions that start all bridges again, unless their settings are faulty."""
     if context.is_shutdown or event.returncode == FAULTY:
         return []
     return [TimerAction(period=2.0, actions=[all_lines()])]
@@ -73,7 +73,7 @@ def all_lines() -> Node:
 
 
 def refuse_unknown(context: LaunchContext) -> None:
-    """Raise RuntimeError for what would reach no bridge: parameters go into the file."""
+    """Raise RuntimeError for an unknown argument: parameters belong into the file."""
     problems = unknown_arguments(__file__, ('lines_file', 'one_process'), sys.argv)
     if problems:
         raise RuntimeError('; '.join(problems))

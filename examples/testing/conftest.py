@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Bring the fixture ``abdf1_cell``; leave out what needs the launch_testing of ROS."""
+"""Provide the fixture ``abdf1_cell``; leave out a test if launch_testing is missing."""
 
 from importlib.util import find_spec
 

@@ -13,10 +13,10 @@
 # limitations under the License.
 
 """
-A bridge and a simulated PLC as a launch file starts them, tested with launch_testing.
+Test a bridge and a simulated PLC with launch_testing; a launch file starts both.
 
-``launch_test press_launch_test.py``, or ``add_launch_test`` in a CMakeLists.txt. Here both run as
-they do in the plant; with the fixture (test_press.py) a test also changes the PLC.
+Run it with ``launch_test press_launch_test.py``, or ``add_launch_test`` in a CMakeLists.txt. The
+bridge runs as in the plant. With the fixture of test_press.py, a test can also change the PLC.
 """
 
 import os
@@ -59,7 +59,7 @@ def generate_test_description():
 
 
 class TestPress(unittest.TestCase):
-    """What runs while both run."""
+    """Tests while both processes run."""
 
     def test_pressure_comes_as_a_topic(self):
         rclpy.init()
@@ -78,7 +78,7 @@ class TestPress(unittest.TestCase):
 
 @launch_testing.post_shutdown_test()
 class TestEnd(unittest.TestCase):
-    """What holds after both have ended."""
+    """Tests after both processes have ended."""
 
     def test_bridge_ends_well(self, proc_info, bridge):
         launch_testing.asserts.assertExitCodes(proc_info, [0], process=bridge)

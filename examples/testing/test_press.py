@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""What a press has to do when its robot's computer, its line or its PLC is in trouble."""
+"""How a press has to react to faults of the robot's computer, the line, or the PLC."""
 
 import signal
 
@@ -41,7 +41,7 @@ def cell(abdf1_cell):
 
 @pytest.fixture
 def pressure(cell):
-    """Return the messages of the press."""
+    """Return the messages with the pressure."""
     return cell.ros.listen(Int16MultiArray, '/abdf1/read/pressure')
 
 
@@ -76,11 +76,11 @@ def test_value_of_a_slow_plc_comes_too(cell, pressure):
 def test_plc_stops_the_press_when_the_bridge_is_killed(cell):
     speed = cell.ros.publisher(Int16MultiArray, '/abdf1/write/speed')
 
-    def is_in_control():  # after 4 s of heartbeats a reset is accepted, while the speed is 0
+    def is_in_control():  # the PLC accepts a reset after 4 s of heartbeats, while the speed is 0
         cell.plcs.say('reset 1')
         return cell.plcs.word('B12:0') & 1 << 2
 
-    def runs():  # where the heartbeats stop for a moment the PLC wants a reset again, at speed 0
+    def runs():  # after a pause of the heartbeats the PLC needs a new reset, at speed 0
         if is_in_control():
             speed.publish(Int16MultiArray(data=[70]))
         return cell.plcs.word('N11:2') == 70  # the speed that the program lets through
