@@ -256,7 +256,7 @@ def test_rule_3_guests_command_that_the_plc_does_not_take_changes_no_heartbeat_a
         with cell.share(place) as hmi:
             assert any(goes_on() for _ in range(ATTEMPTS))
         assert statuses & {0x02, 0x05}  # it was sent
-    assert capfd.readouterr().err.count(' gets no reply of station 1 to echo ') == 1
+    assert capfd.readouterr().err.count(' gets no reply from station 1 to echo ') == 1
 
 
 def test_rule_8_broadcast_of_a_guest_over_a_fallback_is_told_and_written_over(

@@ -180,7 +180,7 @@ def test_files_that_would_stop_the_line_change_nothing(
     bench.write_map()
     assert bench.reload() == (False, (
         f'goes on as before: {bench.map}: it has no row, so all topics would end; only a line '
-        'with Share can be without'))
+        'with Share may have no row'))
     assert bench.node.session is session
     assert held[-1] == session.configuration.held
     monkeypatch.undo()
@@ -190,7 +190,7 @@ def test_link_that_does_not_take_the_files_is_the_end(
         bench: Bench, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(LinkThread, 'exchange', lambda *arguments: False)
     bench.write_map(SPEED, RECIPE, LEVEL)
-    assert bench.reload() == (False, 'ends: its link does not take the new files')
+    assert bench.reload() == (False, 'ends: the link does not accept the new files')
     assert bench.node.has_failed
 
 

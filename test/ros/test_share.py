@@ -82,9 +82,9 @@ def test_what_is_not_allowed_and_who_is_turned_away_is_told_once(tmp_path: Path)
             with socket.create_connection(address) as second, suppress(ConnectionResetError):
                 assert second.recv(1) == b''
             assert hmi.read('F8:4') == 21.5
-        node.wait_for('[WARN] ', f'guest tcp:{place} is refused: protected typed logical '
-                      'write F8:4 = 30.5: Share_Access is Read')
+        node.wait_for('[WARN] ', f'guest tcp:{place}: command refused: protected typed logical '
+                      'write F8:4 = 30.5; Share_Access is Read')
         node.wait_for('[WARN] ', f'guest tcp:{place}: a second program, at 127.0.0.1:',
-                      ', was turned away; one at a time is at a place')
+                      ', was refused: a place takes one program at a time')
         node.end()
-    assert node.text.count('is refused') == 1
+    assert node.text.count('command refused') == 1

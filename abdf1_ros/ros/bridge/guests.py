@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The places of other programs that share the port of a session."""
+"""The places where other programs (guests) share the port of a session."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ from abdf1_ros.text import first
 
 
 class GuestPlaces(GuestListener):
-    """A line for each place, and what is logged of the programs there."""
+    """A guest line for each place, and the log entries about its guest."""
 
     def __init__(self, configuration: Configuration, driver: Driver, opener: PortOpener,
                  notes: LimitedLog, wake: Callable[[], None]) -> None:
@@ -48,29 +48,29 @@ class GuestPlaces(GuestListener):
                       for place in share_places(network.share)]
 
     def start(self) -> None:
-        """Let guests connect, if they may not yet."""
+        """Let guests connect, unless the places are open already."""
         if not self._has_begun:
             self._has_begun = True
             for line in self.lines:
                 line.start()
 
     def stop(self) -> None:
-        """Let go of the guests."""
+        """Close the places and disconnect the guests."""
         for line in self.lines:
             line.stop()
 
     def sends(self, guest: Guest, command: Packet) -> None:
-        """Note in the trace whose command is sent."""
+        """Write into the trace which guest's command is sent."""
         self._opener.note_guest(guest.name, command)
 
     def turned_away(self, guest: Guest, other: str) -> None:
-        """Log that a second program wanted a place."""
+        """Log that a second program tried to use a place."""
         self._notes.warning(f'guest {guest.name}', (
-            f'guest {guest.name}: a second program, at {other}, was turned away; one at a time '
-            'is at a place'))
+            f'guest {guest.name}: a second program, at {other}, was refused: a place takes '
+            'one program at a time'))
 
     def wrote(self, guest: Guest, command: Packet, station: int, words: list[Extent]) -> None:
-        """Log a write of words that we write, too."""
+        """Log that a guest has written words that this bridge writes too."""
         rows = [row for row in self._driver.mappings if row.changes and any(
                 row.extent.meets(extent) for extent in words)]
         if rows:
@@ -80,17 +80,17 @@ class GuestPlaces(GuestListener):
                 f'{describe(command)}, words of {first([row.tag for row in rows])}')
 
     def was_unanswered(self, guest: Guest, command: Packet, sts: int) -> None:
-        """Log the first command without a reply: a scan asks hundreds of stations."""
+        """Log only the first command without a reply: a scan asks hundreds of stations."""
         if guest.unanswered == 1:
             self._notes.info(f'guest {guest.name}', (
-                f'guest {guest.name} gets no reply of station {command.dst} to '
-                f'{describe(command)}, but STS {sts:02X}; the status guests counts the next ones'))
+                f'guest {guest.name} gets no reply from station {command.dst} to '
+                f'{describe(command)}, but STS {sts:02X}; the status "guests" counts more'))
 
     def was_refused(self, guest: Guest, command: Packet) -> None:
-        """Log the first command that is not allowed."""
+        """Log only the first command that is not allowed."""
         if guest.refused == 1:
             self._notes.warning(f'guest {guest.name}', (
-                f'guest {guest.name} is refused: {describe(command)}: Share_Access is '
+                f'guest {guest.name}: command refused: {describe(command)}; Share_Access is '
                 f'{guest.access.value}'))
 
     def _fault(self, error: Exception) -> None:

@@ -12,29 +12,30 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The writes that have come before the end of a node: each has its result."""
+"""Take the writes that came before the end of a node, so that each gets its result."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 import time
 
-# A look that takes so long (s) without a write has found none. Only several in a row tell that no
-# write from before the end still waits: another callback, held up by a busy host, takes as long.
+# Length (s) of a look for writes. One look without a write proves nothing: on a busy host another
+# callback may take as long. Only several empty looks in a row show that no write still waits.
 _LOOK = 0.02
 _LOOKS = 3
 
-# A publisher that never pauses is not waited for longer than this (s).
+# Longest time (s) for all looks, because a publisher may never pause.
 LAST_WRITES = 1.5
 
 
 def take_last_writes(look: Callable[[float], None], taken: Callable[[], int], give_up: float,
                      now: Callable[[], float] = time.monotonic) -> None:
     """
-    Let a node take the writes that have come before its end, so that each has its result.
+    Let a node take the writes that came before its end, so that each gets its result.
 
-    ``look`` lets callbacks run for so long (s) at most, ``taken`` counts the writes; ``give_up``
-    is a value of the clock ``now``.
+    - ``look``: runs callbacks for at most the given time (s)
+    - ``taken``: returns the number of writes taken
+    - ``give_up``: latest end, as a value of the clock ``now`` (s)
     """
     empty = 0
     while empty < _LOOKS and (begun := now()) < give_up:

@@ -13,9 +13,9 @@
 # limitations under the License.
 
 """
-The ROS node: a link, and the session of a pair of files on it; services, start and end.
+The ROS node of a bridge: its link, the session of a pair of files, services, start and end.
 
-Everything is created before the link's thread starts and destroyed after it has ended.
+All parts are created before the link's thread starts, and destroyed after its end.
 """
 
 from __future__ import annotations
@@ -61,21 +61,21 @@ from rclpy.duration import Duration
 from std_msgs.msg import UInt16MultiArray
 from std_srvs.srv import SetBool, Trigger
 
-# Of the end (s): until when, counted from its beginning, writes that have come are waited for and
-# last diagnostics are begun; how long these may take, where a subscriber is stuck.
+# Limits of the shutdown (s). Two count from its start: stop waiting for pending writes, and begin
+# no more last diagnostics. The third: longest wait for a stuck subscriber.
 _LATEST_WRITES = LONGEST_END + 1.0
 _LATEST_WORDS = LONGEST_END + 2.0
 _LAST_WORDS = 0.5
 
-_MOST_PROBLEMS = 20  # of a faulty file, in the answer of ~/reload
+_MOST_PROBLEMS = 20  # most faults in the answer of ~/reload
 
 
 class BridgeNode(AnsweringNode):
     """
-    The bridge; raises ConfigurationError when parameters or files are not fit to run with.
+    The bridge; raises ConfigurationError if it cannot run with its parameters or files.
 
-    ``check`` is to be called every 0.1 s, in any one thread. ``graph`` and ``port_owners`` are
-    those of all lines of the process, ``arguments`` what that was given.
+    One thread calls ``check`` every 0.1 s. All lines of a process share ``graph`` and
+    ``port_owners``. ``arguments``: the arguments of the process.
     """
 
     def __init__(self, name: str = NODE_NAME, *, graph: Graph | None = None,
@@ -91,7 +91,7 @@ class BridgeNode(AnsweringNode):
             self._shown.show(configuration.network, configuration.shown_rows())
             self._hold_ports(*configuration.held)
             self._set_up(configuration, graph or Graph(self))
-        except Exception:  # other lines of this process go on
+        except Exception:  # the process may go on with other lines
             self.destroy_node()
             raise
 
@@ -104,7 +104,8 @@ class BridgeNode(AnsweringNode):
         self.writes = WriteTopics(self)
         self._surroundings = Surroundings(
             self, graph, self._name_watch(graph, configuration), self._opener,
-            # All writes that wait can end at once, faster than a subscriber takes their results.
+            # All waiting writes can end at the same moment, faster than a subscriber takes the
+            # results.
             OfferedPublisher(self, DiagnosticStatus, '~/write_results', MAX_WAITING_WRITES,
                              most=MAX_WAITING_WRITES),
             OfferedPublisher(self, UInt16MultiArray, '~/active_stations', latched_qos(), most=1),
@@ -117,7 +118,7 @@ class BridgeNode(AnsweringNode):
             Service('~/read_link_counters', Trigger, self._read_link_counters,
                     MutuallyExclusiveCallbackGroup())))
         if configuration.parameters.standby:
-            self.get_logger().info('waits for the line, and is silent until it has it')
+            self.get_logger().info('waits for the line; offers no topics and services until then')
         else:
             self._standby.offer()
         self.session = Session(self._surroundings, configuration)
@@ -141,7 +142,7 @@ class BridgeNode(AnsweringNode):
         return opener
 
     def _name_watch(self, graph: Graph, configuration: Configuration) -> NameWatch:
-        """Return what finds another node of our name; that of a spare is meant."""
+        """Return a watch for a second node with our name; a spare has the same name on purpose."""
         name, namespace = self.get_name(), self.get_namespace()
         is_spare = configuration.parameters.standby
         return NameWatch(
@@ -151,7 +152,7 @@ class BridgeNode(AnsweringNode):
 
     @property
     def has_failed(self) -> bool:
-        """Tell whether the node has to end: its link is broken."""
+        """Return True if the link is broken, so that the node has to end."""
         return self._is_stuck or self.link.has_failed
 
     def start(self) -> None:
@@ -161,22 +162,22 @@ class BridgeNode(AnsweringNode):
             self.session.guests.start()
 
     def begin_end(self) -> None:
-        """Begin the end, as ``Session`` does; no request takes it back."""
+        """Begin the end, as ``Session`` does; no request can cancel it."""
         self._is_ending = True
-        self.session.begin_end()  # before messages are taken that have waited, to refuse them
+        self.session.begin_end()  # first, so that messages that have waited are refused
         self.writes.begin()
 
     def end_calls(self) -> None:
-        """Let calls that wait have their answer: the link has ended."""
+        """Answer all waiting calls: the link has ended."""
         self._surroundings.services.end()
         self.session.link_counters.end()
 
     def say_last_words(self, give_up: float) -> None:
-        """Let guests go and tell the last state, up to a monotonic clock value."""
+        """Disconnect guests and publish the last state, at most until a monotonic clock value."""
         self.session.guests.stop()
         self._opener.close()
         self.session.publish_diagnostics(line_time())
-        # Messages that are still under way would be lost with their publisher.
+        # DDS would lose messages that are still under way when their publisher ends.
         self._surroundings.results.wait_for_all_acked(max(0.0, give_up - time.monotonic()))
         self._surroundings.diagnostics.wait_for_all_acked(
             Duration(seconds=max(0.0, give_up - time.monotonic())))
@@ -196,7 +197,7 @@ class BridgeNode(AnsweringNode):
         self.get_logger().error(f'internal error: {bug_text(error)}')
 
     def _reload(self, request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
-        """Use the files as they are now, or go on as before where these have faults."""
+        """Read both files again and use them; if they have faults, go on with the old files."""
         if self._is_ending:
             response.message = ENDS
             return response
@@ -217,19 +218,20 @@ class BridgeNode(AnsweringNode):
             response.success = True
             response.message = f'{printable(str(configuration))}; {changes(before, configuration)}'
         else:
-            response.message = 'ends: its link does not take the new files'
+            response.message = 'ends: the link does not accept the new files'
             self.get_logger().fatal(response.message)
             self._is_stuck = True
         return response
 
     def _hand_over(self, configuration: Configuration) -> bool:
         """
-        Hand the line over to new files; return False where the link does not take them.
+        Hand the line over to new files; return False if the link does not accept them.
 
-        The order is what matters. PLCs come first: for them new files are an end and a start.
-        The new session is made while the old one has the line, so topics of unchanged rows stay.
-        With its machine on the line the old one ends, then the new one begins, and only then may
-        guests come and the old port be taken by others.
+        The order matters:
+        1. Inform the PLCs: to a PLC, new files are an end and a start.
+        2. Make the new session while the old session has the line: topics of unchanged rows stay.
+        3. Put the machine of the new session on the line, end the old session, begin the new one.
+        4. Let guests connect, and give up the old port.
         """
         tell_plcs([self.session], 'goes on with new files', HAND_OVER)
         before, session = self.session, Session(self._surroundings, configuration)
@@ -249,7 +251,7 @@ class BridgeNode(AnsweringNode):
 
     def _set_polling(self, request: SetBool.Request,
                      response: SetBool.Response) -> SetBool.Response:
-        """Leave the port to others, or take it again."""
+        """Release the port for other programs, or take it back."""
         if self._is_ending:
             response.message = ENDS
         elif request.data:
@@ -283,18 +285,18 @@ def _port_settings(configuration: Configuration) -> PortSettings:
 
 
 def _head(network: Network) -> dict[str, str]:
-    """Return what the head of a capture says of a line; sniff finds out what is not known."""
+    """Return the settings for the head of a capture; sniff finds out missing settings."""
     duplex = {} if network.line_mode.only_listens else {'duplex': network.duplex.name.lower()}
     return {'check': network.checksum.value, **duplex}
 
 
 def end_together(nodes: Sequence[BridgeNode], patience: float = _LAST_WORDS) -> None:
     """
-    End nodes, all at once: PLCs, links, results of what has come, last words.
+    End all nodes together: PLCs, links, results of pending writes, last diagnostics.
 
-    Callbacks may run meanwhile: what they still take gets its result, that it is not sent. A node
-    that fails here does not keep the others from their end. It takes 8 s at most, and ``patience``
-    more (s) for a subscriber that is stuck.
+    Callbacks may run meanwhile: a message that they take gets the result that it is not sent. A
+    node that fails here does not stop the end of the rest. The end takes at most 8 s, and
+    ``patience`` s more for a stuck subscriber.
     """
     begun = time.monotonic()
     for node in nodes:
@@ -309,9 +311,10 @@ def end_together(nodes: Sequence[BridgeNode], patience: float = _LAST_WORDS) -> 
                      min(time.monotonic() + LAST_WRITES, begun + _LATEST_WRITES))
     give_up = time.monotonic() + patience
     for node in nodes:
-        if time.monotonic() >= begun + _LATEST_WORDS:  # a hundred on a busy host take seconds
+        # a hundred nodes on a busy host take seconds
+        if time.monotonic() >= begun + _LATEST_WORDS:
             break
         try:
             node.say_last_words(give_up)
-        except Exception as error:  # it may be broken, and the others go on
+        except Exception as error:  # the node may be broken; go on with the rest
             node.get_logger().error(f'its end fails: {bug_text(error)}')

@@ -13,10 +13,10 @@
 # limitations under the License.
 
 """
-What a bridge offers on ROS, and when: a spare offers nothing until the line is its own.
+Publishers that a bridge offers only while it has the line.
 
-Two bridges of one name on two hosts may wait for one line. The topics and services of the one that
-waits would answer for the other, so they are not there.
+Two bridges with the same name on two hosts may wait for one line. If the waiting bridge had topics
+and services, they would answer in place of the active bridge.
 """
 
 from __future__ import annotations
@@ -32,10 +32,11 @@ from rclpy.node import Node
 
 class OfferedPublisher:
     """
-    A publisher that exists while the bridge ``offers`` it.
+    A publisher that exists only while the bridge offers it.
 
-    Until then the last ``most`` messages wait: the line may be ours a moment before that is seen.
-    ``publish`` may be called in any thread, the others in that of the executor.
+    Without a publisher the last ``most`` messages wait: the bridge may have the line a moment
+    before it notices. Any thread may call ``publish``; only the executor's thread may call the
+    rest.
     """
 
     def __init__(self, node: Node, kind: type, topic: str, qos: Any, most: int) -> None:
@@ -45,18 +46,18 @@ class OfferedPublisher:
         self._publisher: Any = None
 
     def offer(self) -> None:
-        """Make the publisher, and publish what waits."""
+        """Make the publisher, and publish the waiting messages."""
         self._publisher = self._node.create_publisher(*self._make)
         self._publish_waiting()
 
     def withdraw(self) -> None:
-        """Close the publisher, and drop what waits: the line is not ours any more."""
+        """Close the publisher and drop waiting messages: the bridge has lost the line."""
         publisher, self._publisher = self._publisher, None
         self._node.destroy_publisher(publisher)
         self._waiting.clear()
 
     def publish(self, message: Any) -> None:
-        """Publish a message now, or when the publisher is there."""
+        """Publish a message now, or keep it until the publisher exists."""
         self._waiting.append(message)
         if self._publisher is not None:
             self._publish_waiting()
@@ -69,10 +70,10 @@ class OfferedPublisher:
                 publisher.publish(self._waiting.popleft())
 
     def has_subscribers(self) -> bool:
-        """Tell whether a message would reach anybody."""
+        """Return True if there is a subscriber."""
         return self._publisher is not None and self._publisher.get_subscription_count() > 0
 
     def wait_for_all_acked(self, patience: float) -> None:
-        """Wait until all subscribers have what was published, for ``patience`` s at most."""
+        """Wait until all subscribers have all messages, at most ``patience`` s."""
         if self._publisher is not None:
             self._publisher.wait_for_all_acked(Duration(seconds=patience))

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Which line of this process has which port."""
+"""The ports that each line of this process uses."""
 
 from __future__ import annotations
 
@@ -23,11 +23,12 @@ from abdf1_ros.settings.share import share_places
 
 class PortOwners:
     """
-    The ports of all lines: two masters on one line would disturb each other.
+    The ports and guest places of all lines; each may belong to one line only.
 
-    So would two lines with one place for guests: a command would go to either PLC.
-    The system refuses a device that is open, but neither the port of a device server nor a device
-    that its line has left for a while.
+    Two masters on one port would disturb each other. With one guest place for two lines, a command
+    might reach the wrong PLC. The operating system refuses a second opening of a device, but not
+    of a port of a device server. Nor does it refuse a device that its line has released for a
+    while.
     """
 
     def __init__(self) -> None:
@@ -35,12 +36,12 @@ class PortOwners:
 
     def hold(self, owner: str, *names: str) -> None:
         """
-        Let a line have these ports and places of Share, and no others any more; from any thread.
+        Let a line hold exactly these ports and places of Share; may be called in any thread.
 
-        Raises ConfigurationError, and leaves all as it was, where another line has one of them.
+        Raises ConfigurationError and changes nothing if another line holds one of them.
         """
         before, wanted = self._devices.get(owner, {}), {_line(name): name for name in names}
-        # Ours are entered first, so that of two lines that want a port at once none or one has it.
+        # Enter ours first: if two lines want a port at the same time, at most one line gets it.
         self._devices[owner] = wanted
         for other, held in [*self._devices.items()]:
             if other != owner and (taken := wanted.keys() & held.keys()):

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Judge new files for a line that runs: what speaks against them, and what they change."""
+"""Judge new files for a running line: whether they would stop it, and what they change."""
 
 from __future__ import annotations
 
@@ -31,14 +31,14 @@ from abdf1_ros.text import first, printable
 def refuse_harm(before: Configuration, after: Configuration, is_open: bool,
                 settings: PortSettings, judge: Callable[[PortSettings], str] = why_not) -> None:
     """
-    Raise ConfigurationError for what is valid, but would stop a line whose port ``is_open``.
+    Raise ConfigurationError for valid files that would stop a line whose port ``is_open``.
 
-    ``settings`` are those of the new port. Its device is tried only where it is another one.
+    ``settings``: of the new port. The device is opened as a trial only if it is a new device.
     """
     problems = []
     if before.mappings and not after.mappings and not after.network.share:
         problems.append(Problem(after.parameters.map_file, (
-            'it has no row, so all topics would end; only a line with Share can be without')))
+            'it has no row, so all topics would end; only a line with Share may have no row')))
     if is_open and line_of(after.port) != line_of(before.port) and (reason := judge(settings)):
         problems.append(Problem('port', f'{after.port} cannot be opened: {reason}'))
     if problems:
@@ -46,7 +46,7 @@ def refuse_harm(before: Configuration, after: Configuration, is_open: bool,
 
 
 def changes(before: Configuration, after: Configuration) -> str:
-    """Return what is different by new files, in words."""
+    """Return a text with the changes that new files bring."""
     parts = [*_settings(before, after), *_rows(before, after)]
     return printable('; '.join(parts)) if parts else 'nothing has changed'
 

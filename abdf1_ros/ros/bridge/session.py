@@ -13,11 +13,10 @@
 # limitations under the License.
 
 """
-What is made of one pair of files, and dropped with it: nothing of it survives a reload.
+The session of one pair of files: a reload drops it and makes a new session.
 
-The driver, its topics, what watches over them, and what has been said so far. Values and results
-are published from the link's thread itself, without the executor in between; publishers may be
-used from any thread.
+A session has the driver, its topics, watches and statuses. The link's thread publishes values and
+results directly, without the executor: rclpy allows any thread to use a publisher.
 """
 
 from __future__ import annotations
@@ -62,19 +61,19 @@ from rclpy.clock import Clock, ClockType
 from rclpy.impl.rcutils_logger import RcutilsLogger
 from std_msgs.msg import UInt16MultiArray
 
-_MOST_REMARKS = 20  # about both files, in the log
+_MOST_REMARKS = 20  # most remarks on both files in the log
 
-_GLANCE = 0.005  # how often (s) it is looked at whether all is confirmed
+_GLANCE = 0.005  # s between two checks whether the PLCs have confirmed
 
 
 @dataclass(slots=True)
 class Surroundings:
     """
-    What belongs to the process and outlives the files.
+    The parts of a bridge that stay when new files come.
 
-    ``published`` are the read topics, kept where the next files have the same row. ``is_offered``
-    tells whether topics and services are there. ``link`` is there once the first session has a
-    machine for it.
+    - ``published``: the read topics, kept if the next files have the same row
+    - ``is_offered``: the topics and services exist
+    - ``link``: set when the first session has made its machine
     """
 
     node: AnsweringNode
@@ -93,7 +92,7 @@ class Surroundings:
     link: LinkThread = field(init=False)
 
     def __post_init__(self) -> None:
-        """Make what has the services of rows."""
+        """Make the services of rows."""
         self.services = RowServices(self.node, self.writes, self.wake_executor)
 
     def wake_executor(self) -> None:
@@ -105,9 +104,9 @@ class Session:
     """
     The bridge between one pair of files and ROS.
 
-    It is made before its driver is on the line, ``begin`` is called afterwards, and ``end`` when
-    another one has taken its place: all three by the executor's thread, or before that runs.
-    ``check`` is to be called every 0.1 s, in any one thread.
+    Make it before its driver is on the line. Then call ``begin``, and ``end`` after a new session
+    has replaced it. The executor's thread does all this, or any thread before the executor runs.
+    One thread calls ``check`` every 0.1 s.
     """
 
     def __init__(self, surroundings: Surroundings, configuration: Configuration) -> None:
@@ -126,7 +125,7 @@ class Session:
         self._alarms = Alarms(self.driver.points.values(), self.port, line_time)
         self.writers: dict[str, WriteTopic] = {}
         if surroundings.is_offered:
-            # Subscriptions first: where there are thousands of publishers, each takes DDS 5 ms.
+            # Subscriptions first: after thousands of publishers, each subscription takes DDS 5 ms.
             self.writers = self._open_writers()
             self.reads.open(self.driver.points)
         self.guests = GuestPlaces(configuration, self.driver, surroundings.opener,
@@ -147,7 +146,7 @@ class Session:
         self._levels: list[bytes] = []
         self._next_diagnostics = self._next_snapshot = 0.0
         self._snapshot: Snapshot | None = None
-        # The nodes of a process are not to publish all at the same moment.
+        # A random start, so that the nodes of a process do not publish all at the same moment.
         self._phase = random.uniform(0.0, parameters.diagnostics_period)
 
     @property
@@ -155,7 +154,7 @@ class Session:
         return self.configuration.port
 
     def _reader(self) -> Callable[[Mapping, Values], None]:
-        """Return what gets the values of good reads, in the thread of the link."""
+        """Return the function that gets the values of good reads, in the thread of the link."""
         if any(mapping.alarm for mapping in self.configuration.mappings):
             return self._read_with_alarms
         return self.reads.read
@@ -173,16 +172,16 @@ class Session:
 
     @property
     def is_waiting(self) -> bool:
-        """Tell whether this is a spare whose line another bridge may have."""
+        """Return True if this is a spare, and another bridge may have the line."""
         return not self._surroundings.is_offered
 
     @property
     def has_line(self) -> bool:
         """
-        Tell whether no other program can have the line.
+        Return True if no other program can have the line.
 
-        A device is ours while it is open. A device server may keep us waiting though it has
-        accepted our connection, so there a station has to answer.
+        A device belongs to us while it is open. A device server may accept our connection and
+        still keep us waiting; so with a device server, a station has to answer first.
         """
         stations = [*self.driver.stations]
         return self._surroundings.link.state.is_open and (
@@ -200,21 +199,22 @@ class Session:
         self.guests.start()
 
     def withdraw(self) -> None:
-        """Close the topics of the map; the line is not ours any more."""
+        """Close the topics of the map: the bridge has lost the line."""
         self._surroundings.services.withdraw()
         self._surroundings.writes.withdraw()
         self.reads.withdraw()
 
     def begin(self) -> None:
-        """Tell of the files; the driver is on the line, or is about to be."""
+        """Log a summary of the files; the driver is on the line, or soon will be."""
         logger, configuration = self._surroundings.node.get_logger(), self.configuration
         _tell_files(logger, configuration)
-        # Before the other remarks, of which there may be dozens.
+        # First, because dozens of other remarks may follow.
         _tell_remarks(logger, [*self._plan().load_remarks(), *setting_remarks(
             configuration.network, configuration.mappings)])
         self.diagnostics.line.attach(self._surroundings.link, self._surroundings.opener)
         self.reads.take_over()
-        if self._surroundings.link.state.is_open:  # otherwise it is said when it has been tried
+        # otherwise port_changed logs it after the first attempt
+        if self._surroundings.link.state.is_open:
             self._publish_active()
 
     def _plan(self) -> Report:
@@ -223,20 +223,20 @@ class Session:
                       self.configuration.driver_settings().default_period, USUAL_RESPONSE_TIME)
 
     def end(self) -> None:
-        """End what waits and watches; another session has taken over the topics."""
+        """End all calls and watches; a new session has taken over the topics."""
         self._events.unreadable_rows.tell()
         self.guests.stop()
         self.link_counters.end()
         self._interlocks.end()
 
     def begin_end(self) -> None:
-        """Have heartbeats set to 0 and fallbacks written; ``tell_plcs`` waits for it (rule 5)."""
+        """Set heartbeats to 0 and write fallbacks; ``tell_plcs`` waits for both (rule 5)."""
         self._events.unreadable_rows.tell()
         self.driver.interlocks.wind_down()
         self._wake_link()
 
     def wait_for_plcs(self, give_up: float, what: str) -> None:
-        """Wait until the PLCs know, up to a monotonic clock value; name what is not confirmed."""
+        """Wait for the PLCs to confirm, at most to a monotonic clock value; log the open rows."""
         interlocks, link = self.driver.interlocks, self._surroundings.link
         while link.state.is_open and link.is_alive() and not interlocks.is_over \
                 and time.monotonic() < give_up:
@@ -260,12 +260,13 @@ class Session:
     def port_changed(self, state: PortState) -> None:
         """Log the state of the port."""
         if state.text == self._port_text:
-            return  # an attempt that failed like the one before
+            return  # the attempt has failed for the same reason as the last one
         self._port_text = state.text
         self._opened = line_time() if state.is_open else math.inf
         self._events.port_changed()
         self._publish_active()
-        if self.is_waiting:  # a server may accept and close each second: the status tells it
+        # a device server may accept and close every second; the status shows it
+        if self.is_waiting:
             return
         is_meant = state.is_open or self._surroundings.link.is_released
         notes = self._events.notes
@@ -273,7 +274,7 @@ class Session:
         tell('the port', f'{self.port}: {state.text}')
 
     def check(self) -> None:
-        """Publish diagnostics when they are due or a level has changed; end what waits."""
+        """Publish diagnostics if they are due or a level has changed; end calls that are over."""
         now = line_time()
         self._surroundings.writes.standstills.look(now)
         self.link_counters.check(now)
@@ -288,12 +289,12 @@ class Session:
         self._publish_snapshot(now)
 
     def _look(self, watch: Watch, now: float) -> None:
-        """Tell what is new; a look fails where DDS reports a name that rclpy cannot read."""
+        """Log news of all watches; a watch fails if DDS reports a name that rclpy cannot read."""
         try:
             for news in watch.look(now):
                 self._events.notes.tell(news)
         except Exception as error:
-            self._surroundings.node.tell_failure('a look at the network', error)
+            self._surroundings.node.tell_failure('the search for other nodes', error)
 
     def publish_diagnostics(self, now: float) -> None:
         """Publish all statuses at the clock value ``now`` (s)."""
@@ -305,7 +306,7 @@ class Session:
         self._publish(self._surroundings.diagnostics, DiagnosticArray(status=statuses))
 
     def _publish_snapshot(self, now: float) -> None:
-        """Publish all values where that is due and there is a subscriber."""
+        """Publish all values if it is time and there is a subscriber."""
         period = self.configuration.parameters.snapshot_period
         if not period or now < self._next_snapshot:
             return
@@ -315,7 +316,7 @@ class Session:
             self._publish(self._surroundings.snapshot, self._snapshot.message(now))
 
     def _publish(self, publisher: Any, message: DiagnosticArray) -> None:
-        # Simulated time may still be 0, which would sort before all other messages.
+        # Simulated time may still be 0; then the message would sort before all earlier ones.
         now = self._surroundings.node.get_clock().now()
         stamped = now if now.nanoseconds else Clock(clock_type=ClockType.SYSTEM_TIME).now()
         message.header.stamp = stamped.to_msg()
@@ -324,9 +325,9 @@ class Session:
 
 def tell_plcs(sessions: Sequence[Session], what: str, limit: float) -> None:
     """
-    Have heartbeats set to 0 and fallbacks written, and wait for all of it together (rule 5).
+    Set heartbeats to 0 and write fallbacks in all sessions, and wait for all (rule 5).
 
-    It takes ``limit`` s at most. ``what`` says in the log what goes on then.
+    It takes at most ``limit`` s. ``what``: what the bridge does next, for the log.
     """
     give_up = time.monotonic() + limit
     for session in sessions:
@@ -336,7 +337,7 @@ def tell_plcs(sessions: Sequence[Session], what: str, limit: float) -> None:
 
 
 def stations_of(mappings: Rows) -> frozenset[int]:
-    """Return the stations that we talk to, gateways among them."""
+    """Return the stations that the bridge sends to, including gateways."""
     numbers = {number for mapping in mappings.of_plcs
                for number in (mapping.station, mapping.via) if number is not None}
     return frozenset(numbers - {BROADCAST})
@@ -355,12 +356,12 @@ def _tell_files(logger: RcutilsLogger, configuration: Configuration) -> None:
         logger.warning('the map has no usable row: nothing is read or written')
     if configuration.ignored:
         logger.warning(
-            'parameters without effect, as the map comes from its file alone: '
+            'parameters without effect, because only the map file counts: '
             + first(configuration.ignored))
 
 
 def _tell_remarks(logger: RcutilsLogger, remarks: Sequence[Remark]) -> None:
-    """Log what ``check`` would remark on both files, in its order."""
+    """Log the remarks of ``check`` on both files, in the same order."""
     for remark in remarks[:_MOST_REMARKS]:
         logger.warning(printable(remark.text))
     if len(remarks) > _MOST_REMARKS:

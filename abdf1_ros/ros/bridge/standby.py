@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""When a bridge offers its topics and services: a spare does not before it has the line."""
+"""Offer topics and services: a spare does this only while it has the line."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ from rclpy.callback_groups import CallbackGroup
 
 
 class Service(NamedTuple):
-    """A service of the node; ``stays`` while the line is left, as only it takes the line again."""
+    """A service of the node; ``stays``: kept while the port is released, to take the port back."""
 
     name: str
     kind: type
@@ -35,9 +35,9 @@ class Service(NamedTuple):
 
 class Standby:
     """
-    Makes and closes what the bridge offers, all but the topics of the map, which ``session`` has.
+    Makes and closes the topics and services of the bridge; the session has the map's topics.
 
-    ``look`` is to be called ten times a second where the bridge is a spare.
+    If the bridge is a spare, call ``look`` ten times a second.
     """
 
     def __init__(self, surroundings: Surroundings, session: Callable[[], Session],
@@ -51,7 +51,7 @@ class Standby:
         self._is_changing = False
 
     def offer(self) -> None:
-        """Make all topics and services that are not those of the map."""
+        """Make all topics and services except the map's."""
         self._surroundings.is_offered = True
         for publisher in self._publishers:
             publisher.offer()
@@ -61,7 +61,7 @@ class Standby:
                     service.kind, service.name, service.answer, callback_group=service.group)
 
     def look(self) -> None:
-        """Begin to offer, or to wait, where the line has become ours, or is not ours any more."""
+        """Begin to offer if the bridge has got the line; begin to wait if it has lost the line."""
         has_line, executor = self._session().has_line, self._surroundings.node.executor
         if has_line is self._surroundings.is_offered or self._is_changing or executor is None:
             return
@@ -69,17 +69,17 @@ class Standby:
         executor.create_task(self._take_line if has_line else self._leave_line)
 
     def _take_line(self) -> None:
-        """Offer everything: the line is ours."""
+        """Offer everything: the bridge has the line."""
         self._surroundings.node.get_logger().info(
-            'has the line: it begins to publish and to take writes')
+            'has got the line: begins to publish and to accept writes')
         self.offer()
         self._session().offer()
         self._is_changing = False
 
     def _leave_line(self) -> None:
-        """Withdraw everything but what takes a line that was left: another may have it."""
+        """Withdraw all but the services that ``stays`` keeps: another bridge may have the line."""
         node = self._surroundings.node
-        node.get_logger().warning('has lost the line: it waits, and is silent')
+        node.get_logger().warning('has lost the line: waits, and offers no topics and services')
         self._surroundings.is_offered = False
         for service in [*self._made]:
             if not service.stays or not self._surroundings.link.is_released:
