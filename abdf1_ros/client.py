@@ -56,6 +56,7 @@ from abdf1_ros.pccc.families import FAMILIES, parse_range
 from abdf1_ros.pccc.file_types import PlcType
 from abdf1_ros.pccc.identity import Identity
 from abdf1_ros.pccc.processor import Processor
+from abdf1_ros.pccc.spellings import family_name
 from abdf1_ros.pccc.steps import AddressedValues
 from abdf1_ros.pccc.values import ValueType, WordOrder
 from abdf1_ros.ports.settings import PortSettings
@@ -102,7 +103,7 @@ class Client(OpenLine):
         self._kinds: dict[int, tuple[PlcType, Processor | None]] = {}
         self._kind: tuple[PlcType, Processor | None] | None = None
         if plc_type is not None:
-            families = one_of({family.value: family for family in FAMILIES})
+            families = one_of({family.value: family for family in FAMILIES}, family_name)
             self._kind = _choice('plc_type', families, plc_type), (
                 None if processor is None else _choice(
                     'processor', member_of(Processor), processor))

@@ -33,6 +33,7 @@ from abdf1_ros.numbers import Kind, one_of, whole
 from abdf1_ros.pccc.access import Access
 from abdf1_ros.pccc.families import FAMILIES, parse_range
 from abdf1_ros.pccc.processor import Processor
+from abdf1_ros.pccc.spellings import family_name
 from abdf1_ros.problems import ConfigurationError
 from abdf1_ros.settings.columns import MAP_COLUMNS
 from abdf1_ros.settings.csv_table import read_table, Row
@@ -50,7 +51,7 @@ _HEARTBEAT = Command.HEARTBEAT.value.lower()
 _STATION = whole(0, BROADCAST)
 _FAMILIES = {family.value: family for family in FAMILIES}
 _KINDS: dict[str, Kind[Any]] = {
-    'Station': _STATION, 'Via': _STATION, 'PLC_Type': one_of(_FAMILIES),
+    'Station': _STATION, 'Via': _STATION, 'PLC_Type': one_of(_FAMILIES, family_name),
     'Access': one_of({way.value: way for way in Access} | {'Read': None}),
     'Processor': one_of({entry.value: entry for entry in Processor})}
 # Columns of a map that keep their cells; further ones get numbers for their names.
@@ -150,7 +151,7 @@ def _number(numbers: dict[tuple[str, str], str], kind: str, name: str) -> str:
 
 
 def _address(text: str, row: Row) -> str:
-    family = _FAMILIES.get(row.get('PLC_Type').upper())
+    family = _FAMILIES.get(family_name(row.get('PLC_Type')))
     try:
         if text and family:
             parse_range(text, family)

@@ -22,7 +22,8 @@ from enum import Enum
 import math
 from operator import attrgetter
 
-from abdf1_ros.numbers import decimal_number, Kind, member_of, TEXT, two_readings, whole
+from abdf1_ros.numbers import decimal_number, Kind, member_of, one_of, TEXT, two_readings, whole
+from abdf1_ros.pccc.spellings import type_name
 from abdf1_ros.pccc.values import ValueType, WordOrder
 from abdf1_ros.settings.alarms import ALARM
 from abdf1_ros.settings.mapping import (
@@ -65,7 +66,17 @@ _TIMES = whole(0, MAX_PERIOD, 'ms')
 _PERIOD = Kind(_period, f'{_TIMES.right}, or "{ON_DEMAND}"', 0, MAX_PERIOD)
 
 _WORDS = Kind(lambda text: tuple(text.split()))
+_READ_WRITE = {'r/w', 'rw', 'read/write'}
+_TYPE = one_of({kind.value: kind for kind in ValueType}, type_name)
 _NUMBER = Kind(_number, 'a number', why_not=_clear_number)
+
+
+def _command_name(text: str) -> str:
+    name = text.lower()
+    return Command.READ_WRITE.value.lower() if name in _READ_WRITE else name
+
+
+COMMAND = one_of({command.value: command for command in Command}, _command_name)
 
 
 @dataclass(frozen=True, slots=True)
@@ -127,7 +138,7 @@ MAP_COLUMNS = (
     Column('Command', None,
            'Read, Write, ReadWrite; Serve: words of ours that PLCs read and write; Heartbeat: a '
            'word that counts while its conditions hold',
-           kind=member_of(Command)),
+           kind=COMMAND),
     Column('Address', None,
            'PLC address of the first element, or a range such as N7:0-9 or B3:1/0-7'),
     Column('Station', None,
@@ -139,7 +150,7 @@ MAP_COLUMNS = (
            kind=whole(1, 65535)),
     Column('Type', 'natural type of the file',
            'bool, int16, uint16, int32, uint32, float32, bcd16, bcd12 or string',
-           kind=member_of(ValueType)),
+           kind=_TYPE),
     Column('Topic', 'Tag', 'name below ~/read/ and ~/write/',
            commands=_TOPICS),
     Column('Period', 'parameter default_period',

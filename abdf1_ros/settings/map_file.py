@@ -16,7 +16,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Iterator
+from collections.abc import Callable, Collection, Iterable, Iterator
+import difflib
 import re
 
 from abdf1_ros.df1.packet import BROADCAST
@@ -46,10 +47,12 @@ def load_mappings(path: str) -> tuple[Rows, list[Problem]]:
     problems = table.faults + table.row_faults
     clashes = _Clashes()
     kept: dict[int, Row] = {}
+    tags = [row.get('Tag') for row in table.rows]
     for row in table.rows:
         reader = RowReader(row)
         mapping = reader.read()
-        faults = reader.faults if mapping is None else clashes.add(mapping)
+        faults = [*reader.faults, *_unknown_counter(row, reader.faults, tags)] \
+            if mapping is None else clashes.add(mapping)
         if mapping is not None and not faults:
             mappings.append(mapping)
             kept[mapping.item] = row
@@ -85,13 +88,29 @@ def broken_links(mappings: Rows) -> Iterator[tuple[Mapping, CellFault]]:
                 yield mapping, CellFault('While', _no_topic(name, mappings))
             elif mapping.is_guarded and not mapping.needs_run:
                 if named is None:
-                    yield mapping, CellFault(
-                        'While', 'should be RUN or the tag of one good Read row; '
-                        f'"{shown(name)}" is neither')
+                    yield mapping, CellFault('While', _no_tag(name, tags))
                 elif text := _no_counter(mapping, named, mappings):
                     yield mapping, CellFault('While', f'"{shown(name)}" {text}')
                 elif text := _too_rare(mapping, named):
                     yield mapping, CellFault('While_Timeout', text)
+
+
+def _unknown_counter(row: Row, faults: Collection[CellFault],
+                     tags: Collection[str]) -> Iterator[CellFault]:
+    """Yield the fault of a tag in While that no row has, where other faults would hide it."""
+    name = row.get('While')
+    is_read = row.get('Command').lower() == Command.READ.value.lower()
+    if is_read and name and name.upper() != RUN and name not in tags and all(
+            fault.column != 'While' for fault in faults):
+        yield CellFault('While', _no_tag(name, tags))
+
+
+def _no_tag(name: str, tags: Iterable[str]) -> str:
+    """Return that no row has the tag of a counter, and which tag may be meant."""
+    alike = {tag.lower(): tag for tag in tags}
+    close = difflib.get_close_matches(name.lower(), alike, 1)
+    meant = f'; did you mean {shown(alike[close[0]])}?' if close else ''
+    return f'should be RUN or the tag of one good Read row; "{shown(name)}" is neither{meant}'
 
 
 def _two_meanings(name: str, row: Mapping, topics: Collection[str]) -> str:

@@ -29,10 +29,11 @@ from abdf1_ros.pccc.address_range import AddressRange
 from abdf1_ros.pccc.families import FAMILIES, parse_range
 from abdf1_ros.pccc.file_types import FileType, PlcType
 from abdf1_ros.pccc.processor import Processor
+from abdf1_ros.pccc.spellings import family_name
 from abdf1_ros.pccc.structures import type_fault, write_fault, wrong_type
 from abdf1_ros.pccc.values import types_of, ValueType, WordOrder
 from abdf1_ros.problems import Problem
-from abdf1_ros.settings.columns import MAP_COLUMNS, NEEDED
+from abdf1_ros.settings.columns import COMMAND, MAP_COLUMNS, NEEDED
 from abdf1_ros.settings.conditions import with_conditions
 from abdf1_ros.settings.csv_table import Row
 from abdf1_ros.settings.hints import hint
@@ -111,7 +112,7 @@ class RowReader:
 
     def _values(self) -> dict[str, Any]:
         """Return the values of the cells that are not empty, by column."""
-        command = self._value('Command', member_of(Command))
+        command = self._value('Command', COMMAND)
         # 255 is a broadcast: all stations take the command, and no station answers.
         last_station = BROADCAST if command is Command.WRITE else MAX_STATION
         station = self._value('Station', whole(0, last_station),
@@ -180,8 +181,17 @@ class RowReader:
             return None
         scaling = Scaling(values.get('Scale', 1.0), values.get('Offset', 0.0))
         if scaling.scale == 0:
-            self._fault('Scale', 'Scale should not be 0')
+            self._fault('Scale', f'Scale should not be 0{self._cut_comma("Scale")}')
         return scaling
+
+    def _cut_comma(self, column: str) -> str:
+        """Return the advice for "0,1" that the delimiter has cut in two, empty for other cells."""
+        number = self._row.columns[column]
+        after = next((self._row.get(name) for name, place in self._row.columns.items()
+                      if place == number + 1), '')
+        text = self._row.get(column)
+        return f'; write {text}.{after} instead of {text},{after}, which are two cells' \
+            if is_digits(text) and is_digits(after) else ''
 
     def _via(self, station: int | None) -> int | None:
         """Return the gateway, None for a station that needs none."""
@@ -195,7 +205,7 @@ class RowReader:
 
     def _plc_type(self) -> PlcType | None:
         text = self._row.get('PLC_Type')
-        kind = next((entry for entry in FAMILIES if entry.value == text.upper()), None)
+        kind = next((entry for entry in FAMILIES if entry.value == family_name(text)), None)
         if kind is None:
             self._fault('PLC_Type', f'a MicroLogix is SLC{hint(text)}', Message.ERR_BAD_PLC_TYPE,
                         shown(text), *_PLC_TYPE_NAMES)

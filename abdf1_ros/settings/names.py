@@ -17,10 +17,15 @@
 from __future__ import annotations
 
 import re
+import unicodedata
 
 # DDS takes topic names of at most 247 characters; 150 leave room for the namespace, the node and
 # "/write/".
 MAX_LENGTH = 150
+
+_SPELLED = str.maketrans({
+    'ä': 'ae', 'ö': 'oe', 'ü': 'ue', 'ß': 'ss', 'Ä': 'Ae', 'Ö': 'Oe', 'Ü': 'Ue', 'æ': 'ae',
+    'ø': 'oe', 'å': 'aa'})
 
 
 def sanitise(text: str) -> str:
@@ -32,6 +37,12 @@ def sanitise(text: str) -> str:
     """
     parts = (_part(part) for part in text.split('/'))
     return '/'.join(part for part in parts if part)
+
+
+def in_ascii(text: str) -> str:
+    """Return ``text`` with ae for ä, and other letters without their accents."""
+    plain = unicodedata.normalize('NFKD', text.translate(_SPELLED))
+    return ''.join(letter for letter in plain if letter.isascii())
 
 
 def _part(text: str) -> str:

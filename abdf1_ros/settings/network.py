@@ -36,6 +36,7 @@ from abdf1_ros.line_names import device_of
 from abdf1_ros.messages import Message
 from abdf1_ros.numbers import is_digits, Kind, one_of, TEXT, whole, whole_number
 from abdf1_ros.pccc.families import FAMILIES
+from abdf1_ros.pccc.spellings import family_name
 from abdf1_ros.problems import ConfigurationError, Place, Problem
 from abdf1_ros.settings import BAUD_RATES, PARITIES
 from abdf1_ros.settings.csv_table import read_table, Row
@@ -118,7 +119,8 @@ class Network:
         message_args=(MODE_NAMES[0], ', '.join(MODE_NAMES[1:-1]), MODE_NAMES[-1]),
         other_words=dict(ChainMap(*(dict(mode.other_words) for mode in MODES))))
     plc_type: str = _net(
-        'PLC_Type', 'PLC5', 'PLC that this node emulates', _named(*PLC_TYPES),
+        'PLC_Type', 'PLC5', 'PLC that this node emulates',
+        one_of({name: name for name in PLC_TYPES}, family_name),
         message=Message.CRT_BAD_PLC_TYPE, message_args=PLC_TYPES)
     error_code: str = _net(
         'Error_Code', 'CRC', 'check of every message', _named('BCC', 'CRC'),

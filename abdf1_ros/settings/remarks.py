@@ -32,6 +32,7 @@ from abdf1_ros.problems import Problem
 from abdf1_ros.settings.columns import MAP_COLUMNS
 from abdf1_ros.settings.csv_table import Row
 from abdf1_ros.settings.mapping import Mapping
+from abdf1_ros.settings.names import in_ascii
 from abdf1_ros.settings.network import Network
 from abdf1_ros.settings.share import share_places, share_remarks
 from abdf1_ros.settings.station_lists import octal_remarks
@@ -148,7 +149,14 @@ def _name_remarks(row: Row, mapping: Mapping) -> Iterator[Problem]:
     if text != mapping.topic:
         below = ', below ~/read/ and ~/write/' if text.startswith('/') else ''
         yield _at(row, column, f'{column} "{shown(text)}" becomes the topic '
-                               f'{mapping.topic}{below}')
+                               f'{mapping.topic}{below}{_plain_advice(text)}')
+
+
+def _plain_advice(text: str) -> str:
+    """Return the name to write instead of one with letters that ROS does not take, or nothing."""
+    plain = in_ascii(text)
+    return f'; ROS takes A to Z, digits and _: {shown(plain)} in Topic reads better' \
+        if plain != text else ''
 
 
 def _useless_cells(row: Row, mapping: Mapping) -> Iterator[Problem]:

@@ -44,6 +44,7 @@ from abdf1_ros.pccc.emulated import EmulatedProcessor, Setting
 from abdf1_ros.pccc.families import dialect_of, FAMILIES, parse_range, served_counters
 from abdf1_ros.pccc.file_types import PlcType
 from abdf1_ros.pccc.server import Server
+from abdf1_ros.pccc.spellings import family_name
 from abdf1_ros.pccc.status import check_status
 from abdf1_ros.pccc.steps import write_requests
 from abdf1_ros.pccc.values import Codec, types_of, ValueType
@@ -315,7 +316,8 @@ def _load_row(row: Row, plcs: dict[int, SimulatedPlc],
     via = _value(row, 'Via', whole(1, MAX_STATION)) if row.get('Via') else None
     length = _value(row, 'Length', whole(1, 1000)) if row.get('Length') else None
     motion = _value(row, 'Motion', member_of(Motion))
-    plc_type = _value(row, 'PLC_Type', one_of({kind.value: kind for kind in FAMILIES}))
+    plc_type = _value(row, 'PLC_Type', one_of(
+        {kind.value: kind for kind in FAMILIES}, family_name))
     if station not in plcs:
         plcs[station] = make(station, plc_type, via)
     plc = plcs[station]

@@ -24,6 +24,7 @@ from abdf1_ros.paths import config_file
 from abdf1_ros.problems import ConfigurationError
 from abdf1_ros.ros.parameters.arguments import Arguments, is_for
 from abdf1_ros.ros.parameters.declared import Configuration, configure, Parameters
+from abdf1_ros.ros.parameters.files import parameter_tree
 from abdf1_ros.ros.parameters.shown import map_cells, ShownFiles
 from abdf1_ros.settings.columns import COLUMNS, MAP_COLUMNS
 from abdf1_ros.settings.network import Network
@@ -220,6 +221,19 @@ def test_parameters_tell_how_stations_are_polled(
         configured: Callable[..., Configuration], values: dict[str, Any],
         expected: PollingSettings) -> None:
     assert configured(**values).driver_settings().polling == expected
+
+
+def test_poll_list_without_standard_polling_is_told(
+        configured: Callable[..., Configuration]) -> None:
+    given = {'poll_list': '1-2', 'poll_multiple': True, 'poll_group_size': 0}
+    assert configured(**given).idle == ['poll_list', 'poll_multiple']
+    assert configured(**given | {'net.polling': 'Standard'}).idle == []
+
+
+def test_csv_as_a_parameter_file_is_told(tmp_path: Path) -> None:
+    path = write_csv(tmp_path / 'net.csv', 'Station,Mode,Com_Port', ['5,Peer,/dev/ttyUSB0'])
+    with pytest.raises(ConfigurationError, match='is not a parameter file, .* -p net_file:='):
+        parameter_tree(str(path))
 
 
 def test_gateway_is_polled_for_the_stations_behind_it(

@@ -261,6 +261,13 @@ def test_rule_13_what_is_no_counter(cells: dict[str, str], text: str) -> None:
     assert text in faults(row(**DOORS), row(**COUNTER | cells))[0]
 
 
+@pytest.mark.parametrize('timeout', ['', '1000'])
+def test_rule_13_misspelt_tag_is_told_with_the_right_name(timeout: str) -> None:
+    told = faults(row(**DOORS | {'While_Timeout': timeout, 'While': 'Countr'}), row(**COUNTER))
+    assert told[-1].endswith('"Countr" is neither; did you mean counter?')
+    assert len(told) == 1 + (not timeout)
+
+
 @pytest.mark.parametrize('text', ['RUM', 'runn', 'RNU'])
 def test_rule_13_misspelt_run_is_not_taken_for_a_tag(text: str) -> None:
     told, = faults(row(**DOORS | {'While_Timeout': '', 'While': text}))
@@ -268,9 +275,10 @@ def test_rule_13_misspelt_run_is_not_taken_for_a_tag(text: str) -> None:
 
 
 def test_rule_14_timeout_has_no_default_and_allows_three_reads() -> None:
-    text, = faults(row(**DOORS | {'While_Timeout': '', 'While': 'PROG'}))
+    text, tag = faults(row(**DOORS | {'While_Timeout': '', 'While': 'PROG'}))
     assert 'While_Timeout is missing: ms that the counter "PROG" may stand still; for the ' \
         'mode of the processor While is RUN' in text
+    assert '(While): Item: 1, should be RUN or the tag of one good Read row; ' in tag
     assert faults(row(**DOORS | {'While_Timeout': '299'}), row(**COUNTER)) == [
         '2:21 (While_Timeout): Item: 1, While_Timeout 299 is less than 3 x 100 ms, the '
         'Period of counter']

@@ -49,6 +49,16 @@ def test_row_with_every_column() -> None:
     assert str(mapping.address) == 'N7:10'
 
 
+@pytest.mark.parametrize(('cells', 'family', 'kind'), [
+    ({'PLC_Type': 'PLC-5', 'Type': 'DINT'}, 'PLC5', 'int32'),
+    ({'PLC_Type': 'SLC 5/03', 'Type': 'REAL'}, 'SLC', 'float32'),
+    ({'PLC_Type': 'MicroLogix', 'Type': 'Word'}, 'SLC', 'uint16')])
+def test_families_and_types_have_the_names_of_the_field(
+        cells: dict[str, str], family: str, kind: str) -> None:
+    mapping = one(Command='Read', Address='N7:0', **cells)
+    assert (str(mapping.plc_type), mapping.type.value) == (family, kind)
+
+
 def test_cells_that_are_left_out_have_defaults() -> None:
     mapping = one(Tag='x:y', Command='Read')
     assert (mapping.length, mapping.type, mapping.topic, mapping.period, mapping.publish) == (
@@ -58,7 +68,7 @@ def test_cells_that_are_left_out_have_defaults() -> None:
 
 @pytest.mark.parametrize('text, reads, writes', [
     ('Read', True, False), ('Write', False, True), ('ReadWrite', True, True),
-    ('READ', True, False), ('write', False, True)])
+    ('READ', True, False), ('write', False, True), ('R/W', True, True), ('rw', True, True)])
 def test_command_says_whether_a_row_reads_and_writes(text: str, reads: bool, writes: bool) -> None:
     mapping = one(Command=text)
     assert (mapping.reads, mapping.writes) == (reads, writes)

@@ -82,6 +82,11 @@ def test_address_that_cannot_be_used(tmp_path: Path, address: str, expected: str
 
 
 @for_all(('text', 'expected'), [
+    (f'{HEAD},Scale,Offset\na,Read,N7:0,1,SLC,0,1\n', [
+        '!2:6 (Scale): Item: 1, Scale should not be 0; write 0.1 instead of 0,1, which are two '
+        'cells']),
+    (f'{HEAD},Scale,Offset\na,Read,N7:0,1,SLC,0,\n', [
+        '!2:6 (Scale): Item: 1, Scale should not be 0']),
     (f'{HEAD}\n#N/A,Read,N7:0,1,SLC\n', [
         '!2:1: "#N/A" is what a spreadsheet writes where it has no value']),
     (f'{HEAD}\n#REF!;x\na,Read,N7:0,1,SLC\n', [
@@ -145,6 +150,9 @@ def test_what_is_told_of_a_map(tmp_path: Path, text: str, expected: list[str]) -
         '2:7 (Publish): Publish has no effect in a Write row']),
     (f'{HEAD},Topic\na,Read,N7:0,1,SLC,/cell/x\n', [
         '2:6 (Topic): Topic "/cell/x" becomes the topic cell/x, below ~/read/ and ~/write/']),
+    (f'{HEAD},Topic\na,Read,N7:0,1,SLC,Füllstand/é\n', [
+        '2:6 (Topic): Topic "Füllstand/é" becomes the topic F_llstand; ROS takes A to Z, digits '
+        'and _: Fuellstand/e in Topic reads better']),
     (f'{HEAD}\na,Read,T4:0,1,SLC\nb,Read,T4:0.ACC,1,SLC\nc,Read,T4:0/DN,1,SLC\n', [
         '2:3 (Address): T4:0 is the control word of the element; its values are T4:0.PRE, '
         'T4:0.ACC']),

@@ -108,8 +108,9 @@ class Search:
 
     def _try(self, baud: int, mode: str, checks: Sequence[str]) -> Found | None:
         """Try one speed and duplex; without any answer the second check is not tried."""
-        # Most full-duplex ports take messages to any station; of the others most have 0 or 1.
-        stations = self._stations[:2] if mode == MODES['full'] else self._stations
+        # Most full-duplex ports take messages to any station; of the others most have 1 or 0.
+        stations = self._stations if mode != MODES['full'] else \
+            sorted(self._stations[:2], key=lambda station: not station)
         for check in checks:
             if self.echoes and mode == MODES['full']:
                 return None

@@ -27,6 +27,7 @@ from abdf1_ros.numbers import whole_number
 from abdf1_ros.pccc.access import Access
 from abdf1_ros.pccc.families import FAMILIES
 from abdf1_ros.pccc.processor import Processor
+from abdf1_ros.pccc.spellings import family_name, type_name
 from abdf1_ros.pccc.values import ValueType, WordOrder
 from abdf1_ros.settings import BAUD_RATES
 from abdf1_ros.settings.columns import MAX_PERIOD
@@ -54,10 +55,6 @@ COLUMN_ROLES = {
 """What the columns of a list may be, for the options of ``plc import``."""
 
 # Names that the PLC's own software and its users have for types and families.
-_TYPES = {'int': 'int16', 'word': 'uint16', 'dint': 'int32', 'long': 'int32', 'dword': 'uint32',
-          'real': 'float32', 'float': 'float32', 'bit': 'bool'}
-_FAMILIES = {'SLC500': 'SLC', 'MICROLOGIX': 'SLC'}
-
 RADIXES = {'dec': Radix.DECIMAL, 'hex': Radix.HEXADECIMAL, 'oct': Radix.OCTAL, 'bin': Radix.BINARY}
 
 _LINE_DEFAULTS = LineDefaults()
@@ -99,7 +96,7 @@ def _add_station(parser: argparse.ArgumentParser) -> None:
 def _add_plc_type(parser: argparse._ActionsContainer,
                   text: str = 'default: the PLC is asked what it is',
                   default: str | None = None) -> None:
-    parser.add_argument('--plc-type', type=_family, choices=[kind.value for kind in FAMILIES],
+    parser.add_argument('--plc-type', type=family_name, choices=[kind.value for kind in FAMILIES],
                         default=default, help=text)
 
 
@@ -212,7 +209,7 @@ def _add_data_options(parser: argparse.ArgumentParser,
     group = parser.add_argument_group('data')
     group.add_argument('--station', metavar='N', type=_station, help=f'address of the PLC {note}')
     _add_plc_type(group)
-    group.add_argument('--type', type=_type, choices=[kind.value for kind in ValueType],
+    group.add_argument('--type', type=type_name, choices=[kind.value for kind in ValueType],
                        help='default: what is natural for the file')
     group.add_argument('--word-order', choices=[order.value for order in WordOrder],
                        help='which word of 32 bits comes first')
@@ -235,15 +232,6 @@ def _add_addresses(parser: argparse.ArgumentParser) -> None:
                         help='keep all bytes of the line in a capture, for "sniff"')
     parser.add_argument('--radix', type=str.lower, choices=tuple(RADIXES), default='dec',
                         help='how whole numbers are written (default: %(default)s)')
-
-
-def _type(text: str) -> str:
-    return _TYPES.get(text.lower(), text.lower())
-
-
-def _family(text: str) -> str:
-    name = text.upper().replace('-', '').replace(' ', '')
-    return _FAMILIES.get(name, name)
 
 
 def _stations(text: str, right: str = '') -> tuple[int, ...]:

@@ -348,7 +348,8 @@ def _detect(options: argparse.Namespace) -> int:
     with Session(found.settings.on(network)) as session, suppress(LinkError):
         if ways := presence.io_access(session, there):
             print(f'inputs and outputs: Access {" or ".join(ways)}')
-    whom = {MODES['full']: '--peer', MODES['half']: f'--station {there.station}'}.get(
+    other = '' if there.station == DEFAULT_STATION else f' --station {there.station}'
+    whom = {MODES['full']: f'--peer{other}', MODES['half']: f'--station {there.station}'}.get(
         settings.mode, f'--radio --station {there.station}') + presence.type_to_say(there)
     parity = '' if network.parity == 'None' else f' --parity {network.parity}'
     print(f'next: {called("plc")} read N7:0 {whom} --port {network.port} --baud {settings.baud} '

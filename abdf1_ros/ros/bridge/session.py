@@ -354,6 +354,9 @@ def _tell_files(logger: RcutilsLogger, configuration: Configuration) -> None:
             f'read_only: no heartbeat and no fallback value is written: {first(silent)}')
     if not configuration.mappings:
         logger.warning('the map has no usable row: nothing is read or written')
+    if configuration.idle:
+        logger.warning(f'{first(configuration.idle)} without effect: for Mode Master with Polling '
+                       'Standard alone')
     if configuration.ignored:
         logger.warning(
             'parameters without effect, because only the map file counts: '

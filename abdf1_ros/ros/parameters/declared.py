@@ -25,6 +25,7 @@ from pathlib import Path
 import random
 from typing import Any
 
+from abdf1_ros.df1.polling import STANDARD
 from abdf1_ros.df1.settings import PollingSettings
 from abdf1_ros.driver.settings import DriverSettings
 from abdf1_ros.paths import config_file
@@ -128,6 +129,8 @@ _KINDS = {bool: 'true or false', int: 'a whole number', float: 'a number', str: 
 
 _MAP_NAMES = {column.lower() for column in COLUMNS}
 
+_OF_STANDARD_POLLING = ('poll_list', 'priority_poll_list', 'poll_group_size', 'poll_multiple',
+                        'send_in_sequence')
 _STATION_LISTS = 'poll_list', 'priority_poll_list'
 
 # Shown as absolute paths, because a relative path does not say which file it is.
@@ -169,6 +172,15 @@ class Configuration:
             DriverSettings(**same), may_store='://' in self.port,
             default_period=self.parameters.default_period / 1000,
             polling=self.polling, first_tns=random.randrange(0x10000))
+
+    @property
+    def idle(self) -> list[str]:
+        """Return the parameters that count with standard polling alone, where there is none."""
+        if self.network.line_mode is STANDARD:
+            return []
+        usual = Parameters()
+        return [name for name in _OF_STANDARD_POLLING
+                if getattr(self.parameters, name) != getattr(usual, name)]
 
     def shown_rows(self) -> Sequence[Mapping]:
         """Return the rows to show as parameters: all or none."""

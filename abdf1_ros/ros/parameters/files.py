@@ -48,7 +48,7 @@ def parameter_tree(path: str) -> yaml.Node | None:
     try:
         text = Path(path).read_text(encoding='utf-8')
         _check_events(path, yaml.parse(text))
-        return yaml.compose(text)
+        tree = yaml.compose(text)
     except yaml.MarkedYAMLError as error:
         mark, text = error.problem_mark, ' '.join(str(error.problem or error).split())
         if "'\\t'" in text:
@@ -57,6 +57,11 @@ def parameter_tree(path: str) -> yaml.Node | None:
         raise ConfigurationError([Problem(place, text)]) from None
     except (OSError, ValueError, yaml.YAMLError) as error:
         raise ConfigurationError([Problem(path, ' '.join(str(error).split()))]) from None
+    if isinstance(tree, yaml.ScalarNode):
+        raise ConfigurationError([Problem(path, (
+            'is not a parameter file, which begins with the name of a node; a CSV is named by '
+            f'-p net_file:={path} or -p map_file:={path}'))])
+    return tree
 
 
 def _check_events(path: str, events: Iterable[yaml.Event]) -> None:

@@ -23,6 +23,7 @@ import threading
 
 from abdf1_ros import settings
 from abdf1_ros.cli.plc import detect
+from abdf1_ros.cli.plc.command import main
 from abdf1_ros.cli.plc.detect import BAUD_RATES, LineSettings, Search
 from abdf1_ros.cli.plc.init import net_csv
 from abdf1_ros.df1.checksum import Checksum
@@ -140,8 +141,22 @@ def test_full_duplex_port_that_compares_stations_is_found(tmp_path: Path) -> Non
         found = Search(network, range(8), trying).run([9600])
     assert found is not None
     assert (found.settings.mode, found.presence.station) == ('Peer', 1)
-    assert trying == ['9600 baud, full duplex, CRC, station 0',
-                      '9600 baud, full duplex, CRC, station 1']
+    assert trying == ['9600 baud, full duplex, CRC, station 1']  # that of plc without --station
+
+
+class Other(FullDuplexPeer):
+    """A full-duplex port that passes over what is not for its own station, which is 0."""
+
+    def _message(self, frame: Frame) -> bytes:
+        return super()._message(frame) if frame.data[:1] == b'\0' else b''
+
+
+def test_full_duplex_port_with_station_0_is_found_and_named(
+        tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    with plc_on(tmp_path / 'line', 'CRC', Duplex.FULL, Other) as network:
+        assert main(['detect', '--port', network.port, '--baud', '9600', '--duplex', 'full',
+                     '--check', 'CRC', '--timeout', '100']) == 0
+    assert '--peer --station 0 --port' in capsys.readouterr().out
 
 
 def test_radio_modem_is_found_by_replies_without_ack(
