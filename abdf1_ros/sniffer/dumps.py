@@ -33,10 +33,11 @@ import zlib
 
 from abdf1_ros.problems import Problem
 from abdf1_ros.sniffer.capture import Chunk, Direction, is_capture_line, read_capture
-from abdf1_ros.sniffer.ethernet_ip import chunks_of, CSP
+from abdf1_ros.sniffer.ethernet_ip import chunks_of, CSP, Seen
 from abdf1_ros.sniffer.logs import LogReader
 from abdf1_ros.sniffer.packet_files import is_packet_file, PacketFile
 from abdf1_ros.sniffer.pcapng import LINK_TYPE
+from abdf1_ros.text import counted
 
 _BLOCK = 4096
 _GZIP = b'\x1F\x8B'
@@ -104,12 +105,17 @@ class Recording:
 
     def _packets(self) -> Iterator[Chunk]:
         file = PacketFile(self._name, cast(BinaryIO, self._file))
-        is_empty, ports = True, set[int]()
-        for chunk in chunks_of(file.packets(), ports):
+        is_empty, seen = True, Seen()
+        for chunk in chunks_of(file.packets(), seen):
             is_empty, self._position = False, file.position
             yield chunk
+        if seen.cut:
+            raise Problem(self._name, (
+                f'{counted(len(seen.cut), "packet")} cut by the recorder, at {max(seen.cut)} '
+                'bytes: what was in them is missing; record whole packets, as "tcpdump -s 0" '
+                'does'))
         if is_empty:
-            csp = f'; TCP port {CSP} is CSP, which is not decoded' if CSP in ports else ''
+            csp = f'; TCP port {CSP} is CSP, which is not decoded' if CSP in seen.ports else ''
             raise Problem(self._name, f'byte {file.position}: no packet up to here has DF1 (link '
                           f'type {LINK_TYPE}) or PCCC in EtherNet/IP (CIP service 4B)' + csp)
 

@@ -24,6 +24,7 @@ number one that is free. A response names no class: it is PCCC where its request
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
+from dataclasses import dataclass, field
 import struct
 
 from abdf1_ros.sniffer.capture import Chunk, Direction
@@ -181,11 +182,19 @@ class _Connections:
             yield Chunk(time, way, ours + pccc, is_message=True)
 
 
-def chunks_of(packets: Iterable[RecordedPacket], ports: set[int]) -> Iterator[Chunk]:
+@dataclass(slots=True)
+class Seen:
+    """The TCP ports of packets, and the sizes (bytes) of those that the recorder has cut."""
+
+    ports: set[int] = field(default_factory=set)
+    cut: list[int] = field(default_factory=list)
+
+
+def chunks_of(packets: Iterable[RecordedPacket], seen: Seen) -> Iterator[Chunk]:
     """
     Yield what DF1 and PCCC there is in packets, with times (s) from the first packet on.
 
-    All TCP ports that were seen come into ``ports``.
+    TCP ports come into ``seen``, and packets that were cut, of which nothing is decoded.
     """
     connections = _Connections()
     begun: float | None = None
@@ -198,16 +207,18 @@ def chunks_of(packets: Iterable[RecordedPacket], ports: set[int]) -> Iterator[Ch
         elif link_type == _RTAC and len(data) > 12 and data[8] in _RTAC_EVENTS:
             yield Chunk(later, _RTAC_EVENTS[data[8]], data[12:])
         elif (segment := _tcp(link_type, data)) is not None:
-            ends, number, payload = segment
+            ends, number, payload, is_cut = segment
             both = {int.from_bytes(ends[8:10], 'big'), int.from_bytes(ends[10:], 'big')}
-            ports |= both
-            if _PORT in both:
+            seen.ports |= both
+            if _PORT in both and is_cut:
+                seen.cut.append(len(data))
+            elif _PORT in both:
                 yield from connections.feed(ends, number, payload, later)
     yield from connections.flush(later)
 
 
-def _tcp(link_type: int, data: bytes) -> tuple[bytes, int, bytes] | None:
-    """Return addresses and ports, sequence number and payload of a segment."""
+def _tcp(link_type: int, data: bytes) -> tuple[bytes, int, bytes, bool] | None:
+    """Return addresses and ports, number and payload of a segment, and whether it is cut."""
     start, kind = _LINKS.get(link_type, (len(data), None))
     if kind is not None:
         while data[kind:kind + 2] in _TAGS:
@@ -218,13 +229,14 @@ def _tcp(link_type: int, data: bytes) -> tuple[bytes, int, bytes] | None:
     if len(head) < 20 or head[0] >> 4 != 4 or head[9] != _TCP or head[6] & 0x3F or head[7]:
         return None  # also fragments, which EtherNet/IP has not
     size = 4 * (head[0] & 0x0F)
-    segment = head[size:int.from_bytes(head[2:4], 'big')]
+    end = int.from_bytes(head[2:4], 'big')
+    segment = head[size:end]
     if len(segment) < 20:
         return None
     ports, number = segment[:4], int.from_bytes(segment[4:8], 'big')
     is_first = segment[13] & 0x02
     payload = segment[4 * (segment[12] >> 4):]
-    return head[12:20] + ports, number + bool(is_first), payload
+    return head[12:20] + ports, number + bool(is_first), payload, len(head) < end
 
 
 def _pccc(message: bytes) -> Iterator[tuple[bool, bytes]]:

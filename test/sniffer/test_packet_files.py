@@ -129,6 +129,20 @@ def test_pccc_of_a_real_processor_is_told_in_words(tmp_path: Path, content: byte
     assert reply.latency == pytest.approx(0.005, abs=2e-6)
 
 
+def test_packets_that_the_recorder_has_cut_are_told_and_others_read(tmp_path: Path) -> None:
+    packets = exchange()
+    whole = exchange(1001.0)
+    cut = [(time, data[:90]) for time, data in packets]
+    with pytest.raises(Problem, match='2 packets cut by the recorder, at 90 bytes: what was in '
+                                      'them is missing; record whole packets'):
+        chunks_of(tmp_path / 'x', pcap(cut))
+    (tmp_path / 'y').write_bytes(pcap(cut + whole))
+    recorded = Recording(tmp_path / 'y').chunks()
+    assert [next(recorded).direction, next(recorded).direction] == [Direction.OUT, Direction.IN]
+    with pytest.raises(Problem, match='2 packets cut'):
+        next(recorded)
+
+
 @pytest.mark.parametrize('data', [
     encapsulated(cip(STATUS), is_connected=True), encapsulated(sent_through(cip(STATUS)))])
 def test_pccc_comes_connected_and_through_a_backplane(tmp_path: Path, data: bytes) -> None:
