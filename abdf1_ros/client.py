@@ -226,7 +226,7 @@ class Client(OpenLine):
         """Return the row of a map that an address would have, and whether it is a single one."""
         from abdf1_ros.plan.reading import row_of
         plc_type, processor = self._kind or self._asked(station)
-        with self.naming(_place(text_of('address', text), station)):
+        with self.naming(_place(text_of('address', text), station), asks=False):
             found = parse_range(text, plc_type, self._access)
             first, length = (found.first, found.length()) if isinstance(found, AddressRange) \
                 else (found, 1)
@@ -242,7 +242,7 @@ class Client(OpenLine):
         chosen = None if kind is None else _choice('kind', member_of(ValueType), kind)
         order = _choice('word_order', member_of(WordOrder), word_order)
         plc_type, processor = self._kind or self._asked(number)
-        with self.naming(_place(place, number)):
+        with self.naming(_place(place, number), asks=False):
             return number, AddressedValues.of(place, plc_type, count, chosen, word_order=order,
                                               access=self._access, processor=processor)
 

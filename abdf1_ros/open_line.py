@@ -222,8 +222,8 @@ class OpenLine:
                          self._mode.pause(self._settings))
 
     @contextmanager
-    def naming(self, place: str) -> Iterator[None]:
-        """Add the subject to errors of the block; log how long the block took."""
+    def naming(self, place: str, asks: bool = True) -> Iterator[None]:
+        """Add the subject to errors of the block; log how long a block that ``asks`` took."""
         begun = time.monotonic()
         try:
             yield
@@ -231,7 +231,8 @@ class OpenLine:
             error.about = error.about or place
             self.log.debug('%s', error)
             raise
-        self.log.debug('%s: %.1f ms', place, (time.monotonic() - begun) * 1000)
+        if asks:
+            self.log.debug('%s: %.1f ms', place, (time.monotonic() - begun) * 1000)
 
     def _told(self, event: Event) -> None:
         is_error = event.message.severity is not Severity.NOTICE
