@@ -27,6 +27,7 @@ from abdf1_ros.cli.monitor.view import Reading, SILENCE, Snapshot, Status, Style
 from abdf1_ros.errors import FormatError
 from abdf1_ros.ros.observer import graph_hint, Observer
 from abdf1_ros.ros.topics.messages import latched_qos, MESSAGES
+from abdf1_ros.text import by_number
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from rclpy.duration import Infinite
 from rclpy.event_handler import SubscriptionEventCallbacks
@@ -126,13 +127,15 @@ class NodeWatch(Listening):
     def bridges(self) -> list[str]:
         """Return the full names of the bridges that can be seen."""
         ending = '/active_stations'
-        return sorted(topic.removesuffix(ending)
-                      for topic, types in self.node.get_topic_names_and_types()
-                      if topic.endswith(ending) and self.node.count_publishers(topic))
+        return sorted((topic.removesuffix(ending)
+                       for topic, types in self.node.get_topic_names_and_types()
+                       if topic.endswith(ending) and self.node.count_publishers(topic)),
+                      key=by_number)
 
     def snapshot(self) -> Snapshot:
         """Return what is known now."""
-        readings = [self._subscriptions[topic].reading for topic in sorted(self._subscriptions)]
+        readings = [self._subscriptions[topic].reading
+                    for topic in sorted(self._subscriptions, key=by_number)]
         return Snapshot(
             self.name, self.is_there, self._told, tuple(self._statuses), readings,
             self._active, tuple(self._results), graph_hint())

@@ -16,6 +16,8 @@
 
 from collections.abc import Callable, Iterator
 import time
+from types import SimpleNamespace
+from typing import Any
 
 from abdf1_ros.cli.monitor.node import full_name, NodeWatch
 from abdf1_ros.cli.monitor.view import Reading, Snapshot, Style
@@ -236,3 +238,10 @@ def test_names_may_lack_the_slash_in_front(text: str, name: str) -> None:
 def test_bad_names_are_refused_with_a_good_one(text: str) -> None:
     with pytest.raises(FormatError, match='it should be like /abdf1 or /cell/abdf1'):
         full_name(text)
+
+
+def test_bridges_are_named_in_the_order_of_their_numbers() -> None:
+    topics = [(f'/line{number}/active_stations', ['x']) for number in (10, 2, 1)]
+    watch: Any = SimpleNamespace(node=SimpleNamespace(
+        get_topic_names_and_types=lambda: topics, count_publishers=lambda topic: 1))
+    assert NodeWatch.bridges(watch) == ['/line1', '/line2', '/line10']
