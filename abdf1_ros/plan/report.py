@@ -377,6 +377,11 @@ def _load_remarks(report: Report) -> Iterator[Remark]:
         yield Remark(RemarkKind.LOAD, (
             f'the periods need {load:.0%} of the line; writes, repetitions and silent stations '
             'have to do with the rest'))
+    guarded = [row for row in report.mappings if row.is_guarded]
+    if load > _HIGH_LOAD and guarded:
+        yield Remark(RemarkKind.LOAD, (
+            'rows with While come more rarely than their neighbours on such a line, as each value '
+            f'needs a young answer about the mode, or a young counter: {_tags(guarded)}'))
     if share_places(report.network.share):
         yield Remark(RemarkKind.LOAD, (
             'while guests (Share) ask, a quarter of the time may be theirs: the periods then need '

@@ -25,12 +25,14 @@ from __future__ import annotations
 import errno
 from hashlib import sha256
 import socket
-from typing import Any
+from typing import Any, ClassVar
 from urllib.parse import urlsplit
+from weakref import WeakValueDictionary
 
 from abdf1_ros.line_names import address_of, device_of, LOOPBACK
 
 BUSY = 'another program has it open'
+_OURS = 'this program has it open, or has not ended its last attempt to connect'
 
 _LOCK = '\0abdf1_ros.port.'
 
@@ -70,13 +72,19 @@ def own(name: str) -> socket.socket:
 class OwnedConnection(socket.socket):
     """A TCP connection to a device server's port, which is ours until it is closed."""
 
+    _locks: ClassVar[WeakValueDictionary[str, socket.socket]] = WeakValueDictionary()
+
     def __init__(self, family: int, address: tuple[Any, ...]) -> None:
-        """Take the port; OSError where another program of this host has it."""
+        """Take the port; OSError where this or another program of this host has it."""
         super().__init__(family, socket.SOCK_STREAM)
+        name = address_of(*address[:2])
         try:
-            self._lock = own(address_of(*address[:2]))
-        except OSError:
+            self._lock = self._locks[name] = own(name)
+        except OSError as error:
             super().close()
+            ours = self._locks.get(name)
+            if ours is not None and ours.fileno() >= 0:
+                error.strerror = _OURS
             raise
 
     def close(self) -> None:

@@ -158,6 +158,16 @@ def test_period_that_another_baud_rate_can_keep() -> None:
         'speed: a read takes 74.2 ms, the period is 50.0 ms']
 
 
+def test_guarded_rows_of_a_full_line_are_named() -> None:
+    rows = [make_mapping('N7:0', period=50, tag='free'),
+            make_mapping('N7:1', period=50, tag='guarded', condition=While(('RUN',)))]
+    assert texts(report_of(*rows), RemarkKind.LOAD)[1:] == [
+        'rows with While come more rarely than their neighbours on such a line, as each value '
+        'needs a young answer about the mode, or a young counter: guarded']
+    light = [replace(row, period=2000) for row in rows]
+    assert texts(report_of(*light), RemarkKind.LOAD) == []
+
+
 def test_baud_rate_has_to_do_for_heartbeats_and_questions_too() -> None:
     rows = [make_mapping('N7:0', length=2, period=100, tag='speed'),
             make_mapping('N10:0', 'Heartbeat', tag='beat', period=300)]

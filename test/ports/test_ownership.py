@@ -74,7 +74,7 @@ def server() -> Iterator[int]:
 def test_port_of_a_device_server_has_one_owner_until_he_leaves_it(server: int) -> None:
     port = open_port(PortSettings(f'socket://localhost:{server}'))
     for url in (f'socket://127.1:{server}', f'rfc2217://127.0.0.1:0{server}'):
-        with pytest.raises(OSError, match='another program has it open'):
+        with pytest.raises(OSError, match='this program has it open, or has not ended its last'):
             open_port(PortSettings(url))
     port.close()
     open_port(PortSettings(f'socket://127.1:{server}')).close()

@@ -36,10 +36,12 @@ about heartbeats runs in each PLC where the plant has a ``scan``.
 
 from __future__ import annotations
 
+from collections import deque
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cache, partial
 import hashlib
+from itertools import count
 import math
 from random import Random
 from typing import NamedTuple
@@ -52,10 +54,11 @@ from abdf1_ros.driver.guests import Guest, GuestCommand, ShareAccess
 from abdf1_ros.driver.settings import DriverSettings
 from abdf1_ros.driver.write import WriteResult
 from abdf1_ros.driver.writes.ages import Ages, most_ahead, Standstills
-from abdf1_ros.errors import FormatError, PortLost
-from abdf1_ros.pccc.address import Address
+from abdf1_ros.errors import FormatError, LinkError, PortLost
+from abdf1_ros.pccc.address import Address, Area
 from abdf1_ros.pccc.emulated import Setting
 from abdf1_ros.pccc.families import dialect_of, parse_address
+from abdf1_ros.pccc.file_types import PlcType
 from abdf1_ros.plan.report import make_report
 from abdf1_ros.settings.heartbeats import Fallback, LONGEST_END, TIME_BASE, While
 from abdf1_ros.settings.mapping import Mapping
@@ -81,6 +84,7 @@ _MASTER_RESTS = 0.005  # s, of one that polls us, before all that it sends
 SLAVE_PRESET = 1000  # of a watchdog where none is printed, in units of 10 ms
 _ALL = 255  # stations
 _WRITES = (b'\x67', b'\xAA')  # functions of a typed write
+_MASKED = 0x0F  # command of a write that names single words
 _TICKS = 30_000
 _FAR = 1  # what a VirtualLine calls the far end
 SMALL = Noise(lost=0.0005, flipped=0.001, inserted=0.0005)
@@ -88,7 +92,7 @@ GREAT = Noise(lost=0.005, flipped=0.01, inserted=0.005)  # of which some is more
 MODES: dict[str, dict[str, str]] = {
     'Message': {}, 'Standard': {'polling': 'Standard'}, 'Peer': {'mode': 'Peer'},
     'Radio': {'mode': 'Radio'}, 'Gateway': {}, 'Standard gateway': {'polling': 'Standard'},
-    'Slave': {'mode': 'Slave', 'plc_type': 'SLC'}}
+    'Slave': {'mode': 'Slave', 'plc_type': 'PLC5'}}
 POLLED = ('Standard', 'Standard gateway', 'Slave')  # polls go on all the time
 OURS, OTHER_BRIDGE, MASTER = 200, 201, 9  # stations
 GATEWAY = 5  # the station on the line, behind which the PLC is
@@ -98,7 +102,9 @@ DAMAGED = b'ZZZZ'  # what the line does not carry: only guests send it
 USUAL: tuple[Filter, Filter] = bytes, bytes
 
 OUTPUTS, FREE, CLOCK, COUNTER, BEAT = 'N7:0', 'N7:20', 'N9:0', 'N9:4', 'N10:0'
-SERVED = 'N7:50'  # of our own table, for the master
+# Words of our own table: that the master only reads, and those that it writes.
+SERVED, TAKEN, TAKEN_WORDS = 'N7:50', 'N7:51', 2
+HELD = 'N7:0'  # from here all words of messages are read, and what follows
 
 
 @dataclass(frozen=True, slots=True)
@@ -122,6 +128,7 @@ class Plant:
     is_read_only: bool = False
     scan: int = 0  # ms of the ladder, 0 for none
     may_store: bool = False  # the port, while another client has the line
+    held: int = 0  # words from the first output on that are read
 
     @classmethod
     def drawn(cls, dice: Random, mode: str = '') -> Plant:
@@ -133,7 +140,7 @@ class Plant:
         if mode == 'Slave':  # the polls of its master leave room for three outputs in all
             stations = min(stations, 2)
             rows = min(rows, 3 // stations)
-        return cls(
+        plant = cls(
             mode, stations, rows, dice.choice(['PLC5', 'SLC']),
             dice.choice([600, 1000, 2000]), dice.choice([500, 1000, 2000]),
             dice.choice([None, None, 800, 1500]),
@@ -141,6 +148,9 @@ class Plant:
                         [19200, 38400] if mode == 'Slave' else [9600, 19200, 38400]),
             dice.choice([1, 2]), dice.choice([0.5, 2.0]), dice.random() < 0.06,
             dice.choice([0, 0, 50, 100]), dice.random() < 0.4)
+        is_held = mode in ('Message', 'Peer', 'Gateway') and dice.random() < 0.5
+        # Of a fast line in two packets.
+        return replace(plant, held=0 if not is_held else 140 if plant.baud > 19200 else 21)
 
     @property
     def network(self) -> Network:
@@ -181,9 +191,13 @@ class Plant:
             add(COUNTER, 'Read', 'counter', period=1000)
             add('N9:3', 'Read', 'counted', period=1000,
                 condition=While((f'counter_{station}',), self.counts_within))
+            if self.held:
+                add(HELD, 'Read', 'held', length=self.held, period=1000)
         if self.mode == 'Slave':
-            found.append(make_mapping(SERVED, 'Serve', station=OURS, plc='SLC', tag='served',
-                                      fallback=Fallback((SAFE,), self.after)))
+            found.append(make_mapping(SERVED, 'Serve', station=OURS, tag='served',
+                                      is_read_only=True, fallback=Fallback((SAFE,), self.after)))
+            found.append(make_mapping(TAKEN, 'Serve', station=OURS, tag='taken',
+                                      length=TAKEN_WORDS))
         return found
 
 
@@ -220,6 +234,29 @@ class Executed:
     is_told: bool = True
 
 
+class Shown(NamedTuple):
+    """Words from an offset of a file on, that a PLC has read out for a command."""
+
+    when: float
+    area: Area
+    offset: int
+    words: bytes
+
+    def word(self, area: Area, offset: int) -> int | None:
+        """Return one of them, None where it is none of them."""
+        at = 2 * (offset - self.offset)
+        return int.from_bytes(self.words[at:at + 2], 'little') \
+            if self.area == area and 0 <= at < len(self.words) else None
+
+
+class Said(NamedTuple):
+    """What the master has written to our table; ``sts`` is None where it got no reply."""
+
+    value: int
+    is_right: bool  # the others name a word that it must not write
+    sts: int | None
+
+
 @dataclass(slots=True)
 class WatchedPlc:
     """A PLC, and what it does with what comes."""
@@ -237,6 +274,7 @@ class WatchedPlc:
     preset: float = 0.0  # s, of the watchdog of its ladder, 0 where it has none
     # What the lamps of its ladder showed, with the time, and which of them are on.
     lamps: list[tuple[float, Lamp, bool]] = field(default_factory=list)
+    shown: deque[Shown] = field(default_factory=lambda: deque(maxlen=100))
     tags: dict[str, str] = field(init=False)  # by address
     place_of: Callable[[str], Address] = field(init=False)
 
@@ -272,6 +310,14 @@ class WatchedPlc:
         """Return when its program ran last."""
         return now if self.plc.is_running else self.stopped
 
+    def answered(self, place: Address, offset: int, until: float) -> tuple[float, int] | None:
+        """Return when it read out a word last until then, and which it was."""
+        for shown in reversed(self.shown):
+            word = shown.word(place.area, offset) if shown.when <= until else None
+            if word is not None:
+                return shown.when, word
+        return None
+
     def last_showed(self, tick: int, now: float) -> float:
         """Return until when its program showed a tick, a time long ago for never."""
         if tick == ticks(self.stopped):  # it stood so until it ran again
@@ -287,6 +333,18 @@ def ticks(now: float) -> int:
 
 # A lead that a stamp has shown is remembered for so long (s) at least (rule 7).
 LEAD_IS_KNOWN = 5.0
+
+
+def _written(value: int, is_right: bool) -> tuple[int, bytes]:
+    """Return how the master writes to our table; a wrong command names a third word last."""
+    place = parse_address(TAKEN, PlcType.PLC5)
+    word = value.to_bytes(2, 'little')
+    if is_right:
+        return dialect_of(PlcType.PLC5).write(place, TAKEN_WORDS * word)
+    elements = *(place.element + at for at in range(TAKEN_WORDS)), \
+        parse_address(SERVED, PlcType.PLC5).element
+    return _MASKED, b'\x26' + b''.join(
+        bytes((7, 0, place.area.file, element, 0, 0)) + word for element in elements)
 
 
 class Clocks:
@@ -370,7 +428,8 @@ class World(DriverBench):
         super().__init__(rows, network=plant.network, settings=settings, start=False, chunk=_FIFO)
         self.rows = {row.tag: row for row in rows}
         self.messages = [row for row in rows if row.tag[0] in 'wfs']
-        self.executed: list[Executed] = []
+        # Words that PLCs have taken; and all that they have executed, as station and command.
+        self.executed, self.commands = list[Executed](), list[tuple[float, int, Packet]]()
         self.published: dict[tuple[str, int], float] = {}
         self.keys: list[tuple[str, int]] = []  # of all messages, in their order
         self._guests = [Guest(f'pty:{number}', ShareAccess.ALL)
@@ -400,7 +459,9 @@ class World(DriverBench):
         self.plcs = {station: self._watch(station) for station in range(1, plant.stations + 1)}
         self.far.hear, self.far.say = self._hear, self._say
         self.master: MasterNode | None = None
-        self.served: list[tuple[float, int]] = []  # what it read of our own table, and when
+        # What it read of our own table, and when. What it did to the words that it may write, in
+        # that order, and what it read there.
+        self.served, self.taken = list[tuple[float, int]](), list[Said | tuple[int, ...]]()
         if plant.mode == 'Slave':
             self._put_a_master()
         self.sent: list[Sent] = []
@@ -432,7 +493,8 @@ class World(DriverBench):
         return self.listener.reads
 
     def _watch(self, station: int) -> WatchedPlc:
-        plc = self.plc(station, self.plant.kind, ('N7:0', 24), ('N9:0', 8), ('N10:0', 1))
+        plc = self.plc(station, self.plant.kind, ('N7:0', max(24, self.plant.held)), ('N9:0', 8),
+                       ('N10:0', 1))
         places = {row.tag: str(row.address) for row in self.rows.values()
                   if row.station == station and (row.writes or row.is_heartbeat)}
         watched = WatchedPlc(plc, places)
@@ -479,23 +541,47 @@ class World(DriverBench):
         master.machine.start(self.line.now, self.line.outlet(master.machine))
         place = self.rows['served'].address
         dialect = self.rows['served'].dialect
+        words, numbers = 1 + TAKEN_WORDS, count(1)
+
+        def take(reply: Packet | None, _: Said) -> None:
+            if reply is not None and not reply.sts:
+                data = dialect.read_data(place, words, reply.data)
+                first, *rest = (int.from_bytes(data[at:at + 2], 'little')
+                                for at in range(0, 2 * words, 2))
+                self.served.append((self.line.now, first))
+                self.taken.append((*rest,))
+
+        def take_end(reply: Packet | None, said: Said) -> None:
+            self.taken.append(said._replace(sts=None if reply is None else reply.sts))
 
         def ask() -> None:
-            if not master.waiting:
-                cmd, data = dialect.read(place, 1)
-                task = master.add(Packet(OURS, MASTER, cmd, 0, len(master.all), data))
-                told = task.reply
-
-                def take(reply: Packet) -> None:
-                    told(reply)
-                    if not reply.sts:
-                        word = dialect.read_data(place, 1, reply.data)
-                        self.served.append((self.line.now, int.from_bytes(word, 'little')))
-
-                task.reply = take  # type: ignore[method-assign,assignment]
+            if all(task.result is not None for task in master.all[-2:]):
+                self._ask_us(master, *dialect.read(place, words), take)
+                value = next(numbers)
+                if value % 2:
+                    is_right = value % 4 == 1
+                    self._ask_us(master, *_written(value, is_right), take_end,
+                                 Said(value, is_right, None))
             self.at(self.line.now + 0.5, ask)
 
         ask()
+
+    def _ask_us(self, master: MasterNode, cmd: int, data: bytes,
+                take: Callable[[Packet | None, Said], None],
+                said: Said = Said(0, False, None)) -> None:  # noqa: B008
+        """Let the master send a command for our own table, and take its end."""
+        task = master.add(Packet(OURS, MASTER, cmd, 0, len(master.all), data))
+        told, failed = task.reply, task.fail
+
+        def reply(packet: Packet) -> None:
+            told(packet)
+            take(packet, said)
+
+        def fail(error: LinkError) -> None:
+            failed(error)
+            take(None, said)
+
+        task.reply, task.fail = reply, fail  # type: ignore[method-assign]
 
     def _pass_on(self, execute: Callable[..., Packet], command: Packet) -> Packet:
         """Let the gateway keep a write for a while, and say that it has not delivered it."""
@@ -515,8 +601,9 @@ class World(DriverBench):
         """Execute a command, unless it is refused; keep what it has written."""
         watched.run_program(self.line.now)
         now = watched.plc._clock()
+        self.commands.append((now, watched.plc.station, command))
         if command.data[:1] not in _WRITES:
-            return serve(command)
+            return self._read_out(watched, command, serve)
         station = watched.plc.station
         written: list[tuple[str, int, int]] = []
         table = watched.plc.table
@@ -546,6 +633,22 @@ class World(DriverBench):
             for tag, value, before in written]
         if not is_told:
             return reply._replace(tns=reply.tns ^ 0x8000)  # which nobody waits for
+        return reply
+
+    def _read_out(self, watched: WatchedPlc, command: Packet,
+                  serve: Callable[[Packet], Packet]) -> Packet:
+        """Execute a command that is no write; keep the words that it has read."""
+        table, now = watched.plc.table, self.line.now
+        read = table.read
+
+        def note(address: Address, words: int) -> bytes:
+            data = read(address, words)
+            watched.shown.append(Shown(now, address.area, address.offset, data))
+            return data
+
+        table.read = note  # type: ignore[method-assign]
+        reply = serve(command)
+        del table.read
         return reply
 
     def _note_sent(self, data: bytes, start: float, receiver: int) -> None:
@@ -782,7 +885,12 @@ class World(DriverBench):
         self.run(self.held_for)
 
     def reload(self) -> None:
-        """Put another driver in the place of one that has ended."""
+        """Put another driver in the place of one that has ended; some rows have a new Length."""
+        for row in self.plant.mappings():
+            if row.tag.startswith(('clock', 'held')):
+                length = self.dice.choice([row.length, row.length // 2])
+                self.rows[row.tag] = replace(self.rows[row.tag], length=length)
+        self._mappings = [*self.rows.values()]
         self.drivers += 1
         self.killed_at = self.opened = self.line.now
         self.said.clear()

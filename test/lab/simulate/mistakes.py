@@ -36,6 +36,7 @@ import math
 from pathlib import Path
 import sys
 import time
+from types import ModuleType
 from typing import Any
 from unittest import mock
 
@@ -43,6 +44,7 @@ if __name__ == '__main__':  # pytest has its own paths
     sys.path[:0] = [str(Path(__file__).parents[number]) for number in (1, 2, 3)]
 
 from abdf1_ros.df1.master import HalfDuplexMaster
+from abdf1_ros.df1.packet import Packet
 from abdf1_ros.driver.agenda import Agenda
 from abdf1_ros.driver.driver import Driver
 from abdf1_ros.driver.guests import GuestJob
@@ -50,26 +52,32 @@ from abdf1_ros.driver.interlocks.fallback import FallbackCause, FallbackRow
 from abdf1_ros.driver.interlocks.heartbeat import BeatState, HeartbeatRow
 from abdf1_ros.driver.interlocks.plc import Plc
 from abdf1_ros.driver.interlocks.queue import Interlocks, OwnWrite
+from abdf1_ros.driver.reads import job
 from abdf1_ros.driver.reads.guards import CounterGuard, RunGuard
 from abdf1_ros.driver.reads.point import ReadPoint
 from abdf1_ros.driver.record import Claim, OwnWords
+from abdf1_ros.driver.served import _MappedTable
 from abdf1_ros.driver.write import Outcome, Write, WriteResult
 from abdf1_ros.driver.writes.ages import RecentMax, Standstills
 from abdf1_ros.driver.writes.queue import MessageJob, WriteQueue
+from abdf1_ros.driver.writes.standing import Standing
 from abdf1_ros.pccc.values import Codec
 from abdf1_ros.plan.bounds import Times
+from abdf1_ros.plan.planner import Block
 from abdf1_ros.settings.mapping import Mapping
 from simulate.rules import Broken
 from simulate.run import Story
 
+_SHORT = 2  # words of rows that have the same place in all plants
+
 
 @dataclass(frozen=True, slots=True)
 class Mistake:
-    """``make`` gets what stands in a class, and returns what is put there instead."""
+    """``make`` gets what stands in a class or module, and returns what is put there instead."""
 
     rule: str
     text: str
-    owner: type
+    owner: type | ModuleType
     name: str
     make: Callable[[Any], Any]
 
@@ -265,6 +273,43 @@ def _preset_of_a_period(preset: Any) -> Any:
     return lambda self, mapping: mapping.period / 1000
 
 
+def _keeps_places(slice_of: Any) -> Any:
+    kept: dict[str, slice] = {}
+
+    def find_wrongly(self: Block, mapping: Mapping) -> slice:
+        found: slice = slice_of(self, mapping)
+        return kept.setdefault(mapping.tag, found) if mapping.length <= _SHORT else found
+
+    return find_wrongly
+
+
+def _undoes_one_word(take_back: Any) -> Any:
+    def take_back_wrongly(self: _MappedTable) -> None:
+        del self.changed[1:]
+        take_back(self)
+
+    return take_back_wrongly
+
+
+def _proves_itself(write_ended: Any) -> Any:
+    def end_wrongly(self: Standing, claim: Claim) -> None:
+        write_ended(self, claim)
+        value = claim.write and self._values.get(claim.write.mapping)
+        if value:
+            value.shown = value.confirmed
+
+    return end_wrongly
+
+
+def _proves_for_long(proof: Any) -> Any:
+    def prove_wrongly(self: Standing, write: Write, now: float) -> str:
+        value = self._values.get(write.mapping)
+        found: str = proof(self, write, min(now, value.shown, value.confirmed) if value else now)
+        return found
+
+    return prove_wrongly
+
+
 def _always(value: Any) -> Callable[[Any], Any]:
     return lambda before: lambda *arguments, **named: value
 
@@ -346,7 +391,17 @@ MISTAKES = (
     Mistake('results', 'unknown is told as not sent', Write, 'result', _told_as_not_sent),
     Mistake('results', 'messages are dropped in silence', WriteQueue, 'drop',
             _dropped_in_silence),
-    Mistake('values', 'a value is that of the read before', Codec, 'decode', _value_before))
+    Mistake('values', 'a value is that of the read before', Codec, 'decode', _value_before),
+    Mistake('values', 'a read that stood still is published', job, 'MOST_LATE',
+            lambda before: math.inf),
+    Mistake('values', 'a reload keeps the Length of before', Block, 'slice_of', _keeps_places),
+    Mistake('link', 'what comes again is not known', Packet, 'duplicate_key',
+            lambda before: property(lambda self: object())),
+    Mistake('served', 'a refused command is undone in its first word', _MappedTable, 'take_back',
+            _undoes_one_word),
+    Mistake('results', 'no read-back shows the value', Write, 'is_held', _always(False)),
+    Mistake('27', 'a confirmation alone is the proof', Standing, 'write_ended', _proves_itself),
+    Mistake('27', 'a proof never becomes too old', Standing, 'proof', _proves_for_long))
 
 
 def find(mistake: Mistake, seed: int, limit: float) -> tuple[str, int, float, float]:

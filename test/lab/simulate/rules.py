@@ -27,16 +27,19 @@ from operator import attrgetter
 
 from abdf1_ros.conform.codec import BlockCheck, next_symbol, SymbolKind
 from abdf1_ros.df1.frames import Duplex
+from abdf1_ros.df1.machine import MOST_LATE
 from abdf1_ros.df1.radio import LONGEST_WAIT
 from abdf1_ros.driver.write import Outcome, WriteResult
 from abdf1_ros.plan.bounds import MODE_PERIOD
 from abdf1_ros.simulator.ladder import Lamp
-from support.world import Executed, GUESTS, OTHERS, SAFE, Sent, STEP, World
+from support.world import Executed, GUESTS, OTHERS, SAFE, Said, Sent, STEP, World
 
 _LEAST_ZERO = 0.5  # s
 _LEAST_LIFE_SIGN = 1.0  # s
 _MOMENT = 0.02  # s, for what goes out before it
 _REWRITTEN = 5.0  # s after which a fallback is written again
+_READ_BACK = 'read back: the PLC holds'
+_REPEATED = 10.0  # s, until a number of a command may come again
 _NEVER_EXECUTED = {Outcome.NOT_SENT, Outcome.REFUSED, Outcome.SUPERSEDED, Outcome.FAILED}
 
 
@@ -245,6 +248,108 @@ class Values(Rule):
         self.demand(len({*values}) == 1, tag, values, 'of two scans')
         showed = world.plcs[station].last_showed(values[0], when)
         self.demand(showed >= when - self.flight - self.held, tag, values, showed)
+
+
+class Answers(Rule):
+    text = 'a value is what the PLC has answered last, and no older than its read'
+
+    def read(self, when: float, tag: str, station: int, values: list[int]) -> None:
+        world, row = self.world, self.world.rows[tag]
+        if row.serves:
+            return
+        self.demand(len(values) == row.length, tag, values, 'of a Length of', row.length)
+        first, watched = row.address.offset, world.plcs[station]
+        found = [watched.answered(row.address, first + at, when) for at in range(row.length)]
+        self.demand(None not in found, tag, 'was never answered')
+        self.demand([each and each[1] for each in found] == [value & 0xFFFF for value in values],
+                    tag, values, 'but it answered', found)
+        oldest = min(each[0] for each in found if each)
+        packets = len({each[0] for each in found if each})
+        limit = packets * self.flight + MOST_LATE
+        self.demand(when - oldest < limit, tag, values, 'answered at', oldest)
+
+
+class ReadBack(Rule):
+    text = 'what is told of an unknown write after a read is what the PLC holds'
+
+    def __init__(self, world: World) -> None:
+        super().__init__(world)
+        self._sent: dict[tuple[str, int], float] = {}
+
+    def sent(self, entry: Sent) -> None:
+        self._sent[entry.tag, entry.value] = entry.when
+
+    def told(self, result: WriteResult) -> None:
+        if _READ_BACK not in result.detail:
+            return
+        row, value = result.mapping, int(result.value.strip('[]'))
+        when = self.world.published[row.tag, value] + result.latency
+        found = self.world.plcs[row.station].answered(row.address, row.address.offset, when)
+        self.demand(found is not None and found[0] >= self._sent[row.tag, value], result,
+                    'not read since', self._sent[row.tag, value])
+        is_held = result.detail.endswith(f'{_READ_BACK} the value')
+        self.demand(found is not None and is_held == (found[1] == value), result,
+                    'but it answered', found)
+
+
+class Repeats(Rule):
+    text = 'a command that comes again is executed once'
+
+    def __init__(self, world: World) -> None:
+        super().__init__(world)
+        self._seen = 0
+        self._when: dict[tuple[object, ...], float] = {}
+
+    def stand(self) -> None:
+        world = self.world
+        for when, station, command in world.commands[self._seen:]:
+            key = world.drivers, station, command
+            before = self._when.get(key, -math.inf)
+            self.demand(when > before + _REPEATED, command, 'at', when, 'and', before)
+            self._when[key] = when
+        self._seen = len(world.commands)
+
+
+class Taken(Rule):
+    text = 'what a master writes is taken once, and nothing of what is refused'
+
+    def __init__(self, world: World) -> None:
+        super().__init__(world)
+        self._seen = self._driver = 0
+        self._published = 0
+        self._all: set[int] = set()  # that was published
+        self._may_hold = {0}  # a new table has zeros
+
+    def read(self, when: float, tag: str, station: int, values: list[int]) -> None:
+        if tag == 'taken':
+            number = values[0]
+            self.demand({*values} == {number} and self._published < number, values, 'after',
+                        self._published)
+            self.demand(number % 4 == 1, values, 'was refused')
+            self._published = number
+            self._all.add(number)
+
+    def stand(self) -> None:
+        world = self.world
+        if self._driver != world.drivers:
+            self._driver = world.drivers
+            self._may_hold.add(0)
+        for entry in world.taken[self._seen:]:
+            if isinstance(entry, Said):
+                self._end(entry)
+            else:
+                self.demand(len({*entry}) == 1 and entry[0] in self._may_hold, 'it holds', entry,
+                            'not', self._may_hold)
+        self._seen = len(world.taken)
+
+    def _end(self, said: Said) -> None:
+        """Take the end of a write: an answer tells what the table holds."""
+        self.demand(said.is_right or said.sts != 0, said, 'was not refused')
+        if said.is_right and said.sts == 0:
+            self.demand(said.value in self._all, said, 'was not published')
+            self._may_hold = {said.value}
+        elif said.is_right:
+            self._may_hold.add(said.value)
 
 
 class Guards(Rule):
@@ -811,7 +916,7 @@ class OneOwner(Rule):
 RULES: tuple[type[Rule], ...] = (
     Results, Ages, Stamps, Turns, Values, Guards, Withheld, Beats, BeatsAfterFallbacks, Order,
     Outputs, OneResult, Probes, Unheard, Queued, AfterRun, Held, ReadOnly, Guests, GuestAges,
-    OnTheWire, View, Served, Rungs)
+    OnTheWire, View, Served, Rungs, Answers, ReadBack, Repeats, Taken)
 
 
 class Judge:

@@ -22,9 +22,10 @@ of a topic the words hold it, each message has one result, and that is true.
 from __future__ import annotations
 
 from collections import defaultdict
+from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from functools import partial
-from itertools import groupby
+from itertools import groupby, takewhile
 from random import Random
 
 from abdf1_ros.df1.packet import Packet
@@ -32,6 +33,8 @@ from abdf1_ros.df1.settings import LinkSettings
 from abdf1_ros.df1.slave import HalfDuplexSlave
 from abdf1_ros.driver.settings import DriverSettings
 from abdf1_ros.driver.write import Outcome, WriteResult
+from abdf1_ros.pccc.address import Address
+from abdf1_ros.pccc.extent import Extent
 from abdf1_ros.settings.heartbeats import Fallback
 from abdf1_ros.settings.mapping import Mapping
 from abdf1_ros.settings.network import Network
@@ -97,6 +100,8 @@ class Steady(DriverBench):
         areas = ('B3:0', 4), ('N7:0', 24), ('F8:0', 4), ('ST9:0', 42)
         self._plc = self.plc(1, 'PLC5', *areas)
         self._plc.faults.delay = 0.0 if mode.get('mode') else dice.choice([0.0, 0.02])
+        # What the PLC has shown to a read.
+        self.shown: defaultdict[str, list[tuple[float, bytes]]] = defaultdict(list)
         self._watch(self._plc)
         self.said: defaultdict[str, list[Said]] = defaultdict(list)
         self.held: defaultdict[str, list[tuple[float, bytes]]] = defaultdict(list)
@@ -105,15 +110,33 @@ class Steady(DriverBench):
         serve = plc.serve
 
         def execute(command: Packet) -> Packet:
+            if command.data[:1] not in _WRITES:
+                return self._read_out(serve, command)
             reply = serve(command)
-            if command.data[:1] in _WRITES:
-                for name in self._names:
-                    self.held[name].append((self.clock(), self._words(name)))
+            for name in self._names:
+                self.held[name].append((self.clock(), self._words(name)))
             return reply
 
         plc.serve = execute  # type: ignore[method-assign]
         plc.slave = HalfDuplexSlave(
             LinkSettings(station=1, checksum=self.network.checksum), execute)
+
+    def _read_out(self, serve: Callable[[Packet], Packet], command: Packet) -> Packet:
+        """Execute a command that is no write; keep what it has read of the rows."""
+        table, found = self._plc.table, list[Extent]()
+        read = table.read
+
+        def note(address: Address, words: int) -> bytes:
+            found.append(Extent(1, address.area, address.offset, address.offset + words))
+            return read(address, words)
+
+        table.read = note  # type: ignore[method-assign]
+        reply = serve(command)
+        del table.read
+        for name in self._names:
+            if any(extent.holds(self._rows[name].extent) for extent in found):
+                self.shown[name].append((self.clock(), self._words(name)))
+        return reply
 
     def _words(self, name: str) -> bytes:
         """Return what the PLC holds of a row; of bits only these."""
@@ -175,15 +198,31 @@ class Steady(DriverBench):
             if result.outcome is Outcome.WRITTEN and not was_held:
                 return f'{name}: {result} at {ended:.3f} s, but nothing was executed'
             if result.outcome is Outcome.STANDS:
-                last = [words for when, words in self.held[name] if when <= ended][-1:]
-                if last != [self._wanted(name, each.message)]:
-                    return f'{name}: {result} at {ended:.3f} s, but the PLC holds another value'
+                if text := self._why_unproven(name, self._wanted(name, each.message), ended):
+                    return f'{name}: {result} at {ended:.3f} s, but {text}'
                 continue
             may_give_way = not self._is_light or self._rows[name].address.bit is None
             if result.outcome is not Outcome.WRITTEN and not (
                     result.outcome is Outcome.SUPERSEDED and may_give_way):
                 return f'{name}: {result}, on a line without a fault'
         return ''
+
+    def _why_unproven(self, name: str, wanted: bytes, now: float) -> str:
+        """Return why a value that is told to stand had to be written (27)."""
+        row = self._rows[name]
+        again = (row.write_again or 0) / 1000
+        held = [entry for entry in reversed(self.held[name]) if entry[0] <= now]
+        stood = [when for when, words in takewhile(lambda entry: entry[1] == wanted, held)]
+        if not stood:
+            return 'the PLC holds another value'
+        patience = row.fallback.after / 1000 if row.fallback else PATIENCE
+        since = max(stood[-1], now - min(again, patience))
+        if not any(since < when <= now and words == wanted for when, words in self.shown[name]):
+            return f'no read has shown it since {since:.3f} s'
+        confirmed = max((each.when + result.latency for each in self.said[name]
+                         for result in each.results if result.outcome is Outcome.WRITTEN
+                         and each.when + result.latency <= now), default=-1.0)
+        return '' if confirmed > now - again else f'it was confirmed at {confirmed:.3f} s'
 
     def _wrong_end(self, name: str) -> str:
         """Return that the words do not hold the newest message of all rows that share them."""

@@ -14,14 +14,27 @@
 
 """A few new plants in each run, and that a seed replays one."""
 
+from dataclasses import replace
 import secrets
 
 from abdf1_ros.df1.frames import ACK, ENQ
+from abdf1_ros.driver.write import Outcome
 import pytest
 from simulate.mistakes import MISTAKES
-from simulate.rules import Broken, GuestAges, OnTheWire, Order, View
+from simulate.rules import (
+    Answers,
+    Broken,
+    GuestAges,
+    OnTheWire,
+    Order,
+    ReadBack,
+    Repeats,
+    Taken,
+    View,
+)
 from simulate.run import simulate, Story
-from support.world import GUESTS, MODES, Plant, POLLED, Sent, STEP, World
+from simulate.steady import Steady
+from support.world import GUESTS, MODES, Plant, POLLED, Said, Sent, STEP, World
 
 
 @pytest.mark.parametrize('mode', MODES)
@@ -111,6 +124,95 @@ def test_responses_that_go_out_together_are_no_command() -> None:
     count = len(world.sent)
     world.line._send(ENQ + 4 * ACK, world.line.now, 1)
     assert len(world.sent) == count
+
+
+def test_value_that_is_not_what_the_plc_answered_last_is_found() -> None:
+    world = World(Plant('Message', held=21), seed=1)
+    world.run(6.0)
+    rule = Answers(world)
+    when, row, values = next(entry for entry in reversed(world.reads) if entry[1].tag == 'held_1')
+    kept = [int(value) for value in values]
+    rule.read(when, row.tag, 1, kept)
+    for late, wrong in ((0.0, [kept[0] ^ 1, *kept[1:]]), (0.0, kept[1:]), (9.0, kept)):
+        with pytest.raises(Broken):
+            rule.read(when + late, row.tag, 1, wrong)
+
+
+def test_finding_of_a_read_that_is_not_true_is_found() -> None:
+    world = World(Plant('Message', held=21), seed=1)
+    world.run(4.0)
+    world.plcs[1].swallows_replies = True
+    world.publish(world.rows['w0_1'])
+    world.run(0.9)
+    world.mend()
+    world.run(3.0)
+    result = next(each for each in world.results if each.outcome is Outcome.UNKNOWN)
+    assert result.detail.endswith('read back: the PLC holds the value')
+    rule = ReadBack(world)
+    entry, = {each.value: each for each in world.sent if each.tag == 'w0_1'
+              and each.value == 1}.values()
+    rule.sent(entry)
+    rule.told(result)
+    with pytest.raises(Broken):
+        rule.told(replace(result, detail='read back: the PLC holds another value'))
+    rule.sent(entry._replace(when=world.line.now))
+    with pytest.raises(Broken):
+        rule.told(result)
+
+
+def test_command_that_is_executed_twice_is_found() -> None:
+    world = World(Plant('Peer'), seed=1)
+    rule = Repeats(world)
+    world.run(4.0)
+    rule.stand()
+    world.commands.append(world.commands[-1])
+    with pytest.raises(Broken):
+        rule.stand()
+
+
+def test_what_a_master_writes_is_taken_once() -> None:
+    world = World(Plant('Slave', baud=38400), seed=1)
+    rule = Taken(world)
+    world.run(8.0)
+    taken = [(when, [int(value) for value in values]) for when, row, values in world.reads
+             if row.tag == 'taken']
+    for when, values in taken:
+        rule.read(when, 'taken', 200, values)
+    rule.stand()
+    assert len(taken) > 1 and {said.sts for said in world.taken
+                               if isinstance(said, Said) and not said.is_right} - {0, None}
+    with pytest.raises(Broken):
+        rule.read(*taken[-1][:1], 'taken', 200, taken[-1][1])
+    world.taken.append((taken[-1][1][0], 3))
+    with pytest.raises(Broken):
+        rule.stand()
+
+
+def test_reload_may_bring_other_lengths() -> None:
+    world = World(Plant('Message', held=21), seed=1)
+    world.run(3.0)
+    lengths = set()
+    for _ in range(6):
+        world.end()
+        world.reload()
+        count = len(world.reads)
+        world.run(4.0)
+        found = {len(values) for _, row, values in world.reads[count:] if row.tag == 'held_1'}
+        assert found == {world.rows['held_1'].length}
+        lengths |= found
+    assert lengths == {10, 21}
+
+
+def test_value_that_no_read_has_shown_does_not_stand() -> None:
+    steady = Steady(104)
+    assert not steady.fault()
+    steady._rows['word'] = replace(steady._rows['word'], write_again=60_000)
+    now, wanted = steady.held['word'][-1][0] + 0.2, steady.held['word'][-1][1]
+    steady.shown['word'] = [(now - 0.1, wanted)]
+    assert steady._why_unproven('word', wanted, now) == ''
+    steady.shown['word'] = [(now - 9.0, wanted)]  # before it was confirmed
+    assert steady._why_unproven('word', wanted, now).startswith('no read has shown it')
+    assert 'another value' in steady._why_unproven('word', b'[9]', now)
 
 
 def test_mistakes_are_made_where_something_is() -> None:
