@@ -208,9 +208,11 @@ class Agenda:
         Otherwise stations that have never answered would all be tried first.
         """
         probes = self._stations.probes
-        if job := self._reads.next_proven(probes.died_at, busy):
+        job, is_kept_waiting = self._reads.next_proven(probes.died_at, busy)
+        if job is not None:
             return job
-        probes.caught_up()
+        if not is_kept_waiting:
+            probes.caught_up()
         return self._write(now, busy) if self._writes.waiting else None
 
     def _guest(self, now: float, busy: Container[int]) -> Job | None:

@@ -38,7 +38,8 @@ NAK, NOTHING, STATUS, LOSES = Answer.NAK, Answer.NOTHING, Answer.ACK, Answer.LOS
 _MODES = {'Peer': (Wiring.FULL, {'mode': 'Peer'}), 'Radio': (Wiring.RADIO, {'mode': 'Radio'})}
 KINDS = [('Message', STATUS), ('Message', NOTHING), ('Message', NAK), ('Standard', STATUS),
          ('Standard', NOTHING), ('Standard', NAK), ('Peer', STATUS), ('Peer', NOTHING),
-         ('Peer', NAK), ('Peer', LOSES), ('Message', LOSES), ('Radio', STATUS), ('Radio', NOTHING)]
+         ('Peer', NAK), ('Peer', LOSES), ('Message', LOSES), ('Standard', LOSES),
+         ('Radio', STATUS), ('Radio', NOTHING)]
 
 
 class Plant(DriverBench):

@@ -107,18 +107,24 @@ class Reads(WriteListener):
             self._due.put(other, other.due)
         return job
 
-    def next_proven(self, due: float, busy: Container[int]) -> ReadJob | None:
-        """Return the next read due at ``then`` of a station that has replied; None for none."""
-        passed_over = []
+    def next_proven(self, due: float, busy: Container[int]) -> tuple[ReadJob | None, bool]:
+        """
+        Return the next read that was due then, of a station that has replied; None for none.
+
+        Return also whether such a read waits for a ``busy`` station.
+        """
+        passed_over, is_kept_waiting = [], False
         while (job := self._due.take(due)) is not None:
             station = self._stations.records[job.station]
-            if station.replies and station.replies_in_time and job.station not in busy:
+            is_proven = station.replies > 0 and station.replies_in_time
+            if is_proven and job.station not in busy:
                 job.is_probe = False
                 break
+            is_kept_waiting |= is_proven
             passed_over.append(job)
         for other in passed_over:
             self._due.put(other, other.due)
-        return job
+        return job, is_kept_waiting
 
     def _probe(self, now: float, busy: Container[int]) -> ReadJob | None:
         """Return the next read of a silent station, None while no probe may be sent."""
