@@ -99,7 +99,7 @@ def look_at(session: Session, station: int) -> Presence:
     except Abdf1Error as caught:
         error = caught
     seconds = time.monotonic() - started
-    if identity is not None and identity.plc_type is None and session.via not in (None, station):
+    if identity is not None and session.via not in (None, station):
         error = _refusal_of_gateway(session, station)
         if error is None and identity.has_no_processor:
             error = FormatError(f'its gateway answers in its place, as {identity}')
