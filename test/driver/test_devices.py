@@ -15,6 +15,8 @@
 """Odd but legal devices, played against the driver in every mode in which they can occur."""
 
 from abdf1_ros.driver.write import Outcome
+from abdf1_ros.pccc.families import parse_address
+from abdf1_ros.pccc.file_types import PlcType
 from abdf1_ros.settings.mapping import Mapping
 from abdf1_ros.settings.network import Network
 from abdf1_ros.simulator.simulated_plc import SimulatedPlc
@@ -121,6 +123,72 @@ def test_controller_that_knows_no_command_is_told_as_it_is(mode: str) -> None:
     assert bench.listener.values(words) == []
     assert bench.listener.outcomes() == [Outcome.FAILED]
     assert 'STS 10' in str(bench.listener.results[0])
+    assert bench.driver.stations[1].active
+
+
+@pytest.mark.parametrize('mode', NETWORKS)
+@pytest.mark.parametrize('station', [0, 16, 254])
+def test_stations_0_and_16_and_254_are_like_any_other(mode: str, station: int) -> None:
+    """The number 16 is DLE (reports of ProSoft), 0 is that of a 1761-NET-ENI."""
+    device = OddDevice(WIRINGS[mode], station)
+    device.words[station, 7, 0] = 0x1010
+    words = make_mapping('N7:0', plc='SLC', station=station)
+    target = make_mapping('N7:5', 'Write', plc='SLC', station=station)
+    bench = odd_bench(mode, device, words, target)
+    bench.open(run=1.0)
+    bench.write(target, [0x1003])
+    bench.run(1.0)
+    assert {tuple(values) for values in bench.listener.values(words)} == {(0x1010,)}
+    assert bench.listener.outcomes() == [Outcome.WRITTEN]
+    assert device.words[station, 7, 5] == 0x1003
+
+
+class LateNode(OddDevice):
+    """Two nodes, 1 and 2; the replies of 2 come with the next reply of 1, before it."""
+
+    def __init__(self, wiring: Wiring) -> None:
+        super().__init__(wiring, 1, (1, 2))
+        self.late: list[bytes] = []
+        self.say = self._say
+
+    def _say(self, data: bytes) -> bytes:
+        at = data.find(b'\x10\x02')
+        if at < 0:
+            return data
+        if data[at + 3] == 2:
+            self.late.append(data[at:])
+            return data[:at]
+        return data[:at] + (self.late.pop(0) if self.late else b'') + data[at:]
+
+
+@pytest.mark.parametrize('mode', ['Peer', 'Radio'])
+def test_late_replies_of_a_site_are_no_values_of_another(mode: str) -> None:
+    """Reports of an SLC 500 with two MicroLogix 1500 by radio: values of a silent site mixed."""
+    device = LateNode(WIRINGS[mode])
+    device.words.update({(1, 7, 0): 111, (2, 7, 0): 222})
+    first, second = (make_mapping('N7:0', plc='SLC', station=number, tag=f'site{number}')
+                     for number in (1, 2))
+    bench = odd_bench(mode, device, first, second)
+    bench.open(run=20.0)
+    values = [{tuple(entry) for entry in bench.listener.values(row)} for row in (first, second)]
+    assert values[0] == {(111,)}
+    assert values[1] <= {(222,)}
+    assert 2510 in bench.listener.numbers()
+    assert len(bench.listener.values(first)) > 50
+
+
+@pytest.mark.parametrize('mode', NETWORKS)
+def test_strings_that_no_program_has_written_are_not_values(mode: str) -> None:
+    """ST elements with LEN 65535, LEN 100, and LEN 3 before old text."""
+    rows = [make_mapping(f'ST9:{number}', plc='SLC', tag=f's{number}') for number in range(3)]
+    bench = DriverBench(rows, start=False, network=Network(
+        baud=19200, timeout=200, **NETWORKS[mode]))  # type: ignore[arg-type]
+    plc = bench.plc(1, 'SLC', ('ST9:0', 3 * 42))
+    for number, length in enumerate((0xFFFF, 100, 3)):
+        plc.table.write(parse_address(f'ST9:{number}', PlcType.SLC),
+                        length.to_bytes(2, 'little') + 41 * b'BA')
+    bench.open(run=2.0)
+    assert [bench.listener.values(row)[:1] for row in rows] == [[], [], ['ABA']]
     assert bench.driver.stations[1].active
 
 

@@ -191,6 +191,12 @@ def ignores_every_second_message() -> Filter:
     return hear
 
 
+@says('Micro800, KF2 4-31: EOT suppression, a slave with nothing to send says nothing',
+      ('Message',))
+def no_eot() -> Filter:
+    return lambda data: b'' if data == EOT else data
+
+
 @says('noise on the line: every third answer is lost', HALF)
 def loses_every_third_answer() -> Filter:
     count = 0
