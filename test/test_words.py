@@ -12,14 +12,17 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The words of CONTRIBUTING.md: one term for one thing, and no two classes of one name."""
+"""The words of CONTRIBUTING.md: one term for one thing, plain sentences, no class twice."""
 
+import ast
 from collections import Counter
 from collections.abc import Iterator
 import io
 from pathlib import Path
 import re
 import tokenize
+
+import pytest
 
 from tools.rooms import MODULES, PACKAGE
 
@@ -98,3 +101,60 @@ def test_one_term_for_one_thing() -> None:
              for number, line in enumerate(page.read_text(encoding='utf-8').splitlines(), 1)
              if pattern.search(line)]
     assert found == []
+
+
+# Phrases that make a reader stop: the subject is unnamed, or the sentence a chain of pronouns.
+_PRONOUN = r'\b(?:it|that|them|which|whose)\b'
+RIDDLES = {
+    'a number without its noun': r'\b[Ss]o (?:many|often|long|much|few)\b(?! (?:as|that)\b)',
+    'a noun left out': r'\b(?:that|those) (?:of|for|in|on|at|by|from|to)\b',
+    'a subject described, not named': r'(?:^|[.:;] )What (?:\w+ ){1,6}\w+[,.]',
+    'a party without a name': (
+        r"\b(?:[Oo]thers?'s?|another's|[Ww]hoever|[Ss]omebody|[Nn]obody|one another)"
+        r'\b(?! \w+s\b)'),
+    'a decision without its reason': (
+        r'\b(?:is|are|was|were|be) taken for\b|\bone (?:knows|does|has|sees)\b'),
+    'not what the method does': r'\b[Tt]ake note\b',
+    'a condition said by its contrast': (
+        r'\b(?:none|nothing|no one|not|but) (?:but|else) (?:that|those|what|where)\b|\bbut for\b'),
+    'a chain of pronouns': '[^.;:]*'.join([_PRONOUN] * 4)}
+
+# Some sentences are found though they are plain. The limits leave room for them only.
+MOST_RIDDLES = {'abdf1_ros': 60, 'docs': 20}
+_HEAD = 13  # lines of the licence
+
+
+def docstrings_and_comments(source: str) -> Iterator[tuple[int, str]]:
+    """Yield each docstring, and each block of comments, on one line, with its line number."""
+    for node in ast.walk(ast.parse(source)):
+        if (isinstance(node, ast.Module | ast.ClassDef | ast.FunctionDef | ast.AsyncFunctionDef)
+                and (text := ast.get_docstring(node))):
+            yield getattr(node, 'lineno', 1), ' '.join(text.split())
+    block: list[str] = []
+    start = 0
+    for token in tokenize.generate_tokens(io.StringIO(source).readline):
+        if token.type == tokenize.COMMENT and token.start[0] > _HEAD:
+            start = start if block else token.start[0]
+            block.append(token.string.lstrip('# '))
+        elif token.type not in (tokenize.NL, tokenize.COMMENT) and block:
+            yield start, ' '.join(block)
+            block = []
+
+
+def riddles(folder: str) -> list[str]:
+    """Return the sentences of a folder that have to be read twice, each with its place."""
+    found = []
+    for path in sorted([*(ROOT / folder).rglob('*.py'), *(ROOT / folder).rglob('*.md')]):
+        source = path.read_text(encoding='utf-8')
+        parts = docstrings_and_comments(source) if path.suffix == '.py' \
+            else enumerate(source.splitlines(), 1)
+        found += [f'{path.relative_to(ROOT)}:{line}: {why}: {sentence}'
+                  for line, text in parts for sentence in re.split(r'(?<=[.!?])\s+', text)
+                  for why, pattern in RIDDLES.items() if re.search(pattern, sentence)]
+    return found
+
+
+@pytest.mark.parametrize('folder', MOST_RIDDLES)
+def test_few_sentences_have_to_be_read_twice(folder: str) -> None:
+    found = riddles(folder)
+    assert len(found) <= MOST_RIDDLES[folder], '\n'.join(found)
