@@ -254,8 +254,8 @@ class Client(OpenLine):
             except RemoteError as error:
                 if is_local_status(error.sts):
                     raise
-                raise FormatError(f'station {station} does not say what it is (STS '
-                                  f'{error.sts:02X} to that question); name plc_type') from None
+                raise FormatError(f'station {station} does not identify itself (STS '
+                                  f'{error.sts:02X} to the question); name plc_type') from None
             if identity.plc_type is None:
                 raise FormatError(f'station {station} is "{identity}", and its family is not '
                                   'known; name plc_type')

@@ -362,7 +362,7 @@ def test_plc_without_diagnostic_status_needs_its_family(tmp_path: Path) -> None:
     plc = simulated_plc(1, 'SLC', time.monotonic, *FILES)
     plc.faults.status = (0x10,)
     with plc_line(tmp_path / 'line', plc) as name, Client(name, duplex='half') as here, \
-            pytest.raises(FormatError, match=r'does not say what it is \(STS 10 .*name plc_type'):
+            pytest.raises(FormatError, match=r'does not identify itself \(STS 10 .*name plc_type'):
         here.read('N7:0')
 
 

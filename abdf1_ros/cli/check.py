@@ -15,8 +15,8 @@
 """
 Check a net CSV and a map CSV before anything is connected.
 
-Every fault of both files is shown with file, line and column. Then comes what the node will do
-with them: which tags are read together, how long that takes on the line, and remarks.
+Every fault of both files is shown with file, line and column. Then follows the plan of the node:
+tags that are read together, their time on the line, and remarks.
 """
 
 from __future__ import annotations
@@ -64,12 +64,12 @@ from abdf1_ros.settings.rows import Rows
 from abdf1_ros.settings.scaling import Scaling
 from abdf1_ros.text import by_number, counted, cut, first, in_ms, printable
 
-_MOST_ROWS = 40  # of a table; JSON has them all
-_SHOWN_TAGS = 8  # in the table; JSON has them all
+_MOST_ROWS = 40  # rows of a table; JSON has all rows
+_SHOWN_TAGS = 8  # tags of a block in the table; JSON has all tags
 _ENDS = 'net.csv', 'map.csv'
 _EPILOG = """\
-exit status: 0 when both files are good, also with warnings; 2 for errors;
-             130 when interrupted by Ctrl-C
+exit status: 0 if both files are good, also with warnings; 2 for errors;
+             130 if interrupted by Ctrl-C
 
 examples:
   check config/net.csv config/map.csv
@@ -82,7 +82,7 @@ examples:
 
 @dataclass(slots=True)
 class Findings:
-    """The contents and faults of both files; no network where the net file has faults."""
+    """The contents and faults of both files; ``network`` is None if the net file has faults."""
 
     network: Network | None = None
     mappings: Rows = Rows()
@@ -136,7 +136,7 @@ def _pair(options: argparse.Namespace) -> tuple[str, bool]:
 
 
 def _draw(options: argparse.Namespace, found: Findings, report: Report | None) -> bool:
-    """Write the page of --html; return whether that went well."""
+    """Write the page of --html; return True on success."""
     from abdf1_ros.cli.check_picture import check_parts
     from abdf1_ros.cli.lanes import write_page
     facts = [] if report is None else _line_text(report).splitlines()
@@ -152,7 +152,7 @@ def _draw(options: argparse.Namespace, found: Findings, report: Report | None) -
 
 
 def _heard(found: Findings, files: Sequence[str]) -> dict[str, Any]:
-    """Return which rows recordings fill in Mode Listen, and what other nodes read there."""
+    """Return the rows that recordings fill in Mode Listen, and the reads of other nodes there."""
     from abdf1_ros.cli.overhearing import overheard
     network = found.network or Network()
     rows = Rows(row for row in found.mappings if row.command is Command.READ)
@@ -183,10 +183,10 @@ def _report(found: Findings, options: argparse.Namespace) -> Report | None:
 
 def pairs(folder: Path) -> tuple[list[tuple[str, Path, Path]], list[str]]:
     """
-    Return name, net and map file of each line below a folder, and which CSV files are of none.
+    Return name, net and map file of each line below a folder, and all other CSV files.
 
     The files of a line are NAME_net.csv and NAME_map.csv, or net.csv and map.csv in a folder
-    NAME. One of them may be missing. Lines are in the order of their names: line2 before line10.
+    NAME. One file of a line may be missing. The order is that of the names, line2 before line10.
     """
     found: dict[str, dict[str, Path]] = {}
     others = []
@@ -207,7 +207,7 @@ def pairs(folder: Path) -> tuple[list[tuple[str, Path, Path]], list[str]]:
 
 
 def _folder(options: argparse.Namespace) -> tuple[str, bool]:
-    """Return a line or an object for each line of a plant, and whether none has an error."""
+    """Return a text or an object for each line of a plant, and True if no line has an error."""
     contents: dict[str, Any] = {}
     texts = []
     bad = warned = 0
@@ -216,7 +216,7 @@ def _folder(options: argparse.Namespace) -> tuple[str, bool]:
     for name, net, map_file in lines:
         found = examine(str(net), str(map_file), options.default_period / 1000)
         if found.network is not None and found.network.com_port != Network().com_port:
-            port = found.network.port  # without one a parameter gives it
+            port = found.network.port  # if the net file has no port, a parameter gives it
             owner = owners.setdefault(line_of(port), name)
             if owner != name:
                 found.problems.append(Problem(str(net), f'{port} is the port of {owner} too'))
@@ -229,7 +229,7 @@ def _folder(options: argparse.Namespace) -> tuple[str, bool]:
         good = len(contents) - bad
         texts.append(f'{counted(len(contents), "line")}: {good} good ({warned} of them with '
                      f'warnings), {bad} with errors'
-                     + (f'; of no line: {first(others)}' if others else ''))
+                     + (f'; not part of a line: {first(others)}' if others else ''))
     else:
         texts.append(f'{printable(options.net)}: no files NAME_net.csv and NAME_map.csv, nor '
                      'folders with net.csv and map.csv')
@@ -239,7 +239,7 @@ def _folder(options: argparse.Namespace) -> tuple[str, bool]:
 
 
 def _summary(name: str, found: Findings, report: Report | None) -> str:
-    """Return one line of text, and one more for each error."""
+    """Return one line of text, and a line for each error."""
     errors = [f'{printable(name)}: {colour(f"error: {problem}", RED, sys.stdout)}'
               for problem in found.problems]
     if report is None:
@@ -262,26 +262,27 @@ def _parse(args: Sequence[str] | None) -> argparse.Namespace:
     parser.add_argument('--json', action='store_true',
                         help='print one JSON object, with every tag of every block')
     parser.add_argument('--html', metavar='FILE',
-                        help='also draw the poll cycle, and what the Periods need, for a browser')
+                        help='also draw the poll cycle and the time that the Periods need, for a '
+                             'browser')
     duration = number_option(f'ms from 0 to {MAX_PERIOD}', 0, MAX_PERIOD)
     parser.add_argument('--default-period', type=duration, metavar='MS',
                         default=DriverSettings().default_period * 1000,
-                        help="the node's default_period (default: %(default)g)")
+                        help="the node's parameter default_period (default: %(default)g)")
     parser.add_argument('--response-time', type=duration, metavar='MS',
                         default=USUAL_RESPONSE_TIME * 1000,
-                        help='ms that a PLC takes for each answer (default: %(default)g)')
+                        help='time that a PLC needs for each answer (default: %(default)g)')
     parser.add_argument('--heard', metavar='FILE', action='append', default=[],
-                        help='a recording of the line ("sniff --save"): tell which rows it would '
+                        help='list the rows that a recording of the line ("sniff --save") would '
                         'fill in Mode Listen; may be repeated')
     options = parser.parse_args(args)
     if options.map is None and options.heard:
-        parser.error('--heard is for one line: name its two files')
+        parser.error('--heard is for one line: give its net CSV and map CSV')
     if options.map is None and not Path(options.net).is_dir():
-        parser.error(f'{printable(options.net)} is not a folder, so a map CSV has to follow')
+        parser.error(f'{printable(options.net)} is not a folder, so a map CSV must follow')
     if options.html and options.map is None:
         parser.error('--html is for one net CSV and one map CSV')
     if options.html and not may_replace(options.html, _is_page):
-        parser.error(f'{printable(options.html)} is there and was not made by --html; '
+        parser.error(f'{printable(options.html)} exists and was not made by --html; '
                      'give another name')
     return options
 
@@ -297,7 +298,7 @@ def _text(found: Findings, report: Report | None) -> str:
     if report is None:
         return '\n'.join([*parts, 'no plan without a good net file'])
     if found.mappings and parts:
-        parts.append('the plan is that of the rows without errors')
+        parts.append('this plan has only the rows without errors')
     remarks = report.remarks()
     parts += [colour(f'warning: {printable(remark.text)}', YELLOW, sys.stdout)
               for remark in remarks]
@@ -312,7 +313,7 @@ def _text(found: Findings, report: Report | None) -> str:
 
 
 def _folded(text: str) -> str:
-    """Return a table without the rows that are too many, in the width of a terminal."""
+    """Return a table, cut to the width of a terminal and to a number of rows."""
     lines = text.split('\n')
     if (more := len(lines) - 1 - _MOST_ROWS) > 0:
         lines = [*lines[:1 + _MOST_ROWS], f'... and {more} more; --json has them all']
@@ -339,8 +340,8 @@ def _listening_text(report: Report) -> str:
     ports = ' and '.join(filter(None, (network.port, network.second_port)))
     return (f'{printable(ports)}: Mode Listen, {network.baud} baud, {network.data_bits} data '
             f'bits, parity {network.parity}, {network.stop_bits} stop, {network.error_code}; '
-            f'nothing is sent\n{counted(count, "row")} to be filled from what another master '
-            'reads')
+            f'nothing is sent\n{counted(count, "row")} to be filled from the reads of another '
+            'master')
 
 
 def _rows_text(report: Report) -> str:
@@ -358,7 +359,7 @@ def _rows_text(report: Report) -> str:
 
 
 def _rows(mappings: Sequence[Mapping], report: Report | None) -> list[dict[str, Any]]:
-    """Return what there is to say of each row."""
+    """Return the remarks on each row."""
     promised = report.promises() if report else {}
     return [_row(mapping, promised.get(mapping)) for mapping in mappings]
 
@@ -367,7 +368,7 @@ def _row(mapping: Mapping, stale: float | None) -> dict[str, Any]:
     """
     Return the cells of a row; a heartbeat has no topic.
 
-    ``stale`` is what its topic promises as deadline (s), None for nothing.
+    ``stale``: the deadline (s) that the topic promises; None if it promises none.
     """
     topics = [f'~/{what}/{mapping.topic}' for what, is_there in (
         ('read', mapping.reads), ('write', mapping.writes)) if is_there]
@@ -429,7 +430,7 @@ def _times_text(report: Report) -> str:
 
 
 def _content(found: Findings, report: Report | None) -> dict[str, Any]:
-    """Return the content for JSON; every key is always there, times are in ms."""
+    """Return the content for JSON; every key is always present, times are in ms."""
     content: dict[str, Any] = {
         'errors': [_problem(problem) for problem in found.problems],
         'warnings': [], 'notes': [], 'network': None, 'mappings': len(found.mappings),

@@ -34,7 +34,7 @@ _TAGS = 8
 
 def check_parts(report: Report | None, problems: Sequence[Problem],
                 facts: Sequence[str]) -> Iterator[str]:
-    """Yield the parts of the page; ``facts`` are sentences on the line and its times."""
+    """Yield the parts of the page; ``facts`` are sentences about the line and its times."""
     if report is None:
         yield _sentence('no plan without a good net file', 'verdict is-bad')
     else:
@@ -47,7 +47,7 @@ def check_parts(report: Report | None, problems: Sequence[Problem],
 
 def _plan(picture: _Picture, errors: int, facts: Sequence[str]) -> Iterator[str]:
     is_good = not errors and not picture.late
-    found = [counted(errors, 'error') + '; the picture is that of the rows without errors'] \
+    found = [counted(errors, 'error') + '; the picture has only the rows without errors'] \
         if errors else []
     yield _sentence('; '.join([*found, picture.verdict()]),
                     f'verdict {"is-good" if is_good else "is-bad"}')
@@ -64,7 +64,7 @@ def _sentence(text: str, look: str = '') -> str:
 
 
 class _Picture:
-    """What is drawn of a report; ``late`` are the blocks whose Period cannot be kept."""
+    """The drawing of a report; ``late`` are the blocks whose Period cannot be kept."""
 
     def __init__(self, report: Report) -> None:
         self.report = report
@@ -96,7 +96,7 @@ class _Picture:
             yield _sentence('Reads with Period 0 have the time that is left.', 'quiet')
 
     def _cycle(self) -> list[Lane]:
-        """Return a lane for each station, with its reads one after the other."""
+        """Return a lane for each station, with its reads in sequence."""
         bars: defaultdict[int, list[Bar]] = defaultdict(list)
         begin = 0.0
         for block in self.report.blocks:
@@ -109,7 +109,7 @@ class _Picture:
         return [Lane(f'station {station}', found) for station, found in sorted(bars.items())]
 
     def _shares(self) -> Iterator[Bar]:
-        """Yield what each read needs of the line's time (%), the largest first."""
+        """Yield the share of the line's time (%) for each read, the largest first."""
         begin = 0.0
         polled = [block for block in self.report.blocks if block.period]
         for block in sorted(polled, key=self._load, reverse=True):

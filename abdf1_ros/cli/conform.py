@@ -13,12 +13,12 @@
 # limitations under the License.
 
 """
-The command ``conform``: plays one end of a line and checks the other against the manual.
+The command ``conform``: simulates one end of a line and checks the far end by the manual.
 
-The other end is a slave or a master of a half-duplex line, or a node of a full-duplex line or of a
-radio modem network that answers commands (peer, radio) or sends them (client, radio-client).
-Every case is a rule: what is sent, what must come back and within what time, with document and
-page.
+The far end is a slave or a master of a half-duplex line, or a node of a full-duplex line or a
+radio modem network. Such a node answers commands (peer, radio) or sends them (client,
+radio-client). Every case is a rule: the bytes to send, the answer that must come, its time, and
+the document with its page.
 """
 
 from __future__ import annotations
@@ -78,16 +78,19 @@ from abdf1_ros.problems import ConfigurationError, Problem
 from abdf1_ros.settings.network import Network
 from abdf1_ros.simulator.simulated_plc import load_plcs
 
-_NEAR = 2.0  # times --answer-time: a DLE ENQ that comes so early may be taken for an answer
+_NEAR = 2.0  # in units of --answer-time: an earlier DLE ENQ may look like an answer
 
-_NOTHING_TRIED = 'no rule was tried: each case says why'
+_NOTHING_TRIED = 'no rule was tried: each case has its reason above'
 _NOBODY = 'no byte was received: check cable, port, speed and power'
 
 End = MasterEnd | PeerEnd | SlaveEnd | ServerEnd
 
 _EPILOG = """\
-exit status: 0 when no case failed, 1 when one did, nothing was ever heard or tried, or the port
-cannot be opened, 2 for bad options and files, 130 after Ctrl-C
+exit status:
+  0    no case failed
+  1    a case failed, no case was tried, no byte was heard, or the port cannot be opened
+  2    bad options or files
+  130  interrupted by Ctrl-C
 
 examples:
   conform slave --port /dev/ttyUSB0 --baud 19200 --station 1 --family SLC
@@ -96,12 +99,12 @@ examples:
   conform client --tcp 127.0.0.1:4001 --check BCC
   conform slave --list
 
-It is not to be run against a machine that is in use.
+Do not run conform against a machine that is in use.
 """
 
 
 class _PortLine:
-    """A port as a script reads it; where it ``echoes``, without what it gives back."""
+    """A port for the scripts of cases; if the port ``echoes``, without the echo."""
 
     def __init__(self, port: Port, echoes: bool) -> None:
         self._port = port
@@ -113,7 +116,7 @@ class _PortLine:
         data = self._port.read(timeout, self._never.descriptor)
         size = min(len(data), len(self._echo))
         if data[:size] != self._echo[:size]:
-            raise OSError('what is sent does not come back as it was; leave out --echo')
+            raise OSError('our bytes do not come back unchanged; leave out --echo')
         self._echo = self._echo[size:]
         return data[size:]
 
@@ -128,7 +131,7 @@ class _PortLine:
 
 
 def main(args: Sequence[str] | None = None) -> int:
-    """Run the cases; the exit statuses are those of --help."""
+    """Run the cases; return an exit status of --help."""
     prepare_output()
     options = _parse(args)
     target = Target(options.target)
@@ -174,7 +177,7 @@ def _judge(options: argparse.Namespace, target: Target, cases: Sequence[Case], w
         results.append(result)
         if not (options.json or options.report):
             print(line_of(result), flush=True)
-    # What can be published: the name of a port may be that of a host.
+    # Facts that may be published: not the name of a port, which may have the name of a host.
     kind = 'TCP' if options.tcp else 'pty' if options.pty else (
         network.port.partition('://')[0] if '://' in network.port else 'serial')
     facts = {'target': target.value, 'processor': str(identity or 'not known'),
@@ -200,18 +203,18 @@ def _judge(options: argparse.Namespace, target: Target, cases: Sequence[Case], w
     if Verdict.FAIL not in verdicts:
         return 0
     if wire.enquired_after < _NEAR * options.answer_time:
-        tell('conform', f'the other end asks with DLE ENQ after {wire.enquired_after:.2f} s; with '
+        tell('conform', f'the target sends DLE ENQ after {wire.enquired_after:.2f} s; with '
              f'--answer-time {options.answer_time:g} that may look like a fault: try '
-             f'{wire.enquired_after / _NEAR:.1g}')
+             f'--answer-time {wire.enquired_after / _NEAR:.1g}')
     return EXIT_FAILED
 
 
 def _identity(end: AskingEnd) -> Identity | None:
-    """Ask the target what it is; the cases that read take its family where none is given."""
+    """Ask the target for its identity; without --family the cases that read use its family."""
     end.settle()
     try:
         identity = decode_identity(end.ask(0x06, b'\x03')[HEADER_SIZE:])
-    except (Failed, FormatError):  # the cases tell what is wrong
+    except (Failed, FormatError):  # the cases report the fault
         return None
     if identity.plc_type in (PlcType.PLC5, PlcType.SLC) and not end.words.family:
         end.words = replace(end.words, family=identity.plc_type.value)
@@ -229,7 +232,7 @@ def _allowed(options: argparse.Namespace) -> frozenset[Permission]:
 
 def _end(options: argparse.Namespace, target: Target, wire: Wire, network: Network,
          serve: Serve | None) -> End:
-    """Return the end that we play; ``serve`` answers the commands of those that ask."""
+    """Return our end of the line; ``serve`` answers the commands of a target that asks."""
     if serve is None:
         kind = MasterEnd if target is Target.SLAVE else (
             PeerEnd if target is Target.PEER else RadioEnd)
@@ -244,7 +247,7 @@ def _end(options: argparse.Namespace, target: Target, wire: Wire, network: Netwo
 def _integer_words(text: str) -> tuple[int, int]:
     found = re.fullmatch(r'[Nn](\d{1,3}):(\d{1,3})', text)
     if found is None:
-        raise argparse.ArgumentTypeError(f'"{text}" should be integer words, as N7:100')
+        raise argparse.ArgumentTypeError(f'"{text}" should be integer words such as N7:100')
     return int(found[1]), int(found[2])
 
 
@@ -261,7 +264,7 @@ def _server(options: argparse.Namespace, network: Network) -> Serve:
 
 
 def _open(options: argparse.Namespace, network: Network) -> _PortLine:
-    """Open the line; one that we have made waits for a client at its other end."""
+    """Open the line; a pseudo-terminal or TCP port waits for its client."""
     line: Endpoint
     if options.tcp is not None:
         line = TcpEndpoint(*options.tcp)
@@ -280,27 +283,29 @@ def _open(options: argparse.Namespace, network: Network) -> _PortLine:
 def _parse(args: Sequence[str] | None) -> argparse.Namespace:
     parser = command_parser('conform', __doc__, _EPILOG)
     parser.add_argument('target', choices=[target.value for target in Target],
-                        help='what stands at the other end')
+                        help='the kind of node at the far end')
     parser.add_argument('--station', type=whole_option, default=1, metavar='N',
-                        help='of the target; for master and clients the one that we play '
-                             '(default: %(default)s)')
+                        help='station of the target; if the target is a master or client: the '
+                             'station we simulate (default: %(default)s)')
     parser.add_argument('--answer-time', type=seconds_option, default=1.0, metavar='S',
-                        help='s that an answer may take, and that silence has to last '
-                             '(default: %(default)s)')
+                        help='longest time (s) for an answer; silence of this length counts as '
+                             'no answer (default: %(default)s)')
     parser.add_argument('--family', type=str.upper, choices=('PLC5', 'SLC'),
-                        help='of the target, for the cases that read and write (default: as it '
-                             'says itself)')
+                        help='family of the target, for cases that read and write (default: the '
+                             'target is asked)')
     parser.add_argument('--words', metavar='ADDRESS', type=_integer_words,
-                        help='integer words that may be overwritten, with --yes (read: N7:0)')
+                        help='first integer word that cases may read, and overwrite with --yes '
+                             '(default for reads: N7:0)')
     parser.add_argument('--count', type=whole_option, default=1, metavar='N',
-                        help='how many words from there (default: %(default)s)')
+                        help='number of these words (default: %(default)s)')
     parser.add_argument('--yes', action='store_true',
-                        help='run cases that write, and those that reset the line')
+                        help='also run cases that write, and cases that reset the line')
     parser.add_argument('--data', metavar='FILE',
-                        help='for master and clients: what we answer from (default: the example)')
+                        help='target master or client: CSV of the data tables that we simulate '
+                             '(default: the example)')
     parser.add_argument('--only', action='append', default=[], metavar='CASE',
-                        help='run this case; may be given again')
-    parser.add_argument('--list', action='store_true', help='show the cases and end')
+                        help='run only this case; may be repeated')
+    parser.add_argument('--list', action='store_true', help='list the cases and end')
     parser.add_argument('--json', action='store_true', help='print the result as JSON')
     parser.add_argument('--report', action='store_true',
                         help='print the result as text for an issue, with the row for '
@@ -308,11 +313,11 @@ def _parse(args: Sequence[str] | None) -> argparse.Namespace:
     parser.add_argument('--pty', metavar='LINK', help='make a pseudo-terminal of this name')
     parser.add_argument('--tcp', metavar='HOST:PORT', help='listen on a TCP port')
     parser.add_argument('--echo', action='store_true',
-                        help='the adapter gives back what is sent (half duplex)')
+                        help='half duplex: the adapter echoes the bytes that we send')
     add_line_options(parser, LineDefaults(), duplex=False)
     options = parser.parse_args(args)
     if options.echo and not Target(options.target).is_half_duplex:
-        parser.error('--echo: in full duplex what comes back looks like an answer')
+        parser.error('--echo: in full duplex an echo looks like an answer')
     unknown = set(options.only) - {case.name for case in CASES}
     if unknown:
         parser.error(f'--only {", ".join(sorted(unknown))}: no such case; --list shows them')

@@ -13,10 +13,10 @@
 # limitations under the License.
 
 """
-The demo: simulated PLCs, the node as a process, and what a robot cell sees of it, step by step.
+The demo: simulated PLCs, the node as a process, and the view of a robot cell, step by step.
 
-It needs no hardware. Everything stays on this machine: discovery is limited to localhost, and
-the domain is one of our own unless ROS_DOMAIN_ID is set.
+The demo needs no hardware. Everything stays on this machine: discovery is limited to localhost.
+Without ROS_DOMAIN_ID the demo uses its own domain.
 """
 
 from __future__ import annotations
@@ -56,8 +56,8 @@ from rclpy.event_handler import SubscriptionEventCallbacks
 from rclpy.node import Node
 from rclpy.qos import QoSProfile
 
-# By its executable, which a signal during the imports ends quietly. When we die, which closes its
-# standard input, it ends as with any other signal.
+# The executable, which a signal during the imports ends quietly. If this process dies, the
+# standard input of the node closes, and the node ends as after a signal.
 _NODE = """
 import os, signal, sys, threading
 from abdf1_ros.cli.main import node
@@ -80,7 +80,7 @@ examples:
 """
 _PATIENCE = 30.0
 _BRIDGE = 'abdf1: '
-_RESETS = 5  # on a busy machine the heartbeat may falter
+_RESETS = 5  # attempts: on a busy machine the heartbeat may stop for a moment
 _OK = DiagnosticStatus.OK
 _LOG_HEAD = re.compile(r'^\[(\w+)\] \[[\d.]+\] \[\w+\]: ')
 _WRITTEN = (211, 222, 233, 244)
@@ -90,10 +90,10 @@ _TOO_LARGE = (1, 2, 3, 5000)
 @dataclass(frozen=True, slots=True)
 class Scene:
     """
-    What is shown: files, the simulated line, and who plays which part.
+    A scene: files, the simulated line, and the part of each PLC and row.
 
-    ``guarded`` is a row that is published only while the program of its PLC runs. That PLC has a
-    ladder program, which supervises the bridge.
+    ``guarded``: a row that is published only while the program of its PLC runs. A ladder program
+    in that PLC supervises the bridge.
     """
 
     title: str
@@ -118,15 +118,15 @@ FULL_DUPLEX = Scene(
 
 
 class Missed(Exception):
-    """What the demo promises has not happened; the text says what."""
+    """A promised event has not happened; the text names the event."""
 
 
 class Bridge:
-    """The node as a process; what it says is printed between the lines of the story."""
+    """The node as a process; its output is printed between the lines of the story."""
 
     def __init__(self, *args: str) -> None:
         self._rest = b''
-        # A session of its own: Ctrl-C is for us, who then end it cleanly.
+        # A session of its own: Ctrl-C reaches the demo only, which then ends the node.
         self.process = subprocess.Popen(
             [sys.executable, '-c', _NODE, *args], stdin=subprocess.PIPE, stdout=subprocess.PIPE,
             stderr=subprocess.STDOUT, start_new_session=True)
@@ -138,7 +138,7 @@ class Bridge:
         return self.process.stdout.fileno()
 
     def relay(self) -> None:
-        """Print what it has said since the last call."""
+        """Print the output of the node since the last call."""
         with suppress(BlockingIOError):
             while data := os.read(self._out, 65536):
                 *lines, self._rest = (self._rest + data).split(b'\n')
@@ -146,7 +146,7 @@ class Bridge:
                     print(_LOG_HEAD.sub(r'node: \1 ', line.decode(errors='replace')), flush=True)
 
     def end(self) -> None:
-        """End it, and print its last words."""
+        """End the node, and print the rest of its output."""
         if self.process.poll() is None:
             self.process.send_signal(signal.SIGINT)
         self.process.wait(_PATIENCE)
@@ -154,7 +154,7 @@ class Bridge:
 
 
 class Watcher(Observer):
-    """The robot cell's side: subscribes to everything and remembers the last of each."""
+    """The robot cell: subscribes to all topics and keeps the last message of each."""
 
     def __init__(self, mappings: Sequence[Mapping], port: str) -> None:
         super().__init__('demo_watcher')
@@ -172,7 +172,7 @@ class Watcher(Observer):
         self.node.create_subscription(DiagnosticArray, '/diagnostics', self._diagnostics, 10)
 
     def expect(self, mapping: Mapping) -> float:
-        """Ask for an event when values stop as long as the bridge promises; return that (s)."""
+        """Count missed deadlines of a topic; return the deadline that the bridge promises (s)."""
         topic = f'/abdf1/read/{mapping.topic}'
         deadline = self.node.get_publishers_info_by_topic(topic)[0].qos_profile.deadline
 
@@ -195,14 +195,14 @@ class Watcher(Observer):
             self.results.append(message)
 
     def _diagnostics(self, message: DiagnosticArray) -> None:
-        """Keep the statuses of our bridge; others may publish theirs as well."""
+        """Keep the statuses of our bridge; other nodes publish statuses as well."""
         self.statuses.update({
             status.name.removeprefix(_BRIDGE): status for status in message.status
             if status.name.startswith(_BRIDGE) and status.hardware_id.startswith(self._port)})
 
 
 class Speed:
-    """The program that commands a speed: it publishes one five times a second while it lives."""
+    """The program that commands a speed: while it lives it publishes five times a second."""
 
     def __init__(self, node: Node, mapping: Mapping) -> None:
         self._message = MESSAGES[mapping.message_type]
@@ -211,7 +211,7 @@ class Speed:
         self.value = 0
 
     def live(self) -> None:
-        """Begin, with a command at rest."""
+        """Start with speed 0."""
         self.value, self._next = 0, time.monotonic()
 
     def die(self) -> None:
@@ -226,7 +226,7 @@ class Speed:
 
 
 class Stage:
-    """PLCs and bridge, who looks at them, and how the story is printed line by line."""
+    """PLCs, bridge and watcher; prints the story line by line."""
 
     def __init__(self, scene: Scene, link: Path) -> None:
         net_file, map_file = config_file(scene.net_file), config_file(scene.map_file)
@@ -237,8 +237,8 @@ class Stage:
         self._bridge_args = ('--ros-args', '-p', f'port:={link}', '-p', f'net_file:={net_file}',
                              '-p', f'map_file:={map_file}')
         self._bridge: Bridge | None = None
-        self._lamps: dict[Lamp, float] = {}  # those that are on, and since when
-        self.step = 0  # the number of the one that is shown
+        self._lamps: dict[Lamp, float] = {}  # lamps that are on, with the time of the change
+        self.step = 0  # number of the present step
         self.last_step = 0
         self.is_told = False
         self._plcs = Cast(parse_options(['--pty', str(link), *scene.simulator]), self._lamp)
@@ -250,7 +250,7 @@ class Stage:
         try:
             if self._bridge is not None:
                 self._bridge.end()
-        finally:  # the thread of the PLCs would keep this process alive
+        finally:  # otherwise the thread of the PLCs keeps this process alive
             self._plcs.close()
             self._watcher.__exit__()
 
@@ -258,7 +258,7 @@ class Stage:
         self._bridge = Bridge(*self._bridge_args)
 
     def _lamp(self, station: str, lamp: Lamp, is_on: bool) -> None:
-        """Remember which lamps of the simulated PLC are on; the thread of the PLCs tells it."""
+        """Record the lamps that are on; called in the thread of the PLCs."""
         self._lamps.pop(lamp, None)
         if is_on:
             self._lamps[lamp] = time.monotonic()
@@ -271,7 +271,7 @@ class Stage:
                       f' {show(self._watcher.values[tag])}', flush=True)
 
     def _level(self, section: str) -> bytes | None:
-        """Return the level of a status, None before it has come."""
+        """Return the level of a status; None before the first message."""
         status = self._watcher.statuses.get(section)
         return status.level if status else None
 
@@ -289,7 +289,7 @@ class Stage:
             raise Missed(f'waited {_PATIENCE:g} s for {what}, which did not come')
 
     def _until_missed(self, tag: str, command: str, what: str) -> float:
-        """Give the simulator a command that ends the values of a row; return its deadline (s)."""
+        """Give the simulator a command that stops the values of a row; return the deadline (s)."""
         deadline = self._watcher.expect(self._mappings[tag])
         self._pause(1.0)
         self._watcher.missed.clear()
@@ -324,10 +324,10 @@ class Stage:
 
 
 class Demo(Stage):
-    """Show the scenes; every step waits until it has happened, or raises Missed."""
+    """Show all steps; each waits for its event, or raises Missed."""
 
     def run(self, seconds: float) -> None:
-        """Run for ``seconds`` (0: until interrupted), at least until the story is over."""
+        """Run for ``seconds``, at least until the story is over; 0: until interrupted."""
         self._plcs.start()
         self._start_bridge()
         print(f'\n{self._scene.title}', flush=True)
@@ -425,7 +425,7 @@ class Demo(Stage):
                   f'{show(self._watcher.values[tag])}')
 
     def _take_control(self) -> Speed:
-        """Let a person press reset, and the publisher command a speed."""
+        """Press reset at the PLC, and let the publisher command a speed."""
         assert self._speed is not None
         self._speed.live()
         for _ in range(_RESETS):
@@ -496,12 +496,12 @@ class Demo(Stage):
 
     def _show_diagnostics(self) -> None:
         self._title('Diagnostics: what `ros2 topic echo /diagnostics` says, in short')
-        if self._speed:  # the bridge has come back, and reset was not pressed
+        if self._speed:  # the bridge came back, but reset was not pressed
             self._wait('the reset to be missed', lambda: 'does not confirm' in
                        self._watcher.statuses['interlocks'].message)
             self._print_statuses('interlocks')
             self._take_control()
-        # After a write that was not confirmed, as on a busy machine, they say so for ten seconds.
+        # For ten seconds after an unconfirmed write (a busy machine) a status is not OK.
         self._wait('all statuses to be OK', lambda: all(
             status.level == _OK for status in self._watcher.statuses.values()))
         self._print_statuses(*self._watcher.statuses)
@@ -512,7 +512,7 @@ class Demo(Stage):
 
 
 def main(args: Sequence[str] | None = None) -> int:
-    """Run the demo; return 0, or 1 when a step was not seen as it should be."""
+    """Run the demo; return 0, or 1 if a step failed."""
     parser = command_parser('demo', __doc__, _EPILOG)
     parser.add_argument('--seconds', default=30.0,
                         type=number_option('a number of seconds from 0', 0),
@@ -526,12 +526,12 @@ def main(args: Sequence[str] | None = None) -> int:
     try:
         with tempfile.TemporaryDirectory(prefix='abdf1_') as folder, interruptible():
             return _tell(Demo(scene, Path(folder) / 'line'), options.seconds)
-    except KeyboardInterrupt:  # before the first step, or after the last
+    except KeyboardInterrupt:  # before the first step, or after the last step
         return 0
 
 
 def _tell(demo: Demo, seconds: float) -> int:
-    """Run the demo and end it; say whether all was seen."""
+    """Run the demo and end it; print the verdict."""
     status, verdict = 0, ''
     try:
         demo.run(seconds)
@@ -544,7 +544,7 @@ def _tell(demo: Demo, seconds: float) -> int:
         verdict = (f'demo: step {demo.step} of {demo.last_step} was not seen as it should be: '
                    f'{reason}')
     finally:
-        ignore_further()  # or a process of ours might stay
+        ignore_further()  # otherwise one of our processes may stay
         demo.close()
     print(verdict or f'demo: all {demo.last_step} steps were seen as they should be', flush=True)
     return status

@@ -13,9 +13,9 @@
 # limitations under the License.
 
 """
-The examples as executables of ROS.
+The examples as ROS executables.
 
-They are no modules of the package, as each is one file to be copied.
+An example is not a module of the package: each is one file for copying.
 """
 
 from __future__ import annotations

@@ -31,12 +31,12 @@ from pathlib import Path
 
 from abdf1_ros.text import printable
 
-WIDTH = 1160  # pixels, of which the names of lanes take the first ones
+WIDTH = 1160  # pixels; the names of lanes take the first NAMES pixels
 NAMES = 110
 _RIGHT = 20
 _GAP = 6
-_LETTER = 6.3  # pixels, in a bar
-_LEAST = 1.6  # pixels: what is shorter can still be seen
+_LETTER = 6.3  # pixels of a letter in a bar
+_LEAST = 1.6  # pixels: least width of a bar, so that it can be seen
 _TICKS = 10
 _MARK = '<meta name="generator" content="abdf1_ros">'
 
@@ -66,7 +66,7 @@ p { margin: .35em 0; } .verdict { font-size: 1.1em; font-weight: 600; } .is-bad 
 
 
 class Look(Enum):
-    """What a bar is; the value is its class in the style."""
+    """The kind of a bar; the value is its class in the style."""
 
     ASK = 'ask'
     ANSWER = 'answer'
@@ -80,10 +80,11 @@ class Look(Enum):
 @dataclass(frozen=True, slots=True)
 class Bar:
     """
-    What lasts from ``start`` to ``end``, in a ``row`` of its lane.
+    An event from ``start`` to ``end``, in a ``row`` of its lane.
 
-    ``title`` is shown by the mouse, and in the bar the first of ``labels`` that it has room for.
-    ``link`` is the name of a drawing.
+    - ``title``: shown under the mouse.
+    - ``labels``: the bar shows the first label that fits.
+    - ``link``: the name of a drawing.
     """
 
     start: float
@@ -97,7 +98,7 @@ class Bar:
 
 @dataclass(frozen=True, slots=True)
 class Lane:
-    """Bars beside each other, in as many rows as they say."""
+    """Bars beside each other, in the rows that they name."""
 
     name: str
     bars: Sequence[Bar]
@@ -113,7 +114,7 @@ class Lane:
 
 
 def text_of(text: str) -> str:
-    """Return text from anywhere as HTML: all of it visible, nothing of it markup."""
+    """Return any text as HTML: all of it visible, none of it markup."""
     return escape(printable(text))
 
 
@@ -122,7 +123,7 @@ def drawing(lanes: Sequence[Lane], start: float, end: float, unit: str, limit: f
     """
     Return an SVG of lanes from ``start`` to ``end``, below them the axis with ``unit``.
 
-    At ``limit`` is a red line. ``name`` is what links lead to.
+    ``limit`` gets a red line. ``name`` is the target of links.
     """
     scale = (WIDTH - NAMES - _RIGHT) / ((end - start) or 1.0)
     height = sum(lane.height + _GAP for lane in lanes)
@@ -179,7 +180,7 @@ def _step(least: float) -> float:
 
 
 def key(entries: Iterable[tuple[Look, str]]) -> str:
-    """Return what the colours mean."""
+    """Return the key of the colours."""
     return '<p class="quiet">' + ' '.join(
         f'<svg class="key" viewBox="0 0 10 8"><rect class="{look.value}" width="10" height="8"/>'
         f'</svg>{text_of(text)}' for look, text in entries) + '</p>'
@@ -196,7 +197,7 @@ def cells(head: Sequence[str], rows: Iterable[Sequence[str]], right: Sequence[in
 
 
 def write_page(path: str, title: str, parts: Iterable[str]) -> None:
-    """Write a page of parts that are HTML; raises OSError."""
+    """Write a page of HTML parts; raises OSError."""
     with open(path, 'w', encoding='utf-8') as file:
         file.write('<!DOCTYPE html>\n<html lang="en">\n<head>\n<meta charset="utf-8">\n'
                    f'{_MARK}\n<meta http-equiv="Content-Security-Policy" '
@@ -209,6 +210,6 @@ def write_page(path: str, title: str, parts: Iterable[str]) -> None:
 
 
 def is_page(path: Path) -> bool:
-    """Tell whether a file is one of these pages, so that a new one may replace it."""
+    """Return True if a file is one of these pages, so that a new page may replace it."""
     with path.open('rb') as file:
         return _MARK.encode() in file.read(1000)

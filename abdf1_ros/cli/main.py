@@ -15,9 +15,9 @@
 """
 The commands by their names, for the executables and for ``python3 -m abdf1_ros``.
 
-The imports of a command take a while. Until its ``main`` handles signals, Ctrl-C and SIGTERM end
-it with the same status as later, at once and without a traceback. Nothing has to be closed at that
-time. So this module imports little: before it has run, Ctrl-C brings a traceback.
+The imports of a command take a while. Until ``main`` of the command handles signals, Ctrl-C and
+SIGTERM end the process at once, without a traceback. The status is the same as later. Nothing is
+open yet at that time. So this module imports little: before it has run, Ctrl-C brings a traceback.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ if TYPE_CHECKING:
     from typing import NoReturn
 
 _NOT_INSTALLED = 2
-_INTERRUPTED = 130  # of the commands whose exit status tells success or failure
+_INTERRUPTED = 130  # for commands whose exit status means success or failure
 
 COMMANDS = {
     'node': 'abdf1_ros.ros.node',
@@ -47,12 +47,12 @@ COMMANDS = {
     'plc': 'abdf1_ros.cli.plc.command',
     'conform': 'abdf1_ros.cli.conform',
 }
-"""Where the ``main`` of each command is."""
+"""The module with the ``main`` of each command."""
 
 _TELLING = ('check', 'plc', 'conform')
 
-# They have done all that has to be done, and take signals without effect. What rclpy has in
-# thousands of objects and some threads may hold up the end of the interpreter for ever.
+# After ``main`` of these commands nothing is left to do, and signals have no effect. The objects
+# and threads of rclpy could block the shutdown of the interpreter for ever.
 _LEAVING = ('node', 'lines', 'simulator')
 
 
@@ -73,14 +73,14 @@ def run(name: str) -> int:
 
 
 def __getattr__(name: str) -> Callable[[], int]:
-    """Return what the executable of this name calls."""
+    """Return the function that the executable of this name calls."""
     if name not in COMMANDS:
         raise AttributeError(name)
     return lambda: run(name)
 
 
 def _end_quietly(status: int) -> None:
-    """End with that status where a signal comes before the command has handlers of its own."""
+    """End with ``status`` if a signal comes before the command has its own handlers."""
     def leave(number: int, frame: FrameType | None) -> None:
         os._exit(status)
 
@@ -97,14 +97,14 @@ def _cure(module: str) -> str:
 
 
 def _ended(status: int) -> int:
-    """Return the status; a second Ctrl-C while Python ends must not change it."""
+    """Return the status; from now on a second Ctrl-C cannot change it."""
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, signal.SIG_IGN)
     return status
 
 
 def _leave(status: int) -> NoReturn:
-    """End the process at once; what it has said is not lost."""
+    """End the process at once, after its output is flushed."""
     for stream in (sys.stdout, sys.stderr):
         try:
             stream.flush()

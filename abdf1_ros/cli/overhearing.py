@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""What another master reads: for ``check`` from a recording, for ``plc init`` from the line."""
+"""The reads of another master: for ``check`` from a recording, for ``plc init`` from the line."""
 
 from __future__ import annotations
 
@@ -38,10 +38,10 @@ from abdf1_ros.sniffer.capture import Chunk, Direction
 from abdf1_ros.sniffer.dumps import Recording
 from abdf1_ros.text import counted
 
-_SECOND = '<'  # the other side of a recording stands for a second port
+_SECOND = '<'  # bytes from the far side of a recording count as bytes of a second port
 _STEP = 0.001  # s between chunks of a recording without times
 
-# The end of a read in words, as ``describe`` gives it.
+# The end of a read in words, as written by ``describe``.
 _READ = re.compile(r'(?P<address>[A-Z]{1,3}\d*:\S+), (?P<count>\d+) (?P<unit>word|element)s?\Z')
 _BYTES = re.compile(r'(?P<address>[0-7]+) \(ADDR \d+\), (?P<count>\d+) bytes?\Z')
 
@@ -54,18 +54,18 @@ Tag,Command,Address,Station,PLC_Type,Length,Period
 
 
 class _Nothing:
-    """A listener that takes note of nothing."""
+    """A listener that ignores all events."""
 
     def __getattr__(self, name: str) -> Callable[..., None]:
-        """Return what ignores any call."""
+        """Return a function that ignores its call."""
         return lambda *args: None
 
 
 class Overhearing:
     """
-    A driver that only listens, and what it has heard: from a recording or from a port.
+    A driver that only listens to a recording or a port, with the reads that it heard.
 
-    ``carried`` are the reads that were answered.
+    ``carried``: the answered reads.
     """
 
     def __init__(self, network: Network, mappings: Rows = Rows()) -> None:  # noqa: B008
@@ -74,7 +74,7 @@ class Overhearing:
         self._now = 0.0
 
     def hear(self, chunk: Chunk) -> None:
-        """Take bytes that were said in the order of their times."""
+        """Take a chunk of bytes; chunks come in the order of their times."""
         self._now = self._now + _STEP if chunk.time is None else chunk.time
         is_far = chunk.direction is Direction.IN
         self._driver.machine.receive_data(
@@ -82,12 +82,12 @@ class Overhearing:
 
     @property
     def carried(self) -> list[Carried]:
-        """Return the reads that were answered, by station and text."""
+        """Return the answered reads, by station and text."""
         assert self._driver.overheard is not None
         return [read for _, read in sorted(self._driver.overheard.carried.items())]
 
     def unread(self) -> dict[Mapping, str]:
-        """Return the rows that were not filled, and why."""
+        """Return the rows without values, with the reason."""
         overheard = self._driver.overheard
         assert overheard is not None
         return {mapping: overheard.why_unread(point)
@@ -97,9 +97,9 @@ class Overhearing:
 def overheard(network: Network, rows: Rows,
               files: Iterable[str]) -> tuple[list[str], dict[Mapping, str]]:
     """
-    Return the reads in recordings as text, and which rows these do not fill, with the reason.
+    Return the reads in recordings as text, and the rows that stay empty, with the reason.
 
-    Raises OSError, and Problem where a file cannot be read.
+    Raises OSError, and Problem if a file is damaged.
     """
     chunks = [chunk for file in files for chunk in Recording(Path(file)).chunks()]
     has_two = any(chunk.direction is Direction.IN for chunk in chunks)
@@ -117,19 +117,19 @@ def texts_of(carried: Iterable[Carried]) -> list[str]:
 
 
 def map_of(carried: Iterable[Carried]) -> str:
-    """Return a map CSV whose rows are filled by these reads."""
+    """Return a map CSV with a row for each of these reads."""
     tags: set[str] = set()
     return HEAD + ''.join(f'{_row(read, tags)}\n' for read in carried)
 
 
 def _row(read: Carried, tags: set[str]) -> str:
-    """Return the row of a read, a comment where it is none of words of one type."""
+    """Return the row of a read; a comment if the read is not of words of one type."""
     place = _place(read)
     if place is None:
         return f'# station {read.station}: {read.text}: {counted(read.count, "time")}'
     plc_type, address, length = place
     tag = re.sub(r'\W+', '_', f'{address.lower()}_{length}_of_{read.station}')
-    if tag in tags:  # with another command
+    if tag in tags:  # the same words, read with another command
         return f'# station {read.station}: {read.text}: as {tag}'
     tags.add(tag)
     return f'{tag},Read,{address},{read.station},{plc_type},{length},{_period(read)}'
@@ -141,7 +141,7 @@ def _period(read: Carried) -> int:
 
 
 def _place(read: Carried) -> tuple[PlcType, str, int] | None:
-    """Return PLC type, address and Length of a read of numbers, None for any other."""
+    """Return PLC type, address and Length of a read of numbers; None for any other read."""
     cmd, data = read.command.cmd & ~PRIORITY_BIT, read.command.data
     plc_type = PlcType.PLC2 if cmd != 0x0F else \
         PlcType.SLC if data[:1] in (b'\xA1', b'\xA2') else PlcType.PLC5

@@ -15,10 +15,10 @@
 """
 The simulator: PLCs on one line, to try the bridge without hardware.
 
-By default all PLCs of the data file share a half-duplex multidrop line; with --full-duplex one
-of them has a full-duplex line for itself, on which it can also send commands. The line is a
-pseudo-terminal, a serial port, or a TCP port. While it runs, lines on standard input switch
-faults on and off.
+By default all PLCs of the data file share a half-duplex multidrop line. With --full-duplex one PLC
+has a full-duplex line of its own, on which it can also send commands. The line is a
+pseudo-terminal, a serial port, or a TCP port. While the simulator runs, lines on standard input
+switch faults on and off.
 """
 
 from __future__ import annotations
@@ -74,8 +74,10 @@ from abdf1_ros.simulator.ladder import Ladder, Lamp
 from abdf1_ros.simulator.simulated_plc import load_plcs, SimulatedPlc
 
 _EPILOG = COMMANDS + """
-exit status: 0 when it is ended, 1 when the port cannot be opened or the name of --pty is taken,
-2 for bad options or data files
+exit status:
+  0  the simulator was ended
+  1  the port cannot be opened, or the name of --pty is in use
+  2  bad options or data files
 
 examples:
   simulator --pty /tmp/plc
@@ -85,17 +87,17 @@ examples:
 """
 
 
-# How long (s) the last lines have to be printed.
+# Time (s) to print the last lines.
 _LAST_LINES = 1.0
 
-# The lamps of a ladder that are reported; the others blink.
+# The lamps of a ladder that are reported; the remaining lamps blink.
 _LAMPS = {Lamp.ALIVE: 'ROS alive', Lamp.IN_CONTROL: 'ROS in control',
           Lamp.STOPPED: 'ROS stopped (heartbeat 0)',
           Lamp.LOST: 'ROS lost (heartbeat stands still)'}
 
 
 class _FaultyPort(PortAround):
-    """The port of the one PLC on a full-duplex line, with the effects of its faults."""
+    """The port of the single PLC on a full-duplex line, with the effects of its faults."""
 
     def __init__(self, port: Port, plc: SimulatedPlc, checksum: Checksum) -> None:
         super().__init__(port)
@@ -103,7 +105,7 @@ class _FaultyPort(PortAround):
         self._decoder = FrameDecoder(checksum, Duplex.FULL)
 
     def read(self, timeout: float | None, wake: int) -> bytes:
-        """Wait for bytes; a silent PLC ignores all, a full one answers messages with NAK."""
+        """Wait for bytes; a silent PLC ignores them, a full PLC answers messages with NAK."""
         data = self._port.read(timeout, wake)
         if self._plc.faults.full:
             self._refuse(data)
@@ -117,13 +119,13 @@ class _FaultyPort(PortAround):
                 self.write(NAK)
 
     def write(self, data: bytes) -> None:
-        """Send bytes, damaged or not at all."""
+        """Send bytes, damaged if the PLC is noisy; a silent PLC sends nothing."""
         if not self._plc.faults.silent:
             self._port.write(self._plc.damaged(data))
 
 
 class _EchoingPort(PortAround):
-    """The port of a line whose adapter gives the other end back what it sends."""
+    """The port of a line whose adapter echoes all bytes to the far end."""
 
     def read(self, timeout: float | None, wake: int) -> bytes:
         data = self._port.read(timeout, wake)
@@ -140,7 +142,7 @@ def main(args: Sequence[str] | None = None) -> int:
     """
     Run until SIGINT, SIGTERM, "quit" or the end of --seconds.
 
-    The exit statuses are those of --help, and 1 after internal errors.
+    Return an exit status of --help, or 1 after internal errors.
     """
     prepare_output()
     options = parse_options(args)
@@ -156,7 +158,7 @@ def _run(options: argparse.Namespace) -> int:
     except (CommandError, ValueError) as error:
         tell('simulator', str(error))
         return EXIT_USAGE
-    # A thread prints: PLCs do not stand still, nor does the end wait, for a terminal or a pipe.
+    # A thread prints, so that a slow terminal or pipe stops neither the PLCs nor the end.
     output = Sink(sys.stdout.fileno())
     cast.say = lambda text: output.put(f'simulator: {text}\n'.encode(
         sys.stdout.encoding, 'backslashreplace'))
@@ -165,7 +167,7 @@ def _run(options: argparse.Namespace) -> int:
         cast.start()
         with EndRequest((signal.SIGINT, signal.SIGTERM)) as ended:
             _converse(cast, script, options, ended)
-    finally:  # the thread would keep the process alive
+    finally:  # otherwise the thread keeps the process alive
         cast.close()
         output.end()
         output.join(_LAST_LINES)
@@ -175,16 +177,16 @@ def _run(options: argparse.Namespace) -> int:
 def _print(text: str) -> None:
     try:
         print(f'simulator: {text}', flush=True)
-    except OSError:  # the reader has left; the PLCs go on
+    except OSError:  # nothing reads the output any more; the PLCs go on
         drop_output()
 
 
 class Cast:
     """
-    PLCs that answer on a line from ``start`` to ``close``, as options of the simulator say.
+    PLCs that answer on a line from ``start`` to ``close``, by the options of the simulator.
 
-    ``on_lamp`` gets station, lamp and state of what their ladders report, ``say`` prints a line;
-    both are called in the thread that answers.
+    ``on_lamp`` gets station, lamp and state from ladder programs; ``say`` prints a line. The
+    thread that answers calls both.
     """
 
     def __init__(self, options: argparse.Namespace,
@@ -202,7 +204,7 @@ class Cast:
         self.say(text)
 
     def start(self) -> None:
-        """Say who plays, and begin."""
+        """Print the stations, and start."""
         names = ', '.join(f'{plc.station} ({plc.table.plc_type.value})' for plc in self._plcs)
         self.say(f'stations {names} on {self._line.name}, {self._check}')
         self._link.start()
@@ -213,7 +215,7 @@ class Cast:
         return self._link.has_failed
 
     def carry_out(self, line: str) -> None:
-        """Carry out a command, and say what came of it."""
+        """Carry out a command, and print its result."""
         try:
             self.say(execute(line, self._plcs, self._is_full_duplex, self.say))
         except CommandError as error:
@@ -221,7 +223,7 @@ class Cast:
         self._link.wake()
 
     def advance(self) -> None:
-        """Let the programs go on, also while nothing is asked of their PLCs."""
+        """Let the ladder programs go on, also without commands to their PLCs."""
         for plc in self._plcs:
             plc.advance()
 
@@ -231,7 +233,7 @@ class Cast:
         self._line.close()
 
     def _run_ladder(self, station: str, on_lamp: Callable[[str, Lamp, bool], None]) -> None:
-        """Run the ladder program of a station; changes of its lamps are said."""
+        """Run the ladder program of a station, and print changes of its lamps."""
         plc = _plc('--ladder', station, self._plcs)
 
         def tell(at: float, lamp: Lamp, is_on: bool) -> None:
@@ -247,7 +249,7 @@ class Cast:
 
 
 def _try_out(script: TimedCommands, options: argparse.Namespace) -> None:
-    """Raise CommandError for a command of --at that would fail later; nothing is sent yet."""
+    """Raise CommandError for a command of --at that would fail later; send nothing."""
     plcs = _load(options)
     for _, line in script:
         try:
@@ -258,7 +260,7 @@ def _try_out(script: TimedCommands, options: argparse.Namespace) -> None:
 
 
 def _load(options: argparse.Namespace) -> list[SimulatedPlc]:
-    """Return the PLCs of the data file, or the one that has a line for itself."""
+    """Return the PLCs of the data file; the single PLC with --full-duplex."""
     plcs = load_plcs(options.data or str(config_file('simulator.csv')),
                      Checksum(options.check), time.monotonic, threading.Lock)
     return plcs if options.full_duplex is None else [
@@ -266,7 +268,7 @@ def _load(options: argparse.Namespace) -> list[SimulatedPlc]:
 
 
 def _plc(option: str, station: str, plcs: Sequence[SimulatedPlc]) -> SimulatedPlc:
-    """Return the PLC that an option names; ValueError where there is none."""
+    """Return the PLC that an option names; raises ValueError if there is none."""
     for plc in plcs:
         if station == str(plc.station):
             return plc
@@ -276,10 +278,10 @@ def _plc(option: str, station: str, plcs: Sequence[SimulatedPlc]) -> SimulatedPl
 
 def _make_thread(plcs: Sequence[SimulatedPlc], line: Endpoint,
                  options: argparse.Namespace, say: Callable[[str], None]) -> LinkThread:
-    """Return the thread that plays ``plcs`` on ``line``."""
+    """Return the thread that answers for ``plcs`` on ``line``."""
     checksum = Checksum(options.check)
     is_full_duplex = options.full_duplex is not None
-    # Only a serial port has a real speed, which the timers have to take into account.
+    # Timers depend on the speed of the line, and only a serial port has a real speed.
     timing = Network(baud=options.baud).timing if options.port else LineTiming()
     if is_full_duplex:
         machine = _full_duplex(plcs[0], checksum, timing)
@@ -298,7 +300,7 @@ def _make_thread(plcs: Sequence[SimulatedPlc], line: Endpoint,
 
 
 def _announcer(say: Callable[[str], None]) -> Callable[[PortState], None]:
-    """Return what says the states of the line, each once, without the normal one."""
+    """Return a function that prints states of the line, each once; not the normal state."""
     last = ''
 
     def announce(state: PortState) -> None:
@@ -316,28 +318,31 @@ def parse_options(args: Sequence[str] | None) -> argparse.Namespace:
     parser.add_argument('--data', help='CSV of the data tables (default: config/simulator.csv)')
     line = parser.add_mutually_exclusive_group()
     line.add_argument('--pty', metavar='NAME', type=_name,
-                      help='a pseudo-terminal of this name (default: one with the name that is '
+                      help='make a pseudo-terminal of this name (default: a new name, which is '
                            'printed)')
-    line.add_argument('--port', type=_name, help=f'a serial port, {URLS}')
-    line.add_argument('--tcp', metavar='HOST:PORT', help='a TCP port to listen on')
+    line.add_argument('--port', type=_name, help=f'use a serial port, {URLS}')
+    line.add_argument('--tcp', metavar='HOST:PORT', help='listen on a TCP port')
     parser.add_argument('--ladder', metavar='STATION', action='append', default=[],
-                        help='its program watches a heartbeat in N10:0 and says when ROS is in '
-                             'control (docs/tutorials/heartbeats.md); may be repeated')
+                        help='the program of this PLC watches a heartbeat in N10:0 and reports '
+                             'when ROS is in control (docs/tutorials/heartbeats.md); may be '
+                             'repeated')
     duplex = parser.add_mutually_exclusive_group()
     duplex.add_argument('--full-duplex', metavar='STATION',
-                        help='this PLC alone, on a full-duplex line')
+                        help='only this PLC answers, on a full-duplex line')
     duplex.add_argument('--radio', action='store_true',
-                        help='all PLCs behind a DF1 radio modem (Mode Radio)')
+                        help='all PLCs answer behind a DF1 radio modem (Mode Radio)')
     parser.add_argument('--echo', action='store_true',
-                        help='the line gives back what it gets, as some two-wire adapters do')
+                        help='the line sends all received bytes back, as some two-wire adapters '
+                             'do')
     parser.add_argument('--baud', type=whole_option, choices=BAUD_RATES, default=9600,
-                        help='of the serial port (default: %(default)s)')
+                        help='baud rate of the serial port (default: %(default)s)')
     parser.add_argument('--check', choices=[check.value for check in Checksum],
-                        default=Checksum.CRC.value, help='default: %(default)s')
+                        default=Checksum.CRC.value,
+                        help='check of messages (default: %(default)s)')
     parser.add_argument('--at', metavar='"SECONDS COMMAND"', action='append', default=[],
-                        help='a command to carry out after so many seconds; may be repeated')
+                        help='carry out a command SECONDS after the start; may be repeated')
     parser.add_argument('--seconds', type=seconds_option, default=math.inf,
-                        help='end after so many seconds')
+                        help='end after this number of seconds')
     return parser.parse_args(args)
 
 
@@ -357,7 +362,7 @@ def _scheduled(text: str) -> tuple[float, str]:
 
 
 def _make_line(options: argparse.Namespace) -> Endpoint:
-    """Return the line; NoPort says which one cannot be had."""
+    """Return the line; raises NoPort with the name of a line that cannot be opened."""
     try:
         if options.tcp is not None:
             try:
@@ -373,14 +378,14 @@ def _make_line(options: argparse.Namespace) -> Endpoint:
 
 
 def _port_settings(options: argparse.Namespace) -> PortSettings:
-    """Return how the port is set; ConfigurationError for a URL that no port can have."""
+    """Return the settings of the port; raises ConfigurationError for a bad URL."""
     if '://' in options.port:
         make_network({'com_port': (options.port, '--port')})
     return PortSettings(options.port, options.baud)
 
 
 def _full_duplex(plc: SimulatedPlc, checksum: Checksum, timing: LineTiming) -> Machine:
-    """Return a machine that is ``plc`` at the other end of a full-duplex line."""
+    """Return a machine that answers for ``plc`` on a full-duplex line."""
     def run(machine: Machine) -> Procedure:
         peer = FullDuplexPeer(
             machine, LinkSettings(station=None, checksum=checksum), ActiveStationList(), plc.serve)
@@ -392,7 +397,7 @@ def _full_duplex(plc: SimulatedPlc, checksum: Checksum, timing: LineTiming) -> M
 
 
 def _radio(plcs: Sequence[SimulatedPlc], checksum: Checksum, timing: LineTiming) -> Machine:
-    """Return a machine that is all PLCs behind one radio modem."""
+    """Return a machine that answers for all PLCs behind one radio modem."""
     def serve(command: Packet) -> Packet | None:
         replies = [plc.serve(command) for plc in plcs
                    if command.dst in (plc.station, BROADCAST) and not plc.faults.silent]
@@ -410,14 +415,14 @@ def _radio(plcs: Sequence[SimulatedPlc], checksum: Checksum, timing: LineTiming)
 
 def _converse(cast: Cast, script: TimedCommands, options: argparse.Namespace,
               ended: EndRequest) -> None:
-    """Carry out commands as they come, until it is time to end."""
+    """Carry out commands when they are due, until it is time to end."""
     def carry_out(line: str) -> None:
         if line.strip() == 'quit':
             ended.set()
         elif line.strip():
             cast.carry_out(line)
 
-    signal.signal(signal.SIGTTIN, signal.SIG_IGN)  # or a background process is stopped
+    signal.signal(signal.SIGTTIN, signal.SIG_IGN)  # otherwise a background process is stopped
     begin = time.monotonic()
     inputs = [sys.stdin.fileno()] if sys.stdin else []
     rest = b''
@@ -429,14 +434,15 @@ def _converse(cast: Cast, script: TimedCommands, options: argparse.Namespace,
             data = _input(inputs[0])
             *lines, rest = (rest + data).split(b'\n')
             if not data:
-                lines, inputs = [rest], []  # input is closed; signals and --seconds still end us
+                # input is closed; a signal or --seconds still ends the process
+                lines, inputs = [rest], []
             for line in lines:
                 carry_out(line.decode(errors='replace'))
 
 
 def _input(descriptor: int) -> bytes:
-    """Return what was typed; nothing from a terminal that is another job's at the moment."""
+    """Return the typed text; nothing while the terminal belongs to another job."""
     try:
         return os.read(descriptor, 4096)
-    except OSError:  # EIO: we are in the background
+    except OSError:  # EIO: this process is in the background
         return b''

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""What commands print: tables, colours, progress, and its failures."""
+"""Output of the commands: tables, colours, progress, and errors."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ from abdf1_ros.text import printable
 
 RED, YELLOW, GREEN = 31, 33, 32
 
-# Exit statuses of all commands: 1 for what a port or a run brings, 2 for files and arguments.
+# Exit statuses of all commands: 1 for failures of a port or a run, 2 for bad files or arguments.
 EXIT_FAILED = 1
 EXIT_USAGE = 2
 EXIT_UNKNOWN = 3  # of "plc write"
@@ -54,11 +54,11 @@ _ENDING = (signal.SIGINT, signal.SIGTERM)
 _ADVICE = {
     errno.EACCES: 'serial ports belong to a group: "sudo usermod -aG dialout $USER", then log in '
                   'again',
-    errno.ENOENT: '"plc ports" lists the ports that there are'}
+    errno.ENOENT: '"plc ports" lists the ports of this machine'}
 
-_ALIKE = 0.7  # --period is named for --perod, --port not for --force
+_ALIKE = 0.7  # --perod suggests --period, but --force does not suggest --port
 
-_PROGRESS_DELAY = 2.0  # shorter work shows no progress
+_PROGRESS_DELAY = 2.0  # s; shorter work shows no progress
 
 
 class NoPort(OSError):
@@ -69,18 +69,18 @@ class NoPort(OSError):
 
 
 def tell(name: str, text: str, code: int | None = None) -> None:
-    """Say ``text`` on standard error, in the name of a command; in a colour where it has one."""
+    """Print ``text`` on standard error after the name of a command, if given in a colour."""
     line = f'{name}: {printable(text)}'
-    with suppress(OSError):  # there is no reader
+    with suppress(OSError):  # nothing reads the output
         print(colour(line, code, sys.stderr) if code else line, file=sys.stderr, flush=True)
 
 
 def run_command(name: str, work: Callable[[], int], interrupted: int = 0, unread: int = 0) -> int:
     """
-    Carry out a command and tell its failures; return the exit status.
+    Carry out a command and print its failures; return the exit status.
 
-    It is ``interrupted`` after a SIGINT or SIGTERM that the work has not handled, ``unread`` where
-    the reader of the output has left.
+    The status is ``interrupted`` after a SIGINT or SIGTERM that ``work`` has not handled. It is
+    ``unread`` if the reader of the output has left.
     """
     complain = partial(tell, name, code=RED)
     try:
@@ -102,12 +102,12 @@ def run_command(name: str, work: Callable[[], int], interrupted: int = 0, unread
 
 
 def is_terminal(stream: TextIO) -> bool:
-    """Tell whether ``stream`` is a terminal, so that output may move the cursor."""
+    """Return True if ``stream`` is a terminal, on which output may move the cursor."""
     return stream.isatty() and os.environ.get('TERM') != 'dumb'
 
 
 def colour(text: str, code: int, stream: TextIO) -> str:
-    """Return ``text`` in a colour where ``stream`` is a terminal and NO_COLOR is not set."""
+    """Return ``text`` in a colour if ``stream`` is a terminal and NO_COLOR is not set."""
     if is_terminal(stream) and 'NO_COLOR' not in os.environ:
         return f'\x1b[{code}m{text}\x1b[0m'
     return text
@@ -117,8 +117,8 @@ def prepare_output() -> None:
     """
     Prepare printing for any kind of output, once at the start of a command.
 
-    A closed stream is replaced by the null device, a character that a stream cannot show by its
-    escape.
+    The null device replaces a closed stream. An escape replaces a character that a stream cannot
+    show.
     """
     for name in ('stdout', 'stderr'):
         if getattr(sys, name) is None:
@@ -133,8 +133,8 @@ def interruptible() -> Iterator[None]:
     """
     Let the first SIGINT or SIGTERM in the block raise KeyboardInterrupt.
 
-    Further ones do nothing, after the block too: a second Ctrl-C, or a signal to a group of
-    processes, disturbs neither the end nor the exit status.
+    Further signals have no effect, also after the block. So a second Ctrl-C, or a signal to a
+    process group, does not disturb the end or the exit status.
     """
     for number in _ENDING:
         signal.signal(number, _interrupt)
@@ -150,18 +150,18 @@ def _interrupt(number: int, frame: FrameType | None) -> None:
 
 
 def ignore_further() -> None:
-    """Take further signals without effect while the process ends."""
-    for number in _ENDING:  # not SIG_IGN: Python tells of a signal that comes in that moment
+    """Make further signals have no effect while the process ends."""
+    for number in _ENDING:  # not SIG_IGN: Python reports a signal that comes at that moment
         signal.signal(number, lambda number, frame: None)
 
 
 def drop_output() -> None:
-    """Drop all further output: its reader has left, or it cannot be written."""
+    """Drop all further output, after its reader has left or a write failed."""
     os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 
 def has_reader_left(error: OSError, tell: Callable[[str], None]) -> bool:
-    """Tell whether that made printing fail; otherwise ``tell`` the error, as of a full disk."""
+    """Return True if printing failed without a reader; ``tell`` any other error (a full disk)."""
     drop_output()
     if isinstance(error, BrokenPipeError):
         return True
@@ -170,7 +170,7 @@ def has_reader_left(error: OSError, tell: Callable[[str], None]) -> bool:
 
 
 def reason_of(name: str, error: OSError) -> str:
-    """Return why ``name`` cannot be used, and advice where there is any; it is named once."""
+    """Return why ``name`` cannot be used, with advice; the text has the name once."""
     text = error.strerror or str(error)
     advice = advice_for(error.errno) if name.startswith('/dev/') else \
         f'a device path is /dev/{name}' if name.startswith('tty') else ''
@@ -178,7 +178,7 @@ def reason_of(name: str, error: OSError) -> str:
 
 
 def may_replace(path: str, is_ours: Callable[[Path], bool]) -> bool:
-    """Tell whether a file may be written: it is new, empty, no file, or one of this command."""
+    """Return True if a file is new, empty, not a file, or made by this command."""
     place = Path(path)
     try:
         return not place.is_file() or not place.stat().st_size or is_ours(place)
@@ -187,7 +187,7 @@ def may_replace(path: str, is_ours: Callable[[Path], bool]) -> bool:
 
 
 def called(name: str) -> str:
-    """Return how a command of the package is called in this environment, to be pasted."""
+    """Return the words that start a command of the package in this environment, for the shell."""
     prefixes = os.environ.get('AMENT_PREFIX_PATH', '').split(os.pathsep)
     if shutil.which('ros2') and any(
             Path(prefix, 'lib', 'abdf1_ros', name).exists() for prefix in filter(None, prefixes)):
@@ -196,19 +196,19 @@ def called(name: str) -> str:
     for script, words in ((shutil.which(name), name), (shutil.which('abdf1'), f'abdf1 {name}'),
                           (str(beside(name)), shlex.quote(str(beside(name)))),
                           (str(beside('abdf1')), f'{shlex.quote(str(beside("abdf1")))} {name}')):
-        # Others have commands of these names too, such as Node.js.
+        # Other packages have commands of these names too, such as Node.js.
         if script and Path(script).is_file() and b'abdf1_ros' in Path(script).read_bytes()[:1000]:
             return words
     return f'{shlex.quote(sys.executable)} -m abdf1_ros {name}'
 
 
 def advice_for(number: int | None) -> str:
-    """Return advice for an error of the operating system with a serial port, or empty."""
+    """Return advice for an operating system error of a serial port; empty for none."""
     return _ADVICE.get(number or 0, '')
 
 
 def table(head: Sequence[str], rows: Sequence[Sequence[str]], right: Sequence[int] = ()) -> str:
-    """Return rows below a head, in columns; those in ``right`` are aligned at their end."""
+    """Return rows below a head, in columns; the columns in ``right`` are aligned right."""
     cells = [list(head), *map(list, rows)]
     widths = [max(map(len, column)) for column in zip(*cells, strict=True)]
     lines = []
@@ -223,20 +223,19 @@ class _Parser(argparse.ArgumentParser):
     """
     A parser whose errors are two lines: a list of all options hides what is wrong.
 
-    An option that it does not know is named by the parser of its own command, with those that may
-    be meant.
+    The parser of the command reports an unknown option, with similar options.
     """
 
     def __init__(self, *args: Any, complete: Callable[[argparse.ArgumentParser], None]
                  = lambda parser: None, **details: Any) -> None:
-        """Make a parser; ``complete`` adds its arguments when it is used."""
+        """Make a parser; ``complete`` adds its arguments when the parser is used."""
         super().__init__(*args, **details)
         self._complete = complete
-        # Python's own takes no exponent, so -1.5e3 would be an option.
+        # Python's own pattern has no exponent, so -1.5e3 would be an option.
         self._negative_number_matcher = re.compile(r'-\d*\.?\d+(?:e[+-]?\d+)?', re.IGNORECASE)
 
     def parse_known_args(self, args: Any = None, namespace: Any = None) -> tuple[Any, list[str]]:
-        """Parse arguments, once; all have to be known."""
+        """Parse arguments, once; an unknown argument is an error."""
         self._complete(self)
         found, unknown = super().parse_known_args(args, namespace)
         if unknown:
@@ -252,7 +251,7 @@ class _Parser(argparse.ArgumentParser):
         return found, unknown
 
     def _surplus(self, words: Sequence[str]) -> str:
-        """Return what to do with words that are no options, and too many."""
+        """Return advice about surplus words that are not options."""
         if words[0].startswith('/dev/') or is_port(words[0]):
             return f'; did you mean --port {words[0]}?'
         places = [action for action in self._actions if not action.option_strings]
@@ -264,24 +263,24 @@ class _Parser(argparse.ArgumentParser):
 
     def error(self, message: str) -> NoReturn:
         """End with status 2."""
-        self.exit(2, f'{self.prog}: error: {message}\n"{self.prog} --help" tells what it takes\n')
+        self.exit(2, f'{self.prog}: error: {message}\n"{self.prog} --help" lists the arguments\n')
 
 
 def is_port(word: str) -> bool:
-    """Tell whether a word is more likely a port than anything else."""
+    """Return True if a word is most likely the name of a port."""
     is_device = word.startswith(('/dev/tty', '/dev/serial/', 'tty')) and not Path(word).is_file()
     return is_device or '://' in word
 
 
 def _alike(name: str, options: Sequence[str]) -> list[str]:
-    """Return the options that a name may stand for: all that begin with it, or those like it."""
+    """Return the options that a name may mean: those that begin with it, or similar options."""
     return [option for option in options if name and option[2:].startswith(name)] \
         or difflib.get_close_matches(f'--{name}', options, 2, _ALIKE)
 
 
 def command_parser(name: str, description: str | None,
                    epilog: str | None = None) -> argparse.ArgumentParser:
-    """Return the parser of a command: its texts keep their line ends; it has --version."""
+    """Return the parser of a command, with --version; the help keeps the line ends of texts."""
     parser = _Parser(
         prog=name, description=description, epilog=epilog, allow_abbrev=False,
         formatter_class=argparse.RawDescriptionHelpFormatter)
@@ -291,7 +290,7 @@ def command_parser(name: str, description: str | None,
 
 class Progress:
     """
-    Tell the progress of work of more than two seconds on standard error.
+    Show the progress of work of more than two seconds on standard error.
 
     A terminal shows one line that changes; elsewhere a new line comes every two seconds.
     """
@@ -302,7 +301,7 @@ class Progress:
         self._is_shown = False
 
     def show(self, text: str) -> None:
-        """Say ``text`` when it is time."""
+        """Show ``text`` when it is time."""
         now = time.monotonic()
         if now < self._next:
             return
@@ -314,7 +313,7 @@ class Progress:
             self._next = now + _PROGRESS_DELAY
 
     def clear(self) -> None:
-        """Remove the progress line, so that something else can be printed."""
+        """Remove the progress line before other output."""
         if self._is_shown:
             print('\r\x1b[K', end='', file=sys.stderr, flush=True)
             self._is_shown = False
@@ -322,7 +321,7 @@ class Progress:
 
 def number_option(right: str, low: float, high: float = math.inf,
                   parse: Callable[[str], Any] = decimal_number) -> Callable[[str], Any]:
-    """Return what reads the number of an option, for argparse; ``right`` is what it should be."""
+    """Return an argparse type for a number; ``right`` describes a good number."""
     def read(text: str) -> Any:
         value = parse(text)
         if value is None or not low <= value <= high:

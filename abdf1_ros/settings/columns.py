@@ -58,7 +58,7 @@ def _clear_number(text: str) -> str:
 
 
 def _period(text: str) -> int | str | None:
-    """Return ms, or that a row is read on demand alone."""
+    """Return ms, or ON_DEMAND for a row that is read on demand only."""
     return ON_DEMAND if ' '.join(text.lower().split()) == ON_DEMAND else _TIMES.read(text)
 
 
@@ -109,7 +109,7 @@ class Column:
         return ' '.join(map(_text, value)) if isinstance(value, tuple) else _text(value)
 
     def why_not(self, command: Command) -> str:
-        """Return why rows with this command have no such column, empty where they may."""
+        """Return why rows with this command must not have the column; empty if they may."""
         if command in self.commands or command in self.idle:
             return ''
         return f'a {command.value} row has no {self.name}: it is for {_rows(self.commands)} rows'
@@ -121,7 +121,7 @@ def _rows(commands: Iterable[Command]) -> str:
 
 
 def _value_of(mapping: Mapping, attribute: str) -> object:
-    """Return the attribute of a mapping, None where a part on its way is not there."""
+    """Return the attribute of a mapping; None if a part of its path is None."""
     part, _, rest = attribute.partition('.')
     value: object = getattr(mapping, part)
     return value if value is None or not rest else attrgetter(rest)(value)
@@ -136,17 +136,18 @@ def _text(value: object) -> str:
 MAP_COLUMNS = (
     Column('Tag', None, 'unique name'),
     Column('Command', None,
-           'Read, Write, ReadWrite; Serve: words of ours that PLCs read and write; Heartbeat: a '
-           'word that counts while its conditions hold',
+           'Read, Write, ReadWrite; Serve: words in our own table, for PLCs to read and write; '
+           'Heartbeat: a counter that we write into the PLC while its conditions hold',
            kind=COMMAND),
     Column('Address', None,
            'PLC address of the first element, or a range such as N7:0-9 or B3:1/0-7'),
     Column('Station', None,
-           '0-254; of a Write also 255, all stations, none of which confirms; of a Serve our own'),
+           '0-254; Write: also 255 for all stations, but no station confirms; Serve: our own '
+           'Station'),
     Column('PLC_Type', None, 'PLC2, PLC3, PLC5 or SLC; a MicroLogix is SLC'),
-    Column('Length', '1; of a range its size',
-           'elements: bits, words, floats; of timers, counters and control their words; of a '
-           'string in N or A words the words',
+    Column('Length', '1; the size of a range',
+           'number of elements: bits, words, floats; timers, counters, control and strings in N '
+           'or A files: number of words',
            kind=whole(1, 65535)),
     Column('Type', 'natural type of the file',
            'bool, int16, uint16, int32, uint32, float32, bcd16, bcd12 or string',
@@ -155,13 +156,13 @@ MAP_COLUMNS = (
            commands=_TOPICS),
     Column('Period', 'parameter default_period',
            'ms between reads; 0: as often as the line allows; "on demand": only when '
-           '~/read_now/<topic> is called; of a Serve the longest time between two writes of the '
-           'PLC; of a Heartbeat 100-60000, default 1000',
+           '~/read_now/<topic> is called; Serve: the PLC should write at least this often; '
+           'Heartbeat: ms between counts, 100-60000, default 1000',
            kind=_PERIOD, attribute='period_cell',
            commands=(*PUBLISHED, Command.HEARTBEAT), idle=(Command.WRITE,)),
     Column('Publish', 'Always',
-           'Always: after every good read. Change: only new values, and the first after an '
-           'outage',
+           'Always: publish after every good read. Change: publish only new values, and the first '
+           'after an outage',
            kind=member_of(Publish), commands=PUBLISHED, idle=(Command.WRITE,)),
     Column('Min', 'none', 'least value that may be written, in the unit of the topic',
            kind=_NUMBER, attribute='minimum', commands=MESSAGES, idle=(Command.READ,)),
@@ -171,59 +172,59 @@ MAP_COLUMNS = (
            'Low or High: which word of an int32, uint32 or float32 over 16-bit words comes first',
            kind=member_of(WordOrder)),
     Column('Scale', '1',
-           'with Scale or Offset the topic is float32: raw value x Scale + Offset; not for bool '
-           'and string',
+           'topic value = raw value x Scale + Offset, as float32; not for bool and string',
            kind=_NUMBER, attribute='scaling.scale', commands=_TOPICS),
     Column('Offset', '0', 'see Scale',
            kind=_NUMBER, attribute='scaling.offset', commands=_TOPICS),
-    Column('Access', 'the first of them',
-           'how words are reached. PLC5: Typed, WordRange. SLC: Slot, Flat. PLC2: Unprotected, '
-           'Protected, CIF. Serve: Read, so that a PLC cannot write',
+    Column('Access', 'the first in the list',
+           'commands that reach the words. PLC5: Typed, WordRange. SLC: Slot, Flat. PLC2: '
+           'Unprotected, Protected, CIF. Serve: Read, so that a PLC cannot write',
            attribute='access_cell'),
     Column('Processor', '5/03',
-           'of an SLC: 5/01, 5/02, 5/03, 5/04, 5/05, ML1000, ML1100, ML1200, ML1400 or ML1500; it '
+           'SLC: 5/01, 5/02, 5/03, 5/04, 5/05, ML1000, ML1100, ML1200, ML1400 or ML1500; it '
            'limits packets and files; the same in all rows of a station',
            commands=_PLCS),
     Column('Fallback', 'none',
-           'of a Write or Serve: values, separated by spaces, that are written when no good '
-           'message has come for Fallback_After; of a bool 0',
+           'Write or Serve: values, separated by spaces, that the bridge writes when no good '
+           'message has come for Fallback_After; for bool only 0',
            kind=_WORDS, attribute='fallback.values', commands=(Command.WRITE, Command.SERVE)),
-    Column('Fallback_After', 'none', 'ms, 200-60000', kind=milliseconds_from(200, 60_000),
+    Column('Fallback_After', 'none', 'ms from the last good message to the Fallback, 200-60000',
+           kind=milliseconds_from(200, 60_000),
            attribute='fallback.after', commands=(Command.WRITE, Command.SERVE)),
     Column('While', 'none',
-           'of a Read: RUN, or the tag of a counter that the program of the PLC runs; values are '
-           'published only while it holds. Of a Heartbeat: write topics, separated by spaces, '
-           'that must have messages',
+           'Read: RUN, or the tag of a counter in the PLC program; values are published only '
+           'while the PLC runs, or the counter changes. Heartbeat: write topics, separated by '
+           'spaces, that must have messages',
            kind=TEXT, attribute='condition.names', commands=(Command.READ, Command.HEARTBEAT)),
     Column('While_Timeout', 'none',
-           'ms that the counter may stay unchanged, or that the last good message of each topic '
-           'may be old; not with RUN', kind=milliseconds_from(100, 3_600_000),
+           'longest time (ms) without a change of the counter, or without a good message on each '
+           'topic; not with RUN', kind=milliseconds_from(100, 3_600_000),
            attribute='condition.timeout', commands=(Command.READ, Command.HEARTBEAT)),
     Column('Confirms', 'none',
-           'of a Read of the one bit "ROS in control": the tag of the Heartbeat row it goes with',
+           'Read of the single bit "ROS in control": the tag of its Heartbeat row',
            kind=TEXT, commands=(Command.READ,)),
     Column('Via', 'Station',
-           'with Mode Master: the station of a gateway on this line (KF2, KF3, KE) behind which '
-           'Station is',
+           'Mode Master: if Station is behind a gateway (KF2, KF3, KE), the station of the '
+           'gateway on this line',
            commands=_PLCS),
     Column('Description', 'none',
-           'what it is in the plant, to be read; in brackets at its end the unit: Tank level [%]',
+           'meaning in the plant, as text; the unit in brackets at the end: Tank level [%]',
            kind=TEXT),
     Column('Alarm', 'none',
-           'of bits: WARN or ERROR, the level on /diagnostics while a bit is 1; "WARN 0" or '
-           '"ERROR 0" while it is 0',
+           'bits: WARN or ERROR is the level on /diagnostics while a bit is 1; "WARN 0" or '
+           '"ERROR 0" while a bit is 0',
            kind=ALARM, commands=PUBLISHED),
     Column('Deadband', '0',
-           'with Publish Change: differences up to this one, in the unit of the topic, are no '
-           'change',
+           'Publish Change: differences up to this value, in the unit of the topic, do not count '
+           'as a change',
            kind=_NUMBER, commands=PUBLISHED),
     Column('Max_Silence', 'none',
-           'with Publish Change: ms after which a value is published again though it has not '
-           'changed, 100-3600000; the topic then promises a deadline',
+           'Publish Change: ms after which an unchanged value is published again, 100-3600000; '
+           'the topic then promises a deadline',
            kind=milliseconds_from(100, 3_600_000), commands=PUBLISHED),
     Column('Write_Again', 'each message is written',
-           'of a Write or ReadWrite: ms, 100-3600000; while reads show that the PLC holds the '
-           'value of a message, it is written again only after so long',
+           'Write or ReadWrite: ms, 100-3600000; while reads show that the PLC holds the value of '
+           'a message, the value is written again only after this time',
            kind=milliseconds_from(100, 3_600_000),
            commands=(Command.WRITE, Command.READ_WRITE)),
 )
@@ -234,6 +235,6 @@ COLUMNS = tuple(BY_NAME)
 
 RENAMED = {'Publish_While': 'While', 'Heartbeat_Timeout': 'While_Timeout', 'Requires': 'While',
            'Requires_Timeout': 'While_Timeout'}
-"""What columns of earlier versions are called now."""
+"""The present names of columns of earlier versions."""
 
 NEEDED = tuple(column.name for column in MAP_COLUMNS if column.default is None)

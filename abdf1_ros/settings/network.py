@@ -59,9 +59,9 @@ class NetField:
     """
     One field of the net CSV.
 
-    A bad value is reported with ``message``; ``message_args`` fill its places after the value. Its
-    words are true of numbers and choices. ``other_words`` are names of choices in other programs,
-    in lower case, with the choice that we advise.
+    - ``message``: text for a bad value; the text fits numbers and choices only.
+    - ``message_args``: fill the places of ``message`` after the value.
+    - ``other_words``: names of choices in other programs, in lower case, with our choice.
     """
 
     column: str
@@ -150,16 +150,17 @@ class Network:
         'Share', '', 'places where other programs connect to share the line, separated by blanks: '
         'pty:/name, tcp:port, tcp:address:port, or a serial device')
     share_access: str = _net(
-        'Share_Access', 'Read', 'what they may do', _named('Read', 'Write', 'All'))
+        'Share_Access', 'Read', 'what programs at these places may do',
+        _named('Read', 'Write', 'All'))
     store_forward: str = _net(
-        'Store_Forward', '', 'Mode Radio: nodes between which packets are sent on, as in 1,3-5; '
-        '255 for broadcasts')
+        'Store_Forward', '', 'Mode Radio: forward packets between these nodes, such as 1,3-5; 255 '
+        'for broadcasts')
     collision_avoidance: bool = _net(
-        'Collision_Avoidance', False, 'Mode Radio, Yes: radios avoid collisions and buffer both '
-        'directions, so commands to several stations may be under way', _YES)
+        'Collision_Avoidance', False, 'Mode Radio: Yes if the radios avoid collisions and buffer '
+        'both directions; then commands may go to several stations at a time', _YES)
     listen_port: str = _net(
-        'Listen_Port', '', 'Mode Listen: a second device, where each direction of the line has a '
-        'wire of its own')
+        'Listen_Port', '', 'Mode Listen: the second device, if each direction of the line has its '
+        'own wire')
     # Remarks about the way the file is written.
     remarks: tuple[Problem, ...] = field(default=(), compare=False)
 
@@ -256,11 +257,11 @@ def _row_remarks(row: Row) -> Iterator[Problem]:
     absent = [column for column in row.columns if column not in row.cells]
     if absent:
         yield Problem(Place(row.file, row.line), (
-            f'the row ends before {", ".join(absent)}: the defaults are taken'))
+            f'the row ends before {", ".join(absent)}: the defaults apply'))
     if not row.get('Com_Port'):
         yield Problem(row.where('Com_Port'), (
-            f'Com_Port is empty, so the port is {Network().port}, unless the parameter port or '
-            'net.com_port names another'))
+            f'Com_Port is empty: the port is {Network().port}, unless the parameter port or '
+            'net.com_port names a port'))
 
 
 def make_network(values: MappingType[str, tuple[str, Place | str]],
@@ -298,7 +299,7 @@ def make_network(values: MappingType[str, tuple[str, Place | str]],
         if place.is_port(port):
             raise ConfigurationError([Problem(share, (
                 f'Share: "{shown(place.text)}" is the port of the line, {shown(port)}; a guest '
-                'needs another'))])
+                'needs another port'))])
     given = {FIELDS[name].column for name in values}
     checked['remarks'] = tuple(
         remark for remark in base.remarks if remark.place.column not in given)
@@ -326,14 +327,14 @@ def _second_fault(text: str) -> str:
 
 
 def _listen_fault(first: str, second: str) -> tuple[str, str]:
-    """Return the column and the fault of ports that are to be listened to, empty for none."""
+    """Return the column and the fault of the ports in Mode Listen; empty for none."""
     if first.lower().startswith('rfc2217:'):
         return 'Com_Port', ('RFC 2217 sets the lines of the far port, and Mode Listen sets none; '
                             'write socket:// where the server has raw TCP')
     if second and '://' in first:
-        return 'Listen_Port', 'both ports have to be devices of this machine'
+        return 'Listen_Port', 'both ports must be devices of this machine'
     if second and device_of(_device(first)) == device_of(_device(second)):
-        return 'Listen_Port', f'{shown(second)} is Com_Port, too'
+        return 'Listen_Port', f'{shown(second)} is the device of Com_Port, too'
     return '', ''
 
 
@@ -356,7 +357,7 @@ _FAULTS = {'com_port': _port_fault, 'listen_port': _second_fault, 'share': _shar
 
 
 def _is_host(name: str) -> bool:
-    """Tell whether a name server could be asked for a name: no part is empty or too long."""
+    """Return True if a name server could know the name: no part is empty or too long."""
     try:
         return bool(name.encode('idna'))
     except UnicodeError:

@@ -114,7 +114,7 @@ def test_plan_of_the_good_rows(files: tuple[Path, Path],
     assert check(files, GOOD_NET, (GOOD_ROW, *BAD_ROWS)) == 2
     out = capsys.readouterr().out
     assert f'error: {files[1]}:5: Item: 4, a Serve row has our own Station, which is 5' in out
-    assert 'the plan is that of the rows without errors' in out
+    assert 'this plan has only the rows without errors' in out
     assert '1 mapping is read with 1 block' in out
 
 
@@ -301,7 +301,7 @@ def test_folder_has_a_line_of_text_for_each_pair(
     lines = capsys.readouterr().out.splitlines()
     assert [line.partition(':')[0] for line in lines] == ['glue', 'hall/paint', 'press', '3 lines']
     assert lines[-1] == \
-        '3 lines: 3 good (0 of them with warnings), 0 with errors; of no line: notes.csv'
+        '3 lines: 3 good (0 of them with warnings), 0 with errors; not part of a line: notes.csv'
     assert lines[0].startswith('glue: 1 row, port /dev/ttyS0, poll cycle ')
 
 
@@ -315,7 +315,7 @@ def test_lines_stand_in_the_order_of_their_numbers(
     main([str(tmp_path)])
     *lines, total = capsys.readouterr().out.splitlines()
     assert [line.partition(':')[0] for line in lines] == ['line1', 'line2', 'line10']
-    assert total.endswith(' 0 with errors; of no line: line1_map.csv')
+    assert total.endswith(' 0 with errors; not part of a line: line1_map.csv')
 
 
 def test_error_of_one_pair_is_named_and_the_others_are_told(
@@ -363,7 +363,7 @@ def test_one_file_is_not_enough(
     write_csv(files[0], NET_HEADER, [GOOD_NET])
     with pytest.raises(SystemExit):
         main([str(files[0])])
-    assert f'{files[0]} is not a folder, so a map CSV has to follow' in capsys.readouterr().err
+    assert f'{files[0]} is not a folder, so a map CSV must follow' in capsys.readouterr().err
 
 
 def test_folder_of_this_place_has_its_own_name(

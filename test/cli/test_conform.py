@@ -56,7 +56,7 @@ def test_result_is_told_in_lines(port: str, capsys: pytest.CaptureFixture[str]) 
 def test_run_in_which_nothing_was_tried_has_not_passed(
         port: str, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(['slave', '--port', port, '--only', 'nak-resets']) == 1
-    assert 'conform: no rule was tried: each case says why' in capsys.readouterr().err
+    assert 'conform: no rule was tried: each case has its reason' in capsys.readouterr().err
 
 
 def test_failure_is_the_exit_status_and_shows_the_bytes(

@@ -234,7 +234,7 @@ def test_option_that_may_be_meant(
         parser.parse_args(['read', *given])
     assert ending.value.code == 2
     assert capsys.readouterr().err == (f'tool read: error: unrecognized arguments: {meant}\n'
-                                       '"tool read --help" tells what it takes\n')
+                                       '"tool read --help" lists the arguments\n')
 
 
 @pytest.mark.parametrize(('nargs', 'name', 'given', 'hint'), [

@@ -213,12 +213,12 @@ PORT = ('should be a number from 1, a device path such as /dev/ttyUSB0, socket:/
         'one row, and the values into the row below it']),
     ('Station\n5\n', [
         '2 (Com_Port): Com_Port is empty, so the port is /dev/ttyS0, unless the parameter port or '
-        'net.com_port names another']),
+        'net.com_port names a port']),
     ('Station,Com_Port\n5,\n', [
         '2:2 (Com_Port): Com_Port is empty, so the port is /dev/ttyS0, unless the parameter port '
-        'or net.com_port names another']),
+        'or net.com_port names a port']),
     ('Com_Port,Station,Baud,Mode\n/dev/ttyUSB0,5\n', [
-        '2: the row ends before Baud, Mode: the defaults are taken']),
+        '2: the row ends before Baud, Mode: the defaults apply']),
     ('Com_Port,Timeout\n1,1 s\n', [
         '!2:2 (Timeout): Timeout = "1 s" should be a whole number from 0 to 360000 ms']),
     ('Com_Port\n192.168.0.9:4001\n', [f'!2:1 (Com_Port): Com_Port = "192.168.0.9:4001" {PORT}; '

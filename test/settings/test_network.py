@@ -379,10 +379,10 @@ LISTENING = {'Com_Port': '/dev/ttyS0', 'Mode': 'Listen'}
 @pytest.mark.parametrize(('cells', 'text'), [
     ({'Listen_Port': 'COM4'}, 'net.csv:2:3 (Listen_Port): Listen_Port = "COM4" should be a device '
      'path such as /dev/ttyUSB1'),
-    ({'Listen_Port': '1'}, 'Listen_Port: 1 is Com_Port, too'),
+    ({'Listen_Port': '1'}, 'Listen_Port: 1 is the device of Com_Port, too'),
     ({'Com_Port': 'rfc2217://h:1'}, 'RFC 2217 sets the lines of the far port'),
     ({'Com_Port': 'socket://h:1', 'Listen_Port': '/dev/ttyS1'},
-     'both ports have to be devices of this machine'),
+     'both ports must be devices of this machine'),
     ({'Share': 'tcp:6000'}, 'Share needs Mode Master or Peer: in Mode Listen nothing is sent')])
 def test_ports_that_cannot_be_listened_to(tmp_path: Path, cells: dict[str, str],
                                           text: str) -> None:

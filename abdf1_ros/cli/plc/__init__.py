@@ -15,7 +15,10 @@
 """
 The command ``plc``: single reads, writes and questions to the PLCs of a line.
 
-``options`` are those of the command line and ``line`` makes settings of them; ``session`` is an
-open line, ``data`` reads and writes, ``presence`` asks who is there, ``detect`` finds out
-settings, ``watch`` shows values live.
+- ``options``: the command line; ``line`` turns it into settings.
+- ``session``: an open line.
+- ``data``: reads and writes.
+- ``presence``: asks which stations answer.
+- ``detect``: finds the settings of a line.
+- ``watch``: shows values live.
 """

@@ -28,14 +28,14 @@ from abdf1_ros.pccc.steps import AddressedValues
 from abdf1_ros.pccc.values import ValueType
 
 TAKEN = timedelta(seconds=3)
-"""A clock that is further away right after it was set has not taken the time."""
+"""A larger difference right after setting means: the clock has not taken the time."""
 
 
 class Clock:
     """
     Year, month, day, hour, minute and second of a station; FormatError where none is known.
 
-    ``address`` is that of the first word.
+    ``address``: address of the first word.
     """
 
     def __init__(self, session: Session, station: int, plc_type: PlcType,
@@ -50,7 +50,7 @@ class Clock:
         self.address = str(self._words.address)
 
     def read(self) -> tuple[datetime, timedelta]:
-        """Return its time, and how far it is ahead of this computer's local time."""
+        """Return the PLC's time, and its lead over this computer's local time."""
         begun = datetime.now()
         values = self._session.ask(self._station, steps.read(self._words))
         ended = datetime.now()
@@ -58,18 +58,18 @@ class Clock:
             found = datetime(*values)
         except ValueError:
             raise FormatError(f'holds no date and time: {" ".join(map(str, values))}'
-                              + ('' if any(values) else '; is its clock off?')) from None
+                              + ('' if any(values) else '; is its clock switched off?')) from None
         return found, found - (begun + (ended - begun) / 2)
 
     def write(self) -> None:
-        """Set it to this computer's local time, to the second."""
+        """Set the clock to this computer's local time, to the second."""
         now = datetime.now()
         values = now.year, now.month, now.day, now.hour, now.minute, now.second
         self._session.ask(self._station, steps.write(self._words, values))
 
 
 def _why_none(processor: Processor) -> str:
-    """Return why S:37 to S:42 of a processor are not taken for its clock."""
+    """Return the reason why S:37 to S:42 of a processor are not its clock."""
     if not processor.is_micrologix:
         return f'is an SLC {processor.value}, which has no clock'
     return (f'is a {processor.value}: S:37 to S:42 are the clock of an SLC 5/03, 5/04 or 5/05. '

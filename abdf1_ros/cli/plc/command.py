@@ -15,9 +15,9 @@
 """
 Read, write and look for PLCs on a DF1 line from the command line.
 
-It is for commissioning. No other program may have the port, so stop the node first. On a
-half-duplex line it is the master, so there must be no other master, or with --slave one that polls
-us. It needs no ROS.
+This tool is for commissioning and needs no ROS. No other program may have the port, so stop the
+node first. On a half-duplex line plc is the master, so there must be no other master. With
+--slave there must be a master that polls us.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ from abdf1_ros.cli.terminal import EXIT_INTERRUPTED, EXIT_USAGE, prepare_output,
 
 
 def main(args: Sequence[str] | None = None) -> int:
-    """Carry out one command; the exit statuses are those of --help."""
+    """Carry out one command; return an exit status of --help."""
     prepare_output()
     parser = make_parser(__doc__)
     words = help_asked(sys.argv[1:] if args is None else args)
@@ -38,9 +38,9 @@ def main(args: Sequence[str] | None = None) -> int:
     options = parser.parse_args(words)
 
     def work() -> int:
-        from abdf1_ros.cli.plc.work import COMMANDS  # --help does without
+        from abdf1_ros.cli.plc.work import COMMANDS  # --help does not need this import
         return COMMANDS[options.command](options)
 
-    # Where what a write says is not read, nothing has been written.
+    # A "write" whose stdout is closed stops before it writes anything.
     return run_command('plc', work, EXIT_INTERRUPTED,
                        EXIT_USAGE if options.command == 'write' else 0)

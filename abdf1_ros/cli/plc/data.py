@@ -68,7 +68,7 @@ _BITS = {ValueType.INT16: 16, ValueType.UINT16: 16, ValueType.INT32: 32, ValueTy
 
 
 class Radix(Enum):
-    """How whole numbers are written; the value is that of Python's formats."""
+    """The base of whole numbers in the output; the value is the letter in a Python format."""
 
     DECIMAL = 'd'
     HEXADECIMAL = 'X'
@@ -78,9 +78,9 @@ class Radix(Enum):
 
 def mapping_of(address: str, cells: MappingType[str, str], item: int = 1) -> Mapping:
     """
-    Return the mapping of an address; ``cells`` are other columns of a map CSV.
+    Return the mapping of an address; ``cells`` are the other columns of a map CSV.
 
-    Raises ConfigurationError with every fault, each by the argument that it is in.
+    Raises ConfigurationError with every fault; each names its argument.
     """
     row = Row('', item, item, {'Tag': f'address_{item}', 'Address': address, **cells}, {})
     reader = RowReader(row)
@@ -92,9 +92,9 @@ def mapping_of(address: str, cells: MappingType[str, str], item: int = 1) -> Map
 
 def mappings_of(address: str, cells: MappingType[str, str], item: int = 1) -> list[Mapping]:
     """
-    Return the mappings of an address: several where one read cannot have all that it names.
+    Return the mappings of an address: several if one read cannot cover it.
 
-    Elements of structures without a word of them, such as T4:0 or PD10:0-1, are all of their named
+    An element of a structure without a word, such as T4:0 or PD10:0-1, stands for all its named
     words. Raises ConfigurationError like ``mapping_of``.
     """
     elements = [] if {'Length', 'Type'} & {*cells} else _elements(address, cells)
@@ -111,13 +111,13 @@ def mappings_of(address: str, cells: MappingType[str, str], item: int = 1) -> li
 
 
 def _elements(text: str, cells: MappingType[str, str]) -> list[Address]:
-    """Return the elements of structures that an address names as a whole, none for others."""
+    """Return the whole structure elements that an address names; empty for any other address."""
     plc_type = PlcType(cells.get('PLC_Type', PlcType.SLC.value))
     ways = {way.value.lower(): way for way in FAMILIES[plc_type].accesses}
     try:
         found = parse_range(text, plc_type, ways.get(cells.get('Access', '').lower()))
     except FormatError:
-        return []  # ``mapping_of`` tells it
+        return []  # ``mapping_of`` reports the fault
     if isinstance(found, AddressRange):
         numbers = range(found.first.element, found.last.element + 1) if found.is_whole else ()
         return [replace(found.first, element=number) for number in numbers]
@@ -127,9 +127,9 @@ def _elements(text: str, cells: MappingType[str, str]) -> list[Address]:
 def check_for_some_family(addresses: Sequence[str], cells: MappingType[str, str],
                           texts: Sequence[str] = ()) -> None:
     """
-    Check addresses, and values where there are any, before the PLC has said what it is.
+    Check addresses and values before the family of the PLC is known.
 
-    Raises ConfigurationError or FormatError where no family could have them.
+    Raises ConfigurationError or FormatError if they fit no family.
     """
     for item, address in enumerate(addresses, 1):
         errors: dict[str, Abdf1Error] = {}
@@ -144,18 +144,18 @@ def check_for_some_family(addresses: Sequence[str], cells: MappingType[str, str]
 
 
 def _in_arguments(fault: CellFault, row: Row) -> Problem:
-    """Return a fault of a row in the words of the command line."""
+    """Return a fault of a row as a problem of a command line argument."""
     argument, text = _ARGUMENTS.get(fault.column, fault.column), fault.text
     if fault.value is not None:
         text = f'"{fault.value}" {text}'
     if fault.is_superfluous:
         text += f'; leave {argument} out'
     if fault.column == 'Length':
-        if fault.message is not None:  # the numbered text does not name the argument
+        if fault.message is not None:  # the text of the specification does not name the argument
             text = f'{row.get("Length")} elements do not fit at {row.get("Address")}; {text}'
         elif fault.value is None:
             argument += f' of {row.get("Address")}'
-        if row.get('Command') != Command.READ.value:  # there it is how many values are given
+        if row.get('Command') != Command.READ.value:  # a write: Length is the number of values
             argument = 'VALUE'
     elif fault.column == 'Address':
         argument += f' "{row.get("Address")}"'
@@ -163,7 +163,7 @@ def _in_arguments(fault: CellFault, row: Row) -> Problem:
 
 
 def length_of(address: str, kind: str | None, texts: Sequence[str]) -> int:
-    """Return the Length of a write; in A and N files a string takes a word for two characters."""
+    """Return the Length of a write; in A and N files a string has two characters per word."""
     if address.upper().startswith('ST'):
         return 1
     is_packed = kind == ValueType.STRING.value
@@ -172,19 +172,19 @@ def length_of(address: str, kind: str | None, texts: Sequence[str]) -> int:
 
 def ask_family(session: Session, station: int) -> tuple[PlcType, Processor | None]:
     """
-    Return family and processor of a station, as it says itself.
+    Return family and processor of a station, from its own identity.
 
-    Raises LinkError, RemoteError, or FormatError where that is unknown.
+    Raises LinkError, RemoteError, or FormatError if they are unknown.
     """
     try:
         identity = session.ask(station, steps.identify())
     except RemoteError as error:
         if is_local_status(error.sts):
             raise
-        raise FormatError(f'does not say what it is (STS {error.sts:02X} to that question); say '
-                          '--plc-type') from None
+        raise FormatError('does not identify itself (STS '
+                          f'{error.sts:02X} to the question); give --plc-type') from None
     if identity.plc_type is None:
-        raise FormatError(f'is "{identity}", and its family is not known; say --plc-type')
+        raise FormatError(f'is "{identity}", and its family is not known; give --plc-type')
     return identity.plc_type, identity.processor
 
 
@@ -200,40 +200,40 @@ def read(session: Session, mapping: Mapping) -> Values:
 
 
 def scaled(mapping: Mapping, values: Values) -> Values:
-    """Return values as the topic of the row has them."""
+    """Return values in the unit of the row's topic."""
     if mapping.scaling is None or isinstance(values, str):
         return values
     return mapping.scaling.publish(values)
 
 
 def named(mapping: Mapping) -> str:
-    """Return what errors call a mapping: the tag too, where it is a row of a map."""
+    """Return the name of a mapping in errors: the address, for a row also the tag."""
     return f'{printable(mapping.tag)} ({mapping.address})' if is_row(mapping) \
         else str(mapping.address)
 
 
 def is_row(mapping: Mapping) -> bool:
-    """Tell whether a mapping is a row of a map, not an address of the command line."""
+    """Return True for a row of a map, False for an address of the command line."""
     return bool(mapping.place.file)
 
 
 def remarks_of_write(mapping: Mapping) -> Iterator[str]:
-    """Yield what a person may not expect of a write."""
+    """Yield warnings about side effects of a write."""
     for remark in mapping.remarks:
         yield remark.text
     if mapping.address.file_type is FileType.BINARY and mapping.address.bit is None:
         yield (f'{mapping.address} is a word: this writes its 16 bits; a bit is '
                f'{mapping.address.with_bit(0)}')
     if mapping.fallback is not None:
-        yield (f'{named(mapping)} has a Fallback, which only the bridge writes: after this write '
-               'nothing brings the value of rest back')
+        yield (f'{named(mapping)} has a Fallback, which only the bridge writes: no '
+               'Fallback follows this write')
 
 
 class Writing:
     """
-    One write to one mapping; as text it is what is to be written.
+    One write to one mapping; as text, the values to write.
 
-    Raises FormatError, saying what is wrong, when ``texts`` are not values of the mapping.
+    Raises FormatError if ``texts`` are not values of the mapping.
     """
 
     def __init__(self, mapping: Mapping, texts: Sequence[str]) -> None:
@@ -241,16 +241,16 @@ class Writing:
         self._write = Write(mapping, parse_values(mapping, texts), time.monotonic())
 
     def __str__(self) -> str:
-        """Return the values, with the raw ones where they differ."""
+        """Return the values, with raw values if the row is scaled."""
         if self.mapping.scaling is None:
             return self._write.value
         return f'{self._write.value} (raw {show(self._write.raw)})'
 
     def carry_out(self, session: Session) -> WriteResult:
-        """Write; also when interrupted by KeyboardInterrupt, return how far it got."""
+        """Write and return the result, also after KeyboardInterrupt."""
         pending = Pending[WriteResult]()
         try:
-            # Inside, as an interrupt may come while the command is on the line already.
+            # Inside the try block: an interrupt may come while the command is on the line.
             session.start(self.mapping.station, carry_out(self._write, time.monotonic), pending)
             return session.wait(pending)
         except (KeyboardInterrupt, PortLost) as error:
@@ -264,7 +264,7 @@ class Writing:
 
 
 def parse_values(mapping: Mapping, texts: Sequence[str]) -> Sequence[float] | str:
-    """Return the values of texts, whole numbers also as 0x and 0b; FormatError for others."""
+    """Return the values of texts; whole numbers also as 0x and 0b. Raises FormatError."""
     if texts and mapping.message_type is ValueType.STRING:
         if len(texts) != 1:
             raise FormatError(f'{mapping.address} takes one text; quote it if it has spaces')
@@ -287,14 +287,14 @@ def _number(mapping: Mapping, text: str) -> float:
         right = 'a number such as -1.5 or 2e3'
     if value is None or not low <= value <= high:
         unsigned = _UNSIGNED.get(kind)
-        hint = f'; with --type {unsigned.value} it is one' if unsigned and value is not None and (
+        hint = f'; --type {unsigned.value} allows it' if unsigned and value is not None and (
             high < value <= unsigned.range[1]) else ''
         raise FormatError(f'"{text}" is not a valid {kind.value}, {right}{hint}')
     return value
 
 
 def tags_of(mappings: Rows, station: int) -> Tags:
-    """Return the tags of a station's rows, with a number where a row has several values."""
+    """Return the tags of a station's rows by address; numbered if a row has several values."""
     tags: dict[str, list[str]] = defaultdict(list)
     for row in mappings.of_plcs:
         if row.station != station:
@@ -309,14 +309,14 @@ def tags_of(mappings: Rows, station: int) -> Tags:
 
 
 def tag_of(mapping: Mapping, number: int, tags: Tags | None) -> str:
-    """Return the tag of a value: its own where it is a row of a map, or those of its address."""
+    """Return the tag of a value: the tag of its row, or the tags at its address."""
     if tags is None or not is_row(mapping):
         return (tags or {}).get(str(mapping.place_of(number)), '')
     return printable(mapping.tag if mapping.length == 1 else f'{mapping.tag}[{number}]')
 
 
 def labels(mapping: Mapping, tags: Tags | None) -> list[str]:
-    """Return the address of each value, and its tag beside it."""
+    """Return the address of each value, followed by its tag."""
     return [f'{mapping.place_of(number)} {tag_of(mapping, number, tags)}'.rstrip()
             for number in range(mapping.length)]
 
@@ -324,10 +324,10 @@ def labels(mapping: Mapping, tags: Tags | None) -> list[str]:
 def rows(mapping: Mapping, values: Values, names: Sequence[str], radix: Radix = Radix.DECIMAL,
          room: int | None = None) -> Iterator[tuple[str, str]]:
     """
-    Yield values in rows of up to ``room`` characters, each with the name of its first.
+    Yield values in rows of up to ``room`` characters, each with the name of its first value.
 
-    ``names`` are the ``labels`` of all values; where one has a tag each value has a row. Bits are
-    numbered as the file numbers them, and a value has the unit of its row.
+    ``names`` are the ``labels`` of all values. If any value has a tag, each value has a row of its
+    own. Bits have the numbers of the file, and values the unit of their row.
     """
     if isinstance(values, str):
         yield names[0], repr(values)
@@ -358,7 +358,7 @@ def rows(mapping: Mapping, values: Values, names: Sequence[str], radix: Radix = 
 
 
 def unit_of(mapping: Mapping) -> str:
-    """Return the unit that a Description ends with, as in "Tank level [%]"; empty for none."""
+    """Return the unit at the end of a Description such as "Tank level [%]"; empty for none."""
     match = _UNIT.search(mapping.description)
     return printable(match['unit']) if match else ''
 
@@ -372,7 +372,7 @@ def _bits_set(place: Address, value: float) -> str:
 
 
 def _with_bits(mapping: Mapping, number: int, value: float, text: str) -> str:
-    """Return a value of a structure; of a word of bits the names of those that are set."""
+    """Return a value of a structure; for a word of bits with the names of the set bits."""
     place = mapping.place_of(number)
     named = [name for name, member in place.layout.members.items()
              if member.bit is not None and member.word == place.word
@@ -386,8 +386,8 @@ def value_texts(mapping: Mapping, values: Sequence[float], radix: Radix) -> list
     """
     Return each value as text.
 
-    In another radix than ten a number has as many digits as its type has bits; floats and single
-    bits are the same in all.
+    Without radix ten, whole numbers have all digits of their type. Floats and single bits look the
+    same in every radix.
     """
     if radix is Radix.DECIMAL or mapping.type not in _BITS or mapping.scaling:
         return [*map(value_text, values)]

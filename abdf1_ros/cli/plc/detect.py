@@ -52,13 +52,13 @@ class LineSettings:
 _WORDS = {'Peer': 'full duplex', 'Master': 'half duplex',
           'Radio': 'radio modem (replies come without ACK)'}
 
-# Echoes that show that a line is radio modem, and s after which a full-duplex PLC whose message we
-# have not acknowledged has asked for the ACK (M 7-25, 7-27).
+# Number of echoes that show a radio modem line. Then the time (s) within which a full-duplex PLC
+# asks for a missing ACK (M 7-25, 7-27).
 _RADIO_ECHOES = 3
 _ENQ_TIME = 5.0
 
 ROUNDS = 2
-"""Each of the settings is tried this often: a lost frame is not absence."""
+"""Number of attempts with the same settings: a lost frame does not prove absence."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -73,8 +73,8 @@ class Search:
     """
     Try settings on the port of ``network``, in half duplex with each of ``stations``.
 
-    ``show`` gets a text about the settings being tried. ``echoes`` tells that what was sent came
-    back, which settles that no full-duplex PLC can be there.
+    ``show`` gets a text about the settings being tried. ``echoes`` is True if our bytes came back:
+    then no full-duplex PLC can be there.
     """
 
     def __init__(self, network: Network, stations: Sequence[int],
@@ -84,18 +84,18 @@ class Search:
                                 cmd_timeout=max(500, network.timeout))
         self._stations = stations
         self._show = show
-        self._characters = Counter[LineSettings]()  # that came without an answer
-        self._lacks_acks = False  # replies have come, and not one ACK
+        self._characters = Counter[LineSettings]()  # received without an answer
+        self._lacks_acks = False  # replies came, but no ACK
 
     @property
     def traces(self) -> list[str]:
-        """Return texts about characters that came without an answer."""
+        """Return a text for each settings with characters, but no answer."""
         return [f'{settings}: {count} characters came'
                 for settings, count in self._characters.items()]
 
     def run(self, bauds: Sequence[int], modes: Sequence[str] = ('Peer', 'Master'),
             checks: Sequence[str] = CHECKS) -> Found | None:
-        """Return the first settings that work, None when none do; raises OSError, PortLost."""
+        """Return the first settings that work, or None; raises OSError, PortLost."""
         for _, baud, mode in product(range(ROUNDS), bauds, modes):
             found = self._try(baud, mode, checks)
             if found is None:
@@ -107,8 +107,8 @@ class Search:
         return None
 
     def _try(self, baud: int, mode: str, checks: Sequence[str]) -> Found | None:
-        """Try one speed and duplex; without any answer the second check is not tried."""
-        # Most full-duplex ports take messages to any station; of the others most have 1 or 0.
+        """Try one speed and duplex; try the second check only after an answer."""
+        # Most full-duplex ports take messages to any station; most of the rest are 1 or 0.
         stations = self._stations if mode != MODES['full'] else \
             sorted(self._stations[:2], key=lambda station: not station)
         for check in checks:
@@ -122,7 +122,7 @@ class Search:
                 if presence.is_there:
                     heard.append(presence.station)
             if mode == MODES['half'] and not heard:
-                return None  # polls have no check of their own that could be wrong
+                return None  # a poll is the same with both checks
             stations = heard or stations
         return None
 
@@ -132,8 +132,8 @@ class Search:
         network = settings.on(self._network)
         if settings.mode == MODES['half']:  # a PLC does not answer to its own address
             network = replace(network, station=free_station(network.station, stations))
-        # One that is not absent is asked with ENQ when it is silent, which any full-duplex port
-        # answers, whatever its check and its own station are.
+        # The session sends ENQ to a silent station that is not in ``absent``. Any full-duplex port
+        # answers ENQ, whatever its check and its own station.
         asks = is_first and settings.mode == MODES['full']
         with Session(network, absent=stations[1:] if asks else stations) as session:
             for station in stations:
@@ -141,7 +141,7 @@ class Search:
                 presence = look_at(session, station)
                 if session.echoes:
                     self.echoes = True
-                    self._characters.clear()  # our own characters, which came back late
+                    self._characters.clear()  # our own bytes that came back late
                     if settings.mode == MODES['full']:
                         return
                 if presence.takes_commands and not understands(session, station):
@@ -152,7 +152,7 @@ class Search:
                 self._characters[settings] += session.counters.chars_received
 
     def _is_radio(self, settings: LineSettings, station: int) -> bool:
-        """Tell whether replies come without any symbol, though we give none either."""
+        """Return True if replies come without any symbol, though we send none either."""
         self._show(f'trying {settings}, station {station}')
         with Session(settings.on(self._network)) as session:
             if not all(understands(session, station) for _ in range(_RADIO_ECHOES)):

@@ -33,7 +33,7 @@ from abdf1_ros.settings.rows import Rows
 _DRAFT_PERIOD = 5000
 
 USUAL_NUMBERS = tuple(range(32))
-"""What is looked for one by one where no option says what."""
+"""Files to look for one by one, without an option for them."""
 
 
 def find_files(session: Session, station: int, plc_type: PlcType, processor: Processor | None,
@@ -41,15 +41,15 @@ def find_files(session: Session, station: int, plc_type: PlcType, processor: Pro
                show: Callable[[str], None] = lambda text: None,
                warn: Callable[[str], None] = lambda text: None) -> Iterator[DataFile]:
     """
-    Yield the files among ``numbers``: all of the processor's own list, or what reads find.
+    Yield the files among ``numbers``: from the processor's own list, or found by reads.
 
-    ``show`` gets a text about the file being asked for, ``warn`` why a list is not used. Raises
-    FormatError for a family whose files cannot be looked for, and LinkError.
+    ``show`` gets a text about the present file, ``warn`` the reason why no list is used. Raises
+    LinkError, and FormatError for a family without a way to find files.
     """
     family = FAMILIES[plc_type]
     search = family.file_search
     if search is None:
-        raise FormatError(f'a {family.addressing.title} has no files that can be looked for')
+        raise FormatError(f'we know no way to find the files of a {family.addressing.title}')
     steps = search.directory(processor)
     if steps is not None:
         try:
@@ -58,7 +58,7 @@ def find_files(session: Session, station: int, plc_type: PlcType, processor: Pro
                     yield entry
             return
         except (RemoteError, FormatError) as error:
-            warn(f'its file directory cannot be read ({error}); so every file is tried')
+            warn(f'its file directory cannot be read ({error}); we try every file number')
     for number in USUAL_NUMBERS if numbers is None else numbers:
         show(f'file {number}')
         found = session.ask(station, search.look_for(number))
@@ -67,7 +67,7 @@ def find_files(session: Session, station: int, plc_type: PlcType, processor: Pro
 
 
 def listed(session: Session, station: int, identity: Identity | None) -> list[DataFile]:
-    """Return the files of the processor's own list, none where it has no list that is known."""
+    """Return the files of the processor's own list; none if we know no list of it."""
     search = FAMILIES[identity.plc_type].file_search if identity and identity.plc_type else None
     steps = search.directory(identity.processor) if search and identity else None
     try:
@@ -78,7 +78,7 @@ def listed(session: Session, station: int, identity: Identity | None) -> list[Da
 
 def outside(found: Sequence[DataFile], mappings: Rows,
             station: int) -> Iterator[Problem]:
-    """Yield the rows of a map that lie outside of the files of a station, and why."""
+    """Yield a problem for each row of a map that lies outside the files of a station."""
     files = {entry.number: entry for entry in found if not entry.type.is_function}
     for mapping in mappings.of_plcs:
         address = mapping.address
@@ -91,7 +91,7 @@ def outside(found: Sequence[DataFile], mappings: Rows,
         elif entry.type is not address.file_type:
             fault = f'file {address.file} is {entry}'
         elif mapping.extent.end > entry.elements * address.layout.words:
-            fault = f'{entry} has {entry.elements} elements'
+            fault = f'{entry} has only {entry.elements} elements'
         if fault:
             yield Problem(replace(mapping.place, column='Address'),
                           f'{address}, Length {mapping.length}: {fault}')
@@ -99,7 +99,7 @@ def outside(found: Sequence[DataFile], mappings: Rows,
 
 def map_rows(found: Sequence[DataFile], station: int, plc_type: PlcType,
              processor: str, via: int | None = None) -> Iterator[str]:
-    """Yield a row of a map CSV for each file, as long as one packet; others are comments."""
+    """Yield a map row for each file, as long as one packet; a comment if no row is possible."""
     for entry in found:
         kind = entry.type
         if kind.is_io or kind.is_function:
@@ -110,12 +110,12 @@ def map_rows(found: Sequence[DataFile], station: int, plc_type: PlcType,
         packet = dialect_of(plc_type).max_read(kind)
         length = 1 if kind is FileType.STRING else min(
             entry.elements * per_element, packet // per_element * per_element)
-        # Words of a structure are counted as words, other elements as such.
+        # Length counts words of structures, and elements of other files.
         if not kind.is_structure:
             length = max(1, length // per_element)
         if length < entry.elements and not kind.is_structure and kind is not FileType.STRING:
-            yield (f'# {entry} has {entry.elements} elements; a row of one packet has {length} of '
-                   'them')
+            yield (f'# {entry} has {entry.elements} elements; this row of one packet reads '
+                   f'{length}')
         number = '' if kind is FileType.STATUS else entry.number
         yield (f'{kind.value.lower()}{entry.number},Read,{kind.value}{number}:0,{station},'
                f'{plc_type.value},{processor},{length},{_DRAFT_PERIOD}'

@@ -30,24 +30,24 @@ from abdf1_ros.pccc.file_search import DataFile
 from abdf1_ros.problems import ConfigurationError, Problem
 from abdf1_ros.settings.network import Network
 
-_TIMEOUT = 300  # ms; the default of a net CSV is long for a person who waits
+_TIMEOUT = 300  # ms; shorter than the default of a net CSV, for a user who waits
 
 _HEAD = """\
-# One row a mapping: a PLC address that becomes a topic. A row that begins with # is not used:
-# take the # away, and write the address and tag that you need.
-# Command is Read, Write, ReadWrite, Serve or Heartbeat. With Fallback or Heartbeat take shorter
-# times in net.csv, or it takes long until a failure is noticed: Timeout 100, Cmd_Timeout 500,
-# NAK_Retries 1, ENQ_Retries 1. "check" says how long, and what the timers of the PLC need.
+# One mapping per row: a PLC address that becomes a topic. A row that begins with # is not used:
+# remove the #, and write the address and tag that you need.
+# Command is Read, Write, ReadWrite, Serve or Heartbeat. With Fallback or Heartbeat use shorter
+# times in net.csv, so that failures are noticed soon: Timeout 100, Cmd_Timeout 500,
+# NAK_Retries 1, ENQ_Retries 1. "check" prints the resulting times, and those for PLC timers.
 Tag,Command,Address,Station,PLC_Type,Processor,Length,Period,While,Fallback,Fallback_After
 """
 
 
 class NewFiles:
     """
-    Files that are not there yet, by their names in a folder.
+    New files in a folder, by their names.
 
-    ConfigurationError where one is there already, or the folder cannot be made; it is made by
-    ``write``.
+    Raises ConfigurationError if a file exists already, or the folder cannot be made. ``write``
+    makes the folder.
     """
 
     def __init__(self, folder: Path, *names: str) -> None:
@@ -55,14 +55,14 @@ class NewFiles:
         there = next(path for path in (folder, *folder.absolute().parents) if path.exists())
         if not there.is_dir() or not os.access(there, os.W_OK):
             raise ConfigurationError([Problem(str(folder), (
-                f'cannot be used: {there} is not a folder that can be written to'))])
+                f'cannot be used: {there} is not a folder, or you may not write to it'))])
         for path in self.paths:
-            if path.exists() and path.stat().st_size:  # a pipe that failed leaves an empty one
+            if path.exists() and path.stat().st_size:  # a failed pipe leaves an empty file
                 raise ConfigurationError([Problem(str(path), (
-                    'is there already and stays as it is; name another folder with --into'))])
+                    'exists already and is not changed; give another folder with --into'))])
 
     def write(self, *texts: str) -> None:
-        """Write all, or leave none: ConfigurationError then."""
+        """Write all files, or leave none and raise ConfigurationError."""
         try:
             self.paths[0].parent.mkdir(parents=True, exist_ok=True)
             for path, text in zip(self.paths, texts, strict=True):
@@ -77,14 +77,14 @@ class NewFiles:
 
 def files_of(network: Network, found: Found, stations: Sequence[Presence],
              listed: Mapping[int, Sequence[DataFile]]) -> tuple[str, str]:
-    """Return net and map CSV of a line, with the files that its stations have listed."""
+    """Return net and map CSV of a line, with the files that its stations list."""
     numbers = [presence.station for presence in stations]
     return (net_csv(network, found, numbers) + '\n',
             _HEAD + ''.join(map_rows(stations, listed)))
 
 
 def net_csv(network: Network, found: Found, stations: Collection[int]) -> str:
-    """Return a net CSV with the settings found; our own Station is none of ``stations``."""
+    """Return a net CSV with the settings found; our own Station is not in ``stations``."""
     settings = found.settings
     row = (free_station(network.station, stations), settings.mode, settings.check,
            network.port, settings.baud, network.parity, _TIMEOUT)
@@ -102,17 +102,17 @@ def listening_csv(network: Network) -> str:
 
 def map_rows(stations: Iterable[Presence],
              listed: Mapping[int, Sequence[DataFile]]) -> Iterable[str]:
-    """Yield a row that works and some rows as comments, for each station and its files."""
+    """Yield for each station one row that works, and rows for its files as comments."""
     for presence in stations:
         number, identity = presence.station, presence.identity
         family = identity.plc_type if identity else None
         yield f'# station {number}: {presence}\n'
         if identity and identity.has_no_processor:
-            yield f'# it has no processor: PLCs behind it have Via {number}; this finds them:\n' \
+            yield f'# no processor: PLCs behind this station have Via {number}; to find them:\n' \
                   f'#   plc scan 0-63 --via {number} --net net.csv\n'
             continue
         if family is None or identity is None:
-            yield f'# its family is not known: write PLC_Type yourself\n' \
+            yield f'# the family of the PLC is not known: write PLC_Type yourself\n' \
                   f'# words_{number},Read,N7:0,{number},SLC,,10,1000,,,\n'
             continue
         tail = f'{number},{family.value},{processor_cell(identity.processor)}'

@@ -25,22 +25,22 @@ from abdf1_ros.df1.stations import MAX_STATION
 from abdf1_ros.problems import ConfigurationError, Problem
 from abdf1_ros.settings.network import load_network, make_network, Network
 
-# A Timeout of 1000 ms, the default of a net CSV, is long for a person who waits.
+# For a user who waits, the default Timeout of a net CSV (1000 ms) is long.
 DEFAULTS = Network(timeout=300)
 
-# PLCs mostly have small numbers, and 1 is asked where no option says which.
+# Most PLCs have small numbers, and without an option we ask station 1.
 _FIRST_SPARE = 10
 
 MODES = {Duplex.HALF.name.lower(): 'Master', Duplex.FULL.name.lower(): 'Peer',
          Duplex.RADIO.name.lower(): 'Radio', 'slave': 'Slave'}
 
-# Options that stand for a column of the net CSV.
+# Options, each for a column of the net CSV.
 _COLUMNS = {'port': 'com_port', 'baud': 'baud', 'check': 'error_code', 'parity': 'parity',
             'timeout': 'timeout', 'own_station': 'station'}
 
 
 def free_station(own: int, taken: Collection[int]) -> int:
-    """Return an address for us that no station of a half-duplex line has: ``own`` if it can be."""
+    """Return a free address for us on a half-duplex line: ``own`` if possible."""
     candidates = (own, *range(_FIRST_SPARE, MAX_STATION))
     return next((number for number in candidates if number not in taken), own)
 
@@ -50,7 +50,7 @@ def network_of(options: argparse.Namespace, duplex: str | None = None,
     """
     Return the line of the options; raises ConfigurationError with every fault.
 
-    ``duplex`` is that of a command without such an option.
+    ``duplex``: used if the command has no duplex option.
     """
     base = load_network(options.net) if options.net else DEFAULTS
     given = {column: (str(value), f'--{option.replace("_", "-")}')
@@ -67,6 +67,6 @@ def network_of(options: argparse.Namespace, duplex: str | None = None,
     if getattr(options, 'via', None) is not None and network.line_mode.has_one_plc:
         raise ConfigurationError([Problem(
             '--via', 'in full duplex a gateway has no address: --station is the node behind it')])
-    # By radio only the reply is waited for.
+    # By radio we wait for the reply only.
     is_told = network.duplex is Duplex.RADIO and options.timeout is not None
     return replace(network, cmd_timeout=network.timeout) if is_told else network

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The options of ``plc``: what it is asked to do, and on which line."""
+"""The options of ``plc``: those of its commands, and those of the line."""
 
 from __future__ import annotations
 
@@ -51,50 +51,49 @@ class LineDefaults:
 COLUMN_ROLES = {
     'tag': 'the column with the names', 'address': 'the column with the addresses',
     'type': 'the column with the types of the data', 'description': 'the column with descriptions',
-    'access': 'the column that says what may be written: RO, R/W; or yes and no under "Read Only"'}
-"""What the columns of a list may be, for the options of ``plc import``."""
+    'access': 'the column with the access: RO, R/W; or yes and no under "Read Only"'}
+"""Roles of the columns of a list, for the options of ``plc import``."""
 
-# Names that the PLC's own software and its users have for types and families.
 RADIXES = {'dec': Radix.DECIMAL, 'hex': Radix.HEXADECIMAL, 'oct': Radix.OCTAL, 'bin': Radix.BINARY}
 
 _LINE_DEFAULTS = LineDefaults()
 _Adder = Callable[[argparse.ArgumentParser], None]
-_TRIED = 'all are tried'
+_TRIED = 'tries all'
 _DETECT_DEFAULTS = LineDefaults(
-    baud=f'{_TRIED}, but none at a URL', check=_TRIED, duplex=_TRIED,
+    baud=f'{_TRIED}; none for a URL', check=_TRIED, duplex=_TRIED,
     timeout='200',  # most attempts get no answer
     net='port, parity and own station')
 
 
 def _complete_import(command: argparse.ArgumentParser) -> None:
-    command.add_argument('file', metavar='FILE', help='the export or list: CSV, of Ignition JSON')
-    _add_folder(command, 'map.csv is')
+    command.add_argument('file', metavar='FILE', help='the export or list: CSV; Ignition: JSON')
+    _add_folder(command, 'map.csv')
     command.add_argument('--station', metavar='LIST', type=_stations, dest='stations',
                          default=(DEFAULT_STATION,),
-                         help='of the PLC, or of several with the same program, as in 1-4 '
-                              f'(default: {DEFAULT_STATION})')
+                         help='station of the PLC; or stations of several PLCs with the same '
+                              f'program, such as 1-4 (default: {DEFAULT_STATION})')
     command.add_argument('--read-only', action='store_true', help='make all rows Read rows')
     for role, text in COLUMN_ROLES.items():
         command.add_argument(f'--{role}', metavar='COLUMN', dest=f'{role}_column',
-                             help=f'of a list: {text}')
+                             help=f'for a list: {text}')
     command.add_argument('--plc', metavar='NAME',
-                         help='the PLC that is meant, by its name in a file with several')
+                         help='name of the PLC, for a file with several PLCs')
     command.add_argument('--status', action='store_true',
-                         help='also take words of the status file without a symbol')
+                         help='also make rows for words of the status file without a symbol')
     command.add_argument('--period', metavar='MS', default=0,
                          type=number_option(f'a whole number of ms up to {MAX_PERIOD}', 0,
                                             MAX_PERIOD, whole_number),
-                         help='the shortest Period of a row (default: as the export has it)')
-    _add_plc_type(command, 'of the PLC; a MicroLogix is SLC (default: %(default)s)', 'SLC')
+                         help='the shortest Period of a row (default: the Period of the export)')
+    _add_plc_type(command, 'family of the PLC; a MicroLogix is SLC (default: %(default)s)', 'SLC')
 
 
 def _add_station(parser: argparse.ArgumentParser) -> None:
     parser.add_argument('station', metavar='STATION', nargs='?', type=_station,
-                        help=f'default: {DEFAULT_STATION}')
+                        help=f'station of the PLC (default: {DEFAULT_STATION})')
 
 
 def _add_plc_type(parser: argparse._ActionsContainer,
-                  text: str = 'default: the PLC is asked what it is',
+                  text: str = 'family of the PLC (default: the PLC is asked)',
                   default: str | None = None) -> None:
     parser.add_argument('--plc-type', type=family_name, choices=[kind.value for kind in FAMILIES],
                         default=default, help=text)
@@ -102,22 +101,23 @@ def _add_plc_type(parser: argparse._ActionsContainer,
 
 def _add_folder(parser: argparse.ArgumentParser, what: str) -> None:
     parser.add_argument('--into', metavar='FOLDER', default='.',
-                        help=f'where {what} to be (default: here)')
+                        help=f'the folder for {what} (default: the current folder)')
 
 
 def _complete_ping(ping: argparse.ArgumentParser) -> None:
     _add_station(ping)
     ping.add_argument('--count', type=_COUNT, default=4, metavar='N',
-                      help='how often (default: %(default)s)')
+                      help='number of echoes (default: %(default)s)')
 
 
 def _complete_scan(scan: argparse.ArgumentParser) -> None:
     scan.add_argument('stations', metavar='STATIONS', nargs='?', type=_stations,
-                      default=tuple(range(32)), help='such as 1,5 or 0-254 (default: 0-31)')
+                      default=tuple(range(32)),
+                      help='stations to ask, such as 1,5 or 0-254 (default: 0-31)')
 
 
 def _complete_init(begin: argparse.ArgumentParser) -> None:
-    _add_folder(begin, 'the files are')
+    _add_folder(begin, 'net.csv and map.csv')
     _complete_search(begin)
 
 
@@ -125,38 +125,40 @@ def _complete_clock(clock: argparse.ArgumentParser) -> None:
     _add_station(clock)
     _add_plc_type(clock)
     clock.add_argument('--set', action='store_true',
-                       help="write this computer's local time; a terminal is asked")
-    clock.add_argument('--yes', action='store_true', help='set it without a question')
+                       help="write this computer's local time into the PLC, after a question on "
+                            'the terminal')
+    clock.add_argument('--yes', action='store_true', help='set the clock without a question')
 
 
 def _complete_search(search: argparse.ArgumentParser) -> None:
     search.add_argument('--stations', metavar='LIST', type=_stations, default=tuple(range(8)),
-                        help='who may be there in half duplex (default: 0-7)')
+                        help='half duplex: stations to look for (default: 0-7)')
     search.set_defaults(timeout=_DETECT_DEFAULTS.timeout)
 
 
 def _complete_files(found: argparse.ArgumentParser) -> None:
     _add_station(found)
     found.add_argument('--files', metavar='LIST', type=_numbers,
-                       help='numbers up to 254 (default: all that the PLC lists, or 0-31)')
+                       help='file numbers up to 254 (default: the list of the PLC, or 0-31)')
     _add_plc_type(found)
     found.add_argument('--map', metavar='FILE', nargs='?', const='',
-                       help='print rows for a map CSV; with FILE, say which of its rows lie '
-                            'outside of the files')
+                       help="print rows for a new map CSV; with FILE, check that map CSV against "
+                            "the PLC's files")
 
 
 def _complete_write(write: argparse.ArgumentParser) -> None:
-    _add_data_options(write, f'needed in half duplex (default in full: {DEFAULT_STATION})')
+    _add_data_options(write, f'(required in half duplex; default in full duplex: '
+                             f'{DEFAULT_STATION})')
     write.add_argument('address', metavar='ADDRESS',
-                       help='such as N7:10, B3:0/5, F8:2; with --map a tag')
+                       help='PLC address such as N7:10, B3:0/5, F8:2; with --map: a tag')
     write.add_argument('values', metavar='VALUE', nargs='+',
-                       help='numbers, 0x and 0b too; 0 and 1 for bits; one text for a string')
+                       help='numbers, also as 0x or 0b; 0 or 1 for bits; one text for a string')
     write.add_argument('--map', metavar='FILE',
-                       help='a map CSV: a row is written by its tag, scaled, within Min and Max, '
-                            'to the station of the row')
+                       help='a map CSV: ADDRESS is then the tag of a row; Scale, Min, Max and '
+                            'Station of the row apply')
     write.add_argument('--yes', action='store_true',
-                       help='do it; without it, what is there now is shown, and a terminal '
-                            'is asked')
+                       help='write at once; without --yes: show the present values and ask on the '
+                            'terminal')
 
 
 def _complete_watch(watch: argparse.ArgumentParser) -> None:
@@ -165,28 +167,30 @@ def _complete_watch(watch: argparse.ArgumentParser) -> None:
                        type=number_option('seconds from 0 to 60; 0.5 is 500 ms', 0, 60),
                        help='s between reads, up to 60 (default: %(default)s)')
     watch.add_argument('--csv', action='store_true',
-                       help='print each value that is read as time,station,address,value')
-    watch.add_argument('--count', type=_COUNT, metavar='N', help='end after so many reads')
+                       help='print each value as time,station,address,value')
+    watch.add_argument('--count', type=_COUNT, metavar='N', help='end after N reads')
 
 
 def add_line_options(parser: argparse.ArgumentParser, defaults: LineDefaults,
                      duplex: bool = True) -> None:
-    """Add the options of the line; ``duplex`` is left out where the command knows it."""
+    """Add the options of the line; ``duplex`` False leaves the duplex options out."""
     group = parser.add_argument_group('line')
     group.add_argument('--port', metavar='NAME',
                        help='serial port, or URL such as socket://192.168.0.9:4001')
     group.add_argument('--net', metavar='FILE',
-                       help=f'take {defaults.net} from this net CSV; other options go before it')
-    group.add_argument('--baud', help=f'one of {", ".join(map(str, BAUD_RATES))} '
+                       help=f'take {defaults.net} from this net CSV; options override the file')
+    group.add_argument('--baud', help=f'baud rate: {", ".join(map(str, BAUD_RATES))} '
                                       f'(default: {defaults.baud})')
-    group.add_argument('--check', type=str.upper, help=f'CRC or BCC (default: {defaults.check})')
+    group.add_argument('--check', type=str.upper,
+                       help=f'check of messages: CRC or BCC (default: {defaults.check})')
     group.add_argument('--parity', help='None, Even or Odd (default: None)')
     if duplex:
         _add_duplex(group, defaults)
     group.add_argument('--own-station', metavar='N',
-                       help=f'our own address, which no PLC has (default: {DEFAULTS.station})')
+                       help=f'our own station, which no PLC may have (default: '
+                            f'{DEFAULTS.station})')
     group.add_argument('--timeout', metavar='MS',
-                       help=f'to wait for each answer (default: {defaults.timeout})')
+                       help=f'time to wait for each answer (default: {defaults.timeout})')
 
 
 def _add_duplex(group: argparse._ArgumentGroup, defaults: LineDefaults) -> None:
@@ -200,44 +204,44 @@ def _add_duplex(group: argparse._ArgumentGroup, defaults: LineDefaults) -> None:
     either.add_argument('--radio', action='store_const', const='radio', dest='duplex',
                         help='the same as --duplex radio')
     either.add_argument('--slave', action='store_const', const='slave', dest='duplex',
-                        help='the same as --duplex slave: --own-station is a number that the '
-                             'master polls')
+                        help='the same as --duplex slave; the master must poll our --own-station')
 
 
 def _add_data_options(parser: argparse.ArgumentParser,
                       note: str = f'(default: {DEFAULT_STATION})') -> None:
     group = parser.add_argument_group('data')
-    group.add_argument('--station', metavar='N', type=_station, help=f'address of the PLC {note}')
+    group.add_argument('--station', metavar='N', type=_station, help=f'station of the PLC {note}')
     _add_plc_type(group)
     group.add_argument('--type', type=type_name, choices=[kind.value for kind in ValueType],
-                       help='default: what is natural for the file')
+                       help='type of the values (default: the natural type of the file)')
     group.add_argument('--word-order', choices=[order.value for order in WordOrder],
-                       help='which word of 32 bits comes first')
+                       help='32-bit values: the word that comes first')
     group.add_argument('--processor', choices=[entry.value for entry in Processor],
-                       help='of an SLC or MicroLogix (default: the one it says it is)')
+                       help='processor of an SLC or MicroLogix (default: the PLC is asked)')
     group.add_argument('--access', choices=[access.value for access in Access],
-                       help='how the words are reached, where a family has several ways')
+                       help='commands that reach the words, if a family has several ways')
 
 
 def _add_addresses(parser: argparse.ArgumentParser) -> None:
     _add_data_options(parser)
     parser.add_argument('addresses', metavar='ADDRESS', nargs='*',
-                        help='such as N7:0, N7:0-9, B3:0/5, B3:0/0-7, T4:0.ACC, ST9:1; with '
-                             '--map also a tag, whose values are scaled; none: all rows that read')
+                        help='PLC address such as N7:0, N7:0-9, B3:0/5, B3:0/0-7, T4:0.ACC, '
+                             'ST9:1; with --map: also a tag, with scaled values; no ADDRESS: all '
+                             'rows that are read')
     parser.add_argument('--length', metavar='N',
-                        help='elements of each address (default: 1, or those of the range)')
+                        help='elements of each address (default: 1, or the size of the range)')
     parser.add_argument('--map', metavar='FILE',
-                        help='a map CSV, whose tags are shown beside the addresses')
+                        help='a map CSV; its tags are shown beside the addresses')
     parser.add_argument('--record', metavar='FILE',
-                        help='keep all bytes of the line in a capture, for "sniff"')
+                        help='record all bytes of the line in a capture file, for "sniff"')
     parser.add_argument('--radix', type=str.lower, choices=tuple(RADIXES), default='dec',
-                        help='how whole numbers are written (default: %(default)s)')
+                        help='number base of whole numbers (default: %(default)s)')
 
 
 def _stations(text: str, right: str = '') -> tuple[int, ...]:
     stations, faults = parse_stations(text)
     if faults or not stations:
-        raise argparse.ArgumentTypeError(right or '; '.join(faults) or 'name a station')
+        raise argparse.ArgumentTypeError(right or '; '.join(faults) or 'give a station')
     return stations
 
 
@@ -253,13 +257,13 @@ def _numbers(text: str) -> tuple[int, ...]:
 
 
 def _on_line(add: _Adder, defaults: LineDefaults = _LINE_DEFAULTS) -> _Adder:
-    """Return what adds the options of the line, too."""
+    """Return a function that adds the options of the line and those of ``add``."""
     def complete(parser: argparse.ArgumentParser) -> None:
         add_line_options(parser, defaults)
         if defaults is not _DETECT_DEFAULTS:
             parser.add_argument('--via', metavar='N', type=_station, default=None,
-                                help='in half duplex: the gateway on the line that the station '
-                                     'is behind')
+                                help='half duplex: station of the gateway, if the PLC is behind '
+                                     'a gateway')
         add(parser)
     return complete
 
@@ -271,4 +275,4 @@ ADDERS: dict[str, _Adder] = {
     'detect': _on_line(_complete_search, _DETECT_DEFAULTS),
     'init': _on_line(_complete_init, _DETECT_DEFAULTS), 'files': _on_line(_complete_files),
     'import': _complete_import, 'clock': _on_line(_complete_clock)}
-"""What adds the options of each command that has some."""
+"""Functions that add the options of a command, by its name."""

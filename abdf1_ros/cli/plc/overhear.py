@@ -33,18 +33,18 @@ from abdf1_ros.settings.network import Network
 from abdf1_ros.sniffer.capture import Chunk, Direction
 
 LISTENED_FOR_READS = 10.0
-"""For a map of what another master reads (s)."""
+"""Listening time (s) for a map of the reads of another master."""
 
 LISTENED = 1.0
-"""At each speed (s); masters poll a few times a second."""
+"""Listening time (s) at each speed; masters poll a few times a second."""
 
-# One in 256 pairs of wrong bytes looks like a poll.
+# One of 256 wrong byte pairs looks like a poll.
 _SURE_POLLS = 2
 
 
 @dataclass(frozen=True, slots=True)
 class ForeignMaster:
-    """What was heard of a master: its speed, the stations it polls, the check of its messages."""
+    """A master that we heard: its speed, the stations that it polls, the check of its messages."""
 
     baud: int
     stations: Sequence[int]
@@ -61,7 +61,7 @@ class ForeignMaster:
 def overhear(network: Network, bauds: Sequence[int],
              show: Callable[[str], None] = lambda text: None) -> ForeignMaster | None:
     """
-    Listen at each speed, but at no further one where the first is silent.
+    Listen at each speed; stop after the first speed if it is silent.
 
     Return the master that is heard. Sends nothing; raises OSError.
     """
@@ -76,12 +76,12 @@ def overhear(network: Network, bauds: Sequence[int],
 
 
 def silent(network: Network) -> Network:
-    """Return the line with a port that is opened for reading only, where that can be."""
+    """Return the line with its port for reading only, if possible."""
     return network if network.port.startswith('rfc2217:') else replace(network, mode='Listen')
 
 
 def heard_reads(network: Network, seconds: float) -> list[Carried]:
-    """Listen for so long; return what other nodes read, of which replies came. Raises OSError."""
+    """Listen for ``seconds``; return the answered reads of other nodes. Raises OSError."""
     overhearing = Overhearing(network)
     port, wake = opened(network)(), Wake()
     try:
@@ -97,7 +97,7 @@ def heard_reads(network: Network, seconds: float) -> list[Carried]:
 
 
 def _heard(network: Network) -> tuple[int, Counter[int], Checksum | None]:
-    """Return how many characters came, the polls with a good check, and the check of messages."""
+    """Return the number of characters, the polls with a good check, and the check of messages."""
     kind = LineKind()
     decoder = ListeningDecoder(kind)
     characters, polls = 0, Counter[int]()

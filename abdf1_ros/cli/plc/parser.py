@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The commands of ``plc`` and their help; the options of each are added when it is chosen."""
+"""The commands of ``plc`` and their help; options are added for the chosen command only."""
 
 from __future__ import annotations
 
@@ -32,15 +32,15 @@ exit status:
   1    no answer, or the PLC refused it; the port cannot be opened or was lost; rows left out
   2    wrong options, files, addresses or values; a write not confirmed with --yes. Nothing was
        written
-  3    a write without a reply, or broken off: unknown whether the PLC has it, or has all of it
-  130  interrupted by Ctrl-C; but watch and ping, once they have begun, end by it with 0 or 1
+  3    a write without a reply, or interrupted: the PLC may have all, a part or nothing of it
+  130  interrupted by Ctrl-C; a running watch or ping ends with 0 or 1 instead
 """
 _EPILOG = _STATUSES + """
 examples:
   plc ports                                   which ports are there?
   plc init                                    find all, and write net.csv and map.csv
   plc detect --port /dev/ttyUSB0              which settings does this line have?
-  plc scan 0-31 --net net.csv                 who is there?
+  plc scan 0-31 --net net.csv                 which stations answer?
   plc files 1 --net net.csv                   which data files does it have?
   plc status 1 --port /dev/ttyUSB0 --baud 19200
   plc read N7:0-9 B3:1/0-7 --peer --port /dev/ttyUSB0
@@ -53,7 +53,7 @@ examples:
 """
 
 
-# What each does, and examples.
+# Each command: its purpose, then examples.
 _COMMANDS = {
     'read': ('read addresses once', 'read N7:0-9 F8:2 --net net.csv'),
     'write': ('write values to an address or a tag',
@@ -63,20 +63,20 @@ _COMMANDS = {
     'watch': ('show values live until Ctrl-C', 'watch B3:0 N7:0 --period 0.5 --net net.csv',
               'watch I:1.0 --radix bin --net net.csv', 'watch --map map.csv --net net.csv',
               'watch F8:0 --csv --net net.csv > curve.csv'),
-    'status': ('tell model, mode and faults of a PLC', 'status 1 --net net.csv'),
-    'ping': ('measure how long a PLC takes to send something back',
+    'status': ('show model, mode and faults of a PLC', 'status 1 --net net.csv'),
+    'ping': ('measure the time that a PLC needs to return an echo',
              'ping 1 --count 10 --net net.csv'),
     'scan': ('look for stations', 'scan 0-31 --net net.csv'),
     'detect': ('find out the settings of a line by trying them',
                'detect --port /dev/ttyUSB0 --stations 1-4'),
     'init': ('find port, settings and stations, and write net.csv and map.csv',
              'init --into line1', 'init --port /dev/ttyUSB0 --stations 1-4'),
-    'files': ('tell which data files a PLC has and how long they are', 'files 1 --net net.csv',
+    'files': ('list the data files of a PLC and their lengths', 'files 1 --net net.csv',
               'files 1 --map --net net.csv', 'files 1 --map map.csv --net net.csv'),
-    'import': ('make map.csv of tags of RSLogix, KEPServer, RSView, InTouch, Ignition, or lists',
+    'import': ('make map.csv from tags of RSLogix, KEPServer, RSView, InTouch, Ignition or a list',
                'import plant.csv --station 2 --plc-type SLC',
                'import plant.csv --station 1-4 --read-only --period 1000'),
-    'clock': ("tell a PLC's time and its drift, or set it", 'clock 1 --net net.csv',
+    'clock': ("show a PLC's time and its drift, or set it", 'clock 1 --net net.csv',
               'clock 1 --set --yes --net net.csv'),
     'ports': ('list serial ports and adapters', 'ports')}
 
@@ -102,7 +102,7 @@ def _complete(name: str, parser: argparse.ArgumentParser) -> None:
 
 
 def help_asked(words: Sequence[str]) -> Sequence[str]:
-    """Return what to parse: "help" stands for the option, N7:10=5 for two words."""
+    """Return the words to parse: "help" stands for --help, N7:10=5 for two words."""
     if words[:1] == ['help']:
         return [*words[1:2], '--help']
     if [*words[:1]] == ['write']:  # N7:10=5
@@ -112,7 +112,7 @@ def help_asked(words: Sequence[str]) -> Sequence[str]:
 
 
 def check_order(parser: argparse.ArgumentParser, words: Sequence[str]) -> None:
-    """End where the first word is neither a command nor an option of all."""
+    """End the program if the first word is neither a command nor --help or --version."""
     first = words[0] if words else ''
     if first in _COMMANDS or first in ('', '-h', '--help', '--version'):
         return

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Which stations are there: diagnostic status, echo, and a scan of many stations."""
+"""Ask which stations answer: diagnostic status, echo, and a scan of many stations."""
 
 from __future__ import annotations
 
@@ -50,12 +50,12 @@ from abdf1_ros.text import counted
 
 _SLOTS_TRIED = 8
 
-# A silent station is asked twice, or this often at most while the line loses frames.
+# Most questions to a silent station while the line loses frames; on a good line 2.
 _MOST_ROUNDS = 4
 
 _ECHO = bytes(range(1, 17))
 
-# A half-duplex station does not answer at all when a setting is wrong; so these come first.
+# A half-duplex station with a wrong setting is silent, so settings come first in the text.
 SILENCE = ('not one character came: station (a PLC-5 shows its own in octal), check or duplex '
            'wrong? Then cable, port, power, baud rate and parity.')
 
@@ -65,8 +65,10 @@ class Presence:
     """
     The identity of a station, and the seconds until its reply.
 
-    Without an ``identity`` ``error`` says why; ``is_there`` tells whether the station has sent
-    anything, ``takes_commands`` whether it understands our frames. It was ``asked`` this often.
+    - ``error``: the reason if there is no ``identity``.
+    - ``is_there``: True if the station has sent anything.
+    - ``takes_commands``: True if the station understands our frames.
+    - ``asked``: number of questions to the station.
     """
 
     station: int
@@ -79,12 +81,12 @@ class Presence:
 
     @property
     def is_settled(self) -> bool:
-        """Tell whether a reply has come, so that asking again would bring nothing new."""
+        """Return True if a reply came, so that another question brings nothing new."""
         return not isinstance(self.error, LinkError)
 
     def __str__(self) -> str:
         """Return one line of text."""
-        return str(self.identity or f'answers, but not who it is: {self.error}')
+        return str(self.identity or f'answers, but does not identify itself: {self.error}')
 
 
 def look_at(session: Session, station: int) -> Presence:
@@ -102,11 +104,11 @@ def look_at(session: Session, station: int) -> Presence:
     if identity is not None and session.via not in (None, station):
         error = _refusal_of_gateway(session, station)
         if error is None and identity.has_no_processor:
-            error = FormatError(f'its gateway answers in its place, as {identity}')
+            error = FormatError(f'the gateway answers for this station, as {identity}')
         identity = identity if error is None else None
-    # A gateway answers for a station that it does not reach (M 8-2).
+    # A gateway answers for a station out of its reach (M 8-2).
     is_reached = not (isinstance(error, RemoteError) and is_local_status(error.sts))
-    # Through a master only a reply tells.
+    # Through another master, only a reply shows that the station is there.
     is_silent = isinstance(
         error, LinkError if session.network.line_mode.is_polled else StationInactive)
     takes_commands = is_reached and not is_silent
@@ -117,10 +119,10 @@ def look_at(session: Session, station: int) -> Presence:
 
 def _refusal_of_gateway(session: Session, station: int) -> Abdf1Error | None:
     """
-    Return why a read does not reach a station, None where it does, whatever the station says.
+    Return why a read does not reach a station; None if the station itself replies.
 
     A gateway may answer diagnostic commands itself, for every number (a switch of the 1770-KF2).
-    All families know the read of a PLC-2.
+    The read of a PLC-2 is known to all families.
     """
     try:
         session.ask(station, _basic_read())
@@ -140,10 +142,10 @@ def _basic_read() -> Steps[None]:
 def scan(network: Network, stations: Sequence[int], via: int | None = None,
          show: Callable[[str], None] = lambda text: None) -> Iterator[Presence]:
     """
-    Yield every station, there or not, ``via`` a gateway; raises OSError and PortLost.
+    Yield the presence of every station, ``via`` a gateway; raises OSError and PortLost.
 
-    Silent stations are asked again after all others: a lost frame is not absence. ``show`` gets
-    a text about the station being asked. Where each has a number, we take one that no station has.
+    Silent stations are asked again at the end: a lost frame does not prove absence. ``show`` gets
+    a text about the present station. On a line with station numbers we use a free number.
     """
     if not network.line_mode.has_one_plc and not network.line_mode.is_polled:
         network = replace(network, station=free_station(network.station, stations))
@@ -167,22 +169,22 @@ def scan(network: Network, stations: Sequence[int], via: int | None = None,
 
 
 def again(asked: int) -> str:
-    """Return how often a station was asked, where that is more than once."""
+    """Return the number of questions to a station as text; empty for one."""
     return f', asked {asked} times' if asked > 1 else ''
 
 
 def tally(found: int, count: int, asked: int) -> str:
-    """Return how many of ``count`` stations were found, and how often the others were asked."""
-    rest = f'; the others were asked {asked} times' if found < count and asked > 1 else ''
+    """Return the number of stations found as text, with the questions to the silent stations."""
+    rest = f'; silent stations were asked {asked} times' if found < count and asked > 1 else ''
     return f'{found} of {count} stations answer{rest}'
 
 
 def understands(session: Session, station: int) -> bool:
     """
-    Tell whether a station sends random data back, or refuses to; raises PortLost.
+    Return True if a station returns random data, or refuses to; raises PortLost.
 
-    Nothing else proves it: an echo of the line, or a device that acknowledges everything, cannot
-    do this.
+    Only this proves a station: an echo of the line, or a device that acknowledges everything,
+    fails.
     """
     try:
         session.ask(station, echo(os.urandom(len(_ECHO))))
@@ -196,7 +198,7 @@ def understands(session: Session, station: int) -> bool:
 
 
 def io_access(session: Session, there: Presence) -> list[str]:
-    """Return with which Access inputs of an SLC or MicroLogix can be read; raises LinkError."""
+    """Return the Access values that read inputs of an SLC or MicroLogix; raises LinkError."""
     kind = there.identity.plc_type if there.identity else None
     ways = () if kind is None else FAMILIES[kind].accesses
     if kind is None or Access.FLAT not in ways:
@@ -215,8 +217,8 @@ def ping(session: Session, station: int) -> float:
     return time.monotonic() - started
 
 
-def said_by_both(session: Session, *stations: int) -> Identity | None:
-    """Return what stations say of themselves where that is the same; raises PortLost."""
+def common_identity(session: Session, *stations: int) -> Identity | None:
+    """Return the common identity of stations; None if they differ. Raises PortLost."""
     first, *others = (look_at(session, station).identity for station in stations)
     return first if all(other == first for other in others) else None
 
@@ -228,7 +230,7 @@ def type_to_say(there: Presence) -> str:
 
 
 def describe(presence: Presence) -> list[str]:
-    """Return all about a station that has said what it is, line by line."""
+    """Return all facts of a station with an identity, line by line."""
     identity = presence.identity
     assert identity is not None
     is_running = identity.mode is not None and identity.mode.is_running
@@ -239,22 +241,22 @@ def describe(presence: Presence) -> list[str]:
              ('program ID', '' if identity.program_id is None
               else f'0x{identity.program_id:04X}', None),
              ('memory', identity.memory, None),
-             ('answered', f'after {presence.seconds * 1000:.0f} ms', None)]
+             ('reply', f'after {presence.seconds * 1000:.0f} ms', None)]
     return [f'station {presence.station}: {identity}', *(
         f'  {name:10} {colour(text, code, sys.stdout) if code else text}'
         for name, text, code in lines if text)]
 
 
 def hint(session: Session, error: Abdf1Error) -> str:
-    """Return what to look at after an error, where that is known."""
+    """Return advice after an error; empty if there is none."""
     if not isinstance(error, LinkError) or isinstance(error, PortLost):
         return ''
     if session.echoes:
         return COMES_BACK
     received, network = session.counters.chars_received, session.network
     if network.line_mode.is_polled and not session.counters.polls_received:
-        return (f'no master has polled us, station {network.station}: "plc detect" tells whom it '
-                'polls; --own-station takes such a number')
+        return (f'no master has polled us, station {network.station}: "plc detect" lists the '
+                'stations that the master polls; give one of them with --own-station')
     if session.counters.messages_received + session.counters.acks_received:
         return ''
     cause = SILENCE if not received else (
@@ -265,17 +267,17 @@ def hint(session: Session, error: Abdf1Error) -> str:
 
 
 def traffic(counters: Counters, stray: str = '') -> str:
-    """Return how often silent stations were asked, and what came, for who gets no answer."""
+    """Return the numbers of frames sent and received, for a user who gets no answer."""
     again = counters.nak_retries + counters.enq_retries
     came = [counted(counters.damaged_frames, 'damaged frame'),
             f'{counters.naks_received} NAK'] + [stray] * bool(stray)
     return (f'sent: {counted(counters.commands_sent, "command")}, '
-            f'{counted(counters.polls_sent, "poll")}, {counted(again, "repetition")} of them; '
+            f'{counted(counters.polls_sent, "poll")}, {counted(again, "repetition")} included; '
             f'received: {", ".join(came)}')
 
 
 def type_hint(session: Session, station: int, plc_type: str | None) -> str:
-    """Return what a PLC is where that is not the type that is given; empty where it is unknown."""
+    """Return a remark if a PLC is not of the given type; empty if that is unknown."""
     if plc_type is None:
         return ''
     try:

@@ -40,7 +40,7 @@ def opened(network: Network) -> Callable[[], Port]:
 
 def recorded(network: Network, open_it: Callable[[], Port],
              path: str) -> tuple[Callable[[], Port], Trace]:
-    """Return what opens a port whose bytes go into a capture, and this."""
+    """Return a function that opens a port with a capture of its bytes, and the capture."""
     trace = Trace(path, {'begun': begun_now(), 'port': network.port, 'baud': str(network.baud),
                          'check': network.error_code, 'duplex': network.duplex.name.lower()},
                   partial(tell, 'plc'))
@@ -50,10 +50,11 @@ def recorded(network: Network, open_it: Callable[[], Port],
 
 class Session(open_line.OpenLine):
     """
-    The line of a net CSV; with ``via`` all others are behind this gateway.
+    The line of a net CSV; with ``via`` all other stations are behind this gateway.
 
-    ``routes`` are the gateways of single stations. ``said`` has the advice that was
-    given, ``is_silent`` tells that a command had no reply.
+    - ``routes``: the gateways of single stations.
+    - ``said``: advice given so far.
+    - ``is_silent``: True if a command had no reply.
 
     Raises NoPort when the port cannot be opened.
     """

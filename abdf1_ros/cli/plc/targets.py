@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""What ``plc`` is to read or to write: addresses of the command line, and rows of a map."""
+"""The targets of ``plc`` reads and writes: addresses of the command line, and rows of a map."""
 
 from __future__ import annotations
 
@@ -40,16 +40,17 @@ from abdf1_ros.text import first, printable, shown
 
 _LIKE_A_TAG = re.compile(r'(?![A-Z]{1,3}\d*$)[A-Z_][\w/.]*', re.ASCII | re.IGNORECASE)
 
-# Options that say for an address what a row of a map says itself.
+# Options for addresses; a row of a map has a column for each.
 _FOR_ADDRESSES = ('length', 'type', 'word_order', 'access', 'processor', 'plc_type', 'via')
 
 
 @dataclass(frozen=True, slots=True)
 class Targets:
     """
-    Rows of a map, and addresses, for which ``cells`` has what the options say.
+    Rows of a map, and addresses; ``cells`` has the values of options for addresses.
 
-    ``tags`` are those of the map by address, ``routes`` the gateways of its stations.
+    - ``tags``: tags of the map, by address.
+    - ``routes``: gateways of the stations in the map.
     """
 
     entries: Sequence[Mapping | str]
@@ -64,30 +65,30 @@ class Targets:
 
     @property
     def addresses(self) -> list[str]:
-        """Return the addresses, whose station the options say."""
+        """Return the addresses; the options give their station."""
         return [entry for entry in self.entries if isinstance(entry, str)]
 
     def check_line(self, network: Network) -> None:
-        """Raise ConfigurationError where the line cannot have a row."""
+        """Raise ConfigurationError if a row does not fit the line."""
         if problems := [problem for _, problem in line_problems(self.rows, network)]:
             raise ConfigurationError(problems)
 
 
 def to_read(options: argparse.Namespace) -> Targets:
     """
-    Return what "plc read" and "plc watch" read.
+    Return the targets of "plc read" and "plc watch".
 
-    Raises ConfigurationError where no PLC could have the addresses.
+    Raises ConfigurationError if no PLC could have the addresses.
     """
     cells = _cells(options, Command.READ, options.length)
     if not options.map:
         if not options.addresses:
             raise ConfigurationError([Problem(
-                'ADDRESS', 'name one such as N7:0, or a map with --map, for all of its rows')])
+                'ADDRESS', 'give an address such as N7:0, or --map FILE for all rows of a map')])
         try:
             data.check_for_some_family(options.addresses, cells)
         except ConfigurationError as error:
-            hints = [Problem('--map', f'if {shown(word)} is a tag, name its map with --map FILE')
+            hints = [Problem('--map', f'if {shown(word)} is a tag, give its map with --map FILE')
                      for word in options.addresses if _LIKE_A_TAG.fullmatch(word)]
             raise ConfigurationError([*error.problems, *hints]) from None
         return Targets(options.addresses, cells)
@@ -114,7 +115,7 @@ def to_read(options: argparse.Namespace) -> Targets:
 
 
 def to_write(options: argparse.Namespace) -> Targets:
-    """Return what "plc write" writes; raises ConfigurationError where no PLC could take it."""
+    """Return the target of "plc write"; raises ConfigurationError if no PLC could take it."""
     if options.map:
         mappings = rows_of_map(options.map)
         row = _row_to_write(mappings, options.map, options.address)
@@ -131,7 +132,7 @@ def to_write(options: argparse.Namespace) -> Targets:
 
 
 def rows_of_map(path: str | None) -> Rows:
-    """Return the good rows of a map, and tell the faults of the others."""
+    """Return the good rows of a map; print the faults of the bad rows."""
     mappings, problems = load_mappings(path) if path else (Rows(), [])
     for problem in problems:
         tell('plc', str(problem), RED)
@@ -140,7 +141,7 @@ def rows_of_map(path: str | None) -> Rows:
 
 @contextmanager
 def no_value(address: str) -> Iterator[None]:
-    """Turn a FormatError, about values that are none, into a ConfigurationError."""
+    """Turn a FormatError about bad values into a ConfigurationError."""
     try:
         yield
     except FormatError as error:
@@ -152,7 +153,7 @@ def _station(options: argparse.Namespace) -> int:
 
 
 def _cells(options: argparse.Namespace, command: Command, length: int | str | None) -> Cells:
-    """Return what the options say of the columns of a map CSV."""
+    """Return the cells of a map CSV that the options give."""
     given = {'Command': command.value, 'Station': str(_station(options)),
              'Length': None if length is None else str(length), 'Type': options.type,
              'Word_Order': options.word_order, 'Access': options.access,
@@ -175,26 +176,26 @@ def _row_to_write(mappings: Rows, path: str, tag: str) -> Mapping:
     text = 'is not a tag of this map' if other is None else \
         f'is a {other.command.value} row of station {other.station}'
     if other is None and looks_like_address(tag):
-        text = 'is an address; with --map a tag is written, within the limits of its row'
+        text = 'is an address; with --map give a tag, so that the limits of its row apply'
     raise ConfigurationError([Problem(path, f'"{shown(tag)}" {text}; tags that can be written: '
                                             f'{first(list(rows)) or "none"}'
                                             f'{_meant(tag, rows)}')])
 
 
 def _meant(word: str, rows: Collection[str]) -> str:
-    """Return the tag that a word may stand for, as a question; empty for none."""
+    """Return a question with the tag that a word may mean; empty for none."""
     names = {tag.casefold(): tag for tag in rows}
     meant = get_close_matches(word.casefold(), names, 1)
     return f'; did you mean {printable(names[meant[0]])}?' if meant else ''
 
 
 def _check_options(options: argparse.Namespace, targets: Targets) -> None:
-    """Raise ConfigurationError where an option contradicts rows of a map, or does nothing."""
+    """Raise ConfigurationError if an option contradicts rows of a map, or has no effect."""
     problems = [] if targets.addresses else [
-        Problem(f'--{name.replace("_", "-")}', 'is for an address; the map says it of each tag')
+        Problem(f'--{name.replace("_", "-")}', 'is for addresses; for tags the map has this value')
         for name in _FOR_ADDRESSES if getattr(options, name, None) is not None]
     if not targets.addresses:
-        problems += [Problem('--station', f'{row.tag} is of station {row.station} in the map')
+        problems += [Problem('--station', f'the map has {row.tag} at station {row.station}')
                      for row in targets.rows if options.station not in (None, row.station)]
     if problems:
         raise ConfigurationError(problems)

@@ -40,22 +40,22 @@ from abdf1_ros.settings.mapping import Mapping
 from abdf1_ros.settings.network import Network
 from abdf1_ros.text import cut, printable
 
-# Ages and errors are shown again so often (ms), also without new values.
+# Period (ms) to show ages and errors again without new values.
 _GLANCE = 250
 
-# Values that wait to be shown; when more come, the older ones are lost, and counted.
+# Most values that wait to be shown; older values are dropped and counted.
 _MAX_NEWS = 1000
 
-# A PLC is asked for its mode so often (s).
+# Period (s) of questions for the mode of a PLC.
 _MODE_PERIOD = 3.0
 
-# So long (s) a value that has changed is marked.
+# Time (s) that a changed value stays marked.
 _MARKED = 1.0
 
-# Characters of a row of values, however narrow the window is.
+# Least width of a row of values, in characters; also in a narrow window.
 _LEAST_ROOM = 16
 
-# Reads that a curve shows, and its bars.
+# Number of reads in a curve, and the characters of its bars.
 _CURVE = 24
 _BARS = '▁▂▃▄▅▆▇█'
 _VALUE_AND_CURVE = f'value, and its last {_CURVE} reads'
@@ -63,13 +63,13 @@ _VALUE_AND_CURVE = f'value, and its last {_CURVE} reads'
 
 @dataclass(frozen=True, slots=True)
 class _NoValue:
-    """Why there is none."""
+    """The reason for a missing value."""
 
     error: str
 
 
 class _News(NamedTuple):
-    """What has come of a read, and when."""
+    """The result of a read, with its time."""
 
     when: datetime
     mapping: Mapping
@@ -80,12 +80,12 @@ class Watch:
     """
     The driver without ROS: read ``mappings`` every ``period`` seconds and show them.
 
-    With ``csv`` each read is a line for each value, also where nothing has changed. ``tags``
-    stand beside the addresses. On a terminal the mode of each PLC stands above the values. All
-    bytes go into the capture ``record``.
+    With ``csv`` each read prints a line per value, also without a change. ``tags`` stand beside
+    the addresses. On a terminal the mode of each PLC stands above the values. All bytes go into
+    the capture ``record``.
 
-    It is the driver's ``Listener``; ``counters`` are those of the line. Raises OSError
-    when the port cannot be opened.
+    This class is the driver's ``Listener``; ``counters`` are the counters of the line. Raises
+    OSError if the port cannot be opened.
     """
 
     def __init__(self, network: Network, mappings: Sequence[Mapping], period: float,
@@ -108,8 +108,8 @@ class Watch:
             port, self._trace = recorded(network, port, record)
         self._link = LinkThread(self._driver.machine, port)
         self._news: deque[_News] = deque(maxlen=_MAX_NEWS)
-        self._lost = self._told = 0  # of them
-        self._has_news = Wake()  # an interrupt in an Event may leave its lock taken
+        self._lost = self._lost_reported = 0
+        self._has_news = Wake()  # not an Event: an interrupt in it may leave its lock taken
         self._reads: Counter[Mapping] = Counter()
         self._shown: dict[Mapping, Values | _NoValue] = {}
         self._height = 0
@@ -119,12 +119,12 @@ class Watch:
         """
         Show values until each address has been read ``count`` times, or KeyboardInterrupt.
 
-        A failed read counts too. Returns how many addresses have no value at the end.
+        A failed read counts too. Returns the number of addresses without a value at the end.
         """
         if self._csv:
             print(f'time,station,address,{"" if self._tags is None else "tag,"}value', flush=True)
         try:
-            self._link.start()  # inside, as the thread would keep the process alive
+            self._link.start()  # inside the try block: the thread would keep the process alive
             while not self._link.has_failed and not self._is_done(count):
                 self._has_news.wait(_GLANCE)
                 self._has_news.take()
@@ -133,7 +133,7 @@ class Watch:
         except KeyboardInterrupt:
             pass
         finally:
-            # The errors that the end of the line causes are not shown.
+            # Errors caused by the end of the line are not shown.
             failed = sum(self._driver.points[mapping].error is not None
                          for mapping in self._mappings)
             self._link.stop()
@@ -150,12 +150,12 @@ class Watch:
         self._has_news.set()
 
     def unreadable(self, *args: object) -> None:
-        """Do nothing: the point has the reason, and nothing else of these can happen here."""
+        """Do nothing: the point has the reason, and no other event can happen here."""
 
     published_again = written = foreign_value = happened = unreadable
 
     def station_changed(self, station: Station) -> None:
-        """Show the news at once."""
+        """Wake the thread that shows the news."""
         self._has_news.set()
 
     def _is_done(self, count: int | None) -> bool:
@@ -170,8 +170,8 @@ class Watch:
         while self._news:
             changed.append(self._news.popleft())
         is_live = is_terminal(sys.stdout) and not self._csv
-        if (lost := self._lost - self._told) and not is_live:
-            self._told += lost
+        if (lost := self._lost - self._lost_reported) and not is_live:
+            self._lost_reported += lost
             tell('plc', f'{lost} reads were lost: this output was too slow for them')
         for mapping in self._mappings:
             error = self._driver.points[mapping].error
@@ -186,7 +186,7 @@ class Watch:
             self._print(changed)
 
     def _print(self, changed: Sequence[_News]) -> None:
-        """Print the rows of each mapping that has changed since the last time."""
+        """Print the rows of each mapping that changed since the last call."""
         for when, mapping, what in changed:
             if mapping not in self._shown or self._shown[mapping] != what:
                 self._shown[mapping] = what
@@ -199,7 +199,7 @@ class Watch:
         for when, mapping, what in news:
             time = when.isoformat(timespec='milliseconds')
             if isinstance(what, _NoValue) and self._shown.get(mapping) == what:
-                continue  # once is enough
+                continue  # print a failure once only
             self._shown[mapping] = what
             texts = [''] if isinstance(what, _NoValue) else \
                 [_quoted(printable(what))] if isinstance(what, str) else \
@@ -211,20 +211,21 @@ class Watch:
                 print(time, mapping.station, place, *tag, text, sep=',', flush=True)
 
     def _note_changes(self, news: Sequence[_News]) -> None:
-        """Keep what to show, and the time of its last change."""
+        """Keep the text to show, and the time of its last change."""
         for _, mapping, what in news:
             before = self._shown.get(mapping)
             if before is not None and before != what:
                 self._changed[mapping] = self._driver.machine.now
             self._shown[mapping] = what
             if isinstance(what, _NoValue):
-                if before != what:  # one gap: a long silence keeps what was before it
+                # one gap per silence, so that the curve keeps the values before it
+                if before != what:
                     self._past[mapping].append(math.nan)
             elif mapping.length == 1 and not isinstance(what, str):
                 self._past[mapping].append(what[0])
 
     def _rows(self, mapping: Mapping, room: int | None = None) -> list[tuple[str, str]]:
-        """Return what is known of an address, in rows of up to ``room`` characters."""
+        """Return the value or the reason of an address, in rows of up to ``room`` characters."""
         what, names = self._shown.get(mapping), self._names[mapping]
         if what is None:
             return [(names[0], '')]
@@ -236,7 +237,7 @@ class Watch:
                 for name, text in rows(mapping, what, names, self._radix, room)]
 
     def _head(self, mapping: Mapping) -> tuple[str, ...]:
-        """Return what stands between an address and its values."""
+        """Return the text between an address and its values."""
         now = self._driver.machine.now
         age = self._driver.points[mapping].age(now)
         is_new = now - self._changed.get(mapping, -math.inf) < _MARKED
@@ -244,7 +245,7 @@ class Watch:
                 '' if age is None else f'{max(age, 0.0):.1f}', '*' if is_new else '')
 
     def _curve(self, mapping: Mapping) -> str:
-        """Return the curve of a number; empty where the output cannot show it."""
+        """Return the curve of a number; empty if the output cannot show it."""
         try:
             _BARS.encode(sys.stdout.encoding or 'ascii')
         except UnicodeError:
@@ -253,7 +254,7 @@ class Watch:
             mapping, [number], self._radix)[0])
 
     def _modes(self) -> Iterator[str]:
-        """Yield what each PLC that was asked says it is, its mode and its faults."""
+        """Yield a line for each PLC that was asked: identity, mode and faults."""
         for station in dict.fromkeys(mapping.station for mapping in self._mappings):
             health = self._driver.checks.known(station)
             if health.identity is None:
@@ -265,17 +266,17 @@ class Watch:
                             + (f'; {faults}' if faults else ''))
 
     def _faults_of_line(self) -> list[str]:
-        """Return the repetitions and damaged frames so far, nothing where there were none."""
+        """Return the repetitions and damaged frames so far; empty if there were none."""
         counters = self.counters
         repeated = counters.nak_retries + counters.enq_retries
         damaged = counters.bcc_errors + counters.crc_errors
         return [f'line: {repeated} repeated, {damaged} damaged'] if repeated or damaged else []
 
     def _redraw(self) -> None:
-        """Draw the table over the one before."""
+        """Draw the table over the table before."""
         size = width, height = shutil.get_terminal_size()
         heads = [self._head(mapping) for mapping in self._mappings]
-        # Other columns keep their widths: the values get what is left of the line.
+        # The other columns keep their widths; the values get the rest of the line.
         titles = ('station', 'type', 'age s', '')
         names = ['address', *(name for names in self._names.values() for name in names)]
         taken = sum(max(map(len, column)) + 2
@@ -286,7 +287,7 @@ class Watch:
             (name, text), *more = self._rows(mapping, room)
             curve = self._curve(mapping)
             with_curve = f'{text:8}  {curve}'
-            if curve and len(with_curve) <= room:  # never a part of one
+            if curve and len(with_curve) <= room:  # never a part of a curve
                 text, value = with_curve, _VALUE_AND_CURVE
             cells.append((name, *head, text, printable(mapping.description)))
             cells += [(name, *[''] * len(head), text, '') for name, text in more]
@@ -298,7 +299,7 @@ class Watch:
             lines = [*lines[:left - 1], f'+{hidden} more; a higher window shows them']
         lines = [*above, *lines, *below]
         picture = [cut(line, width - 1) for line in lines]
-        # In a window of another size the lines before lie elsewhere.
+        # After a change of the window's size the old lines have moved.
         start = '' if self._size is None else \
             f'\x1b[{self._height}A' if size == self._size else '\x1b[H'
         print(start + '\n'.join(f'\x1b[K{line}' for line in picture), end='\n\x1b[J', flush=True)
@@ -307,7 +308,7 @@ class Watch:
 
 def _with_descriptions(titles: Sequence[str], cells: Sequence[tuple[str, ...]],
                        left: int) -> list[str]:
-    """Return the lines of the table; its last column, the descriptions, only where it fits."""
+    """Return the lines of the table; with the descriptions only if they fit."""
     title = 'description'
     if not any(row[-1] for row in cells) \
             or left - max(len(row[-2]) for row in cells) < len(title) + 2:
@@ -322,9 +323,9 @@ def _quoted(text: str) -> str:
 
 def curve_of(numbers: Collection[float], text: Callable[[float], str]) -> str:
     """
-    Return a bar for each number, between the lowest and the highest as ``text`` has them.
+    Return a bar for each number; the scale is from the lowest to the highest.
 
-    NaN and infinity are gaps. Where the two do not differ there is no curve.
+    NaN and infinity are gaps. If ``text`` shows both limits the same, there is no curve.
     """
     known = [number for number in numbers if math.isfinite(number)]
     low, high = min(known, default=0), max(known, default=0)

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""What each command of ``plc`` does."""
+"""The commands of ``plc``: a function for each."""
 
 from __future__ import annotations
 
@@ -73,7 +73,7 @@ _ALL_TRIED_IN_VAIN = (
     'not one character came: cable, port, power? Or a station that was not asked (--stations; a '
     'PLC-5 shows its own in octal)')
 _ONE_PLC_ANSWERS_TO_ALL = (
-    'full duplex tells no addresses apart: most PLCs answer to every station, so these may be one')
+    'in full duplex most PLCs answer to every station number, so these may be one PLC')
 
 _Prepared = TypeVar('_Prepared')
 
@@ -93,10 +93,10 @@ def _mappings(options: argparse.Namespace, session: Session, targets: Targets) -
 
 def _line(options: argparse.Namespace, prepared: object) -> Network:
     """
-    Return the line of a command for one station, and settle which station that is.
+    Return the line of a command for one station, and set the station in ``options``.
 
-    Raises ConfigurationError for a write to one of several that it does not name, and where the
-    station is ourselves. Rows of a map name their stations.
+    Raises ConfigurationError if a write names no station on a line of several, and if the station
+    is our own. Rows of a map name their stations.
     """
     network = network_of(options)
     if isinstance(prepared, Targets) and prepared.rows:
@@ -108,18 +108,18 @@ def _line(options: argparse.Namespace, prepared: object) -> Network:
     options.is_assumed = has_several and options.station is None
     if options.is_assumed and (options.command == 'write' or getattr(options, 'set', False)):
         raise ConfigurationError([Problem(
-            '--station', 'say which station to write to: this line may have several')])
+            '--station', 'give the station to write to: this line may have several stations')])
     if options.station is None:
         options.station = DEFAULT_STATION
     if not has_several or options.station != network.station:
         return network
     if options.is_assumed:
         raise ConfigurationError([Problem(
-            '--station', f'say which station to ask; {options.station} is our own')])
+            '--station', f'give the station to ask; {options.station} is our own Station')])
     if options.net or options.own_station is not None or network.line_mode.is_polled:
         raise ConfigurationError([Problem('--own-station', (
             f'{network.station} is our own Station, so no PLC can answer as {options.station}; '
-            'give us a number that no PLC of the line has'))])
+            'give us a station number that no PLC of the line has'))])
     return replace(network, station=free_station(network.station, [options.station]))
 
 
@@ -127,9 +127,9 @@ def _asking(work: Callable[[argparse.Namespace, Session, _Prepared], int],
             prepare: Callable[[argparse.Namespace], _Prepared],
             ) -> Callable[[argparse.Namespace], int]:
     """
-    Return a command that asks one station; it warns of a gateway that may be none.
+    Return a command that asks one station; it warns if ``via`` may not be a gateway.
 
-    ``work`` gets what ``prepare`` returns, which tells what is wrong before the port is opened.
+    ``prepare`` finds faults before the port is opened; ``work`` gets its result.
     """
     def command(options: argparse.Namespace) -> int:
         prepared = prepare(options)
@@ -138,7 +138,7 @@ def _asking(work: Callable[[argparse.Namespace, Session, _Prepared], int],
         routes = prepared.routes if isinstance(prepared, Targets) else None
         with Session(network, via=options.via, record=record, routes=routes) as session:
             if options.via is not None and (
-                    who := presence.said_by_both(session, options.station, options.via)):
+                    who := presence.common_identity(session, options.station, options.via)):
                 _complain(f'stations {options.station} and {options.via} are both "{who}": if '
                           f'{options.via} is not a gateway, it answers itself')
             try:
@@ -153,7 +153,7 @@ def _asking(work: Callable[[argparse.Namespace, Session, _Prepared], int],
 
 def _failed(options: argparse.Namespace, session: Session, error: Abdf1Error, place: str = '',
             row: Mapping | None = None) -> int:
-    """Tell why a request to a station, about ``place``, has failed; return the exit status."""
+    """Print why a request to a station, about ``place``, failed; return the exit status."""
     if isinstance(error, ConfigurationError | PortLost):
         raise error
     station = options.station if row is None else row.station
@@ -163,23 +163,22 @@ def _failed(options: argparse.Namespace, session: Session, error: Abdf1Error, pl
     _advise(session, presence.hint(session, error))
     session.is_silent |= isinstance(error, LinkError)
     if options.is_assumed and isinstance(error, LinkError):
-        _advise(session, f'no station was given, so {station} was asked; "plc scan" tells who is '
-                         'there')
+        _advise(session, f'no station was given, so {station} was asked; "plc scan" lists the '
+                         'stations that answer')
     if place and isinstance(error, RemoteError) and is_address_fault(error):
-        _advise(session, f'"plc files {station}" tells which data files it has, and how long they '
-                         'are')
+        _advise(session, f'"plc files {station}" lists its data files and their lengths')
     return EXIT_FAILED
 
 
 def _check_type(options: argparse.Namespace, session: Session, station: int) -> None:
-    """Tell where a PLC is of another type than an option says, asking it once."""
+    """Ask a PLC for its type once; warn if an option gives another type."""
     if '--plc-type' not in session.said:
         session.said.add('--plc-type')
         _advise(session, presence.type_hint(session, station, options.plc_type))
 
 
 def _advise(session: Session, text: str) -> None:
-    """Give advice, but once in a command."""
+    """Print an advice once per command."""
     if text and text not in session.said:
         session.said.add(text)
         _complain(text)
@@ -197,7 +196,7 @@ def _read(options: argparse.Namespace, session: Session, targets: Targets) -> in
         else:
             is_read = True
             _print_values(mapping, values, RADIXES[options.radix], targets.tags)
-    if is_read:  # some PLCs answer commands of another family
+    if is_read:  # a PLC may answer commands of another family
         _check_type(options, session, options.station)
     return status
 
@@ -228,7 +227,7 @@ def _write(options: argparse.Namespace, session: Session, targets: Targets) -> i
 
 
 def _is_confirmed(options: argparse.Namespace, session: Session, writing: data.Writing) -> bool:
-    """Show what will be written; ask for a confirmation where there is a terminal."""
+    """Show the present values; return True if the user confirms the write."""
     mapping = writing.mapping
     try:
         print('now:')
@@ -239,7 +238,7 @@ def _is_confirmed(options: argparse.Namespace, session: Session, writing: data.W
 
 
 def _is_wanted(question: str) -> bool:
-    """Ask for a confirmation where there is a terminal."""
+    """Ask the user on a terminal; print the question and return False without a terminal."""
     if not sys.stdin.isatty():
         print(f'would {printable(question)}')
         return False
@@ -250,7 +249,7 @@ def _is_wanted(question: str) -> bool:
 
 
 def _carry_out(session: Session, writing: data.Writing) -> int:
-    """Write, show what the PLC holds after it, and return the exit status."""
+    """Write, show the values in the PLC after it, and return the exit status."""
     mapping = writing.mapping
     place = f'{data.named(mapping)} of station {mapping.station}'
     result = writing.carry_out(session)
@@ -262,7 +261,7 @@ def _carry_out(session: Session, writing: data.Writing) -> int:
         print(f'{place}: {colour(text, GREEN, sys.stdout)}; now:', flush=True)
         _print_values(mapping, data.read(session, mapping))
         sys.stdout.flush()
-    except KeyboardInterrupt:  # it is written all the same
+    except KeyboardInterrupt:  # the write is complete
         pass
     except Abdf1Error as error:
         _complain(f'cannot be read back: {error}')
@@ -304,7 +303,7 @@ def _ping(options: argparse.Namespace, session: Session, prepared: None) -> int:
             else:
                 print(f'station {options.station}: {times[-1] * 1000:.1f} ms', flush=True)
     except KeyboardInterrupt:
-        pass  # the one under way does not count
+        pass  # the interrupted echo does not count
     text = f'{failures + len(times)} sent, {len(times)} answered'
     if times:
         text += (f'; shortest {min(times) * 1000:.1f}, mean '
@@ -339,7 +338,7 @@ def _detect(options: argparse.Namespace) -> int:
     network = network_of(options)
     found = _found(options, network)
     if isinstance(found, overhear.ForeignMaster):
-        return _only_heard(found, '"plc init" writes files that only listen to it')
+        return _only_heard(found, '"plc init" writes net.csv and map.csv for Mode Listen')
     if found is None:
         return EXIT_FAILED
     there = found.presence
@@ -360,10 +359,10 @@ def _detect(options: argparse.Namespace) -> int:
 
 def _found(options: argparse.Namespace,
            network: Network) -> detect.Found | overhear.ForeignMaster | None:
-    """Return the settings that work, or who else asks; where none do, tell what was received."""
+    """Return the settings that work, or another master; print traces if there is neither."""
     if options.duplex == 'slave':
         raise ConfigurationError([Problem(
-            '--duplex', 'a slave cannot try settings; without it detect listens first')])
+            '--duplex', 'a slave cannot try settings; leave --duplex out, then we listen first')])
     progress = Progress()
     bauds: Sequence[int] = [network.baud] if options.baud or '://' in network.port \
         else detect.BAUD_RATES
@@ -386,7 +385,8 @@ def _found(options: argparse.Namespace,
             ('--duplex', options.duplex), ('--baud', options.baud), ('--check', options.check))
             if value]
         if kept:
-            _complain(f'{" and ".join(kept)}: nothing else was tried; leave it out to try all')
+            _complain(f'{" and ".join(kept)}: no other value was tried; leave the option out to '
+                      'try all')
     return found
 
 
@@ -402,7 +402,7 @@ def _init(options: argparse.Namespace) -> int:
     if found is None or isinstance(found, overhear.ForeignMaster):
         return EXIT_FAILED
     print(f'{colour(str(found.settings), GREEN, sys.stdout)}')
-    # A full-duplex port mostly answers to every station, and 0 is the one to avoid (see "check").
+    # Most full-duplex ports answer to every station. We avoid station 0 (see "check").
     others = options.stations if found.settings.mode != MODES['full'] else \
         [1] if found.presence.station == 0 else []
     there = _stations_there(found, found.settings.on(network), others)
@@ -414,7 +414,7 @@ def _init(options: argparse.Namespace) -> int:
     target.write(*init.files_of(network, found, there, listed))
     net, map_file = (shlex.quote(str(path)) for path in target.paths)
     print(f'written: {", ".join(map(str, target.paths))}\n'
-          'how to go on: write the addresses that you need into map.csv, then\n'
+          'next: write the addresses that you need into map.csv, then\n'
           f'  {called("plc")} watch S:0 --station {there[0].station}'
           f'{presence.type_to_say(there[0])} --net {net}\n'
           f'  {called("check")} {net} {map_file}\n'
@@ -423,19 +423,19 @@ def _init(options: argparse.Namespace) -> int:
 
 
 def _only_heard(master: overhear.ForeignMaster | None, what: str) -> int:
-    """Tell what can be done on a line of another master; return the status."""
+    """Print the ways to use a line of another master; return the status."""
     _complain(what if master is None else (
-        f'{master}: nothing was sent. "plc --slave --own-station N" asks through it if it polls N '
-        'and no PLC has that number, as a node of Mode Slave does; "sniff" shows what it reads; '
-        f'{what}'))
+        f'{master}: nothing was sent. If the master polls a station N that no PLC has, "plc '
+        '--slave --own-station N" can ask PLCs through it, like a node of Mode Slave; "sniff" '
+        f'shows what the master reads; {what}'))
     return EXIT_FAILED
 
 
 def _init_listening(network: Network, master: overhear.ForeignMaster | None,
                     target: init.NewFiles) -> int:
-    """Write files that only listen, with what another master reads."""
+    """Write net.csv and map.csv for Mode Listen, with the reads of another master."""
     if master is not None:
-        print(f'{master}: nothing is sent')
+        print(f'{master}: we send nothing')
         check = network.error_code if master.check is None else master.check.value
         network = replace(overhear.silent(network), baud=master.baud, error_code=check)
     progress = Progress()
@@ -443,20 +443,20 @@ def _init_listening(network: Network, master: overhear.ForeignMaster | None,
     reads = overhear.heard_reads(network, overhear.LISTENED_FOR_READS)
     progress.clear()
     if not reads:
-        return _only_heard(master, 'no read with its reply was heard, so nothing was written')
+        return _only_heard(master, 'no read with its reply was heard, so no file was written')
     for text in texts_of(reads):
         print(text)
     target.write(init.listening_csv(network), map_of(reads))
     net, map_file = (shlex.quote(str(path)) for path in target.paths)
     print(f'written: {", ".join(map(str, target.paths))}\n'
-          f'how to go on: {called("check")} {net} {map_file}')
+          f'next: {called("check")} {net} {map_file}')
     return 0
 
 
 def _stations_there(found: detect.Found, network: Network,
                     stations: Sequence[int]) -> list[presence.Presence]:
-    """Return who is there, the found one at least, and tell how often the others were asked."""
-    is_full = found.settings.mode == MODES['full']  # it answers to several numbers
+    """Return the stations that answer, at least the found station; print the tally."""
+    is_full = found.settings.mode == MODES['full']  # the PLC answers to several numbers
     there = {} if is_full and stations else {found.presence.station: found.presence}
     asked = 1
     for seen in presence.scan(network, stations) if stations else ():
@@ -490,12 +490,12 @@ def _import(options: argparse.Namespace) -> int:
     print(f'written: {target}: {counted(result.count, "row")}{left_out}')
     nets = (target.with_name('net.csv'), Path('net.csv'))
     net = next((path for path in nets if path.exists()), None)
-    print(f'how to go on: {called("check")} {shlex.quote(str(net or nets[1]))} '
+    print(f'next: {called("check")} {shlex.quote(str(net or nets[1]))} '
           f'{shlex.quote(str(target))}')
     if net is None:
         print(f'net.csv is not there yet: {called("plc")} init --into ANOTHER_FOLDER makes one')
         return EXIT_FAILED if result.left_out else 0
-    with suppress(ConfigurationError):  # "check" tells it
+    with suppress(ConfigurationError):  # "check" reports the fault
         report = make_report(load_network(str(net)), load_mappings(str(target))[0],
                              DriverSettings().default_period)
         if report.load > 1 and (period := report.needed_period()):
@@ -505,7 +505,7 @@ def _import(options: argparse.Namespace) -> int:
 
 
 def _only_port() -> str:
-    """Return the only port; ConfigurationError where there is none or more than one."""
+    """Return the only port; ConfigurationError if there is none or more than one."""
     ports = serial_ports()
     if len(ports) == 1:
         print(f'port: {ports[0].device} {ports[0].adapter}'.rstrip())
@@ -517,12 +517,12 @@ def _only_port() -> str:
 def _ports(options: argparse.Namespace) -> int:
     ports = serial_ports()
     rows = [(port.device, port.adapter, port.stable,
-             '' if port.may_open else 'not for this user') for port in ports]
+             '' if port.may_open else 'no access for this user') for port in ports]
     if not ports:
         _complain('this machine has no serial port: is the adapter plugged in? In a virtual '
-                  'machine or container it has to be passed through')
+                  'machine or container the host must pass it through')
         return EXIT_FAILED
-    print(table(('port', 'adapter', 'name that stays', ''), rows))
+    print(table(('port', 'adapter', 'stable name', ''), rows))
     if not all(port.may_open for port in ports):
         _complain(advice_for(errno.EACCES))
     return 0
@@ -545,8 +545,8 @@ def _clock(options: argparse.Namespace, session: Session, prepared: None) -> int
     print(f'station {options.station}: {told(time, ahead)}')
     if abs(ahead) <= TAKEN:
         return 0
-    _complain('it has not taken the time, though it has confirmed the write: a processor that '
-              'only shows its clock there is set by its own means')
+    _complain('the PLC confirmed the write, but its clock has not changed: these words may be a '
+              'copy of the clock; set the clock with the software of the PLC')
     return EXIT_FAILED
 
 
@@ -575,7 +575,7 @@ def _files(options: argparse.Namespace, session: Session, mappings: Rows) -> int
 
 
 def _family(options: argparse.Namespace, session: Session) -> tuple[PlcType, Processor | None]:
-    """Return family and processor of the station, which is asked where no option says it."""
+    """Return family and processor: from the option, or ask the station."""
     if options.plc_type:
         return PlcType(options.plc_type), None
     return data.ask_family(session, options.station)

@@ -79,7 +79,8 @@ def test_clock_is_set_when_that_is_wanted(port: str, plcs: tuple[SimulatedPlc, .
 def test_clock_that_holds_no_time(port: str, capsys: Output) -> None:
     said = call(main, capsys, 'clock', '1', '--port', port)
     assert (said.status, said.err) == (
-        1, 'plc: S2:37 of station 1: holds no date and time: 0 0 0 0 0 0; is its clock off?\n')
+        1, 'plc: S2:37 of station 1: holds no date and time: 0 0 0 0 0 0; is its clock '
+           'switched off?\n')
 
 
 def test_family_without_a_known_clock(port: str, capsys: Output) -> None:
@@ -111,7 +112,7 @@ def test_refused_write_is_told(port: str, capsys: Output) -> None:
 
 def test_station_is_named_where_several_may_be(port: str, capsys: Output) -> None:
     said = call(main, capsys, 'clock', '--set', '--yes', '--port', port)
-    assert (said.status, 'say which station to write to' in said.err) == (2, True)
+    assert (said.status, 'give the station to write to' in said.err) == (2, True)
 
 
 @pytest.mark.parametrize(('seconds', 'text'), [

@@ -30,7 +30,7 @@ from support.simulator_process import Files
 
 
 def test_silence_of_a_station_that_nobody_named(plc: Plc, simulator: Process) -> None:
-    told = 'no station was given, so 1 was asked; "plc scan" tells who is there'
+    told = 'no station was given, so 1 was asked; "plc scan" lists the stations that'
     simulator.say('silent 1')
     assert told in plc('read', 'N7:0', *FAST).err
     assert told in plc('status', *FAST).err
@@ -49,7 +49,7 @@ def test_own_station_is_not_asked(plc: Plc, args: tuple[str, ...]) -> None:
 def test_own_station_is_not_taken_for_one_that_nobody_named(plc: Plc) -> None:
     said = plc('read', 'N7:0', '--own-station', '1')
     assert (said.status, said.err) == (
-        2, 'plc: --station: say which station to ask; 1 is our own\n')
+        2, 'plc: --station: give the station to ask; 1 is our own Station\n')
 
 
 def test_scan_asks_a_plc_that_has_our_number(plc: Plc) -> None:
@@ -83,7 +83,7 @@ def test_ping_of_nobody_has_status_1_and_says_that_nothing_came(plc: Plc) -> Non
     assert (said.status, said.lines) == (1, ['2 sent, 0 answered'])
     assert said.err.count('2509 ERR_INACTIVE_STATION: Slave Station (9) Inactive') == 2
     assert said.err.count('not one character came') == said.err.count('plc: sent: ') == 1
-    assert said.err.endswith('plc: sent: 1 command, 1 poll, 3 repetitions of them; received: '
+    assert said.err.endswith('plc: sent: 1 command, 1 poll, 3 repetitions included; received: '
                              '0 damaged frames, 0 NAK\n')
 
 
@@ -100,7 +100,7 @@ def test_scan_finds_who_does_not_say_what_it_is(plc: Plc, simulator: Process) ->
     simulator.say('error 2 10')
     said = plc('scan', '2')
     assert said.status == 0
-    assert 'answers, but not who it is: STS 10' in said.lines[1]
+    assert 'answers, but does not identify itself: STS 10' in said.lines[1]
 
 
 def test_plc_without_diagnostic_status_is_not_called_a_missing_file(
@@ -108,7 +108,7 @@ def test_plc_without_diagnostic_status_is_not_called_a_missing_file(
     simulator.say('error 2 10')
     said = plc('read', 'N7:0', '--station', '2')
     assert said.status == 1
-    assert 'station 2: does not say what it is (STS 10 to that question); say --plc-type' in (
+    assert 'station 2: does not identify itself (STS 10 to the question); give --plc-type' in (
         said.err)
     assert 'file' not in said.err
 
@@ -116,7 +116,7 @@ def test_plc_without_diagnostic_status_is_not_called_a_missing_file(
 def test_scan_of_nobody_has_status_1(plc: Plc) -> None:
     said = plc('scan', '8,9', *FAST)
     assert (said.status, said.lines) == (
-        1, ['0 of 2 stations answer; the others were asked 2 times'])
+        1, ['0 of 2 stations answer; silent stations were asked 2 times'])
 
 
 def test_watch_prints_changes_and_ends_by_count(plc: Plc) -> None:
@@ -232,7 +232,7 @@ def test_help_has_examples_and_exit_statuses(command: str,
     assert said.status == 0
     assert 'exit status:' in said.out
     assert f'plc {command}' in said.out.partition('example')[2]
-    assert 'watch and ping, once they have begun, end by it with 0 or 1' in said.out
+    assert 'a running watch or ping ends with 0 or 1 instead' in said.out
 
 
 def test_process_needs_no_ros() -> None:

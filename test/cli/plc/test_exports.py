@@ -227,11 +227,11 @@ def test_command_writes_a_map_once_and_says_how_to_go_on(
     options = ['import', str(source), '--into', str(target.parent), '--station', '3']
     assert main(options) == 0
     assert capsys.readouterr().out.splitlines() == [
-        f'written: {target}: 4 rows', f'how to go on: {called("check")} net.csv {target}',
+        f'written: {target}: 4 rows', f'next: {called("check")} net.csv {target}',
         f'net.csv is not there yet: {called("plc")} init --into ANOTHER_FOLDER makes one']
     assert {mapping.station for mapping in load_mappings(str(target))[0]} == {3}
     assert main(options) == 2
-    assert f'{target}: is there already' in capsys.readouterr().err
+    assert f'{target}: exists already' in capsys.readouterr().err
     source.write_text(f'{RSLOGIX}"N7:999",,"FAR"\n', encoding='utf-8')
     other = tmp_path / 'other' / 'map.csv'
     (tmp_path / 'net.csv').write_text('Station\n5\n', encoding='utf-8')
@@ -239,7 +239,7 @@ def test_command_writes_a_map_once_and_says_how_to_go_on(
     said = capsys.readouterr()
     assert f'{source}:5: ' in said.err
     assert said.out.splitlines()[1:] == [
-        f'how to go on: {called("check")} net.csv {other}',
+        f'next: {called("check")} net.csv {other}',
         'these rows need 205% of the time of the line in net.csv; --period 500 would do']
 
 

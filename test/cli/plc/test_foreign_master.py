@@ -147,7 +147,7 @@ def test_slave_that_nobody_polls_says_so(
     monkeypatch.setattr(requests, '_LONGEST_UNPOLLED', 0.3)
     with master_on(tmp_path / 'line', 3) as (port, master):
         assert main(['ping', '1', '--count', '1', '--slave', '--port', port]) == 1
-    assert 'no master has polled us, station 5: "plc detect" tells whom it polls' in (
+    assert 'no master has polled us, station 5: "plc detect" lists the stations' in (
         capsys.readouterr().err)
 
 
@@ -180,7 +180,7 @@ def test_init_offers_a_map_of_what_another_master_reads(
     assert not select.select([line.fileno()], [], [], 0.1)[0]
     # By the files themselves, as a full-duplex line needs: they name both ports.
     assert main(['init', '--net', str(new / 'net.csv'), '--into', str(tmp_path / 'again')]) == 1
-    assert 'no read with its reply was heard, so nothing was written' in capsys.readouterr().err
+    assert 'no read with its reply was heard, so no file was written' in capsys.readouterr().err
     line.close()
 
 

@@ -142,7 +142,7 @@ def test_lost_poll_leaves_no_station_out(tmp_path: Path, capsys: Output) -> None
         assert main(['init', '--port', name, '--into', str(tmp_path), '--baud', '19200',
                      '--stations', '1-3', *PATIENT]) == 0
     said = capsys.readouterr().out
-    assert '2 of 3 stations answer; the others were asked 3 times\n' in said
+    assert '2 of 3 stations answer; silent stations were asked 3 times\n' in said
     assert 'station 1: SLC 5/03' in said
     assert 'station 2: SLC 5/03 series A revision 1, REM RUN, asked 2 times' in said
     mappings, _ = load_mappings(str(tmp_path / 'map.csv'))
@@ -152,10 +152,10 @@ def test_lost_poll_leaves_no_station_out(tmp_path: Path, capsys: Output) -> None
 def test_init_leaves_files_alone_that_are_there(port: str, tmp_path: Path, capsys: Output) -> None:
     (tmp_path / 'map.csv').write_text('mine', encoding='utf-8')
     assert main(['init', '--port', port, '--into', str(tmp_path)]) == 2
-    assert 'map.csv: is there already' in capsys.readouterr().err
+    assert 'map.csv: exists already' in capsys.readouterr().err
     assert not (tmp_path / 'net.csv').exists()
     assert main(['init', '--port', port, '--into', str(tmp_path / 'map.csv')]) == 2
-    assert 'map.csv is not a folder that can be written to' in capsys.readouterr().err
+    assert 'map.csv is not a folder, or you may not write to it' in capsys.readouterr().err
 
 
 def test_init_that_finds_nothing_leaves_no_folder(tmp_path: Path, capsys: Output) -> None:
@@ -181,7 +181,7 @@ def test_file_that_is_longer_than_its_row(port: str, capsys: Output) -> None:
     comment, row = capsys.readouterr().out.splitlines()[1:]
     length = row.split(',')[6]
     assert int(length) < 256
-    assert comment == f'# N7 has 256 elements; a row of one packet has {length} of them'
+    assert comment == f'# N7 has 256 elements; this row of one packet reads {length}'
 
 
 @pytest.mark.parametrize('station', ['1', '2'])
@@ -210,7 +210,7 @@ def test_rows_of_a_map_that_lie_outside_of_the_files(
     said = capsys.readouterr()
     assert f'{path}:5:3 (Address): 2503' in said.err
     assert said.out.splitlines() == [
-        f'{path}:2 (Address): N7:90, Length 11: N7 has 100 elements',
+        f'{path}:2 (Address): N7:90, Length 11: N7 has only 100 elements',
         f'{path}:3 (Address): N10:0, Length 1: file 10 is F10',
         f'{path}:4 (Address): B12:0, Length 1: there is no file 12']
 
@@ -253,7 +253,7 @@ def test_plc_that_answers_for_a_gateway_it_is_not(port: str, capsys: Output) -> 
 def test_station_without_files_is_an_error(port: str, capsys: Output) -> None:
     assert main(['files', '1', '--port', port, '--files', '30-31']) == 1
     assert main(['files', '1', '--port', port, '--plc-type', 'PLC2']) == 1
-    assert 'no files that can be looked for' in capsys.readouterr().err
+    assert 'we know no way to find the files of a' in capsys.readouterr().err
 
 
 ADAPTER = SerialPortInfo('/dev/ttyUSB0', '/dev/serial/by-id/usb-FTDI', 'FT232R', True)
@@ -270,7 +270,7 @@ def test_ports_are_listed_with_what_keeps_one_from_opening_them(
     assert main(['ports']) == 0
     said = capsys.readouterr()
     assert said.out.splitlines()[1].split() == ['/dev/ttyUSB0', 'FT232R', ADAPTER.stable]
-    assert said.out.splitlines()[2].endswith('not for this user')
+    assert said.out.splitlines()[2].endswith('no access for this user')
     assert 'usermod -aG dialout' in said.err
 
 

@@ -64,7 +64,7 @@ def help_of(capsys: pytest.CaptureFixture[str], *args: str) -> str:
 
 def test_help_tells_what_detect_does_by_default(capsys: pytest.CaptureFixture[str]) -> None:
     text = help_of(capsys, 'detect')
-    assert text.count('(default: all are tried') == 3
+    assert text.count('(default: tries all') == 3
     assert 'to wait for each answer (default: 200)' in text
     assert 'take port, parity and own station from this net CSV' in text
     text = help_of(capsys, 'scan')

@@ -69,8 +69,8 @@ def test_scan_in_full_duplex_tells_what_it_cannot_know(
         peer: str, capsys: pytest.CaptureFixture[str]) -> None:
     scanned = call(main, capsys, 'scan', '2-3', '--port', peer, *FULL_DUPLEX)
     assert scanned.good_lines[-2:] == [
-        '2 of 2 stations answer', 'full duplex tells no addresses apart: most PLCs answer to '
-        'every station, so these may be one']
+        '2 of 2 stations answer', 'in full duplex most PLCs answer to every station '
+        'number, so these may be one PLC']
 
 
 def test_detect_finds_a_full_duplex_port(peer: str, capsys: pytest.CaptureFixture[str]) -> None:
@@ -114,7 +114,7 @@ def test_detect_of_nobody_has_status_1_and_says_what_was_tried(
         'plc: nothing answers with any of these settings, tried 2 times',
         'plc: not one character came: cable, port, power? Or a station that was '
         'not asked (--stations; a PLC-5 shows its own in octal)',
-        'plc: --baud: nothing else was tried; leave it out to try all']
+        'plc: --baud: no other value was tried; leave the option out to try all']
 
 
 def test_detect_of_what_is_not_understood(tmp_path: Path, files: Files,
@@ -126,8 +126,8 @@ def test_detect_of_what_is_not_understood(tmp_path: Path, files: Files,
     assert said.status == 1
     assert told(said) == ['plc: nothing answers with any of these settings, tried 2 times',
                           'plc: 9600 baud, half duplex, CRC: 4 characters came',
-                          'plc: --duplex and --baud and --check: nothing else was '
-                          'tried; leave it out to try all']
+                          'plc: --duplex and --baud and --check: no other value was '
+                          'tried; leave the option out to try all']
 
 
 @pytest.fixture(scope='module')
@@ -196,7 +196,7 @@ def test_plcs_behind_a_radio_modem(
         assert call(main, capsys, 'read', 'N7:0', '--net', str(net),
                     '--port', port).good_lines == ['N7:0 1200']
         assert call(main, capsys, 'write', 'N7:0', '7', '--yes', *line).err == (
-            'plc: --station: say which station to write to: this line may have several\n')
+            'plc: --station: give the station to write to: this line may have several stations\n')
         write = 'write', 'N7:0', '7', '--yes', '--station', '1'
         assert call(main, capsys, *write, *line).status == 0
         watched = call(main, capsys, 'watch', 'N7:0', '--count', '2', '--period', '0.1', *line)
@@ -204,7 +204,7 @@ def test_plcs_behind_a_radio_modem(
         assert call(main, capsys, 'status', '2', *line).lines[0].startswith('station 2: SLC 5/03')
         # 5 is ours usually.
         found = call(main, capsys, 'scan', '1-2,5', '--timeout', '2000', *line)
-        assert found.lines[-1] == '2 of 3 stations answer; the others were asked 2 times'
+        assert found.lines[-1] == '2 of 3 stations answer; silent stations were asked 2 times'
         process.say('silent 2')
         process.wait_for('station 2: silent')
         silent = call(main, capsys, 'status', '2', '--timeout', '500', *line)

@@ -53,12 +53,12 @@ def test_everything_a_station_has_said() -> None:
         'station 2: SLC 5/03 series B revision 3, REM PROG',
         '  mode       REM PROG', '  faults     major error 0x0021', '  remarks    forces active',
         '  own name   CELL_3', '  program ID 0x1A2B', '  memory     16 K',
-        '  answered   after 31 ms']
+        '  reply      after 31 ms']
 
 
 def test_station_that_does_not_say_what_it_is() -> None:
     seen = Presence(2, 0.1, None, FormatError('too short'), True, True)
-    assert str(seen) == 'answers, but not who it is: too short'
+    assert str(seen) == 'answers, but does not identify itself: too short'
 
 
 @pytest.mark.parametrize('identity, option', [
@@ -151,8 +151,8 @@ def test_node_behind_a_gateway_that_answers_diagnostics_itself_is_proven_by_a_re
         found = list(scan(Network(com_port=name, timeout=2000), [3, 8, 9], via=8))
     assert [(seen.station, seen.is_there, str(seen.identity)[:7]) for seen in found] == [
         (3, False, 'None'), (8, True, '1785-KE'), (9, True, 'None')]
-    assert str(found[2]) == ('answers, but not who it is: its gateway answers in its place, as '
-                             '1785-KE series B revision A')
+    assert str(found[2]) == ('answers, but does not identify itself: the gateway answers for '
+                             'this station, as 1785-KE series B revision A')
     assert 'STS 02' in str(found[0].error)
 
 

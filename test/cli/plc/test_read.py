@@ -86,15 +86,15 @@ def test_rows_of_a_map_are_read_by_their_tags(plc: Plc, tmp_path: Path) -> None:
     said = plc('read', 'sped', '--map', str(path))
     assert said.status == 2 and f'{path}: tags that are read: speed, level' in said.err
     said = plc('read')
-    assert said.status == 2 and 'ADDRESS: name one such as N7:0, or a map with --map' in said.err
+    assert said.status == 2 and 'ADDRESS: give an address such as N7:0' in said.err
 
 
 def test_map_says_of_each_tag_what_options_say_of_addresses(plc: Plc, tmp_path: Path) -> None:
     path = str(write_csv(tmp_path / 'map.csv', *MAP_OF_TAGS))
     assert plc('read', 'level', '--length', '2', '--map', path).err == (
-        'plc: --length: is for an address; the map says it of each tag\n')
+        'plc: --length: is for addresses; for tags the map has this value\n')
     assert plc('read', 'level', '--station', '1', '--map', path).err == (
-        'plc: --station: level is of station 2 in the map\n')
+        'plc: --station: the map has level at station 2\n')
     assert plc('read', '--station', '2', '--map', path).lines == ['N7:30 level 2330 % Tank 4 [%]']
     assert plc('read', '--station', '3', '--map', path).err == (
         f'plc: {path}: has no row of station 3 that is read\n')
@@ -173,7 +173,7 @@ def test_read_goes_on_after_a_refusal(plc: Plc) -> None:
     said = plc('read', 'N99:0', 'N7:0')
     assert (said.status, said.lines) == (1, ['N7:0 1200'])
     assert said.err.startswith('plc: N99:0 of station 1: STS F0 EXT STS')
-    assert '"plc files 1" tells which data files it has' in said.err
+    assert '"plc files 1" lists its data files and their lengths' in said.err
     said = plc('read', 'N99:0', 'N98:0')
     assert said.err.count('of station 1: STS F0') == 2 and said.err.count('"plc files 1"') == 1
 

@@ -51,12 +51,12 @@ def test_row_of_a_map_is_written_by_its_tag(plc: Plc, tmp_path: Path) -> None:
     (('speed', '5'), '"speed" is a Read row of station 1; tags'),
     (('beat', '5'), '"beat" is a Heartbeat row of station 2; tags'),
     (('all', '5'), '"all" is a Write row of station 255; tags'),
-    (('N7:55', '5'), '"N7:55" is an address; with --map a tag is written, within the limits'),
+    (('N7:55', '5'), '"N7:55" is an address; with --map give a tag, so that the limits'),
     (('Level', '11'), 'Level: value 11 at index 0 is outside Min -inf, Max 10'),
     (('Level', '1', '2'), 'Level: 2 values, the mapping has 1'),
     (('Level', 'full'), 'Level: "full" is not a valid float32'),
-    (('Level', '1', '--station', '1'), '--station: Level is of station 2 in the map'),
-    (('Level', '1', '--type', 'int32'), '--type: is for an address; the map says it')])
+    (('Level', '1', '--station', '1'), '--station: the map has Level at station 2'),
+    (('Level', '1', '--type', 'int32'), '--type: is for addresses; for tags the map')])
 def test_what_a_row_does_not_allow_is_told_before_the_port_is_opened(
         tmp_path: Path, capsys: pytest.CaptureFixture[str], args: tuple[str, ...],
         text: str) -> None:
@@ -73,8 +73,8 @@ def test_write_over_a_fallback_is_told(plc: Plc, tmp_path: Path) -> None:
     path = write_csv(tmp_path / 'map.csv', *MAP_TO_WRITE)
     said = plc('write', 'valve', '0', '--map', str(path), '--yes')
     assert said.status == 0 and said.err == (
-        'plc: valve (N7:57) has a Fallback, which only the bridge writes: after this write '
-        'nothing brings the value of rest back\n')
+        'plc: valve (N7:57) has a Fallback, which only the bridge writes: no Fallback '
+        'follows this write\n')
 
 
 def test_write_to_an_input_is_told(plc: Plc) -> None:
@@ -178,7 +178,7 @@ def test_write_of_what_cannot_be_written(plc: Plc, args: tuple[str, ...], text: 
      '--length of ST9:0: a string mapping has Length 1'),
     (('watch', 'line_speed'), 'ADDRESS "line_speed": write type, file, ":", element, as in N7:0, '
                               'B3:1/5, T4:0.ACC or I:1.0/3\nplc: --map: if line_speed is a tag, '
-                              'name its map with --map FILE'),
+                              'give its map with --map FILE'),
     (('write', 'B3:0/1=on'), 'B3:0/1: "on" is not a valid bool, 0 or 1'),
     (('read', 'N7:0', 'B3:O'), 'ADDRESS "B3:O": that is the letter O where a digit should be; '
                                'write B3:0'),
@@ -224,6 +224,6 @@ def test_write_names_its_station_where_there_may_be_several(plc: Plc) -> None:
     said = plc('write', 'N7:21', '5', '--yes')
     assert (said.status, said.lines) == (2, [])
     assert said.err == (
-        'plc: --station: say which station to write to: this line may have several\n')
+        'plc: --station: give the station to write to: this line may have several stations\n')
     assert plc('write', 'N7:21', '5', '--yes', '--station', '2').lines == [
         'N7:21 of station 2: written; now:', 'N7:21 5']
