@@ -15,8 +15,8 @@
 """
 The rules of ament's linters that ruff does not have, for ``make lint``.
 
-``colcon test`` of a ROS runs ament_flake8, ament_pep257, ament_copyright and ament_xmllint; the
-versions are those of Ubuntu 24.04. From the root: ``python -m tools.ament``.
+``colcon test`` runs ament_flake8, ament_pep257, ament_copyright and ament_xmllint, in the versions
+of Ubuntu 24.04. From the root: ``python -m tools.ament``.
 """
 
 from __future__ import annotations
@@ -34,11 +34,11 @@ ROOT = Path(__file__).resolve().parent.parent
 _FOLDERS = 'abdf1_ros', 'examples', 'launch', 'test', 'tools'
 _HEADER = ''.join(Path(__file__).read_text(encoding='utf-8').partition('limitations')[:2])
 _MOST_COLUMNS = 99
-# E121, E123 and E126 are left out by flake8 itself.
+# flake8 itself leaves E121, E123 and E126 out.
 _CODES = 'E122', 'E124', 'E125', 'E127', 'E128', 'E129', 'E131', 'E501'
 
 Finding = tuple[int, str]
-"""A line and what is wrong in it."""
+"""A line and its fault."""
 
 
 def sources() -> Iterator[Path]:
@@ -49,7 +49,7 @@ def sources() -> Iterator[Path]:
 
 
 def findings_in(source: str) -> Iterator[Finding]:
-    """Yield what ament_copyright, ament_flake8 and ament_pep257 find and ruff does not."""
+    """Yield faults that only ament_copyright, ament_flake8 and ament_pep257 find."""
     shown = source.partition('\n')[2] if source.startswith('#!') else source
     if shown and not shown.startswith(_HEADER):
         yield 1, 'copyright: the licence header is missing, or is another'
@@ -82,7 +82,7 @@ def _in_class(node: ast.ClassDef, lines: list[str]) -> Iterator[Finding]:
 
 
 def main() -> int:
-    """Print what is found; return 1 where anything is."""
+    """Print the faults; return 1 if there are any."""
     style = pycodestyle.StyleGuide(select=_CODES, max_line_length=_MOST_COLUMNS)
     count: int = style.check_files([str(path) for path in sources()]).total_errors
     for path in sources():

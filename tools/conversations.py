@@ -26,7 +26,7 @@ from typing import Any
 from tools.tables import table
 
 _FILE = Path(__file__).resolve().parent.parent / 'vectors' / 'conversations.json'
-_OURS = ('ours', 'S0')  # no rules of the protocol
+_OURS = ('ours', 'S0')  # sources that are not rules of the protocol
 _SIDES = {'Master': ('master', 'slave'), 'Slave': ('slave', 'master'), 'Peer': ('node', 'PLC')}
 
 
@@ -38,7 +38,7 @@ def _conversations() -> list[dict[str, Any]]:
 
 
 def rules(*modes: str) -> str:
-    """Return the rules of modes that others have, too, and the conversations that play them."""
+    """Return the protocol rules of the modes, and the conversations that show them."""
     names: defaultdict[tuple[str, str], list[str]] = defaultdict(list)
     for entry in _conversations():
         if entry['mode'] in modes and not entry['source'].startswith(_OURS):

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The tables of the Wireshark dissector, from those of the package."""
+"""The tables of the Wireshark dissector, made from tables of the package."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ from abdf1_ros.pccc.typed_data import TypedData
 # Words of the longest structure (PD of a PLC-5), and bytes of the longest element.
 _MOST_WORDS = 82
 _MOST_BYTES = 164
-_FILE, _ELEMENT = 77, 9  # of the addresses that are shown to see how they are written
+_FILE, _ELEMENT = 77, 9  # file and element of sample addresses, to find their spelling
 
 
 def lua() -> str:
@@ -97,7 +97,7 @@ def _plc5(file: int) -> str:
 
 
 def _plc5_types() -> Iterator[tuple[int, str]]:
-    """Yield the letter that a typed write to a file above 8 tells, by type and size."""
+    """Yield the file letter for a typed write to a file above 8, by type and size."""
     for kind in range(32):
         for size in range(1, _MOST_BYTES + 1):
             shown = system_address(SystemAddress(_FILE, 0), TypedData(kind, size, b''))

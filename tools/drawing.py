@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The drawing of docs/architecture.md: which room imports which, as the code has it."""
+"""The drawing of docs/architecture.md: the imports between rooms, read from the code."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ def _room_of_name(inner: str) -> Room:
 
 
 def _reachable(found: Arrows, start: Room) -> set[Room]:
-    """Return every room that ``start`` leads to."""
+    """Return every room that ``start`` imports, also indirectly."""
     reached: set[Room] = set()
     waiting = [start]
     while waiting:
@@ -53,7 +53,7 @@ def _reachable(found: Arrows, start: Room) -> set[Room]:
 
 
 def reduced(found: Arrows) -> Arrows:
-    """Return the arrows without those that a longer way implies."""
+    """Return the arrows without those that a longer path implies."""
     return {room: {target for target in targets if not any(
         target in _reachable(found, other) for other in targets - {target})}
         for room, targets in found.items()}

@@ -13,13 +13,13 @@
 # limitations under the License.
 
 """
-Run a bridge beside simulated PLCs; draw the line, the monitor and two curves as one picture.
+Run a bridge with simulated PLCs; draw the line, the monitor and two curves as one picture.
 
 From the root, as docs/demo.svg was made::
 
     python -m tools.picture docs/demo.svg
 
-Station 1 is silent for some seconds, so that the picture shows what becomes of its values.
+Station 1 is silent for some seconds, so that the picture shows the effect on its values.
 """
 
 from __future__ import annotations
@@ -42,18 +42,18 @@ from abdf1_ros.cli.monitor.view import render, Snapshot, Style, TextLine
 
 _ROOT = Path(__file__).resolve().parent.parent
 _NET, _MAP = 'config/net.csv', 'config/map.csv'
-_BLANK = '\N{NO-BREAK SPACE}'  # what viewers make no shorter
-_CHARACTER = 7.25  # width of one in the font below, in pixels
+_BLANK = '\N{NO-BREAK SPACE}'  # viewers do not collapse these blanks
+_CHARACTER = 7.25  # width of a character in the font below, in pixels
 _LINE = 16
 _MARGIN = 14
-_SCREEN = 79, 23  # what a terminal of 80 by 24 shows above its line of keys
-_LEFT, _TOP = 16, 128  # where the terminal is
+_SCREEN = 79, 23  # columns and rows of a terminal of 80 by 24 without its line of keys
+_LEFT, _TOP = 16, 128  # position of the terminal, in pixels
 _CURVE = 300, 120
-_SECONDS = 30.0  # of the curves
+_SECONDS = 30.0  # length of the curves
 _COLOURS = {Style.PLAIN: '#cad3f5', Style.TITLE: '#ffffff', Style.GOOD: '#a6da95',
             Style.WARNING: '#eed49f', Style.BAD: '#ed8796'}
 
-# What the simulator does (s after its start), and when the picture is made.
+# Commands to the simulator (s after its start), and the time of the picture.
 _STORY = ('22 silent 1', '28 normal 1')
 _SHOT = 40.0
 
@@ -67,7 +67,7 @@ class Point(NamedTuple):
 
 @dataclass(slots=True)
 class Curve:
-    """What a topic has shown over time, and the name of what is drawn of it."""
+    """The values of a topic over time, with the title of its curve."""
 
     topic: str
     title: str
@@ -115,7 +115,7 @@ def _box(x: float, y: float, wide: float, texts: Sequence[str], colour: str) -> 
 
 
 def _line(stations: Sequence[str], width: int) -> Iterator[str]:
-    """Yield the wire with its PLCs on one end, and the bridge and ROS at the other."""
+    """Yield the wire with the PLCs at one end, and the bridge and ROS at the far end."""
     wide, bus = 190, 92
     bridge = width - 2 * wide - 60
     yield (f'<path d="M{_LEFT} {bus}H{bridge + 95}V66" fill="none" stroke="#39424e" '
@@ -144,7 +144,7 @@ def _terminal(lines: Sequence[TextLine], wide: int, high: int) -> Iterator[str]:
 
 
 def _graph(curve: Curve, left: int, top: int, now: float) -> Iterator[str]:
-    """Yield a curve with its range; between pieces no value was fresh."""
+    """Yield a curve with its range; between its pieces no value was fresh."""
     wide, high = _CURVE
     shown = [[point for point in piece if now - point.time <= _SECONDS]
              for piece in curve.pieces]
@@ -177,7 +177,7 @@ def _graph(curve: Curve, left: int, top: int, now: float) -> Iterator[str]:
 
 
 def stations_of(snapshot: Snapshot) -> list[str]:
-    """Return the number of each station and what its processor is."""
+    """Return the number and the processor of each station."""
     return [f'{status.section.removeprefix("station ")}: '
             f'{status.values.get("processor", "").partition(" series")[0]}'
             for status in snapshot.statuses if status.section.startswith('station ')]
@@ -197,7 +197,7 @@ def _running(*command: str) -> Iterator[None]:
 
 
 def watch(seconds: float, story: Sequence[str]) -> str:
-    """Return the picture that there is after so many seconds of a story of the simulator."""
+    """Return the picture ``seconds`` after the start of a story of the simulator."""
     from abdf1_ros.cli.monitor.node import NodeWatch
     curves = [Curve('line_speed', '/abdf1/read/line_speed.data[0]'),
               Curve('part_counter', '/abdf1/read/part_counter.data[0]')]

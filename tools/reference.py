@@ -64,11 +64,11 @@ PARTS: dict[tuple[str, str], Callable[[], str]] = {
     **{(f'{REFERENCE}/messages.md', severity.value): partial(tables.messages, severity)
        for severity in Severity},
 }
-"""By file and marker: what makes the part."""
+"""The function that makes each part, by file and marker."""
 
 
 def find(text: str, name: str) -> re.Match[str]:
-    """Return where the part is in ``text``, markers included; LookupError where it is not."""
+    """Return the place of a part in ``text``, with its markers; raises LookupError."""
     # A comment of Markdown, or one of Lua.
     match = re.search(rf'((?:<!)?-- generated: {name}(?: -->)?\n).*?((?:<!)?-- end: {name}\b)',
                       text, re.DOTALL)

@@ -13,7 +13,7 @@
 # limitations under the License.
 
 """
-The rooms of the package: what is in each, and what it may import.
+The rooms of the package: their contents, and the imports that each may have.
 
 ``test/test_layers.py`` enforces it; CONTRIBUTING.md and docs/architecture.md show it.
 """
@@ -37,9 +37,10 @@ class Room(NamedTuple):
     """
     Folders or modules of one subject.
 
-    ``paths`` may hold ``*``. ``allowed`` are the modules of the package that may be imported, by
-    the beginning of their dotted names, beside the room's own; None stands for all. A room that
-    ``is_pure`` has to do without clock, threads, ports and ROS: it gets the time as an argument.
+    - ``paths``: may contain ``*``.
+    - ``allowed``: the modules of the package that the room may import beside its own, by the
+      beginning of their dotted names; None for all.
+    - ``is_pure``: the room has no clock, threads, ports and ROS; it gets the time as an argument.
     """
 
     paths: tuple[str, ...]
@@ -49,17 +50,17 @@ class Room(NamedTuple):
 
     @property
     def name(self) -> str:
-        """Return what tables call it."""
+        """Return the name of the room in tables."""
         return ', '.join(path if path.endswith('.py') else f'{path}/' for path in self.paths)
 
     def may_import(self, dotted: str) -> bool:
-        """Tell whether the rules let the room import a module of the package."""
+        """Return True if the room may import a module of the package."""
         own = (path.removesuffix('.py') for path in self.paths)
         return self.allowed is None or any(
             dotted == entry or dotted.startswith(f'{entry}.') for entry in (*self.allowed, *own))
 
     def has(self, module: str) -> bool:
-        """Tell whether a module (a path inside the package) is in it."""
+        """Return True if a module (a path inside the package) is in the room."""
         top = module.split('/')[0]
         return any(fnmatch(top, path) for path in self.paths)
 
@@ -67,7 +68,7 @@ class Room(NamedTuple):
 ROOMS = (
     Room(('messages.py', 'counters.py'), 'numbered errors and notices; status counters', ()),
     Room(('text.py', 'numbers.py', 'line_names.py'), 'text, numbers and names from outside', ()),
-    Room(('errors.py', 'problems.py'), 'the exceptions; faults in what users write',
+    Room(('errors.py', 'problems.py'), 'the exceptions; faults in texts of users',
          ('messages', 'text')),
     Room(('df1',), 'the link: frames, checksums, machine, stations; master, standard polling, '
                    'slave, peer', _BASE),
@@ -78,33 +79,33 @@ ROOMS = (
          ('problems', 'text', 'numbers', 'df1', 'pccc')),
     Room(('settings',), 'both CSV files',
          ('errors', 'messages', 'problems', 'numbers', 'text', 'line_names', 'df1', 'pccc')),
-    Room(('plan',), 'what is read together, what it costs, what comes of it',
+    Room(('plan',), 'the read plan: blocks, their cost on the line, bounds and remarks',
          ('errors', 'problems', 'text', 'df1', 'pccc', 'settings')),
-    Room(('driver',), 'carrying it out: who goes next, points, served words',
+    Room(('driver',), 'the plan carried out: order of commands, points, served words',
          (*_BASE, 'text', 'df1', 'pccc', 'settings', 'plan', 'sniffer')),
-    Room(('ports',), 'ports, the thread that runs a link on one, recording and listening',
+    Room(('ports',), 'ports, the thread that runs a link, recording and listening',
          ('errors', 'line_names', 'df1', 'settings', 'sniffer'), is_pure=False),
     Room(('share',), 'the line shared with other programs: a place for each guest',
          ('df1', 'settings', 'driver', 'ports'), is_pure=False),
     Room(('simulator',), 'simulated PLCs and the commands that they take',
          ('errors', 'counters', 'problems', 'numbers', 'text', 'df1', 'pccc', 'settings')),
-    Room(('conform',), 'cases of the manual, played against the other end of a line', ()),
+    Room(('conform',), 'cases of the manual, run against the far end of a line', ()),
     Room(('client.py', 'tagged_client.py', 'open_line.py'),
          'a blocking client for programs without ROS',
          ('errors', 'messages', 'problems', 'numbers', 'text', 'df1', 'pccc', 'settings', 'plan',
           'driver.requests', 'ports'), is_pure=False),
     Room(('paths.py', 'signals.py', 'console.py'),
-         'where installed files lie; the end that a signal asks for; output without a wait',
+         'places of installed files; the end after a signal; output without a wait',
          (), is_pure=False),
     Room(('ros',), 'the ROS node: parameters, messages, diagnostics, log', is_pure=False),
-    Room(('testing.py',), 'a pytest fixture: simulated PLCs, a bridge, and who looks at both',
+    Room(('testing.py',), 'a pytest fixture: simulated PLCs, a bridge, and a watcher of both',
          is_pure=False),
     Room(('cli', '__main__.py'), 'the commands, one file or folder each', is_pure=False),
 )
 
 
 def room_of(module: str) -> Room:
-    """Return the room of a module (a path inside the package); LookupError where none has it."""
+    """Return the room of a module (a path inside the package); raises LookupError."""
     for room in ROOMS:
         if room.has(module):
             return room

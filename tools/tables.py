@@ -49,7 +49,7 @@ NAMES = {PlcType.PLC5: 'PLC-5', PlcType.SLC: 'SLC, MicroLogix', PlcType.PLC3: 'P
          PlcType.PLC2: 'PLC-2'}
 _5, _S, _3, _2 = NAMES
 
-# Places of one kind in every family that has them; of each the types are the same.
+# Sample places of each kind, by family; all places of a kind have the same types.
 PLACES: tuple[tuple[str, dict[PlcType, str]], ...] = (
     ('O output', {_5: 'O:017', _S: 'O:2.0', _3: 'O:0017'}),
     ('I input', {_5: 'I:003', _S: 'I:1.0', _3: 'I:0017'}),
@@ -166,7 +166,7 @@ def _names(parts: Members, bits: bool) -> str:
 
 
 def packets() -> str:
-    """Return how many words one packet carries, and what files a processor lacks."""
+    """Return the words per packet, and the files that a processor lacks."""
     ways: list[tuple[str, Dialect, str]] = [
         ('PLC-5', dialect_of(PlcType.PLC5), ''),
         ('PLC-5, Access WordRange', dialect_of(PlcType.PLC5, Access.WORD_RANGE), ''),
@@ -202,7 +202,7 @@ def counters() -> str:
 
 
 def outcomes() -> str:
-    """Return how a write may end."""
+    """Return the outcomes of a write."""
     return table(('the message begins with', 'meaning'), (
         (_code(outcome.value), text) for outcome, text in OUTCOMES.items()))
 
@@ -230,7 +230,7 @@ def file_codes() -> str:
 
 
 def statuses() -> str:
-    """Return the meaning of every STS and EXT STS, and what else it means for a family."""
+    """Return the meaning of every STS and EXT STS, with special meanings in a family."""
     codes: list[tuple[int, int | None]] = [
         (sts, None) for sts in (*range(1, 16), *range(16, 256, 16))]
     codes += [(0xF0, ext) for ext in range(1, 256)]
@@ -283,7 +283,7 @@ def bounds() -> str:
 
 
 def rooms() -> str:
-    """Return what is in each room and what it may import."""
+    """Return the contents of each room, and the imports that it may have."""
     return table(('room', 'what is in it', 'may import'), (
         (', '.join(map(_code, room.name.split(', '))), room.contents,
          'everything' if room.allowed is None else ', '.join(map(_code, room.allowed))

@@ -13,8 +13,8 @@
 # limitations under the License.
 
 """
-The PLC's only port, shared: at each place of the column Share a guest finds the PLC.
+Sharing the PLC's only port: a guest finds the PLC at each place of the column Share.
 
-``guest_line`` is one such place, a full-duplex node of its own in a thread of its own, whose
-commands the driver carries out (``driver.guests``).
+``guest_line`` is one such place: a full-duplex node with its own thread. The driver carries out
+the guest's commands (``driver.guests``).
 """

@@ -45,13 +45,16 @@ class _Nothing(TaskSource):
 
 class GuestLine:
     """
-    Take the commands of the guest at ``place`` to ``queue``, and its replies back.
+    Take the commands of the guest at ``place`` to ``queue``, and bring the replies back.
 
-    It is unknown when a command came that was here after a longer wait than asked for: this
-    process, or its host, stood still. It counts as old as it can be.
+    After a wait that lasts too long, this process or its host was paused, and the arrival time of
+    a command is unknown. Then the command counts as old as it can be.
 
-    ``wake`` wakes the link of the PLC, ``listener`` gets what the guest does, ``fault`` of a
-    bug. The guest's program may come and go: a reply to one that has gone is dropped.
+    - ``wake``: wakes the link of the PLC.
+    - ``listener``: gets the actions of the guest.
+    - ``fault``: gets internal errors.
+
+    The guest's program may come and go. A reply to a program that has gone is dropped.
     """
 
     def __init__(self, place: SharePlace, network: Network, queue: GuestQueue,
@@ -74,16 +77,16 @@ class GuestLine:
             self._take)
         self.link = LinkThread(self._machine, self._open, on_state=self._changed, on_fault=fault,
                                retry_period=_GLANCE, longest_wait=_GLANCE, clock=clock)
-        self.link.daemon = True  # a guest never holds the process
+        self.link.daemon = True  # a guest never keeps the process alive
 
     @property
     def state(self) -> str:
-        """Return what a person is to know of the place."""
+        """Return the remarks on the place for users."""
         return self.link.state.text
 
     @property
     def fault(self) -> str:
-        """Return why no program can connect, empty where one can."""
+        """Return why no program can connect; empty if a program can."""
         state = self.link.state
         return state.text if state.kind is PortKind.UNAVAILABLE else ''
 
@@ -109,7 +112,7 @@ class GuestLine:
         self._wake()
 
     def _answer(self, append: Callable[[Packet], None], reply: Packet) -> None:
-        """Send a reply, in any thread; ``append`` leads nowhere once the guest has gone."""
+        """Send a reply, in any thread; ``append`` has no effect after the guest has gone."""
         append(reply)
         self.link.wake()
 

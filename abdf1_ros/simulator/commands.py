@@ -28,22 +28,22 @@ from abdf1_ros.simulator.simulated_plc import InjectedFaults, numbers, Simulated
 
 COMMANDS = """\
 commands, on standard input or with --at:
-  silent STATION              it stops answering
-  full STATION                it has no room for commands
-  slow STATION POLLS          so many polls get EOT before each reply
-  delay STATION MS            polls get EOT until so many ms after each command
-  noise STATION SHARE         so much of what it sends is damaged (0.01 is 1 %)
-  error STATION STS [EXT]     every reply says this error (hexadecimal)
-  normal STATION              it works again
-  mode STATION MODE           its processor is in mode run, program, remote (run), test, or
-                              has a fault; outside of run nothing moves, but it answers
+  silent STATION              the station stops answering
+  full STATION                the station has no room for commands
+  slow STATION POLLS          answer this number of polls with EOT before each reply
+  delay STATION MS            answer polls with EOT for this time after each command
+  noise STATION SHARE         damage this share of the sent characters (0.01 is 1 %)
+  error STATION STS [EXT]     put this error into every reply (hexadecimal)
+  normal STATION              end all faults of the station
+  mode STATION MODE           set the mode of the processor: run, program, remote (run), test
+                              or fault; values move in run only, but the station answers
   program, test, run STATION  the same as mode STATION program, test, remote
-  download STATION            a program is loaded: words are as at the start, mode program
-  power STATION               it loses power and comes back
-  scan STATION MS             a scan of its ladder takes so long (10 at the start)
-  reset STATION               the reset button of its ladder is pressed (--ladder)
-  counters STATION            say what its port has counted
-  msg STATION ADDRESS VALUE.. it writes to the bridge (with --full-duplex)
+  download STATION            load the program: words as at the start, mode program
+  power STATION               switch power off and on
+  scan STATION MS             set the scan time of its ladder (10 at the start)
+  reset STATION               press the reset button of its ladder (--ladder)
+  counters STATION            print the counters of its port
+  msg STATION ADDRESS VALUE.. the PLC writes to the bridge (with --full-duplex)
   quit                        end the simulator
 """
 
@@ -84,15 +84,15 @@ _ACTIONS: dict[str, Callable[[SimulatedPlc], None]] = {
 
 
 class CommandError(Exception):
-    """A text that is not a command; the error says what would be right."""
+    """A text that is not a command; the message describes a good one."""
 
 
 def execute(line: str, plcs: Sequence[SimulatedPlc], is_full_duplex: bool = False,
             report: Callable[[str], None] = lambda text: None) -> str:
     """
-    Carry out a command, all but "quit"; return a text about it, or raise CommandError.
+    Carry out any command except "quit"; return a text about it, or raise CommandError.
 
-    ``report`` is called later with the result of a message.
+    ``report`` gets the result of a message later.
     """
     verb, *words = line.split()
     plc, arguments = _station(words, plcs)
@@ -152,7 +152,7 @@ def _decimal(text: str, what: str, high: float) -> float:
 
 def _byte(text: str) -> int:
     if not re.fullmatch('[0-9A-Fa-f]{2}', text):
-        raise ValueError(f'"{text}" should be a byte in hexadecimal, as in 0B')
+        raise ValueError(f'"{text}" should be a byte in hexadecimal such as 0B')
     return int(text, 16)
 
 

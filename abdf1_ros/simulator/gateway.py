@@ -35,8 +35,8 @@ class SimulatedGateway:
     """
     A 1770-KF3 and the ``plcs`` behind it.
 
-    It answers as its own station on the line, and passes a command on by DST (M 3-7); it keeps the
-    reply of the PLC until a poll. For a PLC that is missing or silent it replies itself.
+    The gateway answers as its own station on the line, and passes a command on by DST (M 3-7). It
+    keeps the reply of the PLC until a poll, and replies itself for a missing or silent PLC.
     """
 
     def __init__(self, station: int, plcs: Sequence[SimulatedPlc], checksum: Checksum) -> None:
@@ -68,7 +68,7 @@ def _answer_for_itself(command: Packet) -> Packet:
 
 
 def stations_of(plcs: Sequence[SimulatedPlc], checksum: Checksum) -> list[Responder]:
-    """Return the stations of a line: PLCs, and the gateways of those behind one."""
+    """Return the stations of a line: PLCs, and the gateways of further PLCs."""
     gateways = dict.fromkeys(plc.via for plc in plcs if plc.via is not None)
     return [*(plc for plc in plcs if plc.via is None),
             *(SimulatedGateway(via, [plc for plc in plcs if plc.via == via], checksum)

@@ -15,13 +15,16 @@
 """
 The PLC's side of heartbeats, as a small program on the words of a simulated PLC.
 
-It is the ladder of docs/tutorials/heartbeats.md, rung by rung, with the numbers of its rungs. N10
-is written by the bridge: word 0 its heartbeat, words 1 and 2 commands. The rest is the program's
-own: N11 (0 the snapshot, 1 the one before it, 2 and 4 the commands that the machine may use, 3 the
-heartbeat of the program), T13 (0 watchdog, 1 stable, 2 the program's clock), the lamps in B12:0.
+This is the ladder of docs/tutorials/heartbeats.md; comments give the numbers of the rungs.
 
-Nothing moves between two scans, so what stands for less than a scan may never be seen. The timers
-have a time base of 10 ms, and count from the scan on that starts them.
+- N10, written by the bridge: 0 its heartbeat, 1 and 2 commands.
+- N11: 0 the snapshot of the heartbeat, 1 the snapshot before, 2 and 4 the commands that the
+  machine may use, 3 the heartbeat of the program.
+- T13: 0 watchdog, 1 stable, 2 the program's clock.
+- B12:0: the lamps.
+
+Nothing moves between two scans, so the program may miss a value that stands for less than a scan.
+The timers have a time base of 10 ms, and count from the scan that starts them.
 """
 
 from __future__ import annotations
@@ -37,14 +40,14 @@ from abdf1_ros.pccc.file_types import FileType
 from abdf1_ros.settings.heartbeats import STABLE, TIME_BASE
 
 USUAL_PRESET = 300
-"""Of the watchdog, in units of the time base: 3 s."""
+"""Preset of the watchdog in units of the time base: 3 s."""
 
 _SCAN_TIME = 0.01  # s
 _PLC_HEARTBEAT = 10
 _LAST_COUNT = 32000
-_COMMANDS = {1: 2, 2: 4}  # what the machine uses of N10: words of N11
+_COMMANDS = {1: 2, 2: 4}  # word of N10 with a command: word of N11 that the machine uses
 
-# Most seconds of scans that the simulator makes up for after a pause. Earlier scans would not
+# After a pause the simulator makes up for scans of at most this time (s). Earlier scans would not
 # change the result.
 _LONGEST_PAUSE = 60.0
 
@@ -75,7 +78,7 @@ class _Timer:
     is_enabled: bool = False
 
     def scan(self, is_true: bool, passed: float = 0.0) -> None:
-        """Take the rung of this scan, ``passed`` s after the last."""
+        """Take the rung of this scan, ``passed`` s after the last scan."""
         self.time = self.time + passed if is_true and self.is_enabled else 0.0
         self.is_enabled = is_true
         self.is_done = is_true and self.accumulated >= self.preset
@@ -97,9 +100,11 @@ class Ladder:
     """
     The program of one PLC.
 
-    ``preset`` of the watchdog is in units of 10 ms, ``scan_time`` in seconds. ``on_lamp`` is
-    called with the time (s), a lamp and whether it is on, at every change. Raises NoSuchFile where
-    a file that it needs has another type.
+    - ``preset``: preset of the watchdog in units of 10 ms.
+    - ``scan_time``: seconds.
+    - ``on_lamp``: called at every change of a lamp, with time (s), lamp and new state.
+
+    Raises NoSuchFile if a file of the program has a wrong type.
     """
 
     def __init__(self, table: DataTable, preset: int = USUAL_PRESET,
@@ -113,8 +118,8 @@ class Ladder:
         self._stable = _Timer(preset + STABLE)
         self._clock = _Timer(_PLC_HEARTBEAT)
         self._lamps = 0
-        self._button = False  # is pressed
-        self._button_before = True  # OSR: a button that stays pressed gives no edge
+        self._button = False  # True while pressed
+        self._button_before = True  # for OSR: a button that stays pressed has no edge
         self._is_first_pass = True
         self._next_scan: float | None = None
         for kind, file, words in ((FileType.INTEGER, 10, 3), (FileType.INTEGER, 11, 5),
@@ -122,7 +127,7 @@ class Ladder:
             table.create(Address(self._addressing, kind, file, 0), words)
 
     def is_on(self, lamp: Lamp) -> bool:
-        """Tell whether a lamp is on."""
+        """Return True if a lamp is on."""
         return bool(self._lamps >> lamp & 1)
 
     def press_reset(self) -> None:
@@ -130,7 +135,7 @@ class Ladder:
         self._button = True
 
     def enter_run(self, now: float) -> None:
-        """Begin to run, after PROGRAM, a download or power-up: OTE and TON begin at rest."""
+        """Start to run after PROGRAM, a download or power-up: OTE and TON start at rest."""
         for timer in (self._watchdog, self._stable, self._clock):
             timer.scan(False)
         self._light(0, now)

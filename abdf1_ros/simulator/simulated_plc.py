@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""A simulated PLC to try the bridge with: changing values, and faults to switch on."""
+"""A simulated PLC for trials of the bridge: changing values, and faults to switch on."""
 
 from __future__ import annotations
 
@@ -97,12 +97,15 @@ class _Mover:
 @dataclass(slots=True)
 class InjectedFaults:
     """
-    The faults that a station has at the moment.
+    The present faults of a station.
 
-    ``silent``: it does not answer. ``full``: it has no room for commands, so it ignores them (half
-    duplex) or answers NAK (full duplex). ``slow``: number of polls that get EOT before each reply.
-    ``delay``: seconds after a command during which polls get EOT. ``noise``: the share of its
-    characters that is damaged. ``status``: STS and EXT STS of every reply.
+    - ``silent``: the station does not answer.
+    - ``full``: it has no room for commands, so it ignores them (half duplex) or answers NAK (full
+      duplex).
+    - ``slow``: number of polls that get EOT before each reply.
+    - ``delay``: seconds after a command during which polls get EOT.
+    - ``noise``: the share of its characters that is damaged.
+    - ``status``: STS and EXT STS of every reply.
     """
 
     silent: bool = False
@@ -114,7 +117,7 @@ class InjectedFaults:
 
 
 class Sending:
-    """A command of a simulated PLC on its way; ``report`` gets how it ended."""
+    """A command of a simulated PLC on its way; ``report`` gets its outcome."""
 
     def __init__(self, command: Packet, report: Callable[[str], None]) -> None:
         self.command = command
@@ -144,8 +147,8 @@ class SimulatedPlc(TaskSource):
     """
     One station with its data table; ``clock`` gives seconds.
 
-    ``via`` is the gateway to it. ``lock`` is held while its program advances, which more than one
-    thread may cause.
+    ``via``: the gateway to it. ``lock``: held while its program advances, which several threads
+    may do.
     """
 
     def __init__(self, station: int, table: DataTable, checksum: Checksum,
@@ -168,7 +171,8 @@ class SimulatedPlc(TaskSource):
         self.lock = lock
         self._saved: DataTable | None = None
         self._polls_to_refuse = 0
-        self._ready = -math.inf  # clock value (s) from which the last command's reply is there
+        # clock value (s) from which the reply to the last command is ready
+        self._ready = -math.inf
 
     def be_full_duplex(self) -> None:
         """Answer from now on as a PLC with a full-duplex port."""
@@ -196,7 +200,7 @@ class SimulatedPlc(TaskSource):
 
     @property
     def is_running(self) -> bool:
-        """Tell whether its program runs; in PROGRAM and TEST nothing moves or drives outputs."""
+        """Return True if its program runs; in PROGRAM and TEST nothing moves or drives outputs."""
         return bool(self.processor.mode.is_running) and not self.processor.is_faulted
 
     def run_ladder(self, ladder: Ladder) -> None:
@@ -206,7 +210,7 @@ class SimulatedPlc(TaskSource):
         self._set_ladder()
 
     def set_mode(self, setting: Setting) -> None:
-        """Change the mode, as the key or the programming software does."""
+        """Change the mode, like the key or the programming software."""
         self.advance()
         was_running = self.is_running
         self.processor.setting = setting
@@ -257,7 +261,7 @@ class SimulatedPlc(TaskSource):
         """
         Write to ``station`` with commands of our own, as a MSG instruction does.
 
-        Only a full-duplex line carries them. ``report`` gets how each of them ended. Raises
+        Only a full-duplex line carries these commands. ``report`` gets the outcome of each. Raises
         FormatError for values that do not fit.
         """
         codec = _natural_codec(address, len(values))
@@ -273,7 +277,7 @@ class SimulatedPlc(TaskSource):
         return self.outbox.popleft() if is_free else None
 
     def damaged(self, data: bytes) -> bytes:
-        """Return ``data`` as they arrive at the far end."""
+        """Return ``data`` with the damage that the far end receives."""
         if not self.faults.noise:
             return data
         return bytes(byte ^ 1 << self._random.randrange(8)
@@ -366,7 +370,7 @@ def _check_extent(row: Row, address: Address, codec: Codec) -> None:
 
 
 def _place(row: Row, plc_type: PlcType) -> tuple[Address, int]:
-    """Return the address, and the Length that it gives: 1 without a range."""
+    """Return the address, and the Length of its range: 1 without a range."""
     found = parse_range(row.get('Address'), plc_type)
     if isinstance(found, AddressRange):
         return found.first, found.length()
@@ -398,7 +402,7 @@ def _values(row: Row, codec: Codec) -> list[float] | str:
 
 
 def numbers(texts: Sequence[str]) -> list[float]:
-    """Return whole and decimal numbers as such; ValueError for anything else."""
+    """Return the int or float of a text; raises ValueError for anything else."""
     values = []
     for text in texts:
         number = whole_number(text)

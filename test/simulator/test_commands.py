@@ -73,7 +73,7 @@ def test_counters_are_told(plcs: list[SimulatedPlc]) -> None:
       for text in ('long', '-5', 'nan', '1e9', '1_0')),
     *((f'noise 1 {text}', f'noise 1 {text}: "{text}" should be a share from 0 to 1')
       for text in ('much', '-0.1', '1.1', 'nan')),
-    *((f'error 1 {text}', f'error 1 {text}: "{text}" should be a byte in hexadecimal, as in 0B')
+    *((f'error 1 {text}', f'error 1 {text}: "{text}" should be a byte in hexadecimal such as 0B')
       for text in ('zz', '5', '500000', '\u0661\u0661')),
     ('error 1', '"error 1" is not a command'), ('normal 1 x', '"normal 1 x" is not a command')])
 def test_command_that_is_wrong_changes_nothing(
