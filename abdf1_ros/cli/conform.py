@@ -86,11 +86,8 @@ _NOBODY = 'no byte was received: check cable, port, speed and power'
 End = MasterEnd | PeerEnd | SlaveEnd | ServerEnd
 
 _EPILOG = """\
-exit status:
-  0    no case failed
-  1    a case failed, no case was tried, no byte was heard, or the port cannot be opened
-  2    bad options or files
-  130  interrupted by Ctrl-C
+exit status: 0 if no case failed, 1 if a case failed, no case was tried, no byte was heard or the
+             port cannot be opened, 2 for bad options or files, 130 after Ctrl-C
 
 examples:
   conform slave --port /dev/ttyUSB0 --baud 19200 --station 1 --family SLC

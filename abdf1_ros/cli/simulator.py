@@ -74,10 +74,8 @@ from abdf1_ros.simulator.ladder import Ladder, Lamp
 from abdf1_ros.simulator.simulated_plc import load_plcs, SimulatedPlc
 
 _EPILOG = COMMANDS + """
-exit status:
-  0  the simulator was ended
-  1  the port cannot be opened, or the name of --pty is in use
-  2  bad options or data files
+exit status: 0 after an end, 1 if the port cannot be opened or the name of --pty is in use, 2 for
+             bad options or data files
 
 examples:
   simulator --pty /tmp/plc

@@ -15,14 +15,18 @@
 """
 Decode the traffic on a DF1 line, live or from a recording.
 
-Live: --port listens on a port that is wired to the line, without sending; --tap stands between
-two ports and passes everything on at once. A file is a capture (of --save, or of the node's
-parameter trace_file), pcap or pcapng (of --pcapng, of an SEL RTAC, or PCCC in EtherNet/IP), a hex
-dump as xxd or hexdump -C write it, or with --binary raw bytes.
+Live: --port listens on a port that is wired to the line, and sends nothing. --tap connects two
+ports and passes all bytes on at once. A file is one of these:
 
-A line has the time in seconds, the direction (">" sent by the master, the first port of the tap
-or whoever has recorded it; "<" the other way; "?" not known), the station, what it is, and
-whether its check is good. The summary comes at the end, also after Ctrl-C.
+- a capture, from --save or from the parameter trace_file of the node
+- pcap or pcapng, from --pcapng, from an SEL RTAC, or with PCCC in EtherNet/IP
+- a hex dump from xxd or hexdump -C
+- raw bytes, with --binary
+
+An output line has the time in seconds, the direction, the station, the message or symbol, and the
+verdict of its check. The direction is ">" if sent by the master, by the first port of the tap or
+by the recording node; "<" the other way; "?" if unknown. The summary comes at the end, also after
+Ctrl-C.
 """
 
 from __future__ import annotations
@@ -81,7 +85,7 @@ _DEFAULT_BAUD = Network().baud
 _PROGRESS_PERIOD = 2.0
 
 _EPILOG = """\
-exit status: 0 at the end, 1 when a port cannot be opened or is lost, 2 for bad options and files
+exit status: 0 at the end, 1 if a port cannot be opened or is lost, 2 for bad options or files
 
 examples:
   sniff --port /dev/ttyUSB0 --baud 19200
@@ -112,13 +116,13 @@ class _Output:
         self._next_progress = time.monotonic() + _PROGRESS_PERIOD
 
     def begin(self, settings: dict[str, str]) -> TrafficDecoder:
-        """Return the decoder; settings that no option gives are taken from a capture's head."""
+        """Return the decoder; without an option, settings come from the head of a capture."""
         if self._session is None:
             options, baud = self._options, settings.get('baud', '')
             check, duplex = (
                 settings.get(name, '').lower() if chosen == _AUTO else chosen
                 for name, chosen in (('check', options.check), ('duplex', options.duplex)))
-            # The head of a capture has the settings of the node, of which one may be wrong.
+            # The head of a capture has the settings of the node, which may be wrong.
             self._session = TrafficDecoder(_CHECKS.get(check), _DUPLEX.get(duplex),
                                            is_certain=options.check != _AUTO)
             speed = whole_number(baud)
@@ -139,17 +143,17 @@ class _Output:
 
     @property
     def is_empty(self) -> bool:
-        """Tell whether there was nothing to decode."""
+        """Return True if there was nothing to decode."""
         return not self._summary.bytes.total()
 
     def show_progress(self, done: str) -> None:
-        """Tell the progress every two seconds, where a terminal shows nothing else."""
+        """Show the progress every two seconds on a terminal without other output."""
         if self._shows_progress and time.monotonic() >= self._next_progress:
             self._next_progress = time.monotonic() + _PROGRESS_PERIOD
             _say(f'{done}, {self._summary.bytes.total()} bytes so far')
 
     def end(self) -> None:
-        """Print what is left, then the summary."""
+        """Print the remaining entries, then the summary."""
         for entry in self.begin({}).finish():
             self._print(entry)
         if self._packets:
@@ -234,7 +238,7 @@ def main(args: Sequence[str] | None = None) -> int:
     """
     Decode until the end of the file, SIGINT, SIGTERM or --seconds.
 
-    The exit statuses are those of --help.
+    Returns an exit status of --help.
     """
     prepare_output()
     options = _parse(args)
@@ -252,28 +256,28 @@ def _decode(options: argparse.Namespace) -> int:
 def _parse(args: Sequence[str] | None) -> argparse.Namespace:
     parser = command_parser('sniff', __doc__, _EPILOG)
     parser.add_argument('files', metavar='FILE', nargs='*',
-                        help='captures, pcap, pcapng or hex dumps, decoded one after the other')
+                        help='captures, pcap, pcapng or hex dumps, decoded in this order')
     parser.add_argument('--binary', action='store_true', help='the files are raw bytes')
     parser.add_argument('--port', metavar='NAME',
                         help=f'listen on a serial port, {URLS}, pty, or pty:NAME')
     parser.add_argument('--tap', nargs=2, metavar=('PORT_A', 'PORT_B'),
-                        help='listen between two ports; ">" is from A to B')
+                        help='connect two ports and listen; ">" is from A to B')
     parser.add_argument('--baud', type=whole_option, choices=BAUD_RATES,
-                        help=f'of the ports (default: {_DEFAULT_BAUD}); for a file, to know '
-                             'the load of the line')
+                        help=f'baud rate of the ports (default: {_DEFAULT_BAUD}); for a file: '
+                             'baud rate of the recorded line, to compute its load')
     parser.add_argument('--parity', choices=PARITIES, default='None',
-                        help='of the ports (default: %(default)s)')
+                        help='parity of the ports (default: %(default)s)')
     parser.add_argument('--check', type=str.lower, choices=(*_CHECKS, _AUTO), default=_AUTO,
-                        help='default: found by itself')
+                        help='check of messages (default: found from the traffic)')
     parser.add_argument('--duplex', type=str.lower, choices=(*_DUPLEX, _AUTO), default=_AUTO,
-                        help='default: found by itself')
+                        help='duplex of the line (default: found from the traffic)')
     parser.add_argument('--json', action='store_true',
-                        help='one JSON object a line, the summary last')
+                        help='print one JSON object per line, the summary last')
     parser.add_argument('--summary', action='store_true', help='print the summary only')
     parser.add_argument('--save', metavar='FILE',
-                        help='also write what a port or a tap hears into a capture')
+                        help='also write the traffic of a port or tap into a capture')
     parser.add_argument('--pcapng', metavar='FILE',
-                        help='also write what is heard as packets, for Wireshark')
+                        help='also write the traffic as packets, for Wireshark')
     parser.add_argument('--html', metavar='FILE',
                         help='also draw the line as a timeline with its faults, for a browser')
     parser.add_argument('--report', metavar='ZIP',
@@ -286,14 +290,14 @@ def _parse(args: Sequence[str] | None) -> argparse.Namespace:
     parser.add_argument('--anonymous', action='store_true',
                         help='leave values and names out of the bundle and the timeline')
     parser.add_argument('--seconds', type=seconds_option, default=math.inf,
-                        help='end after so many seconds')
+                        help='end after this number of seconds')
     options = parser.parse_args(args)
     if port := next(filter(is_port, options.files), None):
         parser.error(f'did you mean --port {port}? A FILE is a recording')
     if sum(map(bool, (options.files, options.port, options.tap))) != 1:
         parser.error('give files, or --port, or --tap')
     if options.tap and options.tap[0] == options.tap[1] != 'pty':
-        parser.error('--tap stands between two ports; these are one and the same')
+        parser.error('--tap needs two different ports')
     if options.files and options.save:
         parser.error('--save is for --port and --tap')
     if options.binary and not options.files:
@@ -301,10 +305,10 @@ def _parse(args: Sequence[str] | None) -> argparse.Namespace:
     if options.report and (not options.files or options.binary):
         parser.error('--report is for captures: record one with --save, or trace_file of the node')
     if options.report and not may_replace(options.report, _is_bundle):
-        parser.error(f'--report: {options.report} is there and is not a bundle of --report; give '
+        parser.error(f'--report: {options.report} exists and is not a bundle of --report; give '
                      'another name')
     if options.html and not may_replace(options.html, _is_page):
-        parser.error(f'{options.html} is there and was not made by --html; give another name')
+        parser.error(f'{options.html} exists and was not made by --html; give another name')
     if not options.report and (options.settings or options.conformance):
         parser.error('--settings and --conformance are for --report')
     if options.anonymous and not (options.report or options.html):
@@ -327,8 +331,8 @@ def _decode_files(options: argparse.Namespace, output: _Output) -> int:
                 output.show_progress(
                     f'{name}: {recording.percent} %' if recording.has_size else name)
             if not has_bytes:
-                _say(f'{name}: there are no bytes in it')
-    except KeyboardInterrupt:  # also out of reading a pipe into which no program writes
+                _say(f'{name}: the file has no bytes')
+    except KeyboardInterrupt:  # also during a read of a pipe without a writer
         output.sum_up()
         return status
     except Problem as problem:
@@ -377,9 +381,9 @@ def _listen(options: argparse.Namespace, output: _Output) -> int:
 def _print_heard(tap: Tap, trace: Trace | None, output: _Output, settings: dict[str, str],
                  options: argparse.Namespace) -> int:
     """
-    Print what the tap hears, until the time is up, a signal, or a lost port.
+    Print the traffic of the tap until the time is up, a signal comes, or a port is lost.
 
-    Output that cannot be written never ends a tap: that would cut program and PLC.
+    A failed output never ends a tap: that would disconnect program and PLC.
     """
     def idle() -> None:
         output.show_progress('listening')
@@ -415,7 +419,7 @@ def _print_heard(tap: Tap, trace: Trace | None, output: _Output, settings: dict[
 
 
 def _tell_lost(tap: Tap, trace: Trace | None, told: int) -> int:
-    """Report pieces that were lost after the first ``told``; return how many were lost."""
+    """Report pieces that were lost after the first ``told``; return the number of lost pieces."""
     if (lost := tap.lost) > told:
         text = f'{lost - told} pieces of traffic were lost: this output was too slow for them'
         _say(text)

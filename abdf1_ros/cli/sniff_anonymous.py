@@ -15,8 +15,8 @@
 """
 Files of a line without the names in them, for ``sniff --report --anonymous``.
 
-Only columns of a list are kept, and of these only cells that mean something in their column:
-what a user has written into a wrong place may be a name.
+Only listed columns are kept, and in these only cells with a valid value: a text in a wrong place
+may be a name.
 """
 
 from __future__ import annotations
@@ -44,7 +44,7 @@ from abdf1_ros.settings.station_lists import parse_stations
 
 _UNREADABLE = 'left out: neither a net file nor a map that can be read'
 _NO_RESULT = 'left out: not a result of "conform --json"'
-# What stands in a cell that is not read: the fault of a report may be just there.
+# The mark for an unreadable cell: the fault of a report may be in this cell.
 _LEFT_OUT = '?'
 
 _HEARTBEAT = Command.HEARTBEAT.value.lower()
@@ -54,12 +54,12 @@ _KINDS: dict[str, Kind[Any]] = {
     'Station': _STATION, 'Via': _STATION, 'PLC_Type': one_of(_FAMILIES, family_name),
     'Access': one_of({way.value: way for way in Access} | {'Read': None}),
     'Processor': one_of({entry.value: entry for entry in Processor})}
-# Columns of a map that keep their cells; further ones get numbers for their names.
+# Columns of a map that keep their cells; names in further columns become numbers.
 _KEPT = ('Command', 'Address', 'Station', 'PLC_Type', 'Length', 'Type', 'Period', 'Publish', 'Min',
          'Max', 'Word_Order', 'Scale', 'Offset', 'Access', 'Processor', 'Fallback_After',
          'While_Timeout', 'Via')
 _TAGS, _TOPICS = ('Tag', 'While', 'Confirms'), ('Topic',)
-# Of a case of conform; what came and was expected has bytes and values.
+# Keys of a case of conform that are kept; other keys have bytes and values.
 _RESULT = ('target', 'check', 'baud', 'parity', 'station', 'abdf1_ros')
 _CASE = ('case', 'verdict', 'rule', 'source', 'seconds')
 
@@ -86,7 +86,7 @@ def anonymous_settings(path: str) -> tuple[str, str]:
 
 
 def anonymous_result(text: str) -> str:
-    """Return a result of ``conform --json`` without what came and was expected."""
+    """Return a result of ``conform --json`` without received and expected bytes."""
     try:
         result = json.loads(text)
         cases = [{key: str(case[key]) for key in _CASE} for case in result['cases']]
@@ -128,7 +128,7 @@ def _map_rows(rows: list[Row]) -> list[list[str]]:
         for name in columns:
             text = row.get(name)
             if name in _TAGS or name in _TOPICS:
-                # A Heartbeat row depends on topics, a Read row on RUN or a tag.
+                # While has topics in a Heartbeat row; RUN or a tag in a Read row.
                 has_topics = name == 'While' and row.get('Command').lower() == _HEARTBEAT
                 words = text.split() if has_topics else [text] * bool(text)
                 kind = 'topic' if has_topics or name in _TOPICS else 'tag'

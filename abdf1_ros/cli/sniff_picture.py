@@ -13,10 +13,10 @@
 # limitations under the License.
 
 """
-The picture of ``sniff --html``: a recorded line as a timeline, for a reader who was not there.
+The picture of ``sniff --html``: a recorded line as a timeline.
 
-First comes an overview with a lane for each station, then each strip of some seconds, to which
-the overview leads. Of a long recording the strips without a fault are only counted.
+First comes an overview with a lane for each station. It links to the strips below, each of some
+seconds. In a long recording, strips without a fault are only counted.
 """
 
 from __future__ import annotations
@@ -37,12 +37,12 @@ from abdf1_ros.sniffer.report import summary_lines, words
 from abdf1_ros.sniffer.summary import BITS_PER_CHARACTER, Summary
 from abdf1_ros.text import counted
 
-_MOST_DRAWN = 20_000  # entries; of what follows only strips with faults are drawn, as many again
+_MOST_DRAWN = 20_000  # entries; then up to the same number again, only in strips with faults
 _MOST_EPISODES = 200
-_PAUSE = 5.0  # s; the same fault after a longer pause is another episode
+_PAUSE = 5.0  # s; after a longer pause the same fault starts a new episode
 _MOST_LANES = 40
-_BUCKETS = 260  # of the overview
-_CHARACTERS = 2000  # of a strip where the recording has no times
+_BUCKETS = 260  # bars in a lane of the overview
+_CHARACTERS = 2000  # length of a strip of a recording without times
 
 _KEY = ((Look.ASK, 'command'), (Look.ANSWER, 'reply'), (Look.SMALL, 'poll, ACK, EOT'),
         (Look.ODD, 'repeated, NAK, ENQ'), (Look.BAD, 'damaged, or an error'),
@@ -51,14 +51,14 @@ _LOOKS = {Kind.COMMAND: Look.ASK, Kind.REPLY: Look.ANSWER, Kind.NAK: Look.ODD, K
           Kind.DAMAGED: Look.BAD, Kind.UNKNOWN: Look.BAD, Kind.NOISE: Look.BAD,
           Kind.SILENCE: Look.MISSING, Kind.UNANSWERED: Look.MISSING}
 _ASKING = (Kind.COMMAND, Kind.POLL, Kind.ENQ)
-_USUAL = {Mark.RELAYED, Mark.FORWARDED}  # as a master or a modem has to
+_USUAL = {Mark.RELAYED, Mark.FORWARDED}  # normal for a master or a modem
 _RANKS = [Look.SMALL, Look.ASK, Look.ANSWER, Look.ODD, Look.MISSING, Look.BAD]
 _FAULTS = (Look.ODD, Look.MISSING, Look.BAD)
 
 
 @dataclass(slots=True)
 class _Strip:
-    """What was seen in one strip, by station."""
+    """The contents of one strip, by station."""
 
     number: int
     bars: defaultdict[int | None, list[Bar]] = field(default_factory=lambda: defaultdict(list))
@@ -66,7 +66,7 @@ class _Strip:
 
 @dataclass(slots=True)
 class _Episode:
-    """A fault that came again and again, told by the ``words`` of the first; times are text."""
+    """A repeated fault, with the ``words`` of the first; times are text."""
 
     station: str
     words: str
@@ -77,17 +77,19 @@ class _Episode:
     count: int = 1
 
     def cells(self) -> tuple[str, ...]:
-        """Return its row of the table."""
+        """Return the row of the fault for the table."""
         return self.start, self.end, self.clock, self.station, str(self.count), self.words
 
 
 @dataclass(slots=True)
 class _Recording:
     """
-    What is drawn of times that go on; ``length`` is that of a strip, ``unit`` of what.
+    The drawing of one recording, whose times increase.
 
-    ``ends`` is until when the rows of each lane are taken. ``seen`` counts looks by station and
-    strip. ``strips`` are drawings by number, None for one that is not drawn.
+    - ``length``: length of a strip, in ``unit``.
+    - ``ends``: the time until which each row of a lane is in use.
+    - ``seen``: number of looks, by station and strip.
+    - ``strips``: drawings by number; None if not drawn.
     """
 
     number: int
@@ -101,18 +103,18 @@ class _Recording:
     strips: dict[int, str | None] = field(default_factory=dict)
 
     def clock(self, place: float) -> str:
-        """Return the time of day, empty where it is not known."""
+        """Return the time of day; empty if unknown."""
         if self.begun is None or self.unit != 's':
             return ''
         return (self.begun + timedelta(seconds=place)).strftime('%H:%M:%S')
 
     def name(self, strip: int) -> str:
-        """Return what links to a strip lead to."""
+        """Return the target of links to a strip."""
         return f'r{self.number}s{strip}'
 
 
 class Timeline:
-    """Collect what ``sniff`` decodes, then write the page; ``is_anonymous`` leaves values out."""
+    """Collect decoded entries, then write the page; ``is_anonymous`` leaves values out."""
 
     def __init__(self, is_anonymous: bool = False) -> None:
         self._is_anonymous = is_anonymous
@@ -124,7 +126,7 @@ class Timeline:
         self._strip: _Strip | None = None
 
     def take(self, chunk: Chunk, baud: int | None, begun: str) -> None:
-        """Take note of bytes before their entries come; where times go back, begin anew."""
+        """Take bytes before their entries come; start a new recording if times go back."""
         time = -math.inf if chunk.time is None else chunk.time
         if not self._recordings or time < self._last:
             self._close()
@@ -161,7 +163,7 @@ class Timeline:
         start, ends = strip.number * recording.length, recording.ends
         if entry.kind is Kind.SILENCE:
             begin = min(ends[station, 0], end)
-        else:  # several symbols can come in one chunk, and have one time
+        else:  # several symbols in one chunk have the same time
             at = max(begin, ends[station, row], start)
             begin, end = at, at + end - begin
             ends[station, row] = end
@@ -198,7 +200,7 @@ class Timeline:
         return words(entry)
 
     def _close(self) -> None:
-        """Draw a strip to which nothing can come any more."""
+        """Draw a strip that is complete."""
         strip, self._strip = self._strip, None
         if strip is None:
             return
@@ -243,7 +245,7 @@ class Timeline:
 
 
 def _overview(recording: _Recording) -> Iterator[str]:
-    """Yield the whole recording as one drawing, with the worst of each moment."""
+    """Yield the whole recording as one drawing, with the worst look of each moment."""
     numbers = [number for _, number in recording.seen]
     least, most = min(numbers), max(numbers) + 1
     step = math.ceil((most - least) / _BUCKETS)
@@ -264,7 +266,7 @@ def _overview(recording: _Recording) -> Iterator[str]:
 
 
 def _moment_of(recording: _Recording, station: int | None, numbers: list[int]) -> Bar:
-    """Return a bar for some strips of a station, which leads to the worst of them."""
+    """Return a bar for some strips of a station, with a link to the worst strip."""
     looks = {number: recording.seen[station, number] for number in numbers}
 
     def rank(number: int) -> int:
@@ -282,7 +284,7 @@ def _moment_of(recording: _Recording, station: int | None, numbers: list[int]) -
 def _strips(recording: _Recording) -> Iterator[str]:
     yield '<h2>Every message</h2>'
     yield key(_KEY)
-    yield ('<p class="quiet">The upper half of a lane is what is sent to the station, the lower '
+    yield ('<p class="quiet">The upper half of a lane shows messages to the station, the lower '
            'half what it sends. The mouse shows the words.</p>')
     left_out = 0
     for drawn in recording.strips.values():
@@ -309,7 +311,7 @@ def _look(entry: Entry) -> Look:
 
 
 def _row(entry: Entry) -> int:
-    """Return 0 for what is sent to a station, 1 for what it sends."""
+    """Return 0 for messages to a station, 1 for messages from it."""
     if entry.direction is Direction.UNKNOWN:
         return int(entry.kind not in _ASKING)
     return int(entry.direction is Direction.IN)

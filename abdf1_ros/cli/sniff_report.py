@@ -13,10 +13,10 @@
 # limitations under the License.
 
 """
-The bundle of ``sniff --report``: all that a report about a line needs, in one ZIP file.
+The bundle of ``sniff --report``: one ZIP file with all facts for a report about a line.
 
-With ``is_anonymous`` it has no values and no names: not the data of messages, and of the files
-given only what ``sniff_anonymous`` keeps.
+With ``is_anonymous`` the bundle has no values and no names: it has no data of messages, and
+``sniff_anonymous`` removes names from the given files.
 """
 
 from __future__ import annotations
@@ -41,19 +41,19 @@ from abdf1_ros.sniffer.summary import Summary
 
 _STATUS_REQUEST = 0x06, b'\x03'  # CMD, and FNC as the first byte of its data
 
-# A bundle has to be small enough for mail: of a long recording it has the first entries as text;
-# the capture has all.
+# A bundle must be small enough for mail: of a long recording it has only the first entries as
+# text. The capture has all entries.
 _MOST_ENTRIES = 100_000
 
-# By which a bundle is known again.
+# The mark that identifies a bundle.
 _COMMENT = b'abdf1_ros sniff --report'
 
 _CONTENTS = {
-    'summary.txt': 'what was seen on the line, counted',
+    'summary.txt': 'counts of the traffic on the line',
     'summary.json': 'the same for programs',
-    'processors.txt': 'what each processor says it is (its diagnostic status)',
+    'processors.txt': 'the identity of each processor (its diagnostic status)',
     'entries.txt': 'every poll, command and reply in words',
-    'entries.json': 'the same for programs, one a line, without the data of messages',
+    'entries.json': 'the same for programs, one per line, without the data of messages',
     'versions.json': 'the versions of abdf1_ros, Python and the operating system',
     'capture/': 'the bytes as they were recorded',
     'settings/': 'the files given with --settings',
@@ -66,8 +66,11 @@ class ReportBundle:
     """
     Collects what ``sniff`` decodes, then writes it.
 
-    ``captures`` are the recordings, ``settings`` net and map CSV, ``conformance`` results of
-    ``conform``. ``write`` raises OSError where a file cannot be read or written.
+    - ``captures``: the recordings.
+    - ``settings``: net and map CSV.
+    - ``conformance``: results of ``conform``.
+
+    ``write`` raises OSError if a file cannot be read or written.
     """
 
     captures: Sequence[str]
@@ -78,7 +81,7 @@ class ReportBundle:
     _processors: dict[int, str] = field(default_factory=dict)
 
     def add(self, entry: Entry) -> None:
-        """Take note of an entry."""
+        """Add an entry."""
         if len(self._entries) < _MOST_ENTRIES:
             self._entries.append(entry)
         reply, request = entry.packet, entry.request
@@ -136,18 +139,18 @@ class ReportBundle:
                   if any(entry.startswith(name) for entry in names)]
         lines.append('')
         if self.is_anonymous:
-            lines.append('It was made with --anonymous: the data of messages and the bytes of the '
-                         'recording are left out, tags and topics are numbered, and of the files '
-                         'only columns without names are kept; "?" is a cell that was not read.')
+            lines.append('This bundle was made with --anonymous, without the data of messages and '
+                         'the bytes of the recording. Tags and topics are numbered. The files '
+                         'have only columns without names; "?" is an unreadable cell.')
         else:
-            lines.append('The recording shows the values that were in the data tables; heads of '
-                         'recordings and the files given may name ports, hosts, users and tags. '
-                         '--anonymous leaves all that out.')
+            lines.append('The recording shows values of the data tables. Heads of recordings and '
+                         'the given files may have names of ports, hosts, users and tags. '
+                         '--anonymous leaves all these out.')
         return '\n'.join([*lines, ''])
 
 
 def is_bundle(path: Path) -> bool:
-    """Tell whether a file is a bundle, so that a new one may replace it."""
+    """Return True if a file is a bundle, so that a new bundle may replace it."""
     if not is_zipfile(path):
         return False
     with ZipFile(path) as bundle:
@@ -155,7 +158,7 @@ def is_bundle(path: Path) -> bool:
 
 
 def _free_name(folder: str, path: str, taken: Container[str]) -> str:
-    """Return the name of a file in the bundle; files of one name get numbers."""
+    """Return the name of a file in the bundle; files with the same name get numbers."""
     name = Path(path).name
     names = (f'{folder}/{number}_{name}' if number else f'{folder}/{name}' for number in count())
     return next(name for name in names if name not in taken)
@@ -171,7 +174,7 @@ def _versions() -> dict[str, str]:
 
 
 def _release() -> str:
-    """Return the version of the kernel without what a builder has added, which may be a name."""
+    """Return the version of the kernel without the suffix of its builder, which may be a name."""
     return platform.release().partition('-')[0]
 
 

@@ -180,7 +180,7 @@ def test_file_without_bytes_is_told(capsys: Output, tmp_path: Path, text: str) -
     path = tmp_path / 'empty'
     path.write_text(text, encoding='ascii')
     assert main([str(path)]) == 0
-    assert capsys.readouterr().err == f'sniff: {path}: there are no bytes in it\n'
+    assert capsys.readouterr().err == f'sniff: {path}: the file has no bytes\n'
 
 
 def test_end_of_the_time_is_no_empty_file(capsys: Output, capture: str) -> None:

@@ -195,7 +195,7 @@ def test_only_a_bundle_is_replaced(tmp_path: Path, capture: str,
         with pytest.raises(SystemExit) as end:
             main([capture, '--summary', '--report', path])
         assert end.value.code == 2 and Path(path).read_bytes() == before
-        assert f'{path} is there and is not a bundle' in capsys.readouterr().err
+        assert f'{path} exists and is not a bundle' in capsys.readouterr().err
     assert main([capture, '--summary', '--report', str(tmp_path / 'empty')]) == 0
 
 

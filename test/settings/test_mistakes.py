@@ -212,10 +212,10 @@ PORT = ('should be a number from 1, a device path such as /dev/ttyUSB0, socket:/
         '!1: the names of the columns stand below each other here; they belong side by side into '
         'one row, and the values into the row below it']),
     ('Station\n5\n', [
-        '2 (Com_Port): Com_Port is empty, so the port is /dev/ttyS0, unless the parameter port or '
+        '2 (Com_Port): Com_Port is empty: the port is /dev/ttyS0, unless the parameter port or '
         'net.com_port names a port']),
     ('Station,Com_Port\n5,\n', [
-        '2:2 (Com_Port): Com_Port is empty, so the port is /dev/ttyS0, unless the parameter port '
+        '2:2 (Com_Port): Com_Port is empty: the port is /dev/ttyS0, unless the parameter port '
         'or net.com_port names a port']),
     ('Com_Port,Station,Baud,Mode\n/dev/ttyUSB0,5\n', [
         '2: the row ends before Baud, Mode: the defaults apply']),

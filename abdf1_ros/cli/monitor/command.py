@@ -13,17 +13,17 @@
 # limitations under the License.
 
 """
-Show what a running bridge does, or all of them, from their topics alone.
+Show the state of a running bridge, or of all bridges, from their topics alone.
 
-First comes the verdict, then each topic with its age, its part of the line's time, a curve of
-the last seconds and its value, then what is wrong. Writes, link, stations and counters follow. On
-a terminal the picture is renewed in place; arrows, pages and the keys of its last line move it.
-Elsewhere, or with --once, plain text is printed.
+First comes the verdict. Then follows each topic with its age, its part of the line's time, a curve
+of the last seconds, and its value. Then follow faults, writes, link, stations and counters. On a
+terminal the picture is renewed in place; arrows, pages and the keys of its last line move it.
+Without a terminal, or with --once, plain text is printed.
 
-With --all there is a line for each bridge that is heard, the worst first; Return shows the one
-that is marked, q goes back.
+With --all there is a line for each bridge, the worst first; Return shows the marked bridge, q goes
+back.
 
-A value is fresh, or STALE when it is older than its topic promises. Topics that are published on
+A value is fresh, or STALE if it is older than its topic promises. Topics that are published on
 change, or when a PLC writes to us, promise nothing: their value may have any age. A blank in a
 curve is a time without a fresh value.
 """
@@ -63,15 +63,15 @@ from rclpy.utilities import remove_ros_args
 
 _say = partial(tell, 'monitor')
 
-# How often (s) the picture is renewed where a terminal shows it in place.
+# Period (s) of the picture on a terminal that shows it in place.
 _RENEWAL = 0.25
 
-# How long (s) one picture waits for values that have been promised, once the node is found.
+# Longest wait (s) of a single picture for promised values, after the node is found.
 _COMPLETION = 3.0
 
 _PROGRESS_PERIOD = 2.0
 
-# This key draws the whole picture again, for when another program has written to the terminal.
+# This key draws the whole picture again, after another program wrote to the terminal.
 _CONTROL_L = 12
 
 _RETURN = (curses.KEY_ENTER, ord('\n'), ord('\r'))
@@ -81,11 +81,11 @@ _SECTION_KEYS = {ord('l'): 'link', ord('s'): 'stations', ord('v'): 'values',
 _PLANT_KEYS = 'q end  arrows, pages  Return shows a line'
 _KEYS = 'q:end v:values r:reasons w:writes l:link s:stations c:counters'
 
-# Colours by the codes of ANSI, which stand for the same colours in curses.
+# Colours by ANSI codes; curses has the same numbers.
 _COLOURS = {Style.GOOD: 2, Style.WARNING: 3, Style.BAD: 1}
 
 _EPILOG = """\
-exit status: 0 at the end, 1 when the node is not found within --wait, 2 for bad options
+exit status: 0 at the end, 1 if the node is not found within --wait, 2 for bad options
 
 examples:
   monitor
@@ -98,7 +98,7 @@ examples:
 
 
 class _Ending:
-    """Tells whether a signal has come, or the time is up."""
+    """Callable: True after a signal, or when the time is up."""
 
     def __init__(self) -> None:
         self._end = math.inf
@@ -110,7 +110,7 @@ class _Ending:
         return self._signalled or time.monotonic() >= self._end
 
     def limit(self, seconds: float) -> None:
-        """End after so many seconds."""
+        """End ``seconds`` from now."""
         self._end = time.monotonic() + seconds
 
     def _signal(self, number: int, frame: FrameType | None) -> None:
@@ -141,10 +141,10 @@ class _Screen:
 
     @property
     def width(self) -> int:
-        return self._window.getmaxyx()[1] - 1  # writing into the last corner is an error
+        return self._window.getmaxyx()[1] - 1  # a write into the last corner is an error
 
     def show(self, lines: Sequence[TextLine], heading: int = 0) -> None:
-        """Show as many lines as fit, from the first one after scrolling, and the keys below."""
+        """Show the lines that fit, from the scroll position on, and the keys below."""
         height = self._window.getmaxyx()[0] - 1 - heading
         self._sections = {line.section: row for row, line in enumerate(lines) if line.section}
         count = len(lines) - heading
@@ -169,10 +169,10 @@ class _Screen:
                 self._window.getmaxyx()[0] - 1, 0, text, self.width, curses.A_REVERSE)
 
     def show_list(self, lines: Sequence[TextLine]) -> None:
-        """Show lines of which one is marked, each with a ``section`` to know it by."""
+        """Show lines with a marked line; each line is identified by its ``section``."""
         rows = [row for row, line in enumerate(lines) if line.section] or [0]
         at = next((row for row in rows if lines[row].section == self._marked), rows[0])
-        if self._step:  # before that it is the first, whatever that is
+        if self._step:  # until a key moves the mark, it stays on the first line
             at = min(max(at + self._step, rows[0]), rows[-1])
             self._marked, self._step = lines[at].section, 0
         self._chosen = lines[at].section
@@ -181,7 +181,7 @@ class _Screen:
         self.show(lines, rows[0])
 
     def wants_other_list(self) -> bool:
-        """Take the keys that have been pressed; tell whether one ends, or chooses a line."""
+        """Take the pressed keys; return True if a key ends the list or chooses a line."""
         for key, rows in self._pressed():
             if key == ord('q'):
                 return True
@@ -192,7 +192,7 @@ class _Screen:
         return False
 
     def _pressed(self) -> Iterator[tuple[int, int]]:
-        """Take the keys that have been pressed, each with the rows that it goes down."""
+        """Yield the pressed keys, each with the number of rows that it moves down."""
         page = self._window.getmaxyx()[0] - 2
         rows = {curses.KEY_UP: -1, curses.KEY_DOWN: 1, curses.KEY_PPAGE: -page,
                 curses.KEY_NPAGE: page, ord(' '): page, curses.KEY_HOME: -1_000_000,
@@ -203,7 +203,7 @@ class _Screen:
             yield key, rows.get(key, 0)
 
     def wants_end(self) -> bool:
-        """Take the keys that have been pressed; tell whether one of them ends."""
+        """Take the pressed keys; return True if a key ends the picture."""
         for key, rows in self._pressed():
             if key == ord('q'):
                 return True
@@ -217,7 +217,7 @@ def main(args: Sequence[str] | None = None) -> int:
     """
     Show the node until SIGINT, SIGTERM, q or --seconds.
 
-    Returns 0, 1 when there is no such node, 2 for bad options.
+    Returns 0; 1 if there is no such node; 2 for bad options.
     """
     words = list(sys.argv if args is None else ['monitor', *args])
     prepare_output()
@@ -245,7 +245,7 @@ def _run(options: argparse.Namespace, words: list[str]) -> int:
 
 
 def _run_all(options: argparse.Namespace, words: list[str], has_ended: _Ending) -> int:
-    """Show all bridges, and each that is chosen."""
+    """Show all bridges, and each chosen bridge."""
     has_ended.limit(options.seconds)
     marked = ''
     while True:
@@ -279,20 +279,19 @@ def _parse(args: Sequence[str]) -> argparse.Namespace:
     parser = command_parser('monitor', __doc__, _EPILOG)
     parser.add_argument('--node', default='/abdf1',
                         help='name of the bridge with its namespace (default: %(default)s)')
-    parser.add_argument('--all', action='store_true', help='show a line for each bridge')
+    parser.add_argument('--all', action='store_true', help='show all bridges, each on one line')
     parser.add_argument('--once', action='store_true', help='print one picture and end')
     parser.add_argument('--seconds', type=seconds_option, default=math.inf,
-                        help='end so many seconds after the node has been found')
+                        help='end this number of seconds after the node is found')
     parser.add_argument('--period', type=seconds_option, default=1.0,
-                        help='seconds from one printed picture to the next (default: '
-                             '%(default)g)')
+                        help='seconds between two printed pictures (default: %(default)g)')
     parser.add_argument('--wait', type=seconds_option, default=10.0,
                         help='seconds to look for the node at the start (default: %(default)g)')
     return parser.parse_args(args)
 
 
 def _find(watch: NodeWatch, seconds: float, has_ended: _Ending) -> bool:
-    """Listen until the node is there."""
+    """Listen until the node is found."""
     end = time.monotonic() + seconds
     said = time.monotonic()
     while not watch.is_there and not has_ended() and time.monotonic() < end:
@@ -306,12 +305,12 @@ def _find(watch: NodeWatch, seconds: float, has_ended: _Ending) -> bool:
 def _not_found(watch: NodeWatch, seconds: float) -> str:
     bridges = watch.bridges()
     if watch.name in bridges:
-        return (f'{watch.name} is seen, but nothing is heard of it within {seconds:g} s: programs '
-                'of one machine have to run as the same user')
+        return (f'{watch.name} is visible, but sent no message within {seconds:g} s: programs on '
+                'one machine must run as the same user')
     domain = os.environ.get('ROS_DOMAIN_ID', '0')
     hint = f'--node may be one of {", ".join(bridges)}' if bridges else (
-        f'no bridge is heard with ROS_DOMAIN_ID {domain}; that and '
-        'ROS_AUTOMATIC_DISCOVERY_RANGE have to be those of the bridge')
+        f'no bridge is heard with ROS_DOMAIN_ID {domain}; ROS_DOMAIN_ID and '
+        'ROS_AUTOMATIC_DISCOVERY_RANGE must be the same as for the bridge')
     return f'there is no node {watch.name} within {seconds:g} s: {hint}{graph_hint()}'
 
 
@@ -319,26 +318,26 @@ def _show(watch: NodeWatch, options: argparse.Namespace, has_ended: _Ending) -> 
     if not options.once and _is_screen():
         curses.wrapper(_draw, watch, has_ended)
         return
-    # Some time for the values that topics have promised.
+    # Time for the values that topics promise.
     watch.wait(lambda: has_ended() or watch.is_complete, _COMPLETION)
     _print_pictures(watch, partial(_picture, watch), options, has_ended)
 
 
 def _picture(watch: NodeWatch, width: int) -> list[TextLine]:
-    # What the C library cannot write would spoil a screen of curses; the console has few letters.
+    # Characters that the C library cannot write would spoil a curses screen; the console has few.
     has_blocks = locale.getencoding() == 'UTF-8' and os.environ.get('TERM') != 'linux'
     return render(watch.snapshot(), time.monotonic(), width, BLOCKS if has_blocks else ASCII)
 
 
 def _is_screen() -> bool:
-    """Tell whether a picture can be renewed in place; make curses ready for that."""
+    """Return True if a picture can be renewed in place; prepare curses for that."""
     if not sys.stdout.isatty():
         return False
     try:
         curses.setupterm()
-    except curses.error:  # TERM names no terminal that is known here
+    except curses.error:  # TERM names an unknown terminal
         return False
-    locale.setlocale(locale.LC_ALL, '')  # or curses shows letters of other languages wrong
+    locale.setlocale(locale.LC_ALL, '')  # otherwise curses shows letters of other languages wrong
     return True
 
 
@@ -351,7 +350,7 @@ def _draw(window: curses.window, watch: NodeWatch, has_ended: _Ending) -> None:
 
 def _print_pictures(watch: NodeWatch | PlantWatch, picture: Callable[[int], list[TextLine]],
                     options: argparse.Namespace, has_ended: _Ending) -> None:
-    """Print a picture, and another after each period until the end."""
+    """Print a picture after each period until the end."""
     _print(picture)
     while not options.once and not has_ended():
         watch.wait(has_ended, options.period)

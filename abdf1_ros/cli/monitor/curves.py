@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""A small curve of what a topic has shown: a character for every two seconds."""
+"""A small curve of a topic's values: a character for every two seconds."""
 
 from __future__ import annotations
 
@@ -27,11 +27,15 @@ ASCII = '_.-=*#'
 
 _STEP = 2.0  # s
 SECONDS = WIDTH * _STEP
-_ELEMENTS = 8  # of a long row only the first ones are looked at
+_ELEMENTS = 8  # only the first elements of a long row are used
 
 
 class _Step(NamedTuple):
-    """What came in a step: its number, when the last came (s), and that by element."""
+    """
+    The values of one step; ``low``, ``high`` and ``last`` by element.
+
+    ``time``: clock value (s) of the last value.
+    """
 
     number: int
     time: float
@@ -42,10 +46,10 @@ class _Step(NamedTuple):
 
 class Curve:
     """
-    The last values of a row of numbers; ``is_bits`` tells that each is 0 or 1.
+    The last values of a row of numbers; with ``is_bits`` each is 0 or 1.
 
-    Of several elements the first that has changed is drawn. Of a step with several values the
-    extreme that is farther from the step before is drawn, so a bit that blinks is seen.
+    Of several elements, the curve shows the first that has changed. Of several values in a step,
+    it shows the extreme farther from the step before, so that a blinking bit is seen.
     """
 
     def __init__(self, is_bits: bool = False) -> None:
@@ -66,7 +70,7 @@ class Curve:
         """
         Return ``WIDTH`` characters, the newest last; a blank is a time without a good value.
 
-        A value is good for ``promised`` seconds, or until the next where that is None.
+        A value is good for ``promised`` seconds; if that is None, until the next value.
         """
         newest = int(now // _STEP)
         shown = [self._at(number, promised) for number in range(newest - WIDTH + 1, newest + 1)]
@@ -76,7 +80,7 @@ class Curve:
         return ''.join(_level(point, bottom, top, levels) for point in points)
 
     def _at(self, number: int, promised: float | None) -> _Step | None:
-        """Return what held in a step, None where no value was good."""
+        """Return the good values in a step; None if there was none."""
         for step in reversed(self._steps):
             if step.number == number:
                 return step
@@ -87,14 +91,14 @@ class Curve:
 
 
 def _changing(steps: Sequence[_Step]) -> int:
-    """Return the number of the first element that has changed, 0 for none."""
+    """Return the index of the first element that has changed; 0 for none."""
     count = min((len(step.last) for step in steps), default=0)
     return next((element for element in range(count) if len(
         {value for step in steps for value in (step.low[element], step.high[element])}) > 1), 0)
 
 
 def _points(steps: Sequence[_Step | None], element: int) -> Iterator[float]:
-    """Yield one value for each step, NaN for none."""
+    """Yield a value for each step; NaN for none."""
     before = math.nan
     for step in steps:
         if step is None or len(step.last) <= element:

@@ -35,7 +35,7 @@ from rclpy.exceptions import InvalidTopicNameException
 from rclpy.validate_full_topic_name import validate_full_topic_name
 from std_msgs.msg import String, UInt16MultiArray  # noqa: I101
 
-# How often (s) the topics of the node are looked for; they do not change while it lives.
+# Period (s) of looking for topics of the node; they do not change while it lives.
 _DISCOVERY_PERIOD = 0.5
 
 _RESULTS_KEPT = 8
@@ -46,12 +46,12 @@ _TEXT, _BITS = 'std_msgs/msg/String', 'std_msgs/msg/UInt8MultiArray'
 
 _STYLES = {DiagnosticStatus.OK: Style.GOOD, DiagnosticStatus.WARN: Style.WARNING}
 
-# The default callbacks make every subscription a burden on every turn of the executor.
+# With default callbacks, every subscription costs time on every turn of the executor.
 _QUIET = SubscriptionEventCallbacks(use_default_callbacks=False)
 
 
 def full_name(text: str) -> str:
-    """Return the fully qualified name of a node; FormatError when it cannot be one."""
+    """Return the fully qualified name of a node; raises FormatError for a bad name."""
     name = f'/{text.strip("/")}'
     try:
         validate_full_topic_name(name)
@@ -70,25 +70,25 @@ class _Subscription:
 
 
 class Listening(Observer):
-    """A node that subscribes, in a ROS context of its own; to be used in a with statement."""
+    """A node that subscribes, in a ROS context of its own; use it in a with statement."""
 
     def __init__(self, ros_arguments: list[str]) -> None:
         super().__init__('abdf1_monitor', args=ros_arguments, start_parameter_services=False,
                          enable_rosout=False)
 
     def subscribe(self, message_type: Any, topic: str, callback: Any, qos: Any) -> Any:
-        """Have ``callback`` called with each message."""
+        """Call ``callback`` with each message."""
         return self.node.create_subscription(
             message_type, topic, callback, qos, event_callbacks=_QUIET)
 
 
 class NodeWatch(Listening):
     """
-    Listen to the node with the full name ``name`` until it is closed.
+    Listen to the node with the full name ``name``, until closed.
 
-    The bridge is not affected: subscriptions ask for no more than every bridge offers, no service
-    is called, and nothing is published. Ages of topics without a promised
-    time count from the publisher's time stamp, so for them the clocks of the hosts have to agree.
+    The bridge is not affected: subscriptions ask only for the QoS of every bridge, no service is
+    called, and nothing is published. Ages of topics without a promised time count from the
+    publisher's time stamp. For these topics the clocks of the hosts must agree.
     """
 
     def __init__(self, name: str, ros_arguments: list[str]) -> None:
@@ -108,7 +108,7 @@ class NodeWatch(Listening):
 
     @property
     def is_complete(self) -> bool:
-        """Tell whether diagnostics, all topics and every value that is promised are here."""
+        """Return True if diagnostics, all topics and all promised values are here."""
         totals = [status.values.get('total', '') for status in self._statuses
                   if status.section == 'mappings']
         if not totals or not totals[0].isdecimal():
@@ -118,14 +118,14 @@ class NodeWatch(Listening):
             for subscription in self._subscriptions.values())
 
     def spin_once(self, seconds: float) -> None:
-        """Take one message, or wait so long; look for topics when it is time."""
+        """Take one message, or wait for ``seconds``; look for topics when it is time."""
         if time.monotonic() >= self._next_discovery:
             self._next_discovery = time.monotonic() + _DISCOVERY_PERIOD
             self._discover()
         super().spin_once(min(seconds, _DISCOVERY_PERIOD))
 
     def bridges(self) -> list[str]:
-        """Return the full names of the bridges that can be seen."""
+        """Return the full names of the visible bridges."""
         ending = '/active_stations'
         return sorted((topic.removesuffix(ending)
                        for topic, types in self.node.get_topic_names_and_types()
@@ -133,7 +133,7 @@ class NodeWatch(Listening):
                       key=by_number)
 
     def snapshot(self) -> Snapshot:
-        """Return what is known now."""
+        """Return a snapshot of the present state."""
         readings = [self._subscriptions[topic].reading
                     for topic in sorted(self._subscriptions, key=by_number)]
         return Snapshot(
@@ -149,7 +149,7 @@ class NodeWatch(Listening):
         reads = {topic: types[0] for topic, types in topics
                  if topic != f'{self.name}/active_stations' and types[0] in _TYPES}
         for topic, known in list(self._subscriptions.items()):
-            if reads.get(topic) != known.type_name:  # the node came back with another map
+            if reads.get(topic) != known.type_name:  # the node restarted with another map
                 self.node.destroy_subscription(known.handle)
                 del self._subscriptions[topic]
         for topic, type_name in reads.items():
@@ -173,7 +173,7 @@ class NodeWatch(Listening):
             return None
         return float(deadlines[0].nanoseconds) / 1e9
 
-    def _taker(self, topic: str) -> Any:  # rclpy's types know callbacks of one argument only
+    def _taker(self, topic: str) -> Any:  # the types of rclpy allow callbacks of one argument only
         def take(message: Any, info: Any) -> None:
             subscription = self._subscriptions[topic]
             reading, received = subscription.reading, time.monotonic()
@@ -205,17 +205,17 @@ class NodeWatch(Listening):
 
 
 def shown_statuses(message: DiagnosticArray, node: str) -> list[Status]:
-    """Return the statuses of a node as they are shown; there may be those of others too."""
+    """Return the statuses of a node for the picture, not of other nodes."""
     return [shown_status(status, node) for status in message.status
             if status.name.startswith(f'{node}: ')]
 
 
 def is_spare(statuses: Sequence[Status]) -> bool:
-    """Tell whether the bridge that says this waits for a line that another one may have."""
+    """Return True if the bridge of this status waits for its line."""
     return [status.section for status in statuses] == ['standby']
 
 
 def shown_status(status: DiagnosticStatus, node: str) -> Status:
-    """Return a status of a node as it is shown."""
+    """Return a status of a node for the picture."""
     return Status(status.name.removeprefix(f'{node}: '), _STYLES.get(status.level, Style.BAD),
                   status.message, {pair.key: pair.value for pair in status.values})

@@ -13,7 +13,7 @@
 # limitations under the License.
 
 """
-A line of text for each bridge that tells its state on /diagnostics, the worst first.
+A line of text for each bridge with a state on /diagnostics, the worst first.
 
 ``PlantWatch`` listens, and ``render_plant`` knows neither ROS nor a terminal.
 """
@@ -37,9 +37,10 @@ _COLUMNS = ('state', 5, 'state'), ('load', 5, 'line load'), ('cycle', 8, 'poll c
 @dataclass(frozen=True, slots=True)
 class LineState:
     """
-    What a bridge has said of itself last, at the clock value ``told`` (s).
+    The last state of a bridge.
 
-    ``spares`` are the hosts on which another bridge waits for its line.
+    - ``told``: clock value (s) of the state.
+    - ``spares``: hosts on which another bridge waits for the line.
     """
 
     name: str
@@ -48,28 +49,29 @@ class LineState:
     spares: Sequence[str] = ()
 
     def worst(self, now: float) -> Status:
-        """Return the status that says most at the clock value ``now`` (s)."""
+        """Return the most important status at the clock value ``now`` (s)."""
         if now - self.told > SILENCE:
             return Status('', Style.BAD, f'no diagnostics for {now - self.told:.0f} s')
         return min(self.statuses, key=lambda status: status.rank)
 
     def values(self) -> dict[str, str]:
-        """Return what the link tells."""
+        """Return the values of the link."""
         return {key: value for status in self.statuses if status.section == 'link'
                 for key, value in status.values.items()}
 
 
 class PlantWatch(Listening):
-    """Listen to all bridges until it is closed."""
+    """Listen to all bridges, until closed."""
 
     def __init__(self, ros_arguments: list[str]) -> None:
         super().__init__(ros_arguments)
         self._lines: dict[str, LineState] = {}
-        self._waiting: dict[str, dict[str, float]] = {}  # when each host said so, by line
+        # clock value of the last message, by line and host
+        self._waiting: dict[str, dict[str, float]] = {}
         self.subscribe(DiagnosticArray, '/diagnostics', self._take, 1000)
 
     def lines(self) -> list[LineState]:
-        """Return all that have been heard."""
+        """Return all bridges that were heard."""
         now = time.monotonic()
         found = {name: replace(line, spares=self._spares(name, now))
                  for name, line in self._lines.items()}
@@ -90,7 +92,7 @@ class PlantWatch(Listening):
         statuses = shown_statuses(message, node)
         sections = {status.section: status for status in statuses}
         now = time.monotonic()
-        if 'lines' in sections:  # the process of many, which knows of those that do not run
+        if 'lines' in sections:  # the process of many lines knows the lines that do not run
             for name, reason in sections['lines'].values.items():
                 if name.startswith('/'):
                     self._lines[name] = LineState(
@@ -103,7 +105,7 @@ class PlantWatch(Listening):
 
 
 def render_plant(lines: Iterable[LineState], now: float, width: int) -> list[TextLine]:
-    """Return two lines of heading, and one for each bridge, whose ``section`` is its name."""
+    """Return two lines of heading, and a line for each bridge; its name is the ``section``."""
     found = sorted(((line.worst(now), line) for line in lines),
                    key=lambda pair: (pair[0].rank[0], by_number(pair[1].name)))
     counts = Counter(status.style for status, _ in found)

@@ -13,9 +13,9 @@
 # limitations under the License.
 
 """
-What is known of a running bridge, and the lines of text that show it.
+A snapshot of a running bridge, and the lines of text that show it.
 
-This module knows neither ROS nor a terminal: ``monitor.node`` fills a ``Snapshot``, and
+This module uses neither ROS nor a terminal: ``monitor.node`` fills a ``Snapshot``, and
 ``monitor.command`` prints the lines. All text from topics is made printable here.
 """
 
@@ -29,10 +29,10 @@ import textwrap
 from abdf1_ros.cli.monitor import curves
 from abdf1_ros.text import counted, cut, printable, value_text
 
-# After so many seconds without diagnostics the picture says so; by default they come every second.
+# Time (s) without diagnostics that the picture reports; by default they come every second.
 SILENCE = 3.0
 
-# Characters that names and addresses get at most; the values have the rest of the line.
+# Most characters of names and addresses; the values get the rest of the line.
 _NAME_WIDTH = 30
 _ADDRESS_WIDTH = 12
 _STATE_WIDTH = 16
@@ -44,18 +44,18 @@ _GOOD_VALUE_WIDTH = 16
 _LEAST_VALUE_WIDTH = 12
 
 _STATION = 'station '
-# How the second line shows values of the link.
+# Words for values of the link in the second line.
 _FACTS = (('load', 'line load'), ('cycle', 'poll cycle with Periods'))
 _LINK_KEYS = ('settings', 'transactions per second', 'line load', 'poll cycle with Periods',
               'longest poll cycle with Periods', 'expected poll cycle, line time alone')
-_PERIOD = 'period '  # how keys of the link begin that tell of a Period
+_PERIOD = 'period '  # beginning of keys of the link about a Period
 _LOAD_BY_TOPIC = 'line load by topic'
 _STATION_KEYS = ('last answer', 'transactions without reply', 'error replies', 'processor',
                  'mode', 'faults')
 
 
 class Style(Enum):
-    """How a line is to be shown, where a terminal can."""
+    """The style of a line on a terminal."""
 
     PLAIN = 'plain'
     TITLE = 'title'
@@ -65,14 +65,14 @@ class Style(Enum):
 
 
 LEVELS = {Style.BAD: 'ERROR', Style.WARNING: 'WARN', Style.GOOD: 'OK'}
-"""How diagnostics call what is shown in these styles, the worst first."""
+"""The names of these styles in diagnostics, the worst first."""
 
 _RANKS = [*LEVELS]
 
 
 @dataclass(frozen=True, slots=True)
 class TextLine:
-    """One line to be shown; ``section`` is the part of the picture that begins with it."""
+    """One line of the picture; ``section`` names the part that begins with it."""
 
     text: str
     style: Style = Style.PLAIN
@@ -84,8 +84,9 @@ class Reading:
     """
     The last message of a read topic; ``values`` is None before the first.
 
-    ``received`` is a clock value (s). ``promised`` is the longest pause (s) between two values
-    that the topic offers, None for one that promises nothing.
+    - ``received``: clock value (s).
+    - ``promised``: longest pause (s) between two values that the topic promises; None if it
+      promises nothing.
     """
 
     topic: str
@@ -97,11 +98,11 @@ class Reading:
 
     @property
     def is_missing(self) -> bool:
-        """Tell whether there is no value of a topic that promises some."""
+        """Return True if a topic that promises values has none."""
         return self.values is None and self.promised is not None
 
     def is_stale(self, now: float) -> bool:
-        """Tell whether the value is older than the topic promises."""
+        """Return True if the value is older than the topic promises."""
         return self.values is not None and self.promised is not None \
             and now - self.received > self.promised
 
@@ -121,8 +122,8 @@ class Status:
     """
     One status of the diagnostics, or the result of one write.
 
-    ``section`` is its name without that of the node, of a result the tag. ``received`` is a clock
-    value (s), for results.
+    - ``section``: name without the node's name; for a result the tag.
+    - ``received``: clock value (s), for results.
     """
 
     section: str
@@ -133,13 +134,13 @@ class Status:
 
     @property
     def rank(self) -> tuple[int, bool]:
-        """Return what sorts the worst to the front, and of equal ones what says most."""
+        """Return a sort key: the worst first, then the most informative."""
         says_most = 'mappings' if self.style is Style.GOOD else 'link'
         return _RANKS.index(self.style), self.section not in ('', says_most)
 
     @property
     def short(self) -> str:
-        """Return the message without its level, and the section where that is not plain."""
+        """Return the message without its level; with the section if the message needs it."""
         text = self.message.removeprefix(f'{LEVELS[self.style]}: ')
         is_plain = self.section in ('', 'link', 'mappings')
         return text if is_plain else f'{self.section}: {text}'
@@ -148,10 +149,11 @@ class Status:
 @dataclass(frozen=True, slots=True)
 class Snapshot:
     """
-    All that is known of one node.
+    All facts about one node.
 
-    ``told`` is the clock value (s) of the last diagnostics, ``active`` the stations of the
-    Active Node Table; each is None before the first message. ``results`` begin with the newest.
+    - ``told``: clock value (s) of the last diagnostics; None before the first.
+    - ``active``: stations of the Active Node Table; None before the first message.
+    - ``results``: the newest first.
     """
 
     node: str
@@ -162,7 +164,7 @@ class Snapshot:
     active: Sequence[int] | None
     results: Sequence[Status]
     hint: str = ''
-    """Why topics may not be seen, empty where nothing is known."""
+    """The reason why topics may not be seen; empty for none."""
 
 
 def render(snapshot: Snapshot, now: float, width: int,
@@ -170,8 +172,8 @@ def render(snapshot: Snapshot, now: float, width: int,
     """
     Return the lines that show ``snapshot`` at the clock value ``now`` (s), cut to ``width``.
 
-    What is looked for first comes first: the verdict, the values, what is wrong. ``levels`` are
-    the characters of curves.
+    The most important parts come first: the verdict, the values, the faults. ``levels`` are the
+    characters of curves.
     """
     parts = {
         'values': [*_head(snapshot, now), *_values(snapshot, now, width, levels)],
@@ -183,10 +185,10 @@ def render(snapshot: Snapshot, now: float, width: int,
 
 
 def show(values: Sequence[float] | str, width: int) -> str:
-    """Return values as text of at most ``width`` characters; what is left out is counted."""
+    """Return values as text of at most ``width`` characters, with the number of omitted values."""
     if isinstance(values, str):
         return cut(f'"{printable(values)}"', width)
-    # An element takes two characters or more: no need to write out what cannot fit.
+    # An element takes two characters or more: elements beyond that cannot fit.
     texts = [value_text(value) for value in values[:width // 2 + 1]]
     for count in range(len(texts), 0, -1):
         rest = len(values) - count
@@ -197,7 +199,7 @@ def show(values: Sequence[float] | str, width: int) -> str:
 
 
 def _head(snapshot: Snapshot, now: float) -> Iterator[TextLine]:
-    """Yield the verdict, and how line and PLCs are."""
+    """Yield the verdict, and the state of line and PLCs."""
     found = sorted([*_heard(snapshot, now), *snapshot.statuses, *_missing(snapshot, now)],
                    key=lambda status: status.rank)
     worst, bad = found[0], sum(status.style is not Style.GOOD for status in found)
@@ -217,11 +219,11 @@ def _head(snapshot: Snapshot, now: float) -> Iterator[TextLine]:
 
 
 def _heard(snapshot: Snapshot, now: float) -> Iterator[Status]:
-    """Yield what is wrong with hearing the node."""
+    """Yield faults of the connection to the node."""
     if not snapshot.is_there:
-        yield Status('', Style.BAD, 'the node is gone; these are its last words')
+        yield Status('', Style.BAD, 'the node is gone; these are its last messages')
     if snapshot.told is None:
-        remapped = '; where /diagnostics is remapped, monitor needs the same -r' \
+        remapped = '; if /diagnostics is remapped, monitor needs the same -r' \
             if snapshot.is_there else ''
         yield Status('', Style.WARNING, f'no diagnostics yet{remapped}')
     elif now - snapshot.told > SILENCE:
@@ -229,7 +231,7 @@ def _heard(snapshot: Snapshot, now: float) -> Iterator[Status]:
 
 
 def _missing(snapshot: Snapshot, now: float) -> Iterator[Status]:
-    """Yield how many topics have no fresh value here, which the bridge may not know."""
+    """Yield the number of topics without a fresh value here; the bridge may not know them."""
     missing = sum(reading.is_missing or reading.is_stale(now) for reading in snapshot.readings)
     topics = counted(len(snapshot.readings), 'topic')
     if missing:
@@ -239,7 +241,7 @@ def _missing(snapshot: Snapshot, now: float) -> Iterator[Status]:
 
 
 def _mode(status: Status) -> str:
-    """Return the number of a station and the mode of its processor, as far as it answers."""
+    """Return the number of a station and the mode of its processor, or "silent"."""
     mode = status.values.get('mode', '').partition(' (')[0] or LEVELS[status.style]
     number = status.section.removeprefix(_STATION)
     return f'{number} {"silent" if status.style is Style.BAD else mode}'
@@ -269,7 +271,7 @@ def _stations(snapshot: Snapshot, width: int) -> Iterator[TextLine]:
 
 @dataclass(frozen=True, slots=True)
 class _Widths:
-    """The columns of the values; 0 for those that a narrow terminal has no room for."""
+    """The widths of the columns of values; 0 for a column that does not fit."""
 
     topic: int
     state: int
@@ -280,7 +282,7 @@ class _Widths:
 
     @classmethod
     def of(cls, topic: int, width: int) -> _Widths:
-        """Share a width out: the value gets what it needs first."""
+        """Divide a width among the columns; the value comes first."""
         left = width - topic - _AGE_WIDTH - _WORD - 8 - _GOOD_VALUE_WIDTH
         sizes = []
         for size in (_SHORT_STATE - _WORD - 2, curves.WIDTH, _LOAD_WIDTH,
@@ -325,7 +327,7 @@ def _values(snapshot: Snapshot, now: float, width: int, levels: str) -> Iterator
 
 
 def _loads(snapshot: Snapshot) -> dict[str, str]:
-    """Return the part of the line's time that each topic takes, by its name."""
+    """Return the part of the line's time for each topic, by its name."""
     told = ', '.join(status.values.get(_LOAD_BY_TOPIC, '')
                      for status in _section(snapshot, 'link'))
     pairs = (entry.rpartition(' ') for entry in printable(told).split(', '))
@@ -333,7 +335,7 @@ def _loads(snapshot: Snapshot) -> dict[str, str]:
 
 
 def _reasons(snapshot: Snapshot, width: int) -> Iterator[TextLine]:
-    """Yield what is wrong, the worst first, with each bad row of the map."""
+    """Yield the faults, the worst first, with each bad row of the map."""
     shown = (status for status in snapshot.statuses if status.style is not Style.GOOD
              or status.section in ('mappings', 'interlocks'))
     for status in sorted(shown, key=lambda status: status.rank):
@@ -355,7 +357,7 @@ def _writes(snapshot: Snapshot, now: float, width: int) -> Iterator[TextLine]:
 
 
 def _counters(snapshot: Snapshot, width: int) -> Iterator[TextLine]:
-    """Yield the counters that are not 0, as many columns as fit."""
+    """Yield the counters that are not 0, in as many columns as fit."""
     for status in _section(snapshot, 'counters'):
         yield from _summary('counters', status, width)
         cells = [f'{printable(key):<24} {printable(value):>9}'
@@ -370,7 +372,7 @@ def _section(snapshot: Snapshot, name: str) -> Iterator[Status]:
 
 
 def _summary(name: str, status: Status, width: int) -> Iterator[TextLine]:
-    """Yield the name and the message of a status, which is never cut."""
+    """Yield the name and the message of a status; the message is never cut."""
     room = max(_LEAST_VALUE_WIDTH, width - 15)
     for number, part in enumerate(textwrap.wrap(printable(status.message), room) or ['']):
         yield TextLine(f'  {"" if number else printable(name):<12} {part}', status.style)
@@ -386,7 +388,7 @@ def _says_something(value: str) -> bool:
 
 
 def _table(values: Mapping[str, str], keys: Sequence[str], width: int) -> Iterator[TextLine]:
-    """Yield what is known of ``keys`` as a column of names and one of values, without zeros."""
+    """Yield the values of ``keys`` as a column of names and a column of values, without zeros."""
     known = [key for key in keys if _says_something(values.get(key, ''))]
     longest = max(map(len, known), default=0)
     for key in known:

@@ -336,8 +336,8 @@ def test_topics_without_a_node_that_is_heard_point_to_another_user(refused: Refu
     with Observer() as observer:
         observer.node.create_publisher(UInt16MultiArray, '/ghost/active_stations', 1)
         assert refused(1, '--node', 'ghost', '--wait', '4')[-1] == (
-            'monitor: /ghost is seen, but nothing is heard of it within 4 s: programs of one '
-            'machine have to run as the same user')
+            'monitor: /ghost is visible, but sent no message within 4 s: programs on one '
+            'machine must run as the same user')
 
 
 @pytest.mark.parametrize(('args', 'text'), [

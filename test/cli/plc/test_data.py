@@ -131,8 +131,8 @@ def test_text_that_is_no_value_is_a_format_error(address: str, texts: list[str])
 
 @pytest.mark.parametrize('address, text, right', [
     ('N7:0', '1_000', '"1_000" is not a valid int16, a whole number from -32768 to 32767'),
-    ('N7:0', '0xFFFF', '"0xFFFF" is not a valid int16, a whole number from -32768 to 32767; with '
-                       '--type uint16 it is one'),
+    ('N7:0', '0xFFFF', '"0xFFFF" is not a valid int16, a whole number from -32768 to 32767; '
+                       '--type uint16 allows it'),
     ('B3:0/1', '2', '"2" is not a valid bool, 0 or 1'),
     ('F8:0', '1_000', '"1_000" is not a valid float32, a number such as -1.5 or 2e3'),
     ('F8:0', '1,000', '"1,000" could be two numbers; write 1000 or 1.000')])

@@ -28,7 +28,7 @@ from pathlib import Path
 import re
 
 from abdf1_ros.cli.plc.data import mapping_of, Tags
-from abdf1_ros.cli.plc.watch import _NoValue, curve_of, Watch
+from abdf1_ros.cli.plc.watch import _News, _NoValue, curve_of, Watch
 from abdf1_ros.driver.checks import Checks, StationHealth
 from abdf1_ros.pccc.file_types import PlcType
 from abdf1_ros.pccc.identity import Identity, Mode
@@ -45,6 +45,7 @@ from support.mappings import make_mapping
 from support.ros import write_csv
 
 SPEED = make_mapping('N7:0', item=1)
+NOW = datetime(2026, 3, 1)
 NAME = make_mapping('ST9:0', item=2)
 
 
@@ -190,7 +191,7 @@ def draw(monkeypatch: pytest.MonkeyPatch) -> Draw:
             patch.setattr('sys.stdout', screen)
             patch.setattr('shutil.get_terminal_size', lambda: os.terminal_size(size))
             for each in news:
-                watch._note_changes([each])
+                watch._note_changes([_News(NOW, *each)])
             watch._redraw()
             screen.flush()
         text = screen.buffer.getvalue().decode(encoding)  # type: ignore[attr-defined]
@@ -231,7 +232,7 @@ def test_nothing_old_stays_below_a_table_that_shrinks(
 
     def show(size: tuple[int, int], *news: tuple[Mapping, Values | _NoValue]) -> list[str]:
         monkeypatch.setattr('shutil.get_terminal_size', lambda: os.terminal_size(size))
-        watch._note_changes(news)
+        watch._note_changes([_News(NOW, *each) for each in news])
         watch._redraw()
         screen.take(capsys.readouterr().out)
         return [' '.join(line.split()) for line in screen.lines if line.strip()]
