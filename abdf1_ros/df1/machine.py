@@ -186,7 +186,7 @@ class _Incoming(NamedTuple):
 
 
 class Background(Protocol):
-    """Work that has to be done in time whatever the line is busy with, and at the end."""
+    """Work that is done when it is due, even if the line is busy, and at the end."""
 
     def expire(self, now: float) -> None:
         """Do work that needs no line, such as ending commands that have waited too long for it."""
@@ -282,7 +282,7 @@ class Machine:
         data = self.decoder.link_data
         is_faster = self.now - self.sender.free_at < len(data) * char_time
         if is_faster or not begins_good_reply(data):
-            return 0.0  # the line is faster (of a simulator), or it is another reply
+            return 0.0  # a simulator's line is faster, or another reply is coming in
         missing = HEADER_SIZE + step.reply_size - len(data) - _LAST_CHARACTERS
         spare = max(missing, 0) * char_time
         return spare if self.deadline is None else min(

@@ -268,7 +268,7 @@ class FullDuplexPeer(EqualNode):
         return None
 
     def _heard_since(self, begun: float, silence: Silence) -> int:
-        """Return the last byte that was heard since a moment, 0 for none."""
+        """Return the last byte heard after a clock value (s), 0 for none."""
         return silence.last_byte if self._machine.now - silence.seconds > begun else 0
 
     def _listen(self, seconds: float = _LATE_RESPONSE) -> Procedure:

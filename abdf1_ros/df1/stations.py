@@ -109,7 +109,7 @@ class ActiveStationList:
 
     Every station counts as active at start (S0). ``on_change`` is called with a station of the
     list whenever it becomes active or inactive. A station outside of the list also has a record if
-    a slave sends it a message. But no message can put it into the list.
+    a slave sends it a message. No message can put such a station into the list.
 
     ``records`` has the record of every station, of the list or not, by number. ``routes`` gives
     the gateway to a station, by number: the gateway is polled in place of the station (M 3-7), and

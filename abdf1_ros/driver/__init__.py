@@ -23,8 +23,12 @@ has the line next. The queues yield jobs (``job_tasks``):
 - ``checks``: questions to a station.
 - ``reads``: the planned reads.
 - ``guests``: commands of other programs.
-``record`` knows who writes which words, ``served`` has the words that PLCs read and write,
-``requests`` asks once, without a map.
+
+Beside them stand
+
+- ``record``: who writes which words.
+- ``served``: the words of our own table, which PLCs read and write.
+- ``requests``: single requests without a map.
 
 Nothing here waits, and nothing looks at a clock: each call brings the time (s). Other threads come
 in through an ``inbox`` only.

@@ -72,7 +72,7 @@ class GuestListener:
         """Take a command that goes to the line, with our SRC and TNS."""
 
     def wrote(self, guest: Guest, command: Packet, station: int, words: list[Extent]) -> None:
-        """Take a command, not a read, that a PLC may have executed."""
+        """Take a command that may have changed a PLC: it is not a read."""
 
     def was_refused(self, guest: Guest, command: Packet) -> None:
         """Take a command that was not allowed."""

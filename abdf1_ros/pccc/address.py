@@ -148,7 +148,7 @@ class Address:
 
     def may_share_file(self, other: Address) -> bool:
         """
-        Tell whether both may lie in one file, or slot, of a PLC.
+        Tell whether both addresses may lie in one file, or slot, of a PLC.
 
         A PLC finds a file by its number, whatever type or family a command names. Where that
         is unknown they may.

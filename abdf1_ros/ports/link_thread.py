@@ -281,7 +281,7 @@ class LinkThread(threading.Thread):
         return attempt.port
 
     def _exchange(self) -> None:
-        """Put a machine on the line that has been handed over, if there is one."""
+        """If another machine has been handed over, put it on the line."""
         self.has_turned = True
         exchange, self._next = self._next, None
         if exchange is not None and exchange.claim():

@@ -86,5 +86,5 @@ class While:
 
 
 def counts(kind: ValueType, length: int) -> bool:
-    """Tell whether While may name this mapping: one integer word (rule 13)."""
+    """Tell whether a row can be the counter of a While: it has one integer word (rule 13)."""
     return kind in _COUNTING and length == 1

@@ -82,8 +82,8 @@ class Plc:
 
     - ``due``: when to look at its rows next.
     - ``first_due``: the same for rows never tried; a pause does not delay these.
-    - ``failures``: number of our own writes without an answer since the last answered write, also
-      of a guest.
+    - ``failures``: number of our own writes in a row without an answer. An answered write of a
+      guest ends the row, too.
     - ``pause_end``: from the second failure on the PLC is left alone until then.
     """
 

@@ -117,7 +117,7 @@ class Interlocks(WriteListener):
         self._refreshes: list[tuple[float, int, FallbackRow]] = []
         self._tickets = itertools.count()
         self._has_begun = False
-        # stations that answered at the beginning of the end
+        # stations that answered when the end began
         self._awaited: frozenset[int] = frozenset()
 
     @property
