@@ -48,6 +48,7 @@ from abdf1_ros.cli.terminal import (
     EXIT_USAGE,
     has_reader_left,
     is_port,
+    limit_output,
     may_replace,
     NoPort,
     prepare_output,
@@ -365,8 +366,13 @@ def _listen(options: argparse.Namespace, output: _Output) -> int:
         tap = Tap(names, PortSettings('', baud or _DEFAULT_BAUD, parity=options.parity))
     except OSError as error:
         raise NoPort(error.filename or '', error) from None
+
+    def end(*_: object) -> None:
+        limit_output()
+        tap.stop()
+
     for number in (signal.SIGINT, signal.SIGTERM):
-        signal.signal(number, lambda *_: tap.stop())
+        signal.signal(number, end)
     with tap:
         try:
             trace = Trace(options.save, settings, _say) if options.save else None

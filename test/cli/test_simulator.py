@@ -33,7 +33,7 @@ from abdf1_ros.df1.checksum import Checksum
 import pytest
 from support.commands import call
 from support.forked import Forked
-from support.ptys import PATIENCE, read_exactly
+from support.ptys import full_pipe, PATIENCE, read_exactly
 from support.ros import Process
 
 DATA = """\
@@ -290,12 +290,7 @@ def test_simulator_goes_on_when_nobody_reads_it_and_ends_when_told(data: Path) -
 def test_simulator_answers_and_ends_while_its_output_is_not_taken(
         data: Path, tmp_path: Path, descriptor: Callable[[Path], int]) -> None:
     """After Ctrl-S, or with ``| less``, its PLCs stood still, and SIGTERM had no effect."""
-    reader, writer = os.pipe()
-    os.set_blocking(writer, False)
-    with pytest.raises(BlockingIOError):
-        while True:
-            os.write(writer, bytes(4096))
-    os.set_blocking(writer, True)
+    reader, writer = full_pipe()
     name = tmp_path / 'plc'
     with subprocess.Popen(
             [sys.executable, '-m', 'abdf1_ros', 'simulator', '--data', str(data), '--pty',

@@ -24,6 +24,7 @@ import resource
 import signal
 import subprocess
 import sys
+import time
 
 from abdf1_ros.cli import sniff
 from abdf1_ros.cli.sniff import main
@@ -34,7 +35,7 @@ from abdf1_ros.sniffer.capture import read_capture
 import pytest
 from support.commands import running_simulator
 from support.forked import Forked
-from support.ptys import PATIENCE, Pty, read_exactly, wait_until
+from support.ptys import full_pipe, PATIENCE, Pty, read_exactly, wait_until
 from support.ros import Process
 
 COMMAND = Packet(2, 5, 0x0F, 0, 0x1234, bytes.fromhex('A2 04 07 89 00 00'))
@@ -285,6 +286,37 @@ def test_pipe_into_which_nobody_writes_until_a_signal(tmp_path: Path) -> None:
         sniff.end()
         os.close(writer)
     assert sniff.lines[0].startswith('summary: 0 bytes')
+
+
+@pytest.mark.parametrize(('way', 'number'), [
+    ('file', signal.SIGTERM), ('--port', signal.SIGINT), ('--tap', signal.SIGTERM)])
+def test_signal_ends_it_while_its_output_is_not_taken(
+        tmp_path: Path, capture: str, way: str, number: signal.Signals) -> None:
+    """After Ctrl-S, or with ``| less``, it printed for ever."""
+    names = [str(tmp_path / name) for name in 'ab']
+    ports = [f'pty:{name}' for name in names[:1 + (way == '--tap')]]
+    reader, writer = full_pipe()
+    arguments = [names[0]] if way == 'file' else [way, *ports]
+    if way == 'file':
+        os.mkfifo(names[0])
+    with subprocess.Popen([sys.executable, '-m', 'abdf1_ros', 'sniff', *arguments], text=True,
+                          stdout=writer, stderr=subprocess.PIPE) as sniff:
+        assert sniff.stderr is not None
+        if way == 'file':
+            line = os.open(names[0], os.O_WRONLY)  # waits until it is opened there
+            os.write(line, Path(capture).read_bytes())
+        else:
+            sniff.stderr.readline()
+            line = os.open(names[0], os.O_RDWR | os.O_NOCTTY)
+            for data in SAID:
+                os.write(line, data)
+        time.sleep(0.5)
+        sniff.send_signal(number)
+        assert sniff.wait(PATIENCE) == 0
+        assert sniff.stderr.read().splitlines()[-1:] == [
+            'standard output was not read after the signal: the rest of it is lost']
+    for descriptor in (line, reader, writer):
+        os.close(descriptor)
 
 
 def test_lost_port_ends_with_the_summary(tmp_path: Path) -> None:

@@ -12,9 +12,10 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Pseudo-terminals whose other end the test holds."""
+"""Pseudo-terminals whose other end the test holds, and pipes that nothing reads."""
 
 from collections.abc import Callable
+from contextlib import suppress
 import os
 from pathlib import Path
 import select
@@ -54,6 +55,17 @@ class Pty:
             self.name.unlink(missing_ok=True)
             os.close(self._slave)
             os.close(self._master)
+
+
+def full_pipe() -> tuple[int, int]:
+    """Return both ends of a pipe that takes no more bytes, as after Ctrl-S."""
+    reader, writer = os.pipe()
+    os.set_blocking(writer, False)
+    with suppress(BlockingIOError):
+        while True:
+            os.write(writer, bytes(4096))
+    os.set_blocking(writer, True)
+    return reader, writer
 
 
 def read_exactly(descriptor: int, count: int) -> bytes:

@@ -53,6 +53,7 @@ from abdf1_ros.cli.terminal import (
     EXIT_FAILED,
     EXIT_USAGE,
     has_reader_left,
+    limit_output,
     prepare_output,
     seconds_option,
     tell,
@@ -115,6 +116,7 @@ class _Ending:
 
     def _signal(self, number: int, frame: FrameType | None) -> None:
         self._signalled = True
+        limit_output()
 
 
 class _Screen:
