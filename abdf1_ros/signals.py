@@ -17,11 +17,18 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
+from contextlib import suppress
 import os
+import select
 import signal
 import threading
 import time
+from types import FrameType
 from typing import Self
+
+# After a signal to end: how long the output may wait for its reader, and between two looks (s).
+_LAST_OUTPUT = 2.0
+_GLANCE = 0.5
 
 
 class EndRequest(threading.Event):
@@ -68,3 +75,36 @@ class EndRequest(threading.Event):
             if number[0] in self._numbers:
                 self.set()
         os.close(self._reader)
+
+
+def limit_output() -> None:
+    """
+    Drop, from 2 s on, output that waits for its reader; a signal has asked for the end.
+
+    Ctrl-S or a pipe that is not read would hold up the end for ever. The alarm interrupts the
+    write, which goes on into the null device. May be called by a signal handler.
+    """
+    signal.signal(signal.SIGALRM, _drop_stuck)
+    signal.setitimer(signal.ITIMER_REAL, _LAST_OUTPUT, _GLANCE)
+
+
+def _drop_stuck(number: int, frame: FrameType | None) -> None:
+    stuck = [descriptor for descriptor in (1, 2) if _is_stuck(descriptor)]
+    for descriptor in stuck:
+        drop(descriptor)
+    if 1 in stuck and 2 not in stuck:
+        os.write(2, b'standard output was not read after the signal: the rest of it is lost\n')
+
+
+def _is_stuck(descriptor: int) -> bool:
+    """Tell whether a write would wait."""
+    with suppress(OSError, ValueError):  # it is closed
+        return not select.select([], [descriptor], [], 0)[1]
+    return False
+
+
+def drop(descriptor: int) -> None:
+    """Let the null device take all that is written to a descriptor."""
+    nowhere = os.open(os.devnull, os.O_WRONLY)
+    os.dup2(nowhere, descriptor)
+    os.close(nowhere)

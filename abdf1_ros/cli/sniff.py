@@ -48,7 +48,6 @@ from abdf1_ros.cli.terminal import (
     EXIT_USAGE,
     has_reader_left,
     is_port,
-    limit_output,
     may_replace,
     NoPort,
     prepare_output,
@@ -67,6 +66,7 @@ from abdf1_ros.ports.trace import begun_now, Trace
 from abdf1_ros.problems import ConfigurationError, Problem
 from abdf1_ros.settings import BAUD_RATES, PARITIES
 from abdf1_ros.settings.network import Network, URLS
+from abdf1_ros.signals import limit_output
 from abdf1_ros.sniffer.capture import Chunk
 from abdf1_ros.sniffer.dumps import Recording
 from abdf1_ros.sniffer.entries import Entry

@@ -27,7 +27,6 @@ import math
 import os
 from pathlib import Path
 import re
-import select
 import shlex
 import shutil
 import signal
@@ -40,6 +39,7 @@ from abdf1_ros.errors import PortLost
 from abdf1_ros.numbers import decimal_number, whole_number
 from abdf1_ros.paths import ShowVersion
 from abdf1_ros.problems import ConfigurationError
+from abdf1_ros.signals import drop, limit_output
 from abdf1_ros.text import printable
 
 RED, YELLOW, GREEN = 31, 33, 32
@@ -60,10 +60,6 @@ _ADVICE = {
 _ALIKE = 0.7  # --perod suggests --period, but --force does not suggest --port
 
 _PROGRESS_DELAY = 2.0  # s; shorter work shows no progress
-
-# After a signal to end: how long the output may wait for its reader, and between two looks (s).
-_LAST_OUTPUT = 2.0
-_GLANCE = 0.5
 
 
 class NoPort(OSError):
@@ -155,32 +151,6 @@ def _interrupt(number: int, frame: FrameType | None) -> None:
     raise KeyboardInterrupt
 
 
-def limit_output() -> None:
-    """
-    Drop, from 2 s on, output that waits for its reader; a signal has asked for the end.
-
-    Ctrl-S or a pipe that is not read would hold up the end for ever. The alarm interrupts the
-    write, which goes on into the null device. May be called by a signal handler.
-    """
-    signal.signal(signal.SIGALRM, _drop_stuck)
-    signal.setitimer(signal.ITIMER_REAL, _LAST_OUTPUT, _GLANCE)
-
-
-def _drop_stuck(number: int, frame: FrameType | None) -> None:
-    stuck = [descriptor for descriptor in (1, 2) if _is_stuck(descriptor)]
-    for descriptor in stuck:
-        _drop(descriptor)
-    if 1 in stuck and 2 not in stuck:
-        os.write(2, b'standard output was not read after the signal: the rest of it is lost\n')
-
-
-def _is_stuck(descriptor: int) -> bool:
-    """Tell whether a write would wait."""
-    with suppress(OSError, ValueError):  # it is closed
-        return not select.select([], [descriptor], [], 0)[1]
-    return False
-
-
 def ignore_further() -> None:
     """Make further signals have no effect while the process ends."""
     for number in _ENDING:  # not SIG_IGN: Python reports a signal that comes at that moment
@@ -189,13 +159,7 @@ def ignore_further() -> None:
 
 def drop_output() -> None:
     """Drop all further output, after its reader has left or a write failed."""
-    _drop(sys.stdout.fileno())
-
-
-def _drop(descriptor: int) -> None:
-    nowhere = os.open(os.devnull, os.O_WRONLY)
-    os.dup2(nowhere, descriptor)
-    os.close(nowhere)
+    drop(sys.stdout.fileno())
 
 
 def has_reader_left(error: OSError, tell: Callable[[str], None]) -> bool:

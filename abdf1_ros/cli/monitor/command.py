@@ -53,13 +53,13 @@ from abdf1_ros.cli.terminal import (
     EXIT_FAILED,
     EXIT_USAGE,
     has_reader_left,
-    limit_output,
     prepare_output,
     seconds_option,
     tell,
 )
 from abdf1_ros.errors import FormatError
 from abdf1_ros.ros.observer import graph_hint
+from abdf1_ros.signals import limit_output
 from rclpy.utilities import remove_ros_args
 
 _say = partial(tell, 'monitor')
