@@ -408,7 +408,7 @@ def test_argument_outside_of_ros_arguments(
     with pytest.raises(SystemExit) as ending:
         main(['node', *arguments])
     assert ending.value.code == 2
-    assert 'parameters follow --ros-args' in capsys.readouterr().err
+    assert 'write parameters after --ros-args' in capsys.readouterr().err
 
 
 def test_third_internal_error_ends_the_node_with_status_1(

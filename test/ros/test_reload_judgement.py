@@ -52,8 +52,8 @@ def refusal(before: Configuration, after: Configuration, *, is_open: bool = True
 
 
 def test_map_without_rows_would_end_all_topics() -> None:
-    text = ('map.csv: it has no row, so all topics would end; only a line with Share can be '
-            'without')
+    text = ('map.csv: it has no row, so all topics would end; only a line with Share may have '
+            'no row')
     assert refusal(configured(ROW), configured()) == (text, [])
     assert refusal(configured(), configured()) == ('', [])
     assert refusal(configured(ROW), configured(share='pty:/tmp/hmi')) == ('', [])

@@ -90,7 +90,7 @@ def test_columns_are_those_of_the_interface() -> None:
                        'Topic', 'Period', 'Publish', 'Min', 'Max', 'Word_Order', 'Scale',
                        'Offset', 'Access', 'Processor', 'Fallback', 'Fallback_After',
                        'While', 'While_Timeout', 'Confirms', 'Via', 'Description', 'Alarm',
-                       'Deadband', 'Max_Silence')
+                       'Deadband', 'Max_Silence', 'Write_Again')
 
 
 def test_every_column_is_there_once_and_described() -> None:
