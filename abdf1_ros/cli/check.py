@@ -185,8 +185,8 @@ def pairs(folder: Path) -> tuple[list[tuple[str, Path, Path]], list[str]]:
     """
     Return name, net and map file of each line below a folder, and all other CSV files.
 
-    The files of a line are NAME_net.csv and NAME_map.csv, or net.csv and map.csv in a folder
-    NAME. One file of a line may be missing. The order is that of the names, line2 before line10.
+    The files of a line are NAME_net.csv and NAME_map.csv, or net.csv and map.csv in a folder NAME.
+    One file of a line may be missing. They are in the order of their names, line2 before line10.
     """
     found: dict[str, dict[str, Path]] = {}
     others = []

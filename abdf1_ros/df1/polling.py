@@ -198,7 +198,7 @@ class StandardPollingMaster:
         if is_good(answer):
             yield from self._answered(number, answer)
             self._unproven.add(number)
-        self._stations.polled_in_vain(begun, self._machine.now)
+        self._stations.polled_silent(begun, self._machine.now)
 
     def _visit(self, number: int, source: TaskSource) -> Procedure:
         """Send what waits, then poll one active station; at our own number only send."""
@@ -365,7 +365,7 @@ class StandardPollingMaster:
             self._end(station, error)
         if number in self._unproven:
             self._unproven.remove(number)
-            self._stations.polled_in_vain(begun, self._machine.now)
+            self._stations.polled_silent(begun, self._machine.now)
 
 
 class StandardPollingMode(MasterMode):

@@ -96,7 +96,7 @@ class Probes:
         """Record that all commands which waited when a station died have had their turn."""
         self.died_at = -math.inf
 
-    def none_waits(self, now: float, asker: Asker = Asker.IN_TURN) -> None:
+    def keep_none_waiting(self, now: float, asker: Asker = Asker.IN_TURN) -> None:
         """Record that probes keep no station waiting: then messages need no turns."""
         self._free = self._put_off = now + self._rest
         self._is_kept_for_message = False

@@ -212,18 +212,18 @@ class ActiveStationList:
         if self[number].replies_in_time or self.is_polled(number) and asker is not Asker.OWN:
             return
         if not self._someone_waits:
-            self.probes.none_waits(now, asker)
+            self.probes.keep_none_waiting(now, asker)
         elif was_silent:
             self.probes.spent(self._took(begun, now), now, asker)
         else:
             self.probes.died(self._took(begun, now), now)
 
-    def polled_in_vain(self, begun: float, now: float) -> None:
+    def polled_silent(self, begun: float, now: float) -> None:
         """Record that the link has asked a silent station from ``begun`` until now."""
         if self._someone_waits:
             self.probes.spent(self._took(begun, now), now)
         else:
-            self.probes.none_waits(now)
+            self.probes.keep_none_waiting(now)
 
     def is_new(self, number: int) -> bool:
         """

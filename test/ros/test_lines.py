@@ -397,13 +397,13 @@ def test_internal_error_restarts_its_line_only_and_its_slow_end_holds_up_no_othe
     monkeypatch.setattr(module, '_RESTART_AFTER', 0.1)
     slow, ended = threading.Event(), threading.Event()
 
-    def say_last_words(node: BridgeNode, give_up: float) -> None:
+    def publish_last_diagnostics(node: BridgeNode, give_up: float) -> None:
         slow.set()
         assert ended.wait(PATIENCE)
 
     plant.start(reads='abc')
     before = {**plant.nodes}
-    monkeypatch.setattr(BridgeNode, 'say_last_words', say_last_words)
+    monkeypatch.setattr(BridgeNode, 'publish_last_diagnostics', publish_last_diagnostics)
     plant.fail('b')
     plant.observer.until(slow.is_set, 'the end of a line')
     assert until_status(plant.observer.diagnostics(plant.plcs['a'].port), 'link', OK)

@@ -64,7 +64,7 @@ class Recorder:
     def end_calls(self) -> None:
         self._record('answer calls')
 
-    def say_last_words(self, give_up: float) -> None:
+    def publish_last_diagnostics(self, give_up: float) -> None:
         self._record('last words')
 
     def get_logger(self) -> Any:

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The options of ``plc``: those of its commands, and those of the line."""
+"""The options of ``plc``: of its commands, and of the line."""
 
 from __future__ import annotations
 
@@ -257,7 +257,7 @@ def _numbers(text: str) -> tuple[int, ...]:
 
 
 def _on_line(add: _Adder, defaults: LineDefaults = _LINE_DEFAULTS) -> _Adder:
-    """Return a function that adds the options of the line and those of ``add``."""
+    """Return a function that adds the options of the line and of ``add``."""
     def complete(parser: argparse.ArgumentParser) -> None:
         add_line_options(parser, defaults)
         if defaults is not _DETECT_DEFAULTS:

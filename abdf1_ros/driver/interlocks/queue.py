@@ -273,7 +273,7 @@ class Interlocks(WriteListener):
             # There is no later for silent PLCs, but those that answer go first.
             only_active |= any(row.is_under_way and plc.is_active
                                for row, plc in self._plc_of.items())
-            self._writing.stations.probes.none_waits(now)
+            self._writing.stations.probes.keep_none_waiting(now)
         if now < min(map(_due_of, self._plcs.values()), default=math.inf):
             return None
         best: tuple[TurnRank, Plc, OwnRow] | None = None

@@ -64,8 +64,8 @@ from std_srvs.srv import SetBool, Trigger
 # Limits of the shutdown (s). Two count from its start: stop waiting for pending writes, and begin
 # no more last diagnostics. The third: longest wait for a stuck subscriber.
 _LATEST_WRITES = LONGEST_END + 1.0
-_LATEST_WORDS = LONGEST_END + 2.0
-_LAST_WORDS = 0.5
+_LATEST_DIAGNOSTICS = LONGEST_END + 2.0
+_LONGEST_PUBLISH = 0.5
 
 _MOST_PROBLEMS = 20  # most faults in the answer of ~/reload
 
@@ -172,7 +172,7 @@ class BridgeNode(AnsweringNode):
         self._surroundings.services.end()
         self.session.link_counters.end()
 
-    def say_last_words(self, give_up: float) -> None:
+    def publish_last_diagnostics(self, give_up: float) -> None:
         """Disconnect guests and publish the last state, at most until a monotonic clock value."""
         self.session.guests.stop()
         self._opener.close()
@@ -290,7 +290,7 @@ def _head(network: Network) -> dict[str, str]:
     return {'check': network.checksum.value, **duplex}
 
 
-def end_together(nodes: Sequence[BridgeNode], patience: float = _LAST_WORDS) -> None:
+def end_together(nodes: Sequence[BridgeNode], patience: float = _LONGEST_PUBLISH) -> None:
     """
     End all nodes together: PLCs, links, results of pending writes, last diagnostics.
 
@@ -312,9 +312,9 @@ def end_together(nodes: Sequence[BridgeNode], patience: float = _LAST_WORDS) -> 
     give_up = time.monotonic() + patience
     for node in nodes:
         # a hundred nodes on a busy host take seconds
-        if time.monotonic() >= begun + _LATEST_WORDS:
+        if time.monotonic() >= begun + _LATEST_DIAGNOSTICS:
             break
         try:
-            node.say_last_words(give_up)
+            node.publish_last_diagnostics(give_up)
         except Exception as error:  # the node may be broken; go on with the rest
             node.get_logger().error(f'its end fails: {bug_text(error)}')

@@ -13,8 +13,8 @@
 # limitations under the License.
 
 """
-Maps made of what other programs export, one module for each format.
+Maps made of exports of other programs, one module for each format.
 
-A row that cannot become a mapping stays in the map as a comment, and is named with its line.
-Nothing is written to the PLC unless the file says that it may be.
+A row that cannot become a mapping stays in the map as a comment, and is named with its line. A row
+may write to the PLC only if the file says so.
 """

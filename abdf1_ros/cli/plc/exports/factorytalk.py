@@ -15,8 +15,8 @@
 """
 Tags of RSView32 and FactoryTalk View: CSV of the tag database.
 
-A line that begins with a semicolon names the columns; those of FactoryTalk View have the PLC as a
-shortcut before the address, [PLC1]N7:0, those of RSView32 in the column Node Name.
+A line that begins with a semicolon names the columns. FactoryTalk View names the PLC by a shortcut
+before the address, [PLC1]N7:0. RSView32 names it in the column Node Name.
 """
 
 from __future__ import annotations
@@ -87,7 +87,7 @@ def _of_device(tag: str, record: Cells, wanted: Wanted) -> FoundRow:
 
 
 def _numbers(record: Cells, command: str) -> Cells:
-    """Return the scaling of an analog tag, and its limits where it is written."""
+    """Return the scaling of an analog tag, and its limits if it is written."""
     if record.get('tag type', '').upper() != 'A':
         return {}
     columns = {'Scale': ('scale', '1'), 'Offset': ('offset', '0')}

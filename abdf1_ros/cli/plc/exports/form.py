@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""What the formats have in common: what is wanted, what a row becomes, and words of many files."""
+"""The common parts of all formats: the wishes of the user, the result of a row, common words."""
 
 from __future__ import annotations
 
@@ -42,12 +42,13 @@ _READ_ONLY = re.compile(r'read.?only|ro', re.IGNORECASE)
 @dataclass(frozen=True, slots=True)
 class Wanted:
     """
-    What is made of each row: one for each of ``stations``, with at least ``period`` ms.
+    The rows to make of each row of a file: one for each station, with at least ``period`` ms.
 
-    With ``read_only`` all are Read rows. ``columns`` are the names of columns that options give,
-    ``node`` the one PLC that is meant where a file has several. With ``has_status`` the words of
-    the status file are taken that have no symbol. Of several stations the tags begin with
-    ``station_N/``.
+    - ``stations``: if there are several, the tags begin with ``station_N/``.
+    - ``read_only``: all rows are Read rows.
+    - ``columns``: names of columns that the user gives by options.
+    - ``node``: the PLC to take if a file has several.
+    - ``has_status``: take words of the status file without a symbol, too.
     """
 
     plc_type: PlcType = PlcType.SLC
@@ -61,7 +62,7 @@ class Wanted:
 
 @dataclass(frozen=True, slots=True)
 class FoundRow:
-    """The cells of a row, the PLC that the file names for it, and what the user should know."""
+    """The cells of a row, the PLC that the file names for it, and remarks for the user."""
 
     cells: Cells
     node: str = ''
@@ -70,13 +71,13 @@ class FoundRow:
 
 @dataclass(frozen=True, slots=True)
 class Ignored:
-    """A row that is not about an address; without ``what`` it is not counted."""
+    """A row without an address; ``what`` it is, or empty for a row that is not counted."""
 
     what: str = ''
 
 
 class Unusable(ValueError):
-    """Why a row about an address cannot be used; ``tag`` names the row."""
+    """The reason why a row with an address cannot be used; ``tag`` names the row."""
 
     def __init__(self, text: str, tag: str = '') -> None:
         super().__init__(text)
@@ -90,10 +91,10 @@ Reader = Callable[[Record], FoundRow | Ignored]
 @dataclass(frozen=True, slots=True)
 class Format:
     """
-    A form of file: what it is, and how it is read.
+    A form of file: its name, and its reader.
 
-    ``reader`` is None where the records are of another form. ConfigurationError where they are of
-    this one, but cannot be used.
+    ``reader`` returns None for records of another form. It raises ConfigurationError for records
+    of this form that cannot be used.
     """
 
     title: str
@@ -106,7 +107,7 @@ def cells_of(**texts: str) -> Cells:
 
 
 def whole_length(address: str, plc_type: PlcType) -> str:
-    """Return the Length of all words where an address is a whole timer or the like, else empty."""
+    """Return the Length of a whole element, such as a timer, at an address; otherwise empty."""
     if re.search('[./-]', address):
         return ''
     try:
@@ -119,7 +120,7 @@ def whole_length(address: str, plc_type: PlcType) -> str:
 
 
 def command_of(text: str, column: str = '') -> str | None:
-    """Return the Command for a cell about access, in a column of this name; None if unknown."""
+    """Return the Command of an access cell in a column of this name; None if unknown."""
     word = text.lower()
     if _READ_ONLY.fullmatch(column):
         return READ if word in _YES else READ_WRITE if word in _NO else _ACCESS.get(word)
@@ -127,7 +128,7 @@ def command_of(text: str, column: str = '') -> str | None:
 
 
 def limited(command: str, wanted: Wanted) -> str:
-    """Return the Command that is wanted; Unusable where a row is only written."""
+    """Return the Command that the user wants; raise Unusable for a row that is only written."""
     if not wanted.read_only:
         return command
     if command == WRITE:
@@ -147,7 +148,7 @@ def scaling(ends: Sequence[str], sign: float = 1.0) -> Cells:
 
 
 def number_text(text: str) -> str:
-    """Return a number as it stands in a map; Unusable for another text."""
+    """Return a number in the form of a map; raise Unusable for another text."""
     value = decimal_number(text.replace(',', '.'))
     if value is None:
         raise Unusable(f'"{shown(text)}" should be a number')

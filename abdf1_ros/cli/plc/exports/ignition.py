@@ -15,8 +15,8 @@
 """
 Tags of Ignition: its JSON export; folders with tags, whose opcItemPath is ns=1;s=[PLC]N7:0.
 
-Each tag becomes a record, so that it is read like the row of any other file. The data type of a
-tag is that of its value in Ignition, not of the words in the PLC.
+Each tag becomes a record, so that it is read like the row of any other file. A tag has the data
+type of its value in Ignition, not of the words in the PLC.
 """
 
 from __future__ import annotations
@@ -47,11 +47,11 @@ _MARK = 'opcItemPath'
 _FIELDS = (_MARK, 'valueSource', 'readOnly', 'documentation', 'engUnit', 'scaleMode', 'rawLow',
            'rawHigh', 'scaledLow', 'scaledHigh')
 _PATH = re.compile(r'(?:ns=\d+;s=)?\[(?P<node>[^]]+)\](?P<address>.+)')
-_MOST_FOLDERS = 50  # in each other
+_MOST_FOLDERS = 50  # folders inside each other
 
 
 def records_of(text: str) -> list[Record]:
-    """Return a record for each tag, after one that names the cells; none for another file."""
+    """Return a record for each tag, after a record that names the cells; none for another file."""
     if not text.lstrip().startswith(('{', '[')) or _MARK not in text:
         return []
     try:
@@ -70,7 +70,7 @@ def records_of(text: str) -> list[Record]:
 
 
 def _tags(node: Any, folder: str, depth: int) -> Iterator[tuple[str, dict[str, Any]]]:
-    """Yield each tag with its name, which has those of its folders."""
+    """Yield each tag with its name, after the names of its folders."""
     if isinstance(node, list):
         for part in node:
             yield from _tags(part, folder, depth)

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The map that a file of another program becomes."""
+"""The map that is made of a file of another program."""
 
 from __future__ import annotations
 
@@ -49,9 +49,9 @@ _COLUMNS = (*NEEDED, 'Length', 'Type', 'Period', 'Scale', 'Offset', 'Min', 'Max'
 @dataclass(slots=True)
 class Import:
     """
-    The rows of a map: ``lines`` as they are written, ``left_out`` what could not be used.
+    The rows of a map: ``lines`` as they are written, ``left_out`` the rows left out.
 
-    ``ignored`` counts rows that are not about an address, ``remarks`` what the user should know.
+    ``ignored`` counts rows without an address, ``remarks`` are for the user.
     """
 
     count: int = 0
@@ -68,9 +68,9 @@ class Import:
 
 def import_map(path: str, wanted: Wanted) -> Import:
     """
-    Return the map that a file becomes.
+    Return the map that is made of a file.
 
-    Raises ConfigurationError where the file cannot be read, or is of no form that is known.
+    Raises ConfigurationError if the file cannot be read, or has no known form.
     """
     records = ignition.records_of(text_of(path)) or read_records(path)
     reader = next(filter(None, (entry.reader(path, records, wanted) for entry in FORMATS)), None)
@@ -97,7 +97,7 @@ def import_map(path: str, wanted: Wanted) -> Import:
 
 
 def _not_known(records: Sequence[Record]) -> str:
-    """Return why records cannot be read, and what would help."""
+    """Return why records cannot be read, with advice."""
     if any(record.first.lower() == 'remark' for record in records[:1]):
         return ('has tags of a Logix controller, which are no addresses; over DF1 it has those of '
                 'its "Map PLC/SLC Messages", which are rows to be written by hand')
@@ -108,7 +108,7 @@ def _not_known(records: Sequence[Record]) -> str:
 
 
 def _check_node(path: str, rows: Sequence[FoundRow], wanted: Wanted) -> None:
-    """Raise ConfigurationError where it is open which PLC of a file is meant."""
+    """Raise ConfigurationError if a file has several PLCs and the user has named none."""
     nodes = dict.fromkeys(row.node for row in rows)
     named = ', '.join(shown(node) or '""' for node in nodes)
     if wanted.node is None and len(nodes) > 1:
@@ -121,7 +121,7 @@ def _check_node(path: str, rows: Sequence[FoundRow], wanted: Wanted) -> None:
 
 def _add(result: Import, seen: dict[str, int], path: str, record: Record, found: FoundRow,
          wanted: Wanted) -> None:
-    """Add the rows of a record where they are good, or say why not."""
+    """Add the good rows of a record, or the reason why it is left out."""
     cells = {'PLC_Type': wanted.plc_type.value, **found.cells}
     names, fault = [], ''
     for row in _rows(cells, wanted):

@@ -13,7 +13,7 @@
 # limitations under the License.
 
 """
-Tags of InTouch: what DBDump writes.
+Tags of InTouch, as DBDump writes them.
 
 A line such as :IOInt names the columns of the tags after it. AccessName is the PLC, ItemName the
 address.
@@ -40,7 +40,7 @@ from abdf1_ros.cli.plc.exports.form import (
 from abdf1_ros.cli.plc.exports.records import Record
 from abdf1_ros.text import shown
 
-# Sections of tags in a PLC; others are of memory, groups and servers.
+# Sections of tags in a PLC; all other sections have memory, groups and servers.
 _IN_PLC = ('iodisc', 'ioint', 'ioreal', 'iomsg')
 _LIMITS = {'Min': 'mineu', 'Max': 'maxeu'}
 
@@ -81,7 +81,7 @@ def _found(record: Cells, section: str, wanted: Wanted) -> FoundRow:
 
 
 def _scaling(record: Cells, command: str) -> Cells:
-    """Return Scale and Offset where raw and engineering units differ, and limits of writes."""
+    """Return Scale and Offset if raw and engineering units differ, and limits of writes."""
     if not record.get('minraw') and not record.get('maxraw'):
         return {}
     if (conversion := record.get('conversion', '')).lower() not in ('', 'linear'):

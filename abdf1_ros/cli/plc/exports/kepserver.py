@@ -15,8 +15,8 @@
 """
 Tags of KEPServerEX: File, Export CSV of a device.
 
-Its columns as Kepware ("CSV Import/Export") and PTC list them; data types and addresses as in the
-help of its driver for Allen-Bradley DF1.
+Kepware ("CSV Import/Export") and PTC list its columns. Data types and addresses are described in
+the help of its driver for Allen-Bradley DF1.
 """
 
 from __future__ import annotations
@@ -53,7 +53,7 @@ _ARRAY = re.compile(r'(?P<address>[^\[]+?)\s*(?P<sizes>(?:\s*\[\d{1,5}\])+)')
 # Addresses in A files count characters, two in a word; a string has its length after "/".
 _CHARACTERS = re.compile(r'A(?P<file>\d{1,3}):(?P<first>\d{1,5})(?:/(?P<count>\d{1,3}))?',
                          re.IGNORECASE)
-# Of a MicroLogix the number may be that of a word of the file, of an SLC that of a slot.
+# For a MicroLogix the number may name a word of the file, for an SLC a slot.
 _SLOT_OR_WORD = re.compile(r'[IO]\d?:\d+(?:/\d+)?', re.IGNORECASE)
 _UNSURE = ('an input or output without its word, such as I:4, is slot 4 of an SLC; of a '
            'MicroLogix it may be word 4: made a Read row, compare its value with the PLC')
@@ -121,7 +121,7 @@ def _characters(match: re.Match[str], kind: str) -> tuple[str, int, str]:
 
 
 def _command(record: Cells, wanted: Wanted) -> tuple[str, str]:
-    """Return Command, and a remark where the file says nothing."""
+    """Return the Command, and a remark if the file has no access cell."""
     text = record.get('client access', '')
     if not text:
         return READ, 'Client Access is empty: made Read rows'

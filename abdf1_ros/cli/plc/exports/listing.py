@@ -13,9 +13,9 @@
 # limitations under the License.
 
 """
-Any list whose first row names the columns: addresses, tags, and what else there is.
+Any list whose first row names the columns, such as addresses and tags.
 
-Names that are usual are found, others are given by the options of ``plc import``.
+Usual names of columns are found. The user gives other names by options of ``plc import``.
 """
 
 from __future__ import annotations
@@ -92,7 +92,7 @@ FORMAT = Format('a list whose first row names its columns (--tag COLUMN --addres
 
 
 def _columns(path: str, head: Record, names: list[str], wanted: Wanted) -> dict[str, int] | None:
-    """Return the columns by role; None where nothing names them."""
+    """Return the columns by role; None if no row names them."""
     columns: dict[str, int] = {}
     for role, name in wanted.columns.items():
         if name.lower() not in names:

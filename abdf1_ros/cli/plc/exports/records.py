@@ -73,7 +73,7 @@ def text_of(path: str) -> str:
     try:
         return raw.decode('utf-16' if raw.startswith(_BYTE_ORDERS) else 'utf-8-sig')
     except UnicodeDecodeError:
-        return raw.decode('cp1252', 'replace')  # as programs on Windows write it
+        return raw.decode('cp1252', 'replace')  # the encoding of programs on Windows
 
 
 def _delimiter(text: str) -> str:

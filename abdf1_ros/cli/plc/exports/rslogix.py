@@ -15,7 +15,7 @@
 """
 Symbols of RSLogix 500 and 5: no header; address, scope, symbol, five lines of description.
 
-Rows about files and rungs stand among them, and every word of the status file.
+Among them stand rows about files and rungs, and every word of the status file.
 """
 
 from __future__ import annotations
@@ -48,7 +48,7 @@ _OTHER_ROWS = re.compile(r'(?P<what>DFILE|PFILE|LAD|RUNG)', re.IGNORECASE)
 def _reader(path: str, records: Sequence[Record], wanted: Wanted) -> Reader | None:
     scopes = [record.cells[1:2] for record in records
               if looks_like_address(record.first.replace('/', ':'))]
-    # Without a scope a list is of some other program, whose columns may mean anything.
+    # A list without a scope comes from another program, whose columns may mean anything.
     if not any(scope and _SCOPE.fullmatch(scope[0]) for scope in scopes) or not all(
             not scope or not scope[0] or _SCOPE.fullmatch(scope[0]) for scope in scopes):
         return None
