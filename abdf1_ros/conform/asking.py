@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Cases of the commands that a driver sends, in every discipline; we answer them."""
+"""Cases of the commands that a driver sends, in every discipline; our end answers them."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ _ASKING = (Target.MASTER, Target.CLIENT, Target.RADIO_CLIENT)
 _ACKNOWLEDGED = (Target.MASTER, Target.CLIENT)
 
 _MOST_COMMANDS = 5
-_CLEARLY = 0.3  # s between what follows a reply and what follows none, for a difference to count
+_CLEARLY = 0.3  # s; least difference between a reply and none, in the time until the next command
 
 
 @case('A command has DST, SRC, CMD, STS 00 and TNS, and the check covers what the manual says.',
@@ -90,7 +90,7 @@ def check_not_doubled(end: AnsweringEnd) -> None:
 
 def _follows(end: AnsweringEnd, command: Symbol,
              answer: Callable[[Symbol], None]) -> tuple[float, Symbol]:
-    """Answer a command; return what follows it, and after how long (s)."""
+    """Answer a command; return the next command, and after how long (s) it came."""
     answer(command)
     begun = end.wire.now
     following = end.next_command('another command')
@@ -98,7 +98,7 @@ def _follows(end: AnsweringEnd, command: Symbol,
 
 
 def expect_not_used(end: AnsweringEnd, *answers: Callable[[Symbol], None]) -> None:
-    """Give answers that are no reply: what follows has to come as late as after none."""
+    """Give answers that are no reply: the next command has to come as late as without one."""
     answered, command = _follows(end, end.next_command(), end.finish)
     unanswered, command = _follows(end, command, end.acknowledge)
     if unanswered < 2 * answered + _CLEARLY:

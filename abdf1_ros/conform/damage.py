@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Cases of damaged messages, which slaves and radio modem nodes pass over alike."""
+"""Cases of damaged messages, which slaves and radio modem nodes ignore alike."""
 
 from __future__ import annotations
 

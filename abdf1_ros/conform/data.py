@@ -45,7 +45,7 @@ _NASTY = bytes.fromhex('10 10 03 10 02 10 05 10 06 10 15 03 02 01 00 FF 10')
 
 
 def _data(reply: bytes) -> bytes:
-    """Return what follows the header of a reply without an error; raises Failed."""
+    """Return the data of a reply without an error; raises Failed."""
     if reply[3]:
         raise Failed('STS 00', f'STS {reply[3]:02X} {reply[HEADER_SIZE:].hex(" ")}'.rstrip())
     return reply[HEADER_SIZE:]
@@ -180,7 +180,7 @@ def _read(end: AskingEnd, count: int, words: Words | None = None) -> bytes:
 
 
 def changes_nothing(end: AskingEnd, send: Callable[[bytes], object]) -> None:
-    """Give ``send`` a command that writes; raises Failed where the words are what it says."""
+    """Give ``send`` a command that writes; raises Failed if the words have changed."""
     words = _words_of(end)
     before = _read(end, words.count)
     written = bytes(byte ^ 0xFF for byte in before)

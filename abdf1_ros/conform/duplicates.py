@@ -31,7 +31,7 @@ _EVERYBODY = (*_ANSWERING, Target.RADIO)
 _SOURCE = 'M 3-4, 4-4, KF2 4-31'
 
 _ECHO = b'\x00twice'
-_OTHER_CMD = 0x0C  # one that no PLC knows: the answer is STS 10 (M 8-2)
+_OTHER_CMD = 0x0C  # a CMD that no PLC knows: the answer is STS 10 (M 8-2)
 
 
 def _carried_out(end: AskingEnd, command: bytes) -> None:

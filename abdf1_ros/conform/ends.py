@@ -30,11 +30,11 @@ POLL_PAUSE = 0.02
 # Longest time (s) until a target that sends by itself sends something.
 PATIENCE = 30.0
 
-HIGHEST_LIMIT = 255  # of repetitions and enquiries that any product can be set to
+HIGHEST_LIMIT = 255  # highest setting of any product for repetitions and enquiries
 
 
 def expect_end_of_naks(wire: Wire, message: bytes, patience: float) -> None:
-    """Refuse a message whenever it comes, until it is given up; Failed where it never is."""
+    """Refuse a message each time, until it is given up; raise Failed if it never is."""
     for _ in range(HIGHEST_LIMIT + 1):
         wire.send(codec.NAK)
         symbol = wire.hear(patience)
@@ -54,8 +54,8 @@ def expect_end_of_enquiries(wire: Wire, patience: float) -> Symbol | None:
                  'products', 'DLE ENQ once more')
 
 
-MOST_TRIES = 3  # of what a full sink may refuse, and of what is asked of a driver
-_MOST_COMMANDS = 20  # in a row that a slave asks by itself
+MOST_TRIES = 3  # tries at a full sink, and commands that a driver is asked for
+_MOST_COMMANDS = 20  # commands in a row that a slave sends by itself
 
 # Longest time of a reply, in answer times.
 _REPLY_TIMES = 5
@@ -77,7 +77,7 @@ class Words:
 
     @property
     def address(self) -> str:
-        """Return the address as people write it."""
+        """Return the address in its usual form."""
         return f'N{self.file}:{self.element}'
 
 
@@ -100,7 +100,7 @@ def check_reply(command: bytes, reply: bytes) -> bytes:
 
 
 class AskingEnd(ABC):
-    """What both ends that ask have: whom they ask (``station``), as whom, and with which TNS."""
+    """The common part of both ends that ask: the ``station`` they ask, their number, the TNS."""
 
     def __init__(self, wire: Wire, station: int, own: int, first_tns: int,
                  words: Words = Words()) -> None:
@@ -108,7 +108,8 @@ class AskingEnd(ABC):
         self.station = station
         self.own = own
         self.words = words
-        self.owed: set[bytes] = set()  # TNS of what was acknowledged and not answered yet
+        # TNS of commands that were acknowledged and not answered yet
+        self.owed: set[bytes] = set()
         self._next_tns = first_tns
 
     def command(self, cmd: int = 0x06, body: bytes = b'\x00', tns: int | None = None) -> bytes:
@@ -174,7 +175,7 @@ class AskingEnd(ABC):
             raise Failed(f'no answer: {what}', str(symbol))
 
     def attempt(self, command: bytes) -> bytes | None:
-        """Return the reply to a command; None where it is not taken."""
+        """Return the reply to a command; None if the command is not taken."""
         try:
             self.deliver(command)
         except Failed:
@@ -342,7 +343,7 @@ class AnsweringEnd(ABC):
         return symbol
 
     def acknowledge(self, command: Symbol) -> None:
-        """Acknowledge a command, where messages are."""
+        """Acknowledge a command, if this discipline has acknowledgements."""
         self.wire.send(codec.ACK)
 
     @abstractmethod

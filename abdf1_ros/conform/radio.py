@@ -16,7 +16,7 @@
 Cases for a node of a DF1 radio modem network: one that answers commands, and one that sends them.
 
 "SLC 13-76" is 1747-RM001G, page 13-76; "ML11 517" is 1763-RM001C, page 517. The target is alone on
-the line. It may send packets for others on, once; which ones, is its setting.
+the line. It may forward packets for other nodes, once; its settings decide which.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ _SENDING_ON = 'ML11 517 to 522'
 
 _BROADCAST = 0xFF
 _ACK_TIMEOUT = 6.0  # s after which the slowest full-duplex node has asked for a DLE ACK
-_MOMENT = 0.3  # s in which a node that takes what it should not has gone on
+_MOMENT = 0.3  # s; a node that accepts a wrong reply sends its next command within this time
 _COUNTERS = b'\x01\x00\x00\x1A'  # FNC, address and size of a read of diagnostic counters
 
 

@@ -25,7 +25,7 @@ from typing import Protocol
 from abdf1_ros.conform import codec
 from abdf1_ros.conform.codec import BlockCheck, Symbol, SymbolKind
 
-# A symbol that has begun may take as long as the longest frame on a slow line, but not for ever.
+# A symbol that has begun may take as long as the longest frame on a slow line, not longer.
 _FRAME_TIME = 3.0
 _LONGEST_FRAME = 1000  # bytes; twice the largest packet, if every byte of it is doubled
 
@@ -53,7 +53,7 @@ class Sent:
 
 
 class Failed(Exception):
-    """The other end has broken the rule."""
+    """The target has broken the rule."""
 
     def __init__(self, expected: str, got: str) -> None:
         super().__init__(f'expected {expected}, got {got}')
@@ -62,7 +62,7 @@ class Failed(Exception):
 
 
 def expect_same(first: bytes, second: bytes) -> None:
-    """Fail where a message that was to come again has come with other bytes."""
+    """Fail if a message was to come again and has come with other bytes."""
     if second != first:
         raise Failed(f'the same message again: {first.hex(" ")}', second.hex(' '))
 
@@ -76,14 +76,14 @@ class Wire:
     One end of a line.
 
     ``answer_time`` is the longest time (s) of an answer, and the time without bytes that counts as
-    silence. It counts from the end of what was sent, at ``char_time`` s a byte. Where it
-    ``is_radio`` nothing has a response, so DLE ENQ gets none. ``transcript`` keeps all bytes in
-    order; ``has_heard`` tells whether any byte came. A response inside a message is heard before
-    that message. ``enquired_after`` is the shortest time (s) from a message of the target to its
-    DLE ENQ. With ``passes_commands`` a command of the target itself, such as a MSG of its program,
-    is acknowledged and ignored. Bytes outside of any symbol are ignored, as M 4-7 to 4-9 has it,
-    and counted in ``noise``; DLE with a code that no symbol has is an answer. By radio a reply
-    that comes again, as a node has sent it on, is ignored too (ML11 517 to 522).
+    silence. It counts from the end of the sent bytes, at ``char_time`` s a byte. With ``is_radio``
+    no message has a response, so DLE ENQ gets none. ``transcript`` keeps all bytes in order;
+    ``has_heard`` tells whether any byte came. A response inside a message is heard before that
+    message. ``enquired_after`` is the shortest time (s) from a message of the target to its DLE
+    ENQ. With ``passes_commands`` a command of the target itself, such as a MSG of its program, is
+    acknowledged and ignored. Bytes outside of any symbol are ignored, as M 4-7 to 4-9 has it, and
+    counted in ``noise``; DLE with a code that no symbol has is an answer. By radio a forwarded
+    reply that comes again is ignored, too (ML11 517 to 522).
     """
 
     def __init__(self, line: RawLine, check: BlockCheck, clock: Callable[[], float], *,
@@ -115,7 +115,7 @@ class Wire:
         return self._clock()
 
     def begin(self, limit: float) -> None:
-        """Begin a case, of at most ``limit`` s; after that it is Skipped wherever it is."""
+        """Begin a case of at most ``limit`` s; after that time it is Skipped."""
         self.transcript.clear()
         self._limit = self._clock() + limit
 
@@ -146,7 +146,7 @@ class Wire:
         return symbol
 
     def _has_passed(self, symbol: Symbol, answers: bool) -> bool:
-        """Return True for what is ignored; answer a DLE ENQ or a command of the target."""
+        """Return True for an ignored symbol; answer a DLE ENQ or a command of the target."""
         if symbol.kind is SymbolKind.NOISE and symbol.raw[:1] != _DLE:
             self.noise += len(symbol.raw)
             return True
@@ -156,12 +156,12 @@ class Wire:
         if answers and not self._is_radio and symbol.kind is SymbolKind.ENQ:
             self.send(self._response)
             return True
-        # A slave has to be polled again for what it has beside a command.
+        # A slave has to be polled again for its next message after a command.
         return self._passes_commands and not self.is_half_duplex \
             and self.has_passed_command(symbol)
 
     def has_passed_command(self, symbol: Symbol) -> bool:
-        """Acknowledge a command that does not repeat one of ours; tell whether it was that."""
+        """Acknowledge a command that does not repeat ours; return True if it was one."""
         if not codec.is_command(symbol) or any(
                 symbol.raw in entry.raw for entry in self.transcript if isinstance(entry, Sent)):
             return False
@@ -233,7 +233,7 @@ class Wire:
         raise Failed(what, f'nothing of the kind in {within:g} s')
 
     def rest(self, seconds: float) -> None:
-        """Wait, and leave unread what comes."""
+        """Wait, and leave incoming bytes unread."""
         end = self._clock() + seconds
         while (left := end - self._clock()) > 0:
             self._read(left)

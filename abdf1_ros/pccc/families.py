@@ -42,7 +42,7 @@ def decode_identity(data: bytes) -> Identity:
     Read the data of a reply to 06/03.
 
     Data of an unknown layout are shown in hexadecimal. Raises FormatError for a reply that is too
-    short to tell.
+    short.
     """
     if len(data) < 2:
         raise FormatError(f'a diagnostic status of {len(data)} bytes')

@@ -42,13 +42,15 @@ class Family:
 
     ``dialects`` has the usual access first. ``decode_identity`` returns None for the reply of
     another family to 06/03. ``encode_identity`` makes the reply of an emulated processor.
-    ``described`` has its commands in words. ``meanings`` explains its own error codes.
-    ``by_processor`` is for a family whose processors take packets of different lengths.
-    ``served_counters`` returns the layout of a port in a mode (Master, Slave, Peer, Radio), None
-    where its counters are not emulated; they are at every address where ``counters_anywhere``.
-    ``is_spoken_by_all`` tells that PLCs of other families know its commands too. ``file_search``
-    finds out which files a PLC has, None where they cannot be looked for. ``clock`` is the first
-    of six words: year, month, day, hour, minute, second.
+    ``described`` has its commands in words. ``meanings`` explains its own error codes. -
+    ``by_processor``: set if its processors take packets of different lengths.
+
+    - ``served_counters``: the counter layout of a port in a mode (Master, Slave, Peer, Radio),
+      None if its counters are not emulated.
+    - ``counters_anywhere``: the counters are at every address.
+    - ``is_spoken_by_all``: PLCs of other families know its commands, too.
+    - ``file_search``: finds the files of a PLC, None if there is no way.
+    - ``clock``: first of six words: year, month, day, hour, minute, second.
     """
 
     addressing: Addressing
@@ -68,7 +70,7 @@ class Family:
 
     @property
     def plc_type(self) -> PlcType:
-        """Return what the CSV files call it."""
+        """Return the name of the family in the CSV files."""
         return self.addressing.plc_type
 
     @property

@@ -42,7 +42,7 @@ class Reader:
 
     @property
     def is_empty(self) -> bool:
-        """Tell whether everything has been taken."""
+        """Tell whether all bytes have been taken."""
         return self._position == len(self._data)
 
     def take(self, count: int) -> bytes:

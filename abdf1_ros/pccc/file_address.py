@@ -44,7 +44,7 @@ _FIXED_FILES = {FileType.OUTPUT: 0, FileType.INPUT: 1, FileType.STATUS: 2, **FUN
 _FIRST_FREE_FILE = 3
 # Files of words whose bits may be numbered from the first word on.
 _FLAT_BITS = (FileType.BINARY, FileType.INTEGER, FileType.ASCII, FileType.BCD)
-# S0 writes "/" before a word of such an element, others write it before a bit.
+# S0 writes "/" before a word of such an element; other programs write it before a bit.
 _NAMED_BITS = (FileType.TIMER, FileType.COUNTER, FileType.CONTROL)
 # Files that exist, but that we do not know well enough to read.
 _OTHER_FILES = {'CT': 'ControlNet transfer', 'PLS': 'programmable limit switch',
@@ -52,7 +52,7 @@ _OTHER_FILES = {'CT': 'ControlNet transfer', 'PLS': 'programmable limit switch',
 
 
 class FileAddressing(Addressing):
-    """What the addresses of both families have in common."""
+    """The common part of the addresses of both families."""
 
     last_file: ClassVar[int]
     is_by_file = True
@@ -89,14 +89,14 @@ class FileAddressing(Addressing):
 
     @abstractmethod
     def mistaken(self, text: str) -> str | None:
-        """Return what is wrong with a text in capitals that is an address elsewhere."""
+        """Return the fault of a text in capitals that is an address in another family."""
 
     def is_octal(self, kind: FileType) -> bool:
         """Tell whether elements and bits of such a file are octal."""
         return False
 
     def elements_name(self, kind: FileType, is_flat: bool) -> str:
-        """Return what the elements of such a file are called."""
+        """Return the name of the elements of such a file."""
         return 'elements'
 
     def _kind(self, letters: str) -> FileType:

@@ -32,7 +32,7 @@ class DataFile:
     """
     A file with its elements.
 
-    Those of the images of inputs and outputs are words, 0 where they cannot be counted.
+    The elements of the images of inputs and outputs are words, 0 if they cannot be counted.
     """
 
     type: FileType  # noqa: A003
@@ -45,13 +45,13 @@ class DataFile:
 
 
 class FileSearch(Protocol):
-    """How the files of a family are found."""
+    """The search for the files of a PLC of one family."""
 
     def directory(self, processor: Processor | None) -> Steps[list[DataFile]] | None:
         """
         Return the steps that read the processor's own list of files, None where none is known.
 
-        They raise RemoteError, LinkError, or FormatError for what is not such a list.
+        They raise RemoteError, LinkError, or FormatError for data that are not such a list.
         """
 
     def look_for(self, number: int) -> Steps[DataFile | None]:

@@ -28,8 +28,8 @@ class PlcType:
     """
     The name of a PLC family; ``value`` is what the CSV files call it (S0, PLC_Type).
 
-    The four of the specification have names here, for code and tests about one of them; which
-    families there are is in ``families``.
+    The four families of the specification have names here, for code and tests about one of them.
+    ``families`` has all families.
     """
 
     value: str
@@ -93,7 +93,7 @@ class FileType(Enum):
 
     @property
     def is_structure(self) -> bool:
-        """Tell whether elements are made of words that mean different things."""
+        """Tell whether the words of an element have different meanings."""
         return self in _STRUCTURES
 
     @property
@@ -106,7 +106,7 @@ DEFAULT_FILES = {
     FileType.OUTPUT: 0, FileType.INPUT: 1, FileType.STATUS: 2, FileType.BINARY: 3,
     FileType.TIMER: 4, FileType.COUNTER: 5, FileType.CONTROL: 6, FileType.INTEGER: 7,
     FileType.FLOAT: 8}
-# By the numbers with which a MicroLogix 1400 was read by its programming software.
+# The numbers with which the programming software read a MicroLogix 1400.
 FUNCTION_FILES = {
     FileType.HSC: 0, FileType.PTO: 1, FileType.PWM: 2, FileType.STI: 3, FileType.EII: 4}
 _STRUCTURES = (

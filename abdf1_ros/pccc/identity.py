@@ -13,10 +13,10 @@
 # limitations under the License.
 
 """
-What a processor or module tells about itself in the reply to a diagnostic status command (06/03).
+The identity of a processor or module: its reply to a diagnostic status command (06/03).
 
-Each family has layouts of its own: ``identity`` in the folders of the families, and
-``gateways``; ``families`` finds out which one a reply has.
+Each family has layouts of its own, in ``identity`` of its folder; ``gateways`` has more.
+``families`` finds the layout of a reply.
 """
 
 from __future__ import annotations
@@ -51,7 +51,7 @@ class Mode(Enum):
 
     @property
     def is_running(self) -> bool:
-        """Tell whether the program runs and drives outputs, which it does not in a test."""
+        """Tell whether the program runs and drives outputs; in a test mode it does not."""
         return self in (Mode.REMOTE_RUN, Mode.RUN)
 
     @property
@@ -69,7 +69,7 @@ _MODULE_COUNTERS = 55
 
 @dataclass(frozen=True, slots=True)
 class Inquiry:
-    """A request that a station is asked for more with, and what its reply's data make of it."""
+    """A second request to a station, and the identity that its reply completes."""
 
     request: Request
     answered: Callable[[bytes], Identity]
@@ -80,14 +80,18 @@ class Identity:
     """
     The type of a station, its mode, and its faults.
 
-    ``plc_type`` is None where the family is unknown; ``mode`` None where the reply has none or
-    one without a name, which is then in ``mode_text``. ``faults`` keep a processor from doing its
-    work, ``remarks`` do not. ``name`` is in the processor's own words with control characters
-    made visible, ``memory`` in its own unit, empty where it does not say. ``interface`` is the
-    code of the port that was asked. Its counters have a ``counter_layout``, or are bytes of the
-    module: at ``counter_address``, ``counter_size`` of them. ``processor`` is what the map file
-    would call it, None where it has no word for it. ``inquiry`` tells more about a fault.
-    A gateway or a computer card ``has_no_processor``.
+    - ``plc_type``: None if the family is unknown.
+    - ``mode``: None if the reply has no mode, or a mode without a name; its code is then in
+      ``mode_text``.
+    - ``faults``: faults that keep a processor from its work; ``remarks``: other facts.
+    - ``name``: the processor's own name, with control characters made visible.
+    - ``memory``: in the processor's own unit, empty if it does not say.
+    - ``interface``: code of the port that was asked.
+    - ``counter_layout``: layout of its counters. Without one they are ``counter_size`` bytes at
+      ``counter_address``.
+    - ``processor``: its name in the map file, None if the map file has none.
+    - ``inquiry``: a request that tells more about a fault.
+    - ``has_no_processor``: it is a gateway or a computer card.
     """
 
     plc_type: PlcType | None
@@ -130,7 +134,7 @@ class Identity:
 
 
 def mode_of(modes: dict[int, Mode], code: int) -> tuple[Mode | None, str]:
-    """Return a mode and its text, which is the code where it has no name."""
+    """Return a mode and its text; without a name the text is the code."""
     mode = modes.get(code)
     return mode, mode.value if mode else f'mode 0x{code:02X}'
 
@@ -165,5 +169,5 @@ def name_in(data: bytes) -> str:
 
 
 def named(conditions: dict[str, int]) -> tuple[str, ...]:
-    """Return the names of those that hold."""
+    """Return the names whose condition holds."""
     return tuple(name for name, holds in conditions.items() if holds)

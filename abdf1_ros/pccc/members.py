@@ -69,8 +69,8 @@ COUNTER = _CONTROL_WORD | _values(1, 'PRE', 'ACC') | _flags(
 CONTROL = _CONTROL_WORD | _values(1, 'LEN', 'POS') | _flags(
     0, EN=15, EU=14, DN=13, EM=12, ER=11, UL=10, IN=9, FD=8)
 
-# Words: publication 1775-6.5.5 A-15; bits as other drivers for a PLC-3 name them. Those also
-# say that only the program may change them.
+# Words: publication 1775-6.5.5 A-15; bits as other drivers for a PLC-3 name them. These drivers
+# also say that only the program may change them.
 _PLC3_VALUES = _read_only(_values(0, 'CTL')) | _values(1, 'PRE', 'ACC')
 PLC3_TIMER = _PLC3_VALUES | _read_only(_flags(0, EN=15, TT=14, DN=13))
 PLC3_COUNTER = _PLC3_VALUES | _read_only(_flags(0, CU=15, CD=14, DN=13, OV=12, UF=11))

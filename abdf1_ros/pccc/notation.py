@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""How commands are put into words: what the families share."""
+"""Commands in words: the part that all families share."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ def hexadecimal(data: bytes) -> str:
 
 @dataclass(frozen=True, slots=True)
 class KnownCommand:
-    """A command: what it does, how it is read, what it says, and what its reply's data are."""
+    """A command: its effect, its reader, its text, and the text of its reply."""
 
     name: str
     effect: Effect = Effect.OTHER

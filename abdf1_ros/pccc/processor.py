@@ -23,7 +23,7 @@ from abdf1_ros.pccc.file_types import FileType, FUNCTION_FILES
 
 
 class Processor(Enum):
-    """An SLC 500 or MicroLogix processor; the value is what the map file calls it."""
+    """An SLC 500 or MicroLogix processor; the value is its name in the map file."""
 
     SLC_5_01 = '5/01'
     SLC_5_02 = '5/02'
@@ -48,12 +48,12 @@ class Processor(Enum):
 
     @property
     def may_lack_masked_write(self) -> bool:
-        """Tell whether it may lack the masked write (0F/AB): no manual says that it has it."""
+        """Tell whether it may lack the masked write (0F/AB), which no manual lists for it."""
         return _MODELS[self] in (_OLD, _ML1000)
 
     @property
     def has_clock(self) -> bool:
-        """Tell whether S:37 to S:42 are its clock, to be read and to be set."""
+        """Tell whether S:37 to S:42 are its clock, which can be read and set."""
         return _MODELS[self] is _NEW
 
     @property

@@ -25,11 +25,11 @@ A capture is ASCII, one line for each chunk of bytes as it was read or written::
     0.000000 > 10 05 01 FF
     0.004210 < 10 04
 
-The first line gives the version of the format. Other lines with ``#`` are settings, "name:
-value", or remarks, and may stand anywhere; "guest: A40E pty:/tmp/hmi" says that the next command
-with TNS A40E is that guest's (column Share). A chunk has the seconds since ``begun``, its
-direction (``>`` sent by whoever has recorded it, or by the first port of a tap; ``<`` received,
-or sent by the second port; ``?`` not known), and its bytes in hexadecimal.
+The first line gives the version of the format. Other lines with ``#`` are settings, "name: value",
+or remarks, and may stand anywhere; "guest: A40E pty:/tmp/hmi" says that the next command with TNS
+A40E is that guest's (column Share). A chunk has the seconds since ``begun``, its direction (``>``
+sent by the recording program, or by the first port of a tap; ``<`` received, or sent by the second
+port; ``?`` not known), and its bytes in hexadecimal.
 """
 
 from __future__ import annotations
@@ -54,7 +54,7 @@ _SHOWN = 60
 
 
 class Direction(Enum):
-    """Which way a chunk went; the value is how a capture writes it."""
+    """The direction of a chunk; the value is its character in a capture."""
 
     OUT = '>'
     IN = '<'
@@ -89,10 +89,10 @@ class CaptureWriter:
     """
     Write a capture to ``path``, and begin a new file when it has become too long.
 
-    ``limit`` is the most bytes on the disk: at half of it the file is renamed to ``<path>.1``,
-    in place of an older one, as is a capture that is there already. Every line is handed to the
-    operating system at once, whole or not at all. Raises OSError, also where ``path`` is something
-    else than a capture, which is left alone.
+    ``limit`` is the most bytes on the disk: at half of it the file is renamed to ``<path>.1``, in
+    place of an older one, as is a capture that is there already. Every line is handed to the
+    operating system at once, whole or not at all. Raises OSError, also if ``path`` is another file
+    than a capture; that file stays as it is.
     """
 
     def __init__(self, path: Path, limit: float = math.inf,
@@ -132,7 +132,7 @@ class CaptureWriter:
             while left:
                 left = left[self._file.write(left):]
         except OSError:
-            self._file.truncate(self._written)  # half a line would tell of other bytes
+            self._file.truncate(self._written)  # half a line would mean other bytes
             raise
         self._written += len(line)
 
@@ -144,7 +144,7 @@ def setting_line(name: str, value: str) -> str:
 
 
 def _is_capture(path: Path) -> bool:
-    """Tell whether a file may be put aside: a capture, or one with nothing in it."""
+    """Tell whether a file may be put aside: a capture, or an empty file."""
     if not path.is_file():
         return False
     with path.open('rb') as file:
@@ -160,7 +160,7 @@ def read_capture(name: str, lines: Iterable[str], settings: dict[str, str]) -> I
     """
     Yield the chunks of a capture, and put its settings into ``settings`` as they come.
 
-    ``name`` names the file in the Problem that is raised for a line that is not one of a capture.
+    ``name`` names the file in the Problem that is raised for a line that no capture has.
     """
     guest = ''
     for number, text in enumerate(lines, 1):

@@ -32,7 +32,7 @@ _MOST_OPEN = 1000
 # By radio modem, a message that comes again within this time (s) is treated as forwarded by a
 # node. Its sender waits for longer until it repeats it: for the time-out of its command.
 _FORWARDED_WITHIN = 1.0
-_MOST_RECENT = 20  # messages; a node that sends on remembers as many (1763-RM001C)
+_MOST_RECENT = 20  # messages; a forwarding node remembers as many (1763-RM001C)
 
 _Key = tuple[int, int, int]
 
@@ -56,7 +56,7 @@ class Transaction:
 
 
 class MessageFacts(NamedTuple):
-    """What the messages before a message tell about it."""
+    """Facts about a message that follow from the messages before it."""
 
     command: Packet | None = None
     latency: float | None = None
@@ -66,9 +66,9 @@ class MessageFacts(NamedTuple):
 
 class Copies:
     """
-    Tell, by radio modem, what a node sends on from what its sender repeats.
+    Separate, by radio modem, forwarded messages from messages that their sender repeats.
 
-    ``recorder`` is the number of the node at ``>``, where all that is said there first has one.
+    ``recorder`` is the number of the node at ``>``, if all first messages there have one number.
     """
 
     def __init__(self) -> None:
@@ -80,7 +80,7 @@ class Copies:
         return min(self._recorders) if len(self._recorders) == 1 else None
 
     def mark(self, packet: Packet, time: float | None, direction: Direction) -> Mark | None:
-        """Return what a message is that has come before, None for a new one."""
+        """Return the mark of a message that has come before, None for a new message."""
         begun, side = self._recent.get(packet, (None, direction))
         age = None if time is None or begun is None else abs(time - begun)
         is_new = packet not in self._recent or (age or 0.0) > _PATIENCE
@@ -115,7 +115,7 @@ class Conversation:
 
     def take(self, packet: Packet, time: float | None, direction: Direction,
              from_master: bool, is_radio: bool = False) -> MessageFacts:
-        """Return what is known of a message; ``from_master`` tells frames with DLE SOH."""
+        """Return the facts about a message; ``from_master`` is set for frames with DLE SOH."""
         mark = self._repetition(packet, from_master)
         self._last[direction] = self._said[*_path(packet), from_master]
         copy = self.copies.mark(packet, time, direction)
@@ -188,7 +188,7 @@ class Conversation:
             return
         if known is not None and not known.answered:
             self._given_up.append(known)  # its TNS is used for another command
-        self._open.pop(key, None)  # the new one takes its place at the end
+        self._open.pop(key, None)  # the new command takes its place at the end
         tns, guest = self._guest
         is_guests = tns == f'{command.tns:04X}'
         if is_guests:

@@ -74,7 +74,7 @@ class Recording:
 
     @property
     def percent(self) -> int:
-        """Return how much of the file has been read, where it has a size."""
+        """Return how much of the file has been read, None without a size."""
         return 100 * self._position // max(1, self._size)
 
     def chunks(self) -> Iterator[Chunk]:
@@ -169,7 +169,8 @@ def read_words(name: str, lines: Iterable[str]) -> Iterator[Chunk]:
     """
     Yield the chunks of a dump in words, whose offsets are hexadecimal or octal.
 
-    The last offset tells whether the last word is one byte. Problem where the offsets do not fit.
+    The last offset shows whether the last word is one byte. Raises Problem if the offsets do not
+    fit.
     """
     data, last = b'', b''
     is_repeated = False

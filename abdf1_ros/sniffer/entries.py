@@ -25,7 +25,7 @@ from abdf1_ros.sniffer.capture import Direction
 
 
 class Kind(Enum):
-    """What an entry is; the value is its name in text and JSON."""
+    """The kind of an entry; the value is its name in text and JSON."""
 
     POLL = 'poll'
     COMMAND = 'command'
@@ -48,7 +48,7 @@ class Mark(Enum):
     A message that comes again is a duplicate if the receiver has acknowledged it; the receiver has
     to drop it (M 3-4). Before the acknowledgement it is a retransmission. A master passes messages
     of slaves to slaves on as they are. By radio modem, a message that comes again soon or from the
-    opposite side has been forwarded by a node. A stray reply is one to no command that was seen.
+    opposite side has been forwarded by a node. A stray reply answers no command that was seen.
     """
 
     RETRANSMISSION = 'retransmission'
@@ -64,13 +64,14 @@ class Entry:
     """
     A thing that was seen on the line, and what is known of it.
 
-    ``time`` is seconds, None where the recording has no times. ``station`` is the slave, or
-    on a full-duplex line the node that commands go to and replies come from. ``valid`` is the
-    verdict of the check of kind ``checksum``, None where there is no check. ``latency`` is the
-    seconds from a command to its reply. ``size`` counts the bytes of noise. ``wire`` has the bytes
-    on the line; it is empty for silence, for a missing reply and for noise. ``guest`` is the place
-    of the guest (column Share) whose command the recording node has sent, ``request`` the command
-    that a reply is to.
+    - ``time``: seconds, None if the recording has no times.
+    - ``station``: the slave; on a full-duplex line the node that gets commands and sends replies.
+    - ``valid``: verdict of the check of kind ``checksum``, None without a check.
+    - ``latency``: seconds from a command to its reply.
+    - ``size``: number of bytes of noise.
+    - ``wire``: the bytes on the line, empty for silence, a missing reply and noise.
+    - ``guest``: place of the guest (column Share) whose command the recording node has sent.
+    - ``request``: the command that a reply answers.
     """
 
     time: float | None

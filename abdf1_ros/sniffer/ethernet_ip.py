@@ -18,7 +18,7 @@ Traffic out of recorded packets: DF1 that ``sniff`` has written, and PCCC inside
 PCCC goes through TCP port 44818 in CIP service 4B (Execute PCCC) of the PCCC object (class 67).
 The service may stand inside of an Unconnected Send (52). It has no frame, check, DST and SRC: the
 last numbers of the IP addresses stand for these two, for a second address with the same last
-number one that is free. A response names no class: it is PCCC where its request was seen.
+number one that is free. A response names no class: it counts as PCCC if its request was seen.
 """
 
 from __future__ import annotations
@@ -56,7 +56,7 @@ _PCCC_OBJECT = b'\x20\x67', b'\x21\x00\x67\x00'  # a path begins with its class
 
 
 class _Stations:
-    """Numbers that stand for IP addresses: the last of the address, or one that is free."""
+    """Numbers that stand for IP addresses: the last of the address, or a free number."""
 
     def __init__(self) -> None:
         self._numbers: dict[bytes, int] = {}
@@ -74,8 +74,8 @@ class _Stream:
     """
     The bytes of one direction of a TCP connection, in their order.
 
-    A segment that comes before its time waits, but not where it is whole messages: these may not
-    come after what answers them.
+    An early segment waits for the segments before it. A segment of whole messages does not wait:
+    it must not come after its answers.
     """
 
     def __init__(self) -> None:
@@ -192,7 +192,7 @@ class Seen:
 
 def chunks_of(packets: Iterable[RecordedPacket], seen: Seen) -> Iterator[Chunk]:
     """
-    Yield what DF1 and PCCC there is in packets, with times (s) from the first packet on.
+    Yield the DF1 and PCCC of packets, with times (s) from the first packet on.
 
     TCP ports come into ``seen``, and packets that were cut, of which nothing is decoded.
     """
@@ -240,7 +240,7 @@ def _tcp(link_type: int, data: bytes) -> tuple[bytes, int, bytes, bool] | None:
 
 
 def _pccc(message: bytes) -> Iterator[tuple[bool, bytes]]:
-    """Yield whether it is a response, and CMD, STS, TNS and what follows of each Execute PCCC."""
+    """Yield for each Execute PCCC whether it is a response, CMD, STS, TNS and the rest."""
     at = 8
     for _ in range(int.from_bytes(message[6:8], 'little')):
         item, size = int.from_bytes(message[at:at + 2], 'little'), int.from_bytes(

@@ -15,10 +15,10 @@
 """
 Logs of serial port monitors, by one rule for all.
 
-A line has an optional time, a word or sign for the direction, and bytes as pairs of hexadecimal
-digits with blanks, commas or dashes between; characters beside them have to be the same bytes. A
-line without bytes tells time and direction of the lines after it. What fits the rule in two ways
-is refused.
+A line has an optional time, a word or sign for the direction, and bytes. The bytes are pairs of
+hexadecimal digits with blanks, commas or dashes between. Characters beside them have to be the
+same bytes. A line without bytes gives time and direction of the lines after it. A line that fits
+the rule in two ways is refused.
 """
 
 from __future__ import annotations
@@ -107,7 +107,7 @@ class LogReader:
 
 
 def _divided(line: str) -> tuple[str, bytes]:
-    """Return what stands before the bytes of a line, and these; ValueError where it is unclear."""
+    """Return the head of a line and its bytes; raise ValueError if the border is unclear."""
     if match := _LITERAL.search(line):
         data = ast.literal_eval(match[0])
         assert isinstance(data, bytes)

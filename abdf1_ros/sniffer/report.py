@@ -69,7 +69,7 @@ def _shade(entry: Entry) -> str:
 
 
 def json_line(entry: Entry) -> str:
-    """Return an entry as a JSON object; what is not known is left out."""
+    """Return an entry as a JSON object, without unknown values."""
     fields: dict[str, object] = {
         'time': None if entry.time is None else round(entry.time, 6),
         'direction': entry.direction.value, 'kind': entry.kind.value,

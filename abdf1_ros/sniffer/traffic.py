@@ -70,9 +70,9 @@ class TrafficDecoder:
     Decode the traffic of one line, whatever the bytes are; nothing is raised.
 
     ``feed`` takes chunks in the order of their times, ``finish`` ends the traffic. Check and
-    duplex are found where they are not given; ``kind`` tells what they are. A ``checksum`` that is
-    not ``is_certain`` is a guess that the frames may prove wrong. Where the direction
-    is not known it is inferred on half-duplex lines, ``>`` being the master's.
+    duplex are found if they are not given; ``kind`` has them. A ``checksum`` that is not
+    ``is_certain`` is a guess that the frames may prove wrong. On half-duplex lines an unknown
+    direction is inferred: ``>`` is from the master.
     """
 
     def __init__(self, checksum: Checksum | None = None, duplex: Duplex | None = None, *,
@@ -80,7 +80,7 @@ class TrafficDecoder:
         self.kind = LineKind(checksum, duplex, is_certain and checksum is not None)
         self._wires: dict[Direction, _OneDirection] = {}
         self._conversation = Conversation()
-        self._station: int | None = None  # the last one that the master sent something to
+        self._station: int | None = None  # the last station that the master sent to
         self._awaited: tuple[Direction, str] | None = None  # asker, and question
         self._last_asker = Direction.OUT
         self._finds_duplex = duplex is None
@@ -104,7 +104,7 @@ class TrafficDecoder:
             wire = self._wires[chunk.direction] = _OneDirection(self.kind)
         for direction, other in self._wires.items():
             is_end = other is wire and wire.ends_before(chunk)
-            if is_end or other is not wire:  # who is answered has said all of the check
+            if is_end or other is not wire:  # an answer shows that the check was complete
                 yield from self._whole(other, direction, is_end)
         wire.last_time = chunk.time
         for start in range(0, len(chunk.data) or 1, _PART):
@@ -114,7 +114,7 @@ class TrafficDecoder:
                 yield from self._entries(symbol, chunk, wire.decoder)
 
     def finish(self) -> Iterator[Entry]:
-        """Yield what is left at the end."""
+        """Yield the entries that are left at the end."""
         for direction, wire in self._wires.items():
             yield from self._whole(wire, direction, is_end=True)
         times = [wire.last_time for wire in self._wires.values() if wire.last_time is not None]
@@ -122,7 +122,7 @@ class TrafficDecoder:
             yield self._unanswered(transaction, max(times, default=None))
 
     def _whole(self, wire: _OneDirection, direction: Direction, is_end: bool) -> Iterator[Entry]:
-        """Yield a frame that has a right BCC and waits for more; at an end, what is left too."""
+        """Yield a frame with a right BCC that waits for more bytes; at an end, also the rest."""
         symbol = wire.decoder.finish()
         if is_end:
             if symbol is None and wire.decoder.in_message:

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The PLC-2: addresses, commands, what we say to it and what it answers."""
+"""The PLC-2: addresses, commands, and both ends: client and server."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ from abdf1_ros.pccc.plc2.dialect import Plc2Dialect
 from abdf1_ros.pccc.plc2.server import Plc2Commands
 from abdf1_ros.pccc.status import Meanings
 
-# What STS mean that a PLC-2's module sends (M 8-5).
+# The meaning of an STS from the module of a PLC-2 (M 8-5).
 MEANINGS = Meanings(sts={
     0x20: 'the PLC has found errors when it verified a command',
     0x30: 'the PLC needs attention: switch, cable or fault',

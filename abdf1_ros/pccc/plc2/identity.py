@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""What a module in front of a PLC-2 says of its processor and of itself (M 10-7, 10-17)."""
+"""The identity that a module in front of a PLC-2 reports (M 10-7, 10-17)."""
 
 from __future__ import annotations
 

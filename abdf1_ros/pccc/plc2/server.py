@@ -13,9 +13,9 @@
 # limitations under the License.
 
 """
-What a PLC-2 answers, and another PLC to the commands of a PLC-2.
+The answers of a PLC-2, and of other PLCs to the commands of a PLC-2.
 
-Whatever is wrong with an address has STS 50, also that there is no compatibility file (M 8-5).
+Each fault of an address has STS 50, also a missing compatibility file (M 8-5).
 """
 
 from __future__ import annotations

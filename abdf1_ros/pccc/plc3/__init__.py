@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The PLC-3: addresses, commands, what we say to it and what it answers."""
+"""The PLC-3: addresses, commands, and both ends: client and server."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ from abdf1_ros.pccc.plc3.dialect import PLC3
 from abdf1_ros.pccc.plc3.server import Plc3Commands
 from abdf1_ros.pccc.status import Meanings
 
-# What STS and EXT STS mean that a PLC-3 sends (M 8-6..8-10).
+# The meaning of an STS and EXT STS from a PLC-3 (M 8-6..8-10).
 MEANINGS = Meanings(
     sts={
         0x30: 'a shutdown was requested',

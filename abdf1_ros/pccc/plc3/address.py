@@ -23,7 +23,7 @@ Grammar, letters in any case::
 The second form is the manuals' own (M 13-5). Both name the same places: T:4.ACC is E3.1.3.0.4.2.
 Bits are octal in every section, words of the I/O image too. Sections and ranges come from
 publication 1775-6.5.5 A-15, and 1779-KFM B-5 confirms them. Floats, high-order integers and
-pointers are left out: what their words hold is in neither.
+pointers are left out: neither publication describes their words.
 """
 
 from __future__ import annotations

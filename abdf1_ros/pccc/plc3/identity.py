@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""What the port of a PLC-3 says of itself: 18 bytes (M 10-13)."""
+"""The identity that the port of a PLC-3 reports: 18 bytes (M 10-13)."""
 
 from __future__ import annotations
 

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""What a PLC-3 answers to commands (M 8-6..8-10)."""
+"""The answers of a PLC-3 to commands (M 8-6..8-10)."""
 
 from __future__ import annotations
 

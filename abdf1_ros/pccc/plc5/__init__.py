@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The PLC-5: addresses, commands, what we say to it and what it answers."""
+"""The PLC-5: addresses, commands, and both ends: client and server."""
 
 from __future__ import annotations
 

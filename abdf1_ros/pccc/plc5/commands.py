@@ -31,8 +31,8 @@ READ_MODIFY_WRITE = 0x26
 TYPED_WRITE = 0x67
 TYPED_READ = 0x68
 
-# What a reply may carry is 240 bytes of descriptors and data, what a write may carry the same
-# with the address (M 7-28, 7-30).
+# A reply carries at most 240 bytes of descriptors and data. A write carries the same, address
+# included (M 7-28, 7-30).
 MAX_REPLY = 240
 MAX_WRITE = 240
 MAX_INTEGERS = 110  # 118 would fit, but without room for descriptors that are padded
@@ -65,7 +65,7 @@ class Element:
 
 
 def element_of(address: Address, is_value: bool) -> Element:
-    """Return what is moved at ``address``: one value of a structure, or whole elements."""
+    """Return the unit that is moved at ``address``: a value of a structure, or whole elements."""
     layout = ADDRESSING.files[address.file_type]  # an SLC serves these commands too
     if not is_value:
         parts = 2 if address.file_type is FileType.ASCII else 1

@@ -40,8 +40,8 @@ def system_address(address: plc5.SystemAddress, values: TypedData | None = None)
     """
     Return a PLC-5 address.
 
-    The type of a file above 8 is not in its address; where ``values`` do not tell it either,
-    the file has its number only.
+    The address of a file above 8 has no type. If ``values`` have none either, the file is shown by
+    its number only.
     """
     kind = _BY_FILE.get(address.file)
     if kind is None and values is not None:

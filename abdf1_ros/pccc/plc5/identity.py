@@ -13,7 +13,7 @@
 # limitations under the License.
 
 """
-What a PLC-5 says of itself (M 10-20..10-22).
+The identity that a PLC-5 reports (M 10-20..10-22).
 
 The oldest have no expansion byte, so the fields after the type stand one byte earlier. The reply
 of a 5/12, 5/15 or 5/25 ends with the byte about its RAM.
@@ -86,7 +86,7 @@ def decode(data: bytes) -> Identity | None:
     """
     Read the data of a reply to 06/03; None when they are not in this form.
 
-    Raises FormatError for one that breaks off.
+    Raises FormatError for a reply that breaks off.
     """
     if data[1] == EXTENDED:
         number, fields = data[2:3].hex().upper(), data[_BEFORE_SIZES:]

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""What a PLC-5 answers to commands."""
+"""The answers of a PLC-5 to commands."""
 
 from __future__ import annotations
 
@@ -40,8 +40,8 @@ class TypedService:
     """
     Typed read and write of ``table``, whose places follow ``addressing``.
 
-    A PLC-5 has them, and the SLC 5/03 and later from operating system 303 on; of an SLC only
-    files that a PLC-5 has in the same form.
+    A PLC-5 has these commands, and so has an SLC 5/03 or later from operating system 303 on. An
+    SLC serves only files that a PLC-5 has in the same form.
     """
 
     def __init__(self, table: DataTable, addressing: Addressing) -> None:
@@ -55,7 +55,7 @@ class TypedService:
 
     @staticmethod
     def _answering(execute: Callable[[Reader], bytes]) -> Callable[[Reader], bytes]:
-        """Return a command that answers with a PLC-5's codes, whoever serves it."""
+        """Return a command that answers with a PLC-5's codes, also in an SLC."""
         def command(reader: Reader) -> bytes:
             try:
                 return execute(reader)
@@ -149,6 +149,6 @@ class Plc5Commands:
 
 
 def _element(address: Address, asked: plc5.SystemAddress) -> plc5.Element:
-    """Return what a typed command with this address moves."""
+    """Return the unit that a typed command with this address moves."""
     is_value = asked.sub_element is not None and address.file_type.is_structure
     return plc5.element_of(address, is_value)

@@ -13,7 +13,7 @@
 # limitations under the License.
 
 """
-What the major error code of an SLC 500 or MicroLogix means (word S:6; M 10-3, 10-4).
+The meaning of the major error code of an SLC 500 or MicroLogix (word S:6; M 10-3, 10-4).
 
 The texts are general knowledge of these processors: no manual that lists them was at hand, so the
 code is always shown beside them. Publication 1747-RM001 has the list. A code above 50 in its low

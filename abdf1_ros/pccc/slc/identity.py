@@ -13,7 +13,7 @@
 # limitations under the License.
 
 """
-What an SLC 500 or MicroLogix says of itself: 24 bytes (M 10-3, 10-4, 10-6).
+The identity of an SLC 500 or MicroLogix: 24 bytes (M 10-3, 10-4, 10-6).
 
 A MicroLogix 1100 and 1400 have been seen to send a 25th, which no manual explains.
 """

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""What an SLC 500 or MicroLogix answers to commands."""
+"""The answers of an SLC 500 or MicroLogix to commands."""
 
 from __future__ import annotations
 
