@@ -18,8 +18,9 @@ import re
 
 from abdf1_ros.df1.checksum import Checksum
 from abdf1_ros.df1.packet import Packet
+from abdf1_ros.pccc.address_range import AddressRange
 from abdf1_ros.pccc.data_table import DataTable
-from abdf1_ros.pccc.families import parse_address
+from abdf1_ros.pccc.families import parse_range
 from abdf1_ros.problems import ConfigurationError
 from abdf1_ros.settings.csv_table import read_rows
 from abdf1_ros.simulator.simulated_plc import COLUMNS, load_plcs
@@ -47,7 +48,8 @@ def one_input(data: bytes) -> None:
     assert len(tables) == len(plcs) and all(0 <= station <= 254 for station in tables)
     for row in read_rows(path, COLUMNS):
         table = tables[int(row.get('Station'))]
-        address = parse_address(row.get('Address'), table.plc_type)
+        found = parse_range(row.get('Address'), table.plc_type)
+        address = found.first if isinstance(found, AddressRange) else found
         assert address.offset < table.length(address.area) <= address.area_size
     for plc in plcs:
         sizes = _sizes(plc.table)
