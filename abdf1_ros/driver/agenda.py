@@ -153,7 +153,7 @@ class Agenda:
         return job
 
     def _own_first(self, now: float, busy: Container[int]) -> Job | None:
-        """Return a due heartbeat or fallback; it counts as no write in a row (rule 11)."""
+        """Return the next job: own writes first, which count as no writes in a row (rule 11)."""
         if self._interlocks.is_ending:  # no value that is read now would be used
             self._own_in_a_row, self._was_silent = 0, False
         if self._own_in_a_row >= OWN_IN_A_ROW:

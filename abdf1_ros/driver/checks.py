@@ -45,8 +45,8 @@ from abdf1_ros.pccc.steps import echo, identify
 # Seconds of silence after which a station gets an echo, and between two echoes.
 ECHO_PERIOD = 2.0
 
-# Periods until the next question of a kind that alone got no reply. Each such question costs
-# Cmd_Timeout, and in Mode Master mostly a DLE NAK.
+# Further periods until the next question of a kind that alone got no reply. Each such question
+# costs Cmd_Timeout, and in Mode Master mostly a DLE NAK.
 _UNANSWERED = 30
 
 _NOT_ASKED = 'unknown (not asked yet)'
@@ -63,9 +63,10 @@ class Check(Job):
     """
     One slow job: ``due`` is the clock value (s) from which it wants the line.
 
-    ``due`` is infinite while the job is under way (since ``begun``), and while the station is
-    inactive. ``period`` is in seconds, infinite for a job that is done once. With ``is_planned``
-    rows depend on the check, and the forecast of the line counts it.
+    ``due`` is infinite while the job is under way (since ``begun``). It is so, too, while the
+    station is inactive, unless the job is an echo. ``period`` is in seconds, infinite for a job
+    that is done once. With ``is_planned`` rows depend on the check, and the forecast of the line
+    counts it.
     """
 
     def __init__(self, checks: Checks, station: int, kind: CheckKind, period: float,
@@ -112,6 +113,7 @@ class Checks:
     - ``link_failed``: called for a transaction without a reply.
     - ``told``: called after each question for the diagnostic status, with the answer, None for
       none, and the clock value (s) of the question.
+
     The objects that ``known`` returns never change. Only ``request_counters`` may be called from
     another thread.
     """
@@ -269,7 +271,7 @@ class Checks:
         self.counters_wanted.discard(station)
 
     def _finish(self, check: Check, next_due: float) -> None:
-        """Plan the next check of this kind; an absent station gets it when it is back."""
+        """Plan the next check of this kind; until it is back a silent station gets only echoes."""
         if check.kind is CheckKind.COUNTERS:
             self._checks.remove(check)
         elif self._stations[check.station].active:

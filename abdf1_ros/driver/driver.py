@@ -91,7 +91,7 @@ class Listener(ValueListener, Protocol):
         """Take a numbered error or notice."""
 
     def foreign_value(self, mapping: Mapping, text: str, is_conflict: bool) -> None:
-        """Take a heartbeat value that we have not written, ``again`` if for the second time."""
+        """Take a heartbeat value that is not ours; ``is_conflict`` if not the first lately."""
 
     def station_changed(self, station: Station) -> None:
         """Take the news that a station has become active or inactive."""
@@ -281,7 +281,7 @@ class Driver:
         self._listener.station_changed(station)
 
     def _station_of_guest(self, dst: int) -> int:
-        """Return the station that a guest means; in Mode Peer it is the one PLC."""
+        """Return the station that a guest means; in Mode Peer the one PLC, whatever the DST."""
         if not self.network.line_mode.has_one_plc:
             return dst
         return next((station.number for station in self.stations), dst)
@@ -335,7 +335,8 @@ class Driver:
         """
         Send no message until a reply comes: the port may store it for long.
 
-        A line without stations to ask, and a line with a master, need no reply.
+        A line without stations to ask needs no reply, and neither does a line whose master polls
+        us.
         """
         network = self.network
         if self._settings.may_store and not network.line_mode.is_polled \

@@ -165,7 +165,7 @@ class GuestQueue:
         self._station_of = station_of
         self._words = words
         self._record = record
-        self.inbox: Inbox[GuestCommand] = Inbox(is_open=False)  # commands that came later
+        self.inbox: Inbox[GuestCommand] = Inbox(is_open=False)  # commands not sorted yet
         self.waiting: deque[Guest] = deque()  # guests with commands, the next one first
         self.next_expiry = math.inf  # when ``expire`` has work (clock value in s)
 

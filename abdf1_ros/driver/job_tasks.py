@@ -60,6 +60,7 @@ class Job:
       counting that command's time on the line.
     - ``is_probe``: a silent station is asked whether it answers again.
     - ``is_own``: a heartbeat or a fallback, which no message has asked for.
+    - ``blames``, ``answer_within``: see ``Task``.
     """
 
     station: int

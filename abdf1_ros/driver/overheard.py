@@ -16,8 +16,8 @@
 Values from the traffic of another master, on a line where we send nothing.
 
 A reply counts only with its command: both heard undamaged, with nothing damaged in between, at
-most Cmd_Timeout apart. It fills each row if it has all words of the row. If another node writes
-words of a row, they are unknown until the next read that began later.
+most Cmd_Timeout apart. It fills each row of which it has all words. If another node writes words
+of a row, they are unknown until the next read that began later.
 """
 
 from __future__ import annotations
@@ -51,10 +51,10 @@ from abdf1_ros.sniffer.capture import Chunk, Direction
 from abdf1_ros.sniffer.entries import Entry, Kind
 from abdf1_ros.sniffer.traffic import TrafficDecoder
 
-# Seconds without a symbol of a station after which it does not answer.
+# Seconds without a reply or an EOT of a station after which it counts as silent.
 _SILENT = 10.0
 
-# Number of bytes outside of frames that are treated as a damaged frame; fewer come when a
+# Least number of bytes outside of frames that are treated as a damaged frame; fewer come when a
 # transmitter is switched on.
 _REST_OF_FRAME = 3
 
@@ -227,7 +227,7 @@ class Overheard:
             self._checks.heard(station, identity, asked)
 
     def _values(self, command: Packet, reply: Packet, asked: float, now: float) -> None:
-        """Fill the rows if a reply has all their words."""
+        """Fill each row of which a reply has all words."""
         text = describe(command)
         self._carry(command, text, now)
         found: dict[ReadPoint, bytes] = {}
@@ -269,7 +269,7 @@ class Overheard:
 
 
 def _words_of(mapping: Mapping, words: ReplyWords) -> list[bytes]:
-    """Return the words of a row, None if one is missing."""
+    """Return those words of a row that are in ``words``, in their order."""
     extent = mapping.extent
     return [word for offset in range(extent.first, extent.end)
             if (word := words.get((extent.area, offset))) is not None]

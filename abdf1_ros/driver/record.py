@@ -38,8 +38,8 @@ from abdf1_ros.settings.mapping import Mapping
 _CHANGED = (Outcome.WRITTEN, Outcome.PARTLY)
 
 
-# Seconds after which the second write of rule 10 comes at an orderly end, which takes twice as
-# long.
+# Most seconds after which the second write of rule 10 comes at an orderly end. With ~/polling and
+# ~/reload the end has twice as long.
 _SETTLE_AT_END = 1.0
 
 
@@ -50,7 +50,7 @@ class _Writer(Enum):
     OURS = auto()
     GUEST = auto()
     GUEST_SOMEWHERE = auto()  # by a command whose effect is not known
-    BEFORE = auto()  # another program that had the line before the port was opened
+    BEFORE = auto()  # any program that had the line before the port was opened
 
 
 # The writer, and the values if they are ours.
@@ -127,9 +127,9 @@ class OwnWords:
     """
     The words of a row that the bridge writes by itself, and other writes that may change them.
 
-    It remembers writes that had not landed when our last confirmed write began. At ``again_at``
-    (clock value, s) none of them can land any more; then our value is written a second time (rule
-    10).
+    It remembers writes that had not landed when the last confirmed write of the row began. At
+    ``again_at`` (clock value, s) none of them can land any more; then our value is written a
+    second time (rule 10).
     """
 
     def __init__(self, row: Mapping, record: WriteRecord) -> None:
@@ -187,7 +187,7 @@ class OwnWords:
 
     @property
     def lands_until(self) -> float:
-        """Return until when a foreign value may land here (clock value in s)."""
+        """Return until when another value than the confirmed one may land (clock value in s)."""
         if not self._record.may_begin(self.row):
             return math.inf
         return max((until for source, until in self._lands_until.items()

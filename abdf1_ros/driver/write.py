@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""One write: the values of a message, and its result."""
+"""One write: the values of a message, or of the bridge itself, and the result."""
 
 from __future__ import annotations
 
@@ -62,11 +62,11 @@ class WriteResult:
     """
     The one result of one message to one mapping.
 
-    - ``detail``: empty for a confirmed write. For an unconfirmed one it says what a later read has
-      found, or why there was no read.
+    - ``detail``: why the write failed, or a remark on a confirmed one, mostly empty. For an
+      unconfirmed one it also says what a later read has found, or why there was no read.
     - ``latency``: seconds from the request.
     - ``request``: the name that the requester gave.
-    - ``packets_done``: number of its packets that were confirmed before ``error`` ended it.
+    - ``packets_done``: number of its packets that were confirmed.
     """
 
     mapping: Mapping
@@ -123,7 +123,7 @@ class Write:
             mapping.address, mapping.codec, self.raw, mapping.dialect)
 
     def equals(self, other: Write) -> bool:
-        """Tell whether both have the same row and values, and neither has been sent."""
+        """Tell whether both write the same values to a row, in the same packets."""
         return self.mapping is other.mapping and self.commands == other.commands
 
     def stand_for(self, other: Write) -> None:

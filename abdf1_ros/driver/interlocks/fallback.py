@@ -60,11 +60,12 @@ class FallbackRow:
 
     - ``cause``: why the fallback is due, None if it is not.
     - ``refreshed``: when the last confirmed message was published.
-    - ``sent``: when the fallback was last sent. No message published before it is sent any more.
+    - ``sent``: when the fallback was last sent. A message that was published before that time is
+      not sent any more.
     - ``due``: when to look at the row next.
     - ``has_failed``: a message after the last confirmed one was not confirmed.
     - ``refusal``: why the last write of the fallback was not confirmed.
-    - ``words``: the writes of other writers to these words.
+    - ``words``: the writes that may change these words.
     """
 
     def __init__(self, words: OwnWords) -> None:
@@ -76,7 +77,7 @@ class FallbackRow:
         self.state = FallbackState.MESSAGE
         self.refreshed = -math.inf
         self.sent = -math.inf
-        self.tried = -math.inf  # like ``sent``, but also set when the fallback is written again
+        self.tried = -math.inf  # like ``sent``, but also set by ``refresh``
         self.tries = 0  # since it became due
         self.due = math.inf
         self.cause: FallbackCause | None = None
@@ -119,7 +120,7 @@ class FallbackRow:
 
     @property
     def is_first_try(self) -> bool:
-        """Tell whether the fallback is due, or was written over, and has not been sent yet."""
+        """Tell whether the fallback is due, or was written over, and was not sent since."""
         if self.state is FallbackState.OVERWRITTEN:
             return self.tried < self._due_since
         return self.cause is not None and self.sent < self._due_since
@@ -138,9 +139,9 @@ class FallbackRow:
         """
         Return when the fallback becomes due (clock value in s), infinite for never.
 
-        ``youngest``: publication time of the youngest message not yet written. It delays the
-        fallback only while writes succeed. Otherwise a fast publisher whose messages the PLC
-        refuses would delay the fallback for ever.
+        ``youngest``: publication time of the youngest message that waits or is under way. It
+        delays the fallback only while writes are confirmed. Otherwise a fast publisher whose
+        messages the PLC refuses would delay the fallback for ever.
         """
         if self.state is FallbackState.DUE:
             return self._due_since

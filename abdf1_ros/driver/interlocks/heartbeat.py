@@ -62,7 +62,7 @@ class BeatState(Enum):
 
 class _OtherWriter:
     """
-    Another bridge that writes our heartbeat word: what we know of it (rule 19).
+    Another writer of our heartbeat word, mostly a bridge: what we know of it (rule 19).
 
     ``seen`` is when its last value was read (clock value, s).
     """
@@ -110,7 +110,7 @@ class HeartbeatRow:
     - ``refusal``: why the last write was not confirmed; ``tried``: when it was sent.
     - ``due``: when to look at the row next.
     - ``first``: the number from which the row counts.
-    - ``words``: the writes of other writers to this word.
+    - ``words``: the writes that may change this word.
     - ``dice``: random numbers, so that two bridges differ.
     """
 
@@ -126,9 +126,9 @@ class HeartbeatRow:
         self.reason = ''
         self.refusal = ''
         self.is_under_way = False
-        self.is_first_try = True  # whether the 0 to be written was never sent
+        self.is_first_try = True  # the 0 that is due has not been sent yet
         self.tried = -math.inf
-        self.tries = 0  # number of tries of the value to be written
+        self.tries = 0  # writes since the last 0 became due
         self.due = math.inf
         self.topics = mapping.condition.names if mapping.condition else ()
         self._timeout = (mapping.condition and mapping.condition.timeout or 0) / 1000
@@ -157,14 +157,15 @@ class HeartbeatRow:
 
     @property
     def is_confirmed(self) -> bool:
-        """Tell whether 0 stands, and no late write can land over it any more."""
+        """Tell whether 0 stands, and no second write of it is planned (rule 10)."""
         return self.is_at_rest and self.words.again_at == math.inf
 
     def begin(self, now: float, *, is_new: bool = False) -> None:
         """
         Start again with 0: the station may be a different PLC by now (rule 2).
 
-        Foreign values are forgotten if the contact ``is_new``: an opened port, or a change to RUN.
+        A conflict with another writer ends if the contact ``is_new``: an opened port, or a change
+        to RUN.
         """
         if is_new or self.state is not BeatState.CONFLICT:
             self.state = BeatState.CONTACT
@@ -180,19 +181,19 @@ class HeartbeatRow:
         self._next = self.due = now
 
     def end(self, now: float) -> None:
-        """Write 0: the bridge ends."""
+        """Let 0 be written, again if another write may still land: the bridge ends."""
         self.due = now
         self.words.end(now)
         if self.words.lands_until > -math.inf:
             self._write_zero(now)
 
     def write_ended(self, claim: Claim, now: float) -> None:
-        """Record that a guest has written to this word: its value is not a 0."""
+        """Record the end of a write to this word: the value of a guest is not our 0."""
         if claim.write is None and claim.has_changed and claim.extents is not None:
             self.overwritten(now)
 
     def overwritten(self, now: float) -> None:
-        """Another value may stand in place of the 0: write the 0 again at once."""
+        """Write the 0 again at once if 0 has to stand: another value may have replaced it."""
         if self.state is BeatState.SHOWN:
             self.state = BeatState.CONTACT
         if self.state is not BeatState.COUNTS and self.value == 0:
@@ -273,7 +274,7 @@ class HeartbeatRow:
 
     def read_back(self, value: int, started: float, now: float) -> str:
         """
-        Compare a value whose read began at ``started``; return the report of a foreign value.
+        Compare a value whose read began at ``started``; return a report of it, empty for none.
 
         The expected value is known only from the confirmation of our write until our next one. The
         first foreign value is treated as a download, the second as another writer. Then 0 stays

@@ -38,10 +38,10 @@ from abdf1_ros.settings.mapping import Mapping
 _FAILURES = 2
 
 # Shortest pause (s) before the next attempt. Behind a gateway the pause is also at least
-# OTHERS_SHARE times the last attempt, so that silent PLCs take an eighth of the time.
+# OTHERS_SHARE times as long as the last attempt, so that a silent PLC takes an eighth of the time.
 _LEAST_PAUSE = 1.0
 
-# Number of tries of a row at a silent PLC before rows that had more tries: its first tries may
+# At silent PLCs a row with fewer tries goes first until it has had this many: its first tries may
 # have been unlucky.
 _QUICK_TRIES = 3
 
@@ -81,9 +81,9 @@ class Plc:
     Times are clock values (s).
 
     - ``due``: when to look at its rows next.
-    - ``first_due``: the same for rows never tried; a pause does not delay these.
-    - ``failures``: number of our own writes in a row without an answer. An answered write of a
-      guest ends the row, too.
+    - ``first_due``: the same for first tries of a 0 or a fallback; a pause does not delay these.
+    - ``failures``: number of our own writes without an answer since the last answered write. That
+      may also be the write of a message or a guest.
     - ``pause_end``: from the second failure on the PLC is left alone until then.
     """
 
@@ -205,10 +205,10 @@ class Plc:
         Return the rank of a row, the least goes first; None if it has to wait (rules 10, 11).
 
         The order is (1) first tries, since a PLC may execute a write that it does not answer; (2)
-        PLCs that answer; (3) PLCs that do not. In (3) the row with the fewest tries goes first,
-        then the row whose last try is oldest. Otherwise a 0 that is due each second would take all
-        turns. Silent PLCs get only the time of probes. At the end a silent PLC has one try for
-        each row.
+        PLCs that answer; (3) PLCs that do not. In (1) PLCs that answer go first. In (3) the row
+        with the fewest tries goes first, then the row whose last try is oldest. Otherwise a 0 that
+        is due each second would take all turns. Silent PLCs get only the time of probes. At the
+        end a silent PLC has one try for each row.
         """
         if self._has_last_try:
             return (1, 1, row.tried) if row.tried < self._conditions.ended else None
@@ -247,7 +247,7 @@ class Plc:
         return min(least, self.first_due, max(self.due, self._free_from))
 
     def good_until(self, beat: HeartbeatRow, youngest: MappingType[Mapping, float]) -> float:
-        """Return until when a heartbeat may be sent (clock value in s), as its conditions end."""
+        """Return until when a heartbeat may be sent (clock value, s): its conditions end then."""
         ends = [row.deadline(youngest.get(row.mapping, -math.inf)) for row in self.fallbacks]
         return min([beat.executor_until(self._conditions.executor),
                     beat.topics_until(self._conditions.messages), *ends])

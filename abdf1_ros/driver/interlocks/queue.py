@@ -54,7 +54,7 @@ class OwnWrite(WriteJob):
     A write that no message has asked for.
 
     It must not be sent after ``expires`` (clock value in s): its value may be wrong by then. With
-    ``is_last`` it is the only try at a silent PLC at the end.
+    ``is_last`` it is the only try of its row at a silent PLC at the end.
     """
 
     is_own = True
@@ -84,12 +84,14 @@ class Interlocks(WriteListener):
 
     - ``writes``: the messages that wait or are under way.
     - ``served``: takes the fallback of a Serve row.
-    - ``listener``: gets the result of each written fallback, and the reason of each refused one.
+    - ``listener``: gets the result of each fallback that was written, and why a PLC refuses a
+      fallback or a heartbeat.
     - ``warn``: gets foreign heartbeat values.
     - ``seed``: a different number in each bridge. Two bridges that began together would not see
       each other if both counted from 1.
-    - ``ours``: the rows of our own table; ``expire`` has work when it is due. Only
-      ``executor_ran``, ``wind_down`` and ``resume`` may be called from another thread.
+    - ``ours``: the rows of our own table; ``expire`` has work when it is due.
+
+    Only ``executor_ran``, ``wind_down`` and ``resume`` may be called from another thread.
     """
 
     def __init__(self, mappings: Rows, writes: WriteQueue, writing: WritesUnderWay,
@@ -308,8 +310,8 @@ class Interlocks(WriteListener):
         """
         Return a fallback that stands and is to be written again, None for none (rule 8).
 
-        It does not go before messages. It waits while a message of its row waits, unless the
-        bridge takes no messages.
+        It does not go before messages. It waits while a message of its row waits, unless the last
+        message of the row was not confirmed.
         """
         passed_over = []
         found = None

@@ -83,7 +83,8 @@ class ReadJob(Job):
     - ``started``: when the read under way, or the last one, began.
     - ``asked``: when its last packet was sent.
     - ``longest_read``: seconds within which all packets of a read have to come.
-    - ``is_unfinished``: packets are still missing, or the last read was too old.
+    - ``is_unfinished``: some packets of a read have come, but not all, or the last read was too
+      old.
     - ``ticket``: number of its valid entry in the queue, 0 for none.
     - ``take``: called at the end of each packet, with the words after the last packet of a read,
       or with the error.

@@ -93,8 +93,8 @@ class ReadPoint:
     - ``withheld``: why its value was not published; ``withheld_since``: since when (clock value,
       s).
     - ``withholdings``: how often values were withheld.
-    - ``guard``: the guard of the row, if it has one; ``patience``: oldest age (s) of the state
-      that its condition depends on.
+    - ``guard``: the guard of the row, if it has one; ``patience``: greatest allowed age (s) of the
+      state that its condition depends on.
     """
 
     def __init__(self, mapping: Mapping, period: float, stale_time: float,
@@ -165,7 +165,8 @@ class ReadPoint:
         """
         Record that a value is withheld; return True, once for each cause, to report it.
 
-        At the start every condition is still open. It is reported only after one stale time.
+        At the start no condition holds yet. That is reported only after ``patience``: the stale
+        time for RUN, While_Timeout for a counter.
         """
         if not self.withheld:
             self.withheld_since, self._is_told = now, False

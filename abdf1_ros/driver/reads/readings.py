@@ -63,7 +63,7 @@ class ValueListener(Protocol):
         """Take the values of a good read that are to be published."""
 
     def unreadable(self, mapping: Mapping, reason: str) -> None:
-        """Take a reply without a usable value; called once for each reason."""
+        """Take why a row has no usable value, or a PLC refuses our write; once for each reason."""
 
     def written(self, result: WriteResult) -> None:
         """Take the one result of a write."""
@@ -278,7 +278,7 @@ class Readings:
             self.reads.replace(old, map(self._job, change.new), self._line.now)
 
     def told(self, station: int, identity: Identity | None, asked: float) -> None:
-        """Use the processor that a station has named, if any, after ``asked`` (clock value, s)."""
+        """Use the answer, if any, of a station ``asked`` at a clock value (s): mode, processor."""
         if late := self.guards.mode_told(station, identity, asked):
             self.reads.go_first(late)
         if identity is not None:

@@ -178,7 +178,7 @@ class Reads(WriteListener):
             self.release(job.station, now)
         if job.is_unfinished:
             self._due.put(job, job.due)
-        elif job.started < job.refreshed or job.started < job.wanted:  # it had begun before
+        elif job.started < job.refreshed or job.started < job.wanted:  # before the write or call
             self._due.put(job, now)
         elif job.is_on_demand:
             self.drop([job], now)

@@ -43,7 +43,7 @@ _DRAINED = 0.5
 
 
 def most_ahead(topic: str, mappings: Iterable[Mapping]) -> float | None:
-    """Return by how much (s) stamps may be ahead, None if nothing depends on them."""
+    """Return by how much (s) stamps may be ahead, None without a fallback or heartbeat."""
     times = [mapping.fallback.after for mapping in mappings
              if mapping.fallback and mapping.topic == topic]
     times += [mapping.condition.timeout or 0 for mapping in mappings

@@ -35,10 +35,13 @@ from abdf1_ros.settings.mapping import Mapping
 @dataclass(slots=True)
 class _Value:
     """
-    What a confirmed ``write`` has put into a row; all times are clock values (s).
+    A value that a confirmed ``write`` has put into a row.
 
-    Equal writes alone were ``confirmed`` ``since`` then. The last read that shows it has begun at
-    ``shown``.
+    Times are clock values (s).
+
+    - ``since``: when the first write of the value was confirmed; only equal writes came after it.
+    - ``confirmed``: when the last of these was confirmed.
+    - ``shown``: when the last read began that has shown the value.
     """
 
     write: Write
