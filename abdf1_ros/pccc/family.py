@@ -40,17 +40,17 @@ class Family:
     """
     A PLC family: its addresses, its commands for us as a client, and its emulation as a server.
 
-    ``dialects`` has the usual access first. ``decode_identity`` returns None for the reply of
-    another family to 06/03. ``encode_identity`` makes the reply of an emulated processor.
-    ``described`` has its commands in words. ``meanings`` explains its own error codes. -
-    ``by_processor``: set if its processors take packets of different lengths.
-
+    - ``dialects``: by access, the usual access first.
+    - ``decode_identity``: returns None for the reply of another family to 06/03.
+    - ``encode_identity``: makes the reply of an emulated processor.
+    - ``described``: its commands in words; ``meanings``: its own error codes.
+    - ``by_processor``: empty unless its processors take packets of different lengths.
     - ``served_counters``: the counter layout of a port in a mode (Master, Slave, Peer, Radio),
       None if its counters are not emulated.
     - ``counters_anywhere``: the counters are at every address.
     - ``is_spoken_by_all``: PLCs of other families know its commands, too.
     - ``file_search``: finds the files of a PLC, None if there is no way.
-    - ``clock``: first of six words: year, month, day, hour, minute, second.
+    - ``clock``: address of the first of six words: year, month, day, hour, minute, second.
     """
 
     addressing: Addressing

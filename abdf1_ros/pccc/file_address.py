@@ -89,7 +89,11 @@ class FileAddressing(Addressing):
 
     @abstractmethod
     def mistaken(self, text: str) -> str | None:
-        """Return the fault of a text in capitals that is an address in another family."""
+        """
+        Return the fault of a text in capitals, None for none.
+
+        Such a text is an address of another family, or of a file that we cannot read.
+        """
 
     def is_octal(self, kind: FileType) -> bool:
         """Tell whether elements and bits of such a file are octal."""

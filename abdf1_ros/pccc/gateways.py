@@ -15,8 +15,8 @@
 """
 The identity of gateways to other links, and of computer cards (M 10-7, 10-15..10-19).
 
-They have no processor and no mode. Some gateways have their name in the reply, the rest are known
-by two bytes. Their counters are at an address that the reply has.
+They have no processor and no mode. Some have their name in the reply. The rest are known by two
+bytes, and their reply has the address of their counters.
 """
 
 from __future__ import annotations

@@ -71,8 +71,8 @@ class ServedCounters:
     """
     The counters of our own link, as a PLC reads and resets them.
 
-    A reset by a PLC moves only the origin that this PLC sees. The counters themselves are also
-    shown elsewhere, and only the thread of the link changes them.
+    A reset moves only the origin of the values that are read with 06/01. The counters themselves
+    are also shown elsewhere, and only the thread of the link changes them.
     """
 
     def __init__(self, counters: Counters, layout: CounterLayout) -> None:
@@ -93,7 +93,7 @@ class ServedCounters:
         return b''
 
     def _counts(self) -> dict[str, int]:
-        """Return the names that we count."""
+        """Return the values of the names that we count."""
         counters = self._counters
         return {
             SENT: counters.messages_sent, RECEIVED: counters.messages_received,

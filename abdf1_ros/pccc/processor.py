@@ -91,7 +91,7 @@ _OLD = _Model(82, 82, frozenset((
 _NEW = _Model(236, 234, frozenset((FileType.LONG, *FUNCTION_FILES)))
 # AG-UM008C 3-38; it has one file each of types O, I, S, B, T, C, R and N.
 _ML1000 = _Model(82, 82, frozenset((FileType.FLOAT, *FUNCTION_FILES)), has_fixed_files=True)
-# The MicroLogix 1100 takes 103 words (1763-RM001); all other MicroLogix take at least as many.
+# The MicroLogix 1100 takes 103 words (1763-RM001); the 1200, 1400 and 1500 take as many or more.
 _MICROLOGIX = _Model(206, 206)
 
 _MODELS = {

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Names of the field for families and for types of values, as what the CSV files call them."""
+"""Other names of PLC families and value types, and what the CSV files call these."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ _TYPES = {'int': 'int16', 'word': 'uint16', 'dint': 'int32', 'long': 'int32', 'd
 
 
 def family_name(text: str) -> str:
-    """Return the value of PLC_Type for a name such as PLC-5; any other text in capitals."""
+    """Return the PLC_Type for a name such as PLC-5; any text in capitals, without - and spaces."""
     name = text.upper().replace('-', '').replace(' ', '')
     return _FAMILIES.get(name, name)
 

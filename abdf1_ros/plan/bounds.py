@@ -64,8 +64,9 @@ OWN_IN_A_ROW = 7
 # command had it.
 OURS_BESIDE_GUESTS = 3
 
-# The line may not carry all changes of a row. After this wait (s), or half its patience, a change
-# gives way to a newer change. But first another write of the row has to go out meanwhile.
+# The line may not carry all changes of a row. A change that has waited this long (s), or for half
+# its patience if that is less, gives way to a newer one. This needs another write of the row that
+# has gone out meanwhile.
 CARRIED_WITHIN = 1.0
 
 # Default of the parameter write_timeout (s), which is not in the files.
@@ -74,7 +75,7 @@ _PATIENCE = 2.0
 # A heartbeat with a shorter Period (ms) may count faster than the PLC scans.
 _SHORT_PERIOD = 200
 
-# A bound is worth a remark if another setting makes it this factor shorter.
+# Another setting is advised if it reduces the longest bound to less than this part.
 _WORTH_IT = 0.9
 
 _STATUS_BYTES = 1, 26  # of the command after TNS, and of the longest usual reply
@@ -86,9 +87,9 @@ class Bound:
     The times of a row (rule 16), in seconds.
 
     For a row with Fallback, ``seconds`` is the longest time that its outputs keep their value
-    without a message. ``usual`` is the same time where no frame gets lost. Both are None if a
-    master of the line decides that. For a heartbeat, ``seconds`` is the preset for the watchdog in
-    the PLC.
+    without a message. ``usual`` is the same time where no frame gets lost, None for a Serve row.
+    Both are None if a master of the line decides that. For a heartbeat, ``seconds`` is the preset
+    for the watchdog in the PLC.
     """
 
     mapping: Mapping
@@ -165,7 +166,11 @@ class Times:
         return Bound(mapping, after + at_most, after + undisturbed)
 
     def _preset(self, mapping: Mapping) -> float:
-        """Return how long a heartbeat that counts stands still at most, with the PLC's scan."""
+        """
+        Return the longest time (s) between two counts of a heartbeat, with a scan of the PLC.
+
+        It is at least three Periods.
+        """
         assert mapping.period is not None
         period, turn = mapping.period / 1000, self._turn(mapping)
         beats, fallbacks = (
@@ -208,7 +213,7 @@ class Times:
     @cached_property
     def _waits(self) -> dict[int, tuple[float, float]]:
         """Return the seconds of a due fallback with its wait: at most, and with no frame lost."""
-        # In standard polling each scan also has the turns of all other stations.
+        # In standard polling the turns of all other stations are part of each transaction's time.
         turns: defaultdict[int, list[float]] = defaultdict(list)
         for own in self._mappings.own:
             turns[self._turn(own)] += self._written[own]
@@ -227,7 +232,7 @@ class Times:
 
     @cached_property
     def _is_apart(self) -> bool:
-        """Tell whether other stations have turns, too: each own write may come between reads."""
+        """Tell whether several stations have turns: then a read may go before each own write."""
         return self._mode.most_under_way(self._line) > 1 or len(
             {self._turn(own) for own in self._mappings.own}) > 1
 
@@ -303,7 +308,7 @@ def remarks(network: Network, mappings: Rows,
 
 
 def _late_states(network: Network, mappings: Rows, response_time: float) -> Iterator[str]:
-    """Yield the first row to lose its newest state if messages come faster than writes."""
+    """Yield a remark on the first row that may lose its newest state if messages are too many."""
     model = forecast.line_model(network)
     rows = [mapping for mapping in mappings.messages if not mapping.serves]
     a_write_each = sum(_with_answers(_packets(model, mapping), response_time) for mapping in rows)

@@ -114,8 +114,9 @@ def stale_times(blocks: Iterable[Block], default_period: float, stale_after: flo
     Return after how many seconds a value of each mapping that is read counts as lost.
 
     Topics promise this time: ``stale_after`` times the expected interval, plus the longest wait
-    for the line. ``default_period`` is in seconds; ``own`` is described at ``intervals``.
-    What ``is_heard`` is read by another master, at least once in a Period.
+    for the line. ``default_period`` is in seconds; ``own`` is described at ``intervals``. With
+    ``is_heard`` another master reads the words, at least once in a Period: then Period takes the
+    place of the interval, and there is no wait.
     """
     blocks = list(blocks)
     expected, wait = ({}, 0.0) if is_heard else (intervals(blocks, own), longest_wait(blocks))
@@ -125,7 +126,7 @@ def stale_times(blocks: Iterable[Block], default_period: float, stale_after: flo
 
 
 def period_of(mapping: Mapping, default_period: float) -> float:
-    """Return the seconds from one read of a mapping to the next, as its Period asks."""
+    """Return the seconds from one read of a mapping to the next, as Period or the default asks."""
     if mapping.is_on_demand:
         return _ON_DEMAND
     return default_period if mapping.period is None else mapping.period / 1000

@@ -72,7 +72,7 @@ class LineModel:
 @cache
 def _overhead(duplex: Duplex, checksum: Checksum, station: int) -> int:
     """Return the characters of a transaction, without the bytes after TNS of both messages."""
-    # Only the size of a frame counts here, so its check may be wrong.
+    # Only the size of a frame counts here, so its check need not be that of its data.
     message = frames.message_frame(b'', checksum)
     sent = message if duplex is not Duplex.HALF else \
         frames.master_frame(station, b'', checksum) + frames.poll_frame(station)

@@ -149,9 +149,9 @@ class Planner:
         """
         Return what to read instead of a refused block.
 
-        A block with several spans becomes two blocks, each with half of the mappings. A block of
-        equal words becomes the same block in shorter packets, as long as a processor may need
-        them. Otherwise the list is empty.
+        If its mappings have several spans, it becomes two blocks, each with half of the spans. If
+        all have the same span, it becomes the same block in shorter packets, as long as a
+        processor may need them. Otherwise the list is empty.
         """
         spans = sorted(set(map(_span, block.mappings)))
         if len(spans) == 1:
@@ -176,7 +176,7 @@ class Planner:
         self._refused[area].add(span)
 
     def allow(self, area: StationArea, span: Span) -> bool:
-        """Record that all of ``span`` can be read; return True if it was refused before."""
+        """Record that all of ``span`` can be read; return True if a part of it was refused."""
         wrong = {other for other in self._refused[area] if span.holds(other)}
         self._refused[area] -= wrong
         return bool(wrong)
@@ -197,8 +197,8 @@ class Planner:
         if mapping.period is None:
             return self._default_period
         seconds = mapping.period / 1000
-        # Each count of a heartbeat needs a read, so that a foreign value is found whenever it is
-        # written.
+        # A heartbeat is read back twice in a Period (rule 19): so a read comes between two counts,
+        # and finds a foreign value whenever it was written.
         return seconds / 2 if mapping.is_heartbeat else seconds
 
     def _plan_area(self, area: StationArea, demands: Sequence[_Demand],

@@ -35,7 +35,7 @@ _Result = TypeVar('_Result')
 
 
 class Asking(Protocol):
-    """A function that carries out steps with a station, and returns their result."""
+    """A line whose ``ask`` carries out steps with a station, and returns their result."""
 
     def ask(self, station: int, work: Steps[_Result]) -> _Result: ...
 
@@ -46,7 +46,7 @@ def read_planned(planner: Planner, mappings: Iterable[Mapping],
     Yield each mapping with its values.
 
     If a station refuses a block, its parts are read, so that an error concerns as few mappings as
-    possible. Raises the errors of ``line`` and of the steps for those mappings.
+    possible. Raises the errors of ``line`` and of the steps; ``about`` names those mappings.
     """
     waiting = planner.plan(mappings)
     while waiting:

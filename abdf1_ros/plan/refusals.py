@@ -118,7 +118,7 @@ class Refusals:
         """
         Record another good read of the last recovering block of its area, and plan the area anew.
 
-        All other blocks of the area have recovered before it, so a file that comes back is planned
+        The blocks that recover with it have done so by then, so a file that comes back is planned
         once.
         """
         if self.recovering.get(block.station_area) is not block:
@@ -136,7 +136,7 @@ class Refusals:
         return change if change.old else None
 
     def _planned_anew(self, blocks: Iterable[Block]) -> Change:
-        """Return the blocks that replace ``blocks``, without parts of divided blocks."""
+        """Return the blocks that replace ``blocks``; parts of a running search stay."""
         parts = {part for search in self._searches.values() for part in search.parts}
         old = {block for block in blocks if block not in parts}
         new = set(self._planner.plan(sorted(

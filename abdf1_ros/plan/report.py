@@ -68,7 +68,7 @@ class RemarkKind(Enum):
 
 @dataclass(frozen=True, slots=True)
 class Remark:
-    """An unusual setting; ``station`` is the station that it concerns, None for the whole line."""
+    """An unusual setting or time; ``station`` is the one that it concerns, None for the line."""
 
     kind: RemarkKind
     text: str
@@ -147,7 +147,11 @@ class Report:
         return BAUD_RATES[found] if found < len(BAUD_RATES) else None
 
     def needed_period(self) -> int | None:
-        """Return the shortest Period (ms) that the line can keep for all rows, or None."""
+        """
+        Return the shortest Period (ms) that all rows with a shorter one may have, or None.
+
+        It is one of ``PERIOD_STEPS``. The periods then need at most ``_HIGH_LOAD`` of the time.
+        """
         others = self.load - forecast.load(self.blocks, self._answer_time)
         return next((period for period in PERIOD_STEPS if others + sum(
             self.time(block) / max(block.period, period / 1000) for block in self.blocks
@@ -201,7 +205,11 @@ class Report:
 
 
 def _unprotected(mappings: Rows) -> Iterator[str]:
-    """Find outputs that stay on when their publisher has died (rule 20 of docs/heartbeats.md)."""
+    """
+    Find rows where a dead publisher or PLC is noticed late or never.
+
+    This is rule 20 of docs/heartbeats.md.
+    """
     written = mappings.of_plcs.messages
     bare = [mapping for mapping in written if mapping.fallback is None]
     if bare:

@@ -17,8 +17,8 @@ Both CSV files: the line, its mappings, and the values in them.
 
 ``network`` is the net file, a field for each column. The map file is ``map_file``, one row of it
 ``map_row``; ``columns`` says what may stand in each column, and in which rows. A checked row is a
-``mapping``, and ``rows`` has all of them, in groups. ``csv_table`` reads files of spreadsheets.
-``hints`` explains wrong cells, ``remarks`` unusual ones.
+``mapping``, and ``rows`` has all of them, in groups. ``csv_table`` reads CSV files as spreadsheets
+write them. ``hints`` explains wrong cells, ``remarks`` unusual ones.
 
 Every fault has file, line and column, and all of a file are found at once. Nothing here knows a
 port or the plan of a line.

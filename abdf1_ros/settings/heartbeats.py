@@ -46,7 +46,7 @@ LONGEST_END = 6.0
 """How long (s) an orderly end may take until all is confirmed (rule 5)."""
 
 LAST_ANSWER = 0.1
-"""How long (s) a silent station has at the end to answer: all of them have their try."""
+"""How long (s) a silent station has to answer at the end, so that each of them has its try."""
 
 HAND_OVER = 2.0
 """The same where the process goes on: a caller waits for the answer of ~/polling and ~/reload."""
@@ -73,7 +73,8 @@ class While:
 
     ``names`` holds RUN, or the tag of a counter in the PLC's program (rules 13 to 15); for a
     heartbeat it holds write topics (rule 3). ``timeout`` (ms) is the longest time that the counter
-    may stay unchanged, and the oldest age of the last message of each topic; None for RUN.
+    may stay unchanged, or the greatest age that the last message of each topic may have. It is
+    None for RUN.
     """
 
     names: tuple[str, ...]

@@ -75,13 +75,13 @@ def is_export_of_kepserver(names: Sequence[str]) -> bool:
 
 
 def export_fault(path: str, names: Sequence[str]) -> str:
-    """Return the kind of a file whose first row comes from another program."""
+    """Return the kind of a file whose first row comes from another program, else empty."""
     return f'is an export of KEPServerEX; "plc import {path}" makes a map of it' \
         if is_export_of_kepserver(names) else ''
 
 
 def row_hint(names: Sequence[str]) -> str:
-    """Return an explanation of a first row that names no column."""
+    """Return an explanation of a first row that names no column, empty for none."""
     if names[0].startswith('//'):
         return ', and a comment begins with #'
     if any(map(looks_like_address, names)):

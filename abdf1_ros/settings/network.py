@@ -59,7 +59,7 @@ class NetField:
     """
     One field of the net CSV.
 
-    - ``message``: text for a bad value; the text fits numbers and choices only.
+    - ``message``: numbered text for a bad value; its words fit numbers and choices only.
     - ``message_args``: fill the places of ``message`` after the value.
     - ``other_words``: names of choices in other programs, in lower case, with our choice.
     """
@@ -252,7 +252,7 @@ def load_network(path: str) -> Network:
 
 
 def _row_remarks(row: Row) -> Iterator[Problem]:
-    """Yield remarks on the spelling of the data row."""
+    """Yield remarks on the way the data row is written."""
     yield from octal_remarks(row)
     absent = [column for column in row.columns if column not in row.cells]
     if absent:

@@ -49,12 +49,12 @@ class Rows(tuple[Mapping, ...]):
 
     @cached_property
     def on_demand(self) -> Rows:
-        """Return those that are read only when a call asks for them."""
+        """Return the rows that are read only when a call asks for them."""
         return Rows(row for row in self if row.is_on_demand)
 
     @cached_property
     def repeated(self) -> Rows:
-        """Return those that are read, written or served without any call."""
+        """Return the rows that are not read on demand."""
         return self.without(self.on_demand) if self.on_demand else self
 
     @cached_property

@@ -32,7 +32,7 @@ class Scaling:
 
     It is computed in double precision and published as float32. The way back takes the raw value
     nearest to (value - ``offset``) / ``scale``. Of two equally near values it takes the even one,
-    as IEEE 754 does. Both are finite, ``scale`` is not 0.
+    as IEEE 754 does. ``scale`` and ``offset`` are finite, ``scale`` is not 0.
     """
 
     scale: float = 1.0

@@ -110,7 +110,7 @@ def _place(text: str) -> SharePlace:
 
 
 def _host_and_port(name: str, text: str) -> tuple[str, int]:
-    """Return host and port after "tcp:"; the name of a host may stand for any interface."""
+    """Return address and port after "tcp:"; ValueError for a name: it may be any interface."""
     with suppress(ValueError):
         host, port = host_and_port(name, '') if ':' in name else host_and_port(f':{name}')
         if port:

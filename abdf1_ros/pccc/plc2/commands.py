@@ -34,7 +34,7 @@ UNPROTECTED_BIT_WRITE = 0x05
 UNPROTECTED_WRITE = 0x08
 
 # Bytes of data in one packet, and bytes to modify in one bit write (M 7-30..7-40). KF2 allows 242
-# bytes in a write, M 244; our writes stay below both, received ones may have either.
+# bytes in a write, M 244. Our writes have at most 242, received ones may have 244.
 MAX_READ = 244
 MAX_WRITE = 242
 MAX_SERVED_WRITE = 244

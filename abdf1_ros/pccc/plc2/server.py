@@ -15,7 +15,8 @@
 """
 The answers of a PLC-2, and of other PLCs to the commands of a PLC-2.
 
-Each fault of an address has STS 50, also a missing compatibility file (M 8-5).
+A word that is not there, or is protected, has STS 50, also if the compatibility file is missing
+(M 8-5). An odd byte address of a word has STS 10.
 """
 
 from __future__ import annotations

@@ -93,8 +93,8 @@ SLAVE_COUNTERS = (
     names.UNUSED, names.POLLS, names.BAD, names.NO_MEMORY, names.DUPLICATES, names.UNUSED,
     names.DCD, names.LOST)
 # No source shows this reply by radio. The words are at the places of the status file CSx of a
-# radio modem port (1763-RM001C 522: CSx:9 to CSx:18). All other DF1 ports have counters of these
-# names at the same places.
+# radio modem port (1763-RM001C 522: CSx:9 to CSx:18). Where other DF1 ports have counters of these
+# names, they have them at the same places.
 RADIO_COUNTERS = (
     names.MODEM_LINES, names.SENT, names.RECEIVED, names.UNSENT, *3 * [names.UNUSED], names.BAD,
     names.NO_MEMORY, names.DUPLICATES)
