@@ -45,7 +45,7 @@ The rooms, from the wire up. Each imports from those above it only; each ``__ini
 - ``driver``: which job has the line next, and its result
 - ``ports``: serial ports, and the thread that runs a link on one
 - ``share``: other programs on the same port
-- ``simulator``, ``sniffer``, ``conform``: PLCs, recorded bytes, and cases of the manual
+- ``simulator``, ``sniffer``, ``conform``: simulated PLCs, recorded bytes, cases of the manual
 - ``client``: the library; ``ros``: the node; ``cli``: the commands
 """
 

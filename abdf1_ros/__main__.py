@@ -41,7 +41,7 @@ def main() -> int:
 
 
 def _help(name: str, called: str) -> int:
-    """Print what the words before any command ask for; return the exit status."""
+    """Print the version or the help, and the fault of an unknown name; return the exit status."""
     from difflib import get_close_matches  # commands do without
 
     from abdf1_ros.paths import package_version

@@ -45,8 +45,8 @@ _MOST_WAITING = 1 << 20
 # Size of our own pipes: the process that reads them may not get to run for a while.
 _PIPE_SIZE = 1 << 20
 
-# Seconds for the last entries after the end of the process, and seconds that the process waits for
-# it.
+# Seconds for the last lines after the pipes are closed, and seconds that the main process waits
+# for the relay.
 _LAST_ENTRIES = 1.0
 _PATIENCE = 0.5
 
@@ -160,7 +160,8 @@ class Console:
     """
     Give standard output and standard error to a process that may wait for them; a context manager.
 
-    ``log`` is the descriptor of a file that gets all output of rclpy's log.
+    ``log`` is the descriptor of a file that also gets the stream of rclpy's log, without colours.
+    This process closes it.
     """
 
     def __init__(self, log: int | None = None) -> None:

@@ -78,7 +78,7 @@ class Kind(Generic[_Meaning_co]):
     why_not: Callable[[str], str] | None = None
 
     def fault(self, text: str) -> str:
-        """Return the fault that follows a text that was not read."""
+        """Return the words of a fault that follow the text that was not read."""
         return (self.why_not and self.why_not(text)) or f'should be {self.right}'
 
 

@@ -55,10 +55,11 @@ LOG = logging.getLogger('abdf1_ros')
 """
 The logger where no other is given: requests with their times, and what happens on the line.
 
-That is logged by who asks: while a request is under way, with the next one, or at the end.
+The thread that asks logs the events of the line: while its request is under way, with the next
+request, or at the end.
 """
 
-# Most events on the line between two requests.
+# Most events on the line that are kept between two requests.
 _MOST_ENTRIES = 1000
 
 _Entry = tuple[int, object, BaseException | None]
@@ -72,7 +73,7 @@ def opened(settings: PortSettings) -> Callable[[], Port]:
     """
     Open a port; return a function that returns it, and later opens it again.
 
-    A port that does not exist then raises OSError here, in the caller.
+    So a port that does not exist raises OSError here, and not in the thread of the link.
     """
     try:
         ports = [open_port(settings)]
@@ -130,9 +131,11 @@ class OpenLine:
     """
     A line that carries out one request at a time, from here to the end of ``with``.
 
-    Inactive ``stations`` get one try each until they answer. To a PLC that asks us we are a
-    ``plc_type``. ``counters`` counts on the whole line. All bytes go into the file ``trace``, for
-    ``sniff``. Raises OSError when the port cannot be opened or the file not be written.
+    ``stations`` has the state of each station, and the gateways of stations behind one. Inactive
+    stations get one try each until they answer. To a PLC that asks us we are a ``plc_type``.
+    ``counters`` counts on the whole line. All bytes go into the file ``trace``, for ``sniff``.
+    Raises OSError when the port cannot be opened or the file not be written, and
+    ConfigurationError for a mode that only listens.
     """
 
     def __init__(self, mode: LineMode, line: LinkSettings, port: PortSettings,
@@ -141,8 +144,8 @@ class OpenLine:
                  logger: logging.Logger = LOG) -> None:
         if mode.only_listens:
             raise ConfigurationError([Problem('Mode', (
-                f'in Mode {mode.name} nothing may be sent on this line; "sniff" shows what others '
-                'send'))])
+                f'in Mode {mode.name} nothing may be sent on this line; "sniff" shows its '
+                'traffic'))])
         self.log = logger
         self._entries: deque[_Entry] = deque()
         self._lost = 0  # entries
@@ -206,7 +209,7 @@ class OpenLine:
         return pending.result()
 
     def close(self) -> None:
-        """End all requests that are under way, and close the port."""
+        """End all requests, also waiting ones, and close the port."""
         self._link.stop()
         self._requests.close()
         self._log_entries()
@@ -248,7 +251,7 @@ class OpenLine:
             self._lost += 1
 
     def _log_entries(self) -> None:
-        """Log what the link has noted, in the thread of who asks."""
+        """Log what the link has noted, in a thread that asks."""
         with suppress(IndexError):  # another thread that asks may take the last
             while self._entries:
                 level, text, error = self._entries.popleft()

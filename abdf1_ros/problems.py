@@ -46,10 +46,10 @@ class Problem(Abdf1Error):
     """
     One fault in a file or parameter that a user wrote.
 
-    ``place`` is its place, ``text`` says what is wrong and what would be right. ``message`` is its
-    numbered entry, None if the specification has none. Without ``args`` the words of the entry
-    would be false, so only its number is shown. Without ``text`` the words of the entry say all. A
-    problem is shown as one visible line, whatever the file contains.
+    ``place`` is where it stands, ``text`` says what is wrong and what would be right. ``message``
+    is its numbered entry, None if the specification has none. Without ``args`` the words of the
+    entry would be false, so only number and mnemonic are shown. Without ``text`` the words of the
+    entry say all. A problem is shown as one visible line, whatever the file contains.
     """
 
     def __init__(self, where: Place | str, text: str, message: Message | None = None,

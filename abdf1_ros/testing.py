@@ -61,7 +61,7 @@ _Result = TypeVar('_Result')
 
 
 def _claim_domain() -> tuple[int, socket.socket]:
-    """Return a domain that no other session on this machine has, and the lock that keeps it."""
+    """Return a domain that no other session on this machine has, and the socket that keeps it."""
     claim = socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM)
     for number in range(os.getpid(), os.getpid() + 100):
         with suppress(OSError):  # another session has it

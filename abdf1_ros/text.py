@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Foreign text, made safe to show, and values as text."""
+"""Text from users and devices, made safe to show, and values as text."""
 
 from __future__ import annotations
 

@@ -28,7 +28,8 @@ _ASKING = (Target.MASTER, Target.CLIENT, Target.RADIO_CLIENT)
 _ACKNOWLEDGED = (Target.MASTER, Target.CLIENT)
 
 _MOST_COMMANDS = 5
-_CLEARLY = 0.3  # s; least difference between a reply and none, in the time until the next command
+# Without a reply, the next command has to come after twice the time with a reply, plus this (s).
+_CLEARLY = 0.3
 
 
 @case('A command has DST, SRC, CMD, STS 00 and TNS, and the check covers what the manual says.',

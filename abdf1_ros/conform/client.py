@@ -85,7 +85,7 @@ def bad_reply_refused(end: ServerEnd) -> None:
 
 
 def _refuse(end: ServerEnd, *then: bytes) -> None:
-    """Send damaged replies, which are refused, then one that gets DLE NAK, then the good reply."""
+    """Send damaged replies and ``then``, each answered with DLE NAK; then send the good reply."""
     command = end.next_command()
     end.wire.send(codec.ACK)
     reply = codec.message(end.serve(command.data), end.wire.check)

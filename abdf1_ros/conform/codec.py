@@ -97,7 +97,7 @@ def check_bytes(data: bytes, check: BlockCheck, station: int | None = None) -> b
     """
     Return the check of a message, as it stands after DLE ETX.
 
-    ``station`` is set in a message of a master. The BCC covers it and the data (M 5-4); the CRC
+    ``station`` is given for a message of a master. The BCC covers it and the data (M 5-4); the CRC
     covers station and STX, the data and ETX (M 5-6, 5-7).
     """
     if check is BlockCheck.BCC:

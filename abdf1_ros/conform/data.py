@@ -180,7 +180,7 @@ def _read(end: AskingEnd, count: int, words: Words | None = None) -> bytes:
 
 
 def changes_nothing(end: AskingEnd, send: Callable[[bytes], object]) -> None:
-    """Give ``send`` a command that writes; raises Failed if the words have changed."""
+    """Give ``send`` a command that writes; raises Failed if the words are now what it writes."""
     words = _words_of(end)
     before = _read(end, words.count)
     written = bytes(byte ^ 0xFF for byte in before)

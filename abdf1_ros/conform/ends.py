@@ -34,7 +34,7 @@ HIGHEST_LIMIT = 255  # highest setting of any product for repetitions and enquir
 
 
 def expect_end_of_naks(wire: Wire, message: bytes, patience: float) -> None:
-    """Refuse a message each time, until it is given up; raise Failed if it never is."""
+    """Refuse a message each time it comes, until it is given up; raise Failed if it never is."""
     for _ in range(HIGHEST_LIMIT + 1):
         wire.send(codec.NAK)
         symbol = wire.hear(patience)
@@ -54,7 +54,7 @@ def expect_end_of_enquiries(wire: Wire, patience: float) -> Symbol | None:
                  'products', 'DLE ENQ once more')
 
 
-MOST_TRIES = 3  # tries at a full sink, and commands that a driver is asked for
+MOST_TRIES = 3  # tries at a full sink, and at an answer to a driver before a case
 _MOST_COMMANDS = 20  # commands in a row that a slave sends by itself
 
 # Longest time of a reply, in answer times.

@@ -137,7 +137,7 @@ def enquiry_limit(end: PeerEnd) -> None:
 
 
 def _embed(end: PeerEnd, command: bytes, response: bytes) -> Symbol | None:
-    """Send a command with a response inside, again while a sink is full; return the response."""
+    """Send a command with ``response`` inside, again after DLE NAK; return the symbol heard."""
     begun, rest = codec.divided(end.frame(command))
     symbol = None
     for _ in range(MOST_TRIES):

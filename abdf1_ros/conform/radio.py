@@ -34,12 +34,16 @@ _SENDING_ON = 'ML11 517 to 522'
 
 _BROADCAST = 0xFF
 _ACK_TIMEOUT = 6.0  # s after which the slowest full-duplex node has asked for a DLE ACK
-_MOMENT = 0.3  # s; a node that accepts a wrong reply sends its next command within this time
+_MOMENT = 0.3  # s; a node that accepts a frame that it should drop sends within this time
 _COUNTERS = b'\x01\x00\x00\x1A'  # FNC, address and size of a read of diagnostic counters
 
 
 def _sent_on(end: RadioEnd, command: bytes) -> int:
-    """Send a message for another node; return how often it is forwarded, Failed for a reply."""
+    """
+    Send a message that is not for the target; return how often the target forwards it.
+
+    Raises Failed for a reply, or any other symbol.
+    """
     end.send(command)
     until, count = end.wire.now + 2 * end.wire.answer_time, 0
     while (symbol := end.wire.hear(max(until - end.wire.now, 0.0))) is not None:
@@ -142,7 +146,11 @@ def silence_not_enquired(end: RadioServerEnd) -> None:
 
 
 def _not_taken(end: RadioServerEnd, command: Symbol, *frames: bytes) -> None:
-    """Send frames before the reply to a command; the target may only forward them."""
+    """
+    Send frames before the reply to a command, then the reply.
+
+    Before the reply the target may only forward frames that have the SRC of another node.
+    """
     for frame in frames:
         end.wire.send(frame)
     while (symbol := end.wire.hear(_MOMENT)) is not None:

@@ -146,7 +146,7 @@ class Wire:
         return symbol
 
     def _has_passed(self, symbol: Symbol, answers: bool) -> bool:
-        """Return True for an ignored symbol; answer a DLE ENQ or a command of the target."""
+        """Return True for an ignored symbol; answer DLE ENQ, and acknowledge a command."""
         if symbol.kind is SymbolKind.NOISE and symbol.raw[:1] != _DLE:
             self.noise += len(symbol.raw)
             return True
@@ -233,7 +233,7 @@ class Wire:
         raise Failed(what, f'nothing of the kind in {within:g} s')
 
     def rest(self, seconds: float) -> None:
-        """Wait, and leave incoming bytes unread."""
+        """Wait, and keep incoming bytes for the next ``hear``."""
         end = self._clock() + seconds
         while (left := end - self._clock()) > 0:
             self._read(left)

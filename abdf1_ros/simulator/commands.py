@@ -32,11 +32,11 @@ commands, on standard input or with --at:
   full STATION                the station has no room for commands
   slow STATION POLLS          answer this number of polls with EOT before each reply
   delay STATION MS            answer polls with EOT for this time after each command
-  noise STATION SHARE         damage this share of the sent characters (0.01 is 1 %)
+  noise STATION SHARE         damage this share of its characters (0.01 is 1 %)
   error STATION STS [EXT]     put this error into every reply (hexadecimal)
-  normal STATION              end all faults of the station
+  normal STATION              end silent, full, slow, delay, noise or error
   mode STATION MODE           set the mode of the processor: run, program, remote (run), test
-                              or fault; values move in run only, but the station answers
+                              or fault; outside of run nothing moves, but the station answers
   program, test, run STATION  the same as mode STATION program, test, remote
   download STATION            load the program: words as at the start, mode program
   power STATION               switch power off and on

@@ -18,8 +18,8 @@ The PLC's side of heartbeats, as a small program on the words of a simulated PLC
 This is the ladder of docs/tutorials/heartbeats.md; comments give the numbers of the rungs.
 
 - N10, written by the bridge: 0 its heartbeat, 1 and 2 commands.
-- N11: 0 the snapshot of the heartbeat, 1 the snapshot before, 2 and 4 the commands that the
-  machine may use, 3 the heartbeat of the program.
+- N11, written by the program: 0 the snapshot of the heartbeat, 1 the snapshot before, 2 and 4 the
+  commands that the machine may use, 3 the heartbeat of the program.
 - T13: 0 watchdog, 1 stable, 2 the program's clock.
 - B12:0: the lamps.
 

@@ -402,7 +402,7 @@ def _values(row: Row, codec: Codec) -> list[float] | str:
 
 
 def numbers(texts: Sequence[str]) -> list[float]:
-    """Return the int or float of a text; raises ValueError for anything else."""
+    """Return the int or float of each text; raises ValueError for anything else."""
     values = []
     for text in texts:
         number = whole_number(text)

@@ -68,7 +68,8 @@ class Copies:
     """
     Separate, by radio modem, forwarded messages from messages that their sender repeats.
 
-    ``recorder`` is the number of the node at ``>``, if all first messages there have one number.
+    ``recorder`` is the number of the node at ``>``: the SRC of the messages that came there first,
+    None unless that is one number.
     """
 
     def __init__(self) -> None:

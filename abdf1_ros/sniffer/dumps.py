@@ -74,7 +74,7 @@ class Recording:
 
     @property
     def percent(self) -> int:
-        """Return how much of the file has been read, None without a size."""
+        """Return how many percent of the file have been read; without a size it means nothing."""
         return 100 * self._position // max(1, self._size)
 
     def chunks(self) -> Iterator[Chunk]:

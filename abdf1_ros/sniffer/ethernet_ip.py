@@ -16,9 +16,10 @@
 Traffic out of recorded packets: DF1 that ``sniff`` has written, and PCCC inside EtherNet/IP.
 
 PCCC goes through TCP port 44818 in CIP service 4B (Execute PCCC) of the PCCC object (class 67).
-The service may stand inside of an Unconnected Send (52). It has no frame, check, DST and SRC: the
-last numbers of the IP addresses stand for these two, for a second address with the same last
-number one that is free. A response names no class: it counts as PCCC if its request was seen.
+The service may stand inside of an Unconnected Send (52). PCCC has no frame, check, DST and SRC
+there. The last numbers of the IP addresses stand for DST and SRC; a second address with the same
+last number gets a free number. A response names no class: it counts as PCCC if its request was
+seen.
 """
 
 from __future__ import annotations
@@ -218,7 +219,7 @@ def chunks_of(packets: Iterable[RecordedPacket], seen: Seen) -> Iterator[Chunk]:
 
 
 def _tcp(link_type: int, data: bytes) -> tuple[bytes, int, bytes, bool] | None:
-    """Return addresses and ports, number and payload of a segment, and whether it is cut."""
+    """Return addresses with ports, sequence number, payload, and whether the segment is cut."""
     start, kind = _LINKS.get(link_type, (len(data), None))
     if kind is not None:
         while data[kind:kind + 2] in _TAGS:

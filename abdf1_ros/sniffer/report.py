@@ -32,7 +32,7 @@ _ROUTINE = (Kind.POLL, Kind.ACK, Kind.EOT)
 
 
 def text_line(entry: Entry, colour: bool = False) -> str:
-    """Return time, direction, station, kind, text, check, latency and marks of an entry."""
+    """Return time, direction, station, kind, and the ``words`` of an entry."""
     time = '-' if entry.time is None else f'{entry.time:.6f}'
     station = '' if entry.station is None else str(entry.station)
     line = (f'{time:>13} {entry.direction.value} {station:>3} {entry.kind.value:<8} '
@@ -42,7 +42,7 @@ def text_line(entry: Entry, colour: bool = False) -> str:
 
 
 def words(entry: Entry) -> str:
-    """Return text, check, latency and marks of an entry."""
+    """Return text, guest, check, latency and marks of an entry."""
     guest = f'guest {entry.guest}' if entry.guest else ''
     parts = [part for part in (entry.text, guest, _check(entry), _latency(entry)) if part]
     return ' | '.join([*parts, *(mark.value.upper() for mark in entry.marks)])
