@@ -61,8 +61,8 @@ examples:
   command_writer.py recipe 211 222 233 244
   command_writer.py setpoint 21.5 --node /cell/line_1
   command_writer.py name 'Tank 4'
-  command_writer.py speeds 40 --tags speed_north speed_south two mappings, one topic
-  command_writer.py speed 40 --station 1                     while ROS is in control there
+  command_writer.py speeds 40 --tags speed_north speed_south   two mappings, one topic
+  command_writer.py speed 40 --station 1                       while ROS is in control there
 """
 
 

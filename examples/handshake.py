@@ -29,11 +29,12 @@ confused with an old one. There is a second race at the end. The robot gives up 
 begun in time, and the job begins later without a robot. So the request is taken back, and
 ~/write_results has to confirm this. Only a state that was read after that counts.
 
-The map needs a Write row ``job_request`` and a Read row ``job_state`` of two words, busy and done.
-The request is published at a steady rate while the job runs. So its row may have a Fallback of 0:
-then the PLC also learns when this program dies. With ``--control TAG`` a Read row of one bit shows
-whether the PLC uses the values from ROS (rung 7 of the tutorial on heartbeats). While this bit is
-0, the program neither requests a job nor waits for one.
+The map needs a Write row and a Read row with the tags ``job_request`` and ``job_state``. The Read
+row has two words, busy and done. The request is published at a steady rate while the job runs. So
+its row may have a Fallback of 0: then the PLC also learns when this program dies. With
+``--control TAG`` a Read row of one bit shows whether the PLC uses the values from ROS (rung 7 of
+the tutorial on heartbeats). While this bit is 0, the program neither requests a job nor waits for
+one.
 
 Exit status: 0 done, 1 not done and not begun, 3 unknown.
 """

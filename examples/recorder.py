@@ -100,7 +100,7 @@ class Recorder(Node):
 
 
 def record(node: Recorder, seconds: float, wait: float, ended: list[int]) -> bool:
-    """Spin until time is over or a signal comes; return True if the bridge was found."""
+    """Spin until time is over or a signal comes; return False if the bridge was not found."""
     begin = said = time.monotonic()
     while time.monotonic() < begin + seconds:
         if ended:
@@ -148,7 +148,7 @@ def run(options: argparse.Namespace, file: TextIO, ended: list[int]) -> int:
         node.destroy_node()
         rclpy.try_shutdown()
     if not found:
-        os.unlink(options.file)  # the file has no rows, and would block the next try
+        os.unlink(options.file)  # it has no messages, and would block the next try
     print(f'{node.rows} messages in {options.file}' if found else
           f'{options.node} is not there, or has no read topic{hint()}')
     return 0 if found else 1

@@ -53,7 +53,7 @@ def start_node(context: LaunchContext) -> list[LaunchDescriptionEntity]:
 
 
 def bridge(arguments: dict[str, str]) -> Node:
-    """Return a bridge that is started again if ``arguments`` say so and have no faults."""
+    """Return a bridge that is started again if ``arguments`` say so, unless it refused them."""
     def started_again(event: ProcessExited,
                       context: LaunchContext) -> list[LaunchDescriptionEntity]:
         if arguments['respawn'] not in YES or context.is_shutdown:

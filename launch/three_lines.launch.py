@@ -73,7 +73,7 @@ def all_lines() -> Node:
 
 
 def refuse_unknown(context: LaunchContext) -> None:
-    """Raise RuntimeError for an unknown argument: parameters belong into the file."""
+    """Raise RuntimeError for an unknown argument: parameters belong in the file."""
     problems = unknown_arguments(__file__, ('lines_file', 'one_process'), sys.argv)
     if problems:
         raise RuntimeError('; '.join(problems))

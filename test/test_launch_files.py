@@ -164,7 +164,7 @@ def test_log_level_reaches_a_node_below_a_pushed_namespace(
 def test_faulty_configuration_is_not_started_again(launch: Starter, yes: str) -> None:
     process = launch('bridge.launch.py', 'net_file:=/nowhere/net.csv', EXAMPLE[1],
                      f'respawn:={yes}')
-    process.wait_for('not started again after status 2, which is for faulty files or parameters')
+    process.wait_for('not started again after status 2: faulty files or parameters')
     process.result()  # nothing is left to be done
     assert process.text.count('process started with pid') == 1
     assert 'exit code 2' in process.text

@@ -135,7 +135,7 @@ class Executor(SingleThreadedExecutor):
 
 
 def _give_back(entity: Any) -> None:
-    """Wait for an entity again: rclpy forgets this if it cannot take the entity's message."""
+    """Let the executor wait for an entity again: rclpy forgets this if a take has failed."""
     if entity is not None and entity._executor_event:  # noqa: SLF001
         entity._executor_event = False  # noqa: SLF001
         entity.callback_group.ending_execution(entity)

@@ -81,7 +81,7 @@ class Observer:
         self.executor.spin_once(timeout_sec=seconds)
 
     def published(self, name: str) -> list[tuple[str, list[str]]] | None:
-        """Return the topics and types of the node ``name``; None if it is not known yet."""
+        """Return the topics that the node ``name`` publishes, and types; None if not known yet."""
         namespace, _, base = name.rpartition('/')
         try:
             return self.node.get_publisher_names_and_types_by_node(base, namespace or '/')

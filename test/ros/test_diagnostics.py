@@ -429,7 +429,7 @@ def test_refused_command_of_a_plc_is_told_for_a_minute(bench: Bench) -> None:
     text = ('station 1: protected typed logical write N7:10: STS 10: illegal command, format or '
             'length, or the file does not exist')
     assert bench.says('link', NOW + 61.0) == (
-        WARN, f'WARN: port open, but it has refused a command of {text}')
+        WARN, f'WARN: port open, but the bridge has refused a command of {text}')
     assert bench.says('link', NOW + 62.1)[0] == OK
     assert details(bench.status('link', NOW + 62.1))[f'refused: {text}'] == '3 times'
 

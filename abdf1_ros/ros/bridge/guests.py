@@ -70,7 +70,7 @@ class GuestPlaces(GuestListener):
             'one program at a time'))
 
     def wrote(self, guest: Guest, command: Packet, station: int, words: list[Extent]) -> None:
-        """Log that a guest has written words that this bridge writes too."""
+        """Log that a guest has sent a write to words that this bridge writes too."""
         rows = [row for row in self._driver.mappings if row.changes and any(
                 row.extent.meets(extent) for extent in words)]
         if rows:
@@ -84,7 +84,7 @@ class GuestPlaces(GuestListener):
         if guest.unanswered == 1:
             self._notes.info(f'guest {guest.name}', (
                 f'guest {guest.name} gets no reply from station {command.dst} to '
-                f'{describe(command)}, but STS {sts:02X}; the status "guests" counts more'))
+                f'{describe(command)}, but STS {sts:02X}; the status "guests" counts them all'))
 
     def was_refused(self, guest: Guest, command: Packet) -> None:
         """Log only the first command that is not allowed."""

@@ -33,7 +33,7 @@ def take_last_writes(look: Callable[[float], None], taken: Callable[[], int], gi
     """
     Let a node take the writes that came before its end, so that each gets its result.
 
-    - ``look``: runs callbacks for at most the given time (s)
+    - ``look``: lets callbacks run for at most the given time (s)
     - ``taken``: returns the number of writes taken
     - ``give_up``: latest end, as a value of the clock ``now`` (s)
     """

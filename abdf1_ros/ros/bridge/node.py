@@ -15,7 +15,7 @@
 """
 The ROS node of a bridge: its link, the session of a pair of files, services, start and end.
 
-All parts are created before the link's thread starts, and destroyed after its end.
+The link's thread starts after the first session is made, and ends before the node is destroyed.
 """
 
 from __future__ import annotations

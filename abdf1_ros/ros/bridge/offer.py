@@ -35,8 +35,8 @@ class OfferedPublisher:
     A publisher that exists only while the bridge offers it.
 
     Without a publisher the last ``most`` messages wait: the bridge may have the line a moment
-    before it notices. Any thread may call ``publish``; only the executor's thread may call the
-    rest.
+    before it notices. Any thread may call ``publish``; only the executor's thread may call
+    ``offer`` and ``withdraw``.
     """
 
     def __init__(self, node: Node, kind: type, topic: str, qos: Any, most: int) -> None:

@@ -31,9 +31,10 @@ from abdf1_ros.text import first, printable
 def refuse_harm(before: Configuration, after: Configuration, is_open: bool,
                 settings: PortSettings, judge: Callable[[PortSettings], str] = why_not) -> None:
     """
-    Raise ConfigurationError for valid files that would stop a line whose port ``is_open``.
+    Raise ConfigurationError for valid files that would stop a running line.
 
-    ``settings``: of the new port. The device is opened as a trial only if it is a new device.
+    ``settings``: of the new port. If the old port ``is_open`` and the new port is another device,
+    that device is opened as a trial.
     """
     problems = []
     if before.mappings and not after.mappings and not after.network.share:

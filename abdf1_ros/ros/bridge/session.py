@@ -208,12 +208,12 @@ class Session:
         """Log a summary of the files; the driver is on the line, or soon will be."""
         logger, configuration = self._surroundings.node.get_logger(), self.configuration
         _tell_files(logger, configuration)
-        # First, because dozens of other remarks may follow.
+        # Load remarks first, because dozens of setting remarks may follow.
         _tell_remarks(logger, [*self._plan().load_remarks(), *setting_remarks(
             configuration.network, configuration.mappings)])
         self.diagnostics.line.attach(self._surroundings.link, self._surroundings.opener)
         self.reads.take_over()
-        # otherwise port_changed logs it after the first attempt
+        # otherwise port_changed publishes the table after the first attempt
         if self._surroundings.link.state.is_open:
             self._publish_active()
 
@@ -230,7 +230,7 @@ class Session:
         self._interlocks.end()
 
     def begin_end(self) -> None:
-        """Set heartbeats to 0 and write fallbacks; ``tell_plcs`` waits for both (rule 5)."""
+        """Begin to set heartbeats to 0 and write fallbacks; ``tell_plcs`` waits (rule 5)."""
         self._events.unreadable_rows.tell()
         self.driver.interlocks.wind_down()
         self._wake_link()
@@ -274,7 +274,7 @@ class Session:
         tell('the port', f'{self.port}: {state.text}')
 
     def check(self) -> None:
-        """Publish diagnostics if they are due or a level has changed; end calls that are over."""
+        """Publish diagnostics if due or if a level has changed; end calls that need not wait."""
         now = line_time()
         self._surroundings.writes.standstills.look(now)
         self.link_counters.check(now)
@@ -289,7 +289,7 @@ class Session:
         self._publish_snapshot(now)
 
     def _look(self, watch: Watch, now: float) -> None:
-        """Log news of all watches; a watch fails if DDS reports a name that rclpy cannot read."""
+        """Log the news of a watch; it fails if DDS reports a name that rclpy cannot read."""
         try:
             for news in watch.look(now):
                 self._events.notes.tell(news)

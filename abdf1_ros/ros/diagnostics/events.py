@@ -72,7 +72,7 @@ class LineEvents:
         self._has_told_tools = False
 
     def port_changed(self) -> None:
-        """Expect that stations may answer commands sent on the old port."""
+        """Expect that stations may answer commands sent before the port was opened."""
         self._may_have_left_over = set(self._stations)
 
     def lost(self, topic: str, count: int) -> None:
@@ -111,8 +111,8 @@ class LineEvents:
         self.unreadable_rows.add(line_time(), mapping, reason)
 
     def published_again(self, mapping: Mapping, seconds: float) -> None:
-        """Log that a row is published again; first log the rows that still have no value."""
-        self.unreadable_rows.tell()
+        """Log that a row, and all rows with the same condition, are published again."""
+        self.unreadable_rows.tell()  # first, because these entries are older
         self.notes.info(mapping.tag, f'{where(mapping)}: published again after {seconds:.1f} s')
 
     def foreign_value(self, mapping: Mapping, text: str, is_conflict: bool) -> None:
@@ -132,7 +132,7 @@ class LineEvents:
         is_inactive = event.message is Message.ERR_INACTIVE_STATION
         if event.message is not Message.NTC_REPLY_MSG_RCVD:
             moment = event, self._clock()
-            # An inactive station has a status of its own; its last event still says why.
+            # Other values of the status say that a station is inactive; its last event says why.
             if not is_inactive:
                 self.seen.last_events[event.station] = moment
             if event.message.severity is not Severity.NOTICE:

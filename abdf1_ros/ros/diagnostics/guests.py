@@ -24,7 +24,7 @@ from abdf1_ros.text import counted, milliseconds
 
 
 class GuestsStatus:
-    """Which places have a guest, and what these guests have sent."""
+    """Which places are open, and what their guests have sent."""
 
     name = 'guests'
 

@@ -95,7 +95,7 @@ class LinkStatus:
             return WARN, f'port open, {silent} of {total} stations take commands and do not reply'
         heard = sum(station.last_heard is not None for station in stations)
         if refused := self._line.driver.refused.lately(now):
-            return WARN, f'port open, but it has refused a command of {refused[-1]}'
+            return WARN, f'port open, but the bridge has refused a command of {refused[-1]}'
         return OK, f'port open, {heard} of {total} stations have answered'
 
     def values(self, now: float) -> dict[str, str]:
@@ -199,7 +199,7 @@ def load_by_topic(jobs: Iterable[ReadJob]) -> str:
 
 
 def _paces(points: Iterable[ReadPoint]) -> dict[str, str]:
-    """Return the wanted and the real time between reads, by period; without Serve rows."""
+    """Return the wanted and the measured time between reads by period, of periodic rows."""
     found: defaultdict[float, list[float]] = defaultdict(list)
     for point in points:
         if point.mapping.polls and not point.mapping.is_on_demand:

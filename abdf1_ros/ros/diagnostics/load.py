@@ -25,7 +25,8 @@ from abdf1_ros.plan.report import PERIOD_STEPS
 from abdf1_ros.settings.mapping import Mapping
 from abdf1_ros.text import first, milliseconds
 
-# A row is slow if its reads take more than 1.5 periods, and until they take 1.25 or less.
+# A row becomes slow if more than 1.5 periods lie between its reads; it stays slow while more than
+# 1.25 do.
 _SLOW, _STILL_SLOW = 1.5, 1.25
 
 _LOOK_PERIOD = 1.0  # s

@@ -175,7 +175,7 @@ class Configuration:
 
     @property
     def idle(self) -> list[str]:
-        """Return the parameters that count with standard polling alone, where there is none."""
+        """Return the changed parameters that only standard polling uses, if the line has none."""
         if self.network.line_mode is STANDARD:
             return []
         usual = Parameters()
@@ -188,7 +188,7 @@ class Configuration:
         return self.mappings if is_few and self.parameters.expose_map_parameters else ()
 
     def __str__(self) -> str:
-        """Return one line of text with the files, the port, and the number of rows and topics."""
+        """Return one line of text: files, settings of the line, numbers of rows and topics."""
         network, parameters = self.network, self.parameters
         read = len(self.mappings.published)
         written = len({mapping.topic for mapping in self.mappings.messages})
@@ -285,7 +285,7 @@ def _overridden(given: Given, network: Network) -> Network:
 
 
 def _needed(name: str, path: str, problems: list[Problem]) -> str:
-    """Return the path of a file; raises ConfigurationError if it is missing."""
+    """Return the path of a file; raises ConfigurationError, with help, if none is given."""
     if '$(' in path:
         raise ConfigurationError([Problem(
             f'parameter {name}', f'{path}: $(...) is for launch files; write the path')])
@@ -398,7 +398,7 @@ def _declare(node: Node, given: Given, name: str, default: Any,
     Declare a parameter and return its value, even if that has a wrong type or range.
 
     rclpy only shows types and ranges; we check them, with better messages. A path is shown
-    resolved, but returned as the user gave it.
+    resolved, but returned as the user gave it, with ~ expanded.
     """
     if name in _PATHS and isinstance(value := given.get(name), str):
         path = os.path.expanduser(value)  # the shell does not expand net_file:=~/net.csv

@@ -43,7 +43,8 @@ def parameter_tree(path: str) -> yaml.Node | None:
     """
     Return the YAML nodes of a parameter file.
 
-    Raises ConfigurationError if the file is not YAML, or uses YAML features that ROS refuses.
+    Raises ConfigurationError if the file cannot be read, is not a parameter file in YAML, or uses
+    YAML features that ROS refuses.
     """
     try:
         text = Path(path).read_text(encoding='utf-8')
@@ -65,7 +66,7 @@ def parameter_tree(path: str) -> yaml.Node | None:
 
 
 def _check_events(path: str, events: Iterable[yaml.Event]) -> None:
-    """Raise ConfigurationError for features that ROS refuses, and for endless nesting."""
+    """Raise ConfigurationError for features that ROS refuses, and for too many levels."""
     keys: list[bool | None] = []  # for each open mapping: is a key next? For a list: None
     for event in events:
         if isinstance(event, yaml.CollectionEndEvent):

@@ -113,7 +113,7 @@ def run_ros(name: str, parser: argparse.ArgumentParser,
 
     ``make`` gets the arguments (``args``, by default from the command line); it opens no port.
     With ``leaves_out``, sections of parameter files are left out if ROS refuses their names. If
-    ``make`` fails, the reason is logged under ``name``. The exit status is EXIT_CONFIGURATION if
+    ``make`` fails, the reason is reported as ``name``. The exit status is EXIT_CONFIGURATION if
     the user has to change arguments, parameters or files. It is EXIT_FAULT for a reason that may
     pass. An error while the program runs is a bug: a traceback, and EXIT_FAULT.
     """

@@ -118,8 +118,8 @@ class Runner:
         Run all lines until the end; return the exit status.
 
         All nodes exist before the first line starts. Running lines hold the GIL most of the time:
-        they made the start of a hundred nodes four times slower. The threads of callbacks start
-        late too, because each new node would wake them all.
+        with them, a hundred nodes took four times as long, and their threads half as long again.
+        The threads of callbacks start late too, because each new node would wake them all.
         """
         try:
             for line in self._lines:

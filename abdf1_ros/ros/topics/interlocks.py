@@ -80,6 +80,6 @@ class InterlockWatch:
 
 
 def count_owners(node: Node, topic: str) -> int:
-    """Return how many publishers a write topic has, and callers its ~/set."""
+    """Return the number of publishers to a write topic, plus the number of callers of ~/set."""
     return count_publishers(node, topic) + node.count_clients(
         node.resolve_service_name(f'~/set/{topic}'))

@@ -90,7 +90,8 @@ def read_qos(mapping: Mapping, stale_time: float) -> QoSProfile:
     A row promises a longest time between two values, if it is read at least every ``stale_time``
     seconds. A late subscriber gets the last value, unless it is older than the promised time. A
     subscriber with deadline or liveliness QoS gets an event when values stop. A topic promises
-    nothing if it is published when a PLC writes, or on change without Max_Silence.
+    nothing if its row is read on demand, or is published when a PLC writes, or on change without
+    Max_Silence.
     """
     profile = latched_qos()
     if math.isfinite(promise := mapping.promise(stale_time)):

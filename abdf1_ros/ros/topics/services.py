@@ -82,7 +82,7 @@ class RowServices:
     """
     All services of rows.
 
-    - ``take``: may be called in any thread
+    - ``take``, ``end``: may be called in any thread
     - ``look``: is called ten times a second, always by the same thread
     - all else: only in the thread of the executor
     - ``wake_executor``: makes the executor continue calls that have their results
@@ -118,7 +118,7 @@ class RowServices:
                     qos_profile=QoSProfile(depth=_DEPTH))
 
     def withdraw(self) -> None:
-        """Close all services."""
+        """Answer all calls; ``look`` closes all services once no call waits."""
         self._rows = {}
         self.end()
         self._retire()

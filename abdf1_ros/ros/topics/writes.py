@@ -230,7 +230,7 @@ class WriteTopics:
                 for end in self._node.get_publishers_info_by_topic(_name(topic))]
 
     def take(self, topic: str, message: Any, info: Any) -> None:
-        """Count what was lost before a message, then hand it on or let it wait."""
+        """Count what was lost before a message; then hand it on, let it wait, or refuse it."""
         self._topics[topic].arrived(info)
         reject_reason = '' if self._is_open else TOO_MANY
         if reject_reason and len(self._waiting) < MAX_WAITING_WRITES:
