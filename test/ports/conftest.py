@@ -12,11 +12,13 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""A pseudo-terminal, and link threads that end with the test."""
+"""A pseudo-terminal, a connection, and link threads that end with the test."""
 
 from collections.abc import Iterator
 from pathlib import Path
+import socket
 
+from abdf1_ros.ports.descriptor import DescriptorPort
 import pytest
 from support.link_threads import Link
 from support.ptys import Pty
@@ -27,6 +29,14 @@ def pty(tmp_path: Path) -> Iterator[Pty]:
     line = Pty(tmp_path / 'line')
     yield line
     line.close()
+
+
+@pytest.fixture
+def sockets() -> Iterator[tuple[DescriptorPort, socket.socket]]:
+    ours, theirs = socket.socketpair()
+    yield DescriptorPort(ours.fileno(), ours.close), theirs
+    theirs.close()
+    ours.close()
 
 
 @pytest.fixture

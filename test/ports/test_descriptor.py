@@ -25,14 +25,6 @@ from support.ptys import PATIENCE
 
 
 @pytest.fixture
-def sockets() -> Iterator[tuple[DescriptorPort, socket.socket]]:
-    ours, theirs = socket.socketpair()
-    yield DescriptorPort(ours.fileno(), ours.close), theirs
-    theirs.close()
-    ours.close()
-
-
-@pytest.fixture
 def wake() -> Iterator[tuple[int, int]]:
     pipe = os.pipe()
     yield pipe

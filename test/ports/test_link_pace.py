@@ -14,7 +14,7 @@
 
 """When the link thread looks at its port, and when it leaves the port alone."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 import math
 from pathlib import Path
 import socket
@@ -181,14 +181,6 @@ def test_serial_port_is_not_looked_at_before_a_reply_can_be_complete(
     assert thread.pauses[0] == pytest.approx(0.084)  # 16 of the 100 bytes are waited for
     thread.stop()
     opener.close()
-
-
-@pytest.fixture
-def sockets() -> Iterator[tuple[DescriptorPort, socket.socket]]:
-    ours, theirs = socket.socketpair()
-    yield DescriptorPort(ours.fileno(), ours.close), theirs
-    theirs.close()
-    ours.close()
 
 
 def test_bytes_of_a_connection_are_read_as_they_come(

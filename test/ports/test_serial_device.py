@@ -37,13 +37,6 @@ from support.ptys import PATIENCE, Pty
 
 
 @pytest.fixture
-def pty(tmp_path: Path) -> Iterator[Pty]:
-    line = Pty(tmp_path / 'line')
-    yield line
-    line.close()
-
-
-@pytest.fixture
 def wake() -> Iterator[int]:
     ends = os.pipe()
     yield ends[0]
