@@ -107,9 +107,9 @@ class Accounting:
         """
         Count and report a reply that no command waits for (S0, message 2510).
 
-        The reply proves its station, unless a node on the way has replied for the station. A reply
-        that may answer an earlier command is stale (S0, counter 2548). Any other is invalid (2550,
-        "incorrect addressing"): not for us, or from a station that we do not ask.
+        A reply that may answer an earlier command is stale (S0, counter 2548). It proves its
+        station, unless a node on the way has replied for the station. Any other reply is invalid
+        (2550, "incorrect addressing"): not for us, or from a station that we do not ask.
         """
         may_answer = self._number in (None, reply.dst) and reply.src in self._stations
         self.counters.stale_messages += may_answer
@@ -132,8 +132,8 @@ class Accounting:
         """
         End a task with the reply to its command, or as WrongCommandCode if CMD differs (S0).
 
-        A gateway replies for a PLC that it does not reach, maybe after a long time. A late error
-        reply of a gateway counts as a timeout if other commands had to wait for it.
+        A gateway replies for a PLC that it does not reach, maybe after a long time. If other
+        commands have to wait for such a reply, it counts in ``overdue`` like a missing reply.
         """
         number = reply.src
         expected = task.command.cmd | REPLY_BIT

@@ -17,9 +17,9 @@ The echo of our own frames: TX and RX are connected, or the adapter echoes.
 
 A line that echoes gives back all frames in their order, before any station can answer. So a
 message equal to a message that we sent, and have not yet seen again, is our echo. If a foreign ACK
-arrives before our message has come back, the line does not echo. An equal message that comes later
-is then from a PLC. As long as this is unknown, an equal message counts as our echo, once. If it
-was from a PLC, the PLC gets no response and sends it again.
+arrives after our message has left, and before it has come back, the line does not echo. An equal
+message that comes later is then from a PLC. As long as this is unknown, an equal message counts as
+our echo, once. If it was from a PLC, the PLC gets no response and sends it again.
 """
 
 from __future__ import annotations

@@ -31,8 +31,8 @@ from typing import Final, NamedTuple
 from abdf1_ros.df1.checksum import bcc, Checksum
 from abdf1_ros.df1.packet import HEADER_SIZE
 
-# Most bytes of unstuffed link data that we take. The largest reply is 244 bytes after a header (M
-# 7-30..7-40), and no known device sends more than this limit.
+# Most bytes of unstuffed link data that we take. The largest reply is 244 bytes after a header
+# (M 7-30..7-40), and no known device sends more than this limit.
 MAX_LINK_DATA = 261
 
 # Bytes that wait to be read while a machine does not listen, some seconds of the fastest line.
@@ -275,7 +275,7 @@ class FrameDecoder:
         self.waiting.clear()
 
     def broken_off(self) -> Frame:
-        """Return the message that is coming in, as broken off."""
+        """Return the message that is coming in, with the fault that it has if it ends here."""
         data = bytes(self.link_data)
         if self._step != self._check:
             return Frame(data, self._station, FrameFault.NO_ETX, has_stopped=True)

@@ -190,7 +190,7 @@ class ListeningDecoder(FrameDecoder):
                 self._kind.checksum = Checksum.BCC
 
     def _reconsider(self) -> None:
-        """Change the check when the last frames have been right with the second check only."""
+        """Change to the other check when the last frames have been right with that check only."""
         other = Checksum.BCC if self._checksum is Checksum.CRC else Checksum.CRC
         if self._matches(self._checksum):
             self._contrary_frames = 0

@@ -53,7 +53,8 @@ class Send(NamedTuple):
 
     - ``timeout``: seconds after the last byte has left, None for no limit; with 0 the step does
       not wait.
-    - ``delay``: seconds before the frame goes out, at least TX_Delay unless ``at_once``.
+    - ``delay``: seconds before the frame goes out, at least TX_Delay.
+    - ``at_once``: the frame goes out without ``delay`` and without TX_Delay.
     - ``expires``: clock value (s) after which the frame does not go out any more. CommandExpired
       is then raised at the ``yield``.
     - ``reply_size``: bytes after the header of the expected good reply, 0 if unknown.
@@ -132,14 +133,15 @@ MOST_LATE = 0.2
 # Longest time (s) that an operating system or a device server holds bytes of a frame back.
 HELD_BACK = 0.1
 
-# Pause, in characters, that ends a message besides that time.
+# Pause, in characters, after which a message or a line is over. The time that the equipment may
+# hold bytes back is added.
 QUIET_CHARACTERS = 20
 
 # A shorter time (s) counts as none: no wait ends so exactly.
 MOMENT = 0.0001
 
-# A message that has begun may take this many times the time of its bytes at the set speed, plus
-# two pauses. It may take no longer than the longest message. Without a limit a station that
+# A message that has begun may take this many times the time of its bytes at the set speed, but no
+# longer than the longest message. Two pauses are added to either. Without a limit a station that
 # dribbles, or never ends, would keep the line from all other stations.
 _SLOWEST = 4
 _LONGEST = 2 * MAX_LINK_DATA
@@ -147,7 +149,7 @@ _LONGEST = 2 * MAX_LINK_DATA
 # Characters that a UART may hand on at once. Bytes at the end of a reply are read as they come.
 _LAST_CHARACTERS = 16
 
-# Responses: a full-duplex node sends them only after a complete message or ENQ.
+# Responses: a full-duplex node sends them only after it has heard a message or an ENQ to its end.
 _RESPONSES = (Control.ACK, Control.NAK)
 
 Heard = Symbol | Silence
@@ -282,7 +284,7 @@ class Machine:
         data = self.decoder.link_data
         is_faster = self.now - self.sender.free_at < len(data) * char_time
         if is_faster or not begins_good_reply(data):
-            return 0.0  # a simulator's line is faster, or another reply is coming in
+            return 0.0  # faster than its speed (a simulator's line), or not a good reply
         missing = HEADER_SIZE + step.reply_size - len(data) - _LAST_CHARACTERS
         spare = max(missing, 0) * char_time
         return spare if self.deadline is None else min(
@@ -327,7 +329,7 @@ class Machine:
             return  # these bytes came before our command left, so they cannot answer it
         if self._is_listening and now - self._last_heard > self._pause_limit:
             if not self.decoder.in_message:
-                self.decoder.reset()  # the message that broke off must not swallow the next one
+                self.decoder.reset()  # a symbol that broke off must not swallow the next one
             elif now > self._message_end():
                 self._break_off()
         self._last_heard = now
@@ -429,7 +431,8 @@ class Machine:
         """
         echo = self.sender.echo
         while (symbol := self.decoder.next_symbol()) is not None:
-            # A master sends no frame without a station number, and no response before its echo.
+            # A master sends no frame without a station number, and no response before it hears
+            # its echo.
             is_slaves = self._forget_on_send and (
                 symbol.station is None if isinstance(symbol, Frame)
                 else isinstance(symbol, Control) and not echo.is_heard)

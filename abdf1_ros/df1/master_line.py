@@ -125,10 +125,10 @@ class MasterLine:
         Send a message to a station until it is acknowledged (S0, "Network Reads"; M 3-12).
 
         Return when the acknowledged transmission began (clock value in s). Raises CommandExpired,
-        and StationInactive after the last retry. If the gateway of the station answers a poll, the
-        error names only the station. For a message to the gateway itself the error is
-        CommandTimeout. A silent station gets the message once, and so does a station behind an
-        active gateway that has never replied: the other nodes of the gateway would wait for all
+        and StationInactive after the last retry. If the gateway of the station then answers a
+        poll, the error names only the station; for a message to the gateway itself it is
+        CommandTimeout. A silent station gets the message once. So does a station that has never
+        replied, if its gateway has been heard: the other nodes of the gateway would wait for all
         retries. The answer of a silent station is waited for ``answer_within`` s at most.
         """
         frame = frames.master_frame(number, packet.encode(), self.settings.checksum)
@@ -172,7 +172,7 @@ class MasterLine:
         raise StationInactive(number)
 
     def _note_cause(self, answer: Heard, number: int, expected: Message) -> Message:
-        """Note why a frame has to be sent again, at worst that ``expected`` did not come."""
+        """Note why a frame has to be sent again, by default ``expected``; return that message."""
         if answer is Control.NAK:
             self.accounting.nak_received(number)
             return Message.ERR_RCVD_NAK_SYMBOL
@@ -196,7 +196,7 @@ class MasterLine:
                 self.take_unwanted(packet)
 
     def poll_inactive(self, number: int) -> Generator[Step, Heard, Heard]:
-        """Poll an inactive station; report each symbol that is not a good answer."""
+        """Poll an inactive station; report an answer that is not good, unless no byte came."""
         answer = yield from self._poll(number)
         if is_good(answer):
             self.stations.heard(number, self.machine.now)
@@ -373,7 +373,7 @@ class MasterLine:
         """End a task with the reply to its command."""
         if reply.src in self.stations.routes and not is_local_status(reply.sts) \
                 and reply.cmd != DIAGNOSTIC_REPLY:
-            # the station was heard when the reply came
+            # A station without a gateway has been marked as heard when its reply came.
             self.stations.heard(reply.src, self.machine.now)
         self.accounting.complete(task, reply, keeps_others_waiting=keeps_others_waiting)
 

@@ -113,7 +113,7 @@ class LineMode:
         Return how long a transaction takes at most that ends within its retries.
 
         ``frames`` is the time of its frames, each once. ``others`` is the longest such time of
-        another transaction. ``stations`` are on the line.
+        another transaction. ``stations`` is the number of stations on the line.
         """
         timeout = answer_time(line)
         # Cmd_Timeout runs from the beginning of the try that is acknowledged.

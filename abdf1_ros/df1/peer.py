@@ -32,8 +32,8 @@ needed a second try, there is a short pause. A response in that pause is late, a
 for the next message.
 
 An ACK is not a reply. A command waits for its reply up to Cmd_Timeout after the ACK. Several
-commands may wait, up to ``max_outstanding``; a reply finds its command by station, CMD and TNS. A
-reply that overtakes its ACK counts as the ACK, too (M 4-13).
+commands may wait, up to ``max_outstanding``; a reply finds its command by station and TNS. A reply
+that overtakes its ACK counts as the ACK, too (M 4-13).
 
 A message is sent again when its sender has not understood our response (M 4-5). So a repetition
 comes within the time that the sender's retries take. If the sender has acknowledged our reply and
@@ -367,7 +367,8 @@ class FullDuplexPeer(EqualNode):
             return False
         is_settled = last.is_answered and not last.may_come_again
         enq_retries = 0 if is_settled else max(_ENQ_LIMIT, settings.enq_retries)
-        # Most seconds that the far end needs for ``ENQ_Retries`` ENQs.
+        # Most seconds that the far end needs for these ENQs. Of our settings and the default
+        # settings of the products the larger ones count.
         retry_time = (enq_retries + 1) * max(_ACK_TIMEOUT, settings.timeout)
         return self._machine.now - last.when < retry_time
 

@@ -214,8 +214,8 @@ class StandardPollingMaster:
                 answer = yield from self._line.poll_with_retries(
                     number, 0.0, self._reply_size(number))
             except StationInactive as error:
-                # Of several pending commands the guest's is given up first. The next poll shows
-                # whether the remaining commands get replies.
+                # If a reply cannot be fetched, the commands of guests are given up first. The
+                # next poll shows whether the station answers.
                 guests = [station for station, entry in self._waiting_for(number)
                           if not entry.task.blames]
                 for station in guests:

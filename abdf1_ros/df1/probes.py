@@ -24,7 +24,7 @@ OTHERS_SHARE = 7
 
 
 class Asker(Enum):
-    """The kinds of commands that ask a silent station whether it answers again."""
+    """The kinds of probes, which ask a silent station whether it answers again."""
 
     IN_TURN = auto()  # reads, checks and polls, which ask the silent stations in their order
     MESSAGE = auto()
@@ -35,9 +35,14 @@ class Probes:
     """
     Limit the time of all probes to an eighth of the line's time.
 
-    The kinds of probes take turns: (a) the round of silent stations, from ``next`` on (clock
-    value, s), and (b) messages to silent stations. A message cannot wait: a message that comes
-    before its turn is refused, and the next turn is then reserved for a message.
+    The kinds of probes take turns, each from a clock value (s) on:
+
+    - ``next``: the round of silent stations.
+    - ``next_message``: messages to silent stations.
+    - ``next_own``: a 0 or a fallback.
+
+    A message cannot wait: a message that comes before its turn is refused. The next turn is then
+    reserved for a message, if the last probe was not a message.
 
     - ``pause``: seconds for active stations after the last probe. Before the first probe it
       follows from ``usual``, the usual seconds of a probe.

@@ -23,8 +23,8 @@ a PLC knows it as a repetition.
 Ours: a node waits until the line is quiet, and then for a random time, before it sends. That time
 grows with each try, because several nodes may have waited for the same end. A repetition of a
 command is answered with the reply that we have given, because that reply may have been lost. If we
-hear a packet with our number that we did not send, another node has our number. We then ignore
-replies that may belong to its commands.
+hear a packet with our number as SRC that we did not send, another node has our number. We then
+ignore replies that may belong to its commands.
 
 A node that stores and forwards sends a packet again, once. It does so if SRC and DST are in its
 table and the packet is not among the last packets.
@@ -69,14 +69,14 @@ from abdf1_ros.messages import Event, Message
 _MOST_HEARD = 20
 _RECENT = 10.0
 
-# Number of our packets that nodes may forward back to us.
+# Most packets of ours that are remembered: nodes may forward them back to us.
 _MOST_SENT = 256
 
 # Most replies and forwarded packets that wait for a quiet line; the newest are dropped.
 _MOST_WAITING = 16
 
-# The random time before the first try is at most the line time of our frame. It doubles with each
-# further try, up to this many times the frame.
+# The random time before the first try is at most the line time of our frame. This limit doubles
+# with each further try, up to this many times its first value.
 _MOST_BACK_OFF = 8
 
 # Longest wait (s) for a quiet line; then the node sends all the same.

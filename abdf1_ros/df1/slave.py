@@ -271,7 +271,7 @@ class HalfDuplexSlave:
 
 
 class Responder(Protocol):
-    """Anything that answers symbols on a line: a slave, or a device that misbehaves."""
+    """Anything that answers symbols on a line: a slave, or one that misbehaves on purpose."""
 
     def handle(self, symbol: Symbol) -> bytes:
         """Return the bytes to send in answer to ``symbol``."""

@@ -43,9 +43,9 @@ class SlaveLink(Link, Initiator):
     Serve the master on the line of ``machine``, and send the commands of a source.
 
     After the master has taken a command, the link waits Cmd_Timeout for its reply. Before that the
-    command waits for the next poll. ``serve`` and ``report`` are the same as in every link. The
-    link is the ``Initiator`` of its own slave. ``last_poll`` is the clock value (s) of the last
-    poll, or of the start.
+    command waits for the next poll, also Cmd_Timeout at most. ``serve`` and ``report`` are the
+    same as in every link. The link is the ``Initiator`` of its own slave. ``last_poll`` is the
+    clock value (s) of the last poll, or of the start.
     """
 
     def __init__(self, machine: Machine, settings: LinkSettings, stations: ActiveStationList,

@@ -28,7 +28,7 @@ MAX_STATION = 254
 # Number of commands in a row without a reply in time after which a station is treated as silent.
 MOST_OVERDUE = 2
 
-# Number of returns without a reply to a command after which a return is not treated as recovered.
+# Number of returns, without a reply to a command, after which a return does not end an outage.
 _MOST_RETURNS = 2
 
 

@@ -27,7 +27,7 @@ from abdf1_ros.errors import LinkError
 
 class Task(Protocol):
     """
-    One command on its way; its job waits for the reply.
+    One command on its way, and the receiver of its reply.
 
     The link ends the command by calling ``reply`` or ``fail``, once.
 
@@ -37,9 +37,9 @@ class Task(Protocol):
     - ``expires``: clock value (s) after which the command is neither sent nor repeated.
     - ``blames``: a failure says something about the station. The failure of a guest's command does
       not.
-    - ``is_own``: a 0 or a Fallback, which no message has asked for. It goes to an inactive station
-      once, without a poll before it.
-    - ``answer_within``: most seconds that the link waits for the answer to that.
+    - ``is_own``: a heartbeat or a fallback, which no message has asked for. It goes to an inactive
+      station once, without a poll before it.
+    - ``answer_within``: most seconds that the link waits for the answer of an inactive station.
     """
 
     command: Packet

@@ -49,8 +49,8 @@ class Port(Protocol):
     """
     An open line. Every method raises OSError when the line is gone.
 
-    ``has_more`` tells that the last ``read`` has left bytes unread. A port that ``is_terminal`` is
-    a device of this machine, not a connection.
+    ``has_more`` tells that the last ``read`` may have left bytes unread. A port that
+    ``is_terminal`` is a device of this machine, not a connection.
     """
 
     @property

@@ -40,7 +40,7 @@ _GLANCE = 0.2  # for a client (s)
 # A client that has sent nothing for this time (s) loses its place to the next client.
 _SILENT = 30.0
 
-# TCP asks a client that has vanished after 4 s, then every 2 s. After the third question the
+# If a client has vanished, TCP asks it after 4 s, then every 2 s. After the third question the
 # client is gone. Bytes sent to it have to arrive within the same 10 s.
 _TCP = socket.IPPROTO_TCP
 _OPTIONS = ((_TCP, socket.TCP_NODELAY, 1), (socket.SOL_SOCKET, socket.SO_KEEPALIVE, 1),
@@ -112,7 +112,8 @@ class PtyPlace(PtyEndpoint):
     """
     A pseudo-terminal for one program at a time; bytes that a program leaves behind are dropped.
 
-    These are bytes that the program has not read, and bytes written shortly before its end.
+    These are bytes that the program has not read, and bytes that it has written shortly before
+    its end.
     """
 
     def __init__(self, link: str) -> None:

@@ -132,12 +132,12 @@ class LinkThread(threading.Thread):
     Run ``machine`` on the port that ``open_port`` opens; open it again when it is lost.
 
     ``on_state`` is called when the port opens, is lost, or cannot be opened (in this thread);
-    attempts to open it are ``retry_period`` seconds apart. The bytes of this call came after the
-    clock value ``came_after`` (s), when nothing was left to read. That is about ``longest_wait`` s
-    ago, as no wait takes longer. ``while_sending`` is called whenever all bytes to send have been
-    given to the port: work done then delays nothing on the line. ``on_fault`` is called with an
-    exception that is a bug; the machine starts again after it. Three within a minute end the
-    thread, and ``has_failed`` tells so.
+    attempts to open it are ``retry_period`` seconds apart. Bytes that the machine gets now came
+    after the clock value ``came_after`` (s), when nothing was left to read. That is about
+    ``longest_wait`` s ago, as no wait takes longer. ``while_sending`` is called whenever all bytes
+    to send have been given to the port: work done then delays nothing on the line. ``on_fault`` is
+    called with an exception that is a bug; the machine starts again after it. Three within a
+    minute end the thread, and ``has_failed`` tells so.
 
     ``release`` closes the port for others until ``take``. ``exchange`` puts another machine on
     the line.

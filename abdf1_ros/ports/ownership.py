@@ -39,7 +39,7 @@ _LOCK = '\0abdf1_ros.port.'
 
 def line_of(port: str) -> str:
     """
-    Return the same text for all names of one port, without asking a name server.
+    Return the same text for all names of one port, as far as this needs no name server.
 
     A device is known by its number, a device server by address and port, whatever the scheme.
     """

@@ -90,8 +90,8 @@ def _connection_from(local: int, family: int, address: tuple[object, ...]) -> so
         connection.settimeout(_CONNECT_TIMEOUT)
         connection.connect(address)
         # Without the first option a short frame waits until the one before it has been
-        # acknowledged by TCP. The last option is for bytes that we send, all others are for a line
-        # on which we only listen.
+        # acknowledged by TCP. The last option is for bytes that we send, the options between are
+        # for a line on which we only listen.
         for option, value in (
                 (socket.TCP_NODELAY, 1), (socket.TCP_KEEPIDLE, _SILENCE_LIMIT),
                 (socket.TCP_KEEPINTVL, 1), (socket.TCP_USER_TIMEOUT, _SILENCE_LIMIT * 1000)):

@@ -81,7 +81,7 @@ class GuestLine:
 
     @property
     def state(self) -> str:
-        """Return the remarks on the place for users."""
+        """Return the state of the place, as a text for users."""
         return self.link.state.text
 
     @property
