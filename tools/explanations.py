@@ -164,7 +164,7 @@ COUNTERS: dict[str, str] = {
     'commands_received': 'PLCs send by themselves: messages for `Serve` rows, or to be passed on.',
     'replies_sent': 'Our replies to these commands.',
     'replies_received': 'Should keep up with CNT_CMD_MSGS_SENT.',
-    'polls_sent': 'Masters only. Many polls for one reply: the PLC is slow, which costs time.',
+    'polls_sent': 'Masters only. Many polls for one reply: the PLC is slow and costs line time.',
     'polls_received': 'Mode Slave only. Stays the same: the master does not poll us.',
     'naks_sent': 'Masters: one NAK for each 2508 with `nak_on_command_timeout`. Peer: damaged '
                  'messages.',

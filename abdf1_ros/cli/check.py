@@ -186,7 +186,7 @@ def pairs(folder: Path) -> tuple[list[tuple[str, Path, Path]], list[str]]:
     Return name, net and map file of each line below a folder, and all other CSV files.
 
     The files of a line are NAME_net.csv and NAME_map.csv, or net.csv and map.csv in a folder NAME.
-    One file of a line may be missing. They are in the order of their names, line2 before line10.
+    One file of a line may be missing. Lines are in the order of their names, line2 before line10.
     """
     found: dict[str, dict[str, Path]] = {}
     others = []
@@ -359,7 +359,7 @@ def _rows_text(report: Report) -> str:
 
 
 def _rows(mappings: Sequence[Mapping], report: Report | None) -> list[dict[str, Any]]:
-    """Return the remarks on each row."""
+    """Return the cells of each row, for the table and for JSON."""
     promised = report.promises() if report else {}
     return [_row(mapping, promised.get(mapping)) for mapping in mappings]
 

@@ -80,7 +80,7 @@ from abdf1_ros.simulator.simulated_plc import load_plcs
 
 _NEAR = 2.0  # in units of --answer-time: an earlier DLE ENQ may look like an answer
 
-_NOTHING_TRIED = 'no rule was tried: each case has its reason above'
+_NOTHING_TRIED = 'no rule was tried: each case has its reason'
 _NOBODY = 'no byte was received: check cable, port, speed and power'
 
 End = MasterEnd | PeerEnd | SlaveEnd | ServerEnd

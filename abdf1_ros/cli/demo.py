@@ -154,7 +154,7 @@ class Bridge:
 
 
 class Watcher(Observer):
-    """The robot cell: subscribes to all topics and keeps the last message of each."""
+    """The robot cell: subscribes to all topics; keeps last values and statuses, all results."""
 
     def __init__(self, mappings: Sequence[Mapping], port: str) -> None:
         super().__init__('demo_watcher')
@@ -258,7 +258,7 @@ class Stage:
         self._bridge = Bridge(*self._bridge_args)
 
     def _lamp(self, station: str, lamp: Lamp, is_on: bool) -> None:
-        """Record the lamps that are on; called in the thread of the PLCs."""
+        """Record the lamps that are on; called in the thread of the PLCs, too."""
         self._lamps.pop(lamp, None)
         if is_on:
             self._lamps[lamp] = time.monotonic()

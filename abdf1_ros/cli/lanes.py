@@ -123,7 +123,7 @@ def drawing(lanes: Sequence[Lane], start: float, end: float, unit: str, limit: f
     """
     Return an SVG of lanes from ``start`` to ``end``, below them the axis with ``unit``.
 
-    ``limit`` gets a red line. ``name`` is the target of links.
+    ``limit`` gets a thick line. ``name`` is the target of links.
     """
     scale = (WIDTH - NAMES - _RIGHT) / ((end - start) or 1.0)
     height = sum(lane.height + _GAP for lane in lanes)

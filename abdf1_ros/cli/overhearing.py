@@ -47,8 +47,8 @@ _BYTES = re.compile(r'(?P<address>[0-7]+) \(ADDR \d+\), (?P<count>\d+) bytes?\Z'
 
 HEAD = """\
 # What another master reads on this line, one row a read. Each becomes a topic; the bridge sends
-# nothing (Mode Listen). Period is twice the mean time between two of its reads. A comment below
-# was heard, too, and is not a row of numbers.
+# nothing (Mode Listen). Period is at least twice the mean time between two such reads. A comment
+# below was heard, too, and is not a row of numbers.
 Tag,Command,Address,Station,PLC_Type,Length,Period
 """
 

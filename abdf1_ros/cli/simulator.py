@@ -74,8 +74,8 @@ from abdf1_ros.simulator.ladder import Ladder, Lamp
 from abdf1_ros.simulator.simulated_plc import load_plcs, SimulatedPlc
 
 _EPILOG = COMMANDS + """
-exit status: 0 after an end, 1 if the port cannot be opened or the name of --pty is in use, 2 for
-             bad options or data files
+exit status: 0 after "quit", a signal or --seconds, 1 if the port cannot be opened or the name of
+             --pty is in use, 2 for bad options or data files
 
 examples:
   simulator --pty /tmp/plc
@@ -183,8 +183,8 @@ class Cast:
     """
     PLCs that answer on a line from ``start`` to ``close``, by the options of the simulator.
 
-    ``on_lamp`` gets station, lamp and state from ladder programs; ``say`` prints a line. The
-    thread that answers calls both.
+    ``on_lamp`` gets station, lamp and state from ladder programs; ``say`` prints a line. Both are
+    called in the thread that answers, and in the thread of the caller.
     """
 
     def __init__(self, options: argparse.Namespace,

@@ -25,8 +25,8 @@ ports and passes all bytes on at once. A file is one of these:
 
 An output line has the time in seconds, the direction, the station, the message or symbol, and the
 verdict of its check. The direction is ">" if sent by the master, by the first port of the tap or
-by the recording node; "<" the other way; "?" if unknown. The summary comes at the end, also after
-Ctrl-C.
+by the device that recorded it; "<" the other way; "?" if unknown. The summary comes at the end,
+also after Ctrl-C.
 """
 
 from __future__ import annotations

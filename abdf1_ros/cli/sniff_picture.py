@@ -66,7 +66,11 @@ class _Strip:
 
 @dataclass(slots=True)
 class _Episode:
-    """A repeated fault, with the ``words`` of the first; times are text."""
+    """
+    A repeated fault, with the ``words`` of the first; ``start`` and ``end`` are links.
+
+    ``latest``: place of the last one, in the unit of the recording.
+    """
 
     station: str
     words: str

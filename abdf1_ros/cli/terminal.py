@@ -70,7 +70,7 @@ class NoPort(OSError):
 
 
 def tell(name: str, text: str, code: int | None = None) -> None:
-    """Print ``text`` on standard error after the name of a command, if given in a colour."""
+    """Print ``text`` on standard error, after the name of a command, in the colour ``code``."""
     line = f'{name}: {printable(text)}'
     with suppress(OSError):  # nothing reads the output
         print(colour(line, code, sys.stderr) if code else line, file=sys.stderr, flush=True)

@@ -352,7 +352,7 @@ def _draw(window: curses.window, watch: NodeWatch, has_ended: _Ending) -> None:
 
 def _print_pictures(watch: NodeWatch | PlantWatch, picture: Callable[[int], list[TextLine]],
                     options: argparse.Namespace, has_ended: _Ending) -> None:
-    """Print a picture after each period until the end."""
+    """Print a picture, then another after each period until the end; only one with --once."""
     _print(picture)
     while not options.once and not has_ended():
         watch.wait(has_ended, options.period)

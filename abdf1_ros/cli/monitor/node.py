@@ -86,9 +86,9 @@ class NodeWatch(Listening):
     """
     Listen to the node with the full name ``name``, until closed.
 
-    The bridge is not affected: subscriptions ask only for the QoS of every bridge, no service is
-    called, and nothing is published. Ages of topics without a promised time count from the
-    publisher's time stamp. For these topics the clocks of the hosts must agree.
+    The bridge is not affected: subscriptions ask for no QoS beyond the offer of every bridge, no
+    service is called, and nothing is published. Ages of topics without a promised time count from
+    the publisher's time stamp. For these topics the clocks of the hosts must agree.
     """
 
     def __init__(self, name: str, ros_arguments: list[str]) -> None:

@@ -41,6 +41,6 @@ def main(args: Sequence[str] | None = None) -> int:
         from abdf1_ros.cli.plc.work import COMMANDS  # --help does not need this import
         return COMMANDS[options.command](options)
 
-    # A "write" whose stdout is closed stops before it writes anything.
+    # An output error of a "write" that ends here came before the write: nothing was written.
     return run_command('plc', work, EXIT_INTERRUPTED,
                        EXIT_USAGE if options.command == 'write' else 0)

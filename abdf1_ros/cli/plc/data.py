@@ -247,7 +247,7 @@ class Writing:
         return f'{self._write.value} (raw {show(self._write.raw)})'
 
     def carry_out(self, session: Session) -> WriteResult:
-        """Write and return the result, also after KeyboardInterrupt."""
+        """Write and return the result, also after KeyboardInterrupt or PortLost."""
         pending = Pending[WriteResult]()
         try:
             # Inside the try block: an interrupt may come while the command is on the line.
@@ -264,7 +264,7 @@ class Writing:
 
 
 def parse_values(mapping: Mapping, texts: Sequence[str]) -> Sequence[float] | str:
-    """Return the values of texts; whole numbers also as 0x and 0b. Raises FormatError."""
+    """Return the values of texts; whole numbers also as 0x, 0b. FormatError for others."""
     if texts and mapping.message_type is ValueType.STRING:
         if len(texts) != 1:
             raise FormatError(f'{mapping.address} takes one text; quote it if it has spaces')
@@ -386,8 +386,8 @@ def value_texts(mapping: Mapping, values: Sequence[float], radix: Radix) -> list
     """
     Return each value as text.
 
-    Without radix ten, whole numbers have all digits of their type. Floats and single bits look the
-    same in every radix.
+    In any radix except ten, whole numbers have all digits of their type. Floats, single bits and
+    scaled values look the same in every radix.
     """
     if radix is Radix.DECIMAL or mapping.type not in _BITS or mapping.scaling:
         return [*map(value_text, values)]

@@ -89,7 +89,7 @@ class Search:
 
     @property
     def traces(self) -> list[str]:
-        """Return a text for each settings with characters, but no answer."""
+        """Return texts about settings with which characters came, but no answer."""
         return [f'{settings}: {count} characters came'
                 for settings, count in self._characters.items()]
 
@@ -107,7 +107,7 @@ class Search:
         return None
 
     def _try(self, baud: int, mode: str, checks: Sequence[str]) -> Found | None:
-        """Try one speed and duplex; try the second check only after an answer."""
+        """Try one speed and duplex; in half duplex a second check only after an answer."""
         # Most full-duplex ports take messages to any station; most of the rest are 1 or 0.
         stations = self._stations if mode != MODES['full'] else \
             sorted(self._stations[:2], key=lambda station: not station)

@@ -61,7 +61,7 @@ class ForeignMaster:
 def overhear(network: Network, bauds: Sequence[int],
              show: Callable[[str], None] = lambda text: None) -> ForeignMaster | None:
     """
-    Listen at each speed; stop after the first speed if it is silent.
+    Listen at each speed; stop at a speed without a character.
 
     Return the master that is heard. Sends nothing; raises OSError.
     """

@@ -195,7 +195,7 @@ class Watch:
                     print(f'{time}  {address}  {text}', flush=True)
 
     def _print_csv(self, news: Sequence[_News]) -> None:
-        """Print each value with its time of day and address; empty for a read that has failed."""
+        """Print each value with date, time and address; empty for a read that has failed."""
         for when, mapping, what in news:
             time = when.isoformat(timespec='milliseconds')
             if isinstance(what, _NoValue) and self._shown.get(mapping) == what:

@@ -178,7 +178,7 @@ def _check_type(options: argparse.Namespace, session: Session, station: int) -> 
 
 
 def _advise(session: Session, text: str) -> None:
-    """Print an advice once per command."""
+    """Print a text of advice once per command."""
     if text and text not in session.said:
         session.said.add(text)
         _complain(text)

@@ -71,13 +71,13 @@ class FoundRow:
 
 @dataclass(frozen=True, slots=True)
 class Ignored:
-    """A row without an address; ``what`` it is, or empty for a row that is not counted."""
+    """A row that is passed over; ``what`` it is, or empty for a row that is not counted."""
 
     what: str = ''
 
 
 class Unusable(ValueError):
-    """The reason why a row with an address cannot be used; ``tag`` names the row."""
+    """The reason why a row that should have an address cannot be used; ``tag`` names it."""
 
     def __init__(self, text: str, tag: str = '') -> None:
         super().__init__(text)

@@ -51,7 +51,7 @@ class Import:
     """
     The rows of a map: ``lines`` as they are written, ``left_out`` the rows left out.
 
-    ``ignored`` counts rows without an address, ``remarks`` are for the user.
+    ``ignored`` counts rows that are passed over, ``remarks`` are for the user.
     """
 
     count: int = 0
@@ -108,7 +108,7 @@ def _not_known(records: Sequence[Record]) -> str:
 
 
 def _check_node(path: str, rows: Sequence[FoundRow], wanted: Wanted) -> None:
-    """Raise ConfigurationError if a file has several PLCs and the user has named none."""
+    """Raise ConfigurationError if the user named none of several PLCs, or an unknown PLC."""
     nodes = dict.fromkeys(row.node for row in rows)
     named = ', '.join(shown(node) or '""' for node in nodes)
     if wanted.node is None and len(nodes) > 1:

@@ -92,7 +92,7 @@ FORMAT = Format('a list whose first row names its columns (--tag COLUMN --addres
 
 
 def _columns(path: str, head: Record, names: list[str], wanted: Wanted) -> dict[str, int] | None:
-    """Return the columns by role; None if no row names them."""
+    """Return the columns by role; None if the head names neither tags nor addresses."""
     columns: dict[str, int] = {}
     for role, name in wanted.columns.items():
         if name.lower() not in names:

@@ -45,7 +45,7 @@ class Record:
 
 
 def read_records(path: str) -> list[Record]:
-    """Return the records of a CSV file that are not empty; ConfigurationError if it is none."""
+    """Return the records of a CSV file that are not empty; raises ConfigurationError."""
     return list(_records(path, text_of(path)))
 
 
