@@ -218,7 +218,12 @@ class Network:
 
 
 def _device(text: str) -> str:
-    return f'/dev/ttyS{int(text) - 1}' if text.isdigit() else text
+    return f'/dev/ttyS{int(text) - 1}' if is_digits(text) else text
+
+
+def _is_device(text: str) -> bool:
+    """Tell whether a text is the path of a device, or the number of a port from 1 on."""
+    return text.startswith('/') or bool(is_digits(text) and whole_number(text))
 
 
 FIELDS: dict[str, NetField] = {
@@ -307,7 +312,7 @@ def make_network(values: MappingType[str, tuple[str, Place | str]],
 
 
 def _port_fault(text: str) -> str:
-    if _is_url(text) or text.startswith('/') or (is_digits(text) and whole_number(text)):
+    if _is_url(text) or _is_device(text):
         return ''
     advice = f'"plc ports" lists the devices{hint(text)}'
     match = _HOST.fullmatch(text)
@@ -322,8 +327,9 @@ def _port_fault(text: str) -> str:
 
 
 def _second_fault(text: str) -> str:
-    return '' if text.startswith('/') or text.isdigit() or not text else (
-        f'Listen_Port = "{shown(text)}" should be a device path such as /dev/ttyUSB1')
+    return '' if not text or _is_device(text) else (
+        f'Listen_Port = "{shown(text)}" should be a number from 1 or a device path such as '
+        '/dev/ttyUSB1')
 
 
 def _listen_fault(first: str, second: str) -> tuple[str, str]:

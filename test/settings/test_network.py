@@ -377,8 +377,10 @@ LISTENING = {'Com_Port': '/dev/ttyS0', 'Mode': 'Listen'}
 
 
 @pytest.mark.parametrize(('cells', 'text'), [
-    ({'Listen_Port': 'COM4'}, 'net.csv:2:3 (Listen_Port): Listen_Port = "COM4" should be a device '
-     'path such as /dev/ttyUSB1'),
+    ({'Listen_Port': 'COM4'}, 'net.csv:2:3 (Listen_Port): Listen_Port = "COM4" should be a number '
+     'from 1 or a device path such as /dev/ttyUSB1'),
+    ({'Listen_Port': '0'}, 'Listen_Port = "0" should be a number from 1'),
+    ({'Listen_Port': '²'}, 'Listen_Port = "²" should be a number from 1'),
     ({'Listen_Port': '1'}, 'Listen_Port: 1 is the device of Com_Port, too'),
     ({'Com_Port': 'rfc2217://h:1'}, 'RFC 2217 sets the lines of the far port'),
     ({'Com_Port': 'socket://h:1', 'Listen_Port': '/dev/ttyS1'},
