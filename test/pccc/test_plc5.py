@@ -14,10 +14,13 @@
 
 """A PLC-5: its commands, byte for byte, requests and replies, and an emulated one."""
 
+from abdf1_ros.df1.packet import Packet
 from abdf1_ros.errors import FormatError
 from abdf1_ros.pccc.address import Address
+from abdf1_ros.pccc.data_table import DataTable
 from abdf1_ros.pccc.families import FAMILIES, parse_address
 from abdf1_ros.pccc.fields import Reader
+from abdf1_ros.pccc.file_search import DataFile
 from abdf1_ros.pccc.file_types import FileType, PlcType
 from abdf1_ros.pccc.plc5.address import ADDRESSING
 from abdf1_ros.pccc.plc5.commands import (
@@ -27,6 +30,8 @@ from abdf1_ros.pccc.plc5.commands import (
     SystemAddress,
 )
 from abdf1_ros.pccc.plc5.dialect import Plc5Dialect
+from abdf1_ros.pccc.plc5.file_search import Plc5FileSearch
+from abdf1_ros.pccc.server import Server
 from abdf1_ros.pccc.typed_data import TypedData
 import pytest
 from support.cases import for_all
@@ -233,3 +238,15 @@ def test_plc5_read_modify_write_of_the_same_word_twice_runs_in_order() -> None:
     words = table(PLC5, B3_0='00 00')
     assert ask(words, '26 07 00 03 00 FF FF 03 00 07 00 03 00 FE FF 00 00') == (0, '')
     assert words_at(words, 'B3:0') == '02 00'
+
+
+def test_files_of_a_plc_5_80_are_counted_to_their_end() -> None:
+    """The files of a PLC-5/40 to 5/80 may have 2,000 elements."""
+    there = DataTable(PlcType.PLC5)
+    there.create(parse_address('N12:0', PlcType.PLC5), 1500)
+    steps = Plc5FileSearch().look_for(12)
+    request = next(steps)
+    with pytest.raises(StopIteration) as done:
+        while True:
+            request = steps.send(Server(there).serve(Packet(1, 0, 0x0F, 0, 7, request[1])))
+    assert done.value.value == DataFile(FileType.INTEGER, 12, 1500)

@@ -28,7 +28,6 @@ from abdf1_ros.pccc.status import check_status
 from abdf1_ros.pccc.typed_data import BYTE_STRING, TypedData
 
 _USUAL = {number: kind for kind, number in DEFAULT_FILES.items()}
-_MOST_ELEMENTS = 1000
 
 
 class Plc5FileSearch:
@@ -45,7 +44,8 @@ class Plc5FileSearch:
             return None
         if kind is None or kind.is_io:
             return kind and DataFile(kind, number, 0)
-        return (yield from counted(ADDRESSING, PLC5_TYPED, kind, number, _MOST_ELEMENTS))
+        return (yield from counted(ADDRESSING, PLC5_TYPED, kind, number,
+                                   ADDRESSING.last_element(kind) + 1))
 
 
 def _kind(number: int, data: TypedData) -> FileType | None:
