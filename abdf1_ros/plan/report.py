@@ -399,7 +399,7 @@ def _load_remarks(report: Report) -> Iterator[Remark]:
 
 def _again_remarks(report: Report) -> Iterator[Remark]:
     """Find rows with Write_Again whose words are read too seldom to show what the PLC holds."""
-    expected = forecast.intervals(report.blocks)
+    expected = report.intervals()
     for row in report.mappings:
         if row.write_again is None:
             continue

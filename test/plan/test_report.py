@@ -321,6 +321,14 @@ def test_rows_promise_three_intervals_and_a_read() -> None:
     assert report_of(row, response=0.1).promises() == report_of(row).promises()
 
 
+def test_write_again_is_held_against_the_reads_that_slow_plcs_allow() -> None:
+    rows = [make_mapping('N7:0', 'Write', tag='w', write_again=1000),
+            make_mapping('N7:0', tag='r', length=4, period=200)]
+    assert not texts(report_of(*rows), RemarkKind.SETTING)
+    found = texts(report_of(*rows, response=0.5, cmd_timeout=2000), RemarkKind.SETTING)
+    assert any('well below Write_Again, 1000 ms' in text for text in found)
+
+
 @pytest.mark.parametrize(('again', 'after', 'period', 'expected'), [
     (1000, None, 200, ''), (1000, None, 800, 'read every 800 ms, and that has to be well below '
                                              'Write_Again, 1000 ms'),
