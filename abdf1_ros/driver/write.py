@@ -119,12 +119,12 @@ class Write:
         self.is_probe = self.is_own = False
         self.value = show(values)
         self.raw = raw_values(mapping, values)
-        self.commands = write_requests(
+        self.commands = self._usual = write_requests(
             mapping.address, mapping.codec, self.raw, mapping.dialect)
 
     def equals(self, other: Write) -> bool:
         """Tell whether both write the same values to a row, in the same packets."""
-        return self.mapping is other.mapping and self.commands == other.commands
+        return self.mapping is other.mapping and self._usual == other._usual
 
     def stand_for(self, other: Write) -> None:
         """Take over the messages of an equal write."""

@@ -23,6 +23,9 @@ from abdf1_ros.driver.settings import DriverSettings
 from abdf1_ros.driver.write import Outcome, Write
 from abdf1_ros.driver.writes.standing import Standing
 from abdf1_ros.pccc.emulated import Setting
+from abdf1_ros.pccc.families import dialect_of
+from abdf1_ros.pccc.file_types import PlcType
+from abdf1_ros.pccc.processor import Processor
 from abdf1_ros.settings.heartbeats import Fallback
 from abdf1_ros.settings.mapping import Mapping
 from abdf1_ros.settings.network import Network
@@ -297,3 +300,14 @@ def test_stopped_program_and_lost_port_end_it() -> None:
             bench.open(run=0.5)
         bench.write(row, [7], run=0.5)
         assert bench.listener.outcomes()[-1] is not STANDS
+
+
+def test_equal_values_are_equal_whatever_packets_a_station_takes() -> None:
+    """A station that names an old processor gets a long row in shorter packets."""
+    row = make_mapping('N7:0', 'Write', plc='SLC', length=60, write_again=1000)
+    sent, new = (Write(row, range(60), now) for now in (1.0, 2.0))
+    packets = len(sent.commands)
+    sent.speak(dialect_of(PlcType.SLC, processor=Processor.SLC_5_01))
+    assert len(sent.commands) > packets
+    assert sent.equals(new)
+    assert not sent.equals(Write(row, range(1, 61), 2.0))
