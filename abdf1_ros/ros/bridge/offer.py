@@ -59,11 +59,11 @@ class OfferedPublisher:
     def publish(self, message: Any) -> None:
         """Publish a message now, or keep it until the publisher exists."""
         self._waiting.append(message)
-        if self._publisher is not None:
-            self._publish_waiting()
+        self._publish_waiting()
 
     def _publish_waiting(self) -> None:
-        publisher = self._publisher
+        if (publisher := self._publisher) is None:
+            return
         # Another thread may have taken the last message, or have closed the publisher.
         with suppress(IndexError, rclpy_implementation.InvalidHandle):
             while True:
@@ -71,9 +71,12 @@ class OfferedPublisher:
 
     def has_subscribers(self) -> bool:
         """Return True if there is a subscriber."""
-        return self._publisher is not None and self._publisher.get_subscription_count() > 0
+        publisher = self._publisher  # the executor's thread may withdraw it meanwhile
+        with suppress(rclpy_implementation.InvalidHandle):
+            return publisher is not None and publisher.get_subscription_count() > 0
+        return False
 
     def wait_for_all_acked(self, patience: float) -> None:
         """Wait until all subscribers have all messages, at most ``patience`` s."""
-        if self._publisher is not None:
-            self._publisher.wait_for_all_acked(Duration(seconds=patience))
+        if (publisher := self._publisher) is not None:
+            publisher.wait_for_all_acked(Duration(seconds=patience))
