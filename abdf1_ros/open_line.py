@@ -148,7 +148,7 @@ class OpenLine:
                 'traffic'))])
         self.log = logger
         self._entries: deque[_Entry] = deque()
-        self._lost = 0  # entries
+        self._lost = self._lost_reported = 0  # entries
         self._mode, self._settings = mode, line
         self.stations = ActiveStationList() if stations is None else stations
         self._requests = Requests(mode, line, self.stations, random.randrange(0x10000), plc_type,
@@ -256,8 +256,8 @@ class OpenLine:
             while self._entries:
                 level, text, error = self._entries.popleft()
                 self.log.log(level, '%s', text, exc_info=error)
-        if lost := self._lost:
-            self._lost -= lost
+        if lost := self._lost - self._lost_reported:
+            self._lost_reported += lost
             self.log.warning('%d entries were lost here: nothing was asked meanwhile', lost)
 
     def _traced(self, path: str, port: PortSettings,

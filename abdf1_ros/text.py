@@ -17,6 +17,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from datetime import datetime, UTC
 import re
 
 # The beginning of a cell is enough to find it.
@@ -72,6 +73,11 @@ def by_number(name: str) -> list[tuple[int, str]]:
 def milliseconds(seconds: float | None, digits: int = 0) -> str:
     """Return a time (s) in ms, None as unknown."""
     return 'unknown' if seconds is None else f'{seconds * 1000:.{digits}f} ms'
+
+
+def utc_text(seconds: float) -> str:
+    """Return a time (s since 1970) as text in UTC, with milliseconds."""
+    return datetime.fromtimestamp(seconds, UTC).isoformat(timespec='milliseconds')
 
 
 def in_ms(seconds: float | None) -> float | None:

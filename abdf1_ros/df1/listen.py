@@ -93,7 +93,7 @@ class ListeningLink(Link):
 
     def __init__(self, machine: Machine, settings: LinkSettings, stations: ActiveStationList,
                  serve: Callable[[Packet], Packet], report: Callable[[Event], None]) -> None:
-        self._machine = machine
+        """Take the arguments of every link; this one needs none."""
 
     def run(self, source: TaskSource) -> Procedure:
         """Look at the clock again and again; no task is ever asked for."""

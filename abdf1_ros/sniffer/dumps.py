@@ -75,7 +75,7 @@ class Recording:
     @property
     def percent(self) -> int:
         """Return how many percent of the file have been read; without a size it means nothing."""
-        return 100 * self._position // max(1, self._size)
+        return min(100, 100 * self._position // max(1, self._size))
 
     def chunks(self) -> Iterator[Chunk]:
         """Yield the chunks; Problem names file and line where something cannot be read."""

@@ -14,6 +14,7 @@
 
 """Files of recorded bytes, as several programs write them."""
 
+import gzip
 from pathlib import Path
 
 from abdf1_ros.problems import Problem
@@ -139,6 +140,14 @@ def test_settings_of_a_capture_are_known_once_it_is_read(recording: Recording) -
 def test_percent_tells_how_much_has_been_read(recording: Recording) -> None:
     percents = [recording.percent for _ in recording.chunks()]
     assert 0 < percents[0] < percents[1] == 100
+
+
+def test_percent_of_a_packed_file_ends_at_100(tmp_path: Path) -> None:
+    path = tmp_path / 'x.gz'
+    lines = (f'{second} > 10\n' for second in range(1000))
+    path.write_bytes(gzip.compress(b'# abdf1_ros capture 1\n' + ''.join(lines).encode()))
+    recording = Recording(path)
+    assert max(recording.percent for _ in recording.chunks()) == 100
 
 
 def test_file_has_a_size_and_a_device_has_none(recording: Recording) -> None:

@@ -22,7 +22,7 @@ callback never blocks the executor while it waits for the link (rule 3 c of docs
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from datetime import datetime, UTC
+from contextlib import contextmanager
 from functools import partial
 import math
 import time
@@ -38,7 +38,7 @@ from abdf1_ros.ros.callbacks import AnsweringNode
 from abdf1_ros.ros.topics.writes import WriteTopics
 from abdf1_ros.settings.mapping import Mapping
 from abdf1_ros.settings.rows import Rows
-from abdf1_ros.text import printable, value_text
+from abdf1_ros.text import printable, utc_text, value_text
 from rclpy.callback_groups import ReentrantCallbackGroup
 from rclpy.qos import QoSProfile
 from rclpy.task import Future
@@ -159,15 +159,14 @@ class RowServices:
         until = line_time() + self._longest
         if (call := self._new(len(rows), until, response)) is None:
             return response
-        label = f'set {uuid.uuid4()}'  # unique: no publisher uses the same label
-        self._calls[label] = call
-        self._writes.take(rows[0].topic, UInt8MultiArray(
-            layout=MultiArrayLayout(dim=[MultiArrayDimension(label=label)]),
-            data=[int(request.data)]), {
-                'source_timestamp': published, 'received_timestamp': received,
-                'publication_sequence_number': None})
-        await call.done
-        del self._calls[label]
+        # The label is unique: no publisher uses the same one.
+        with self._waiting(f'set {uuid.uuid4()}', call) as label:
+            self._writes.take(rows[0].topic, UInt8MultiArray(
+                layout=MultiArrayLayout(dim=[MultiArrayDimension(label=label)]),
+                data=[int(request.data)]), {
+                    'source_timestamp': published, 'received_timestamp': received,
+                    'publication_sequence_number': None})
+            await call.done
         results: list[WriteResult] = call.results
         response.success = len(results) == len(rows) and all(
             result.outcome in (Outcome.WRITTEN, Outcome.STANDS) for result in results)
@@ -183,16 +182,24 @@ class RowServices:
         # the driver ends it in time
         if (call := self._new(len(rows), math.inf, response)) is None:
             return response
-        self._calls[label := f'read {uuid.uuid4()}'] = call
-        self._driver.read_now(rows[0], line_time(), call.take)
-        self._wake_link()
-        await call.done
-        del self._calls[label]
+        with self._waiting(f'read {uuid.uuid4()}', call):
+            self._driver.read_now(rows[0], line_time(), call.take)
+            self._wake_link()
+            await call.done
         answer: ReadAnswer = (call.results or [ReadAnswer(error=ENDS)])[0]
         response.success = answer.values is not None
         response.message = printable(answer.error) if answer.values is None else \
             f'{_text(answer.values)} at {_moment(answer.read)}'
         return response
+
+    @contextmanager
+    def _waiting(self, label: str, call: _Call) -> Iterator[str]:
+        """Let a call wait under a label, until its results have come or an error ends it."""
+        self._calls[label] = call
+        try:
+            yield label
+        finally:
+            del self._calls[label]
 
     def _new(self, count: int, until: float, response: Any) -> _Call | None:
         """Return a call that waits for ``count`` results; None if it is refused."""
@@ -234,5 +241,4 @@ def _text(values: Values) -> str:
 
 def _moment(read: float) -> str:
     """Return a clock value (s) as a time in UTC."""
-    seconds = time.time() - line_time() + read
-    return datetime.fromtimestamp(seconds, UTC).isoformat(timespec='milliseconds')
+    return utc_text(time.time() - line_time() + read)

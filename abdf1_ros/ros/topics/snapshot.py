@@ -18,7 +18,6 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from collections.abc import Mapping as MappingType
-from datetime import datetime, UTC
 import time
 
 from abdf1_ros.driver.reads.point import Freshness, ReadPoint
@@ -26,7 +25,7 @@ from abdf1_ros.driver.write import show
 from abdf1_ros.pccc.values import Values, ValueType
 from abdf1_ros.ros.diagnostics.status import WORDS
 from abdf1_ros.settings.mapping import Mapping
-from abdf1_ros.text import printable, value_text
+from abdf1_ros.text import printable, utc_text, value_text
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 
 # Arrays with more values are shown as one text, cut short.
@@ -85,7 +84,7 @@ class _ValueRow:
             texts = texts or [freshness.value]
         else:
             texts.append(f'{_text(values)}, {now - read:.1f} s ago')
-            pairs = [*self._values(values), ('stamp', _moment(begun + read)),
+            pairs = [*self._values(values), ('stamp', utc_text(begun + read)),
                      ('age_ms', f'{(now - read) * 1000:.0f}')]
         return DiagnosticStatus(
             level=level, name=self._tag, hardware_id=self._place,
@@ -102,10 +101,6 @@ def _text(values: Values) -> str:
     if isinstance(values, str):
         return printable(values)
     return value_text(values[0]) if len(values) == 1 else show(values)
-
-
-def _moment(seconds: float) -> str:
-    return datetime.fromtimestamp(seconds, UTC).isoformat(timespec='milliseconds')
 
 
 def _keys(mapping: Mapping, names: MappingType[tuple[int, str], str]) -> Sequence[str]:
