@@ -53,7 +53,7 @@ Tag,Command,Address,Station,PLC_Type,Length,Period
 """
 
 
-class _Nothing:
+class _Ignoring:
     """A listener that ignores all events."""
 
     def __getattr__(self, name: str) -> Callable[..., None]:
@@ -69,7 +69,7 @@ class Overhearing:
     """
 
     def __init__(self, network: Network, mappings: Rows = Rows()) -> None:  # noqa: B008
-        self._driver = Driver(network, mappings, DriverSettings(), cast(Listener, _Nothing()))
+        self._driver = Driver(network, mappings, DriverSettings(), cast(Listener, _Ignoring()))
         self._driver.machine.start(-1.0)
         self._now = 0.0
 
