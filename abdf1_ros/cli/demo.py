@@ -57,13 +57,17 @@ from rclpy.node import Node
 from rclpy.qos import QoSProfile
 
 # The executable, which a signal during the imports ends quietly. If this process dies, the
-# standard input of the node closes, and the node ends as after a signal.
+# standard input of the node closes, and the node ends as after a signal. It removes the folder
+# of the demo first: the name of the port there would soon lead to another program's terminal.
 _NODE = """
-import os, signal, sys, threading
+import os, shutil, signal, sys, threading
 from abdf1_ros.cli.main import node
+
+folder = sys.argv.pop(1)
 
 def end_with_the_demo():
     os.read(0, 1)
+    shutil.rmtree(folder, ignore_errors=True)
     os.kill(os.getpid(), signal.SIGTERM)
 
 threading.Thread(target=end_with_the_demo, daemon=True).start()
@@ -124,12 +128,12 @@ class Missed(Exception):
 class Bridge:
     """The node as a process; its output is printed between the lines of the story."""
 
-    def __init__(self, *args: str) -> None:
+    def __init__(self, folder: Path, *args: str) -> None:
         self._rest = b''
         # A session of its own: Ctrl-C reaches the demo only, which then ends the node.
         self.process = subprocess.Popen(
-            [sys.executable, '-c', _NODE, *args], stdin=subprocess.PIPE, stdout=subprocess.PIPE,
-            stderr=subprocess.STDOUT, start_new_session=True)
+            [sys.executable, '-c', _NODE, str(folder), *args], stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE, stderr=subprocess.STDOUT, start_new_session=True)
         os.set_blocking(self._out, False)
 
     @property
@@ -231,7 +235,7 @@ class Stage:
     def __init__(self, scene: Scene, link: Path) -> None:
         net_file, map_file = config_file(scene.net_file), config_file(scene.map_file)
         mappings, _ = load_mappings(str(map_file))
-        self._scene = scene
+        self._scene, self._folder = scene, link.parent
         self._mappings = {mapping.tag: mapping for mapping in mappings}
         self._begin = time.monotonic()
         self._bridge_args = ('--ros-args', '-p', f'port:={link}', '-p', f'net_file:={net_file}',
@@ -255,7 +259,7 @@ class Stage:
             self._watcher.__exit__()
 
     def _start_bridge(self) -> None:
-        self._bridge = Bridge(*self._bridge_args)
+        self._bridge = Bridge(self._folder, *self._bridge_args)
 
     def _lamp(self, station: str, lamp: Lamp, is_on: bool) -> None:
         """Record the lamps that are on; called in the thread of the PLCs, too."""

@@ -47,7 +47,9 @@ def test_others_on_the_network_are_not_taken_for_the_bridge() -> None:
     assert 'pump' not in story.text
 
 
-def test_bridge_ends_with_a_demo_that_is_killed() -> None:
+def test_bridge_and_folder_end_with_a_demo_that_is_killed(
+        tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv('TMPDIR', str(tmp_path))
     with Observer() as observer, Process('demo', '--peer', '--seconds', '60') as story:
         observer.until(lambda: 'abdf1' in observer.node.get_node_names(), lambda: story.text)
         children = Path(f'/proc/{story.number}/task/{story.number}/children')
@@ -58,8 +60,10 @@ def test_bridge_ends_with_a_demo_that_is_killed() -> None:
                 return ') Z ' in bridge.read_text(encoding='utf-8')
             return True
 
+        assert list(tmp_path.glob('abdf1_*'))
         story.send(signal.SIGKILL)
         observer.until(has_ended, 'its end')
+    assert not list(tmp_path.glob('abdf1_*'))
 
 
 class Told:
