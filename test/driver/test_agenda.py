@@ -74,6 +74,23 @@ class NinePackets(Job):
             yield 0x0F, b''
 
 
+def test_connection_that_is_unheard_again_has_its_quick_questions_again() -> None:
+    bench = Bench(make_job(period=0))
+
+    def ask() -> bool:
+        if (job := bench.next(0.0)) is None:
+            return False
+        assert isinstance(job, ReadJob)
+        bench.finish(job, 0.0, 0.0)
+        return True
+
+    for _ in range(2):
+        bench.tasks.connect()
+        assert [ask() for _ in range(12)] == 10 * [True] + 2 * [False]
+        bench.tasks.is_heard = True
+        assert ask()
+
+
 def test_packets_of_a_long_write_use_up_the_turn_of_writes() -> None:
     read = make_job()
     bench = Bench(read)

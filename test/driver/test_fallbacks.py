@@ -21,8 +21,10 @@ from random import Random
 from abdf1_ros.df1.packet import Packet
 from abdf1_ros.df1.settings import LinkSettings
 from abdf1_ros.df1.slave import HalfDuplexSlave
+from abdf1_ros.df1.stations import ActiveStationList
 from abdf1_ros.driver.interlocks.fallback import FallbackCause, FallbackRow
 from abdf1_ros.driver.interlocks.heartbeat import HeartbeatRow
+from abdf1_ros.driver.interlocks.plc import Conditions, Plc
 from abdf1_ros.driver.record import Claim, WriteRecord
 from abdf1_ros.driver.write import Outcome, Write
 from abdf1_ros.pccc.address import Address
@@ -96,6 +98,29 @@ def test_rule_11_only_the_first_try_over_a_guest_is_not_held_up_by_a_pause() -> 
     one.fallback(row.refresh(1.0), 1.2, Outcome.UNKNOWN)
     assert row.judge(1.2, -math.inf)
     assert row.first_due == math.inf
+
+
+def test_rule_11_answered_write_of_a_guest_ends_the_pause() -> None:
+    one = OneRow()
+    plc = Plc(1, [one.row], ActiveStationList([1], probe_time=1.0), one.record, Conditions())
+
+    def ended(now: float, outcome: Outcome, write: Write | None = None) -> None:
+        claim = Claim(1, [one.mapping.extent], write, now)
+        claim.end(outcome, now, 0.0)
+        plc.write_ended(claim, now)
+
+    one.row.make_due(FallbackCause.START, 0.0)
+    own = one.row.take(0.0)
+    one.fallback(own, 0.1, Outcome.UNKNOWN)
+    plc.plan()
+    for _ in range(2):
+        ended(0.1, Outcome.UNKNOWN, own)
+    assert plc.rank(one.row, 0.2) is None
+    assert plc.next_due(math.inf) == 1.1
+    ended(0.2, Outcome.WRITTEN)
+    assert plc.next_due(math.inf) < 0.2
+    ended(0.3, Outcome.UNKNOWN, own)  # one failure is no reason for a pause
+    assert plc.rank(one.row, 0.3) is not None
 
 
 def test_rule_7_message_refreshes_from_its_own_time_when_it_is_confirmed() -> None:

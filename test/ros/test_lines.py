@@ -28,7 +28,7 @@ from typing import Any
 from abdf1_ros.problems import ConfigurationError
 from abdf1_ros.ros import lines as module
 from abdf1_ros.ros.bridge.node import BridgeNode
-from abdf1_ros.ros.lines import chosen, main, sections
+from abdf1_ros.ros.lines import chosen, main, RestartedLine, sections
 from abdf1_ros.ros.parameters import files
 from abdf1_ros.ros.parameters.files import parameter_files, usable_files
 from abdf1_ros.ros.process import main as process
@@ -175,6 +175,23 @@ def test_no_line_at_all() -> None:
 
 
 # A process with three lines
+
+
+def test_line_is_started_again_once_after_each_internal_error(
+        monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(module, '_RESTART_AFTER', 0.0)
+    made: list[Exception] = []
+    ends = iter([AttributeError('a bug'), AttributeError('a bug'), ConfigurationError([])])
+
+    def make() -> BridgeNode:
+        made.append(next(ends))
+        raise made[-1]
+
+    line = RestartedLine('/hall/a', make)
+    line.make()
+    for _ in range(5):
+        line.check()
+    assert (len(made), line.restarts) == (3, 2)
 
 
 class Plant:

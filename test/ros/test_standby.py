@@ -158,6 +158,17 @@ def test_line_that_is_lost_is_offered_no_longer(pair: Pair) -> None:
     pair.ros.until(lambda: not pair.services(), 'no services')
 
 
+def test_line_that_was_lost_for_a_moment_has_its_active_stations_again(pair: Pair) -> None:
+    """The table is latched, and the new publisher has nothing of what the old one published."""
+    bridge = pair.node
+    pair.ros.until(lambda: bridge._surroundings.active_words == [2] + 15 * [0], 'station 1')
+    left = bridge.executor.create_task(bridge._standby._leave_line)
+    pair.ros.until(left.done, 'the line to be left')
+    pair.ros.until(lambda: pair.counts == (1, 1), 'the bridge to have the line again')
+    stations = pair.ros.listen(UInt16MultiArray, '/abdf1/active_stations')
+    stations.values([2] + 15 * [0])
+
+
 def test_spare_in_the_queue_of_a_device_server_waits(tmp_path: Path) -> None:
     with socket.create_server(('127.0.0.1', 0)) as server, Observer() as ros:  # accepts, is silent
         write_csv(tmp_path / 'net.csv', NET.splitlines()[0], NET.splitlines()[1:])

@@ -25,7 +25,7 @@ from abdf1_ros.ros.topics.writes import count_publishers, LossCounter, WriteTopi
 from abdf1_ros.settings.mapping import Mapping
 import pytest
 from rclpy.node import Node
-from std_msgs.msg import Int16MultiArray
+from std_msgs.msg import Float32MultiArray, Int16MultiArray
 from support.mappings import make_mapping
 from support.ros import Observer
 
@@ -79,10 +79,12 @@ class Taker:
         self.mappings = [make_mapping('N7:0', 'Write', tag=tag) for tag in tags]
         self.executor, self.tasks, self.said = self, list[Callable[[], None]](), list[str]()
         self.callbacks: dict[str, Callable[[Any, Any], None]] = {}
+        self.kinds: dict[str, type] = {}
         self.wakes = 0
 
     def create_subscription(self, kind: Any, name: str, callback: Any, qos: Any) -> None:
-        self.callbacks[name.rpartition('/')[2]] = callback
+        topic = name.rpartition('/')[2]
+        self.callbacks[topic], self.kinds[topic] = callback, kind
 
     def destroy_subscription(self, subscription: object) -> None:
         """Take a topic away."""
@@ -197,6 +199,15 @@ def test_message_that_waits_for_rows_which_a_reload_takes_away_ends_nothing(
     topics.begin()
     node.tasks[0]()
     assert node.said == ['b 1']
+
+
+def test_row_of_another_message_type_has_another_subscription(
+        node: Taker, topics: WriteTopics) -> None:
+    assert node.kinds == dict.fromkeys('ab', Int16MultiArray)
+    node.mappings[0] = make_mapping('F8:0', 'Write', tag='a')
+    node.kinds.clear()
+    node.open(topics)
+    assert node.kinds == {'a': Float32MultiArray}
 
 
 def test_remapped_topic_has_the_publishers_of_its_new_name() -> None:
