@@ -23,50 +23,21 @@ from abdf1_ros.driver.guests import Guest, GuestCommand, ShareAccess
 from abdf1_ros.driver.interlocks.fallback import FallbackState
 from abdf1_ros.driver.record import Claim
 from abdf1_ros.driver.write import Outcome
-from abdf1_ros.settings.mapping import Mapping
 from abdf1_ros.settings.network import POLLING_MODES
 import pytest
 from support.driver_bench import store
-from support.interlocks import beat_row, Cell, end, FALLBACK, speed_row, START, WORDS
+from support.interlocks import (
+    beat_row,
+    Cell,
+    end,
+    FALLBACK,
+    GuestCell,
+    hold,
+    speed_row,
+    START,
+    WORDS,
+)
 from support.mappings import make_mapping
-
-
-def hold(cell: Cell, seconds: float, is_meant: Callable[[Packet], bool]) -> None:
-    """Let a gateway say that a command was not delivered, and deliver it later."""
-    serve = cell.plc.serve
-
-    def keep(command: Packet) -> Packet:
-        if not is_meant(command):
-            return serve(command)
-        cell.bench.at(cell.now + seconds, lambda: serve(command))
-        return command.reply(sts=0x02)
-
-    cell.plc.serve = keep  # type: ignore[method-assign]
-
-
-class GuestCell(Cell):
-    """A cell with a guest who writes there."""
-
-    def __init__(self, *rows: Mapping, start: bool = True, run: float = 1.0,
-                 polling: str = 'Message') -> None:
-        super().__init__(*rows, start=False, polling=polling)
-        self.replies: list[int] = []
-        if start:
-            self.bench.open()
-            self.run(run)
-
-    def ask(self, text: str, value: int, dst: int = 1) -> None:
-        """Let the guest write a word."""
-        row = make_mapping(text, 'Write')
-        cmd, data = row.dialect.write(row.address, value.to_bytes(2, 'little'))
-        self.bench.driver.guests.put(GuestCommand(
-            Guest('pty:hmi', ShareAccess.ALL), Packet(dst, 9, cmd, 0, 1, data), self.now,
-            lambda reply: self.replies.append(reply.sts)))
-        self.bench.line.wake(self.bench.driver.machine)
-
-    def hold_guests(self, seconds: float) -> None:
-        """Let a gateway keep the guest's 99."""
-        hold(self, seconds, lambda command: command.data.endswith(b'\x63\0'))
 
 
 @pytest.mark.parametrize('dst', [1, 255])
