@@ -41,10 +41,12 @@ from abdf1_ros.ports.link_thread import LinkThread, PortState
 from abdf1_ros.ports.settings import PortSettings
 from abdf1_ros.ports.trace import PortOpener
 from abdf1_ros.ros.bridge.session import stations_of
+from abdf1_ros.ros.diagnostics.dds_files import LOST
 from abdf1_ros.ros.diagnostics.events import LineEvents
 from abdf1_ros.ros.diagnostics.line import takes_in_silence
 from abdf1_ros.ros.diagnostics.status import Seen
 from abdf1_ros.ros.diagnostics.statuses import Diagnostics
+from abdf1_ros.ros.diagnostics.watches import watches_of
 from abdf1_ros.ros.diagnostics.writes import WriteLog
 from abdf1_ros.settings.map_file import load_mappings
 from abdf1_ros.settings.mapping import Command, Mapping
@@ -229,6 +231,17 @@ def test_link_of_a_node_with_a_duplicate_name(bench: Bench) -> None:
                                         'another node is called /line_a too')
     bench.set_port(False, 'gone')
     assert bench.says('link') == (ERROR, 'ERROR: gone; another node is called /line_a too')
+
+
+def test_link_of_a_node_that_new_programs_cannot_hear(bench: Bench) -> None:
+    faults = ['', LOST, LOST]
+    watches = watches_of(bench.diagnostics.line, PORT, bench.seen, (), lambda now: [],
+                         lambda now: [], lambda now: faults[int(now)])
+    told = [[news.text for watch in watches for news in watch.look(now)]
+            for now in (0.0, 1.0, 2.0)]
+    assert told == [[], [LOST], []]
+    assert bench.says('link') == (
+        WARN, f'WARN: port open, 0 of 2 stations have answered; {LOST}')
 
 
 def test_slave_that_nobody_polls_is_a_warning(make_bench: Callable[..., Bench]) -> None:

@@ -27,6 +27,7 @@ from collections.abc import Callable, Iterable, Iterator
 from collections.abc import Mapping as MappingType
 from time import thread_time
 
+from abdf1_ros.ros.diagnostics.dds_files import DdsFiles
 from abdf1_ros.ros.diagnostics.log import INFO, News, WARN
 from abdf1_ros.settings.mapping import Mapping
 from rclpy.node import Node
@@ -48,9 +49,14 @@ _KILLED_IS_SEEN = 30.0
 
 
 class Graph:
-    """The nodes and topics of the domain, as the node ``source`` sees them; for one thread."""
+    """
+    The nodes and topics of the domain, as the node ``source`` sees them; for one thread.
+
+    ``files``: the files of DDS that others need to see us.
+    """
 
     def __init__(self, source: Node) -> None:
+        self.files = DdsFiles()
         self._source = source
         self._nodes: Counter[tuple[str, str]] = Counter()
         self._clashes: dict[str, list[str]] = {}

@@ -54,8 +54,8 @@ class LinkStatus:
 
     def judge(self, now: float) -> Judgement:
         level, text = self._judge_line(now)
-        if clash := self._seen.duplicate_name():
-            return max(level, WARN), f'{text}; {clash}'
+        for fault in filter(None, (self._seen.duplicate_name(), self._seen.dds_fault)):
+            level, text = max(level, WARN), f'{text}; {fault}'
         return level, text
 
     def _judge_line(self, now: float) -> Judgement:

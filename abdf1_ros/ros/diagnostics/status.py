@@ -56,6 +56,8 @@ class Seen:
     """Returns a text if another node has our name, otherwise an empty text."""
     changed_files: Sequence[str] = ()
     """Names of files that have changed since they were read."""
+    dds_fault: str = ''
+    """The reason why other programs cannot hear this process; empty if none is known."""
     crowded: Sequence[str] = ()
     """Topics with a Fallback and more than one publisher."""
     conflicts: dict[str, str] = field(default_factory=dict)

@@ -73,7 +73,8 @@ class DeafStations:
 
 def watches_of(line: LineView, port: str, seen: Seen, guests: Sequence[GuestLine],
                changed_files: Callable[[float], Sequence[str]],
-               crowded_topics: Callable[[float], Sequence[str]]) -> list[Watch]:
+               crowded_topics: Callable[[float], Sequence[str]],
+               dds_fault: Callable[[float], str]) -> list[Watch]:
     """Return the watches of a session; they put into ``seen`` what statuses show."""
     def changed(now: float) -> list[str]:
         seen.changed_files = changed_files(now)
@@ -85,6 +86,10 @@ def watches_of(line: LineView, port: str, seen: Seen, guests: Sequence[GuestLine
                 'while any of them goes on (a forgotten "ros2 topic pub -r"?)'
                 for topic in seen.crowded]
 
+    def unheard(now: float) -> list[str]:
+        seen.dds_fault = dds_fault(now)
+        return [seen.dds_fault] if seen.dds_fault else []
+
     def fault(now: float) -> list[str]:
         text = line.fault(now)
         return [f'{port}: {text}'] if text else []
@@ -92,6 +97,7 @@ def watches_of(line: LineView, port: str, seen: Seen, guests: Sequence[GuestLine
     return [
         NewFaults(WARN, 'the files', changed),
         NewFaults(WARN, 'publishers', crowded),
+        NewFaults(WARN, 'DDS', unheard),
         NewFaults(ERROR, 'guests', lambda now: [
             f'guest {guest.guest.name}: {guest.fault}' for guest in guests if guest.fault]),
         NewFaults(WARN, 'commands to us', lambda now: [
