@@ -76,6 +76,17 @@ def tell(name: str, text: str, code: int | None = None) -> None:
         print(colour(line, code, sys.stderr) if code else line, file=sys.stderr, flush=True)
 
 
+def is_wanted(question: str) -> bool:
+    """Ask the user on a terminal; print the question and return False without a terminal."""
+    if not sys.stdin.isatty():
+        print(f'would {printable(question)}')
+        return False
+    try:
+        return input(f'{printable(question)}? [y/N] ').strip().lower() in ('y', 'yes')
+    except EOFError:
+        return False
+
+
 def run_command(name: str, work: Callable[[], int], interrupted: int = 0, unread: int = 0) -> int:
     """
     Carry out a command and print its failures; return the exit status.

@@ -15,7 +15,9 @@
 """
 The command ``plc``: single reads, writes and questions to the PLCs of a line.
 
-- ``options``: the command line; ``line`` turns it into settings.
+- ``parser``: the verbs and their help; a file for each is in ``verbs``.
+- ``options``: options that verbs share; ``line`` turns those of the line into settings.
+- ``asking``: what the verbs share that ask one station.
 - ``session``: an open line.
 - ``data``: reads and writes.
 - ``presence``: asks which stations answer.

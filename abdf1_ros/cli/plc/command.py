@@ -23,10 +23,11 @@ node first. On a half-duplex line plc is the master, so there must be no other m
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import partial
 import sys
 
-from abdf1_ros.cli.plc.parser import check_order, help_asked, make_parser
-from abdf1_ros.cli.terminal import EXIT_INTERRUPTED, EXIT_USAGE, prepare_output, run_command
+from abdf1_ros.cli.plc.parser import check_order, help_asked, make_parser, verb
+from abdf1_ros.cli.terminal import EXIT_INTERRUPTED, prepare_output, run_command
 
 
 def main(args: Sequence[str] | None = None) -> int:
@@ -36,11 +37,6 @@ def main(args: Sequence[str] | None = None) -> int:
     words = help_asked(sys.argv[1:] if args is None else args)
     check_order(parser, words)
     options = parser.parse_args(words)
-
-    def work() -> int:
-        from abdf1_ros.cli.plc.work import COMMANDS  # --help does not need this import
-        return COMMANDS[options.command](options)
-
-    # An output error of a "write" that ends here came before the write: nothing was written.
-    return run_command('plc', work, EXIT_INTERRUPTED,
-                       EXIT_USAGE if options.command == 'write' else 0)
+    chosen = verb(options.command)
+    return run_command('plc', partial(chosen.run, options), EXIT_INTERRUPTED,
+                       getattr(chosen, 'UNREAD_STATUS', 0))

@@ -394,3 +394,14 @@ def value_texts(mapping: Mapping, values: Sequence[float], radix: Radix) -> list
     bits = _BITS[mapping.type]
     digits = len(f'{(1 << bits) - 1:{radix.value}}')
     return [f'{int(value) & (1 << bits) - 1:0{digits}{radix.value}}' for value in values]
+
+
+def print_values(mapping: Mapping, values: Values, radix: Radix = Radix.DECIMAL,
+                 tags: Tags | None = None) -> None:
+    """Print the values of a mapping, each with its address."""
+    lines = list(rows(mapping, values, labels(mapping, tags), radix))
+    width = max(len(address) for address, _ in lines)
+    note = mapping.description if is_row(mapping) else ''
+    for address, text in lines:
+        print(printable(f'{address:{width}}  {text}  {note}'.rstrip()))
+        note = ''

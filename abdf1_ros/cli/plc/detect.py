@@ -16,6 +16,7 @@
 
 from __future__ import annotations
 
+import argparse
 from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
@@ -23,9 +24,13 @@ from itertools import product
 import time
 
 from abdf1_ros.cli.plc.line import free_station, MODES
+from abdf1_ros.cli.plc.overhear import ForeignMaster, overhear
 from abdf1_ros.cli.plc.presence import look_at, Presence, understands
-from abdf1_ros.cli.plc.session import Session
+from abdf1_ros.cli.plc.session import complain, Session
+from abdf1_ros.cli.terminal import EXIT_FAILED, Progress
 from abdf1_ros.df1.checksum import Checksum
+from abdf1_ros.df1.echo import COMES_BACK
+from abdf1_ros.problems import ConfigurationError, Problem
 from abdf1_ros.settings.network import Network
 
 # The usual ones first.
@@ -59,6 +64,10 @@ _ENQ_TIME = 5.0
 
 ROUNDS = 2
 """Number of attempts with the same settings: a lost frame does not prove absence."""
+
+_ALL_TRIED_IN_VAIN = (
+    'not one character came: cable, port, power? Or a station that was not asked (--stations; a '
+    'PLC-5 shows its own in octal)')
 
 
 @dataclass(frozen=True, slots=True)
@@ -160,3 +169,45 @@ class Search:
             time.sleep(_ENQ_TIME)
             seen = session.counters
             return not seen.acks_received + seen.naks_received + seen.enqs_received
+
+
+def found_settings(options: argparse.Namespace,
+                   network: Network) -> Found | ForeignMaster | None:
+    """Return the settings that work, or another master; print traces if there is neither."""
+    if options.duplex == 'slave':
+        raise ConfigurationError([Problem(
+            '--duplex', 'a slave cannot try settings; leave --duplex out, then we listen first')])
+    progress = Progress()
+    bauds: Sequence[int] = [network.baud] if options.baud or '://' in network.port \
+        else BAUD_RATES
+    modes = [MODES[options.duplex]] if options.duplex else [MODES['full'], MODES['half']]
+    checks = [network.error_code] if options.check else CHECKS
+    master = overhear(network, bauds, progress.show)
+    if master is not None:
+        progress.clear()
+        return master
+    search = Search(network, options.stations, progress.show)
+    found = search.run(bauds, modes, checks)
+    progress.clear()
+    if search.echoes:
+        complain(COMES_BACK)
+    if found is None:
+        complain(f'nothing answers with any of these settings, tried {ROUNDS} times')
+        for trace in search.traces or [_ALL_TRIED_IN_VAIN] * (not search.echoes):
+            complain(trace)
+        kept = [option for option, value in (
+            ('--duplex', options.duplex), ('--baud', options.baud), ('--check', options.check))
+            if value]
+        if kept:
+            complain(f'{" and ".join(kept)}: no other value was tried; leave the option out to '
+                     'try all')
+    return found
+
+
+def only_heard(master: ForeignMaster | None, what: str) -> int:
+    """Print the ways to use a line of another master; return the status."""
+    complain(what if master is None else (
+        f'{master}: nothing was sent. If the master polls a station N that no PLC has, "plc '
+        '--slave --own-station N" can ask PLCs through it, like a node of Mode Slave; "sniff" '
+        f'shows what the master reads; {what}'))
+    return EXIT_FAILED

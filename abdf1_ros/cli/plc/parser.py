@@ -12,15 +12,19 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The commands of ``plc`` and their help; options are added for the chosen command only."""
+"""The verbs of ``plc`` and their help; only the file of the chosen verb is imported."""
 
 from __future__ import annotations
 
 import argparse
 from collections.abc import Sequence
 import difflib
-from functools import partial
+from functools import cache, partial
+from importlib import import_module
+from keyword import iskeyword
+from pathlib import Path
 import re
+from types import ModuleType
 
 from abdf1_ros.cli.terminal import command_parser
 
@@ -52,53 +56,40 @@ examples:
 "plc COMMAND --help" explains each command.
 """
 
+# The order of the help. A verb that is not named here comes after these.
+_ORDER = ('read', 'write', 'watch', 'status', 'ping', 'scan', 'detect', 'init', 'files', 'import',
+          'clock', 'ports')
 
-# Each command: its purpose, then examples.
-_COMMANDS = {
-    'read': ('read addresses once', 'read N7:0-9 F8:2 --net net.csv'),
-    'write': ('write values to an address or a tag',
-              'write N7:10 5 6 7 --station 1 --yes --net net.csv',
-              'write F8:2 -1.5e3 --station 1 --yes --net net.csv',
-              'write line_speed 12.5 --map map.csv --net net.csv'),
-    'watch': ('show values live until Ctrl-C', 'watch B3:0 N7:0 --period 0.5 --net net.csv',
-              'watch I:1.0 --radix bin --net net.csv', 'watch --map map.csv --net net.csv',
-              'watch F8:0 --csv --net net.csv > curve.csv'),
-    'status': ('show model, mode and faults of a PLC', 'status 1 --net net.csv'),
-    'ping': ('measure the time that a PLC needs to return an echo',
-             'ping 1 --count 10 --net net.csv'),
-    'scan': ('look for stations', 'scan 0-31 --net net.csv'),
-    'detect': ('find out the settings of a line by trying them',
-               'detect --port /dev/ttyUSB0 --stations 1-4'),
-    'init': ('find port, settings and stations, and write net.csv and map.csv',
-             'init --into line1', 'init --port /dev/ttyUSB0 --stations 1-4'),
-    'files': ('list the data files of a PLC and their lengths', 'files 1 --net net.csv',
-              'files 1 --map --net net.csv', 'files 1 --map map.csv --net net.csv'),
-    'import': ('make map.csv from tags of RSLogix, KEPServer, RSView, InTouch, Ignition or a list',
-               'import plant.csv --station 2 --plc-type SLC',
-               'import plant.csv --station 1-4 --read-only --period 1000'),
-    'clock': ("show a PLC's time and its drift, or set it", 'clock 1 --net net.csv',
-              'clock 1 --set --yes --net net.csv'),
-    'ports': ('list serial ports and adapters', 'ports')}
+
+@cache
+def _verbs() -> dict[str, str]:
+    """Return the docstring of each verb's file by the name of the verb."""
+    files = {path.stem.rstrip('_'): path for path in Path(__file__).parent.glob('verbs/[a-z]*.py')}
+    names = [name for name in _ORDER if name in files] + sorted({*files} - {*_ORDER})
+    return {name: files[name].read_text(encoding='utf-8').split('"""')[1] for name in names}
+
+
+def verb(name: str) -> ModuleType:
+    """Import the file of a verb."""
+    return import_module(f'abdf1_ros.cli.plc.verbs.{name}{"_" * iskeyword(name)}')
 
 
 def make_parser(description: str | None) -> argparse.ArgumentParser:
-    """Return the parser; the name of the command is in ``command``."""
+    """Return the parser; the name of the verb is in ``command``."""
     parser = command_parser('plc', description, _EPILOG)
     commands = parser.add_subparsers(metavar='COMMAND', dest='command', required=True)
-    for name, (text, *examples) in _COMMANDS.items():
-        shown = '\n'.join(f'  plc {example}' for example in examples)
+    for name, text in _verbs().items():
+        purpose, _, examples = text.strip().partition('\n\n')
         commands.add_parser(
-            name, help=text, description=f'{text[0].upper()}{text[1:]}.',
-            epilog=f'example:\n{shown}\n\n{_STATUSES}', allow_abbrev=False,
+            name, help=f'{purpose[0].lower()}{purpose[1:-1]}', description=purpose,
+            epilog=f'example:\n{examples}\n\n{_STATUSES}', allow_abbrev=False,
             formatter_class=argparse.RawDescriptionHelpFormatter,
             complete=partial(_complete, name))
     return parser
 
 
 def _complete(name: str, parser: argparse.ArgumentParser) -> None:
-    from abdf1_ros.cli.plc.options import ADDERS
-    if name in ADDERS:
-        ADDERS[name](parser)
+    verb(name).add_arguments(parser)
 
 
 def help_asked(words: Sequence[str]) -> Sequence[str]:
@@ -114,10 +105,10 @@ def help_asked(words: Sequence[str]) -> Sequence[str]:
 def check_order(parser: argparse.ArgumentParser, words: Sequence[str]) -> None:
     """End the program if the first word is neither a command nor --help or --version."""
     first = words[0] if words else ''
-    if first in _COMMANDS or first in ('', '-h', '--help', '--version'):
+    if first in _verbs() or first in ('', '-h', '--help', '--version'):
         return
-    named = next((word for word in words if word in _COMMANDS), None)
+    named = next((word for word in words if word in _verbs()), None)
     if first.startswith('-') and named:
         parser.error(f'options come after the command, as in "plc {named} ... {first} ..."')
-    meant = difflib.get_close_matches(first, _COMMANDS, 1)
+    meant = difflib.get_close_matches(first, _verbs(), 1)
     parser.error(f'"{first}" is not a command' + (f'; did you mean {meant[0]}?' if meant else ''))

@@ -21,13 +21,16 @@ from functools import partial
 import time
 
 from abdf1_ros import open_line
-from abdf1_ros.cli.terminal import NoPort, tell
+from abdf1_ros.cli.terminal import NoPort, RED, tell
 from abdf1_ros.df1.stations import ActiveStationList, MAX_STATION
 from abdf1_ros.pccc.file_types import PlcType
 from abdf1_ros.ports.descriptor import Port
 from abdf1_ros.ports.settings import PortSettings
 from abdf1_ros.ports.trace import begun_now, Trace, TracedPort
 from abdf1_ros.settings.network import Network
+
+complain = partial(tell, 'plc', code=RED)
+"""Print a text about a failure on standard error."""
 
 
 def opened(network: Network) -> Callable[[], Port]:

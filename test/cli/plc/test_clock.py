@@ -20,8 +20,8 @@ from pathlib import Path
 import re
 import time
 
-from abdf1_ros.cli.plc.clock import told
 from abdf1_ros.cli.plc.command import main
+from abdf1_ros.cli.plc.verbs.clock import told
 from abdf1_ros.pccc.processor import Processor
 from abdf1_ros.simulator.simulated_plc import SimulatedPlc
 import pytest

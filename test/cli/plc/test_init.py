@@ -18,12 +18,13 @@ from collections.abc import Iterator
 from pathlib import Path
 import time
 
-from abdf1_ros.cli.plc import work
 from abdf1_ros.cli.plc.command import main
 from abdf1_ros.cli.plc.files import find_files
 from abdf1_ros.cli.plc.init import map_rows, NewFiles
 from abdf1_ros.cli.plc.presence import Presence
 from abdf1_ros.cli.plc.session import Session
+from abdf1_ros.cli.plc.verbs import init
+from abdf1_ros.cli.plc.verbs import ports as ports_verb
 from abdf1_ros.pccc import gateways
 from abdf1_ros.pccc.file_types import PlcType
 from abdf1_ros.pccc.identity import Identity
@@ -261,7 +262,8 @@ OTHER = SerialPortInfo('/dev/ttyS0', '', '', False)
 
 
 def _with_ports(monkeypatch: pytest.MonkeyPatch, *ports: SerialPortInfo) -> None:
-    monkeypatch.setattr(work, 'serial_ports', lambda: list(ports))
+    for verb in (init, ports_verb):
+        monkeypatch.setattr(verb, 'serial_ports', lambda: list(ports))
 
 
 def test_ports_are_listed_with_what_keeps_one_from_opening_them(

@@ -12,14 +12,23 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The clock of a PLC: shown with its drift, and set."""
+"""
+Show a PLC's time and its drift, or set it.
+
+  plc clock 1 --net net.csv
+  plc clock 1 --set --yes --net net.csv
+"""
 
 from __future__ import annotations
 
+import argparse
 from datetime import datetime, timedelta
 
-from abdf1_ros.cli.plc.session import Session
-from abdf1_ros.errors import FormatError
+from abdf1_ros.cli.plc.asking import ask, failed, family_of
+from abdf1_ros.cli.plc.options import add_plc_type, add_station
+from abdf1_ros.cli.plc.session import complain, Session
+from abdf1_ros.cli.terminal import EXIT_FAILED, EXIT_USAGE, is_wanted
+from abdf1_ros.errors import Abdf1Error, FormatError
 from abdf1_ros.pccc import steps
 from abdf1_ros.pccc.families import FAMILIES
 from abdf1_ros.pccc.file_types import PlcType
@@ -27,8 +36,45 @@ from abdf1_ros.pccc.processor import Processor
 from abdf1_ros.pccc.steps import AddressedValues
 from abdf1_ros.pccc.values import ValueType
 
-TAKEN = timedelta(seconds=3)
-"""A larger difference right after setting means: the clock has not taken the time."""
+# A larger difference right after setting means: the clock has not taken the time.
+_TAKEN = timedelta(seconds=3)
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add the arguments."""
+    add_station(parser)
+    add_plc_type(parser)
+    parser.add_argument('--set', action='store_true',
+                        help="write this computer's local time into the PLC, after a question on "
+                             'the terminal')
+    parser.add_argument('--yes', action='store_true', help='set the clock without a question')
+
+
+def run(options: argparse.Namespace) -> int:
+    """Show the clock of the station, or set it."""
+    return ask(options, _clock, writes=options.set)
+
+
+def _clock(options: argparse.Namespace, session: Session) -> int:
+    clock = Clock(session, options.station, *family_of(options, session))
+    try:
+        if not options.set:
+            print(f'station {options.station}: {told(*clock.read())}')
+            return 0
+        if not options.yes and not is_wanted(
+                f'set the clock of station {options.station} ({clock.address})'):
+            complain('nothing was written; --yes writes')
+            return EXIT_USAGE
+        clock.write()
+        time, ahead = clock.read()
+    except Abdf1Error as error:
+        return failed(options, session, error, clock.address)
+    print(f'station {options.station}: {told(time, ahead)}')
+    if abs(ahead) <= _TAKEN:
+        return 0
+    complain('the PLC confirmed the write, but its clock has not changed: these words may be a '
+             'copy of the clock; set the clock with the software of the PLC')
+    return EXIT_FAILED
 
 
 class Clock:

@@ -1,0 +1,145 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""What the verbs of ``plc`` share that ask one station."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Callable
+from dataclasses import replace
+
+from abdf1_ros.cli.plc import data, presence
+from abdf1_ros.cli.plc.line import free_station, MODES, network_of
+from abdf1_ros.cli.plc.options import DEFAULT_STATION
+from abdf1_ros.cli.plc.session import complain, Session
+from abdf1_ros.cli.plc.targets import Targets
+from abdf1_ros.cli.terminal import EXIT_FAILED
+from abdf1_ros.errors import Abdf1Error, LinkError, PortLost, RemoteError
+from abdf1_ros.pccc.file_types import PlcType
+from abdf1_ros.pccc.processor import Processor
+from abdf1_ros.pccc.status import is_address_fault
+from abdf1_ros.problems import ConfigurationError, Problem
+from abdf1_ros.settings.mapping import Mapping
+from abdf1_ros.settings.network import Network
+
+
+def ask(options: argparse.Namespace, work: Callable[[argparse.Namespace, Session], int],
+        targets: Targets | None = None, writes: bool = False, record: str | None = None) -> int:
+    """
+    Open the line and carry out ``work`` with one station; warn if ``via`` may not be a gateway.
+
+    - ``targets``: what ``work`` reads or writes; a row of a map names its station.
+    - ``writes``: the user has to name the station if the line has several.
+    - ``record``: a file for all bytes of the line.
+    """
+    network = _line(options, targets, writes)
+    routes = targets.routes if targets else None
+    with Session(network, via=options.via, record=record, routes=routes) as session:
+        if options.via is not None and (
+                who := presence.common_identity(session, options.station, options.via)):
+            complain(f'stations {options.station} and {options.via} are both "{who}": if '
+                     f'{options.via} is not a gateway, it answers itself')
+        try:
+            return work(options, session)
+        except Abdf1Error as error:
+            return failed(options, session, error)
+        finally:
+            if session.is_silent:
+                complain(presence.traffic(session.counters, session.stray))
+
+
+def mappings_of(options: argparse.Namespace, session: Session,
+                targets: Targets) -> list[Mapping]:
+    """Return the mappings of addresses; where needed, ask the PLC for its type first."""
+    if not targets.addresses:
+        return targets.rows
+    plc_type, processor = family_of(options, session)
+    kind = {'PLC_Type': plc_type.value, 'Processor': data.processor_cell(processor)}
+    cells = {column: text for column, text in kind.items() if text} | targets.cells
+    return [mapping for item, entry in enumerate(targets.entries, 1) for mapping in (
+        [entry] if isinstance(entry, Mapping) else data.mappings_of(entry, cells, item))]
+
+
+def family_of(options: argparse.Namespace,
+              session: Session) -> tuple[PlcType, Processor | None]:
+    """Return family and processor: from the option, or ask the station."""
+    if options.plc_type:
+        return PlcType(options.plc_type), None
+    return data.ask_family(session, options.station)
+
+
+def failed(options: argparse.Namespace, session: Session, error: Abdf1Error, place: str = '',
+           row: Mapping | None = None) -> int:
+    """Print why a request to a station, about ``place``, failed; return the exit status."""
+    if isinstance(error, ConfigurationError | PortLost):
+        raise error
+    station = options.station if row is None else row.station
+    complain(f'{place and f"{place} of "}station {station}: {error}')
+    if isinstance(error, RemoteError):
+        check_type(options, session, station)
+    _advise(session, presence.hint(session, error))
+    session.is_silent |= isinstance(error, LinkError)
+    if options.is_assumed and isinstance(error, LinkError):
+        _advise(session, f'no station was given, so {station} was asked; "plc scan" lists the '
+                         'stations that answer')
+    if place and isinstance(error, RemoteError) and is_address_fault(error):
+        _advise(session, f'"plc files {station}" lists its data files and their lengths')
+    return EXIT_FAILED
+
+
+def check_type(options: argparse.Namespace, session: Session, station: int) -> None:
+    """Ask a PLC for its type once; warn if an option gives another type."""
+    if '--plc-type' not in session.said:
+        session.said.add('--plc-type')
+        _advise(session, presence.type_hint(session, station, options.plc_type))
+
+
+def _line(options: argparse.Namespace, targets: Targets | None, writes: bool) -> Network:
+    """
+    Return the line of a command for one station, and set the station in ``options``.
+
+    Raises ConfigurationError if a write names no station on a line of several, and if the station
+    is our own. Rows of a map name their stations.
+    """
+    network = network_of(options)
+    if targets and targets.rows:
+        targets.check_line(network)
+        if not targets.addresses:
+            options.is_assumed, options.station = False, targets.rows[0].station
+            return network
+    has_several = network.mode != MODES['full']
+    options.is_assumed = has_several and options.station is None
+    if options.is_assumed and writes:
+        raise ConfigurationError([Problem(
+            '--station', 'give the station to write to: this line may have several stations')])
+    if options.station is None:
+        options.station = DEFAULT_STATION
+    if not has_several or options.station != network.station:
+        return network
+    if options.is_assumed:
+        raise ConfigurationError([Problem(
+            '--station', f'give the station to ask; {options.station} is our own Station')])
+    if options.net or options.own_station is not None or network.line_mode.is_polled:
+        raise ConfigurationError([Problem('--own-station', (
+            f'{network.station} is our own Station, so no PLC can answer as {options.station}; '
+            'give us a station number that no PLC of the line has'))])
+    return replace(network, station=free_station(network.station, [options.station]))
+
+
+def _advise(session: Session, text: str) -> None:
+    """Print a text of advice once per command."""
+    if text and text not in session.said:
+        session.said.add(text)
+        complain(text)

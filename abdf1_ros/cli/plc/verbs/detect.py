@@ -1,0 +1,68 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+Find out the settings of a line by trying them.
+
+  plc detect --port /dev/ttyUSB0 --stations 1-4
+"""
+
+from __future__ import annotations
+
+import argparse
+from contextlib import suppress
+import sys
+
+from abdf1_ros.cli.plc import init, overhear, presence
+from abdf1_ros.cli.plc.detect import found_settings, only_heard
+from abdf1_ros.cli.plc.line import MODES, network_of
+from abdf1_ros.cli.plc.options import (
+    add_line_options,
+    add_stations_to_try,
+    DEFAULT_STATION,
+    DETECT_DEFAULTS,
+)
+from abdf1_ros.cli.plc.session import Session
+from abdf1_ros.cli.terminal import called, colour, EXIT_FAILED, GREEN
+from abdf1_ros.errors import LinkError
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add the arguments."""
+    add_line_options(parser, DETECT_DEFAULTS)
+    add_stations_to_try(parser)
+
+
+def run(options: argparse.Namespace) -> int:
+    """Try settings; print those that work, and the commands to go on with."""
+    network = network_of(options)
+    found = found_settings(options, network)
+    if isinstance(found, overhear.ForeignMaster):
+        return only_heard(found, '"plc init" writes net.csv and map.csv for Mode Listen')
+    if found is None:
+        return EXIT_FAILED
+    there = found.presence
+    print(f'{colour(str(found.settings), GREEN, sys.stdout)}: station {there.station} {there}')
+    settings = found.settings
+    with Session(found.settings.on(network)) as session, suppress(LinkError):
+        if ways := presence.io_access(session, there):
+            print(f'inputs and outputs: Access {" or ".join(ways)}')
+    other = '' if there.station == DEFAULT_STATION else f' --station {there.station}'
+    whom = {MODES['full']: f'--peer{other}', MODES['half']: f'--station {there.station}'}.get(
+        settings.mode, f'--radio --station {there.station}') + presence.type_to_say(there)
+    parity = '' if network.parity == 'None' else f' --parity {network.parity}'
+    print(f'next: {called("plc")} read N7:0 {whom} --port {network.port} --baud {settings.baud} '
+          f'--check {settings.check}{parity}')
+    print(f'net.csv:\n{init.net_csv(network, found, [there.station])}')
+    return 0

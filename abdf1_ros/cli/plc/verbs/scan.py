@@ -1,0 +1,62 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+Look for stations.
+
+  plc scan 0-31 --net net.csv
+"""
+
+from __future__ import annotations
+
+import argparse
+
+from abdf1_ros.cli.plc import presence
+from abdf1_ros.cli.plc.line import MODES, network_of
+from abdf1_ros.cli.plc.options import add_line, stations_option
+from abdf1_ros.cli.terminal import EXIT_FAILED, Progress
+
+_ONE_PLC_ANSWERS_TO_ALL = (
+    'in full duplex most PLCs answer to every station number, so these may be one PLC')
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add the arguments."""
+    add_line(parser)
+    parser.add_argument('stations', metavar='STATIONS', nargs='?', type=stations_option,
+                        default=tuple(range(32)),
+                        help='stations to ask, such as 1,5 or 0-254 (default: 0-31)')
+
+
+def run(options: argparse.Namespace) -> int:
+    """Ask the stations, and print those that answer."""
+    progress = Progress()
+    found = 0
+    asked = 1
+    network = network_of(options)
+    for there in presence.scan(network, options.stations, options.via, progress.show):
+        if there.is_there:
+            if not found:
+                print('station    answer  processor')
+            found += 1
+            progress.clear()
+            print(f'{there.station:7}  {there.seconds * 1000:5.0f} ms  {there}'
+                  f'{presence.again(there.asked)}', flush=True)
+        else:
+            asked = there.asked
+    progress.clear()
+    print(presence.tally(found, len(options.stations), asked))
+    if found > 1 and network.mode == MODES['full']:
+        print(_ONE_PLC_ANSWERS_TO_ALL)
+    return 0 if found else EXIT_FAILED

@@ -1,0 +1,63 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""
+Show values live until Ctrl-C.
+
+  plc watch B3:0 N7:0 --period 0.5 --net net.csv
+  plc watch I:1.0 --radix bin --net net.csv
+  plc watch --map map.csv --net net.csv
+  plc watch F8:0 --csv --net net.csv > curve.csv
+"""
+
+from __future__ import annotations
+
+import argparse
+from functools import partial
+
+from abdf1_ros.cli.plc import presence
+from abdf1_ros.cli.plc.asking import ask, mappings_of
+from abdf1_ros.cli.plc.options import add_addresses, COUNT, RADIXES
+from abdf1_ros.cli.plc.session import complain, Session
+from abdf1_ros.cli.plc.targets import Targets, to_read
+from abdf1_ros.cli.plc.watch import Watch
+from abdf1_ros.cli.terminal import EXIT_FAILED, number_option
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add the arguments."""
+    add_addresses(parser)
+    parser.add_argument('--period', default=0.5, metavar='S',
+                        type=number_option('seconds from 0 to 60; 0.5 is 500 ms', 0, 60),
+                        help='s between reads, up to 60 (default: %(default)s)')
+    parser.add_argument('--csv', action='store_true',
+                        help='print each value as time,station,address,value')
+    parser.add_argument('--count', type=COUNT, metavar='N', help='end after N reads')
+
+
+def run(options: argparse.Namespace) -> int:
+    """Read the addresses again and again, and show their values."""
+    targets = to_read(options)
+    return ask(options, partial(_watch, targets=targets), targets)
+
+
+def _watch(options: argparse.Namespace, session: Session, targets: Targets) -> int:
+    mappings = mappings_of(options, session, targets)
+    session.close()  # the driver opens the port itself
+    watch = Watch(session.network, mappings, options.period, RADIXES[options.radix],
+                  options.csv, targets.tags, options.record)
+    failed = watch.run(options.count)
+    if failed:
+        complain(presence.traffic(watch.counters))
+    return EXIT_FAILED if failed else 0
