@@ -18,14 +18,20 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from abdf1_ros.df1.packet import BROADCAST, Packet
+from abdf1_ros.df1.packet import BROADCAST, Packet, PRIORITY_BIT
+from abdf1_ros.pccc.access import Access
 from abdf1_ros.pccc.address import Address
 from abdf1_ros.pccc.data_table import DataTable
 from abdf1_ros.pccc.extent import Extent
 from abdf1_ros.pccc.file_types import FileType, PlcType
+from abdf1_ros.pccc.plc2 import commands as plc2
+from abdf1_ros.pccc.processor import CIF_FILES
 from abdf1_ros.pccc.server import Server
 from abdf1_ros.settings.mapping import Mapping
 from abdf1_ros.settings.rows import Rows
+
+_BASIC = (plc2.READ, plc2.UNPROTECTED_WRITE, plc2.PROTECTED_WRITE, plc2.PROTECTED_BIT_WRITE,
+          plc2.UNPROTECTED_BIT_WRITE)
 
 
 class NotedTable(DataTable):
@@ -55,6 +61,24 @@ class NotedTable(DataTable):
         self.written.append((address, len(data) // 2))
 
 
+def uses_common_file(command: Packet, rows: Sequence[Mapping]) -> bool:
+    """
+    Tell whether a command uses the common interface file of an SLC.
+
+    S:2/8 of the SLC decides which of its words: a command counts words or bytes. The rows have one
+    PLC type of the station.
+    """
+    return command.cmd & ~PRIORITY_BIT in _BASIC and any(map(_is_slc, rows))
+
+
+def _is_slc(row: Mapping) -> bool:
+    return row.plc_type == PlcType.SLC or row.access is Access.CIF
+
+
+def _may_be_common(row: Mapping) -> bool:
+    return row.access is Access.CIF or row.address.file in CIF_FILES
+
+
 def written_extents(command: Packet, station: int,
                     mappings: Rows) -> list[Extent] | None:
     """
@@ -68,7 +92,11 @@ def written_extents(command: Packet, station: int,
             if station in (mapping.station, BROADCAST)]
     found: list[Extent] = []
     for number, plc_type in {(row.station, row.plc_type): None for row in rows}:
-        table = NotedTable(plc_type, [row for row in rows if row.station == number])
+        there = [row for row in rows if row.station == number]
+        if uses_common_file(command, there):
+            found += [row.extent for row in there if _may_be_common(row)]
+            continue
+        table = NotedTable(plc_type, there)
         reply = Server(table).serve(command)
         if reply.sts and not table.is_elsewhere:
             return None

@@ -19,7 +19,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from abdf1_ros.df1.packet import Packet, PRIORITY_BIT
-from abdf1_ros.driver.guest_words import NotedTable
+from abdf1_ros.driver.guest_words import NotedTable, uses_common_file
 from abdf1_ros.errors import FormatError
 from abdf1_ros.pccc.address import Address, Area
 from abdf1_ros.pccc.file_types import PlcType
@@ -64,7 +64,7 @@ def words_in_reply(command: Packet, reply: Packet, rows: Sequence[Mapping]) -> R
     The rows have one PLC type of the station. A server of the family executes the command: where
     its reply has the code of a word, the heard reply has the value of this word.
     """
-    if uses_common_file(command, rows[0].plc_type):
+    if uses_common_file(command, rows):
         return {}
     table = _CodedTable(rows[0].plc_type, rows)
     expected = Server(table).serve(command)
@@ -80,11 +80,6 @@ def words_in_reply(command: Packet, reply: Packet, rows: Sequence[Mapping]) -> R
     if len(data) != len(expected.data) or data[:begin] != expected.data[:begin]:
         return {}
     return {(place.area, place.offset): data[at:at + 2] for at, place in places.items()}
-
-
-def uses_common_file(command: Packet, plc_type: PlcType) -> bool:
-    """Tell whether a command uses the common interface file of an SLC, as S:2/8 decides."""
-    return plc_type == PlcType.SLC and command.cmd & ~PRIORITY_BIT != plc5.CMD
 
 
 def _same_form(command: Packet, data: bytes) -> bytes:

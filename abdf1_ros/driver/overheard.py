@@ -34,7 +34,7 @@ from abdf1_ros.df1.packet import BROADCAST, is_local_status, Packet
 from abdf1_ros.df1.stations import ActiveStationList
 from abdf1_ros.driver.checks import Checks
 from abdf1_ros.driver.guest_words import written_extents
-from abdf1_ros.driver.heard_words import ReplyWords, uses_common_file, words_in_reply
+from abdf1_ros.driver.heard_words import ReplyWords, words_in_reply
 from abdf1_ros.driver.job_tasks import JobTasks
 from abdf1_ros.driver.reads.point import ReadPoint
 from abdf1_ros.driver.reads.readings import Readings
@@ -262,7 +262,7 @@ class Overheard:
         what = describe(command).partition(' = ')[0]
         for mapping, point in self._readings.points.items():
             is_there = command.dst in (mapping.station, BROADCAST)
-            if is_there and (extents is None or uses_common_file(command, mapping.plc_type)
+            if is_there and (extents is None
                              or any(extent.meets(mapping.extent) for extent in extents)):
                 self._valid_from.written[point] = now
                 point.fail(f'not read since station {command.src} has sent "{what}"')

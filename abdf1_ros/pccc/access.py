@@ -37,7 +37,3 @@ class Access(Enum):
     UNPROTECTED = 'Unprotected'
     PROTECTED = 'Protected'
     CIF = 'CIF'
-
-
-CIF_FILES = (7, 9)
-"""The files that the common interface file may be: of a MicroLogix 1000, of an SLC."""

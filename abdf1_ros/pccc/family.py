@@ -55,7 +55,7 @@ class Family:
 
     addressing: Addressing
     dialects: Mapping[Access, Dialect]
-    commands: Callable[[DataTable], ServedFamily]
+    commands: Callable[[DataTable, EmulatedProcessor], ServedFamily]
     decode_identity: Callable[[bytes], Identity | None]
     encode_identity: Callable[[EmulatedProcessor], bytes]
     described: Mapping[CommandCode, KnownCommand]

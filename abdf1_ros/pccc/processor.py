@@ -57,6 +57,11 @@ class Processor(Enum):
         return _MODELS[self] is _NEW
 
     @property
+    def common_interface_file(self) -> int:
+        """Return the number of the file that the commands of a PLC-2 reach (M 7-31)."""
+        return 7 if self is Processor.ML1000 else 9
+
+    @property
     def is_micrologix(self) -> bool:
         """Tell whether this is a MicroLogix."""
         return self.value.startswith('ML')
@@ -71,6 +76,9 @@ class Processor(Enum):
 
 USUAL = Processor.SLC_5_03
 """What an SLC is taken for when it is not known which it is."""
+
+CIF_FILES = frozenset(processor.common_interface_file for processor in Processor)
+"""The files that the common interface file may be."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -43,9 +43,10 @@ class Server:
     def __init__(self, table: DataTable, processor: EmulatedProcessor | None = None,
                  counters: ServedCounters | None = None) -> None:
         family = FAMILIES[table.plc_type]
-        self._family = family.commands(table)
+        processor = processor or EmulatedProcessor()
+        self._family = family.commands(table, processor)
         self._commands: Commands = self._family.commands | _diagnostics(
-            family, processor or EmulatedProcessor(), counters)
+            family, processor, counters)
 
     def serve(self, command: Packet) -> Packet:
         """Return the reply to ``command``; every command has one."""

@@ -21,13 +21,13 @@ from enum import Enum
 import math
 
 from abdf1_ros.df1.packet import BROADCAST
-from abdf1_ros.pccc.access import Access, CIF_FILES
+from abdf1_ros.pccc.access import Access
 from abdf1_ros.pccc.address import Address, BITS
 from abdf1_ros.pccc.dialect import Dialect
 from abdf1_ros.pccc.extent import Extent
 from abdf1_ros.pccc.families import dialect_of, parse_address
 from abdf1_ros.pccc.file_types import FileType, PlcType
-from abdf1_ros.pccc.processor import Processor
+from abdf1_ros.pccc.processor import CIF_FILES, Processor
 from abdf1_ros.pccc.values import Codec, ValueType, WordOrder
 from abdf1_ros.problems import Place, Problem
 from abdf1_ros.settings.alarms import Alarm
@@ -238,7 +238,7 @@ class Mapping:
         if self.access is not Access.CIF or other.access is Access.CIF:
             return [self.address]
         return [parse_address(f'N{file}:0', PlcType.SLC).at_offset(self.address.offset)
-                for file in CIF_FILES]
+                for file in sorted(CIF_FILES)]
 
     def _meets(self, other: Mapping) -> bool:
         """Tell whether both have a word, or for bits a bit, of one number."""

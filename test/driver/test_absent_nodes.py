@@ -34,12 +34,14 @@ from support.odd_device import Answer, OddDevice, Wiring
 GATEWAY, LIVING, SECONDS, TIMEOUT = 8, 1, 20.0, 0.3
 ABSENT = (11, 12, 13)
 MESSAGES = 15
-NAK, NOTHING, STATUS, LOSES = Answer.NAK, Answer.NOTHING, Answer.ACK, Answer.LOSES
+NAK, NOTHING, STATUS = Answer.NAK, Answer.NOTHING, Answer.ACK
+LOSES, LATE = Answer.LOSES, Answer.LATE
 _MODES = {'Peer': (Wiring.FULL, {'mode': 'Peer'}), 'Radio': (Wiring.RADIO, {'mode': 'Radio'})}
 KINDS = [('Message', STATUS), ('Message', NOTHING), ('Message', NAK), ('Standard', STATUS),
          ('Standard', NOTHING), ('Standard', NAK), ('Peer', STATUS), ('Peer', NOTHING),
          ('Peer', NAK), ('Peer', LOSES), ('Message', LOSES), ('Standard', LOSES),
-         ('Radio', STATUS), ('Radio', NOTHING)]
+         ('Radio', STATUS), ('Radio', NOTHING), ('Message', LATE), ('Standard', LATE),
+         ('Peer', LATE), ('Radio', LATE)]
 
 
 class Plant(DriverBench):

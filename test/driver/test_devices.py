@@ -21,7 +21,7 @@ from abdf1_ros.settings.mapping import Mapping
 from abdf1_ros.settings.network import Network
 from abdf1_ros.simulator.simulated_plc import SimulatedPlc
 import pytest
-from support.devices import Device, DEVICES, WRONG
+from support.devices import Device, DEVICES, link_of, WRONG
 from support.driver_bench import DriverBench, store, stored
 from support.guests import Program, READ_N7
 from support.mappings import make_mapping
@@ -190,6 +190,41 @@ def test_strings_that_no_program_has_written_are_not_values(mode: str) -> None:
     bench.open(run=2.0)
     assert [bench.listener.values(row)[:1] for row in rows] == [[], [], ['ABA']]
     assert bench.driver.stations[1].active
+
+
+@pytest.mark.parametrize('mode', NETWORKS)
+@pytest.mark.parametrize('has_reads', [True, False])
+def test_first_number_of_a_new_process_may_be_the_last_one_of_the_old_process(
+        mode: str, has_reads: bool) -> None:
+    """The PLC takes our first command for a repetition: it acknowledges, and does nothing."""
+    device, = (each for each in DEVICES if each.name == 'knows_the_last_tns_for_ever')
+    words = make_mapping('N7:0', plc='SLC', length=3)
+    target = make_mapping('N7:5', 'Write', plc='SLC')
+    bench, plc = bench_of(device, mode, 'CRC', *([words] if has_reads else []), target)
+    hear, numbers = bench.far.hear, [0]
+
+    def note(data: bytes) -> bytes:
+        if link := link_of(data):
+            numbers.append(int.from_bytes(link[4:6], 'little'))
+        return hear(data)
+
+    bench.far.hear = note
+    bench.open(run=1.0)
+    bench.write(target, [1])
+    bench.run_until(lambda: bool(bench.listener.results), 20.0)
+    numbers.append(last := numbers[-1])
+    bench.listener.reads.clear()
+    bench.restart(first_tns=last - 1 & 0xFFFF)
+    bench.write(target, [2])
+    bench.run_until(lambda: len(bench.listener.results) == 2, 20.0)
+    bench.run(3.0)
+    assert numbers.count(last) > 2
+    outcome = bench.listener.outcomes()[1]
+    assert (outcome, stored(plc, 'N7:5')) in (
+        (Outcome.WRITTEN, b'\x02\x00'), (Outcome.UNKNOWN, b'\x01\x00'))
+    bench.write(target, [3], run=1.0)
+    assert (bench.listener.outcomes()[2], stored(plc, 'N7:5')) == (Outcome.WRITTEN, b'\x03\x00')
+    assert bool(bench.listener.values(words)) == has_reads
 
 
 def test_every_device_has_a_source_and_a_name_of_its_own() -> None:

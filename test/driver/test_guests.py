@@ -148,6 +148,18 @@ def test_words_of_a_write_are_known_by_its_address(entry: tuple[str, str, str, i
     assert found == expected
 
 
+@pytest.mark.parametrize('text', ['08 02 00 34 12', '00 02 00 34 12', '05 02 00 01 00'])
+def test_words_of_a_write_to_the_common_interface_file_are_all_of_the_file(text: str) -> None:
+    """File 9 of an SLC, 7 of a MicroLogix 1000; S:2/8 decides whether a command counts bytes."""
+    rows = [make_mapping(address, plc='SLC') for address in ('N7:9', 'N9:30', 'B3:1', 'N10:0')]
+    data = bytes.fromhex(text)
+    found = written_extents(Packet(1, 9, data[0], 0, 1, data[1:]), 1, Rows(rows))
+    assert found == [row.extent for row in rows[:2]]
+    rows = [make_mapping('005', plc='PLC2', access='CIF')]
+    found = written_extents(Packet(1, 9, data[0], 0, 1, data[1:]), 1, Rows(rows))
+    assert found == [rows[0].extent]
+
+
 @pytest.mark.parametrize('text', ['0F 80 01', '0F 57 00', '0F'])
 def test_words_of_a_command_that_nobody_knows_may_be_any(text: str) -> None:
     data, rows = bytes.fromhex(text), [make_mapping('N7:0', plc='SLC')]

@@ -96,7 +96,7 @@ class ToyCommands:
     out_of_range: Codes = 0x50, None
     protected: Codes = 0x60, None
 
-    def __init__(self, table: DataTable) -> None:
+    def __init__(self, table: DataTable, processor: EmulatedProcessor) -> None:
         self._table = table
         self.basic_commands: BasicCommands = {}
         self.commands: Commands = {

@@ -142,6 +142,18 @@ def test_data_file_of_a_plc2_and_a_plc3(path: Path, clock: Clock) -> None:
     assert (three_master.number('N10:0'), three_master.number('T:1.ACC')) == (-1, 6)
 
 
+def test_common_interface_file_of_a_micrologix_1000_is_n7(path: Path, clock: Clock) -> None:
+    """M 7-31; it has no file 9."""
+    old, new = load(path, clock, '1,SLC,N7:0,4,,,,,ML1000', '2,SLC,N7:0,4,,,', '2,SLC,N9:0,4,,,')
+    for plc, file in ((old, 'N7'), (new, 'N9')):
+        write = Packet(plc.station, 0, 0x08, 0, 1, b'\x02\x00\x34\x12')
+        assert plc.serve(write).sts == 0
+        assert stored(plc, f'{file}:2') == b'\x34\x12'
+        read = Packet(plc.station, 0, 0x01, 0, 2, b'\x02\x00\x02')
+        assert plc.serve(read).data == b'\x34\x12'
+    assert stored(new, 'N7:2') == b'\x00\x00'
+
+
 @pytest.mark.parametrize(('plc', 'text', 'cmd', 'data'), [
     ('PLC2', '020', 0x08, '20 00 07 00'),
     ('PLC3', 'N7:0', 0x0F, '00 00 00 01 00 2C 05 07 00 07 00')])

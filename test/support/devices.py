@@ -117,6 +117,21 @@ def message_like(other: bytes, data: bytes) -> bytes:
     return STX + data.replace(b'\x10', b'\x10\x10') + b'\x10\x03' + check
 
 
+def link_of(message: bytes) -> bytes:
+    """Return the link data of an undamaged message; nothing of all else."""
+    is_from_master = message.startswith(SOH)
+    start = message.find(STX) if is_from_master else 0
+    if not is_from_master and not message.startswith(STX):
+        return b''
+    station = message[2:start].replace(b'\x10\x10', b'\x10')
+    end = -4 if message[-4:-2] == b'\x10\x03' else -3
+    data = message[start + 2:end].replace(b'\x10\x10', b'\x10')
+    covered = station + b'\x02' * is_from_master + data + b'\x03'
+    check = crc(covered) if end == -4 else bytes((-sum(station + data) & 0xFF,))
+    is_good = message[end + 2:] == check and len(data) >= 6
+    return data if is_good else b''
+
+
 def changed(message: bytes, change: Callable[[bytes], bytes]) -> bytes:
     """Return a message with other link data, and their check."""
     if not message.startswith(STX):
@@ -191,10 +206,125 @@ def ignores_every_second_message() -> Filter:
     return hear
 
 
+@hears('SLC, DH+ gateways: the last TNS of each source stays known, also over our restarts', ALL)
+def knows_the_last_tns_for_ever() -> Filter:
+    last: dict[int, tuple[bytes, bytes]] = {}
+
+    def hear(data: bytes) -> bytes:
+        link = link_of(data)
+        if not link or link[2] & 0x40:
+            return data
+        key = link[2:3] + link[4:6]
+        known, message = last.get(link[1], (b'', b''))
+        if known == key:
+            return message  # a repetition for the PLC, too: ACK, and no reply
+        last[link[1]] = key, data
+        return data
+    return hear
+
+
 @says('Micro800, KF2 4-31: EOT suppression, a slave with nothing to send says nothing',
       ('Message',))
 def no_eot() -> Filter:
     return lambda data: b'' if data == EOT else data
+
+
+_READS = (b'\x0f\xa2', b'\x0f\x68', b'\x0f\x01')
+
+
+class OffForAMoment:
+    """
+    A gateway whose node is off for every sixth read: the local status comes after later replies.
+
+    Meanwhile the gateway takes commands for other nodes, and replies to them.
+    """
+
+    def __init__(self) -> None:
+        self.late: list[bytes] = []
+        self.reads = 0
+        self.is_unread = False  # the PLC has not had the ACK of what was kept back
+        self.is_asked = False  # the next ACK is for a late reply
+        self._lost: set[bytes] = set()
+
+    def note(self, data: bytes) -> None:
+        """Take note of each read."""
+        link = link_of(data[data.find(SOH):] if SOH in data else data[data.find(STX):])
+        if link and link[2:3] + link[6:7] in _READS:
+            self.reads += 1
+            if self.reads % 6 == 4:
+                self._lost.add(link[4:6])
+
+    def keeps(self, message: bytes) -> bool:
+        """Keep a reply back that is late; return False for any other."""
+        link = link_of(message)
+        if not link or not link[2] & 0x40 or link[4:6] not in self._lost:
+            return False
+        self._lost.discard(link[4:6])
+        self.late.append(changed(message, lambda link: link[:3] + b'\x02' + link[4:6]))
+        return True
+
+
+@acts('KF2 users: STS 02 for a node that is off comes seconds later, after other replies', HALF,
+      'write-and-read')
+def late_local_status() -> tuple[Filter, Filter]:
+    gateway = OffForAMoment()
+
+    def hear(data: bytes) -> bytes:
+        gateway.note(data)
+        if gateway.is_asked and data.startswith(ACK):
+            gateway.is_asked, data = False, data[2:]
+        if gateway.is_unread and ENQ in data:
+            gateway.is_unread, data = False, ACK + data
+        return data
+
+    def say(data: bytes) -> bytes:
+        if gateway.keeps(data):
+            gateway.is_unread = True
+            return EOT
+        if gateway.late and gateway.reads % 6 != 4 and (data == EOT or data.startswith(STX)):
+            gateway.is_asked = True
+            return gateway.late.pop(0)
+        return data
+    return hear, say
+
+
+@acts('the same in full duplex, without a poll', FULL, 'write-and-read')
+def late_local_status_by_wire() -> tuple[Filter, Filter]:
+    gateway = OffForAMoment()
+
+    def hear(data: bytes) -> bytes:
+        gateway.note(data)
+        if gateway.is_unread:
+            gateway.is_unread, data = False, ACK + data
+        return data
+
+    def say(data: bytes) -> bytes:
+        symbols = data[:2] if data.startswith(ACK + STX) else b''
+        message = data[len(symbols):]
+        if gateway.keeps(message):
+            gateway.is_unread = True
+            return symbols
+        if gateway.is_unread and data == ENQ:
+            return b''
+        if gateway.late and message.startswith(STX):
+            return symbols + gateway.late.pop(0) + message
+        return data
+    return hear, say
+
+
+@acts('the same by radio', RADIO, 'write-and-read')
+def late_local_status_by_radio() -> tuple[Filter, Filter]:
+    gateway = OffForAMoment()
+
+    def hear(data: bytes) -> bytes:
+        gateway.note(data)
+        return data
+
+    def say(data: bytes) -> bytes:
+        if gateway.keeps(data):
+            return b''
+        return gateway.late.pop(0) + data if gateway.late and data.startswith(STX) else data
+    return hear, say
 
 
 @says('noise on the line: every third answer is lost', HALF)

@@ -15,6 +15,7 @@
 """A driver and simulated PLCs on a virtual line."""
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 import heapq
 import itertools
 from random import Random
@@ -236,9 +237,10 @@ class DriverBench:
         if run:
             self.run(run)
 
-    def restart(self) -> None:
+    def restart(self, first_tns: int = 0) -> None:
         """Kill the driver, and put a fresh one in its place."""
-        driver = Driver(self.network, self._mappings, self._settings, self.listener)
+        settings = replace(self._settings, first_tns=first_tns)
+        driver = Driver(self.network, self._mappings, settings, self.listener)
         self.line.exchange(self.driver.machine, driver.machine)
         self.driver = driver
         self.open()

@@ -48,6 +48,7 @@ class Answer(Enum):
     NAK = 'has no room for it'
     NOTHING = 'says nothing'
     LOSES = 'acknowledges it, and nothing follows'
+    LATE = 'acknowledges it, and tells long after that it was not delivered'
 
 
 def crc(data: bytes) -> bytes:
@@ -65,6 +66,11 @@ def frame(data: bytes) -> bytes:
     return _STX + data.replace(b'\x10', b'\x10\x10') + b'\x10\x03' + crc(data + b'\x03')
 
 
+def _reply_to(data: bytes, status: int) -> bytes:
+    """Return the link data of a reply without a result."""
+    return bytes((data[1], data[0], data[2] | _REPLY, status)) + data[4:6]
+
+
 class OddDevice:
     """
     A device; ``nodes`` have the words ``words[node, file, element]``.
@@ -75,6 +81,7 @@ class OddDevice:
 
     next_call: float | None = None
     spare_time = 0.0
+    late = 2.5  # s
 
     def __init__(self, wiring: Wiring, station: int = 1, nodes: Iterable[int] = ()) -> None:
         self.wiring, self.station = wiring, station
@@ -89,6 +96,8 @@ class OddDevice:
         self.executed: list[bytes] = []
         self._buffer = self._out = b''
         self._replies: deque[bytes] = deque()
+        self._to_come: list[tuple[float, bytes]] = []
+        self._now = 0.0
         self._response = NAK
         self._is_polled = False
         self._last = b''
@@ -97,10 +106,16 @@ class OddDevice:
         """Begin; there is nothing to do."""
 
     def handle_timeout(self, now: float) -> None:
-        """Do what is due: nothing."""
+        """Send the late replies that are due."""
+        due = [reply for when, reply in self._to_come if when <= now]
+        self._to_come = self._to_come[len(due):]
+        self._plan()
+        for reply in due:
+            self._send(reply)
 
     def receive_data(self, data: bytes, now: float) -> None:
         """Take bytes."""
+        self._now = now
         self._buffer += self.hear(data)
         while self._take_symbol():
             pass
@@ -171,9 +186,18 @@ class OddDevice:
         if self.wiring is not Wiring.RADIO:
             self._response = NAK if answer is Answer.NAK else ACK
             self._out += self._response
-        if answer in (Answer.ACK, Answer.REFUSES) and not data[2] & _REPLY and data != self._last:
+        if data[2] & _REPLY or data == self._last:
+            return
+        if answer is Answer.LATE:
+            self._last = data
+            self._to_come.append((self._now + self.late, _reply_to(data, _NOT_DELIVERED)))
+            self._plan()
+        elif answer in (Answer.ACK, Answer.REFUSES):
             self._last = data
             self._execute(data, answer is Answer.REFUSES)
+
+    def _plan(self) -> None:
+        self.next_call = self._to_come[0][0] if self._to_come else None
 
     def _execute(self, data: bytes, is_refused: bool) -> None:
         self.executed.append(data)
@@ -183,7 +207,9 @@ class OddDevice:
         elif data[0] in self.nodes | {self.station} or (
                 self.executes_diagnostics and data[2] == _ECHO):
             status, result = self._answer(data)
-        reply = bytes((data[1], data[0], data[2] | _REPLY, status)) + data[4:6] + result
+        self._send(_reply_to(data, status) + result)
+
+    def _send(self, reply: bytes) -> None:
         if self.wiring is Wiring.HALF:
             self._replies.append(reply)
             if not self.waits_for_poll:

@@ -27,6 +27,7 @@ from dataclasses import dataclass
 from abdf1_ros.pccc import status
 from abdf1_ros.pccc.address import Address
 from abdf1_ros.pccc.data_table import DataTable, NoSuchFile, OutOfRange, Protected
+from abdf1_ros.pccc.emulated import EmulatedProcessor
 from abdf1_ros.pccc.fields import Reader
 from abdf1_ros.pccc.file_types import FileType
 from abdf1_ros.pccc.plc2 import commands as plc2
@@ -120,7 +121,7 @@ class Plc2Commands:
     out_of_range: Codes = status.STS_ADDRESS, None
     protected: Codes = status.STS_ADDRESS, None
 
-    def __init__(self, table: DataTable) -> None:
+    def __init__(self, table: DataTable, processor: EmulatedProcessor) -> None:
         everything = Window(Address(ADDRESSING, FileType.BINARY, 0, 0))
         self.commands: Commands = {}
         self.basic_commands = BasicService(table, lambda source: everything).everything()

@@ -19,6 +19,7 @@ from __future__ import annotations
 from abdf1_ros.pccc import status
 from abdf1_ros.pccc.address import Address, AddressRefusal
 from abdf1_ros.pccc.data_table import DataTable
+from abdf1_ros.pccc.emulated import EmulatedProcessor
 from abdf1_ros.pccc.fields import Reader
 from abdf1_ros.pccc.file_types import FileType
 from abdf1_ros.pccc.plc2.server import BasicService, Window
@@ -42,7 +43,7 @@ class Plc3Commands:
     out_of_range: Codes = status.EXTENDED, status.EXT_BAD_ADDRESS
     protected: Codes = status.EXTENDED, status.EXT_PROTECTED
 
-    def __init__(self, table: DataTable) -> None:
+    def __init__(self, table: DataTable, processor: EmulatedProcessor) -> None:
         words = WordRangeService(table, ExtendedAddress.read, _place, _CODES)
         files = WordRangeService(table, _read_file_address, _place, _CODES)
         self.commands = words.commands() | {(word_range.CMD, word_range.FILE_READ): files.read}

@@ -21,6 +21,7 @@ from collections.abc import Callable
 from abdf1_ros.pccc import status
 from abdf1_ros.pccc.address import Address, Addressing
 from abdf1_ros.pccc.data_table import DataTable, NoSuchFile, OutOfRange
+from abdf1_ros.pccc.emulated import EmulatedProcessor
 from abdf1_ros.pccc.fields import Reader
 from abdf1_ros.pccc.file_types import FileType
 from abdf1_ros.pccc.plc2.server import BasicService, Window
@@ -123,7 +124,7 @@ class Plc5Commands:
     out_of_range = _OUT_OF_RANGE
     protected: Codes = status.EXTENDED, status.EXT_NO_PRIVILEGE
 
-    def __init__(self, table: DataTable) -> None:
+    def __init__(self, table: DataTable, processor: EmulatedProcessor) -> None:
         self._table = table
         self.basic_commands = BasicService(table, self._compatibility_file).everything()
         typed = TypedService(table, ADDRESSING)

@@ -21,16 +21,17 @@ from functools import partial
 from abdf1_ros.pccc import status
 from abdf1_ros.pccc.address import Address
 from abdf1_ros.pccc.data_table import DataTable, NoSuchFile, OutOfRange
+from abdf1_ros.pccc.emulated import EmulatedProcessor
 from abdf1_ros.pccc.fields import Reader
 from abdf1_ros.pccc.file_types import FileType
 from abdf1_ros.pccc.plc2.server import BasicService, Window
 from abdf1_ros.pccc.plc5.server import TypedService
+from abdf1_ros.pccc.processor import USUAL
 from abdf1_ros.pccc.serving import Codes, Commands, Refusal
 from abdf1_ros.pccc.slc import commands as slc
 from abdf1_ros.pccc.slc.address import ADDRESSING, BY_CODE
 from abdf1_ros.pccc.slc.file_search import directory_of, SLC_DIRECTORY
 
-_COMMON_INTERFACE_FILE = 9
 _ADDRESSING_MODE = Address(ADDRESSING, FileType.STATUS, 2, 2)
 _BYTE_ADDRESSES = 8
 
@@ -42,8 +43,9 @@ class SlcCommands:
     out_of_range: Codes = status.STS_ADDRESS, None
     protected: Codes = status.STS_ADDRESS, None
 
-    def __init__(self, table: DataTable) -> None:
+    def __init__(self, table: DataTable, processor: EmulatedProcessor) -> None:
         self._table = table
+        self._processor = processor
         self.basic_commands = BasicService(
             table, self._common_interface_file, slc.MAX_READ, slc.MAX_WRITE,
             takes_odd=True).reads_and_writes()
@@ -90,9 +92,9 @@ class SlcCommands:
         return b''
 
     def _common_interface_file(self, source: int) -> Window:
-        """Return file 9, addressed by words unless S:2/8 is set (M 7-31..7-40)."""
-        start = Address(ADDRESSING, self._table.file_type(_COMMON_INTERFACE_FILE),
-                        _COMMON_INTERFACE_FILE, 0)
+        """Return the file, addressed by words unless S:2/8 is set (M 7-31..7-40)."""
+        file = (self._processor.processor or USUAL).common_interface_file
+        start = Address(ADDRESSING, self._table.file_type(file), file, 0)
         try:
             flags = int.from_bytes(self._table.read(_ADDRESSING_MODE, 1), 'little')
         except (NoSuchFile, OutOfRange):
