@@ -37,11 +37,14 @@ MESSAGES = 15
 NAK, NOTHING, STATUS = Answer.NAK, Answer.NOTHING, Answer.ACK
 LOSES, LATE = Answer.LOSES, Answer.LATE
 _MODES = {'Peer': (Wiring.FULL, {'mode': 'Peer'}), 'Radio': (Wiring.RADIO, {'mode': 'Radio'})}
+# Each node is a station of the line (1747-UM005B 3-8, 1785-KE 5-13).
+_REMOTE = {'Remote Message': 'Message', 'Remote Standard': 'Standard'}
 KINDS = [('Message', STATUS), ('Message', NOTHING), ('Message', NAK), ('Standard', STATUS),
          ('Standard', NOTHING), ('Standard', NAK), ('Peer', STATUS), ('Peer', NOTHING),
          ('Peer', NAK), ('Peer', LOSES), ('Message', LOSES), ('Standard', LOSES),
          ('Radio', STATUS), ('Radio', NOTHING), ('Message', LATE), ('Standard', LATE),
-         ('Peer', LATE), ('Radio', LATE)]
+         ('Peer', LATE), ('Radio', LATE), *(
+             (mode, answer) for mode in _REMOTE for answer in (STATUS, NAK, LOSES, LATE))]
 
 
 class Plant(DriverBench):
@@ -49,7 +52,7 @@ class Plant(DriverBench):
 
     def __init__(self, polling: str, answer: Answer, absent: Sequence[int] = (),
                  *, has_own: bool = False, executes_diagnostics: bool = False) -> None:
-        via = None if polling in _MODES else GATEWAY
+        via = None if polling in _MODES or polling in _REMOTE else GATEWAY
         self.read = make_mapping('N7:0', station=LIVING, plc='SLC', via=via, period=200)
         self.order = make_mapping(
             'N7:20', 'Write', station=LIVING, plc='SLC', via=via, tag='order',
@@ -58,8 +61,11 @@ class Plant(DriverBench):
         rows = [self.read, self.order, *([beat] if has_own else []), *(
             make_mapping('N7:0', station=number, plc='SLC', via=via, period=200)
             for number in absent)]
-        wiring, mode = _MODES.get(polling, (Wiring.HALF, {'polling': polling}))
+        wiring, mode = _MODES.get(
+            polling, (Wiring.HALF, {'polling': _REMOTE.get(polling, polling)}))
         self.device = OddDevice(wiring, GATEWAY, (LIVING,))
+        if polling in _REMOTE:
+            self.device.stations = frozenset((LIVING, *ABSENT))
         self.device.takes = lambda data: Answer.ACK if data[0] not in ABSENT or (
             executes_diagnostics and data[2] == 6) else answer
         self.device.executes_diagnostics = executes_diagnostics

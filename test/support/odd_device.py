@@ -22,7 +22,7 @@ executes all that reaches it, whether its replies are taken or not. A test chang
     device.takes = lambda data: Answer.NAK if data[0] == 9 else Answer.ACK
 """
 
-from collections import deque
+from collections import defaultdict, deque
 from collections.abc import Callable, Iterable
 from enum import Enum
 
@@ -86,6 +86,8 @@ class OddDevice:
     def __init__(self, wiring: Wiring, station: int = 1, nodes: Iterable[int] = ()) -> None:
         self.wiring, self.station = wiring, station
         self.nodes = frozenset(nodes or {station})
+        self.stations = frozenset((station,))  # that it takes messages and polls for
+        self.identities: dict[int, bytes] = {}  # of those that are not an SLC
         self.executes_diagnostics = False  # for all nodes
         self.waits_for_poll = True  # with its replies, in half duplex
         self.knows_commands = True
@@ -95,11 +97,11 @@ class OddDevice:
         self.say: Callable[[bytes], bytes] = bytes
         self.executed: list[bytes] = []
         self._buffer = self._out = b''
-        self._replies: deque[bytes] = deque()
+        self._replies: defaultdict[int, deque[bytes]] = defaultdict(deque)  # by station
         self._to_come: list[tuple[float, bytes]] = []
         self._now = 0.0
         self._response = NAK
-        self._is_polled = False
+        self._polled_station: int | None = None  # which has sent a reply
         self._last = b''
 
     def start(self, now: float) -> None:
@@ -135,17 +137,17 @@ class OddDevice:
         pair, size = data[:2], 2
         if pair == ENQ and self.wiring is Wiring.HALF:
             size = 5 if data[2:4] == b'\x10\x10' else 4
-            if len(data) >= size and data[2] == self.station:
-                self._polled()
+            if len(data) >= size and data[2] in self.stations:
+                self._polled(data[2])
         elif pair in (_SOH, _STX):
             size = self._message_in(data)
         if len(data) < size or not size:
             self._buffer = data
             return False
         self._buffer = data[size:]
-        if pair == ACK and self._is_polled:
-            self._replies.popleft()
-            self._is_polled = False
+        if pair == ACK and self._polled_station is not None:
+            self._replies[self._polled_station].popleft()
+            self._polled_station = None
         elif pair == ENQ and self.wiring is Wiring.FULL:
             self._out += self._response
         return True
@@ -173,12 +175,13 @@ class OddDevice:
                 return at  # broken off
         return 0
 
-    def _polled(self) -> None:
-        self._is_polled = bool(self._replies)
-        self._out += frame(self._replies[0]) if self._replies else EOT
+    def _polled(self, station: int) -> None:
+        replies = self._replies[station]
+        self._polled_station = station if replies else None
+        self._out += frame(replies[0]) if replies else EOT
 
     def _message(self, station: bytes, data: bytes, is_good: bool) -> None:
-        if station and station[0] != self.station:
+        if station and station[0] not in self.stations:
             return
         answer = self.takes(data) if is_good else Answer.NAK
         if answer is Answer.NOTHING or not is_good and self.wiring is not Wiring.FULL:
@@ -211,9 +214,10 @@ class OddDevice:
 
     def _send(self, reply: bytes) -> None:
         if self.wiring is Wiring.HALF:
-            self._replies.append(reply)
+            station = reply[1] if reply[1] in self.stations else self.station
+            self._replies[station].append(reply)
             if not self.waits_for_poll:
-                self._polled()
+                self._polled(station)
         else:
             self._out += frame(reply)
 
@@ -221,7 +225,7 @@ class OddDevice:
         """Return status and data of a reply: to echo, status, typed reads and writes of words."""
         node, command, function, rest = data[0], data[2] & 0x0F, data[6], data[7:]
         if command == _ECHO:
-            return 0, _IDENTITY if function == 3 else rest
+            return 0, self.identities.get(node, _IDENTITY) if function == 3 else rest
         if command != _TYPED or function not in (0xA2, 0xAA):
             return _ILLEGAL, b''
         size, file, element = rest[0], rest[1], rest[3]

@@ -16,7 +16,11 @@
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+import os
 from pathlib import Path
+import select
+import threading
+import time
 
 from abdf1_ros.df1.checksum import Checksum
 from abdf1_ros.df1.machine import Machine
@@ -26,6 +30,8 @@ from abdf1_ros.ports.endpoints import PtyEndpoint
 from abdf1_ros.ports.link_thread import LinkThread
 from abdf1_ros.simulator.gateway import stations_of
 from abdf1_ros.simulator.simulated_plc import SimulatedPlc
+from support.odd_device import OddDevice
+from support.ptys import Pty
 
 
 @contextmanager
@@ -41,6 +47,32 @@ def plc_line(path: Path, *plcs: SimulatedPlc,
         yield line.name
     finally:
         link.stop()
+        line.close()
+
+
+@contextmanager
+def odd_line(path: Path, device: OddDevice) -> Iterator[str]:
+    """Put a device that shares no code with the package on a line; yield the name of ours."""
+    line = Pty(path)
+    ended, end = os.pipe()
+
+    def live() -> None:
+        while ended not in (ready := select.select([line.fileno(), ended], [], [], 0.01)[0]):
+            if ready:
+                device.receive_data(os.read(line.fileno(), 4096), time.monotonic())
+            if device.next_call is not None:
+                device.handle_timeout(time.monotonic())
+            if data := device.data_to_send():
+                line.write(data)
+
+    thread = threading.Thread(target=live)
+    thread.start()
+    try:
+        yield str(path)
+    finally:
+        os.close(end)
+        thread.join()
+        os.close(ended)
         line.close()
 
 

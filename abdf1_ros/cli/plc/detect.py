@@ -72,7 +72,7 @@ _ALL_TRIED_IN_VAIN = (
 
 @dataclass(frozen=True, slots=True)
 class Found:
-    """Settings with which a station takes commands."""
+    """Settings with which a PLC takes commands; without a PLC a gateway."""
 
     settings: LineSettings
     presence: Presence
@@ -123,13 +123,17 @@ class Search:
         for check in checks:
             if self.echoes and mode == MODES['full']:
                 return None
-            heard = []
+            heard, gateway = [], None
             is_first = check == checks[0]
             for presence in self._look(LineSettings(baud, mode, check), stations, is_first):
-                if presence.takes_commands:
+                if presence.is_of_gateway:
+                    gateway = gateway or Found(LineSettings(baud, mode, check), presence)
+                elif presence.takes_commands:
                     return Found(LineSettings(baud, mode, check), presence)
-                if presence.is_there:
+                elif presence.is_there:
                     heard.append(presence.station)
+            if gateway:
+                return gateway
             if mode == MODES['half'] and not heard:
                 return None  # a poll is the same with both checks
             stations = heard or stations

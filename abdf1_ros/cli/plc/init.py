@@ -24,7 +24,7 @@ from pathlib import Path
 from abdf1_ros.cli.plc import files
 from abdf1_ros.cli.plc.data import processor_cell
 from abdf1_ros.cli.plc.detect import Found
-from abdf1_ros.cli.plc.line import free_station
+from abdf1_ros.cli.plc.line import free_station, MODES
 from abdf1_ros.cli.plc.presence import Presence
 from abdf1_ros.pccc.file_search import DataFile
 from abdf1_ros.problems import ConfigurationError, Problem
@@ -80,7 +80,12 @@ def files_of(network: Network, found: Found, stations: Sequence[Presence],
     """Return net and map CSV of a line, with the files that its stations list."""
     numbers = [presence.station for presence in stations]
     return (net_csv(network, found, numbers) + '\n',
-            _HEAD + ''.join(map_rows(stations, listed)))
+            _HEAD + ''.join(map_rows(stations, listed, found.settings.mode)))
+
+
+def nodes_of(gateway: int, mode: str) -> str:
+    """Return the arguments of "plc scan" for the nodes behind a gateway."""
+    return f'0-63 --via {gateway}' if mode == MODES['half'] else '0-63'
 
 
 def net_csv(network: Network, found: Found, stations: Collection[int]) -> str:
@@ -100,16 +105,17 @@ def listening_csv(network: Network) -> str:
             + ','.join(map(str, row)) + '\n')
 
 
-def map_rows(stations: Iterable[Presence],
-             listed: Mapping[int, Sequence[DataFile]]) -> Iterable[str]:
+def map_rows(stations: Iterable[Presence], listed: Mapping[int, Sequence[DataFile]],
+             mode: str = MODES['half']) -> Iterable[str]:
     """Yield for each station one row that works, and rows for its files as comments."""
     for presence in stations:
         number, identity = presence.station, presence.identity
         family = identity.plc_type if identity else None
         yield f'# station {number}: {presence}\n'
-        if identity and identity.has_no_processor:
-            yield f'# no processor: PLCs behind this station have Via {number}; to find them:\n' \
-                  f'#   plc scan 0-63 --via {number} --net net.csv\n'
+        if presence.is_of_gateway:
+            via = f' have Via {number}' if mode == MODES['half'] else ' have an empty Via'
+            yield f'# a gateway: PLCs behind it{via} and their own numbers; to find them:\n' \
+                  f'#   plc scan {nodes_of(number, mode)} --net net.csv\n'
             continue
         if family is None or identity is None:
             yield f'# the family of the PLC is not known: write PLC_Type yourself\n' \

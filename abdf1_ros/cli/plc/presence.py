@@ -84,8 +84,17 @@ class Presence:
         """Return True if a reply came, so that another question brings nothing new."""
         return not isinstance(self.error, LinkError)
 
+    @property
+    def is_of_gateway(self) -> bool:
+        """Return True if a gateway replied: for itself, or that it does not reach the station."""
+        if self.identity is not None:
+            return self.identity.has_no_processor
+        return isinstance(self.error, RemoteError) and is_local_status(self.error.sts)
+
     def __str__(self) -> str:
         """Return one line of text."""
+        if self.is_of_gateway and self.identity is None:
+            return f'not reached, a gateway answers for it: {self.error}'
         return str(self.identity or f'answers, but does not identify itself: {self.error}')
 
 

@@ -40,7 +40,8 @@ from abdf1_ros.settings.network import Network
 from abdf1_ros.simulator.simulated_plc import SimulatedPlc
 import pytest
 from support.driver_bench import simulated_plc
-from support.plc_line import LosesPolls, plc_line
+from support.odd_device import OddDevice, Wiring
+from support.plc_line import LosesPolls, odd_line, plc_line
 from support.ptys import Pty
 
 
@@ -259,3 +260,61 @@ def test_traces_of_the_wrong_settings(tmp_path: Path) -> None:
         search = Search(network, [1])
         assert search.run([9600], checks=['CRC']) is None
     assert search.traces == ['9600 baud, half duplex, CRC: 4 characters came']
+
+
+KE = bytes.fromhex('00 FE 19 00 00 00 10 00 20 00')
+DETECT = ('--baud', '19200', '--check', 'CRC', '--timeout', '1000')
+
+
+def gateway_of(wiring: Wiring, *nodes: int, identity: bytes = KE) -> OddDevice:
+    """Return a gateway, station 8 in half duplex, with SLCs behind it."""
+    device = OddDevice(wiring, 8, nodes)
+    device.identities[8] = identity
+    return device
+
+
+def detected(path: Path, device: OddDevice, capsys: pytest.CaptureFixture[str],
+             *options: str) -> str:
+    """Return what detect says of a line, and the options that it proposes for the next command."""
+    with odd_line(path, device) as name:
+        assert main(['detect', '--port', name, *DETECT, *options]) == 0
+        said = capsys.readouterr().out
+        task = said.partition('next: ')[2].partition('plc ')[2].partition('\n')[0]
+        assert main([*task.split(), '--timeout', '1000']) == 0
+    return said + capsys.readouterr().out
+
+
+def test_gateway_in_half_duplex_is_named_with_the_way_to_its_nodes(
+        tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    said = detected(tmp_path / 'line', gateway_of(Wiring.HALF, 1, 9), capsys,
+                    '--duplex', 'half', '--stations', '6-9')
+    assert '19200 baud, half duplex, CRC: station 8 1785-KE series B' in said
+    assert 'plc scan 0-63 --via 8 --port' in said and 'read N7:0' not in said
+    assert '\n      1 ' in said and '\n      9 ' in said and '3 of 64 stations answer' in said
+
+
+def test_gateway_in_full_duplex_proves_the_settings_though_no_node_is_asked_that_is_there(
+        tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    device = OddDevice(Wiring.FULL, 9)
+    said = detected(tmp_path / 'line', device, capsys, '--duplex', 'full')
+    assert 'station 1 not reached, a gateway answers for it: STS 02' in said
+    assert 'plc scan 0-63 --peer --port' in said
+    assert '\n      9 ' in said and '1 of 64 stations answer' in said
+
+
+@pytest.mark.usefixtures('half_duplex_only')
+def test_plc_on_the_line_goes_before_a_gateway(tmp_path: Path) -> None:
+    device = gateway_of(Wiring.HALF)
+    device.stations = device.nodes = frozenset((8, 11))  # 11 is a slave of its own
+    with odd_line(tmp_path / 'line', device) as name:
+        found = Search(Network(com_port=name, timeout=1000), [8, 11]).run([19200])
+    assert found is not None and found.presence.station == 11
+
+
+def test_nodes_that_are_stations_of_the_line_are_found_without_via(
+        tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Remote mode of a 1747-KE (1747-UM005B 3-8): node 9 of group 1 is station 41."""
+    device = OddDevice(Wiring.HALF, 41)
+    device.stations = frozenset(range(32, 64))
+    said = detected(tmp_path / 'line', device, capsys, '--duplex', 'half', '--stations', '38-43')
+    assert 'station 41 SLC 5/03' in said and 'plc read N7:0 --station 41' in said

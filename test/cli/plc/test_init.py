@@ -37,7 +37,8 @@ import pytest
 from support.disks import no_file_longer_than
 from support.driver_bench import simulated_plc, store, stored
 from support.mappings import cell_of
-from support.plc_line import LosesPolls, plc_line
+from support.odd_device import OddDevice, Wiring
+from support.plc_line import LosesPolls, odd_line, plc_line
 
 PATIENT = ('--timeout', '2000', '--duplex', 'half')  # ms; a busy host may be late
 
@@ -112,6 +113,26 @@ def test_gateway_leads_to_the_nodes_behind_it() -> None:
     rows = ''.join(map_rows([Presence(8, 0.0, gateway, None, True, True)], {}))
     assert 'plc scan 0-63 --via 8 --net net.csv' in rows
     assert 'words_8' not in rows
+
+
+@pytest.mark.parametrize(('wiring', 'options', 'scan'), [
+    (Wiring.HALF, ('--duplex', 'half', '--stations', '8'), 'scan 0-63 --via 8'),
+    (Wiring.FULL, ('--duplex', 'full'), 'scan 0-63')])
+def test_line_with_nothing_but_a_gateway_leads_to_the_nodes_behind_it(
+        wiring: Wiring, options: tuple[str, ...], scan: str, tmp_path: Path, capsys: Output
+        ) -> None:
+    device = OddDevice(wiring, 8, (9,))
+    device.identities[8] = bytes.fromhex('00 FE 19 00 00 00 10 00 20 00')
+    with odd_line(tmp_path / 'plc', device) as name:
+        assert main(['init', '--port', name, '--into', str(tmp_path), '--baud', '19200',
+                     '--check', 'CRC', '--timeout', '2000', *options]) == 0
+        said = capsys.readouterr().out
+        assert f'plc {scan} --net' in said and 'watch' not in said
+        net = str(tmp_path / 'net.csv')
+        assert main([*scan.split(), '--net', net, '--timeout', '2000']) == 0
+    assert '\n      9 ' in capsys.readouterr().out
+    rows = (tmp_path / 'map.csv').read_text(encoding='utf-8')
+    assert f'#   plc {scan} --net net.csv' in rows and 'words_' not in rows
 
 
 @pytest.mark.usefixtures('half_duplex_only')

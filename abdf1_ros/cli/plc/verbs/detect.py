@@ -25,7 +25,7 @@ from contextlib import suppress
 import sys
 
 from abdf1_ros.cli.plc import init, overhear, presence
-from abdf1_ros.cli.plc.detect import found_settings, only_heard
+from abdf1_ros.cli.plc.detect import Found, found_settings, only_heard
 from abdf1_ros.cli.plc.line import MODES, network_of
 from abdf1_ros.cli.plc.options import (
     add_line_options,
@@ -36,6 +36,10 @@ from abdf1_ros.cli.plc.options import (
 from abdf1_ros.cli.plc.session import Session
 from abdf1_ros.cli.terminal import called, colour, EXIT_FAILED, GREEN
 from abdf1_ros.errors import LinkError
+
+_BEHIND_GATEWAY = (
+    'a gateway: each PLC behind it has a node number. If a scan with --via finds no node, scan '
+    'without --via: the gateway may make each node a station of this line')
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -58,11 +62,21 @@ def run(options: argparse.Namespace) -> int:
     with Session(found.settings.on(network)) as session, suppress(LinkError):
         if ways := presence.io_access(session, there):
             print(f'inputs and outputs: Access {" or ".join(ways)}')
-    other = '' if there.station == DEFAULT_STATION else f' --station {there.station}'
-    whom = {MODES['full']: f'--peer{other}', MODES['half']: f'--station {there.station}'}.get(
-        settings.mode, f'--radio --station {there.station}') + presence.type_to_say(there)
+    if there.is_of_gateway:
+        print(_BEHIND_GATEWAY)
     parity = '' if network.parity == 'None' else f' --parity {network.parity}'
-    print(f'next: {called("plc")} read N7:0 {whom} --port {network.port} --baud {settings.baud} '
-          f'--check {settings.check}{parity}')
+    print(f'next: {called("plc")} {_first_task(found)} --port {network.port} '
+          f'--baud {settings.baud} --check {settings.check}{parity}')
     print(f'net.csv:\n{init.net_csv(network, found, [there.station])}')
     return 0
+
+
+def _first_task(found: Found) -> str:
+    """Return the command that shows most of what was found, without the settings of the line."""
+    there, mode = found.presence, found.settings.mode
+    duplex = {MODES['full']: ' --peer', MODES['half']: ''}.get(mode, ' --radio')
+    if there.is_of_gateway:
+        return f'scan {init.nodes_of(there.station, mode)}{duplex}'
+    is_default = mode == MODES['full'] and there.station == DEFAULT_STATION
+    return (f'read N7:0{duplex}{"" if is_default else f" --station {there.station}"}'
+            f'{presence.type_to_say(there)}')

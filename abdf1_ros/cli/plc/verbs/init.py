@@ -78,11 +78,18 @@ def run(options: argparse.Namespace) -> int:
     net, map_file = (shlex.quote(str(path)) for path in target.paths)
     print(f'written: {", ".join(map(str, target.paths))}\n'
           'next: write the addresses that you need into map.csv, then\n'
-          f'  {called("plc")} watch S:0 --station {there[0].station}'
-          f'{presence.type_to_say(there[0])} --net {net}\n'
+          f'  {called("plc")} {_first_look(found, there)} --net {net}\n'
           f'  {called("check")} {net} {map_file}\n'
           f'  {called("node")} --ros-args -p net_file:={net} -p map_file:={map_file}')
     return 0
+
+
+def _first_look(found: detect.Found, there: Sequence[presence.Presence]) -> str:
+    """Return the command that shows values of a PLC, or the nodes where only a gateway is."""
+    plc = next((seen for seen in there if not seen.is_of_gateway), None)
+    if plc is None:
+        return f'scan {init.nodes_of(there[0].station, found.settings.mode)}'
+    return f'watch S:0 --station {plc.station}{presence.type_to_say(plc)}'
 
 
 def _init_listening(network: Network, master: overhear.ForeignMaster | None,
