@@ -87,31 +87,36 @@ class Sink(threading.Thread):
 
     def run(self) -> None:
         """Write until ``end``."""
-        while data := self._take():
+        while True:
+            data, lost = self._take()
+            if not data and not lost:
+                return
+            if lost:
+                data += b'[WARN] abdf1_ros: %d lines were lost here: they were not taken\n' % lost
             try:
-                self._write(data)
+                while data:
+                    data = data[self._write(data):]
             except OSError:  # the disk is full, or the terminal gone
-                with self._news:
-                    self._lost += data.count(b'\n')
+                with self._news:  # of the last line, which is ours, the number
+                    self._lost += data.count(b'\n') + max(0, lost - 1)
                 time.sleep(_PAUSE)
 
-    def _take(self) -> bytes:
-        """Wait for lines; return them, and after them how many were lost."""
+    def _take(self) -> tuple[bytes, int]:
+        """Wait for lines; return them, and how many were lost after them."""
         with self._news:
             self._news.wait_for(lambda: self._lines or self._lost or self._is_ended)
             data = b''.join(self._lines)
             lost, self._size, self._lost = self._lost, 0, 0
             self._lines.clear()
-        if lost:
-            data += b'[WARN] abdf1_ros: %d lines were lost here: they were not taken\n' % lost
-        return data if self._has_colours else _COLOURS.sub(b'', data)
+        return data if self._has_colours else _COLOURS.sub(b'', data), lost
 
-    def _write(self, data: bytes) -> None:
-        while data:
-            try:
-                data = data[os.write(self._descriptor, data):]
-            except BlockingIOError:  # another process of this terminal has made it non-blocking
-                select.select([], [self._descriptor], [])
+    def _write(self, data: bytes) -> int:
+        """Return how many bytes were taken."""
+        try:
+            return os.write(self._descriptor, data)
+        except BlockingIOError:  # another process of this terminal has made it non-blocking
+            select.select([], [self._descriptor], [])
+            return 0
 
 
 def pass_on(source: int, sinks: Sequence[Sink]) -> None:
@@ -122,8 +127,7 @@ def pass_on(source: int, sinks: Sequence[Sink]) -> None:
         for line in lines:
             for sink in sinks:
                 sink.put(line + b'\n')
-        if len(rest) > _PIPE_SIZE:  # no text
-            rest = b''
+        rest = rest[:_MOST_WAITING + 1]  # a sink counts a longer line as lost
     for sink in sinks:
         if rest:
             sink.put(rest)

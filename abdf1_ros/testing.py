@@ -215,9 +215,9 @@ class Plcs:
         self.faults: list[Exception] = []
         machine = Machine(multidrop(self._plcs), checksum=Checksum.CRC)
         self._link = LinkThread(machine, self._line.open, on_fault=self.faults.append)
-        self._link.start()
 
     def __enter__(self) -> Plcs:
+        self._link.start()
         return self
 
     def __exit__(self, *exception: object) -> None:

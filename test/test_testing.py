@@ -149,6 +149,19 @@ def test_executor_ends_before_a_node_goes_and_the_context_last(
     assert observer.executor.get_nodes() == []
 
 
+def test_cell_that_cannot_be_made_leaves_no_thread(
+        tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The thread of its PLCs ran before the observer was there."""
+    def fail(*arguments: object, **options: object) -> None:
+        raise TimeoutError('a busy host')
+
+    monkeypatch.setattr(SimulatedCell, 'observer', fail)
+    before = threading.enumerate()
+    with pytest.raises(TimeoutError):
+        SimulatedCell(tmp_path, *SMALL)
+    assert threading.enumerate() == before
+
+
 @pytest.mark.parametrize('at', ['start', 'end'])
 def test_cell_that_fails_leaves_no_thread_and_no_context(
         at: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

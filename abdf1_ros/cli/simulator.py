@@ -88,6 +88,8 @@ examples:
 # Time (s) to print the last lines.
 _LAST_LINES = 1.0
 
+_GLANCE = 0.05  # s
+
 # The lamps of a ladder that are reported; the remaining lamps blink.
 _LAMPS = {Lamp.ALIVE: 'ROS alive', Lamp.IN_CONTROL: 'ROS in control',
           Lamp.STOPPED: 'ROS stopped (heartbeat 0)',
@@ -428,8 +430,11 @@ def _converse(cast: Cast, script: TimedCommands, options: argparse.Namespace,
         while script and script[0][0] <= passed:
             carry_out(script.pop(0)[1])
         cast.advance()
-        if select.select(inputs, [], [], 0.05)[0]:
+        if select.select(inputs, [], [], _GLANCE)[0]:
             data = _input(inputs[0])
+            if data is None:
+                time.sleep(_GLANCE)
+                continue
             *lines, rest = (rest + data).split(b'\n')
             if not data:
                 # input is closed; a signal or --seconds still ends the process
@@ -438,9 +443,9 @@ def _converse(cast: Cast, script: TimedCommands, options: argparse.Namespace,
                 carry_out(line.decode(errors='replace'))
 
 
-def _input(descriptor: int) -> bytes:
-    """Return the typed text; nothing while the terminal belongs to another job."""
+def _input(descriptor: int) -> bytes | None:
+    """Return the typed text; None while the terminal belongs to another job."""
     try:
         return os.read(descriptor, 4096)
     except OSError:  # EIO: this process is in the background
-        return b''
+        return None

@@ -264,8 +264,9 @@ class PeerEnd(AskingEnd):
         return acknowledgement
 
     def settle(self) -> None:
-        if self._early is not None:
-            self.collect()
+        early, self._early = self._early, None
+        if early is not None:
+            self.taken(early)
         end = self.wire.now + 2 * _REPLY_TIMES * self.wire.answer_time
         while self.wire.now < end:
             symbol = self.wire.hear((_REPLY_TIMES if self.owed else 1) * self.wire.answer_time)

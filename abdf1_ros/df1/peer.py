@@ -167,7 +167,8 @@ class FullDuplexPeer(EqualNode):
         try:
             delivered = yield from self._transfer(
                 task.command, lambda: key not in self._outstanding,
-                is_once=is_once, expires=task.expires, answer_within=task.answer_within)
+                is_once=is_once, expires=task.expires,
+                answer_within=math.inf if station.active else task.answer_within)
         except CommandExpired as error:
             if self._outstanding.pop(key, None):
                 task.sent = error.sent

@@ -233,6 +233,7 @@ class RadioNode(EqualNode):
             task.sent = error.sent = command.tries > 0
             del self._under_way[number]
             task.fail(error)
+            return
         command.tries += 1
         command.deadline = self._machine.sender.free_at + self._settings.cmd_timeout
 

@@ -111,6 +111,7 @@ class Requests(TaskSource):
         self.machine = mode.make_machine(line, self._run, self.counters)
         self._tasks = JobTasks(line.station or 0, first_tns)
         self._waiting: Inbox[_RequestJob] = Inbox()
+        self._taken: list[_RequestJob] = []  # in the link thread; they wait for their stations
         self._lost: LinkError = PortLost('not opened yet')
         self.stray = ''
         # Without DLE NAK, which would make other stations of a line in use drop their replies.
@@ -145,7 +146,9 @@ class Requests(TaskSource):
         under_way = self._tasks.first(busy)
         if under_way is not None:
             return self._tasks.take(under_way, now)
-        for request in self._waiting.take():
+        self._taken += self._waiting.take()
+        for request in [taken for taken in self._taken if taken.station not in busy]:
+            self._taken.remove(request)
             with suppress(StopIteration):  # it has ended before its first command
                 return self._heard_first(request.start(self._tasks, now), now)
         return None
@@ -175,7 +178,8 @@ class Requests(TaskSource):
         """Leave no request without an end; further ones end at once."""
         self._lost = error
         self._tasks.fail(error)
-        for request in self._waiting.close():
+        taken, self._taken = self._taken, []
+        for request in (*taken, *self._waiting.close()):
             _refuse(request, error)
 
 

@@ -68,6 +68,9 @@ class Port(Protocol):
     def unsent(self) -> int:
         """Return how many written bytes have not been sent yet, 0 if unknown."""
 
+    def errors(self) -> dict[str, int]:
+        """Return what a UART has counted since the port was opened; empty if none counts."""
+
     def close(self) -> None:
         """Give the line back."""
 
@@ -94,6 +97,9 @@ class PortAround:
 
     def unsent(self) -> int:
         return self._port.unsent()
+
+    def errors(self) -> dict[str, int]:
+        return self._port.errors()
 
     def close(self) -> None:
         self._port.close()
@@ -149,6 +155,9 @@ class DescriptorPort:
                 if left <= 0:
                     raise OSError('the line takes no data; is Handshake right?') from None
                 poll.poll(math.ceil(left * 1000))
+
+    def errors(self) -> dict[str, int]:
+        return {}
 
     def unsent(self) -> int:
         """Return how many bytes the operating system still has."""

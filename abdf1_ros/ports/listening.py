@@ -21,6 +21,7 @@ whatever program; docs/listening.md says what follows for the cable.
 
 from __future__ import annotations
 
+from collections import Counter
 from contextlib import ExitStack
 from dataclasses import replace
 import errno
@@ -88,6 +89,11 @@ class TwoPorts(_SilentPort):
             return b''
         data = self._second.read(0, wake)
         return SecondPort(data) if type(data) is bytes else data
+
+    def errors(self) -> dict[str, int]:
+        counts = Counter(self._first.errors())
+        counts.update(self._second.errors())
+        return counts
 
     def close(self) -> None:
         self._first.close()

@@ -28,7 +28,6 @@ from abdf1_ros.df1.listen import SecondPort
 from abdf1_ros.df1.packet import Packet
 from abdf1_ros.ports.descriptor import Port, PortAround
 from abdf1_ros.ports.opening import open_port
-from abdf1_ros.ports.serial_device import SerialDevice
 from abdf1_ros.ports.settings import PortSettings
 from abdf1_ros.sniffer.capture import CaptureWriter, Chunk, Direction, setting_line
 
@@ -151,7 +150,7 @@ class PortOpener:
 
     def errors(self) -> dict[str, int]:
         """Return what the UART has counted since the port was opened; from any thread."""
-        return self._port.errors() if isinstance(self._port, SerialDevice) else {}
+        return self._port.errors() if self._port else {}
 
     def trace(self, path: str, limit: float, head: dict[str, str],
               on_error: Callable[[str], None]) -> None:

@@ -76,7 +76,7 @@ class AnsweringNode(Node):
         return super().create_service(srv_type, srv_name, answer, **options)
 
     def tell_failure(self, what: str, error: BaseException) -> None:
-        """Log that a message or call from outside has failed."""
+        """Log that a message, a call, or a look at what comes from outside has failed."""
         self._failures.error('what comes from outside', (
             f'{what} has failed, all else goes on: {failure_text(error)}'))
 

@@ -242,7 +242,7 @@ class Lines:
             self._node.look()
             self._executor.spin_once(timeout_sec=0)
         except Exception as error:  # the lines go on: they have executors of their own
-            self._node.tell_failure('the search for other nodes', error)
+            self._node.tell_failure('a periodic check', error)
         if self._node.is_asked_again:
             self._node.is_asked_again = False
             for line in self._lines:

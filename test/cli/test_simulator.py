@@ -312,4 +312,29 @@ def test_input_of_a_job_in_the_background_is_none(monkeypatch: pytest.MonkeyPatc
         raise OSError(errno.EIO, 'Input/output error')
 
     monkeypatch.setattr(os, 'read', refuse)
-    assert _input(0) == b''
+    assert _input(0) is None
+
+
+def test_input_goes_on_when_a_job_comes_back_from_the_background(
+        data: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The first EIO was taken for the end of the input, so "fg" led to a deaf terminal."""
+    texts: list[bytes | OSError] = [
+        OSError(errno.EIO, 'Input/output error'), b'silent 1\nquit\n']
+
+    real_read = os.read
+
+    def read(descriptor: int, size: int) -> bytes:
+        text = texts.pop(0) if descriptor == reader else real_read(descriptor, size)
+        if isinstance(text, OSError):
+            raise text
+        return text
+
+    reader, writer = os.pipe()
+    os.write(writer, b'typed')
+    with os.fdopen(reader) as stdin:
+        monkeypatch.setattr(sys, 'stdin', stdin)
+        monkeypatch.setattr(os, 'read', read)
+        assert main(['--data', str(data), '--pty', str(data.with_name('plc')), '--seconds', '5'
+                     ]) == 0
+    os.close(writer)
+    assert not texts

@@ -270,12 +270,12 @@ def test_plc5_that_refuses_an_area_fails_address_forms() -> None:
 
 
 class Babble:
-    """A line on which others send all the time."""
+    """A line on which others send ``data`` all the time."""
 
-    def __init__(self, data: bytes) -> None:
+    def __init__(self, data: bytes = b'') -> None:
         self.now = 0.0
         self.sent = b''
-        self._data = data
+        self.data = data
 
     def clock(self) -> float:
         """Return the time."""
@@ -285,7 +285,7 @@ class Babble:
         """Let time pass."""
         self.now += min(timeout, 0.3)
         assert self.now < 60.0, 'no end'
-        return self._data
+        return self.data
 
     def write(self, data: bytes) -> None:
         """Take what is sent."""
@@ -353,3 +353,14 @@ def test_line_that_is_never_quiet_keeps_no_case_waiting(kind: type[AskingEnd]) -
     wire = Wire(line, BlockCheck.CRC, line.clock, is_half_duplex=kind is MasterEnd)
     kind(wire, 1, 0, 0).settle()
     assert line.now <= 12.0
+
+
+def test_damaged_reply_that_a_case_has_left_is_not_the_fault_of_the_next_case() -> None:
+    """The next case failed though nothing of it had been tried."""
+    line = Babble()
+    end = PeerEnd(Wire(line, BlockCheck.CRC, line.clock, is_half_duplex=False), 1, 0, 0)
+    command = end.command()
+    line.data = codec.damaged(end.frame(command)) + codec.ACK
+    end.offer(command)
+    line.data = b''
+    end.settle()

@@ -302,3 +302,14 @@ def test_replies_of_a_gateway_in_place_of_a_station_are_counted_like_late_ones()
         peer.hear_packet(later(REPLY, number)._replace(sts=sts))
         seen.append((peer.stations[1].overdue, peer.stations[1].local_status))
     assert seen == [(1, 0x02), (2, 0x07), (0, 0), (1, 0x02), (0, 0)]
+
+
+def test_short_wait_is_for_an_inactive_station() -> None:
+    """Timeout counts for the answer of an active station, as on a half-duplex line."""
+    peer, task = acknowledged()
+    answer(peer, task)
+    brief = peer.add(later(COMMAND, 1))
+    brief.answer_within = 0.1
+    peer.machine.wake(peer.now)
+    assert peer.said() == peer.frame(later(COMMAND, 1))
+    assert [round(at, 1) for at, data in peer.wait(1.05)] == [TIMEOUT]

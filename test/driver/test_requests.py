@@ -14,11 +14,12 @@
 
 """Requests on a virtual line: one after the other, over the links of both duplexes."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 from abdf1_ros.df1.machine import Machine
 from abdf1_ros.df1.peer import PEER
+from abdf1_ros.df1.radio import RADIO
 from abdf1_ros.df1.settings import LinkSettings
 from abdf1_ros.df1.slave import HalfDuplexSlave, multidrop, Responder
 from abdf1_ros.df1.stations import ActiveStationList
@@ -186,3 +187,35 @@ def test_other_modes_are_served_by_the_same_requests() -> None:
     requests.machine.handle_timeout(0.1)
     assert requests.machine.data_to_send().startswith(b'\x10\x02\x01\x05\x06\x00')
     assert ends.count() == 0
+
+
+def test_station_has_one_request_at_a_time_by_radio() -> None:
+    """The second one took the place of the first, which then never ended."""
+    requests = Requests(RADIO, replace(NETWORK.line, avoids_collisions=True),
+                        ActiveStationList(), first_tns=7)
+    machine, ends, now = requests.machine, Ends(), 0.0
+    machine.start(now)
+    for station in (1, 1, 2):
+        requests.add(station, echo(b''), ends.results.append, ends.errors.append)
+    machine.wake(now)
+    asked = {machine.data_to_send()[2:3]}
+    while ends.count() < 3 and now < 30.0:
+        assert machine.next_call is not None
+        now = max(now, machine.next_call)
+        machine.handle_timeout(now)
+        if not ends.count():
+            asked.add(machine.data_to_send()[2:3])
+    assert [type(error) for error in ends.errors] == [StationInactive] * 3
+    assert {b'\x01', b'\x02'} <= asked  # another station does not wait for the first
+
+
+def test_request_that_waits_for_its_station_ends_with_the_port() -> None:
+    requests = Requests(RADIO, replace(NETWORK.line, avoids_collisions=True),
+                        ActiveStationList(), first_tns=7)
+    ends = Ends()
+    requests.machine.start(0.0)
+    for _ in range(2):
+        requests.add(1, echo(b''), ends.results.append, ends.errors.append)
+    requests.machine.wake(0.0)
+    requests.machine.stop(PortLost('gone'))
+    assert [type(error) for error in ends.errors] == [PortLost] * 2

@@ -28,6 +28,7 @@ from abdf1_ros.df1.listen import SecondPort
 from abdf1_ros.ports import listening
 from abdf1_ros.ports.link_thread import LinkThread
 from abdf1_ros.ports.opening import open_port
+from abdf1_ros.ports.serial_device import SerialDevice
 from abdf1_ros.ports.settings import PortSettings
 from abdf1_ros.ports.trace import PortOpener
 import pytest
@@ -180,3 +181,13 @@ def test_damaged_characters_of_either_port_are_damaged(ptys: list[Pty]) -> None:
         port.close()
     os.close(wake)
     os.close(end)
+
+
+def test_errors_of_both_ports_are_counted(
+        ptys: list[Pty], monkeypatch: pytest.MonkeyPatch) -> None:
+    """They were not counted at all."""
+    opener = PortOpener(listening_to(*ptys))
+    port = opener.open()
+    monkeypatch.setattr(SerialDevice, 'errors', lambda self: {'parity errors': 2, 'overruns': 1})
+    assert opener.errors() == {'parity errors': 4, 'overruns': 2}
+    port.close()

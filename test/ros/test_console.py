@@ -15,6 +15,7 @@
 """What a process says never holds it up, though its terminal, pipe or disk stands still."""
 
 from contextlib import ExitStack
+import errno
 import os
 from pathlib import Path
 import pty
@@ -22,9 +23,11 @@ import signal
 import subprocess
 import sys
 import termios
+import time
 from typing import Any
 
-from abdf1_ros.console import Sink
+from abdf1_ros import console
+from abdf1_ros.console import pass_on, Sink
 from abdf1_ros.testing import PATIENCE, Plcs
 import pytest
 from std_msgs.msg import Int16MultiArray
@@ -33,6 +36,7 @@ from support.ros import Observer, ros_args, write_csv
 ROWS = ('speed,Write,N7:0,1,PLC5,1,speed,-1,500', 'refused,Write,N7:99,1,PLC5,1,refused,,')
 DATA = 'Station,PLC_Type,Address,Length,Values\n1,PLC5,N7:0,4,0 0 0 0\n'
 NET = 'Com_Port,Baud,Timeout,Cmd_Timeout\n/dev/plc,115200,300,3000\n'
+LOST = b'[WARN] abdf1_ros: %d lines were lost here: they were not taken\n'
 
 
 def fill(descriptor: int) -> None:
@@ -132,7 +136,45 @@ def test_lines_that_nothing_takes_are_counted_and_told_when_they_are_taken_again
     while b'lost' not in text:
         text += os.read(reader, 65536).replace(b'x', b'')
     sink.join(PATIENCE)
-    assert text.splitlines() == [*(b'line %d' % number for number in range(5)), (
-        b'[WARN] abdf1_ros: 5 lines were lost here: they were not taken')]
+    assert text == b''.join(b'line %d\n' % number for number in range(5)) + LOST % 5
+    for descriptor in (reader, writer):
+        os.close(descriptor)
+
+
+def test_count_of_lost_lines_outlives_a_write_that_fails(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A full disk took the count of the lines before with it."""
+    monkeypatch.setattr(console, '_PAUSE', 0.01)
+    taken: list[bytes] = []
+    answers: list[int | OSError] = [7, OSError(errno.ENOSPC, 'No space left on device')]
+
+    def write(descriptor: int, data: bytes) -> int:
+        answer = answers.pop(0) if answers else len(data)
+        if isinstance(answer, OSError):
+            raise answer
+        taken.append(data[:answer])
+        return answer
+
+    monkeypatch.setattr(os, 'write', write)
+    sink = Sink(-1, most=20)
+    for number in range(6):
+        sink.put(b'line %d\n' % number)  # two fit, four are lost
+    sink.start()
+    while answers or not taken[1:]:
+        time.sleep(0.01)
+    sink.end()
+    sink.join(PATIENCE)
+    assert b''.join(taken) == b'line 0\n' + LOST % 5
+
+
+def test_line_that_is_too_long_is_counted(tmp_path: Path) -> None:
+    text = tmp_path / 'text'
+    text.write_bytes(b'before\n' + b'x' * 2_500_000 + b'\nafter\n')
+    reader, writer = os.pipe()
+    sink = Sink(writer)
+    with text.open('rb') as source:
+        pass_on(source.fileno(), [sink])
+    sink.start()
+    sink.join(PATIENCE)
+    assert os.read(reader, 1000) == b'before\n' + LOST % 2
     for descriptor in (reader, writer):
         os.close(descriptor)

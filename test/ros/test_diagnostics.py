@@ -19,7 +19,7 @@ from dataclasses import replace
 from pathlib import Path
 import time
 from types import SimpleNamespace
-from typing import Any
+from typing import Any, cast
 
 from abdf1_ros.cli.monitor import plant, view
 from abdf1_ros.df1.frames import message_frame
@@ -27,6 +27,7 @@ from abdf1_ros.df1.packet import Packet
 from abdf1_ros.df1.slave_link import SlaveLink
 from abdf1_ros.driver.checks import StationHealth
 from abdf1_ros.driver.driver import Driver
+from abdf1_ros.driver.guests import Guest
 from abdf1_ros.driver.interlocks.fallback import FallbackCause, FallbackState
 from abdf1_ros.driver.interlocks.heartbeat import BeatState
 from abdf1_ros.driver.reads.point import ReadPoint
@@ -43,6 +44,7 @@ from abdf1_ros.ports.trace import PortOpener
 from abdf1_ros.ros.bridge.session import stations_of
 from abdf1_ros.ros.diagnostics.dds_files import LOST
 from abdf1_ros.ros.diagnostics.events import LineEvents
+from abdf1_ros.ros.diagnostics.guests import GuestsStatus
 from abdf1_ros.ros.diagnostics.line import takes_in_silence
 from abdf1_ros.ros.diagnostics.status import Seen
 from abdf1_ros.ros.diagnostics.statuses import Diagnostics
@@ -51,6 +53,7 @@ from abdf1_ros.ros.diagnostics.writes import WriteLog
 from abdf1_ros.settings.map_file import load_mappings
 from abdf1_ros.settings.mapping import Command, Mapping
 from abdf1_ros.settings.network import Network
+from abdf1_ros.share.guest_line import GuestLine
 from abdf1_ros.simulator.simulated_plc import InjectedFaults
 from diagnostic_msgs.msg import DiagnosticStatus
 import pytest
@@ -689,6 +692,13 @@ def test_bit_of_the_plc_confirms_control_while_it_is_fresh_and_1(
     bench.driver.checks._known[1] = StationHealth('PLC-5/40', stopped, NOW + 33)
     assert station(1, NOW + 33) == (
         WARN, 'not in control: ruled is 1, but the PLC is in program mode (REM PROG)')
+
+
+def test_guests_that_are_connected_are_counted() -> None:
+    guests = [Guest('pty:a', is_connected=True), Guest('tcp:7')]
+    status = GuestsStatus([cast(GuestLine, SimpleNamespace(guest=guest, fault=''))
+                           for guest in guests], PORT)
+    assert status.judge(NOW) == (OK, '1 of 2 guests are connected')
 
 
 def test_value_of_a_guest_over_a_fallback_is_a_warning(make_bench: Callable[..., Bench]) -> None:

@@ -290,12 +290,12 @@ class Session:
         self._publish_snapshot(now)
 
     def _look(self, watch: Watch, now: float) -> None:
-        """Log the news of a watch; it fails if DDS reports a name that rclpy cannot read."""
+        """Log the news of a watch; a watch fails if DDS reports a name that rclpy cannot read."""
         try:
             for news in watch.look(now):
                 self._events.notes.tell(news)
         except Exception as error:
-            self._surroundings.node.tell_failure('the search for other nodes', error)
+            self._surroundings.node.tell_failure('a periodic check', error)
 
     def publish_diagnostics(self, now: float) -> None:
         """Publish all statuses at the clock value ``now`` (s)."""

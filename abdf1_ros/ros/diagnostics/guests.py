@@ -39,7 +39,7 @@ class GuestsStatus:
             (sum(guest.refused for guest in guests), 'command', 'not allowed'),
             (sum(guest.collisions for guest in guests), 'write', 'to words of this bridge'))
             if count]
-        text = f'{connected} of {len(guests)} places are open'
+        text = f'{connected} of {len(guests)} guests are connected'
         faults = [f'{line.guest.name}: {line.fault}' for line in self._lines if line.fault]
         if faults:
             return ERROR, '; '.join(faults)
