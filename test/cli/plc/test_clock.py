@@ -19,9 +19,13 @@ from datetime import datetime, timedelta
 from pathlib import Path
 import re
 import time
+from types import SimpleNamespace
+from typing import cast
 
 from abdf1_ros.cli.plc.command import main
-from abdf1_ros.cli.plc.verbs.clock import told
+from abdf1_ros.cli.plc.session import Session
+from abdf1_ros.cli.plc.verbs.clock import Clock, told
+from abdf1_ros.pccc.file_types import PlcType
 from abdf1_ros.pccc.processor import Processor
 from abdf1_ros.simulator.simulated_plc import SimulatedPlc
 import pytest
@@ -74,6 +78,22 @@ def test_clock_is_set_when_that_is_wanted(port: str, plcs: tuple[SimulatedPlc, .
     assert said.status == 0, said
     # The clock has whole seconds, and a busy host may take some more.
     assert re.search('(as|0:00:0[23] behind) this computer$', said.lines[0])
+
+
+def test_drift_counts_from_the_middle_of_the_read(monkeypatch: pytest.MonkeyPatch) -> None:
+    begun = datetime(2026, 3, 1, 12, 0, 0)
+    moments = iter([begun, begun + timedelta(seconds=4)])
+
+    class Moments(datetime):
+        """A computer whose clock is read twice."""
+
+        @classmethod
+        def now(cls, tz: object = None) -> datetime:  # type: ignore[override]
+            return next(moments)
+
+    monkeypatch.setattr('abdf1_ros.cli.plc.verbs.clock.datetime', Moments)
+    session = cast(Session, SimpleNamespace(ask=lambda station, steps: (2026, 3, 1, 12, 0, 2)))
+    assert Clock(session, 1, PlcType.PLC5, None).read()[1] == timedelta(0)
 
 
 def test_clock_that_holds_no_time(port: str, capsys: Output) -> None:

@@ -131,6 +131,12 @@ def test_tag_that_cannot_be_used_is_left_out_and_stays_as_a_comment(
     assert f'# line 3: {row.split(",")[0].strip(chr(34))},' in (tmp_path / 'map.csv').read_text()
 
 
+def test_each_row_of_a_name_says_where_it_is_used(tmp_path: Path) -> None:
+    rows = ''.join(f'"Speed","N7:{number}",Short,1,R/W,100,,,,,,,,,,"",\n' for number in range(3))
+    assert imported(tmp_path, KEPSERVER + rows)[1] == [
+        f'{line}: Speed: the name Speed is that of line 2' for line in (3, 4)]
+
+
 def test_symbols_of_rslogix_become_rows_and_the_rest_is_told(tmp_path: Path) -> None:
     rows = RSLOGIX + '"DFILE:N7","","","Numbers"\n"PLS10:0","Global","CAM"\n"","Global","LOST"\n'
     mappings, left_out = imported(tmp_path, rows)
