@@ -51,6 +51,14 @@ def test_link_error_reads_as_its_numbered_text(error: LinkError, text: str) -> N
     assert str(error) == text
 
 
+@pytest.mark.parametrize('error', [
+    CommandTimeout(), StationInactive(9), WrongCommandCode(9, 0x41, 0x4F), PortLost('unplugged')])
+def test_copy_of_a_link_error_says_whether_the_command_was_sent(error: LinkError) -> None:
+    for is_sent in (True, False):  # as driver/job_tasks.py makes it
+        copy = type(error)(*error.args, sent=is_sent)
+        assert (str(copy), copy.sent) == (str(error), is_sent)
+
+
 @pytest.mark.parametrize(('place', 'text'), [
     (Place('net.csv', 2, 1, 'Station'), 'net.csv:2:1 (Station)'),
     (Place('net.csv', 2, None, 'Station'), 'net.csv:2 (Station)'),

@@ -371,14 +371,15 @@ class Machine:
     def handle_timeout(self, now: float) -> None:
         """Do what is due when the clock reads ``now``; nothing before ``next_call``."""
         self.now = now
-        if self._background is not None and now >= self._background.next_expiry():
-            self._background.expire(now)
+        has_expired = self._expire(now)
         due = self.sender.outgoing.due
         if due is not None and now >= due:
             self.sender.next_portion(now)
         if self.decoder.in_message and now >= self._message_end():
             self._break_off()
         if self.deadline is None or now < self.deadline:
+            if has_expired:  # what waited for it may go out now
+                self._end_rest()
             return
         self.late += now - self.deadline
         if now - self.deadline > MOST_LATE:
@@ -391,6 +392,13 @@ class Machine:
             self._resume(Silence(decoder.last_byte, decoder.in_message, now - self._last_heard))
         self._deliver_symbols()
 
+    def _expire(self, now: float) -> bool:
+        """Do the work that needs no line; return True if there was some."""
+        if self._background is None or now < self._background.next_expiry():
+            return False
+        self._background.expire(now)
+        return True
+
     def took(self, begun: float, now: float) -> float:
         """Return the seconds from a clock value to now, without the last pause."""
         end, seconds = self._last_pause
@@ -401,6 +409,9 @@ class Machine:
         self.now = now
         if self._background is not None and self._procedure is not None:
             self._background.expire(now)
+        self._end_rest()
+
+    def _end_rest(self) -> None:
         if self._procedure is not None and isinstance(self._step, Rest):
             self._resume(_NOTHING)
             self._deliver_symbols()

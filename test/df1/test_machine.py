@@ -602,6 +602,14 @@ def test_background_has_its_time_while_a_step_waits(due: float, call: float) -> 
     assert bench.got == []
 
 
+def test_rest_ends_with_work_of_the_background() -> None:
+    """A message that has waited too long may have held up something that goes out at once."""
+    bench = Bench(Rest(5.0), Send(FRAME, 1.0), start=None, background=Clockwork(1.5))
+    bench.machine.start(1.0)
+    bench.machine.handle_timeout(1.5)
+    assert bench.machine.data_to_send() == FRAME
+
+
 # echo
 
 

@@ -159,6 +159,19 @@ def test_rule_7_fallback_waits_for_a_message_that_waits() -> None:
     assert plc.ready({}, due) == [row]
 
 
+def test_rule_7_fallback_waits_no_longer_for_a_message_that_has_expired() -> None:
+    speed = speed_row(Fallback((7,), 2000))
+    cell = Cell(speed, run=1.0, write_timeout=0.5)
+    cell.publish(speed, 3, run=1.9)
+    cell.bench.driver._writes._first_free = lambda busy: None  # type: ignore[method-assign]
+    cell.publish(speed, 4, run=0.2)
+    assert cell.word('N7:0') == 3  # the fallback waits for it
+    cell.run(0.35)
+    assert cell.written('N7:0') == [7, 3, 7]
+    assert cell.results()[-2:] == [
+        'not written: not sent: waited longer than 0.5 s for the line', TIMEOUT]
+
+
 def test_rule_7_message_that_is_older_than_fallback_after_is_not_sent() -> None:
     cell, speed = speed_cell()
     cell.bench.driver.write([speed], [3], cell.now - 0.6)

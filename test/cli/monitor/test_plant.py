@@ -16,10 +16,11 @@
 
 from collections.abc import Callable, Iterator
 from dataclasses import replace
+import time
 
 from abdf1_ros.cli.monitor.command import main
 from abdf1_ros.cli.monitor.plant import LineState, PlantWatch, render_plant
-from abdf1_ros.cli.monitor.view import Status, Style
+from abdf1_ros.cli.monitor.view import SILENCE, Status, Style
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 import pytest
 from rclpy.node import Node
@@ -109,7 +110,8 @@ def test_bridges_are_heard_and_others_are_not(publish: Publish) -> None:
     assert lines['/hall/b'] == Status('', Style.BAD, 'does not run: b_net.csv:2:1: Baud')
 
 
-def test_spares_stand_beside_the_line_that_has_an_owner(publish: Publish) -> None:
+def test_spares_stand_beside_the_line_that_has_an_owner(
+        publish: Publish, monkeypatch: pytest.MonkeyPatch) -> None:
     waiting = array('hall/a', standby=OK), array('hall/b', standby=OK)
     for message, host in zip(waiting, ('beta', 'gamma'), strict=True):
         message.status[0].values = [KeyValue(key='host', value=host)]
@@ -121,6 +123,9 @@ def test_spares_stand_beside_the_line_that_has_an_owner(publish: Publish) -> Non
         assert lines['/hall/a'].worst(lines['/hall/a'].told).style is Style.GOOD
         assert lines['/hall/b'].worst(lines['/hall/b'].told) == Status(
             '', Style.BAD, 'no bridge has the line; waiting: gamma')
+        later = time.monotonic() + SILENCE
+        monkeypatch.setattr(time, 'monotonic', lambda: later)
+        assert {line.name: line.spares for line in watch.lines()} == {'/hall/a': []}
 
 
 def test_spare_is_named() -> None:

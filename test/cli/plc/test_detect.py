@@ -26,6 +26,8 @@ from abdf1_ros.cli.plc import detect
 from abdf1_ros.cli.plc.command import main
 from abdf1_ros.cli.plc.detect import BAUD_RATES, LineSettings, Search
 from abdf1_ros.cli.plc.init import net_csv
+from abdf1_ros.cli.plc.presence import Presence
+from abdf1_ros.counters import Counters
 from abdf1_ros.df1.checksum import Checksum
 from abdf1_ros.df1.frames import ACK, Duplex, Frame
 from abdf1_ros.df1.machine import Machine, Procedure
@@ -251,6 +253,33 @@ def test_own_characters_that_come_back_late_are_no_trace(
         echo.join()
         line.close()
     assert search.echoes
+    assert search.traces == []
+
+
+def test_characters_of_before_an_echo_was_seen_are_no_trace(
+        monkeypatch: pytest.MonkeyPatch) -> None:
+    class EchoedSession:
+        """Characters come back too late to be known, at 19200 baud in time."""
+
+        counters = Counters()
+
+        def __init__(self, network: Network, absent: object = ()) -> None:
+            self.echoes = network.baud == 19200
+            self.counters.chars_received = 4
+
+        def __enter__(self) -> 'EchoedSession':
+            return self
+
+        def __exit__(self, *exception: object) -> None:
+            """Close nothing."""
+
+    absent = Presence(1, 0.0, None, None, is_there=False, takes_commands=False)
+    monkeypatch.setattr(detect, 'Session', EchoedSession)
+    monkeypatch.setattr(detect, 'look_at', lambda session, station: absent)
+    search = Search(Network(), [1])
+    assert search.run([9600]) is None
+    assert len(search.traces) == 3
+    assert search.run([9600, 19200]) is None
     assert search.traces == []
 
 
