@@ -121,7 +121,8 @@ class FileAddressing(Addressing):
             return kind.default_file
         file = int(text)
         if fixed is not None and file != fixed:
-            raise AddressRangeError(f'the {kind.value} file is file {fixed}')
+            string = f'; for a string write ST{file}:0' if kind is FileType.STATUS else ''
+            raise AddressRangeError(f'the {kind.value} file is file {fixed}{string}')
         if fixed is None and not _FIRST_FREE_FILE <= file <= self.last_file:
             raise AddressRangeError(
                 f'files of type {kind.value} run from {_FIRST_FREE_FILE} to {self.last_file}')

@@ -146,6 +146,13 @@ def test_what_other_programs_write_leads_to_what_is_right(
         parse_address(right[1], family)
 
 
+@for_all('family', BOTH)
+def test_string_with_one_letter_leads_to_the_file_type_with_two(family: PlcType) -> None:
+    with pytest.raises(AddressRangeError, match='the S file is file 2; for a string write ST13:0'):
+        parse_address('S13:0', family)
+    assert parse_address('ST13:0', family).file_type is FileType.STRING
+
+
 @st.composite
 def addresses(draw: st.DrawFn) -> Address:
     """Return any place of any file type."""

@@ -409,6 +409,18 @@ def test_station_that_answers_polls_and_no_command(bench: Bench) -> None:
     assert bench.says('station 1', NOW + 12)[0] == OK
 
 
+@pytest.mark.parametrize(('mode', 'acks', 'why'), [
+    ('Peer', 0, '; it answers DLE NAK to all: is Error_Code right?'), ('Peer', 1, ''),
+    ('Master', 0, '')])
+def test_full_duplex_plc_that_refuses_all_has_another_check(
+        mode: str, acks: int, why: str, make_bench: Callable[..., Bench]) -> None:
+    bench = make_bench('speed,Read,N7:0,1,PLC5,1000', mode=mode)
+    bench.driver.counters.naks_received += 3
+    bench.driver.counters.acks_received += acks
+    bench.driver.stations.lost(1, NOW - 2)
+    assert bench.says('station 1') == (ERROR, f'ERROR: station 1 inactive for 2.0 s{why}')
+
+
 @pytest.mark.parametrize('counter', ['overdue', 'unanswered'])
 @pytest.mark.parametrize('is_heard', [False, True])
 def test_station_that_does_not_reply_in_time(bench: Bench, counter: str, is_heard: bool) -> None:

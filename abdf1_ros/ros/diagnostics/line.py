@@ -82,6 +82,13 @@ class LineView:
                 and now - station.last_heard < _HEARD_LATELY
                 and self.driver.network.line_mode.is_master)
 
+    @property
+    def is_refused(self) -> bool:
+        """Return True if the only PLC of a full-duplex line has refused all that we have sent."""
+        driver = self.driver
+        return (driver.network.line_mode.has_one_plc and driver.counters.naks_received > 0
+                and not driver.counters.acks_received)
+
     def wrong_types(self) -> list[str]:
         """Return which PLCs are not of the family, or the processor, that the map says."""
         found = (self.wrong_type(station.number) for station in self.driver.stations)

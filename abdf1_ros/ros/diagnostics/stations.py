@@ -77,6 +77,8 @@ class StationStatus:
             via = line.driver.stations.via(station.number)
             is_passed_on = via != station.number and line.driver.stations[via].active
             but = f'; its gateway, station {via}, answers' if is_passed_on else ''
+            if line.is_refused:
+                but = '; it answers DLE NAK to all: is Error_Code right?'
             return ERROR, f'station {station.number} inactive for {since:.1f} s{but}'
         if station.local_status:
             return WARN, f'commands do not get to station {station.number}: ' \
