@@ -53,7 +53,7 @@ from __future__ import annotations
 
 TYPE_CHECKING = False  # mypy takes it as true; the module typing takes long to import
 if TYPE_CHECKING:
-    from abdf1_ros.client import Client
+    from abdf1_ros.client import Client  # noqa: I300
 
     __version__: str
 

@@ -16,6 +16,7 @@
 
 from pathlib import Path
 
+import pytest
 from support.ros_tools import needs
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -28,16 +29,18 @@ def test_ament_finds_a_licence_header_in_every_file() -> None:
     assert needs('ament_copyright.main').main(argv=SOURCES) == 0
 
 
+@pytest.mark.timeout(1800)  # 100 s of processor time for 600 files
 def test_ament_flake8_finds_nothing_wrong() -> None:
     status, errors = needs('ament_flake8.main').main_with_errors(argv=SOURCES)
     assert (status, errors) == (0, [])
 
 
+@pytest.mark.timeout(600)
 def test_ament_pep257_finds_nothing_wrong() -> None:
     assert needs('ament_pep257.main').main(argv=SOURCES) == 0
 
 
 def test_ament_xmllint_finds_nothing_wrong() -> None:
     # package.xml names a schema on a server; that is for those who have the Internet.
-    folders = [str(ROOT / name) for name in ('config', 'launch')]
+    folders = [str(ROOT / name) for name in ('config', 'examples', 'launch')]
     assert needs('ament_xmllint.main').main(argv=folders) == 0

@@ -24,8 +24,10 @@ from __future__ import annotations
 import ast
 import builtins
 from collections.abc import Iterator
+import io
 from pathlib import Path
 import sys
+import tokenize
 from xml.etree import ElementTree
 
 import pycodestyle
@@ -61,6 +63,29 @@ def findings_in(source: str) -> Iterator[Finding]:
             first = (ast.get_docstring(node) or '').partition('\n')[0]
             if f'{node.name}(' in first.replace(' ', ''):
                 yield node.lineno, 'D402: the first line of the docstring reads like a signature'
+    yield from _far_type_imports(ast.parse(source).body, lines)
+    yield from _needless_double_quotes(source)
+
+
+def _far_type_imports(body: list[ast.stmt], lines: list[str]) -> Iterator[Finding]:
+    """Yield imports for types that do not follow the other imports after one empty line."""
+    end = None
+    for node in body:
+        if isinstance(node, ast.Import | ast.ImportFrom):
+            end = node.end_lineno
+        elif end and isinstance(node, ast.If) and 'TYPE_CHECKING' in ast.unparse(node.test):
+            first = node.body[0].lineno
+            if first - end != 3 and 'noqa: I300' not in lines[first - 1]:
+                yield first, 'I300: "if TYPE_CHECKING" is not one line below the other imports'
+
+
+def _needless_double_quotes(source: str) -> Iterator[Finding]:
+    """Yield each string in double quotes without need; ruff judges adjacent strings together."""
+    for token in tokenize.generate_tokens(io.StringIO(source).readline):
+        text = token.string.lstrip('bBfFrRuU')
+        if token.type == tokenize.STRING and text.startswith('"') \
+                and not text.startswith('"""') and "'" not in text:
+            yield token.start[0], 'Q000: double quotes where single quotes would do'
 
 
 def _in_class(node: ast.ClassDef, lines: list[str]) -> Iterator[Finding]:

@@ -32,7 +32,13 @@ HEADER = Path(__file__).read_text(encoding='utf-8').partition('""')[0]
     ('class Door:\n\n    def open(self) -> None:\n        pass\n', ['A003']),
     ('class Door:\n\n    def open(self) -> None:  # noqa: A003\n        pass\n', []),
     ('class Door:\n    type = 3\n', ['A003']), ('class Door:\n    type: int\n', ['A003']),
-    ('class Door:\n    __doc__ = "a door"\n', []),
+    ("class Door:\n    __doc__ = 'a door'\n", []),
+    ('import wall\nif TYPE_CHECKING:\n    import door\n', ['I300']),
+    ('import wall\n\nx = 1\nif TYPE_CHECKING:\n    import door\n', ['I300']),
+    ('import wall\n\nx = 1\nif TYPE_CHECKING:\n    import door  # noqa: I300\n', []),
+    ('import typing\n\nif typing.TYPE_CHECKING:\n    import door\n', []),
+    ('x = "it\'s" "b"\n', ['Q000']),
+    ('x = "it\'s"\n', []), ('x = """a"""\n', []),
     ('def sent(x: int) -> None:\n    """Judge what is sent (rule 3)."""\n', ['D402']),
     ('def sent(x: int) -> None:\n    """Judge what goes out (rule 3)."""\n', [])])
 def test_rule(source: str, expected: list[str]) -> None:
