@@ -176,14 +176,13 @@ class Console:
         routes, reads, writes = [], [], {}
         logged = 1 if os.environ.get('RCUTILS_LOGGING_USE_STDOUT') == '1' else 2
         for number in (1, 2):
-            with suppress(OSError):  # it is closed
-                self._before[number] = os.dup(number)
+            self._before[number] = os.dup(number)
         for number, before in self._before.items():
             reader, writes[number] = os.pipe()
             reads.append(reader)
             log = '' if self._log is None or number != logged else f',{self._log}'
             routes.append(f'{reader}:{before}{log}')
-        if logged in self._before and os.isatty(self._before[logged]):
+        if os.isatty(self._before[logged]):
             # rcutils cannot see the terminal any more
             os.environ.setdefault('RCUTILS_COLORIZED_OUTPUT', '1')
         kept = [*reads, *self._before.values(), *([] if self._log is None else [self._log])]

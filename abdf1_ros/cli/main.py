@@ -29,7 +29,7 @@ import sys
 
 TYPE_CHECKING = False  # mypy takes it as true; the module typing takes long to import
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable  # noqa: I300
     from types import FrameType
     from typing import NoReturn
 
@@ -59,6 +59,7 @@ _LEAVING = ('node', 'lines', 'simulator')
 def run(name: str) -> int:
     """Run a command with the arguments of this process; return its exit status."""
     _end_quietly(_INTERRUPTED if name in _TELLING else 0)
+    _open_standard_streams()
     try:
         status: int = import_module(COMMANDS[name]).main()
     except ModuleNotFoundError as error:  # also one that a command imports when it needs it
@@ -86,6 +87,21 @@ def _end_quietly(status: int) -> None:
 
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, leave)
+
+
+def _open_standard_streams() -> None:
+    """
+    Open each of standard input, output and error that is closed, on /dev/null.
+
+    Otherwise the next file that is opened gets its number. That may be the port: then DDS would
+    write its messages to the PLC.
+    """
+    for number, name in enumerate(('stdin', 'stdout', 'stderr')):
+        try:
+            os.fstat(number)
+        except OSError:
+            os.set_inheritable(os.open(os.devnull, os.O_RDWR), True)  # gets the lowest number
+            setattr(sys, name, os.fdopen(number, 'w' if number else 'r'))
 
 
 def _cure(module: str) -> str:

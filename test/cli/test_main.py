@@ -61,6 +61,32 @@ for _ in range(300):
 """
 
 
+TELLING = """import os, sys
+with open(os.environ['TOLD'], 'w') as file:
+    links = [os.readlink(f'/proc/self/fd/{number}') for number in range(3)]
+    print(file.fileno(), *links, file=file)
+print('lost')
+print('lost', file=sys.stderr)
+os._exit(7)
+"""
+
+
+@pytest.mark.parametrize('closed', ['<&- >&- 2>&-', '>&-', '2>&-'])
+def test_no_file_takes_the_place_of_a_closed_stream(tmp_path: Path, closed: str) -> None:
+    """DDS would write its messages into it, and it may be the port."""
+    (tmp_path / 'rclpy.py').write_text(TELLING)
+    told = tmp_path / 'told'
+    done = subprocess.run(
+        ['sh', '-c', f'exec "$@" {closed}', 'sh', sys.executable, '-c',
+         'from abdf1_ros.cli.main import node; node()'],
+        check=False, env=os.environ | {'PYTHONPATH': str(tmp_path), 'TOLD': str(told)},
+        stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+    assert done.returncode == 7
+    number, *links = told.read_text().split()
+    assert int(number) > 2
+    assert links == ['/dev/null'] * 3
+
+
 @pytest.mark.parametrize('name', NAMES)
 def test_signal_during_the_imports_ends_quietly(tmp_path: Path, name: str) -> None:
     with held_at_an_import(tmp_path, name, SLOW) as process:

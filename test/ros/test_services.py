@@ -47,6 +47,7 @@ ROWS = (
     'everybody,Write,B3:2/0,255,PLC5,,,,,,',
     'flags,Write,B3:0/4,1,PLC5,2,,,,,')
 SET, READ = '/abdf1/set/', '/abdf1/read_now/'
+HEARTBEAT = Trigger, f'{READ}heartbeat', Trigger.Request()
 
 
 class Bench(BridgeCell):
@@ -242,6 +243,55 @@ def test_old_call_is_not_written_and_the_end_answers_who_waits(tmp_path: Path) -
         observer.until(lambda: all(future.done() for future in waiting), 'the last answers')
         assert [future.result().success for future in waiting] == [False, False]
         simulator.say('normal 2')
+
+
+def test_caller_of_a_killed_bridge_ends_by_its_own_limit(tmp_path: Path) -> None:
+    files = make_files(tmp_path)
+    answers: dict[str, Any] = {}
+    with Observer() as observer, files.start_simulator() as simulator, \
+            Process('node', *files.args()) as node:
+        calls = [(observer.node.create_client(kind, f'/abdf1/{name}'), name, kind)
+                 for kind, name in ((SetBool, 'set/lamp'), (Trigger, 'read_now/heartbeat'))]
+        observer.until(lambda: all(client.service_is_ready() for client, _, _ in calls), 'both')
+        observer.until(lambda: observer.call(*HEARTBEAT).success, 'the PLC')
+        simulator.say('delay 2 60000')
+        callers = [threading.Thread(target=lambda client, name, kind: answers.update(
+            {name: client.call(kind.Request(), 4.0)}), args=call) for call in calls]
+        for caller in callers:
+            caller.start()
+        observer.wait(lambda: False, 1.0)
+        node.send(signal.SIGKILL)
+        assert node.result() == -signal.SIGKILL
+        observer.until(lambda: not any(caller.is_alive() for caller in callers), 'their ends')
+        assert answers == {'set/lamp': None, 'read_now/heartbeat': None}
+
+
+def answer_of(observer: Observer, client: Any, request: Any) -> Any:
+    """Call again until an answer comes: for 20 s DDS may send a call to a killed bridge alone."""
+    def call() -> Any:
+        future = client.call_async(request)
+        observer.wait(future.done, 2.0)
+        return future.result() if future.done() else None
+
+    return observer.until(call, 'an answer')
+
+
+def test_call_to_a_bridge_that_is_killed_is_not_executed_by_the_next(tmp_path: Path) -> None:
+    files = make_files(tmp_path)
+    with Observer() as observer, files.start_simulator():
+        results = observer.results()
+        client = observer.node.create_client(SetBool, '/abdf1/set/lamp')
+        with Process('node', *files.args()) as node:
+            observer.until(client.service_is_ready, 'the service')
+            observer.until(lambda: observer.call(*HEARTBEAT).success, 'the PLC')
+            node.stop()
+            lost = client.call_async(SetBool.Request(data=True))
+            observer.wait(lambda: False, 0.5)
+            node.send(signal.SIGKILL)
+        with Process('node', *files.args()) as node:
+            assert answer_of(observer, client, SetBool.Request(data=False)).message == 'written'
+        assert not lost.done()
+        assert {details(result)['value'] for result in results} == {'[0]'}
 
 
 def test_line_that_is_only_listened_to_has_no_services_of_rows(tmp_path: Path) -> None:

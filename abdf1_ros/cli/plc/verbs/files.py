@@ -42,7 +42,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
                         help='file numbers up to 254 (default: the list of the PLC, or 0-31)')
     add_plc_type(parser)
     parser.add_argument('--map', metavar='FILE', nargs='?', const='',
-                        help="print rows for a new map CSV; with FILE, check that map CSV against "
+                        help='print rows for a new map CSV; with FILE, check that map CSV against '
                              "the PLC's files")
 
 
