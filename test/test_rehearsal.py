@@ -31,10 +31,23 @@ def has_namespaces() -> bool:
         ['unshare', '--net', 'true'], check=False, capture_output=True).returncode == 0
 
 
-@pytest.mark.skipif(not has_namespaces(), reason='namespaces need root')
+NEEDS_NAMESPACES = pytest.mark.skipif(not has_namespaces(), reason='namespaces need root')
+
+
+@NEEDS_NAMESPACES
 def test_spare_takes_over_the_lines_of_a_host_that_dies() -> None:
     done = subprocess.run(
         [sys.executable, str(PROGRAM), '--hosts', '2', '--lines', '1', '--faults', '1',
          '--seed', '1'], check=False, capture_output=True, text=True, timeout=110)
     assert done.returncode == 0, done.stdout + done.stderr
     assert 'kill     1 times, all lines read and written to after ' in done.stdout
+
+
+@NEEDS_NAMESPACES
+def test_no_result_comes_a_second_time_after_a_long_cut() -> None:
+    done = subprocess.run(
+        [sys.executable, str(PROGRAM), '--hosts', '2', '--lines', '1', '--faults', '1',
+         '--only', 'apart', '--discovery-server', '--seed', '1'], check=False,
+        capture_output=True, text=True, timeout=110)
+    assert done.returncode == 0, done.stdout + done.stderr
+    assert 'apart    1 times, all lines read and written to after ' in done.stdout

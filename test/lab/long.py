@@ -105,7 +105,8 @@ def parts(work: Path) -> dict[str, Part]:
             'simulate/run.py', f'--seed={seed}', f'--seconds={left:.0f}'),
             {'plants': r'(?m)^(\d+) plants', 'values': r'(\d+) values'}),
         'rehearsal': Part(0.1, lambda seed, left: script(
-            'rehearsal/run.py', f'--seed={seed}', f'--seconds={left:.0f}'),
+            'rehearsal/run.py', f'--seed={seed}', f'--seconds={left:.0f}',
+            *['--discovery-server'] * (seed % 2)),
             {'faults': r'(?m)^\w+ +(\d+) times', 'values': r'(\d+) values'}, least=600.0),
         'fuzz': Part(0.2, lambda seed, left: script(
             'fuzz/run.py', f'--seconds={left:.0f}', f'--work={work / "fuzz"}'),

@@ -27,6 +27,7 @@ from abdf1_ros.ros.topics.messages import (
     MESSAGES,
     new_message,
     read_qos,
+    results_qos,
     values_of,
     write_qos,
 )
@@ -188,6 +189,14 @@ def test_topic_without_a_rhythm_promises_none(
     assert profile.deadline == default.deadline
     assert profile.liveliness_lease_duration == default.liveliness_lease_duration
     assert profile.liveliness is not LivelinessPolicy.MANUAL_BY_TOPIC
+
+
+def test_result_is_not_repeated_to_a_subscriber_that_was_cut_off_for_its_lease() -> None:
+    profile = results_qos()
+    assert profile.reliability is ReliabilityPolicy.RELIABLE
+    assert profile.durability is DurabilityPolicy.VOLATILE
+    assert (profile.history, profile.depth) == (HistoryPolicy.KEEP_LAST, 1000)
+    assert profile.lifespan == Duration(seconds=10)  # a lease is 20 s
 
 
 def test_write_topic_keeps_a_burst_but_nothing_from_before() -> None:

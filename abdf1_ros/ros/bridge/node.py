@@ -50,7 +50,7 @@ from abdf1_ros.ros.parameters.declared import (
     read_again,
 )
 from abdf1_ros.ros.parameters.shown import ShownFiles
-from abdf1_ros.ros.topics.messages import latched_qos
+from abdf1_ros.ros.topics.messages import latched_qos, results_qos
 from abdf1_ros.ros.topics.writes import WriteTopics
 from abdf1_ros.settings.heartbeats import HAND_OVER, LONGEST_END
 from abdf1_ros.settings.network import Network
@@ -104,9 +104,7 @@ class BridgeNode(AnsweringNode):
         self.writes = WriteTopics(self)
         self._surroundings = Surroundings(
             self, graph, self._name_watch(graph, configuration), self._opener,
-            # All waiting writes can end at the same moment, faster than a subscriber takes the
-            # results.
-            OfferedPublisher(self, DiagnosticStatus, '~/write_results', MAX_WAITING_WRITES,
+            OfferedPublisher(self, DiagnosticStatus, '~/write_results', results_qos(),
                              most=MAX_WAITING_WRITES),
             OfferedPublisher(self, UInt16MultiArray, '~/active_stations', latched_qos(), most=1),
             self.create_publisher(DiagnosticArray, '/diagnostics', 10),

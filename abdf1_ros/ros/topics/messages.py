@@ -21,6 +21,7 @@ from collections.abc import Callable
 import math
 from typing import Any
 
+from abdf1_ros.driver.writes.queue import MAX_WAITING_WRITES
 from abdf1_ros.errors import FormatError
 from abdf1_ros.pccc.values import Values, ValueType
 from abdf1_ros.settings.mapping import Mapping
@@ -38,6 +39,9 @@ ACTIVE_LAYOUT = MultiArrayLayout(dim=[MultiArrayDimension(
 
 # Publishers send bits one by one, so a burst of messages has to fit. Unused places take no memory.
 _WRITE_DEPTH = 1000
+
+# Seconds for which a result is repeated to a subscriber that did not acknowledge it.
+_RESULT_LIFESPAN = 10.0
 
 
 def new_message(mapping: Mapping) -> Any:
@@ -106,6 +110,19 @@ def write_qos() -> QoSProfile:
     return QoSProfile(
         depth=_WRITE_DEPTH, reliability=ReliabilityPolicy.RELIABLE,
         durability=DurabilityPolicy.VOLATILE)
+
+
+def results_qos() -> QoSProfile:
+    """
+    Return the QoS of the results of writes.
+
+    All waiting writes can end at the same moment, faster than a subscriber takes the results. A
+    subscriber whose network was cut for longer than its lease (20 s) is a new subscriber to DDS,
+    which would send it all results again that were not acknowledged before.
+    """
+    return QoSProfile(
+        depth=MAX_WAITING_WRITES, reliability=ReliabilityPolicy.RELIABLE,
+        durability=DurabilityPolicy.VOLATILE, lifespan=Duration(seconds=_RESULT_LIFESPAN))
 
 
 def latched_qos() -> QoSProfile:

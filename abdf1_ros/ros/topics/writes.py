@@ -172,6 +172,7 @@ class WriteTopics:
         self._has_begun = self._is_open = False
         self._subscriptions: dict[str, tuple[Any, Any]] = {}
         self._topics: dict[str, WriteTopic] = {}
+        self._latest: dict[tuple[str, int, int], None] = {}  # topic, stamp and number of messages
         self.standstills = Standstills()
         self.taken = 0
 
@@ -231,6 +232,8 @@ class WriteTopics:
 
     def take(self, topic: str, message: Any, info: Any) -> None:
         """Count what was lost before a message; then hand it on, let it wait, or refuse it."""
+        if self._came_before(topic, info):
+            return
         self._topics[topic].arrived(info)
         reject_reason = '' if self._is_open else TOO_MANY
         if reject_reason and len(self._waiting) < MAX_WAITING_WRITES:
@@ -238,6 +241,22 @@ class WriteTopics:
             return
         self.taken += 1
         self._topics[topic].take(message, info, reject_reason)
+
+    def _came_before(self, topic: str, info: Any) -> bool:
+        """
+        Record a message; return True if DDS has delivered it before.
+
+        DDS does that after a cut of the network: to the reader the publisher is a new one then,
+        which repeats all messages that were not acknowledged before the cut.
+        """
+        stamp, number = info['source_timestamp'], info['publication_sequence_number']
+        if not stamp or number is None:
+            return False
+        came_before = (topic, stamp, number) in self._latest
+        self._latest[topic, stamp, number] = None
+        if len(self._latest) > MAX_WAITING_WRITES:
+            del self._latest[next(iter(self._latest))]
+        return came_before
 
     def _subscription(self, topic: str, kind: Any) -> Any:
         callback: Any = partial(self.take, topic)

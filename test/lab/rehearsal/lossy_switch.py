@@ -16,13 +16,16 @@
 A switch that delays and loses packets, for kernels without netem.
 
 ``lossy_switch.py SPARED DELAY LOSS LINK...`` passes frames on between the links of its network
-namespace, DELAY ms late, and without LOSS % of them. Frames from and to the link SPARED pass at
-once, all of them. It runs until it is ended.
+namespace at once. From the first line of its input on, they are DELAY ms late, and LOSS % of them
+get lost, but not those from and to the link SPARED. It runs until it is ended. Where it may, it
+goes before other programs: with one that waits for a processor, all frames would come late.
 """
 
 from __future__ import annotations
 
 from collections import deque
+from contextlib import suppress
+import os
 import random
 import select
 import socket
@@ -51,8 +54,10 @@ def links_of(names: list[str]) -> dict[str, socket.socket]:
 def main() -> None:
     """Pass frames on until the process is ended."""
     spared, names = sys.argv[1], sys.argv[4:]
-    delay, loss = float(sys.argv[2]) / 1000, float(sys.argv[3]) / 100
-    links = links_of(names)
+    with suppress(PermissionError):
+        os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(1))
+    delay = loss = 0.0
+    links, said_to_us = links_of(names), [sys.stdin]
     homes: dict[bytes, str] = {}
     late: deque[tuple[float, str, bytes]] = deque()
 
@@ -64,7 +69,10 @@ def main() -> None:
 
     while True:
         wait = max(0.0, late[0][0] - time.monotonic()) if late else None
-        readable, _, _ = select.select(links.values(), [], [], wait)
+        readable, _, _ = select.select([*links.values(), *said_to_us], [], [], wait)
+        if sys.stdin in readable:
+            delay, loss = float(sys.argv[2]) / 1000, float(sys.argv[3]) / 100
+            said_to_us.clear()
         while late and late[0][0] <= time.monotonic():
             send(*late.popleft()[1:])
         for name, link in links.items():

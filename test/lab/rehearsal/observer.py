@@ -15,15 +15,18 @@
 """
 Look at the lines of a plant from another host, write to them, and judge.
 
-``observer.py LINES`` says on standard output, a line each: ``ill WHY`` while a line is not read
-or not written to, ``doubled WHY`` while the endpoints of two bridges are seen, ``well`` otherwise,
-``quiet NUMBER`` and ``back NUMBER`` when values of a line end and come again, and ``BROKEN WHY``
-for what must never be. At the end of its input it says what it has judged.
+``observer.py LINES PERIOD`` writes to each line each PERIOD s, and expects values as often. With
+``listen`` as a third word it writes nothing: another observer does. It says on standard output, a
+line each: ``ill WHY`` while a line is not read or not written to, ``doubled WHY`` while the
+endpoints of two bridges are seen, ``well`` otherwise, ``quiet NUMBER`` and ``back NUMBER`` when
+values of a line end and come again, and ``BROKEN WHY`` for what must never be. Each line of its
+input lets it count anew. At the end of its input it says what it has counted.
 """
 
 from __future__ import annotations
 
 from functools import partial
+from queue import SimpleQueue
 import sys
 import threading
 import time
@@ -35,9 +38,8 @@ import rclpy
 from rclpy.node import Node
 from std_msgs.msg import Int16MultiArray, MultiArrayDimension, MultiArrayLayout
 
-_WRITES = 0.25  # s between two commands to a line
 _FRESH = 2.0  # s
-_GAP = 0.7  # s; a value is read each 0.2 s
+_GAP = 3.5  # Periods of a value
 _LOOKS = 0.1
 _RAMP = 1000  # where a ramp of the simulator begins again
 
@@ -45,24 +47,34 @@ _RAMP = 1000  # where a ramp of the simulator begins again
 class Line:
     """What is known of one line; its ramp and the commands go up, so an old one is seen."""
 
-    def __init__(self, node: Node, name: str) -> None:
-        self.name, self._node = name, node
-        self.values = self.results = self.number = self.fallbacks = self.late = 0
+    def __init__(self, node: Node, name: str, period: float) -> None:
+        self.name, self._node, self._gap = name, node, _GAP * period
+        self.values = self.results = self.commands = self.fallbacks = self.late = 0
+        self.number = 0
         self.broken: list[str] = []
         self._ramp = self._held = -1
         self._seen = self._written = -1e9
         self._requests: dict[str, int] = {}
         self._sent: dict[str, float] = {}
         self.slowest, self._is_quiet = 0.0, True
+        if sys.argv[3:] != ['listen']:
+            node.create_timer(period, self.write)
         self._publisher = node.create_publisher(Int16MultiArray, f'{name}/write/command', 10)
         for tag, take in (('ramp', self._take_ramp), ('held', self._take_held)):
             node.create_subscription(Int16MultiArray, f'{name}/read/{tag}', take, latched_qos())
         node.create_subscription(
             DiagnosticStatus, f'{name}/write_results', self._take_result, 1000)
 
+    def count_anew(self) -> None:
+        """Forget what was counted, not what was seen."""
+        self.values = self.results = self.commands = self.fallbacks = self.late = 0
+        self._sent.clear()
+        self.slowest = 0.0
+
     def write(self) -> None:
         """Send the next command."""
         self.number += 1
+        self.commands += 1
         label = f'{self.name} {self.number}'
         self._sent[str(self.number)] = time.monotonic()
         self._publisher.publish(Int16MultiArray(
@@ -70,7 +82,7 @@ class Line:
 
     def look(self, now: float) -> None:
         """Say when no more values come, and when they come again."""
-        if self._is_quiet != (now - self._seen > _GAP):
+        if self._is_quiet != (now - self._seen > self._gap):
             self._is_quiet = not self._is_quiet
             number = self.name.split('/')[1].removeprefix('line_')
             print('quiet' if self._is_quiet else 'back', number, flush=True)
@@ -111,7 +123,8 @@ class Line:
         request = next((pair.value for pair in result.values if pair.key == 'request'), '')
         self._requests[request] = self._requests.get(request, 0) + 1
         if self._requests[request] > 1:
-            self.broken.append(f'{request} has {self._requests[request]} results')
+            self.broken.append(
+                f'{request} has {self._requests[request]} results: {result.message}')
         if request.startswith(f'{self.name} ') and request.split()[1] in self._sent:
             self.slowest = max(self.slowest, time.monotonic() - self._sent.pop(request.split()[1]))
         if result.message == 'written':
@@ -122,9 +135,8 @@ def main() -> int:
     """Look until the input ends; return 1 where something was broken."""
     rclpy.init()
     node = Node('observer')
-    lines = [Line(node, f'/line_{number}/abdf1') for number in range(1, int(sys.argv[1]) + 1)]
-    for line in lines:
-        node.create_timer(_WRITES, line.write)
+    lines = [Line(node, f'/line_{number}/abdf1', float(sys.argv[2]))
+             for number in range(1, int(sys.argv[1]) + 1)]
     said = ['']
 
     def look() -> None:
@@ -143,12 +155,18 @@ def main() -> int:
 
     is_broken: list[str] = []
     node.create_timer(_LOOKS, look)
-    ended = threading.Event()
-    threading.Thread(target=partial(_wait_for_end, ended), daemon=True).start()
-    while not ended.is_set():
+    said_to_us: SimpleQueue[str] = SimpleQueue()
+    threading.Thread(target=partial(_listen, said_to_us), daemon=True).start()
+    while True:
         rclpy.spin_once(node, timeout_sec=0.1)
+        if said_to_us.empty():
+            continue
+        if not said_to_us.get():
+            break
+        for line in lines:
+            line.count_anew()
     print(f'{sum(line.values for line in lines)} values, '
-          f'{sum(line.number for line in lines)} commands, '
+          f'{sum(line.commands for line in lines)} commands, '
           f'{sum(line.results for line in lines)} results, '
           f'{sum(line.fallbacks for line in lines)} fallbacks by timeout, '
           f'{sum(line.late for line in lines)} writes too late, '
@@ -158,9 +176,11 @@ def main() -> int:
     return int(bool(is_broken))
 
 
-def _wait_for_end(ended: threading.Event) -> None:
-    sys.stdin.read()
-    ended.set()
+def _listen(said_to_us: SimpleQueue[str]) -> None:
+    """Pass each line of the input on, and an empty text at its end."""
+    for line in iter(sys.stdin.readline, ''):
+        said_to_us.put(line)
+    said_to_us.put('')
 
 
 if __name__ == '__main__':
