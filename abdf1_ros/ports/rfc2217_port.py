@@ -31,7 +31,7 @@ import time
 
 from abdf1_ros.ports.descriptor import DescriptorPort
 from abdf1_ros.ports.settings import PortSettings
-from abdf1_ros.ports.socket_port import connected
+from abdf1_ros.ports.socket_port import connected, ServerPort
 
 _NEGOTIATION_TIMEOUT = 3.0
 
@@ -83,7 +83,7 @@ _MOST_SUBOPTION = 300
 def open_port(settings: PortSettings) -> DescriptorPort:
     """Connect to a device server and set its serial port; raises OSError."""
     connection = connected(settings.name)
-    port = Rfc2217Port(connection)
+    port = Rfc2217Port(connection, settings.name)
     try:
         port.negotiate(settings)
     except OSError:
@@ -92,11 +92,11 @@ def open_port(settings: PortSettings) -> DescriptorPort:
     return port
 
 
-class Rfc2217Port(DescriptorPort):
+class Rfc2217Port(ServerPort):
     """The port of a device server; call ``negotiate`` first, which sets it."""
 
-    def __init__(self, connection: socket.socket) -> None:
-        super().__init__(connection.fileno(), connection.close)
+    def __init__(self, connection: socket.socket, url: str) -> None:
+        super().__init__(connection, url)
         self._offered = {_Option.COM_PORT, _Option.BINARY, _Option.SUPPRESS_GO_AHEAD}
         self._asked = set(self._offered)
         self._is_accepted = False

@@ -23,8 +23,10 @@ answers that there is none, and the server's port is free (RFC 9293, section 3.5
 
 from __future__ import annotations
 
+from collections import deque
 import errno
 import socket
+import time
 from urllib.parse import urlsplit
 
 from abdf1_ros.ports.descriptor import DescriptorPort
@@ -44,11 +46,49 @@ _LOCAL_PORT_TAKEN = (errno.EADDRINUSE, errno.EADDRNOTAVAIL)
 # Our port of the last connection to each far address.
 _local_ports: dict[tuple[object, ...], int] = {}
 
+# So many connections ended by the server, within so many seconds, have a common cause.
+_MOST_ENDS, _ENDS_PERIOD = 3, 10.0
+_ENDS_CAUSE = (
+    f'{_MOST_ENDS} times within {_ENDS_PERIOD:.0f} s: another client has this line, or takes it '
+    'each time (then let the device server refuse a second client), or the inactivity time of the '
+    'server is too short')
+
+# When the server of each URL has ended our last connections.
+_ends: dict[str, deque[float]] = {}
+
+
+class ServerPort(DescriptorPort):
+    """A port of a device server: tells why the server ends one connection after the other."""
+
+    def __init__(self, connection: socket.socket, url: str) -> None:
+        super().__init__(connection.fileno(), connection.close)
+        self._url = url
+
+    def _take(self) -> bytes:
+        try:
+            return super()._take()
+        except OSError as error:
+            raise self._ended(error) from None
+
+    def write(self, data: bytes) -> None:
+        try:
+            super().write(data)
+        except (ConnectionResetError, BrokenPipeError) as error:
+            raise self._ended(error) from None
+
+    def _ended(self, error: OSError) -> OSError:
+        """Record an end of a connection; return the error with the cause, where that is known."""
+        ends = _ends.setdefault(self._url, deque(maxlen=_MOST_ENDS))
+        ends.append(time.monotonic())
+        if error.errno == errno.ETIMEDOUT or len(ends) < _MOST_ENDS or (
+                ends[-1] - ends[0] > _ENDS_PERIOD):
+            return error
+        return OSError(f'{error.strerror or error}, {_ENDS_CAUSE}')
+
 
 def open_port(settings: PortSettings) -> DescriptorPort:
     """Connect to a device server; raises OSError."""
-    connection = connected(settings.name)
-    return DescriptorPort(connection.fileno(), connection.close)
+    return ServerPort(connected(settings.name), settings.name)
 
 
 def connected(url: str) -> socket.socket:

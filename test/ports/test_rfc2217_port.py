@@ -51,7 +51,7 @@ def wake() -> Iterator[int]:
 def ends() -> Iterator[tuple[Rfc2217Port, socket.socket]]:
     ours, theirs = socket.socketpair()
     theirs.settimeout(PATIENCE)
-    yield Rfc2217Port(ours), theirs
+    yield Rfc2217Port(ours, 'rfc2217://here'), theirs
     ours.close()
     theirs.close()
 

@@ -28,6 +28,30 @@ _TCP_REPAIR = 19  # of Linux: a socket that is closed in this state sends nothin
 _TRIES = 20
 
 
+class NewestClientServer:
+    """A server that throws its client out for the next one, as ser2net does with kickolduser."""
+
+    def __init__(self) -> None:
+        self._listening = socket.create_server(('127.0.0.1', 0))
+        self.address = self._listening.getsockname()
+        threading.Thread(target=self._accept, daemon=True).start()
+
+    def _accept(self) -> None:
+        client: socket.socket | None = None
+        while True:
+            try:
+                newest, _ = self._listening.accept()
+            except OSError:
+                return
+            newest.sendall(b'!')
+            if client is not None:
+                client.close()
+            client = newest
+
+    def close(self) -> None:
+        self._listening.close()
+
+
 class OneClientServer:
     """A server that takes one client, and closes the connections of all others at once."""
 
@@ -109,3 +133,22 @@ def test_local_port_that_is_not_free_yet_is_no_obstacle(server: OneClientServer)
         give_up = time.monotonic() + PATIENCE
         while not answers(server):  # until the server has seen the end of the one before
             assert time.monotonic() < give_up
+
+
+def test_client_that_is_thrown_out_again_and_again_is_told_of_the_other_one() -> None:
+    server = NewestClientServer()
+    url = 'socket://{}:{}'.format(*server.address)
+    said = []
+    for _ in range(4):
+        port = open_port(PortSettings(url))
+        assert port.read(PATIENCE, port.fileno()) == b'!'  # type: ignore[attr-defined]
+        with socket.create_connection(server.address), pytest.raises(OSError) as caught:
+            port.read(PATIENCE, port.fileno())  # type: ignore[attr-defined]
+        port.close()
+        said.append(str(caught.value))
+    server.close()
+    assert said[:2] == 2 * ['the other end has closed the connection']
+    assert said[2:] == 2 * [
+        'the other end has closed the connection, 3 times within 10 s: another client has this '
+        'line, or takes it each time (then let the device server refuse a second client), or the '
+        'inactivity time of the server is too short']

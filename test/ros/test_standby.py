@@ -169,7 +169,8 @@ def test_line_that_was_lost_for_a_moment_has_its_active_stations_again(pair: Pai
     stations.values([2] + 15 * [0])
 
 
-def test_spare_in_the_queue_of_a_device_server_waits(tmp_path: Path) -> None:
+def test_spare_in_the_queue_of_a_device_server_waits_and_blames_no_plc(
+        tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
     with socket.create_server(('127.0.0.1', 0)) as server, Observer() as ros:  # accepts, is silent
         write_csv(tmp_path / 'net.csv', NET.splitlines()[0], NET.splitlines()[1:])
         write_csv(tmp_path / 'map.csv', ROWS.splitlines()[0], ROWS.splitlines()[1:])
@@ -186,3 +187,4 @@ def test_spare_in_the_queue_of_a_device_server_waits(tmp_path: Path) -> None:
             assert not {service.srv_name[2:] for service in spare.services} & {*SERVICES}
         finally:
             ros.end(spare)
+    assert 'before the PLC has confirmed' not in capfd.readouterr().err

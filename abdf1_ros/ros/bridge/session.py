@@ -237,12 +237,16 @@ class Session:
         self._wake_link()
 
     def wait_for_plcs(self, give_up: float, what: str) -> None:
-        """Wait for the PLCs to confirm, at most to a monotonic clock value; log the open rows."""
+        """
+        Wait for the PLCs to confirm, at most to a monotonic clock value; log the open rows.
+
+        A spare without the line has no open rows: they are those of the bridge that has the line.
+        """
         interlocks, link = self.driver.interlocks, self._surroundings.link
         while link.state.is_open and link.is_alive() and not interlocks.is_over \
                 and time.monotonic() < give_up:
             time.sleep(_GLANCE)
-        if tags := interlocks.unconfirmed():
+        if not self.is_waiting and (tags := interlocks.unconfirmed()):
             self._surroundings.node.get_logger().error(
                 f'{what} before the PLC has confirmed: {first(tags)}')
 
