@@ -554,12 +554,14 @@ def test_faulty_parameter_is_told_in_one_line(
      'put quotes around a text with [ or :; '),
     (['--ros-args', '--help'], "write this before --ros-args: ['--help']"),
     (['--ros-args', '-r', '__ns:=cell'], 'a namespace begins with "/"; '),
+    (['--ros-args', '-r', '__ns:=/cell//x'], 'a namespace has names of letters, digits and '
+     'underscores, each after one "/"; '),
     (['--ros-args', '__ns:=/cell'], "-r is missing before ['__ns:=/cell']"),
     (['--ros-args', '-p'], "Couldn't parse trailing -p flag."),
     (['--ros-args', '--bogus'], '--bogus'),
     (['--ros-args', '-r', f'__ns:=/{240 * "n"}'], "length should not exceed '255U - 8U'")],
-    ids=['remap', 'colon', 'bare', 'list', 'help', 'namespace', 'bare_name', 'parameter',
-         'unknown', 'long'])
+    ids=['remap', 'colon', 'bare', 'list', 'help', 'namespace', 'slashes', 'bare_name',
+         'parameter', 'unknown', 'long'])
 def test_unusable_arguments_are_told_in_one_line(
         refusal: Callable[..., list[str]], arguments: list[str], expected: str) -> None:
     lines = refusal(*arguments)
@@ -567,6 +569,19 @@ def test_unusable_arguments_are_told_in_one_line(
     assert line.startswith('abdf1: bad arguments: ')
     assert expected in line
     assert 'Traceback' not in ' '.join(lines)
+
+
+def test_security_that_ros_may_leave_out_is_told(
+        refusal: Callable[..., list[str]], monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv('ROS_SECURITY_ENABLE', 'true')
+    monkeypatch.setenv('ROS_SECURITY_KEYSTORE', '')
+    first, *_ = refusal(*ros_args(*EXAMPLE_FILES, 'gain:=3'))
+    assert first.startswith('[WARN] [')
+    assert 'ROS_SECURITY_STRATEGY is not Enforce: if ROS finds no keys, it starts without' in first
+    monkeypatch.setenv('ROS_SECURITY_STRATEGY', 'Enforce')
+    assert refusal(status=1) == [
+        'abdf1: ROS does not start: failed to initialize rcl: error not set; ROS_SECURITY_ENABLE '
+        'is true: set ROS_SECURITY_KEYSTORE, too']
 
 
 def test_what_may_pass_at_the_start_has_the_status_of_a_fault(

@@ -78,8 +78,15 @@ _ADVICE = (
     (r"parameter override rule: '-p \w+=", 'a parameter is NAME:=VALUE, with a colon; '),
     (r"override rule: '-p [\w.]+:=\[", 'put quotes around a text with [ or :; '),
     (r"^\['--?[hv]", 'write this before --ros-args: '),
+    (r'remap rule: .*__ns:=/', 'a namespace has names of letters, digits and underscores, each '
+     'after one "/"; '),
     (r'remap rule: .*__ns:=', 'a namespace begins with "/"; '),
     (r'remap rule: .*__(?:node|name):=', 'a node name has letters, digits and underscores; '))
+
+
+_NOT_ENFORCED = (
+    'ROS_SECURITY_STRATEGY is not Enforce: if ROS finds no keys, it starts without security, and '
+    'any program on the network can write to the PLC')
 
 
 def make_parser(usage: str, description: str) -> argparse.ArgumentParser:
@@ -131,6 +138,8 @@ def run_ros(name: str, parser: argparse.ArgumentParser,
                 _check_arguments(parser, usable)
                 stack.enter_context(Console(_log_file(name, usable)))
                 _begin(usable)
+            if _wants_security() and os.environ.get('ROS_SECURITY_STRATEGY') != 'Enforce':
+                get_logger(name).warning(_NOT_ENFORCED)
             made = _made(make, given)
         except ConfigurationError as error:
             for problem in error.problems:
@@ -199,6 +208,10 @@ def _begin(given: list[str]) -> None:
         raise rclpy_implementation.RCLError(str(error)) from error
 
 
+def _wants_security() -> bool:
+    return os.environ.get('ROS_SECURITY_ENABLE') == 'true'
+
+
 def _made(make: Callable[[Sequence[str]], Program], given: list[str]) -> Program:
     try:
         return make(given)
@@ -250,6 +263,8 @@ def _refusal(error: Exception) -> tuple[int, str]:
     may_pass = isinstance(error, RuntimeError) and \
         not isinstance(error, rclpy_implementation.UnknownROSArgsError)
     if may_pass and not _BAD_ARGUMENTS.search(text):
-        return EXIT_FAULT, f'ROS does not start: {text}'
+        hint = '; ROS_SECURITY_ENABLE is true: set ROS_SECURITY_KEYSTORE, too' \
+            if text.endswith('error not set') and _wants_security() else ''
+        return EXIT_FAULT, f'ROS does not start: {text}{hint}'
     advice = next((advice for pattern, advice in _ADVICE if re.search(pattern, text)), '')
     return EXIT_CONFIGURATION, f'bad arguments: {advice}{text}'
