@@ -27,6 +27,7 @@ from abdf1_ros.cli.plc.session import Session
 from abdf1_ros.cli.terminal import colour, GREEN, RED, YELLOW
 from abdf1_ros.counters import Counters
 from abdf1_ros.df1.echo import COMES_BACK
+from abdf1_ros.df1.frames import Duplex
 from abdf1_ros.df1.packet import is_local_status
 from abdf1_ros.errors import (
     Abdf1Error,
@@ -110,7 +111,7 @@ def look_at(session: Session, station: int) -> Presence:
     except Abdf1Error as caught:
         error = caught
     seconds = time.monotonic() - started
-    if identity is not None and session.via not in (None, station):
+    if identity is not None and _may_be_of_gateway(session, station, identity):
         error = _refusal_of_gateway(session, station)
         if error is None and identity.has_no_processor:
             error = FormatError(f'the gateway answers for this station, as {identity}')
@@ -124,6 +125,13 @@ def look_at(session: Session, station: int) -> Presence:
     is_there = takes_commands or (
         is_reached and session.stations[station].last_heard is not None)
     return Presence(station, seconds, identity, error, is_there, takes_commands)
+
+
+def _may_be_of_gateway(session: Session, station: int, identity: Identity) -> bool:
+    """Return True if a gateway may have answered for another station."""
+    if session.via is None:
+        return identity.has_no_processor and session.network.duplex is not Duplex.HALF
+    return session.via != station
 
 
 def _refusal_of_gateway(session: Session, station: int) -> Abdf1Error | None:

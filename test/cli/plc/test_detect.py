@@ -347,3 +347,14 @@ def test_nodes_that_are_stations_of_the_line_are_found_without_via(
     device.stations = frozenset(range(32, 64))
     said = detected(tmp_path / 'line', device, capsys, '--duplex', 'half', '--stations', '38-43')
     assert 'station 41 SLC 5/03' in said and 'plc read N7:0 --station 41' in said
+
+
+def test_gateway_in_full_duplex_that_answers_diagnostics_for_all_has_the_nodes_that_a_read_finds(
+        tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    device = OddDevice(Wiring.FULL, 9)
+    device.executes_diagnostics = True
+    device.identities.update(dict.fromkeys(range(64), KE))
+    said = detected(tmp_path / 'line', device, capsys, '--duplex', 'full')
+    assert 'station 1 not reached, a gateway answers for it: STS 02' in said
+    assert '1 of 64 stations answer' in said
+    assert 'the gateway answers for this station, as 1785-KE' in said.partition('      9 ')[2]
