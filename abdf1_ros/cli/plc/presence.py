@@ -157,32 +157,41 @@ def _basic_read() -> Steps[None]:
 
 
 def scan(network: Network, stations: Sequence[int], via: int | None = None,
-         show: Callable[[str], None] = lambda text: None) -> Iterator[Presence]:
+         show: Callable[[str], None] = lambda text: None,
+         complain: Callable[[str], None] = lambda text: None) -> Iterator[Presence]:
     """
     Yield the presence of every station, ``via`` a gateway; raises OSError and PortLost.
 
     Silent stations are asked again at the end: a lost frame does not prove absence. ``show`` gets
-    a text about the present station. On a line with station numbers we use a free number.
+    a text about the present station, ``complain`` the traffic if a silent station was heard. On a
+    line with station numbers we use a free number.
     """
     if not network.line_mode.has_one_plc and not network.line_mode.is_polled:
         network = replace(network, station=free_station(network.station, stations))
     with Session(network, absent=stations, via=via) as session:
         left: Sequence[int] = stations
+        counters, has_lost = session.counters, False
         for asked in range(1, _MOST_ROUNDS + 1):
-            damaged = session.counters.damaged_frames
+            damaged, loses = counters.damaged_frames, False
             silent = []
             for count, station in enumerate(left, 1):
                 show(f'station {count} of {len(left)}{again(asked)}')
+                heard = counters.chars_received
                 presence = replace(look_at(session, station), asked=asked)
                 if presence.is_settled:
                     yield presence
-                else:
-                    silent.append(presence)
-            loses = session.counters.damaged_frames > damaged or len(silent) < len(left)
+                    continue
+                silent.append(presence)
+                loses |= counters.chars_received > heard and not session.echoes
+            loses |= counters.damaged_frames > damaged
+            has_lost |= loses
+            loses |= len(silent) < len(left)
             left = [presence.station for presence in silent]
             if not left or asked == _MOST_ROUNDS or asked > 1 and not loses:
                 break
         yield from silent
+        if silent and has_lost:
+            complain(traffic(counters, session.stray))
 
 
 def again(asked: int) -> str:
@@ -286,7 +295,8 @@ def hint(session: Session, error: Abdf1Error) -> str:
 def traffic(counters: Counters, stray: str = '') -> str:
     """Return the numbers of frames sent and received, for a user who gets no answer."""
     again = counters.nak_retries + counters.enq_retries
-    came = [counted(counters.damaged_frames, 'damaged frame'),
+    came = [counted(counters.chars_received, 'character'),
+            counted(counters.damaged_frames, 'damaged frame'),
             f'{counters.naks_received} NAK'] + [stray] * bool(stray)
     return (f'sent: {counted(counters.commands_sent, "command")}, '
             f'{counted(counters.polls_sent, "poll")}, {counted(again, "repetition")} included; '

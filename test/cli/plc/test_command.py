@@ -84,7 +84,7 @@ def test_ping_of_nobody_has_status_1_and_says_that_nothing_came(plc: Plc) -> Non
     assert said.err.count('2509 ERR_INACTIVE_STATION: Slave Station (9) Inactive') == 2
     assert said.err.count('not one character came') == said.err.count('plc: sent: ') == 1
     assert said.err.endswith('plc: sent: 1 command, 1 poll, 3 repetitions included; received: '
-                             '0 damaged frames, 0 NAK\n')
+                             '0 characters, 0 damaged frames, 0 NAK\n')
 
 
 def test_scan_lists_who_answers_and_counts_them(plc: Plc) -> None:

@@ -149,7 +149,7 @@ def test_plc_that_has_our_usual_number_is_found(tmp_path: Path, capsys: Output) 
 @pytest.mark.usefixtures('half_duplex_only')
 def test_plc_that_falls_silent_after_it_was_found(
         port: str, tmp_path: Path, capsys: Output, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr('abdf1_ros.cli.plc.presence.scan', lambda *_: [])
+    monkeypatch.setattr('abdf1_ros.cli.plc.presence.scan', lambda *_, **options: [])
     assert main(['init', '--port', port, '--into', str(tmp_path), '--baud', '19200',
                  '--stations', '1', *PATIENT]) == 0
     assert 'watch S:0 --station 1 --net' in capsys.readouterr().out

@@ -21,6 +21,7 @@ from types import SimpleNamespace
 from typing import cast
 
 from abdf1_ros.cli.plc import presence
+from abdf1_ros.cli.plc.command import main
 from abdf1_ros.cli.plc.presence import describe, hint, look_at, Presence, scan, type_to_say
 from abdf1_ros.cli.plc.session import Session
 from abdf1_ros.df1.checksum import Checksum
@@ -39,7 +40,8 @@ from abdf1_ros.settings.network import Network
 from abdf1_ros.simulator.gateway import SimulatedGateway
 import pytest
 from support.driver_bench import simulated_plc
-from support.plc_line import LosesPolls, plc_line
+from support.odd_device import OddDevice, Wiring
+from support.plc_line import LosesPolls, odd_line, plc_line
 from support.ptys import Pty
 
 IDENTITY = Identity(
@@ -217,5 +219,20 @@ def test_scan_of_nobody_ends_after_two_rounds(tmp_path: Path) -> None:
 def test_scan_asks_more_often_while_frames_come_damaged(tmp_path: Path) -> None:
     plc = simulated_plc(1, 'SLC', time.monotonic)
     with plc_line(tmp_path / 'line', plc, around=Damages) as name:
-        seen, = scan(Network(com_port=name, timeout=1000, enq_retries=0), [1])
+        said: list[str] = []
+        seen, = scan(Network(com_port=name, timeout=1000, enq_retries=0), [1],
+                     complain=said.append)
     assert (seen.is_there, seen.takes_commands, seen.asked) == (True, False, 4)
+    assert [text.rpartition('received: ')[2] for text in said] == [
+        '148 characters, 4 damaged frames, 0 NAK']
+
+
+def test_scan_says_what_came_where_noise_makes_symbols_of_the_answers(
+        tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    device = OddDevice(Wiring.HALF, 1)
+    device.say = lambda data: b'\x10' + bytes((data[1] ^ 0x55,)) + data[2:]
+    with odd_line(tmp_path / 'line', device) as name:
+        assert main(['scan', '1-2', '--port', name]) == 1
+    said = capsys.readouterr()
+    assert '0 of 2 stations answer; silent stations were asked 4 times' in said.out
+    assert 'received: 8 characters, 0 damaged frames, 0 NAK' in said.err

@@ -25,6 +25,7 @@ import argparse
 from abdf1_ros.cli.plc import presence
 from abdf1_ros.cli.plc.line import MODES, network_of
 from abdf1_ros.cli.plc.options import add_line, stations_option
+from abdf1_ros.cli.plc.session import complain
 from abdf1_ros.cli.terminal import EXIT_FAILED, Progress
 
 _ONE_PLC_ANSWERS_TO_ALL = (
@@ -45,7 +46,8 @@ def run(options: argparse.Namespace) -> int:
     found = 0
     asked = 1
     network = network_of(options)
-    for there in presence.scan(network, options.stations, options.via, progress.show):
+    for there in presence.scan(
+            network, options.stations, options.via, progress.show, complain):
         if there.is_there:
             if not found:
                 print('station    answer  processor')
