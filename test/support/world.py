@@ -662,6 +662,8 @@ class World(DriverBench):
         if begun < len(STX):
             return  # responses: after a pause some go out together
         station, tail = data[begun], data[begun:]
+        if tail[1] != OURS:
+            return  # a message that we pass on for a slave
         for name, begin in self._begins.items():
             at = tail.find(begin)
             if at >= 0:

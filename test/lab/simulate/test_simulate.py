@@ -34,6 +34,7 @@ from simulate.rules import (
 )
 from simulate.run import simulate, Story
 from simulate.steady import Steady
+from support.devices import DEVICES
 from support.world import GUESTS, MODES, Plant, POLLED, Said, Sent, STEP, World
 
 
@@ -90,6 +91,15 @@ def test_command_of_a_guest_that_is_too_old_is_found() -> None:
     rule.sent(Sent(12.0, 1, 'free_1', GUESTS[0], is_again=True))
     with pytest.raises(Broken):
         rule.sent(Sent(10.6, 1, 'free_1', GUESTS[0], is_again=False))
+
+
+def test_message_that_a_master_passes_on_is_none_of_ours() -> None:
+    world = World(Plant('Message'), seed=1)
+    device, = (each for each in DEVICES if each.name == 'messages_before_the_reply')
+    world.behave_oddly(device)
+    world.run(4.0)
+    assert world.driver.counters.commands_received > 4
+    assert {entry.tag for entry in world.sent} <= {*world.rows}
 
 
 @pytest.mark.parametrize('mode', ['Standard', 'Slave'])
