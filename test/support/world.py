@@ -149,8 +149,9 @@ class Plant:
             dice.choice([1, 2]), dice.choice([0.5, 2.0]), dice.random() < 0.06,
             dice.choice([0, 0, 50, 100]), dice.random() < 0.4)
         is_held = mode in ('Message', 'Peer', 'Gateway') and dice.random() < 0.5
-        # Of a fast line in two packets.
-        return replace(plant, held=0 if not is_held else 140 if plant.baud > 19200 else 21)
+        # Of a fast line in two packets; of a slow one in a reply that takes longer than Timeout.
+        held = 140 if plant.baud > 19200 else 100 if plant.baud < 19200 else 21
+        return replace(plant, held=held if is_held else 0)
 
     @property
     def network(self) -> Network:

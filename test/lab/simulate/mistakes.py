@@ -19,11 +19,12 @@ Make a mistake in each rule, and see how soon the simulation finds it.
 many plants, hours of line time and seconds of processor time. The status is 1 where one is not
 found within ``--seconds``.
 
-A simulated plant has no terminal, disk, ROS or device, and its reads are short. So mistakes there
-are for other tests: a log that the link waits for (test/ros/test_console.py,
-test/ports/test_trace.py), exceptions from outside (test/ros/test_node.py, test/ros/test_lines.py),
-two masters on one line (test/ports/test_serial_device.py), how long the process lets an end take
-(test/plan/test_plan_interlocks.py), and long replies (test/driver/test_slow_replies.py).
+A simulated plant has no terminal, disk, ROS or device. So mistakes there are for other tests: a
+log that the link waits for (test/ros/test_console.py, test/ports/test_trace.py), exceptions from
+outside (test/ros/test_node.py, test/ros/test_lines.py), two masters on one line
+(test/ports/test_serial_device.py), and how long the process lets an end take
+(test/plan/test_plan_interlocks.py). Long replies at other speeds are for
+test/driver/test_slow_replies.py.
 """
 
 from __future__ import annotations
@@ -43,6 +44,7 @@ from unittest import mock
 if __name__ == '__main__':  # pytest has its own paths
     sys.path[:0] = [str(Path(__file__).parents[number]) for number in (1, 2, 3)]
 
+from abdf1_ros.df1.machine import Machine
 from abdf1_ros.df1.master import HalfDuplexMaster
 from abdf1_ros.df1.packet import Packet
 from abdf1_ros.driver.agenda import Agenda
@@ -310,6 +312,17 @@ def _proves_for_long(proof: Any) -> Any:
     return prove_wrongly
 
 
+def _looks_too_late(spare_time: Any) -> Any:
+    def spare_wrongly(self: Machine) -> float:
+        deadline, self.deadline = self.deadline, None
+        try:
+            return spare_time.fget(self)  # type: ignore[no-any-return]
+        finally:
+            self.deadline = deadline
+
+    return property(spare_wrongly)
+
+
 def _always(value: Any) -> Callable[[Any], Any]:
     return lambda before: lambda *arguments, **named: value
 
@@ -395,6 +408,8 @@ MISTAKES = (
     Mistake('values', 'a read that stood still is published', job, 'MOST_LATE',
             lambda before: math.inf),
     Mistake('values', 'a reload keeps the Length of before', Block, 'slice_of', _keeps_places),
+    Mistake('link', 'a long reply is looked at after its deadline', Machine, 'spare_time',
+            _looks_too_late),
     Mistake('link', 'what comes again is not known', Packet, 'duplicate_key',
             lambda before: property(lambda self: object())),
     Mistake('served', 'a refused command is undone in its first word', _MappedTable, 'take_back',
