@@ -47,7 +47,7 @@ from abdf1_ros.df1.settings import LinkSettings
 from abdf1_ros.df1.slave_link import SLAVE
 from abdf1_ros.df1.stations import MAX_STATION
 from abdf1_ros.errors import FormatError, RemoteError
-from abdf1_ros.numbers import Kind, member_of, one_of
+from abdf1_ros.numbers import member_of, one_of, ValueKind
 from abdf1_ros.open_line import LOG, OpenLine, plain, single, text_of, values_of
 from abdf1_ros.pccc import steps
 from abdf1_ros.pccc.access import Access
@@ -285,7 +285,7 @@ def _seconds(name: str, value: Any) -> float:
                       f'{_LONGEST:.0f}{hint}')
 
 
-def _choice(name: str, kind: Kind[_T], value: Any) -> _T:
+def _choice(name: str, kind: ValueKind[_T], value: Any) -> _T:
     """Return what is meant by a value, in any letter case."""
     found = kind.read(value) if isinstance(value, str) else None
     if found is None:

@@ -62,7 +62,7 @@ def two_readings(text: str) -> str:
 
 
 @dataclass(frozen=True, slots=True)
-class Kind(Generic[_Meaning_co]):
+class ValueKind(Generic[_Meaning_co]):
     """
     The kind of value of a cell, an option or an argument.
 
@@ -82,26 +82,26 @@ class Kind(Generic[_Meaning_co]):
         return (self.why_not and self.why_not(text)) or f'should be {self.right}'
 
 
-TEXT = Kind(str)
+TEXT = ValueKind(str)
 
 
-def whole(low: int, high: int, unit: str = '') -> Kind[int]:
+def whole(low: int, high: int, unit: str = '') -> ValueKind[int]:
     """Return the kind of whole numbers in a range."""
     def read(text: str) -> int | None:
         value = whole_number(text)
         return value if value is not None and low <= value <= high else None
-    return Kind(read, f'a whole number from {low} to {high} {unit}'.rstrip(), low, high)
+    return ValueKind(read, f'a whole number from {low} to {high} {unit}'.rstrip(), low, high)
 
 
-def one_of(known: Mapping[str, _T], spelled: Callable[[str], object] = str.lower) -> Kind[_T]:
+def one_of(known: Mapping[str, _T], spelled: Callable[[str], object] = str.lower) -> ValueKind[_T]:
     """Return the kind of choices by name; two texts that are ``spelled`` alike are the same."""
     meanings = {spelled(name): meaning for name, meaning in known.items()}
     choices = tuple(filter(None, known))
-    return Kind(lambda text: meanings.get(spelled(text)), f'one of {", ".join(choices)}',
-                choices=choices)
+    return ValueKind(lambda text: meanings.get(spelled(text)), f'one of {", ".join(choices)}',
+                     choices=choices)
 
 
 @functools.cache
-def member_of(kind: type[_Member]) -> Kind[_Member]:
+def member_of(kind: type[_Member]) -> ValueKind[_Member]:
     """Return the kind of the members of an enumeration, by value."""
     return one_of({str(member.value): member for member in kind})

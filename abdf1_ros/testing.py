@@ -136,7 +136,7 @@ class Bridge:
         return '; its last words:\n' + '\n'.join(lines[-10:]) if lines else ''
 
 
-class Observer(observer.Observer):
+class Observer(observer.ObservingNode):
     """
     A ROS node that observes other nodes from outside; it also runs nodes that are added.
 

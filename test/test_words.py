@@ -64,6 +64,15 @@ def test_no_two_classes_of_a_room_have_one_name() -> None:
     assert counts['driver', 'Driver'] == counts['pccc', 'Request'] == 1
 
 
+def test_no_two_classes_of_the_package_have_one_name() -> None:
+    """``conform`` shares nothing with the link that it judges, names included."""
+    counts = Counter(match['class'].lstrip('_') for module in MODULES
+                     if not module.startswith('conform/') for match in _NAMES.finditer(
+                         (PACKAGE / module).read_text(encoding='utf-8')) if match['class'])
+    assert [name for name, count in counts.items() if count > 1] == []
+    assert counts['Driver'] == 1
+
+
 # Of machines: reported, random, without effect, cleanly, a noun for the pronoun, and what does it.
 _IDIOMS = re.compile(
     r'\b(?:nobody|somebody|by chance|in vain|reckon with|(?:for|to) people'

@@ -38,7 +38,7 @@ import time
 from typing import NamedTuple
 from xml.sax.saxutils import escape
 
-from abdf1_ros.cli.monitor.view import render, Snapshot, Style, TextLine
+from abdf1_ros.cli.monitor.view import NodeView, render, Style, TextLine
 
 _ROOT = Path(__file__).resolve().parent.parent
 _NET, _MAP = 'config/net.csv', 'config/map.csv'
@@ -74,7 +74,7 @@ class Curve:
     pieces: list[list[Point]] = field(default_factory=list)
     _is_interrupted: bool = True
 
-    def take(self, snapshot: Snapshot, now: float) -> None:
+    def take(self, snapshot: NodeView, now: float) -> None:
         """Take the first value of the topic, if it is fresh; begin a piece after a pause."""
         for reading in snapshot.readings:
             if reading.topic != self.topic or reading.values is None:
@@ -176,7 +176,7 @@ def _graph(curve: Curve, left: int, top: int, now: float) -> Iterator[str]:
            'fill="#5a6572" font-size="11" text-anchor="end">now</text>')
 
 
-def stations_of(snapshot: Snapshot) -> list[str]:
+def stations_of(snapshot: NodeView) -> list[str]:
     """Return the number and the processor of each station."""
     return [f'{status.section.removeprefix("station ")}: '
             f'{status.values.get("processor", "").partition(" series")[0]}'

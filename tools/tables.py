@@ -25,7 +25,7 @@ from typing import Any
 from abdf1_ros.counters import numbered
 from abdf1_ros.df1.frames import Code
 from abdf1_ros.messages import Message, Severity
-from abdf1_ros.numbers import Kind
+from abdf1_ros.numbers import ValueKind
 from abdf1_ros.pccc.access import Access
 from abdf1_ros.pccc.describe import command_codes
 from abdf1_ros.pccc.dialect import Dialect
@@ -105,7 +105,7 @@ def net_fields() -> str:
          for name, value in Network().cells().items()))
 
 
-def _values(kind: Kind[Any]) -> str:
+def _values(kind: ValueKind[Any]) -> str:
     if kind.choices:
         return ', '.join(kind.choices)
     return '' if kind.low is None else f'{kind.low}-{kind.high}'

@@ -46,7 +46,7 @@ from abdf1_ros.cli.terminal import (
 )
 from abdf1_ros.driver.write import show
 from abdf1_ros.paths import config_file
-from abdf1_ros.ros.observer import Observer
+from abdf1_ros.ros.observer import ObservingNode
 from abdf1_ros.ros.topics.messages import latched_qos, MESSAGES
 from abdf1_ros.settings.map_file import load_mappings
 from abdf1_ros.settings.mapping import Mapping
@@ -125,7 +125,7 @@ class Missed(Exception):
     """A promised event has not happened; the text names the event."""
 
 
-class Bridge:
+class DemoBridge:
     """The node as a process; its output is printed between the lines of the story."""
 
     def __init__(self, folder: Path, *args: str) -> None:
@@ -157,7 +157,7 @@ class Bridge:
         self.relay()
 
 
-class Watcher(Observer):
+class Watcher(ObservingNode):
     """The robot cell: subscribes to all topics; keeps last values and statuses, all results."""
 
     def __init__(self, mappings: Sequence[Mapping], port: str) -> None:
@@ -240,7 +240,7 @@ class Stage:
         self._begin = time.monotonic()
         self._bridge_args = ('--ros-args', '-p', f'port:={link}', '-p', f'net_file:={net_file}',
                              '-p', f'map_file:={map_file}')
-        self._bridge: Bridge | None = None
+        self._bridge: DemoBridge | None = None
         self._lamps: dict[Lamp, float] = {}  # lamps that are on, with the time of the change
         self.step = 0  # number of the present step
         self.last_step = 0
@@ -259,7 +259,7 @@ class Stage:
             self._watcher.__exit__()
 
     def _start_bridge(self) -> None:
-        self._bridge = Bridge(self._folder, *self._bridge_args)
+        self._bridge = DemoBridge(self._folder, *self._bridge_args)
 
     def _lamp(self, station: str, lamp: Lamp, is_on: bool) -> None:
         """Record the lamps that are on; called in the thread of the PLCs, too."""

@@ -29,7 +29,7 @@ from typing import Any
 
 from abdf1_ros.df1.packet import BROADCAST
 from abdf1_ros.errors import FormatError
-from abdf1_ros.numbers import Kind, one_of, whole
+from abdf1_ros.numbers import one_of, ValueKind, whole
 from abdf1_ros.pccc.access import Access
 from abdf1_ros.pccc.families import FAMILIES, parse_range
 from abdf1_ros.pccc.processor import Processor
@@ -50,7 +50,7 @@ _LEFT_OUT = '?'
 _HEARTBEAT = Command.HEARTBEAT.value.lower()
 _STATION = whole(0, BROADCAST)
 _FAMILIES = {family.value: family for family in FAMILIES}
-_KINDS: dict[str, Kind[Any]] = {
+_KINDS: dict[str, ValueKind[Any]] = {
     'Station': _STATION, 'Via': _STATION, 'PLC_Type': one_of(_FAMILIES, family_name),
     'Access': one_of({way.value: way for way in Access} | {'Read': None}),
     'Processor': one_of({entry.value: entry for entry in Processor})}
@@ -104,7 +104,7 @@ def _net_rows(rows: list[Row]) -> list[list[str]]:
               for row in rows)]
 
 
-def _net_cell(column: str, text: str, kind: Kind[Any]) -> str:
+def _net_cell(column: str, text: str, kind: ValueKind[Any]) -> str:
     if not text:
         return ''
     if column == 'Com_Port':

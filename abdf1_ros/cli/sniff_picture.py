@@ -86,7 +86,7 @@ class _Episode:
 
 
 @dataclass(slots=True)
-class _Recording:
+class _Drawing:
     """
     The drawing of one recording, whose times increase.
 
@@ -122,7 +122,7 @@ class Timeline:
 
     def __init__(self, is_anonymous: bool = False) -> None:
         self._is_anonymous = is_anonymous
-        self._recordings: list[_Recording] = []
+        self._recordings: list[_Drawing] = []
         self._episodes: list[_Episode] = []
         self._latest: dict[tuple[object, ...], _Episode] = {}
         self._count = self._drawn = self._characters = 0
@@ -135,7 +135,7 @@ class Timeline:
         if not self._recordings or time < self._last:
             self._close()
             length = min(16.0, max(0.5, 19200 / baud)) if baud else 1.0
-            self._recordings.append(_Recording(len(self._recordings) + 1, length))
+            self._recordings.append(_Drawing(len(self._recordings) + 1, length))
         recording = self._recordings[-1]
         if chunk.time is None:
             recording.length, recording.unit = _CHARACTERS, 'bytes'
@@ -179,7 +179,7 @@ class Timeline:
         if look in _FAULTS:
             self._note_fault(entry, recording, strip.number, begin)
 
-    def _note_fault(self, entry: Entry, recording: _Recording, strip: int, place: float) -> None:
+    def _note_fault(self, entry: Entry, recording: _Drawing, strip: int, place: float) -> None:
         self._count += 1
         what = recording.number, entry.station, entry.kind, entry.marks
         time = f'{place:.3f} s' if recording.unit == 's' else f'byte {place:.0f}'
@@ -248,7 +248,7 @@ class Timeline:
             yield from _strips(recording)
 
 
-def _overview(recording: _Recording) -> Iterator[str]:
+def _overview(recording: _Drawing) -> Iterator[str]:
     """Yield the whole recording as one drawing, with the worst look of each moment."""
     numbers = [number for _, number in recording.seen]
     least, most = min(numbers), max(numbers) + 1
@@ -269,7 +269,7 @@ def _overview(recording: _Recording) -> Iterator[str]:
         yield f'<p>and {counted(more, "station")} more</p>'
 
 
-def _moment_of(recording: _Recording, station: int | None, numbers: list[int]) -> Bar:
+def _moment_of(recording: _Drawing, station: int | None, numbers: list[int]) -> Bar:
     """Return a bar for some strips of a station, with a link to the worst strip."""
     looks = {number: recording.seen[station, number] for number in numbers}
 
@@ -285,7 +285,7 @@ def _moment_of(recording: _Recording, station: int | None, numbers: list[int]) -
     return Bar(start, end, _RANKS[rank(worst)], title, link=link)
 
 
-def _strips(recording: _Recording) -> Iterator[str]:
+def _strips(recording: _Drawing) -> Iterator[str]:
     yield '<h2>Every message</h2>'
     yield key(_KEY)
     yield ('<p class="quiet">The upper half of a lane shows messages to the station, the lower '

@@ -104,7 +104,7 @@ class _Executed:
 
 
 @dataclass(slots=True)
-class _Command:
+class _SentCommand:
     """
     A command that waits for its reply, which is overdue at ``deadline`` (clock value in s).
 
@@ -152,7 +152,7 @@ class RadioNode(EqualNode):
         self._heard: deque[tuple[bytes, float]] = deque(maxlen=_MOST_HEARD)  # and when
         self._executed: defaultdict[int, deque[_Executed]] = defaultdict(
             lambda: deque(maxlen=MOST_UNDER_WAY))  # by SRC
-        self._under_way: dict[int, _Command] = {}  # by station
+        self._under_way: dict[int, _SentCommand] = {}  # by station
         self._sent: deque[bytes] = deque(maxlen=_MOST_SENT)
         self._begun = self._machine.now
 
@@ -183,7 +183,7 @@ class RadioNode(EqualNode):
     def _has_room(self) -> bool:
         return len(self._under_way) < self._most_under_way
 
-    def _overdue(self) -> _Command | None:
+    def _overdue(self) -> _SentCommand | None:
         """Return the command whose reply is overdue for the longest time, None for none."""
         first = min(self._under_way.values(), key=lambda command: command.deadline, default=None)
         return first if first and first.deadline <= self._machine.now else None
@@ -207,13 +207,13 @@ class RadioNode(EqualNode):
         is_once = not station.active or (
             keeps_others_waiting and not station.replies and self._stations.is_new(number))
         most = 1 if is_once else self._settings.nak_retries + 1
-        self._under_way[number] = command = _Command(task, most)
+        self._under_way[number] = command = _SentCommand(task, most)
         yield from self._try(command)
         if number == BROADCAST and not self._is_over(command):
             del self._under_way[number]
             task.reply(task.command.reply())
 
-    def _try(self, command: _Command) -> Procedure:
+    def _try(self, command: _SentCommand) -> Procedure:
         """Send a command, or once more; end it after the last try, or when it is too old."""
         task, number = command.task, command.task.command.dst
         if command.tries == command.most:
@@ -237,7 +237,7 @@ class RadioNode(EqualNode):
         command.tries += 1
         command.deadline = self._machine.sender.free_at + self._settings.cmd_timeout
 
-    def _send(self, data: bytes, command: _Command | None = None) -> Procedure:
+    def _send(self, data: bytes, command: _SentCommand | None = None) -> Procedure:
         """Send link data when the line is quiet, but no command that has its reply by then."""
         frame = frames.message_frame(data, self._settings.checksum)
         yield from self._wait_for_quiet(len(frame), command)
@@ -259,7 +259,7 @@ class RadioNode(EqualNode):
         while (left := self._machine.sender.free_at - self._machine.now) > 0:
             self._hear((yield Listen(left)))
 
-    def _wait_for_quiet(self, size: int, command: _Command | None) -> Procedure:
+    def _wait_for_quiet(self, size: int, command: _SentCommand | None) -> Procedure:
         """Wait until a frame of ``size`` characters may go, or its command has had its reply."""
         machine = self._machine
         if self._settings.avoids_collisions:
@@ -279,10 +279,10 @@ class RadioNode(EqualNode):
                 self._hear(symbol)
                 begun, pause = machine.now, quiet + self._random.uniform(0.0, most)
 
-    def _is_over(self, command: _Command) -> bool:
+    def _is_over(self, command: _SentCommand) -> bool:
         return self._under_way.get(command.task.command.dst) is not command
 
-    def _count_try(self, command: _Command) -> None:
+    def _count_try(self, command: _SentCommand) -> None:
         """Count and report a command that is sent again."""
         if command.tries:
             self._counters.nak_retries += 1

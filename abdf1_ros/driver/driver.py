@@ -58,7 +58,7 @@ from abdf1_ros.driver.inbox import Inbox
 from abdf1_ros.driver.interlocks.queue import Interlocks
 from abdf1_ros.driver.job_tasks import JobTasks
 from abdf1_ros.driver.overheard import Overheard
-from abdf1_ros.driver.reads.demands import Demand, ReadAnswer
+from abdf1_ros.driver.reads.demands import ReadAnswer, ReadCall
 from abdf1_ros.driver.reads.readings import Readings, ValueListener
 from abdf1_ros.driver.record import WriteRecord
 from abdf1_ros.driver.refused import RefusedCommands
@@ -215,7 +215,7 @@ class Driver:
             answer(ReadAnswer(error=f'Mode {self.network.mode}: nothing is sent'))
         elif self.interlocks.is_ending:
             answer(ReadAnswer(error=ENDS))
-        elif not self._demands.inbox.put(Demand(mapping, now, answer)):
+        elif not self._demands.inbox.put(ReadCall(mapping, now, answer)):
             answer(ReadAnswer(error=_NOT_OPEN))
 
     def refuse(self, mappings: Iterable[Mapping], reason: str,

@@ -179,7 +179,7 @@ def _target_of(link: Path) -> str:
         return ''
 
 
-class _Client(DescriptorPort):
+class _ClientPort(DescriptorPort):
     """
     The connection of the one client of a listening port.
 
@@ -241,7 +241,7 @@ class TcpEndpoint:
         for level, option, value in _OPTIONS:
             client.setsockopt(level, option, value)
         self._heard = monotonic()
-        return _Client(client, self._listener, partial(self._look, client))
+        return _ClientPort(client, self._listener, partial(self._look, client))
 
     def _look(self, client: socket.socket, has_said: bool) -> None:
         """Turn another client away, or raise OSError where it takes a place that is left."""

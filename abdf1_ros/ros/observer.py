@@ -40,7 +40,7 @@ def graph_hint() -> str:
     return '; ROS_DISCOVERY_SERVER is set: set ROS_SUPER_CLIENT=TRUE too' if is_client else ''
 
 
-class Observer:
+class ObservingNode:
     """
     A node with an executor of its own; nodes that are added to the executor run too.
 

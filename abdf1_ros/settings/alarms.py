@@ -19,7 +19,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from enum import Enum
 
-from abdf1_ros.numbers import Kind
+from abdf1_ros.numbers import ValueKind
 
 
 class AlarmLevel(Enum):
@@ -46,4 +46,4 @@ def _read(text: str) -> Alarm | None:
     return known.get(' '.join(text.upper().removesuffix(' 1').split()))
 
 
-ALARM = Kind(_read, 'WARN or ERROR, for a 1; WARN 0 or ERROR 0, for a 0')
+ALARM = ValueKind(_read, 'WARN or ERROR, for a 1; WARN 0 or ERROR 0, for a 0')

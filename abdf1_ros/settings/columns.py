@@ -22,7 +22,15 @@ from enum import Enum
 import math
 from operator import attrgetter
 
-from abdf1_ros.numbers import decimal_number, Kind, member_of, one_of, TEXT, two_readings, whole
+from abdf1_ros.numbers import (
+    decimal_number,
+    member_of,
+    one_of,
+    TEXT,
+    two_readings,
+    ValueKind,
+    whole,
+)
 from abdf1_ros.pccc.spellings import type_name
 from abdf1_ros.pccc.values import ValueType, WordOrder
 from abdf1_ros.settings.alarms import ALARM
@@ -42,7 +50,7 @@ _TOPICS = (Command.READ, *MESSAGES)
 _PLCS = (Command.READ, Command.WRITE, Command.READ_WRITE, Command.HEARTBEAT)
 
 
-def milliseconds_from(low: int, high: int) -> Kind[int]:
+def milliseconds_from(low: int, high: int) -> ValueKind[int]:
     """Return the kind of times in a range."""
     return replace(whole(low, high), right=f'ms from {low} to {high}')
 
@@ -63,12 +71,12 @@ def _period(text: str) -> int | str | None:
 
 
 _TIMES = whole(0, MAX_PERIOD, 'ms')
-_PERIOD = Kind(_period, f'{_TIMES.right}, or "{ON_DEMAND}"', 0, MAX_PERIOD)
+_PERIOD = ValueKind(_period, f'{_TIMES.right}, or "{ON_DEMAND}"', 0, MAX_PERIOD)
 
-_WORDS = Kind(lambda text: tuple(text.split()))
+_WORDS = ValueKind(lambda text: tuple(text.split()))
 _READ_WRITE = {'r/w', 'rw', 'read/write'}
 _TYPE = one_of({kind.value: kind for kind in ValueType}, type_name)
-_NUMBER = Kind(_number, 'a number', why_not=_clear_number)
+_NUMBER = ValueKind(_number, 'a number', why_not=_clear_number)
 
 
 def _command_name(text: str) -> str:
@@ -94,7 +102,7 @@ class Column:
     name: str
     default: str | None
     description: str
-    kind: Kind[object] | None = None
+    kind: ValueKind[object] | None = None
     attribute: str = ''
     commands: tuple[Command, ...] = tuple(Command)
     idle: tuple[Command, ...] = ()

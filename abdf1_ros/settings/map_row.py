@@ -22,7 +22,7 @@ from typing import Any, TypeVar
 from abdf1_ros.df1.packet import BROADCAST
 from abdf1_ros.df1.stations import MAX_STATION
 from abdf1_ros.messages import Message
-from abdf1_ros.numbers import is_digits, Kind, member_of, one_of, whole
+from abdf1_ros.numbers import is_digits, member_of, one_of, ValueKind, whole
 from abdf1_ros.pccc.access import Access
 from abdf1_ros.pccc.address import Address, AddressRangeError, AddressSyntaxError
 from abdf1_ros.pccc.address_range import AddressRange
@@ -168,7 +168,7 @@ class RowReader:
             self._fault(column, f'{column} has {len(name)} characters, at most {MAX_LENGTH} go')
         return name
 
-    def _value(self, column: str, kind: Kind[_T], message: Message | None = None,
+    def _value(self, column: str, kind: ValueKind[_T], message: Message | None = None,
                *args: object) -> _T | None:
         text = self._row.get(column)
         value = kind.read(text) if text else None

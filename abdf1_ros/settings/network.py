@@ -34,7 +34,7 @@ from abdf1_ros.df1.settings import LinkOptions, LinkSettings
 from abdf1_ros.df1.stations import MAX_STATION
 from abdf1_ros.line_names import device_of
 from abdf1_ros.messages import Message
-from abdf1_ros.numbers import is_digits, Kind, one_of, TEXT, whole, whole_number
+from abdf1_ros.numbers import is_digits, one_of, TEXT, ValueKind, whole, whole_number
 from abdf1_ros.pccc.families import FAMILIES
 from abdf1_ros.pccc.spellings import family_name
 from abdf1_ros.problems import ConfigurationError, Place, Problem
@@ -67,7 +67,7 @@ class NetField:
     column: str
     default: int | str | bool
     description: str
-    kind: Kind[Any]
+    kind: ValueKind[Any]
     message: Message | None = None
     message_args: tuple[Any, ...] = ()
     other_words: MappingType[str, str] = field(default_factory=dict)
@@ -91,13 +91,13 @@ class NetField:
         return value
 
 
-def _net(column: str, default: int | str, description: str, kind: Kind[Any] = TEXT,
+def _net(column: str, default: int | str, description: str, kind: ValueKind[Any] = TEXT,
          **details: Any) -> Any:
     entry = NetField(column, default, description, kind, **details)
     return field(default=default, metadata={'net': entry})
 
 
-def _named(*names: str) -> Kind[str]:
+def _named(*names: str) -> ValueKind[str]:
     return one_of({name: name for name in names})
 
 

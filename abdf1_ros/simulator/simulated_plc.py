@@ -36,7 +36,7 @@ from abdf1_ros.df1.slave import HalfDuplexSlave
 from abdf1_ros.df1.stations import MAX_STATION
 from abdf1_ros.df1.tasks import TaskSource
 from abdf1_ros.errors import FormatError, LinkError, RemoteError
-from abdf1_ros.numbers import decimal_number, Kind, member_of, one_of, whole, whole_number
+from abdf1_ros.numbers import decimal_number, member_of, one_of, ValueKind, whole, whole_number
 from abdf1_ros.pccc.address import Address
 from abdf1_ros.pccc.address_range import AddressRange
 from abdf1_ros.pccc.data_table import DataTable, NoSuchFile
@@ -381,7 +381,7 @@ def _natural_codec(address: Address, length: int) -> Codec:
     return Codec(types_of(address)[0], length, address.bit or 0)
 
 
-def _value(row: Row, column: str, kind: Kind[_T]) -> _T:
+def _value(row: Row, column: str, kind: ValueKind[_T]) -> _T:
     value = kind.read(row.get(column))
     if value is None:
         raise Problem(row.where(column), f'{column} = "{shown(row.get(column))}" should be '

@@ -33,7 +33,7 @@ import zlib
 
 from abdf1_ros.problems import Problem
 from abdf1_ros.sniffer.capture import Chunk, Direction, is_capture_line, read_capture
-from abdf1_ros.sniffer.ethernet_ip import chunks_of, CSP, Seen
+from abdf1_ros.sniffer.ethernet_ip import chunks_of, CSP, SeenPackets
 from abdf1_ros.sniffer.logs import LogReader
 from abdf1_ros.sniffer.packet_files import is_packet_file, PacketFile
 from abdf1_ros.sniffer.pcapng import LINK_TYPE
@@ -105,7 +105,7 @@ class Recording:
 
     def _packets(self) -> Iterator[Chunk]:
         file = PacketFile(self._name, cast(BinaryIO, self._file))
-        is_empty, seen = True, Seen()
+        is_empty, seen = True, SeenPackets()
         for chunk in chunks_of(file.packets(), seen):
             is_empty, self._position = False, file.position
             yield chunk

@@ -184,14 +184,14 @@ class _Connections:
 
 
 @dataclass(slots=True)
-class Seen:
+class SeenPackets:
     """The TCP ports of packets, and the sizes (bytes) of those that the recorder has cut."""
 
     ports: set[int] = field(default_factory=set)
     cut: list[int] = field(default_factory=list)
 
 
-def chunks_of(packets: Iterable[RecordedPacket], seen: Seen) -> Iterator[Chunk]:
+def chunks_of(packets: Iterable[RecordedPacket], seen: SeenPackets) -> Iterator[Chunk]:
     """
     Yield the DF1 and PCCC of packets, with times (s) from the first packet on.
 

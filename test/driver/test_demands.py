@@ -18,7 +18,7 @@ from functools import partial
 import math
 
 from abdf1_ros.df1.packet import Packet
-from abdf1_ros.driver.reads.demands import Demand, Demands, ReadAnswer
+from abdf1_ros.driver.reads.demands import ReadAnswer, ReadCall, ReadCalls
 from abdf1_ros.driver.reads.point import Freshness
 from abdf1_ros.driver.settings import DriverSettings
 from abdf1_ros.driver.write import Outcome
@@ -300,9 +300,9 @@ def test_lost_port_and_the_end_answer_every_call() -> None:
 
 def test_each_call_ends_at_its_own_time_whatever_came_after_it() -> None:
     ended: list[str] = []
-    demands = Demands(1.0)
+    demands = ReadCalls(1.0)
     for name, now in (('first', 0.0), ('second', 0.4)):
-        demands.add(Demand(RECIPE, now, lambda answer, name=name: ended.append(name)), now, 0.5)
+        demands.add(ReadCall(RECIPE, now, lambda answer, name=name: ended.append(name)), now, 0.5)
     assert demands.next_expiry == 1.5
     demands.expire(demands.next_expiry)
     assert ended == ['first']

@@ -23,7 +23,7 @@ from abdf1_ros.ports.link_thread import LinkThread
 from abdf1_ros.ports.opening import open_port
 from abdf1_ros.ports.settings import PortSettings
 from abdf1_ros.ros.bridge.guests import GuestPlaces
-from abdf1_ros.ros.bridge.session import Session
+from abdf1_ros.ros.bridge.session import BridgeSession
 from abdf1_ros.ros.diagnostics.graph import Graph
 from abdf1_ros.ros.diagnostics.line import LineView
 from abdf1_ros.ros.parameters.file_watch import FileWatch
@@ -260,9 +260,10 @@ def test_line_is_handed_over_in_order(bench: Bench, monkeypatch: pytest.MonkeyPa
         monkeypatch.setattr(owner, name, recorded)
 
     for owner, name, text in (
-            (Session, 'begin_end', 'tell the PLCs'), (Session, 'wait_for_plcs', 'wait for them'),
-            (Session, '__init__', 'make the new'), (LinkThread, 'exchange', 'exchange'),
-            (Session, 'end', 'end the old'), (Session, 'begin', 'begin the new'),
+            (BridgeSession, 'begin_end', 'tell the PLCs'),
+            (BridgeSession, 'wait_for_plcs', 'wait for them'),
+            (BridgeSession, '__init__', 'make the new'), (LinkThread, 'exchange', 'exchange'),
+            (BridgeSession, 'end', 'end the old'), (BridgeSession, 'begin', 'begin the new'),
             (GuestPlaces, 'start', 'guests'), (ShownFiles, 'show', 'parameters')):
         record(owner, name, text)
     assert bench.reload()[0]

@@ -17,7 +17,7 @@
 from pathlib import Path
 from xml.etree import ElementTree
 
-from abdf1_ros.cli.monitor.view import Reading, Snapshot, Status, Style, TextLine
+from abdf1_ros.cli.monitor.view import NodeView, Reading, ShownStatus, Style, TextLine
 import pytest
 
 from tools import picture
@@ -33,9 +33,9 @@ def texts(svg: str) -> list[str]:
             for entry in ElementTree.fromstring(svg).iter(f'{SVG}text')]
 
 
-def snapshot(value: float, received: float, *statuses: Status) -> Snapshot:
+def snapshot(value: float, received: float, *statuses: ShownStatus) -> NodeView:
     reading = Reading('speed', [value], 'N7:0', received, 1.0)
-    return Snapshot('/abdf1', True, 0.0, statuses, [reading], None, [])
+    return NodeView('/abdf1', True, 0.0, statuses, [reading], None, [])
 
 
 def drawn(*values: tuple[float, float, float]) -> ElementTree.Element:
@@ -71,7 +71,8 @@ def test_curve_without_values_is_empty() -> None:
 
 
 def test_stations_are_named_by_their_processors() -> None:
-    status = Status('station 2', Style.GOOD, 'OK', {'processor': 'SLC 5/03 series A, REM RUN'})
+    status = ShownStatus(
+        'station 2', Style.GOOD, 'OK', {'processor': 'SLC 5/03 series A, REM RUN'})
     assert picture.stations_of(snapshot(1, 0, status)) == ['2: SLC 5/03']
 
 

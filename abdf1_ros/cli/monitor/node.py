@@ -23,9 +23,9 @@ import time
 from typing import Any
 
 from abdf1_ros.cli.monitor.curves import Curve
-from abdf1_ros.cli.monitor.view import Reading, SILENCE, Snapshot, Status, Style
+from abdf1_ros.cli.monitor.view import NodeView, Reading, ShownStatus, SILENCE, Style
 from abdf1_ros.errors import FormatError
-from abdf1_ros.ros.observer import graph_hint, Observer
+from abdf1_ros.ros.observer import graph_hint, ObservingNode
 from abdf1_ros.ros.topics.messages import latched_qos, MESSAGES
 from abdf1_ros.text import by_number
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
@@ -69,7 +69,7 @@ class _Subscription:
     reading: Reading
 
 
-class Listening(Observer):
+class Listening(ObservingNode):
     """A node that subscribes, in a ROS context of its own; use it in a with statement."""
 
     def __init__(self, ros_arguments: list[str]) -> None:
@@ -95,10 +95,10 @@ class NodeWatch(Listening):
         super().__init__(ros_arguments)
         self.name = name
         self._subscriptions: dict[str, _Subscription] = {}
-        self._statuses: list[Status] = []
+        self._statuses: list[ShownStatus] = []
         self._told: float | None = None
         self._active: list[int] | None = None
-        self._results: deque[Status] = deque(maxlen=_RESULTS_KEPT)
+        self._results: deque[ShownStatus] = deque(maxlen=_RESULTS_KEPT)
         self._next_discovery = 0.0
         self.is_there = False
         self.subscribe(DiagnosticArray, '/diagnostics', self._take_diagnostics, 100)
@@ -132,11 +132,11 @@ class NodeWatch(Listening):
                        if topic.endswith(ending) and self.node.count_publishers(topic)),
                       key=by_number)
 
-    def snapshot(self) -> Snapshot:
+    def snapshot(self) -> NodeView:
         """Return a snapshot of the present state."""
         readings = [self._subscriptions[topic].reading
                     for topic in sorted(self._subscriptions, key=by_number)]
-        return Snapshot(
+        return NodeView(
             self.name, self.is_there, self._told, tuple(self._statuses), readings,
             self._active, tuple(self._results), graph_hint())
 
@@ -204,18 +204,18 @@ class NodeWatch(Listening):
                         for bit in range(16) if bits >> bit & 1]
 
 
-def shown_statuses(message: DiagnosticArray, node: str) -> list[Status]:
+def shown_statuses(message: DiagnosticArray, node: str) -> list[ShownStatus]:
     """Return the statuses of a node for the picture, not of other nodes."""
     return [shown_status(status, node) for status in message.status
             if status.name.startswith(f'{node}: ')]
 
 
-def is_spare(statuses: Sequence[Status]) -> bool:
+def is_spare(statuses: Sequence[ShownStatus]) -> bool:
     """Return True if the bridge of this status waits for its line."""
     return [status.section for status in statuses] == ['standby']
 
 
-def shown_status(status: DiagnosticStatus, node: str) -> Status:
+def shown_status(status: DiagnosticStatus, node: str) -> ShownStatus:
     """Return a status of a node for the picture."""
-    return Status(status.name.removeprefix(f'{node}: '), _STYLES.get(status.level, Style.BAD),
-                  status.message, {pair.key: pair.value for pair in status.values})
+    return ShownStatus(status.name.removeprefix(f'{node}: '), _STYLES.get(status.level, Style.BAD),
+                       status.message, {pair.key: pair.value for pair in status.values})

@@ -26,7 +26,7 @@ from dataclasses import dataclass, replace
 import time
 
 from abdf1_ros.cli.monitor.node import Listening, shown_statuses
-from abdf1_ros.cli.monitor.view import LEVELS, SILENCE, Status, Style, TextLine
+from abdf1_ros.cli.monitor.view import LEVELS, ShownStatus, SILENCE, Style, TextLine
 from abdf1_ros.text import by_number, counted, cut, printable
 from diagnostic_msgs.msg import DiagnosticArray
 
@@ -45,13 +45,13 @@ class LineState:
 
     name: str
     told: float
-    statuses: Sequence[Status]
+    statuses: Sequence[ShownStatus]
     spares: Sequence[str] = ()
 
-    def worst(self, now: float) -> Status:
+    def worst(self, now: float) -> ShownStatus:
         """Return the most important status at the clock value ``now`` (s)."""
         if now - self.told > SILENCE:
-            return Status('', Style.BAD, f'no diagnostics for {now - self.told:.0f} s')
+            return ShownStatus('', Style.BAD, f'no diagnostics for {now - self.told:.0f} s')
         return min(self.statuses, key=lambda status: status.rank)
 
     def values(self) -> dict[str, str]:
@@ -78,7 +78,7 @@ class PlantWatch(Listening):
         for name in self._waiting:
             if (name not in found or now - found[name].told > SILENCE) \
                     and (spares := self._spares(name, now)):
-                found[name] = LineState(name, now, [Status(
+                found[name] = LineState(name, now, [ShownStatus(
                     '', Style.BAD, f'no bridge has the line; waiting: {", ".join(spares)}')])
         return [*found.values()]
 
@@ -96,7 +96,7 @@ class PlantWatch(Listening):
             for name, reason in sections['lines'].values.items():
                 if name.startswith('/'):
                     self._lines[name] = LineState(
-                        name, now, [Status('', Style.BAD, f'does not run: {reason}')])
+                        name, now, [ShownStatus('', Style.BAD, f'does not run: {reason}')])
         elif 'standby' in sections:
             host = sections['standby'].values.get('host', '')
             self._waiting.setdefault(f'/{node}', {})[host] = now
@@ -129,5 +129,5 @@ def render_plant(lines: Iterable[LineState], now: float, width: int) -> list[Tex
               for name, (status, line) in zip(names, found, strict=True))]
 
 
-def _text(status: Status, spares: Sequence[str]) -> str:
+def _text(status: ShownStatus, spares: Sequence[str]) -> str:
     return f'{status.short}; spare: {", ".join(spares)}' if spares else status.short

@@ -15,7 +15,7 @@
 """
 A snapshot of a running bridge, and the lines of text that show it.
 
-This module uses neither ROS nor a terminal: ``monitor.node`` fills a ``Snapshot``, and
+This module uses neither ROS nor a terminal: ``monitor.node`` fills a ``NodeView``, and
 ``monitor.command`` prints the lines. All text from topics is made printable here.
 """
 
@@ -118,7 +118,7 @@ class Reading:
 
 
 @dataclass(frozen=True, slots=True)
-class Status:
+class ShownStatus:
     """
     One status of the diagnostics, or the result of one write.
 
@@ -147,7 +147,7 @@ class Status:
 
 
 @dataclass(frozen=True, slots=True)
-class Snapshot:
+class NodeView:
     """
     All facts about one node.
 
@@ -159,15 +159,15 @@ class Snapshot:
     node: str
     is_there: bool
     told: float | None
-    statuses: Sequence[Status]
+    statuses: Sequence[ShownStatus]
     readings: Sequence[Reading]
     active: Sequence[int] | None
-    results: Sequence[Status]
+    results: Sequence[ShownStatus]
     hint: str = ''
     """The reason why topics may not be seen; empty for none."""
 
 
-def render(snapshot: Snapshot, now: float, width: int,
+def render(snapshot: NodeView, now: float, width: int,
            levels: str = curves.BLOCKS) -> list[TextLine]:
     """
     Return the lines that show ``snapshot`` at the clock value ``now`` (s), cut to ``width``.
@@ -198,7 +198,7 @@ def show(values: Sequence[float] | str, width: int) -> str:
     return cut(' '.join(texts), width)
 
 
-def _head(snapshot: Snapshot, now: float) -> Iterator[TextLine]:
+def _head(snapshot: NodeView, now: float) -> Iterator[TextLine]:
     """Yield the verdict, and the state of line and PLCs."""
     found = sorted([*_heard(snapshot, now), *snapshot.statuses, *_missing(snapshot, now)],
                    key=lambda status: status.rank)
@@ -218,36 +218,36 @@ def _head(snapshot: Snapshot, now: float) -> Iterator[TextLine]:
                        Style.PLAIN if is_good else Style.WARNING)
 
 
-def _heard(snapshot: Snapshot, now: float) -> Iterator[Status]:
+def _heard(snapshot: NodeView, now: float) -> Iterator[ShownStatus]:
     """Yield faults of the connection to the node."""
     if not snapshot.is_there:
-        yield Status('', Style.BAD, 'the node is gone; these are its last messages')
+        yield ShownStatus('', Style.BAD, 'the node is gone; these are its last messages')
     if snapshot.told is None:
         remapped = '; if /diagnostics is remapped, monitor needs the same -r' \
             if snapshot.is_there else ''
-        yield Status('', Style.WARNING, f'no diagnostics yet{remapped}')
+        yield ShownStatus('', Style.WARNING, f'no diagnostics yet{remapped}')
     elif now - snapshot.told > SILENCE:
-        yield Status('', Style.BAD, f'no diagnostics for {now - snapshot.told:.1f} s')
+        yield ShownStatus('', Style.BAD, f'no diagnostics for {now - snapshot.told:.1f} s')
 
 
-def _missing(snapshot: Snapshot, now: float) -> Iterator[Status]:
+def _missing(snapshot: NodeView, now: float) -> Iterator[ShownStatus]:
     """Yield the number of topics without a fresh value here; the bridge may not know them."""
     missing = sum(reading.is_missing or reading.is_stale(now) for reading in snapshot.readings)
     topics = counted(len(snapshot.readings), 'topic')
     if missing:
-        yield Status('topics', Style.BAD, f'{missing} of {topics} without a fresh value here')
+        yield ShownStatus('topics', Style.BAD, f'{missing} of {topics} without a fresh value here')
     elif not snapshot.statuses:
-        yield Status('', Style.GOOD, topics)
+        yield ShownStatus('', Style.GOOD, topics)
 
 
-def _mode(status: Status) -> str:
+def _mode(status: ShownStatus) -> str:
     """Return the number of a station and the mode of its processor, or "silent"."""
     mode = status.values.get('mode', '').partition(' (')[0] or LEVELS[status.style]
     number = status.section.removeprefix(_STATION)
     return f'{number} {"silent" if status.style is Style.BAD else mode}'
 
 
-def _link(snapshot: Snapshot, width: int) -> Iterator[TextLine]:
+def _link(snapshot: NodeView, width: int) -> Iterator[TextLine]:
     for status in _section(snapshot, 'link'):
         yield from _summary('link', status, width)
         periods = [key for key in status.values if key.startswith(_PERIOD)]
@@ -259,7 +259,7 @@ def _link(snapshot: Snapshot, width: int) -> Iterator[TextLine]:
         yield from _summary('standby', status, width)
 
 
-def _stations(snapshot: Snapshot, width: int) -> Iterator[TextLine]:
+def _stations(snapshot: NodeView, width: int) -> Iterator[TextLine]:
     if snapshot.active is not None:
         numbers = ', '.join(map(str, snapshot.active)) or 'none'
         yield TextLine(f'  active stations: {numbers}')
@@ -306,7 +306,7 @@ class _Widths:
         return ('  ' + '  '.join(shown)).rstrip()
 
 
-def _values(snapshot: Snapshot, now: float, width: int, levels: str) -> Iterator[TextLine]:
+def _values(snapshot: NodeView, now: float, width: int, levels: str) -> Iterator[TextLine]:
     longest = min(_NAME_WIDTH, width // 3)
     names = [cut(printable(reading.topic), longest) for reading in snapshot.readings]
     widths = _Widths.of(max(map(len, ['topic', *names])), width)
@@ -326,7 +326,7 @@ def _values(snapshot: Snapshot, now: float, width: int, levels: str) -> Iterator
         yield TextLine(f'  no read topic found{snapshot.hint}', Style.WARNING)
 
 
-def _loads(snapshot: Snapshot) -> dict[str, str]:
+def _loads(snapshot: NodeView) -> dict[str, str]:
     """Return the part of the line's time for each topic, by its name."""
     told = ', '.join(status.values.get(_LOAD_BY_TOPIC, '')
                      for status in _section(snapshot, 'link'))
@@ -334,7 +334,7 @@ def _loads(snapshot: Snapshot) -> dict[str, str]:
     return {topic: load for topic, _, load in pairs}
 
 
-def _reasons(snapshot: Snapshot, width: int) -> Iterator[TextLine]:
+def _reasons(snapshot: NodeView, width: int) -> Iterator[TextLine]:
     """Yield the faults, the worst first, with each bad row of the map."""
     shown = (status for status in snapshot.statuses if status.style is not Style.GOOD
              or status.section in ('mappings', 'interlocks'))
@@ -346,7 +346,7 @@ def _reasons(snapshot: Snapshot, width: int) -> Iterator[TextLine]:
                     yield from _wrapped(f'{key}: {value}', width, status.style)
 
 
-def _writes(snapshot: Snapshot, now: float, width: int) -> Iterator[TextLine]:
+def _writes(snapshot: NodeView, now: float, width: int) -> Iterator[TextLine]:
     for status in _section(snapshot, 'writes'):
         if status.style is not Style.GOOD or any(map(_says_something, status.values.values())):
             yield from _summary('writes', status, width)
@@ -356,7 +356,7 @@ def _writes(snapshot: Snapshot, now: float, width: int) -> Iterator[TextLine]:
                             f'{result.message} ({latency} ms)', width, result.style)
 
 
-def _counters(snapshot: Snapshot, width: int) -> Iterator[TextLine]:
+def _counters(snapshot: NodeView, width: int) -> Iterator[TextLine]:
     """Yield the counters that are not 0, in as many columns as fit."""
     for status in _section(snapshot, 'counters'):
         yield from _summary('counters', status, width)
@@ -367,11 +367,11 @@ def _counters(snapshot: Snapshot, width: int) -> Iterator[TextLine]:
             yield TextLine('      ' + '    '.join(cells[start:start + columns]))
 
 
-def _section(snapshot: Snapshot, name: str) -> Iterator[Status]:
+def _section(snapshot: NodeView, name: str) -> Iterator[ShownStatus]:
     return (status for status in snapshot.statuses if status.section == name)
 
 
-def _summary(name: str, status: Status, width: int) -> Iterator[TextLine]:
+def _summary(name: str, status: ShownStatus, width: int) -> Iterator[TextLine]:
     """Yield the name and the message of a status; the message is never cut."""
     room = max(_LEAST_VALUE_WIDTH, width - 15)
     for number, part in enumerate(textwrap.wrap(printable(status.message), room) or ['']):

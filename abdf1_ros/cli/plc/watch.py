@@ -68,7 +68,7 @@ class _NoValue:
     error: str
 
 
-class _News(NamedTuple):
+class _WatchedRead(NamedTuple):
     """The result of a read, with its time."""
 
     when: datetime
@@ -76,7 +76,7 @@ class _News(NamedTuple):
     what: Values | _NoValue
 
 
-class Watch:
+class LiveValues:
     """
     The driver without ROS: read ``mappings`` every ``period`` seconds and show them.
 
@@ -107,7 +107,7 @@ class Watch:
         if record is not None:
             port, self._trace = recorded(network, port, record)
         self._link = LinkThread(self._driver.machine, port)
-        self._news: deque[_News] = deque(maxlen=_MAX_NEWS)
+        self._news: deque[_WatchedRead] = deque(maxlen=_MAX_NEWS)
         self._lost = self._lost_reported = 0
         self._has_news = Wake()  # not an Event: an interrupt in it may leave its lock taken
         self._reads: Counter[Mapping] = Counter()
@@ -145,7 +145,7 @@ class Watch:
     def read(self, mapping: Mapping, values: Values) -> None:
         """Take the values of a read; called in the link thread."""
         self._lost += len(self._news) == _MAX_NEWS
-        self._news.append(_News(datetime.now(), mapping, values))
+        self._news.append(_WatchedRead(datetime.now(), mapping, values))
         self._reads[mapping] += 1
         self._has_news.set()
 
@@ -166,7 +166,7 @@ class Watch:
                    for mapping in self._mappings)
 
     def _show(self) -> None:
-        changed: list[_News] = []
+        changed: list[_WatchedRead] = []
         while self._news:
             changed.append(self._news.popleft())
         is_live = is_terminal(sys.stdout) and not self._csv
@@ -176,7 +176,7 @@ class Watch:
         for mapping in self._mappings:
             error = self._driver.points[mapping].error
             if error is not None:
-                changed.append(_News(datetime.now(), mapping, _NoValue(error)))
+                changed.append(_WatchedRead(datetime.now(), mapping, _NoValue(error)))
         if self._csv:
             self._print_csv(changed)
         elif is_live:
@@ -185,7 +185,7 @@ class Watch:
         else:
             self._print(changed)
 
-    def _print(self, changed: Sequence[_News]) -> None:
+    def _print(self, changed: Sequence[_WatchedRead]) -> None:
         """Print the rows of each mapping that changed since the last call."""
         for when, mapping, what in changed:
             if mapping not in self._shown or self._shown[mapping] != what:
@@ -194,7 +194,7 @@ class Watch:
                 for address, text in self._rows(mapping):
                     print(f'{time}  {address}  {text}', flush=True)
 
-    def _print_csv(self, news: Sequence[_News]) -> None:
+    def _print_csv(self, news: Sequence[_WatchedRead]) -> None:
         """Print each value with date, time and address; empty for a read that has failed."""
         for when, mapping, what in news:
             time = when.isoformat(timespec='milliseconds')
@@ -210,7 +210,7 @@ class Watch:
                     _quoted(tag_of(mapping, number, self._tags))]
                 print(time, mapping.station, place, *tag, text, sep=',', flush=True)
 
-    def _note_changes(self, news: Sequence[_News]) -> None:
+    def _note_changes(self, news: Sequence[_WatchedRead]) -> None:
         """Keep the text to show, and the time of its last change."""
         for _, mapping, what in news:
             before = self._shown.get(mapping)

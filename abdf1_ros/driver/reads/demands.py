@@ -40,7 +40,7 @@ class ReadAnswer:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Demand:
+class ReadCall:
     """A call for the values of a row, of a read that begins after ``since`` (clock, s)."""
 
     mapping: Mapping
@@ -48,7 +48,7 @@ class Demand:
     answer: Callable[[ReadAnswer], None]
 
 
-class Demands:
+class ReadCalls:
     """
     The calls that wait for a read: ``patience`` s, and as long as the read itself may take.
 
@@ -58,12 +58,12 @@ class Demands:
     """
 
     def __init__(self, patience: float) -> None:
-        self.inbox: Inbox[Demand] = Inbox(is_open=False)
-        self.waiting: dict[Mapping, list[tuple[float, Demand]]] = {}
+        self.inbox: Inbox[ReadCall] = Inbox(is_open=False)
+        self.waiting: dict[Mapping, list[tuple[float, ReadCall]]] = {}
         self.next_expiry = math.inf
         self._patience = patience
 
-    def add(self, demand: Demand, now: float, longest: float) -> None:
+    def add(self, demand: ReadCall, now: float, longest: float) -> None:
         """Let a call wait for a read that takes ``longest`` s at most."""
         until = now + self._patience + longest
         self.waiting.setdefault(demand.mapping, []).append((until, demand))
@@ -95,7 +95,7 @@ class Demands:
         self.next_expiry = math.inf
 
     def _end(self, mapping: Mapping, answer: ReadAnswer,
-             is_over: Callable[[float, Demand], bool]) -> None:
+             is_over: Callable[[float, ReadCall], bool]) -> None:
         calls = self.waiting.pop(mapping, ())
         if kept := [call for call in calls if not is_over(*call)]:
             self.waiting[mapping] = kept

@@ -24,7 +24,7 @@ from typing import Protocol
 from abdf1_ros.df1.packet import BROADCAST
 from abdf1_ros.df1.stations import ActiveStationList
 from abdf1_ros.driver.job_tasks import LineTime
-from abdf1_ros.driver.reads.demands import Demand, Demands, ReadAnswer
+from abdf1_ros.driver.reads.demands import ReadAnswer, ReadCall, ReadCalls
 from abdf1_ros.driver.reads.guards import Guards
 from abdf1_ros.driver.reads.job import ReadJob, ReadTooOld
 from abdf1_ros.driver.reads.point import Guard, ReadPoint
@@ -93,7 +93,7 @@ class Readings:
                               own_work(self.planner.line_model, mappings, *times),
                               is_heard=network.line_mode.only_listens)
         self.reads = Reads(stations)
-        self.demands = Demands(settings.write_timeout)
+        self.demands = ReadCalls(settings.write_timeout)
         self.expected_poll_cycle = poll_cycle(blocks, answer_time(network, blocks))
         self._network = network
         self._stations = stations
@@ -119,7 +119,7 @@ class Readings:
         for demand in self.demands.inbox.take():
             self._want(demand, now)
 
-    def _want(self, demand: Demand, now: float) -> None:
+    def _want(self, demand: ReadCall, now: float) -> None:
         """Read a row at once for a call; a silent station's row is answered without a read."""
         mapping = demand.mapping
         station = self._stations[mapping.station]

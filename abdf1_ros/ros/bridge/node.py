@@ -36,7 +36,7 @@ from abdf1_ros.ros.bridge.last_writes import LAST_WRITES, take_last_writes
 from abdf1_ros.ros.bridge.offer import OfferedPublisher
 from abdf1_ros.ros.bridge.port_owners import PortOwners
 from abdf1_ros.ros.bridge.reload import changes, refuse_harm
-from abdf1_ros.ros.bridge.session import Session, Surroundings, tell_plcs
+from abdf1_ros.ros.bridge.session import BridgeSession, Surroundings, tell_plcs
 from abdf1_ros.ros.bridge.standby import Service, Standby
 from abdf1_ros.ros.callbacks import AnsweringNode
 from abdf1_ros.ros.diagnostics.graph import DISCOVERY, Graph, NameWatch
@@ -119,7 +119,7 @@ class BridgeNode(AnsweringNode):
             self.get_logger().info('waits for the line; offers no topics and services until then')
         else:
             self._standby.offer()
-        self.session = Session(self._surroundings, configuration)
+        self.session = BridgeSession(self._surroundings, configuration)
         self.writes.give_to(self.session.writers)
         self.link = self._surroundings.link = LinkThread(
             self.session.driver.machine, self._opener.open,
@@ -160,7 +160,7 @@ class BridgeNode(AnsweringNode):
             self.session.guests.start()
 
     def begin_end(self) -> None:
-        """Begin the end, as ``Session`` does; no request can cancel it."""
+        """Begin the end, as ``BridgeSession`` does; no request can cancel it."""
         self._is_ending = True
         self.session.begin_end()  # first, so that messages that have waited are refused
         self.writes.begin()
@@ -232,7 +232,7 @@ class BridgeNode(AnsweringNode):
         4. Let guests connect, and give up the old port.
         """
         tell_plcs([self.session], 'goes on with new files', HAND_OVER)
-        before, session = self.session, Session(self._surroundings, configuration)
+        before, session = self.session, BridgeSession(self._surroundings, configuration)
         self.session = session
         self.writes.give_to(session.writers)
         if not self.link.exchange(session.driver.machine, session.reads.publish_later_values,

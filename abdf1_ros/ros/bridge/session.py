@@ -100,7 +100,7 @@ class Surroundings:
             self.node.executor.wake()
 
 
-class Session:
+class BridgeSession:
     """
     The bridge between one pair of files and ROS.
 
@@ -328,7 +328,7 @@ class Session:
         publisher.publish(message)
 
 
-def tell_plcs(sessions: Sequence[Session], what: str, limit: float) -> None:
+def tell_plcs(sessions: Sequence[BridgeSession], what: str, limit: float) -> None:
     """
     Set heartbeats to 0 and write fallbacks in all sessions, and wait for all (rule 5).
 

@@ -19,7 +19,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
 
-from abdf1_ros.ros.bridge.session import Session, Surroundings
+from abdf1_ros.ros.bridge.session import BridgeSession, Surroundings
 from rclpy.callback_groups import CallbackGroup
 
 
@@ -40,7 +40,7 @@ class Standby:
     If the bridge is a spare, call ``look`` ten times a second.
     """
 
-    def __init__(self, surroundings: Surroundings, session: Callable[[], Session],
+    def __init__(self, surroundings: Surroundings, session: Callable[[], BridgeSession],
                  services: Sequence[Service]) -> None:
         self._surroundings = surroundings
         self._session = session

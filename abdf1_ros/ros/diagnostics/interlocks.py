@@ -29,7 +29,7 @@ from abdf1_ros.ros.diagnostics.status import ERROR, Judgement, OK, Seen, WARN, w
 from abdf1_ros.text import milliseconds
 
 
-class _Control(IntEnum):
+class _InControl(IntEnum):
     """Whether ROS controls a PLC, as far as one heartbeat shows; the worst state comes first."""
 
     NOT_IN_CONTROL = 0
@@ -59,7 +59,7 @@ class InterlockStatus:
         """Return WARN if ROS is not in control, ERROR if another program writes a heartbeat."""
         at_rest = [beat.mapping.tag for beat in self._beats if self._why_not(beat, now)]
         unconfirmed = [beat.mapping.tag for beat in self._beats if beat.mapping.tag not in at_rest
-                       and self._control(beat, now)[0] <= _Control.UNKNOWN]
+                       and self._control(beat, now)[0] <= _InControl.UNKNOWN]
         due = [row.mapping.tag for row in self._fallbacks if row.cause is not None]
         guests = [row.mapping.tag for row in self._fallbacks
                   if row.state is FallbackState.OVERWRITTEN]
@@ -87,38 +87,38 @@ class InterlockStatus:
         else:
             self._since.pop(tag, None)
 
-    def _control(self, beat: HeartbeatRow, now: float) -> tuple[_Control, str]:
+    def _control(self, beat: HeartbeatRow, now: float) -> tuple[_InControl, str]:
         """Return how long ROS has been in control, or why it is not, as one heartbeat shows."""
         if reason := self._why_not(beat, now):
-            return _Control.NOT_IN_CONTROL, f'not in control: {reason}'
+            return _InControl.NOT_IN_CONTROL, f'not in control: {reason}'
         begun, point = self._since[beat.mapping.tag], self._bits.get(beat.mapping.tag)
         if point is None:
-            return _Control.COUNTS, f'heartbeat counts (for {now - begun:.1f} s)'
+            return _InControl.COUNTS, f'heartbeat counts (for {now - begun:.1f} s)'
         tag, (control, reason) = point.mapping.tag, self._confirmed(point, begun, now)
-        self._seen(tag, control is _Control.IN_CONTROL, now)
+        self._seen(tag, control is _InControl.IN_CONTROL, now)
         return control, reason or f'in control for {now - max(begun, self._since[tag]):.1f} s'
 
-    def _confirmed(self, point: ReadPoint, begun: float, now: float) -> tuple[_Control, str]:
+    def _confirmed(self, point: ReadPoint, begun: float, now: float) -> tuple[_InControl, str]:
         """Return what a bit confirms of a heartbeat that counts since ``begun`` (s), and why."""
         tag, freshness = point.mapping.tag, point.freshness(now)
         bit, why = self._watched.latest.get(point.mapping.topic), point.error or point.withheld
         if bit is None or not freshness.is_usable:
-            return _Control.UNKNOWN, f'unknown: {tag} is {freshness.value}' + (
+            return _InControl.UNKNOWN, f'unknown: {tag} is {freshness.value}' + (
                 f': {why}' if why else '')
         if (point.last_good or 0.0) < begun:
-            return _Control.UNKNOWN, \
+            return _InControl.UNKNOWN, \
                 f'unknown: {tag} has not been read since the heartbeat counts'
         if not bit[0]:
-            return _Control.NOT_IN_CONTROL, (
+            return _InControl.NOT_IN_CONTROL, (
                 f'not in control: the heartbeat counts, but {tag} is 0: '
                 'a person has to press reset (docs/tutorials/heartbeats.md)')
         if fault := processor_fault(self._checks.known(point.mapping.station).identity):
-            return _Control.NOT_IN_CONTROL, f'not in control: {tag} is 1, but the PLC is {fault}'
-        return _Control.IN_CONTROL, ''
+            return _InControl.NOT_IN_CONTROL, f'not in control: {tag} is 1, but the PLC is {fault}'
+        return _InControl.IN_CONTROL, ''
 
     def values(self, now: float) -> dict[str, str]:
         """Return the state of each PLC, of each heartbeat and fallback, and their bounds."""
-        stations: dict[int, tuple[_Control, str]] = {}  # the worst of each station's heartbeats
+        stations: dict[int, tuple[_InControl, str]] = {}  # the worst of each station's heartbeats
         for beat in self._beats:
             control, number = self._control(beat, now), beat.mapping.station
             stations[number] = min(stations.get(number, control), control, key=itemgetter(0))

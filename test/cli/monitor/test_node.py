@@ -20,7 +20,7 @@ from types import SimpleNamespace
 from typing import Any
 
 from abdf1_ros.cli.monitor.node import full_name, NodeWatch
-from abdf1_ros.cli.monitor.view import Reading, Snapshot, Style
+from abdf1_ros.cli.monitor.view import NodeView, Reading, Style
 from abdf1_ros.errors import FormatError
 from abdf1_ros.ros.topics.messages import latched_qos, new_message, read_qos
 from abdf1_ros.settings.mapping import Mapping
@@ -80,7 +80,7 @@ def watch() -> Iterator[NodeWatch]:
         yield watch
 
 
-def until(watch: NodeWatch, condition: Callable[[Snapshot], object]) -> Snapshot:
+def until(watch: NodeWatch, condition: Callable[[NodeView], object]) -> NodeView:
     """Listen until the picture fulfils ``condition``; return it."""
     end = time.monotonic() + PATIENCE
     while not condition(watch.snapshot()):
@@ -89,7 +89,7 @@ def until(watch: NodeWatch, condition: Callable[[Snapshot], object]) -> Snapshot
     return watch.snapshot()
 
 
-def heard(picture: Snapshot) -> dict[str, Reading]:
+def heard(picture: NodeView) -> dict[str, Reading]:
     return {reading.topic: reading for reading in picture.readings if reading.values is not None}
 
 

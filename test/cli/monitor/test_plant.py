@@ -20,7 +20,7 @@ import time
 
 from abdf1_ros.cli.monitor.command import main
 from abdf1_ros.cli.monitor.plant import LineState, PlantWatch, render_plant
-from abdf1_ros.cli.monitor.view import SILENCE, Status, Style
+from abdf1_ros.cli.monitor.view import ShownStatus, SILENCE, Style
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 import pytest
 from rclpy.node import Node
@@ -28,14 +28,14 @@ from support.commands import call
 from support.ros import ERROR, Observer, OK
 
 NOW = 1000.0
-LINK = Status('link', Style.GOOD, 'OK: port open',
-              {'line load': '93 %', 'poll cycle with Periods': '34 ms'})
-FRESH = Status('mappings', Style.GOOD, 'OK: of 10 mappings 10 fresh')
-SILENT = Status('station 3', Style.BAD, 'ERROR: station 3 inactive for 4.0 s')
-REFUSED = Status('writes', Style.WARNING, 'WARN: 3 of 4 writes confirmed')
+LINK = ShownStatus('link', Style.GOOD, 'OK: port open',
+                   {'line load': '93 %', 'poll cycle with Periods': '34 ms'})
+FRESH = ShownStatus('mappings', Style.GOOD, 'OK: of 10 mappings 10 fresh')
+SILENT = ShownStatus('station 3', Style.BAD, 'ERROR: station 3 inactive for 4.0 s')
+REFUSED = ShownStatus('writes', Style.WARNING, 'WARN: 3 of 4 writes confirmed')
 
 
-def line(name: str, *statuses: Status, told: float = NOW) -> LineState:
+def line(name: str, *statuses: ShownStatus, told: float = NOW) -> LineState:
     return LineState(name, told, (LINK, *statuses, FRESH))
 
 
@@ -106,8 +106,8 @@ def test_bridges_are_heard_and_others_are_not(publish: Publish) -> None:
         publish(watch, lambda lines: set(lines) == {'/hall/a', '/hall/b'},
                 array('battery', state=OK), array('hall/a', link=OK, mappings=ERROR), down)
         lines = {line.name: line.worst(line.told) for line in watch.lines()}
-    assert lines['/hall/a'] == Status('mappings', Style.BAD, '')
-    assert lines['/hall/b'] == Status('', Style.BAD, 'does not run: b_net.csv:2:1: Baud')
+    assert lines['/hall/a'] == ShownStatus('mappings', Style.BAD, '')
+    assert lines['/hall/b'] == ShownStatus('', Style.BAD, 'does not run: b_net.csv:2:1: Baud')
 
 
 def test_spares_stand_beside_the_line_that_has_an_owner(
@@ -121,7 +121,7 @@ def test_spares_stand_beside_the_line_that_has_an_owner(
         lines = {line.name: line for line in watch.lines()}
         assert lines['/hall/a'].spares == ['beta']
         assert lines['/hall/a'].worst(lines['/hall/a'].told).style is Style.GOOD
-        assert lines['/hall/b'].worst(lines['/hall/b'].told) == Status(
+        assert lines['/hall/b'].worst(lines['/hall/b'].told) == ShownStatus(
             '', Style.BAD, 'no bridge has the line; waiting: gamma')
         later = time.monotonic() + SILENCE
         monkeypatch.setattr(time, 'monotonic', lambda: later)

@@ -16,11 +16,11 @@
 
 from abdf1_ros.cli.monitor.curves import ASCII, Curve
 from abdf1_ros.cli.monitor.view import (
+    NodeView,
     Reading,
     render,
     show,
-    Snapshot,
-    Status,
+    ShownStatus,
     Style,
     TextLine,
 )
@@ -33,25 +33,25 @@ NOW = 1000.0
 WIDTH = 120
 
 
-def snapshot(**changes: object) -> Snapshot:
+def snapshot(**changes: object) -> NodeView:
     """Return a bridge of which nothing is wrong, changed as told."""
     fields: dict[str, object] = {
         'node': '/cell/abdf1', 'is_there': True, 'told': NOW - 0.4, 'statuses': [],
         'readings': [Reading('speeds', [1200, -800], 'N7:0', NOW - 0.25, 0.5)],
         'active': [1, 17], 'results': []}
-    return Snapshot(**fields | changes)  # type: ignore[arg-type]
+    return NodeView(**fields | changes)  # type: ignore[arg-type]
 
 
-def lines(picture: Snapshot, width: int = WIDTH) -> list[str]:
+def lines(picture: NodeView, width: int = WIDTH) -> list[str]:
     return [line.text for line in render(picture, NOW, width)]
 
 
-def line_with(text: str, picture: Snapshot) -> TextLine:
+def line_with(text: str, picture: NodeView) -> TextLine:
     (line,) = [line for line in render(picture, NOW, WIDTH) if text in line.text]
     return line
 
 
-def styles_of(text: str, picture: Snapshot) -> list[Style]:
+def styles_of(text: str, picture: NodeView) -> list[Style]:
     """Return the styles of all lines with a text: what is wrong is told there, and in its part."""
     return [line.style for line in render(picture, NOW, WIDTH) if text in line.text]
 
@@ -73,25 +73,25 @@ def test_value_is_the_last_column_to_go(width: int) -> None:
 
 def test_every_part_can_be_found_by_its_first_line() -> None:
     picture = snapshot(statuses=[
-        Status('mappings', Style.BAD, 'ERROR', {'a': 'failed'}),
-        Status('writes', Style.GOOD, 'OK', {'total': '1'}),
-        Status('counters', Style.GOOD, 'OK', {'A': '1'})])
+        ShownStatus('mappings', Style.BAD, 'ERROR', {'a': 'failed'}),
+        ShownStatus('writes', Style.GOOD, 'OK', {'total': '1'}),
+        ShownStatus('counters', Style.GOOD, 'OK', {'A': '1'})])
     found = {line.section: line.text for line in render(picture, NOW, WIDTH) if line.section}
     assert {name: found[name].split()[0] for name in ('reasons', 'writes', 'counters')} == {
         'reasons': 'mappings', 'writes': 'writes', 'counters': 'counters'}
 
 
 WITHHELD = [
-    Status('link', Style.GOOD, 'OK: port open', {
+    ShownStatus('link', Style.GOOD, 'OK: port open', {
         'line load': '47 %', 'poll cycle with Periods': '240 ms',
         'line load by topic': 'row_2 12.5%, row_1 0.4%'}),
-    Status('station 1', Style.GOOD, 'OK: station 1 active', {'mode': 'REM RUN (0.1 s ago)'}),
-    Status('station 2', Style.WARNING, 'WARN: station 2 in mode REM PROG',
-           {'mode': 'REM PROG (0.1 s ago)'}),
-    Status('mappings', Style.BAD, 'ERROR: of 10 mappings 2 withheld', {
+    ShownStatus('station 1', Style.GOOD, 'OK: station 1 active', {'mode': 'REM RUN (0.1 s ago)'}),
+    ShownStatus('station 2', Style.WARNING, 'WARN: station 2 in mode REM PROG',
+                {'mode': 'REM PROG (0.1 s ago)'}),
+    ShownStatus('mappings', Style.BAD, 'ERROR: of 10 mappings 2 withheld', {
         'total': '10', 'row_1': 'withheld: the processor is in mode REM PROG',
         'row_2': 'withheld: the processor is in mode REM PROG'}),
-    Status('writes', Style.GOOD, 'OK: 0 of 0 writes confirmed')]
+    ShownStatus('writes', Style.GOOD, 'OK: 0 of 0 writes confirmed')]
 
 
 def test_verdict_values_and_what_is_wrong_fit_a_terminal_of_80_by_24_for_ten_rows() -> None:
@@ -130,20 +130,21 @@ def test_curve_stands_beside_its_value() -> None:
 
 @pytest.mark.parametrize(('statuses', 'verdict', 'style'), [
     ((), 'OK: 1 topic', Style.GOOD),
-    ((Status('mappings', Style.GOOD, 'OK: of 1 mappings 1 fresh'),
-      Status('link', Style.GOOD, 'OK: port open')), 'OK: of 1 mappings 1 fresh', Style.GOOD),
-    ((Status('mappings', Style.BAD, 'ERROR: of 1 mappings 1 failed'),
-      Status('link', Style.BAD, 'ERROR: port gone')), 'ERROR (1 of 2): port gone', Style.BAD),
-    ((Status('writes', Style.WARNING, 'WARN: 1 lost'),), 'WARN: writes: 1 lost', Style.WARNING),
+    ((ShownStatus('mappings', Style.GOOD, 'OK: of 1 mappings 1 fresh'),
+      ShownStatus('link', Style.GOOD, 'OK: port open')), 'OK: of 1 mappings 1 fresh', Style.GOOD),
+    ((ShownStatus('mappings', Style.BAD, 'ERROR: of 1 mappings 1 failed'),
+      ShownStatus('link', Style.BAD, 'ERROR: port gone')), 'ERROR (1 of 2): port gone', Style.BAD),
+    ((ShownStatus('writes', Style.WARNING, 'WARN: 1 lost'),), 'WARN: writes: 1 lost',
+     Style.WARNING),
 ])
 def test_verdict_is_the_worst_that_is_told(
-        statuses: tuple[Status, ...], verdict: str, style: Style) -> None:
+        statuses: tuple[ShownStatus, ...], verdict: str, style: Style) -> None:
     first = render(snapshot(statuses=statuses), NOW, WIDTH)[0]
     assert (first.text, first.style) == (f'/cell/abdf1  {verdict}', style)
 
 
 def test_value_that_does_not_come_here_is_in_the_verdict_though_the_bridge_is_content() -> None:
-    good = [Status('mappings', Style.GOOD, 'OK: of 2 mappings 2 fresh')]
+    good = [ShownStatus('mappings', Style.GOOD, 'OK: of 2 mappings 2 fresh')]
     for reading in (Reading('a', [1], received=NOW - 5, promised=1.0), Reading('a', promised=1.0)):
         told = lines(snapshot(statuses=good, readings=[reading, Reading('b', [1])]))
         assert told[0] == '/cell/abdf1  ERROR: topics: 1 of 2 topics without a fresh value here'
@@ -172,17 +173,17 @@ def test_strings_of_a_plc_cannot_move_the_cursor_or_forge_a_line() -> None:
     picture = snapshot(
         node='/n\x1b[2J',
         readings=[Reading('na\nme', 'Tank\x1b[31m\n4', 'N7\r', NOW, 1.0)],
-        statuses=[Status('link', Style.GOOD, 'OK: \x1b]0;', {'settings': '\x9b1m'}),
-                  Status('counters', Style.GOOD, '', {'A\n': '\x00'}),
-                  Status('mappings', Style.GOOD, '', {'tag\n': 'x\u202e'}),
-                  Status('station 1\n', Style.GOOD, '', {'mode': '\x7f'})],
-        results=[Status('t\n', Style.GOOD, '\x1b', {'value': '\n'}, NOW)])
+        statuses=[ShownStatus('link', Style.GOOD, 'OK: \x1b]0;', {'settings': '\x9b1m'}),
+                  ShownStatus('counters', Style.GOOD, '', {'A\n': '\x00'}),
+                  ShownStatus('mappings', Style.GOOD, '', {'tag\n': 'x\u202e'}),
+                  ShownStatus('station 1\n', Style.GOOD, '', {'mode': '\x7f'})],
+        results=[ShownStatus('t\n', Style.GOOD, '\x1b', {'value': '\n'}, NOW)])
     assert all(line.isprintable() for line in lines(picture))
     assert r'"Tank\x1b[31m\n4"' in line_with('na\\nme', picture).text
 
 
 def test_link_shows_load_and_poll_cycle() -> None:
-    picture = snapshot(statuses=[Status(
+    picture = snapshot(statuses=[ShownStatus(
         'link', Style.WARNING, 'WARN: port open', {
             'port': 'open', 'settings': '19200 baud, CRC', 'line load': '61 %',
             'poll cycle with Periods': '240 ms',
@@ -195,7 +196,7 @@ def test_link_shows_load_and_poll_cycle() -> None:
 
 
 def test_stations_are_told_from_the_active_node_table_and_the_diagnostics() -> None:
-    picture = snapshot(statuses=[Status(
+    picture = snapshot(statuses=[ShownStatus(
         'station 2', Style.BAD, 'ERROR: station 2 inactive', {'last answer': '4.7 s ago'})])
     assert 'active stations: 1, 17' in '\n'.join(lines(picture))
     assert styles_of('  station 2    ERROR', picture) == [Style.BAD] * 2
@@ -207,8 +208,8 @@ def test_stations_are_told_from_the_active_node_table_and_the_diagnostics() -> N
 def test_no_sentence_is_cut_and_zeros_are_left_out() -> None:
     text = 'ERROR: port open, but none of the stations has ever answered a command'
     picture = snapshot(statuses=[
-        Status('link', Style.BAD, text, {'settings': '9600 baud', 'line load': '0'}),
-        Status('writes', Style.GOOD, 'OK: 0 of 0 writes confirmed', {'total': '0'})])
+        ShownStatus('link', Style.BAD, text, {'settings': '9600 baud', 'line load': '0'}),
+        ShownStatus('writes', Style.GOOD, 'OK: 0 of 0 writes confirmed', {'total': '0'})])
     shown = lines(picture, 44)
     assert all(len(line) <= 44 for line in shown)
     assert text in ' '.join(' '.join(line.split()) for line in shown)
@@ -216,14 +217,15 @@ def test_no_sentence_is_cut_and_zeros_are_left_out() -> None:
 
 
 def test_mappings_name_what_is_wrong_and_leave_the_counts_to_the_summary() -> None:
-    picture = snapshot(statuses=[Status('mappings', Style.BAD, 'ERROR: of 2 mappings 1 failed', {
-        'total': '2', 'failed': '1', 'part_counter': 'failed: C5:0.ACC at station 2'})])
+    values = {'total': '2', 'failed': '1', 'part_counter': 'failed: C5:0.ACC at station 2'}
+    picture = snapshot(statuses=[
+        ShownStatus('mappings', Style.BAD, 'ERROR: of 2 mappings 1 failed', values)])
     assert line_with('part_counter: failed: C5:0.ACC', picture).style is Style.BAD
     assert not [line for line in lines(picture) if 'total' in line]
 
 
 def test_results_of_writes_are_shown_with_value_age_and_latency() -> None:
-    picture = snapshot(results=[Status(
+    picture = snapshot(results=[ShownStatus(
         'recipe', Style.BAD, 'not written: refused', {'value': '[1, 2]', 'latency_ms': '0.3'},
         NOW - 2)])
     line = line_with('recipe', picture)
@@ -232,7 +234,7 @@ def test_results_of_writes_are_shown_with_value_age_and_latency() -> None:
 
 
 def test_only_counters_that_have_counted_are_shown() -> None:
-    picture = snapshot(statuses=[Status(
+    picture = snapshot(statuses=[ShownStatus(
         'counters', Style.GOOD, 'OK: 3', {'CNT_A': '3', 'CNT_B': '0', 'CNT_C': '1'})])
     (line,) = [line for line in lines(picture) if 'CNT' in line]
     assert line.split() == ['CNT_A', '3', 'CNT_C', '1']
@@ -275,7 +277,7 @@ def test_values_never_take_more_than_their_width(values: list[float] | str, widt
 def test_no_line_is_wider_than_the_terminal(width: int, name: str, text: str) -> None:
     picture = snapshot(
         readings=[Reading(name, text, name, NOW, 1.0)],
-        statuses=[Status('link', Style.GOOD, text, {'settings': text}),
-                  Status('mappings', Style.GOOD, text, {name: text})])
+        statuses=[ShownStatus('link', Style.GOOD, text, {'settings': text}),
+                  ShownStatus('mappings', Style.GOOD, text, {name: text})])
     widths = [len(line) for line in lines(picture, max(width, 20))]
     assert max(widths) <= max(width, 20)

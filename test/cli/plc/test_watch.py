@@ -28,7 +28,7 @@ from pathlib import Path
 import re
 
 from abdf1_ros.cli.plc.data import mapping_of, Tags
-from abdf1_ros.cli.plc.watch import _News, _NoValue, curve_of, Watch
+from abdf1_ros.cli.plc.watch import _NoValue, _WatchedRead, curve_of, LiveValues
 from abdf1_ros.driver.checks import Checks, StationHealth
 from abdf1_ros.pccc.file_types import PlcType
 from abdf1_ros.pccc.identity import Identity, Mode
@@ -61,7 +61,7 @@ def network_on(plcs: Plcs, timeout: int = 1000) -> Network:
     return Network(com_port=plcs.port, baud=115200, timeout=timeout, nak_retries=0)
 
 
-class Counting(Watch):
+class Counting(LiveValues):
     """A watch that raises N7:0 by one after each read, and loses the line after some."""
 
     def __init__(self, plcs: Plcs, reads: int = 1000) -> None:
@@ -90,7 +90,7 @@ def test_every_change_is_shown_with_its_time(plcs: Plcs,
 
 
 def test_what_stays_is_shown_once(plcs: Plcs, capsys: pytest.CaptureFixture[str]) -> None:
-    assert Watch(network_on(plcs), [SPEED, NAME], 0.01).run(4) == 0
+    assert LiveValues(network_on(plcs), [SPEED, NAME], 0.01).run(4) == 0
     assert sorted(shown(capsys)) == ['N7:0  0', "ST9:0  'Tank'"]
 
 
@@ -104,7 +104,7 @@ def test_each_read_is_a_line_of_csv_for_each_value(
     store(plcs[1], 'ST9:0', 'a,"b"')
     words, name = (mapping_of(text, {'Command': 'Read', 'Station': '1', 'PLC_Type': 'PLC5'})
                    for text in ('N7:0-1', 'ST9:0'))
-    assert Watch(network_on(plcs), [words, name], 0.01, csv=True, tags=tags).run(2) == 0
+    assert LiveValues(network_on(plcs), [words, name], 0.01, csv=True, tags=tags).run(2) == 0
     head, *lines = capsys.readouterr().out.splitlines()
     assert head == f'time,station,address,{title}value'
     told = [line.partition(',')[2] for line in lines]
@@ -115,7 +115,7 @@ def test_each_read_is_a_line_of_csv_for_each_value(
 def test_reads_that_the_output_does_not_take_are_counted_and_others_keep_their_times(
         plcs: Plcs, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr('abdf1_ros.cli.plc.watch._MAX_NEWS', 2)
-    watch = Watch(network_on(plcs), [SPEED], 0.01, csv=True)
+    watch = LiveValues(network_on(plcs), [SPEED], 0.01, csv=True)
     watch._news = deque(maxlen=2)
     for value in range(5):
         watch.read(SPEED, array('h', [value]))
@@ -132,7 +132,7 @@ def test_reads_that_the_output_does_not_take_are_counted_and_others_keep_their_t
 def test_read_that_fails_is_a_line_of_csv_without_a_value(
         plcs: Plcs, capsys: pytest.CaptureFixture[str]) -> None:
     plcs.say('silent 1')
-    assert Watch(network_on(plcs, 100), [SPEED], 0.01, csv=True).run(2) == 1
+    assert LiveValues(network_on(plcs, 100), [SPEED], 0.01, csv=True).run(2) == 1
     assert [line.partition(',')[2] for line in capsys.readouterr().out.splitlines()[1:]] == [
         '1,N7:0,']
 
@@ -140,7 +140,7 @@ def test_read_that_fails_is_a_line_of_csv_without_a_value(
 def test_control_characters_of_a_plc_do_not_reach_the_screen(
         plcs: Plcs, capsys: pytest.CaptureFixture[str]) -> None:
     store(plcs[1], 'ST9:0', 'a\x1b[2J\x9b')
-    assert Watch(network_on(plcs), [NAME], 0.01).run(1) == 0
+    assert LiveValues(network_on(plcs), [NAME], 0.01).run(1) == 0
     assert shown(capsys) == [r"ST9:0  'a\x1b[2J\x9b'"]
 
 
@@ -154,7 +154,7 @@ def test_lost_line_is_shown(plcs: Plcs, capsys: pytest.CaptureFixture[str]) -> N
 
 def test_silent_station_is_shown(plcs: Plcs, capsys: pytest.CaptureFixture[str]) -> None:
     plcs.say('silent 1')
-    assert Watch(network_on(plcs, 100), [SPEED], 0.01).run(2) == 1
+    assert LiveValues(network_on(plcs, 100), [SPEED], 0.01).run(2) == 1
     assert shown(capsys) == [
         'N7:0  no value: 2509 ERR_INACTIVE_STATION: Slave Station (1) Inactive']
 
@@ -169,7 +169,7 @@ def test_interrupt_of_the_start_leaves_no_thread(
             raise KeyboardInterrupt
 
     monkeypatch.setattr('abdf1_ros.cli.plc.watch.LinkThread', Interrupted)
-    watch = Watch(network_on(plcs), [SPEED], 0.01)
+    watch = LiveValues(network_on(plcs), [SPEED], 0.01)
     with suppress(KeyboardInterrupt):
         watch.run(1)
     assert not watch._link.is_alive()
@@ -187,11 +187,11 @@ def draw(monkeypatch: pytest.MonkeyPatch) -> Draw:
         screen = io.TextIOWrapper(io.BytesIO(), encoding, errors='backslashreplace')
         with monkeypatch.context() as patch:
             patch.setattr('abdf1_ros.cli.plc.watch.opened', lambda network: None)
-            watch = Watch(Network(), mappings, 0.01, tags=tags)
+            watch = LiveValues(Network(), mappings, 0.01, tags=tags)
             patch.setattr('sys.stdout', screen)
             patch.setattr('shutil.get_terminal_size', lambda: os.terminal_size(size))
             for each in news:
-                watch._note_changes([_News(NOW, *each)])
+                watch._note_changes([_WatchedRead(NOW, *each)])
             watch._redraw()
             screen.flush()
         text = screen.buffer.getvalue().decode(encoding)  # type: ignore[attr-defined]
@@ -232,12 +232,12 @@ def test_nothing_old_stays_below_a_table_that_shrinks(
 
     def show(size: tuple[int, int], *news: tuple[Mapping, Values | _NoValue]) -> list[str]:
         monkeypatch.setattr('shutil.get_terminal_size', lambda: os.terminal_size(size))
-        watch._note_changes([_News(NOW, *each) for each in news])
+        watch._note_changes([_WatchedRead(NOW, *each) for each in news])
         watch._redraw()
         screen.take(capsys.readouterr().out)
         return [' '.join(line.split()) for line in screen.lines if line.strip()]
 
-    watch = Watch(Network(), rows, 0.01)
+    watch = LiveValues(Network(), rows, 0.01)
     fault = _NoValue('2509 ERR_INACTIVE_STATION: Slave Station (1) Inactive')
     assert len(show((60, 9), *((row, fault) for row in rows))) > 4
     healed = show((60, 9), *((row, array('h', [5])) for row in rows))
@@ -303,7 +303,8 @@ def test_rows_of_a_map_have_their_own_tags_and_scaled_values(
     store(plcs[1], 'N7:1', [125])
     row = make_mapping('N7:1', tag='height', scaling=Scaling(0.1, -2.0))
     capture = tmp_path / 'line.cap'
-    watch = Watch(network_on(plcs), [row], 0.01, tags={'N7:1': 'another'}, record=str(capture))
+    watch = LiveValues(
+        network_on(plcs), [row], 0.01, tags={'N7:1': 'another'}, record=str(capture))
     assert watch.run(1) == 0
     assert shown(capsys) == ['N7:1 height  10.5']
     assert capture.read_text('ascii').startswith('# abdf1_ros capture 1\n')
@@ -320,10 +321,11 @@ def test_mode_of_each_plc_and_faults_of_the_line_stand_around_the_values(
     assert lines[0] == ('station 1: PLC-5/40, PROG: its program does not run, values may stand '
                         'still; memory lost')
     assert lines[1].startswith('address') and len(lines) == 3
-    monkeypatch.setattr(Watch, '_faults_of_line', lambda self: ['line: 3 repeated, 1 damaged'])
+    monkeypatch.setattr(
+        LiveValues, '_faults_of_line', lambda self: ['line: 3 repeated, 1 damaged'])
     assert draw([SPEED], (SPEED, array('h', [5])))[-1] == 'line: 3 repeated, 1 damaged'
 
 
 def test_port_that_is_not_there() -> None:
     with pytest.raises(OSError):
-        Watch(Network(com_port='/nowhere/tty'), [SPEED], 0.1)
+        LiveValues(Network(com_port='/nowhere/tty'), [SPEED], 0.1)

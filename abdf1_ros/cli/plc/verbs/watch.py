@@ -31,7 +31,7 @@ from abdf1_ros.cli.plc.asking import ask, mappings_of
 from abdf1_ros.cli.plc.options import add_addresses, COUNT, RADIXES
 from abdf1_ros.cli.plc.session import complain, Session
 from abdf1_ros.cli.plc.targets import Targets, to_read
-from abdf1_ros.cli.plc.watch import Watch
+from abdf1_ros.cli.plc.watch import LiveValues
 from abdf1_ros.cli.terminal import EXIT_FAILED, number_option
 
 
@@ -55,8 +55,8 @@ def run(options: argparse.Namespace) -> int:
 def _watch(options: argparse.Namespace, session: Session, targets: Targets) -> int:
     mappings = mappings_of(options, session, targets)
     session.close()  # the driver opens the port itself
-    watch = Watch(session.network, mappings, options.period, RADIXES[options.radix],
-                  options.csv, targets.tags, options.record)
+    watch = LiveValues(session.network, mappings, options.period, RADIXES[options.radix],
+                       options.csv, targets.tags, options.record)
     failed = watch.run(options.count)
     if failed:
         complain(presence.traffic(watch.counters))
