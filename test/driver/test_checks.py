@@ -130,6 +130,19 @@ def test_program_mode_and_fault_are_seen(network: Network) -> None:
     assert bench.listener.changes == []
 
 
+def test_check_without_a_reply_shows_that_the_rows_of_its_station_have_no_value() -> None:
+    mapping = make_mapping('N7:0', station=1, plc='SLC', period=60_000)
+    bench = DriverBench([mapping], settings=DriverSettings(processor_period=0.5))
+    plc = bench.plc(1, 'SLC', ('N7:0', 20))
+    bench.run(2.0)
+    point = bench.driver.points[mapping]
+    assert point.error is None
+    plc.faults.silent = True
+    bench.run(3.0)
+    assert point.error is not None
+    assert bench.driver.stations[1].failures > 0
+
+
 def test_processor_that_nobody_asks_is_said_to_be_unasked_before_and_after_a_silence() -> None:
     bench, (plc,), _ = make_bench(word(1), period=0.0)
     never = 'unknown (not asked: processor_period is 0)'

@@ -27,6 +27,7 @@ from abdf1_ros.driver.write import Outcome
 from abdf1_ros.errors import CommandTimeout
 from abdf1_ros.messages import Message
 from abdf1_ros.pccc.extent import Extent
+from abdf1_ros.plan.bounds import OURS_BESIDE_GUESTS
 from abdf1_ros.settings.network import Network
 from abdf1_ros.settings.rows import Rows
 import pytest
@@ -63,6 +64,28 @@ def test_reply_of_the_plc_comes_back_with_the_numbers_of_the_guest() -> None:
     (_, reply), = program.replies
     assert reply == command.reply(b'\x10\x10')
     assert program.guest.slowest < 0.3
+
+
+def test_guest_waits_on_an_idle_line_no_longer_than_its_last_failure_asks_for() -> None:
+    bench = DriverBench(
+        [make_mapping('N7:0', station=station, plc='SLC', period=20_000) for station in (1, 2)],
+        network=Network(baud=19200, timeout=100, cmd_timeout=5000))
+    for station in (1, 2):
+        bench.plc(station, 'SLC', ('N7:0', 20))
+    bench.run(1.0)
+    program = Program(bench)
+    bench.far.say = lambda data: b''
+    asked = bench.clock()
+    program.ask(READ_N7, dst=2)
+    while not program.statuses:
+        bench.run(0.005)
+    took = bench.clock() - asked
+    bench.far.say = lambda data: data
+    program.ask(READ_N7)
+    bench.run(OURS_BESIDE_GUESTS * took - 0.1)
+    assert len(program.statuses) == 1
+    bench.run(0.3)
+    assert program.statuses[1:] == [0]
 
 
 @for_all('entry', [
