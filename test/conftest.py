@@ -15,13 +15,14 @@
 
 """What holds for all tests: the examples of property tests, and which files begin."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 import gc
 import os
 from pathlib import Path
 
 from hypothesis import HealthCheck, settings
 import pytest
+from support.ptys import Pty
 
 # Files that wait for other processes most of the time, and files that compute; the longest first.
 _WAITING = (
@@ -42,6 +43,15 @@ _COMMON = {'deadline': None, 'suppress_health_check': [HealthCheck.too_slow]}
 settings.register_profile('same', max_examples=60, derandomize=True, database=None, **_COMMON)
 settings.register_profile('new', max_examples=150, **_COMMON)
 settings.load_profile(os.environ.get('ABDF1_ROS_EXAMPLES', 'same'))
+
+
+@pytest.fixture
+def ptys(tmp_path: Path) -> Iterator[list[Pty]]:
+    """Two pseudo-terminals, which end with the test."""
+    lines = [Pty(tmp_path / name) for name in ('first', 'second')]
+    yield lines
+    for line in lines:
+        line.close()
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:

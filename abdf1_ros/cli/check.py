@@ -32,12 +32,12 @@ import sys
 from typing import Any
 
 from abdf1_ros.cli.terminal import (
+    check_page,
     colour,
     command_parser,
     EXIT_INTERRUPTED,
     EXIT_USAGE,
     GREEN,
-    may_replace,
     number_option,
     prepare_output,
     reason_of,
@@ -281,15 +281,8 @@ def _parse(args: Sequence[str] | None) -> argparse.Namespace:
         parser.error(f'{printable(options.net)} is not a folder, so a map CSV must follow')
     if options.html and options.map is None:
         parser.error('--html is for one net CSV and one map CSV')
-    if options.html and not may_replace(options.html, _is_page):
-        parser.error(f'{printable(options.html)} exists and was not made by --html; '
-                     'give another name')
+    check_page(parser, options.html)
     return options
-
-
-def _is_page(path: Path) -> bool:
-    from abdf1_ros.cli.lanes import is_page
-    return is_page(path)
 
 
 def _text(found: Findings, report: Report | None) -> str:

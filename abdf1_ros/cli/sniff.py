@@ -43,6 +43,7 @@ import time
 from typing import TYPE_CHECKING
 
 from abdf1_ros.cli.terminal import (
+    check_page,
     command_parser,
     EXIT_FAILED,
     EXIT_USAGE,
@@ -230,11 +231,6 @@ def _is_bundle(path: Path) -> bool:
     return is_bundle(path)
 
 
-def _is_page(path: Path) -> bool:
-    from abdf1_ros.cli.lanes import is_page
-    return is_page(path)
-
-
 def main(args: Sequence[str] | None = None) -> int:
     """
     Decode until the end of the file, SIGINT, SIGTERM or --seconds.
@@ -308,8 +304,7 @@ def _parse(args: Sequence[str] | None) -> argparse.Namespace:
     if options.report and not may_replace(options.report, _is_bundle):
         parser.error(f'--report: {options.report} exists and is not a bundle of --report; give '
                      'another name')
-    if options.html and not may_replace(options.html, _is_page):
-        parser.error(f'{options.html} exists and was not made by --html; give another name')
+    check_page(parser, options.html)
     if not options.report and (options.settings or options.conformance):
         parser.error('--settings and --conformance are for --report')
     if options.anonymous and not (options.report or options.html):

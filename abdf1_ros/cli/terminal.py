@@ -199,6 +199,13 @@ def may_replace(path: str, is_ours: Callable[[Path], bool]) -> bool:
         return False
 
 
+def check_page(parser: argparse.ArgumentParser, path: str | None) -> None:
+    """End the program if ``path`` is a file that no --html has made."""
+    from abdf1_ros.cli.lanes import is_page
+    if path and not may_replace(path, is_page):
+        parser.error(f'{printable(path)} exists and was not made by --html; give another name')
+
+
 def called(name: str) -> str:
     """Return the words that start a command of the package in this environment, for the shell."""
     prefixes = os.environ.get('AMENT_PREFIX_PATH', '').split(os.pathsep)

@@ -14,11 +14,9 @@
 
 """Ports that are only listened to: for reading alone, no signal, no byte."""
 
-from collections.abc import Iterator
 import errno
 import fcntl
 import os
-from pathlib import Path
 import select
 import termios
 from typing import Any
@@ -43,14 +41,6 @@ SIGNALS = {termios.TIOCMSET, termios.TIOCMBIS, termios.TIOCMBIC,
 COMMAND = bytes.fromhex('10 01 02 10 02 02 00 0F 00 02 00 01 00 00 03 00 06 07 07 06 10 03 6E A0')
 POLL = bytes.fromhex('10 05 02 FE')
 REPLY = bytes.fromhex('10 02 00 02 4F 00 02 00 00 00 00 00 00 00 10 03 C5 73')
-
-
-@pytest.fixture
-def ptys(tmp_path: Path) -> Iterator[list[Pty]]:
-    lines = [Pty(tmp_path / name) for name in ('first', 'second')]
-    yield lines
-    for line in lines:
-        line.close()
 
 
 def listening_to(*ptys: Pty, **others: Any) -> PortSettings:

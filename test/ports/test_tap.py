@@ -14,7 +14,6 @@
 
 """Listening on a port, and between two."""
 
-from collections.abc import Iterator
 import math
 import os
 from pathlib import Path
@@ -24,14 +23,6 @@ from abdf1_ros.ports.tap import is_pty, Tap
 from abdf1_ros.sniffer.capture import Chunk, Direction
 import pytest
 from support.ptys import PATIENCE, Pty, read_exactly
-
-
-@pytest.fixture
-def ptys(tmp_path: Path) -> Iterator[tuple[Pty, Pty]]:
-    pair = Pty(tmp_path / 'a'), Pty(tmp_path / 'b')
-    yield pair
-    for pty in pair:
-        pty.close()
 
 
 def tap(*names: object) -> Tap:
@@ -50,13 +41,13 @@ def hear(listening: Tap, count: int) -> list[Chunk]:
     return [Chunk(None, direction, data) for direction, data in found.items()]
 
 
-def test_one_port_is_listened_to(ptys: tuple[Pty, Pty]) -> None:
+def test_one_port_is_listened_to(ptys: list[Pty]) -> None:
     with tap(ptys[0].name) as listening:
         ptys[0].write(b'\x10\x04')
         assert hear(listening, 2) == [Chunk(None, Direction.UNKNOWN, b'\x10\x04')]
 
 
-def test_everything_is_passed_on_both_ways(ptys: tuple[Pty, Pty]) -> None:
+def test_everything_is_passed_on_both_ways(ptys: list[Pty]) -> None:
     one, other = ptys
     every = bytes(range(256))
     with tap(one.name, other.name) as listening:
@@ -68,7 +59,7 @@ def test_everything_is_passed_on_both_ways(ptys: tuple[Pty, Pty]) -> None:
             Chunk(None, Direction.OUT, every), Chunk(None, Direction.IN, every[::-1])]
 
 
-def test_new_pseudo_terminal_takes_its_name_away(ptys: tuple[Pty, Pty], tmp_path: Path) -> None:
+def test_new_pseudo_terminal_takes_its_name_away(ptys: list[Pty], tmp_path: Path) -> None:
     name = tmp_path / 'new'
     with tap(f'pty:{name}', ptys[1].name) as listening:
         assert listening.names == [str(name), str(ptys[1].name)]
@@ -81,7 +72,7 @@ def test_new_pseudo_terminal_takes_its_name_away(ptys: tuple[Pty, Pty], tmp_path
     assert not name.is_symlink()
 
 
-def test_port_that_cannot_be_opened(ptys: tuple[Pty, Pty], tmp_path: Path) -> None:
+def test_port_that_cannot_be_opened(ptys: list[Pty], tmp_path: Path) -> None:
     first = tmp_path / 'first'
     with pytest.raises(OSError, match='No such file') as error:
         tap(f'pty:{first}', tmp_path / 'none')
@@ -89,21 +80,21 @@ def test_port_that_cannot_be_opened(ptys: tuple[Pty, Pty], tmp_path: Path) -> No
     assert not first.is_symlink()  # the first has been closed again
 
 
-def test_lost_port_ends_it_with_an_error(ptys: tuple[Pty, Pty]) -> None:
+def test_lost_port_ends_it_with_an_error(ptys: list[Pty]) -> None:
     with tap(ptys[0].name, ptys[1].name) as listening:
         ptys[1].close()
         with pytest.raises(OSError, match='Input/output error|the other end has closed'):
             list(listening.chunks(PATIENCE, PATIENCE, lambda: None))
 
 
-def test_it_ends_when_told_or_when_the_time_is_up(ptys: tuple[Pty, Pty]) -> None:
+def test_it_ends_when_told_or_when_the_time_is_up(ptys: list[Pty]) -> None:
     with tap(ptys[0].name) as listening:
         listening.stop()
         assert list(listening.chunks(math.inf, PATIENCE, lambda: None)) == []
         assert list(listening.chunks(0.0, PATIENCE, lambda: None)) == []
 
 
-def test_silence_is_told(ptys: tuple[Pty, Pty]) -> None:
+def test_silence_is_told(ptys: list[Pty]) -> None:
     told: list[int] = []
     with tap(ptys[0].name) as listening:
         def idle() -> None:
@@ -123,7 +114,7 @@ def test_word_pty_and_its_file_name_ask_for_a_pseudo_terminal(name: str, expecte
 
 
 def test_what_nothing_takes_is_passed_on_and_counted(
-        ptys: tuple[Pty, Pty], monkeypatch: pytest.MonkeyPatch) -> None:
+        ptys: list[Pty], monkeypatch: pytest.MonkeyPatch) -> None:
     """After Ctrl-S it was all kept, without a bound."""
     monkeypatch.setattr('abdf1_ros.ports.tap._MOST_WAITING', 3)
     with tap(ptys[0].name, ptys[1].name) as listening:

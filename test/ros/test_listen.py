@@ -14,7 +14,6 @@
 
 """A bridge in Mode Listen beside a master that was written here, byte by byte."""
 
-from collections.abc import Iterator
 import os
 from pathlib import Path
 import select
@@ -79,14 +78,6 @@ class ForeignMaster(threading.Thread):
         for byte in data:
             pty.write(bytes((byte,)))
         time.sleep(0.002)
-
-
-@pytest.fixture
-def ptys(tmp_path: Path) -> Iterator[list[Pty]]:
-    lines = [Pty(tmp_path / name) for name in ('first', 'second')]
-    yield lines
-    for line in lines:
-        line.close()
 
 
 @pytest.mark.parametrize('is_full', [False, True])
