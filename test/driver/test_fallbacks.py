@@ -123,6 +123,24 @@ def test_rule_11_answered_write_of_a_guest_ends_the_pause() -> None:
     assert plc.rank(one.row, 0.3) is not None
 
 
+def test_rule_11_first_tries_go_first_then_plcs_that_answer() -> None:
+    one = OneRow()
+    stations = ActiveStationList([1], probe_time=1.0)
+    plc = Plc(1, [one.row], stations, one.record, Conditions())
+    one.row.make_due(FallbackCause.START, 0.0)
+    stations.heard(1, 0.0)
+    first = plc.rank(one.row, 0.0)
+    own = one.row.take(0.0)
+    one.fallback(own, 0.1, Outcome.FAILED)
+    answers = plc.rank(one.row, 2.0)
+    silent = Claim(1, [one.mapping.extent], own, 2.0)
+    silent.end(Outcome.UNKNOWN, 2.1, 0.0)
+    plc.write_ended(silent, 2.1)
+    left_alone = plc.rank(one.row, 4.0)
+    assert first and answers and left_alone
+    assert first < answers < (2,) < (3,) < left_alone
+
+
 def test_rule_7_message_refreshes_from_its_own_time_when_it_is_confirmed() -> None:
     cell, speed = speed_cell()
     cell.bench.driver.write([speed], [3], cell.now - 0.3)
