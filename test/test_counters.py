@@ -37,3 +37,7 @@ def test_counters_are_those_of_the_specification_each_described() -> None:
     assert set(Counters().by_mnemonic().values()) == {0}
     with pytest.raises(AttributeError):
         setattr(Counters(), 'polls', 1)
+
+
+def test_frames_are_damaged_whichever_check_is_wrong() -> None:
+    assert Counters(bcc_errors=2, crc_errors=3).damaged_frames == 5

@@ -141,6 +141,15 @@ def test_on_two_ports_a_number_that_is_used_again_tells_nothing(tns: int) -> Non
     assert bench.values(mapping) == ([] if tns == 7 else [[99]])
 
 
+def test_numbers_that_tell_nothing_are_forgotten_with_their_commands() -> None:
+    bench = ListeningBench([row()], has_two_ports=True)
+    for tns in range(300):
+        for asked in (READ_N7_0, 'A2 02 07 89 04 00'):
+            bench.hear(frame(command(tns, asked)))
+    assert bench.driver.overheard is not None
+    assert 0 < len(bench.driver.overheard._ambiguous) <= 200
+
+
 def test_reply_counts_only_with_its_command() -> None:
     mapping = row(length=4)
     bench = ListeningBench([mapping])
