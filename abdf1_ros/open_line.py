@@ -53,10 +53,8 @@ _GLANCE = 0.2  # s; interval of looks whether the thread of the link still runs
 
 LOG = logging.getLogger('abdf1_ros')
 """
-The logger where no other is given: requests with their times, and what happens on the line.
-
-The thread that asks logs the events of the line: while its request is under way, with the next
-request, or at the end.
+The default logger. It gets requests with their times, and the events of the line. The thread that
+asks logs these events: during its request, at its next request, or at the end.
 """
 
 # Most events on the line that are kept between two requests.

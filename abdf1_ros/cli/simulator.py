@@ -135,7 +135,7 @@ class _EchoingPort(PortAround):
 
 
 TimedCommands = list[tuple[float, str]]
-"""Seconds and command."""
+"""Commands with their times: seconds after the start, and the command."""
 
 
 def main(args: Sequence[str] | None = None) -> int:

@@ -94,7 +94,7 @@ LONGEST_CASE = 290.0
 LONGEST_RUN = 600.0
 
 CaseScript = Callable[[Any], None]
-"""Plays a case with the end it is given; raises Failed or Skipped."""
+"""Plays a case with one end of the line; raises Failed or Skipped."""
 
 
 def case(rule: str, source: str, *targets: Target,

@@ -308,7 +308,7 @@ class RadioEnd(PeerEnd):
 
 
 Serve = Callable[[bytes], bytes]
-"""Executes a command: link data in, link data of the reply out."""
+"""Executes a command: takes its link data, returns the link data of the reply."""
 
 
 class AnsweringEnd(ABC):

@@ -199,7 +199,7 @@ class Need(Enum):
 MORE: Final = Need.MORE
 
 Decoded = Symbol | Need | None
-"""The result of a step: a symbol, the need of more bytes, or None where the next step follows."""
+"""The result of a step: a symbol, the need of more bytes, or None if the next step follows."""
 
 
 class Damaged(bytes):

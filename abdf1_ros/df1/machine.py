@@ -100,7 +100,7 @@ class Rest(NamedTuple):
 
 
 Step = Send | Listen | Rest
-"""What a procedure asks of the machine."""
+"""The requests of a procedure to the machine."""
 
 LISTEN_ON = Listen(None, is_continued=True)
 

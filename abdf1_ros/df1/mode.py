@@ -29,10 +29,10 @@ from abdf1_ros.df1.stations import ActiveStationList
 from abdf1_ros.messages import Event
 
 Serve = Callable[[Packet], Packet]
-"""Executes a command of another node, and returns its reply."""
+"""Executes a command of another node, and returns the reply."""
 
 Report = Callable[[Event], None]
-"""Takes every numbered error and notice."""
+"""Gets every numbered error and notice."""
 
 
 class LinkMaker(Protocol):
@@ -46,46 +46,50 @@ class LineMode:
     """A mode, as the columns Mode and Polling of a net CSV name it; times are in seconds."""
 
     name: ClassVar[str]
-    """What stands in the column Mode."""
+    """The name of the mode in the column Mode."""
 
     link: ClassVar[LinkMaker]
-    """Makes its link."""
+    """Makes the link of the mode."""
 
     polling: ClassVar[str] = ''
-    """What stands in the column Polling, where the mode depends on that."""
+    """The value of the column Polling, if the mode depends on this column."""
 
     other_words: ClassVar[Mapping[str, str]] = {}
-    """What others call it, in lower case, and what to advise those."""
+    """Names that other products have for the mode, in lower case, each with the mode to advise."""
 
     duplex: ClassVar[Duplex] = Duplex.HALF
-    """How symbols are understood."""
+    """The duplex that decides the meaning of symbols."""
 
     is_master: ClassVar[bool] = False
-    """We poll the stations of the line, and address gateways to stations behind them."""
+    """
+    True if we poll the stations of the line, and address stations behind gateways by the gateway.
+    """
 
     has_one_plc: ClassVar[bool] = False
-    """There is one other end, whose number does not matter."""
+    """True if the line has one far end only, whose number does not matter."""
 
     is_polled: ClassVar[bool] = False
-    """Another node is the master, so when we may send is not ours to say."""
+    """True if another node is the master, which decides when we may send."""
 
     waits_for_acks: ClassVar[bool] = False
-    """Each of our messages waits Timeout for its response."""
+    """True if each message waits for its response, at most Timeout."""
 
     only_listens: ClassVar[bool] = False
-    """Nothing is sent: rows are filled from what other nodes say."""
+    """True if we send nothing, and fill rows from the traffic of other nodes."""
 
     takes_turns: ClassVar[bool] = False
-    """Stations are polled one after the other, whoever has a command."""
+    """True if all stations are polled in turn, whether there is a command for them or not."""
 
     answers_by_itself: ClassVar[bool] = False
-    """Commands of the other end come and are answered also without Serve rows."""
+    """True if we answer commands of the far end even without Serve rows."""
 
     answers: ClassVar[int] = 2
-    """So many answers of the station a transaction has: to the command, and the reply."""
+    """
+    Number of answers that a transaction needs from the station: to the command, and the reply.
+    """
 
     why_unshared: ClassVar[str] = ''
-    """Why the line cannot be shared with guests, empty where it can."""
+    """The reason why guests cannot share the line; empty if they can."""
 
     def make_machine(self, line: LinkSettings, run: Callable[[], Procedure], counters: Counters,
                      background: Background | None = None) -> Machine:

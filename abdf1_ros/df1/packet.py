@@ -29,11 +29,11 @@ PRIORITY_BIT = 0x20
 BROADCAST = 255
 
 STS_NOT_DELIVERED = 0x02
-"""The destination does not acknowledge (M 8-2)."""
+"""STS of a gateway: the destination does not acknowledge (M 8-2)."""
 
 
 DIAGNOSTIC_REPLY = 0x46
-"""The reply to echo, status and counters, which a gateway may give in place of a node."""
+"""CMD of replies to echo, status and counters. A gateway may send them in place of a node."""
 
 
 def is_local_status(sts: int) -> bool:

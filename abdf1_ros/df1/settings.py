@@ -45,25 +45,27 @@ class LinkOptions:
     """Settings of a link that are not in the net CSV."""
 
     duplicate_detection: bool = True
-    """A message that comes again is acknowledged, and not executed again."""
+    """Acknowledge a repeated message, but do not execute it again."""
 
     nak_on_command_timeout: bool = True
-    """A master sends DLE NAK when a reply is overdue: slaves then drop what they hold (M 2-7)."""
+    """A master sends DLE NAK if a reply is overdue: then slaves drop their messages (M 2-7)."""
 
     accept_slave_messages: bool = True
-    """A master serves commands of slaves or passes them on; otherwise they are dropped."""
+    """A master serves commands of slaves or passes them on; otherwise it drops them."""
 
     polling: PollingSettings | None = None
-    """The poll lists of standard polling, None for one list of all mapped stations."""
+    """The poll lists of standard polling; None for one list of all mapped stations."""
 
     max_outstanding: int = 1
-    """So many commands of a full-duplex peer may wait for their replies."""
+    """Number of commands of a full-duplex peer that may wait for replies at the same time."""
 
     eot_suppression: bool = False
-    """A slave answers a poll only with messages. The master sees no difference to a dead one."""
+    """
+    A slave without a message does not answer a poll. To the master it looks like a dead station.
+    """
 
     poll_timeout: float = 60.0
-    """After so long without a poll the commands of a slave fail; 0 for never."""
+    """Seconds without a poll after which the commands of a slave fail; 0 for never."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -71,40 +73,42 @@ class LinkSettings(LinkOptions):
     """Settings of a link, named as in S0, with the defaults of a net CSV."""
 
     station: int | None = 5
-    """Our own number on the line; None for a peer to which messages to any number go."""
+    """Our own number on the line; None for a peer that takes messages to any number."""
 
     checksum: Checksum = Checksum.CRC
     """The check of every message."""
 
     timing: LineTiming = LineTiming()
-    """How long characters take, and the pause before each transmission."""
+    """The time that characters take, and the pause before each transmission."""
 
     nak_retries: int = 3
-    """A message that is not acknowledged is sent again so often; by radio one without a reply."""
+    """Most repetitions of a message without ACK; by radio, of a message without a reply."""
 
     enq_retries: int = 3
-    """A poll, or the question for a response, is sent again so often."""
+    """Most repetitions of a poll, or of an ENQ for a response."""
 
     timeout: float = 1.0
-    """How long each answer of another node is waited for."""
+    """Most seconds to wait for each answer of another node."""
 
     cmd_timeout: float = 1.0
-    """How long the reply to a command is waited for."""
+    """Most seconds to wait for the reply to a command."""
 
     poll_pause: float = 0.005
-    """A master waits so long after an EOT, so that the station can finish its reply."""
+    """Seconds that a master waits after an EOT, so that the station can finish its reply."""
 
     queue_size: int = 4
-    """So many replies of a slave may wait for a poll before its sink is full."""
+    """
+    Number of replies of a slave that may wait for a poll; then the slave takes no more commands.
+    """
 
     store_forward: Collection[int] = ()
-    """A radio modem node sends packets between these on; 255 stands for broadcasts."""
+    """A radio modem node forwards packets between these nodes; 255 stands for broadcasts."""
 
     also: Collection[int] = ()
-    """Further numbers of a radio modem node: several simulated PLCs may be one node."""
+    """Further numbers of a radio modem node: one node may stand for several simulated PLCs."""
 
     avoids_collisions: bool = False
-    """Radio modems wait for a quiet line and buffer both directions, so we need not wait."""
+    """The radios wait for a quiet line and buffer both directions, so we need not wait."""
 
     @classmethod
     def of(cls, options: LinkOptions, **line: object) -> LinkSettings:

@@ -27,25 +27,25 @@ class DriverSettings(LinkOptions):
     """Settings of a driver that are not in the net CSV; times in seconds."""
 
     default_period: float = 0.1
-    """Between two reads of a row without Period."""
+    """Seconds between two reads of a row without Period."""
 
     stale_after: float = USUAL_STALE_AFTER
-    """A value is stale when it is older than so many periods."""
+    """Number of periods after which a value is stale."""
 
     write_timeout: float = 2.0
-    """A message that waits for longer is not sent any more."""
+    """Seconds that a message may wait; after that it is not sent."""
 
     may_store: bool = False
-    """The port may store what is sent: a device server, while another client has its line."""
+    """True if the port may store bytes: a device server, while another client has its line."""
 
     read_only: bool = False
-    """Nothing is written to a PLC."""
+    """True if nothing may be written to a PLC."""
 
     processor_period: float = 0.0
-    """Between two questions for the diagnostic status of a station, 0 for never."""
+    """Seconds between two questions for the diagnostic status of a station; 0 for never."""
 
     first_tns: int = 0
     """
-    The first transaction number. It should be random: a station could take the first command of a
-    restarted driver for a duplicate.
+    The first transaction number. It should be random: after a restart of the driver a station may
+    take the first command for a duplicate.
     """

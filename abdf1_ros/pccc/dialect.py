@@ -27,12 +27,12 @@ from abdf1_ros.pccc.address import Address
 from abdf1_ros.pccc.file_types import FileType, Layout
 
 Request = tuple[int, bytes]
-"""CMD, and what follows TNS."""
+"""CMD, and the bytes after TNS."""
 
 _Result = TypeVar('_Result')
 
 Steps = Generator[Request, Packet, _Result]
-"""What is done with a station: yields requests, is sent the replies, returns the result."""
+"""A procedure with a station: yields requests, gets the replies, returns the result."""
 
 
 @dataclass(frozen=True, slots=True)

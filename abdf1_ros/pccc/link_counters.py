@@ -39,7 +39,7 @@ UNUSED = ''
 
 
 CounterLayout = tuple[str, ...]
-"""What each word counts; '' for a word that is not used."""
+"""The meaning of each word; '' for a word without a meaning."""
 
 
 def decode_counters(data: bytes, layout: CounterLayout | None) -> dict[str, str]:

@@ -75,7 +75,7 @@ class Processor(Enum):
 
 
 USUAL = Processor.SLC_5_03
-"""What an SLC is taken for when it is not known which it is."""
+"""The processor that we assume for an SLC whose processor is not known."""
 
 CIF_FILES = frozenset(processor.common_interface_file for processor in Processor)
 """The files that the common interface file may be."""

@@ -23,13 +23,13 @@ from abdf1_ros.pccc import status
 from abdf1_ros.pccc.fields import Reader
 
 Commands = dict[tuple[int, int], Callable[[Reader], bytes]]
-"""By CMD and FNC: what takes the parameters off a reader and returns the reply's data."""
+"""Functions by CMD and FNC. They take the parameters from a reader and return the reply's data."""
 
 BasicCommand = Callable[[Reader, int], bytes]
-"""The same for a command without FNC; the second argument is the command's SRC."""
+"""Such a function for a command without FNC; the second argument is the command's SRC."""
 
 BasicCommands = dict[int, BasicCommand]
-"""By CMD."""
+"""Functions by CMD, for commands without FNC."""
 
 Codes = tuple[int, int | None]
 """STS and EXT STS."""

@@ -40,7 +40,7 @@ from abdf1_ros.plan.partition import Candidate, CostModel, partition, Span
 from abdf1_ros.settings.mapping import Mapping
 
 StationArea = tuple[int, Area, Dialect]
-"""Station, area and way to read: a block lies within one such area."""
+"""Station, area and dialect. All words of a block belong to one such area."""
 
 
 @dataclass(frozen=True, slots=True)

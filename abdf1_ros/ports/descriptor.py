@@ -33,7 +33,7 @@ from typing import Protocol
 _INT = struct.Struct('i')
 
 READ_SIZE = 512
-"""Bytes that are read at a time, more than a line can have brought while its thread slept."""
+"""Most bytes of one read. A line brings fewer bytes while its thread sleeps."""
 
 _WRITE_TIMEOUT = 2.0
 

@@ -243,6 +243,6 @@ COLUMNS = tuple(BY_NAME)
 
 RENAMED = {'Publish_While': 'While', 'Heartbeat_Timeout': 'While_Timeout', 'Requires': 'While',
            'Requires_Timeout': 'While_Timeout'}
-"""The present names of columns of earlier versions."""
+"""Present names of columns, by their names in earlier versions."""
 
 NEEDED = tuple(column.name for column in MAP_COLUMNS if column.default is None)

@@ -28,28 +28,32 @@ from dataclasses import dataclass
 from abdf1_ros.pccc.values import ValueType
 
 DEFAULT_PERIOD = 1000
-"""Of a heartbeat (ms)."""
+"""Period of a heartbeat row with an empty cell (ms)."""
 
 RUN = 'RUN'
-"""What While says for the mode of the processor."""
+"""The word of the column While for the mode of the processor."""
 
 READS_IN_TIME = 3
-"""So often a counter has to be read within its While_Timeout (rule 14)."""
+"""Number of reads of a counter that its While_Timeout has to allow (rule 14)."""
 
 TIME_BASE = 0.01
-"""Of the timers in the PLC (s)."""
+"""Time base of the timers in the PLC (s)."""
 
 STABLE = 100
-"""So many units of that rung 5 is longer than rung 3."""
+"""Difference between the presets of rung 5 and rung 3, in units of the time base."""
 
 LONGEST_END = 6.0
-"""How long (s) an orderly end may take until all is confirmed (rule 5)."""
+"""Longest time (s) of an orderly end, until all writes are confirmed (rule 5)."""
 
 LAST_ANSWER = 0.1
-"""How long (s) a silent station has to answer at the end, so that each of them has its try."""
+"""
+Time (s) for the answer of a silent station at the end, so that there is time to try each one.
+"""
 
 HAND_OVER = 2.0
-"""The same where the process goes on: a caller waits for the answer of ~/polling and ~/reload."""
+"""
+Longest time (s) of such an end if the process goes on: a caller of ~/polling or ~/reload waits.
+"""
 
 _COUNTING = (ValueType.INT16, ValueType.UINT16)
 

@@ -33,7 +33,7 @@ from abdf1_ros.settings.rows import Rows
 from abdf1_ros.text import shown
 
 Clash = Callable[[str, Mapping, str], None]
-"""Takes column, other row, and what is wrong with both."""
+"""Reports a conflict: takes the column, the other row, and what is wrong with both."""
 
 
 def load_mappings(path: str) -> tuple[Rows, list[Problem]]:

@@ -33,7 +33,7 @@ from abdf1_ros.settings.rows import Rows
 _DRAFT_PERIOD = 5000
 
 USUAL_NUMBERS = tuple(range(32))
-"""Numbers of the files to look for one by one if no option gives numbers."""
+"""Numbers of the files to look for, one by one, if no option gives numbers."""
 
 
 def find_files(session: Session, station: int, plc_type: PlcType, processor: Processor | None,

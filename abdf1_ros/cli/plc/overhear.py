@@ -33,10 +33,10 @@ from abdf1_ros.settings.network import Network
 from abdf1_ros.sniffer.capture import Chunk, Direction
 
 LISTENED_FOR_READS = 10.0
-"""Listening time (s) for a map of the reads of another master."""
+"""Seconds to listen for the reads of another master, for a map of them."""
 
 LISTENED = 1.0
-"""Listening time (s) at each speed; masters poll a few times a second."""
+"""Seconds to listen at each speed; masters poll a few times a second."""
 
 # One of 256 wrong byte pairs looks like a poll.
 _SURE_POLLS = 2

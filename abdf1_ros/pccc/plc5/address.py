@@ -56,7 +56,9 @@ _LAST = {
 _LAST_ELEMENT = 1999
 
 USUAL_LAST_ELEMENT = 999
-"""Three sources end files here, two let those of a PLC-5/40 to 5/80 run to 1999."""
+"""
+The last element of a file in three sources; in two sources it is 1999 for a PLC-5/40 to 5/80.
+"""
 
 
 class _Plc5Addressing(FileAddressing):

@@ -61,7 +61,9 @@ class Seen:
     crowded: Sequence[str] = ()
     """Topics with a Fallback and more than one publisher."""
     conflicts: dict[str, str] = field(default_factory=dict)
-    """Text on what another program has written over a heartbeat, by tag of the heartbeat."""
+    """
+    Text on the value that another program has written over a heartbeat, by tag of the heartbeat.
+    """
     latest: Mapping[str, Values] = field(default_factory=dict)
     """The last values that were published, by topic."""
     last_error: Moment | None = None

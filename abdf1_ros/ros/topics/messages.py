@@ -35,7 +35,7 @@ MESSAGES: dict[ValueType, Any] = {kind: getattr(std_msgs, kind.message) for kind
 
 ACTIVE_LAYOUT = MultiArrayLayout(dim=[MultiArrayDimension(
     label='station n is active where bit n % 16 of word n / 16 is 1', size=16, stride=16)])
-"""The layout of ~/active_stations; its label explains the words to a reader of the topic."""
+"""The layout of ~/active_stations; its label explains the words."""
 
 # Publishers send bits one by one, so a burst of messages has to fit. Unused places take no memory.
 _WRITE_DEPTH = 1000

@@ -46,7 +46,7 @@ from std_msgs.msg import MultiArrayDimension, MultiArrayLayout, UInt8MultiArray
 from std_srvs.srv import SetBool, Trigger
 
 MOST_CALLS = 100
-"""Most calls that may wait; more are refused, as each slows down every turn of rclpy."""
+"""Most waiting calls; more calls are refused, because each call slows down every turn of rclpy."""
 
 # Calls that arrive at the same moment have to fit. Unused places take no memory.
 _DEPTH = 1000

@@ -85,7 +85,7 @@ class Unusable(ValueError):
 
 
 Reader = Callable[[Record], FoundRow | Ignored]
-"""Takes the records of a file one after the other; raises Unusable."""
+"""Reads one record of a file after the other; raises Unusable."""
 
 
 @dataclass(frozen=True, slots=True)

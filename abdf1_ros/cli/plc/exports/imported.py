@@ -41,7 +41,7 @@ from abdf1_ros.text import printable, shown
 
 FORMATS = (kepserver.FORMAT, factorytalk.FORMAT, intouch.FORMAT, ignition.FORMAT, listing.FORMAT,
            rslogix.FORMAT)
-"""The first that takes a file reads it."""
+"""The known formats; the first format that accepts a file reads it."""
 
 _COLUMNS = (*NEEDED, 'Length', 'Type', 'Period', 'Scale', 'Offset', 'Min', 'Max', 'Description')
 

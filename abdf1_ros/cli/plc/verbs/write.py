@@ -44,7 +44,7 @@ from abdf1_ros.driver.write import Outcome
 from abdf1_ros.errors import Abdf1Error
 
 UNREAD_STATUS = EXIT_USAGE
-"""Exit status after an output error: it came before the write, so nothing was written."""
+"""Exit status if the output cannot be printed: the write has not begun, so nothing was written."""
 
 _UNCERTAIN = (Outcome.UNKNOWN, Outcome.PARTLY)
 
