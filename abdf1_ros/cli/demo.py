@@ -399,7 +399,7 @@ class Demo(Stage):
         return [result for result in self._watcher.results if result.name == tag]
 
     def _show_push(self) -> None:
-        self._title('Serve: the PLC writes to words of ours, without being asked')
+        self._title('Serve: the PLC writes to words of the bridge on its own')
         tag = next(tag for tag, mapping in self._mappings.items() if mapping.serves)
         self._plcs.carry_out(self._scene.push or '')
         self._wait('the values', lambda: tag in self._watcher.values)
@@ -477,7 +477,7 @@ class Demo(Stage):
         self._print_statuses('mappings')
 
     def _show_death_of_bridge(self) -> None:
-        self._title('The bridge dies (kill -9); first another reset, as control is gone')
+        self._title('The bridge dies (kill -9); first another reset, because ROS has lost control')
         self._take_control()
         assert self._bridge is not None
         self._bridge.process.kill()

@@ -185,8 +185,8 @@ class _Output:
             self.has_failed = True
             _say(f'--report: {reason_of(error.filename or path, error)}')
         else:
-            _say(f'{path}: what it holds is in its README.txt; look through it before you pass '
-                 'it on')
+            _say(f'{path}: its README.txt lists the contents; look through the bundle before you '
+                 'pass it on')
 
     def sum_up(self) -> None:
         """Print the summary."""

@@ -103,13 +103,13 @@ def expect_not_used(end: AnsweringEnd, *answers: Callable[[Symbol], None]) -> No
     answered, command = _follows(end, end.next_command(), end.finish)
     unanswered, command = _follows(end, command, end.acknowledge)
     if unanswered < 2 * answered + _CLEARLY:
-        raise Skipped('not judged: a command without a reply is followed as soon as one with it')
+        raise Skipped('not judged: the next command comes as soon after no reply as after a reply')
     for answer in answers:
         for _ in range(2):  # so that it does not count us as inactive
             _, command = _follows(end, command, end.finish)
         took, command = _follows(end, command, answer)
         if took < (answered + unanswered) / 2:
-            raise Failed(f'nothing new for {unanswered:.1f} s, as without a reply',
+            raise Failed(f'no new command for {unanswered:.1f} s, as after no reply',
                          f'the next command after {took:.2f} s')
     end.finish(command)
 

@@ -49,7 +49,7 @@ class Permission(Enum):
     """The permission that a case needs, with the option that gives it."""
 
     NOTHING = ''
-    RESET = '--yes: every slave on the line drops what it holds'
+    RESET = '--yes: every slave on the line drops its messages'
     WRITE = '--yes and --words: words that may be overwritten'
 
 

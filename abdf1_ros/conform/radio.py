@@ -110,7 +110,7 @@ def sent_on_once(end: RadioEnd) -> None:
     if count > 1:
         raise Failed('the packet once, or not at all', f'{count} times')
     if not count:
-        raise Skipped('not tried: it sends nothing on')
+        raise Skipped('not tried: the node forwards nothing')
 
 
 @case('A packet whose SRC is the number of the node comes back to it: it is dropped.',

@@ -29,8 +29,8 @@ from collections.abc import Callable
 
 from abdf1_ros.df1.frames import beginning_of, Control, Symbol
 
-COMES_BACK = ('what is sent comes back: TX and RX are connected, or the adapter echoes; look at '
-              'the cable, and behind an adapter that echoes use half duplex')
+COMES_BACK = ('our own bytes come back: TX and RX are connected, or the adapter echoes; check '
+              'the cable, or use half duplex with an adapter that echoes')
 
 # Frames that may not have come back yet: what is sent in some seconds, at the shortest Timeout.
 _MOST_EXPECTED = 64

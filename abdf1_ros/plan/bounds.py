@@ -113,7 +113,8 @@ class Bound:
                     f'rung 3) and {stable} (rung 5), time base 0.01 s')
         kind = 'heartbeat' if self.mapping.is_heartbeat else 'fallback of'
         if self.seconds is None:
-            return f'{kind} {tag}, station {station}: no bound, its master decides'
+            return (f'{kind} {tag}, station {station}: no bound, because the master of the line '
+                    'decides when the bridge writes')
         usual = '' if self.usual is None else \
             f', {milliseconds(self.usual)} where no frame gets lost'
         return f'{kind} {tag}, station {station}: written after ' \
@@ -282,14 +283,14 @@ def remarks(network: Network, mappings: Rows,
     longest, end = times.longest, times.end or 0.0
     if end > LONGEST_END:
         yield (f'an orderly end needs {milliseconds(end)} and has {milliseconds(LONGEST_END)}: '
-               'the last rows keep what they have; fewer rows, a higher Baud or several lines')
+               'the last rows keep their values. Use fewer rows, a higher Baud or several lines')
     elif end > HAND_OVER:
         yield (f'an orderly end needs {milliseconds(end)}; ~/polling has '
-               f'{milliseconds(HAND_OVER)}, and the last rows keep what they have')
+               f'{milliseconds(HAND_OVER)}, and the last rows keep their values')
     if end <= LONGEST_END < (silent := times.end_in_silence or 0.0):
         yield (f'an orderly end where no PLC answers needs {milliseconds(silent)} and has '
-               f'{milliseconds(LONGEST_END)}: the last rows are not tried; shorten Timeout or '
-               'Cmd_Timeout, or take fewer rows')
+               f'{milliseconds(LONGEST_END)}: the bridge does not try the last rows; shorten '
+               'Timeout or Cmd_Timeout, or use fewer rows')
     for mapping in mappings:
         if mapping.is_heartbeat and mapping.period is not None:
             if longest > mapping.period / 1000:
@@ -316,9 +317,10 @@ def _late_states(network: Network, mappings: Rows, response_time: float) -> Iter
         after = mapping.fallback.after / 1000 if mapping.fallback else math.inf
         patience = min(_PATIENCE, after)
         if min(CARRIED_WITHIN, patience / 2) + a_write_each > patience:
-            yield (f'{mapping.tag}: where all write topics are published faster than the line '
-                   f'carries, a message waits for a write of each, {milliseconds(a_write_each)}; '
-                   f'so its newest value may be older than {milliseconds(patience)} and is not '
+            yield (f'{mapping.tag}: if programs publish all write topics faster than the line '
+                   'can carry, a message waits for a write of each, '
+                   f'{milliseconds(a_write_each)}; so even the newest value may be older than '
+                   f'{milliseconds(patience)} and is not '
                    'sent. Publish less often, or fewer rows')
             return
 
@@ -386,8 +388,8 @@ def conditions(network: Network, mappings: Rows) -> Iterator[str]:
            'of a PLC that drops repetitions, as SLC and MicroLogix do: that PLC then counts as '
            'silent until it answers a probe')
     if network.store_forward:
-        yield ('bounds by radio: a node that stores and forwards drops repetitions, so behind one '
-               'no bound holds after a lost packet')
+        yield ('bounds by radio: a node that stores and forwards drops repetitions, so behind '
+               'such a node no bound holds after a lost packet')
 
 
 def guard_faults(model: LineModel, mappings: Rows,
@@ -403,4 +405,5 @@ def guard_faults(model: LineModel, mappings: Rows,
         if timeout / 1000 < needed:
             yield mapping, CellFault(
                 'While_Timeout', f'While_Timeout {timeout} ms is shorter than '
-                f'{READS_IN_TIME} reads of {tag} on this line; {needed * 1000:.0f} ms would do')
+                f'{READS_IN_TIME} reads of {tag} on this line; {needed * 1000:.0f} ms would be '
+                'enough')

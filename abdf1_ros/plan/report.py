@@ -166,9 +166,9 @@ class Report:
                 and mapping.type is ValueType.BOOL]
         silent = [mapping for mapping in bits if math.isinf(mapping.promise(0.0))]
         if silent:
-            found.append(f'bits with Publish Change: {_tags(silent)}; their topics promise '
-                         'nothing, so a subscriber with a deadline gets no values; Max_Silence '
-                         'changes that')
+            found.append(f'bits with Publish Change: {_tags(silent)}; their topics have no '
+                         'deadline, so a subscriber that asks for a deadline gets no values; '
+                         'Max_Silence gives them a deadline')
         free = [mapping for mapping in bits if mapping.condition is None]
         if free:
             found.append(f'bits without While: {_tags(free)}; their values go on when the '
@@ -221,7 +221,7 @@ def _unprotected(mappings: Rows) -> Iterator[str]:
     deaf = [mapping for mapping in beats if mapping.condition is None
             and mapping.station in stations]
     if deaf:
-        yield f'heartbeats that count whoever publishes, without While: {_tags(deaf)}'
+        yield f'heartbeats without While, which count even if no program publishes: {_tags(deaf)}'
     slow = [mapping for mapping in beats
             if mapping.condition and (mapping.condition.timeout or 0) > _LONG_TIMEOUT]
     if slow:
@@ -270,13 +270,13 @@ def _overlap_remarks(mappings: Sequence[Mapping]) -> Iterator[Remark]:
         about = f'{mapping.place}: {mapping.tag} writes {mapping.address}'
         if read and mapping.command is Command.WRITE and not mapping.write_again:
             yield Remark(RemarkKind.SETTING, (
-                f'{about}, which {_tags(read)} reads, so a message sets what the PLC is '
-                'to tell; ReadWrite in one row if that is meant, otherwise another address'),
+                f'{about}, which {_tags(read)} reads, so a message overwrites the value of the '
+                'PLC; if you mean that, use one ReadWrite row, otherwise another address'),
                 mapping.station)
         if written:
             yield Remark(RemarkKind.SETTING, (
-                f'{about}, of which {_tags(written)} writes a part or all too: each undoes what '
-                'the other has written'), mapping.station)
+                f'{about}, of which {_tags(written)} also writes some or all: each row '
+                'overwrites values of the other row'), mapping.station)
 
 
 def _case_remarks(mappings: Iterable[Mapping]) -> Iterator[Remark]:
@@ -376,10 +376,11 @@ def _load_remarks(report: Report) -> Iterator[Remark]:
     if load > 1:
         baud = report.needed_baud()
         period = report.needed_period()
-        advice = f'{baud} baud would do' if baud else 'no baud rate is enough, only longer periods'
+        advice = f'{baud} baud would be enough' if baud \
+            else 'no baud rate is enough, only longer periods'
         advice += f'; or Period {period} in place of shorter ones' if period else ''
         yield Remark(RemarkKind.LOAD, (
-            f'the periods need {load:.0%} of the time there is at {report.network.baud} baud, '
+            f'the periods need {load:.0%} of the time of the line at {report.network.baud} baud, '
             f'so reads come late; {advice}'))
     elif load > _HIGH_LOAD:
         yield Remark(RemarkKind.LOAD, (
@@ -388,8 +389,8 @@ def _load_remarks(report: Report) -> Iterator[Remark]:
     guarded = [row for row in report.mappings if row.is_guarded]
     if load > _HIGH_LOAD and guarded:
         yield Remark(RemarkKind.LOAD, (
-            'rows with While come more rarely than their neighbours on such a line, as each value '
-            f'needs a young answer about the mode, or a young counter: {_tags(guarded)}'))
+            'on such a line rows with While come less often than other rows, because each value '
+            f'needs a recent mode of the PLC, or a recent counter: {_tags(guarded)}'))
     if share_places(report.network.share):
         yield Remark(RemarkKind.LOAD, (
             'while guests (Share) ask, a quarter of the time may be theirs: the periods then need '

@@ -50,8 +50,8 @@ def line_problems(mappings: Iterable[Mapping], network: Network) -> list[tuple[M
         elif mapping.station == BROADCAST and mode.has_one_plc:
             text = 'Station 255 is for a line with many stations, not for Mode Peer'
         elif mapping.station == network.station and not mode.has_one_plc:
-            text = (f'Station {mapping.station} is our own in the net file; here belongs the '
-                    'station to read or write')
+            text = (f'Station {mapping.station} is our own Station in the net file; write the '
+                    'station of the PLC here')
         elif mapping.via == network.station and mode.is_master:
             text = f'Via {mapping.via} is our own Station in the net file, not a gateway'
         if text is not None:
@@ -88,8 +88,8 @@ def _listen_fault(mapping: Mapping) -> tuple[str, str] | None:
         return 'Command', (f'{mapping.command.value} sends commands, and Mode Listen sends '
                            'nothing; only Read rows are possible')
     if not mapping.period or mapping.is_on_demand:
-        return 'Period', ('Mode Listen needs a Period above 0: in how many ms the other master '
-                          'reads these words at least once')
+        return 'Period', ('Mode Listen needs a Period above 0: the longest time (ms) between two '
+                          'reads of these words by the other master')
     if mapping.access in (Access.CIF, Access.FLAT):
         return 'Access', (f'Mode Listen does not understand reads with Access '
                           f'{mapping.access.value}')

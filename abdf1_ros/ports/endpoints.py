@@ -165,8 +165,8 @@ def _make_link(link: Path, target: str) -> None:
     try:
         link.symlink_to(target)
     except FileExistsError:
-        raise OSError(f'{link} is there already, and no link that a simulator has left; '
-                      'give another name') from None
+        raise OSError(f'{link} exists already, and no simulator has made it; give another '
+                      'name') from None
     except OSError as error:
         raise OSError(f'{link} cannot be made: {error.strerror}') from None
 
@@ -253,10 +253,11 @@ class TcpEndpoint:
             return
         if _has_left(client):
             self._next = other
-            raise OSError('it was closed from the other end, and another one has come')
+            raise OSError('the program closed the connection, and another program has come')
         if monotonic() - self._heard > _SILENT:
             self._next = other
-            raise OSError(f'it has said nothing for {_SILENT:.0f} s, and another one has come')
+            raise OSError(f'the program was silent for {_SILENT:.0f} s, and another program has '
+                          'come')
         other.close()
         self._tell(':'.join(map(str, address[:2])))
 

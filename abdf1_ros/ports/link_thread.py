@@ -46,7 +46,7 @@ _PORTION = 64  # bytes of one step of work, if they come too fast
 class PortKind(Enum):
     """The reason why a port is not open."""
 
-    NO_CLIENT = 'our end is there, and no program at the other one'
+    NO_CLIENT = 'this end is open, but no program has opened the other end'
     UNAVAILABLE = 'it cannot be opened'
     OTHER = ''
 
@@ -60,7 +60,7 @@ class PortState:
     kind: PortKind = field(default=PortKind.OTHER, compare=False)
 
 
-RELEASED = 'the port is left to others: polling is off'
+RELEASED = 'polling is off, so other programs may use the port'
 
 # The error for all commands that are under way when files are read again.
 _READ_AGAIN = 'the files have been read again'

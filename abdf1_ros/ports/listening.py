@@ -54,7 +54,7 @@ class _SilentPort:
 
     def write(self, data: bytes) -> None:
         """Refuse: no caller may come here."""
-        raise OSError(errno.EBADF, 'this port is only listened to')
+        raise OSError(errno.EBADF, 'the bridge only listens to this port')
 
     def unsent(self) -> int:
         return 0

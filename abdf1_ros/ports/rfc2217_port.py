@@ -174,7 +174,7 @@ class Rfc2217Port(ServerPort):
             at = len(data)
         self._left = data[at:]
         if len(self._left) >= _MOST_SUBOPTION:
-            raise OSError('the device server sends what is not RFC 2217')
+            raise OSError('the device server sends bytes that are not RFC 2217')
         return bytes(rest)
 
     def _obey(self, command: bytes) -> None:

@@ -204,7 +204,8 @@ def _check_text(place: Place, line: str) -> None:
 def _cells(place: Place, line: str, delimiter: str) -> list[str]:
     """Return the stripped cells of a line; raise Problem where it cannot be divided."""
     if len(line) > _LONGEST_LINE:
-        raise Problem(place, f'this line has {len(line)} characters, at most {_LONGEST_LINE} go')
+        raise Problem(place, f'this line has {len(line)} characters, at most {_LONGEST_LINE} are '
+                             'allowed')
     # Only an open quote makes a cell go on to a second line.
     reader = csv.reader([line, ''], delimiter=delimiter, skipinitialspace=True)
     cells = next(reader)

@@ -138,7 +138,7 @@ def _no_topic(topic: str, mappings: Rows) -> str:
     if re.search('[,;|]', topic):
         return f'{text}; put spaces between topics'
     if any(mapping.topic == topic for mapping in mappings):
-        return f'{text}: it is one that we publish; name topics whose messages we get'
+        return f'{text}: the bridge publishes it; name topics whose messages the bridge gets'
     other = next((mapping for mapping in mappings.messages if topic in (
         mapping.tag, f'/{mapping.topic}', f'~/write/{mapping.topic}')), None)
     return f'{text}; did you mean {other.topic}?' if other else text
@@ -256,9 +256,9 @@ class _Clashes:
         """Find another writer of words that only a heartbeat or a Fallback may write."""
         for other in self._changing if mapping.changes else ():
             if (mapping.is_alone or other.is_alone) and mapping.shares_words(other):
-                clash('Address', other, 'a heartbeat or a Fallback has its words for itself; '
-                                        f'{mapping.address}{_why_same(mapping, other)} shares '
-                                        'some with the row')
+                clash('Address', other, (
+                    'the words of a heartbeat or a Fallback belong to no other row; '
+                    f'{mapping.address}{_why_same(mapping, other)} shares words with the row'))
                 return
 
 

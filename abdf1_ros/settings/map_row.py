@@ -165,7 +165,8 @@ class RowReader:
         if not name:
             self._bad_value(column, 'has no letter, digit or underscore')
         elif len(name) > MAX_LENGTH:
-            self._fault(column, f'{column} has {len(name)} characters, at most {MAX_LENGTH} go')
+            self._fault(column, f'{column} has {len(name)} characters, at most {MAX_LENGTH} are '
+                                'allowed')
         return name
 
     def _value(self, column: str, kind: ValueKind[_T], message: Message | None = None,

@@ -66,12 +66,12 @@ def network_remarks(network: Network) -> Iterator[str]:
             ('Collision_Avoidance', not is_radio and network.collision_avoidance, 'Radio'),
             ('Listen_Port', not mode.only_listens and network.listen_port, 'Listen')):
         if is_idle:
-            yield f'{column} is for Mode {right}; in Mode {network.mode} it does nothing'
+            yield f'{column} is for Mode {right}; in Mode {network.mode} it has no effect'
     if is_radio and network.station in network.line.store_forward:
         yield (f'Store_Forward names our own Station {network.station}; it is for nodes that hear '
                'each other only through us')
     if network.share_access != Network().share_access and not network.share:
-        yield 'Share_Access is for a line with Share; without it it does nothing'
+        yield 'Share_Access is for a line with Share; it has no effect without Share'
     yield from share_remarks(share_places(network.share))
     if network.share and network.share_access == 'All':
         yield 'Share_Access All: guests may change modes, download and reset, too'
@@ -101,8 +101,8 @@ def row_remarks(row: Row, mapping: Mapping) -> Iterator[Problem]:
     address = mapping.address
     if mapping.plc_type is PlcType.SLC and not mapping.serves and mapping.processor is None \
             and not USUAL.has_file(address.file, address.file_type):
-        yield _at(row, 'Address', f'{address}: a {USUAL.value}, for which an empty Processor '
-                                  f'stands, has no such file; {having(address)} may have it')
+        yield _at(row, 'Address', f'{address}: a {USUAL.value}, the default of Processor, has no '
+                                  f'such file; {having(address)} may have it')
     yield from _bcd_remarks(row, mapping)
     last = mapping.place_of(mapping.length - 1)
     if mapping.plc_type is PlcType.PLC5 and not mapping.serves \

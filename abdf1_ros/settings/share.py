@@ -123,5 +123,6 @@ def share_remarks(places: list[SharePlace]) -> Iterator[str]:
     """Yield which places are open to other machines."""
     for place in places:
         if place.is_open_to_others:
-            yield (f'Share {shown(place.text)}: whoever reaches {place.host}:{place.port} over '
-                   'the network can send commands to the PLC; nothing asks who it is')
+            yield (f'Share {shown(place.text)}: every program that reaches '
+                   f'{place.host}:{place.port} over the network can send commands to the PLC, '
+                   'without a password')

@@ -62,7 +62,7 @@ class PcapngWriter:
     def __init__(self, path: str) -> None:
         place = Path(path)
         if place.exists() and not place.is_fifo() and not _is_ours(place):
-            raise OSError(f'{path} is there and is not pcapng of ours; give another name')
+            raise OSError(f'{path} exists and was not made by --pcapng; give another name')
         self.begun = 0.0
         place.touch(0o640)
         self._file = place.open('wb', buffering=0)

@@ -189,8 +189,8 @@ def _refused(capsys: pytest.CaptureFixture[str], *options: str, status: int = 2)
     (('--full-duplex', '7'), 2, '--full-duplex: name a station (1, 2)'),
     (('--data', '/nowhere'), 2, '/nowhere: cannot be read: No such file or directory'),
     (('--pty', '/nowhere/plc'), 1, '/nowhere/plc cannot be made: No such file or directory'),
-    (('--pty', '/dev/null'), 1, '/dev/null is there already, and no link that a simulator has '
-     'left; give another name'),
+    (('--pty', '/dev/null'), 1, '/dev/null exists already, and no simulator has made it; '
+     'give another name'),
     (('--port', '/nowhere/tty'), 1, '/nowhere/tty: No such file or directory'),
     (('--port', '/dev/null'), 1, '/dev/null: this is not a serial port'),
     (('--port', 'socket://127.0.0.1:1'), 1, 'socket://127.0.0.1:1: Connection refused')])

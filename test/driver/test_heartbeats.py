@@ -197,7 +197,7 @@ def test_rule_3d_the_0_stands_for_half_a_second(period: int, lost: float) -> Non
     why: list[str] = []
     cell.bench.at(since + lost + 0.4, lambda: why.append(beat.why_not(cell.now)))
     cell.publish(speed, 3, times=30, run=2.5)  # the topic is back at once
-    assert why == ['0 stands, for the PLC to see it']
+    assert why == ['the PLC has to see the 0 first']
     first = next(when for when, _, value in cell.writes if when >= since and value == 0)
     after = next(when for when, name, value in cell.writes
                  if when > first and name == 'N10:0' and value)
@@ -366,8 +366,9 @@ def test_rule_19_second_foreign_value_stays_until_a_new_start(event: str) -> Non
     assert (cell.told(), cell.value, cell.states()) == ([False, True], 0, [BeatState.CONFLICT])
     text = bench.listener.foreign[-1][1]
     assert text == (
-        'another program writes this word: 889 was read where 2 was written; 0 stays until the '
-        'PLC goes from PROGRAM to RUN, ~/reload, or the port is opened again')
+        'another program writes this word: 889 was read where 2 was written; the '
+        'bridge writes 0 until the PLC goes from PROGRAM to RUN, you call ~/reload, or the port '
+        'is opened again')
     cell.run(100.0)
     cell.store(890)
     cell.run(5.0)

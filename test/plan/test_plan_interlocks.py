@@ -117,7 +117,8 @@ def test_rule_16_standard_polling_adds_its_scans_and_slave_has_no_bound() -> Non
     assert standard.seconds - message.seconds > 3 * 2 * 11 * 4 * 0.2
     slave, = Times(Network(mode='Slave'), Rows(rows[:1])).bounds()
     assert (slave.seconds, str(slave)) == (
-        None, 'fallback of speed, station 1: no bound, its master decides')
+        None, 'fallback of speed, station 1: no bound, because the master of '
+              'the line decides when the bridge writes')
 
 
 def test_rule_16_what_plcs_ask_of_us_takes_turns_with_our_commands() -> None:
@@ -270,8 +271,8 @@ def test_rule_5_end_that_is_too_long_where_no_plc_answers_is_warned_of() -> None
 
 
 @pytest.mark.parametrize(('stations', 'rows', 'text'), [
-    (1, 5, ''), (5, 5, '~/polling has 2000 ms, and the last rows keep what they have'),
-    (5, 30, 'and has 6000 ms: the last rows keep what they have')])
+    (1, 5, ''), (5, 5, '~/polling has 2000 ms, and the last rows keep their values'),
+    (5, 30, 'and has 6000 ms: the last rows keep their values')])
 def test_rule_5_end_that_takes_longer_than_it_has_is_warned_of(
         stations: int, rows: int, text: str) -> None:
     network = replace(QUICK, baud=9600)
@@ -297,7 +298,7 @@ def test_rule_14_timeout_is_three_planned_intervals() -> None:
     assert mapping is guarded
     assert (fault.column, fault.text) == (
         'While_Timeout', 'While_Timeout 250 ms is shorter than 3 reads of alive on this '
-        'line; 300 ms would do')
+        'line; 300 ms would be enough')
 
 
 def test_heartbeats_and_questions_for_run_are_counted_in_the_load() -> None:

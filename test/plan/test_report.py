@@ -51,8 +51,8 @@ def test_write_over_what_another_row_reads_is_odd() -> None:
     bits = make_mapping('B3:2/0', tag='il', length=3)
     odd = report_of(bits, make_mapping('B3:2/2', 'Write', tag='rip', item=4)).remarks()
     assert odd == [Remark(RemarkKind.SETTING, (
-        'map.csv:5: rip writes B3:2/2, which il reads, so a message sets what the PLC is '
-        'to tell; ReadWrite in one row if that is meant, otherwise another address'), 1)]
+        'map.csv:5: rip writes B3:2/2, which il reads, so a message overwrites the value '
+        'of the PLC; if you mean that, use one ReadWrite row, otherwise another address'), 1)]
     assert report_of(bits, make_mapping('B3:1', 'Write', length=2)).remarks()
     # Other bits, other stations and all of them, and rows that say that they do both.
     for address, command, station in (
@@ -64,8 +64,8 @@ def test_write_over_what_another_row_reads_is_odd() -> None:
 def test_words_that_two_rows_write_are_odd() -> None:
     first = make_mapping('N7:0', 'Write', tag='jog', length=2)
     assert report_of(first, make_mapping('N7:1', 'Write', tag='rip', item=4)).remarks() == [
-        Remark(RemarkKind.SETTING, 'map.csv:5: rip writes N7:1, of which jog writes a part or all '
-                                   'too: each undoes what the other has written', 1)]
+        Remark(RemarkKind.SETTING, 'map.csv:5: rip writes N7:1, of which jog also writes some or '
+                                   'all: each row overwrites values of the other row', 1)]
 
 
 def texts(report: Report, kind: RemarkKind) -> list[str]:
@@ -152,8 +152,8 @@ def test_period_that_another_baud_rate_can_keep() -> None:
     slow = report_of(make_mapping('N7:0', length=2, period=50), response=0.02)
     assert slow.needed_baud() == 57600  # 9.0 ms and 40 ms
     assert texts(report, RemarkKind.LOAD) == [
-        'the periods need 148% of the time there is at 9600 baud, so reads come late; '
-        '19200 baud would do; or Period 100 in place of shorter ones']
+        'the periods need 148% of the time of the line at 9600 baud, so reads come late; '
+        '19200 baud would be enough; or Period 100 in place of shorter ones']
     assert texts(report, RemarkKind.PERIOD) == [
         'speed: a read takes 74.2 ms, the period is 50.0 ms']
 
@@ -162,8 +162,8 @@ def test_guarded_rows_of_a_full_line_are_named() -> None:
     rows = [make_mapping('N7:0', period=50, tag='free'),
             make_mapping('N7:1', period=50, tag='guarded', condition=While(('RUN',)))]
     assert texts(report_of(*rows), RemarkKind.LOAD)[1:] == [
-        'rows with While come more rarely than their neighbours on such a line, as each value '
-        'needs a young answer about the mode, or a young counter: guarded']
+        'on such a line rows with While come less often than other rows, because each value '
+        'needs a recent mode of the PLC, or a recent counter: guarded']
     light = [replace(row, period=2000) for row in rows]
     assert texts(report_of(*light), RemarkKind.LOAD) == []
 
@@ -175,7 +175,7 @@ def test_baud_rate_has_to_do_for_heartbeats_and_questions_too() -> None:
     assert report_of(rows[0]).load < 1 < report.load
     needed = report.needed_baud()
     assert needed == 19200
-    assert f'{needed} baud would do' in texts(report, RemarkKind.LOAD)[0]
+    assert f'{needed} baud would be enough' in texts(report, RemarkKind.LOAD)[0]
     assert report_of(*rows, baud=needed).load <= 1
 
 
@@ -291,9 +291,9 @@ def test_rule_20_what_nothing_protects_is_one_note() -> None:
     note, = report_of(*guarded, *bare).notes()
     assert note == (
         'nothing protects: 4 of 5 written rows, without Fallback: lamp, bit, word and 1 more; '
-        'heartbeats that count whoever publishes, without While: bare; While_Timeout over '
-        '10 s: slow; topics of Serve rows without Period, so a PLC that stops is not noticed: '
-        'silent')
+        'heartbeats without While, which count even if no program publishes: bare; While_Timeout '
+        'over 10 s: slow; topics of Serve rows without Period, so a PLC that stops is not '
+        'noticed: silent')
 
 
 def test_bits_that_go_on_without_the_program_are_noted_and_are_not_odd() -> None:
@@ -310,8 +310,8 @@ def test_bits_that_go_on_without_the_program_are_noted_and_are_not_odd() -> None
                     f'{62 * CHARACTER + ANSWERS:.0%} of the time')
     assert report_of(rows[3]).notes() == []
     assert report_of(make_mapping('B3:0/0', tag='door', publish='Change')).notes()[0] == (
-        'bits with Publish Change: door; their topics promise nothing, so a subscriber with a '
-        'deadline gets no values; Max_Silence changes that')
+        'bits with Publish Change: door; their topics have no deadline, so a subscriber '
+        'that asks for a deadline gets no values; Max_Silence gives them a deadline')
 
 
 def test_rows_promise_three_intervals_and_a_read() -> None:

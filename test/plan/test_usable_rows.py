@@ -72,8 +72,8 @@ def test_full_duplex_line_has_no_broadcast() -> None:
 def test_station_to_be_read_is_not_our_own(network: Network, is_wrong: bool) -> None:
     ours = [make_mapping('N7:0', station=1), make_mapping('N7:0', 'Write', station=1)]
     assert texts(*ours, network=network) == [
-        'map.csv:2: Item: 1, Station 1 is our own in the net file; here belongs the '
-        'station to read or write'] * 2 * is_wrong
+        'map.csv:2: Item: 1, Station 1 is our own Station in the net file; write the '
+        'station of the PLC here'] * 2 * is_wrong
 
 
 def test_rule_14_counter_has_to_be_read_often_enough_on_this_line() -> None:
@@ -83,7 +83,7 @@ def test_rule_14_counter_has_to_be_read_often_enough_on_this_line() -> None:
     assert good == (counter,)
     assert str(problem) == (
         'map.csv:3 (While_Timeout): Item: 2, While_Timeout 250 ms is shorter than 3 reads '
-        'of alive on this line; 300 ms would do')
+        'of alive on this line; 300 ms would be enough')
 
 
 def test_rule_15_row_that_does_not_fit_the_line_takes_along_what_depends_on_it() -> None:
@@ -109,10 +109,10 @@ def test_problems_go_with_their_rows() -> None:
      'Mode Listen sends nothing; only Read rows are possible'),
     (make_mapping(command='Serve', station=5, period=100), 'Command): Item: 1, Serve sends '
      'commands, and Mode Listen sends nothing; only Read rows are possible'),
-    (make_mapping(), 'Period): Item: 1, Mode Listen needs a Period above 0: in how many ms the '
-     'other master reads these words at least once'),
-    (make_mapping(period=0), 'Period): Item: 1, Mode Listen needs a Period above 0: in how many '
-     'ms the other master reads these words at least once'),
+    (make_mapping(), 'Period): Item: 1, Mode Listen needs a Period above 0: the longest time '
+     '(ms) between two reads of these words by the other master'),
+    (make_mapping(period=0), 'Period): Item: 1, Mode Listen needs a Period above 0: the longest '
+     'time (ms) between two reads of these words by the other master'),
     (make_mapping('I:1', plc='SLC', access='Flat', period=100), 'Access): Item: 1, Mode Listen '
      'does not understand reads with Access Flat'),
     (make_mapping(length=200, period=100), 'Length): Item: 1, 200 words never come in one reply, '

@@ -118,7 +118,7 @@ def test_link_that_has_been_replaced_stays_at_the_end(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize('link, text', [
-    ('taken', 'taken is there already'), ('adapter', 'adapter is there already'),
+    ('taken', 'taken exists already'), ('adapter', 'adapter exists already'),
     ('none/plc', 'none/plc cannot be made: No such file')])
 def test_name_that_cannot_be_had_leaves_no_terminal_open(
         tmp_path: Path, link: str, text: str) -> None:
@@ -219,7 +219,7 @@ def test_tcp_client_that_says_nothing_gives_its_place_to_the_next(
                     assert port.read(PATIENCE, wake) == b''
                     port.close()
                     return
-                with pytest.raises(OSError, match='has said nothing for 30 s'):
+                with pytest.raises(OSError, match='was silent for 30 s'):
                     port.read(PATIENCE, wake)
                 port.close()
                 with closing(line.open()) as taken:

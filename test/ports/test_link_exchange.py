@@ -88,8 +88,8 @@ def test_port_that_is_released_is_free_until_it_is_taken_again(pty: Pty, link: L
     script, thread = link.begin(pty, Listen(None))
     assert link.state().is_open
     assert thread.release()
-    assert link.state() == PortState(False, 'the port is left to others: polling is off')
-    assert script.end() == repr(PortLost('the port is left to others: polling is off'))
+    assert link.state() == PortState(False, 'polling is off, so other programs may use the port')
+    assert script.end() == repr(PortLost('polling is off, so other programs may use the port'))
     open_port(PortSettings(str(pty.name))).close()
     thread.wake()
     thread.take()

@@ -89,7 +89,7 @@ def test_bytes_and_signals_stay_as_they_are(ptys: list[Pty], monkeypatch: Any) -
 
 def test_port_for_reading_takes_no_byte(ptys: list[Pty]) -> None:
     port = open_port(listening_to(ptys[0]))
-    with pytest.raises(OSError, match='only listened to'):
+    with pytest.raises(OSError, match='only listens to this port'):
         port.write(b'A')
     assert isinstance(port, listening.ListeningDevice)
     with pytest.raises(OSError) as caught:  # nor does the system

@@ -201,7 +201,7 @@ def test_suboption_without_an_end_is_given_up(
         ends: tuple[Rfc2217Port, socket.socket], wake: int) -> None:
     port, server = ends
     server.sendall(bytes([255, 250, 44]) + bytes(400))
-    with pytest.raises(OSError, match='sends what is not RFC 2217'):
+    with pytest.raises(OSError, match='sends bytes that are not RFC 2217'):
         for _ in range(2):
             port.read(PATIENCE, wake)
 

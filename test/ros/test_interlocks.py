@@ -182,7 +182,7 @@ def test_rule_5_port_that_is_left_to_others_is_left_with_zero(
     cell.plcs.say('silent 1')
     monkeypatch.setattr('abdf1_ros.ros.bridge.node.HAND_OVER', 0.1)
     assert cell.call(SetBool, 'polling', SetBool.Request(data=False)).success
-    assert 'the port is left before the PLC has confirmed: beat' in capfd.readouterr().err
+    assert 'the port is closed before the PLC has confirmed: beat' in capfd.readouterr().err
 
 
 @pytest.mark.parametrize(('made', 'is_end', 'rows'), [

@@ -523,7 +523,7 @@ def test_load_that_the_line_cannot_carry_is_told_before_other_remarks(
     rows = [f'N{number}:7,Read,N{number}:0,1,PLC5,1,' for number in range(10, 40)]
     make_bench(*rows, parameters=('default_period:=50',))
     warnings = [line for line in ''.join(capfd.readouterr()).splitlines() if 'WARN' in line]
-    assert re.search(r'the periods need \d+% of the time there is at \d+ baud', warnings[0])
+    assert re.search(r'the periods need \d+% of the time of the line at \d+ baud', warnings[0])
     assert '; or Period ' in warnings[0]
 
 

@@ -342,7 +342,7 @@ def test_files_are_read_again_while_the_port_is_left_to_others(bench: Bench) -> 
 
 
 def test_port_is_left_to_others_and_taken_again(bench: Bench) -> None:
-    text = 'the port is left to others: polling is off'
+    text = 'polling is off, so other programs may use the port'
     until_status(bench.diagnostics, 'link', OK)
     assert bench.polling(False) == (True, f'{bench.plcs.port}: {text}')
     open_port(PortSettings(bench.plcs.port)).close()  # which is exclusive

@@ -99,7 +99,7 @@ def test_bridge_that_fails_at_its_end_keeps_no_other_from_it(
     nodes: Any = [Recorder(calls, 'last words'), Recorder(calls)]
     end_together(nodes)
     assert calls[-2:] == ['last words', 'last words']
-    assert "its end fails: KeyError('a bug')" in capfd.readouterr().err
+    assert "the end of this node has failed: KeyError('a bug')" in capfd.readouterr().err
 
 
 def test_executor_is_shut_down_when_its_thread_has_ended(monkeypatch: pytest.MonkeyPatch) -> None:

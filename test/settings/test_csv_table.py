@@ -122,8 +122,8 @@ def test_line_that_is_much_too_long_is_refused(path: Path) -> None:
     longest = 'x' * (131_072 - 1)
     assert cells_of(path, f'Tag\n{longest}\n') == [[longest, '', '']]
     assert problems_of(path, f'Tag\na\nx{longest}\n"x{longest}\n') == [
-        'FILE:3: this line has 131073 characters, at most 131072 go',
-        'FILE:4: this line has 131074 characters, at most 131072 go']
+        'FILE:3: this line has 131073 characters, at most 131072 are allowed',
+        'FILE:4: this line has 131074 characters, at most 131072 are allowed']
 
 
 @given(content=st.one_of(

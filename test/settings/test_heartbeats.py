@@ -63,8 +63,9 @@ def test_rule_1_what_a_heartbeat_cannot_be(cells: dict[str, str], text: str) -> 
 @pytest.mark.parametrize('command', ['Write', 'ReadWrite', 'Heartbeat'])
 def test_rule_1_nobody_else_writes_the_word(command: str) -> None:
     found = faults(row(**BEAT), row(Tag='other', Command=command, Address='N10:0'))
-    assert found == ['3:3 (Address): Item: 2, a heartbeat or a Fallback has its words for itself; '
-                     'N10:0 shares some with the row of item 1 (line 2, tag "beat")']
+    assert found == ['3:3 (Address): Item: 2, the words of a heartbeat or a Fallback belong to no '
+                     'other row; '
+                     'N10:0 shares words with the row of item 1 (line 2, tag "beat")']
 
 
 BY_NUMBER = ' (a PLC finds a file by its number, whatever Type or PLC_Type a row gives it)'
@@ -86,8 +87,9 @@ def test_rules_1_and_12_same_words_under_other_names(
     rows = [own, {'Tag': 'other', 'Command': 'Write'} | cells]
     found = faults(*(row(**cells) for cells in rows))
     address = str(one(**rows[1]).address)
-    assert found == ['3:3 (Address): Item: 2, a heartbeat or a Fallback has its words for itself; '
-                     f'{address}{why} shares some with the row of item 1 (line 2, tag "beat")']
+    assert found == ['3:3 (Address): Item: 2, the words of a heartbeat or a Fallback belong to no '
+                     'other row; '
+                     f'{address}{why} shares words with the row of item 1 (line 2, tag "beat")']
     rows[1]['Tag'] = 'a'  # whichever comes first
     assert len(faults(*(row(**cells) for cells in reversed(rows)))) == 1
 
@@ -222,7 +224,7 @@ def test_long_cell_is_shown_without_its_end(cells: dict[str, str]) -> None:
 
 def test_rule_12_a_fallback_owns_its_words() -> None:
     own = WRITE | {'Fallback': '0', 'Fallback_After': '500'}
-    assert 'has its words for itself' in faults(
+    assert 'belong to no other row' in faults(
         row(**own), row(Tag='b', Command='Write', Address='N10:0', Length='2'))[0]
     bits = own | {'Address': 'B3:0/0', 'Length': '4', 'Fallback': '0 0 0 0'}
     # Other bits of the word are written by a mask, so they are others.

@@ -107,7 +107,8 @@ def test_command_says_whether_a_row_reads_and_writes(text: str, reads: bool, wri
     ({'Max': '1e999'}, '12 (Max): Item: 1, Max = "1e999" should be a number'),
     ({'Tag': '--'}, '1 (Tag): Item: 1, Tag = "--" has no letter, digit or underscore'),
     ({'Topic': '/'}, '8 (Topic): Item: 1, Topic = "/" has no letter, digit or underscore'),
-    ({'Topic': 'x' * 151}, '8 (Topic): Item: 1, Topic has 151 characters, at most 150 go'),
+    ({'Topic': 'x' * 151}, '8 (Topic): Item: 1, Topic has 151 characters, at most 150 are '
+     'allowed'),
     *(({column: ''}, f'{COLUMNS.index(column) + 1} ({column}): Item: 1, {column} is missing')
       for column in ('Tag', 'Command', 'Address', 'Station', 'PLC_Type')),
     # Cells that do not fit each other.

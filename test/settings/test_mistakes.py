@@ -133,15 +133,15 @@ def test_what_is_told_of_a_map(tmp_path: Path, text: str, expected: list[str]) -
 
 @for_all(('text', 'expected'), [
     (f'{HEAD}\na,Write,N7:0,1,SLC\nb,Write,N7:0,1,SLC\n', [
-        '3: b writes N7:0, of which a writes a part or all too: each undoes what '
-        'the other has written']),
+        '3: b writes N7:0, of which a also writes some or all: each row '
+        'overwrites values of the other row']),
     (f'{HEAD},Length\na,Write,N7:0,1,SLC,5\nb,ReadWrite,N7:4,1,SLC,\nc,Write,N7:5,1,SLC,\n', [
-        '3: b writes N7:4, of which a writes a part or all too: each undoes what '
-        'the other has written']),
+        '3: b writes N7:4, of which a also writes some or all: each row '
+        'overwrites values of the other row']),
     (f'{HEAD}\nword,Write,B3:0,1,SLC\nbit,Write,B3:0/5,1,SLC\nsame,Write,B3:1/5,1,SLC\n'
      'next,Write,B3:1/6,1,SLC\n', [
-        '3: bit writes B3:0/5, of which word writes a part or all too: each '
-        'undoes what the other has written']),
+        '3: bit writes B3:0/5, of which word also writes some or all: each '
+        'row overwrites values of the other row']),
     (f'{HEAD},Min,Max\na,Read,N7:0,1,SLC,1,5\n', [
         '2:6 (Min): Min has no effect in a Read row', '2:7 (Max): Max has no effect in a Read row',
     ]),
@@ -166,7 +166,7 @@ def test_what_is_told_of_a_map(tmp_path: Path, text: str, expected: list[str]) -
     (f'{HEAD}\nSpeed,Read,N7:0,1,SLC\nspeed,Read,N7:1,1,SLC\nspeeds,Read,N7:2,1,SLC\n', [
         'tags that differ only in capital and small letters: Speed, speed']),
     (f'{HEAD}\na,Read,L9:0,1,SLC\n', [
-        '2:3 (Address): L9:0: a 5/03, for which an empty Processor stands, has no such file; '
+        '2:3 (Address): L9:0: a 5/03, the default of Processor, has no such file; '
         'ML1100, ML1200, ML1400, ML1500 may have it']),
 ])
 def test_what_is_odd_in_a_map(tmp_path: Path, text: str, expected: list[str]) -> None:
@@ -186,7 +186,8 @@ NO_TOPIC = '!2:7 (While): Item: 1, no good Write, ReadWrite or Serve row has the
 @for_all(('requires', 'expected'), [
     ('"speed,lamp"', '"speed,lamp"; put spaces between topics'),
     ('speed;lamp', '"speed;lamp"; put spaces between topics'),
-    ('level', '"level": it is one that we publish; name topics whose messages we get'),
+    ('level', '"level": the bridge publishes it; name topics whose messages the bridge '
+     'gets'),
     ('~/write/lamp', '"~/write/lamp"; did you mean lamp?'),
     ('lamp_1', '"lamp_1"; did you mean lamp?'), ('door', '"door"')])
 def test_requires_that_names_no_write_topic(tmp_path: Path, requires: str, expected: str) -> None:
@@ -282,15 +283,15 @@ GOOD = Network(timeout=300)
     (Network(timeout=0, tx_delay=5000, mode='Slave'), []),
     (Network(mode='Radio', store_forward='1,2', collision_avoidance=True), []),
     (Network(store_forward='1,2', collision_avoidance=True), [
-        'Store_Forward is for Mode Radio; in Mode Master it does nothing',
-        'Collision_Avoidance is for Mode Radio; in Mode Master it does nothing']),
+        'Store_Forward is for Mode Radio; in Mode Master it has no effect',
+        'Collision_Avoidance is for Mode Radio; in Mode Master it has no effect']),
     (Network(mode='Peer', polling='Standard'), [
-        'Polling is for Mode Master; in Mode Peer it does nothing']),
+        'Polling is for Mode Master; in Mode Peer it has no effect']),
     (Network(mode='Radio', store_forward='5,6'), [
         'Store_Forward names our own Station 5; it is for nodes that hear each other only through '
         'us']),
     (Network(share_access='Write'), [
-        'Share_Access is for a line with Share; without it it does nothing']),
+        'Share_Access is for a line with Share; it has no effect without Share']),
     (Network(share='pty:/tmp/hmi', share_access='Write'), []),
     (Network(share='pty:/tmp/hmi', share_access='All'), [
         'Share_Access All: guests may change modes, download and reset, too']),

@@ -346,8 +346,8 @@ def test_slave_has_nothing_to_share() -> None:
 def test_place_that_is_open_to_other_machines_is_told() -> None:
     remarks = [*network_remarks(Network(share='pty:/tmp/a tcp:0.0.0.0:4501'))]
     assert remarks == [
-        'Share tcp:0.0.0.0:4501: whoever reaches 0.0.0.0:4501 over the network can send commands '
-        'to the PLC; nothing asks who it is']
+        'Share tcp:0.0.0.0:4501: every program that reaches 0.0.0.0:4501 over the network '
+        'can send commands to the PLC, without a password']
     assert [*network_remarks(Network())] == []
 
 
@@ -400,6 +400,6 @@ def test_ports_that_cannot_be_listened_to(tmp_path: Path, cells: dict[str, str],
 def test_second_port_is_for_mode_listen() -> None:
     network = Network(listen_port='2', com_port='/dev/ttyS0')
     assert network.second_port == '/dev/ttyS1'
-    assert 'Listen_Port is for Mode Listen; in Mode Master it does nothing' in [
+    assert 'Listen_Port is for Mode Listen; in Mode Master it has no effect' in [
         *network_remarks(network)]
     assert not [*network_remarks(replace(network, mode='Listen'))]

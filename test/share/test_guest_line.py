@@ -203,7 +203,7 @@ def test_place_that_cannot_be_opened_says_why_until_it_can(tmp_path: Path) -> No
     (tmp_path / 'hmi').write_text('mine')
     with shared(tmp_path, f'pty:{tmp_path}/hmi tcp:{OWN_HOST}:{free_port()}') as line:
         taken, waiting = line.guests
-        assert 'is there already' in taken.fault
+        assert 'exists already' in taken.fault
         assert (waiting.state, waiting.fault) == ('waiting for a client', '')
         assert (tmp_path / 'hmi').read_text() == 'mine'
         (tmp_path / 'hmi').unlink()

@@ -76,7 +76,7 @@ def test_only_a_file_of_ours_is_replaced_and_nobody_else_may_read_it(tmp_path: P
     assert path.stat().st_mode & 0o007 == 0
     for content in (b'mine', HEAD.replace(b'DF1', b'eth')):  # also a capture of Wireshark
         path.write_bytes(content)
-        with pytest.raises(OSError, match='is there and is not pcapng of ours'):
+        with pytest.raises(OSError, match='exists and was not made by --pcapng'):
             PcapngWriter(str(path))
         assert path.read_bytes() == content
 

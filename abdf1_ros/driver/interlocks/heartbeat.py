@@ -54,10 +54,10 @@ class BeatState(Enum):
     """The value that the PLC is to see: 0, or a value that counts."""
 
     CONTACT = 'first contact: 0 has to be confirmed'
-    SHOWN = '0 stands, for the PLC to see it'
+    SHOWN = 'the PLC has to see the 0 first'
     COUNTS = 'counts'
-    HELD = '0, while it must not count'
-    CONFLICT = '0, as another writer writes this word'
+    HELD = '0, because it must not count now'
+    CONFLICT = '0, because another program writes this word'
 
 
 class _OtherWriter:
@@ -295,10 +295,10 @@ class HeartbeatRow:
             self._next = self.due = now + self._other.next_zero()
             return ''
         if is_again:
-            return (f'another program writes this word: {text}; 0 stays until the PLC goes from '
-                    'PROGRAM to RUN, ~/reload, or the port is opened again')
+            return (f'another program writes this word: {text}; the bridge writes 0 until the '
+                    'PLC goes from PROGRAM to RUN, you call ~/reload, or the port is opened again')
         self._other.differ()
-        return f'{text}: taken for a download'
+        return f'{text}: probably a download'
 
     @property
     def wants_zero(self) -> bool:

@@ -259,7 +259,7 @@ class BridgeNode(AnsweringNode):
             self.link.take()
             response.success, response.message = True, f'{self.session.port} is being opened'
         else:
-            tell_plcs([self.session], 'the port is left', HAND_OVER)
+            tell_plcs([self.session], 'the port is closed', HAND_OVER)
             response.success = self.link.release()
             response.message = f'{self.session.port}: {self.link.state.text}'
         return response
@@ -315,4 +315,4 @@ def end_together(nodes: Sequence[BridgeNode], patience: float = _LONGEST_PUBLISH
         try:
             node.publish_last_diagnostics(give_up)
         except Exception as error:  # the node may be broken; go on with the rest
-            node.get_logger().error(f'its end fails: {bug_text(error)}')
+            node.get_logger().error(f'the end of this node has failed: {bug_text(error)}')

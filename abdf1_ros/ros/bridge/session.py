@@ -360,8 +360,8 @@ def _tell_files(logger: RcutilsLogger, configuration: Configuration) -> None:
     if not configuration.mappings:
         logger.warning('the map has no usable row: nothing is read or written')
     if configuration.idle:
-        logger.warning(f'{first(configuration.idle)} without effect: for Mode Master with Polling '
-                       'Standard alone')
+        logger.warning(f'{first(configuration.idle)} without effect: only for Mode Master with '
+                       'Polling Standard')
     if configuration.ignored:
         logger.warning(
             'parameters without effect, because only the map file counts: '

@@ -101,4 +101,4 @@ class SlowRows:
         # row.
         needed = max(self._slow.values()) / _ADVISED_LOAD * 1000
         period = next((step for step in PERIOD_STEPS if step >= needed), None)
-        return '' if period is None else f'; Period {period} would do'
+        return '' if period is None else f'; the line can keep Period {period}'

@@ -210,7 +210,7 @@ def test_read_only_rows_of_several_stations_with_a_longer_period(tmp_path: Path)
         ('station_1/Speed', 1, 2000), ('station_3/Speed', 3, 2000),
         ('station_1/Slow', 1, 5000), ('station_3/Slow', 3, 5000)]
     assert {(row.command.value, row.maximum) for row in mappings} == {('Read', math.inf)}
-    assert left_out == ['4: Out: is only written, and --read-only is given']
+    assert left_out == ['4: Out: cannot be read, and --read-only is given']
 
 
 def test_command_suggests_a_period_that_the_line_can_keep(
@@ -223,10 +223,10 @@ def test_command_suggests_a_period_that_the_line_can_keep(
     options = ['import', str(source), '--into', str(tmp_path)]
     assert main(options) == 0
     told = capsys.readouterr().out.splitlines()[-1]
-    assert told.startswith('these rows need ') and told.endswith('--period 5000 would do')
+    assert told.startswith('these rows need ') and told.endswith('--period 5000 would be enough')
     (tmp_path / 'map.csv').unlink()
     assert main([*options, '--period', '5000']) == 0
-    assert 'would do' not in capsys.readouterr().out
+    assert 'would be enough' not in capsys.readouterr().out
     (tmp_path / 'map.csv').unlink()
     assert main(['import', str(source), '--into', str(source)]) == 2
     assert f'{source} is not a folder' in capsys.readouterr().err
@@ -254,7 +254,7 @@ def test_command_writes_a_map_once_and_says_how_to_go_on(
     assert f'{source}:5: ' in said.err
     assert said.out.splitlines()[1:] == [
         f'next: {called("check")} net.csv {other}',
-        'these rows need 205% of the time of the line in net.csv; --period 500 would do']
+        'these rows need 205% of the time of the line in net.csv; --period 500 would be enough']
 
 
 @for_all(('text', 'expected'), [
@@ -468,7 +468,7 @@ def test_list_with_comments_and_whole_timers(tmp_path: Path) -> None:
     ('N7:35,Speed of line\nB3:0/0,Start\n', '; it has addresses, but no first row with names: '
                                             'write one, such as Address,Tag'),
     ('remark,"CSV-Import-Export"\n0.3\nTYPE,SCOPE,NAME\nTAG,,Speed\n',
-     'has tags of a Logix controller, which are no addresses')])
+     'has tags of a Logix controller, which are not addresses')])
 def test_file_that_is_not_known_is_told_with_a_cure(
         tmp_path: Path, text: str, told: str) -> None:
     with pytest.raises(ConfigurationError) as caught:

@@ -101,8 +101,8 @@ def test_map_says_of_each_tag_what_options_say_of_addresses(plc: Plc, tmp_path: 
     assert plc('read', 'Level', '--map', path).err.endswith(
         'tags that are read: speed, level; did you mean level?\n')
     assert plc('read', 'level', '--map', path, '--own-station', '2').err == (
-        f'plc: {path}:3: Item: 2, Station 2 is our own in the net file; here belongs the station '
-        'to read or write\n')
+        f'plc: {path}:3: Item: 2, Station 2 is our own Station in the net file; write the '
+        'station of the PLC here\n')
 
 
 @pytest.mark.parametrize('args', [

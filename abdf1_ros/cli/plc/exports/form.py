@@ -132,7 +132,7 @@ def limited(command: str, wanted: Wanted) -> str:
     if not wanted.read_only:
         return command
     if command == WRITE:
-        raise Unusable('is only written, and --read-only is given')
+        raise Unusable('cannot be read, and --read-only is given')
     return READ
 
 

@@ -99,8 +99,9 @@ def import_map(path: str, wanted: Wanted) -> Import:
 def _not_known(records: Sequence[Record]) -> str:
     """Return why records cannot be read, with advice."""
     if any(record.first.lower() == 'remark' for record in records[:1]):
-        return ('has tags of a Logix controller, which are no addresses; over DF1 it has those of '
-                'its "Map PLC/SLC Messages", which are rows to be written by hand')
+        return ('has tags of a Logix controller, which are not addresses. Over DF1 the '
+                'controller has only the addresses of its "Map PLC/SLC Messages": write these '
+                'rows by hand')
     text = 'is none of these: ' + '; '.join(entry.title for entry in FORMATS)
     if any(looks_like_address(cell) for record in records for cell in record.cells):
         text += '; it has addresses, but no first row with names: write one, such as Address,Tag'

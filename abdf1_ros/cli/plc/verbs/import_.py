@@ -104,5 +104,5 @@ def run(options: argparse.Namespace) -> int:
                              DriverSettings().default_period)
         if report.load > 1 and (period := report.needed_period()):
             print(f'these rows need {report.load:.0%} of the time of the line in {net}; '
-                  f'--period {period} would do')
+                  f'--period {period} would be enough')
     return EXIT_FAILED if result.left_out else 0
