@@ -44,6 +44,7 @@ def test_spare_takes_over_the_lines_of_a_host_that_dies() -> None:
 
 
 @NEEDS_NAMESPACES
+@pytest.mark.long
 def test_no_result_comes_a_second_time_after_a_long_cut() -> None:
     done = subprocess.run(
         [sys.executable, str(PROGRAM), '--hosts', '2', '--lines', '1', '--faults', '1',

@@ -147,6 +147,7 @@ def test_picture_that_cannot_be_written_is_told(tmp_path: Path, capsys: Output) 
     assert '--html: ' in said.err and 'No such file or directory' in said.err
 
 
+@pytest.mark.long
 def test_browser_shows_blocks_and_red_ones(tmp_path: Path, capsys: Output) -> None:
     _, page = drawn(tmp_path, capsys)
     shown = browser.colours(page, tmp_path)

@@ -179,16 +179,27 @@ def test_timeline_that_cannot_be_written_is_told(tmp_path: Path, capsys: Output)
     assert 'sniff: --html: ' in said.err
 
 
-def test_browser_shows_ten_thousand_frames_with_their_faults(
-        tmp_path: Path, capsys: Output) -> None:
-    parts = [exchange(0.06 * number, number, station=1 + number % 3) for number in range(2000)]
+def long_line(tmp_path: Path, capsys: Output, count: int) -> Path:
+    """Return the page of ``count`` exchanges of five frames each, and of two faults."""
+    parts = [exchange(0.06 * number, number, station=1 + number % 3) for number in range(count)]
     drawn(tmp_path, capsys, capture(tmp_path / 'line.cap', *parts, silence(121.0, station=9),
                                     exchange(121.5, 1)))
     page = tmp_path / 'line.html'
-    assert page.stat().st_size < 4_000_000
     found = browser.dom(page, tmp_path)
-    assert found.bars('ask') == 2001
+    assert found.bars('ask') == count + 1
     assert found.bars('missing') == 2
+    return page
+
+
+def test_browser_shows_all_frames_with_their_faults(tmp_path: Path, capsys: Output) -> None:
+    long_line(tmp_path, capsys, 100)
+
+
+@pytest.mark.long
+def test_browser_shows_ten_thousand_frames_in_their_colours(
+        tmp_path: Path, capsys: Output) -> None:
+    page = long_line(tmp_path, capsys, 2000)
+    assert page.stat().st_size < 4_000_000
     shown = browser.colours(page, tmp_path)
     assert {(0xFB, 0xE3, 0xE1), (0x2E, 0x8B, 0x57)} <= shown
 

@@ -76,6 +76,7 @@ def test_stations_are_named_by_their_processors() -> None:
     assert picture.stations_of(snapshot(1, 0, status)) == ['2: SLC 5/03']
 
 
+@pytest.mark.long
 def test_run_of_a_bridge_becomes_a_file(
         tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(picture, '_SHOT', 15.0)
