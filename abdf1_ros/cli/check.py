@@ -152,7 +152,7 @@ def _draw(options: argparse.Namespace, found: Findings, report: Report | None) -
 
 
 def _heard(found: Findings, files: Sequence[str]) -> dict[str, Any]:
-    """Return the rows that recordings fill in Mode Listen, and the reads of other nodes there."""
+    """Return the rows that recordings fill in Mode Listen, and the reads in the recordings."""
     from abdf1_ros.cli.overhearing import overheard
     network = found.network or Network()
     rows = Rows(row for row in found.mappings if row.command is Command.READ)

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The picture of ``check --html``: one poll cycle, and what the Periods need of the line."""
+"""The picture of ``check --html``: one poll cycle, and the line's time that the Periods need."""
 
 from __future__ import annotations
 

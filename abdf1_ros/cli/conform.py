@@ -101,7 +101,7 @@ Do not run conform against a machine that is in use.
 
 
 class _PortLine:
-    """A port for the scripts of cases; if the port ``echoes``, without the echo."""
+    """A port for cases; if the port ``echoes`` our bytes, ``read`` leaves them out."""
 
     def __init__(self, port: Port, echoes: bool) -> None:
         self._port = port
@@ -128,7 +128,7 @@ class _PortLine:
 
 
 def main(args: Sequence[str] | None = None) -> int:
-    """Run the cases; return an exit status of --help."""
+    """Run the cases; return one of the exit statuses that --help lists."""
     prepare_output()
     options = _parse(args)
     target = Target(options.target)
@@ -174,7 +174,7 @@ def _judge(options: argparse.Namespace, target: Target, cases: Sequence[Case], w
         results.append(result)
         if not (options.json or options.report):
             print(line_of(result), flush=True)
-    # Facts that may be published: not the name of a port, which may have the name of a host.
+    # Facts that may be published. The name of the port is left out: it may contain a host's name.
     kind = 'TCP' if options.tcp else 'pty' if options.pty else (
         network.port.partition('://')[0] if '://' in network.port else 'serial')
     facts = {'target': target.value, 'processor': str(identity or 'not known'),

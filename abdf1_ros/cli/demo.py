@@ -56,9 +56,10 @@ from rclpy.event_handler import SubscriptionEventCallbacks
 from rclpy.node import Node
 from rclpy.qos import QoSProfile
 
-# The executable, which a signal during the imports ends quietly. If this process dies, the
-# standard input of the node closes, and the node ends as after a signal. It removes the folder
-# of the demo first: the name of the port there would soon lead to another program's terminal.
+# The program of the node's process. A signal during its imports ends it quietly. If this process
+# dies, the standard input of the node closes, and the node ends as after a signal. The node first
+# removes the folder of the demo, because the name of the port there could soon lead to another
+# program's terminal.
 _NODE = """
 import os, shutil, signal, sys, threading
 from abdf1_ros.cli.main import node
@@ -158,7 +159,11 @@ class DemoBridge:
 
 
 class Watcher(ObservingNode):
-    """The robot cell: subscribes to all topics; keeps last values and statuses, all results."""
+    """
+    The robot cell: subscribes to all topics.
+
+    It keeps the last values and statuses, and all results.
+    """
 
     def __init__(self, mappings: Sequence[Mapping], port: str) -> None:
         super().__init__('demo_watcher')
@@ -250,7 +255,7 @@ class Stage:
         self._speed = Speed(self._watcher.node, self._mappings['speed']) if scene.guarded else None
 
     def close(self) -> None:
-        """End all, the bridge first."""
+        """End the bridge, then the PLCs and the watcher."""
         try:
             if self._bridge is not None:
                 self._bridge.end()
@@ -505,7 +510,7 @@ class Demo(Stage):
                        self._watcher.statuses['interlocks'].message)
             self._print_statuses('interlocks')
             self._take_control()
-        # For ten seconds after an unconfirmed write (a busy machine) a status is not OK.
+        # If a busy machine has caused an unconfirmed write, a status is not OK for ten seconds.
         self._wait('all statuses to be OK', lambda: all(
             status.level == _OK for status in self._watcher.statuses.values()))
         self._print_statuses(*self._watcher.statuses)

@@ -15,8 +15,8 @@
 """
 Pictures for a browser: blocks of time in lanes, as SVG in one HTML file.
 
-The file needs no network and runs no program: its own policy forbids both. All texts from outside
-go through ``text_of``.
+The file needs no network and runs no program: its Content-Security-Policy forbids both. All texts
+from outside go through ``text_of``.
 """
 
 from __future__ import annotations
@@ -98,7 +98,7 @@ class Bar:
 
 @dataclass(frozen=True, slots=True)
 class Lane:
-    """Bars beside each other, in the rows that they name."""
+    """Bars in one row or several rows; each bar has the number of its row."""
 
     name: str
     bars: Sequence[Bar]
@@ -174,13 +174,13 @@ def _axis(start: float, end: float, scale: float, top: int, unit: str) -> Iterat
 
 
 def _step(least: float) -> float:
-    """Return the next step of 1, 2 or 5 times a power of ten."""
+    """Return the smallest step that is at least ``least``, as 1, 2 or 5 times a power of ten."""
     power = 10.0 ** math.floor(math.log10(least)) if least > 0 else 1.0
     return next(factor * power for factor in (1, 2, 5, 10) if factor * power >= least * 0.999)
 
 
 def key(entries: Iterable[tuple[Look, str]]) -> str:
-    """Return the key of the colours."""
+    """Return the legend of the colours."""
     return '<p class="quiet">' + ' '.join(
         f'<svg class="key" viewBox="0 0 10 8"><rect class="{look.value}" width="10" height="8"/>'
         f'</svg>{text_of(text)}' for look, text in entries) + '</p>'

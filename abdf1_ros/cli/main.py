@@ -16,8 +16,9 @@
 The commands by their names, for the executables and for ``python3 -m abdf1_ros``.
 
 The imports of a command take a while. Until ``main`` of the command handles signals, Ctrl-C and
-SIGTERM end the process at once, without a traceback. The status is the same as later. Nothing is
-open yet at that time. So this module imports little: before it has run, Ctrl-C brings a traceback.
+SIGTERM end the process at once, without a traceback. The status is the same as later. No port or
+file is open at that time. This module imports little, because Ctrl-C during its own imports prints
+a traceback.
 """
 
 from __future__ import annotations
@@ -51,8 +52,8 @@ COMMANDS = {
 
 _TELLING = ('check', 'plc', 'conform')
 
-# After ``main`` of these commands nothing is left to do, and signals have no effect. The objects
-# and threads of rclpy could block the shutdown of the interpreter for ever.
+# After ``main`` of these commands, all work is done, and signals have no effect. So the process
+# ends at once: the objects and threads of rclpy could block the interpreter's shutdown for ever.
 _LEAVING = ('node', 'lines', 'simulator')
 
 
@@ -62,7 +63,7 @@ def run(name: str) -> int:
     _open_standard_streams()
     try:
         status: int = import_module(COMMANDS[name]).main()
-    except ModuleNotFoundError as error:  # also one that a command imports when it needs it
+    except ModuleNotFoundError as error:  # also a module that a command imports later
         if error.name is None or error.name.startswith('abdf1_ros'):
             raise
         print(f'{os.path.basename(sys.argv[0])}: the Python module {error.name} is missing; '
@@ -93,8 +94,8 @@ def _open_standard_streams() -> None:
     """
     Open each of standard input, output and error that is closed, on /dev/null.
 
-    Otherwise the next file that is opened gets its number. That may be the port: then DDS would
-    write its messages to the PLC.
+    Otherwise the next opened file gets the number of the closed stream. If that file is the port,
+    DDS writes its messages to the PLC.
     """
     for number, name in enumerate(('stdin', 'stdout', 'stderr')):
         try:
@@ -113,7 +114,7 @@ def _cure(module: str) -> str:
 
 
 def _ended(status: int) -> int:
-    """Return the status; from now on a second Ctrl-C cannot change it."""
+    """Return the status; ignore signals, so that a second Ctrl-C cannot change the status."""
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, signal.SIG_IGN)
     return status

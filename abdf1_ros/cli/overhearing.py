@@ -74,7 +74,7 @@ class Overhearing:
         self._now = 0.0
 
     def hear(self, chunk: Chunk) -> None:
-        """Take a chunk of bytes; chunks come in the order of their times."""
+        """Read a chunk of bytes; the caller gives chunks in the order of their times."""
         self._now = self._now + _STEP if chunk.time is None else chunk.time
         is_far = chunk.direction is Direction.IN
         self._driver.machine.receive_data(
@@ -123,7 +123,7 @@ def map_of(carried: Iterable[Carried]) -> str:
 
 
 def _row(read: Carried, tags: set[str]) -> str:
-    """Return the row of a read; a comment if the read is not of words of one type."""
+    """Return the row of a read; a comment if its words have several types, or a row already."""
     place = _place(read)
     if place is None:
         return f'# station {read.station}: {read.text}: {counted(read.count, "time")}'

@@ -142,7 +142,7 @@ def main(args: Sequence[str] | None = None) -> int:
     """
     Run until SIGINT, SIGTERM, "quit" or the end of --seconds.
 
-    Return an exit status of --help, or 1 after internal errors.
+    Return one of the exit statuses that --help lists, or 1 after internal errors.
     """
     prepare_output()
     options = parse_options(args)
@@ -260,7 +260,7 @@ def _try_out(script: TimedCommands, options: argparse.Namespace) -> None:
 
 
 def _load(options: argparse.Namespace) -> list[SimulatedPlc]:
-    """Return the PLCs of the data file; the single PLC with --full-duplex."""
+    """Return the PLCs of the data file; with --full-duplex only the PLC that it names."""
     plcs = load_plcs(options.data or str(config_file('simulator.csv')),
                      Checksum(options.check), time.monotonic, threading.Lock)
     return plcs if options.full_duplex is None else [
@@ -300,7 +300,7 @@ def _make_thread(plcs: Sequence[SimulatedPlc], line: Endpoint,
 
 
 def _announcer(say: Callable[[str], None]) -> Callable[[PortState], None]:
-    """Return a function that prints states of the line, each once; not the normal state."""
+    """Return a function that prints each change of the line's state, except to a normal state."""
     last = ''
 
     def announce(state: PortState) -> None:

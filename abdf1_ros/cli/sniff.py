@@ -215,7 +215,8 @@ class _Output:
             print(text_line(entry, self._colour))
 
 
-# What only a few calls need is imported there: it takes as long as the rest.
+# Modules that only a few calls need are imported there. Their import takes as long as all other
+# imports.
 def _bundle(options: argparse.Namespace) -> ReportBundle:
     from abdf1_ros.cli.sniff_report import ReportBundle
     return ReportBundle(options.files, options.settings, options.conformance, options.anonymous)
@@ -235,7 +236,7 @@ def main(args: Sequence[str] | None = None) -> int:
     """
     Decode until the end of the file, SIGINT, SIGTERM or --seconds.
 
-    Returns an exit status of --help.
+    Returns one of the exit statuses that --help lists.
     """
     prepare_output()
     options = _parse(args)
@@ -420,7 +421,7 @@ def _print_heard(tap: Tap, trace: Trace | None, output: _Output, settings: dict[
 
 
 def _tell_lost(tap: Tap, trace: Trace | None, told: int) -> int:
-    """Report pieces that were lost after the first ``told``; return the number of lost pieces."""
+    """Report lost pieces beyond the ``told`` pieces; return the number of all lost pieces."""
     if (lost := tap.lost) > told:
         text = f'{lost - told} pieces of traffic were lost: this output was too slow for them'
         _say(text)

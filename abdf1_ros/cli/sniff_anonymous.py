@@ -15,8 +15,8 @@
 """
 Files of a line without the names in them, for ``sniff --report --anonymous``.
 
-Only listed columns are kept, and in these only cells with a valid value: a text in a wrong place
-may be a name.
+Only listed columns are kept, and in these columns only cells with a valid value: a text in a wrong
+place may be a name.
 """
 
 from __future__ import annotations
@@ -44,7 +44,7 @@ from abdf1_ros.settings.station_lists import parse_stations
 
 _UNREADABLE = 'left out: neither a net file nor a map that can be read'
 _NO_RESULT = 'left out: not a result of "conform --json"'
-# The mark for an unreadable cell: the fault of a report may be in this cell.
+# The mark for an unreadable cell: the reported fault may be in this cell.
 _LEFT_OUT = '?'
 
 _HEARTBEAT = Command.HEARTBEAT.value.lower()
@@ -54,7 +54,7 @@ _KINDS: dict[str, ValueKind[Any]] = {
     'Station': _STATION, 'Via': _STATION, 'PLC_Type': one_of(_FAMILIES, family_name),
     'Access': one_of({way.value: way for way in Access} | {'Read': None}),
     'Processor': one_of({entry.value: entry for entry in Processor})}
-# Columns of a map that keep their cells; names in further columns become numbers.
+# Columns of a map that keep their cells. Names in the columns of _TAGS and _TOPICS become numbers.
 _KEPT = ('Command', 'Address', 'Station', 'PLC_Type', 'Length', 'Type', 'Period', 'Publish', 'Min',
          'Max', 'Word_Order', 'Scale', 'Offset', 'Access', 'Processor', 'Fallback_After',
          'While_Timeout', 'Via')
@@ -145,7 +145,7 @@ def _map_rows(rows: list[Row]) -> list[list[str]]:
 
 
 def _number(numbers: dict[tuple[str, str], str], kind: str, name: str) -> str:
-    """Return the same number for the same name."""
+    """Return a text such as ``tag_1``, the same for the same name."""
     known = sum(other == kind for other, _ in numbers)
     return numbers.setdefault((kind, name.lower()), f'{kind}_{known + 1}')
 

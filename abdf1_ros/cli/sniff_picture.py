@@ -67,9 +67,9 @@ class _Strip:
 @dataclass(slots=True)
 class _Episode:
     """
-    A repeated fault, with the ``words`` of the first; ``start`` and ``end`` are links.
+    A repeated fault; ``words`` describe the first, ``start`` and ``end`` are links.
 
-    ``latest``: place of the last one, in the unit of the recording.
+    ``latest``: place of the last fault, in the unit of the recording.
     """
 
     station: str
@@ -130,7 +130,7 @@ class Timeline:
         self._strip: _Strip | None = None
 
     def take(self, chunk: Chunk, baud: int | None, begun: str) -> None:
-        """Take bytes before their entries come; start a new recording if times go back."""
+        """Record a chunk's time before its entries; start a new recording if times go back."""
         time = -math.inf if chunk.time is None else chunk.time
         if not self._recordings or time < self._last:
             self._close()

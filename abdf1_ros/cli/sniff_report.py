@@ -64,7 +64,7 @@ _CONTENTS = {
 @dataclass(slots=True)
 class ReportBundle:
     """
-    Collects what ``sniff`` decodes, then writes it.
+    Collects the decoded entries of ``sniff``, then writes the bundle.
 
     - ``captures``: the recordings.
     - ``settings``: net and map CSV.
@@ -97,7 +97,7 @@ class ReportBundle:
             self._processors[reply.src] = \
                 str(error) if self.is_anonymous else f'{reply.data.hex(" ")} ({error})'
             return
-        # The name of the program is in the status.
+        # An anonymous bundle leaves out the name of the program, which is in the status.
         who = str(identity).partition(' (')[0] if self.is_anonymous else str(identity)
         facts = [who, *identity.faults, *identity.remarks]
         if not self.is_anonymous:

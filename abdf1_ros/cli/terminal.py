@@ -63,7 +63,7 @@ _PROGRESS_DELAY = 2.0  # s; shorter work shows no progress
 
 
 class NoPort(OSError):
-    """A port that cannot be opened; the text names it and gives advice."""
+    """A port that cannot be opened; the text names the port and gives advice."""
 
     def __init__(self, name: str, error: OSError) -> None:
         super().__init__(reason_of(name, error))
@@ -174,7 +174,7 @@ def drop_output() -> None:
 
 
 def has_reader_left(error: OSError, tell: Callable[[str], None]) -> bool:
-    """Return True if printing failed without a reader; ``tell`` any other error (a full disk)."""
+    """Return True if the reader of the output has left; ``tell`` any other error (a full disk)."""
     drop_output()
     if isinstance(error, BrokenPipeError):
         return True
@@ -241,7 +241,7 @@ def table(head: Sequence[str], rows: Sequence[Sequence[str]], right: Sequence[in
 
 class _Parser(argparse.ArgumentParser):
     """
-    A parser whose errors are two lines: a list of all options hides what is wrong.
+    A parser that prints an error in two lines: a list of all options would hide the fault.
 
     The parser of the command reports an unknown option, with similar options.
     """

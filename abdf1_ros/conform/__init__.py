@@ -21,6 +21,6 @@ case, ``ends`` are the parts that we play. ``slave``, ``master``, ``peer``, ``cl
 ``asking`` hold cases for several targets. ``cases`` has all of them. ``report`` writes the
 results.
 
-The codec is a second one on purpose, written from the manual and not from ``df1``: with the same
-code at both ends a wrong rule would pass. Pages are cited as in ``df1``.
+The kit has its own codec, written from the manual and not from ``df1``: with the same code at both
+ends a wrong rule would pass. Pages are cited as in ``df1``.
 """

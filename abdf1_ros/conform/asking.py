@@ -28,7 +28,8 @@ _ASKING = (Target.MASTER, Target.CLIENT, Target.RADIO_CLIENT)
 _ACKNOWLEDGED = (Target.MASTER, Target.CLIENT)
 
 _MOST_COMMANDS = 5
-# Without a reply, the next command has to come after twice the time with a reply, plus this (s).
+# A case is judged only if a missing reply clearly delays the next command: to more than twice the
+# time with a reply, plus this time (s).
 _CLEARLY = 0.3
 
 
@@ -91,7 +92,7 @@ def check_not_doubled(end: AnsweringEnd) -> None:
 
 def _follows(end: AnsweringEnd, command: Symbol,
              answer: Callable[[Symbol], None]) -> tuple[float, Symbol]:
-    """Answer a command; return the next command, and after how long (s) it came."""
+    """Answer a command; return the time (s) until the next command, and that command."""
     answer(command)
     begun = end.wire.now
     following = end.next_command('another command')
@@ -99,13 +100,13 @@ def _follows(end: AnsweringEnd, command: Symbol,
 
 
 def expect_not_used(end: AnsweringEnd, *answers: Callable[[Symbol], None]) -> None:
-    """Give answers that are no reply: the next command has to come as late as without one."""
+    """Give answers that are not replies: the next command must come as late as without a reply."""
     answered, command = _follows(end, end.next_command(), end.finish)
     unanswered, command = _follows(end, command, end.acknowledge)
     if unanswered < 2 * answered + _CLEARLY:
         raise Skipped('not judged: the next command comes as soon after no reply as after a reply')
     for answer in answers:
-        for _ in range(2):  # so that it does not count us as inactive
+        for _ in range(2):  # so that the target does not count us as inactive
             _, command = _follows(end, command, end.finish)
         took, command = _follows(end, command, answer)
         if took < (answered + unanswered) / 2:
@@ -114,7 +115,7 @@ def expect_not_used(end: AnsweringEnd, *answers: Callable[[Symbol], None]) -> No
     end.finish(command)
 
 
-# With another CMD it may end the command, as an error: that cannot be seen from here.
+# No reply with another CMD: it may end the command as an error, and we cannot see that.
 @case('A reply with another TNS or DST is not that of the command.', 'M 6-3, 6-7', *_ACKNOWLEDGED)
 def other_reply_ignored(end: AnsweringEnd) -> None:
     def with_change(at: int) -> Callable[[Symbol], None]:

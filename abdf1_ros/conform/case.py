@@ -78,7 +78,7 @@ class Case:
 
 @dataclass(frozen=True, slots=True)
 class CaseResult:
-    """The result of a case; ``seconds`` it took, ``transcript`` has the bytes of the line."""
+    """The result of a case; ``seconds`` is its time, ``transcript`` has the bytes of the line."""
 
     case: Case
     verdict: Verdict
@@ -99,7 +99,7 @@ CaseScript = Callable[[Any], None]
 
 def case(rule: str, source: str, *targets: Target,
          permission: Permission = Permission.NOTHING) -> Callable[[CaseScript], Case]:
-    """Make a function a case of ``targets``, with its own name."""
+    """Make a function a case of ``targets``, named after the function."""
     def made(run: CaseScript) -> Case:
         return Case(run.__name__.replace('_', '-'), rule, source, targets, run, permission)
     return made
@@ -110,8 +110,8 @@ def run_cases(cases: Iterable[Case], wire: Wire, end: Any,
     """
     Yield the result of each case, in their order.
 
-    ``end`` is the end that we play. Before each case it waits until the target has finished what
-    the case before has left. The caller handles OSError of the line.
+    ``end`` is the end that we play. Before each case, ``end`` waits until the target has finished
+    the work of the case before. The caller handles OSError of the line.
     """
     first = wire.now
     for entry in cases:

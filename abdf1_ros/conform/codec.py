@@ -59,10 +59,10 @@ class SymbolKind(Enum):
 @dataclass(frozen=True, slots=True)
 class Symbol:
     """
-    One symbol: ``raw`` as it came, ``data`` its link data without doubled DLE.
+    One symbol: ``raw`` as received, ``data`` its link data without doubled DLE.
 
-    ``is_good`` is False for a wrong check. ``embedded`` are the responses inside a message
-    (M 4-3). ``at`` is when its last byte had come, in seconds of the wire's clock.
+    ``is_good`` is False for a wrong check. ``embedded`` are the responses inside a message (M
+    4-3). ``at`` is the time of its last byte, in seconds of the wire's clock.
     """
 
     kind: SymbolKind
@@ -95,7 +95,7 @@ def crc(data: Iterable[int]) -> int:
 
 def check_bytes(data: bytes, check: BlockCheck, station: int | None = None) -> bytes:
     """
-    Return the check of a message, as it stands after DLE ETX.
+    Return the check of a message, as it is sent after DLE ETX.
 
     ``station`` is given for a message of a master. The BCC covers it and the data (M 5-4); the CRC
     covers station and STX, the data and ETX (M 5-6, 5-7).
@@ -144,7 +144,7 @@ def all_damaged(frame: bytes, check: BlockCheck) -> list[bytes]:
 
 
 def has_10_in_check(frame: bytes, check: BlockCheck) -> bool:
-    """Tell whether a byte of the check, which is never doubled (M 5-5), is 10."""
+    """Tell whether the check has a byte 10; a byte of the check is never doubled (M 5-5)."""
     return DLE in frame[-CHECK_SIZES[check]:]
 
 
@@ -182,7 +182,7 @@ def next_symbol(buffer: bytes, check: BlockCheck, is_half_duplex: bool) -> Symbo
 
 
 def _station(buffer: bytes) -> tuple[int, int] | None:
-    """Return the station after two bytes, and where it ends."""
+    """Return the station after the first two bytes, and its end; None where bytes are missing."""
     if len(buffer) < 4:
         return None
     return (buffer[2], 4 if buffer[2:4] == b'\x10\x10' else 3)

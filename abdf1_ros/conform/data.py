@@ -36,7 +36,8 @@ _TYPED = 0x0F
 _ILLEGAL = 0x10  # STS: command code, sub-code, length or format not accepted (M 8-2)
 _EXTENDED = 0xF0  # STS: an EXT STS follows (M 8-3)
 
-# Bytes of an echo that every product takes: SLC 5/01 and 5/02 end at 95, a PLC-5 at 243.
+# Sizes (bytes) of an echo that every product accepts. SLC 5/01 and 5/02 accept up to 95 bytes, a
+# PLC-5 up to 243.
 _ECHO_SIZES = (0, 1, 2, 64, 95)
 _LARGE_ECHO_SIZES = (243, 236, 200, 128, 112)
 
@@ -138,7 +139,7 @@ def _words_of(end: AskingEnd) -> Words:
 
 
 def _number(value: int) -> bytes:
-    """Return a level of an address: a byte, from 255 on FF and two bytes (M 13-10 to 13-15)."""
+    """Return a level of an address: a byte below 255, else FF and two bytes (M 13-10 to 13-15)."""
     return bytes((value,)) if value < 255 else b'\xFF' + value.to_bytes(2, 'little')
 
 
@@ -180,7 +181,7 @@ def _read(end: AskingEnd, count: int, words: Words | None = None) -> bytes:
 
 
 def changes_nothing(end: AskingEnd, send: Callable[[bytes], object]) -> None:
-    """Give ``send`` a command that writes; raises Failed if the words are now what it writes."""
+    """Call ``send`` with a write command; raise Failed if the words then have its values."""
     words = _words_of(end)
     before = _read(end, words.count)
     written = bytes(byte ^ 0xFF for byte in before)

@@ -24,17 +24,17 @@ from abdf1_ros.conform import codec
 from abdf1_ros.conform.codec import Symbol, SymbolKind
 from abdf1_ros.conform.wire import Failed, Skipped, Wire
 
-# Between two polls of a station that answers DLE EOT (s), so that it can finish.
+# Pause (s) between two polls of a station that answers DLE EOT, so that it can finish.
 POLL_PAUSE = 0.02
 
-# Longest time (s) until a target that sends by itself sends something.
+# Longest wait (s) for the next message of a target that sends by itself.
 PATIENCE = 30.0
 
 HIGHEST_LIMIT = 255  # highest setting of any product for repetitions and enquiries
 
 
 def expect_end_of_naks(wire: Wire, message: bytes, patience: float) -> None:
-    """Refuse a message each time it comes, until it is given up; raise Failed if it never is."""
+    """Refuse a message each time it comes; raise Failed if the target never gives it up."""
     for _ in range(HIGHEST_LIMIT + 1):
         wire.send(codec.NAK)
         symbol = wire.hear(patience)
@@ -45,7 +45,11 @@ def expect_end_of_naks(wire: Wire, message: bytes, patience: float) -> None:
 
 
 def expect_end_of_enquiries(wire: Wire, patience: float) -> Symbol | None:
-    """Return what comes after DLE ENQ that get no answer, None for silence; Failed for no end."""
+    """
+    Leave each DLE ENQ without an answer; return the next other symbol, None for silence.
+
+    Raises Failed if the DLE ENQ do not end.
+    """
     for _ in range(HIGHEST_LIMIT + 1):
         symbol = wire.hear(patience, answers=False)
         if symbol is None or symbol.kind is not SymbolKind.ENQ:
@@ -54,7 +58,7 @@ def expect_end_of_enquiries(wire: Wire, patience: float) -> Symbol | None:
                  'products', 'DLE ENQ once more')
 
 
-MOST_TRIES = 3  # tries at a full sink, and at an answer to a driver before a case
+MOST_TRIES = 3  # tries to send to a full sink, and to answer a command before a case
 _MOST_COMMANDS = 20  # commands in a row that a slave sends by itself
 
 # Longest time of a reply, in answer times.
@@ -66,8 +70,8 @@ class Words:
     """
     Words of the target for the cases that read and write.
 
-    ``address`` is in an integer file, as N7:0; ``count`` of its words may be overwritten (0:
-    none). ``family`` is PLC5 or SLC, empty where it is not known.
+    ``address`` is the first word, in an integer file, such as N7:0. ``count`` words from there on
+    may be overwritten (0: none). ``family`` is PLC5 or SLC, empty where it is not known.
     """
 
     file: int = 7
@@ -88,7 +92,7 @@ def header(dst: int, src: int, cmd: int, tns: int) -> bytes:
 
 def check_reply(command: bytes, reply: bytes) -> bytes:
     """
-    Return ``reply`` if it answers ``command``: raises Failed.
+    Return ``reply`` if it answers ``command``, else raise Failed.
 
     DST and SRC are exchanged, CMD has bit 6, TNS is the same (M 6-3 to 6-8).
     """
@@ -100,7 +104,7 @@ def check_reply(command: bytes, reply: bytes) -> bytes:
 
 
 class AskingEnd(ABC):
-    """The common part of both ends that ask: the ``station`` they ask, their number, the TNS."""
+    """The common part of all ends that send commands to a ``station``; ``own`` is our number."""
 
     def __init__(self, wire: Wire, station: int, own: int, first_tns: int,
                  words: Words = Words()) -> None:
@@ -114,9 +118,9 @@ class AskingEnd(ABC):
 
     def command(self, cmd: int = 0x06, body: bytes = b'\x00', tns: int | None = None) -> bytes:
         """
-        Return the link data of a command: an echo of nothing, if not given.
+        Return the link data of a command, by default of an echo without data.
 
-        None has the TNS of another in a run of 65,536.
+        No two of 65,536 commands in a row have the same TNS.
         """
         if tns is None:
             tns, self._next_tns = self._next_tns & 0xFFFF, self._next_tns + 1
@@ -124,10 +128,10 @@ class AskingEnd(ABC):
 
     @abstractmethod
     def settle(self) -> None:
-        """Take what the target still sends or owes, so that a case begins clean."""
+        """Receive the messages that the target still has to send, before a case begins."""
 
     def frame(self, command: bytes) -> bytes:
-        """Return a message as it stands on the line."""
+        """Return the frame of a message."""
         return codec.message(command, self.wire.check)
 
     def send(self, command: bytes) -> None:
@@ -144,10 +148,10 @@ class AskingEnd(ABC):
 
     def deliver(self, command: bytes, before: Callable[[], object] = lambda: None) -> None:
         """
-        Send a message that has to be acknowledged, each time after ``before``.
+        Call ``before``, send a message, and expect DLE ACK; raise Failed without it.
 
-        A sink may be full: a slave is silent then (KF2 4-31), and a full-duplex node answers DLE
-        NAK (M 4-8), so the message is sent again.
+        If a sink is full, a slave is silent (KF2 4-31), and a full-duplex node answers DLE NAK (M
+        4-8). Then ``before`` and the message are repeated.
         """
         for _ in range(MOST_TRIES):
             before()
@@ -168,14 +172,14 @@ class AskingEnd(ABC):
         """Return the first answer within ``seconds`` that is not DLE EOT."""
 
     def expect_nothing(self, what: str) -> None:
-        """Expect no answer at all, at a poll either; Failed says ``what`` should have none."""
+        """Expect no answer, not even to a poll; Failed gives the reason for silence, ``what``."""
         self.wire.expect_silence(what)
         symbol = self.further(self.wire.answer_time)
         if symbol is not None:
             raise Failed(f'no answer: {what}', str(symbol))
 
     def attempt(self, command: bytes) -> bytes | None:
-        """Return the reply to a command; None if the command is not taken."""
+        """Return the reply to a command; None if the command is not accepted."""
         try:
             self.deliver(command)
         except Failed:
@@ -190,7 +194,7 @@ class AskingEnd(ABC):
         return symbol.data
 
     def ask(self, cmd: int, body: bytes, tns: int | None = None) -> bytes:
-        """Carry out a command, FNC included in ``body``; return the link data of its reply."""
+        """Send a command, with FNC in ``body``; return the link data of its reply."""
         command = self.command(cmd, body, tns)
         self.deliver(command)
         return check_reply(command, self.collect())
@@ -216,7 +220,7 @@ class MasterEnd(AskingEnd):
         return codec.master_message(self.station, command, self.wire.check)
 
     def poll(self) -> Symbol | None:
-        """Poll and return what comes, after commands that the slave sends by itself."""
+        """Poll and return the answer; acknowledge and skip commands of the slave itself."""
         for _ in range(_MOST_COMMANDS):
             self.wire.send(codec.poll(self.station))
             symbol = self.wire.hear()
@@ -244,7 +248,7 @@ class MasterEnd(AskingEnd):
 
 class PeerEnd(AskingEnd):
     """
-    A full-duplex node that sends commands to another, ``station``.
+    A full-duplex node that sends commands to another node, ``station``.
 
     A reply may overtake the ACK of its command, as the two are sent independently (M 4-13).
     """
@@ -291,7 +295,7 @@ class PeerEnd(AskingEnd):
 
 
 class RadioEnd(PeerEnd):
-    """A node of a radio modem network that sends commands to another, ``station``."""
+    """A node of a radio modem network that sends commands to another node, ``station``."""
 
     def deliver(self, command: bytes, before: Callable[[], object] = lambda: None) -> None:
         before()
@@ -312,14 +316,14 @@ Serve = Callable[[bytes], bytes]
 
 
 class AnsweringEnd(ABC):
-    """The common part of both ends that answer commands."""
+    """The common part of all ends that answer commands."""
 
     def __init__(self, wire: Wire, serve: Serve) -> None:
         self.wire = wire
         self.serve = serve
 
     def settle(self) -> None:
-        """Answer one command, so that no case begins with an end that counts us as inactive."""
+        """Answer one command, so that the target does not count us as inactive in the case."""
         for _ in range(MOST_TRIES):
             try:
                 self.finish(self.next_command())
@@ -329,10 +333,10 @@ class AnsweringEnd(ABC):
 
     @abstractmethod
     def next_command(self, what: str = '') -> Symbol:
-        """Wait for a good command; Failed says ``what`` was expected, without it Skipped."""
+        """Wait for a good command; else raise Failed with ``what``, or Skipped if it is empty."""
 
     def hear_command(self, is_wanted: Callable[[Symbol], bool], what: str) -> Symbol:
-        """Return the first good command that ``is_wanted``, as ``next_command`` does."""
+        """Return the first command that ``is_wanted``; raises as ``next_command``."""
         try:
             symbol = self.wire.until(is_wanted, what, PATIENCE)
         except Failed:
@@ -349,10 +353,10 @@ class AnsweringEnd(ABC):
 
     @abstractmethod
     def say(self, raw: bytes) -> None:
-        """Send a message in the place of the reply to a command that was acknowledged."""
+        """Send a message instead of the reply to an acknowledged command."""
 
     def expect_taken(self, command: Symbol) -> None:
-        """Expect that the reply to a command was taken."""
+        """Expect that the target has accepted the reply to a command."""
         self.wire.expect(SymbolKind.ACK, 'DLE ACK for a good reply')
 
     @abstractmethod
@@ -360,7 +364,7 @@ class AnsweringEnd(ABC):
         """Answer a command to its end: acknowledge, reply, hear the ACK."""
 
     def reply_to(self, command: Symbol) -> None:
-        """Send the reply to a command; on a half-duplex line that is the answer to a poll."""
+        """Send the reply to a command; on a half-duplex line it must follow a poll."""
         self.wire.send(codec.message(self.serve(command.data), self.wire.check))
 
     def reply_and_hear(self, command: Symbol, what: str = 'DLE ACK for a good reply') -> None:
@@ -390,7 +394,7 @@ class SlaveEnd(AnsweringEnd):
         self.wire.send(raw)
 
     def next_poll(self, what: str = 'a poll of our station') -> Symbol:
-        """Wait for a poll of us; a message before it, or a reset of the line, is a failure."""
+        """Wait for a poll of our station; raise Failed for a message or a reset before it."""
         def is_ours(symbol: Symbol) -> bool:
             return symbol.station == self.station or symbol.kind is SymbolKind.NAK
 
@@ -406,7 +410,7 @@ class SlaveEnd(AnsweringEnd):
 
 
 class ServerEnd(AnsweringEnd):
-    """A full-duplex node that answers the commands of another."""
+    """A full-duplex node that answers the commands of another node."""
 
     def next_command(self, what: str = '') -> Symbol:
         return self.hear_command(lambda heard: heard.kind is SymbolKind.MESSAGE, what)
@@ -420,7 +424,7 @@ class ServerEnd(AnsweringEnd):
 
 
 class RadioServerEnd(ServerEnd):
-    """A node of a radio modem network that answers the commands of another."""
+    """A node of a radio modem network that answers the commands of another node."""
 
     def acknowledge(self, command: Symbol) -> None:
         pass

@@ -29,8 +29,9 @@ from abdf1_ros.conform.ends import (
 from abdf1_ros.conform.wire import expect_same, Failed
 
 _PEER = Target.PEER
-# How long (s) a node may wait for the response to its message before it asks: 1 to 4.4 s are the
-# defaults of the products (M 7-25, 7-27). Once it has asked that is known.
+# Longest time (s) that a node may wait for the response to its message before it sends DLE ENQ.
+# The defaults of the products are 1 to 4.4 s (M 7-25, 7-27). After a first DLE ENQ, the limit is
+# computed from the measured time.
 _LONGEST_ACK_TIMEOUT = 20.0
 
 

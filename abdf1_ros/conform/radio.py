@@ -16,7 +16,7 @@
 Cases for a node of a DF1 radio modem network: one that answers commands, and one that sends them.
 
 "SLC 13-76" is 1747-RM001G, page 13-76; "ML11 517" is 1763-RM001C, page 517. The target is alone on
-the line. It may forward packets for other nodes, once; its settings decide which.
+the line. It may forward a packet for another node once, if its settings allow it.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ _RULES = 'SLC 13-76 to 13-80'
 _SENDING_ON = 'ML11 517 to 522'
 
 _BROADCAST = 0xFF
-_ACK_TIMEOUT = 6.0  # s after which the slowest full-duplex node has asked for a DLE ACK
+_ACK_TIMEOUT = 6.0  # s; the slowest full-duplex node sends DLE ENQ within this time
 _MOMENT = 0.3  # s; a node that accepts a frame that it should drop sends within this time
 _COUNTERS = b'\x01\x00\x00\x1A'  # FNC, address and size of a read of diagnostic counters
 

@@ -27,7 +27,7 @@ RunFacts = Mapping[str, str]
 
 
 def line_of(result: CaseResult) -> str:
-    """Return a result as a line, and after a failure what was expected and what came."""
+    """Return a result as a line; a failure has more lines: expected, got, and the bytes."""
     case = result.case
     text = f'{result.verdict.value:4}  {case.name:24} {case.source:16} {case.rule}'
     if result.verdict is Verdict.SKIP:

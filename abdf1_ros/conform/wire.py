@@ -25,7 +25,7 @@ from typing import Protocol
 from abdf1_ros.conform import codec
 from abdf1_ros.conform.codec import BlockCheck, Symbol, SymbolKind
 
-# A symbol that has begun may take as long as the longest frame on a slow line, not longer.
+# Longest time (s) of a symbol that has begun. On a slow line, it is the time of the longest frame.
 _FRAME_TIME = 3.0
 _LONGEST_FRAME = 1000  # bytes; twice the largest packet, if every byte of it is doubled
 
@@ -46,7 +46,7 @@ class RawLine(Protocol):
 
 @dataclass(frozen=True, slots=True)
 class Sent:
-    """Bytes that we have sent, and when (s)."""
+    """Bytes that we have sent, and the time (s)."""
 
     at: float
     raw: bytes
@@ -62,7 +62,7 @@ class Failed(Exception):
 
 
 def expect_same(first: bytes, second: bytes) -> None:
-    """Fail if a message was to come again and has come with other bytes."""
+    """Raise Failed if a repeated message does not have the bytes of the first."""
     if second != first:
         raise Failed(f'the same message again: {first.hex(" ")}', second.hex(' '))
 
@@ -78,11 +78,11 @@ class Wire:
     ``answer_time`` is the longest time (s) of an answer, and the time without bytes that counts as
     silence. It counts from the end of the sent bytes, at ``char_time`` s a byte. With ``is_radio``
     no message has a response, so DLE ENQ gets none. ``transcript`` keeps all bytes in order;
-    ``has_heard`` tells whether any byte came. A response inside a message is heard before that
-    message. ``enquired_after`` is the shortest time (s) from a message of the target to its DLE
-    ENQ. With ``passes_commands`` a command of the target itself, such as a MSG of its program, is
-    acknowledged and ignored. Bytes outside of any symbol are ignored, as M 4-7 to 4-9 has it, and
-    counted in ``noise``; DLE with a code that no symbol has is an answer. By radio a forwarded
+    ``has_heard`` tells whether any byte came. ``hear`` returns a response inside a message before
+    that message. ``enquired_after`` is the shortest time (s) from a message of the target to its
+    DLE ENQ. With ``passes_commands`` a command of the target itself, such as a MSG of its program,
+    is acknowledged and ignored. Bytes outside of any symbol are ignored, as M 4-7 to 4-9 requires,
+    and counted in ``noise``; DLE with a code that no symbol has is an answer. By radio a forwarded
     reply that comes again is ignored, too (ML11 517 to 522).
     """
 
@@ -134,7 +134,7 @@ class Wire:
 
     def hear(self, within: float | None = None, *, answers: bool = True) -> Symbol | None:
         """
-        Return the next symbol; None where none has begun after ``within`` s.
+        Return the next symbol; None if no symbol begins within ``within`` s.
 
         With ``answers`` a DLE ENQ gets the last response, and is not returned (M 4-5, 4-13).
         """
@@ -156,12 +156,12 @@ class Wire:
         if answers and not self._is_radio and symbol.kind is SymbolKind.ENQ:
             self.send(self._response)
             return True
-        # A slave has to be polled again for its next message after a command.
+        # In half duplex, ``MasterEnd.poll`` does this, because a slave must be polled again.
         return self._passes_commands and not self.is_half_duplex \
             and self.has_passed_command(symbol)
 
     def has_passed_command(self, symbol: Symbol) -> bool:
-        """Acknowledge a command that does not repeat ours; return True if it was one."""
+        """If a symbol is a command that is not a copy of ours, acknowledge it and return True."""
         if not codec.is_command(symbol) or any(
                 symbol.raw in entry.raw for entry in self.transcript if isinstance(entry, Sent)):
             return False
@@ -176,7 +176,7 @@ class Wire:
             symbol = codec.next_symbol(self._buffer, self.check, self.is_half_duplex)
             if symbol is not None:
                 return self._take(symbol)
-            # A symbol that has begun may end; it must not go on for ever.
+            # Wait for the end of a symbol that has begun, but not for ever.
             longest = max(_FRAME_TIME, _LONGEST_FRAME * self._char_time)
             limit = max(end, begun + longest) if self._buffer else end
             left = limit - self._clock()
@@ -196,7 +196,7 @@ class Wire:
         self._buffer = self._buffer[len(symbol.raw):]
         self.transcript.append(symbol)
         if symbol.kind is SymbolKind.MESSAGE:
-            self._response = codec.NAK  # until it has one
+            self._response = codec.NAK  # until we send its response
             self._message_at = symbol.at
         elif symbol.kind is SymbolKind.ENQ and symbol.at > self._message_at:
             self.enquired_after = min(self.enquired_after, symbol.at - self._message_at)
@@ -207,7 +207,7 @@ class Wire:
         return self._embedded.popleft()
 
     def expect(self, kind: SymbolKind, what: str = '', within: float | None = None) -> Symbol:
-        """Return the next symbol if it is of ``kind`` and good; raises Failed."""
+        """Return the next symbol if it is of ``kind`` and good, else raise Failed."""
         expected, noise = what or kind.value, self.noise
         symbol = self.hear(within, answers=kind is not SymbolKind.ENQ)
         if symbol is None:
@@ -239,7 +239,7 @@ class Wire:
             self._read(left)
 
     def drain(self, limit: float) -> None:
-        """Hear and drop all until the line is quiet, at most ``limit`` s."""
+        """Receive and drop symbols until the line is quiet, at most ``limit`` s."""
         end = self._clock() + limit
         while self._clock() < end and self.hear(_QUIET) is not None:
             pass

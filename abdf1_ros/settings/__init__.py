@@ -13,15 +13,16 @@
 # limitations under the License.
 
 """
-Both CSV files: the line, its mappings, and the values in them.
+The two CSV files: the settings of the line, its mappings, and the values in their cells.
 
-``network`` is the net file, a field for each column. The map file is ``map_file``, one row of it
-``map_row``; ``columns`` says what may stand in each column, and in which rows. A checked row is a
-``mapping``, and ``rows`` has all of them, in groups. ``csv_table`` reads CSV files as spreadsheets
-write them. ``hints`` explains wrong cells, ``remarks`` unusual ones.
+``network`` reads the net file and has a field for each column. ``map_file`` reads the map file,
+``map_row`` one row of it. ``columns`` lists the values that each column allows, and the rows that
+may have it. A checked row is a ``mapping``, and ``rows`` has all mappings, in groups.
+``csv_table`` reads CSV files as spreadsheets write them. ``hints`` explains wrong cells,
+``remarks`` unusual ones.
 
-Every fault has file, line and column, and all of a file are found at once. Nothing here knows a
-port or the plan of a line.
+Every fault has file, line and column. All faults of a file are found at once. No module here opens
+a port or makes the plan of a line.
 """
 
 BAUD_RATES = (1200, 2400, 4800, 9600, 19200, 38400, 57600, 115200)

@@ -31,7 +31,7 @@ class AlarmLevel(Enum):
 
 @dataclass(frozen=True, slots=True)
 class Alarm:
-    """The ``state`` of a bit, 0 or 1, that is an alarm, and how bad that is."""
+    """The ``state`` of a bit (0 or 1) that is an alarm, and the ``level`` of the alarm."""
 
     level: AlarmLevel
     state: int = 1

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The columns of the map CSV: their contents, where they lead, and the rows that they are for."""
+"""The columns of the map CSV: their contents, the attributes that they set, and their rows."""
 
 from __future__ import annotations
 
@@ -93,10 +93,12 @@ class Column:
     One column of the map CSV.
 
     - ``default``: meaning of an empty cell; None if the cell must not be empty.
-    - ``attribute``: attribute of a mapping with the value, by default the name in small letters.
-    - ``kind``: set if the cell alone gives the value; otherwise other cells decide, too.
-    - ``commands``: the rows that may have the column.
-    - ``idle``: the rows in which it has no effect, which is a remark and not a fault.
+    - ``attribute``: attribute of a mapping that has the value; by default the name in small
+      letters.
+    - ``kind``: kind of the value; None if the value depends on other cells, too.
+    - ``commands``: commands of the rows that may have the column.
+    - ``idle``: commands of the rows in which the column has no effect. A cell there gives a
+      remark, not a fault.
     """
 
     name: str

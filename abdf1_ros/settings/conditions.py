@@ -40,14 +40,14 @@ from abdf1_ros.settings.limits import raw_values
 from abdf1_ros.settings.mapping import Mapping, ON_DEMAND, Publish
 from abdf1_ros.text import counted, shown
 
-# The values of the cells of a row that are not empty, by column.
+# The values in a row by column, without empty cells.
 Cells: TypeAlias = MappingType[str, Any]
 
 _PERIODS = milliseconds_from(100, 60_000)
 
 _NO_NUMBERS = (ValueType.BOOL, ValueType.STRING)
 
-# The processor reads or writes their words itself.
+# Files whose words the processor itself reads or writes.
 _NO_COUNTING = (FileType.STATUS, FileType.INPUT, FileType.OUTPUT)
 
 
@@ -83,7 +83,7 @@ def with_conditions(row: Row, values: Cells, mapping: Mapping, fault: ReportFaul
 
 
 def _check_on_demand(row: Row, mapping: Mapping, fault: ReportFault) -> None:
-    """Check what a row asks for that is read only on demand."""
+    """Report settings that a row must not have if it is read only on demand."""
     if not mapping.polls:
         fault('Period', f'Period "{ON_DEMAND}" is for Read and ReadWrite rows')
     if mapping.publish is not Publish.ALWAYS:

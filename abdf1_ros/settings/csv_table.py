@@ -20,8 +20,8 @@ cells, quoted cells, blank lines, empty cells and columns at the end, column nam
 letter case, spaces around values, and lines starting with # as comments. A first line such as
 sep=; only tells a spreadsheet the separator, and is left out.
 
-A cell ends on the line it begins on. No column needs more. Otherwise a forgotten closing quote
-would hide all rows up to the next quote, without an error.
+A cell must end on the line where it begins, because no column needs more lines. If cells could go
+on, a forgotten closing quote would hide all rows up to the next quote, without an error.
 """
 
 from __future__ import annotations
@@ -44,9 +44,9 @@ _DELIMITERS = {',': 'comma', ';': 'semicolon', '\t': 'tab'}
 _BLANK = ''.join(_DELIMITERS) + ' \r\n'
 _SEPARATOR_LINE = re.compile(r'"?sep=\W*', re.IGNORECASE)
 
-# Most bytes of a file: far more than one row for each word of a PLC needs.
+# Largest size of a file (bytes). A map with a row for each word of a PLC is far smaller.
 _LARGEST = 10_000_000
-# The limit of csv.reader for one cell.
+# Most characters of a line: csv.reader has this limit for one cell.
 _LONGEST_LINE = 131_072
 # Similarity (0 to 1) from which a wrong name counts as a mistyped column.
 _ALIKE = 0.7
@@ -91,7 +91,7 @@ class Table:
 
     @property
     def is_usable(self) -> bool:
-        """Tell whether its rows can be trusted; if most are bad, the good ones may be shifted."""
+        """Tell whether the rows can be trusted; if most are bad, the good rows may be shifted."""
         return not self.faults and len(self.row_faults) <= len(self.rows)
 
 
@@ -112,9 +112,9 @@ def read_table(path: str, known: Sequence[str], needed: Collection[str] = (),
     """
     Read a file whose header uses ``known`` column names, the ``needed`` ones among them.
 
-    Raises ConfigurationError if there is no header. If a needed column is missing, there are no
-    rows: each would lack the same cell. Columns that were ``renamed``, and their cells, are faults
-    that give the new name.
+    Raises ConfigurationError if there is no header. If a needed column is missing, the table has
+    no rows, because each would lack the same cell. A column that was ``renamed`` is a fault, and
+    each of its cells, too. These faults give the new name.
     """
     try:
         (first, header), *others = _read_lines(path, known)
@@ -165,7 +165,7 @@ def _read_lines(path: str, known: Sequence[str]) -> list[tuple[int, str]]:
 
 
 def _is_comment(line: str) -> bool:
-    """Tell whether a line is one; #N/A in its first cell comes from a spreadsheet."""
+    """Tell whether a line is a comment: it begins with #, but not with a mark such as #N/A."""
     text = line.lstrip()
     return text.startswith('#') and not is_spreadsheet_error(re.split('[,;\t]', text)[0].rstrip())
 
@@ -189,7 +189,7 @@ def _read_text(path: str) -> str:
 
 
 def _check_text(place: Place, line: str) -> None:
-    """Raise Problem where a line is not UTF-8 text, or has a zero byte as UTF-16 has."""
+    """Raise Problem where a line is not UTF-8 text, or has a zero byte, as UTF-16 has."""
     raw = line.encode(errors='surrogateescape')
     try:
         raw.decode()
@@ -206,7 +206,7 @@ def _cells(place: Place, line: str, delimiter: str) -> list[str]:
     if len(line) > _LONGEST_LINE:
         raise Problem(place, f'this line has {len(line)} characters, at most {_LONGEST_LINE} are '
                              'allowed')
-    # Only an open quote makes a cell go on to a second line.
+    # csv.reader reads the second, empty line only if a quote is still open.
     reader = csv.reader([line, ''], delimiter=delimiter, skipinitialspace=True)
     cells = next(reader)
     if reader.line_num > 1:
@@ -217,7 +217,7 @@ def _cells(place: Place, line: str, delimiter: str) -> list[str]:
 
 def _check_direction(place: Place, names: list[str], others: list[tuple[int, str]],
                      known: Sequence[str]) -> None:
-    """Raise Problem where the names of the columns stand below each other."""
+    """Raise Problem if the names of the columns are below each other, not side by side."""
     spellings = {name.lower() for name in known}
     below = [re.split('[,;\t]', line)[0].strip().lower() in spellings for _, line in others]
     if sum(name.lower() in spellings for name in names) < 2 and len(names) > 1 \
@@ -240,7 +240,7 @@ def _columns(place: Place, names: list[str], known: Sequence[str], needed: Colle
     """
     Return the cell number of each column, and the faults of the header.
 
-    ConfigurationError where it is none.
+    Raises ConfigurationError if the first row is not a header.
     """
     spelling = {name.lower(): name for name in known}
     meant = [spelling.get(name.lower()) for name in names]
@@ -284,7 +284,7 @@ def _columns(place: Place, names: list[str], known: Sequence[str], needed: Colle
 
 
 def _close(name: str, free: Sequence[str]) -> str | None:
-    """Return the column that is most likely meant by another name."""
+    """Return the column that a wrong name most likely means, None if no column is similar."""
     name, known = _squeezed(name), {_squeezed(column): column for column in free}
     close = difflib.get_close_matches(name, known, 1, _ALIKE) or [
         column for column in known if len(column) > 2 and name.startswith(column)]

@@ -15,10 +15,10 @@
 """
 Heartbeats, fallback values and reads that depend on a running PLC, as a map CSV asks for them.
 
-A heartbeat tells the PLC that the bridge is alive, and that messages of the topics in While still
-come. A fallback value is written when no message comes any more. While withholds values of a PLC
-whose program does not run. None of them is a safety function. The rules have the numbers of
-docs/heartbeats.md.
+A heartbeat tells the PLC that the bridge is alive, and that messages on the topics in While still
+arrive. A fallback value is written when no message arrives any more. With While, values of a PLC
+whose program does not run are not published. None of them is a safety function. The rules have the
+numbers of docs/heartbeats.md.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ from dataclasses import dataclass
 from abdf1_ros.pccc.values import ValueType
 
 DEFAULT_PERIOD = 1000
-"""Period of a heartbeat row with an empty cell (ms)."""
+"""Period (ms) of a heartbeat row whose cell Period is empty."""
 
 RUN = 'RUN'
 """The word of the column While for the mode of the processor."""
@@ -47,12 +47,16 @@ LONGEST_END = 6.0
 
 LAST_ANSWER = 0.1
 """
-Time (s) for the answer of a silent station at the end, so that there is time to try each one.
+Time (s) to wait for each silent station at an orderly end.
+
+It is short, so that there is time to try each station.
 """
 
 HAND_OVER = 2.0
 """
-Longest time (s) of such an end if the process goes on: a caller of ~/polling or ~/reload waits.
+Longest time (s) of an orderly end if the process goes on.
+
+It is short, because a caller of ~/polling or ~/reload waits.
 """
 
 _COUNTING = (ValueType.INT16, ValueType.UINT16)
@@ -63,7 +67,7 @@ class Fallback:
     """
     Values that are written when no good message has come for ``after`` ms (rules 7 to 12).
 
-    ``values`` are in the unit of the topic, as many as the mapping has elements.
+    ``values`` are in the unit of the topic, one for each element of the mapping.
     """
 
     values: tuple[float, ...]

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Explanations of cells and first rows that cannot be used: look-alikes, foreign programs."""
+"""Explanations of bad cells and first rows: look-alike characters, files of other programs."""
 
 from __future__ import annotations
 
@@ -75,7 +75,7 @@ def is_export_of_kepserver(names: Sequence[str]) -> bool:
 
 
 def export_fault(path: str, names: Sequence[str]) -> str:
-    """Return the kind of a file whose first row comes from another program, else empty."""
+    """Return the fault of a file that another program has exported, empty for none."""
     return f'is an export of KEPServerEX; "plc import {path}" makes a map of it' \
         if is_export_of_kepserver(names) else ''
 

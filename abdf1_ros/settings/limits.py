@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""From the values of a topic to raw values for the PLC, within all limits."""
+"""Conversion of the values of a topic to raw values for the PLC, within all limits."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ from abdf1_ros.settings.mapping import Mapping
 from abdf1_ros.settings.scaling import float32_step, Scaling
 from abdf1_ros.text import value_text
 
-# Tolerance at a limit, in raw steps: the loss of double precision with 32 bits.
+# Tolerance at a limit, in raw steps: the rounding error of double precision for 32-bit values.
 _EXACT = 1e-6
 
 _UNSCALED = Scaling()
@@ -37,8 +37,8 @@ def raw_values(mapping: Mapping, values: Sequence[float] | str) -> Sequence[floa
     """
     Return the raw values to write; FormatError where a limit or the type forbids one.
 
-    No raw value is outside of Min and Max. The float32 nearest to a limit can lie outside: it then
-    stands for the limit, and the nearest raw value inside is written.
+    No raw value is outside of Min and Max. The float32 nearest to a limit can be outside. It then
+    counts as the limit, and the nearest raw value inside is written.
     """
     codec, scaling = mapping.codec, mapping.scaling
     raw = values if isinstance(values, str) or scaling is None \
@@ -55,7 +55,7 @@ def raw_values(mapping: Mapping, values: Sequence[float] | str) -> Sequence[floa
 
 
 def _raw_inside(mapping: Mapping, values: Sequence[float]) -> list[float]:
-    """Return raw values inside the limits; FormatError where the nearest one is outside."""
+    """Return raw values inside the limits; FormatError where the nearest raw value is outside."""
     scaling, low, high = mapping.scaling or _UNSCALED, mapping.minimum, mapping.maximum
     found = scaling.raw([min(max(value, low), high) for value in values], mapping.type)
     low, high = sorted((end - scaling.offset) / scaling.scale for end in (low, high))
@@ -69,7 +69,7 @@ def _raw_inside(mapping: Mapping, values: Sequence[float]) -> list[float]:
 
 
 def _inside(value: float, low: float, high: float) -> float:
-    """Return the float32 next to a value that is inside the limits."""
+    """Return the float32 nearest to ``value`` that is not outside the limits."""
     nearest, = array('f', [value])
     step = float32_step(nearest)
     return nearest + step * ((nearest < low) - (nearest > high))

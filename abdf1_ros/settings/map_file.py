@@ -33,7 +33,7 @@ from abdf1_ros.settings.rows import Rows
 from abdf1_ros.text import shown
 
 Clash = Callable[[str, Mapping, str], None]
-"""Reports a conflict: takes the column, the other row, and what is wrong with both."""
+"""Reports a conflict; its arguments are the column, the other row and the text of the fault."""
 
 
 def load_mappings(path: str) -> tuple[Rows, list[Problem]]:
@@ -97,7 +97,7 @@ def broken_links(mappings: Rows) -> Iterator[tuple[Mapping, CellFault]]:
 
 def _unknown_counter(row: Row, faults: Collection[CellFault],
                      tags: Collection[str]) -> Iterator[CellFault]:
-    """Yield the fault of a tag in While that no row has, where other faults would hide it."""
+    """Yield the fault of an unknown tag in While, for a row that has other faults, too."""
     name = row.get('While')
     is_read = row.get('Command').lower() == Command.READ.value.lower()
     if is_read and name and name.upper() != RUN and name not in tags and all(
@@ -106,7 +106,7 @@ def _unknown_counter(row: Row, faults: Collection[CellFault],
 
 
 def _no_tag(name: str, tags: Iterable[str]) -> str:
-    """Return that no row has the tag of a counter, and which tag may be meant."""
+    """Return the fault of a counter's tag that no row has, with the tag that may be meant."""
     alike = {tag.lower(): tag for tag in tags}
     close = difflib.get_close_matches(name.lower(), alike, 1)
     meant = f'; did you mean {shown(alike[close[0]])}?' if close else ''
@@ -172,7 +172,7 @@ def _no_counter(mapping: Mapping, counter: Mapping, mappings: Rows) -> str:
 
 
 def _processor(mapping: Mapping) -> Processor | None:
-    """Return which SLC a mapping goes to, None for anything else."""
+    """Return the SLC processor of a mapping; None for other PLCs, Serve rows and broadcasts."""
     has_processors = bool(FAMILIES[mapping.plc_type].by_processor)
     if not has_processors or mapping.serves or mapping.station == BROADCAST:
         return None
@@ -192,7 +192,7 @@ class _Clashes:
         self._gateways: dict[int, Mapping] = {}
 
     def add(self, mapping: Mapping) -> list[CellFault]:
-        """Return the clashes of ``mapping``; without any, remember it for the rows after it."""
+        """Return the clashes of ``mapping``; if there are none, remember it for later rows."""
         faults: list[CellFault] = []
 
         def clash(column: str, other: Mapping, text: str) -> None:
@@ -204,7 +204,7 @@ class _Clashes:
             same = 'is already the tag' if mapping.tag == other.tag \
                 else f'becomes "{mapping.name}", the name'
             clash('Tag', other, f'tag "{shown(mapping.tag)}" {same}')
-        # A topic named after the tag is changed with the tag.
+        # If the tag has a fault, a topic named after the tag is not reported again.
         is_named = not faults or mapping.topic != mapping.name
         if is_named and mapping.reads and (other := self._readers.get(mapping.topic)):
             clash('Topic', other, f'read topic "{mapping.topic}" is the topic')
@@ -237,7 +237,7 @@ class _Clashes:
         return faults
 
     def _check_route(self, mapping: Mapping, clash: Clash) -> None:
-        """Find a station with two routes: replies have only the number of the station."""
+        """Find a station with two routes: a reply has the station's number, but not its route."""
         if mapping.serves:
             return
         if (other := self._routed.get(mapping.station)) and other.via != mapping.via:

@@ -51,11 +51,11 @@ _T = TypeVar('_T')
 @dataclass(frozen=True, slots=True)
 class CellFault:
     """
-    The fault of a cell, in parts, as a row may come from a file or a command line.
+    The fault of a cell, in parts, because a row may come from a file or a command line.
 
-    ``text`` is the whole fault, or the words after the ``value`` in ``column``: "should be one of
-    Low, High". With ``is_superfluous`` the cell should be empty. ``args`` fill the numbered
-    ``message``, except for the item.
+    ``text`` is the whole fault. If ``value`` is given, ``text`` has only the words after it, such
+    as "should be one of Low, High". With ``is_superfluous`` the cell should be empty. ``args``
+    fill the places of the numbered ``message`` after the item number.
     """
 
     column: str
@@ -73,7 +73,7 @@ class CellFault:
         return f'{text}; leave the cell empty' if self.is_superfluous else text
 
     def in_file(self, row: Row) -> Problem:
-        """Return the fault in the words of the map file that the row stands in."""
+        """Return the fault as a problem of the map file that contains the row."""
         text, where = self.words(), row.where(self.column)
         is_told = self.value is not None and is_digits(self.value)
         if self.message is None or (self.value is not None and not is_told):
@@ -82,7 +82,7 @@ class CellFault:
 
 
 class RowReader:
-    """Check one row by itself, collecting every fault of it in ``faults``."""
+    """Check one row by itself, and collect its faults in ``faults``."""
 
     def __init__(self, row: Row) -> None:
         self._row = row
@@ -140,7 +140,7 @@ class RowReader:
         scaling = self._scaling(values)
         if self.faults:
             return None
-        # Not only given cells: an address range tells the Length.
+        # ``values`` can have more than the given cells: an address range sets the Length.
         period = values.get('Period')
         told = {'type': _natural_type(values['Address'])} | {
             column.attribute: values[column.name] for column in MAP_COLUMNS
@@ -258,7 +258,7 @@ class RowReader:
 
     def _length_of(self, place: AddressRange, kind: ValueType | None,
                    given: int | None) -> int | None:
-        """Return the Length of a range; a cell Length beside it has to agree."""
+        """Return the Length of a range; report a fault if the cell Length differs."""
         try:
             length = place.length(kind)
         except AddressSyntaxError as error:

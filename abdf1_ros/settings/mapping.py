@@ -70,7 +70,7 @@ class Mapping:
     One checked row; no two are equal, so a row can be a key.
 
     - ``item``: number of the data row, from 1; ``place``: file and line.
-    - ``name``: the tag as ROS takes it; ``topic``: the topic as ROS takes it.
+    - ``name``: the tag as a valid ROS name; ``topic``: the topic as a valid ROS name.
     - ``period``: ms between reads, 0 for as often as the line allows, None for the node's default.
     - ``is_on_demand``: the row has no period, and is read only by its service.
     - ``minimum``, ``maximum``: limits of written values, in the unit of the topic.
@@ -144,9 +144,10 @@ class Mapping:
 
     def promise(self, stale_time: float) -> float:
         """
-        Return after how many seconds without a message values have stopped.
+        Return the longest time (s) between two messages while values are good.
 
-        Values are read at least every ``stale_time`` s. Infinite where nothing is promised.
+        Values are read at least every ``stale_time`` s. The time is infinite if the row promises
+        none.
         """
         if self.is_on_demand:
             return math.inf
@@ -161,7 +162,7 @@ class Mapping:
 
     @property
     def is_heartbeat(self) -> bool:
-        """Tell whether we count in the word."""
+        """Tell whether the word is a counter that we write."""
         return self.command is Command.HEARTBEAT
 
     @property
@@ -206,12 +207,12 @@ class Mapping:
 
     @property
     def period_cell(self) -> str | int | None:
-        """Return what the column Period says."""
+        """Return the value of the column Period."""
         return ON_DEMAND if self.is_on_demand else self.period
 
     @property
     def access_cell(self) -> str | Access | None:
-        """Return what the column Access says."""
+        """Return the value of the column Access."""
         return READ_ONLY if self.is_read_only else self.access
 
     @property
@@ -241,7 +242,7 @@ class Mapping:
                 for file in sorted(CIF_FILES)]
 
     def _meets(self, other: Mapping) -> bool:
-        """Tell whether both have a word, or for bits a bit, of one number."""
+        """Tell whether both rows have a word, or for bits a bit, with the same number."""
         first = max(self.extent.first, other.extent.first)
         end = min(self.extent.end, other.extent.end)
         if first >= end or not self.type.is_part or not other.type.is_part:

@@ -19,7 +19,7 @@ from __future__ import annotations
 import re
 import unicodedata
 
-# DDS takes topic names of at most 247 characters; 150 leave room for the namespace, the node and
+# DDS allows topic names of at most 247 characters; 150 leave room for the namespace, the node and
 # "/write/".
 MAX_LENGTH = 150
 
@@ -30,7 +30,7 @@ _SPELLED = str.maketrans({
 
 def sanitise(text: str) -> str:
     """
-    Return ``text`` as a relative topic name, or '' where nothing is left of it.
+    Return ``text`` as a relative topic name, or '' if no part of it is left.
 
     "/" separates parts; any other character that ROS does not allow becomes "_", runs of "_"
     become one, and a part that begins with a digit gets a "t" in front.

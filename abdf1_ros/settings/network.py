@@ -59,7 +59,7 @@ class NetField:
     """
     One field of the net CSV.
 
-    - ``message``: numbered text for a bad value; its words fit numbers and choices only.
+    - ``message``: numbered text for a bad value; its wording fits only numbers and choices.
     - ``message_args``: fill the places of ``message`` after the value.
     - ``other_words``: names of choices in other programs, in lower case, with our choice.
     """
@@ -102,7 +102,7 @@ def _named(*names: str) -> ValueKind[str]:
 
 
 _YES = one_of({'Yes': True, 'No': False})
-# S0 prints the default as a dash.
+# S0 prints the default, None, as a dash.
 _PARITY = one_of({name: name for name in PARITIES}, lambda text: text.lower().replace('-', 'none'))
 
 
@@ -181,7 +181,7 @@ class Network:
         return self.link(LinkOptions())
 
     def link(self, options: LinkOptions) -> LinkSettings:
-        """Return the settings of the link with such options."""
+        """Return the settings of the link with these options."""
         return LinkSettings.of(
             options, station=self.station, checksum=self.checksum, timing=self.timing,
             nak_retries=self.nak_retries, enq_retries=self.enq_retries,
@@ -201,12 +201,12 @@ class Network:
 
     @property
     def port(self) -> str:
-        """Return the device path or URL that Com_Port stands for."""
+        """Return the device path or URL that Com_Port means."""
         return _device(self.com_port)
 
     @property
     def second_port(self) -> str:
-        """Return the device path that Listen_Port stands for, empty for none."""
+        """Return the device path that Listen_Port means, empty for none."""
         return _device(self.listen_port)
 
     @property
@@ -272,9 +272,10 @@ def _row_remarks(row: Row) -> Iterator[Problem]:
 def make_network(values: MappingType[str, tuple[str, Place | str]],
                  base: Network | None = None) -> Network:
     """
-    Check ``values`` (by field name: text, and where it comes from) and make a network of them.
+    Check ``values`` and make a network of them.
 
-    Other fields are taken from ``base``. Raises ConfigurationError.
+    ``values`` has the text of each field and the place of the text, by field name. Other fields
+    are taken from ``base``. Raises ConfigurationError.
     """
     base = base or Network()
     checked: dict[str, Any] = {entry.name: getattr(base, entry.name) for entry in fields(base)}

@@ -42,7 +42,7 @@ _ACK_SIZE = 2
 _SHORT_PERIOD = 10  # ms; a smaller number was probably meant as seconds
 _LONG_TIMEOUT = 10_000  # ms
 
-# The effect of a write; for timers and counters of a write to a bit.
+# The effect of a write, by file type; for timers and counters, the effect of a write to a bit.
 _WRITTEN = {
     FileType.INPUT: 'is an input: the PLC overwrites what is written there with its next scan',
     FileType.STATUS: 'is in the status file: a write may change how the processor runs',
@@ -86,7 +86,7 @@ def _time_remarks(network: Network) -> Iterator[str]:
     if network.timeout > _LONG_TIMEOUT:
         yield (f'Timeout {network.timeout} is in ms: the line stands still for '
                f'{network.timeout / 1000:.0f} s whenever an answer gets lost')
-    # The command comes before the reply, and in half duplex the poll as well.
+    # TX_Delay passes before the command, and in half duplex also before the poll for the reply.
     times = 1 if network.duplex is Duplex.FULL else 2
     if times * network.tx_delay >= network.cmd_timeout:
         yield (f'TX_Delay {network.tx_delay} ms comes {"once" if times == 1 else "twice"} before '
@@ -153,7 +153,7 @@ def _name_remarks(row: Row, mapping: Mapping) -> Iterator[Problem]:
 
 
 def _plain_advice(text: str) -> str:
-    """Return the name to write instead of one with letters that ROS does not take, or nothing."""
+    """Return the advice for a text with letters that ROS does not allow, else empty."""
     plain = in_ascii(text)
     return f'; ROS takes A to Z, digits and _: {shown(plain)} in Topic reads better' \
         if plain != text else ''
@@ -182,7 +182,7 @@ def _useless_cells(row: Row, mapping: Mapping) -> Iterator[Problem]:
 
 
 def _beyond_control(mapping: Mapping) -> Address | None:
-    """Return the control word that values reach over from one element to the next."""
+    """Return the control word that is among the values if they go on into the next element."""
     address = mapping.address
     if not address.file_type.is_structure or address.bit is not None or not address.word:
         return None

@@ -30,9 +30,9 @@ class Scaling:
     """
     Engineering value = raw value * ``scale`` + ``offset``.
 
-    It is computed in double precision and published as float32. The way back takes the raw value
-    nearest to (value - ``offset``) / ``scale``. Of two equally near values it takes the even one,
-    as IEEE 754 does. ``scale`` and ``offset`` are finite, ``scale`` is not 0.
+    It is computed in double precision and published as float32. A written value becomes the raw
+    value nearest to (value - ``offset``) / ``scale``. Of two equally near raw values, it becomes
+    the even one, as in IEEE 754. ``scale`` and ``offset`` are finite, ``scale`` is not 0.
     """
 
     scale: float = 1.0
@@ -58,10 +58,10 @@ class Scaling:
 
     def fault(self, kind: ValueType) -> str | None:
         """
-        Return why values of ``kind`` cannot be scaled so, None when they can.
+        Return why values of ``kind`` cannot have this scaling, None when they can.
 
-        Published values are float32. Two different 16-bit values must not become the same
-        float32: only then does writing it back give the same raw value.
+        Published values are float32. Two different 16-bit values must not become the same float32.
+        Otherwise a published value, written back, could give another raw value.
         """
         if kind in (ValueType.BOOL, ValueType.STRING):
             return f'Scale and Offset are for numbers, not for {kind.value}'

@@ -72,7 +72,7 @@ class SharePlace:
 
 
 def share_places(text: str) -> list[SharePlace]:
-    """Return the places of a cell, separated by blanks; ValueError says what would be right."""
+    """Return the places of a cell, separated by blanks; ValueError gives the right form."""
     places = [_place(word) for word in text.split()]
     known: dict[str, str] = {}
     for place in places:
@@ -110,7 +110,11 @@ def _place(text: str) -> SharePlace:
 
 
 def _host_and_port(name: str, text: str) -> tuple[str, int]:
-    """Return address and port after "tcp:"; ValueError for a name: it may be any interface."""
+    """
+    Return address and port after "tcp:"; ValueError for a host name.
+
+    A name may mean any interface.
+    """
     with suppress(ValueError):
         host, port = host_and_port(name, '') if ':' in name else host_and_port(f':{name}')
         if port:

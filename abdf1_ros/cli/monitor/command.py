@@ -183,7 +183,7 @@ class _Screen:
         self.show(lines, rows[0])
 
     def wants_other_list(self) -> bool:
-        """Take the pressed keys; return True if a key ends the list or chooses a line."""
+        """Read the pressed keys; return True if a key ends the list or chooses a line."""
         for key, rows in self._pressed():
             if key == ord('q'):
                 return True
@@ -205,7 +205,7 @@ class _Screen:
             yield key, rows.get(key, 0)
 
     def wants_end(self) -> bool:
-        """Take the pressed keys; return True if a key ends the picture."""
+        """Read the pressed keys; return True if a key ends the picture."""
         for key, rows in self._pressed():
             if key == ord('q'):
                 return True
@@ -326,7 +326,8 @@ def _show(watch: NodeWatch, options: argparse.Namespace, has_ended: _Ending) -> 
 
 
 def _picture(watch: NodeWatch, width: int) -> list[TextLine]:
-    # Characters that the C library cannot write would spoil a curses screen; the console has few.
+    # Characters that the C library cannot write would spoil a curses screen. The Linux console can
+    # show few characters.
     has_blocks = locale.getencoding() == 'UTF-8' and os.environ.get('TERM') != 'linux'
     return render(watch.snapshot(), time.monotonic(), width, BLOCKS if has_blocks else ASCII)
 

@@ -27,7 +27,7 @@ ASCII = '_.-=*#'
 
 _STEP = 2.0  # s
 SECONDS = WIDTH * _STEP
-_ELEMENTS = 8  # only the first elements of a long row are used
+_ELEMENTS = 8  # only the first elements of a long array are used
 
 
 class _Step(NamedTuple):
@@ -46,10 +46,11 @@ class _Step(NamedTuple):
 
 class Curve:
     """
-    The last values of a row of numbers; with ``is_bits`` each is 0 or 1.
+    The last values of an array of numbers; with ``is_bits`` each is 0 or 1.
 
-    Of several elements, the curve shows the first that has changed. Of several values in a step,
-    it shows the extreme farther from the step before, so that a blinking bit is seen.
+    Of several elements, the curve shows the first that has changed. If a step has several values,
+    the curve shows the least or the greatest, whichever is farther from the point before. So a
+    blinking bit is visible.
     """
 
     def __init__(self, is_bits: bool = False) -> None:
@@ -57,7 +58,7 @@ class Curve:
         self._steps: deque[_Step] = deque(maxlen=WIDTH + 1)
 
     def take(self, values: Sequence[float], now: float) -> None:
-        """Take the values of a message that came at the clock value ``now`` (s)."""
+        """Record the values of a message that arrived at the clock value ``now`` (s)."""
         number, last = int(now // _STEP), [float(value) for value in values[:_ELEMENTS]]
         low = high = last
         if self._steps and self._steps[-1].number == number:

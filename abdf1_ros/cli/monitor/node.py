@@ -86,9 +86,9 @@ class NodeWatch(Listening):
     """
     Listen to the node with the full name ``name``, until closed.
 
-    The bridge is not affected: subscriptions ask for no QoS beyond the offer of every bridge, no
-    service is called, and nothing is published. Ages of topics without a promised time count from
-    the publisher's time stamp. For these topics the clocks of the hosts must agree.
+    The bridge is not affected: subscriptions request only the QoS that every bridge offers, no
+    service is called, and no message is published. Ages of topics without a promised time count
+    from the publisher's time stamp. For these topics the clocks of the hosts must agree.
     """
 
     def __init__(self, name: str, ros_arguments: list[str]) -> None:
@@ -108,7 +108,7 @@ class NodeWatch(Listening):
 
     @property
     def is_complete(self) -> bool:
-        """Return True if diagnostics, all topics and all promised values are here."""
+        """Return True if diagnostics, all topics and all promised values have arrived."""
         totals = [status.values.get('total', '') for status in self._statuses
                   if status.section == 'mappings']
         if not totals or not totals[0].isdecimal():

@@ -15,7 +15,7 @@
 """
 A line of text for each bridge with a state on /diagnostics, the worst first.
 
-``PlantWatch`` listens, and ``render_plant`` knows neither ROS nor a terminal.
+``PlantWatch`` listens. ``render_plant`` makes the lines, and uses neither ROS nor a terminal.
 """
 
 from __future__ import annotations

@@ -29,7 +29,7 @@ import textwrap
 from abdf1_ros.cli.monitor import curves
 from abdf1_ros.text import counted, cut, printable, value_text
 
-# Time (s) without diagnostics that the picture reports; by default they come every second.
+# The picture reports a longer time (s) without diagnostics. By default they come every second.
 SILENCE = 3.0
 
 # Most characters of names and addresses; the values get the rest of the line.
@@ -107,7 +107,7 @@ class Reading:
             and now - self.received > self.promised
 
     def state(self, now: float) -> tuple[str, Style]:
-        """Return the state of the values in a word, at the clock value ``now`` (s)."""
+        """Return the state of the values as text, at the clock value ``now`` (s)."""
         if self.values is None:
             return 'no value', Style.BAD
         if self.promised is None:
@@ -188,7 +188,7 @@ def show(values: Sequence[float] | str, width: int) -> str:
     """Return values as text of at most ``width`` characters, with the number of omitted values."""
     if isinstance(values, str):
         return cut(f'"{printable(values)}"', width)
-    # An element takes two characters or more: elements beyond that cannot fit.
+    # An element needs two characters or more, so later elements cannot fit.
     texts = [value_text(value) for value in values[:width // 2 + 1]]
     for count in range(len(texts), 0, -1):
         rest = len(values) - count
@@ -282,7 +282,7 @@ class _Widths:
 
     @classmethod
     def of(cls, topic: int, width: int) -> _Widths:
-        """Divide a width among the columns; the value comes first."""
+        """Divide a width among the columns; the column of values has priority."""
         left = width - topic - _AGE_WIDTH - _WORD - 8 - _GOOD_VALUE_WIDTH
         sizes = []
         for size in (_SHORT_STATE - _WORD - 2, curves.WIDTH, _LOAD_WIDTH,

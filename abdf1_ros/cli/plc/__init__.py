@@ -16,8 +16,8 @@
 The command ``plc``: single reads, writes and questions to the PLCs of a line.
 
 - ``parser``: the verbs and their help; a file for each is in ``verbs``.
-- ``options``: options that verbs share; ``line`` turns those of the line into settings.
-- ``asking``: what the verbs share that ask one station.
+- ``options``: options that verbs share; ``line`` makes settings of the options of the line.
+- ``asking``: the common part of the verbs that ask one station.
 - ``session``: an open line.
 - ``data``: reads and writes.
 - ``presence``: asks which stations answer.

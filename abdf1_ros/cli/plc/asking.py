@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""What the verbs of ``plc`` share that ask one station."""
+"""The common part of the ``plc`` verbs that ask one station."""
 
 from __future__ import annotations
 
@@ -40,8 +40,9 @@ def ask(options: argparse.Namespace, work: Callable[[argparse.Namespace, Session
     """
     Open the line and carry out ``work`` with one station; warn if ``via`` may not be a gateway.
 
-    - ``targets``: what ``work`` reads or writes; a row of a map names its station.
-    - ``writes``: the user has to name the station if the line has several.
+    - ``targets``: the rows and addresses that ``work`` reads or writes; a row of a map names its
+      station.
+    - ``writes``: if True, the user has to name the station on a line with several stations.
     - ``record``: a file for all bytes of the line.
     """
     network = _line(options, targets, writes)
@@ -74,7 +75,7 @@ def mappings_of(options: argparse.Namespace, session: Session,
 
 def family_of(options: argparse.Namespace,
               session: Session) -> tuple[PlcType, Processor | None]:
-    """Return family and processor: from the option, or ask the station."""
+    """Return family and processor: from the option, or from the station's reply."""
     if options.plc_type:
         return PlcType(options.plc_type), None
     return data.ask_family(session, options.station)
@@ -110,8 +111,8 @@ def _line(options: argparse.Namespace, targets: Targets | None, writes: bool) ->
     """
     Return the line of a command for one station, and set the station in ``options``.
 
-    Raises ConfigurationError if a write names no station on a line of several, and if the station
-    is our own. Rows of a map name their stations.
+    Raises ConfigurationError if a write names no station on a line of several stations, and if the
+    station is our own. Rows of a map name their stations.
     """
     network = network_of(options)
     if targets and targets.rows:

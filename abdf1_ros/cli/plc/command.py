@@ -31,7 +31,7 @@ from abdf1_ros.cli.terminal import EXIT_INTERRUPTED, prepare_output, run_command
 
 
 def main(args: Sequence[str] | None = None) -> int:
-    """Carry out one command; return an exit status of --help."""
+    """Carry out one command; return one of the exit statuses that --help lists."""
     prepare_output()
     parser = make_parser(__doc__)
     words = help_asked(sys.argv[1:] if args is None else args)

@@ -231,7 +231,7 @@ def remarks_of_write(mapping: Mapping) -> Iterator[str]:
 
 class Writing:
     """
-    One write to one mapping; as text, the values to write.
+    One write to one mapping; ``str`` returns the values to write.
 
     Raises FormatError if ``texts`` are not values of the mapping.
     """
@@ -264,7 +264,7 @@ class Writing:
 
 
 def parse_values(mapping: Mapping, texts: Sequence[str]) -> Sequence[float] | str:
-    """Return the values of texts; whole numbers also as 0x, 0b. FormatError for others."""
+    """Return the values of texts; whole numbers also as 0x, 0b. FormatError for bad texts."""
     if texts and mapping.message_type is ValueType.STRING:
         if len(texts) != 1:
             raise FormatError(f'{mapping.address} takes one text; quote it if it has spaces')
@@ -327,7 +327,7 @@ def rows(mapping: Mapping, values: Values, names: Sequence[str], radix: Radix = 
     Yield values in rows of up to ``room`` characters, each with the name of its first value.
 
     ``names`` are the ``labels`` of all values. If any value has a tag, each value has a row of its
-    own. Bits have the numbers of the file, and values the unit of their row.
+    own. Each bit has its number in the file, and each value the unit of its row.
     """
     if isinstance(values, str):
         yield names[0], repr(values)

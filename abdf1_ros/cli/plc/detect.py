@@ -33,7 +33,7 @@ from abdf1_ros.df1.echo import COMES_BACK
 from abdf1_ros.problems import ConfigurationError, Problem
 from abdf1_ros.settings.network import Network
 
-# The usual ones first.
+# Baud rates to try, the usual rates first.
 BAUD_RATES = (19200, 9600, 38400, 57600, 115200, 4800, 2400, 1200)
 CHECKS = tuple(check.value for check in (Checksum.CRC, Checksum.BCC))
 
@@ -57,8 +57,8 @@ class LineSettings:
 _WORDS = {'Peer': 'full duplex', 'Master': 'half duplex',
           'Radio': 'radio modem (replies come without ACK)'}
 
-# Number of echoes that show a radio modem line. Then the time (s) within which a full-duplex PLC
-# asks for a missing ACK (M 7-25, 7-27).
+# Number of echoes that show a radio modem line, and the time (s) within which a full-duplex PLC
+# sends ENQ for a missing ACK (M 7-25, 7-27).
 _RADIO_ECHOES = 3
 _ENQ_TIME = 5.0
 
@@ -72,7 +72,7 @@ _ALL_TRIED_IN_VAIN = (
 
 @dataclass(frozen=True, slots=True)
 class Found:
-    """Settings with which a PLC takes commands; without a PLC a gateway."""
+    """Settings with which a PLC accepts commands, or a gateway if no PLC does."""
 
     settings: LineSettings
     presence: Presence
@@ -83,7 +83,7 @@ class Search:
     Try settings on the port of ``network``, in half duplex with each of ``stations``.
 
     ``show`` gets a text about the settings being tried. ``echoes`` is True if our bytes came back:
-    then no full-duplex PLC can be there.
+    then there cannot be a full-duplex PLC.
     """
 
     def __init__(self, network: Network, stations: Sequence[int],
@@ -117,7 +117,8 @@ class Search:
 
     def _try(self, baud: int, mode: str, checks: Sequence[str]) -> Found | None:
         """Try one speed and duplex; in half duplex a second check only after an answer."""
-        # Most full-duplex ports take messages to any station; most of the rest are 1 or 0.
+        # Most full-duplex ports accept messages to any station. Most other ports are station 1 or
+        # 0.
         stations = self._stations if mode != MODES['full'] else \
             sorted(self._stations[:2], key=lambda station: not station)
         for check in checks:
@@ -141,7 +142,7 @@ class Search:
 
     def _look(self, settings: LineSettings, stations: Sequence[int],
               is_first: bool) -> Iterator[Presence]:
-        """Yield the presence of each station; ignore one that only seems to take commands."""
+        """Yield the presence of each station; ``takes_commands`` also needs a reply to an echo."""
         network = settings.on(self._network)
         if settings.mode == MODES['half']:  # a PLC does not answer to its own address
             network = replace(network, station=free_station(network.station, stations))
@@ -165,7 +166,7 @@ class Search:
                 self._characters[settings] += session.counters.chars_received
 
     def _is_radio(self, settings: LineSettings, station: int) -> bool:
-        """Return True if replies come without any symbol, though we send none either."""
+        """Return True if replies come without ACK, NAK or ENQ, although we send no ACK."""
         self._show(f'trying {settings}, station {station}')
         with Session(settings.on(self._network)) as session:
             if not all(understands(session, station) for _ in range(_RADIO_ECHOES)):

@@ -67,7 +67,7 @@ def find_files(session: Session, station: int, plc_type: PlcType, processor: Pro
 
 
 def listed(session: Session, station: int, identity: Identity | None) -> list[DataFile]:
-    """Return the files of the processor's own list; none if we know no list of it."""
+    """Return the files of the processor's own list; empty if no list is known or readable."""
     search = FAMILIES[identity.plc_type].file_search if identity and identity.plc_type else None
     steps = search.directory(identity.processor) if search and identity else None
     try:
@@ -99,7 +99,7 @@ def outside(found: Sequence[DataFile], mappings: Rows,
 
 def map_rows(found: Sequence[DataFile], station: int, plc_type: PlcType,
              processor: str, via: int | None = None) -> Iterator[str]:
-    """Yield a map row for each file, as long as one packet; a comment if no row is possible."""
+    """Yield a map row of one packet for each file; a comment if no row is possible."""
     for entry in found:
         kind = entry.type
         if kind.is_io or kind.is_function:

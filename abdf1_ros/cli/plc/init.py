@@ -98,7 +98,7 @@ def net_csv(network: Network, found: Found, stations: Collection[int]) -> str:
 
 
 def listening_csv(network: Network) -> str:
-    """Return a net CSV that only listens."""
+    """Return a net CSV for Mode Listen."""
     row = ('Listen', network.error_code, network.com_port, network.listen_port, network.baud,
            network.parity)
     return ('Mode,Error_Code,Com_Port,Listen_Port,Baud,Parity\n'

@@ -28,7 +28,8 @@ from abdf1_ros.settings.network import load_network, make_network, Network
 # For a user who waits, the default Timeout of a net CSV (1000 ms) is long.
 DEFAULTS = Network(timeout=300)
 
-# Most PLCs have small numbers, and without an option we ask station 1.
+# The first number to try for our own station. Most PLCs have smaller numbers, and by default we
+# ask station 1.
 _FIRST_SPARE = 10
 
 MODES = {Duplex.HALF.name.lower(): 'Master', Duplex.FULL.name.lower(): 'Peer',
@@ -67,6 +68,6 @@ def network_of(options: argparse.Namespace, duplex: str | None = None,
     if getattr(options, 'via', None) is not None and network.line_mode.has_one_plc:
         raise ConfigurationError([Problem(
             '--via', 'in full duplex a gateway has no address: --station is the node behind it')])
-    # By radio we wait for the reply only.
+    # By radio there is no ACK, so --timeout limits the wait for the reply.
     is_told = network.duplex is Duplex.RADIO and options.timeout is not None
     return replace(network, cmd_timeout=network.timeout) if is_told else network

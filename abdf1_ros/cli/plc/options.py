@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The options that verbs of ``plc`` share, and those of the line."""
+"""The options that verbs of ``plc`` share, and the options of the line."""
 
 from __future__ import annotations
 
@@ -77,7 +77,7 @@ def add_folder(parser: argparse.ArgumentParser, what: str) -> None:
 
 
 def add_stations_to_try(parser: argparse.ArgumentParser) -> None:
-    """Add the option for the stations with which settings are tried, and its Timeout."""
+    """Add the option for the stations to try settings with, and set a short Timeout."""
     parser.add_argument('--stations', metavar='LIST', type=stations_option,
                         default=tuple(range(8)),
                         help='half duplex: stations to look for (default: 0-7)')

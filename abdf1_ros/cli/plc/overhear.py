@@ -33,12 +33,13 @@ from abdf1_ros.settings.network import Network
 from abdf1_ros.sniffer.capture import Chunk, Direction
 
 LISTENED_FOR_READS = 10.0
-"""Seconds to listen for the reads of another master, for a map of them."""
+"""Seconds to listen for the reads of another master, to make a map of these reads."""
 
 LISTENED = 1.0
 """Seconds to listen at each speed; masters poll a few times a second."""
 
-# One of 256 wrong byte pairs looks like a poll.
+# Number of polls that show a master. One poll is not enough: after DLE ENQ, one of 256 random byte
+# pairs has a right BCC.
 _SURE_POLLS = 2
 
 
@@ -63,7 +64,7 @@ def overhear(network: Network, bauds: Sequence[int],
     """
     Listen at each speed; stop at a speed without a character.
 
-    Return the master that is heard. Sends nothing; raises OSError.
+    Return the first master that is heard, None for none. Sends nothing; raises OSError.
     """
     for baud in bauds:
         show(f'listening at {baud} baud')

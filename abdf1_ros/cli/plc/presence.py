@@ -87,7 +87,7 @@ class Presence:
 
     @property
     def is_of_gateway(self) -> bool:
-        """Return True if a gateway replied: for itself, or that it does not reach the station."""
+        """Return True if a gateway replied: for itself, or because it cannot reach the station."""
         if self.identity is not None:
             return self.identity.has_no_processor
         return isinstance(self.error, RemoteError) and is_local_status(self.error.sts)
@@ -139,7 +139,7 @@ def _refusal_of_gateway(session: Session, station: int) -> Abdf1Error | None:
     Return why a read does not reach a station; None if the station itself replies.
 
     A gateway may answer diagnostic commands itself, for every number (a switch of the 1770-KF2).
-    The read of a PLC-2 is known to all families.
+    All families know the read command of a PLC-2.
     """
     try:
         session.ask(station, _basic_read())
@@ -163,8 +163,8 @@ def scan(network: Network, stations: Sequence[int], via: int | None = None,
     Yield the presence of every station, ``via`` a gateway; raises OSError and PortLost.
 
     Silent stations are asked again at the end: a lost frame does not prove absence. ``show`` gets
-    a text about the present station, ``complain`` the traffic if a silent station was heard. On a
-    line with station numbers we use a free number.
+    a text about the present station, ``complain`` the traffic if stations stay silent on a line
+    that loses frames. On a line with station numbers we use a free number.
     """
     if not network.line_mode.has_one_plc and not network.line_mode.is_polled:
         network = replace(network, station=free_station(network.station, stations))
@@ -209,8 +209,8 @@ def understands(session: Session, station: int) -> bool:
     """
     Return True if a station returns random data, or refuses to; raises PortLost.
 
-    Only this proves a station: an echo of the line, or a device that acknowledges everything,
-    fails.
+    Only such a reply proves a station. An echo of the line, or a device that acknowledges every
+    message, does not give it.
     """
     try:
         session.ask(station, echo(os.urandom(len(_ECHO))))

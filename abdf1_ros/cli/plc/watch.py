@@ -80,9 +80,9 @@ class LiveValues:
     """
     The driver without ROS: read ``mappings`` every ``period`` seconds and show them.
 
-    With ``csv`` each read prints a line per value, also without a change. ``tags`` stand beside
-    the addresses. On a terminal the mode of each PLC stands above the values. All bytes go into
-    the capture ``record``.
+    With ``csv`` each read prints a line per value, also without a change. ``tags`` are shown
+    beside the addresses. On a terminal the mode of each PLC is shown above the values. All bytes
+    go into the capture ``record``.
 
     This class is the driver's ``Listener``; ``counters`` are the counters of the line. Raises
     OSError if the port cannot be opened.
@@ -109,7 +109,7 @@ class LiveValues:
         self._link = LinkThread(self._driver.machine, port)
         self._news: deque[_WatchedRead] = deque(maxlen=_MAX_NEWS)
         self._lost = self._lost_reported = 0
-        self._has_news = Wake()  # not an Event: an interrupt in it may leave its lock taken
+        self._has_news = Wake()  # not an Event: an interrupt in it may leave its lock locked
         self._reads: Counter[Mapping] = Counter()
         self._shown: dict[Mapping, Values | _NoValue] = {}
         self._height = 0
@@ -133,7 +133,7 @@ class LiveValues:
         except KeyboardInterrupt:
             pass
         finally:
-            # Errors caused by the end of the line are not shown.
+            # Count before the stop, because the end of the line causes more errors.
             failed = sum(self._driver.points[mapping].error is not None
                          for mapping in self._mappings)
             self._link.stop()
@@ -143,7 +143,7 @@ class LiveValues:
         return failed
 
     def read(self, mapping: Mapping, values: Values) -> None:
-        """Take the values of a read; called in the link thread."""
+        """Record the values of a read; called in the link thread."""
         self._lost += len(self._news) == _MAX_NEWS
         self._news.append(_WatchedRead(datetime.now(), mapping, values))
         self._reads[mapping] += 1
@@ -211,7 +211,7 @@ class LiveValues:
                 print(time, mapping.station, place, *tag, text, sep=',', flush=True)
 
     def _note_changes(self, news: Sequence[_WatchedRead]) -> None:
-        """Keep the text to show, and the time of its last change."""
+        """Record the values to show, and the times of their last changes."""
         for _, mapping, what in news:
             before = self._shown.get(mapping)
             if before is not None and before != what:
@@ -325,7 +325,8 @@ def curve_of(numbers: Collection[float], text: Callable[[float], str]) -> str:
     """
     Return a bar for each number; the scale is from the lowest to the highest.
 
-    NaN and infinity are gaps. If ``text`` shows both limits the same, there is no curve.
+    NaN and infinity are gaps. If ``text`` returns the same text for both limits, there is no
+    curve.
     """
     known = [number for number in numbers if math.isfinite(number)]
     low, high = min(known, default=0), max(known, default=0)

@@ -15,6 +15,6 @@
 """
 Maps made of exports of other programs, one module for each format.
 
-A row that cannot become a mapping stays in the map as a comment, and is named with its line. A row
-may write to the PLC only if the file says so.
+A row that cannot become a mapping stays in the map as a comment, and is reported with its line. A
+row may write to the PLC only if the file says so.
 """

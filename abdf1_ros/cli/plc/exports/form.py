@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The common parts of all formats: the wishes of the user, the result of a row, common words."""
+"""The common parts of all formats: the user's options, the result of a row, common words."""
 
 from __future__ import annotations
 
@@ -42,8 +42,9 @@ _READ_ONLY = re.compile(r'read.?only|ro', re.IGNORECASE)
 @dataclass(frozen=True, slots=True)
 class Wanted:
     """
-    The rows to make of each row of a file: one for each station, with at least ``period`` ms.
+    The rows to make of each row of a file: one for each station.
 
+    - ``period``: the least Period (ms) of a row.
     - ``stations``: if there are several, the tags begin with ``station_N/``.
     - ``read_only``: all rows are Read rows.
     - ``columns``: names of columns that the user gives by options.
@@ -71,13 +72,13 @@ class FoundRow:
 
 @dataclass(frozen=True, slots=True)
 class Ignored:
-    """A row that is passed over; ``what`` it is, or empty for a row that is not counted."""
+    """A row that is skipped; ``what`` is its kind, empty for a row that is not counted."""
 
     what: str = ''
 
 
 class Unusable(ValueError):
-    """The reason why a row that should have an address cannot be used; ``tag`` names it."""
+    """The reason why a row that should have an address cannot be used; ``tag`` names the row."""
 
     def __init__(self, text: str, tag: str = '') -> None:
         super().__init__(text)
@@ -85,7 +86,7 @@ class Unusable(ValueError):
 
 
 Reader = Callable[[Record], FoundRow | Ignored]
-"""Reads one record of a file after the other; raises Unusable."""
+"""Reads one record of a file; raises Unusable."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -137,7 +138,7 @@ def limited(command: str, wanted: Wanted) -> str:
 
 
 def scaling(ends: Sequence[str], sign: float = 1.0) -> Cells:
-    """Return Scale and Offset of the line through raw low and high, and low and high."""
+    """Return Scale and Offset that make raw low and raw high the values low and high."""
     numbers = [decimal_number(text.replace(',', '.')) for text in ends]
     raw_low, raw_high, low, high = numbers
     if raw_low is None or raw_high is None or low is None or high is None or raw_low == raw_high:

@@ -13,7 +13,7 @@
 # limitations under the License.
 
 """
-Tags of Ignition: its JSON export; folders with tags, whose opcItemPath is ns=1;s=[PLC]N7:0.
+Tags of Ignition: its JSON export has folders with tags; opcItemPath is ns=1;s=[PLC]N7:0.
 
 Each tag becomes a record, so that it is read like the row of any other file. A tag has the data
 type of its value in Ignition, not of the words in the PLC.
@@ -70,7 +70,7 @@ def records_of(text: str) -> list[Record]:
 
 
 def _tags(node: Any, folder: str, depth: int) -> Iterator[tuple[str, dict[str, Any]]]:
-    """Yield each tag with its name, after the names of its folders."""
+    """Yield each tag with its name; the names of its folders are before it: folder/tag."""
     if isinstance(node, list):
         for part in node:
             yield from _tags(part, folder, depth)

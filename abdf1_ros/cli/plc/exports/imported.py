@@ -49,9 +49,9 @@ _COLUMNS = (*NEEDED, 'Length', 'Type', 'Period', 'Scale', 'Offset', 'Min', 'Max'
 @dataclass(slots=True)
 class Import:
     """
-    The rows of a map: ``lines`` as they are written, ``left_out`` the rows left out.
+    The rows of a map: ``lines`` of the new file, ``left_out`` the faults of rows left out.
 
-    ``ignored`` counts rows that are passed over, ``remarks`` are for the user.
+    ``ignored`` counts skipped rows by kind. ``remarks`` counts rows by the remark for the user.
     """
 
     count: int = 0

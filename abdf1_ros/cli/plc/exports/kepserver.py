@@ -75,7 +75,7 @@ FORMAT = Format('tags of KEPServerEX (File, Export CSV)', _reader)
 
 
 def _found(record: Cells, wanted: Wanted) -> FoundRow:
-    # A dot stands between a group and its tags.
+    # A dot separates the names of a group and its tags.
     tag = record.get('tag name', '').replace('.', '/')
     try:
         address, length, kind = _place(record)

@@ -15,7 +15,7 @@
 """
 Symbols of RSLogix 500 and 5: no header; address, scope, symbol, five lines of description.
 
-Among them stand rows about files and rungs, and every word of the status file.
+The file also has rows about files and rungs, and a row for every word of the status file.
 """
 
 from __future__ import annotations

@@ -15,6 +15,6 @@
 """
 The verbs of ``plc``, one file each, with ``add_arguments`` and ``run``.
 
-The docstring of the file is the help of the verb: a sentence, then examples. A name of Python has
-an underscore after it.
+The docstring of the file is the help of the verb: a sentence, then examples. If a verb is a
+keyword of Python, the name of its file ends with an underscore.
 """

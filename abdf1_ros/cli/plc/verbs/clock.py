@@ -36,7 +36,7 @@ from abdf1_ros.pccc.processor import Processor
 from abdf1_ros.pccc.steps import AddressedValues
 from abdf1_ros.pccc.values import ValueType
 
-# A larger difference right after setting means: the clock has not taken the time.
+# A larger difference right after a write means that the clock has not accepted the time.
 _TAKEN = timedelta(seconds=3)
 
 
@@ -79,7 +79,7 @@ def _clock(options: argparse.Namespace, session: Session) -> int:
 
 class Clock:
     """
-    Year, month, day, hour, minute and second of a station; FormatError where none is known.
+    Year, month, day, hour, minute and second of a station; FormatError if no clock is known.
 
     ``address``: address of the first word.
     """

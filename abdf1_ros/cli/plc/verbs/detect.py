@@ -49,7 +49,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(options: argparse.Namespace) -> int:
-    """Try settings; print those that work, and the commands to go on with."""
+    """Try settings; print the settings that work, and the next command."""
     network = network_of(options)
     found = found_settings(options, network)
     if isinstance(found, overhear.ForeignMaster):
@@ -72,7 +72,7 @@ def run(options: argparse.Namespace) -> int:
 
 
 def _first_task(found: Found) -> str:
-    """Return the command that shows most of what was found, without the settings of the line."""
+    """Return the next command for the station found, without the options of the line."""
     there, mode = found.presence, found.settings.mode
     duplex = {MODES['full']: ' --peer', MODES['half']: ''}.get(mode, ' --radio')
     if there.is_of_gateway:

@@ -85,7 +85,7 @@ def run(options: argparse.Namespace) -> int:
 
 
 def _first_look(found: detect.Found, there: Sequence[presence.Presence]) -> str:
-    """Return the command that shows values of a PLC, or the nodes where only a gateway is."""
+    """Return the command that shows values of a PLC; without a PLC, nodes behind a gateway."""
     plc = next((seen for seen in there if not seen.is_of_gateway), None)
     if plc is None:
         return f'scan {init.nodes_of(there[0].station, found.settings.mode)}'
