@@ -212,7 +212,7 @@ def test_port_or_file_that_cannot_be_opened_is_named(capsys: Output, tmp_path: P
 def test_packets_go_nowhere_else_than_into_pcapng(capsys: Output, capture: str) -> None:
     assert refused(capsys, '--pcapng', '/nowhere/x', capture).endswith(
         'sniff: --pcapng: /nowhere/x: No such file or directory\n')
-    assert 'is there and is not pcapng' in refused(capsys, '--pcapng', capture, capture)
+    assert 'exists and was not made by --pcapng' in refused(capsys, '--pcapng', capture, capture)
 
 
 @pytest.mark.parametrize('args', [

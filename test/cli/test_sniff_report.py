@@ -75,7 +75,7 @@ def test_bundle_has_all_that_a_report_needs(
     assert set(json.loads(files['versions.json'])) == {'abdf1_ros', 'python', 'system'}
     for name in ('capture/', 'entries.txt', 'settings/'):
         assert name in files['README.txt']
-    assert 'look through it' in capsys.readouterr().err
+    assert 'look through the bundle' in capsys.readouterr().err
 
 
 def test_anonymous_bundle_has_no_values_and_no_names(tmp_path: Path, capture: str) -> None:

@@ -111,7 +111,7 @@ def test_release_while_the_port_cannot_be_opened() -> None:
     assert asked.wait(PATIENCE)
     is_repeated = again.wait(0.7)  # longer than the period of a node
     assert thread.release()
-    while 'left to others' not in states.get(timeout=PATIENCE).text:
+    while 'other programs may use the port' not in states.get(timeout=PATIENCE).text:
         pass
     thread.stop()
     assert not is_repeated
