@@ -13,7 +13,7 @@
 # limitations under the License.
 
 """
-The reads and writes of one line: which, when, and their results; no clock, thread, port or ROS.
+The reads and writes of one line, and their results, without a clock, thread, port or ROS.
 
 Begin with ``driver``: its docstring says where each fact lives. ``agenda`` alone decides which job
 has the line next. The queues yield jobs (``job_tasks``):
@@ -24,12 +24,12 @@ has the line next. The queues yield jobs (``job_tasks``):
 - ``reads``: the planned reads.
 - ``guests``: commands of other programs.
 
-Beside them stand
+The other modules are
 
 - ``record``: who writes which words.
 - ``served``: the words of our own table, which PLCs read and write.
 - ``requests``: single requests without a map.
 
-Nothing here waits, and nothing looks at a clock: each call brings the time (s). Other threads come
-in through an ``inbox`` only.
+No function here waits or reads a clock: its caller gives it the time (s). Other threads hand over
+items through an ``inbox`` only.
 """

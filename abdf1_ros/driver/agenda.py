@@ -15,8 +15,8 @@
 """
 The one place that decides which job has the line next.
 
-Heartbeats and fallbacks (``interlocks``) go first, but after ``OWN_IN_A_ROW`` of them, and after
-each to a silent station, a check or read has its turn. Then there are three queues:
+Heartbeats and fallbacks (``interlocks``) go first. A check or read has its turn after
+``OWN_IN_A_ROW`` of them, and after each of them to a silent station. Then there are three queues:
 
 - ``writes`` go first, but after ``MAX_WRITES_IN_A_ROW`` of their commands a check or read that is
   due has its turn.
@@ -24,7 +24,7 @@ each to a silent station, a check or read has its turn. Then there are three que
   reads that were due when it began go before the next check. If rows depend on several stations'
   modes, one read goes between two questions, and every due read before a question is repeated.
 - ``reads`` go in the order of ``reads.queue``. Fallbacks that are written again take turns with
-  them.
+  the reads.
 
 ``guests`` share the time that heartbeats, fallbacks and writes leave. After a guest's command, due
 checks and reads have the line ``OURS_BESIDE_GUESTS`` times as long as the command took, answered
@@ -50,17 +50,17 @@ from abdf1_ros.plan.bounds import OURS_BESIDE_GUESTS, OWN_IN_A_ROW
 
 MAX_WRITES_IN_A_ROW = 4
 
-# On an unheard connection this many questions go out without a pause, then one in QUESTION_PERIOD
-# seconds.
+# On an unheard connection this many questions are sent without a pause, then one in
+# QUESTION_PERIOD seconds.
 _QUICK_QUESTIONS = 10
 QUESTION_PERIOD = 1.0
 
 
 class _GuestShare:
     """
-    What guests have of the line beside our checks and reads.
+    The guests' share of the line beside our checks and reads.
 
-    No command of theirs goes out before ``begins`` (clock value in s).
+    No command of a guest is sent before ``begins`` (clock value in s).
     """
 
     def __init__(self, stations: ActiveStationList, guests: GuestQueue, tasks: JobTasks) -> None:
@@ -110,7 +110,7 @@ class Agenda:
         self._reads = reads
         self._guests = guests
         self._share = _GuestShare(stations, guests, tasks)
-        self._held_until = math.inf  # a guest that waits for its share (clock value in s)
+        self._held_until = math.inf  # when a waiting guest has its share (clock value in s)
         self._tasks = tasks
         self._own_in_a_row = 0
         self._was_silent = False  # the station of the last own write
@@ -139,8 +139,8 @@ class Agenda:
         """
         Return the next job on a connection that has not been heard.
 
-        After the first questions only one a second goes out, as the port may store them. A 0 or a
-        fallback need not wait: it is still the value of rest when it comes late.
+        After the first questions only one a second is sent, because the port may store them. A 0
+        or a fallback need not wait: it is a safe value even when it arrives late.
         """
         is_limited = self._questions >= _QUICK_QUESTIONS and now < self._next_question
         if is_limited:
@@ -153,14 +153,15 @@ class Agenda:
         return job
 
     def _own_first(self, now: float, busy: Container[int]) -> Job | None:
-        """Return the next job: own writes first, which count as no writes in a row (rule 11)."""
+        """Return the next job: own writes first, not counted as ``writes`` in a row (rule 11)."""
         if self._interlocks.is_ending:  # no value that is read now would be used
             self._own_in_a_row, self._was_silent = 0, False
         if self._own_in_a_row >= OWN_IN_A_ROW:
             self._own_in_a_row = 0
             if job := self._check_or_read(now, busy):
                 return job
-        # The rest of a long fallback first: heartbeats that are always due would keep it waiting.
+        # Remaining packets of a long fallback go first: heartbeats that are always due would keep
+        # them waiting.
         if under_way := self._tasks.first(busy, is_own=True):
             self._own_in_a_row += 1
             return self._tasks.take(under_way, now)
@@ -185,7 +186,7 @@ class Agenda:
                 and (write := self._write(now, busy)):
             return write
         guests = self._guests
-        # A guest could write over a fallback that the end has confirmed already.
+        # At the end a guest could overwrite a fallback that is confirmed already.
         has_guests = (guests.inbox.items or guests.waiting) and not self._interlocks.is_ending
         is_held = has_guests and now < self._share.begins
         self._held_until = self._share.begins if is_held else math.inf
@@ -227,7 +228,7 @@ class Agenda:
         return job
 
     def _write(self, now: float, busy: Container[int]) -> Job | None:
-        """Return a new write, or the next packet of one under way, in turns."""
+        """Return a new write or the next packet of a write under way, in turns."""
         under_way = self._tasks.first(busy)
         write = None
         if under_way is None or not self._has_begun_write:

@@ -16,8 +16,8 @@
 Slow jobs of a driver: identity and mode of each station, and whether it still answers.
 
 A station is asked for its diagnostic status at the start, when it comes back, and every
-``processor_period``. A station without reads gets an echo when it has not been heard for a while;
-without that its silence would not be noticed. Link counters are read on request only.
+``processor_period``. A station without reads gets an echo when it has not been heard for a while,
+because its silence would not be noticed otherwise. Link counters are read on request only.
 
 Checks do not count as reads, nor in the poll cycle. A refusal is not a fault of the station.
 ``agenda`` decides when a check has the line.
@@ -45,8 +45,9 @@ from abdf1_ros.pccc.steps import echo, identify
 # Seconds of silence after which a station gets an echo, and between two echoes.
 ECHO_PERIOD = 2.0
 
-# Further periods until the next question of a kind that alone got no reply. Each such question
-# costs Cmd_Timeout, and in Mode Master mostly a DLE NAK.
+# If an active station of unknown processor does not reply to a question, the next one is this
+# number of periods later than usual, unless rows depend on it. Each such question costs
+# Cmd_Timeout, and in Mode Master mostly a DLE NAK.
 _UNANSWERED = 30
 
 _NOT_ASKED = 'unknown (not asked yet)'
@@ -63,10 +64,10 @@ class Check(Job):
     """
     One slow job: ``due`` is the clock value (s) from which it wants the line.
 
-    ``due`` is infinite while the job is under way (since ``begun``). It is so, too, while the
-    station is inactive, unless the job is an echo. ``period`` is in seconds, infinite for a job
-    that is done once. With ``is_planned`` rows depend on the check, and the forecast of the line
-    counts it.
+    ``due`` is infinite while the job is under way (since ``begun``). While the station is inactive
+    ``due`` is also infinite, unless the job is an echo. ``period`` is in seconds, infinite for a
+    job that is done once. With ``is_planned`` rows depend on the check, and the forecast of the
+    line counts it.
     """
 
     def __init__(self, checks: Checks, station: int, kind: CheckKind, period: float,
@@ -83,7 +84,7 @@ class Check(Job):
         return self._checks.question(self)
 
     def ended(self, error: Exception | None) -> None:
-        """Plan the next one."""
+        """Plan the next check of this kind."""
         self._checks.ended(self, error)
 
 
@@ -145,7 +146,7 @@ class Checks:
         return self._known.get(station) or StationHealth(self._unknown(station, _NOT_ASKED))
 
     def _unknown(self, station: int, text: str) -> str:
-        """Return a text for a processor that is unknown: for ever, if it is never asked."""
+        """Return a text for an unknown processor; another text if the station is never asked."""
         return text if station in self._asked else _NEVER_ASKED
 
     def request_counters(self, station: int) -> None:
@@ -231,7 +232,7 @@ class Checks:
             self._take_counters(station, decode_counters(reply, asked.counter_layout))
 
     def ended(self, check: Check, error: Exception | None) -> None:
-        """Take the end of a check: an answer that has been taken already, or an error."""
+        """Record the end of a check: its answer is recorded already, or there is an error."""
         next_due = check.begun + check.period
         if isinstance(error, FormatError | RemoteError):
             self._take_refusal(check, str(error))
@@ -271,7 +272,7 @@ class Checks:
         self.counters_wanted.discard(station)
 
     def _finish(self, check: Check, next_due: float) -> None:
-        """Plan the next check of this kind; until it is back a silent station gets only echoes."""
+        """Plan the next check of this kind; a silent station gets only echoes until it answers."""
         if check.kind is CheckKind.COUNTERS:
             self._checks.remove(check)
         elif self._stations[check.station].active:

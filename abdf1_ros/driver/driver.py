@@ -26,7 +26,7 @@ Where each fact lives:
 who writes which words, until when it may land      ``record.WriteRecord``, ``record.OwnWords``
 messages that wait                                  ``writes.queue.WriteQueue.waiting``
 commands of guests that wait                        ``guests.Guest.waiting``
-calls that wait for a read                          ``reads.demands.Demands.waiting``
+calls that wait for a read                          ``reads.demands.ReadCalls.waiting``
 until when a command may be sent                    ``job_tasks.Job.expires``
 commands of jobs under way                          ``job_tasks.JobTasks``
 when an own row has to be looked at                 its ``due``; the first of a PLC in ``Plc.due``
@@ -171,7 +171,7 @@ class Driver:
         Ask for values to be written to all ``mappings``, or to none if one of them refuses.
 
         May be called from any thread, followed by ``LinkThread.wake``. Exactly one WriteResult
-        follows for each mapping, at once when the request is refused; ``request`` comes with it.
+        follows for each mapping, at once when the request is refused; each contains ``request``.
         """
         reason = self._why_nothing_is_written(len(mappings))
         if reason:
@@ -194,7 +194,7 @@ class Driver:
                 self.refuse([write.mapping], _NOT_OPEN, values, request)
 
     def _why_nothing_is_written(self, count: int) -> str:
-        """Return why no write of ``count`` mappings is taken now, empty if one is."""
+        """Return why no write of ``count`` mappings is accepted now, empty if it is."""
         if self._settings.read_only:
             return 'this node is read_only'
         if not self.is_online:
@@ -287,7 +287,8 @@ class Driver:
         return next((station.number for station in self.stations), dst)
 
     def _words_of_guest(self, command: Packet, station: int) -> list[Extent] | None:
-        # A PLC-5 has words for each number that writes as to a PLC-2; on the line it is ours.
+        # A PLC-5 has separate words for each station number that sends it PLC-2 writes. On the
+        # line this number is ours.
         return written_extents(command._replace(src=self.network.station), station, self.mappings)
 
     def _sort_inbox(self, now: float) -> None:
@@ -313,7 +314,7 @@ class Driver:
                 self._end_write(write, Outcome.WRITTEN)
 
     def _leave_out(self, write: Write, now: float) -> str:
-        """Return what shows that a message need not be written, empty for nothing."""
+        """Return the proof that a message need not be written, empty for no proof."""
         proof = self._standing.proof(write, now)
         if not proof or not self.interlocks.may_stand(write):
             return ''
@@ -345,7 +346,7 @@ class Driver:
             self._writes.drop(_NOT_HEARD, self.machine.now)
 
     def _run(self) -> Procedure:
-        """Begin to work, as long as there is a port."""
+        """Open the queues; return the procedure of the link, which ends with the port."""
         self._connect()
         if self.overheard is not None:
             self.overheard.begin(self.machine.now)
@@ -374,12 +375,12 @@ class Driver:
         self._read_backs.end(self.machine.now)
 
     def _foreign_value(self, mapping: Mapping, text: str, is_conflict: bool) -> None:
-        """Report it, and ask for the mode at once: a PLC with a download is not in RUN."""
+        """Report the value; ask for the mode at once: a PLC with a download is not in RUN."""
         self.checks.ask_status(mapping.station, self.machine.now)
         self._listener.foreign_value(mapping, text, is_conflict)
 
     def _station_told(self, station: int, identity: Identity | None, asked: float) -> None:
-        """Use the answer of a station: its mode, and the packets that it takes."""
+        """Use the answer of a station: its mode, and the packets that it accepts."""
         if identity is not None and identity.is_running is not None:
             is_running = identity.is_running and not identity.faults
             if not is_running:  # a download may follow

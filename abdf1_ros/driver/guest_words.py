@@ -36,7 +36,7 @@ _BASIC = (plc2.READ, plc2.UNPROTECTED_WRITE, plc2.PROTECTED_WRITE, plc2.PROTECTE
 
 class NotedTable(DataTable):
     """
-    The files of some rows, each without end; writes are noted, and their data dropped.
+    The files of some rows, each of unlimited size; writes are noted, and their data dropped.
 
     ``is_elsewhere`` tells that a command named a file of no row.
     """
@@ -65,8 +65,8 @@ def uses_common_file(command: Packet, rows: Sequence[Mapping]) -> bool:
     """
     Tell whether a command uses the common interface file of an SLC.
 
-    S:2/8 of the SLC decides which of its words: a command counts words or bytes. The rows have one
-    PLC type of the station.
+    Bit S:2/8 of the SLC decides whether such a command counts words or bytes, and so which words
+    it means. The rows have one PLC type of the station.
     """
     return command.cmd & ~PRIORITY_BIT in _BASIC and any(map(_is_slc, rows))
 

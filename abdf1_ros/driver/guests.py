@@ -196,7 +196,7 @@ class GuestQueue:
 
     def next(self, now: float, busy: Container[int], *,  # noqa: A003
              may_write: bool = True) -> GuestJob | None:
-        """Return the next command of the guest whose turn it is, maybe only if it reads."""
+        """Return the next command of the guests, in turns; without ``may_write`` only reads."""
         self._sort()
         for guest in list(self.waiting):
             station = self._station_of(guest.waiting[0].packet.dst)
@@ -208,7 +208,7 @@ class GuestQueue:
                 self.waiting.append(guest)
             self._look()
             if self._stations[station].last_heard is None:
-                self._silent(station, now)  # it may not exist: one poll or try at a time
+                self._silent(station, now)  # maybe no such station: one poll or try at a time
             # A broadcast has no reply.
             is_read = effect_of(command.packet) is Effect.READS
             is_vain = station == BROADCAST if is_read else not may_write
@@ -238,7 +238,7 @@ class GuestQueue:
         self._look()
 
     def answered(self, command: GuestCommand, reply: Packet) -> None:
-        """Hand a reply on, with the numbers of the guest."""
+        """Send a reply to the guest, with the addresses and TNS of its command."""
         guest = command.guest
         guest.slowest = max(guest.slowest, self.line.now - command.requested)
         command.answer(command.packet.reply(reply.data, reply.sts))
@@ -262,7 +262,7 @@ class GuestQueue:
                              was_silent=not self._stations[station].replies_in_time)
 
     def _silent(self, station: int, now: float) -> None:
-        """Treat a station as silent that only guests ask: no other command shows it."""
+        """Treat a station that only guests ask as silent: no other command shows its silence."""
         if station not in self._stations and station != BROADCAST:
             self._stations.lost(station, now)
 

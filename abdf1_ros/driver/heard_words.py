@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Which words of a PLC a reply to a foreign command has."""
+"""The words of a PLC that a reply to another node's command has."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ ReplyWords = dict[tuple[Area, int], bytes]
 """Words by area and offset."""
 
 # A word of the coded table has its number in both bytes: the low byte from 80 to BF, the high byte
-# from C0 to FF. So no code can be found across two of them, nor in a descriptor.
+# from C0 to FF. So no code can be found across two words, nor in a descriptor.
 _DIGIT = 64
 
 

@@ -27,7 +27,7 @@ class Inbox(Generic[_Item]):
     """
     Hand items from any threads to one thread that takes them, in their order, each once.
 
-    ``items`` are the items that wait. A closed inbox takes nothing. There is no lock: every step
+    ``items`` are the items that wait. A closed inbox accepts no item. There is no lock: every step
     is one atomic operation of a deque. The items are never copied and then cleared: an item that
     another thread adds in between would be lost.
     """
@@ -41,16 +41,16 @@ class Inbox(Generic[_Item]):
         return len(self.items)
 
     def open(self) -> None:  # noqa: A003
-        """Take items from now on."""
+        """Accept items from now on."""
         self._is_open = True
 
     def close(self) -> Iterator[_Item]:
-        """Take no more items; return those that wait."""
+        """Accept no more items; return the items that wait."""
         self._is_open = False
         return self.take()
 
     def put(self, item: _Item) -> bool:
-        """Add an item; return False when the inbox is closed, and it will not be taken."""
+        """Add an item; return False if the inbox is closed and the item will not be taken."""
         self.items.append(item)
         if self._is_open:
             return True

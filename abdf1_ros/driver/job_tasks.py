@@ -13,7 +13,7 @@
 # limitations under the License.
 
 """
-Jobs, and the jobs that are under way: each is a task for the link.
+Jobs, and the jobs that are under way: each job is a task for the link.
 
 The steps of a job are a generator: it yields requests and is sent the replies. Without a reply the
 error is raised in the generator.
@@ -35,7 +35,7 @@ _With = TypeVar('_With', Packet, LinkError)
 
 
 class LineTime(Protocol):
-    """The clock of a line, such as its machine: see there."""
+    """The clock of a line, such as its machine: see ``df1.machine.Machine``."""
 
     now: float
     late: float
@@ -50,7 +50,7 @@ class Job:
     A job is a ``Task`` of the link, with its present ``command``, from ``start`` until it has
     ``ended``; then it may be started again.
 
-    - ``taken``: when the link took that command (clock value in s).
+    - ``taken``: when the link took the present command (clock value in s).
     - ``reply_size``: bytes after the header of the reply to the first command, 0 if unknown.
     - ``expires``: the first command must not be sent after this clock value (s). Messages and
       guests' commands expire by age. A heartbeat expires when its conditions may have ended. A 0
@@ -82,7 +82,7 @@ class Job:
         raise NotImplementedError
 
     def ended(self, error: Exception | None) -> None:
-        """React, once, to the end of the job: by an error not handled, or by itself."""
+        """React, once, to the end of the job: by itself, or by an unhandled ``error``."""
         raise NotImplementedError
 
     def start(self, tasks: JobTasks, now: float) -> Job:
@@ -162,7 +162,7 @@ class JobTasks:
         self.is_heard = False
 
     def first(self, busy: Container[int], is_own: bool = False) -> Job | None:
-        """Return the first waiting job, not for a ``busy`` station; only our own if asked."""
+        """Return the first waiting job, not for a ``busy`` station; ``is_own``: only own jobs."""
         return next((job for job in self.waiting if job.station not in busy
                      and (job.is_own or not is_own)), None)
 

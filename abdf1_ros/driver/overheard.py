@@ -15,9 +15,9 @@
 """
 Values from the traffic of another master, on a line where we send nothing.
 
-A reply counts only with its command: both heard undamaged, with nothing damaged in between, at
-most Cmd_Timeout apart. It fills each row of which it has all words. If another node writes words
-of a row, they are unknown until the next read that began later.
+A reply counts only if its command was heard at most Cmd_Timeout before it. Both and the bytes in
+between have to be undamaged. The reply fills each row of which it has all words. If another node
+writes words of a row, these words are unknown until the reply to a later read.
 """
 
 from __future__ import annotations
@@ -58,7 +58,7 @@ _SILENT = 10.0
 # transmitter is switched on.
 _REST_OF_FRAME = 3
 
-_MOST_CARRIED = 200  # different reads that are kept
+_MOST_CARRIED = 200  # greatest number of different reads that are kept
 
 _STATUS = bytes((diagnostics.STATUS,))
 
@@ -90,9 +90,10 @@ class _Path(NamedTuple):
 @dataclass(slots=True)
 class _ValidFrom:
     """
-    The moment (clock value, s) before which no read may have begun for its reply to count.
+    A reply counts only if its read began after this moment (clock value, s).
 
-    ``sound`` holds for all points, after damage; ``written`` for points whose words were written.
+    ``sound`` is the moment for all points, after damage; ``written`` has the moments for points
+    whose words were written.
     """
 
     sound: float
@@ -162,7 +163,7 @@ class Overheard:
                 self._readings.unreadable(point, self.why_unread(point))
 
     def why_unread(self, point: ReadPoint) -> str:
-        """Return why a row has no value though the line is heard."""
+        """Return why a row has no value although the line is heard."""
         part = self._parts.get(point)
         return 'no other node reads it' if part is None else (
             f'no reply has all of its words; "{part}" has a part of them')

@@ -13,12 +13,12 @@
 # limitations under the License.
 
 """
-One record of all writes: who writes which words of a PLC, and until when they may land.
+One record of all writes: who writes which words of a PLC, and until when a write may land.
 
 A word of a PLC can be written by a message, by the bridge itself (heartbeat, fallback), by a
-guest, and by a copy that a gateway has kept. Each of them may also write to all stations at once.
-Each such write is a ``Claim`` from the moment it has the line. The rules of docs/heartbeats.md ask
-this record about all writers.
+guest, and by a copy that a gateway has kept. Each of these writers may also write to all stations
+at once. Each write is a ``Claim`` from the moment it has the line. The rules of docs/heartbeats.md
+ask this record about all writers.
 """
 
 from __future__ import annotations
@@ -38,8 +38,8 @@ from abdf1_ros.settings.mapping import Mapping
 _CHANGED = (Outcome.WRITTEN, Outcome.PARTLY)
 
 
-# Most seconds after which the second write of rule 10 comes at an orderly end. With ~/polling and
-# ~/reload the end has twice as long.
+# At an orderly end the second write of rule 10 is sent after this many seconds at most. With
+# ~/polling and ~/reload the whole end may take twice that time.
 _SETTLE_AT_END = 1.0
 
 
@@ -107,7 +107,7 @@ class WriteListener:
     """A listener to all writes; methods that are not overridden do nothing."""
 
     def write_begins(self, claim: Claim) -> None:
-        """Take a write that goes out."""
+        """Take a write that now has the line."""
 
     def write_ended(self, claim: Claim) -> None:
         """Take a write that has ended."""
@@ -135,7 +135,7 @@ class OwnWords:
     def __init__(self, row: Mapping, record: WriteRecord) -> None:
         self.row = row
         self.again_at = math.inf
-        self._latest = math.inf  # latest moment for ``again_at``; bounded at the end
+        self._latest = math.inf  # latest ``again_at``, finite only at the end
         self._record = record
         self._lands_until: dict[_Source, float] = {}
         self._stands: _Source = ()
@@ -155,12 +155,12 @@ class OwnWords:
                                  if until > claim.begun}
 
     def plan_again(self, tried: float) -> None:
-        """Plan the second write of our value, sent at ``tried`` (s), if older writes may land."""
+        """Plan a second write of the value sent at ``tried`` (s) if a write may land later."""
         until = min(self.lands_until, self._latest)
         self.again_at = until if tried < until else math.inf
 
     def try_again(self, when: float, now: float) -> None:
-        """Plan to write once more, unless a second write is planned: this write failed."""
+        """Plan another write after a failed one, unless a second write is planned (rule 10)."""
         if not now < self.again_at < math.inf:
             self.again_at = when
 
@@ -226,7 +226,7 @@ class WriteRecord:
                 words.may_land((_Writer.BEFORE,), self.line.now + self._settle_time)
 
     def may_begin(self, row: Mapping) -> bool:
-        """Tell whether no write of these words is under way: packets of two must not mix."""
+        """Tell whether no write of these words is under way: packets of writes must not mix."""
         return not any(claim.meets(row.extent) for claim in self._under_way)
 
     def messages(self) -> Iterator[Write]:
@@ -244,7 +244,7 @@ class WriteRecord:
         return claim
 
     def ended(self, claim: Claim, outcome: Outcome, *, may_land: bool = False) -> None:
-        """Record the end of a write; ``may_land`` tells whether some of it may still land."""
+        """Record the end of a write; ``may_land`` tells whether a part of it may still land."""
         self._under_way.remove(claim)
         landed = 0.0 if outcome in _CHANGED else -math.inf
         may_land |= outcome is Outcome.BROADCAST  # no station answers it
@@ -255,12 +255,12 @@ class WriteRecord:
             listener.write_ended(claim)
 
     def _concerned(self, claim: Claim) -> Iterable[OwnWords]:
-        """Return the words that a claim may have changed: of its row, or all for a guest."""
+        """Return the words of a claim's row, or for a guest all that it may have changed."""
         if claim.write is not None:
             return filter(None, (self._words.get(claim.write.mapping),))
         return [words for row, words in self._words.items() if claim.meets(row.extent)]
 
     def expired(self, write: Write) -> None:
-        """Pass on that a message was too old to have the line."""
+        """Tell the listeners that a message was too old to have the line."""
         for listener in self._listeners:
             listener.write_expired(write)

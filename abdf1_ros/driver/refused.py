@@ -25,7 +25,7 @@ from abdf1_ros.pccc.families import FAMILIES
 from abdf1_ros.pccc.file_types import PlcType
 from abdf1_ros.pccc.status import check_status
 
-# Most different commands that are kept; a PLC with more has the same fault in all of them.
+# Greatest number of different commands that are kept. If a PLC has more, all have the same fault.
 _MOST = 8
 
 _LATELY = 60.0  # s
@@ -43,7 +43,7 @@ class RefusedCommands:
     """
     Refused commands, by a text with station, address and reason.
 
-    Only the thread of the link adds; any thread may ask.
+    Only the link thread adds commands; any thread may read them.
     """
 
     def __init__(self, plc_type: PlcType) -> None:
@@ -68,5 +68,5 @@ class RefusedCommands:
         return [text for text, entry in [*self._found.items()] if now - entry.last < _LATELY]
 
     def counted(self) -> dict[str, int]:
-        """Return how often each was refused."""
+        """Return how often each command was refused."""
         return {text: entry.count for text, entry in [*self._found.items()]}

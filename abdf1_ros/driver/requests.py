@@ -67,11 +67,11 @@ class _RequestJob(Job):
             self._succeed(result)
 
     def ended(self, error: Exception | None) -> None:
-        """Do nothing: the steps have reported it."""
+        """Do nothing: the steps have reported the end."""
 
 
 class _Question(Job):
-    """An echo, after whose answer a job goes out; without an answer the job fails unsent."""
+    """An echo before a job; the job starts after the answer, and fails unsent without one."""
 
     def __init__(self, job: Job) -> None:
         self.station = job.station
@@ -98,8 +98,8 @@ class Requests(TaskSource):
     Commands for us are refused, except an echo and the diagnostic status, which shows a
     ``plc_type``. ``stray`` names the last reply that answers no command, empty for none.
     ``report`` gets every numbered error and notice, in the link thread. If the port ``may_store``
-    our bytes, only reads go out until an answer has come on this connection. The same holds after
-    a request without an answer (rule 26 of docs/heartbeats.md).
+    our bytes, only reads are sent until an answer has come on this connection. The same holds
+    after a request without an answer (rule 26 of docs/heartbeats.md).
     """
 
     def __init__(self, mode: LineMode, line: LinkSettings, stations: ActiveStationList,
@@ -149,7 +149,7 @@ class Requests(TaskSource):
         self._taken += self._waiting.take()
         for request in [taken for taken in self._taken if taken.station not in busy]:
             self._taken.remove(request)
-            with suppress(StopIteration):  # it has ended before its first command
+            with suppress(StopIteration):  # the request has ended before its first command
                 return self._heard_first(request.start(self._tasks, now), now)
         return None
 
@@ -175,7 +175,7 @@ class Requests(TaskSource):
             raise
 
     def _end(self, error: LinkError) -> None:
-        """Leave no request without an end; further ones end at once."""
+        """End all requests; later requests end at once."""
         self._lost = error
         self._tasks.fail(error)
         taken, self._taken = self._taken, []

@@ -103,7 +103,7 @@ class Served:
     The served mappings, and the commands that come for them.
 
     ``on_write`` is called with a mapping and its words after a PLC has written any of them.
-    ``counters`` are the link counters that a PLC reads. All of it belongs to the link thread.
+    ``counters`` are the link counters that a PLC reads. Only the link thread may use this object.
     """
 
     def __init__(self, plc_type: PlcType, mappings: Rows,

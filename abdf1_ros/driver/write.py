@@ -62,8 +62,8 @@ class WriteResult:
     """
     The one result of one message to one mapping.
 
-    - ``detail``: why the write failed, or a remark on a confirmed one, mostly empty. For an
-      unconfirmed one it also says what a later read has found, or why there was no read.
+    - ``detail``: why the write failed, or a remark on a confirmed write, mostly empty. For an
+      unconfirmed write it also says what a later read has found, or why there was no read.
     - ``latency``: seconds from the request.
     - ``request``: the name that the requester gave.
     - ``packets_done``: number of its packets that were confirmed.
@@ -104,7 +104,7 @@ class Write:
 
     - ``value``: the values as text; ``raw``: the values for the PLC.
     - ``commands``: the requests that write them.
-    - ``is_probe``: the station was inactive when the write got the line.
+    - ``is_probe``: the station was silent when the write got the line.
     - ``is_own``: a heartbeat or fallback, which no message has asked for.
     - ``origins``: the equal messages that it stands for, in their order.
     - ``oldest``, ``requested``: when the oldest and the youngest of them were published.

@@ -13,12 +13,12 @@
 # limitations under the License.
 
 """
-The read plan: which words are read together, what that costs on the line, and its times.
+The read plan: which words are read together, the cost on the line, and the times.
 
 - ``planner`` makes blocks of mappings, with ``partition`` and the costs of ``line_model``.
 - ``forecast`` computes poll cycle, load and intervals.
 - ``bounds`` computes which times heartbeats and fallback values can keep.
-- ``report`` puts all of it into words for ``check``.
+- ``report`` describes the plan and its times for ``check``.
 - ``usable_rows`` leaves out rows that do not fit the line.
 - ``refusals`` divides blocks that a PLC has refused.
 - ``reading`` reads mappings once, for the library.

@@ -65,8 +65,8 @@ OWN_IN_A_ROW = 7
 OURS_BESIDE_GUESTS = 3
 
 # The line may not carry all changes of a row. A change that has waited this long (s), or for half
-# its patience if that is less, gives way to a newer one. This needs another write of the row that
-# has gone out meanwhile.
+# its patience if that is less, gives way to a newer change. The condition is that another write of
+# the row has had the line meanwhile.
 CARRIED_WITHIN = 1.0
 
 # Default of the parameter write_timeout (s), which is not in the files.
@@ -88,8 +88,8 @@ class Bound:
 
     For a row with Fallback, ``seconds`` is the longest time that its outputs keep their value
     without a message. ``usual`` is the same time where no frame gets lost, None for a Serve row.
-    Both are None if a master of the line decides that. For a heartbeat, ``seconds`` is the preset
-    for the watchdog in the PLC.
+    Both are None if a master of the line decides when we send. For a heartbeat, ``seconds`` is the
+    preset for the watchdog in the PLC.
     """
 
     mapping: Mapping
@@ -105,7 +105,7 @@ class Bound:
         return watchdog, watchdog + STABLE
 
     def __str__(self) -> str:
-        """Return it in words, with times in ms."""
+        """Return the bound in words, with times in ms."""
         tag, station = self.mapping.tag, self.mapping.station
         if self.presets is not None:
             watchdog, stable = self.presets
@@ -123,7 +123,7 @@ class Bound:
 
 class Times:
     """
-    What heartbeats and fallbacks of a line can promise.
+    The times that heartbeats and fallbacks of a line can keep.
 
     - ``blocks``: the blocks that are read.
     - ``response_time``: usual seconds of a station for an answer.
@@ -213,7 +213,7 @@ class Times:
 
     @cached_property
     def _waits(self) -> dict[int, tuple[float, float]]:
-        """Return the seconds of a due fallback with its wait: at most, and with no frame lost."""
+        """Return the seconds until a due fallback is written: at most, and with no frame lost."""
         # In standard polling the turns of all other stations are part of each transaction's time.
         turns: defaultdict[int, list[float]] = defaultdict(list)
         for own in self._mappings.own:
@@ -248,7 +248,7 @@ class Times:
             self._line, frames, self._any_frames, len(self._mappings.stations))
 
     def _undisturbed(self, frames: float) -> float:
-        """Return the same where no frame gets lost."""
+        """Return the seconds of a transaction in which no frame gets lost."""
         reply = self._reply + self._response_time if self._serves else 0.0
         return reply + self._mode.undisturbed(
             self._line, frames, self._response_time, self._any_frames,

@@ -16,8 +16,8 @@
 The forecast of a line: poll cycle, load and intervals, before anything is connected.
 
 It uses the line model of the planner, and assumes how long a station takes to answer. A
-transaction has two answers (M 14-2): to the command, and to the poll, or in full duplex the
-reply. PLCs serve the port once in a program scan.
+transaction has two answers (M 14-2). The first is to the command. The second is to the poll, or in
+full duplex it is the reply. PLCs serve the port once in a program scan.
 """
 
 from __future__ import annotations
@@ -34,8 +34,8 @@ USUAL_RESPONSE_TIME = 0.01
 USUAL_STALE_AFTER = 3.0  # periods, after which a value counts as lost
 ANSWERS = LineMode.answers
 
-# Reads without a period get the time that reads with a period leave. At the least each has one
-# turn in this number of poll cycles.
+# Reads without a period get the time that reads with a period leave. Each has at least one turn in
+# this number of poll cycles.
 PATIENCE = 4
 
 # Period (s) that the forecast assumes for a row that is read on demand.
@@ -58,7 +58,8 @@ def answer_time(network: Network, blocks: Iterable[Block],
     """
     Return the seconds that the line waits for an answer that takes ``response_time`` seconds.
 
-    By radio a transaction has one answer, and several stations may work on theirs at a time.
+    By radio a transaction has one answer, and several stations may work on their answers at a
+    time.
     """
     mode, line = network.line_mode, network.line
     stations = len({block.station for block in blocks})
@@ -87,7 +88,7 @@ def intervals(blocks: Iterable[Block], own: Iterable[tuple[float, float]] = (),
 
     That is the period, as far as the line allows. On a full line all periods become longer by the
     factor of the load, at most by a poll cycle, as in ``ReadQueue``. ``own`` holds the seconds and
-    the period of each heartbeat and each question for a mode: they go in between.
+    the period of each heartbeat and each question for a mode: these go between the reads.
     """
     blocks, own = list(blocks), list(own)
     once = poll_cycle(blocks, response_time)

@@ -51,7 +51,7 @@ class LineModel:
     wait: float = 0.0
 
     def read_time(self, dialect: Dialect, request: ReadRequest, station: int = 0) -> float:
-        """Return the seconds that a read takes of a station that answers at once."""
+        """Return the seconds of a read from a station that answers at once."""
         _, body = dialect.read(request.start, request.words)
         stuffed = len(frames.stuff(body))
         return self.transaction_time(
@@ -72,7 +72,7 @@ class LineModel:
 @cache
 def _overhead(duplex: Duplex, checksum: Checksum, station: int) -> int:
     """Return the characters of a transaction, without the bytes after TNS of both messages."""
-    # Only the size of a frame counts here, so its check need not be that of its data.
+    # Only the size of a frame counts here, so its checksum may be wrong.
     message = frames.message_frame(b'', checksum)
     sent = message if duplex is not Duplex.HALF else \
         frames.master_frame(station, b'', checksum) + frames.poll_frame(station)

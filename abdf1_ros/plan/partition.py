@@ -48,7 +48,7 @@ class Span:
         return self.first <= other.first and other.end <= self.end
 
     def aligned(self, per_element: int) -> Span:
-        """Return whole elements, which is what reads of more than one word take."""
+        """Return the span in whole elements: a read of more than one word needs them."""
         if self.words <= 1:
             return self
         return Span(self.first - self.first % per_element, self.end + -self.end % per_element)
@@ -94,7 +94,7 @@ class CostModel:
         return span.aligned(self.per_element)
 
     def cost(self, block: Span) -> float:
-        """Return the seconds that a block takes; infinity for one that is not possible."""
+        """Return the seconds that a block takes; infinity for an impossible block."""
         if block.first < self.first_allowed(block.end):
             return math.inf
         return self.costs[block.words]
@@ -109,7 +109,7 @@ def cheapest(needed: Iterable[Span], model: CostModel) -> list[Span]:
     spans = without_contained(needed)
     element = model.per_element
     starts = [span.first - span.first % element for span in spans]
-    least = [0.0]  # for the spans before this one
+    least = [0.0]  # least cost of the first spans, by their number
     begins: list[int] = []
     for last, span in enumerate(spans):
         best, begin = least[last] + model.costs[span.words], last
@@ -133,7 +133,7 @@ def cheapest(needed: Iterable[Span], model: CostModel) -> list[Span]:
 
 
 def without_contained(spans: Iterable[Span]) -> list[Span]:
-    """Return the spans that no other holds, by first word."""
+    """Return the spans that no other span holds, sorted by first word."""
     kept: list[Span] = []
     for span in sorted(set(spans), key=lambda span: (span.first, -span.end)):
         if not kept or span.end > kept[-1].end:

@@ -16,9 +16,9 @@
 The read planner: cover all mapped words for the least of the line's time.
 
 Mappings of one station and one area (a file, or one I/O slot) are read together where that is
-cheaper than apart; which blocks are cheapest is worked out in ``partition``, what they cost in
-``line_model``. A mapping that fits in one packet always lies in one, so its values belong
-together; a longer one is a block of its own, read packet by packet.
+cheaper than separate reads. ``partition`` finds the cheapest blocks, ``line_model`` their costs. A
+mapping that fits in one packet is always read in one packet, so its values belong together. A
+longer mapping is a block of its own, read packet by packet.
 """
 
 from __future__ import annotations
@@ -91,7 +91,7 @@ class Block:
 
     @property
     def transfer(self) -> Transfer:
-        """Return all that the requests move together."""
+        """Return the words that all requests read together."""
         return Transfer(self.start, self.words)
 
     def slice_of(self, mapping: Mapping) -> slice:
@@ -142,12 +142,12 @@ class Planner:
                 for block in self._plan_area(area, group, poll_cycle)]
 
     def alone(self, mapping: Mapping) -> Block:
-        """Return what is read for a row by itself, such as one that is read on demand."""
+        """Return the block of a row that is read by itself, such as a row on demand."""
         return self._block([mapping], _span(mapping))
 
     def split(self, block: Block) -> list[Block]:
         """
-        Return what to read instead of a refused block.
+        Return the blocks to read instead of a refused block.
 
         If its mappings have several spans, it becomes two blocks, each with half of the spans. If
         all have the same span, it becomes the same block in shorter packets, as long as a

@@ -50,7 +50,7 @@ class _RefusalSearch:
         self._refused: list[Span] = []
 
     def divide(self, block: Block, halves: Sequence[Block]) -> None:
-        """Put the halves of a refused block in its place, or itself in shorter packets."""
+        """Replace a refused block by its halves, or by itself in shorter packets."""
         self.parts.remove(block)
         self.parts += halves
         if len(halves) > 1:
@@ -83,13 +83,13 @@ class Refusals:
     def __init__(self, planner: Planner) -> None:
         self._planner = planner
         self._searches: dict[Block, _RefusalSearch] = {}
-        self.recovering: dict[StationArea, Block] = {}  # the last of each area
+        self.recovering: dict[StationArea, Block] = {}  # last recovered block of each area
 
     def refused(self, block: Block, blocks: Iterable[Block]) -> Change | None:
         """
         Record that a station has refused a block; return None if it is to be read as before.
 
-        ``blocks`` are all that are read.
+        ``blocks`` are all blocks that are read.
         """
         search = self._searches.pop(block, None)
         halves = self._planner.split(block)
@@ -106,7 +106,7 @@ class Refusals:
         return Change([block], halves)
 
     def recovered(self, block: Block, blocks: Iterable[Block]) -> Change | None:
-        """Record a good read after a bad one; ``blocks`` are all that are read."""
+        """Record a good read after a bad one; ``blocks`` are all blocks that are read."""
         search = self._searches.pop(block, None)
         if search is not None:
             return self._settle(search, block, blocks, is_refused=False)
@@ -118,8 +118,8 @@ class Refusals:
         """
         Record another good read of the last recovering block of its area, and plan the area anew.
 
-        The blocks that recover with it have done so by then, so a file that comes back is planned
-        once.
+        By then the other recovering blocks of the area have also been read. So a file that comes
+        back is planned only once.
         """
         if self.recovering.get(block.station_area) is not block:
             return None

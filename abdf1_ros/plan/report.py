@@ -55,7 +55,7 @@ PERIOD_STEPS = tuple(step * 10**power for power in (2, 3, 4) for step in (1, 2, 
 
 
 class RemarkKind(Enum):
-    """What a remark is about; the value is what programs see."""
+    """The subject of a remark; programs see the value."""
 
     MAP = 'map'
     SETTING = 'setting'
@@ -68,7 +68,7 @@ class RemarkKind(Enum):
 
 @dataclass(frozen=True, slots=True)
 class Remark:
-    """An unusual setting or time; ``station`` is the one that it concerns, None for the line."""
+    """An unusual setting or time; ``station``: the station concerned, None for the line."""
 
     kind: RemarkKind
     text: str
@@ -126,7 +126,7 @@ class Report:
         return Times(self.network, self.mappings, self.blocks, self.response_time)
 
     def promises(self) -> dict[Mapping, float]:
-        """Return the stale time (s) of each row that we read and that promises to publish."""
+        """Return the deadline (s) of the topic of each row that we read, if it has one."""
         # The node promises the same time, however long a PLC really takes to answer.
         stale = forecast.stale_times(
             self.blocks, self.default_period, forecast.USUAL_STALE_AFTER, bounds.own_work(
@@ -140,7 +140,7 @@ class Report:
         return forecast.block_time(block, self._answer_time)
 
     def needed_baud(self) -> int | None:
-        """Return the lowest baud rate that carries all periods, or None."""
+        """Return the lowest baud rate at which the line can keep all periods, or None."""
         found = bisect_left(BAUD_RATES, True, key=lambda baud: make_report(
             replace(self.network, baud=baud), self.mappings, self.default_period,
             self.response_time).load <= 1)
@@ -148,7 +148,7 @@ class Report:
 
     def needed_period(self) -> int | None:
         """
-        Return the shortest Period (ms) that all rows with a shorter one may have, or None.
+        Return the shortest Period (ms) that may replace all shorter ones, or None.
 
         It is one of ``PERIOD_STEPS``. The periods then need at most ``_HIGH_LOAD`` of the time.
         """
@@ -255,7 +255,7 @@ def setting_remarks(network: Network, mappings: Sequence[Mapping]) -> Iterator[R
 
 
 def _overlap_remarks(mappings: Sequence[Mapping]) -> Iterator[Remark]:
-    """Find Write rows over what Read rows map, and words that several rows write."""
+    """Find Write rows that write words of Read rows, and words that several rows write."""
     here: defaultdict[tuple[object, ...], list[Mapping]] = defaultdict(list)
     for mapping in mappings:
         for place in _places(mapping):
@@ -477,7 +477,7 @@ def _ends(mappings: Sequence[Mapping]) -> tuple[Address, Address]:
 
 
 def last_address(address: Address, offset: int) -> Address:
-    """Return the element of the area of ``address``, or a structure's word, at an offset."""
+    """Return the address of the element, or a structure's word, at an offset in the area."""
     whole = 1 if address.file_type.is_structure else address.layout.words
     return address.at_offset(offset - offset % whole)
 

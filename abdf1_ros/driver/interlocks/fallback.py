@@ -29,7 +29,7 @@ from abdf1_ros.driver.write import Outcome, Write
 # Seconds after which a refused fallback value is written again.
 _PAUSE_AFTER_REFUSAL = 1.0
 
-# Least seconds after which a fallback value that stands is written again (rule 8).
+# Least time (s) after which a confirmed fallback value is written again (rule 8).
 _LEAST_REFRESH = 5.0
 
 
@@ -63,7 +63,7 @@ class FallbackRow:
     - ``sent``: when the fallback was last sent. A message that was published before that time is
       not sent any more.
     - ``due``: when to look at the row next.
-    - ``has_failed``: a message after the last confirmed one was not confirmed.
+    - ``has_failed``: the last message of the row that had the line was not confirmed.
     - ``refusal``: why the last write of the fallback was not confirmed.
     - ``words``: the writes that may change these words.
     """
@@ -78,19 +78,20 @@ class FallbackRow:
         self.refreshed = -math.inf
         self.sent = -math.inf
         self.tried = -math.inf  # like ``sent``, but also set by ``refresh``
-        self.tries = 0  # since it became due
+        self.tries = 0  # since the fallback became due
         self.due = math.inf
         self.cause: FallbackCause | None = None
         self.refusal = ''
         self.is_under_way = False
-        # Start of Fallback_After: the last confirmed message; after a fallback, the first message
-        # with an unknown outcome.
+        # Fallback_After counts from the publication of the last confirmed message. After a
+        # fallback it counts from the first message with an unknown outcome.
         self._counts_from = -math.inf
         self.has_failed = False
         self._values = mapping.fallback.values
         self._due_since = 0.0
         self._next_try = -math.inf
-        self.refresh_at = math.inf  # against changes that were not seen (rule 8)
+        # when to write it again, as a change may not have been seen (rule 8)
+        self.refresh_at = math.inf
 
     @property
     def stands(self) -> bool:
@@ -98,15 +99,15 @@ class FallbackRow:
         return self.state is FallbackState.STANDS
 
     def make_due(self, cause: FallbackCause, now: float) -> None:
-        """Make the fallback due at once; the first cause is the one that is reported."""
+        """Make the fallback due at once; the first cause is reported."""
         if self.cause is None:
             self.cause, self._due_since = cause, now
-        self._due_since = min(self._due_since, now)  # a message may have delayed it
+        self._due_since = min(self._due_since, now)  # a message may have set a later time
         self.state = FallbackState.DUE
         self._next_try = self.due = now
 
     def end(self, now: float) -> None:
-        """Write the fallback, except where it surely stands already: the bridge ends."""
+        """Make the fallback due at the end, unless the PLC surely holds it already."""
         self.words.end(now)
         self.due = -math.inf
         if not self.stands or self.words.lands_until > -math.inf:
@@ -114,7 +115,7 @@ class FallbackRow:
 
     @property
     def is_confirmed(self) -> bool:
-        """Tell whether all that was due has been written and confirmed."""
+        """Tell whether the PLC has confirmed every write that was due."""
         is_left = self.stands and self.words.again_at < math.inf
         return self.cause is None and self.state is not FallbackState.OVERWRITTEN and not is_left
 
@@ -127,12 +128,12 @@ class FallbackRow:
 
     @property
     def first_due(self) -> float:
-        """Return when the next look at it may find a first try (clock value in s)."""
+        """Return when the next look at the row may find a first try (clock value in s)."""
         may_be = self.is_first_try or self.state is FallbackState.MESSAGE
         return self.due if may_be else math.inf
 
     def is_fresh(self, now: float) -> bool:
-        """Tell whether the last confirmed message is young enough."""
+        """Tell whether the last confirmed message is younger than Fallback_After."""
         return now < self.refreshed + self.after
 
     def deadline(self, youngest: float) -> float:
@@ -167,14 +168,14 @@ class FallbackRow:
         return self.due <= now
 
     def take(self, now: float) -> Write:
-        """Return the write of the fallback, which ends with ``ended``."""
+        """Return the write of the fallback; its end has to be reported to ``ended``."""
         if self.is_first_try:
             self.tries = 0
         self.sent = now
         return self.refresh(now)
 
     def refresh(self, now: float) -> Write:
-        """Return the write of a fallback that stands already."""
+        """Return the write of a fallback that the PLC holds already."""
         self.is_under_way, self.tried, self.tries = True, now, self.tries + 1
         return Write(self.mapping, self._values, now)
 
@@ -182,8 +183,8 @@ class FallbackRow:
         """
         Record how the write ended; return for how long (s) it was due, None for no report.
 
-        The fallback is written once more when nothing that a gateway may hold can land any more
-        (rule 10). The same happens if it has become due again since this write began.
+        The fallback is written once more as soon as no write that a gateway may hold can land any
+        more (rule 10). It is also written again if it has become due since this write began.
         """
         self.is_under_way = False
         self.due = now
@@ -208,7 +209,7 @@ class FallbackRow:
                 assert claim.outcome is not None
                 self.message_ended(claim.write.requested, claim.outcome)
         elif claim.has_changed and self.stands:
-            if claim.extents is None:  # the guest hardly meant these words
+            if claim.extents is None:  # its words are unknown, hardly these
                 self.refresh_at = now
             else:
                 self.state = FallbackState.OVERWRITTEN
@@ -222,7 +223,7 @@ class FallbackRow:
         return f'the fallback of {self.mapping.tag} is not confirmed' if self.cause else ''
 
     def message_ended(self, requested: float, outcome: Outcome) -> None:
-        """Record the end of a message of the row that had the line (rule 7)."""
+        """Record how a message that had the line ended (rule 7)."""
         self.due = -math.inf
         self.has_failed = outcome is not Outcome.WRITTEN
         if outcome is Outcome.WRITTEN:
@@ -231,9 +232,10 @@ class FallbackRow:
             if self.state in (FallbackState.STANDS, FallbackState.OVERWRITTEN):
                 self._counts_from = requested
             elif self.state is FallbackState.DUE and not self.is_first_try:
-                # The message may stand over a fallback that the PLC has not confirmed.
+                # The PLC may hold this message instead of the fallback, which it has not
+                # confirmed.
                 self._due_since = max(self._due_since, requested + self.after)
         else:
             return
-        if self.state is not FallbackState.DUE:  # until the PLC has confirmed the fallback
+        if self.state is not FallbackState.DUE:  # due until the PLC has confirmed it
             self.state = FallbackState.MESSAGE

@@ -32,22 +32,22 @@ LARGEST = 32_767
 
 _LEAST_LIFE_SIGN = 1.0  # s
 
-# Shortest time (s) that a 0 stands: a PLC sees a word once in a scan (rule 2).
+# Shortest time (s) for which the PLC holds a 0, as a PLC sees a word once in a scan (rule 2).
 _LEAST_ZERO = 0.5
 
-# Seconds, or a shorter Period, after which an unconfirmed 0 is written again.
+# An unconfirmed 0 is written again after this many seconds, or after a Period if that is shorter.
 _REPEAT_ZERO = 1.0
 
 # Interval (s) of the link's own looks at the executor: a stopped executor does not wake the link.
 _GLANCE = 0.1
 
-# Seconds, or Periods if that is longer, within which a second foreign value means another writer,
-# not a download.
+# A second foreign value within this many seconds, or Periods if these are longer, means another
+# writer, not a download.
 _CONFLICT_TIME = 60.0
 _CONFLICT_PERIODS = 20
 
 _SHIFTS = 7
-_GOLDEN = 0.618  # its multiples lie evenly between whole numbers
+_GOLDEN = 0.618  # the fractions of its multiples are spread evenly
 
 
 class BeatState(Enum):
@@ -62,7 +62,7 @@ class BeatState(Enum):
 
 class _OtherWriter:
     """
-    Another writer of our heartbeat word, mostly a bridge: what we know of it (rule 19).
+    What we know of another writer of our heartbeat word, mostly a bridge (rule 19).
 
     ``seen`` is when its last value was read (clock value, s).
     """
@@ -86,14 +86,14 @@ class _OtherWriter:
 
     def differ(self) -> None:
         """
-        Let the next 0 stand longer than the 0 of the other bridge.
+        Extend the next 0 by a random number of Periods.
 
         If both bridges counted from 1 at the same time, neither would see foreign values any more.
         """
         self._extra_zero = self._period * self._dice.randint(1, _SHIFTS)
 
     def take_extra_zero(self) -> float:
-        """Return, once, the extra seconds that the next 0 stands."""
+        """Return the extra seconds of the next 0, and set them to 0."""
         extra, self._extra_zero = self._extra_zero, 0.0
         return extra
 
@@ -157,7 +157,7 @@ class HeartbeatRow:
 
     @property
     def is_confirmed(self) -> bool:
-        """Tell whether 0 stands, and no second write of it is planned (rule 10)."""
+        """Tell whether the PLC has confirmed 0, and no second write of it is planned (rule 10)."""
         return self.is_at_rest and self.words.again_at == math.inf
 
     def begin(self, now: float, *, is_new: bool = False) -> None:
@@ -181,19 +181,19 @@ class HeartbeatRow:
         self._next = self.due = now
 
     def end(self, now: float) -> None:
-        """Let 0 be written, again if another write may still land: the bridge ends."""
+        """Let 0 be written at the end, also a second time if another write may still land."""
         self.due = now
         self.words.end(now)
         if self.words.lands_until > -math.inf:
             self._write_zero(now)
 
     def write_ended(self, claim: Claim, now: float) -> None:
-        """Record the end of a write to this word: the value of a guest is not our 0."""
+        """Record the end of a write to this word: a guest may have overwritten our 0."""
         if claim.write is None and claim.has_changed and claim.extents is not None:
             self.overwritten(now)
 
     def overwritten(self, now: float) -> None:
-        """Write the 0 again at once if 0 has to stand: another value may have replaced it."""
+        """Write 0 again at once if the PLC has to hold 0: another value may have replaced it."""
         if self.state is BeatState.SHOWN:
             self.state = BeatState.CONTACT
         if self.state is not BeatState.COUNTS and self.value == 0:
@@ -267,7 +267,7 @@ class HeartbeatRow:
 
     @property
     def first_due(self) -> float:
-        """Return when the next look at it may find the first try of a 0 (clock value in s)."""
+        """Return when the next look at the row may find a first try of a 0 (clock value in s)."""
         if self.state is not BeatState.COUNTS:
             return self.due if self.is_first_try else math.inf
         return self._holds_at if self.value and not self.is_under_way else math.inf
@@ -278,7 +278,8 @@ class HeartbeatRow:
 
         The expected value is known only from the confirmation of our write until our next one. The
         first foreign value is treated as a download, the second as another writer. Then 0 stays
-        until a change to RUN shows that the second was a download as well (rule 19).
+        until the port is opened again, or until a change to RUN shows that the second was a
+        download as well (rule 19).
         """
         is_known = self._is_confirmed and not self.is_under_way
         if not is_known or started < (self.confirmed or 0.0) or value == self.value:
@@ -306,14 +307,14 @@ class HeartbeatRow:
         return self.state is not BeatState.COUNTS
 
     def take(self, now: float) -> Write:
-        """Return the write of 0, or of the next value, which ends with ``ended``."""
+        """Return the write of 0 or of the next value; its end has to be reported to ``ended``."""
         self.tries = 1 if self.is_first_try else self.tries + 1
         self.is_under_way, self.is_first_try, self.tried = True, False, now
-        if self.state is BeatState.SHOWN:  # it is written once more
+        if self.state is BeatState.SHOWN:  # the 0 is written once more
             self.state = BeatState.CONTACT
         if self.wants_zero:
             self.value, self._is_confirmed = 0, False
-        elif self._is_confirmed:  # otherwise the same value again (rule 3 a)
+        elif self._is_confirmed:  # otherwise it stays the same (rule 3 a)
             before = self.value or self._before_first
             self.value, self._is_confirmed = before % LARGEST + 1, False
         # The other bridge has to see our 0 between two of its own values.

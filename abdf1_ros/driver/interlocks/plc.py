@@ -41,8 +41,8 @@ _FAILURES = 2
 # OTHERS_SHARE times as long as the last attempt, so that a silent PLC takes an eighth of the time.
 _LEAST_PAUSE = 1.0
 
-# At silent PLCs a row with fewer tries goes first until it has had this many: its first tries may
-# have been unlucky.
+# At silent PLCs the row with fewer tries goes first. Tries after this number are not counted: the
+# first tries may have been unlucky.
 _QUICK_TRIES = 3
 
 _ANSWERED = (Outcome.WRITTEN, Outcome.PARTLY, Outcome.FAILED)
@@ -84,7 +84,7 @@ class Plc:
     - ``first_due``: the same for first tries of a 0 or a fallback; a pause does not delay these.
     - ``failures``: number of our own writes without an answer since the last answered write. That
       may also be the write of a message or a guest.
-    - ``pause_end``: from the second failure on the PLC is left alone until then.
+    - ``pause_end``: after the second and each later failure, only first tries are sent until then.
     """
 
     def __init__(self, station: int, rows: Iterable[OwnRow], stations: ActiveStationList,
@@ -132,7 +132,7 @@ class Plc:
         for row in self.fallbacks:
             if not row.is_fresh(now):
                 row.make_due(FallbackCause.RETURN, now)
-            else:  # the message that delays it may be gone with the port
+            else:  # its message may be lost with the port
                 row.due = -math.inf
         self.plan()
 
@@ -156,9 +156,9 @@ class Plc:
         """
         Record how a write to this PLC ended, also of a guest, and whether the PLC has answered.
 
-        If the PLC does not answer our own writes, it is left alone for a while, or they would take
-        the whole line. A PLC behind a gateway that answers again has a first contact, because its
-        station was active all the time (rules 2, 8).
+        After own writes that the PLC does not answer there is a pause, because they would take the
+        whole line otherwise. A PLC behind a gateway that answers again has a first contact,
+        because its station was active all the time (rules 2, 8).
         """
         is_behind_gateway = self.rows[0].mapping.via is not None
         if claim.outcome in _ANSWERED:
@@ -230,15 +230,15 @@ class Plc:
 
     @property
     def _free_from(self) -> float:
-        """Return from when on other writes than first tries may go out (clock value in s)."""
-        if self._conditions.is_ending:  # the end leaves no later moment
+        """Return when writes that are not first tries may be sent (clock value in s)."""
+        if self._conditions.is_ending:  # after the end there is no later moment
             return -math.inf
         # Probes of an inactive station have their own pause.
         pause_end = self.pause_end if self.is_active else -math.inf
         return max(pause_end, self._stations.next_own(self.station))
 
     def next_due(self, least: float) -> float:
-        """Return when the next write may go out, if that is before ``least`` (clock values, s)."""
+        """Return when the next write may be sent, if before ``least`` (clock values, s)."""
         if self.due >= least:
             return least
         if self._has_last_try:

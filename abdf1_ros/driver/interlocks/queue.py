@@ -54,7 +54,7 @@ class OwnWrite(WriteJob):
     A write that no message has asked for.
 
     It must not be sent after ``expires`` (clock value in s): its value may be wrong by then. With
-    ``is_last`` it is the only try of its row at a silent PLC at the end.
+    ``is_last`` the bridge ends, the PLC is silent, and this write is the only try of its row.
     """
 
     is_own = True
@@ -66,14 +66,14 @@ class OwnWrite(WriteJob):
         super().__init__(write, writing)
         self.is_free = is_free
         self.answer_within = LAST_ANSWER if is_last else math.inf
-        # Each packet of a fallback goes out: the PLC may execute a packet that it does not answer.
+        # Each packet of a fallback is sent: the PLC may execute a packet that it does not answer.
         self.goes_on = isinstance(row, FallbackRow)
         self.row = row
         self.expires = expires
         self._interlocks = interlocks
 
     def ended(self, error: Exception | None) -> None:
-        """Tell the row."""
+        """Record the end of the write, also for its row."""
         self._writing.ended(self)
         self._interlocks.ended(self)
 
@@ -89,7 +89,7 @@ class Interlocks(WriteListener):
     - ``warn``: gets foreign heartbeat values.
     - ``seed``: a different number in each bridge. Two bridges that began together would not see
       each other if both counted from 1.
-    - ``ours``: the rows of our own table; ``expire`` has work when it is due.
+    - ``ours``: the rows of our own table; ``expire`` has work when ``ours`` is due.
 
     Only ``executor_ran``, ``wind_down`` and ``resume`` may be called from another thread.
     """
@@ -137,8 +137,8 @@ class Interlocks(WriteListener):
         """
         Write heartbeats 0, then fallbacks, and take no more messages (rule 5).
 
-        The caller wakes the link then. ``is_over`` tells whether all have been confirmed;
-        ``unconfirmed`` has the rows that have not.
+        Then the caller has to wake the link. ``is_over`` tells whether all these writes are done;
+        ``unconfirmed`` returns the rows that are not confirmed.
         """
         self._conditions.is_ending = True
 
@@ -153,8 +153,8 @@ class Interlocks(WriteListener):
         """
         Tell whether all writes of the end are done.
 
-        The stations that answered at ``wind_down`` have confirmed theirs, each silent station has
-        had its try.
+        Stations that were active when the end began have confirmed all their rows. At silent
+        stations each row has had its try.
         """
         return not self._plc_of or self._conditions.are_all_due and not any(
             row.mapping.station in self._awaited or row.is_under_way
@@ -213,7 +213,7 @@ class Interlocks(WriteListener):
         messages[topic] = max(write.requested, messages.get(topic, -math.inf))
 
     def is_overruled(self, write: Write) -> bool:
-        """Tell whether a message comes after the end, or before a fallback of its row (5, 9)."""
+        """Tell whether the end has begun, or a fallback was sent after a message (rules 5, 9)."""
         row = self._by_mapping.get(write.mapping)
         return row is not None and (self._conditions.are_all_due or write.requested <= row.sent)
 
@@ -221,13 +221,13 @@ class Interlocks(WriteListener):
         """
         Tell whether a message comes while the fallback of its row is due at a silent PLC (4).
 
-        Otherwise the PLC might execute both in turns, as long as messages come.
+        Otherwise the PLC might execute messages and fallbacks in turns, as long as messages come.
         """
         row = self._by_mapping.get(write.mapping)
         return row is not None and row.cause is not None and not self._plc_of[row].is_active
 
     def may_stand(self, write: Write) -> bool:
-        """Tell whether a message of the row need not be written, as far as its fallback goes."""
+        """Tell whether the state of the row's fallback allows a message to be left out."""
         row = self._by_mapping.get(write.mapping)
         return row is None or row.state is FallbackState.MESSAGE and not row.is_under_way
 
@@ -238,7 +238,7 @@ class Interlocks(WriteListener):
             self._plc_of[row].look_again(row)
 
     def write_ended(self, claim: Claim) -> None:
-        """Record how any write ended: fallbacks may wait for that (rules 7, 9)."""
+        """Record how any write ended: fallbacks may wait for its end (rules 7, 9)."""
         now = self._writing.record.line.now
         if claim.station in self._plcs:
             self._plcs[claim.station].write_ended(claim, now)
@@ -260,7 +260,7 @@ class Interlocks(WriteListener):
             plc.release()
 
     def write_expired(self, write: Write) -> None:
-        """Let no fallback wait for a message any more that was too old to have the line."""
+        """Let the fallback stop waiting for a message that was too old to have the line."""
         if write.mapping in self._by_mapping:
             row = self._by_mapping[write.mapping]
             self._plc_of[row].look_again(row)
@@ -269,10 +269,10 @@ class Interlocks(WriteListener):
 
     def next(self, now: float, busy: Container[int] = (), *,  # noqa: A003
              only_active: bool = False) -> OwnWrite | None:
-        """Return what has to be written next, maybe ``only_active`` PLCs; None for nothing."""
+        """Return the next own write, None for none; ``only_active``: not for silent PLCs."""
         self.expire(now)
         if self._conditions.are_all_due:
-            # There is no later for silent PLCs, but those that answer go first.
+            # Silent PLCs have no later chance, but PLCs that answer go first.
             only_active |= any(row.is_under_way and plc.is_active
                                for row, plc in self._plc_of.items())
             self._writing.stations.probes.keep_none_waiting(now)
@@ -308,7 +308,7 @@ class Interlocks(WriteListener):
 
     def refresh(self, now: float, busy: Container[int] = ()) -> OwnWrite | None:
         """
-        Return a fallback that stands and is to be written again, None for none (rule 8).
+        Return the next repeated write of a confirmed fallback, None for none (rule 8).
 
         It does not go before messages. It waits while a message of its row waits, unless the last
         message of the row was not confirmed.

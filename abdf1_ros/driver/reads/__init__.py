@@ -13,7 +13,7 @@
 # limitations under the License.
 
 """
-The reads: which blocks are due, what their values become, and which are withheld.
+The reads: which blocks are due, and which values are published or withheld.
 
 - ``readings``: takes the words of each block and gives them to the points of its rows.
 - ``point``: the last value of one row, and its freshness.

@@ -41,7 +41,7 @@ class ReadAnswer:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ReadCall:
-    """A call for the values of a row, of a read that begins after ``since`` (clock, s)."""
+    """A call for the values of a row, from a read that begins at ``since`` (clock, s) or later."""
 
     mapping: Mapping
     since: float
@@ -50,11 +50,11 @@ class ReadCall:
 
 class ReadCalls:
     """
-    The calls that wait for a read: ``patience`` s, and as long as the read itself may take.
+    The calls that wait for a read, for ``patience`` s plus the longest time of the read.
 
     ``inbox`` takes calls from any thread. All else belongs to the link thread. ``waiting`` has the
     calls of each row, each with the clock value (s) until which it waits. ``next_expiry`` is the
-    first of these.
+    earliest of these clock values.
     """
 
     def __init__(self, patience: float) -> None:

@@ -29,7 +29,7 @@ from abdf1_ros.settings.mapping import Mapping
 
 
 class RunGuard(Guard):
-    """Permits values while a station answers, within their stale time, that it is in RUN."""
+    """Permits values while a station says RUN, and the answer is within their stale time."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -38,9 +38,9 @@ class RunGuard(Guard):
 
     def told(self, identity: Identity | None, asked: float) -> set[ReadPoint]:
         """
-        Take an answer about the mode, None for one that cannot be used.
+        Take an answer about the mode, None for an answer that cannot be used.
 
-        Return the points for which the answer before is too old, if the program runs.
+        If the program runs, return the points for which the previous answer was too old.
         """
         late = {point for point in self.points if asked - self._told > point.patience}
         is_running = identity is not None and bool(identity.is_running) and not identity.faults
@@ -71,7 +71,7 @@ class RunGuard(Guard):
 
 
 class CounterGuard(Guard):
-    """Permits values after two changes of a word in time, until one is overdue."""
+    """Permits values after two changes of a word in time, until the next change is overdue."""
 
     def __init__(self, tag: str) -> None:
         super().__init__()
@@ -80,7 +80,7 @@ class CounterGuard(Guard):
         self._changed = -math.inf
 
     def read(self, word: bytes, now: float) -> None:
-        """Take what was read of the word."""
+        """Take the word as it was read."""
         if self._word is not None and word != self._word:
             for limit, since in self._since.items():
                 if now - self._changed > limit:
@@ -112,7 +112,7 @@ class Guards:
             return None
         if mapping.needs_run:
             return self._runs.setdefault(mapping.station, RunGuard())
-        tag, = mapping.condition.names  # it is there once in the map
+        tag, = mapping.condition.names  # the tag is unique in the map
         return self.counters.setdefault(tag, CounterGuard(tag))
 
     def mode_told(self, station: int, identity: Identity | None, asked: float) -> set[ReadPoint]:

@@ -72,14 +72,14 @@ class _PacketRead(NamedTuple):
 
 class ReadJob(Job):
     """
-    A block to be read again and again, and the ``points`` it serves: where their words are.
+    A block to be read again and again, and the place of the words of each of its ``points``.
 
     Times are clock values (s).
 
     - ``due``: when the block is due.
-    - ``refreshed``: when a write has changed words of the block last, until a read after it;
-      otherwise minus infinity.
-    - ``wanted``: the same for the last call that asks for the block.
+    - ``refreshed``: when a write last changed words of the block; minus infinity after a later
+      read.
+    - ``wanted``: when a call last asked for the block; minus infinity when no call waits for it.
     - ``started``: when the read under way, or the last one, began.
     - ``asked``: when its last packet was sent.
     - ``longest_read``: seconds within which all packets of a read have to come.
@@ -112,7 +112,7 @@ class ReadJob(Job):
         self.reply_size = self._packets[0].reply_size
 
     def steps(self, now: float) -> Steps[None]:
-        """Read one packet; raises LinkError, ReadTooOld, and like ``words_in``."""
+        """Read one packet; raises LinkError, ReadTooOld, and the errors of ``words_in``."""
         self.asked, number = now, len(self._words)
         if not number:
             self.started, self._late = now, self._line.late

@@ -22,7 +22,7 @@ import math
 from abdf1_ros.pccc.values import Values
 from abdf1_ros.settings.mapping import Mapping, Publish
 
-# 0.3 / 0.1 is a little less than 3.
+# Relative allowance for rounding: 0.3 / 0.1 is a little less than 3.
 _ROUNDING = 1e-9
 
 # Weight of the newest interval in the usual interval.
@@ -221,7 +221,7 @@ def _content(values: Values) -> bytes | str:
 
 class Guard:
     """
-    One condition of a station, and the ``points`` whose values may be published while it holds.
+    One condition of a station, and the ``points`` that may be published while it holds.
 
     ``withheld`` are the points that are withheld and reported.
     """

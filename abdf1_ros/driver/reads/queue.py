@@ -20,10 +20,10 @@ each block is read within its period as long as the line is fast enough. If the 
 read is late by more than its period. Then three of four turns go to the read that is the most
 periods late. So all periods become longer by about the same factor: many slow reads do not make
 the fast ones as slow as themselves. The fourth turn still goes to the earliest deadline: a period
-that no line can keep does not block other reads.
+that is too short for the line does not block other reads.
 
 A read that a call has asked for goes first. Then all other reads have the line three times as long
-as one of its packets takes. So calls get a quarter of a full line, however many there are.
+as one of its packets takes. So calls get a quarter of a full line, however many calls wait.
 
 A block of several packets is in the queue once for each packet, so other reads wait for one packet
 at most. A read without a period is due again as soon as it has begun. It gets the time that all
@@ -62,7 +62,7 @@ class ReadQueue:
         self._poll_cycle = 0.0
         self._wanted: list[_QueueEntry] = []
         self._heaps: dict[float, list[_QueueEntry]] = {_WANTED: self._wanted}
-        self._wanted_from = -math.inf  # before it other due reads go first (clock value in s)
+        self._wanted_from = -math.inf  # until then other due reads go first (clock value in s)
         self._tickets = itertools.count(1)
         self._turn = 0
 
@@ -74,7 +74,7 @@ class ReadQueue:
         """Forget ``old`` jobs and add ``new`` ones, all due at once."""
         added, old = list(new), list(old)
         for job in old:
-            job.ticket = 0  # of no entry
+            job.ticket = 0  # no entry has this ticket
         self.jobs.difference_update(old)
         self.jobs.update(added)
         self._poll_cycle = poll_cycle(job.block for job in self.jobs)

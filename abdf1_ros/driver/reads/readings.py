@@ -63,7 +63,7 @@ class ValueListener(Protocol):
         """Take the values of a good read that are to be published."""
 
     def unreadable(self, mapping: Mapping, reason: str) -> None:
-        """Take why a row has no usable value, or a PLC refuses our write; once for each reason."""
+        """Take a new reason why a row has no usable value, or why a PLC refuses our write."""
 
     def written(self, result: WriteResult) -> None:
         """Take the one result of a write."""
@@ -77,8 +77,8 @@ class Readings:
     The ``points`` of all rows that are published, and the ``reads`` that serve them.
 
     ``listener`` gets the values, ``record`` all words. ``planner`` knows the packets that each
-    station takes. ``mode_periods`` has the stations that have to be asked for their mode, with the
-    period (s).
+    station accepts. ``mode_periods`` has the stations that have to be asked for their mode, with
+    the period (s).
     """
 
     def __init__(self, network: Network, mappings: Rows, settings: DriverSettings,
@@ -183,7 +183,7 @@ class Readings:
         is_refresh = job.refreshed > -math.inf or job.wanted > -math.inf
         for point, place in job.points.items():
             has_recovered |= point.error is not None
-            # all other points are for every read
+            # Points without a longer Period than the block are updated by every read.
             is_rare = point.period > period and not is_refresh
             if is_rare and not point.is_due(now, period):
                 continue
@@ -278,7 +278,7 @@ class Readings:
             self.reads.replace(old, map(self._job, change.new), self._line.now)
 
     def told(self, station: int, identity: Identity | None, asked: float) -> None:
-        """Use the answer, if any, of a station ``asked`` at a clock value (s): mode, processor."""
+        """Use mode and processor of a station ``asked`` at a clock value (s); None: unknown."""
         if late := self.guards.mode_told(station, identity, asked):
             self.reads.go_first(late)
         if identity is not None:

@@ -39,7 +39,7 @@ class Reads(WriteListener):
         self._stations = stations
         self._due = ReadQueue()
         self._aside: dict[int, deque[ReadJob]] = {}
-        self._put_off = 0.0  # until when, as no station replies (clock value, s)
+        self._put_off = 0.0  # no probe before it: no station replies (clock value, s)
 
     @property
     def jobs(self) -> frozenset[ReadJob]:
@@ -67,7 +67,7 @@ class Reads(WriteListener):
         self._due.replace(old, new, now)
 
     def want(self, job: ReadJob, now: float) -> None:
-        """Make a read due at once that a call has asked for; add it if it is new."""
+        """Make a read that a call has asked for due at once; add it if it is new."""
         job.wanted = now
         if job not in self._due.jobs:
             self._due.replace((), [job], now)
@@ -109,7 +109,7 @@ class Reads(WriteListener):
 
     def next_proven(self, due: float, busy: Container[int]) -> tuple[ReadJob | None, bool]:
         """
-        Return the next read that was due then, of a station that has replied; None for none.
+        Return the next read of a station that has replied, if it was due then; None for none.
 
         Return also whether such a read waits for a ``busy`` station.
         """
@@ -129,7 +129,7 @@ class Reads(WriteListener):
     def _probe(self, now: float, busy: Container[int]) -> ReadJob | None:
         """Return the next read of a silent station, None while no probe may be sent."""
         for number in list(self._aside):
-            if self._stations[number].replies_in_time:  # to a write, or to a guest
+            if self._stations[number].replies_in_time:  # e.g. to a write or a guest
                 self.release(number, now)
         if now < self._next_probe():
             return None

@@ -33,11 +33,12 @@ from abdf1_ros.settings.mapping import Mapping
 MOST_AHEAD = 0.2
 _SHARE = 4
 
-# Seconds for which a clock that was ahead is remembered; at most twice that.
+# A clock that was ahead is remembered for at least this many seconds, and for at most twice as
+# many.
 _REMEMBERED = 5.0
 
-# Longest time (s) between two looks of a running process, and seconds after a longer pause in
-# which messages may have waited all the time.
+# Longest time (s) between two looks of a running process. For _DRAINED seconds after a longer
+# pause, messages that come may have waited during the whole pause.
 _LOOKS = 0.25
 _DRAINED = 0.5
 
@@ -53,9 +54,9 @@ def most_ahead(topic: str, mappings: Iterable[Mapping]) -> float | None:
 
 class RecentMax:
     """
-    The greatest number that came in the last ``seconds``, at most twice that.
+    The greatest number of the last ``seconds``, or of at most twice that time.
 
-    It forgets only when a new number comes.
+    Old numbers are forgotten only when a new number is added.
     """
 
     def __init__(self, seconds: float) -> None:
@@ -115,13 +116,14 @@ class Ages:
         """
         Return the age (s) of a message with these times of publication and reception (s).
 
-        ``wall`` is the present time of the clock of stamps, ``now`` of a clock that is never set.
-        Raises FormatError if the message is too old, or if its age is unknown.
+        ``wall`` is the present time of the clock that stamps are compared with, ``now`` the time
+        of a clock that is never set. Raises FormatError if the message is too old, or if its age
+        is unknown.
         """
         ages = [wall - stamp for stamp in stamps]
         ahead = -min([0.0, *ages])
         self.lead = max(0.0, self._leads.add(ahead, now))
-        behind = self._offsets.add(wall - now, now) - (wall - now)  # as the clock was set back
+        behind = self._offsets.add(wall - now, now) - (wall - now)  # the clock was set back
         least = self._standstills.least_age(now)
         waited = max([0.0, *ages])
         if self._allowed is not None:

@@ -15,9 +15,9 @@
 """
 The writes that wait for the line.
 
-Equal messages are one write. For words only the newest value waits; for bits each change waits,
-unless there are more than the line can carry. The writes of a station keep their order, and two
-writes of the same words are never under way together.
+Equal messages become one write. For words only the newest value waits; for bits each change waits,
+unless the line cannot send all changes. The writes of a station keep their order, and two writes
+of the same words are never under way together.
 """
 
 from __future__ import annotations
@@ -48,7 +48,8 @@ class MessageJob(WriteJob):
         super().__init__(write, writing)
         patience = queue.patience_of(write.mapping) + slack
         self.expires = write.requested + patience
-        # If the row has a fallback, all packets of a long write have to leave before it is due.
+        # If the row has a fallback, all packets of a long write have to be sent before the
+        # fallback is due.
         self.patience = 0.0 if write.mapping.fallback else patience
         self._queue = queue
 
@@ -62,11 +63,11 @@ class WriteQueue:
     """
     Keep writes until they have the line, for ``patience`` seconds at most.
 
-    Writes are in ``waiting``. ``report`` gets the results. ``tx_delay`` (s) comes before each
+    Writes are in ``waiting``. ``report`` gets the results. ``tx_delay`` (s) passes before each
     transmission. A write to a silent station is a probe; if ``stations.probes`` does not admit it,
     it ends unsent. ``next_expiry`` is when ``expire`` has work (clock value in s). Another thread
-    may only ask for the length. ``leave_out`` returns why a write that would have the line now is
-    not needed, empty if it is.
+    may only call ``len``. ``leave_out`` returns why a write that would have the line now is not
+    needed, empty if it is needed.
     """
 
     def __init__(self, stations: ActiveStationList, writing: WritesUnderWay, patience: float,
@@ -92,10 +93,10 @@ class WriteQueue:
         """
         Let a write wait: in the place of an older value of its row, or merged with an equal one.
 
-        At the end of the queue, a topic that is published again and again would never have its
-        turn. But the write must not overtake a later write of another mapping to the same words.
-        In that case the older value is sent as well, or two such topics would delay each other for
-        ever.
+        If each new value went to the end of the queue, a topic that is published again and again
+        would never have its turn. But the write must not overtake a later write of another mapping
+        to the same words. In that case the older value is sent as well, because otherwise two such
+        topics would delay each other for ever.
         """
         write.came = now
         self.next_expiry = min(self.next_expiry, self._expiry(write))
@@ -119,7 +120,7 @@ class WriteQueue:
             self.waiting.insert(len(self.waiting) if is_overlapped else at, write)
 
     def _append(self, write: Write, now: float) -> None:
-        """Let a write wait after all others; of too many, the oldest of the fullest row ends."""
+        """Append a write; if too many wait, end the oldest write of the row with the most."""
         self.waiting.append(write)
         if len(self.waiting) > MAX_WAITING_WRITES:
             (row, count), = Counter(each.mapping for each in self.waiting).most_common(1)
@@ -154,7 +155,7 @@ class WriteQueue:
         return None
 
     def _gives_way(self, write: Write, now: float) -> bool:
-        """Tell whether a change is superseded, as the line does not carry all of its row."""
+        """Tell whether a write is superseded: the line cannot send all changes of its row."""
         within = min(CARRIED_WITHIN, self.patience_of(write.mapping) / 2)
         return now > write.came + within \
             and self._begun.get(write.mapping, -math.inf) > write.came \

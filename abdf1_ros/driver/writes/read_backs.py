@@ -44,8 +44,8 @@ class ReadBacks(WriteListener):
     The writes that wait to be read back, for ``patience`` seconds at most.
 
     ``report`` gets their results, ``line`` has the time. ``next_expiry`` is when the first write
-    will have waited too long (clock value in s), infinite for never. All of it belongs to the link
-    thread.
+    will have waited too long (clock value in s), infinite for never. Only the link thread may use
+    this object.
     """
 
     def __init__(self, line: LineTime, patience: float,

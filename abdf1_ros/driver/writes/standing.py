@@ -13,10 +13,10 @@
 # limitations under the License.
 
 """
-Values that stand in a PLC: a message that asks for the same need not be written again.
+Values that stand in a PLC: a message that asks for the same value need not be written.
 
-Rule 27 of docs/heartbeats.md says when. A reply to a write proves that it was executed then; only
-a read proves that its value stands now.
+Rule 27 of docs/heartbeats.md says when. A reply proves that the write was executed then; only a
+read proves that the PLC still holds its value.
 """
 
 from __future__ import annotations
@@ -41,7 +41,7 @@ class _Value:
 
     - ``since``: when the first write of the value was confirmed; only equal writes came after it.
     - ``confirmed``: when the last of these was confirmed.
-    - ``shown``: when the last read began that has shown the value.
+    - ``shown``: when the last read that has shown the value began.
     """
 
     write: Write
@@ -58,8 +58,8 @@ class Standing(WriteListener):
                           for row in rows}
         self._line = line
         self._values: dict[Mapping, _Value] = {}
-        self._settled: dict[Mapping, float] = {}  # from when no other write can land (clock, s)
-        self._sharing: dict[Mapping, list[Mapping]] = {}  # by row, as that takes long to find out
+        self._settled: dict[Mapping, float] = {}  # no other write can land after it (clock, s)
+        self._sharing: dict[Mapping, list[Mapping]] = {}  # cached, as it takes long to find out
 
     def write_begins(self, claim: Claim) -> None:
         """Forget the values that a write may change."""
@@ -67,7 +67,7 @@ class Standing(WriteListener):
             self._values.pop(row, None)
 
     def write_ended(self, claim: Claim) -> None:
-        """Take the value of a confirmed message; forget all that the write may have changed."""
+        """Take the value of a confirmed message; forget all values that the write may change."""
         for row in self._disturbed(claim):
             self._unsettle(row, claim)
         write, now = claim.write, self._line.now
@@ -82,12 +82,12 @@ class Standing(WriteListener):
             self._values[row] = _Value(write, now, now)
 
     def _unsettle(self, row: Mapping, claim: Claim) -> None:
-        """Forget the value of a row; take no other before the write has landed for certain."""
+        """Forget the value of a row; record no new one before the write has landed for certain."""
         self._values.pop(row, None)
         self._settled[row] = max(claim.lands_until, self._settled.get(row, -math.inf))
 
     def _disturbed(self, claim: Claim) -> list[Mapping]:
-        """Return the rows that a write may change to something else than what stands."""
+        """Return the rows whose known value a write may replace by another value."""
         if (write := claim.write) is None:
             return [row for row in self._patience if claim.meets(row.extent)]
         sharing = self._sharing.get(write.mapping)
@@ -102,7 +102,7 @@ class Standing(WriteListener):
             value is None or write.equals(value.write))
 
     def words_read(self, block: Block, data: bytes, started: float) -> None:
-        """Take the words of a good read: a value is shown by them, or gone."""
+        """Take the words of a good read: record that they show a value, or forget the value."""
         for row, value in [*self._values.items()]:
             if started >= value.since and block.extent.holds(row.extent):
                 if value.write.is_held(data[block.slice_of(row)]):
@@ -111,12 +111,12 @@ class Standing(WriteListener):
                     del self._values[row]
 
     def forget(self, station: int | None = None) -> None:
-        """Forget the values in a station that may be another one now; in all without a number."""
+        """Forget the values of a station that may be another PLC now; without a number, of all."""
         for row in [row for row in self._values if station in (None, row.station)]:
             del self._values[row]
 
     def proof(self, write: Write, now: float) -> str:
-        """Return what shows that the value of a message stands, empty where nothing does."""
+        """Return the proof that the PLC holds the value of a message, empty for no proof."""
         row = write.mapping
         value = self._values.get(row)
         if value is None or row.write_again is None or not value.write.equals(write):

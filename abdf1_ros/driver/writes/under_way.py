@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The common part of all writes, of messages and our own: packets, retries of bits, their end."""
+"""The common part of all writes, of messages and our own: they begin, are sent, and end."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ from abdf1_ros.settings.mapping import Mapping
 
 class WriteJob(Job):
     """
-    A write that has the line; ``result`` is there when it has ended.
+    A write that has the line; ``result`` is final when the write has ended.
 
     With ``is_free`` its time at a silent station does not count as time of probes.
     """
@@ -51,7 +51,8 @@ class WriteJob(Job):
 
     def steps(self, now: float) -> Steps[None]:
         """Send every packet."""
-        # the result if no other comes: a bug ends the use of the port
+        # This result stays only if a bug breaks the write off; the bug also ends the use of the
+        # port.
         bug = PortLost(INTERNAL_ERROR)
         self.result = self.write.result(Outcome.UNKNOWN, str(bug), now, error=bug)
         self.result = yield from self._writing.carry_out(self.write, self.goes_on)
@@ -68,7 +69,7 @@ class WritesUnderWay:
         self.line = record.line
         self.stations = stations
         self._readings = readings
-        self.spent: dict[Mapping, float] = {}  # s of the line, by messages of a row
+        self.spent: dict[Mapping, float] = {}  # line time (s) of each row's messages
 
     def begin(self, write: Write) -> Claim:
         """Record that a write is under way, until it has ``ended``."""
@@ -77,7 +78,7 @@ class WritesUnderWay:
         return self.record.begin(station, (write.mapping.extent,), write)
 
     def carry_out(self, write: Write, goes_on: bool) -> Steps[WriteResult]:
-        """Send a write in the packets that its station takes."""
+        """Send a write in the packets that its station accepts."""
         write.speak(self._readings.planner.dialect(write.mapping))
         return (yield from carry_out(write, lambda: self.line.now, goes_on=goes_on))
 
