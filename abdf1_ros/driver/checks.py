@@ -45,8 +45,8 @@ from abdf1_ros.pccc.steps import echo, identify
 # Seconds of silence after which a station gets an echo, and between two echoes.
 ECHO_PERIOD = 2.0
 
-# If an active station of unknown processor does not reply to a question, the next one is this
-# number of periods later than usual, unless rows depend on it. Each such question costs
+# If an active station with an unknown processor does not reply to a question, the next one is this
+# number of periods later. Questions that rows depend on are not delayed. Each such question costs
 # Cmd_Timeout, and in Mode Master mostly a DLE NAK.
 _UNANSWERED = 30
 
@@ -200,7 +200,7 @@ class Checks:
     def next(self, now: float, busy: Container[int], probe_from: float,  # noqa: A003
              may_go: Callable[[Check], bool]) -> Check | None:
         """
-        Return the next check that is due and may go, None for none or while its station is busy.
+        Return the next check that is due and may be sent, None for none or if its station is busy.
 
         It may be a probe from the clock value ``probe_from`` (s) on.
         """

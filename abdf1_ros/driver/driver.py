@@ -15,10 +15,10 @@
 """
 The driver of one line: carries out reads, writes and checks, and reports their results.
 
-It does no input or output itself, like the link layer below it: ``Driver.machine`` takes bytes
-and a clock value, and a ``Listener`` gets values, results and events.
-``abdf1_ros.ports.link_thread.LinkThread`` gives it a port and a clock; the tests give it a
-virtual line.
+It does no input or output itself, like the link layer below it. ``Driver.machine`` takes bytes and
+a clock value, and a ``Listener`` gets values, results and events.
+``abdf1_ros.ports.link_thread.LinkThread`` gives it a port and a clock; the tests give it a virtual
+line.
 
 Where each fact lives:
 
@@ -85,7 +85,7 @@ TOO_MANY = 'too many writes are waiting'
 
 
 class Listener(ValueListener, Protocol):
-    """A listener to all results, in the link thread; ``written`` also in ``write``'s caller."""
+    """A listener to all results, in the link thread; ``write`` may also call ``written``."""
 
     def happened(self, event: Event) -> None:
         """Take a numbered error or notice."""

@@ -15,8 +15,8 @@
 """
 Commands of guests: programs that share the PLC's port with us, each at a place of its own.
 
-A guest's command waits here for its turn on the line and gets exactly one reply, in time: the
-reply of the PLC, or our reply with an STS of M 8-2.
+A guest's command waits here for its turn on the line and gets exactly one reply, in time. This is
+the reply of the PLC, or our reply with an STS of M 8-2.
 
 - Not sent: 60 (not allowed), 01 (no buffer, or too old to be sent), 04 (the port is not open), 07
   (the station is silent).
@@ -59,7 +59,7 @@ class ShareAccess(Enum):
     ALL = 'All'
 
     def allows(self, command: Packet) -> bool:
-        """Tell whether a command may go to the line."""
+        """Tell whether a command may be sent."""
         effect = effect_of(command)
         return self is ShareAccess.ALL or effect is Effect.READS or (
             self is ShareAccess.WRITE and effect is Effect.WRITES)
@@ -69,7 +69,7 @@ class GuestListener:
     """A listener to guests, in any thread; methods that are not overridden do nothing."""
 
     def sends(self, guest: Guest, command: Packet) -> None:
-        """Take a command that goes to the line, with our SRC and TNS."""
+        """Take a command that is sent now, with our SRC and TNS."""
 
     def wrote(self, guest: Guest, command: Packet, station: int, words: list[Extent]) -> None:
         """Take a command that may have changed a PLC: it is not a read."""

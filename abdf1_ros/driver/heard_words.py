@@ -61,7 +61,7 @@ def words_in_reply(command: Packet, reply: Packet, rows: Sequence[Mapping]) -> R
     """
     Return the words of files of ``rows`` that a good reply has; none if unknown.
 
-    The rows have one PLC type of the station. A server of the family executes the command: where
+    The rows have one PLC type of the station. A server of the family executes the command. Where
     its reply has the code of a word, the heard reply has the value of this word.
     """
     if uses_common_file(command, rows):

@@ -15,10 +15,10 @@
 """
 One record of all writes: who writes which words of a PLC, and until when a write may land.
 
-A word of a PLC can be written by a message, by the bridge itself (heartbeat, fallback), by a
-guest, and by a copy that a gateway has kept. Each of these writers may also write to all stations
-at once. Each write is a ``Claim`` from the moment it has the line. The rules of docs/heartbeats.md
-ask this record about all writers.
+Four writers can write a word of a PLC: a message, the bridge itself (heartbeat, fallback), a
+guest, and a gateway that has kept a copy of a write. Each of these writers may also write to all
+stations at once. Each write is a ``Claim`` from the moment it has the line. The rules of
+docs/heartbeats.md ask this record about all writers.
 """
 
 from __future__ import annotations
@@ -178,11 +178,11 @@ class OwnWords:
 
     @property
     def are_guests(self) -> bool:
-        """Tell whether a guest's value may stand in these words."""
+        """Tell whether these words may have a guest's value."""
         return self._guest_done > -math.inf
 
     def may_hold(self, value: int) -> bool:
-        """Tell whether ``value`` is ours and may stand in these words."""
+        """Tell whether ``value`` is ours and these words may have it."""
         return (_Writer.OURS, value) in self._lands_until
 
     @property

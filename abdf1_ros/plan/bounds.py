@@ -64,9 +64,9 @@ OWN_IN_A_ROW = 7
 # command had it.
 OURS_BESIDE_GUESTS = 3
 
-# The line may not carry all changes of a row. A change that has waited this long (s), or for half
-# its patience if that is less, gives way to a newer change. The condition is that another write of
-# the row has had the line meanwhile.
+# The line may be too slow for all changes of a row. A change that has waited this long (s), or for
+# half its patience if that is less, gives way to a newer change. The condition is that another
+# write of the row has had the line meanwhile.
 CARRIED_WITHIN = 1.0
 
 # Default of the parameter write_timeout (s), which is not in the files.
@@ -182,7 +182,7 @@ class Times:
         count = len(beats) + len(fallbacks)
         reads = self._reads_between(count) if count > 1 else 0
         # The transaction under way, the reads with a turn in between, all heartbeats, and the
-        # fallbacks of other PLCs. The response time stands for the scan of the PLC.
+        # fallbacks of other PLCs. The response time is used as the scan time of the PLC.
         wait = (1 + reads) * self._at_most(self._any_frames) + sum(map(self._at_most, beats)) \
             + sum(map(self._undisturbed, fallbacks)) + self._response_time
         return max(3 * period, period + wait)

@@ -76,7 +76,7 @@ def load(blocks: Iterable[Block], response_time: float = USUAL_RESPONSE_TIME) ->
     """
     Return the part of the line's time that all periods need; above 1 they cannot be kept.
 
-    Blocks without a period take the rest and are not counted.
+    Blocks without a period use the remaining time and are not counted.
     """
     return sum(block_time(block, response_time) / block.period for block in blocks if block.period)
 
@@ -116,7 +116,7 @@ def stale_times(blocks: Iterable[Block], default_period: float, stale_after: flo
 
     Topics promise this time: ``stale_after`` times the expected interval, plus the longest wait
     for the line. ``default_period`` is in seconds; ``own`` is described at ``intervals``. With
-    ``is_heard`` another master reads the words, at least once in a Period: then Period takes the
+    ``is_heard`` another master reads the words, at least once in a Period. Then Period takes the
     place of the interval, and there is no wait.
     """
     blocks = list(blocks)

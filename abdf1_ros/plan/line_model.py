@@ -15,8 +15,8 @@
 """
 The time of a transaction on the line: the model behind plans and forecasts.
 
-It counts the characters of the real frames. It does not know the response time of a station, nor
-the data of a reply, of which one byte in 256 is doubled (M 2-7).
+It counts the characters of the real frames. It does not know the response time of a station. It
+does not know the data of a reply either, of which one byte in 256 is doubled (M 2-7).
 """
 
 from __future__ import annotations

@@ -15,8 +15,8 @@
 """
 Stretches of words, and the cheapest way to put them into blocks.
 
-This is the arithmetic of the read planner; it knows nothing of PLCs. A block is one span of words
-that one command reads. A command costs much by itself and little for each word. So a block
+This is the arithmetic of the read planner; it does not depend on PLCs. A block is one span of
+words that one command reads. A command costs much by itself and little for each word. So a block
 includes a short gap if that is cheaper than another command.
 """
 

@@ -13,7 +13,7 @@
 # limitations under the License.
 
 """
-The read planner: cover all mapped words for the least of the line's time.
+The read planner: cover all mapped words in the least line time.
 
 Mappings of one station and one area (a file, or one I/O slot) are read together where that is
 cheaper than separate reads. ``partition`` finds the cheapest blocks, ``line_model`` their costs. A
@@ -197,7 +197,7 @@ class Planner:
         if mapping.period is None:
             return self._default_period
         seconds = mapping.period / 1000
-        # A heartbeat is read back twice in a Period (rule 19): so a read comes between two counts,
+        # A heartbeat is read back twice in a Period (rule 19). So a read comes between two counts,
         # and finds a foreign value whenever it was written.
         return seconds / 2 if mapping.is_heartbeat else seconds
 

@@ -158,7 +158,7 @@ class Report:
             if block.period) <= _HIGH_LOAD), None)
 
     def notes(self) -> list[str]:
-        """Return facts that a reader should know though nothing is unusual."""
+        """Return facts that a reader should know although they are not unusual."""
         found = list(bounds.costs(
             self.network, self.mappings, self.default_period, self.response_time))
         found += bounds.conditions(self.network, self.mappings)

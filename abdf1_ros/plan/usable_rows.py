@@ -65,8 +65,8 @@ def usable_rows(mappings: Rows, network: Network,
     Return the rows that can be used on this line, and the faults of all other rows.
 
     ``default_period`` (s) is for rows without Period. A row cannot be used if its counter is not
-    read often enough for While_Timeout, or if it depends on any row that cannot be used
-    (docs/heartbeats.md, rules 14 and 15).
+    read often enough for While_Timeout (rule 14 of docs/heartbeats.md). Nor can a row that depends
+    on an unusable row (rule 15).
     """
     found = line_problems(mappings, network)
     problems = [problem for _, problem in found]

@@ -236,7 +236,7 @@ class HeartbeatRow:
             self.state = BeatState.COUNTS
         if why_held:
             self.hold()
-        elif self.state is BeatState.HELD and self.is_at_rest:  # the PLC has to see the 0
+        elif self.state is BeatState.HELD and self.is_at_rest:  # the PLC had to see the 0 first
             self.state = BeatState.COUNTS
         if self.is_under_way:
             self.due = math.inf
@@ -278,8 +278,8 @@ class HeartbeatRow:
 
         The expected value is known only from the confirmation of our write until our next one. The
         first foreign value is treated as a download, the second as another writer. Then 0 stays
-        until the port is opened again, or until a change to RUN shows that the second was a
-        download as well (rule 19).
+        until the port is opened again, or until a change to RUN. That change shows that the second
+        value was a download as well (rule 19).
         """
         is_known = self._is_confirmed and not self.is_under_way
         if not is_known or started < (self.confirmed or 0.0) or value == self.value:

@@ -38,7 +38,7 @@ from abdf1_ros.settings.mapping import Mapping
 _FAILURES = 2
 
 # Shortest pause (s) before the next attempt. Behind a gateway the pause is also at least
-# OTHERS_SHARE times as long as the last attempt, so that a silent PLC takes an eighth of the time.
+# OTHERS_SHARE times as long as the last attempt. So a silent PLC takes an eighth of the time.
 _LEAST_PAUSE = 1.0
 
 # At silent PLCs the row with fewer tries goes first. Tries after this number are not counted: the
@@ -132,7 +132,7 @@ class Plc:
         for row in self.fallbacks:
             if not row.is_fresh(now):
                 row.make_due(FallbackCause.RETURN, now)
-            else:  # its message may be lost with the port
+            else:  # the message that delays it may have been lost with the port
                 row.due = -math.inf
         self.plan()
 
@@ -204,11 +204,11 @@ class Plc:
         """
         Return the rank of a row, the least goes first; None if it has to wait (rules 10, 11).
 
-        The order is (1) first tries, since a PLC may execute a write that it does not answer; (2)
-        PLCs that answer; (3) PLCs that do not. In (1) PLCs that answer go first. In (3) the row
-        with the fewest tries goes first, then the row whose last try is oldest. Otherwise a 0 that
-        is due each second would take all turns. Silent PLCs get only the time of probes. At the
-        end a silent PLC has one try for each row.
+        The order is (1) first tries; (2) PLCs that answer; (3) PLCs that do not. First tries go
+        first because a PLC may execute a write that it does not answer. In (1) PLCs that answer go
+        first. In (3) the row with the fewest tries goes first, then the row whose last try is
+        oldest. Otherwise a 0 that is due each second would take all turns. Silent PLCs get only
+        the time of probes. At the end a silent PLC has one try for each row.
         """
         if self._has_last_try:
             return (1, 1, row.tried) if row.tried < self._conditions.ended else None

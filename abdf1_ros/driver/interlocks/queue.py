@@ -15,10 +15,10 @@
 """
 The order of the driver's own writes, which no message has asked for: heartbeats, fallback values.
 
-At first contact the heartbeats of a PLC are written as 0. Then its due fallback values follow, and
-only then do its heartbeats count. The rules have the numbers of docs/heartbeats.md. As everywhere
-in the driver, ``now`` is an argument. It has to come from a clock that also counts while the host
-sleeps (rule 6). None of this is a safety function.
+At first contact the heartbeats of a PLC are written as 0. Then its due fallback values are
+written, and only after them its heartbeats count. The rules have the numbers of
+docs/heartbeats.md. As everywhere in the driver, ``now`` is an argument. It has to come from a
+clock that also counts while the host sleeps (rule 6). None of this is a safety function.
 """
 
 from __future__ import annotations

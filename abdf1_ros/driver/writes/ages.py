@@ -16,7 +16,7 @@
 The age of a message, as far as clocks can be trusted (rule 7 of docs/heartbeats.md).
 
 The time stamp comes from the clock of the publisher. An old message looks new in three cases: the
-publisher's clock is ahead, our clock was set back, or this process stood still while the message
+publisher's clock is ahead, our clock was set back, or this process was stopped while the message
 waited.
 """
 

@@ -13,7 +13,7 @@
 # limitations under the License.
 
 """
-Values that stand in a PLC: a message that asks for the same value need not be written.
+Values that a PLC holds: a message that asks for the same value need not be written.
 
 Rule 27 of docs/heartbeats.md says when. A reply proves that the write was executed then; only a
 read proves that the PLC still holds its value.

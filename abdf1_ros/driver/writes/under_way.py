@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The common part of all writes, of messages and our own: they begin, are sent, and end."""
+"""The common part of all writes, of messages and our own: their begin, sending and end."""
 
 from __future__ import annotations
 
