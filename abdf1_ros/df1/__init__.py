@@ -15,9 +15,9 @@
 """
 The DF1 data-link layer, without clock, thread or port.
 
-Sources are cited as in the literature: "M 5-2" is publication 1770-6.5.16 (October 1996, DF1
+Sources are cited by publication and page: "M 5-2" is publication 1770-6.5.16 (October 1996, DF1
 Protocol and Command Set Reference Manual), page 5-2; "KF2 4-31" is the user manual of the
 1770-KF2, page 4-31; "1766-RM001" is the reference manual of the MicroLogix 1400. "S0" is the
 specification of this driver: the documentation of the AB DF1 module, revision 0.1 of 7 August
-2003, whose fields, ranges, counters and numbered messages it has.
+2003. This driver has its fields, ranges, counters and numbered messages.
 """

@@ -49,7 +49,7 @@ def count_fault(frame: Frame, checksum: Checksum, counters: Counters,
 
 
 def count_unheard(symbol: Symbol, checksum: Checksum, counters: Counters) -> None:
-    """Count symbols of a slave that come while its master waits for nothing."""
+    """Count a symbol of a slave that comes while the master does not wait for an answer."""
     if isinstance(symbol, Control):
         counters.acks_received += symbol is Control.ACK
         counters.naks_received += symbol is Control.NAK
@@ -71,7 +71,7 @@ def wrong_message(packet: Packet, station: int) -> Event:
 
 class Accounting:
     """
-    The accounts of one link: its counters, the records of its stations, its reports.
+    Update the counters and the records of stations of one link, and report its events.
 
     ``number`` is our own station, None if messages to any station are ours.
     """
@@ -88,7 +88,7 @@ class Accounting:
         self.report(Event(message, args, station))
 
     def sent(self, packet: Packet) -> None:
-        """Count a message of ours once, also if it is sent several times."""
+        """Count a message of ours, once even if it is sent several times."""
         if packet.cmd & REPLY_BIT:
             self.counters.replies_sent += 1
             self.counters.error_messages_sent += packet.sts != 0
@@ -107,9 +107,9 @@ class Accounting:
         """
         Count and report a reply that no command waits for (S0, message 2510).
 
-        A reply that may answer an earlier command is stale (S0, counter 2548). It proves its
-        station, unless a node on the way has replied for the station. Any other reply is invalid
-        (2550, "incorrect addressing"): not for us, or from a station that we do not ask.
+        A reply that may answer an earlier command is stale (S0, counter 2548). It proves that its
+        station answers, unless a node on the way has replied for the station. Any other reply is
+        invalid (2550, "incorrect addressing"): not for us, or from a station that we do not ask.
         """
         may_answer = self._number in (None, reply.dst) and reply.src in self._stations
         self.counters.stale_messages += may_answer
@@ -132,8 +132,9 @@ class Accounting:
         """
         End a task with the reply to its command, or as WrongCommandCode if CMD differs (S0).
 
-        A gateway replies for a PLC that it does not reach, maybe after a long time. If other
-        commands have to wait for such a reply, it counts in ``overdue`` like a missing reply.
+        If a gateway does not reach a PLC, it sends an error reply in its place, maybe after a long
+        time. If other commands have to wait for such a reply, it counts in ``overdue`` like a
+        missing reply.
         """
         number = reply.src
         expected = task.command.cmd | REPLY_BIT

@@ -32,10 +32,10 @@ class Checksum(Enum):
         """
         Return the check of a message frame as a number.
 
-        ``data`` is the unstuffed link data. ``station`` is the STN of a master frame, or None
-        for a slave's or a full-duplex frame. A BCC covers STN and data (M 5-4, 5-5). A CRC
-        covers STN, STX, data and ETX in a master frame, data and ETX in any other (M 5-6, 5-7;
-        the example of M 14-2 comes out right only this way).
+        ``data`` is the unstuffed link data. ``station`` is the STN of a master frame, or None for
+        a slave's or a full-duplex frame. A BCC covers STN and data (M 5-4, 5-5). A CRC covers STN,
+        STX, data and ETX in a master frame, data and ETX in any other frame (M 5-6, 5-7). Only
+        this rule gives the check in the example of M 14-2.
         """
         if self is Checksum.BCC:
             return bcc(data, station or 0)
@@ -65,7 +65,7 @@ _CRC_HIGH = tuple(entry >> 8 for entry in _CRC_TABLE)
 
 def crc16(data: bytes | bytearray) -> int:
     """Return CRC-16 x^16+x^15+x^2+1, reflected (A001), begun with 0 (M 5-6)."""
-    # Byte by byte: Python makes no new objects of small numbers.
+    # The two bytes are computed apart, because Python makes no new objects for small numbers.
     low = high = 0
     for byte in data:
         index = low ^ byte

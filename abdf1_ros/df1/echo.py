@@ -13,13 +13,14 @@
 # limitations under the License.
 
 """
-The echo of our own frames: TX and RX are connected, or the adapter echoes.
+The echo of our own frames, where TX and RX are connected or the adapter echoes.
 
 A line that echoes gives back all frames in their order, before any station can answer. So a
-message equal to a message that we sent, and have not yet seen again, is our echo. If a foreign ACK
-arrives after our message has left, and before it has come back, the line does not echo. An equal
-message that comes later is then from a PLC. As long as this is unknown, an equal message counts as
-our echo, once. If it was from a PLC, the PLC gets no response and sends it again.
+message is our echo if it equals a message that we sent and that has not come back yet. If a
+foreign ACK arrives after our message has left, and before it has come back, the line does not
+echo. An equal message that comes later is then from a PLC. As long as it is unknown whether the
+line echoes, an equal message counts as our echo, once. If it was from a PLC, the PLC gets no
+response and sends it again.
 """
 
 from __future__ import annotations
@@ -32,11 +33,11 @@ from abdf1_ros.df1.frames import beginning_of, Control, Symbol
 COMES_BACK = ('our own bytes come back: TX and RX are connected, or the adapter echoes; check '
               'the cable, or use half duplex with an adapter that echoes')
 
-# Frames that may not have come back yet: what is sent in some seconds, at the shortest Timeout.
+# Most frames that may not have come back yet: some seconds of sending with the shortest Timeout.
 _MOST_EXPECTED = 64
 
-# Number of messages without an echo after which the echo has ended. A few may only be late: device
-# servers are far away, and Timeout is short.
+# Number of messages without an echo after which the echo has ended. A few echoes may only be late,
+# because device servers are far away and Timeout is short.
 _MOST_MISSING = 8
 
 _CONTROL_SIZE = 2
@@ -44,9 +45,9 @@ _CONTROL_SIZE = 2
 
 class LineEcho:
     """
-    Know the echo of one line; ``is_heard`` tells that it gives back what is sent.
+    Recognize the echo of one line; ``is_heard`` tells that the line echoes.
 
-    In half duplex a node sends again only after its last frame has come back.
+    In half duplex, a node sends its next frame only after its last frame has come back.
     """
 
     def __init__(self, is_half_duplex: bool) -> None:
@@ -63,7 +64,7 @@ class LineEcho:
         self._expected.append((end, frame))
 
     def withdrawn(self) -> None:
-        """Forget the last frame: it does not go out after all."""
+        """Forget the last frame, because it is not sent after all."""
         self._expected.pop()
 
     def forget(self) -> None:
@@ -73,7 +74,9 @@ class LineEcho:
 
     def take_ours(self, symbol: Symbol, has_left: Callable[[int], bool]) -> bool:
         """
-        Take a symbol; tell whether it is our own. ``has_left`` knows positions.
+        Take a symbol; tell whether it is our own.
+
+        ``has_left`` tells whether all bytes up to a position have left.
 
         An ACK, NAK or ENQ does not name its sender: it is ours only if an echo is known.
         """
@@ -91,7 +94,7 @@ class LineEcho:
         if not isinstance(symbol, Control):
             self.is_heard = True
         elif any(map(_is_message, passed)):
-            self.is_heard = False  # a message of ours would have come before it
+            self.is_heard = False  # no echo: one of our messages would have come back before it
         return self.is_heard
 
 

@@ -15,9 +15,9 @@
 """
 Frames and symbols: the bytes on the line.
 
-Encoding is three functions; decoding is ``FrameDecoder``, which turns any bytes, in any
-chunks, into symbols and never raises. A control symbol is a pair DLE x; a data byte equal to
-DLE is doubled (M 2-7); check bytes are never doubled (M 3-5, 5-5).
+Three functions encode frames. ``FrameDecoder`` decodes: it turns any bytes, in any chunks, into
+symbols, and never raises. A control symbol is a pair DLE x. A data byte equal to DLE is doubled
+(M 2-7), but check bytes are never doubled (M 3-5, 5-5).
 """
 
 from __future__ import annotations
@@ -31,12 +31,12 @@ from typing import Final, NamedTuple
 from abdf1_ros.df1.checksum import bcc, Checksum
 from abdf1_ros.df1.packet import HEADER_SIZE
 
-# Most bytes of unstuffed link data that we take. The largest reply is 244 bytes after a header
+# Most bytes of unstuffed link data that we accept. The largest reply is 244 bytes after a header
 # (M 7-30..7-40), and no known device sends more than this limit.
 MAX_LINK_DATA = 261
 
-# Bytes that wait to be read while a machine does not listen, some seconds of the fastest line.
-# Further bytes are lost, as in a UART.
+# Most bytes that wait while a machine does not listen: some seconds of the fastest line. Further
+# bytes are lost, as in a UART.
 MAX_WAITING = 65536
 
 
@@ -120,18 +120,18 @@ _CONTROLS = {pair: Control(Code(pair[1])) for pair in (ACK, NAK, EOT, ENQ)}
 
 @dataclass(frozen=True, slots=True)
 class Unknown:
-    """A pair DLE x that is not a symbol, or not one of this duplex; ``byte`` is x."""
+    """A pair DLE x that is not a symbol, or not a symbol of this duplex; ``byte`` is x."""
 
     byte: int
 
     @property
     def is_misplaced(self) -> bool:
-        """Tell whether it is a symbol of the opposite duplex (S0, message 2514)."""
+        """Tell whether the pair is a symbol of the opposite duplex (S0, message 2514)."""
         return self.byte in _CODES
 
 
-# Bytes outside of any symbol since the last message. NOISE comes before a DLE ENQ, which then asks
-# for the response to bytes that we have not understood (M 4-8).
+# Bytes outside of any symbol since the last message. The decoder gives NOISE before a DLE ENQ,
+# because the ENQ then asks for the response to bytes that we have not understood (M 4-8).
 NOISE = Unknown(Code.DLE)
 
 
@@ -147,11 +147,13 @@ class Frame(NamedTuple):
     """
     A message frame, good or bad.
 
-    ``data`` is the unstuffed link data, ``station`` the STN of a master's frame (None for any
-    other). ``fault`` is None for a good frame. ``received`` and ``expected`` are the check as read
-    and as computed, for a good frame or a BAD_CHECK; ``received`` of a NO_ETX is the code after
-    the DLE that broke in. After a frame that ``has_stopped`` no byte came. ``has_response`` tells
-    that a response was embedded (M 4-3).
+    ``data`` is the unstuffed link data. ``station`` is the STN of a master's frame, or None for
+    any other frame. ``fault`` is None for a good frame.
+
+    For a good frame or a BAD_CHECK, ``received`` and ``expected`` are the check as read and as
+    computed. For a NO_ETX, ``received`` is the code after the DLE that interrupted the data. A
+    frame ``has_stopped`` if its bytes stopped before its end. ``has_response`` tells that a
+    response was embedded (M 4-3).
     """
 
     data: bytes
@@ -182,7 +184,7 @@ class Duplex(Enum):
     """
     The line discipline that gives DLE ENQ and DLE SOH their meaning (M 2-6..2-8).
 
-    By radio modem the messages of full duplex are sent without any other symbol.
+    On a radio modem line there are only the messages of full duplex, and no other symbols.
     """
 
     HALF = 'half duplex'
@@ -199,7 +201,7 @@ class Need(Enum):
 MORE: Final = Need.MORE
 
 Decoded = Symbol | Need | None
-"""The result of a step: a symbol, the need of more bytes, or None if the next step follows."""
+"""The result of a step: a symbol, MORE if bytes are missing, or None if the next step follows."""
 
 
 class Damaged(bytes):
@@ -220,8 +222,8 @@ class FrameDecoder:
     - ``waiting``: bytes that are still to be read.
     - ``noise``: number of bytes outside of any symbol.
     - ``last_byte``: the last byte heard, for reports.
-    - ``link_data``: link data of the message that is coming in, as far as it has come.
-    - ``in_message``: a message has begun and not ended.
+    - ``link_data``: link data received so far of the message that is coming in.
+    - ``in_message``: True while a message has begun and not ended.
     - ``begun``: number of messages that have begun.
     """
 
@@ -251,7 +253,7 @@ class FrameDecoder:
         self.last_byte = 0
 
     def feed(self, data: bytes) -> None:
-        """Take bytes from the line, in any chunks; with ``MAX_WAITING`` unread, drop them."""
+        """Take bytes from the line, in any chunks; keep at most ``MAX_WAITING`` unread bytes."""
         if isinstance(data, Damaged):
             self._take_damaged(data)
         elif data:
@@ -270,12 +272,12 @@ class FrameDecoder:
                 return
         else:
             self._step = self._idle
-        # With the first half of a pair: the byte that follows is not its second half.
+        # Drop also the first half of a pair: the byte that follows is not its second half.
         self.noise += len(self.waiting) + len(data)
         self.waiting.clear()
 
     def broken_off(self) -> Frame:
-        """Return the message that is coming in, with the fault that it has if it ends here."""
+        """Return the incomplete message as a frame, with the fault of a message that ends here."""
         data = bytes(self.link_data)
         if self._step != self._check:
             return Frame(data, self._station, FrameFault.NO_ETX, has_stopped=True)
@@ -338,7 +340,7 @@ class FrameDecoder:
         elif self.waiting[1] == Code.DLE:
             self._station = int(Code.DLE)
             del self.waiting[:2]
-        else:  # another symbol broke in
+        else:  # interrupted by another symbol
             self._step = self._idle
             return None
         self._step = following
@@ -348,7 +350,7 @@ class FrameDecoder:
         return self._take_station(self._soh_stx)
 
     def _poll_station(self) -> Decoded:
-        # A master that does not double STN 10: DLE ENQ 10 F0 (F0 being its BCC).
+        # Some masters do not double STN 10 (hex): DLE ENQ 10 F0, where F0 is the BCC.
         if self.waiting[:2] == bytes((Code.DLE, bcc(DLE))):
             del self.waiting[:1]
             self._station = int(Code.DLE)

@@ -33,7 +33,7 @@ from abdf1_ros.messages import Event
 
 @cache
 def ack_on_reply(sender: int | None = None) -> Reflex:
-    """Return the reflex to a good reply to another node, of this sender if one is given."""
+    """Return the reflex: ACK to a good reply whose DST is not SRC, from ``sender`` if given."""
     def reflex(symbol: Symbol) -> bytes:
         if not isinstance(symbol, Frame) or symbol.fault is not None or symbol.station is not None:
             return b''
@@ -50,7 +50,7 @@ class ScanTimes:
     longest: float | None = None
 
     def add(self, seconds: float) -> None:
-        """Take the time of a scan."""
+        """Record the time of a scan."""
         self.last = seconds
         self.longest = max(self.longest or 0.0, seconds)
 
@@ -60,7 +60,7 @@ class LinkState:
     """
     Details that only some kinds of links have.
 
-    - ``last_poll``: clock value (s) of the last poll of a slave, or of its start.
+    - ``last_poll``: clock value (s) of the last poll that a slave got, or of its start.
     - ``same_number``: clock value (s) of the last packet of another radio modem node with our
       number.
     - ``scans``: times of the poll lists of a master, by their names.
@@ -79,7 +79,7 @@ _QUIET_CHARACTERS = 10
 
 
 def quiet_time(char_time: float) -> float:
-    """Return the seconds of silence after which nothing of a broken message follows."""
+    """Return the seconds of silence after which no more bytes of a broken message follow."""
     return MIN_RESPONSE_TIME + _QUIET_CHARACTERS * char_time
 
 

@@ -34,14 +34,17 @@ from abdf1_ros.df1.stations import ActiveStationList
 from abdf1_ros.df1.tasks import TaskSource
 from abdf1_ros.messages import Event
 
-_LOOK = 0.1  # s; longest pause of this process that stays unnoticed, besides MOST_LATE
+# Interval (s) of looks. A pause of this process that is longer than this interval plus MOST_LATE
+# is noticed.
+_LOOK = 0.1
 
-# Seconds after a pause in which bytes may have lain in a buffer.
+# Seconds after a pause of this process for which bytes are dropped: they may be old bytes of a
+# buffer.
 _OLD = 0.5
 
 
 class SecondPort(bytes):
-    """Bytes of the second port of a line that is heard on two."""
+    """Bytes of the second port of a line that is heard on two ports."""
 
 
 class ByteListener(Protocol):
@@ -96,7 +99,7 @@ class ListeningLink(Link):
         """Take the arguments of every link; this one needs none."""
 
     def run(self, source: TaskSource) -> Procedure:
-        """Look at the clock again and again; no task is ever asked for."""
+        """Look at the clock again and again; never take a task."""
         while True:
             yield Listen(_LOOK)
 

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""A decoder for foreign traffic, which finds out check and duplex by itself."""
+"""A decoder for foreign traffic, which finds out the check and the duplex by itself."""
 
 from __future__ import annotations
 
@@ -35,18 +35,18 @@ from abdf1_ros.df1.frames import (
     Symbol,
 )
 
-# One in 256 wrong frames seems to have a good BCC, so a single one proves nothing.
+# One in 256 frames without a BCC seems to have a good BCC, so a single frame proves nothing.
 _BCC_FRAMES = 2
-# Number of frames in a row, right with BCC only, after which the guess CRC was wrong.
+# Number of frames in a row that are right with BCC only. They prove that the guess CRC was wrong.
 _CONTRARY_FRAMES = 3
-# Bytes that are kept of noise, or of a message that does not end.
+# Most bytes that are kept of noise, or of a message that does not end.
 _MOST_KEPT = 2048
 
 
 @dataclass(slots=True)
 class LineKind:
     """
-    Check and discipline of a line, None while not known; both directions share one.
+    Check and duplex of a line, None while unknown; one object serves both directions.
 
     With ``is_certain`` the check is given and never changed.
     """
@@ -58,12 +58,12 @@ class LineKind:
 
 class ListeningDecoder(FrameDecoder):
     """
-    A frame decoder that finds check and duplex by itself, where ``kind`` does not have them.
+    A frame decoder that finds check and duplex by itself, if they are unknown in ``kind``.
 
     DLE SOH and DLE EOT exist in half duplex only (M 2-6). A message before the first of them
-    counts as full duplex. One frame with a right CRC settles the check for CRC, two frames with a
-    right BCC settle it for BCC. Until then a frame is given out when the byte after its BCC is
-    there, because it may be the second byte of a CRC. The guess BCC is given up when a frame is
+    counts as full duplex. After one frame with a right CRC the check is CRC; after two frames with
+    a right BCC it is BCC. Until then the decoder waits for one byte after the BCC of a frame,
+    because this byte may be the second byte of a CRC. The guess BCC is given up when a frame is
     right with CRC only. The guess CRC is given up when three frames in a row are right with BCC
     only.
 
@@ -97,7 +97,7 @@ class ListeningDecoder(FrameDecoder):
 
     def next_symbol(self) -> Symbol | None:
         symbol = super().next_symbol()
-        while symbol is NOISE:  # the count is enough
+        while symbol is NOISE:  # the decoder counts it in ``noise``
             symbol = super().next_symbol()
         if symbol is not None:
             self._keep(symbol)
@@ -123,7 +123,7 @@ class ListeningDecoder(FrameDecoder):
         self.wire = heard[start:]
 
     def finish(self) -> Frame | None:
-        """Return a frame that waits for a second check byte which will not come any more."""
+        """Return a frame that still waits for a second check byte, when no byte comes any more."""
         kind = self._kind
         waits = self._step == self._check and len(self.waiting) == 1
         if not waits or kind.is_certain or not self._matches(Checksum.BCC):
@@ -146,7 +146,8 @@ class ListeningDecoder(FrameDecoder):
         return frame
 
     def _begin(self, pair: bytes) -> Decoded:
-        # The bytes before are noise; their last byte may look like the beginning.
+        # The bytes before the pair are noise. They are dropped, as their last byte may look like a
+        # beginning.
         del self._heard[:max(0, len(self._heard) - len(self.waiting) - len(pair))]
         kind = self._kind
         if not self._duplex_given:
@@ -190,7 +191,7 @@ class ListeningDecoder(FrameDecoder):
                 self._kind.checksum = Checksum.BCC
 
     def _reconsider(self) -> None:
-        """Change to the other check when the last frames have been right with that check only."""
+        """Change to the other check if the last frames were right only with it."""
         other = Checksum.BCC if self._checksum is Checksum.CRC else Checksum.CRC
         if self._matches(self._checksum):
             self._contrary_frames = 0
@@ -201,6 +202,6 @@ class ListeningDecoder(FrameDecoder):
             self._kind.checksum = other
 
     def _matches(self, checksum: Checksum, count: int = 2) -> bool:
-        """Tell whether the received check has this kind, by its first ``count`` bytes."""
+        """Tell whether the first ``count`` bytes of the received check are right for this kind."""
         check = checksum.encode(checksum.of_message(self.link_data, self._station))
         return self.waiting.startswith(check[:count])

@@ -53,16 +53,16 @@ class Send(NamedTuple):
 
     - ``timeout``: seconds after the last byte has left, None for no limit; with 0 the step does
       not wait.
-    - ``delay``: seconds before the frame goes out, at least TX_Delay.
-    - ``at_once``: the frame goes out without ``delay`` and without TX_Delay.
-    - ``expires``: clock value (s) after which the frame does not go out any more. CommandExpired
-      is then raised at the ``yield``.
+    - ``delay``: seconds before the frame is sent; a longer TX_Delay replaces it.
+    - ``at_once``: the frame is sent without ``delay`` and without TX_Delay.
+    - ``expires``: clock value (s) after which the frame is not sent any more. CommandExpired is
+      then raised at the ``yield``.
     - ``reply_size``: bytes after the header of the expected good reply, 0 if unknown.
 
     ``reflex`` returns the frame that answers the next symbol, empty for none. The machine sends
-    this frame before the procedure hears of the symbol; the procedure has to send the same frame
-    then. The machine does not ask ``reflex`` if there is a TX_Delay, or if other bytes still have
-    to go out.
+    this frame before it hands the symbol to the procedure. The next frame that the procedure sends
+    has to be the same frame. The machine does not ask ``reflex`` if there is a TX_Delay, or if
+    other bytes still have to be sent.
     """
 
     frame: bytes
@@ -76,10 +76,10 @@ class Send(NamedTuple):
 
 class Listen(NamedTuple):
     """
-    Wait for the next symbol, for ``timeout`` seconds after all has left, None for no limit.
+    Wait for the next symbol, for ``timeout`` seconds after our last byte; None for no limit.
 
-    With 0 the step hears only a symbol that is here already. ``is_continued`` keeps the time limit
-    of the step before. ``reflex`` is described at ``Send``.
+    With 0 the step returns only a symbol that has already come. ``is_continued`` keeps the time
+    limit of the previous step. ``reflex`` is described at ``Send``.
     """
 
     timeout: float | None
@@ -89,10 +89,10 @@ class Listen(NamedTuple):
 
 class Rest(NamedTuple):
     """
-    Wait until ``timeout`` seconds are over, None for no limit, or ``Machine.wake``.
+    Wait for ``timeout`` seconds (None: no limit), or until a call of ``Machine.wake``.
 
-    A half-duplex master is deaf meanwhile, all other nodes hear the next symbol. ``reflex`` is
-    described at ``Send``.
+    A half-duplex master hears nothing meanwhile. For all other nodes the next symbol ends the
+    wait. ``reflex`` is described at ``Send``.
     """
 
     timeout: float | None = None
@@ -109,9 +109,9 @@ class Silence(NamedTuple):
     """
     No symbol came before the time of a step was up.
 
-    ``last_byte`` is the last byte that was heard, 0 for none; a half-duplex master counts from its
-    last transmission. ``is_broken_off`` tells that a message had begun. The line has been quiet
-    for ``seconds``.
+    ``last_byte`` is the last byte that was heard, 0 for none. For a half-duplex master, only bytes
+    after its last transmission count. ``is_broken_off`` tells that a message has begun and not
+    ended. The line has been quiet for ``seconds``.
     """
 
     last_byte: int = 0
@@ -119,11 +119,11 @@ class Silence(NamedTuple):
     seconds: float = math.inf
 
 
-# After a step that was not to wait.
+# The result of a step that does not wait.
 _NOTHING = Silence()
 
-# Longest time (s) that an operating system or USB adapter holds a byte back. No wait is shorter,
-# so Timeout = 0, which S0 allows, means "as short as the equipment can do".
+# Longest time (s) that an operating system or USB adapter holds a byte back. No wait for an answer
+# is shorter. So Timeout = 0, which S0 allows, means "as short as the equipment can do".
 MIN_RESPONSE_TIME = 0.02
 
 # If a call comes this late (s) after a deadline, the process or its host was paused. The age of
@@ -133,20 +133,21 @@ MOST_LATE = 0.2
 # Longest time (s) that an operating system or a device server holds bytes of a frame back.
 HELD_BACK = 0.1
 
-# Pause, in characters, after which a message or a line is over. The time that the equipment may
-# hold bytes back is added.
+# Pause, in characters, after which a message has ended or a line is quiet. The time that the
+# equipment may hold bytes back is added.
 QUIET_CHARACTERS = 20
 
-# A shorter time (s) counts as none: no wait ends so exactly.
+# A shorter time (s) counts as 0, because no wait is more exact.
 MOMENT = 0.0001
 
-# A message that has begun may take this many times the time of its bytes at the set speed, but no
-# longer than the longest message. Two pauses are added to either. Without a limit a station that
-# dribbles, or never ends, would keep the line from all other stations.
+# A message that has begun may take _SLOWEST times the time of its bytes at the set speed, but at
+# most the time of _LONGEST characters. Two pauses are added. Without these limits, a station that
+# sends very slowly, or never stops, would block the line for all other stations.
 _SLOWEST = 4
 _LONGEST = 2 * MAX_LINK_DATA
 
-# Characters that a UART may hand on at once. Bytes at the end of a reply are read as they come.
+# Most characters that a UART passes on together. The last characters of a reply are read as they
+# come.
 _LAST_CHARACTERS = 16
 
 # Responses: a full-duplex node sends them only after it has heard a message or an ENQ to its end.
@@ -166,8 +167,8 @@ class LineTiming:
     """
     The timing of a line.
 
-    ``char_time`` is seconds per character, start and stop bits included (0 where the line
-    has no speed of its own); ``tx_delay`` seconds pass before each transmission (S0, TX_Delay).
+    ``char_time`` is seconds per character, start and stop bits included (0 if the line has no
+    speed of its own). ``tx_delay`` seconds pass before each transmission (S0, TX_Delay).
     """
 
     char_time: float = 0.0
@@ -176,9 +177,10 @@ class LineTiming:
 
 class _Incoming(NamedTuple):
     """
-    The message that is coming in: when its first bytes came, and how many had come by then.
+    The message that is coming in; ``number`` counts all messages up to it.
 
-    ``is_in_time`` tells whether it has begun before the time for it was up.
+    ``begun`` is when its first bytes came (clock value in s). ``heard`` counts all bytes that had
+    come from the line by then. ``is_in_time`` tells whether the message began before the deadline.
     """
 
     number: int = 0
@@ -188,7 +190,7 @@ class _Incoming(NamedTuple):
 
 
 class Background(Protocol):
-    """Work that is done when it is due, even if the line is busy, and at the end."""
+    """Work to do when it is due, even if the line is busy, and when the procedure ends."""
 
     def expire(self, now: float) -> None:
         """Do work that needs no line, such as ending commands that have waited too long for it."""
@@ -204,13 +206,13 @@ class Machine:
     """
     Run one procedure over one line.
 
-    ``procedure`` makes the generator, afresh at every ``start``. With ``forget_on_send`` bytes
-    that were heard before a transmission are dropped: for the master of a half-duplex line they
-    cannot be the answer. ``counters`` gets the characters in both directions. ``background`` has
-    its time whatever the line is busy with.
+    ``procedure`` makes a new generator at every ``start``. With ``forget_on_send`` bytes that were
+    heard before a transmission are dropped: for the master of a half-duplex line they cannot be
+    the answer. ``counters`` gets the characters in both directions. ``background`` does its work
+    even while the line is busy.
 
-    ``sender`` has the bytes that go out. ``late`` is the sum of the seconds by which calls came
-    after a deadline of the procedure: for this time the process, or its host, has not run.
+    ``sender`` has the bytes to send. ``late`` is the sum of the seconds by which calls came after
+    a deadline of the procedure. In this time the process, or its host, did not run.
     """
 
     def __init__(self, procedure: Callable[[Machine], Procedure], *, checksum: Checksum,
@@ -256,13 +258,13 @@ class Machine:
 
     @property
     def message_begun(self) -> float:
-        """Return when the last message began to come in: now for a message in one piece."""
+        """Return when the last message began to come in; ``now`` if it came in one piece."""
         is_known = self._message.number == self.decoder.begun
         return self._message.begun if is_known else self.now
 
     @property
     def hears_until(self) -> float:
-        """Return until when the message that is coming in is heard; -inf if none is."""
+        """Return until when to hear the message that has begun (clock value in s), or -inf."""
         if not self.decoder.in_message:
             return -math.inf
         heard = self.counters.chars_received - self._message.heard
@@ -273,10 +275,10 @@ class Machine:
     @property
     def spare_time(self) -> float:
         """
-        Return for how long (s) incoming bytes need no look: a long reply is coming in.
+        Return for how long (s) incoming bytes need not be read, because a long reply is coming in.
 
-        One read of the whole reply spares most of the wake-ups that its bytes cost. The read comes
-        well before the deadline, which each byte puts off.
+        One read of the whole reply avoids most of the wake-ups for single bytes. The read comes
+        well before the deadline, because only bytes that have been read postpone it.
         """
         step, char_time = self._step, self.timing.char_time
         if not isinstance(step, Send) or not step.reply_size or not self.decoder.in_message:
@@ -291,7 +293,7 @@ class Machine:
             spare, max(0.0, self.deadline - self.now) / 2)
 
     def start(self, now: float, outlet: Outlet | None = None) -> None:
-        """Begin the procedure from its beginning, on a line that has this outlet."""
+        """Start the procedure from its beginning; ``outlet`` is the port of the line."""
         self.stop()
         self.now = now
         self.sender.begin(now, outlet)
@@ -300,10 +302,10 @@ class Machine:
 
     def stop(self, error: Exception | None = None) -> None:
         """
-        End the procedure; with ``error``, raise that inside it first.
+        End the procedure; if there is an ``error``, raise it inside the procedure first.
 
-        A procedure handles the error like the end of its transaction, so each command of it gets a
-        result.
+        A procedure handles the error like the end of its transaction, so each of its commands gets
+        a result.
         """
         procedure, self._procedure = self._procedure, None
         self.sender.clear()
@@ -359,7 +361,7 @@ class Machine:
         self._resume(message)
 
     def _hear_out(self, now: float) -> None:
-        """Let a message that has begun in time be heard to its end, unless it pauses or crawls."""
+        """Postpone the deadline to the end of a message that began in time and is not too slow."""
         heard = self.counters.chars_received
         if self._message.number != self.decoder.begun:
             self._message = _Incoming(self.decoder.begun, now, heard, now <= self._due)
@@ -400,7 +402,7 @@ class Machine:
         return True
 
     def took(self, begun: float, now: float) -> float:
-        """Return the seconds from a clock value to now, without the last pause."""
+        """Return the seconds from a clock value to now, without the last pause of the process."""
         end, seconds = self._last_pause
         return now - begun - (seconds if end > begun else 0.0)
 
@@ -422,9 +424,9 @@ class Machine:
 
     def withdraw(self, now: float) -> None:
         """
-        Take back a command that has become too old since it was looked at.
+        Take back a command that has become too old since its age was checked.
 
-        The procedure gets no error if it has gone on by then.
+        If the procedure has already gone on to another step, it gets no error.
         """
         self.now = now
         expires = self.sender.send_before
@@ -437,13 +439,13 @@ class Machine:
         """
         Return the next symbol of another node, None if more bytes are needed.
 
-        In full duplex the echo of our message is treated as noise: it clears the last response (M
-        4-8). If the message was from a PLC after all, the PLC then repeats it.
+        In full duplex the echo of our message is treated as noise: noise clears the last response
+        (M 4-8). If the message was from a PLC after all, this PLC then repeats it.
         """
         echo = self.sender.echo
         while (symbol := self.decoder.next_symbol()) is not None:
-            # A master sends no frame without a station number, and no response before it hears
-            # its echo.
+            # A frame without a station number is from a slave, because a master sends none. Until
+            # an echo has been heard, a control symbol is from a slave, too.
             is_slaves = self._forget_on_send and (
                 symbol.station is None if isinstance(symbol, Frame)
                 else isinstance(symbol, Control) and not echo.is_heard)
@@ -459,7 +461,7 @@ class Machine:
                 and (symbol := self._next_symbol()) is not None:
             if self._step.reflex is not None and not self.timing.tx_delay:
                 sender.react(self._step.reflex, symbol)
-            if self._is_half_duplex:  # what we have sent has left
+            if self._is_half_duplex:  # a symbol came, so our bytes have left
                 sender.free_at = min(sender.free_at, self.now)
             elif symbol in _RESPONSES:
                 sender.answered(self.now)
@@ -491,7 +493,7 @@ class Machine:
                 heard = self._next_symbol() or _NOTHING
 
     def _wait(self, step: Listen | Rest) -> bool:
-        """Begin to wait; return whether there is no time for it."""
+        """Begin to wait; return True if the step does not wait."""
         if isinstance(step, Listen) and step.is_continued:
             return False
         is_rest = isinstance(step, Rest)

@@ -18,12 +18,12 @@ The master with message-based polling: one transaction with one station, then th
 Theory of operation (S0, "Functional Overview"; M 3-12..3-17). The master speaks, a slave
 answers. A transaction has three phases, each a generator::
 
-    probe     only for a station in the list as inactive: one poll. DLE EOT or any message
-              makes it active and the transaction proceeds; silence ends it.
+    probe     only for a station that is inactive in the list: one poll. DLE EOT or any message
+              makes the station active, and the transaction proceeds; silence ends it.
     deliver   the command frame, until DLE ACK. Silence or DLE NAK: again, up to NAK_Retries.
-    collect   polls, until the reply. DLE EOT means not ready: poll again, until Cmd_Timeout
-              has passed since the transmission that was acknowledged began. Silence, DLE NAK
-              or a damaged frame: again, up to ENQ_Retries for each poll.
+    collect   polls, until the reply. DLE EOT means not ready: poll again, until Cmd_Timeout has
+              passed since the beginning of the transmission that was acknowledged. Silence,
+              DLE NAK or a damaged frame: again, up to ENQ_Retries for each poll.
 
 A station that passes a retry limit becomes inactive.
 
@@ -72,7 +72,8 @@ class HalfDuplexMaster(Link):
         """Carry out the tasks of ``source``, one at a time, for ever."""
         self._line.begin()
         while True:
-            # In turns, or slaves that send all the time would keep our own commands from the line.
+            # Messages of slaves and our own commands take turns. Otherwise slaves that send all
+            # the time would block our commands.
             if self._line.forwards:
                 yield from self._line.forward(collect=self._collect_for_slave)
             now = self._machine.now
@@ -84,9 +85,9 @@ class HalfDuplexMaster(Link):
                 yield Rest(None if due is None else max(due - now, 0.0))
 
     def carry_out(self, task: Task) -> Procedure:
-        """Send the command of a task and end it; a broadcast has no reply but our own."""
+        """Send the command of a task and end the task; for a broadcast, we make a reply."""
         command = task.command
-        # On this line (M 3-7).
+        # The station of this line that is addressed (M 3-7).
         number = self._stations.routes.get(command.dst, command.dst)
         try:
             is_silent = number != BROADCAST and not self._stations.records[number].active
@@ -129,7 +130,7 @@ class HalfDuplexMaster(Link):
 
     def _collect(self, number: int, command: Packet, started: float,
                  reply_size: int = 0) -> Generator[Step, Heard, Packet]:
-        """Poll until the reply to ``command`` is here (S0, "Network Reads"; M 3-13..3-15)."""
+        """Poll until the reply to ``command`` comes (S0, "Network Reads"; M 3-13..3-15)."""
         pause, passed_over = 0.0, 0
         while True:
             answer = yield from self._line.poll_with_retries(number, pause, reply_size)

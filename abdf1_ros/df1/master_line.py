@@ -15,12 +15,12 @@
 """
 The work of every half-duplex master on its line: deliver, poll, receive, pass on.
 
-The rules come from S0, "Functional Overview", and M 3-12..3-17. ``master`` makes a transaction of
-them, ``polling`` a polling scan.
+The rules come from S0, "Functional Overview", and M 3-12..3-17. The module ``master`` combines
+these steps into a transaction, ``polling`` into a polling scan.
 
-Every good message is acknowledged, also an unexpected one: the slave keeps it until then (M 3-15).
-A master never asks for a repetition with DLE NAK, which resets all slaves of the line (M 2-7,
-3-11).
+A good message is acknowledged even if it is unexpected, because the slave keeps it until the ACK
+(M 3-15). A master never asks for a repetition with DLE NAK, which resets all slaves of the line (M
+2-7, 3-11).
 """
 
 from __future__ import annotations
@@ -67,16 +67,17 @@ from abdf1_ros.messages import Event, Message
 # Pause (s) after a broadcast, which no station answers.
 BROADCAST_PAUSE = 0.05
 
-# Messages of slaves that wait to be passed on; with more, a slave gets no ACK and keeps its own.
+# Most messages of slaves that wait to be passed on. A slave that sends one more command gets no
+# ACK, and keeps it.
 MAX_FORWARDS = 16
 
 # Most commands passed on that are remembered until their replies come; the oldest are dropped
 # first.
 _MOST_PASSED_ON = 2 * MAX_FORWARDS
 
-# Messages that a slave may have queued before the reply to our command. The master takes them even
-# after the time of the command. Otherwise, on a slow line, each reply would stay queued after an
-# older one for ever.
+# Most messages that a slave may have queued before the reply to our command. The master fetches
+# them even after Cmd_Timeout. Otherwise, on a slow line, there would always be an older reply
+# before the reply to the last command.
 MOST_QUEUED = 8
 
 _ACKNOWLEDGE = Send(frames.ACK)
@@ -125,11 +126,13 @@ class MasterLine:
         Send a message to a station until it is acknowledged (S0, "Network Reads"; M 3-12).
 
         Return when the acknowledged transmission began (clock value in s). Raises CommandExpired,
-        and StationInactive after the last retry. If the gateway of the station then answers a
-        poll, the error names only the station; for a message to the gateway itself it is
-        CommandTimeout. A silent station gets the message once. So does a station that has never
-        replied, if its gateway has been heard: the other nodes of the gateway would wait for all
-        retries. The answer of a silent station is waited for ``answer_within`` s at most.
+        and StationInactive after the last retry. A station that is a gateway is then polled. If it
+        answers, StationInactive names only the station behind it; for a message to the gateway
+        itself, the error is CommandTimeout.
+
+        A silent station gets the message only once. A station that has never replied gets it only
+        once if its gateway has been heard. Otherwise the other nodes of the gateway would wait for
+        all retries. The wait for the answer of a silent station is ``answer_within`` s at most.
         """
         frame = frames.master_frame(number, packet.encode(), self.settings.checksum)
         self.accounting.sent(packet)
@@ -172,7 +175,7 @@ class MasterLine:
         raise StationInactive(number)
 
     def _note_cause(self, answer: Heard, number: int, expected: Message) -> Message:
-        """Note why a frame has to be sent again, by default ``expected``; return that message."""
+        """Note why a frame has to be sent again, by default ``expected``; return the reason."""
         if answer is Control.NAK:
             self.accounting.nak_received(number)
             return Message.ERR_RCVD_NAK_SYMBOL
@@ -185,7 +188,7 @@ class MasterLine:
         """
         Poll a station once (S0, "Active Station List").
 
-        Any proper answer makes it active; StationInactive when there is none.
+        Any proper answer makes it active. Raises StationInactive if there is none.
         """
         answer = yield from self.poll_inactive(number)
         if not is_good(answer):
@@ -196,7 +199,7 @@ class MasterLine:
                 self.take_unwanted(packet)
 
     def poll_inactive(self, number: int) -> Generator[Step, Heard, Heard]:
-        """Poll an inactive station; report an answer that is not good, unless no byte came."""
+        """Poll an inactive station; report a bad answer, but not complete silence."""
         answer = yield from self._poll(number)
         if is_good(answer):
             self.stations.heard(number, self.machine.now)
@@ -287,7 +290,7 @@ class MasterLine:
 
     def _take_late(self, number: int, frame: Frame) -> bool:
         """
-        Take a late message of a station other than the asked one; return True if it was one.
+        Take a late message of a station that is not asked now; return False for any other message.
 
         Such a message answers an earlier poll, whose time was up. It gets no ACK, because the
         station asked now would relate the ACK to its own message. So the message comes again, as a
@@ -314,9 +317,10 @@ class MasterLine:
         """
         Acknowledge a good message; return it, or None when it is a repetition.
 
-        SRC has to be the station that was polled. Another SRC comes from damage that no check
-        shows (a CRC begins with 0, so it does not notice a lost or inserted leading 00). Such a
-        message gets no ACK, unless the station sends it again.
+        SRC has to be the station that was polled, or a station behind it, and must not equal DST.
+        Wrong addresses come from damage that no check shows (a CRC begins with 0, so it does not
+        notice a lost or inserted leading 00). Such a message gets no ACK, unless the station sends
+        it again.
         """
         self.counters.messages_received += 1
         packet = Packet.decode(frame.data)
@@ -333,7 +337,7 @@ class MasterLine:
             return None
         is_to_keep = self.settings.accept_slave_messages and not packet.cmd & REPLY_BIT
         if is_to_keep and self.is_full and not station.repeats(packet):
-            return None  # not acknowledged: the slave keeps it; replies make room and go on
+            return None  # without an ACK the slave keeps its command; replies are still accepted
         self.counters.acks_sent += 1
         yield _ACKNOWLEDGE
         if not station.note_new(packet):
@@ -354,9 +358,9 @@ class MasterLine:
         """
         Tell whether a reply has the number of its gateway in place of ours (M 6-4).
 
-        This number is Via. On its other network the gateway may have another number, which we do
-        not know. We accept a number that two replies in a row have, unless it is another station
-        of ours.
+        The column Via has this number. On its other network the gateway may have another number,
+        which we do not know. We accept another number if two replies in a row have it, unless it
+        is the number of a station in our list.
         """
         if not packet._replace(dst=command.src).answers(command):
             return False
@@ -405,11 +409,11 @@ class MasterLine:
                 collect: Callable[[int, Packet], Procedure] | None = None
                 ) -> Generator[Step, Heard, Packet | None]:
         """
-        Deliver one message to be passed on, not to a ``busy`` station; return it if delivered.
+        Pass on the first message that is not for a ``busy`` station; return it if it is delivered.
 
         The link data stay as they are (M 3-2, 3-8). The sender of a command that cannot be
-        delivered gets an error reply. ``collect`` gets the reply to a command, by the station of
-        the line that has it.
+        delivered gets an error reply. ``collect`` polls a station of the line for the reply to a
+        command that has been passed on.
         """
         packet = next(packet for packet in self.forwards if packet.dst not in busy)
         self.forwards.remove(packet)
@@ -434,7 +438,7 @@ class MasterLine:
         return packet
 
     def _refuse(self, packet: Packet) -> None:
-        """Answer a command that cannot be passed on."""
+        """Let the sender of a command that cannot be passed on get an error reply."""
         if not packet.is_reply and packet.src != self.settings.station:
             self.forwards.append(packet.reply(sts=STS_NOT_DELIVERED))
 
@@ -449,12 +453,12 @@ class MasterLine:
                 number, begun, self.machine.now, was_silent=was_silent, asker=Asker.MESSAGE)
 
     def has_forwards(self, busy: Container[int] = ()) -> bool:
-        """Tell whether messages wait to be passed on, but not to ``busy`` stations."""
+        """Tell whether a message waits to be passed on to a station that is not ``busy``."""
         return any(packet.dst not in busy for packet in self.forwards)
 
     @property
     def is_full(self) -> bool:
-        """Tell whether no more messages can be kept to be passed on."""
+        """Tell whether there is no room for further messages to be passed on."""
         return len(self.forwards) >= MAX_FORWARDS
 
     def _count_control(self, control: Control) -> None:

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""A mode of a line: how its link is made, and which times it can keep."""
+"""A mode of a line: how its link is made, and how long its transactions take."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ Report = Callable[[Event], None]
 
 
 class LinkMaker(Protocol):
-    """A function that makes a link, such as its class."""
+    """A function that makes a link, or the class of the link itself."""
 
     def __call__(self, machine: Machine, settings: LinkSettings, stations: ActiveStationList,
                  serve: Serve, report: Report) -> Link: ...
@@ -62,7 +62,7 @@ class LineMode:
 
     is_master: ClassVar[bool] = False
     """
-    True if we poll the stations of the line, and address stations behind gateways by the gateway.
+    True if we poll the stations of the line, and reach other stations through their gateways.
     """
 
     has_one_plc: ClassVar[bool] = False
@@ -85,7 +85,7 @@ class LineMode:
 
     answers: ClassVar[int] = 2
     """
-    Number of answers that a transaction needs from the station: to the command, and the reply.
+    Number of answers of the station in a transaction: mostly an ACK to the command, and the reply.
     """
 
     why_unshared: ClassVar[str] = ''
@@ -104,7 +104,7 @@ class LineMode:
         return self.link(machine, line, stations, serve, report)
 
     def pause(self, line: LinkSettings) -> float:
-        """Return how long a command waits for a quiet line, mostly."""
+        """Return how long a command usually waits for a quiet line."""
         return 0.0
 
     def most_under_way(self, line: LinkSettings) -> int:
@@ -114,15 +114,15 @@ class LineMode:
     def longest_transaction(self, line: LinkSettings, frames: float, others: float = 0.0,
                             stations: int = 0) -> float:
         """
-        Return how long a transaction takes at most that ends within its retries.
+        Return the longest time of a transaction that succeeds, with all retries.
 
-        ``frames`` is the time of its frames, each once. ``others`` is the longest such time of
-        another transaction. ``stations`` is the number of stations on the line.
+        ``frames`` is the time that its frames take if each is sent once. ``others`` is the longest
+        such time of any other transaction. ``stations`` is the number of stations on the line.
         """
         timeout = answer_time(line)
         # Cmd_Timeout runs from the beginning of the try that is acknowledged.
         tries = line.nak_retries + line.enq_retries + 1
-        # A frame that breaks off is over after a pause.
+        # The end of a frame that breaks off is only known after a pause.
         return tries * timeout + max(line.cmd_timeout, timeout) \
             + (max(line.nak_retries, line.enq_retries) + 1) \
             * (frames + quiet_time(line.timing.char_time))
@@ -130,32 +130,34 @@ class LineMode:
     def undisturbed(self, line: LinkSettings, frames: float, response_time: float,
                     others: float = 0.0, stations: int = 0) -> float:
         """
-        Return how long a transaction takes at most where no frame gets lost.
+        Return the longest time of a transaction in which no frame gets lost.
 
-        Each answer comes after ``response_time``; the rest is as in ``longest_transaction``.
+        Each answer begins after ``response_time``. The other parameters are those of
+        ``longest_transaction``.
         """
         return frames + self.answers * response_time
 
     def longest_reply(self, line: LinkSettings, frames: float) -> float:
-        """Return the longest time of a reply of ours; our replies take turns with commands."""
+        """Return the longest time to send our own reply; our replies take turns with commands."""
         return (line.nak_retries + 1) * (answer_time(line) + frames)
 
     def last_tries(self, line: LinkSettings, frames: Sequence[float],
                    answer_within: float) -> float:
         """
-        Return how long it takes to send each of these once where no station answers.
+        Return the time to send each of some commands once, if no station answers.
 
-        The answers are waited for ``answer_within`` at most. A probe may be under way.
+        ``frames`` has the time of each command. The wait for an answer is ``answer_within`` at
+        most. A probe that is under way may have to end first.
         """
         wait = min(answer_time(line), answer_within)
         return self.longest_probe(line) + sum(frames) + len(frames) * wait
 
     def longest_probe(self, line: LinkSettings) -> float:
-        """Return how long it takes to find a silent station silent."""
+        """Return the time of a probe that a station does not answer."""
         return answer_time(line) + line.timing.tx_delay \
             + len(poll_frame(0)) * line.timing.char_time
 
 
 def answer_time(line: LinkSettings) -> float:
-    """Return how long an answer is waited for: never less than a node may take."""
+    """Return the longest wait for an answer: Timeout, but at least MIN_RESPONSE_TIME."""
     return max(line.timeout, MIN_RESPONSE_TIME)

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The modes that there are, each beside its link."""
+"""The list of all modes. Each mode is defined in the module of its link."""
 
 from __future__ import annotations
 

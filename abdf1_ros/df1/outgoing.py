@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Messages on their way out, in portions, so that responses can go between their bytes."""
+"""Messages that are sent in portions, so that responses can be sent between two portions."""
 
 from __future__ import annotations
 
@@ -23,9 +23,9 @@ import math
 from abdf1_ros.df1.checksum import Checksum
 from abdf1_ros.df1.frames import DLE, ETX, STX
 
-# Line time (s) of a portion of a message, and the rest of the line time at which the next portion
-# is given out. A response waits for one portion at most, and a thread that is a little late leaves
-# no gap.
+# Line time (s) of a portion of a message. The next portion is given out when the second time (s)
+# is left of it. So a response waits for one portion at most, and a thread that is a little late
+# leaves no gap.
 _AHEAD = 0.03
 _LEFT = 0.015
 
@@ -36,10 +36,10 @@ class Outgoing:
     """
     Give a message out in portions, each of whole symbols.
 
-    Between two data symbols a response may be embedded, and nowhere else (M 4-3): not between a
-    DLE and its partner, nor between the data and DLE ETX with its check. ``char_time`` is seconds
-    per character; where it is 0, or the message is short, all is given out at once. ``due``
-    is when to call ``next`` (clock value in s), None for never.
+    A response may be embedded only between two data symbols (M 4-3). It must not divide a DLE and
+    its partner, or the data and DLE ETX with its check. ``char_time`` is seconds per character. If
+    it is 0, or the message is short, the whole message is given out at once. ``due`` is when to
+    call ``next`` (clock value in s), None for never.
     """
 
     def __init__(self, checksum: Checksum, char_time: float) -> None:
@@ -57,7 +57,7 @@ class Outgoing:
         return len(self._kept) > 1
 
     def put(self, frame: bytes, free: float) -> bytes:
-        """Return the part of a frame that goes out at once; the line is busy until ``free``."""
+        """Return the part of a frame to send at once; the line is busy until ``free``."""
         if not self._kept:
             if not frame.startswith(STX) or not 0 < self._portion < len(frame):
                 return frame
@@ -71,7 +71,7 @@ class Outgoing:
         portion = bytearray()
         while self._kept and len(portion) < self._portion:
             portion += self._kept.popleft()
-        if len(self._kept) == 1:  # DLE ETX and its check: nothing goes before them
+        if len(self._kept) == 1:  # DLE ETX and its check: no response may be sent before them
             portion += self._kept.popleft()
         self.size -= len(portion)
         self._busy_until = max(self._busy_until, now) + len(portion) * self._char_time

@@ -37,7 +37,7 @@ DIAGNOSTIC_REPLY = 0x46
 
 
 def is_local_status(sts: int) -> bool:
-    """Tell whether STS is of a node on the way: the command may not have got there (M 8-2)."""
+    """Tell whether a node on the way has set STS: the command may not have arrived (M 8-2)."""
     return 0 < sts < 0x10
 
 
@@ -53,7 +53,7 @@ class Packet(NamedTuple):
     - ``dst``, ``src``: station addresses (0-255).
     - ``cmd``: bit 6 is set in a reply (M 6-5).
     - ``tns``: 16-bit transaction number, low byte first on the line (M 6-7).
-    - ``data``: the rest, which is FNC and parameters of a command, EXT STS or data of a reply.
+    - ``data``: FNC and parameters of a command, or EXT STS or data of a reply.
     """
 
     dst: int
@@ -86,7 +86,7 @@ class Packet(NamedTuple):
         Tell whether the header can be whole: a command has STS 0 (M 6-3..6-8).
 
         A leading 00 that is lost or inserted is invisible to BCC and CRC, which both begin at 0.
-        All fields then move by one, and TNS or CMD stands where STS should.
+        All fields then move by one byte, and a byte of TNS or CMD is read as STS.
         """
         return self.is_reply or self.sts == 0
 
@@ -97,7 +97,7 @@ class Packet(NamedTuple):
 
     @property
     def key_of_command(self) -> tuple[int, int, int]:
-        """Return, of a reply, the ``duplicate_key`` of the command that it answers."""
+        """Return the ``duplicate_key`` of the command that this reply answers."""
         return self.dst, self.cmd & ~REPLY_BIT, self.tns
 
     def answers(self, command: Packet) -> bool:

@@ -13,7 +13,7 @@
 # limitations under the License.
 
 """
-The full-duplex peer: both ends send commands and replies whenever they like (M 4-3..4-13).
+The full-duplex peer: both ends may send commands and replies at any time (M 4-3..4-13).
 
 Theory of operation. The transmitter sends one message at a time and waits for its response
 (M 4-5)::
@@ -22,9 +22,9 @@ Theory of operation. The transmitter sends one message at a time and waits for i
     DLE NAK   send it again, up to NAK_Retries
     silence   DLE ENQ asks for the response again, up to ENQ_Retries
 
-The receiver answers every message at once with ACK or NAK and remembers what it answered, for
-an ENQ (M 4-7..4-9). That memory begins as NAK, and goes back to NAK after anything that is not a
-message: an old ACK must not count for a new message that got lost.
+The receiver answers every message at once with ACK or NAK. It remembers this response, because an
+ENQ may ask for it again (M 4-7..4-9). The remembered response is NAK at the start, and after
+noise: an old ACK must not count for a new message that got lost.
 
 A response does not name its message. A response that comes before all bytes of our message have
 left is not for that message (M 4-5: WAIT follows SEND). After the start, and after a transfer that
@@ -37,8 +37,9 @@ that overtakes its ACK counts as the ACK, too (M 4-13).
 
 A message is sent again when its sender has not understood our response (M 4-5). So a repetition
 comes within the time that the sender's retries take. If the sender has acknowledged our reply and
-has not asked again, it comes within the time of one retry. A later message with the same number is
-a new one: some processors count from 0 after each power-up, some programs always send 0.
+has not asked again, a repetition comes within the time of one retry. A later message with the same
+TNS is a new message: some processors count from 0 after each power-up, and some programs always
+send 0.
 """
 
 from __future__ import annotations
@@ -65,7 +66,7 @@ from abdf1_ros.messages import Event, Message
 # repetition waits this much longer (s).
 _NAK_PAUSE = 0.25
 
-# Replies that wait for their turn on the line; with more, commands are answered with NAK.
+# Most replies that wait for their turn on the line. Further commands are answered with NAK.
 MAX_WAITING_REPLIES = 8
 
 # Longest delay (s) of a late response: after its time-out, after another response, or after the
@@ -78,7 +79,7 @@ _ENQ_LIMIT = 3
 
 _REFLEX = ack_on_reply()
 
-# Interval (s) of looks for overdue commands while the peer waits for a response.
+# Interval (s) at which a peer that waits for a response checks for overdue commands.
 _TICK = 0.25
 
 
@@ -87,8 +88,8 @@ class _Accepted:
     """
     The last message accepted: its key (M 4-4), and when (clock value in s) it came.
 
-    ``is_answered`` tells that our reply to it has been acknowledged, ``may_come_again`` that its
-    sender has asked for a response again, or has had a NAK.
+    ``is_answered`` tells that our reply to it has been acknowledged. ``may_come_again`` tells that
+    its sender has asked for a response again, or that we have sent a NAK.
     """
 
     key: tuple[int, int, int]
@@ -102,7 +103,7 @@ class FullDuplexPeer(EqualNode):
     Carry out tasks on the line of ``machine`` and answer the commands that come in.
 
     ``serve`` executes a command and returns its reply; it is called once for each command, never
-    for a repetition. Where it returns None, the caller later adds the reply to ``replies``, in any
+    for a repetition. If it returns None, the caller later adds the reply to ``replies``, from any
     thread, and wakes the machine. Each start makes a new ``replies``. ``report`` is called with
     every numbered error and notice.
     """
@@ -118,10 +119,11 @@ class FullDuplexPeer(EqualNode):
     def run(self, source: TaskSource) -> Procedure:
         """Carry out the tasks of ``source`` and serve the far end, for ever."""
         self._forget()
-        yield from self._listen()  # it answers an earlier process
+        yield from self._listen()  # a response now is for an earlier process
         while True:
             self._expire()
-            # In turns, or a far end that asks all the time would keep our commands waiting.
+            # Replies and commands take turns. Otherwise a far end that asks all the time would
+            # keep our commands waiting.
             if self.replies:
                 yield from self._send_reply(self.replies.popleft())
             task = self._next_task(source)
@@ -147,7 +149,7 @@ class FullDuplexPeer(EqualNode):
         return source.next_task(self._machine.now)
 
     def _idle_time(self, source: TaskSource) -> float | None:
-        """Return the seconds until a reply is overdue or a task is due that may be sent."""
+        """Return the seconds until a reply is overdue or a task may be sent; None for never."""
         moments: list[float | None] = [
             self._given_up(entry) for entry in self._outstanding.values()]
         if len(self._outstanding) < self._settings.max_outstanding:
@@ -161,7 +163,7 @@ class FullDuplexPeer(EqualNode):
         entry = self._outstanding[key] = Outstanding(task)
         self._accounting.sent(task.command)
         task.sent = True
-        # A station that did not answer last time gets one try, not a whole cycle of them.
+        # A station that did not answer last time, or may be absent, gets one try without retries.
         station = self._stations[number]
         is_once = not station.active or not station.replies and self._stations.is_new(number)
         try:
@@ -190,7 +192,7 @@ class FullDuplexPeer(EqualNode):
     def _transfer(self, packet: Packet, is_answered: Callable[[], bool],
                   is_once: bool, expires: float = math.inf, answer_within: float = math.inf
                   ) -> Generator[Step, Heard, float | None]:
-        """Return when the message was delivered, None if it was not (M 4-5, TRANSFER)."""
+        """Send a message; return when it was delivered, None if it was not (M 4-5, TRANSFER)."""
         message = frames.message_frame(packet.encode(), self._settings.checksum)
         naks = enqs = 0
         sending = message
@@ -247,7 +249,7 @@ class FullDuplexPeer(EqualNode):
 
     def _response(self, sending: bytes, is_answered: Callable[[], bool],
                   expires: float, timeout: float) -> Generator[Step, Heard, Code | None]:
-        """Send; return ACK, NAK, STX where the reply itself came first, or None for silence."""
+        """Send; return ACK, NAK, STX if the reply came before the ACK, or None for silence."""
         machine = self._machine
         last_byte, begun = 0, machine.now
         symbol = yield Send(sending, min(timeout, _TICK), expires=expires, reflex=_REFLEX)
@@ -282,11 +284,11 @@ class FullDuplexPeer(EqualNode):
             symbol = yield from self._next(end)
 
     def _left(self, end: float) -> float:
-        """Return the seconds up to ``end`` in which nothing of ours is on the line."""
+        """Return the seconds from now, or from the end of our transmission, up to ``end``."""
         return end - max(self._machine.now, self._machine.sender.free_at)
 
     def _next(self, end: float) -> Generator[Step, Heard, Heard]:
-        """Return the next symbol up to ``end``, or up to the next tick."""
+        """Return the next symbol, or a Silence at ``end`` or after ``_TICK``."""
         self._expire()
         left = self._left(end)
         if left <= 0:
@@ -294,7 +296,7 @@ class FullDuplexPeer(EqualNode):
         return (yield Listen(min(left, _TICK), reflex=_REFLEX))
 
     def _answer(self, symbol: Symbol) -> Procedure:
-        """Send the response to a symbol, and use the message that it brings."""
+        """Send the response to a symbol, and use the message if the symbol is one."""
         response = self._hear(symbol)
         if self._machine.timing.tx_delay:  # the response waits for TX_Delay, the message need not
             self._make_use()
@@ -338,7 +340,7 @@ class FullDuplexPeer(EqualNode):
         if frame.fault is not None:
             self._report(count_fault(frame, self._settings.checksum, self._counters))
             is_given_up = frame.fault is FrameFault.NO_ETX and frame.received in (
-                Code.STX, Code.ENQ)  # its sender begins again, or asks
+                Code.STX, Code.ENQ)  # its sender begins again, or sends an ENQ
             if is_given_up or frame.has_stopped:
                 self._last_response = frames.NAK
                 return b''
@@ -369,7 +371,7 @@ class FullDuplexPeer(EqualNode):
         is_settled = last.is_answered and not last.may_come_again
         enq_retries = 0 if is_settled else max(_ENQ_LIMIT, settings.enq_retries)
         # Most seconds that the far end needs for these ENQs. Of our settings and the default
-        # settings of the products the larger ones count.
+        # settings of the products, the larger value counts.
         retry_time = (enq_retries + 1) * max(_ACK_TIMEOUT, settings.timeout)
         return self._machine.now - last.when < retry_time
 
@@ -379,13 +381,14 @@ class FullDuplexPeer(EqualNode):
             self._accepted.may_come_again = True
 
     def _take_reply(self, packet: Packet) -> None:
-        """Give a reply to its command, if that still waits."""
+        """Give a reply to its command, if the command still waits."""
         self._expire(self._machine.message_begun)
         self._accounting.received(packet)
         key = packet.src, packet.tns
         entry = self._outstanding.get(key)
         if entry is None or not packet.answers(entry.task.command):
-            if entry is not None:  # for another node: our reply may follow with the same numbers
+            # for another node: our reply may follow with the same SRC, CMD and TNS
+            if entry is not None:
                 self._accepted = None
             self._accounting.unexpected(packet, self._machine.now)
             return
@@ -400,7 +403,7 @@ class FullDuplexPeer(EqualNode):
         return max(entry.deadline, machine.hears_until) if is_in_time else entry.deadline
 
     def _expire(self, begun: float | None = None) -> None:
-        """End the commands whose reply is overdue (S0, counter 2545), or was when it began."""
+        """End the commands whose reply is overdue now, or at ``begun`` (S0, counter 2545)."""
         now = self._machine.now if begun is None else begun
         overdue = [key for key, entry in self._outstanding.items() if self._given_up(entry) <= now]
         for key in overdue:
@@ -430,19 +433,19 @@ class PeerMode(LineMode):
 
     def longest_transaction(self, line: LinkSettings, frames: float, others: float = 0.0,
                             stations: int = 0) -> float:
-        """Return the same with the pauses after NAKs and late responses."""
+        """Return the time of the base class, plus the pauses after NAKs and for late responses."""
         return super().longest_transaction(line, frames) + _pauses(line)
 
     def last_tries(self, line: LinkSettings, frames: Sequence[float],
                    answer_within: float) -> float:
-        """Return it with the pauses in which late responses count for nothing."""
+        """Return the time of the base class, plus the pauses that ignore late responses."""
         return super().last_tries(line, frames, answer_within) \
             + (1 + len(frames)) * _LATE_RESPONSE
 
     def longest_reply(self, line: LinkSettings, frames: float) -> float:
         """Return how long the transfer of a reply takes: messages, ENQs and pauses."""
         tries = line.nak_retries + line.enq_retries + 1
-        # If a command becomes overdue meanwhile, the next look ends it.
+        # A command that becomes overdue meanwhile is ended within _TICK.
         return tries * answer_time(line) + (line.nak_retries + 1) * frames \
             + _pauses(line) + _TICK
 

@@ -23,10 +23,10 @@ the PLC-5 and Logix masters). One scan is::
     the next ``group_size`` active stations of the normal list (0: all of them)
     one inactive station of the normal list, when all its active ones have had their turn
 
-A command leaves before the next station is polled ("between stations"), or when the master's
-own address comes up in the list ("in sequence"). It completes when its station is polled and
-has the reply ready. So several stations work on their replies at the same time, and commands
-complete in the order of the poll list.
+A command is sent before the next station is polled ("between stations"), or when the master's own
+address is next in the list ("in sequence"). It completes when its station is polled and has the
+reply ready. So several stations work on their replies at the same time, and commands complete in
+the order of the poll list.
 
 A station that does not answer is polled again up to ENQ_Retries, then becomes inactive; any answer
 makes it active. A dead station costs a whole Timeout, and active stations must not wait for it. So
@@ -54,15 +54,15 @@ from abdf1_ros.df1.tasks import Outstanding, Task, TaskSource
 from abdf1_ros.errors import CommandExpired, CommandTimeout, LinkError, StationInactive
 from abdf1_ros.messages import Event
 
-# "At least four" may leave between two polls (1766-RM001).
+# Most commands between two polls: the manual says "at least four" (1766-RM001).
 COMMANDS_BETWEEN_POLLS = 4
 
 # A poll and the EOT that answers it.
 _POLL_CHARACTERS = 6
 
 # If several stations behind a gateway have not replied in time, the gateway gets one command at a
-# time for this long (s). It may work on one command at a time. With more commands than it can do
-# in Cmd_Timeout it would be late with each of them, for ever.
+# time for this long (s). Maybe it can execute only one command at a time. If it always had more
+# commands than it can execute in Cmd_Timeout, every reply would be late.
 _SLOW_TIME = 30.0
 
 # Pause between scans in which no station could be polled (s).
@@ -81,7 +81,7 @@ class _PollList:
     is_kept_waiting: bool = False
 
     def turn(self, now: float) -> None:
-        """Begin again at the top."""
+        """Begin the next scan at the first station, and record the time of the last scan."""
         if self.started is not None:
             self.times.add(now - self.started)
         self.started = now
@@ -121,11 +121,12 @@ class StandardPollingMaster:
         stations.add(self._polled, are_polled=True)
         # Stations that got a command of another station and have not replied, with the time (clock
         # value, s) until which they may reply. Until then the master passes no second command on
-        # to them. Several senders would soon fill the message sink of the station, as a poll takes
-        # only one message out. Our own commands would find no room.
+        # to them. Otherwise several senders would soon fill the message sink of the station,
+        # because a poll fetches only one message. Our own commands would then find no room.
         self._given: dict[int, float] = {}
         # Stations that have answered a probe, but no command since. Their time on the line counts
-        # as time of probes: otherwise a station that takes no commands would come back at once.
+        # as time of probes. Otherwise a station that accepts no commands would be probed again at
+        # once.
         self._unproven: set[int] = set()
         self._last_probed: _PollList | None = None
         self._slow_until: defaultdict[int, float] = defaultdict(lambda: -math.inf)  # of gateways
@@ -151,7 +152,7 @@ class StandardPollingMaster:
                 yield Rest(_PAUSE)
 
     def _is_active(self, number: int) -> bool:
-        """Tell whether an entry of a list is polled; our own is not a station of the line."""
+        """Tell whether an entry of a list has its turn: our own number, or an active station."""
         return number == self._settings.station or self._stations[number].active
 
     def _scan(self, source: TaskSource) -> Procedure:
@@ -201,7 +202,7 @@ class StandardPollingMaster:
         self._stations.polled_silent(begun, self._machine.now)
 
     def _visit(self, number: int, source: TaskSource) -> Procedure:
-        """Send what waits, then poll one active station; at our own number only send."""
+        """Send waiting commands, then poll an active station; do not poll our own number."""
         if number == self._settings.station:
             yield from self._send_commands(source)
             return
@@ -262,7 +263,7 @@ class StandardPollingMaster:
                 self._overdue(station)
 
     def _take_reply(self, number: int, packet: Packet) -> bool:
-        """Complete the command that a message answers, by its SRC; return False for none."""
+        """Complete the command to which a message is the reply; return False if there is none."""
         entry = self._outstanding.get(packet.src)
         if entry is None or not self._line.answers(packet, entry.task.command):
             return False
@@ -271,7 +272,7 @@ class StandardPollingMaster:
         return True
 
     def _is_over(self, entry: Outstanding, is_message: bool) -> bool:
-        """Tell whether to give up after an answer; after a message the reply may be next."""
+        """Tell whether a command is overdue; if a message came, its reply may be the next one."""
         entry.passed_over += is_message
         return self._machine.now >= entry.deadline and not (
             is_message and entry.passed_over <= MOST_QUEUED)
@@ -279,7 +280,7 @@ class StandardPollingMaster:
     def _overdue(self, number: int) -> None:
         """End the command whose reply has not come in time."""
         via, now = self._stations.via(number), self._machine.now
-        # Mostly no other station waits for it: all other stations are polled meanwhile.
+        # Usually all other stations are polled meanwhile. They only wait behind a slow gateway.
         self._line.accounting.overdue(self._outstanding.pop(number).task,
                                       keeps_others_waiting=now < self._slow_until[via])
         behind = self._stations.behind(via)
@@ -287,7 +288,7 @@ class StandardPollingMaster:
             self._slow_until[via] = now + _SLOW_TIME
 
     def _busy(self) -> Container[int]:
-        """Return the stations that get no command now, as they or their slow gateways have one."""
+        """Return the stations that get no command now: they, or their slow gateways, have one."""
         gateways = {self._stations.via(number) for number in self._outstanding}
         slow = [self._stations.behind(number) for number in gateways
                 if self._machine.now < self._slow_until[number]]
@@ -313,7 +314,7 @@ class StandardPollingMaster:
                     and self._stations.via(packet.dst) in self._listed:
                 self._given[packet.dst] = self._machine.now + self._settings.cmd_timeout
         for number, entry in list(self._outstanding.items()):
-            if not self._stations[number].active:  # it did not take what was passed on
+            if not self._stations[number].active:  # it did not accept a message that was passed on
                 self._end(number, StationInactive(number))
             elif self._machine.now >= entry.deadline \
                     and self._stations.via(number) not in self._polled:
@@ -324,7 +325,11 @@ class StandardPollingMaster:
                 return
 
     def _send(self, task: Task) -> Generator[Step, Heard, bool]:
-        """Send a command; return False if no station took it, which has cost polls their time."""
+        """
+        Send a command; return False if the next command has to wait for polls.
+
+        A command that no station accepts uses up the time of the polls, unless its wait was short.
+        """
         station = task.command.dst
         number = self._stations.via(station)
         if number == BROADCAST:
@@ -376,7 +381,7 @@ class StandardPollingMode(MasterMode):
 
     def make_link(self, machine: Machine, line: LinkSettings, stations: ActiveStationList,
                   serve: Serve, report: Report) -> Link:
-        """Return the link; it polls every mapped station, as none replies without a poll."""
+        """Return the link; it polls every mapped station, because slaves reply only to polls."""
         polling = line.polling or PollingSettings(())
         listed = {*polling.priority, *polling.normal}
         mapped = dict.fromkeys(stations.via(station.number) for station in stations)
@@ -387,23 +392,24 @@ class StandardPollingMode(MasterMode):
 
     def longest_transaction(self, line: LinkSettings, frames: float, others: float = 0.0,
                             stations: int = 0) -> float:
-        """Return the same with the time that all other stations may have meanwhile."""
+        """Return the time of message-based polling, plus the time of all other stations."""
         poll = (line.enq_retries + 1) * (
             answer_time(line) + others + quiet_time(line.timing.char_time))
-        # The command leaves within a scan. Polls for its reply end a scan after Cmd_Timeout.
+        # The command is sent within one scan. The last poll for its reply is within one scan after
+        # Cmd_Timeout.
         return super().longest_transaction(line, frames) + 2 * stations * (
             poll + self.longest_reply(line, others))
 
     def last_tries(self, line: LinkSettings, frames: Sequence[float],
                    answer_within: float) -> float:
-        """Return it with the polls in between."""
+        """Return the time of message-based polling, plus the polls between the commands."""
         in_a_row = 1 if line.polling and line.polling.in_sequence else COMMANDS_BETWEEN_POLLS
         return super().last_tries(line, frames, answer_within) \
             + -(-len(frames) // in_a_row) * self.longest_probe(line)
 
     def undisturbed(self, line: LinkSettings, frames: float, response_time: float,
                     others: float = 0.0, stations: int = 0) -> float:
-        """Return the same with a scan in which each station is polled and gets a command."""
+        """Return the time of message-based polling, plus a scan that serves every station."""
         poll = _POLL_CHARACTERS * line.timing.char_time + line.timing.tx_delay + response_time
         other = super().undisturbed(line, others, response_time)
         return super().undisturbed(line, frames, response_time) + stations * (poll + other)

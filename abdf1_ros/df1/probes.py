@@ -19,7 +19,7 @@ from __future__ import annotations
 from enum import auto, Enum
 import math
 
-# After a probe that has taken the line for t, 7 t are left to the other stations.
+# After a probe that has used the line for a time t, the other stations get 7 t.
 OTHERS_SHARE = 7
 
 
@@ -35,17 +35,17 @@ class Probes:
     """
     Limit the time of all probes to an eighth of the line's time.
 
-    The kinds of probes take turns, each from a clock value (s) on:
+    The kinds of probes take turns. Each kind has the clock value (s) from which it may be sent:
 
     - ``next``: the round of silent stations.
     - ``next_message``: messages to silent stations.
     - ``next_own``: a 0 or a fallback.
 
-    A message cannot wait: a message that comes before its turn is refused. The next turn is then
-    reserved for a message, if the last probe was not a message.
+    A message cannot wait: if it comes before its turn, it is refused. The next turn is then
+    reserved for a message, unless the last probe was a message.
 
-    - ``pause``: seconds for active stations after the last probe. Before the first probe it
-      follows from ``usual``, the usual seconds of a probe.
+    - ``pause``: seconds for active stations after the last probe. Before the first probe it is
+      computed from ``usual``, the usual seconds of a probe.
     - ``died_at``: when a station became silent last (clock value, s). It is minus infinity after
       all commands that waited at that time have had their turn.
     - ``rest``: seconds between two probes if no station answers.
@@ -91,8 +91,8 @@ class Probes:
         """
         Record that a station has become silent, which took ``seconds`` until now.
 
-        Only a message may ask it at once. If a gateway reports the silence quickly, that costs
-        little.
+        Only a message may be sent to it at once. If a gateway reports the silence quickly, the
+        pause is short.
         """
         self._put_off = now + min(self.pause, OTHERS_SHARE * seconds)
         self.died_at = now
@@ -102,7 +102,7 @@ class Probes:
         self.died_at = -math.inf
 
     def keep_none_waiting(self, now: float, asker: Asker = Asker.IN_TURN) -> None:
-        """Record that probes keep no station waiting: then messages need no turns."""
+        """Record that probes keep no station waiting, so that messages need no turns."""
         self._free = self._put_off = now + self._rest
         self._is_kept_for_message = False
         self._last = Asker.OWN if asker is Asker.OWN else Asker.IN_TURN

@@ -15,16 +15,16 @@
 """
 A node of a DF1 radio modem network: frames without ACK, NAK, ENQ or polls.
 
-Sources: 1747-RM001G 13-76 to 13-80, 1763-RM001C 517 to 522. Any node sends to any other, in the
-frames of full duplex. A node takes what has its number or 255 as DST, and drops the rest. A
-command is answered by its reply, or by nothing: then we send it again, with the same TNS, so that
-a PLC knows it as a repetition.
+Sources: 1747-RM001G 13-76 to 13-80, 1763-RM001C 517 to 522. Any node may send to any other node,
+in the frames of full duplex. A node accepts packets with its number or 255 as DST, and drops all
+other packets. The only answer to a command is its reply. If no reply comes, we send the command
+again with the same TNS, so that a PLC recognizes the repetition.
 
-Ours: a node waits until the line is quiet, and then for a random time, before it sends. That time
-grows with each try, because several nodes may have waited for the same end. A repetition of a
-command is answered with the reply that we have given, because that reply may have been lost. If we
-hear a packet with our number as SRC that we did not send, another node has our number. We then
-ignore replies that may belong to its commands.
+Our own rules: a node waits until the line is quiet, and then for a random time, before it sends.
+The random time grows with each try, because several nodes may have waited for the end of the same
+packet. A repetition of a command is answered with the reply that we have given, because that reply
+may have been lost. If we hear a packet with our number as SRC that we did not send, another node
+has our number. We then ignore replies that may belong to its commands.
 
 A node that stores and forwards sends a packet again, once. It does so if SRC and DST are in its
 table and the packet is not among the last packets.
@@ -64,25 +64,25 @@ from abdf1_ros.df1.tasks import Task, TaskSource
 from abdf1_ros.errors import CommandExpired, PortLost, StationInactive
 from abdf1_ros.messages import Event, Message
 
-# Number of last packets that a node does not forward once more (1763-RM001C), and for how long
-# (s): some programs always send TNS 0.
+# A node does not forward a packet that is among this number of last packets heard (1763-RM001C).
+# Older packets (s) are ignored, because some programs always send TNS 0.
 _MOST_HEARD = 20
 _RECENT = 10.0
 
 # Most packets of ours that are remembered: nodes may forward them back to us.
 _MOST_SENT = 256
 
-# Most replies and forwarded packets that wait for a quiet line; the newest are dropped.
+# Most replies and forwarded packets that wait for a quiet line. Further packets are dropped.
 _MOST_WAITING = 16
 
 # The random time before the first try is at most the line time of our frame. This limit doubles
 # with each further try, up to this many times its first value.
 _MOST_BACK_OFF = 8
 
-# Longest wait (s) for a quiet line; then the node sends all the same.
+# Longest wait (s) for a quiet line. After it the node sends, even if the line is not quiet.
 LONGEST_WAIT = 2.0
 
-# Characters of a command that reads, and of the longest packet.
+# Characters of a read command, and of the longest packet.
 _SHORT_FRAME, _LONG_FRAME = 24, MAX_LINK_DATA + 8
 
 # Interval (s) at which a node that waits for replies looks for commands to other stations.
@@ -95,7 +95,7 @@ MOST_UNDER_WAY = 4
 
 @dataclass(slots=True)
 class _Executed:
-    """A command for us, when it came and was answered last (clock values in s), our reply."""
+    """A command for us, our reply, and when it came and was last answered (clock values in s)."""
 
     command: Packet
     when: float
@@ -149,7 +149,7 @@ class RadioNode(EqualNode):
 
     def _forget(self) -> None:
         self._waiting: deque[bytes] = deque()  # link data to be sent
-        self._heard: deque[tuple[bytes, float]] = deque(maxlen=_MOST_HEARD)  # and when
+        self._heard: deque[tuple[bytes, float]] = deque(maxlen=_MOST_HEARD)  # and when heard
         self._executed: defaultdict[int, deque[_Executed]] = defaultdict(
             lambda: deque(maxlen=MOST_UNDER_WAY))  # by SRC
         self._under_way: dict[int, _SentCommand] = {}  # by station
@@ -168,7 +168,8 @@ class RadioNode(EqualNode):
 
     def _work(self, source: TaskSource) -> Procedure:
         while True:
-            # In turns, or one kind could keep the rest waiting for ever.
+            # Packets, repetitions and new commands take turns, so that none of them waits for
+            # ever.
             if self._waiting:
                 yield from self._send(self._waiting.popleft())
             if (command := self._overdue()) is not None:
@@ -184,12 +185,12 @@ class RadioNode(EqualNode):
         return len(self._under_way) < self._most_under_way
 
     def _overdue(self) -> _SentCommand | None:
-        """Return the command whose reply is overdue for the longest time, None for none."""
+        """Return the command whose reply has been overdue longest, None if no reply is overdue."""
         first = min(self._under_way.values(), key=lambda command: command.deadline, default=None)
         return first if first and first.deadline <= self._machine.now else None
 
     def _rest(self, source: TaskSource) -> Step:
-        """Return the step up to the next moment at which something is due."""
+        """Return the step that waits until a command is overdue or a task is due."""
         if not self._under_way:
             due = source.next_due()
             return Rest(None if due is None else max(due - self._machine.now, 0.0))
@@ -198,10 +199,10 @@ class RadioNode(EqualNode):
         return Listen(min(left, _TICK) if self._has_room else left)
 
     def _begin(self, task: Task) -> Procedure:
-        """Send a command the first time; a broadcast ends by that."""
+        """Send a command the first time; a broadcast is complete then."""
         number = task.command.dst
         self._accounting.sent(task.command)
-        # A station that did not answer last time gets one try, not a whole cycle of them.
+        # A station that did not answer last time, or may be absent, gets one try without retries.
         station = self._stations[number]
         keeps_others_waiting = self._most_under_way == 1
         is_once = not station.active or (
@@ -214,7 +215,7 @@ class RadioNode(EqualNode):
             task.reply(task.command.reply())
 
     def _try(self, command: _SentCommand) -> Procedure:
-        """Send a command, or once more; end it after the last try, or when it is too old."""
+        """Send a command, or repeat it; end it after the last try, or when it is too old."""
         task, number = command.task, command.task.command.dst
         if command.tries == command.most:
             del self._under_way[number]
@@ -238,7 +239,7 @@ class RadioNode(EqualNode):
         command.deadline = self._machine.sender.free_at + self._settings.cmd_timeout
 
     def _send(self, data: bytes, command: _SentCommand | None = None) -> Procedure:
-        """Send link data when the line is quiet, but no command that has its reply by then."""
+        """Send link data when the line is quiet, unless their command has ended by then."""
         frame = frames.message_frame(data, self._settings.checksum)
         yield from self._wait_for_quiet(len(frame), command)
         expires = math.inf
@@ -255,12 +256,12 @@ class RadioNode(EqualNode):
             self._counters.messages_sent -= 1
             raise
         self._hear(symbol)
-        # Nothing of ours follows before it has left.
+        # We send nothing more before this frame has left.
         while (left := self._machine.sender.free_at - self._machine.now) > 0:
             self._hear((yield Listen(left)))
 
     def _wait_for_quiet(self, size: int, command: _SentCommand | None) -> Procedure:
-        """Wait until a frame of ``size`` characters may go, or its command has had its reply."""
+        """Wait until a frame of ``size`` characters may be sent, or its command has ended."""
         machine = self._machine
         if self._settings.avoids_collisions:
             return
@@ -337,13 +338,13 @@ class RadioNode(EqualNode):
             command.is_doubtful = True
 
     def _take_command(self, command: Packet) -> None:
-        """Execute a command once, and give its reply once more when it is repeated."""
+        """Execute a command once; when it is repeated, send its reply again."""
         now, executed = self._machine.now, self._executed[command.src]
         known = next((entry for entry in executed if entry.command == command
                       and now - entry.when < self._repetition_time), None)
         if known is not None:
             self._counters.duplicate_messages += 1
-            # A forwarded packet comes soon after the first; a repetition comes later.
+            # A forwarded packet comes soon after the original packet; a repetition comes later.
             if now - known.answered > self._settings.cmd_timeout / 2:
                 known.answered = now
                 self._answer(known.reply)
@@ -366,7 +367,7 @@ class RadioNode(EqualNode):
         return len(self._waiting) >= _MOST_WAITING
 
     def _put(self, data: bytes) -> None:
-        """Let link data wait for the line."""
+        """Add link data to the queue for the line, if there is room."""
         if self._is_full:
             self._counters.refused_for_memory += 1
         else:
@@ -401,7 +402,7 @@ class RadioMode(LineMode):
     why_unshared = 'in Mode Radio it has not been tried'
 
     def pause(self, line: LinkSettings) -> float:
-        """Return how long a first try waits for a quiet line, mostly."""
+        """Return how long a first try usually waits for a quiet line."""
         if line.avoids_collisions:
             return 0.0
         timing = line.timing
@@ -413,7 +414,7 @@ class RadioMode(LineMode):
 
     def longest_transaction(self, line: LinkSettings, frames: float = 0.0, others: float = 0.0,
                             stations: int = 0) -> float:
-        """Return the same with the longest frames that exist."""
+        """Return the longest time of a transaction, computed with the longest possible frames."""
         char_time = line.timing.char_time
         frame = _LONG_FRAME * char_time
         # An incoming message is heard to its end, also if it breaks off.
@@ -426,7 +427,7 @@ class RadioMode(LineMode):
 
     def undisturbed(self, line: LinkSettings, frames: float, response_time: float,
                     others: float = 0.0, stations: int = 0) -> float:
-        """Return the same with the longest random pause before a first try."""
+        """Return the time of the base class, plus the longest random pause before a first try."""
         chance = 0.0 if line.avoids_collisions else MIN_RESPONSE_TIME + frames
         return super().undisturbed(line, frames, response_time) + chance
 
@@ -436,11 +437,11 @@ class RadioMode(LineMode):
 
     def last_tries(self, line: LinkSettings, frames: Sequence[float],
                    answer_within: float) -> float:
-        """Return it with Cmd_Timeout for each: a reply may come as late as that."""
+        """Return the time with Cmd_Timeout for each command: a reply may come that late."""
         return (1 + len(frames)) * self.longest_probe(line) + sum(frames)
 
     def longest_probe(self, line: LinkSettings) -> float:
-        """Return how long one command takes that is not answered."""
+        """Return the time of one command without a reply."""
         return line.cmd_timeout + self.pause(line)
 
 

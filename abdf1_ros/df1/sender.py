@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The bytes that go out on a line: at once or in portions, until when, and what has left."""
+"""Send bytes on a line, at once or in portions, and know which bytes have left."""
 
 from __future__ import annotations
 
@@ -30,13 +30,13 @@ Reflex = Callable[[Symbol], bytes]
 
 
 class Outlet(Protocol):
-    """Where bytes leave: the port."""
+    """The port, to which bytes are written."""
 
     def write(self, data: bytes) -> None:
         """Put bytes on the line, after all earlier bytes."""
 
     def unsent(self) -> int:
-        """Return how many bytes have still to leave, as far as this is known."""
+        """Return how many written bytes have not left yet, as far as this is known."""
 
 
 class Sender:
@@ -47,12 +47,11 @@ class Sender:
     ``data_to_send``.
 
     - ``position``: number of bytes given out so far.
-    - ``free_at``: when they have left, by their number (clock value in s).
+    - ``free_at``: when they have left, computed from their number (clock value in s).
     - ``embeds``: the far end embeds responses. A long message is then given out in portions, and a
-      response goes between two of them (M 4-3). Products do the same with Embedded Responses =
+      response is sent between two portions (M 4-3). Products do the same with Embedded Responses =
       Auto-detect.
-    - ``send_before``: clock value (s) after which ``withdraw`` is due in place of
-      ``data_to_send``.
+    - ``send_before``: clock value (s). After it, call ``withdraw`` in place of ``data_to_send``.
     """
 
     def __init__(self, checksum: Checksum, duplex: Duplex, char_time: float,
@@ -66,8 +65,8 @@ class Sender:
         self._counters = counters
         self.begin(-math.inf, None)
         self.waiting = b''
-        self._fresh = b''  # the last of it, which must leave before ``send_before``
-        self._ahead = b''  # on the line by reflex, and not yet sent by the procedure
+        self._fresh = b''  # the last frame of ``waiting``, to be sent before ``send_before``
+        self._ahead = b''  # sent by a reflex, but not yet by the procedure
 
     def begin(self, now: float, outlet: Outlet | None) -> None:
         """Begin on a line that is free."""
@@ -83,7 +82,7 @@ class Sender:
         self.echo.forget()
 
     def put(self, frame: bytes, now: float, expires: float = math.inf) -> None:
-        """Send a frame after all waiting bytes, unless it has gone by reflex."""
+        """Send a frame after all waiting bytes, unless a reflex has sent it already."""
         free = max(now, self.free_at)
         is_alone = not self.outgoing.size
         self._fresh = frame
@@ -101,13 +100,13 @@ class Sender:
         self.echo.sent(frame, self.position)
 
     def _given_out(self, frame: bytes, free: float) -> bytes:
-        """Return the part of a frame that goes out at once; the line is busy until ``free``."""
+        """Return the part of a frame to send at once; the line is busy until ``free``."""
         if self.outgoing.can_embed and frame in (ACK, NAK):
             return frame  # after the portion of our message on the line, before the rest of it
         return self.outgoing.put(frame, free)
 
     def react(self, reflex: Reflex, symbol: Symbol) -> None:
-        """Send the answer of a reflex to a symbol, unless other bytes still have to go out."""
+        """Send the answer of a reflex to a symbol, unless other bytes still have to be sent."""
         if not self.waiting and not self.outgoing.size and (frame := reflex(symbol)):
             self._ahead = frame
             self._write(frame)
@@ -140,7 +139,7 @@ class Sender:
 
     @property
     def still_here(self) -> int:
-        """Return how many bytes have still to leave, as far as the outlet knows."""
+        """Return how many bytes have not left yet, as far as the outlet knows."""
         return self.outgoing.size + len(self.waiting) + self._unsent()
 
     def has_left(self, position: int) -> bool:

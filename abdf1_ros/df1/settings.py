@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The settings of a link, of all modes; each link takes those it needs. Times are in seconds."""
+"""The settings of links of all modes; each link uses some of them. Times are in seconds."""
 
 from __future__ import annotations
 
@@ -28,9 +28,9 @@ class PollingSettings:
     """
     How stations are polled.
 
-    ``priority`` and ``normal`` are the poll lists; ``group_size`` normal stations are polled
-    in a scan, 0 for all. With ``multiple`` a station is polled until it has no more messages. With
-    ``in_sequence`` commands wait until the master's own address comes up.
+    ``priority`` and ``normal`` are the poll lists; ``group_size`` stations of the normal list are
+    polled in a scan, 0 for all. With ``multiple`` a station is polled until it has no more
+    messages. With ``in_sequence`` commands wait until the scan reaches the master's own address.
     """
 
     normal: tuple[int, ...]
@@ -61,7 +61,7 @@ class LinkOptions:
 
     eot_suppression: bool = False
     """
-    A slave without a message does not answer a poll. To the master it looks like a dead station.
+    A slave without a message does not answer a poll. For the master it looks like a dead station.
     """
 
     poll_timeout: float = 60.0
@@ -98,14 +98,14 @@ class LinkSettings(LinkOptions):
 
     queue_size: int = 4
     """
-    Number of replies of a slave that may wait for a poll; then the slave takes no more commands.
+    Most replies of a slave that wait for a poll. With this number it accepts no commands.
     """
 
     store_forward: Collection[int] = ()
     """A radio modem node forwards packets between these nodes; 255 stands for broadcasts."""
 
     also: Collection[int] = ()
-    """Further numbers of a radio modem node: one node may stand for several simulated PLCs."""
+    """Further numbers of a radio modem node, which may simulate several PLCs."""
 
     avoids_collisions: bool = False
     """The radios wait for a quiet line and buffer both directions, so we need not wait."""

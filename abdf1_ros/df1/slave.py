@@ -85,11 +85,12 @@ class HalfDuplexSlave:
     One station on a half-duplex line.
 
     ``serve`` executes a command and returns its reply. It is called after the command has been
-    accepted, once for each command, never for a repetition. ``initiator`` has commands of its
-    own to send, if there are any; ``report`` gets the faults of messages for us.
+    accepted, once for each command, never for a repetition. ``initiator`` gives the commands that
+    this station sends, if there are any. ``report`` gets the faults of messages for us.
 
-    A stored message may be acknowledged before it is executed (KF2 4-31). So a caller with a line
-    sends the bytes of ``respond`` first, and then calls ``make_use``; ``handle`` does both.
+    A stored message may be acknowledged before it is executed (KF2 4-31). So a caller that has a
+    line sends the bytes of ``respond`` first, and then calls ``make_use``. ``handle`` does both
+    without a line.
     """
 
     def __init__(self, settings: LinkSettings, serve: Callable[[Packet], Packet],
@@ -114,7 +115,7 @@ class HalfDuplexSlave:
         return response
 
     def respond(self, symbol: Symbol) -> bytes:
-        """Return the same bytes, and leave the message of the symbol to ``make_use``."""
+        """Return the bytes that answer a symbol, and leave its message to ``make_use``."""
         just_sent, self._just_sent = self._just_sent, False
         if isinstance(symbol, Poll):
             return self._polled(symbol)
@@ -128,7 +129,7 @@ class HalfDuplexSlave:
             self.counters.naks_received += 1
             self._report(Event(Message.NTC_RCVD_NAK_SYMBOL))
             self._release(LineReset())
-            self._queue.clear()  # the reset of the whole line (M 2-7, 3-11)
+            self._queue.clear()  # a NAK resets all slaves of the line (M 2-7, 3-11)
         elif symbol is Control.EOT:
             self.counters.eots_received += 1
         elif isinstance(symbol, Unknown) and not symbol.is_misplaced:
@@ -136,7 +137,7 @@ class HalfDuplexSlave:
         return b''
 
     def reset(self) -> None:
-        """Forget all messages to send and the last one heard."""
+        """Forget all messages to send, and the last message heard."""
         self._held, self._last_key = None, None
         self._just_sent, self._sent_reply, self._unused = False, True, None
         self._queue.clear()
@@ -156,7 +157,7 @@ class HalfDuplexSlave:
         return self._just_sent and self._held is not None and not self._held.packet.is_reply
 
     def take_back(self) -> bool:
-        """Forget a command that was given and has not left; return True if it had left earlier."""
+        """Take back a command before it is sent; return True if an earlier try was sent."""
         held, self._held, self._just_sent = self._held, None, False
         assert held is not None
         was_sent = held.sent > 1
@@ -247,7 +248,8 @@ class HalfDuplexSlave:
         """
         Return a reply that waits, or a command of our own.
 
-        They take turns, or a master that always has a reply to fetch would never get our commands.
+        Replies and commands take turns. Otherwise a master that always has a reply to fetch would
+        never get our commands.
         """
         if self._sent_reply or not self._queue:
             command = self._initiator.next_command()
@@ -271,7 +273,7 @@ class HalfDuplexSlave:
 
 
 class Responder(Protocol):
-    """Anything that answers symbols on a line: a slave, or one that misbehaves on purpose."""
+    """A party that answers symbols on a line: a slave, or a test slave with wrong behaviour."""
 
     def handle(self, symbol: Symbol) -> bytes:
         """Return the bytes to send in answer to ``symbol``."""
@@ -283,8 +285,8 @@ def answer(machine: Machine, symbol: Symbol, handle: Callable[[Symbol], bytes],
     """
     Send the answer of ``handle`` to ``symbol`` after TX_Delay; meanwhile call ``look`` repeatedly.
 
-    ``expires`` returns the clock value (s) after which an answer must not leave; then
-    CommandExpired is raised.
+    ``expires`` returns the clock value (s) after which an answer must not be sent. If it is too
+    late, CommandExpired is raised.
 
     A master that has sent another symbol does not wait for the old answer any more. It would
     relate the old answer to the new symbol. So a poll or a message is ignored if another symbol
@@ -296,7 +298,8 @@ def answer(machine: Machine, symbol: Symbol, handle: Callable[[Symbol], bytes],
         if _wants_answer(symbol):
             heard = yield from _next_within(machine, machine.timing.tx_delay, look)
         if heard is None and (data := handle(symbol)):
-            # At once, except an answer with an age: the caller that has the port checks it.
+            # An answer with a time limit waits until the caller, who has the port, has checked the
+            # limit.
             limit = expires()
             after = yield Send(
                 data, 0 if limit == math.inf else MOMENT, expires=limit, at_once=True)
@@ -321,7 +324,7 @@ def _next_within(machine: Machine, seconds: float,
 
 
 def multidrop(stations: Sequence[Responder]) -> Callable[[Machine], Procedure]:
-    """Return the procedure of a machine that is all of ``stations`` on one line."""
+    """Return the procedure of a machine that answers as all ``stations`` of a line."""
     def handle(symbol: Symbol) -> bytes:
         return b''.join(station.handle(symbol) for station in stations)
 

@@ -15,9 +15,9 @@
 """
 A slave with a driver: it serves the master, and sends commands when it is polled.
 
-The master passes its commands on to other stations, and their replies back. Nothing is sent before
-a poll. If no poll has come for the poll timeout, all waiting commands fail, so that no old command
-is sent when the polls come back.
+The master passes commands of the slave on to other stations, and passes their replies back.
+Nothing is sent before a poll. If no poll has come for the poll timeout, all waiting commands fail,
+so that no old command is sent when the polls come back.
 """
 
 from __future__ import annotations
@@ -42,8 +42,8 @@ class SlaveLink(Link, Initiator):
     """
     Serve the master on the line of ``machine``, and send the commands of a source.
 
-    After the master has taken a command, the link waits Cmd_Timeout for its reply. Before that the
-    command waits for the next poll, also Cmd_Timeout at most. ``serve`` and ``report`` are the
+    A command waits for the next poll, at most Cmd_Timeout. After the master has acknowledged the
+    command, the link waits at most Cmd_Timeout for the reply. ``serve`` and ``report`` are the
     same as in every link. The link is the ``Initiator`` of its own slave. ``last_poll`` is the
     clock value (s) of the last poll, or of the start.
     """
@@ -73,7 +73,7 @@ class SlaveLink(Link, Initiator):
         self.last_poll = self._machine.now
         next_look = self._machine.now + TICK
         while True:
-            # At a fixed time, not after a pause: the line may never be quiet.
+            # Look at fixed times, not after a pause, because the line may never be quiet.
             symbol = yield Rest(max(0.0, next_look - self._machine.now))
             if not isinstance(symbol, Silence):
                 try:
@@ -87,7 +87,7 @@ class SlaveLink(Link, Initiator):
                 next_look = self._machine.now + TICK
 
     def _serve_own(self, command: Packet) -> Packet:
-        """Execute a command for us; refuse one for a node behind us: we are not a gateway."""
+        """Execute a command for us; refuse a command for another node: we are not a gateway."""
         if command.dst in (self._settings.station, BROADCAST):
             return self._serve(command)
         self._accounting.misdirected(command)
@@ -99,7 +99,7 @@ class SlaveLink(Link, Initiator):
         return math.inf if entry is None or not self._slave.gives_command else entry.task.expires
 
     def _take_back(self, error: CommandExpired) -> None:
-        """End a command that was too old when the port was free for it."""
+        """End a command that was too old at the moment at which it could be sent."""
         was_sent = self._slave.take_back()
         entry = self._end()
         if entry is not None:
@@ -111,7 +111,7 @@ class SlaveLink(Link, Initiator):
         entry = self._outstanding
         if entry is None or entry.is_delivered:
             return
-        # A command that is not repeated must not wait until a master comes back.
+        # The command ends Cmd_Timeout after the last poll, so it does not wait for a master.
         entry.deadline = self.last_poll + self._settings.cmd_timeout
         if self.last_poll > entry.task.expires:
             self._end()
@@ -130,7 +130,7 @@ class SlaveLink(Link, Initiator):
         return task.command
 
     def delivered(self, command: Packet) -> None:
-        """Begin to wait for the reply, where there will be one."""
+        """Begin to wait for the reply; a broadcast has none and is complete."""
         entry = self._outstanding
         if entry is None:
             return
@@ -142,7 +142,7 @@ class SlaveLink(Link, Initiator):
         entry.deadline = self._machine.now + self._settings.cmd_timeout
 
     def undelivered(self, command: Packet, error: LinkError) -> None:
-        """Fail the command that the master did not take."""
+        """Fail the command that the master did not acknowledge."""
         entry = self._end()
         if entry is not None:
             entry.task.fail(error)
@@ -152,16 +152,17 @@ class SlaveLink(Link, Initiator):
         entry = self._outstanding
         if entry is None or not reply.answers(entry.task.command):
             if entry is not None and reply.src == entry.task.command.dst:
-                self._slave.forget_last()  # the right reply may follow with the same numbers
+                # the right reply may follow with the same SRC, CMD and TNS
+                self._slave.forget_last()
             self._accounting.unexpected(reply, self._machine.now)
             return
-        self._end()  # also if the master's ACK got lost: the master has had the command
+        self._end()  # even if the master's ACK got lost, because the master has had the command
         if not is_local_status(reply.sts):
             self._stations.heard(reply.src, self._machine.now)
         self._accounting.complete(entry.task, reply, keeps_others_waiting=True)
 
     def _look_after(self, source: TaskSource) -> None:
-        """End what is overdue."""
+        """End a command that is overdue; without polls, end all commands."""
         now = self._machine.now
         entry = self._outstanding
         is_overdue = entry is not None and now >= entry.deadline
@@ -170,14 +171,14 @@ class SlaveLink(Link, Initiator):
             self._fail()
         if not is_alone:
             return
-        waiting = []  # first take all commands: a read that fails is soon due again
+        waiting = []  # take all commands first, because a read that fails is soon due again
         while (task := source.next_task(now)) is not None:
             waiting.append(task)
         for task in waiting:
             task.fail(CommandTimeout())
 
     def _end(self) -> Outstanding | None:
-        """Return the command that is out; it is not sent again."""
+        """Forget and return the command that waits for a poll or reply; do not send it again."""
         entry, self._outstanding = self._outstanding, None
         self._slave.withdraw()
         return entry

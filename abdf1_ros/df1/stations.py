@@ -28,7 +28,8 @@ MAX_STATION = 254
 # Number of commands in a row without a reply in time after which a station is treated as silent.
 MOST_OVERDUE = 2
 
-# Number of returns, without a reply to a command, after which a return does not end an outage.
+# Number of times that a station may become active again without a reply to a command. After that,
+# a return does not end its outage.
 _MOST_RETURNS = 2
 
 
@@ -40,15 +41,15 @@ class Station:
     - ``last_heard``: clock value (s) of the last answer of any kind, None before the first.
     - ``last_key``: DST and duplicate key of the last message accepted. DST is part of it because
       replies to two nodes that we pass on may have the same TNS.
-    - ``last_refused``: link data of the last message whose addresses cannot be right.
+    - ``last_refused``: link data of the last message that was refused because of its addresses.
     - ``overdue``: number of commands in a row that were delivered, not answered within
       Cmd_Timeout, and kept other commands waiting.
-    - ``unanswered``: the same, whether other commands waited or not.
+    - ``unanswered``: the same number, but it also counts commands that kept no others waiting.
     - ``local_status``: STS of the last reply if a gateway sent it for the station; 0 if the
       station replied itself.
     - ``returns``: how often the station has become active again since its last reply to a command.
-    - ``other_number``: of a gateway, the DST of its last reply that had neither our number nor its
-      own.
+    - ``other_number``: for a gateway, the DST of its last reply with a DST that was neither our
+      number nor the gateway's.
     """
 
     number: int
@@ -79,7 +80,7 @@ class Station:
 
     @property
     def takes_no_commands(self) -> bool:
-        """Tell whether the station comes and goes: it answers polls, but no command."""
+        """Tell whether the station becomes active repeatedly, but never replies to a command."""
         return self.returns >= _MOST_RETURNS
 
     def note_new(self, packet: Packet) -> bool:
@@ -96,7 +97,7 @@ class Station:
 
 
 class _Records(dict[int, Station]):
-    """The records of stations, each made when it is first asked for."""
+    """The records of stations; a record is made when it is first used."""
 
     def __missing__(self, number: int) -> Station:
         """Return a new record."""
@@ -105,18 +106,18 @@ class _Records(dict[int, Station]):
 
 class ActiveStationList:
     """
-    All stations the master talks to.
+    All stations to which we send commands.
 
     Every station counts as active at start (S0). ``on_change`` is called with a station of the
-    list whenever it becomes active or inactive. A station outside of the list also has a record if
-    a slave sends it a message. No message can put such a station into the list.
+    list whenever it becomes active or inactive. A station that is not in the list also gets a
+    record if a slave sends it a message. A message never adds a station to the list.
 
-    ``records`` has the record of every station, of the list or not, by number. ``routes`` gives
-    the gateway to a station, by number: the gateway is polled in place of the station (M 3-7), and
-    none of its stations is active while the gateway is not. ``probes`` decides when silent
-    stations may be asked. A probe takes ``probe_time`` seconds; if no station answers, ``rest``
-    seconds pass between two probes. ``took`` returns for how much of the time between two clock
-    values (s) this process has run.
+    ``records`` has the record of every station by number, whether it is in the list or not.
+    ``routes`` gives the gateway to a station, by number: the gateway is polled in place of the
+    station (M 3-7). While the gateway is inactive, all its stations are inactive. ``probes``
+    decides when silent stations may be asked. A probe takes ``probe_time`` seconds; if no station
+    answers, ``rest`` seconds pass between two probes. ``took`` returns for how much of the time
+    between two clock values (s) this process has run.
     """
 
     def __init__(self, numbers: Iterable[int] = (),
@@ -138,7 +139,7 @@ class ActiveStationList:
 
     def add(self, numbers: Iterable[int], *, are_polled: bool = False) -> None:
         """
-        Take stations into the list.
+        Add stations to the list.
 
         If the link polls them all the time, they need no probes.
         """
@@ -155,7 +156,7 @@ class ActiveStationList:
         return number in self._stations
 
     def __getitem__(self, number: int) -> Station:
-        """Return the record of a station (0-254), of the list or not."""
+        """Return the record of a station (0-254), whether it is in the list or not."""
         return self.records[number]
 
     def via(self, number: int) -> int:
@@ -167,7 +168,7 @@ class ActiveStationList:
         return [number, *(station for station, via in self.routes.items() if via == number)]
 
     def heard(self, number: int, now: float) -> None:
-        """Record an answer of any kind: the station is active, with a gateway all behind it."""
+        """Record any answer: the station is active; if its gateway was not, all behind it are."""
         station = self.records[number]
         station.last_heard = now
         if station.active:
@@ -182,7 +183,7 @@ class ActiveStationList:
                 self._tell(station)
 
     def lost(self, number: int, now: float) -> None:
-        """Take a station out of the active ones, with a gateway all that are behind it."""
+        """Make a station inactive; if it is a gateway, also all stations behind it."""
         for station in map(self.__getitem__, self.behind(number)):
             if station.active:
                 station.active, station.silent_since = False, now
@@ -194,7 +195,7 @@ class ActiveStationList:
         return gateway in self._polled and (gateway == number or not self.records[gateway].active)
 
     def claim_message(self, number: int, now: float) -> bool:
-        """Tell whether a message may go to a station; to a silent one in its probes' time only."""
+        """Tell whether to send a message to a station; a silent station gets it as a due probe."""
         return self[number].replies_in_time or (
             not self.is_polled(number) and self.probes.claim_message(now))
 
@@ -227,9 +228,10 @@ class ActiveStationList:
 
     def is_new(self, number: int) -> bool:
         """
-        Tell whether a station has never replied to a command, though another station has.
+        Tell whether a station has never replied to a command, but another station has.
 
-        It may be absent, so it gets one try at a time: other stations would wait for all retries.
+        The station may be absent. So it gets one try at a time, because the other stations would
+        have to wait for all retries.
         """
         return not self.records[number].replies and any(station.replies for station in self)
 

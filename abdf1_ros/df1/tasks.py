@@ -31,14 +31,13 @@ class Task(Protocol):
 
     The link ends the command by calling ``reply`` or ``fail``, once.
 
-    - ``sent``: set by the link when the command has been on the line. Without a reply its outcome
-      is then unknown.
+    - ``sent``: set by the link when the command may have been on the line. If no reply comes then,
+      it is unknown whether the command was executed.
     - ``reply_size``: bytes after the header of a good reply, 0 if unknown.
     - ``expires``: clock value (s) after which the command is neither sent nor repeated.
-    - ``blames``: a failure says something about the station. The failure of a guest's command does
-      not.
-    - ``is_own``: a heartbeat or a fallback, which no message has asked for. It goes to an inactive
-      station once, without a poll before it.
+    - ``blames``: a failure counts against the station. This is False for commands of guests.
+    - ``is_own``: a heartbeat or a fallback, which no message has asked for. It is sent to an
+      inactive station once, without a poll before it.
     - ``answer_within``: most seconds that the link waits for the answer of an inactive station.
     """
 
@@ -63,8 +62,8 @@ class Outstanding:
     A task whose command is on its way or waits for its reply.
 
     ``deadline`` is when the reply is overdue (clock value in s), counted from the delivery
-    (``is_delivered``); before the delivery each kind of link decides. ``passed_over`` counts other
-    messages that came in place of the reply.
+    (``is_delivered``). Before the delivery, its value depends on the kind of link. ``passed_over``
+    counts other messages that came in place of the reply.
     """
 
     task: Task
@@ -77,7 +76,7 @@ class TaskSource(Protocol):
     """The source of the tasks of a link; this base class has none."""
 
     def next_task(self, now: float, busy: Container[int] = ()) -> Task | None:
-        """Return the next task, not for a ``busy`` station; None for none."""
+        """Return the next task that is not for a ``busy`` station, or None."""
         return None
 
     def next_due(self) -> float | None:
