@@ -13,11 +13,12 @@
 # limitations under the License.
 
 """
-Ports, and the thread that runs a link on one: the only room that waits for bytes.
+Ports, and the thread that runs a link on a port. Only this package waits for bytes.
 
-Begin with ``link_thread``. ``opening`` opens what a net file names: ``serial_device``, or a device
-server (``socket_port``, ``rfc2217_port``). ``ownership`` says who has a line, ``wake`` ends a wait
-from another thread, ``trace`` records bytes, ``tap`` listens, ``endpoints`` are ends that we make.
+Begin with ``link_thread``. ``opening`` opens the port that a net file names: a ``serial_device``,
+or the port of a device server (``socket_port``, ``rfc2217_port``). ``ownership`` allows one
+program for each line. ``wake`` ends a wait from another thread. ``trace`` records bytes, ``tap``
+listens, and ``endpoints`` makes ends of lines.
 
-No protocol lives here: a machine of ``df1`` gets the bytes and the time.
+There is no protocol here: a machine of ``df1`` gets the bytes and the time.
 """

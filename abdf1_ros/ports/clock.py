@@ -19,7 +19,7 @@ from __future__ import annotations
 from functools import partial
 import time
 
-# Seconds that never go back, and also count while the host sleeps. A monotonic clock stops during
-# a suspend: a command from before would seem young after it. Values of this clock are compared
+# Seconds that never go back, and that also count while the host sleeps. A monotonic clock stops
+# during a suspend, so after it an old command would seem recent. Values of this clock are compared
 # only with each other.
 line_time = partial(time.clock_gettime, time.CLOCK_BOOTTIME)

@@ -15,7 +15,7 @@
 """
 Ports with a file descriptor: serial device, pseudo-terminal, or network connection.
 
-They are read with poll(2) and read(2), which costs a half to a tenth of pyserial's own read.
+They are read with poll(2) and read(2). This costs a half to a tenth of a read by pyserial.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ from typing import Protocol
 _INT = struct.Struct('i')
 
 READ_SIZE = 512
-"""Most bytes of one read. A line brings fewer bytes while its thread sleeps."""
+"""Most bytes of one read. Fewer bytes arrive while the thread of a line sleeps."""
 
 _WRITE_TIMEOUT = 2.0
 
@@ -69,10 +69,10 @@ class Port(Protocol):
         """Return how many written bytes have not been sent yet, 0 if unknown."""
 
     def errors(self) -> dict[str, int]:
-        """Return what a UART has counted since the port was opened; empty if none counts."""
+        """Return the error counts of the UART since the port was opened; empty if it has none."""
 
     def close(self) -> None:
-        """Give the line back."""
+        """Close the port, so that other programs may open it."""
 
 
 class PortAround:
@@ -163,7 +163,7 @@ class DescriptorPort:
         """Return how many bytes the operating system still has."""
         try:
             answer = fcntl.ioctl(self._descriptor, termios.TIOCOUTQ, bytes(_INT.size))
-        except OSError:  # the driver of this device does not know it
+        except OSError:  # the driver of this device has no such request
             return 0
         count: int = _INT.unpack(answer)[0]
         return count

@@ -35,13 +35,13 @@ from abdf1_ros.ports.settings import PortSettings
 
 _PTYS = '/dev/pts/'
 
-_GLANCE = 0.2  # for a client (s)
+_GLANCE = 0.2  # s; longest wait for a client in ``open``
 
 # A client that has sent nothing for this time (s) loses its place to the next client.
 _SILENT = 30.0
 
-# If a client has vanished, TCP asks it after 4 s, then every 2 s. After the third question the
-# client is gone. Bytes sent to it have to arrive within the same 10 s.
+# TCP probes a silent client after 4 s, then every 2 s. After three probes without an answer the
+# client counts as gone. Bytes sent to it have to arrive within the same 10 s.
 _TCP = socket.IPPROTO_TCP
 _OPTIONS = ((_TCP, socket.TCP_NODELAY, 1), (socket.SOL_SOCKET, socket.SO_KEEPALIVE, 1),
             (_TCP, socket.TCP_KEEPIDLE, 4), (_TCP, socket.TCP_KEEPINTVL, 2),
@@ -50,16 +50,16 @@ _OPTIONS = ((_TCP, socket.TCP_NODELAY, 1), (socket.SOL_SOCKET, socket.SO_KEEPALI
 
 class Endpoint(Protocol):
     """
-    The end of a line that a link opens as its port, and opens again when it was lost.
+    The end of a line that a link opens as its port, and opens again after a loss.
 
-    ``name`` is the name that other programs use. The constructor raises OSError where it is not
-    available.
+    ``name`` is the name that other programs use. The constructor raises OSError if the
+    endpoint cannot be made.
     """
 
     name: str
 
     def open(self) -> Port:  # noqa: A003
-        """Return the port; OSError while there is none."""
+        """Return the port; raise OSError while there is none."""
 
     def close(self) -> None:
         """Remove the endpoint; the caller closes the port that ``open`` has returned."""
@@ -69,17 +69,17 @@ class PtyEndpoint:
     """
     A pseudo-terminal; ``link`` is a name for its far end.
 
-    A link that an earlier run has left is replaced; OSError if another file has the name.
+    A link that an earlier run has left is replaced. Raises OSError if another file has the name.
     """
 
     def __init__(self, link: str | None) -> None:
         self._link = Path(link) if link else None
         self._lock = _own(self._link) if self._link else None
         if self._link:
-            # Before we make a terminal: it may get the number that an old link points to.
+            # Done before we make a terminal, because it may get the number in an old link.
             _remove_left_over(self._link)
         self._ours, self._theirs = os.openpty()
-        # Both ends stay open, or a read fails whenever no client is connected.
+        # Both ends stay open. Otherwise a read fails while no client is connected.
         tty.setraw(self._theirs)
         self._target = os.ttyname(self._theirs)
         self.name = link or self._target
@@ -110,10 +110,10 @@ class PtyEndpoint:
 
 class PtyPlace(PtyEndpoint):
     """
-    A pseudo-terminal for one program at a time; bytes that a program leaves behind are dropped.
+    A pseudo-terminal for one program at a time.
 
-    These are bytes that the program has not read, and bytes that it has written shortly before
-    its end.
+    When a program ends, bytes that it has not read are dropped. So are bytes that it has written
+    shortly before its end.
     """
 
     def __init__(self, link: str) -> None:
@@ -123,7 +123,7 @@ class PtyPlace(PtyEndpoint):
         self._hangs_up.register(self._ours, 0)
 
     def open(self) -> Port:  # noqa: A003
-        """Return our end when a program has opened the far end; OSError while none has."""
+        """Return our end if a program has opened the far end; raise NoClient otherwise."""
         if self._hangs_up.poll(0):
             self._forget()
             raise NoClient
@@ -147,7 +147,7 @@ class PtyPlace(PtyEndpoint):
 
 
 def _own(link: Path) -> socket.socket:
-    """Take a link; OSError where this or another process has it."""
+    """Reserve a link; raise OSError if this or another process has it."""
     try:
         return own(link_of(str(link)))
     except OSError:
@@ -161,7 +161,7 @@ def _remove_left_over(link: Path) -> None:
 
 
 def _make_link(link: Path, target: str) -> None:
-    """Let ``link`` lead to a pseudo-terminal; OSError says why it cannot."""
+    """Make ``link`` point to a pseudo-terminal; raise OSError with the reason if it cannot."""
     try:
         link.symlink_to(target)
     except FileExistsError:
@@ -172,7 +172,7 @@ def _make_link(link: Path, target: str) -> None:
 
 
 def _target_of(link: Path) -> str:
-    """Return the target of a symbolic link, empty where there is none."""
+    """Return the target of a symbolic link, empty if there is none."""
     try:
         return os.readlink(link)
     except OSError:
@@ -184,7 +184,7 @@ class _ClientPort(DescriptorPort):
     The connection of the one client of a listening port.
 
     ``look`` is called after each read; its argument tells whether the read has brought bytes. It
-    raises OSError where another client has taken the place.
+    raises OSError if another client takes the place.
     """
 
     def __init__(self, client: socket.socket, listener: socket.socket,
@@ -208,11 +208,11 @@ def _has_left(client: socket.socket) -> bool:
 
 class TcpEndpoint:
     """
-    A listening TCP port, any that is free for 0; one client at a time is the line.
+    A listening TCP port, which one client at a time uses as a line; with 0, any free port.
 
-    A second client is closed at once, and ``tell`` is called with its address. But it takes the
-    place of a client that has sent nothing for 30 s. A client that has vanished is missed within
-    10 s. ``open`` waits for a client for ``glance`` seconds.
+    The connection of a second client is closed at once, and ``tell`` is called with its address.
+    But a second client takes the place of a client that has closed, or has sent nothing for 30 s.
+    The loss of a client is noticed within 10 s. ``open`` waits ``glance`` seconds for a client.
     """
 
     def __init__(self, host: str, port: int, tell: Callable[[str], None] = lambda other: None,
@@ -223,12 +223,12 @@ class TcpEndpoint:
         self._tell = tell
         self._glance = glance
         self._next: socket.socket | None = None
-        self._heard = 0.0  # when the client has said something (s)
+        self._heard = 0.0  # when the client sent its last bytes (s)
         host, port = self._listener.getsockname()[:2]
         self.name = f'socket://[{host}]:{port}' if ':' in host else f'socket://{host}:{port}'
 
     def open(self) -> Port:  # noqa: A003
-        """Return the connection of a client; OSError while there is none."""
+        """Return the connection of a client; raise NoClient while there is none."""
         client, self._next = self._next, None
         if client is None:
             glance = select.poll()
@@ -244,7 +244,7 @@ class TcpEndpoint:
         return _ClientPort(client, self._listener, partial(self._look, client))
 
     def _look(self, client: socket.socket, has_said: bool) -> None:
-        """Turn another client away, or raise OSError where it takes a place that is left."""
+        """Refuse another client, or raise OSError if it takes the place of this client."""
         if has_said:
             self._heard = monotonic()
         try:
@@ -274,15 +274,15 @@ class SerialEndpoint:
     def __init__(self, settings: PortSettings) -> None:
         self.name = settings.name
         self._settings = settings
-        # Opened at once: a lost port is waited for, but a port that never existed is a mistake.
+        # Opened at once: a lost port may come back, but a port that never existed is a mistake.
         self._first: Port | None = open_port(settings)
 
     def open(self) -> Port:  # noqa: A003
-        """Return the port; from the second call on it is opened again."""
+        """Return the port, opened again from the second call on."""
         port, self._first = self._first, None
         return port or open_port(self._settings)
 
     def close(self) -> None:
-        """Close the port if no program has taken it."""
+        """Close the port if ``open`` has not returned it."""
         if self._first is not None:
             self._first.close()

@@ -31,8 +31,8 @@ from abdf1_ros.ports.descriptor import NoClient, Port, READ_SIZE
 from abdf1_ros.ports.pace import Pace
 from abdf1_ros.ports.wake import Wake
 
-# Between attempts to open a port (s). They cost almost nothing, and a person who has plugged the
-# cable in again is waiting.
+# Time (s) between attempts to open a port. An attempt costs almost nothing. A person who has
+# plugged the cable in again waits for it.
 _RETRY_PERIOD = 0.5
 
 _MAX_FAULTS = 3
@@ -40,7 +40,7 @@ _FAULT_WINDOW = 60.0
 
 _POLL_STEP = 0.001  # poll(2) counts milliseconds
 
-_PORTION = 64  # bytes of one step of work, if they come too fast
+_PORTION = 64  # most bytes of one step of work, if bytes come too fast
 
 
 class PortKind(Enum):
@@ -53,7 +53,7 @@ class PortKind(Enum):
 
 @dataclass(frozen=True, slots=True)
 class PortState:
-    """Whether the port is open, with a text to be read; ``kind`` tells more where it is not."""
+    """Whether the port is open, with a text for users; ``kind`` is the reason if it is not."""
 
     is_open: bool
     text: str
@@ -69,7 +69,7 @@ _GLANCE = 0.1
 
 
 class _Exchange:
-    """The next machine; ``is_done`` is set when it is on the line."""
+    """The next machine of a line; ``is_done`` is set when it has replaced the last machine."""
 
     def __init__(self, machine: Machine, while_sending: Callable[[], None], reopen: bool) -> None:
         self.machine = machine
@@ -79,15 +79,15 @@ class _Exchange:
         self._claim = threading.Lock()
 
     def claim(self) -> bool:
-        """Return True to the first caller only: that caller does the exchange, or withdraws it."""
+        """Return True to the first caller only, who then does the exchange or cancels it."""
         return self._claim.acquire(blocking=False)
 
 
 class _Attempt(threading.Thread):
     """
-    Open a port in a thread of its own: resolving a name may take minutes.
+    Open a port in a thread of its own, because a name server may take minutes.
 
-    ``wake`` is called at the end, unless ``abandon`` was.
+    ``wake`` is called at the end, unless ``abandon`` was called before.
     """
 
     def __init__(self, open_port: Callable[[], Port], wake: Callable[[], None]) -> None:
@@ -131,16 +131,17 @@ class LinkThread(threading.Thread):
     """
     Run ``machine`` on the port that ``open_port`` opens; open it again when it is lost.
 
-    ``on_state`` is called when the port opens, is lost, or cannot be opened (in this thread);
-    attempts to open it are ``retry_period`` seconds apart. Bytes that the machine gets now came
-    after the clock value ``came_after`` (s), when nothing was left to read. That is about
-    ``longest_wait`` s ago, as no wait takes longer. ``while_sending`` is called whenever all bytes
-    to send have been given to the port: work done then delays nothing on the line. ``on_fault`` is
-    called with an exception that is a bug; the machine starts again after it. Three within a
-    minute end the thread, and ``has_failed`` tells so.
+    ``on_state`` is called in this thread when the port opens, is lost, or cannot be opened.
+    Attempts to open it are ``retry_period`` seconds apart. ``came_after`` is the last clock value
+    (s) at which all bytes had been read: bytes that the machine gets now came later. It is at most
+    about ``longest_wait`` s ago, because no wait takes longer. ``while_sending`` is called
+    whenever all bytes to send have been given to the port, so its work does not delay the line.
 
-    ``release`` closes the port for others until ``take``. ``exchange`` puts another machine on
-    the line.
+    ``on_fault`` is called with an exception that is a bug. The machine then starts again. Three
+    such exceptions within a minute end the thread, and ``has_failed`` becomes True.
+
+    ``release`` closes the port for other programs until ``take``. ``exchange`` puts another
+    machine on the line.
     """
 
     def __init__(self, machine: Machine, open_port: Callable[[], Port], *,
@@ -167,13 +168,13 @@ class LinkThread(threading.Thread):
         self._clock = clock
         self._pace = Pace(clock, processor_clock)
         self._next: _Exchange | None = None
-        self.has_turned = True  # since a supervisor has set it to False
+        self.has_turned = True  # a supervisor sets it to False, and looks for True later
         self._stopping = False
         self._faults: deque[float] = deque(maxlen=_MAX_FAULTS)
         self._wake = Wake()
 
     def wake(self) -> None:
-        """Tell the machine, from any thread, that there may be something new to do."""
+        """Let the machine look for new work; may be called from any thread."""
         self._wake.set()
 
     def ask_to_stop(self) -> None:
@@ -182,7 +183,7 @@ class LinkThread(threading.Thread):
         self.wake()
 
     def stop(self) -> None:
-        """End the thread, finishing what it does with an error, and wait for its end."""
+        """End the thread, with an error for commands under way, and wait for its end."""
         self.ask_to_stop()
         if self.is_alive():
             self.join()
@@ -203,10 +204,10 @@ class LinkThread(threading.Thread):
     def exchange(self, machine: Machine, while_sending: Callable[[], None],
                  reopen: bool) -> bool:
         """
-        Go on with another machine, on the same port or on one that is opened for it.
+        Go on with another machine, on the same port, or with ``reopen`` on a newly opened port.
 
-        Return whether that has happened within 5 s; otherwise it will not happen any more. Called
-        from one thread only.
+        Return True if the machine is on the line within about 5 s. If not, the exchange is
+        cancelled. Called from one thread only.
         """
         exchange = _Exchange(machine, while_sending, reopen)
         self._next = exchange
@@ -215,7 +216,7 @@ class LinkThread(threading.Thread):
             not exchange.claim() and self._has_happened(exchange.is_done))
 
     def _has_happened(self, event: threading.Event) -> bool:
-        """Wait for what this thread is to do, but not longer than it runs."""
+        """Wait up to 5 s until this thread has set an event, but only while the thread runs."""
         give_up = time.monotonic() + _EXCHANGE_LIMIT
         while not event.wait(_GLANCE) and self.is_alive() and time.monotonic() < give_up:
             pass
@@ -250,7 +251,7 @@ class LinkThread(threading.Thread):
             self.state = PortState(False, 'closed')
 
     def _use_port(self) -> bool:
-        """Open the port and run on it; return False where it cannot be opened, or was lost."""
+        """Open the port and run on it; return False if it cannot be opened, or was lost."""
         asked = self._clock()
         try:
             port = self._opened_port()
@@ -265,7 +266,7 @@ class LinkThread(threading.Thread):
         return False
 
     def _opened_port(self) -> Port | None:
-        """Return the port, None when it is not wanted any more; raises OSError."""
+        """Return the port, or None if it is no longer needed; raises OSError."""
         attempt = _Attempt(self._open_port, self.wake)
         attempt.start()
         while not attempt.is_over and not self._is_interrupted:
@@ -274,7 +275,7 @@ class LinkThread(threading.Thread):
         if self._is_interrupted:
             attempt.abandon()
             return None
-        attempt.join()  # it only has to wake us
+        attempt.join()  # it has only its call of ``wake`` left to do
         self._wake.take()
         if attempt.error is not None:
             raise attempt.error
@@ -291,7 +292,7 @@ class LinkThread(threading.Thread):
             exchange.is_done.set()
 
     def _run_on(self, port: Port) -> bool:
-        """Run machines until the port has to be closed; return False where it was lost."""
+        """Run machines until the port has to be closed; return False if it was lost."""
         self._set_state(True, 'open')
         end = 'the driver is stopping'
         try:
@@ -304,17 +305,17 @@ class LinkThread(threading.Thread):
         except OSError as error:
             end = _reason(error)
             self._set_state(False, f'the port was lost: {end}')
-        except Exception as error:  # a bug must not end the bridge when it happens first
+        except Exception as error:  # the first bug must not end the bridge
             end = INTERNAL_ERROR
             self._take_fault(error)
         finally:
             self._machine.stop(PortLost(end))
             port.close()
-            self._while_sending()  # work that waited for the next frame; no frame came
+            self._while_sending()  # its work has waited for the next frame, which does not come
         return False
 
     def _serve(self, port: Port) -> None:
-        """Run the machine until something else is wanted."""
+        """Run the machine until the thread stops, the port is released, or a machine follows."""
         machine, clock = self._machine, self._clock
         sender = machine.sender
         machine.start(clock(), port)
@@ -327,7 +328,7 @@ class LinkThread(threading.Thread):
             if data:
                 port.write(data)
             self._while_sending()
-            # Bytes of a connection are read at once: they may come earlier than on a serial line.
+            # Bytes of a connection are always read at once: they may come faster than Baud.
             if port.is_terminal and (spare_time := machine.spare_time):
                 self._pause(spare_time)
             deadline, asked = machine.next_call, clock()
@@ -341,8 +342,8 @@ class LinkThread(threading.Thread):
                 raise
             now = clock()
             if deadline is not None and now >= deadline:
-                # The deadline first: after a pause of this process it is unknown whether an
-                # answer in the buffer came in time.
+                # The deadline comes before the bytes: after a pause of this process, it is unknown
+                # whether an answer in the buffer came in time.
                 machine.handle_timeout(now)
             if left or port.has_more:
                 left = self._take_portion(data, now)
@@ -364,7 +365,7 @@ class LinkThread(threading.Thread):
         machine, portion = self._machine, data[:_PORTION]
         if portion:
             machine.receive_data(portion, now)
-        # Nothing is left if all bytes were commands of a device server.
+        # There is no portion if all bytes read were commands of a device server.
         count = len(portion) or READ_SIZE
         self._rest(self._pace.rest_after(count, machine.timing.char_time, now))
         self._pace.go_on()
@@ -373,14 +374,14 @@ class LinkThread(threading.Thread):
         return data[_PORTION:]
 
     def _rest(self, seconds: float) -> None:
-        """Leave the processor to other threads, up to a deadline or a wake."""
+        """Let other threads have the processor, for some time, or until a deadline or a wake."""
         deadline = self._machine.next_call
         if deadline is not None:
             seconds = max(0.0, min(seconds, deadline - self._clock()))
         self._wake.wait(math.ceil(seconds * 1000))
 
     def _pause(self, seconds: float) -> None:
-        """Wait, but not when the port has to be closed or another one opened."""
+        """Wait, but only while the port need not be closed, or another port opened."""
         end = self._clock() + seconds
         while not self._is_interrupted and (left := end - self._clock()) > 0:
             if left < _POLL_STEP:

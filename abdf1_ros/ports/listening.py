@@ -13,10 +13,10 @@
 # limitations under the License.
 
 """
-Ports for listening only: devices opened for reading, and pairs of them.
+Ports for listening only: devices opened for reading, and pairs of such devices.
 
-No line signal is set here. The system itself raises RTS and DTR when a serial port is opened, for
-whatever program; docs/listening.md says what follows for the cable.
+This module sets no line signal. But the system itself raises RTS and DTR whenever a program opens
+a serial port. docs/listening.md says what this means for the cable.
 """
 
 from __future__ import annotations
@@ -46,14 +46,14 @@ from abdf1_ros.ports.socket_port import open_port as open_socket
 
 _SIZES = {5: termios.CS5, 6: termios.CS6, 7: termios.CS7, 8: termios.CS8}
 _PARITY = termios.PARENB | termios.PARODD
-_KEPT = termios.HUPCL  # the effect of a program's end on RTS and DTR stays as it was
+_KEPT = termios.HUPCL  # this flag stays as it was: it drops RTS and DTR when a program ends
 
 
 class _SilentPort:
     """A port to which no byte is written."""
 
     def write(self, data: bytes) -> None:
-        """Refuse: no caller may come here."""
+        """Raise OSError: no caller may write to this port."""
         raise OSError(errno.EBADF, 'the bridge only listens to this port')
 
     def unsent(self) -> int:
@@ -65,7 +65,7 @@ class ListeningDevice(_SilentPort, SerialDevice):
 
 
 class TwoPorts(_SilentPort):
-    """Two ports as one; bytes of the second one are ``SecondPort``."""
+    """Two ports as one port; bytes of the second port are ``SecondPort``."""
 
     is_terminal = True
     has_more = False
@@ -101,7 +101,7 @@ class TwoPorts(_SilentPort):
 
 
 def open_port(settings: PortSettings) -> Port:
-    """Open the port, or both, for reading only; raises OSError."""
+    """Open the port, or both ports, for reading only; raises OSError."""
     if '://' in settings.name:
         return open_socket(settings)
     with ExitStack() as stack:
@@ -116,7 +116,7 @@ def open_port(settings: PortSettings) -> Port:
 
 
 def open_device(settings: PortSettings) -> ListeningDevice:
-    """Open a device for reading, and for no other program; raises OSError."""
+    """Open a device exclusively, for reading only; raises OSError."""
     with ExitStack() as stack:
         number = device_of(settings.name)
         stack.callback(own(number).close)

@@ -30,9 +30,9 @@ class SerialPortInfo:
     """
     A serial port.
 
-    ``stable`` is a name that stays the same when adapters change places, empty where there is
-    none. ``adapter`` is the description that the adapter gives. ``may_open`` tells whether this
-    user may open the port.
+    ``stable`` is a name that stays the same when adapters change places, empty if there is none.
+    ``adapter`` is the description that the adapter gives. ``may_open`` tells whether this user may
+    open the port.
     """
 
     device: str
@@ -62,7 +62,7 @@ def _stable_names() -> dict[str, str]:
 
 
 def _has_uart(device: str) -> bool:
-    """Tell whether there is hardware: Linux has names for 32 ports that need not exist."""
+    """Tell whether a port has hardware: Linux has names for 32 ports that may not exist."""
     path = Path('/sys/class/tty', Path(device).name, 'type')
     try:
         return path.read_text(encoding='ascii').strip() != '0'

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The one way to open a port."""
+"""Open a port of any kind."""
 
 from __future__ import annotations
 
@@ -28,16 +28,16 @@ from abdf1_ros.ports.settings import PortSettings
 
 def name_port(error: OSError, name: str) -> None:
     """Give an error the name of the port, if it has none, and leave its text as it is."""
-    if error.errno is None:  # then a name alone would take the place of the text
+    if error.errno is None:  # a file name alone would replace the text of the error
         error.errno, error.strerror = EIO, error.strerror or str(error)
     error.filename = error.filename or name
 
 
 def open_port(settings: PortSettings, tell: Callable[[str], None] = lambda text: None) -> Port:
     """
-    Open a port, a serial device exclusively.
+    Open a port; a serial device is opened exclusively.
 
-    A URL is opened by the module of its scheme, where there is one. ``tell`` is called with
+    A URL is opened by the module of its scheme, if there is one. ``tell`` is called with
     settings that the port does not support, which is not an error. Raises OSError.
     """
     if settings.listens:
@@ -49,7 +49,7 @@ def open_port(settings: PortSettings, tell: Callable[[str], None] = lambda text:
     try:
         opener = import_module(module)
     except ModuleNotFoundError as error:
-        if error.name != module:  # what the scheme needs is not installed
+        if error.name != module:  # a module that the scheme needs is not installed
             raise
         return open_device(settings, tell)
     port: Port = opener.open_port(settings)

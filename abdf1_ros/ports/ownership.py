@@ -13,11 +13,11 @@
 # limitations under the License.
 
 """
-One line, one owner: which port a name means, and whether a program of this host has it.
+One owner for each line: which port a name means, and whether a program of this host has it.
 
-The system keeps a device for the program that has it open. The port of a device server is kept by
-a name in the abstract namespace of Unix sockets: it needs no file, holds between users, and ends
-with its process.
+The system reserves a device for the program that has opened it. Devices and ports of device
+servers are also reserved by a name in the abstract namespace of Unix sockets. Such a name needs no
+file, counts for all users, and ends with its process.
 """
 
 from __future__ import annotations
@@ -39,9 +39,9 @@ _LOCK = '\0abdf1_ros.port.'
 
 def line_of(port: str) -> str:
     """
-    Return the same text for all names of one port, as far as this needs no name server.
+    Return the same text for all names of one port, if no name server is needed for it.
 
-    A device is known by its number, a device server by address and port, whatever the scheme.
+    The text is the number of a device, or address and port of a device server for any scheme.
     """
     if '://' in port:
         url = urlsplit(port)
@@ -50,7 +50,7 @@ def line_of(port: str) -> str:
 
 
 def _number_of(host: str) -> str:
-    """Return the address that a host has by its name alone, otherwise the name."""
+    """Return the address of a host if it follows from the name alone, otherwise the name."""
     try:
         found = socket.getaddrinfo(host, None, flags=socket.AI_NUMERICHOST)
     except (OSError, UnicodeError):  # a name with an empty or a long part has no address
@@ -59,7 +59,7 @@ def _number_of(host: str) -> str:
 
 
 def own(name: str) -> socket.socket:
-    """Take a name of a line until the socket is closed; OSError where any process has it."""
+    """Reserve a line until the socket is closed; raise OSError if a process has it already."""
     lock = socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM)
     try:
         lock.bind(_LOCK + sha256(name.encode()).hexdigest())  # a path may be too long for a name
@@ -75,7 +75,7 @@ class OwnedConnection(socket.socket):
     _locks: ClassVar[WeakValueDictionary[str, socket.socket]] = WeakValueDictionary()
 
     def __init__(self, family: int, address: tuple[Any, ...]) -> None:
-        """Take the port; OSError where this or another program of this host has it."""
+        """Reserve the port; raise OSError if this or another program of this host has it."""
         super().__init__(family, socket.SOCK_STREAM)
         name = address_of(*address[:2])
         try:

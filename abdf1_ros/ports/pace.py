@@ -19,22 +19,23 @@ from __future__ import annotations
 from collections.abc import Callable
 import math
 
-# A useless symbol costs up to 18 us a byte. After a portion, other lines have the processor for
-# this many times as long as the portion took. The pause is at most as long as the line would have
-# needed for its bytes.
+# A useless symbol costs up to 18 us a byte. After a portion, this thread leaves the processor to
+# other lines for this many times the time that the portion took. But the pause ends when a line
+# would have transmitted the bytes.
 _OTHERS = 19
 
-_FASTEST = 10 / 115200  # s a character, where the line has no speed
+_FASTEST = 10 / 115200  # s per character, if the line has no speed
 
 
 class Pace:
     """
     The rests between the portions of a burst.
 
-    No serial line brings such a burst, but a connection to a broken or hostile server can. It
-    would take a whole processor, and keep the interpreter lock from the other lines of this
-    process. A burst that ends is worked off in the time that it would have taken on the line,
-    until ``line_until`` (clock value, s; minus infinity for no burst).
+    A serial line cannot send such a burst, but a connection to a broken or hostile server can.
+    Without rests, the burst would use a whole processor, and keep the interpreter lock from the
+    other lines of this process. A burst that ends is processed in the time that it would have
+    taken on the line. This time ends at ``line_until`` (clock value, s; minus infinity for no
+    burst).
     """
 
     def __init__(self, clock: Callable[[], float], processor_clock: Callable[[], float]) -> None:
@@ -44,7 +45,7 @@ class Pace:
         self._worked = 0.0  # processor time (s) up to the last portion
 
     def rest_after(self, count: int, char_time: float, now: float) -> float:
-        """Return how long (s) to rest after ``count`` characters that were there at ``now``."""
+        """Return how long (s) to rest after ``count`` characters that had come at ``now``."""
         if self.line_until == -math.inf:
             self.line_until = now
         self.line_until += count * (char_time or _FASTEST)
@@ -52,5 +53,5 @@ class Pace:
         return max(0.0, min(_OTHERS * used, self.line_until - self._clock()))
 
     def go_on(self) -> None:
-        """Count the processor's time for the next portion from now on."""
+        """Begin to measure the processor time of the next portion."""
         self._worked = self._processor_clock()

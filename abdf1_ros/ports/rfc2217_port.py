@@ -16,8 +16,8 @@
 Serial ports of device servers, ``rfc2217://host:port``.
 
 RFC 2217 sets speed and character format of the far port by telnet options (RFC 854, 856 and 858).
-This is a client for one connection. It keeps a suboption of some bytes at most, whatever the
-server sends.
+This is a client for one connection. It never keeps more than 300 bytes of an incomplete command,
+even if the server goes on sending.
 """
 
 from __future__ import annotations
@@ -49,7 +49,7 @@ class _Telnet(IntEnum):
 
 
 class _Option(IntEnum):
-    """Telnet options that we take part in."""
+    """Telnet options that we use."""
 
     BINARY = 0
     SUPPRESS_GO_AHEAD = 3
@@ -76,7 +76,7 @@ _PURGE_BOTH = 3
 _IAC = bytes([_Telnet.IAC])
 _NEGOTIATIONS = (_Telnet.WILL, _Telnet.WONT, _Telnet.DO, _Telnet.DONT)
 
-# Bytes of a suboption; RFC 2217 has at most 6, except for a signature.
+# Most bytes of a suboption. Those of RFC 2217 have at most 6 bytes, except a signature.
 _MOST_SUBOPTION = 300
 
 
@@ -93,7 +93,7 @@ def open_port(settings: PortSettings) -> DescriptorPort:
 
 
 class Rfc2217Port(ServerPort):
-    """The port of a device server; call ``negotiate`` first, which sets it."""
+    """The port of a device server; call ``negotiate`` first, which sets speed and format."""
 
     def __init__(self, connection: socket.socket, url: str) -> None:
         super().__init__(connection, url)
@@ -104,7 +104,7 @@ class Rfc2217Port(ServerPort):
         self._left = b''  # the beginning of an incomplete command
 
     def negotiate(self, settings: PortSettings) -> None:
-        """Set speed and character; OSError where the server does not do it within 3 s each."""
+        """Set speed and format, in two steps of at most 3 s; raise OSError if a step fails."""
         for option in sorted(self._offered):
             self._send(_Telnet.WILL, option)
         for option in sorted(self._asked):
@@ -135,9 +135,9 @@ class Rfc2217Port(ServerPort):
 
     def _wait(self, condition: Callable[[], bool], failure: str, silence: str = '') -> None:
         """
-        Take commands of the server until ``condition``; data before that are dropped.
+        Take commands of the server until ``condition`` is true; drop all data.
 
-        Raises OSError with ``failure`` after 3 s, or with ``silence`` if nothing came at all.
+        Raises OSError with ``failure`` after 3 s, or with ``silence`` if no byte came at all.
         """
         has_come = False
         give_up = time.monotonic() + _NEGOTIATION_TIMEOUT
@@ -156,7 +156,7 @@ class Rfc2217Port(ServerPort):
         return self._without_commands(self._left + data)
 
     def _without_commands(self, data: bytes) -> bytes:
-        """Carry out the commands among ``data``; return the rest, with 255 for IAC IAC."""
+        """Carry out the commands among ``data``; return the other bytes, with 255 for IAC IAC."""
         rest = bytearray()
         at = 0
         while (start := data.find(_IAC, at)) >= 0:
@@ -187,7 +187,7 @@ class Rfc2217Port(ServerPort):
             self._agree(kind, command[2])
 
     def _agree(self, kind: int, option: int) -> None:
-        """Answer an offer or a request, unless it is itself the answer to one of ours."""
+        """Refuse options that we do not use, and record whether the server accepts RFC 2217."""
         self._is_accepted |= option == _Option.COM_PORT and kind in (_Telnet.DO, _Telnet.WILL)
         if kind == _Telnet.DO and option not in self._offered:
             self._send(_Telnet.WONT, option)
@@ -208,7 +208,7 @@ class Rfc2217Port(ServerPort):
 
 
 def _size_of_command(data: bytes) -> int | None:
-    """Return the bytes of the command that ``data`` begins with; None while some are missing."""
+    """Return the size of the command at the beginning of ``data``; None if it is incomplete."""
     if len(data) < 2:
         return None
     if data[1] in _NEGOTIATIONS:

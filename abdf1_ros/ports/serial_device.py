@@ -44,18 +44,18 @@ _REASONS = {errno.EAGAIN: BUSY, errno.EBUSY: BUSY, errno.ENOTTY: NOT_SERIAL}
 
 _PARITIES = {'None': serial.PARITY_NONE, 'Even': serial.PARITY_EVEN, 'Odd': serial.PARITY_ODD}
 
-# Linux, <linux/serial.h>: struct serial_icounter_struct, and where its members are.
+# struct serial_icounter_struct of Linux, <linux/serial.h>, and the indexes of its members.
 _TIOCGICOUNT = 0x545D
 _ICOUNTER = struct.Struct('20i')
 _FRAME, _OVERRUN, _PARITY, _BUFFER_OVERRUN = 6, 7, 8, 10
 
 _PSEUDO_TERMINALS = '/dev/pts/'
 
-# How long (s) a close waits for the last bytes, and in which steps.
+# Longest time (s) that ``close`` waits for the last bytes, and the interval (s) of its looks.
 _LAST_BYTES = 1.0
 _LOOK = 0.005
 
-# Interval (s) of looks whether another program has changed the settings.
+# Interval (s) at which we check whether another program has changed the settings.
 _SETTINGS_LOOK = 1.0
 
 # The byte that the system puts before a damaged character, and doubles if it is data (PARMRK).
@@ -63,7 +63,7 @@ _MARK = 0xFF
 
 
 def is_pseudo_terminal(name: str) -> bool:
-    """Tell whether ``name``, or what it leads to, is a device without speed and parity."""
+    """Tell whether ``name``, or the target of its links, has no speed and no parity."""
     return os.path.realpath(name).startswith(_PSEUDO_TERMINALS)
 
 
@@ -97,7 +97,7 @@ def _opened(settings: PortSettings) -> serial.Serial:
             settings.name, baudrate=settings.baud, bytesize=settings.data_bits,
             parity=_PARITIES[settings.parity], stopbits=settings.stop_bits,
             rtscts=settings.handshake, exclusive=True)
-    except (OSError, ValueError, termios.error) as error:  # the last: not every device has parity
+    except (OSError, ValueError, termios.error) as error:  # termios.error: a device without parity
         if settings.parity != 'None' and is_pseudo_terminal(settings.name):
             raise OSError(errno.EINVAL, 'a pseudo-terminal has no parity: Parity None') from error
         raise OSError(*_plain(error)) from error
@@ -111,7 +111,7 @@ def _plain(error: Exception) -> tuple[object, ...]:
 
 
 def _set_options(port: serial.Serial, settings: PortSettings, tell: Callable[[str], None]) -> None:
-    """Set options of a device besides speed and character format."""
+    """Set the options of a device, apart from speed and character format."""
     if settings.low_latency:
         try:
             port.set_low_latency_mode(True)
@@ -129,7 +129,7 @@ def mark_damage(descriptor: int) -> None:
     """
     Let the system check parity, and mark characters whose parity or stop bit is wrong.
 
-    pyserial has parity sent, but not checked.
+    pyserial lets the system send parity, but not check it.
     """
     attributes = termios.tcgetattr(descriptor)
     attributes[0] |= termios.INPCK | termios.PARMRK
@@ -139,9 +139,9 @@ def mark_damage(descriptor: int) -> None:
 
 class SerialDevice(DescriptorPort):
     """
-    A serial port; with ``is_marked`` a damaged character comes alone, as ``Damaged``.
+    A serial port; with ``is_marked`` a damaged character is returned alone, as ``Damaged``.
 
-    See ``mark_damage`` for what makes the marks.
+    ``mark_damage`` lets the system make the marks.
     """
 
     def __init__(self, descriptor: int, close: Callable[[], None], *,
@@ -157,11 +157,11 @@ class SerialDevice(DescriptorPort):
     def _current_settings(self) -> list[object]:
         try:
             return termios.tcgetattr(self._descriptor)
-        except (OSError, termios.error):  # gone, which is noticed elsewhere
+        except (OSError, termios.error):  # the device is gone; the next read or write reports it
             return []
 
     def write(self, data: bytes) -> None:
-        """Send; OSError where another program has changed the settings: they are set anew then."""
+        """Send; raise OSError if another program has changed the settings, so we open again."""
         if (now := time.monotonic()) >= self._next_look:
             self._next_look = now + _SETTINGS_LOOK
             if self._current_settings() not in ([], self._settings):
@@ -212,14 +212,14 @@ class SerialDevice(DescriptorPort):
     def _counts(self) -> dict[str, int]:
         try:
             raw = fcntl.ioctl(self._descriptor, _TIOCGICOUNT, bytes(_ICOUNTER.size))
-        except (OSError, ValueError):  # the latter after the end: there is no descriptor
+        except (OSError, ValueError):  # ValueError: closed, so there is no descriptor
             return {}
         counts = _ICOUNTER.unpack(raw)
         return {'parity errors': counts[_PARITY], 'framing errors': counts[_FRAME],
                 'overruns': counts[_OVERRUN] + counts[_BUFFER_OVERRUN]}
 
     def close(self) -> None:
-        """Close the device; bytes that cannot be sent within a second are dropped (no CTS)."""
+        """Close the device; drop bytes that cannot be sent within 1 s, as without CTS."""
         give_up = time.monotonic() + _LAST_BYTES
         with suppress(OSError, termios.error):  # the device is gone
             while self.unsent() and time.monotonic() < give_up:

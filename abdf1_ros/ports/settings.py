@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The settings of a port: its name and, for a serial one, speed and character format."""
+"""The settings of a port: its name and, for a serial port, speed and character format."""
 
 from __future__ import annotations
 
@@ -32,9 +32,9 @@ class PortSettings:
 
     These are the columns of the net CSV about the port. With ``low_latency`` a USB adapter passes
     bytes on at once, instead of collecting them for up to 16 ms. ``rs485`` switches the
-    transmitter of an RS-485 port on and off with RTS. A port that supports neither is opened all
-    the same. With ``listens`` the port is opened for reading only. ``second`` is the second port
-    of a line that is heard on two ports.
+    transmitter of an RS-485 port on and off with RTS. A port that does not support one of these
+    options is opened without it. With ``listens`` the port is opened for reading only. ``second``
+    is the second port of a line that is heard on two ports.
     """
 
     name: str

@@ -15,10 +15,11 @@
 """
 Serial ports of device servers, over plain TCP: ``socket://host:port``.
 
-A network that is cut can leave a server with a connection whose end it never hears of. A server
-that takes one client then refuses all others, for ever where it has no timer. So a process
-connects again from the local port that it had: the server asks about its old connection, our host
-answers that there is none, and the server's port is free (RFC 9293, section 3.5.2).
+If a network is interrupted, a server may never learn that a connection has ended. If it accepts
+only one client, it then refuses all other clients, for ever if it has no timer. So a process
+connects again from the local port that it had before. The server then asks about its old
+connection. Our host answers that there is none, and the port of the server is free (RFC 9293,
+section 3.5.2).
 """
 
 from __future__ import annotations
@@ -33,32 +34,32 @@ from abdf1_ros.ports.descriptor import DescriptorPort
 from abdf1_ros.ports.ownership import OwnedConnection
 from abdf1_ros.ports.settings import PortSettings
 
-# An attempt to connect ends after this many seconds, so a network that heals is seen soon.
+# An attempt to connect ends after this time (s), so that we soon notice a repaired network.
 _CONNECT_TIMEOUT = 1.0
 
 # Seconds without an answer from the far host after which a TCP connection counts as lost. The
 # limit of the operating system is a quarter of an hour.
 _SILENCE_LIMIT = 5
 
-# The system does not give a local port again: another program has it, or it is not yet free.
+# Errors if we cannot have the same local port: another program has it, or it is not yet free.
 _LOCAL_PORT_TAKEN = (errno.EADDRINUSE, errno.EADDRNOTAVAIL)
 
 # Our port of the last connection to each far address.
 _local_ports: dict[tuple[object, ...], int] = {}
 
-# So many connections ended by the server, within so many seconds, have a common cause.
+# If the server ends this number of connections within this time (s), they have a common cause.
 _MOST_ENDS, _ENDS_PERIOD = 3, 10.0
 _ENDS_CAUSE = (
     f'{_MOST_ENDS} times within {_ENDS_PERIOD:.0f} s: another client has this line, or takes it '
     'each time (then let the device server refuse a second client), or the inactivity time of the '
     'server is too short')
 
-# When the server of each URL has ended our last connections.
+# By URL: the times (s) at which the server has ended our last connections.
 _ends: dict[str, deque[float]] = {}
 
 
 class ServerPort(DescriptorPort):
-    """A port of a device server: tells why the server ends one connection after the other."""
+    """A port of a device server; its error names the cause if connections end repeatedly."""
 
     def __init__(self, connection: socket.socket, url: str) -> None:
         super().__init__(connection.fileno(), connection.close)
@@ -77,7 +78,7 @@ class ServerPort(DescriptorPort):
             raise self._ended(error) from None
 
     def _ended(self, error: OSError) -> OSError:
-        """Record an end of a connection; return the error with the cause, where that is known."""
+        """Record the end of a connection; return the error, with the cause if it is known."""
         ends = _ends.setdefault(self._url, deque(maxlen=_MOST_ENDS))
         ends.append(time.monotonic())
         if error.errno == errno.ETIMEDOUT or len(ends) < _MOST_ENDS or (
@@ -108,7 +109,7 @@ def connected(url: str) -> socket.socket:
 
 
 def _connection(family: int, address: tuple[object, ...]) -> socket.socket:
-    """Connect, from the local port of before where there is one."""
+    """Connect, from the local port of the last connection to this address if there was one."""
     local = _local_ports.get(address, 0)
     try:
         connection = _connection_from(local, family, address)
@@ -121,7 +122,7 @@ def _connection(family: int, address: tuple[object, ...]) -> socket.socket:
 
 
 def _connection_from(local: int, family: int, address: tuple[object, ...]) -> socket.socket:
-    """Connect from a local port; the system chooses one for 0."""
+    """Connect from a local port; with 0, the system chooses the port."""
     connection = OwnedConnection(family, address)
     try:
         if local:
@@ -129,9 +130,9 @@ def _connection_from(local: int, family: int, address: tuple[object, ...]) -> so
             connection.bind(('', local))
         connection.settimeout(_CONNECT_TIMEOUT)
         connection.connect(address)
-        # Without the first option a short frame waits until the one before it has been
-        # acknowledged by TCP. The last option is for bytes that we send, the options between are
-        # for a line on which we only listen.
+        # Without TCP_NODELAY, a short frame waits until TCP has acknowledged the frame before it.
+        # TCP_USER_TIMEOUT is for bytes that we send. The KEEP options are for a line on which we
+        # only listen.
         for option, value in (
                 (socket.TCP_NODELAY, 1), (socket.TCP_KEEPIDLE, _SILENCE_LIMIT),
                 (socket.TCP_KEEPINTVL, 1), (socket.TCP_USER_TIMEOUT, _SILENCE_LIMIT * 1000)):

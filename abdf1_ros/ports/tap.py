@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Listen on a port, or stand between two ports and pass all bytes on."""
+"""Listen on a port, or pass all bytes on between two ports."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ from abdf1_ros.sniffer.capture import Chunk, Direction
 
 _PTY = 'pty'
 
-# Chunks that wait for the output at most: some minutes of a busy line.
+# Most chunks that wait for the output: some minutes of a busy line.
 _MOST_WAITING = 10_000
 
 _TapQueue = SimpleQueue[Chunk | OSError | None]
@@ -63,7 +63,7 @@ class _TapReader(threading.Thread):
             while not self.stopping:
                 data = self._port.read(None, self._wake)
                 if data:
-                    # Queued first, or an answer could be queued before it.
+                    # Queued before it is passed on. Otherwise an answer could be queued before it.
                     if self._heard.qsize() < _MOST_WAITING:
                         self._heard.put(Chunk(time.monotonic(), self._direction, data))
                     else:
@@ -71,16 +71,17 @@ class _TapReader(threading.Thread):
                     if self._onward is not None:
                         self._onward.write(data)
         except OSError as error:
-            # As another error: a broken pipe would look like the broken pipe of standard output.
+            # Not as BrokenPipeError, which would look like the broken pipe of standard output.
             self._heard.put(OSError(error.strerror or str(error)))
 
 
 class Tap:
     """
-    One port to listen on, or two to stand between; open while the ``with`` block runs.
+    One port to listen on, or two ports to pass bytes between; open during the ``with`` block.
 
-    A name names a port with these ``settings``; "pty" or "pty:NAME" makes a new pseudo-terminal.
-    ``names`` are the names that other programs use. Raises OSError when one cannot be opened.
+    Each of ``names`` is a port with these ``settings``; "pty" or "pty:NAME" makes a new
+    pseudo-terminal. The attribute ``names`` has the names that other programs use. Raises OSError
+    if a port cannot be opened.
     """
 
     def __init__(self, names: Sequence[str], settings: PortSettings) -> None:
@@ -115,7 +116,7 @@ class Tap:
 
     @property
     def lost(self) -> int:
-        """Return how many chunks were lost: ``chunks`` was too slow for them."""
+        """Return how many chunks were lost, because the user of ``chunks`` was too slow."""
         return sum(reader.lost for reader in self._readers)
 
     def stop(self) -> None:
@@ -127,7 +128,7 @@ class Tap:
         Yield the bytes that are received, with the seconds since the ports were opened.
 
         It ends after ``seconds`` or ``stop``. ``idle`` is called every ``period`` seconds in
-        which nothing is heard. Raises OSError when a port is lost.
+        which nothing is heard. Raises OSError if a port is lost.
         """
         end = self._begun + seconds
         while (left := end - time.monotonic()) > 0:

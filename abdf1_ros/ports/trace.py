@@ -31,10 +31,10 @@ from abdf1_ros.ports.opening import open_port
 from abdf1_ros.ports.settings import PortSettings
 from abdf1_ros.sniffer.capture import CaptureWriter, Chunk, Direction, setting_line
 
-# Chunks that wait for the disk at most: some minutes of a busy line.
+# Most chunks that wait for the disk: some minutes of a busy line.
 _MOST_WAITING = 10_000
 
-_LAST_CHUNKS = 1.0  # s that the disk has for them at the end
+_LAST_CHUNKS = 1.0  # s; longest wait for the disk at the end
 
 
 def begun_now() -> str:
@@ -46,9 +46,9 @@ class Trace:
     """
     A capture that ends when it cannot be written; then ``on_error`` is called once.
 
-    A thread of its own writes it, so the line does not wait for a disk. What the disk does not
-    take in time is lost, and reported in the capture and by ``on_error``. ``limit`` is the most
-    bytes on the disk. Raises OSError when it cannot be begun.
+    A thread of its own writes the capture, so the line does not wait for a disk. If the disk is
+    too slow, chunks are lost. The capture and ``on_error`` report this loss. ``limit`` is the most
+    bytes on the disk. Raises OSError if the capture cannot be begun.
     """
 
     def __init__(self, path: str, settings: dict[str, str], on_error: Callable[[str], None],
@@ -62,19 +62,19 @@ class Trace:
         self._thread.start()
 
     def write(self, chunk: Chunk | str) -> None:
-        """Write a chunk or a setting soon, or nothing after an error; from any thread."""
+        """Queue a chunk or a setting for the disk, from any thread; no effect after an error."""
         if self._waiting.qsize() < _MOST_WAITING:
             self._waiting.put(chunk)
         else:
             self._lost += 1
 
     def close(self) -> None:
-        """End the capture; wait for the disk, but not for long."""
+        """End the capture; wait at most 1 s for the disk."""
         self._waiting.put(None)
         self._thread.join(_LAST_CHUNKS)
 
     def _run(self) -> None:
-        """Write until ``close``, or until that fails."""
+        """Write until ``close``, or until a write fails."""
         try:
             self._write_all()
         except OSError as error:
@@ -101,7 +101,7 @@ class TracedPort(PortAround):
     """
     A port whose bytes go into ``trace`` as well, with the seconds since ``begun``.
 
-    Bytes that are read go in direction ``first``; bytes of a second port go in the opposite one.
+    Bytes that are read get the direction ``first``; bytes of a second port get ``IN``.
     """
 
     def __init__(self, port: Port, trace: Trace, begun: float,
@@ -131,8 +131,9 @@ class PortOpener:
     """
     Open a port, again after each loss.
 
-    ``tell`` is passed to ``open_port``. After ``trace`` all bytes of the port go into a capture.
-    An error of that is given to ``on_error`` and has no effect on the port.
+    ``tell`` is passed to ``open_port``. After ``trace``, a capture records all bytes of the port
+    from its next opening on. An error of the capture is given to ``on_error``, and has no effect
+    on the port.
     """
 
     def __init__(self, settings: PortSettings,
@@ -144,12 +145,12 @@ class PortOpener:
         self._begun = 0.0
 
     def use(self, settings: PortSettings) -> bool:
-        """Open with these settings from now on; return whether they are others."""
+        """Open with these settings from now on; return True if they differ from the last ones."""
         before, self._settings = self._settings, settings
         return settings != before
 
     def errors(self) -> dict[str, int]:
-        """Return what the UART has counted since the port was opened; from any thread."""
+        """Return the UART's error counts since the port was opened; from any thread."""
         return self._port.errors() if self._port else {}
 
     def trace(self, path: str, limit: float, head: dict[str, str],
@@ -164,7 +165,7 @@ class PortOpener:
             on_error(f'{error}; nothing is recorded')
 
     def note_guest(self, place: str, command: Packet) -> None:
-        """Record in the capture that the command sent now is a guest's."""
+        """Record in the capture that the command sent now is from a guest."""
         if self._trace is not None:
             self._trace.write(setting_line('guest', f'{command.tns:04X} {place}'))
 

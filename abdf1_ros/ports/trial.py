@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Find out whether a port can be opened, before a line gives up the one that it has."""
+"""Find out whether a port can be opened, before a line closes its present port for it."""
 
 from __future__ import annotations
 
@@ -24,17 +24,18 @@ from urllib.parse import urlsplit
 from abdf1_ros.ports.opening import open_port
 from abdf1_ros.ports.settings import PortSettings
 
-# A name server or a driver that takes longer (s) has not refused. Heartbeats go on: by rule 3 (c)
-# the thread that asks may stand still for 1 s.
+# If a name server or a driver takes longer (s), this does not count as a refusal. The limit keeps
+# heartbeats going: by rule 3 (c) the thread that asks may wait for 1 s.
 _PATIENCE = 0.5
 
 
 def why_not(settings: PortSettings, patience: float = _PATIENCE) -> str:
     """
-    Return why a port cannot be opened, empty where it can, or where that is not known in time.
+    Return why a port cannot be opened, or an empty text.
 
-    A serial device is opened and closed again. The host of a URL is looked up and not connected
-    to, as a connection could throw out a client that the device server has.
+    The text is empty if the port can be opened, or if this is not known in time. A serial device
+    is opened and closed again. For a URL, only the name of the host is resolved: a connection
+    could end the connection of another client of the device server.
     """
     attempt = _look_up if '://' in settings.name else _open
     reasons: list[str] = []
@@ -60,5 +61,5 @@ def _look_up(settings: PortSettings) -> None:
     try:
         socket.getaddrinfo(urlsplit(settings.name).hostname, None)
     except socket.gaierror as error:
-        if error.errno == socket.EAI_NONAME:  # others pass
+        if error.errno == socket.EAI_NONAME:  # other errors may be temporary
             raise

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""What ends the wait of a thread for its port, from any other thread."""
+"""A signal from any thread that ends the wait of another thread for its port."""
 
 from __future__ import annotations
 
@@ -23,16 +23,16 @@ import threading
 
 class Wake:
     """
-    Set by any thread, seen by the one that waits: on ``descriptor``, or in ``wait``.
+    A flag that any thread may set. A thread waits for it on ``descriptor`` or in ``wait``.
 
-    It stays set until ``take``; to set it after ``close`` does nothing.
+    It stays set until ``take``. After ``close``, ``set`` has no effect.
     """
 
     def __init__(self) -> None:
         self.descriptor = os.eventfd(0, os.EFD_NONBLOCK | os.EFD_CLOEXEC)
         self._is_closed = False
         self._closing = threading.Lock()
-        self._poll = select.poll()  # not select(): that knows no descriptor from 1024 on
+        self._poll = select.poll()  # not select(), which fails for descriptors from 1024 on
         self._poll.register(self.descriptor, select.POLLIN)
 
     def set(self) -> None:  # noqa: A003
@@ -42,19 +42,19 @@ class Wake:
                 os.eventfd_write(self.descriptor, 1)
 
     def take(self) -> bool:
-        """Return whether it was set; it is not any more."""
+        """Clear the flag; return True if it was set."""
         try:
             return bool(os.eventfd_read(self.descriptor))
         except BlockingIOError:
             return False
 
     def wait(self, milliseconds: int | None = None) -> None:
-        """Wait until it is set, but not for longer."""
+        """Wait until the flag is set, but at most for this time; None for no limit."""
         self._poll.poll(milliseconds)
 
     def close(self) -> None:
-        """Give the descriptor back."""
-        with self._closing:  # or another thread might write to another file
+        """Close the descriptor."""
+        with self._closing:  # without the lock, ``set`` might write to another file
             if not self._is_closed:
                 self._is_closed = True
                 os.close(self.descriptor)
