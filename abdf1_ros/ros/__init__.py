@@ -18,7 +18,7 @@ The ROS node: parameters, messages, diagnostics, log.
 - ``node``, ``lines``: the two commands
 - ``process``: signals, threads, and the end of the process
 - ``bridge``: one line; its node stays when new files bring a new ``session``
-- ``parameters``: settings that come in
+- ``parameters``: settings from arguments and files
 - ``topics``: values in both directions
 - ``diagnostics``: statuses and log
 

@@ -16,7 +16,7 @@
 Callbacks of a node: a bad message or call from outside never ends the node or its line.
 
 If rclpy or one of our callbacks fails on a message or a call, only this callback ends, with an
-entry in the log. A call is answered.
+entry in the log. A call that fails is still answered.
 """
 
 from __future__ import annotations
@@ -38,8 +38,8 @@ from rclpy.executors import (
 from rclpy.impl.implementation_singleton import rclpy_implementation
 from rclpy.node import Node
 
-# An executor that fails while it waits for callbacks tries again after a pause (s). This many
-# failures in a row end it.
+# An executor that fails while it waits for callbacks tries again after a pause (s).
+# ``_MOST_FAILED_WAITS`` failures in a row end the executor.
 _MOST_FAILED_WAITS = 3
 _PAUSE = 0.1
 
@@ -76,7 +76,7 @@ class AnsweringNode(Node):
         return super().create_service(srv_type, srv_name, answer, **options)
 
     def tell_failure(self, what: str, error: BaseException) -> None:
-        """Log that a message, a call, or a look at what comes from outside has failed."""
+        """Log that the handling of a message or call, or a periodic check, has failed."""
         self._failures.error('what comes from outside', (
             f'{what} has failed, all else goes on: {failure_text(error)}'))
 
@@ -95,7 +95,7 @@ def _refusal(srv_type: Any, request: Any, reason: str) -> Any:
 
 class Executor(SingleThreadedExecutor):
     """
-    Runs callbacks of ``node``; a callback that fails ends alone.
+    Runs callbacks of ``node``; if a callback fails, only this callback ends.
 
     ``spin_once`` raises an error only if it cannot wait for callbacks at all.
     """
@@ -135,14 +135,14 @@ class Executor(SingleThreadedExecutor):
 
 
 def _give_back(entity: Any) -> None:
-    """Let the executor wait for an entity again: rclpy forgets this if a take has failed."""
+    """Let the executor wait for an entity again: rclpy does not, if a take has failed."""
     if entity is not None and entity._executor_event:  # noqa: SLF001
         entity._executor_event = False  # noqa: SLF001
         entity.callback_group.ending_execution(entity)
 
 
 class Callbacks(threading.Thread):
-    """Runs the callbacks of a node until ``end``; ``error``: what has ended it before."""
+    """Runs the callbacks of a node until ``end``, or until an error of the executor: ``error``."""
 
     def __init__(self, node: AnsweringNode) -> None:
         super().__init__(name='callbacks', daemon=True)
@@ -173,5 +173,5 @@ class Callbacks(threading.Thread):
         self._ends = True
         self.wake()
         self.join(max(0.0, give_up - time.monotonic()))
-        if not self.is_alive():  # while the thread lives, it may wait on what a shutdown destroys
+        if not self.is_alive():  # a living thread may wait on objects that a shutdown destroys
             self._executor.shutdown()

@@ -15,8 +15,8 @@
 """
 Many lines in one process: ``lines``.
 
-Each line is a node as in the command ``node``. All share one ROS context, so one DDS participant.
-A fault of a line stays in this line.
+Each line is a node as in the command ``node``. All lines share one ROS context, and so one DDS
+participant. A fault of one line does not affect the other lines.
 """
 
 from __future__ import annotations
@@ -194,7 +194,7 @@ class LinesNode(AnsweringNode):
             self._notes.tell(news)
 
     def publish(self, lines: Sequence[RestartedLine]) -> None:
-        """Publish which lines run, and why the rest do not."""
+        """Publish which lines run, and why the other lines do not."""
         faulty = [line for line in lines if line.node is None]
         level, text = (ERROR, f'{len(faulty)} of {len(lines)} lines do not run') \
             if faulty else (OK, f'{len(lines)} of {len(lines)} lines run')
@@ -228,7 +228,7 @@ class Lines:
             line.make()
 
     def run(self, ended: EndRequest) -> int:
-        """Run all lines until the end, if enough of them can; return the exit status."""
+        """Run all lines until the end, if enough lines can run; return the exit status."""
         running = sum(line.node is not None for line in self._lines)
         self._node.get_logger().info(f'{running} of {len(self._lines)} lines run')
         if running < (len(self._lines) if self._node.is_strict else 1):
@@ -329,7 +329,7 @@ def _allow_files() -> None:
 
 
 def _own_name(given: Sequence[str]) -> str:
-    """Return the name of the process; raises ConfigurationError for a name for all nodes."""
+    """Return the name of the process; ConfigurationError if an argument would name all nodes."""
     own = NODE_NAME
     for text in given:
         if renamed := re.fullmatch(rf'/?{NODE_NAME}:__(?:node|name):=(\w+)', text):

@@ -44,7 +44,8 @@ class ObservingNode:
     """
     A node with an executor of its own; nodes that are added to the executor run too.
 
-    Without ``context`` it makes one from ``args``, and ends it. ``options``: of the node.
+    Without ``context``, it makes a context from ``args``, and ends it too. ``options``: of the
+    node.
     """
 
     def __init__(self, name: str, context: Context | None = None, args: Sequence[str] = (),
@@ -66,7 +67,7 @@ class ObservingNode:
 
         Until its shutdown the executor has a wait set with the parts of its nodes. So the executor
         ends before rclpy destroys these parts. One race remains, inside Fast DDS 2.14: its
-        discovery thread may use the listener of a deleted reader (issue 3303 there).
+        discovery thread may use the listener of a deleted reader (issue 3303 of Fast DDS).
         """
         with ExitStack() as stack:
             if self._owns_context:
@@ -89,7 +90,7 @@ class ObservingNode:
             return None
 
     def wait(self, condition: Callable[[], _Result | None], seconds: float) -> _Result | None:
-        """Spin until ``condition`` returns a true value, or for ``seconds``; return its result."""
+        """Spin until ``condition`` returns a true value, or for ``seconds``; return the value."""
         end = time.monotonic() + seconds
         while not (result := condition()) and (left := end - time.monotonic()) > 0:
             self.spin_once(min(left, 0.05))

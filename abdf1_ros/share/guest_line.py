@@ -35,7 +35,7 @@ from abdf1_ros.ports.settings import PortSettings
 from abdf1_ros.settings.network import Network
 from abdf1_ros.settings.share import SharePlace
 
-# Poll interval (s) for new programs at a place; it also bounds the error of a command's age.
+# Poll interval (s) for new programs at a place; it also limits the error of a command's age.
 _GLANCE = 0.1
 
 
@@ -45,16 +45,17 @@ class _Nothing(TaskSource):
 
 class GuestLine:
     """
-    Take the commands of the guest at ``place`` to ``queue``, and bring the replies back.
+    Put the commands of the guest at ``place`` into ``queue``, and send the replies to the guest.
 
-    After a wait that lasts too long, this process or its host was paused, and the arrival time of
-    a command is unknown. Then the command counts as old as it can be.
+    If a wait has lasted too long, this process or its host was paused, and the arrival time of a
+    command is unknown. Then its earliest possible arrival time counts.
 
     - ``wake``: wakes the link of the PLC.
     - ``listener``: gets the actions of the guest.
     - ``fault``: gets internal errors.
 
-    The guest's program may come and go. A reply to a program that has gone is dropped.
+    The guest's program may connect and disconnect at any time. A reply to a program that has
+    disconnected is dropped.
     """
 
     def __init__(self, place: SharePlace, network: Network, queue: GuestQueue,

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The commands that the simulator takes while it runs: faults, modes, counters, messages."""
+"""The commands that the simulator accepts while it runs: faults, modes, counters, messages."""
 
 from __future__ import annotations
 
@@ -84,7 +84,7 @@ _ACTIONS: dict[str, Callable[[SimulatedPlc], None]] = {
 
 
 class CommandError(Exception):
-    """A text that is not a command; the message describes a good one."""
+    """A text that is not a command; the message describes a right command."""
 
 
 def execute(line: str, plcs: Sequence[SimulatedPlc], is_full_duplex: bool = False,

@@ -68,7 +68,7 @@ def _answer_for_itself(command: Packet) -> Packet:
 
 
 def stations_of(plcs: Sequence[SimulatedPlc], checksum: Checksum) -> list[Responder]:
-    """Return the stations of a line: the PLCs on it, and the gateways to the PLCs behind one."""
+    """Return the stations of a line: PLCs without a gateway, and gateways of all other PLCs."""
     gateways = dict.fromkeys(plc.via for plc in plcs if plc.via is not None)
     return [*(plc for plc in plcs if plc.via is None),
             *(SimulatedGateway(via, [plc for plc in plcs if plc.via == via], checksum)

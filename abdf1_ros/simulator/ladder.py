@@ -17,14 +17,14 @@ The PLC's side of heartbeats, as a small program on the words of a simulated PLC
 
 This is the ladder of docs/tutorials/heartbeats.md; comments give the numbers of the rungs.
 
-- N10, written by the bridge: 0 its heartbeat, 1 and 2 commands.
-- N11, written by the program: 0 the snapshot of the heartbeat, 1 the snapshot before, 2 and 4 the
-  commands that the machine may use, 3 the heartbeat of the program.
-- T13: 0 watchdog, 1 stable, 2 the program's clock.
+- N10, written by the bridge: word 0 its heartbeat, words 1 and 2 commands.
+- N11, written by the program: word 0 the snapshot of the heartbeat, word 1 the snapshot before.
+  Words 2 and 4 are the commands that the machine may use. Word 3 is the heartbeat of the program.
+- T13: timer 0 watchdog, timer 1 stable, timer 2 the program's clock.
 - B12:0: the lamps.
 
-Nothing moves between two scans, so the program may miss a value that stands for less than a scan.
-The timers have a time base of 10 ms, and count from the scan that starts them.
+The program runs only at its scans, so it may miss a value that lasts less than a scan. The timers
+have a time base of 10 ms, and count from the scan that starts them.
 """
 
 from __future__ import annotations
@@ -47,8 +47,8 @@ _PLC_HEARTBEAT = 10
 _LAST_COUNT = 32000
 _COMMANDS = {1: 2, 2: 4}  # word of N10 with a command: word of N11 that the machine uses
 
-# After a pause the simulator makes up for scans of at most this time (s). Earlier scans would not
-# change the result.
+# After a pause, the simulator makes up the missed scans of at most this time (s). Earlier scans
+# would not change the result.
 _LONGEST_PAUSE = 60.0
 
 _ROUNDING = 1e-6
@@ -78,7 +78,7 @@ class _Timer:
     is_enabled: bool = False
 
     def scan(self, is_true: bool, passed: float = 0.0) -> None:
-        """Take the rung of this scan, ``passed`` s after the last scan."""
+        """Update the timer from the state of its rung, ``passed`` s after the last scan."""
         self.time = self.time + passed if is_true and self.is_enabled else 0.0
         self.is_enabled = is_true
         self.is_done = is_true and self.accumulated >= self.preset

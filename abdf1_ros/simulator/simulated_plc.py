@@ -147,8 +147,8 @@ class SimulatedPlc(TaskSource):
     """
     One station with its data table; ``clock`` gives seconds.
 
-    ``via``: the gateway to it. ``lock``: held while its program advances, which several threads
-    may do.
+    ``via``: the number of its gateway. ``lock``: locked while its program advances, because
+    several threads may advance it.
     """
 
     def __init__(self, station: int, table: DataTable, checksum: Checksum,
@@ -200,7 +200,7 @@ class SimulatedPlc(TaskSource):
 
     @property
     def is_running(self) -> bool:
-        """Return True if its program runs; in PROGRAM and TEST nothing moves or drives outputs."""
+        """Return True if the program runs and drives outputs; not in PROGRAM and TEST."""
         return bool(self.processor.mode.is_running) and not self.processor.is_faulted
 
     def run_ladder(self, ladder: Ladder) -> None:
@@ -218,7 +218,7 @@ class SimulatedPlc(TaskSource):
             self._set_ladder()
 
     def download(self) -> None:
-        """Download the program: its saved words come back, and the mode is PROGRAM."""
+        """Download the program: its saved words are restored, and the mode is PROGRAM."""
         self.set_mode(Setting.PROGRAM)
         if self._saved is not None:
             self.table.restore(self._saved)
@@ -252,7 +252,7 @@ class SimulatedPlc(TaskSource):
                 self.ladder.advance(now)
 
     def move(self, mover: _Mover) -> None:
-        """Change values from now on."""
+        """Let ``mover`` change values from now on."""
         mover.next_time = self._clock() + mover.period
         self._movers.append(mover)
 
@@ -261,8 +261,8 @@ class SimulatedPlc(TaskSource):
         """
         Write to ``station`` with commands of our own, as a MSG instruction does.
 
-        Only a full-duplex line carries these commands. ``report`` gets the outcome of each. Raises
-        FormatError for values that do not fit.
+        Only a full-duplex line sends these commands. ``report`` gets the outcome of each command.
+        Raises FormatError for values that do not fit.
         """
         codec = _natural_codec(address, len(values))
         codec.check(values)
@@ -272,12 +272,12 @@ class SimulatedPlc(TaskSource):
             self.outbox.append(Sending(command, report))
 
     def next_task(self, now: float, busy: Container[int] = ()) -> Sending | None:
-        """Return a command of our own that waits to be sent."""
+        """Return our next command to send; None if there is none, or its station is busy."""
         is_free = self.outbox and self.outbox[0].command.dst not in busy
         return self.outbox.popleft() if is_free else None
 
     def damaged(self, data: bytes) -> bytes:
-        """Return ``data`` with the damage that the far end receives."""
+        """Return ``data``, with random damage if the fault ``noise`` is on."""
         if not self.faults.noise:
             return data
         return bytes(byte ^ 1 << self._random.randrange(8)

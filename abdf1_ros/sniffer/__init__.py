@@ -13,8 +13,8 @@
 # limitations under the License.
 
 """
-Decoding of the traffic on a DF1 line, in words; without clock, port or file.
+Decoding of the traffic on a DF1 line into words, without clock or port.
 
-``TrafficDecoder`` takes chunks of bytes and gives entries, ``Summary`` counts those, ``report``
+``TrafficDecoder`` takes chunks of bytes and gives entries. ``Summary`` counts entries. ``report``
 writes both as text or JSON.
 """

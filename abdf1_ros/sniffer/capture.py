@@ -25,11 +25,15 @@ A capture is ASCII, one line for each chunk of bytes as it was read or written::
     0.000000 > 10 05 01 FF
     0.004210 < 10 04
 
-The first line gives the version of the format. Other lines with ``#`` are settings, "name: value",
-or remarks, and may stand anywhere; "guest: A40E pty:/tmp/hmi" says that the next command with TNS
-A40E is that guest's (column Share). A chunk has the seconds since ``begun``, its direction (``>``
-sent by the recording program, or by the first port of a tap; ``<`` received, or sent by the second
-port; ``?`` not known), and its bytes in hexadecimal.
+The first line gives the version of the format. Other lines with ``#`` are settings ("name: value")
+or remarks, at any place. The setting "guest: A40E pty:/tmp/hmi" says that the next command with
+TNS A40E is from the guest at pty:/tmp/hmi (column Share).
+
+A chunk has the seconds since ``begun``, its direction, and its bytes in hexadecimal. Directions:
+
+- ``>``: sent by the recording program, or by the first port of a tap
+- ``<``: received by the recording program, or sent by the second port of a tap
+- ``?``: not known
 """
 
 from __future__ import annotations
@@ -47,9 +51,9 @@ from abdf1_ros.text import printable
 VERSION = 1
 _MAGIC = '# abdf1_ros capture'
 _FIRST_LINE = f'{_MAGIC} {VERSION}'
-# Seconds; more than the seconds since 1970.
+# Times (s) from here on are refused; it is more than the seconds since 1970.
 _LATEST = 1e10
-# Characters of a line that a Problem shows.
+# Most characters of a line that a Problem shows.
 _SHOWN = 60
 
 
@@ -68,10 +72,10 @@ class Direction(Enum):
 
 class Chunk(NamedTuple):
     """
-    Bytes as they were read or written; ``time`` in seconds, None where not recorded.
+    Bytes as they were read or written; ``time`` in seconds, None if not recorded.
 
-    With ``is_message`` they are the link data of one message, which had no frame. ``guest`` is
-    "TNS place" where a guest's command follows, in this chunk or a later one.
+    With ``is_message``, the bytes are the link data of one message without a frame. If a guest's
+    command follows, in this chunk or a later chunk, ``guest`` is "TNS place".
     """
 
     time: float | None
@@ -89,10 +93,10 @@ class CaptureWriter:
     """
     Write a capture to ``path``, and begin a new file when it has become too long.
 
-    ``limit`` is the most bytes on the disk: at half of it the file is renamed to ``<path>.1``, in
-    place of an older one, as is a capture that is there already. Every line is handed to the
-    operating system at once, whole or not at all. Raises OSError, also if ``path`` is another file
-    than a capture; that file stays as it is.
+    ``limit`` is the most bytes on the disk. At half of it, the file is renamed to ``<path>.1`` and
+    replaces an older file of this name. A capture that exists already is renamed at the start.
+    Every line is given to the operating system at once, whole or not at all. Raises OSError, also
+    if ``path`` or ``<path>.1`` exists and is not a capture; such a file is not changed.
     """
 
     def __init__(self, path: Path, limit: float = math.inf,
@@ -108,7 +112,7 @@ class CaptureWriter:
         self._begin()
 
     def write(self, chunk: Chunk | str) -> None:
-        """Write a chunk, or a line that is one of ``setting_line``."""
+        """Write a chunk, or a line from ``setting_line``."""
         line = str(chunk)
         if self._written + len(line) + 1 > self._limit:
             self._file.close()
@@ -144,7 +148,7 @@ def setting_line(name: str, value: str) -> str:
 
 
 def _is_capture(path: Path) -> bool:
-    """Tell whether a file may be put aside: a capture, or an empty file."""
+    """Return True if a file may be renamed or replaced: a capture, or an empty file."""
     if not path.is_file():
         return False
     with path.open('rb') as file:
@@ -152,15 +156,15 @@ def _is_capture(path: Path) -> bool:
 
 
 def is_capture_line(line: str) -> bool:
-    """Tell whether ``line`` is the first of a capture, of whatever version."""
+    """Return True if ``line`` is the first line of a capture of any version."""
     return line.startswith(_MAGIC)
 
 
 def read_capture(name: str, lines: Iterable[str], settings: dict[str, str]) -> Iterator[Chunk]:
     """
-    Yield the chunks of a capture, and put its settings into ``settings`` as they come.
+    Yield the chunks of a capture, and put its settings into ``settings`` as they are read.
 
-    ``name`` names the file in the Problem that is raised for a line that no capture has.
+    Raises Problem for a line that does not belong in a capture; ``name`` is the file name in it.
     """
     guest = ''
     for number, text in enumerate(lines, 1):

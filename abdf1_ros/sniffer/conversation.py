@@ -24,13 +24,14 @@ from abdf1_ros.df1.packet import BROADCAST, Packet, REPLY_BIT
 from abdf1_ros.sniffer.capture import Direction
 from abdf1_ros.sniffer.entries import Mark
 
-# Seconds after which no reply is expected any more: Cmd_Timeout is at most 5 s (S0), and a master
-# with standard polling may need as long until it polls the station.
+# Seconds after which no reply is expected any more. Cmd_Timeout is at most 5 s (S0). A master with
+# standard polling may need another 5 s until it polls the station.
 _PATIENCE = 10.0
 _MOST_OPEN = 1000
 
 # By radio modem, a message that comes again within this time (s) is treated as forwarded by a
-# node. Its sender waits for longer until it repeats it: for the time-out of its command.
+# node. The sender of a message waits longer before it repeats the message: for the time-out of the
+# command.
 _FORWARDED_WITHIN = 1.0
 _MOST_RECENT = 20  # messages; a forwarding node remembers as many (1763-RM001C)
 
@@ -39,7 +40,7 @@ _Key = tuple[int, int, int]
 
 @dataclass(slots=True)
 class _Said:
-    """The last message of one node to another."""
+    """The last message from one node to another node."""
 
     packet: Packet
     acknowledged: bool = False
@@ -66,10 +67,10 @@ class MessageFacts(NamedTuple):
 
 class Copies:
     """
-    Separate, by radio modem, forwarded messages from messages that their sender repeats.
+    On radio modems, separate forwarded messages from messages that their sender repeats.
 
-    ``recorder`` is the number of the node at ``>``: the SRC of the messages that came there first,
-    None unless that is one number.
+    ``recorder`` is the number of the recording node: the SRC of all messages that were new in
+    direction ``>``. It is None if these messages have several SRC, or if there are none.
     """
 
     def __init__(self) -> None:
@@ -100,10 +101,10 @@ class Copies:
 
 class Conversation:
     """
-    Remember the messages of a line; every good one is handed to ``take``.
+    Remember the messages of a line; call ``take`` with every good message.
 
-    Times that go back far belong to another recording; open commands then get no reply. They may
-    go back a little where two ports are recorded.
+    If the times go back far, another recording has begun; open commands then get no reply. If two
+    ports are recorded, the times may go back a little.
     """
 
     def __init__(self) -> None:
@@ -139,12 +140,12 @@ class Conversation:
         return MessageFacts(command, latency, marks, transaction.guest)
 
     def note_guest(self, note: str) -> None:
-        """Take "TNS place", whose command will be the next with this TNS."""
+        """Record "TNS place": the next command with this TNS is from the guest at this place."""
         tns, _, place = note.partition(' ')
         self._guest = tns, place
 
     def acknowledge(self, direction: Direction) -> None:
-        """Take an ACK in ``direction``: it is for the last message of the opposite direction."""
+        """Record an ACK in ``direction``: it is for the last message of the opposite direction."""
         said = self._last.get(direction.opposite)
         if said is not None:
             said.acknowledged = True
@@ -168,7 +169,7 @@ class Conversation:
         return [entry for entry in self._open.values() if not entry.answered]
 
     def _repetition(self, packet: Packet, from_master: bool) -> Mark | None:
-        """Return how this message repeats another, and keep it as the last of its direction."""
+        """Return how a message repeats an earlier message; record it as the last of its path."""
         path = _path(packet)
         last = self._said.get((*path, from_master))
         if last is not None and last.packet == packet:
@@ -183,13 +184,13 @@ class Conversation:
         key = command.src, command.dst, command.tns
         known = self._open.get(key)
         if command.dst == BROADCAST or mark is Mark.FORWARDED:
-            return  # no station replies, or the command has been taken
+            return  # no station replies, or the command is recorded already
         if known is not None and mark is not None and not (
                 mark is Mark.DUPLICATE and known.answered):
             return
         if known is not None and not known.answered:
             self._given_up.append(known)  # its TNS is used for another command
-        self._open.pop(key, None)  # the new command takes its place at the end
+        self._open.pop(key, None)  # the new command comes last
         tns, guest = self._guest
         is_guests = tns == f'{command.tns:04X}'
         if is_guests:

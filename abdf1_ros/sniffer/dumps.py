@@ -16,8 +16,9 @@
 Read recorded bytes from files of several kinds: captures, packets, dumps, logs, raw bytes.
 
 A hex dump is bytes in hexadecimal, with or without spaces. It may have the offsets and characters
-of ``xxd`` and ``hexdump -C``. It has neither times nor directions. ``hexdump`` and ``od -x`` alone
-write words of two bytes, the low one last. All other lines are read by ``logs``.
+of ``xxd`` and ``hexdump -C``. It has neither times nor directions. ``hexdump`` without options,
+and ``od -x``, write words of two bytes, with the low byte last. All other lines are read by
+``logs``.
 """
 
 from __future__ import annotations
@@ -41,24 +42,24 @@ from abdf1_ros.text import counted
 
 _BLOCK = 4096
 _GZIP = b'\x1F\x8B'
-# The longest text line in bytes: no program writes longer ones, and a file without line ends, such
-# as /dev/zero, must not fill the memory.
+# The longest text line in bytes: no program writes longer lines, and a file without line ends,
+# such as /dev/zero, must not fill the memory.
 _LONGEST_LINE = 1_000_000
-# The bytes, and after two spaces the same as characters.
+# The bytes, and after two spaces the same bytes as characters.
 _XXD = re.compile(r'(?P<offset>[0-9a-f]{6,}): (?P<bytes>\S.*?)(?:  .*)?', re.IGNORECASE)
 _HEXDUMP = re.compile(r'(?P<offset>[0-9a-f]{7,})  (?P<bytes>[0-9a-f ]+)(?:\|.*)?', re.IGNORECASE)
 _WORDS = re.compile(r'(?P<offset>[0-9a-f]{7,})(?P<words>(?: +[0-9a-f]{4}){1,8})?', re.IGNORECASE)
 _REPEATED = '*'
-# Bytes that a dump may leave out: hours of one and the same byte on the fastest line.
+# Bytes that a dump may leave out: hours of the same byte on the fastest line.
 _MOST_LEFT_OUT = 100_000_000
 
 
 class Recording:
     """
-    The chunks of a file; ``settings`` come from a capture, as far as it has been read.
+    The chunks of a file; ``settings`` has the settings of a capture, as far as it has been read.
 
     ``has_size`` tells whether the file has a known size; a pipe or device has none. Raises OSError
-    when the file cannot be opened.
+    if the file cannot be opened.
     """
 
     def __init__(self, path: Path, is_binary: bool = False) -> None:
@@ -78,7 +79,7 @@ class Recording:
         return min(100, 100 * self._position // max(1, self._size))
 
     def chunks(self) -> Iterator[Chunk]:
-        """Yield the chunks; Problem names file and line where something cannot be read."""
+        """Yield the chunks; raises Problem, with the place, if something cannot be read."""
         try:
             yield from self._chunks()
         except (EOFError, zlib.error, BadGzipFile) as error:
@@ -138,9 +139,9 @@ class Recording:
 
 
 def read_hex(name: str, lines: Iterable[str]) -> Iterator[Chunk]:
-    """Yield the chunks of a hex dump; Problem names file and line of anything else."""
+    """Yield the chunks of a hex dump or log; raises Problem, with the line, for other texts."""
     log = LogReader()
-    end = 0  # where the last line with an offset has ended
+    end = 0  # offset after the bytes of the last line that has an offset
     last = b''
     is_repeated = False
     for number, text in enumerate(lines, 1):
@@ -169,8 +170,8 @@ def read_words(name: str, lines: Iterable[str]) -> Iterator[Chunk]:
     """
     Yield the chunks of a dump in words, whose offsets are hexadecimal or octal.
 
-    The last offset shows whether the last word is one byte. Raises Problem if the offsets do not
-    fit.
+    The last offset shows whether the last word has only one byte. Raises Problem if the offsets do
+    not fit.
     """
     data, last = b'', b''
     is_repeated = False
@@ -215,7 +216,7 @@ def _bare_offset(line: str, end: int, is_repeated: bool) -> int | None:
 
 
 def _repetition(data: bytes, count: int, where: str) -> Iterator[Chunk]:
-    """Yield the lines that a dump has left out because they are like the one before."""
+    """Yield the data of lines that a dump leaves out because they repeat the line before."""
     if not 0 <= count <= _MOST_LEFT_OUT:
         raise Problem(where, f'the offset does not fit: "{_REPEATED}" stands for lines like the '
                              f'one above, at most {_MOST_LEFT_OUT // 1_000_000} MB of them')

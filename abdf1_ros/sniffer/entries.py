@@ -45,10 +45,13 @@ class Mark(Enum):
     """
     The role of a message in its conversation, if it is not a plain message.
 
-    A message that comes again is a duplicate if the receiver has acknowledged it; the receiver has
-    to drop it (M 3-4). Before the acknowledgement it is a retransmission. A master passes messages
-    of slaves to slaves on as they are. By radio modem, a message that comes again soon or from the
-    opposite side has been forwarded by a node. A stray reply answers no command that was seen.
+    - Duplicate: it comes again after its acknowledgement; the receiver has to drop it (M 3-4).
+    - Retransmission: it comes again before its acknowledgement.
+    - Relayed: the master passes it on, unchanged, from a slave to a slave.
+    - Forwarded: by radio modem, it comes again soon or from the opposite side, so a node has
+      forwarded it.
+    - Stray: it is a reply, but its command was not seen.
+    - Wrong command code: it is a reply, but its code does not fit its command.
     """
 
     RETRANSMISSION = 'retransmission'
@@ -62,7 +65,7 @@ class Mark(Enum):
 @dataclass(frozen=True, slots=True)
 class Entry:
     """
-    A thing that was seen on the line, and what is known of it.
+    A symbol or event on the line, and the facts that are known about it.
 
     - ``time``: seconds, None if the recording has no times.
     - ``station``: the slave; on a full-duplex line the node that gets commands and sends replies.

@@ -13,13 +13,13 @@
 # limitations under the License.
 
 """
-Traffic out of recorded packets: DF1 that ``sniff`` has written, and PCCC inside EtherNet/IP.
+Traffic in recorded packets: DF1 from ``sniff`` or an RTAC, and PCCC inside EtherNet/IP.
 
-PCCC goes through TCP port 44818 in CIP service 4B (Execute PCCC) of the PCCC object (class 67).
-The service may stand inside of an Unconnected Send (52). PCCC has no frame, check, DST and SRC
-there. The last numbers of the IP addresses stand for DST and SRC; a second address with the same
-last number gets a free number. A response names no class: it counts as PCCC if its request was
-seen.
+Inside EtherNet/IP (TCP port 44818), PCCC is the data of CIP service 4B (Execute PCCC) of the PCCC
+object (class 67). The service may be inside an Unconnected Send (52). There, PCCC has no frame,
+check, DST or SRC. We use the last numbers of the IP addresses as DST and SRC. A second address
+with the same last number gets a free number. A response does not contain the class, so it counts
+as PCCC only if its request was seen.
 """
 
 from __future__ import annotations
@@ -32,22 +32,22 @@ from abdf1_ros.sniffer.capture import Chunk, Direction
 from abdf1_ros.sniffer.packet_files import RecordedPacket
 from abdf1_ros.sniffer.pcapng import DIRECTIONS, HEAD_SIZE, LINK_TYPE, VERSION
 
-# A serial port recorded by an RTAC of SEL (link type RTAC_SERIAL): 12 bytes before the data, the
-# ninth says what has happened; a beginning and an end of sending or receiving have data.
+# A serial port recorded by an RTAC of SEL (link type RTAC_SERIAL): 12 bytes before the data. The
+# ninth byte is the event; only the begin and the end of sending or receiving have data.
 _RTAC = 250
 _RTAC_EVENTS = {1: Direction.OUT, 2: Direction.IN, 3: Direction.OUT, 4: Direction.IN}
 
 _DIRECTIONS = {number: way for way, number in DIRECTIONS.items()}
 
 _PORT = 44818
-CSP = 2222  # PCCC of older Ethernet processors, in a way of its own
-# The bytes before an IPv4 header, and where among them its EtherType stands, by link type:
+CSP = 2222  # PCCC of older Ethernet processors, in a format of its own
+# Number of bytes before an IPv4 header, and the position of its EtherType in them, by link type:
 # loopback, Ethernet, raw IP, Linux cooked 1 and 2.
 _LINKS = {0: (4, None), 1: (14, 12), 101: (0, None), 113: (16, 14), 276: (20, 0)}
 _IP, _TCP = b'\x08\x00', 6
 _TAGS = b'\x81\x00', b'\x88\xA8'  # 802.1Q and 802.1ad
 _MOST_STREAMS = 1000
-_MOST_EARLY = 8  # segments that wait for one before them
+_MOST_EARLY = 8  # segments that wait for an earlier segment
 
 _SEND_RR, _SEND_UNIT = 0x6F, 0x70
 _COMMANDS = (0x00, 0x01, 0x04, 0x63, 0x64, 0x65, 0x66, _SEND_RR, _SEND_UNIT, 0x72, 0x73)
@@ -57,7 +57,7 @@ _PCCC_OBJECT = b'\x20\x67', b'\x21\x00\x67\x00'  # a path begins with its class
 
 
 class _Stations:
-    """Numbers that stand for IP addresses: the last of the address, or a free number."""
+    """Station numbers for IP addresses: the last number of the address, or a free number."""
 
     def __init__(self) -> None:
         self._numbers: dict[bytes, int] = {}
@@ -75,8 +75,8 @@ class _Stream:
     """
     The bytes of one direction of a TCP connection, in their order.
 
-    An early segment waits for the segments before it. A segment of whole messages does not wait:
-    it must not come after its answers.
+    An early segment waits for the segments before it. A segment of whole messages does not wait,
+    because its messages must come before their answers.
     """
 
     def __init__(self) -> None:
@@ -90,7 +90,7 @@ class _Stream:
         known = 0 if self._next is None else self._next - number & 0xFFFFFFFF
         if known >= 1 << 31:  # a segment before it comes later, or was lost
             yield from self._take_early(number, data)
-        elif not known or known < len(data):  # otherwise they come again
+        elif not known or known < len(data):  # otherwise all its bytes came before
             self._next = number & 0xFFFFFFFF if self._next is None else self._next
             yield from self._take(data[known:])
             yield from self._follow()
@@ -129,7 +129,7 @@ class _Stream:
 
 
 def _messages(data: bytes) -> tuple[list[bytes], bytes]:
-    """Return the whole messages at the beginning of data, and the rest if it may become one."""
+    """Return the whole messages that data begins with, and bytes that may begin the next one."""
     found: list[bytes] = []
     while len(data) >= 24:
         command, size = struct.unpack_from('<HH', data)
@@ -143,13 +143,13 @@ def _messages(data: bytes) -> tuple[list[bytes], bytes]:
 
 
 def _sent(messages: Iterable[bytes]) -> Iterator[bytes]:
-    """Yield the data of messages that carry CIP."""
+    """Yield the data of messages that contain CIP."""
     return (message[24:] for message in messages
             if struct.unpack_from('<H', message)[0] in (_SEND_RR, _SEND_UNIT))
 
 
 class _Connections:
-    """The TCP connections of EtherNet/IP: their streams, and which requests were seen."""
+    """The TCP connections of EtherNet/IP: their streams, and the requests that were seen."""
 
     def __init__(self) -> None:
         self._streams: dict[bytes, _Stream] = {}
@@ -185,7 +185,7 @@ class _Connections:
 
 @dataclass(slots=True)
 class SeenPackets:
-    """The TCP ports of packets, and the sizes (bytes) of those that the recorder has cut."""
+    """The TCP ports of packets, and the sizes (bytes) of packets that the recorder has cut."""
 
     ports: set[int] = field(default_factory=set)
     cut: list[int] = field(default_factory=list)
@@ -195,7 +195,7 @@ def chunks_of(packets: Iterable[RecordedPacket], seen: SeenPackets) -> Iterator[
     """
     Yield the DF1 and PCCC of packets, with times (s) from the first packet on.
 
-    TCP ports come into ``seen``, and packets that were cut, of which nothing is decoded.
+    ``seen`` gets the TCP ports, and the sizes of packets that were cut and are not decoded.
     """
     connections = _Connections()
     begun: float | None = None
@@ -228,7 +228,7 @@ def _tcp(link_type: int, data: bytes) -> tuple[bytes, int, bytes, bool] | None:
             return None
     head = data[start:]
     if len(head) < 20 or head[0] >> 4 != 4 or head[9] != _TCP or head[6] & 0x3F or head[7]:
-        return None  # also fragments, which EtherNet/IP has not
+        return None  # also fragments, because EtherNet/IP has none
     size = 4 * (head[0] & 0x0F)
     end = int.from_bytes(head[2:4], 'big')
     segment = head[size:end]
@@ -241,7 +241,7 @@ def _tcp(link_type: int, data: bytes) -> tuple[bytes, int, bytes, bool] | None:
 
 
 def _pccc(message: bytes) -> Iterator[tuple[bool, bytes]]:
-    """Yield for each Execute PCCC whether it is a response, CMD, STS, TNS and the rest."""
+    """Yield, for each Execute PCCC, whether it is a response, and its bytes from CMD on."""
     at = 8
     for _ in range(int.from_bytes(message[6:8], 'little')):
         item, size = int.from_bytes(message[at:at + 2], 'little'), int.from_bytes(
@@ -256,7 +256,7 @@ def _pccc(message: bytes) -> Iterator[tuple[bool, bytes]]:
 
 
 def _executed(cip: bytes) -> bytes:
-    """Return the PCCC of a CIP request or response, empty where it has none."""
+    """Return the PCCC of a CIP request or response; empty if it has none."""
     if len(cip) < 4:
         return b''
     if cip[0] == _EXECUTE_PCCC | _REPLY:

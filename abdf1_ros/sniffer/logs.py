@@ -13,12 +13,12 @@
 # limitations under the License.
 
 """
-Logs of serial port monitors, by one rule for all.
+Read logs of serial port monitors, by one rule for all logs.
 
 A line has an optional time, a word or sign for the direction, and bytes. The bytes are pairs of
-hexadecimal digits with blanks, commas or dashes between. Characters beside them have to be the
-same bytes. A line without bytes gives time and direction of the lines after it. A line that fits
-the rule in two ways is refused.
+hexadecimal digits with blanks, commas or dashes between them. Characters beside the bytes have to
+show the same bytes. A line without bytes sets time and direction of the lines after it. A line
+that fits the rule in two ways is refused.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ import re
 
 from abdf1_ros.sniffer.capture import Chunk, Direction
 
-# Before a time of day; alone it might be bytes.
+# Only before a time of day, because a date alone might be bytes.
 _DATE = r'(?:\d{4}[-/.]\d\d?[-/.]\d\d?|\d\d?[-/.]\d\d?[-/.]\d{2,4})[ T]+'
 _TIME_OF_DAY = re.compile(
     rf'(?:{_DATE})?(?P<hours>\d\d?):(?P<minutes>\d\d):(?P<seconds>\d\d(?:[.,]\d+)?)(?!:?\d)')
@@ -42,16 +42,16 @@ _IN = {'rx', 'received', 'receive', 'recv', 'receiving', 'read', 'irp_mj_read', 
        '<<<', '<-', '<--'}
 _WORD = re.compile(r'[A-Za-z_]+|-*>+|<+-*')
 
-# Nothing but bytes: pairs, or groups of them, with one sign between.
+# A line with only bytes: pairs, or groups of pairs, with the same sign between them.
 _PAIRS = re.compile(r'(?P<group>(?:[0-9A-Fa-f]{2})+)(?:(?P<sign>[ -])(?:[0-9A-Fa-f]{2})+'
                     r'(?:(?P=sign)(?:[0-9A-Fa-f]{2})+)*)?')
 _BYTE = r'(?:0x)?[0-9A-Fa-f]{2}'
 _AFTER = r'(?![0-9A-Za-z:=.])'
-# Up to the characters beside them, which may look like more bytes.
+# A run of bytes. It may include characters beside the bytes that look like more bytes.
 _BYTES = re.compile(rf'(?:^|(?<=[\s,\[({{"\'])){_BYTE}(?:[\s,;-]+{_BYTE})*{_AFTER}')
 _GAP = re.compile(r'\s{2,}|\t')
 _REST = re.compile(r'[\s,;\])}"\']*')
-# A line with a direction, and without bytes, must not have this.
+# A line with a direction but without bytes is refused if it contains this.
 _LEFT_OVER = re.compile(r'(?<![\w=(.])[0-9A-Fa-f]{1,4}(?![\w=)]| bytes?\b)')
 _LITERAL = re.compile(r'\bb(?P<sign>[\'"])(?:\\.|(?!(?P=sign)).)*(?P=sign)')
 
@@ -60,8 +60,8 @@ class LogReader:
     """
     Read the lines of a log in their order.
 
-    ``read`` returns the chunk of a line, None for one without bytes; ValueError for a line that
-    does not fit the rule.
+    ``read`` returns the chunk of a line, or None if the line has no bytes. It raises ValueError if
+    a line does not fit the rule.
     """
 
     def __init__(self) -> None:
@@ -147,7 +147,7 @@ def _splits(line: str, start: int) -> Iterator[tuple[str, str]]:
 
 
 def _are_characters(text: str, data: bytes) -> bool:
-    """Tell whether a text is what a dump shows of bytes: themselves, or a sign for others."""
+    """Return True if a text can show ``data`` in a dump, with signs for unprintable bytes."""
     text, data = text.strip(' '), data.strip(b' ')  # blanks at the ends may be missing
     return len(text) == len(data) > 0 and all(
         chr(byte) == sign or sign == '.' or not (0x20 < byte < 0x7F or sign.isalnum())

@@ -33,11 +33,11 @@ _PCAP = {b'\xD4\xC3\xB2\xA1': ('<', 1e-6), b'\xA1\xB2\xC3\xD4': ('>', 1e-6),
 _BYTE_ORDERS = {b'\x4D\x3C\x2B\x1A': '<', b'\x1A\x2B\x3C\x4D': '>'}
 _INTERFACE, _SIMPLE, _ENHANCED = 1, 3, 6
 _RESOLUTION = 9  # option of an interface
-_LONGEST = 1_000_000  # bytes of a packet or block; no network has longer ones
+_LONGEST = 1_000_000  # bytes of a packet or block; no network has longer packets
 
 
 class RecordedPacket(NamedTuple):
-    """A packet: seconds since 1970 (None: not recorded), link type, bytes as far as kept."""
+    """A packet: seconds since 1970 (None: not recorded), link type, and the recorded bytes."""
 
     time: float | None
     link_type: int
@@ -45,7 +45,7 @@ class RecordedPacket(NamedTuple):
 
 
 def is_packet_file(start: bytes) -> bool:
-    """Tell whether a file that begins with these bytes is pcap or pcapng."""
+    """Return True if a file that begins with these bytes is pcap or pcapng."""
     return start[:4] == _PCAPNG or start[:4] in _PCAP
 
 
@@ -118,7 +118,7 @@ class PacketFile:
 
 
 def _tick(order: str, options: bytes) -> float:
-    """Return the seconds that a time stamp of an interface counts in."""
+    """Return the length (s) of a tick in the time stamps of an interface."""
     while len(options) >= 5:
         code, size = struct.unpack_from(f'{order}HH', options)
         if code == _RESOLUTION:

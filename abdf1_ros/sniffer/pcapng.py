@@ -15,11 +15,16 @@
 """
 Entries as a pcapng file, which Wireshark reads with the dissector of this package.
 
-The link type is USER0. Each packet is one symbol of DF1 (a message, a poll, DLE ACK, ...) as its
-bytes stood on the line, after four bytes of ours: version (1), direction (0 not known, 1 ">", 2
-"<"), check (0 none, 1 BCC, 2 CRC) and its verdict (0 none, 1 right, 2 wrong). There are no packets
-for noise, silence and missing replies. The format follows draft-ietf-opsawg-pcapng, sections 4.1
-to 4.3.
+The link type is USER0. Each packet is one symbol of DF1 (a message, a poll, DLE ACK, ...): four
+bytes of ours, then the bytes of the symbol on the line. Noise, silence and missing replies have no
+packets. The four bytes are:
+
+- version: 1
+- direction: 0 not known, 1 ">", 2 "<"
+- check: 0 none, 1 BCC, 2 CRC
+- verdict of the check: 0 none, 1 right, 2 wrong
+
+The format follows draft-ietf-opsawg-pcapng, sections 4.1 to 4.3.
 """
 
 from __future__ import annotations
@@ -44,7 +49,7 @@ _NAME = 2  # option of an interface
 _FLAGS = 2  # option of a packet; its lowest two bits are the direction
 _SNAP_LENGTH = 0  # no limit
 DIRECTIONS = {Direction.UNKNOWN: 0, Direction.OUT: 1, Direction.IN: 2}
-# Inbound is 1 for pcapng, outbound 2.
+# In pcapng, inbound is 1 and outbound is 2.
 _FLAG = {Direction.UNKNOWN: 0, Direction.OUT: 2, Direction.IN: 1}
 _CHECKS = {None: 0, Checksum.BCC: 1, Checksum.CRC: 2}
 _VERDICTS = {None: 0, True: 1, False: 2}
@@ -52,11 +57,11 @@ _VERDICTS = {None: 0, True: 1, False: 2}
 
 class PcapngWriter:
     """
-    Write entries to ``path``, a file or a named pipe; a file that is there has to be of ours.
+    Write entries to ``path``: a new file, an earlier file of ours, or a named pipe.
 
-    A file is replaced; a pipe waits for its reader. Raises OSError where it cannot be written, or
-    is something else, which is left alone. Other users may not read it: it holds the values of a
-    plant.
+    An earlier file is replaced. With a pipe, the constructor waits for the reader. Raises OSError
+    if ``path`` cannot be written, or if it is another file, which is not changed. A new file is
+    not readable for all users, because it contains values of a plant.
     """
 
     def __init__(self, path: str) -> None:
@@ -69,7 +74,7 @@ class PcapngWriter:
         self._file.write(_head())
 
     def begin(self, begun: str) -> None:
-        """Take the time of day (ISO 8601) from which the entries that follow count."""
+        """Set the date and time (ISO 8601) from which the times of the next entries count."""
         try:
             self.begun = datetime.fromisoformat(begun).timestamp()
         except ValueError:

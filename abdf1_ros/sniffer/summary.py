@@ -35,24 +35,25 @@ class Latency:
     longest: float = 0.0
 
     def add(self, seconds: float) -> None:
-        """Take a latency (s)."""
+        """Add a latency (s)."""
         self.count += 1
         self.total += seconds
         self.longest = max(self.longest, seconds)
 
     @property
     def mean(self) -> float:
-        """Return the mean; 0 when there was none."""
+        """Return the mean (s); 0 if there was no latency."""
         return self.total / self.count if self.count else 0.0
 
 
 @dataclass(slots=True)
 class Counts:
     """
-    How often things were seen, of the whole line or of one station.
+    The counts of entries, of the whole line or of one station.
 
-    ``errors`` are replies with an STS that is not 0, ``repeated`` retransmissions of either
-    side, ``damaged`` everything with a wrong check or a broken frame.
+    - ``errors``: replies with an STS that is not 0
+    - ``damaged``: entries with a wrong check or a broken frame
+    - ``noise``: bytes of noise
     """
 
     kinds: Counter[Kind] = field(default_factory=Counter)
@@ -77,7 +78,7 @@ class Summary:
     """
     Count the entries of a ``TrafficDecoder``; ``baud`` is needed for the load of the line.
 
-    Where the times go back, another recording has begun.
+    If the times go back, another recording has begun.
     """
 
     def __init__(self, baud: int | None = None) -> None:
@@ -113,10 +114,10 @@ class Summary:
 
     def load(self, duplex: Duplex | None) -> float | None:
         """
-        Return how much of its time the line carries bytes, 0 to 1; None when unknown.
+        Return the share of its time (0 to 1) in which the line transmits; None if unknown.
 
-        Full duplex has a wire for each direction; the busier one counts. More than a line can
-        carry comes over a pseudo-terminal or a network, whose speed is not known.
+        Full duplex has a wire for each direction; the busier wire counts. A share above 1 comes
+        from a pseudo-terminal or a network. Their speed is not known, so the result is None.
         """
         if not self.baud or not self.seconds:
             return None

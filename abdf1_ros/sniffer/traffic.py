@@ -28,12 +28,13 @@ from abdf1_ros.sniffer.capture import Chunk, Direction
 from abdf1_ros.sniffer.conversation import Conversation, Transaction
 from abdf1_ros.sniffer.entries import Entry, Kind, Mark
 
-# Seconds of silence after which an unfinished frame is given up, as a receiver does: some
-# characters, plus the time that an operating system or a device server may hold bytes back.
+# Seconds of silence after which an unfinished frame is given up, as a receiver does. It is the
+# time of some characters, plus the time for which an operating system or a device server may hold
+# bytes back.
 _PAUSE = 0.15
 
-# Bytes for a decoder at once, which drops more than MAX_WAITING: one line of a dump can be as long
-# as its file.
+# Most bytes that a decoder gets at once. It drops bytes beyond MAX_WAITING, and one line of a dump
+# can be as long as its file.
 _PART = 4096
 
 # After this number of replies without any DLE ACK, NAK or ENQ the line is treated as radio modem.
@@ -54,7 +55,7 @@ class _OneDirection:
         self._noise_told = 0
 
     def ends_before(self, chunk: Chunk) -> bool:
-        """Tell whether a pause, or another recording, ends a frame that is not complete."""
+        """Return True if a pause, or another recording, ends a frame that is not complete."""
         return chunk.time is not None and self.last_time is not None and (
             not 0 <= chunk.time - self.last_time <= _PAUSE)
 
@@ -67,12 +68,12 @@ class _OneDirection:
 
 class TrafficDecoder:
     """
-    Decode the traffic of one line, whatever the bytes are; nothing is raised.
+    Decode the traffic of one line; no bytes cause an exception.
 
-    ``feed`` takes chunks in the order of their times, ``finish`` ends the traffic. Check and
-    duplex are found if they are not given; ``kind`` has them. A ``checksum`` that is not
-    ``is_certain`` is a guess that the frames may prove wrong. On half-duplex lines an unknown
-    direction is inferred: ``>`` is from the master.
+    ``feed`` takes chunks in the order of their times, ``finish`` ends the traffic. If check and
+    duplex are not given, they are found; ``kind`` has both. Without ``is_certain``, ``checksum``
+    is a guess that the frames may prove wrong. On half-duplex lines, an unknown direction is
+    inferred: ``>`` is from the master.
     """
 
     def __init__(self, checksum: Checksum | None = None, duplex: Duplex | None = None, *,
@@ -84,7 +85,7 @@ class TrafficDecoder:
         self._awaited: tuple[Direction, str] | None = None  # asker, and question
         self._last_asker = Direction.OUT
         self._finds_duplex = duplex is None
-        self._without_ack = 0  # replies since the last symbol
+        self._without_ack = 0  # replies since the last DLE ACK, NAK or ENQ
 
     def feed(self, chunk: Chunk) -> Iterator[Entry]:
         """Yield the entries that these bytes complete."""
@@ -114,7 +115,7 @@ class TrafficDecoder:
                 yield from self._entries(symbol, chunk, wire.decoder)
 
     def finish(self) -> Iterator[Entry]:
-        """Yield the entries that are left at the end."""
+        """Yield the entries that remain at the end."""
         for direction, wire in self._wires.items():
             yield from self._whole(wire, direction, is_end=True)
         times = [wire.last_time for wire in self._wires.values() if wire.last_time is not None]
@@ -122,7 +123,11 @@ class TrafficDecoder:
             yield self._unanswered(transaction, max(times, default=None))
 
     def _whole(self, wire: _OneDirection, direction: Direction, is_end: bool) -> Iterator[Entry]:
-        """Yield a frame with a right BCC that waits for more bytes; at an end, also the rest."""
+        """
+        Yield a frame with a right BCC that still waits for more bytes.
+
+        At an end, also yield an unfinished frame.
+        """
         symbol = wire.decoder.finish()
         if is_end:
             if symbol is None and wire.decoder.in_message:
@@ -164,7 +169,7 @@ class TrafficDecoder:
         return self.kind.duplex is Duplex.HALF
 
     def _direction(self, symbol: Symbol, direction: Direction) -> Direction:
-        """Infer the direction on a two-wire line: masters and slaves send different symbols."""
+        """Infer the direction on a half-duplex line: masters and slaves send different symbols."""
         if direction is not Direction.UNKNOWN or not self._is_half:
             return direction
         if _is_masters(symbol):
@@ -210,7 +215,7 @@ class TrafficDecoder:
         return Entry(time, direction, kind, text, station)
 
     def _guess_duplex(self, before: Duplex, now: Duplex) -> None:
-        """Take the line for another kind, if it is one of this kind and no option has said so."""
+        """Change the duplex from ``before`` to ``now``, unless an option has set the duplex."""
         if self._finds_duplex and self.kind.duplex is before:
             self.kind.duplex = now
 
@@ -262,7 +267,7 @@ class TrafficDecoder:
 
 
 def _is_masters(symbol: Symbol) -> bool:
-    """Tell whether only the master of a half-duplex line sends this."""
+    """Return True if only the master of a half-duplex line sends this symbol."""
     if isinstance(symbol, Control):
         return symbol.code is Code.NAK
     return isinstance(symbol, Poll) or isinstance(symbol, Frame) and symbol.station is not None

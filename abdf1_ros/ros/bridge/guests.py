@@ -60,7 +60,7 @@ class GuestPlaces(GuestListener):
             line.stop()
 
     def sends(self, guest: Guest, command: Packet) -> None:
-        """Write into the trace which guest's command is sent."""
+        """Write the name of the guest into the trace: its command is sent now."""
         self._opener.note_guest(guest.name, command)
 
     def turned_away(self, guest: Guest, other: str) -> None:

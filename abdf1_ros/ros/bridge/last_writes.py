@@ -19,12 +19,13 @@ from __future__ import annotations
 from collections.abc import Callable
 import time
 
-# Length (s) of a look for writes. One look without a write proves nothing: on a busy host another
-# callback may take as long. Only several empty looks in a row show that no write still waits.
+# Length (s) of a look for writes. One look without a write proves nothing: on a busy host, another
+# callback may take as long as the look. Only several empty looks in a row show that no write still
+# waits.
 _LOOK = 0.02
 _LOOKS = 3
 
-# Longest time (s) for all looks, because a publisher may never pause.
+# Longest time (s) for all looks together. A limit is needed, because a publisher may never pause.
 LAST_WRITES = 1.5
 
 

@@ -61,8 +61,9 @@ from rclpy.duration import Duration
 from std_msgs.msg import UInt16MultiArray
 from std_srvs.srv import SetBool, Trigger
 
-# Limits of the shutdown (s). Two count from its start: stop waiting for pending writes, and begin
-# no more last diagnostics. The third: longest wait for a stuck subscriber.
+# Limits of the shutdown (s). The first two count from its start: the end of the look for last
+# writes, and the latest begin of a node's last diagnostics. The third is the longest wait for a
+# stuck subscriber.
 _LATEST_WRITES = LONGEST_END + 1.0
 _LATEST_DIAGNOSTICS = LONGEST_END + 2.0
 _LONGEST_PUBLISH = 0.5
@@ -160,7 +161,7 @@ class BridgeNode(AnsweringNode):
             self.session.guests.start()
 
     def begin_end(self) -> None:
-        """Begin the end, as ``BridgeSession`` does; no request can cancel it."""
+        """Begin the end of the bridge and its session; no request can cancel it."""
         self._is_ending = True
         self.session.begin_end()  # first, so that messages that have waited are refused
         self.writes.begin()
@@ -171,7 +172,7 @@ class BridgeNode(AnsweringNode):
         self.session.link_counters.end()
 
     def publish_last_diagnostics(self, give_up: float) -> None:
-        """Disconnect guests and publish the last state, at most until a monotonic clock value."""
+        """Disconnect guests, publish the last state, wait for acks until a monotonic time."""
         self.session.guests.stop()
         self._opener.close()
         self.session.publish_diagnostics(line_time())
@@ -240,7 +241,7 @@ class BridgeNode(AnsweringNode):
             return False
         before.end()
         self.session.begin()
-        if self._is_ending:  # since then
+        if self._is_ending:  # the end has begun meanwhile
             self.session.begin_end()
         self.session.guests.start()
         self._shown.show(configuration.network, configuration.shown_rows())
@@ -254,7 +255,7 @@ class BridgeNode(AnsweringNode):
             response.message = ENDS
         elif request.data:
             self.session.driver.interlocks.resume()
-            if self._is_ending:  # since then
+            if self._is_ending:  # the end has begun meanwhile
                 self.session.begin_end()
             self.link.take()
             response.success, response.message = True, f'{self.session.port} is being opened'
@@ -292,9 +293,9 @@ def end_together(nodes: Sequence[BridgeNode], patience: float = _LONGEST_PUBLISH
     """
     End all nodes together: PLCs, links, results of pending writes, last diagnostics.
 
-    Callbacks may run meanwhile: a message that they take gets the result that it is not sent. A
-    node that fails here does not stop the end of the rest. The end takes at most 8 s, and
-    ``patience`` s more for a stuck subscriber.
+    Callbacks may still run: a message that they take now is not sent, and its result says so. If a
+    node fails here, all other nodes still end. The end takes at most 8 s, plus ``patience`` s if a
+    subscriber is stuck.
     """
     begun = time.monotonic()
     for node in nodes:
@@ -314,5 +315,5 @@ def end_together(nodes: Sequence[BridgeNode], patience: float = _LONGEST_PUBLISH
             break
         try:
             node.publish_last_diagnostics(give_up)
-        except Exception as error:  # the node may be broken; go on with the rest
+        except Exception as error:  # the node may be broken; go on with the other nodes
             node.get_logger().error(f'the end of this node has failed: {bug_text(error)}')

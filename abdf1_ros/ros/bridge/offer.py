@@ -34,8 +34,8 @@ class OfferedPublisher:
     """
     A publisher that exists only while the bridge offers it.
 
-    Without a publisher the last ``most`` messages wait: the bridge may have the line a moment
-    before it notices. Any thread may call ``publish``; only the executor's thread may call
+    Without a publisher, the last ``most`` messages wait, because the bridge notices a moment late
+    that it has the line. Any thread may call ``publish``; only the executor's thread may call
     ``offer`` and ``withdraw``.
     """
 

@@ -25,10 +25,9 @@ class PortOwners:
     """
     The ports and guest places of all lines; each may belong to one line only.
 
-    Two masters on one port would disturb each other. With one guest place for two lines, a command
-    might reach the wrong PLC. The operating system refuses a second opening of a device, but not
-    of a port of a device server. Nor does it refuse a device that its line has released for a
-    while.
+    Two masters on one port would disturb each other. If two lines had one guest place, a command
+    might reach the wrong PLC. The operating system refuses to open a device twice. But it refuses
+    neither the port of a device server nor a device that its line has released for a while.
     """
 
     def __init__(self) -> None:

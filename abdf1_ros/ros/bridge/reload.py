@@ -47,7 +47,7 @@ def refuse_harm(before: Configuration, after: Configuration, is_open: bool,
 
 
 def changes(before: Configuration, after: Configuration) -> str:
-    """Return a text with the changes that new files bring."""
+    """Return a text with the changes that new files make."""
     parts = [*_settings(before, after), *_rows(before, after)]
     return printable('; '.join(parts)) if parts else 'nothing has changed'
 

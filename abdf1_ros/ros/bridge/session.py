@@ -69,7 +69,7 @@ _GLANCE = 0.005  # s between two checks whether the PLCs have confirmed
 @dataclass(slots=True)
 class Surroundings:
     """
-    The parts of a bridge that stay when new files come.
+    The parts of a bridge that a reload keeps.
 
     - ``published``: the read topics, kept if the next files have the same row
     - ``is_offered``: the topics and services exist
@@ -104,9 +104,9 @@ class BridgeSession:
     """
     The bridge between one pair of files and ROS.
 
-    Make it before its driver is on the line. Then call ``begin``, and ``end`` after a new session
-    has replaced it. The executor's thread does all this, or any thread before the executor runs.
-    One thread calls ``check`` every 0.1 s.
+    Make the session before its driver is on the line. Then call ``begin``, and call ``end`` after
+    a new session has replaced it. Only the executor's thread does this; before the executor runs,
+    any thread may. One thread calls ``check`` every 0.1 s.
     """
 
     def __init__(self, surroundings: Surroundings, configuration: Configuration) -> None:
@@ -214,7 +214,7 @@ class BridgeSession:
             configuration.network, configuration.mappings)])
         self.diagnostics.line.attach(self._surroundings.link, self._surroundings.opener)
         self.reads.take_over()
-        # otherwise port_changed publishes the table after the first attempt
+        # with a closed port, port_changed publishes the table after the first attempt to open it
         if self._surroundings.link.state.is_open:
             self._publish_active()
 
@@ -231,16 +231,16 @@ class BridgeSession:
         self._interlocks.end()
 
     def begin_end(self) -> None:
-        """Begin to set heartbeats to 0 and write fallbacks; ``tell_plcs`` waits (rule 5)."""
+        """Begin to set heartbeats to 0 and write fallbacks (rule 5); ``tell_plcs`` waits."""
         self._events.unreadable_rows.tell()
         self.driver.interlocks.wind_down()
         self._wake_link()
 
     def wait_for_plcs(self, give_up: float, what: str) -> None:
         """
-        Wait for the PLCs to confirm, at most to a monotonic clock value; log the open rows.
+        Wait until the PLCs confirm, at most to a monotonic clock value; log unconfirmed rows.
 
-        A spare without the line has no open rows: they are those of the bridge that has the line.
+        A spare without the line logs none: these rows belong to the bridge that has the line.
         """
         interlocks, link = self.driver.interlocks, self._surroundings.link
         while link.state.is_open and link.is_alive() and not interlocks.is_over \
@@ -270,7 +270,8 @@ class BridgeSession:
         self._opened = line_time() if state.is_open else math.inf
         self._events.port_changed()
         self._publish_active()
-        # a device server may accept and close every second; the status shows it
+        # a spare does not log this: a device server may accept and close its connection every
+        # second; the status shows it
         if self.is_waiting:
             return
         is_meant = state.is_open or self._surroundings.link.is_released
@@ -279,7 +280,7 @@ class BridgeSession:
         tell('the port', f'{self.port}: {state.text}')
 
     def check(self) -> None:
-        """Publish diagnostics if due or if a level has changed; end calls that need not wait."""
+        """Publish diagnostics if due or if a level has changed; end calls that wait no longer."""
         now = line_time()
         self._surroundings.writes.standstills.look(now)
         self.link_counters.check(now)
@@ -321,7 +322,8 @@ class BridgeSession:
             self._publish(self._surroundings.snapshot, self._snapshot.message(now))
 
     def _publish(self, publisher: Any, message: DiagnosticArray) -> None:
-        # Simulated time may still be 0; then the message would sort before all earlier ones.
+        # While simulated time is 0, use system time: otherwise this message would sort before all
+        # earlier messages.
         now = self._surroundings.node.get_clock().now()
         stamped = now if now.nanoseconds else Clock(clock_type=ClockType.SYSTEM_TIME).now()
         message.header.stamp = stamped.to_msg()
@@ -332,7 +334,7 @@ def tell_plcs(sessions: Sequence[BridgeSession], what: str, limit: float) -> Non
     """
     Set heartbeats to 0 and write fallbacks in all sessions, and wait for all (rule 5).
 
-    It takes at most ``limit`` s. ``what``: what the bridge does next, for the log.
+    The wait takes at most ``limit`` s. ``what``: what the bridge does next, for the log.
     """
     give_up = time.monotonic() + limit
     for session in sessions:

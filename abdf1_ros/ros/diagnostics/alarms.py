@@ -15,7 +15,7 @@
 """
 Statuses of alarms: bits of the PLC that mean a fault of the plant.
 
-A bit that came and went between two statuses is still shown once.
+If a bit was an alarm only between two statuses, the next status still shows it.
 """
 
 from __future__ import annotations
@@ -101,7 +101,7 @@ class AlarmStatus:
         return {bit.place: bit.text(now) for bit in self._bits}
 
     def forget(self) -> None:
-        """Forget the bits that have gone: a status has shown them now."""
+        """Forget alarms that are over: a status has shown them."""
         for bit in self._bits:
             bit.is_news = False
 
@@ -125,6 +125,6 @@ class Alarms:
             status.take(values, self._clock())
 
     def forget(self) -> None:
-        """Forget the bits that have gone, in all rows: the statuses have shown them."""
+        """Forget alarms that are over, in all rows: the statuses have shown them."""
         for status in self._by_mapping.values():
             status.forget()

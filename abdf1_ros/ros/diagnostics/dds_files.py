@@ -13,12 +13,12 @@
 # limitations under the License.
 
 """
-Find that the files of Fast DDS in /dev/shm are gone.
+Find out whether the files of Fast DDS in /dev/shm are gone.
 
-Fast DDS exchanges messages between processes of a host through these files, and keeps a lock on
-each file of its own. If another program removes the files, no error comes: programs that start
-later get nothing, and connected programs get nothing after some seconds. logind removes the files
-of a user at the last logout.
+Fast DDS exchanges messages between processes of a host through these files, and a process keeps a
+lock on each file that it has made. If another program removes the files, Fast DDS reports no
+error. Programs that start later get no messages. After some seconds, connected programs get no
+messages either. logind removes the files of a user at the last logout.
 """
 
 from __future__ import annotations
@@ -55,8 +55,8 @@ class DdsFiles:
     """
     The files of Fast DDS that this process has made; for one thread.
 
-    Fast DDS makes a port anew that another process took for dead. So only a lock that is lost at
-    two looks in a row counts.
+    If another process has treated a port as dead, Fast DDS makes the port anew. So a lock counts
+    as lost only if two looks in a row find it lost.
     """
 
     def __init__(self, find: Callable[[], frozenset[str]] = lost_locks) -> None:
@@ -66,7 +66,7 @@ class DdsFiles:
         self.fault = ''
 
     def look(self, now: float) -> str:
-        """Return what is wrong at the clock value ``now`` (s); empty if nothing is."""
+        """Return the fault at the clock value ``now`` (s) as a text; empty if there is none."""
         if now >= self._next_look:
             self._next_look = now + _PERIOD
             before, self._lost = self._lost, self._find()

@@ -13,7 +13,7 @@
 # limitations under the License.
 
 """
-Find that the process began before its host had a network.
+Find out whether the process began before its host had a network.
 
 Fast DDS looks at the network links of the host once, when the process begins. If no link was up
 then, programs on other hosts never hear the process, even after the network is up.
@@ -68,7 +68,7 @@ class DdsLinks:
         self.fault = ''
 
     def look(self, now: float) -> str:
-        """Return what is wrong at the clock value ``now`` (s); empty if nothing is."""
+        """Return the fault at the clock value ``now`` (s) as a text; empty if there is none."""
         if self._may_be_early and not self.fault and now >= self._next_look:
             self._next_look = now + _PERIOD
             self.fault = BEGAN_EARLY if self._has_links() else ''

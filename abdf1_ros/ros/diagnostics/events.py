@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Show the driver's events: results on their topic, the rest in log and statuses."""
+"""Show the driver's events: write results on their topic, all other events in log and statuses."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ class LineEvents:
     - ``scans``: True if "plc scan" works on this line
     - ``read``: is called with the values of each good read
     - ``results``: publisher for the results of writes
-    - ``answer``: is called with each result too
+    - ``answer``: is also called with each result
     - ``table_changed``: is called when a station has become active or inactive
     """
 
@@ -76,14 +76,14 @@ class LineEvents:
         self._may_have_left_over = set(self._stations)
 
     def lost(self, topic: str, count: int) -> None:
-        """Log messages to a write topic that DDS has dropped."""
+        """Log that DDS has dropped messages to a write topic."""
         self.writes.lost(topic, count, self._clock())
         self.notes.warning(f'lost writes to {topic}', f'~/write/{topic}: {count} messages were '
                            'lost on their way here and have no result: the publisher is too '
                            'fast for this node, or the network was cut')
 
     def ahead(self, topic: str, seconds: float, nodes: Sequence[str]) -> None:
-        """Log that the clock of one of these publishers is ahead of ours."""
+        """Log that the clock of a publisher among ``nodes`` is ahead of ours."""
         shown = ' or '.join(nodes[:_SHOWN_NODES]) or 'a node that is gone'
         text = f'the clock of {shown} is {seconds:.2f} s ahead of the clock here'
         self.writes.ahead(f'~/write/{topic}: {text}', self._clock())
@@ -153,7 +153,7 @@ class LineEvents:
         """Publish the Active Node Table and log the change."""
         self._table_changed()
         if station.takes_no_commands:
-            return  # such a station comes and goes; DeafStations reports it once
+            return  # its state changes again and again; DeafStations reports it once
         self._log.forget(station.number)
         about = f'station {station.number}'
         if station.active:

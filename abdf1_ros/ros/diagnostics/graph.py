@@ -33,10 +33,12 @@ from abdf1_ros.ros.diagnostics.log import INFO, News, WARN
 from abdf1_ros.settings.mapping import Mapping
 from rclpy.node import Node
 
-# Seconds; short, to report a node with our name before it has taken many of our messages.
+# Seconds between two looks for our name; short, to report a second node with our name before it
+# has taken many of our messages.
 _NAMES_PERIOD = 0.25
 
-# Seconds until a new node has found the nodes that run already; mostly it takes a fifth of this.
+# Seconds until a new node has found the nodes that run already; usually a fifth of this time is
+# enough.
 DISCOVERY = 0.5
 
 # Pause between two queries for topics: at least ``_LEAST`` s, and at least ``_MULTIPLE`` times the
@@ -85,8 +87,8 @@ class NameWatch:
     """
     Report that another node has our name: both then have the same topics and services.
 
-    Such a node is reported at once, even if it may be an earlier run that was killed: both nodes
-    may take the next command.
+    Such a node is reported at once, even if it may be an earlier run of ours that was killed.
+    Until one of the two ends, both may take the next command.
 
     - ``count``: returns the number of nodes with our name, our own included
     - ``first_look``: clock value (s) of the first look

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The status ``interlocks``: which PLCs ROS controls, and why it does not control the rest."""
+"""The status ``interlocks``: which PLCs ROS controls, and why it does not control other PLCs."""
 
 from __future__ import annotations
 
@@ -50,7 +50,8 @@ class InterlockStatus:
         self._fallbacks = driver.interlocks.fallbacks
         self._checks = driver.checks
         self._bounds = [*Times(driver.network, driver.mappings, driver.readings.blocks).bounds()]
-        # Rows that confirm a heartbeat, by its tag. All other rows share the key ''.
+        # Rows that confirm a heartbeat, by the tag of the heartbeat. All other rows share the key
+        # ''.
         self._bits = {point.mapping.confirms: point for point in driver.points.values()}
         # Clock values (s), by tag: since when a heartbeat counts, or a bit is 1.
         self._since: dict[str, float] = {}
@@ -88,7 +89,7 @@ class InterlockStatus:
             self._since.pop(tag, None)
 
     def _control(self, beat: HeartbeatRow, now: float) -> tuple[_InControl, str]:
-        """Return how long ROS has been in control, or why it is not, as one heartbeat shows."""
+        """Return the state of a PLC as one heartbeat shows it; also how long, or why not."""
         if reason := self._why_not(beat, now):
             return _InControl.NOT_IN_CONTROL, f'not in control: {reason}'
         begun, point = self._since[beat.mapping.tag], self._bits.get(beat.mapping.tag)
@@ -99,7 +100,7 @@ class InterlockStatus:
         return control, reason or f'in control for {now - max(begun, self._since[tag]):.1f} s'
 
     def _confirmed(self, point: ReadPoint, begun: float, now: float) -> tuple[_InControl, str]:
-        """Return what a bit confirms of a heartbeat that counts since ``begun`` (s), and why."""
+        """Return if a bit confirms a heartbeat that counts since ``begun`` (s); if not, why."""
         tag, freshness = point.mapping.tag, point.freshness(now)
         bit, why = self._watched.latest.get(point.mapping.topic), point.error or point.withheld
         if bit is None or not freshness.is_usable:

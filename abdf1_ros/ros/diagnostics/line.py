@@ -34,7 +34,7 @@ from abdf1_ros.settings.mapping import Mapping
 # Another node with our number is reported until this many seconds after its last packet.
 _SAME_NUMBER_TOLD = 60.0
 
-# A station that takes no commands is silent after this time (s) without a sign of life.
+# A station that takes no commands counts as silent after this time (s) without a sign of life.
 _HEARD_LATELY = 10.0
 
 
@@ -90,7 +90,7 @@ class LineView:
                 and not driver.counters.acks_received)
 
     def wrong_types(self) -> list[str]:
-        """Return which PLCs are not of the family, or the processor, that the map says."""
+        """Return a text for each PLC whose family or processor differs from the map."""
         found = (self.wrong_type(station.number) for station in self.driver.stations)
         return [text for text in found if text is not None]
 
@@ -101,10 +101,9 @@ class LineView:
 
 def wrong_type(station: int, identity: Identity | None, rows: Iterable[Mapping]) -> str | None:
     """
-    Return a text if a PLC is not what a row of the map says, otherwise None.
+    Return a text if PLC_Type or Processor of a row does not fit the PLC, otherwise None.
 
-    Its PLC_Type or its Processor may differ. A row of type PLC2 fits any PLC, because all families
-    know the commands of the PLC-2.
+    A row of type PLC2 fits any PLC, because all families know the commands of the PLC-2.
     """
     if identity is None or identity.plc_type is None:
         return None

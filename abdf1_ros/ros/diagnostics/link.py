@@ -38,7 +38,7 @@ _LONGEST_UNPOLLED = 5.0
 
 LOAD_BY_TOPIC = 'line load by topic'
 _MOST_TOPICS = 40  # a map may have thousands
-_MOST_CARRIED = 30  # most reads of other nodes that are shown: the latest
+_MOST_CARRIED = 30  # most reads of other nodes in the status: the latest
 
 
 class LinkStatus:
@@ -136,12 +136,12 @@ class CountersStatus:
 
     def reset(self) -> None:
         """Show every counter from zero again."""
-        # The counters themselves belong to the link thread; only their origin moves.
+        # The link thread owns the counters, so a reset only changes the baseline.
         self._baseline = self._counters.by_mnemonic()
 
     def judge(self, now: float) -> Judgement:
-        # This runs ten times a second, so it reads two counters: all of them take 20 times as
-        # long.
+        # This runs ten times a second, so it reads only two counters: reading all of them takes 20
+        # times as long.
         counters, before = self._counters, self._baseline
         sent = counters.commands_sent - before['CNT_CMD_MSGS_SENT']
         received = counters.replies_received - before['CNT_REPLY_MSGS_RCVD']
@@ -199,7 +199,7 @@ def load_by_topic(jobs: Iterable[ReadJob]) -> str:
 
 
 def _paces(points: Iterable[ReadPoint]) -> dict[str, str]:
-    """Return the wanted and the measured time between reads by period, of periodic rows."""
+    """Return the wanted and the measured time between reads, for each period of periodic rows."""
     found: defaultdict[float, list[float]] = defaultdict(list)
     for point in points:
         if point.mapping.polls and not point.mapping.is_on_demand:

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Rows that are too much for the line: reads slower than their Period, and many writes."""
+"""Rows that overload the line: reads slower than their Period, and too many writes."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ from abdf1_ros.settings.mapping import Mapping
 from abdf1_ros.text import first, milliseconds
 
 # A row becomes slow if more than 1.5 periods lie between its reads; it stays slow while more than
-# 1.25 do.
+# 1.25 periods do.
 _SLOW, _STILL_SLOW = 1.5, 1.25
 
 _LOOK_PERIOD = 1.0  # s
@@ -97,7 +97,7 @@ class SlowRows:
                 and point.kept > point.period * (_STILL_SLOW if point in self._slow else _SLOW)}
 
     def _advice(self) -> str:
-        # The line carries the present reads. So it carries all rows at the pace of the slowest
+        # The line can do the present reads. So it can also read all rows as seldom as the slowest
         # row.
         needed = max(self._slow.values()) / _ADVISED_LOAD * 1000
         period = next((step for step in PERIOD_STEPS if step >= needed), None)

@@ -16,8 +16,8 @@
 The node's entries in the ROS log: all characters are visible, the number of entries is limited.
 
 A numbered event is logged once for each cause, and its repetitions are counted. While the cause
-lasts or comes and goes, an entry now and then repeats it. All other entries are limited to a few
-per minute about one subject. So neither a PLC nor a publisher can fill the disk.
+lasts or returns, it is logged again from time to time. All other entries are limited to a few per
+minute about one subject. So neither a PLC nor a publisher can fill the disk.
 """
 
 from __future__ import annotations
@@ -50,15 +50,15 @@ MOST_CAUSES = 1000
 MOST_ENTRIES = 10
 _MINUTE = 60.0
 
-# Rows without a value are logged together: ``_PAUSE`` s after the last row has come, or
+# Rows without a value are logged together: ``_PAUSE`` s after the last row was added, or
 # ``_LONGEST`` s after the first.
 _PAUSE = 1.0
 _LONGEST = 10.0
 
-# Most rows that wait for the log; /diagnostics shows the rest too.
+# Most rows that wait for the log; /diagnostics shows all rows.
 _MOST_ROWS = 10_000
 
-# Events of every transaction, and events that come with another event that is logged.
+# Events that every transaction has, and events that accompany another logged event.
 _ROUTINE = (
     Message.NTC_REPLY_MSG_RCVD, Message.NTC_NAK_RETRY, Message.NTC_ENQ_RETRY,
     Message.NTC_ACK_EXPECTED, Message.NTC_EOT_STX_EXPECTED)
@@ -202,8 +202,8 @@ class UnreadableRows:
     """
     Logs why rows have no value: one entry for all rows of a file with the same reason.
 
-    A PLC that lacks a file refuses its rows one by one, because we divide a refused block and ask
-    again. Only the thread of the link calls ``add``; any thread may call ``tell``.
+    If a PLC lacks a file, it refuses all rows of the file one by one, because we divide a refused
+    block and ask again. Only the thread of the link calls ``add``; any thread may call ``tell``.
     """
 
     def __init__(self, log: LimitedLog) -> None:
@@ -219,7 +219,7 @@ class UnreadableRows:
             self._rows[mapping, reason] = None
 
     def look(self, now: float) -> None:
-        """Write the entries if no row has come for a while, or the first has waited for long."""
+        """Write the entries if no row was added for a while, or the first row has waited long."""
         if self._rows and (now - self._last >= _PAUSE or now - self._first >= _LONGEST):
             self.tell()
 

@@ -35,9 +35,9 @@ FRESHNESS_LEVELS = {
 
 class MappingsStatus:
     """
-    How many rows are fresh; which are not, and why; which are slow, or fill the line.
+    The number of fresh rows; which rows are not fresh, and why; which are slow or fill the line.
 
-    ``left_out``: the faults of rows that the map was read without.
+    ``left_out``: the faults of the rows that were left out of the map.
     """
 
     name = 'mappings'

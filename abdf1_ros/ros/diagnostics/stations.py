@@ -112,11 +112,12 @@ class StationStatus:
 
 class LinkCounterService:
     """
-    Ask every active station for the counters of its port; ~/read_link_counters.
+    The service ~/read_link_counters: asks every active station for the counters of its port.
 
     ``answer`` is the callback. It has a callback group of its own and does not block the executor.
-    It continues when ``check`` finds that all stations have answered, or after five seconds. Any
-    thread may call ``check``, which then calls ``wake_executor``.
+    It continues when ``check`` finds that all stations have answered, that the port is closed, or
+    that five seconds have passed. Any thread may call ``check``. If ``check`` ends the waiting, it
+    calls ``wake_executor``.
     """
 
     def __init__(self, driver: Driver, wake_link: Callable[[], None],

@@ -39,7 +39,7 @@ class Diagnostics:
 
     - ``node_name``: the full name, so that equal names in two namespaces stay apart
     - ``events``: the listener of the driver
-    - ``left_out``: faults of the rows that the map was read without
+    - ``left_out``: faults of the rows that were left out of the map
     - ``guests``: the places of other programs
     - ``alarms``: the statuses of rows with an alarm
     """

@@ -75,7 +75,7 @@ def watches_of(line: LineView, port: str, seen: Seen, guests: Sequence[GuestLine
                changed_files: Callable[[float], Sequence[str]],
                crowded_topics: Callable[[float], Sequence[str]],
                dds_fault: Callable[[float], str]) -> list[Watch]:
-    """Return the watches of a session; they put into ``seen`` what statuses show."""
+    """Return the watches of a session; they put findings for the statuses into ``seen``."""
     def changed(now: float) -> list[str]:
         seen.changed_files = changed_files(now)
         return [changed_text(seen.changed_files)] if seen.changed_files else []

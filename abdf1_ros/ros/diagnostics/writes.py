@@ -22,7 +22,7 @@ from abdf1_ros.driver.interlocks.fallback import FallbackCause
 from abdf1_ros.driver.write import Outcome, WriteResult
 from abdf1_ros.ros.diagnostics.status import Judgement, Moment, OK, WARN, with_age
 
-# How long a failed write keeps its status at WARN, in seconds.
+# Seconds for which a failed write, a lost message or a wrong clock keeps the status at WARN.
 _WRITE_MEMORY = 10.0
 
 _FAILURES = Outcome.FAILED, Outcome.NOT_SENT, Outcome.PARTLY
@@ -38,8 +38,8 @@ class WriteLog:
     """
     Counts writes by their outcome.
 
-    Each count has one writer: the executor's thread counts refusals and lost messages, the link
-    thread counts all else.
+    Only one thread changes each count: the executor's thread counts refusals and lost messages,
+    the link thread counts all other results.
     """
 
     name = 'writes'

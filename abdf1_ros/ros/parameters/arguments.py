@@ -103,7 +103,7 @@ class Arguments:
 
 
 def is_for(section: str, full_name: str) -> bool:
-    """Return True if ROS gives the parameters of a section to a node; mind wildcards."""
+    """Return True if ROS gives the parameters of a section, maybe with wildcards, to a node."""
     pattern = re.escape(section).replace(r'/\*\*', r'(/\w+)*').replace(r'/\*', r'/\w+')
     return re.fullmatch(pattern, full_name) is not None
 

@@ -140,7 +140,7 @@ _PATHS = ('net_file', 'map_file')
 @dataclass(frozen=True, slots=True)
 class Configuration:
     """
-    All that the node needs to know.
+    The node's parameters and the contents of both files, checked.
 
     - ``map_problems``: faults of rows that were left out
     - ``given``: the parameters that the user has set
@@ -175,7 +175,7 @@ class Configuration:
 
     @property
     def idle(self) -> list[str]:
-        """Return the changed parameters that only standard polling uses, if the line has none."""
+        """Return the changed parameters of standard polling, if the line does not use it."""
         if self.network.line_mode is STANDARD:
             return []
         usual = Parameters()
@@ -275,7 +275,7 @@ def _from_files(given: Given, parameters: Parameters, problems: list[Problem], *
 
 
 def _overridden(given: Given, network: Network) -> Network:
-    """Return the network with the values of parameters ``net.*`` in place of the file's."""
+    """Return the network with the values of parameters ``net.*`` in place of the file's values."""
     texts = {name: text_of(given[entry.parameter]) for name, entry in FIELDS.items()
              if entry.parameter in given}
     cells = network.cells()
@@ -308,10 +308,10 @@ def wrong_names(node: Node, given: Given, arguments: Arguments, known: Collectio
     """
     Return faults of parameters that do not exist, are for another node, or are octal.
 
-    Every name is checked in sections that name this node, and on the command line. Elsewhere, only
-    names are checked that resemble ours or start with ``begins``: the rest may belong to other
-    nodes. ``map.*`` is allowed, because a dump of our parameters contains it; see ``_ignored``.
-    Numbers with a leading zero are reported, because YAML reads them as octal.
+    In sections that name this node, and on the command line, every name is checked. Elsewhere, a
+    name is checked only if it resembles ours or starts with ``begins``: all other names may belong
+    to other nodes. ``map.*`` is allowed, because a dump of our parameters contains it; see
+    ``_ignored``. Numbers with a leading zero are reported, because YAML reads them as octal.
     """
     full_name = node.get_fully_qualified_name()
     problems = [*arguments.misdirected(full_name, usual_name, known)]
@@ -361,7 +361,7 @@ def _nearest(name: str, known: Collection[str], begins: str, likeness: float) ->
 
 
 def _ignored(given: Given, mappings: Rows) -> list[str]:
-    """Return the names of ``map.*`` whose values differ from the map."""
+    """Return the parameters ``map.*`` whose values differ from the map."""
     texts = {name: text_of(value) for name, value in given.items() if name.startswith('map.')}
     repeated = {name for name, value, _ in map_cells(mappings) if texts.get(name) == value} \
         if texts else set()
@@ -395,7 +395,7 @@ def _stations(name: str, text: str, problems: list[Problem]) -> tuple[int, ...]:
 def _declare(node: Node, given: Given, name: str, default: Any,
              descriptor: ParameterDescriptor) -> Any:
     """
-    Declare a parameter and return its value, even if that has a wrong type or range.
+    Declare a parameter and return its value, even a value of a wrong type or range.
 
     rclpy only shows types and ranges; we check them, with better messages. A path is shown
     resolved, but returned as the user gave it, with ~ expanded.

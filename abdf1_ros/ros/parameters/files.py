@@ -151,7 +151,7 @@ def node_sections(tree: yaml.Node | None, above: str = '', line: int = 1,
     """
     Yield the sections of a parameter file: full node name, line, and parameters.
 
-    A name with wildcards stands for several nodes.
+    A name with wildcards may mean several nodes.
     """
     for key, below in tree.value if isinstance(tree, yaml.MappingNode) else ():
         name, number = str(key.value).strip('/'), key.start_mark.line + 1

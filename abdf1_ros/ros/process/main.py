@@ -51,9 +51,9 @@ from rclpy.utilities import remove_ros_args
 EXIT_CONFIGURATION = 2
 EXIT_FAULT = 1
 
-# Limits after a signal (s, from the signal on): the process has ended; its nodes have left the
-# network. PLCs, pending writes and the last diagnostics take at most 8 s before that. All is less
-# than the 10 s after which systemd, launch and Docker kill.
+# Times (s) after a signal by which the process has ended, and by which its nodes have left the
+# network. Before that, PLCs, pending writes and the last diagnostics take at most 8 s. systemd,
+# launch and Docker kill a process only after 10 s.
 _END_LIMIT = LONGEST_END + 3.0
 _DESTRUCTION_LIMIT = LONGEST_END + 2.5
 
@@ -120,9 +120,10 @@ def run_ros(name: str, parser: argparse.ArgumentParser,
 
     ``make`` gets the arguments (``args``, by default from the command line); it opens no port.
     With ``leaves_out``, sections of parameter files are left out if ROS refuses their names. If
-    ``make`` fails, the reason is reported as ``name``. The exit status is EXIT_CONFIGURATION if
+    ``make`` fails, the reason is reported under ``name``. The exit status is EXIT_CONFIGURATION if
     the user has to change arguments, parameters or files. It is EXIT_FAULT for a reason that may
-    pass. An error while the program runs is a bug: a traceback, and EXIT_FAULT.
+    pass. An error while the program runs is a bug: a traceback is logged, and the exit status is
+    EXIT_FAULT.
     """
     program: Program | None = None
 
@@ -221,8 +222,8 @@ def _made(make: Callable[[Sequence[str]], Program], given: list[str]) -> Program
 
 
 def _end_by_the_clock() -> None:
-    """Set a timer that ends the process even if it hangs; it then prints all threads."""
-    # A Python thread could not do it: C code that hangs may hold the GIL.
+    """Set a timer that prints all threads and ends the process, even if the process hangs."""
+    # A Python thread could not do this: C code that hangs may hold the GIL.
     faulthandler.dump_traceback_later(_END_LIMIT, exit=True, file=2)
 
 
@@ -230,7 +231,7 @@ def _destroy(program: Program, give_up: float) -> None:
     """
     Take the nodes off the network; give up at a monotonic clock value.
 
-    With thousands of topics this takes seconds. If it is given up, other nodes still see ours
+    With thousands of topics this takes seconds. If the time is not enough, other nodes see ours
     until the lease of the participant ends.
     """
     def destroy() -> None:
@@ -243,7 +244,7 @@ def _destroy(program: Program, give_up: float) -> None:
 
 
 def _check_log_directory() -> None:
-    """Raise ConfigurationError if rclpy would find none; rclpy's own error is unclear."""
+    """Raise ConfigurationError if rclpy would find no log directory; its own error is unclear."""
     if not any(os.environ.get(name) for name in ('ROS_LOG_DIR', 'ROS_HOME', 'HOME')):
         raise ConfigurationError([Problem('environment', (
             'HOME is not set, so there is no directory for the log; set ROS_LOG_DIR to a '

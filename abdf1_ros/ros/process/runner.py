@@ -33,7 +33,7 @@ from abdf1_ros.ros.process.main import EXIT_FAULT
 from abdf1_ros.ros.process.supervisor import Supervisor, Works
 from abdf1_ros.signals import EndRequest
 
-# Seconds between two checks of a line; a changed level is then published at once.
+# Seconds between two checks of a line; a check publishes a changed level at once.
 _LEVEL_CHECK_PERIOD = 0.1
 
 # Number of groups of lines; the groups are checked in turn. A check of a hundred lines in one go
@@ -45,7 +45,7 @@ _LAST_CALLBACKS = 0.5
 
 
 class LinkFailed(Exception):
-    """The link of a bridge is broken; the argument says how. It has been logged."""
+    """The link of a bridge is broken; the argument says how, and has been logged."""
 
 
 class Line:
@@ -117,9 +117,10 @@ class Runner:
         """
         Run all lines until the end; return the exit status.
 
-        All nodes exist before the first line starts. Running lines hold the GIL most of the time:
-        with them, a hundred nodes took four times as long, and their threads half as long again.
-        The threads of callbacks start late too, because each new node would wake them all.
+        All nodes exist before the first line starts. Running lines hold the GIL most of the time.
+        While lines ran, a hundred nodes took four times as long to make, and their threads 1.5
+        times as long to start. The threads of callbacks start late too, because each new node
+        would wake them all.
         """
         try:
             for line in self._lines:

@@ -47,7 +47,7 @@ class Supervisor:
     def __init__(self) -> None:
         address = os.environ.get('NOTIFY_SOCKET', '')
         self._address = '\0' + address[1:] if address.startswith('@') else address
-        # A third, so that a lost sign or a slow host does not end the process.
+        # A third of the limit, so that a lost sign or a slow host does not end the process.
         self._period = int(os.environ.get('WATCHDOG_USEC', '0')) / 3e6
         self._next = 0.0
         self.say('READY=1')

@@ -13,7 +13,7 @@
 # limitations under the License.
 
 """
-What only the node can watch for heartbeats and fallbacks: the executor, and the publishers.
+Watch the executor and the publishers for heartbeats and fallbacks: only the node can do so.
 
 docs/heartbeats.md has the numbered rules.
 """
@@ -67,7 +67,7 @@ class InterlockWatch:
 
     def look(self, now: float) -> tuple[str, ...]:
         """
-        Return the topics of Fallback rows that two or more publishers and callers feed (rule 17).
+        Return the topics of Fallback rows with two or more publishers and callers (rule 17).
 
         Between two counts it returns the last result.
         """

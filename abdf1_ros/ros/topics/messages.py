@@ -37,7 +37,8 @@ ACTIVE_LAYOUT = MultiArrayLayout(dim=[MultiArrayDimension(
     label='station n is active where bit n % 16 of word n / 16 is 1', size=16, stride=16)])
 """The layout of ~/active_stations; its label explains the words."""
 
-# Publishers send bits one by one, so a burst of messages has to fit. Unused places take no memory.
+# Publishers send bits one by one, so the queue needs room for a burst of messages. Unused places
+# take no memory.
 _WRITE_DEPTH = 1000
 
 # Seconds for which a result is repeated to a subscriber that did not acknowledge it.
@@ -46,10 +47,10 @@ _RESULT_LIFESPAN = 10.0
 
 def new_message(mapping: Mapping) -> Any:
     """
-    Return a message for the values of ``mapping``, its layout filled in.
+    Return a message for the values of ``mapping``, with its layout filled in.
 
-    Characters of a string are published unchanged, but the string ends at the first NUL, as ROS
-    passes strings on like C.
+    Characters of a string are published unchanged, but the string ends at the first NUL, because
+    ROS ends strings at a NUL, like C.
     """
     message = MESSAGES[mapping.message_type]()
     if mapping.message_type is not ValueType.STRING:
@@ -78,7 +79,7 @@ def encoder(mapping: Mapping) -> Callable[[Values], Any]:
 
 
 def values_of(message: Any) -> Values:
-    """Return the values of a message to be written; FormatError if its data_offset is not 0."""
+    """Return the values that a message writes; FormatError if its data_offset is not 0."""
     if isinstance(message, String):
         return str(message.data)
     if message.layout.data_offset:
@@ -93,8 +94,8 @@ def read_qos(mapping: Mapping, stale_time: float) -> QoSProfile:
 
     A row promises a longest time between two values, if it is read at least every ``stale_time``
     seconds. A late subscriber gets the last value, unless it is older than the promised time. A
-    subscriber with deadline or liveliness QoS gets an event when values stop. A topic promises
-    nothing if its row is read on demand, or is published when a PLC writes, or on change without
+    subscriber with deadline or liveliness QoS gets an event when values stop. A row promises no
+    time if it is read on demand, or published when a PLC writes, or published on change without
     Max_Silence.
     """
     profile = latched_qos()
@@ -116,9 +117,9 @@ def results_qos() -> QoSProfile:
     """
     Return the QoS of the results of writes.
 
-    All waiting writes can end at the same moment, faster than a subscriber takes the results. A
-    subscriber whose network was cut for longer than its lease (20 s) is a new subscriber to DDS,
-    which would send it all results again that were not acknowledged before.
+    All waiting writes can end at the same moment, faster than a subscriber takes the results. If
+    the network of a subscriber was cut for longer than its lease (20 s), DDS treats it as a new
+    subscriber. Without a lifespan, DDS would then send it all unacknowledged results again.
     """
     return QoSProfile(
         depth=MAX_WAITING_WRITES, reliability=ReliabilityPolicy.RELIABLE,
@@ -126,6 +127,6 @@ def results_qos() -> QoSProfile:
 
 
 def latched_qos() -> QoSProfile:
-    """Return the QoS of a topic whose last message a late subscriber gets."""
+    """Return the QoS of a topic that sends its last message to late subscribers."""
     return QoSProfile(depth=1, reliability=ReliabilityPolicy.RELIABLE,
                       durability=DurabilityPolicy.TRANSIENT_LOCAL)

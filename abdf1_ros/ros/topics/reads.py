@@ -30,12 +30,13 @@ from abdf1_ros.settings.mapping import Mapping
 from rclpy.event_handler import PublisherEventCallbacks
 from rclpy.node import Node
 
-# Number of values published at once, while the ACK (two characters) is on the line. The rest of a
-# reply is published during the next command: a hundred values would delay the line by 3 ms.
+# Number of values published at once, while the ACK (two characters) is on the line. All other
+# values of a reply are published during the next command, because a hundred values would delay the
+# line by 3 ms.
 _VALUES_AT_ONCE = 4
 
-# A publisher is kept if the new row promises at most this multiple of its old time. A deadline
-# that is a little too short gives no false alarm.
+# A publisher is kept if the new row promises at most this multiple of the old row's time. A
+# deadline that is a little too short gives no false alarm.
 _MARGIN = 1.5
 
 
@@ -93,7 +94,7 @@ class ReadTopics:
         self._published.clear()
 
     def open(self, points: MappingType[Mapping, ReadPoint]) -> None:  # noqa: A003
-        """Get a publisher for each row that is read: an old one, or a new one."""
+        """Keep or make a publisher for each row that is read; some rows wait for ``take_over``."""
         for mapping, point in points.items():
             earlier = self._published.get(mapping.topic)
             # DDS allows one type for a topic, so the old publisher with another type has to end
@@ -104,7 +105,7 @@ class ReadTopics:
                 self._topics[mapping.topic] = self._topic(mapping, point, earlier)
 
     def take_over(self) -> None:
-        """Close the unused publishers of the old map; then make those that waited for that."""
+        """Close the unused publishers of the old map; then make the publishers that waited."""
         kept = set(self._topics.values())
         for topic in self._published.values():
             if topic not in kept:

@@ -48,7 +48,7 @@ from std_srvs.srv import SetBool, Trigger
 MOST_CALLS = 100
 """Most waiting calls; more calls are refused, because each call slows down every turn of rclpy."""
 
-# Calls that arrive at the same moment have to fit. Unused places take no memory.
+# The queue needs room for calls that arrive at the same moment. Unused places take no memory.
 _DEPTH = 1000
 
 _TOO_MANY = f'{MOST_CALLS} calls wait already'
@@ -72,7 +72,7 @@ class _Call:
             self.end()
 
     def end(self) -> None:
-        """Let the callback continue, with the results that have come."""
+        """Let the callback continue, with the results that have arrived."""
         if not self.done.done():
             self.done.set_result(None)
             self._wake()
@@ -84,7 +84,7 @@ class RowServices:
 
     - ``take``, ``end``: may be called in any thread
     - ``look``: is called ten times a second, always by the same thread
-    - all else: only in the thread of the executor
+    - all other methods: only in the thread of the executor
     - ``wake_executor``: makes the executor continue calls that have their results
     """
 
@@ -104,7 +104,8 @@ class RowServices:
         """Offer the services of the rows of a driver; keep those that exist already."""
         self._driver, self._wake_link = driver, wake_link
         network = driver.network
-        # A write waits for the line, and after it for a read. A transaction follows each wait.
+        # A write waits for the line, and may then wait to be read back. A transaction follows each
+        # wait.
         self._longest = 2 * (patience + network.line_mode.longest_transaction(network.line, 0.0))
         self._rows = {} if network.line_mode.only_listens \
             else dict(_offered(driver.mappings, most))
@@ -153,7 +154,7 @@ class RowServices:
 
     async def _set(self, name: str, request: SetBool.Request,
                    response: SetBool.Response) -> SetBool.Response:
-        """Write a bit as a message does, and answer with its result."""
+        """Write a bit as a message to the write topic does, and answer with the result."""
         rows = self._rows.get(name, ())
         published, received = self._node.call_stamps
         until = line_time() + self._longest
@@ -179,7 +180,7 @@ class RowServices:
                     response: Trigger.Response) -> Trigger.Response:
         """Read a row at once, publish it, and answer with its values."""
         rows = self._rows.get(name, ())
-        # the driver ends it in time
+        # the driver ends the call in time
         if (call := self._new(len(rows), math.inf, response)) is None:
             return response
         with self._waiting(f'read {uuid.uuid4()}', call):
@@ -213,8 +214,9 @@ def _offered(mappings: Rows, most: int) -> Iterator[tuple[str, tuple[Mapping, ..
     """
     Yield the services of a map, and the rows of each.
 
-    Rows on demand always have theirs. All ~/set services are offered if they are at most ``most``,
-    otherwise none. The same then holds for ~/read_now, with what is left of ``most``.
+    A row on demand always has its ~/read_now service. All ~/set services are offered if they are
+    at most ``most``, otherwise none. All ~/read_now services of other rows are offered if,
+    together with the ~/set services, they are at most ``most``.
     """
     bits: dict[str, tuple[Mapping, ...]] = {}
     for row in mappings.messages:

@@ -16,8 +16,8 @@
 Write topics: hand messages to the driver, and notice messages that DDS has dropped.
 
 With Fast DDS, a publisher numbers its messages; another DDS may not. If a number is missing, a
-message was dropped: the executor was slower than the publisher, and a queue was full. There is no
-other sign: Fast DDS 2.14 has no message-lost event for it.
+message was dropped: the executor was slower than the publisher, and a queue was full. A missing
+number is the only sign: Fast DDS 2.14 has no message-lost event for this case.
 """
 
 from __future__ import annotations
@@ -52,14 +52,15 @@ _MOST_PUBLISHERS = 16
 
 class LossCounter:
     """
-    Counts the messages of a topic that never came.
+    Counts the lost messages of a topic.
 
-    rclpy does not show which publisher sent a number. We decide in this order:
+    rclpy shows the number of a message, but not its publisher. We decide in this order:
 
-    - The number follows the last number of a known publisher: it is from this publisher.
+    - The number follows the last number of a known publisher: the message is from this publisher.
     - All known numbers are higher, or ``count_publishers`` gives more publishers than are known:
-      it is from a new publisher.
-    - Otherwise the messages before it were lost.
+      the message is from a new publisher.
+    - Otherwise: it is from the publisher with the nearest lower number, and all messages between
+      were lost.
     """
 
     def __init__(self, count_publishers: Callable[[], int]) -> None:
@@ -87,10 +88,10 @@ class LossCounter:
 
 def _request(message: Any, info: Any) -> str:
     """
-    Return the name of a message for its result, unique in its topic.
+    Return the text that identifies a message in its result.
 
-    The name is the label in the message's layout, if the publisher has set one. Otherwise it is
-    the time of publication (ns), because rclpy does not show the publisher.
+    This is the label in the message's layout, if the publisher has set one. Otherwise it is the
+    time of publication (ns), because rclpy does not show the publisher.
     """
     if not isinstance(message, String) and message.layout.dim and message.layout.dim[0].label:
         return printable(message.layout.dim[0].label[:_LONGEST_LABEL])
@@ -112,7 +113,7 @@ class WriteTopic:
     The mappings that one topic writes to; ``take`` handles one message.
 
     - ``ages``: finds the age of a message; a message that is too old is refused
-    - ``listener``: gets lost messages, and publishers whose clock is ahead
+    - ``listener``: is called for lost messages, and for publishers whose clock is ahead
     - ``publishers``: returns the names of the nodes that publish now
     - ``wake``: is called when the link has something to do
     """
@@ -231,7 +232,7 @@ class WriteTopics:
                 for end in self._node.get_publishers_info_by_topic(_name(topic))]
 
     def take(self, topic: str, message: Any, info: Any) -> None:
-        """Count what was lost before a message; then hand it on, let it wait, or refuse it."""
+        """Count messages lost before a message; then hand it on, let it wait, or refuse it."""
         if self._came_before(topic, info):
             return
         self._topics[topic].arrived(info)
@@ -246,8 +247,8 @@ class WriteTopics:
         """
         Record a message; return True if DDS has delivered it before.
 
-        DDS does that after a cut of the network: to the reader the publisher is a new one then,
-        which repeats all messages that were not acknowledged before the cut.
+        DDS does so after a cut of the network, because the reader then treats the publisher as
+        new. The publisher repeats all messages that were not acknowledged before the cut.
         """
         stamp, number = info['source_timestamp'], info['publication_sequence_number']
         if not stamp or number is None:
