@@ -18,7 +18,7 @@ Read and write Allen-Bradley PLCs over their DF1 serial port.
 PLC-5, SLC 500, MicroLogix, PLC-2 and PLC-3; full duplex, half duplex and radio modem; Linux.
 
 A program without ROS uses ``Client``. It opens the port, blocks until the PLC has replied, and
-repeats what gets lost on the line:
+repeats messages that get lost on the line:
 
     from abdf1_ros import Client
 
@@ -28,17 +28,18 @@ repeats what gets lost on the line:
         plc.write('B3:0/1', True)
         print(plc.identify())
 
-Its errors are in ``abdf1_ros.errors``. ``Client.from_files`` takes the two files of the node, and
-reads and writes by tag. For a machine take the node (``abdf1 node``, or ``ros2 run abdf1_ros
-node``). It makes topics of the rows of a map, polls them, and writes heartbeats and fallback
-values.
+Its errors are in ``abdf1_ros.errors``. ``Client.from_files`` reads the two CSV files of the node;
+its client reads and writes by tag. For a machine use the node (``abdf1 node``, or ``ros2 run
+abdf1_ros node``). The node makes topics of the rows of a map, polls the PLCs, and writes
+heartbeats and fallback values.
 
-Importing this package imports nothing else: a name is looked up when it is used, and only
+Importing this package imports no other module: a name is looked up when it is used. Only
 ``abdf1_ros.ros`` and a few commands need ROS.
 
-The rooms, from the wire up. Each imports from those above it only; each ``__init__`` is a map:
+The rooms of the package, from the wire up. A room imports only from rooms above it in this list;
+``driver`` and ``ports`` also import from ``sniffer``. Each ``__init__`` describes its room:
 
-- ``df1``: the link. Bytes and time in, bytes and a deadline out
+- ``df1``: the link. Its input is bytes and time, its output bytes and a deadline
 - ``pccc``: commands, addresses, values, and a folder for each family of PLCs
 - ``settings``: both CSV files, every fault with its place
 - ``plan``: which words are read together, and the times of the line
@@ -51,7 +52,7 @@ The rooms, from the wire up. Each imports from those above it only; each ``__ini
 
 from __future__ import annotations
 
-TYPE_CHECKING = False  # mypy takes it as true; the module typing takes long to import
+TYPE_CHECKING = False  # mypy treats it as true; the import of the module typing is slow
 if TYPE_CHECKING:
     from abdf1_ros.client import Client  # noqa: I300
 
@@ -61,7 +62,7 @@ __all__ = ['Client', '__version__']
 
 
 def __getattr__(name: str) -> object:
-    """Return what is imported when it is used: Client brings pyserial, the version is read."""
+    """Return ``Client``, which imports pyserial, or the version: each only when it is used."""
     if name == 'Client':
         from abdf1_ros.client import Client
         return Client
@@ -72,5 +73,5 @@ def __getattr__(name: str) -> object:
 
 
 def __dir__() -> list[str]:
-    """Return the names that are there, looked up or not."""
+    """Return all names of the package, also names that have not been looked up yet."""
     return sorted({*globals(), *__all__})

@@ -32,7 +32,7 @@ _TEXTS = {
 
 
 def main() -> int:
-    """Run the command that the first argument names; return its exit status, 2 for none."""
+    """Run the command that the first argument names; return its exit status, or 2 without one."""
     program, name = os.path.basename(sys.argv[0]), ''.join(sys.argv[1:2])
     if name in COMMANDS:
         sys.argv[:2] = [name]
@@ -42,7 +42,7 @@ def main() -> int:
 
 def _help(name: str, called: str) -> int:
     """Print the version or the help, and the fault of an unknown name; return the exit status."""
-    from difflib import get_close_matches  # commands do without
+    from difflib import get_close_matches  # commands do not need it
 
     from abdf1_ros.paths import package_version
     from abdf1_ros.text import printable

@@ -26,7 +26,7 @@ A blocking client, without ROS: read and write a PLC from any program.
         plant.read('line_speed')
 
 docs/library.md has more. Times are seconds, as in Python's own modules (the files have
-milliseconds). Errors come from ``abdf1_ros.errors``.
+milliseconds). The errors are defined in ``abdf1_ros.errors``.
 """
 
 from __future__ import annotations
@@ -82,14 +82,17 @@ class Client(OpenLine):
     The PLC at the far end of a line, or in half duplex the PLCs on it.
 
     ``port`` is a device path, ``socket://host:port`` or ``rfc2217://host:port``. ``duplex`` is
-    full, half with us as the master, or slave, which another master polls; ``station`` is the PLC
-    that is meant where a call names no other, ``own_station`` our address. Without ``plc_type``
-    (SLC, PLC5, PLC3, PLC2) a PLC is asked what it is. ``timeout`` and ``cmd_timeout`` are seconds:
-    for each answer, and for a reply; ``retries`` are repetitions of what is not acknowledged or
-    answered. ``trace`` is a file for all bytes, which ``sniff`` reads. All calls block, and may
-    come from any thread. They raise RemoteError if the PLC refuses, and LinkError if it does not
-    answer: ``sent`` then tells whether it may have executed the command. A wrong call raises
-    FormatError before anything is sent.
+    full, half (we are the master) or slave (another master polls us). ``station`` is the PLC of a
+    call that names no station, ``own_station`` is our address. Without ``plc_type`` (SLC, PLC5,
+    PLC3, PLC2) the client asks each PLC for its family. ``timeout`` is the time (s) for each
+    acknowledgement or answer on the link, ``cmd_timeout`` the time (s) for a reply. ``retries`` is
+    the number of repetitions of a message without acknowledgement, or of a poll without answer.
+    ``trace`` is a file for all bytes, which ``sniff`` reads.
+
+    All calls block, and may come from any thread. They raise RemoteError if the PLC refuses a
+    command. They raise LinkError if it does not answer: the attribute ``sent`` then tells whether
+    the PLC may have executed the command. A wrong call raises FormatError before its command is
+    sent.
     """
 
     def __init__(self, port: str | os.PathLike[str], *, plc_type: str | None = None,
@@ -129,12 +132,12 @@ class Client(OpenLine):
     def from_files(net_file: str | os.PathLike[str], map_file: str | os.PathLike[str], *,
                    trace: str | os.PathLike[str] | None = None,
                    logger: logging.Logger = LOG) -> TaggedClient:
-        """Return what reads and writes the rows of a map CSV by their tags."""
-        from abdf1_ros.tagged_client import TaggedClient  # a program without files does without
+        """Return a client that reads and writes the rows of a map CSV by their tags."""
+        from abdf1_ros.tagged_client import TaggedClient  # only a program with files needs it
         return TaggedClient(text_of('net_file', net_file), text_of('map_file', map_file),
                             None if trace is None else text_of('trace', trace), logger)
 
-    # What there is without ``kind`` depends on the file of the address.
+    # Without ``kind`` the type of the result depends on the file of the address.
     @overload
     def read(self, address: str, length: SupportsIndex | None = None, kind: None = None, *,
              word_order: str = 'Low', station: int | None = None) -> Any: ...
@@ -177,9 +180,9 @@ class Client(OpenLine):
         """
         Return the value at an address, or a list of ``length`` values from there on.
 
-        ``kind`` is bool, int16, uint16, int32, uint32, float32, bcd16, bcd12 or string; without
-        it the natural type of the file is meant. A type checker knows the result by it. A string
-        over words has ``length`` words.
+        ``kind`` is bool, int16, uint16, int32, uint32, float32, bcd16, bcd12 or string; without it
+        the values have the natural type of the file. From ``kind`` a type checker knows the type
+        of the result. A string over words has ``length`` words.
         """
         number, target = self._target(
             address, 1 if length is None else length, kind, word_order, station)
@@ -189,10 +192,10 @@ class Client(OpenLine):
 
     def read_many(self, addresses: Iterable[str], *, station: int | None = None) -> dict[str, Any]:
         """
-        Return the values at many addresses or ranges (N7:0-9), in as few packets as it takes.
+        Return the values at many addresses or ranges (N7:0-9), in as few packets as possible.
 
-        They are not of one instant: each packet is a transaction of its own. The result is by
-        address, in their order; of a range it is a list.
+        The values do not belong to one instant: each packet is a transaction of its own. The keys
+        of the result are the addresses, in their order. The value of a range is a list.
         """
         from abdf1_ros.plan.planner import Planner  # not needed for single reads
         from abdf1_ros.plan.reading import read_planned
@@ -204,7 +207,7 @@ class Client(OpenLine):
 
     def write(self, address: str, values: float | str | Sequence[float], kind: str | None = None,
               *, word_order: str = 'Low', station: int | None = None) -> None:
-        """Write a value, or several from an address on; returns when the PLC has confirmed all."""
+        """Write one or more values from an address on; return when the PLC has confirmed all."""
         values = values_of(values)
         is_packed = isinstance(values, str) and kind is not None
         length = (len(values) + 1) // 2 if is_packed else \
@@ -214,7 +217,7 @@ class Client(OpenLine):
             self.ask(number, steps.write(target, values))
 
     def identify(self, station: int | None = None) -> Identity:
-        """Return what a station says of itself: model, mode, faults."""
+        """Return the identity that a station reports: model, mode, faults."""
         number = self._of(station)
         with self.naming(f'status of station {number}'):
             return self.ask(number, steps.identify())
@@ -223,7 +226,7 @@ class Client(OpenLine):
         return _whole('station', self.station if station is None else station, 0, MAX_STATION)
 
     def _row(self, text: str, item: int, station: int) -> tuple[Row, bool]:
-        """Return the row of a map that an address would have, and whether it is a single one."""
+        """Return a map row for an address or a range, and True if it is a single address."""
         from abdf1_ros.plan.reading import row_of
         plc_type, processor = self._kind or self._asked(station)
         with self.naming(_place(text_of('address', text), station), asks=False):
@@ -247,7 +250,7 @@ class Client(OpenLine):
                                               access=self._access, processor=processor)
 
     def _asked(self, station: int) -> tuple[PlcType, Processor | None]:
-        """Return the family of a station, which is asked once."""
+        """Return family and processor of a station; the station is asked for them only once."""
         if station not in self._kinds:
             try:
                 identity = self.identify(station)
@@ -286,7 +289,7 @@ def _seconds(name: str, value: Any) -> float:
 
 
 def _choice(name: str, kind: ValueKind[_T], value: Any) -> _T:
-    """Return what is meant by a value, in any letter case."""
+    """Return the meaning of a value, which may have any letter case."""
     found = kind.read(value) if isinstance(value, str) else None
     if found is None:
         raise FormatError(f'{name} {shown(repr(value))} should be {kind.right}')

@@ -13,15 +13,16 @@
 # limitations under the License.
 
 """
-Output of the process to terminal, pipe, journal and log file: nothing waits for it.
+Output to terminal, pipe, journal and log file, for which the main process never waits.
 
 rclpy's log call holds the interpreter's lock while it writes, and rcl, DDS and faulthandler write
 to the same descriptors. So standard output and standard error become pipes of ours, whose write
-ends never block. A process of its own passes their lines on. Where a terminal stands still
-(Ctrl-S), a pipe is full or a disk hangs, that process waits. Output that it cannot keep is lost,
-counted, and reported as soon as its sink takes bytes again.
+ends never block. A second process, the relay, passes their lines on. If a terminal is stopped
+(Ctrl-S), a pipe is full or a disk hangs, only the relay waits. Output that the relay cannot keep
+is lost. The relay counts the lost lines, and reports their number as soon as the sink accepts
+bytes again.
 
-This file is the program of that process, too: it starts without the package.
+This file is also the program of the relay, which imports no other module of the package.
 """
 
 from __future__ import annotations
@@ -42,11 +43,11 @@ import time
 # Bytes that wait for each sink: some 10,000 entries.
 _MOST_WAITING = 1 << 20
 
-# Size of our own pipes: the process that reads them may not get to run for a while.
+# Size of our own pipes (bytes): some time may pass before the relay can run and read them.
 _PIPE_SIZE = 1 << 20
 
-# Seconds for the last lines after the pipes are closed, and seconds that the main process waits
-# for the relay.
+# Time (s) in which the relay may write the last lines after the pipes are closed, and time (s)
+# that the main process waits for the relay.
 _LAST_ENTRIES = 1.0
 _PATIENCE = 0.5
 
@@ -56,7 +57,7 @@ _COLOURS = re.compile(rb'\x1b\[[0-9;]*m')
 
 
 class Sink(threading.Thread):
-    """Write lines to a descriptor, which may take as long as it likes; ``put`` never waits."""
+    """Write lines to a descriptor, which may block for any time; ``put`` never waits."""
 
     def __init__(self, descriptor: int, most: int = _MOST_WAITING,
                  colours: bool = True) -> None:
@@ -70,7 +71,7 @@ class Sink(threading.Thread):
         self._news = threading.Condition()
 
     def put(self, line: bytes) -> None:
-        """Take a line, or count it as lost."""
+        """Keep a line for the thread, or count it as lost."""
         with self._news:
             if self._lost or self._size + len(line) > self._most:
                 self._lost += 1
@@ -97,12 +98,12 @@ class Sink(threading.Thread):
                 while data:
                     data = data[self._write(data):]
             except OSError:  # the disk is full, or the terminal gone
-                with self._news:  # of the last line, which is ours, the number
+                with self._news:  # our own last line stands for ``lost`` lines
                     self._lost += data.count(b'\n') + max(0, lost - 1)
                 time.sleep(_PAUSE)
 
     def _take(self) -> tuple[bytes, int]:
-        """Wait for lines; return them, and how many were lost after them."""
+        """Wait for lines; return them, and the number of lines that were lost after them."""
         with self._news:
             self._news.wait_for(lambda: self._lines or self._lost or self._is_ended)
             data = b''.join(self._lines)
@@ -111,7 +112,7 @@ class Sink(threading.Thread):
         return data if self._has_colours else _COLOURS.sub(b'', data), lost
 
     def _write(self, data: bytes) -> int:
-        """Return how many bytes were taken."""
+        """Write bytes; return how many of them the descriptor has accepted."""
         try:
             return os.write(self._descriptor, data)
         except BlockingIOError:  # another process of this terminal has made it non-blocking
@@ -138,10 +139,11 @@ def relay(routes: Sequence[str]) -> None:
     """
     Pass lines on from descriptors, as long as a process has their far ends open.
 
-    A route is ``source:sink`` or ``source:sink,sink``; from the second one on they get no colours.
+    A route is ``source:sink`` or ``source:sink,sink``; only the first sink of a route gets
+    colours.
     """
     for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGTTOU):
-        # the last lines of the main process are still to come
+        # the last lines of the main process have not arrived yet
         signal.signal(number, signal.SIG_IGN)
     threads: list[threading.Thread] = []
     sinks: list[Sink] = []
@@ -162,7 +164,7 @@ def relay(routes: Sequence[str]) -> None:
 
 class Console:
     """
-    Give standard output and standard error to a process that may wait for them; a context manager.
+    Pass standard output and standard error to the relay, which may wait; a context manager.
 
     ``log`` is the descriptor of a file that also gets the stream of rclpy's log, without colours.
     This process closes it.
@@ -192,7 +194,7 @@ class Console:
         for number in (*reads, *([] if self._log is None else [self._log])):
             os.close(number)
         for number, writer in writes.items():
-            with suppress(OSError):  # more than a user may have: the size stays as it is
+            with suppress(OSError):  # the limit of the user is lower: the pipe keeps its size
                 fcntl.fcntl(writer, fcntl.F_SETPIPE_SZ, _PIPE_SIZE)
             os.set_blocking(writer, False)  # ours alone: no other process has it
             _flush()
@@ -201,7 +203,7 @@ class Console:
         return self
 
     def __exit__(self, *exception: object) -> None:
-        """Restore both; if the relay still waits, nothing more is written to them."""
+        """Restore both descriptors; if the relay still waits, discard all later output."""
         _flush()
         for number, before in self._before.items():
             os.dup2(before, number)

@@ -15,8 +15,9 @@
 """
 The status counters of the driver, in one table.
 
-Source: S0 (see ``abdf1_ros.df1``), tables "Status Counters" and "Hardware Status Counters". Which
-event feeds which counter is our reading of the names and stands with each of them.
+Source: S0 (see ``abdf1_ros.df1``), tables "Status Counters" and "Hardware Status Counters". The
+description of each counter says which event it counts. These descriptions are our interpretation
+of the names.
 """
 
 from __future__ import annotations
@@ -89,7 +90,7 @@ class Counters:
 
     @property
     def damaged_frames(self) -> int:
-        """Return how many frames came with a wrong check."""
+        """Return the number of frames that were received with a wrong check."""
         return self.bcc_errors + self.crc_errors
 
     def by_mnemonic(self) -> dict[str, int]:

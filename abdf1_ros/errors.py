@@ -23,7 +23,7 @@ class Abdf1Error(Exception):
     """
     Anything this package raises on purpose.
 
-    ``about`` is what was asked for, such as "N7:0 of station 1", empty where that is not known.
+    ``about`` is the subject of the request, such as "N7:0 of station 1"; it is empty if unknown.
     """
 
     about: str = ''
@@ -33,7 +33,7 @@ class Abdf1Error(Exception):
         return super().__str__()
 
     def __str__(self) -> str:
-        """Return what is wrong, and with what."""
+        """Return the subject and what is wrong with it."""
         return f'{self.about}: {self.words()}' if self.about else self.words()
 
 
@@ -96,11 +96,11 @@ class CommandExpired(LinkError):
     """The command was too old to be sent, or to be repeated."""
 
     def words(self) -> str:
-        """Return that; the specification has no number for it."""
+        """Return this text; the specification has no number for it."""
         return 'too old to be sent once more' if self.sent else 'too old to be sent'
 
 
-INTERNAL_ERROR = 'internal error, see the log'  # where a bug ends the use of the port
+INTERNAL_ERROR = 'internal error, see the log'  # the reason if a bug ends the use of the port
 
 
 class PortLost(LinkError):
@@ -113,7 +113,7 @@ class PortLost(LinkError):
 
 class RemoteError(Abdf1Error):
     """
-    A reply that says the station did not do what was asked.
+    A reply that says that the station did not execute the command.
 
     ``sts`` and ``ext_sts`` (None where the reply has none) are the codes of the reply.
     """

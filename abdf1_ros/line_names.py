@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""One text for all ways to write a device, a link, or an address, as far as is known."""
+"""One text for all known ways to write the name of a device, a link, or an address."""
 
 from __future__ import annotations
 
@@ -28,12 +28,12 @@ LOOPBACK = '127.0.0.1'
 
 
 # Major numbers of pseudo-terminals (Linux, admin-guide/devices.txt). Each mount of devpts, for
-# example of a container, has numbers of its own below them.
+# example in a container, counts minor numbers of its own.
 _PSEUDO_TERMINALS = range(136, 144)
 
 
 def device_of(path: str) -> str:
-    """Return the same text for all names of a device: its number, or where there is none yet."""
+    """Return one text for all names of a device: its number, or its path if there is no device."""
     try:
         status = Path(path).stat()
     except OSError:
@@ -50,12 +50,16 @@ def number_of(status: Any) -> str:
 
 
 def link_of(path: str) -> str:
-    """Return the same text for all ways to write the name of a link, wherever that leads."""
+    """Return one text for all ways to write the name of a link; the link is not followed."""
     return str(Path(path).parent.resolve() / Path(path).name)
 
 
 def host_and_port(text: str, default: str = LOOPBACK) -> tuple[str, int]:
-    """Return what "HOST:PORT" says, a host in [] too, the default for none; ValueError else."""
+    """
+    Return host and port of "HOST:PORT" or "[HOST]:PORT".
+
+    If HOST is missing it is ``default``. Raises ValueError for any other text.
+    """
     host, colon, port = text.rpartition(':')
     number = whole_number(port) if is_digits(port) else None
     with suppress(UnicodeError):

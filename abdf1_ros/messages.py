@@ -105,9 +105,9 @@ class Message(Enum):
         """
         Return the text with ``args`` in its places.
 
-        A ``%d`` place also takes text, because a number that a user mistyped ("abc" as a
-        station) has to be shown as it was typed. A list of choices at the end takes as many as
-        there are.
+        A ``%d`` place also takes text, because a number that a user mistyped ("abc" as a station)
+        has to be shown as it was typed. A list of choices at the end gets one place for each
+        choice.
         """
         text = self.template.replace('%d', '%s')
         if self.has_choices:
@@ -131,6 +131,6 @@ class Event(NamedTuple):
     station: int | None = None
 
     def __str__(self) -> str:
-        """Return the numbered text, with the station where the text itself does not name it."""
+        """Return the numbered text, and the station if it is known."""
         where = '' if self.station is None else f' [station {self.station}]'
         return self.message.entry(*self.args) + where

@@ -15,7 +15,7 @@
 """
 Numbers and choices as people write them.
 
-Python's own ``int`` and ``float`` take more than that: "1_000", the digits of every script,
+Python's own ``int`` and ``float`` also accept other texts: "1_000", the digits of every script,
 "nan" and "infinity".
 """
 
@@ -66,8 +66,8 @@ class ValueKind(Generic[_Meaning_co]):
     """
     The kind of value of a cell, an option or an argument.
 
-    ``read`` returns the value of a text, or None for a fault; ``right`` then says what it should
-    be. A number lies from ``low`` to ``high``. ``why_not`` may give a more precise fault.
+    ``read`` returns the value of a text, or None for a faulty text. ``right`` describes the right
+    texts. A number is from ``low`` to ``high``. ``why_not`` may return a more precise fault.
     """
 
     read: Callable[[str], _Meaning_co | None]
@@ -78,7 +78,7 @@ class ValueKind(Generic[_Meaning_co]):
     why_not: Callable[[str], str] | None = None
 
     def fault(self, text: str) -> str:
-        """Return the words of a fault that follow the text that was not read."""
+        """Return the end of an error message, which follows the text that could not be read."""
         return (self.why_not and self.why_not(text)) or f'should be {self.right}'
 
 
@@ -94,7 +94,7 @@ def whole(low: int, high: int, unit: str = '') -> ValueKind[int]:
 
 
 def one_of(known: Mapping[str, _T], spelled: Callable[[str], object] = str.lower) -> ValueKind[_T]:
-    """Return the kind of choices by name; two texts that are ``spelled`` alike are the same."""
+    """Return the kind of choices by name; texts are equal if ``spelled`` makes them equal."""
     meanings = {spelled(name): meaning for name, meaning in known.items()}
     choices = tuple(filter(None, known))
     return ValueKind(lambda text: meanings.get(spelled(text)), f'one of {", ".join(choices)}',

@@ -49,12 +49,12 @@ if TYPE_CHECKING:
     from abdf1_ros.plan.line_model import LineModel
     from abdf1_ros.ports.trace import Trace
 
-_GLANCE = 0.2  # s; interval of looks whether the thread of the link still runs
+_GLANCE = 0.2  # s; interval of the checks whether the thread of the link still runs
 
 LOG = logging.getLogger('abdf1_ros')
 """
-The default logger. It gets requests with their times, and the events of the line. The thread that
-asks logs these events: during its request, at its next request, or at the end.
+The default logger. It gets requests with their times, and the events of the line. A thread that
+makes a request logs these events: during this request, during the next request, or in ``close``.
 """
 
 # Most events on the line that are kept between two requests.
@@ -87,8 +87,8 @@ class Pending(Generic[_Result]):
     """
     The result of a request, set by the thread of the link.
 
-    It is not a Future. The lock of a Future stays taken for ever if a KeyboardInterrupt comes
-    after taking the lock, before its ``with`` block. The thread of the link would then never end.
+    It is not a Future. If a KeyboardInterrupt comes between the lock of a Future and its ``with``
+    block, the lock is never released. The thread of the link would then never end.
     """
 
     def __init__(self) -> None:
@@ -112,7 +112,7 @@ class Pending(Generic[_Result]):
         self._ended.put(None)
 
     def wait(self, seconds: float) -> bool:
-        """Wait for the end, but not for longer; return whether it has come."""
+        """Wait for the end, at most for ``seconds``; return True if the request has ended."""
         if not self.is_done:
             with suppress(Empty):
                 self._ended.get(timeout=seconds)
@@ -127,13 +127,13 @@ class Pending(Generic[_Result]):
 
 class OpenLine:
     """
-    A line that carries out one request at a time, from here to the end of ``with``.
+    An open line, which carries out one request at a time; the end of ``with`` closes it.
 
-    ``stations`` has the state of each station, and the gateways of stations behind one. Inactive
-    stations get one try each until they answer. To a PLC that asks us we are a ``plc_type``.
-    ``counters`` counts on the whole line. All bytes go into the file ``trace``, for ``sniff``.
-    Raises OSError when the port cannot be opened or the file not be written, and
-    ConfigurationError for a mode that only listens.
+    ``stations`` has the state of each station, and the gateway if the station is behind one. An
+    inactive station gets only one try for each request until it answers. To a PLC that asks for
+    our identity we report a ``plc_type``. ``counters`` counts the events of the whole line. All
+    bytes are written to the file ``trace``, for ``sniff``. Raises OSError if the port cannot be
+    opened or the file cannot be written, and ConfigurationError for a mode that only listens.
     """
 
     def __init__(self, mode: LineMode, line: LinkSettings, port: PortSettings,
@@ -159,7 +159,7 @@ class OpenLine:
         self._link = LinkThread(self._requests.machine, port_of,
                                 on_fault=lambda error: self._note(
                                     logging.CRITICAL, 'internal error', error))
-        self._link.daemon = True  # a KeyboardInterrupt before ``with`` leaves nothing to stop it
+        self._link.daemon = True  # after a KeyboardInterrupt before ``with`` no code stops it
         self._line = line_of(port.name)
         _ours.add(self._line)
         self._link.start()
@@ -173,16 +173,16 @@ class OpenLine:
 
     @property
     def echoes(self) -> bool:
-        """Tell whether the line gives back what is sent."""
+        """Tell whether the line echoes the bytes that we send."""
         return self._requests.machine.echoes
 
     @property
     def stray(self) -> str:
-        """Return the last reply that came and answers no command, empty for none."""
+        """Return the last reply that answers no command, empty if there was none."""
         return self._requests.stray
 
     def settle(self) -> None:
-        """Wait until the link takes commands: a peer only listens at first; raises PortLost."""
+        """Wait until the link accepts commands: at first a peer only listens; raises PortLost."""
         self.ask(0, _nothing())
 
     def ask(self, station: int, work: Steps[_Result]) -> _Result:
@@ -198,7 +198,7 @@ class OpenLine:
         return pending
 
     def wait(self, pending: Pending[_Result]) -> _Result:
-        """Return the result of a request; raises its error, PortLost at the latest."""
+        """Return the result of a request; raises its error, or PortLost if the link has ended."""
         while not pending.wait(_GLANCE):
             self._log_entries()
             if not self._link.is_alive() and not pending.is_done:
@@ -217,14 +217,14 @@ class OpenLine:
 
     @property
     def line_model(self) -> LineModel:
-        """Return what transactions cost on this line."""
+        """Return the model of the times of transactions on this line."""
         from abdf1_ros.plan.line_model import LineModel  # only a plan needs it
         return LineModel(self._settings.checksum, self._mode.duplex, self._settings.timing,
                          self._mode.pause(self._settings))
 
     @contextmanager
     def naming(self, place: str, asks: bool = True) -> Iterator[None]:
-        """Add the subject to errors of the block; log how long a block that ``asks`` took."""
+        """Add ``place`` to errors of the block; if it ``asks`` a station, log the time it took."""
         begun = time.monotonic()
         try:
             yield
@@ -240,7 +240,7 @@ class OpenLine:
         self._note(logging.INFO if is_error else logging.DEBUG, event)
 
     def _note(self, level: int, text: object, error: BaseException | None = None) -> None:
-        """Keep an entry for the log: a handler may wait for a disk or a pipe, the link may not."""
+        """Keep a log entry for later: a handler may wait for a disk or pipe, the link must not."""
         if not self.log.isEnabledFor(level):
             return
         if len(self._entries) < _MOST_ENTRIES:
@@ -249,8 +249,8 @@ class OpenLine:
             self._lost += 1
 
     def _log_entries(self) -> None:
-        """Log what the link has noted, in a thread that asks."""
-        with suppress(IndexError):  # another thread that asks may take the last
+        """Log the entries that the link has kept; only threads that make requests call this."""
+        with suppress(IndexError):  # another thread may remove the last entry
             while self._entries:
                 level, text, error = self._entries.popleft()
                 self.log.log(level, '%s', text, exc_info=error)
@@ -260,7 +260,7 @@ class OpenLine:
 
     def _traced(self, path: str, port: PortSettings,
                 open_it: Callable[[], Port]) -> Callable[[], Port]:
-        """Begin the trace; return the function that opens the port whose bytes go into it."""
+        """Begin the trace; return a function that opens the port and records its bytes."""
         from abdf1_ros.ports.trace import begun_now, Trace, TracedPort
         trace = self._trace = Trace(path, {
             'begun': begun_now(), 'port': port.name, 'baud': str(port.baud),
@@ -275,12 +275,12 @@ def _nothing() -> Steps[None]:
 
 
 def single(values: list[float] | str, is_one: bool) -> float | str | list[float]:
-    """Return the value itself if only one is meant."""
+    """Return the value itself if only one value was asked for."""
     return values[0] if is_one and not isinstance(values, str) else values
 
 
 def plain(values: Values, kind: ValueType) -> list[float] | str:
-    """Return values as a program without arrays takes them."""
+    """Return values as a list (bits as bool) or a str, for programs without arrays."""
     if isinstance(values, str):
         return values
     return [*map(bool, values)] if kind is ValueType.BOOL else [*values]

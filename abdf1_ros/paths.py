@@ -25,7 +25,8 @@ _PACKAGE = 'abdf1_ros'
 
 def package_version() -> str:
     """Return the version of this package, as it is installed."""
-    from importlib.metadata import PackageNotFoundError, version  # a tenth of a command's start
+    # this import takes a tenth of the time in which a command starts
+    from importlib.metadata import PackageNotFoundError, version
 
     try:
         return version(_PACKAGE)
@@ -34,7 +35,7 @@ def package_version() -> str:
 
 
 class ShowVersion(argparse.Action):
-    """The option ``--version``, for which the version is looked up only where it is given."""
+    """The option ``--version``; the version is looked up only if the option is given."""
 
     def __init__(self, option_strings: list[str], dest: str) -> None:
         super().__init__(option_strings, argparse.SUPPRESS, nargs=0, default=argparse.SUPPRESS,
@@ -52,7 +53,7 @@ def config_file(name: str) -> Path:
 
 
 def example_file(name: str) -> Path:
-    """Return a file of examples/, from where ``config_file`` has its own."""
+    """Return a file of examples/, from the same place as ``config_file``."""
     return _folder('examples') / name
 
 

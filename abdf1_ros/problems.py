@@ -26,9 +26,9 @@ from abdf1_ros.text import printable
 @dataclass(frozen=True, slots=True)
 class Place:
     """
-    Where in a file something stands; lines, and the cells of a line, are counted from 1.
+    A place in a file; lines, and the cells of a line, are counted from 1.
 
-    ``file`` may also be the name of something else that a user gives: a parameter, an option.
+    ``file`` may also be the name of a parameter or an option of a user.
     """
 
     file: str
@@ -37,7 +37,7 @@ class Place:
     column: str | None = None
 
     def __str__(self) -> str:
-        """Return "file:line:cell (column)", without what is not known."""
+        """Return "file:line:cell (column)", without the parts that are not known."""
         numbers = ''.join(f':{number}' for number in (self.line, self.cell) if number)
         return f'{self.file}{numbers}' + (f' ({self.column})' if self.column else '')
 
@@ -46,10 +46,11 @@ class Problem(Abdf1Error):
     """
     One fault in a file or parameter that a user wrote.
 
-    ``place`` is where it stands, ``text`` says what is wrong and what would be right. ``message``
-    is its numbered entry, None if the specification has none. Without ``args`` the words of the
-    entry would be false, so only number and mnemonic are shown. Without ``text`` the words of the
-    entry say all. A problem is shown as one visible line, whatever the file contains.
+    ``place`` is the place of the fault, ``text`` says what is wrong and what would be right.
+    ``message`` is its numbered entry, None if the specification has none. Without ``args`` the
+    text of the entry would be false, so only number and mnemonic are shown. Without ``text`` the
+    text of the entry is the whole description. A problem is shown as one visible line, whatever
+    the file contains.
     """
 
     def __init__(self, where: Place | str, text: str, message: Message | None = None,

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The end of a process that a signal asks for."""
+"""The end of a process after a signal."""
 
 from __future__ import annotations
 
@@ -26,7 +26,8 @@ import time
 from types import FrameType
 from typing import Self
 
-# After a signal to end: how long the output may wait for its reader, and between two looks (s).
+# After a signal to end: longest wait of the output for its reader (s), and interval of the checks
+# (s).
 _LAST_OUTPUT = 2.0
 _GLANCE = 0.5
 
@@ -35,11 +36,12 @@ class EndRequest(threading.Event):
     """
     An event that is set by a signal to end; a context manager of the main thread.
 
-    A handler in Python runs between any two steps of the main thread, also of a handler. One that
-    takes a lock, as an event does, may wait for itself for ever. So the handler does nothing. The
-    interpreter writes each signal to a pipe, and the thread that reads it sets the event, also
-    while the main thread is held up. A process that ends by itself sets it too. ``on_set`` is
-    called then, and ``when`` is the monotonic clock value.
+    Python runs a handler between any two steps of the main thread, even inside another handler. An
+    event has a lock: a handler that sets the event might wait for ever for a lock that its own
+    thread has. So the handlers do nothing. The interpreter writes each signal to a pipe. A thread
+    reads this pipe and sets the event, even while the main thread is blocked. A process that ends
+    by itself also sets the event. ``set`` calls ``on_set`` once, and stores the monotonic clock
+    value (s) in ``when``.
     """
 
     def __init__(self, numbers: Iterable[signal.Signals],
@@ -79,10 +81,11 @@ class EndRequest(threading.Event):
 
 def limit_output() -> None:
     """
-    Drop, from 2 s on, output that waits for its reader; a signal has asked for the end.
+    Drop output that still waits for its reader 2 s after a signal to end.
 
-    Ctrl-S or a pipe that is not read would hold up the end for ever. The alarm interrupts the
-    write, which goes on into the null device. May be called by a signal handler.
+    Without this, Ctrl-S or a pipe without a reader would delay the end for ever. An alarm
+    interrupts the write, which then continues to the null device. A signal handler may call this
+    function.
     """
     signal.signal(signal.SIGALRM, _drop_stuck)
     signal.setitimer(signal.ITIMER_REAL, _LAST_OUTPUT, _GLANCE)
@@ -104,7 +107,7 @@ def _is_stuck(descriptor: int) -> bool:
 
 
 def drop(descriptor: int) -> None:
-    """Let the null device take all that is written to a descriptor."""
+    """Redirect a descriptor to the null device."""
     nowhere = os.open(os.devnull, os.O_WRONLY)
     os.dup2(nowhere, descriptor)
     os.close(nowhere)

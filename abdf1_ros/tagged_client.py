@@ -42,10 +42,10 @@ class TaggedClient(OpenLine):
     """
     The line of a net CSV, whose words are read and written by the tags of a map CSV.
 
-    ``rows`` are its Read, Write and ReadWrite rows by tag. Values are the same as on the topics:
-    scaled, and written within Min and Max. This class does nothing by itself: it has no heartbeat
-    and no fallback, and withholds no value. Errors are the same as in ``Client``; the constructor
-    raises ConfigurationError with every fault of the files.
+    ``rows`` are the Read, Write and ReadWrite rows of the map, by tag. Values are the same as on
+    the topics: scaled, and written within Min and Max. This class writes nothing by itself: it has
+    no heartbeat and no fallback. It withholds no value. Errors are the same as in ``Client``; the
+    constructor raises ConfigurationError with every fault of the files.
     """
 
     def __init__(self, net_file: str, map_file: str, trace: str | None = None,
@@ -84,7 +84,7 @@ class TaggedClient(OpenLine):
         return {row.tag: _shown(row, values[row]) for row in rows}
 
     def write(self, tag: str, values: float | str | Sequence[float]) -> None:
-        """Write to a Write or ReadWrite row; returns when the PLC has confirmed all."""
+        """Write to a Write or ReadWrite row; return when the PLC has confirmed all values."""
         row = self._row(tag, 'written', lambda row: row.writes)
         with self.naming(_named(row)):
             self.ask(row.station, steps.write(_target_of(row), raw_values(row, values_of(values))))

@@ -15,9 +15,9 @@
 """
 Tests of a cell without its PLCs: simulated PLCs, a bridge on their line, and an observer.
 
-``pytest_plugins = ['abdf1_ros.testing']`` in a conftest.py brings the fixture ``abdf1_cell``; see
-docs/tutorials/testing.md. Importing this keeps all topics on this machine, in a ROS domain that no
-other session of tests here has.
+``pytest_plugins = ['abdf1_ros.testing']`` in a conftest.py makes the fixture ``abdf1_cell``
+available; see docs/tutorials/testing.md. Importing this module keeps all topics on this machine,
+in a ROS domain that no other session of tests on this machine has.
 """
 
 from __future__ import annotations
@@ -54,7 +54,7 @@ from rclpy.context import Context
 from rclpy.qos import HistoryPolicy, QoSProfile
 from rclpy.signals import SignalHandlerOptions
 
-PATIENCE = 40.0  # s; what takes longer does not happen
+PATIENCE = 40.0  # s; longest wait for an event
 EVERYTHING = QoSProfile(history=HistoryPolicy.KEEP_ALL)
 
 _Result = TypeVar('_Result')
@@ -65,14 +65,15 @@ def _claim_domain() -> tuple[int, socket.socket]:
     claim = socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM)
     for number in range(os.getpid(), os.getpid() + 100):
         with suppress(OSError):  # another session has it
-            claim.bind(f'\0abdf1_ros.test.domain.{1 + number % 100}')  # a name in no file system
+            # an abstract name, without a file
+            claim.bind(f'\0abdf1_ros.test.domain.{1 + number % 100}')
             return 1 + number % 100, claim
     raise RuntimeError('all ROS domains are in use by other test sessions')
 
 
 _DOMAIN, _CLAIM = _claim_domain()
 
-# Read when the first context is made, here and in every child process.
+# ROS reads these variables for the first context, here and in every child process.
 os.environ |= {'ROS_AUTOMATIC_DISCOVERY_RANGE': 'LOCALHOST', 'ROS_DOMAIN_ID': str(_DOMAIN)}
 
 
@@ -105,7 +106,7 @@ class Bridge:
         self._process: subprocess.Popen[bytes] | None = None
 
     def start(self) -> None:
-        """Start it; also again, after its end."""
+        """Start the process, also again after its end."""
         with self._log.open('ab') as log:
             self._process = subprocess.Popen(
                 [sys.executable, '-m', 'abdf1_ros', 'node', '--ros-args', *self._words],
@@ -113,11 +114,11 @@ class Bridge:
 
     @property
     def is_running(self) -> bool:
-        """Tell whether it has been started and not ended."""
+        """Tell whether the process has been started and has not ended."""
         return self._process is not None and self._process.poll() is None
 
     def end(self, number: signal.Signals) -> int:
-        """End it by a signal, if it runs; return its exit status."""
+        """End the process by a signal, if it runs; return its exit status."""
         if self._process is None:
             return 0
         if self.is_running:
@@ -126,12 +127,12 @@ class Bridge:
         return process.wait(PATIENCE)
 
     def check(self) -> None:
-        """Raise AssertionError where it has ended by itself."""
+        """Raise AssertionError if the process has ended by itself."""
         if self._process is not None and (status := self._process.poll()) is not None:
             raise AssertionError(f'the bridge has ended with {status}{self.last_words()}')
 
     def last_words(self) -> str:
-        """Return the end of its log."""
+        """Return the last lines of the log."""
         lines = self._log.read_text(errors='replace').splitlines() if self._log.exists() else []
         return '; its last words:\n' + '\n'.join(lines[-10:]) if lines else ''
 
@@ -140,7 +141,8 @@ class Observer(observer.ObservingNode):
     """
     A ROS node that observes other nodes from outside; it also runs nodes that are added.
 
-    While it waits it checks that ``bridge`` still runs. It ends a context that it has made.
+    While the observer waits it checks that ``bridge`` still runs. It ends a context that it has
+    made.
     """
 
     def __init__(self, name: str = 'observer', context: Context | None = None,
@@ -150,7 +152,7 @@ class Observer(observer.ObservingNode):
 
     def until(self, condition: Callable[[], _Result | None],
               what: str | Callable[[], str]) -> _Result:
-        """Spin until ``condition`` gives something true; return that."""
+        """Spin until ``condition`` returns a true value; return this value."""
         def is_over() -> _Result | None:
             result = condition()
             if not result and self._bridge is not None:
@@ -170,7 +172,7 @@ class Observer(observer.ObservingNode):
         return inbox
 
     def publisher(self, message_type: Any, topic: str) -> Any:
-        """Return a publisher for <node>/write/..., once the node knows all that is here."""
+        """Return a publisher for <node>/write/... when that node knows all our endpoints."""
         publisher = self.node.create_publisher(message_type, topic, EVERYTHING)
         self.until(publisher.get_subscription_count, f'a subscriber of {topic}')
         self.meet(topic.partition('/write/')[0])
@@ -181,8 +183,8 @@ class Observer(observer.ObservingNode):
         Wait until a node knows all publishers and subscriptions that were made here before.
 
         Finding the node is not enough: messages that it publishes before it has found us are lost.
-        DDS announces endpoints in their order, so a node that answers knows those before the
-        client.
+        DDS announces endpoints in the order of their creation. So a node that answers a client
+        knows all endpoints that we made before this client.
         """
         client = self.node.create_client(GetParameters, f'{node}/get_parameters')
         self.until(client.service_is_ready, f'the parameters of {node}')
@@ -190,7 +192,8 @@ class Observer(observer.ObservingNode):
 
         def is_answered() -> bool:
             nonlocal asked
-            if time.monotonic() > asked + 1.0:  # an answer to a client not known yet is dropped
+            # ask again: a node drops its answer to a client that it does not know yet
+            if time.monotonic() > asked + 1.0:
                 asked = time.monotonic()
                 answers.append(client.call_async(GetParameters.Request()))
             return any(answer.done() for answer in answers)
@@ -203,7 +206,8 @@ class Plcs:
     """
     Simulated PLCs in this process, on a pseudo-terminal; ``data`` is a simulator CSV.
 
-    Its name disappears with it. The number of a terminal is soon used by another test.
+    The name ``port`` disappears with the line. The number of the terminal may soon belong to
+    another test.
     """
 
     def __init__(self, data: Path, ladders: Sequence[int] = ()) -> None:
@@ -242,7 +246,7 @@ class Plcs:
         execute(command, self._plcs)
 
     def word(self, address: str, station: int = 1) -> int:
-        """Return a word as it stands in a PLC, from 0 to 65535."""
+        """Return a word of a PLC, from 0 to 65535."""
         self[station].advance()
         table = self[station].table
         return int.from_bytes(table.read(parse_address(address, table.plc_type), 1), 'little')
@@ -297,15 +301,16 @@ class SimulatedCell:
         self._ends.close()
 
     def start(self) -> None:
-        """Start the bridge; also again, after its end."""
+        """Start the bridge, also again after its end."""
         self._bridge.start()
 
     def end(self, number: signal.Signals = signal.SIGTERM) -> int:
         """
         End the bridge by a signal, if it runs; return its exit status.
 
-        It leaves the graph before that, unless it is killed: Fast DDS 2.14 may crash where a
-        subscription ends while another process takes its publishers away (its issue 3303).
+        Unless it is killed, return only when the bridge has left the ROS graph, at most 1 s later.
+        Fast DDS 2.14 may crash if a subscription ends while another process removes its publishers
+        (its issue 3303).
         """
         takes_leave = (self._bridge.is_running and number != signal.SIGKILL
                        and self.ros.context.ok())

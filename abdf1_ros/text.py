@@ -54,7 +54,7 @@ def shown(cell: str) -> str:
 
 
 def first(names: Sequence[str], most: int = 5) -> str:
-    """Return names as text, ``most`` of them; how many more there are is counted."""
+    """Return at most ``most`` names as text, and the number of the remaining names."""
     more = f' and {len(names) - most} more' if len(names) > most else ''
     return printable(', '.join(names[:most])) + more
 

@@ -26,8 +26,9 @@ finished::
 Without numbers there is a race: a robot sets a bit "start" and waits for a bit "done". "Done" is
 still set by the job before, so the robot goes on before this job has begun. A new number cannot be
 confused with an old one. There is a second race at the end. The robot gives up a job that has not
-begun in time, and the job begins later without a robot. So the request is taken back, and
-~/write_results has to confirm this. Only a state that was read after that counts.
+begun in time, and the job begins later without a robot. So ROS takes the request back: it writes
+0, and ~/write_results has to confirm this write. Only a state that was read after this
+confirmation counts.
 
 The map needs a Write row and a Read row with the tags ``job_request`` and ``job_state``. The Read
 row has two words, busy and done. The request is published at a steady rate while the job runs. So
@@ -151,12 +152,12 @@ class Handshake(Node):
         self._is_at_rest = False
         if not self._publish_until(0, lambda: self._is_at_rest, seconds):
             return False
-        # The first state may have been read before: it was already on its way.
+        # The next state may be older than the confirmation: the bridge may have read it before.
         states = self._states
         return self._spin(lambda: self._states >= states + 2, seconds)
 
     def _publish_until(self, value: int, condition: Callable[[], bool], seconds: float) -> bool:
-        """Publish at a steady rate until the condition holds; return False if it is too late."""
+        """Publish at a steady rate until the condition holds; return False if time is over."""
         end, due = time.monotonic() + seconds, 0.0
         while not condition() and time.monotonic() < end:
             if time.monotonic() >= due:

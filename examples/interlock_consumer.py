@@ -84,8 +84,8 @@ class InterlockConsumer(Node):
                 incompatible_qos=self._incompatible))
         except UnsupportedEventTypeError:  # rmw_zenoh lacks these events
             self._subscribe(topic, qos, SubscriptionEventCallbacks())
-        # DDS reports no missed deadline before the first value, and some RMWs never do. The node's
-        # own clock may be simulated and stand still, so the timer has its own.
+        # DDS reports no missed deadline before the first value, and some RMWs never report one.
+        # The node's own clock may be simulated and stop, so the timer uses a steady clock.
         self._silence = self.create_timer(
             patience, self._silent, clock=Clock(clock_type=ClockType.STEADY_TIME))
         self.create_service(Trigger, '~/reset', self._reset)
@@ -120,7 +120,7 @@ class InterlockConsumer(Node):
         return ''
 
     def _liveliness(self, event: Any) -> None:
-        if event.alive_count <= 0:  # -1 if it joined late (Fast DDS)
+        if event.alive_count <= 0:  # -1 if this subscriber joined late (Fast DDS)
             self._stopped()
 
     def _stopped(self) -> None:

@@ -14,7 +14,7 @@
 # limitations under the License.
 
 """
-Record what a bridge reads from the PLCs into a CSV file that a spreadsheet opens.
+Record the values that a bridge reads from PLCs, in a CSV file for a spreadsheet.
 
 A row is one message: time of publication (UTC), topic below ~/read/, PLC address, and values. For
 replay, plots, or topics of other nodes use rosbag2: docs/recording.md has the commands.

@@ -88,7 +88,7 @@ def bridge(arguments: dict[str, str]) -> Node:
 
 
 def logger(arguments: dict[str, str]) -> str:
-    """Return the name of the node's logger; without a name, a level also holds for rcl and rmw."""
+    """Return the name of the node's logger; a level without a name also applies to rcl and rmw."""
     namespace = make_namespace_absolute(
         prefix_namespace(arguments.get('ros_namespace'), arguments['namespace']))
     parts = [*(namespace or '').split('/'), arguments['name']]

@@ -35,7 +35,7 @@ from launch_ros.substitutions import ExecutableInPackage, FindPackageShare
 
 PORT = '/tmp/abdf1_demo'
 
-# Arguments of the bridge that have another default here, or the same; its port is the simulator's.
+# Arguments that are passed on to the bridge, with their defaults. Its port is the simulator's.
 DEFAULTS = {'params_file': '', 'namespace': '', 'name': 'abdf1', 'log_level': 'info',
             'respawn': 'false'}
 

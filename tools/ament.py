@@ -15,8 +15,8 @@
 """
 The rules of ament's linters that ruff does not have, for ``make lint``.
 
-``colcon test`` of ROS runs ament_flake8, ament_pep257, ament_copyright and ament_xmllint. The
-versions here are from Ubuntu 24.04. From the root: ``python -m tools.ament``.
+``colcon test`` of ROS runs ament_flake8, ament_pep257, ament_copyright and ament_xmllint. This
+module follows their versions in Ubuntu 24.04. From the root: ``python -m tools.ament``.
 """
 
 from __future__ import annotations

@@ -28,7 +28,7 @@ from abdf1_ros.messages import Message
 
 
 class Cause(NamedTuple):
-    """Where a numbered message comes from and what cures it."""
+    """The cause of a numbered message, and its cure."""
 
     cause: str
     cure: str

@@ -75,7 +75,7 @@ class Curve:
     _is_interrupted: bool = True
 
     def take(self, snapshot: NodeView, now: float) -> None:
-        """Take the first value of the topic, if it is fresh; begin a piece after a pause."""
+        """Add the first value of the topic if it is fresh; begin a new piece after a pause."""
         for reading in snapshot.readings:
             if reading.topic != self.topic or reading.values is None:
                 continue

@@ -258,12 +258,12 @@ def commands() -> str:
 
 
 def bounds() -> str:
-    """Return the times of the heartbeat and the fallbacks in config/ with other settings."""
+    """Return the times of the heartbeat and the fallbacks in config/ for several settings."""
     network = load_network(str(CONFIG / 'net.csv'))
     mappings, _ = load_mappings(str(CONFIG / 'heartbeat_map.csv'))
 
     def row(timeout: int, cmd_timeout: int, retries: int) -> list[str]:
-        """Return the cells of such settings."""
+        """Return the cells of a row for these settings."""
         settings = replace(network, timeout=timeout, cmd_timeout=cmd_timeout,
                            nak_retries=retries, enq_retries=retries)
         message, standard = (make_report(replace(settings, polling=polling), mappings, 0.1)

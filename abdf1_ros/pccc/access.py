@@ -21,7 +21,7 @@ from enum import Enum
 
 class Access(Enum):
     """
-    A way to the words of a data table; the value is what the map file calls it.
+    A way to the words of a data table; the value is its name in the map file.
 
     PLC-5: TYPED commands (M 7-28), or WORD_RANGE for processors and gateways without them
     (M 7-34). SLC and MicroLogix: O and I by SLOT and word (M 7-17), or FLAT, the word in the

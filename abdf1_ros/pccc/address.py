@@ -13,10 +13,10 @@
 # limitations under the License.
 
 """
-PLC addresses: one place in a data table, and how a family writes and counts such places.
+PLC addresses: places in a data table, and how a family writes and counts them.
 
-The grammar that PLC-5 and SLC share is in ``file_address``; each family's own is in ``address``
-of its folder. ``families`` reads the text of an address of any of them.
+``file_address`` has the grammar that PLC-5 and SLC share. The module ``address`` in the folder of
+a family has the grammar of this family. ``families`` reads the text of an address of any family.
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ class AddressSyntaxError(FormatError):
 
 
 class AddressRangeError(FormatError):
-    """The address is well formed, but outside what the family can have."""
+    """The address is well formed, but outside the ranges of the family."""
 
 
 class AddressRefusal(FormatError):
@@ -53,9 +53,9 @@ class Addressing(ABC):
     """
     How the places of one family's data table are written and counted.
 
-    ``title`` is what people call it, ``files`` are the file types that it can have.
-    ``has_sections`` tells whether each type has file numbers of its own, ``is_by_file`` whether
-    commands of other such families find a file by the same number.
+    ``title`` is the usual name of the family, ``files`` are the file types that it can have.
+    ``has_sections`` tells whether each type has file numbers of its own. If two families have
+    ``is_by_file``, the commands of both find a file by the same number.
     """
 
     plc_type: ClassVar[PlcType]
@@ -81,7 +81,7 @@ class Addressing(ABC):
         """Return the number of the last element that a file of this type can have."""
 
     def slot_of(self, address: Address) -> int | None:
-        """Return the I/O slot whose words are numbered by themselves, None for a file."""
+        """Return the I/O slot if words are numbered in each slot, None for a file."""
         return None
 
     def area_size(self, address: Address) -> int:
@@ -131,7 +131,7 @@ class Address:
 
     @property
     def area(self) -> Area:
-        """Return the stretch of data table this lies in."""
+        """Return the stretch of data table that contains the address."""
         return Area(self.plc_type, self.file_type, self.file, self.addressing.slot_of(self))
 
     @property
@@ -150,8 +150,8 @@ class Address:
         """
         Tell whether both addresses may lie in one file, or slot, of a PLC.
 
-        A PLC finds a file by its number, whatever type or family a command names. Where that
-        is unknown they may.
+        A PLC finds a file by its number, whatever type or family a command names. If this is not
+        sure, return True.
         """
         mine, others = self.area, other.area
         if None not in (mine.slot, others.slot) and mine.slot != others.slot:
@@ -163,7 +163,7 @@ class Address:
         return mine.file == others.file and (not is_by_type or mine.file_type is others.file_type)
 
     def counts_like(self, other: Address) -> bool:
-        """Tell whether one offset means one word, where both lie in the same file."""
+        """Tell whether equal offsets are the same word if both addresses are in one file."""
         return self._is_found_like(other) and self.layout.words == other.layout.words \
             and self.area.slot == other.area.slot
 

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""What may be meant by a text that is not an address: a letter for a digit, a bit after a dot."""
+"""Corrections of texts that are not addresses: a letter for a digit, a bit after a dot."""
 
 from __future__ import annotations
 
@@ -28,12 +28,12 @@ _LETTERS_O = re.compile(r'(?<=[:;./0-9-])O+(?![A-Z])', re.ASCII)
 # As an array of a Logix controller.
 _ARRAY = re.compile(r'(?P<file>[A-Z]+\d+)\[(?P<element>\d+)\]', re.ASCII)
 
-# In other programs bits of the status file count through it.
+# Other programs count the bits of the status file from its first word on.
 _STATUS_BIT = re.compile(r'S2?/(?P<bit>\d{1,5})', re.ASCII)
 
 
 def corrections(text: str) -> Iterator[tuple[str, str]]:
-    """Yield what may be wrong with a text, and another that may be right."""
+    """Yield a possible fault of a text, and a text that may be right."""
     text = text.strip().upper()
     if _LETTERS_O.search(text):
         yield ('that is the letter O where a digit should be',

@@ -43,7 +43,7 @@ class AddressRange:
     Neighbours in a data table, from ``first`` to ``last``.
 
     With ``is_whole`` both are whole elements of a structure, such as timers. With ``is_short`` the
-    last was only a number: bits then count as the text counts them.
+    text had only a number as its last end: bits may then be in several words.
     """
 
     first: Address
@@ -55,8 +55,8 @@ class AddressRange:
         """
         Return the Length with which the same words or bits are read from ``first`` on.
 
-        ``kind`` is the type of the values, None for the natural one. Raises AddressSyntaxError,
-        with what would be right, where they are not neighbours.
+        ``kind`` is the type of the values, None for the natural one. Raises AddressSyntaxError if
+        they are not neighbours; its text says what would be right.
         """
         first, last = self.first, self.last
         if (first.bit is None) != (last.bit is None):
@@ -137,12 +137,12 @@ def read_range(text: str, parse: Callable[[str], Address]) -> Address | AddressR
         end = _NUMBER.sub(end, start)
     first, last = parse(start), parse(end)
     found = AddressRange(first, last, is_element(first, start) and is_element(last, end), is_short)
-    found.length()  # raises what is wrong with both ends together
+    found.length()  # raises an error if the ends do not fit each other
     return found
 
 
 def _of_count(first: Address, names_word: bool, count: int) -> AddressRange:
-    """Return ``count`` elements from ``first`` on, or bits, as other programs write them."""
+    """Return the range of ``count`` elements or bits from ``first``, as other programs count."""
     if count < 1:
         raise AddressSyntaxError('a range has at least one element')
     if first.bit is not None:

@@ -24,15 +24,15 @@ from abdf1_ros.pccc.file_types import FileType, PlcType
 
 
 class NoSuchFile(Abdf1Error):
-    """The table has no such file, or a file of that number and another type."""
+    """The table has no such file, or its file of this number has another type."""
 
 
 class OutOfRange(Abdf1Error):
-    """The file is shorter than what was asked for."""
+    """The file ends before the last word of the request."""
 
 
 class Protected(Abdf1Error):
-    """The words are not to be written."""
+    """The words must not be written."""
 
 
 class DataTable:

@@ -38,16 +38,16 @@ from abdf1_ros.pccc.status import check_status, EXT_BAD_ADDRESS, EXT_BAD_SYMBOL,
 from abdf1_ros.pccc.word_range import commands as word_range
 from abdf1_ros.text import counted, printable
 
-# Commands that carry a function code (M 7-2, 7-3).
+# Commands that have a function code (M 7-2, 7-3).
 _WITH_FUNCTION = (0x06, 0x07, 0x0F)
 
 
 def describe(packet: Packet, command: Packet | None = None) -> str:
     """
-    Return what a command asks, or what a reply says.
+    Return the contents of a command or reply in words.
 
-    ``command`` is the one that a reply answers; without it the data of a reply are bytes. Unknown
-    or malformed parts are given in notation.hexadecimal.
+    ``command`` is the command that a reply answers; without it the data of a reply are shown as
+    bytes. Bytes, and unknown or malformed parts, are in hexadecimal.
     """
     if not packet.is_reply:
         return _describe_command(packet)
@@ -100,7 +100,8 @@ def _describe_command(packet: Packet) -> str:
     try:
         return f'{entry.name} {entry.words(entry.read(Reader(_parameters(packet))))}'.rstrip()
     except FormatError as error:
-        # An address of program files or the like is whole, though our servers have not such.
+        # An address of program files or the like is well formed, though our servers lack such
+        # files.
         is_elsewhere = isinstance(error, AddressRefusal) and error.ext_sts == EXT_BAD_ADDRESS
         fault = error if is_elsewhere else f'malformed ({error})'
         return f'{entry.name}, {fault}: {notation.hexadecimal(packet.data)}'
@@ -122,7 +123,7 @@ class _SymbolicName:
     name: str
 
     def encode(self) -> bytes:
-        """Return it as it stands in a command."""
+        """Return the symbol in the form that a command contains."""
         return b'\0' + self.name.encode('latin-1', 'replace') + b'\0'
 
 
@@ -130,7 +131,7 @@ _Range = SystemAddress | ExtendedAddress | _SymbolicName
 
 
 def _range_address(reader: Reader) -> _Range:
-    """Take an address of a PLC-5 or a PLC-3; only the former has bit 1 (file) and none above 3."""
+    """Read an address of a PLC-5, whose flag has bit 1 (file) and none above 3, or of a PLC-3."""
     flag = copy(reader).byte()
     if flag == 0:
         return _named(reader)
@@ -140,7 +141,7 @@ def _range_address(reader: Reader) -> _Range:
 
 
 def _named(reader: Reader) -> SystemAddress | _SymbolicName:
-    """Take what is written in ASCII: an address of a PLC-5 after "$", or a symbol, "$" or not."""
+    """Read ASCII: a PLC-5 address, which begins with "$", or a symbol with or without "$"."""
     ahead = copy(reader)
     ahead.byte()
     try:
@@ -230,7 +231,7 @@ _NAMED: dict[CommandCode, KnownCommand] = {
     (0x0F, 0x29): KnownCommand('read section size', Effect.READS),
     (0x0F, 0x79): KnownCommand('read-modify-write N', Effect.WRITES),
     (0x0F, 0x94): KnownCommand('read file information', Effect.READS),
-    # In no manual; recorded of a MicroLogix 1400, each item is FF and an address.
+    # In no manual, but in a recording of a MicroLogix 1400. Each item is FF and an address.
     (0x0F, 0xA3): KnownCommand('read of words by physical address', Effect.READS),
 } | {code: KnownCommand(name) for code, name in {
     (0x03, None): 'physical write', (0x04, None): 'physical read',

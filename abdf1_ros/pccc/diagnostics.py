@@ -43,8 +43,8 @@ class ReadCounters:
     """
     Read diagnostic counters, 06/01.
 
-    ``address`` is 0 for an SLC, anything for a PLC-5, and for a module what its diagnostic
-    status says; ``size`` is bytes, at most 244.
+    ``address`` is 0 for an SLC, anything for a PLC-5, and for a module the address from its
+    diagnostic status. ``size`` is bytes, at most 244.
     """
 
     address: int
@@ -56,7 +56,7 @@ class ReadCounters:
 
     @classmethod
     def read(cls, reader: Reader) -> ReadCounters:
-        """Take the parameters off ``reader``; FormatError unless there are just these."""
+        """Take the parameters off ``reader``; FormatError if bytes are missing or left."""
         request = cls(reader.word(), reader.byte())
         reader.end()
         return request

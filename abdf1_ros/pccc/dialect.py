@@ -40,8 +40,8 @@ class Transfer:
     """
     The words that several packets move together: ``words`` words from ``start`` on.
 
-    Commands with an offset and a total name the transfer. All other commands know only their own
-    packet.
+    Commands with an offset and a total name the transfer. All other commands have only the address
+    and size of their own packet.
     """
 
     start: Address
@@ -64,8 +64,8 @@ class Dialect(ABC):
     """
     Turn an address and a number of words into a request, and a reply's data into words.
 
-    Data are words in the order of ``Address.offset``, each low byte first. A packet that is not
-    the whole of a transfer is encoded with that transfer. ``writes_bits`` is False where a family
+    Data are words in the order of ``Address.offset``, each low byte first. If a packet is only a
+    part of a transfer, the transfer is an argument too. ``writes_bits`` is False where a family
     has no command that changes single bits; ``write_bits`` then raises FormatError.
     """
 
@@ -73,26 +73,26 @@ class Dialect(ABC):
 
     @abstractmethod
     def max_read(self, file_type: FileType) -> int:
-        """Return the most words that one read of such a file brings, whole elements."""
+        """Return the most words, in whole elements, that one read of such a file can return."""
 
     def sure_read(self, file_type: FileType) -> int:
-        """Return the most words that every processor of the family brings in one read."""
+        """Return the most words that every processor of the family can return for one read."""
         return self.max_read(file_type)
 
     @abstractmethod
     def max_write(self, file_type: FileType) -> int:
-        """Return the most words that one write to such a file takes, whole elements."""
+        """Return the most words, in whole elements, that one write to such a file can contain."""
 
     @abstractmethod
     def read(self, address: Address, words: int, transfer: Transfer | None = None) -> Request:
         """
         Return a read of ``words`` words.
 
-        More than one word of a structure file has to be whole elements.
+        Words of a structure file have to be one value or whole elements.
         """
 
     def reply_size(self, address: Address, words: int) -> int:
-        """Return the bytes after the header of the reply to that read."""
+        """Return the number of bytes after the header of the reply to that read."""
         return 2 * words
 
     def read_data(self, address: Address, words: int, data: bytes) -> bytes:

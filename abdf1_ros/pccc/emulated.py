@@ -42,7 +42,7 @@ _MODES = {
 @dataclass(slots=True)
 class EmulatedProcessor:
     """
-    The processor of an emulated PLC, and what it is set to at the moment.
+    The processor of an emulated PLC, and its present ``setting``.
 
     It is an SLC 5/03 (or another ``processor``), a PLC-5/40, a PLC-3 behind the RS-232 port of a
     1775-KA, or a PLC-2 behind a 1771-KG. ``identity`` in the folder of the family has its reply.

@@ -27,7 +27,7 @@ class Extent:
     """
     The words from ``first`` up to, not including, ``end`` of an area of a station.
 
-    Those of a broadcast are the words of every station.
+    If the station is the broadcast address, the words are in every station.
     """
 
     station: int

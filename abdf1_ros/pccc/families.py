@@ -58,7 +58,7 @@ def served_counters(counters: Counters, plc_type: PlcType, mode: str) -> ServedC
     Return our counters as a processor of the family in the same mode shows its own.
 
     The modules in front of a PLC-2 or PLC-3 have blocks of their own (M 9-10), which are not
-    emulated: None.
+    emulated: then return None.
     """
     layout_in = FAMILIES[plc_type].served_counters
     return layout_in and ServedCounters(counters, layout_in(mode))

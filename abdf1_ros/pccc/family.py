@@ -44,10 +44,10 @@ class Family:
     - ``decode_identity``: returns None for the reply of another family to 06/03.
     - ``encode_identity``: makes the reply of an emulated processor.
     - ``described``: its commands in words; ``meanings``: its own error codes.
-    - ``by_processor``: empty unless its processors take packets of different lengths.
+    - ``by_processor``: empty unless its processors accept packets of different lengths.
     - ``served_counters``: the counter layout of a port in a mode (Master, Slave, Peer, Radio),
       None if its counters are not emulated.
-    - ``counters_anywhere``: the counters are at every address.
+    - ``counters_anywhere``: a read of the counters may name any address.
     - ``is_spoken_by_all``: PLCs of other families know its commands, too.
     - ``file_search``: finds the files of a PLC, None if there is no way.
     - ``clock``: address of the first of six words: year, month, day, hour, minute, second.
@@ -84,5 +84,5 @@ class Family:
         return tuple(kind for kind in FileType if kind in self.addressing.files)
 
     def layout(self, file_type: FileType) -> Layout:
-        """Return how elements of such a file are built; KeyError where it has none."""
+        """Return the layout of the elements of such a file; KeyError if the family has none."""
         return self.addressing.files[file_type]

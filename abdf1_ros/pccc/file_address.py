@@ -226,7 +226,7 @@ def _with_member(address: Address, name: str) -> Address:
 
 
 def _check_named(address: Address, bit: int) -> None:
-    """Refuse a bit of the first word without a name: the word of that number may be meant."""
+    """Refuse an unnamed bit of the first word: the text may mean the word of this number."""
     members = address.layout.members
     if any((member.word, member.bit) == (0, bit) for member in members.values()):
         return

@@ -51,11 +51,12 @@ class FileSearch(Protocol):
         """
         Return the steps that read the processor's own list of files, None where none is known.
 
-        They raise RemoteError, LinkError, or FormatError for data that are not such a list.
+        The steps raise RemoteError or LinkError, and FormatError for data that are not such a
+        list.
         """
 
     def look_for(self, number: int) -> Steps[DataFile | None]:
-        """Return the steps that find out by reads what a file is, None where there is none."""
+        """Return the steps that look for a file by reads; their result is None without a file."""
 
 
 def is_there(address: Address, dialect: Dialect) -> Steps[bool]:
@@ -70,7 +71,7 @@ def is_there(address: Address, dialect: Dialect) -> Steps[bool]:
 
 def counted(addressing: Addressing, dialect: Dialect, kind: FileType, number: int,
             most: int) -> Steps[DataFile]:
-    """Count the elements of a file, at most ``most``, by halving; element 0 exists."""
+    """Count the elements of a file, at most ``most``, by bisection; element 0 has to exist."""
     low, high = 1, most
     while low < high:
         middle = (low + high + 1) // 2

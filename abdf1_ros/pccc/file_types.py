@@ -78,7 +78,7 @@ class FileType(Enum):
 
     @property
     def default_file(self) -> int | None:
-        """Return the file that is meant without a number (S0), None where there is none."""
+        """Return the file number of an address that names none (S0), None if it needs one."""
         return DEFAULT_FILES.get(self, FUNCTION_FILES.get(self))
 
     @property
@@ -106,7 +106,7 @@ DEFAULT_FILES = {
     FileType.OUTPUT: 0, FileType.INPUT: 1, FileType.STATUS: 2, FileType.BINARY: 3,
     FileType.TIMER: 4, FileType.COUNTER: 5, FileType.CONTROL: 6, FileType.INTEGER: 7,
     FileType.FLOAT: 8}
-# The numbers with which the programming software read a MicroLogix 1400.
+# The file numbers that the programming software used when it read a MicroLogix 1400.
 FUNCTION_FILES = {
     FileType.HSC: 0, FileType.PTO: 1, FileType.PWM: 2, FileType.STI: 3, FileType.EII: 4}
 _STRUCTURES = (
@@ -119,10 +119,10 @@ class Layout:
     """
     How the elements of a file are built in one family.
 
-    ``words`` is 16-bit words per element as addresses count them. ``code`` is what commands
-    call the file: the data type of a PLC-5 (M 7-28; PD, MG, SC, BT from practice), the file
-    type of an SLC (M 7-17; 8D and above from practice), 0 where they do not name it.
-    ``typed_words`` is what a typed read of a PLC-5 returns for an element, where that is not
+    ``words`` is 16-bit words per element as addresses count them. ``code`` is what commands call
+    the file: the data type of a PLC-5 (M 7-28; PD, MG, SC, BT from practice), the file type of an
+    SLC (M 7-17; 8D and above from practice), 0 where they do not name it. ``typed_words`` is the
+    number of words that a typed read of a PLC-5 returns for an element, if it differs from
     ``words``. ``members`` are empty unless the file type is a structure.
     """
 

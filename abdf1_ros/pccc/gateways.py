@@ -15,8 +15,8 @@
 """
 The identity of gateways to other links, and of computer cards (M 10-7, 10-15..10-19).
 
-They have no processor and no mode. Some have their name in the reply. The rest are known by two
-bytes, and their reply has the address of their counters.
+They have no processor and no mode. Some report their name. All other modules are known by two or
+three bytes of the reply, and report the address of their counters.
 """
 
 from __future__ import annotations
@@ -40,7 +40,7 @@ class _Module:
     release: int = 8
 
 
-# By the two bytes from byte 2 on.
+# By the two or three bytes from byte 2 on.
 _MODULES = {
     bytes((0xEE, 0x10, 0x10)): _Module('1785-KA'),  # M 10-16
     bytes((0xEE, 0x30, 0x2F)): _Module('1785-KA5'),  # M 10-17, asked over DH+
@@ -50,7 +50,7 @@ _MODULES = {
 
 
 def decode(data: bytes) -> Identity | None:
-    """Read the data of a reply to 06/03; None when they are not in one of these forms."""
+    """Read the data of a reply to 06/03; None if they have none of these forms."""
     for start, module in _MODULES.items():
         if data[1:1 + len(start)] == start and len(data) > module.release:
             return Identity(None, module.name, *letters(data[module.release]), interface=data[2],

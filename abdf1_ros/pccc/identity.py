@@ -15,8 +15,8 @@
 """
 The identity of a processor or module: its reply to a diagnostic status command (06/03).
 
-Each family has layouts of its own, in ``identity`` of its folder; ``gateways`` has more.
-``families`` finds the layout of a reply.
+The module ``identity`` in the folder of a family has its layouts. ``gateways`` has the layouts of
+gateways and computer cards. ``families`` finds the layout of a reply.
 """
 
 from __future__ import annotations
@@ -63,7 +63,7 @@ class Mode(Enum):
 _MODE_WORDS = {'RUN': 'run', 'PROG': 'program', 'TEST': 'test', 'SUSPEND': 'suspend',
                'DOWNLOAD': 'download'}
 
-# The size for a module whose counters are single bytes in an order of its own (M 9-10).
+# Bytes of the counters of a module: each counter is one byte, in an order of its own (M 9-10).
 _MODULE_COUNTERS = 55
 
 
@@ -83,7 +83,8 @@ class Identity:
     - ``plc_type``: None if the family is unknown.
     - ``mode``: None if the reply has no mode, or a mode without a name; its code is then in
       ``mode_text``.
-    - ``faults``: faults that keep a processor from its work; ``remarks``: other facts.
+    - ``faults``: faults because of which a processor does not run its program; ``remarks``: other
+      facts.
     - ``name``: the processor's own name, with control characters made visible.
     - ``memory``: in the processor's own unit, empty if it does not say.
     - ``interface``: code of the port that was asked.

@@ -46,8 +46,8 @@ def decode_counters(data: bytes, layout: CounterLayout | None) -> dict[str, str]
     """
     Return each counter by its name; without a layout the bytes, in hexadecimal.
 
-    A reply may have fewer words than the layout, or more, which are numbered. Raises
-    FormatError for an empty one, and for half a word.
+    A reply may have fewer words than the layout. If it has further words, they get numbers as
+    their names. Raises FormatError for an empty reply, and for an odd number of bytes.
     """
     if not data:
         raise FormatError('no counters in the reply')
@@ -71,8 +71,9 @@ class ServedCounters:
     """
     The counters of our own link, as a PLC reads and resets them.
 
-    A reset moves only the origin of the values that are read with 06/01. The counters themselves
-    are also shown elsewhere, and only the thread of the link changes them.
+    A reset stores the present counts, which are then subtracted from the values that 06/01 reads.
+    It does not change the counters, which are also shown elsewhere. Only the thread of the link
+    changes them.
     """
 
     def __init__(self, counters: Counters, layout: CounterLayout) -> None:
@@ -88,7 +89,7 @@ class ServedCounters:
             for name in self._layout)
 
     def reset(self) -> bytes:
-        """Begin again at 0; return the reply's data, which are none."""
+        """Begin again at 0; return the data of the reply, which are empty."""
         self._origin = self._counts()
         return b''
 

@@ -15,8 +15,8 @@
 """
 The named parts of the structures in a data table, and which of them may be written.
 
-Members that hold the target of a transfer, or the result of an instruction, belong to the
-processor: a wrong number there moves other data, a wrong bit hides a fault. So in message and
+Members with the target of a transfer, or with the result of an instruction, belong to the
+processor. A wrong number in them moves other data, a wrong bit hides a fault. So in message and
 block transfer structures only the bits CO and TO may be written, which a program sets too.
 """
 
@@ -55,7 +55,7 @@ def _values(first: int, *names: str, words: int = 1) -> Members:
 
 
 def _read_only(members: Members, *names: str) -> Members:
-    """Return the members, those named (without names, all) not writable."""
+    """Return the members; not writable are the named members, or all if none is named."""
     return {name: replace(member, writable=bool(names) and name not in names)
             for name, member in members.items()}
 
@@ -75,7 +75,7 @@ _PLC3_VALUES = _read_only(_values(0, 'CTL')) | _values(1, 'PRE', 'ACC')
 PLC3_TIMER = _PLC3_VALUES | _read_only(_flags(0, EN=15, TT=14, DN=13))
 PLC3_COUNTER = _PLC3_VALUES | _read_only(_flags(0, CU=15, CD=14, DN=13, OV=12, UF=11))
 
-# P5A. Of an SFC step only the preset is set from outside, the rest follows the program.
+# P5A. Only the preset of an SFC step is set from outside; all other members follow the program.
 PLC5_SFC = _values(1, 'PRE') | _read_only(
     _values(2, 'TIM') | _flags(0, SA=15, FS=14, LS=13, OV=12, ER=11, DN=10))
 PLC5_BLOCK_TRANSFER = _flags(0, CO=11, TO=8) | _read_only(
@@ -95,8 +95,8 @@ PLC5_PID = _read_only(
 # Function files of a MicroLogix; no manual that gives the order of their words was at hand. A
 # recording of a 1400 confirms HIP, LOP, OVF and UNF, by the limits of its six counters (7FFFFFFF,
 # 80000000). It confirms IS of EII by the inputs 0 to 7 of its interrupts. The places of all other
-# members are not confirmed here. Where the bits lie is not known, so words 2 and 3 have numbers
-# only.
+# members are not confirmed here. The places of the bits are not known, so words 2 and 3 have
+# numbers but no names.
 HSC = _read_only(_values(0, 'PFN', 'ER') | _values(4, 'MOD')
                  | _values(5, 'ACC', 'HIP', 'LOP', 'OVF', 'UNF', words=2)
                  | _values(15, 'OMB', 'HPO', 'LPO'))
@@ -104,7 +104,7 @@ STI = _read_only(_values(0, 'PFN', 'ER') | _values(3, 'SPM'))
 EII = _read_only(_values(0, 'PFN', 'ER') | _values(3, 'IS'))
 PULSES = _read_only(_values(0, 'OUT'))
 
-# Publication 1762-RM001C 21-4..21-6 (MicroLogix); the rest of the 25 words is reserved.
+# Publication 1762-RM001C 21-4..21-6 (MicroLogix); all other words of the 25 are reserved.
 SLC_MESSAGE = _read_only(
     _values(5, 'RBL', 'LBN', 'RBN', 'CHN', 'NOD', 'MTO') | _values(13, 'TFN', 'ELE')
     | _values(18, 'ERR') | _flags(17, ST=14, DN=13, ER=12, EW=10, R=0))

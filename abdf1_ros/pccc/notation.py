@@ -33,7 +33,7 @@ CommandCode = tuple[int, int | None]
 
 
 class Effect(Enum):
-    """The effect of a command, by which guests are allowed to send it."""
+    """The effect of a command; it decides whether a guest may send the command."""
 
     READS = 'reads'
     WRITES = 'writes data'
@@ -41,7 +41,7 @@ class Effect(Enum):
 
 
 def hexadecimal(data: bytes) -> str:
-    """Return bytes as they stand on the line."""
+    """Return bytes in hexadecimal, in the order of the line."""
     return data.hex(' ').upper()
 
 
@@ -57,12 +57,12 @@ class KnownCommand:
 
 
 def part_of(offset: int, size: int, total: int) -> str:
-    """Return where in a transaction of several packets this is, or nothing if it is all."""
+    """Return the place of a packet in its transaction, empty if the packet is the whole."""
     return '' if (offset, size) == (0, total) else f' (from {offset} of {total})'
 
 
 def place_text(addressing: Addressing, kind: FileType, file: int, element: int, word: int) -> str:
-    """Return an address; a word that its element does not have is counted from there on."""
+    """Return an address; a word after the end of its element is shown as `` + n words``."""
     start = Address(addressing, kind, file, element)
     is_inside = kind.is_structure and word < start.layout.words
     extra = 0 if addressing.slot_of(start) is not None or is_inside else word
@@ -90,7 +90,7 @@ def floats_text(data: bytes) -> str:
 
 
 def _listed(data: bytes, code: str, show: Callable[[Any], str] = str) -> str:
-    """Return values of this code of ``struct``, or bytes where they are not whole values."""
+    """Return values by a code of ``struct``, or bytes if they are not a whole number of values."""
     if len(data) % struct.calcsize(code):
         return hexadecimal(data)
     return ' '.join(show(value) for value, in struct.iter_unpack(f'<{code}', data))

@@ -78,7 +78,7 @@ USUAL = Processor.SLC_5_03
 """The processor that we assume for an SLC whose processor is not known."""
 
 CIF_FILES = frozenset(processor.common_interface_file for processor in Processor)
-"""The files that the common interface file may be."""
+"""The numbers that the common interface file may have."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -91,15 +91,16 @@ class _Model:
     has_fixed_files: bool = False
 
 
-# M 7-17, 7-18. Floats, strings, A and D files came with the 5/03, longs with the MicroLogix
-# (1747-RM001G).
+# M 7-17, 7-18. The 5/03 was the first to have float, string, A and D files, the MicroLogix the
+# first to have long files (1747-RM001G).
 _OLD = _Model(82, 82, frozenset((
     FileType.FLOAT, FileType.STRING, FileType.ASCII, FileType.BCD, FileType.LONG,
     *FUNCTION_FILES)))
 _NEW = _Model(236, 234, frozenset((FileType.LONG, *FUNCTION_FILES)))
 # AG-UM008C 3-38; it has one file each of types O, I, S, B, T, C, R and N.
 _ML1000 = _Model(82, 82, frozenset((FileType.FLOAT, *FUNCTION_FILES)), has_fixed_files=True)
-# The MicroLogix 1100 takes 103 words (1763-RM001); the 1200, 1400 and 1500 take as many or more.
+# The MicroLogix 1100 accepts 103 words (1763-RM001); the 1200, 1400 and 1500 accept as many or
+# more.
 _MICROLOGIX = _Model(206, 206)
 
 _MODELS = {

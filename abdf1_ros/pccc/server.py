@@ -15,7 +15,7 @@
 """
 Answer commands from a data table, as a PLC of the table's family does.
 
-M 8-2..8-4 have only a part of the answers of a real PLC to bad requests. The rest comes from
+M 8-2..8-4 have only some of the answers of a real PLC to bad requests. All other answers come from
 reports of drivers in the field.
 """
 
@@ -38,7 +38,7 @@ from abdf1_ros.pccc.serving import Commands, extended, Refusal
 
 
 class Server:
-    """Execute commands on ``table``; ``serve`` is what a link hands its commands to."""
+    """Execute commands on ``table``; a link passes its commands to ``serve``."""
 
     def __init__(self, table: DataTable, processor: EmulatedProcessor | None = None,
                  counters: ServedCounters | None = None) -> None:
@@ -84,10 +84,11 @@ class Server:
 def _diagnostics(family: Family, processor: EmulatedProcessor,
                  counters: ServedCounters | None) -> Commands:
     """
-    Return what executes each diagnostic command, by CMD and FNC; FormatError for a bad request.
+    Return the diagnostic commands by CMD and FNC; they raise FormatError for a bad request.
 
-    Without ``counters`` a read of them is refused. Commands that set up a link (06/02, 04 to 06,
-    08) are not served: our settings come from a file, and must not be changed from the line.
+    Without ``counters`` a read and a reset of counters are refused. Commands that set up a link
+    (06/02, 04 to 06, 08) are not served: our settings come from a file, and must not be changed
+    from the line.
     """
     cmd = diagnostics.CMD
     commands: Commands = {(cmd, diagnostics.ECHO): partial(_echo, family.max_echo),

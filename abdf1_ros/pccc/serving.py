@@ -26,7 +26,7 @@ Commands = dict[tuple[int, int], Callable[[Reader], bytes]]
 """Functions by CMD and FNC. They take the parameters from a reader and return the reply's data."""
 
 BasicCommand = Callable[[Reader, int], bytes]
-"""Such a function for a command without FNC; the second argument is the command's SRC."""
+"""A function for a command without FNC; the second argument is the command's SRC."""
 
 BasicCommands = dict[int, BasicCommand]
 """Functions by CMD, for commands without FNC."""
@@ -51,7 +51,7 @@ def extended(ext_sts: int) -> Refusal:
 
 class ServedFamily(Protocol):
     """
-    The commands of a family, and what it answers to addresses that are not there.
+    The commands of a family, and its answers to addresses that do not exist.
 
     ``protected`` is the answer to a write of words that may only be read.
     """

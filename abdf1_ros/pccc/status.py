@@ -46,7 +46,7 @@ _ADDRESS_FAULTS = (
     EXT_BAD_SYMBOL, EXT_BAD_ADDRESS, EXT_WRONG_SIZE, EXT_PAST_THE_END, EXT_TOO_LARGE,
     EXT_DELETED_AREA, EXT_TYPE_MISMATCH, EXT_PROTECTED)
 
-# After these comes the address of the node that owns the file or program (M 8-5).
+# After these codes the reply has the address of the node that owns the file or program (M 8-5).
 _WITH_OWNER = (0x1A, 0x1B)
 
 _LOCAL = {
@@ -142,7 +142,7 @@ def check_status(reply: Packet, meanings: Meanings = USUAL_MEANINGS) -> bytes:
     """
     Return the data of a reply that reports success.
 
-    Raises RemoteError for any other; a reply that breaks off before its EXT STS counts too.
+    Raises RemoteError for any other reply, also if it ends before its EXT STS.
     """
     if reply.sts == 0:
         return reply.data

@@ -33,14 +33,14 @@ from abdf1_ros.pccc.status import check_status, is_address_fault, STS_ILLEGAL_CO
 from abdf1_ros.pccc.structures import type_fault, write_fault, wrong_type
 from abdf1_ros.pccc.values import Codec, types_of, Values, ValueType, WordOrder
 
-# What libplctag's users report of an SLC 5/05 and of MicroLogix (its issues 121, 479 and 657).
+# From reports of libplctag's users about an SLC 5/05 and MicroLogix (its issues 121, 479 and 657).
 _PERHAPS_FLAT = ('some SLC and MicroLogix have inputs and outputs with Access Flat only, by the '
                  'word of the whole image, as in I:5')
 
 
 @dataclass(frozen=True, slots=True)
 class AddressedValues:
-    """Values in a PLC: where they begin, what they are, and the way to them."""
+    """Values in a PLC: their first address, their codec, and the dialect that moves them."""
 
     address: Address
     codec: Codec
@@ -51,7 +51,7 @@ class AddressedValues:
            word_order: WordOrder = WordOrder.LOW, access: Access | None = None,
            processor: Processor | None = None) -> AddressedValues:
         """
-        Return ``length`` values from the address ``text`` on, of the natural type for None.
+        Return ``length`` values from the address ``text`` on; ``kind`` None: the natural type.
 
         Raises FormatError, saying what would be right.
         """
@@ -102,7 +102,7 @@ def words_in(reply: Packet, start: Address, words: int, dialect: Dialect) -> byt
 
 
 def data_of(reply: Packet, address: Address) -> bytes:
-    """Return the data of a good reply; RemoteError, in the words of the family, for any other."""
+    """Return the data of a good reply; else raise RemoteError with the family's meaning."""
     if reply.sts == 0:
         return reply.data
     try:
@@ -115,11 +115,11 @@ def data_of(reply: Packet, address: Address) -> bytes:
 
 def write(target: AddressedValues, values: Sequence[float] | str) -> Steps[None]:
     """
-    Return the steps that write values, packet by packet, as long as each is confirmed.
+    Return the steps that write values; each packet is sent after the confirmation of the last.
 
-    Raises FormatError at once where they cannot or must not be written. The steps raise
-    RemoteError where the PLC refuses them; LinkError tells in ``sent`` whether it may have them
-    all the same.
+    Raises FormatError at once if the values cannot or must not be written. The steps raise
+    RemoteError if the PLC refuses a packet. If they raise LinkError, its ``sent`` tells whether
+    the PLC may have executed the packet all the same.
     """
     address, codec = target.address, target.codec
     if fault := write_fault(address, codec.type, codec.length):
@@ -148,9 +148,9 @@ def write_requests(address: Address, codec: Codec, values: Sequence[float] | str
 
 def _packets(address: Address, codec: Codec, words: int,
              dialect: Dialect) -> list[tuple[int, int]]:
-    """Return first word and number of words of each packet; none ends within a value."""
+    """Return first word and number of words of each packet; no packet divides a value."""
     kind, value_words = address.file_type, codec.element_words
-    # Members of structures are written one by one: between them lie words not ours.
+    # Members of structures are written one by one: words between them may belong to the PLC.
     step = value_words if kind.is_structure else dialect.max_write(kind)
     step -= step % value_words
     return [(first, min(step, words - first)) for first in range(0, words, step)]
@@ -158,7 +158,7 @@ def _packets(address: Address, codec: Codec, words: int,
 
 def identify() -> Steps[Identity]:
     """
-    Ask a station for its identity, and what its fault is where that takes a request more.
+    Ask a station for its identity; if its fault needs a second request, send this too.
 
     Raises LinkError, RemoteError, or FormatError for a reply too short to tell.
     """

@@ -13,7 +13,7 @@
 # limitations under the License.
 
 """
-Strings in a PLC: what an ST element and a stretch of words look like.
+Strings in a PLC: the form of an ST element, and of a string in a stretch of words.
 
 Characters are Latin-1, two in a word, the first of them in the high byte.
 """
@@ -44,7 +44,7 @@ def encode_counted(text: str) -> bytes:
 
 
 def decode_packed(data: bytes) -> str:
-    """Return the text in words that hold characters only, without the NULs after it."""
+    """Return the text in words without a length word; NULs at its end are removed."""
     return _swap(data).rstrip(b'\0').decode('latin-1')
 
 

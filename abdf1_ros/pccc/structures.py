@@ -24,7 +24,7 @@ from abdf1_ros.pccc.values import types_of, ValueType
 
 
 def wrong_type(address: Address, kind: ValueType) -> str | None:
-    """Return what would be right where an address has no values of a type, None where it has."""
+    """Return what would be right if an address has no values of this type, None if it has."""
     types = types_of(address)
     if kind in types:
         return None
@@ -48,8 +48,8 @@ def named_runs(address: Address) -> list[tuple[Address, int, int]]:
     """
     Return the named words of the element at an address: runs of values of one size.
 
-    Of each run the first address, the number of values, and the words of a value; a word whose
-    bits have names is a value of one word.
+    The result has for each run its first address, the number of values, and the words of a value.
+    A word whose bits have names is a value of one word.
     """
     sizes = {member.word: member.words for member in address.layout.members.values()}
     runs: list[list[int]] = []
@@ -62,7 +62,7 @@ def named_runs(address: Address) -> list[tuple[Address, int, int]]:
 
 
 def type_fault(address: Address, kind: ValueType, length: int) -> str | None:
-    """Return the word of ``length`` elements that is not a ``kind``, None if all are."""
+    """Return the fault if one of ``length`` elements is not a ``kind``, None if all are."""
     if not address.file_type.is_structure or kind is ValueType.BOOL:
         return None
     for place in _places(address, kind, length):
@@ -73,7 +73,7 @@ def type_fault(address: Address, kind: ValueType, length: int) -> str | None:
 
 
 def write_fault(address: Address, kind: ValueType, length: int) -> str | None:
-    """Return the part of a structure that must not be written, None if all may be."""
+    """Return the fault if a part of a structure must not be written, None if all may."""
     if not address.file_type.is_structure:
         return None
     if kind is ValueType.BOOL:

@@ -15,11 +15,10 @@
 """
 The type/data parameter of the PLC-5 typed commands (M 7-28, 7-29).
 
-A descriptor is a flag byte, then the type ID and the size where they do not fit in the flag.
-Bits 6-4 of the flag are the ID, or with bit 7 the number of ID bytes that follow; bits 2-0 are
-the size, or with bit 3 the number of size bytes. An array (ID 9) holds one inner descriptor
-and its elements; its size counts both. Zero padding is legal, so 43, 49 03 and 4A 03 00 are the
-same.
+A descriptor is a flag byte, then the type ID and the size if they do not fit into the flag. Bits
+6-4 of the flag are the ID, or with bit 7 the number of ID bytes that follow; bits 2-0 are the
+size, or with bit 3 the number of size bytes. An array (ID 9) holds one inner descriptor and its
+elements; its size counts both. Zero padding is legal, so 43, 49 03 and 4A 03 00 are the same.
 """
 
 from __future__ import annotations
@@ -64,8 +63,8 @@ class TypedData:
         """
         Read an array or a bare element, in every legal form.
 
-        Padding after the declared size of an array is ignored. Raises FormatError for
-        anything else that does not add up.
+        Padding after the declared size of an array is ignored. Raises FormatError if any other
+        length is wrong.
         """
         reader = Reader(parameter)
         type_id, size = _read_descriptor(reader)

@@ -38,7 +38,7 @@ FLOAT_MAX = 3.4028234663852886e38  # the greatest float32
 
 class ValueType(Enum):
     """
-    What a mapping's Type column may say.
+    A type of values; its value is the text in the column Type of a mapping.
 
     - ``words``: words of one element in a PLC, 0 for a bit.
     - ``message``: name of the message in std_msgs that carries such values.
@@ -65,7 +65,7 @@ class ValueType(Enum):
 
     def __new__(cls, name: str, words: int, message: str, array_code: str,
                 limits: tuple[float, float]) -> ValueType:
-        """Return a member whose value is what the column says."""
+        """Return a member whose value is the text in the column."""
         member = object.__new__(cls)
         member._value_, member.words, member.message = name, words, message
         member.array_code, member.range = array_code, limits
@@ -73,7 +73,7 @@ class ValueType(Enum):
 
     @property
     def is_part(self) -> bool:
-        """Tell whether a value is a part of the bits of its words, so that all other bits stay."""
+        """Tell whether a value has only some bits of its words; a write keeps all other bits."""
         return self in (ValueType.BOOL, ValueType.BCD12)
 
 
@@ -131,18 +131,18 @@ class Codec:
 
     @property
     def element_words(self) -> int:
-        """Return the words of one value, which must not be divided."""
+        """Return the number of words of one value, which packets must not divide."""
         return 1 if self.packed else max(1, self.type.words)
 
     @property
     def words(self) -> int:
-        """Return the number of words that the elements take or touch."""
+        """Return the number of words in which the elements have bits."""
         if self.type is ValueType.BOOL:
             return (self.bit + self.length + 15) // 16
         return self.element_words * self.length
 
     def decoder(self) -> Callable[[bytes], Values]:
-        """Return ``decode``, or for plain numbers what does the same in a third of the time."""
+        """Return ``decode``, or for plain numbers an equal function in a third of its time."""
         is_plain = self.word_order is WordOrder.LOW and sys.byteorder == 'little' and \
             self.type not in (ValueType.STRING, ValueType.BOOL, *_BCD)
         return partial(array, self.type.array_code) if is_plain else self.decode
@@ -165,7 +165,7 @@ class Codec:
         return values
 
     def check(self, values: Sequence[float] | str) -> None:
-        """Raise FormatError, saying which value is wrong, unless all can be written."""
+        """Raise FormatError, which names the wrong value, unless all values can be written."""
         if isinstance(values, str) is not (self.type is ValueType.STRING):
             raise FormatError(f'{values!r} is not a valid {self.type.value}')
         if isinstance(values, str):
@@ -202,7 +202,7 @@ class Codec:
         return b''.join((int(value) & mask).to_bytes(size, 'little') for value in values)
 
     def store(self, table: DataTable, start: Address, values: Sequence[float] | str) -> None:
-        """Write values into a data table; parts of words leave the other bits as they are."""
+        """Write values into a data table; values that are parts of words keep all other bits."""
         if not self.type.is_part:
             table.write(start, self.encode(values))
             return
@@ -222,7 +222,7 @@ class Codec:
 
     def bit_changes(self, start: Address,
                     values: Sequence[float]) -> list[tuple[Address, int, int]]:
-        """Return word, mask and bits for each word that parts of words from ``start`` on touch."""
+        """Return address, mask and bits of each word in which the values have some of the bits."""
         if self.type is ValueType.BOOL:
             number = sum(int(value) << n for n, value in enumerate(values)) << self.bit
             words = _words(number, self.words)

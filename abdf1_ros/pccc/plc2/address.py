@@ -35,7 +35,7 @@ FILES = {FileType.BINARY: Layout()}
 
 _LAST_WORD = 0o77777  # the byte address has 16 bits
 _LAST_BIT = 0o17
-_LAST_SHORT = 0o7777  # words that four digits hold
+_LAST_SHORT = 0o7777  # the last word that four digits can name
 _FORM = re.compile(r'[#$]?(?P<word>\d{1,9})(?:/(?P<bit>\d{1,3}))?', re.ASCII)
 _BIT_FORM = re.compile(r'[#$]?(?P<word>\d{3})(?P<bit>\d{2})', re.ASCII)
 

@@ -34,13 +34,13 @@ UNPROTECTED_BIT_WRITE = 0x05
 UNPROTECTED_WRITE = 0x08
 
 # Bytes of data in one packet, and bytes to modify in one bit write (M 7-30..7-40). KF2 allows 242
-# bytes in a write, M 244. Our writes have at most 242, received ones may have 244.
+# bytes in a write, M 244. Our writes have at most 242 bytes, received writes may have 244.
 MAX_READ = 244
 MAX_WRITE = 242
 MAX_SERVED_WRITE = 244
 MAX_SETS = 60
 
-# An SLC 5/01 or 5/02 takes 95 bytes in a read and 94 in a write (M 7-31..7-40).
+# An SLC 5/01 or 5/02 accepts at most 95 bytes in a read and 94 in a write (M 7-31..7-40).
 MAX_CIF = 94
 
 
@@ -52,7 +52,7 @@ class BasicRead:
     size: int
 
     def encode(self) -> bytes:
-        """Return what follows TNS."""
+        """Return the bytes after TNS."""
         return word(self.address) + bytes((self.size,))
 
     @classmethod
@@ -71,7 +71,7 @@ class BasicWrite:
     data: bytes
 
     def encode(self) -> bytes:
-        """Return what follows TNS."""
+        """Return the bytes after TNS."""
         return word(self.address) + self.data
 
     @classmethod
@@ -89,7 +89,7 @@ class ByteChange:
     reset: int
 
     def __post_init__(self) -> None:
-        """Check that no bit is in both."""
+        """Check that no bit is in both masks."""
         if self.set & self.reset:
             raise FormatError(f'bits {self.set & self.reset:02X} are to be set and reset')
 
@@ -110,7 +110,7 @@ class BasicBitWrite:
     changes: tuple[ByteChange, ...]
 
     def encode(self) -> bytes:
-        """Return what follows TNS."""
+        """Return the bytes after TNS."""
         return b''.join(change.encode() for change in self.changes)
 
     @classmethod

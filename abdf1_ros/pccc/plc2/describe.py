@@ -23,7 +23,7 @@ from abdf1_ros.text import counted
 
 
 def _byte_address(address: int) -> str:
-    # The octal word of a PLC-2, which an SLC may take for a word's number.
+    # The octal word that a PLC-2 addresses; an SLC may count words in ADDR, not bytes.
     return f'{show_word(address // 2)} (ADDR {address})'
 
 

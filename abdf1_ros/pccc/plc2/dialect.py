@@ -47,7 +47,7 @@ class Plc2Dialect(Dialect):
         return (plc2.MAX_CIF if self._is_cif else plc2.MAX_WRITE) // 2
 
     def read(self, address: Address, words: int, transfer: Transfer | None = None) -> Request:
-        """Return an unprotected read; there is no other."""
+        """Return an unprotected read; there is no protected read."""
         return plc2.READ, BasicRead(self._first(address), 2 * words).encode()
 
     def write(self, address: Address, data: bytes, transfer: Transfer | None = None) -> Request:

@@ -24,7 +24,7 @@ KG = 0x14  # byte 2: a 1771-KG (4) of a PLC-2 (1)
 MODULE_ALONE = 0x08  # byte 1
 SIZE = 10
 _KA3 = 0xD
-_EXPANSION = 0xE  # in the place of the processor: it is in the byte that follows (M 10-17)
+_EXPANSION = 0xE  # in the place of the processor: the next byte has the processor (M 10-17)
 
 MODES = {0: Mode.PROGRAM, 1: Mode.TEST, 2: Mode.RUN, 4: Mode.REMOTE_PROGRAM, 5: Mode.REMOTE_TEST}
 
@@ -73,7 +73,7 @@ def encode(emulated: EmulatedProcessor) -> bytes:
     """
     Return the data of the reply of a PLC-2 behind a 1771-KG to 06/03.
 
-    Fields for memory and programs, which it does not have, are 0.
+    Fields for memory and programs are 0, because the emulated PLC has none.
     """
     # There is no remote run; a PLC-2 that has faulted does not talk to its module.
     state = code_of(MODES, Mode.RUN if emulated.mode is Mode.REMOTE_RUN else emulated.mode)

@@ -15,8 +15,8 @@
 """
 The answers of a PLC-2, and of other PLCs to the commands of a PLC-2.
 
-A word that is not there, or is protected, has STS 50, also if the compatibility file is missing
-(M 8-5). An odd byte address of a word has STS 10.
+If a word does not exist or is protected, the reply has STS 50, also if the compatibility file is
+missing (M 8-5). For an odd byte address of a word the reply has STS 10.
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ from abdf1_ros.pccc.serving import BasicCommand, BasicCommands, Codes, Commands,
 
 @dataclass(frozen=True, slots=True)
 class Window:
-    """The words that the commands reach: from ``start`` on, addressed by ``unit`` bytes."""
+    """The words that commands reach, from ``start`` on; addresses count ``unit`` bytes each."""
 
     start: Address
     unit: int = 1
@@ -48,7 +48,8 @@ class BasicService:
     """
     Execute commands without FNC; ``window`` gives the words for the SRC of a command.
 
-    Only an SLC ``takes_odd`` numbers of bytes (M 7-31..7-40).
+    With ``takes_odd`` a read may have an odd number of bytes; only an SLC allows this (M
+    7-31..7-40).
     """
 
     def __init__(self, table: DataTable, window: Callable[[int], Window],
@@ -66,7 +67,7 @@ class BasicService:
                 plc2.UNPROTECTED_WRITE: self._in_window(self._write)}
 
     def everything(self) -> BasicCommands:
-        """Return the protected and the bit commands too."""
+        """Return all commands: also the protected write and the bit writes."""
         return self.reads_and_writes() | {
             plc2.PROTECTED_WRITE: self._in_window(self._write),
             plc2.PROTECTED_BIT_WRITE: self._in_window(self._write_bits),
@@ -107,7 +108,7 @@ class BasicService:
 
 
 def _word(window: Window, address: int) -> Address:
-    """Return the word at an address of a command; an odd byte address is none."""
+    """Return the word at an address of a command; refuse an odd byte address."""
     number, odd = divmod(address * window.unit, 2)
     if odd:
         raise Refusal(status.STS_ILLEGAL_COMMAND)

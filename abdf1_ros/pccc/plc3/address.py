@@ -37,7 +37,7 @@ from abdf1_ros.pccc.file_types import FileType, Layout, PlcType
 from abdf1_ros.pccc.members import Members
 from abdf1_ros.pccc.plc3.commands import CONTEXT, DATA_TABLE
 
-# The files of a PLC-3, whose words are all the same but in timers and counters.
+# The files of a PLC-3. Only timers and counters are structures.
 FILES = {kind: Layout() for kind in (
     FileType.OUTPUT, FileType.INPUT, FileType.INTEGER, FileType.BCD, FileType.BINARY,
     FileType.ASCII, FileType.STATUS)} | {
@@ -161,7 +161,7 @@ def _part(kind: FileType, member: str | None, bit: str | None) -> tuple[int, int
 
 
 def _check_named(kind: FileType, members: Members, bit: int | None) -> None:
-    """Refuse a bit without a name: the word of that number may be meant."""
+    """Refuse a bit without a name: the text may mean the word of this number."""
     bits = {name: member.bit for name, member in members.items() if member.bit is not None}
     if bit not in bits.values():
         raise AddressSyntaxError(f'bit {bit:02o} of a {kind.value} element has no name; bits: '

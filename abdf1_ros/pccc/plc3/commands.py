@@ -15,8 +15,9 @@
 """
 The extended address of a PLC-3 (M 13-5..13-8).
 
-A flag byte says which of six levels follow: area, context, section, file, structure, word. The
-area of the data table is 3; a level that is left out is 3, 1, or 0 for all after these two.
+A flag byte says which of six levels follow: area, context, section, file, structure, word. A level
+that is left out has its default: area 3, which is the data table, context 1, and 0 for all other
+levels.
 """
 
 from __future__ import annotations
@@ -45,7 +46,7 @@ class ExtendedAddress:
     word: int = 0
 
     def encode(self) -> bytes:
-        """Return the flag byte and the levels, those left out that the default stands for."""
+        """Return flag byte and levels; area, context and structure only if not the default."""
         levels = (DATA_TABLE, CONTEXT, self.section, self.file, self.structure, self.word)
         sent = [n for n, value in enumerate(levels) if n in _ALWAYS_THERE or value != _DEFAULTS[n]]
         flag = sum(1 << n for n in sent)
@@ -77,7 +78,7 @@ class ExtendedAddress:
 
 
 def _no_symbol(reader: Reader) -> AddressRefusal:
-    """Return why the symbol that follows is refused: its length, or no symbols here."""
+    """Return the refusal of the symbol that follows: wrong length, or no symbols here."""
     length = len(reader.text())
     if not 0 < length <= _LONGEST_SYMBOL:
         return AddressRefusal(status.EXT_BAD_SYMBOL, f'a symbol of {length} characters')

@@ -42,7 +42,7 @@ def encode(emulated: EmulatedProcessor) -> bytes:
     """
     Return the data of the reply of a PLC-3, asked at the RS-232 port of a 1775-KA, to 06/03.
 
-    Fields for memory and programs, which it does not have, are 0.
+    Fields for memory and programs are 0, because the emulated PLC has none.
     """
     # A PLC-3 has neither remote modes nor a remote run.
     local = {Mode.REMOTE_RUN: Mode.RUN, Mode.REMOTE_PROGRAM: Mode.PROGRAM,

@@ -36,7 +36,7 @@ class Plc3Commands:
     """
     The commands a PLC-3 serves.
 
-    A PLC-2 command works on the input file whose number is the station it comes from.
+    A PLC-2 command reads and writes the input file whose number is the station of the sender.
     """
 
     no_such_file: Codes = status.EXTENDED, status.EXT_BAD_ADDRESS
@@ -50,7 +50,7 @@ class Plc3Commands:
         self.basic_commands = BasicService(table, _compatibility_file).everything()
 
 
-# M 8-8, 8-9: sizes that do not fit each other have an STS of their own.
+# M 8-8, 8-9: for sizes that do not fit each other there is an STS without EXT STS.
 _CODES = RangeCodes(
     bad_size=(status.STS_ILLEGAL_COMMAND, None),
     missing=(status.EXTENDED, status.EXT_BAD_ADDRESS),

@@ -28,7 +28,7 @@ from abdf1_ros.pccc import members
 from abdf1_ros.pccc.file_address import FileAddressing
 from abdf1_ros.pccc.file_types import FileType, Layout, PlcType
 
-# Data types (M 7-29). A file's own type has to be named when it is written.
+# Data types (M 7-29). A write has to name the file's own type.
 _CHARACTERS, _INTEGER, _BCD = 3, 4, 16
 
 # The files of a PLC-5, by the data types of its commands (M 7-28; PD, MG, SC, BT: practice).

@@ -31,8 +31,8 @@ READ_MODIFY_WRITE = 0x26
 TYPED_WRITE = 0x67
 TYPED_READ = 0x68
 
-# A reply carries at most 240 bytes of descriptors and data. A write carries the same, address
-# included (M 7-28, 7-30).
+# A reply has at most 240 bytes of descriptors and data. A write has at most 240 bytes of address,
+# descriptors and data (M 7-28, 7-30).
 MAX_REPLY = 240
 MAX_WRITE = 240
 MAX_INTEGERS = 110  # 118 would fit, but without room for descriptors that are padded
@@ -50,8 +50,9 @@ class Element:
     The unit in which a typed command counts.
 
     ``type_id`` is the data type (M 7-29), ``wire_size`` the bytes of a unit on the line, ``size``
-    the bytes among them that have an address. It travels as ``parts`` pieces of that type: a word
-    of an A file as two characters (publication 1785-6.5.9 6-12 gives the type one byte).
+    the bytes among them that have an address. On the line a unit is ``parts`` pieces of that type.
+    A word of an A file is two characters, because in publication 1785-6.5.9 6-12 this type has one
+    byte.
     """
 
     type_id: int
@@ -86,8 +87,8 @@ class SystemAddress:
         """
         Return the logical binary form (M 13-10..13-12).
 
-        The address leaves the memory area out, which means the data table. Some servers refuse an
-        address that names the area; ``read`` takes both forms.
+        The form has no memory area, which means the data table. Some servers refuse an address
+        that names the area; ``read`` accepts both forms.
         """
         mask = _FILE | _ELEMENT
         levels = number(self.file) + number(self.element)
@@ -101,7 +102,7 @@ class SystemAddress:
         """
         Take an address off ``reader``, logical binary or logical ASCII (M 13-10..13-15).
 
-        Raises AddressRefusal for one that does not exist, FormatError when bytes run out.
+        Raises AddressRefusal for an address that does not exist, FormatError when bytes run out.
         """
         mask = reader.byte()
         if mask == 0:
@@ -139,8 +140,8 @@ class TypedRead:
     """
     Typed read, 0F/68 (M 7-28).
 
-    ``size`` elements are asked for in this packet, ``offset`` elements into a transaction of
-    ``total`` elements that begins at ``address``.
+    A transaction of ``total`` elements begins at ``address``. This packet asks for ``size`` of
+    these elements, from element ``offset`` on.
     """
 
     address: SystemAddress

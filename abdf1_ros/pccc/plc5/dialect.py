@@ -31,8 +31,8 @@ class Plc5Dialect(Dialect):
     """
     Typed read and write, read-modify-write for bits.
 
-    One value of a structure, a word or a float32, is moved by itself (M 13-12); anything more
-    is whole elements.
+    One value of a structure, a word or a float32, is moved by itself (M 13-12); all larger
+    requests are whole elements.
     """
 
     def max_read(self, file_type: FileType) -> int:
@@ -46,7 +46,7 @@ class Plc5Dialect(Dialect):
         return plc5.CMD, plc5.TypedRead(_system_address(address, words), count, 0, count).encode()
 
     def reply_size(self, address: Address, words: int) -> int:
-        """Return descriptors and elements of the reply's array."""
+        """Return the number of bytes of the reply's array, with its descriptors."""
         element = _element(address, words)
         data = bytes(2 * words // element.size * element.wire_size)
         return len(element.typed(data).encode())
@@ -66,7 +66,7 @@ class Plc5Dialect(Dialect):
                               f'{typed.element_size} bytes, asked were {asked} of {size}')
         if typed.element_size == size:
             return typed.data
-        # Timers carry two internal words after the three that have names.
+        # A timer in a reply has two internal words after its three named words.
         step = typed.element_size
         return b''.join(typed.data[at:at + size] for at in range(0, len(typed.data), step))
 
@@ -97,7 +97,8 @@ def _most_words(file_type: FileType, room: int) -> int:
     """Return the words of as many whole elements as fit into ``room`` with their descriptors."""
     layout = FILES[file_type]
     size = 2 * layout.wire_words
-    some = bytes(8 * size)  # enough for the array's size to need a byte of its own, as all do
+    # an array so long that its size needs a byte of its own, as in the largest packet
+    some = bytes(8 * size)
     descriptors = len(TypedData(layout.code, size, some).encode()) - len(some)
     count = (room - descriptors) // size
     return min(count, plc5.MAX_INTEGERS) * layout.words

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The data files of a PLC-5, which says in its reply what the elements of a file are."""
+"""The data files of a PLC-5. Its reply to a typed read names the type of the elements."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ _USUAL = {number: kind for kind, number in DEFAULT_FILES.items()}
 
 
 class Plc5FileSearch:
-    """By typed reads: no list of files is known."""
+    """Search by typed reads, because no list of the files is known."""
 
     def directory(self, processor: Processor | None) -> None:
         return None

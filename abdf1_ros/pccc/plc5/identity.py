@@ -15,8 +15,8 @@
 """
 The identity that a PLC-5 reports (M 10-20..10-22).
 
-The oldest have no expansion byte, so the fields after the type stand one byte earlier. The reply
-of a 5/12, 5/15 or 5/25 ends with the byte about its RAM.
+The oldest models have no expansion byte, so their fields after the type are one byte earlier. The
+reply of a 5/12, 5/15 or 5/25 ends with the byte about its RAM.
 """
 
 from __future__ import annotations
@@ -119,7 +119,7 @@ def _with_fault(identity: Identity, reply: bytes) -> Identity:
     """
     Return an identity whose fault is named by S:11 and S:12.
 
-    Raises FormatError for a reply that does not hold these words.
+    Raises FormatError if the reply does not contain these words.
     """
     words = Plc5Dialect().read_data(_FAULT_WORDS, 2, reply)
     bits, code = word_at(words, 0), word_at(words, 2)
@@ -133,7 +133,7 @@ def encode(emulated: EmulatedProcessor) -> bytes:
     """
     Return the data of the reply of a PLC-5/40 to 06/03.
 
-    Fields for memory and programs, which it does not have, are 0.
+    Fields for memory and programs are 0, because the emulated PLC has none.
     """
     state = code_of(MODES, emulated.mode) | MAJOR_FAULT * emulated.is_faulted
     return bytes((state, EXTENDED, PLC_5_40)).ljust(SIZE, b'\0')

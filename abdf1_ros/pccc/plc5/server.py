@@ -111,7 +111,7 @@ class TypedService:
         return start.at_offset(start.offset + offset * _element(start, address).size // 2)
 
     def _is_other(self, kind: FileType) -> bool:
-        """Tell whether files of this type differ from files of a PLC-5, or have several pieces."""
+        """Tell whether files of this type differ from files of a PLC-5, or consist of slots."""
         theirs, ours = self._addressing.files[kind], ADDRESSING.files.get(kind)
         has_slots = kind.is_io and self._addressing is not ADDRESSING
         return ours is None or ours.words != theirs.words or has_slots
@@ -145,7 +145,7 @@ class Plc5Commands:
         return b''
 
     def _compatibility_file(self, source: int) -> Window:
-        """Return the file whose number is the station that the command comes from (M 6-4)."""
+        """Return the file whose number is the station of the sender (M 6-4)."""
         return Window(Address(ADDRESSING, self._table.file_type(source), source, 0))
 
 

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The SLC 500 and MicroLogix: addresses, commands, what we say to it and what it answers."""
+"""The SLC 500 and MicroLogix: addresses, commands, and both ends: client and server."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ from abdf1_ros.pccc.slc.file_search import SlcFileSearch
 from abdf1_ros.pccc.slc.server import SlcCommands
 from abdf1_ros.pccc.status import Meanings
 
-# What EXT STS mean that an SLC or MicroLogix sends: as on DH-485 (M 8-5).
+# The meaning of an EXT STS from an SLC or MicroLogix: the same as on DH-485 (M 8-5).
 MEANINGS = Meanings(ext_sts={
     0x07: 'memory module is too small',
     0x0B: 'access denied',

@@ -15,9 +15,9 @@
 """
 The commands of an SLC 500 or MicroLogix: protected typed logical read and write (M 7-17, 7-18).
 
-Their address is file number, file type, element, and sub-element, the word inside an element at
-which the data begin. A1 and A9 are read and write without the sub-element; they are older than
-the manual and in use still (1756-PM020).
+Their address is file number, file type, element, and sub-element. The sub-element is the word
+inside the element at which the data begin. A1 is a read and A9 a write without the sub-element.
+Both are older than the manual and still in use (1756-PM020).
 """
 
 from __future__ import annotations

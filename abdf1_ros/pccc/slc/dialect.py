@@ -29,7 +29,7 @@ class SlcDialect(Dialect):
     """
     Protected typed logical read, write and masked write with three address fields.
 
-    Packets are as long as ``processor`` takes them.
+    ``processor`` sets the longest packets.
     """
 
     def __init__(self, processor: Processor = USUAL) -> None:
@@ -39,7 +39,7 @@ class SlcDialect(Dialect):
         return whole_elements(FILES[file_type], self._processor.max_read)
 
     def sure_read(self, file_type: FileType) -> int:
-        """Return what the oldest processor brings."""
+        """Return the most words that one read of the oldest processor brings."""
         return whole_elements(FILES[file_type], Processor.SLC_5_01.max_read)
 
     def max_write(self, file_type: FileType) -> int:
@@ -62,5 +62,5 @@ def _logical_address(address: Address) -> slc.LogicalAddress:
     return slc.LogicalAddress(address.file, code, address.element, address.word)
 
 
-# Slots or the whole image: an address tells which.
+# One dialect for Access Slot and Flat: each address tells which of them it is.
 BY_PROCESSOR = {processor: SlcDialect(processor) for processor in Processor}

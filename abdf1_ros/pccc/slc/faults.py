@@ -16,9 +16,10 @@
 The meaning of the major error code of an SLC 500 or MicroLogix (word S:6; M 10-3, 10-4).
 
 The texts are general knowledge of these processors: no manual that lists them was at hand, so the
-code is always shown beside them. Publication 1747-RM001 has the list. A code above 50 in its low
-byte is about the I/O slot in its high byte. Codes that only one of the MicroLogix has, or has
-with another meaning, are left out: their text is in the manual of that controller.
+code is always shown beside them. Publication 1747-RM001 has the list. A code from 50 on
+(hexadecimal) in the low byte is about the I/O slot in the high byte. Codes that only one
+MicroLogix model has, or that have another meaning there, are left out: the manual of that
+controller has their text.
 """
 
 from __future__ import annotations

@@ -15,12 +15,13 @@
 """
 The data files of an SLC 500 or MicroLogix.
 
-Newer ones have a list, the file directory, in file 0 of a type that depends on the processor: a
-row each for programs, configuration, the data files in the order of their numbers, forces, and
-function files. No manual that was read has this list. Layout and commands come from a recorded
-MicroLogix 1400 and its programming software (vectors/processors.json). pycomm3, which was tried
-with an SLC 5/05 and a MicroLogix 1100, has the same rows at the same places. Processors without
-the list are asked for every type that a file may have, because a read has to name the type.
+Newer processors have a list, the file directory, in file 0; its type code depends on the
+processor. The list has rows for programs, configuration, the data files in the order of their
+numbers, forces, and function files. No manual that was read has this list. Layout and commands are
+from a recording of a MicroLogix 1400 and its programming software (vectors/processors.json).
+pycomm3, which was tried with an SLC 5/05 and a MicroLogix 1100, has the same rows at the same
+places. Processors without the list are asked for every type that a file may have, because a read
+has to name the type.
 """
 
 from __future__ import annotations
@@ -42,13 +43,13 @@ from abdf1_ros.pccc.slc.dialect import SlcDialect
 from abdf1_ros.pccc.status import check_status
 
 _PACKET = 80  # bytes, as the programming software reads it
-_ROW = 10  # type, length in bytes, address, and what is not known
+_ROW = 10  # type, length in bytes, address, and unknown bytes
 _MOST = 8192
 _RESERVED = 0x81  # a number without a file
-_FORCES = 0xA0  # types from here on are no data files
+_FORCES = 0xA0  # types from here on are not data files
 
 _USUAL = {number: kind for kind, number in DEFAULT_FILES.items()}
-# Types of user files, the frequent ones first. The first three files have one type.
+# Types of user files, the frequent ones first. Each of the first three files has a fixed type.
 _TYPES = (FileType.INTEGER, FileType.BINARY, FileType.FLOAT, FileType.TIMER, FileType.COUNTER,
           FileType.CONTROL, FileType.LONG, FileType.STRING, FileType.ASCII, FileType.BCD)
 _FIRST_OF_ANY_TYPE = 3
@@ -59,10 +60,10 @@ _MOST_ELEMENTS = 256
 @dataclass(frozen=True, slots=True)
 class Directory:
     """
-    Where a processor has its list of files.
+    The place and form of a processor's list of files.
 
-    ``own_row`` is the byte at which the list itself has its row, the first. The commands that have
-    been seen count words as elements (``is_short``), or as sub-elements of element 0.
+    ``own_row`` is the byte at which the first row begins, which is about the list itself. Recorded
+    commands count the words as elements (``is_short``), or as sub-elements of element 0.
     """
 
     type_code: int
@@ -85,7 +86,7 @@ _DIRECTORIES = {
 
 
 class SlcFileSearch:
-    """By the file directory where the processor is known to have one, else by reads."""
+    """Search in the file directory if the processor is known to have one, else by reads."""
 
     def directory(self, processor: Processor | None) -> Steps[list[DataFile]] | None:
         layout = _DIRECTORIES.get(processor) if processor else None

@@ -15,7 +15,7 @@
 """
 The identity of an SLC 500 or MicroLogix: 24 bytes (M 10-3, 10-4, 10-6).
 
-A MicroLogix 1100 and 1400 have been seen to send a 25th, which no manual explains.
+A MicroLogix 1100 and a 1400 were seen to send a 25th byte, which no manual explains.
 """
 
 from __future__ import annotations
@@ -47,7 +47,7 @@ HALF_DUPLEX_PORT = 0x36
 
 
 class _SlcModel(NamedTuple):
-    """Byte 4, what the name begins with, the model, and what the map file calls it."""
+    """Byte 4, the beginning of the name, the model, and its name in the map file."""
 
     code: int
     start: str
@@ -55,8 +55,8 @@ class _SlcModel(NamedTuple):
     processor: Processor
 
 
-# The codes from 78 on are those that drivers in the field know, 9F is recorded. The fixed ones
-# take the packets of the 5/01 (M 7-17).
+# The codes from 78 on come from drivers in the field, and 9F also from a recording. A fixed SLC
+# 500 accepts the packets of the 5/01 (M 7-17).
 _MODELS = (
     _SlcModel(0x18, '5/01', 'SLC 5/01', Processor.SLC_5_01),
     _SlcModel(0x1A, '500', 'SLC 500 fixed', Processor.SLC_5_01),
@@ -70,7 +70,7 @@ _MODELS = (
     _SlcModel(0x9F, '1766', 'MicroLogix 1400', Processor.ML1400),
     _SlcModel(0x89, '1764', 'MicroLogix 1500 LSP', Processor.ML1500),
     _SlcModel(0x8C, '1764', 'MicroLogix 1500 LRP', Processor.ML1500))
-_ANY_SLC = ('5/', '1747')  # names of any SLC 500 begin so
+_ANY_SLC = ('5/', '1747')  # the name of any SLC 500 begins with one of these
 
 MODES = {
     0x00: Mode.REMOTE_DOWNLOAD, 0x01: Mode.REMOTE_PROGRAM, 0x03: Mode.REMOTE_SUSPEND,
@@ -141,17 +141,17 @@ def _counters(processor: Processor | None, interface: int) -> CounterLayout:
 
 
 def served_counters(mode: str) -> CounterLayout:
-    """Return the layout of the port of an SLC in such a mode."""
+    """Return the counter layout of the port of an SLC in a mode."""
     return {'Peer': FULL_DUPLEX_COUNTERS, 'Master': MASTER_COUNTERS,
             'Radio': RADIO_COUNTERS}.get(mode, SLAVE_COUNTERS)
 
 
 def _model(code: int, name: str) -> tuple[str, Processor | None, tuple[str, ...]]:
     """
-    Return the model, empty for one of another family, its processor, and what is odd about it.
+    Return the model, which is empty for another family, its processor, and remarks.
 
-    Codes of newer processors come from drivers in the field only, so where the code and the
-    name disagree the name counts.
+    Codes of newer processors come only from drivers in the field. So if code and name disagree,
+    the name counts.
     """
     by_code = next((known for known in _MODELS if known.code == code), None)
     by_name = next((known for known in _MODELS if name.startswith(known.start)), None)
@@ -168,7 +168,7 @@ def encode(emulated: EmulatedProcessor) -> bytes:
     """
     Return the data of the reply of an SLC 5/03, or of another processor, to 06/03.
 
-    Fields for memory and programs, which it does not have, are 0.
+    Fields for memory and programs are 0, because the emulated PLC has none.
     """
     processor = emulated.processor or USUAL
     known = next(known for known in _MODELS if known.processor is processor)

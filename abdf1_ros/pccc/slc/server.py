@@ -107,7 +107,7 @@ class SlcCommands:
             raise Refusal(status.STS_ILLEGAL_COMMAND)
 
     def _places(self, address: slc.LogicalAddress, size: int) -> list[tuple[Address, int]]:
-        """Return where the words of a command lie, stretch by stretch; all of them exist."""
+        """Return the stretches of words of a command, after a check that all words exist."""
         words = size // 2
         kind = slc.BY_FLAT_CODE.get(address.type_code)
         if kind is not None and kind.default_file == address.file:

@@ -12,4 +12,4 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Word range commands, which PLC-3 and PLC-5 share: what we say and what is answered."""
+"""Word range commands, which PLC-3 and PLC-5 share, and both ends: client and server."""

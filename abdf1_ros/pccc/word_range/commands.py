@@ -15,8 +15,8 @@
 """
 Word range read and write, file read and bit write of PLC-3 and PLC-5 (M 7-4, 7-34, 7-35).
 
-``offset`` and ``total`` count words: a packet carries the words that lie ``offset`` words into
-a transaction of ``total`` words, which begins at ``address`` (M 14-6).
+``offset`` and ``total`` count words. A transaction of ``total`` words begins at ``address``. A
+packet has some of these words, from word ``offset`` on (M 14-6).
 """
 
 from __future__ import annotations
@@ -68,7 +68,7 @@ class WordRangeRead(Generic[_Place]):
     @classmethod
     def read(cls, reader: Reader,
              read_address: Callable[[Reader], _Place]) -> WordRangeRead[_Place]:
-        """Take the parameters off ``reader``; those of a file read, 0F/04, are the same."""
+        """Take the parameters off ``reader``; a file read, 0F/04, has the same parameters."""
         offset, total = reader.word(), reader.word()
         address = read_address(reader)
         size = reader.byte()
@@ -125,17 +125,17 @@ class WordBitWrite(Generic[_Place]):
 
 
 # Such commands move words as a PLC-5 stores them: the high word of a float comes first (M 13-17).
-# Everywhere else in this package, as in typed commands, the low word does.
+# Everywhere else in this package, as in typed commands, the low word comes first.
 _WITH_FLOATS = (FileType.FLOAT, FileType.PID)
 
 
 def word_on_line(address: Address) -> Address:
-    """Return which of our words is the one that the line has at ``address``."""
+    """Return the address at which we have the word that the line has at ``address``."""
     return address.at_offset(address.offset + _step(address))
 
 
 def in_line_order(address: Address, data: bytes) -> bytes:
-    """Return whole values from ``address`` on in the line's order, or from it in ours."""
+    """Turn whole values from ``address`` on from our word order into the line's, or back."""
     if address.file_type not in _WITH_FLOATS:
         return data
     words = [data[at:at + 2] for at in range(0, len(data), 2)]

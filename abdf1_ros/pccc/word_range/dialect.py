@@ -34,12 +34,12 @@ from abdf1_ros.pccc.word_range.commands import (
 @dataclass(slots=True, eq=False)
 class WordRangeDialect(Dialect):
     """
-    Word range read and write; several packets of one transfer carry their offset in it.
+    Word range read and write; each packet of a transfer contains its offset.
 
-    Structures are the words they are stored as, floats travel high word first (M 13-17). The
-    families differ in ``files``, ``address_size`` (bytes of the longest address), the form of an
-    address in a command, and the bit write. The bit write has FNC and parameters for a word and
-    the bits to set and to reset.
+    A structure is moved as the words that the PLC stores; a float is sent high word first (M
+    13-17). The families differ in ``files``, ``address_size`` (bytes of the longest address), the
+    form of an address in a command, and the bit write. The bit write has FNC and parameters for a
+    word and the bits to set and to reset.
     """
 
     files: Mapping[FileType, Layout]

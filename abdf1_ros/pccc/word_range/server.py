@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""What a PLC-3 or PLC-5 answers to word range commands, file reads and bit writes."""
+"""The answers of a PLC-3 or PLC-5 to word range commands, file reads and bit writes."""
 
 from __future__ import annotations
 
@@ -39,10 +39,10 @@ _Place = TypeVar('_Place', bound=WireAddress)
 @dataclass(frozen=True, slots=True)
 class RangeCodes:
     """
-    What a family answers to word range commands that cannot be executed.
+    The answers of a family to word range commands that cannot be executed.
 
     - ``bad_size``: sizes, offsets and totals that do not fit each other.
-    - ``missing``: a first word that is not there.
+    - ``missing``: a first word that does not exist.
     - The remaining codes: a transaction that ends after its file.
     """
 
@@ -57,7 +57,7 @@ class WordRangeService(Generic[_Place]):
     """
     Execute word range commands on ``table``.
 
-    ``read_address`` takes an address off a command, ``find`` says where it is.
+    ``read_address`` reads the address in a command, ``find`` returns its place in the table.
     """
 
     table: DataTable
@@ -111,7 +111,7 @@ class WordRangeService(Generic[_Place]):
 
     def _words(self, start: Address, offset: int, size: int, total: int,
                past_end: Codes) -> list[Address]:
-        """Return the words of one packet, after a look at all of the transaction."""
+        """Return the words of one packet, after a check that the whole transaction exists."""
         if size == 0 or size % 2 or offset + size // 2 > total:
             raise Refusal(*self.codes.bad_size)
         if not self._is_there(start, total):
