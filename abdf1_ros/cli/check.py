@@ -152,7 +152,12 @@ def _draw(options: argparse.Namespace, found: Findings, report: Report | None) -
 
 
 def _heard(found: Findings, files: Sequence[str]) -> dict[str, Any]:
-    """Return the rows that recordings fill in Mode Listen, and the reads in the recordings."""
+    """
+    Return what Mode Listen would get from recordings.
+
+    ``rows`` has the tag of each Read row, with the reason why no recording fills it (empty if a
+    recording does); ``reads`` has the reads of the recordings.
+    """
     from abdf1_ros.cli.overhearing import overheard
     network = found.network or Network()
     rows = Rows(row for row in found.mappings if row.command is Command.READ)

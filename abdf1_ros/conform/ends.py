@@ -48,7 +48,7 @@ def expect_end_of_enquiries(wire: Wire, patience: float) -> Symbol | None:
     """
     Leave each DLE ENQ without an answer; return the next other symbol, None for silence.
 
-    Raises Failed if the DLE ENQ do not end.
+    Raises Failed if the target does not stop sending DLE ENQ.
     """
     for _ in range(HIGHEST_LIMIT + 1):
         symbol = wire.hear(patience, answers=False)

@@ -292,9 +292,9 @@ class MasterLine:
         """
         Take a late message of a station that is not asked now; return False for any other message.
 
-        Such a message answers an earlier poll, whose time was up. It gets no ACK, because the
-        station asked now would relate the ACK to its own message. So the message comes again, as a
-        repetition.
+        Such a message answers an earlier poll, whose time was up. We send no ACK: the station
+        that we poll now would take the ACK for its own message. So the late message comes again,
+        as a repetition.
         """
         src = frame.data[1]
         if src == number or self._speaks_for(number, src) or src not in self.stations:

@@ -21,8 +21,9 @@ Heartbeats and fallbacks (``interlocks``) go first. A check or read has its turn
 - ``writes`` go first, but after ``MAX_WRITES_IN_A_ROW`` of their commands a check or read that is
   due has its turn.
 - ``checks``, such as the question for a station's mode, go before the reads. After a check, all
-  reads that were due when it began go before the next check. If rows depend on several stations'
-  modes, one read goes between two questions, and every due read before a question is repeated.
+  reads that were due when it began go before the next check. If rows depend on the modes of
+  several stations, one read goes between two of these questions. Before a question is sent again,
+  every due read goes first.
 - ``reads`` go in the order of ``reads.queue``. Fallbacks that are written again take turns with
   the reads.
 

@@ -50,7 +50,7 @@ class Inbox(Generic[_Item]):
         return self.take()
 
     def put(self, item: _Item) -> bool:
-        """Add an item; return False if the inbox is closed and the item will not be taken."""
+        """Add an item and return True; return False, without the item, if the inbox is closed."""
         self.items.append(item)
         if self._is_open:
             return True

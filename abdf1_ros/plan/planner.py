@@ -91,7 +91,7 @@ class Block:
 
     @property
     def transfer(self) -> Transfer:
-        """Return the words that all requests read together."""
+        """Return the sum of the words of all requests."""
         return Transfer(self.start, self.words)
 
     def slice_of(self, mapping: Mapping) -> slice:

@@ -51,7 +51,7 @@ _FRAME, _OVERRUN, _PARITY, _BUFFER_OVERRUN = 6, 7, 8, 10
 
 _PSEUDO_TERMINALS = '/dev/pts/'
 
-# Longest time (s) that ``close`` waits for the last bytes, and the interval (s) of its looks.
+# Longest time (s) that ``close`` waits for the last bytes, and the time (s) between two looks.
 _LAST_BYTES = 1.0
 _LOOK = 0.005
 

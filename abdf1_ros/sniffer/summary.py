@@ -42,7 +42,7 @@ class Latency:
 
     @property
     def mean(self) -> float:
-        """Return the mean (s); 0 if there was no latency."""
+        """Return the mean in seconds; 0 if there was no latency."""
         return self.total / self.count if self.count else 0.0
 
 

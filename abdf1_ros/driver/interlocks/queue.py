@@ -308,7 +308,7 @@ class Interlocks(WriteListener):
 
     def refresh(self, now: float, busy: Container[int] = ()) -> OwnWrite | None:
         """
-        Return the next repeated write of a confirmed fallback, None for none (rule 8).
+        Return the next confirmed fallback that has to be written again; None for none (rule 8).
 
         It does not go before messages. It waits while a message of its row waits, unless the last
         message of the row was not confirmed.

@@ -41,7 +41,7 @@ class Freshness(Enum):
 
     @property
     def is_usable(self) -> bool:
-        """Tell whether the last value counts as what the PLC has now."""
+        """Tell whether the last value is still valid."""
         return self in (Freshness.FRESH, Freshness.LATE)
 
 

@@ -51,8 +51,7 @@ class Element:
 
     ``type_id`` is the data type (M 7-29), ``wire_size`` the bytes of a unit on the line, ``size``
     the bytes among them that have an address. On the line a unit is ``parts`` pieces of that type.
-    A word of an A file is two characters, because in publication 1785-6.5.9 6-12 this type has one
-    byte.
+    In an A file one element is one byte (1785-6.5.9 6-12), so one word holds two characters.
     """
 
     type_id: int

@@ -19,9 +19,9 @@ from __future__ import annotations
 from collections.abc import Callable
 import time
 
-# Length (s) of a look for writes. One look without a write proves nothing: on a busy host, another
-# callback may take as long as the look. Only several empty looks in a row show that no write still
-# waits.
+# Length (s) of a look for writes. A single look that finds no write proves nothing: on a busy
+# host, another callback may run during the whole look. Only several empty looks in a row show that
+# no write still waits.
 _LOOK = 0.02
 _LOOKS = 3
 

@@ -37,8 +37,8 @@ from rclpy.node import Node
 # has taken many of our messages.
 _NAMES_PERIOD = 0.25
 
-# Seconds until a new node has found the nodes that run already; usually a fifth of this time is
-# enough.
+# Longest time (s) that a new node needs to find the nodes that run already; usually a fifth of it
+# is enough.
 DISCOVERY = 0.5
 
 # Pause between two queries for topics: at least ``_LEAST`` s, and at least ``_MULTIPLE`` times the

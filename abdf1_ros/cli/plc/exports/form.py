@@ -121,7 +121,7 @@ def whole_length(address: str, plc_type: PlcType) -> str:
 
 
 def command_of(text: str, column: str = '') -> str | None:
-    """Return the Command of an access cell in a column of this name; None if unknown."""
+    """Return the Command that an access cell stands for; None if the cell is unknown."""
     word = text.lower()
     if _READ_ONLY.fullmatch(column):
         return READ if word in _YES else READ_WRITE if word in _NO else _ACCESS.get(word)
@@ -149,7 +149,7 @@ def scaling(ends: Sequence[str], sign: float = 1.0) -> Cells:
 
 
 def number_text(text: str) -> str:
-    """Return a number in the form of a map; raise Unusable for another text."""
+    """Return a number as a map writes it; raise Unusable if the text is not a number."""
     value = decimal_number(text.replace(',', '.'))
     if value is None:
         raise Unusable(f'"{shown(text)}" should be a number')
