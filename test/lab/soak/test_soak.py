@@ -29,7 +29,9 @@ MOST_GROWTH = 30_000
 MOST_AT_REST = 256
 
 
-@pytest.mark.parametrize('mode', MODES)
+@pytest.mark.parametrize('mode', [
+    pytest.param(mode, marks=pytest.mark.long) if mode in ('Standard', 'Radio') else mode
+    for mode in MODES])
 def test_faults_cannot_grow_memory(mode: str) -> None:
     rig = FaultyLine(mode, pause=2.0, longest=5.0)
     rig.disturb()  # fills caches, and what is learned at first
