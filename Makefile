@@ -3,6 +3,7 @@
 PYTHON ?= python3
 DEMO_SECONDS ?= 30
 FUZZ_SECONDS ?= 60
+FUZZ_ARGS ?=
 MUTANTS ?= 200
 PART ?= df1
 LONG_HOURS ?= 1
@@ -50,7 +51,7 @@ help: ## List the targets
 	@echo
 	@echo 'Variables: PYTHON (of setup), DEMO_SECONDS (of demo), PYTEST_ARGS (of test),'
 	@echo 'TEST_WORKERS (6: processes of test, more than processors, as many tests wait),'
-	@echo 'PART and MUTANTS (of mutate), HOURS (of simulate), FUZZ_SECONDS (of fuzz), LONG_HOURS and LONG_ARGS (of long; LONG_ARGS=--help).'
+	@echo 'PART and MUTANTS (of mutate), HOURS (of simulate), FUZZ_SECONDS and FUZZ_ARGS (of fuzz; --draw 2), LONG_HOURS and LONG_ARGS (of long; LONG_ARGS=--help).'
 
 .PHONY: setup
 setup: $(INSTALLED) ## Make .venv with all that the other targets need
@@ -158,7 +159,7 @@ GET_ATHERIS := $(PY) -c 'import atheris' 2>/dev/null || $(PY) -m pip install --q
 .PHONY: fuzz
 fuzz: $(INSTALLED) ## Fuzz what reads bytes and text for FUZZ_SECONDS (60), from the stored corpus
 	@if $(GET_ATHERIS); then \
-	    $(PY) test/lab/fuzz/run.py --seconds $(FUZZ_SECONDS); \
+	    $(PY) test/lab/fuzz/run.py --seconds $(FUZZ_SECONDS) $(FUZZ_ARGS); \
 	else \
 	    echo 'fuzz: not done, as there is no atheris for this machine' | tee -a "$${NOTES:-/dev/null}"; \
 	fi

@@ -26,6 +26,7 @@ from dataclasses import dataclass
 import hashlib
 import importlib
 from pathlib import Path
+import random
 import re
 import subprocess
 import sys
@@ -90,12 +91,16 @@ def _arguments() -> argparse.Namespace:
     parser.add_argument('targets', nargs='*', default=corpus.TARGETS, metavar='TARGET',
                         help=f'of {", ".join(corpus.TARGETS)}; all unless told')
     parser.add_argument('--seconds', type=int, default=60, help='for all targets together (60)')
+    parser.add_argument('--draw', type=int, metavar='N', help='try N of the targets, drawn anew')
     parser.add_argument('--work', type=Path, help='where new inputs are kept')
     parser.add_argument('--store', action='store_true', help='store what brings coverage')
     arguments = parser.parse_args()
     unknown = set(arguments.targets) - set(corpus.TARGETS)
     if unknown:
         parser.error(f'there is no target {", ".join(sorted(unknown))}')
+    if arguments.draw is not None:
+        arguments.targets = random.sample(
+            [*arguments.targets], min(arguments.draw, len(arguments.targets)))
     return arguments
 
 
