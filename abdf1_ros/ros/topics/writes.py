@@ -249,6 +249,7 @@ class WriteTopics:
 
         DDS does so after a cut of the network, because the reader then treats the publisher as
         new. The publisher repeats all messages that were not acknowledged before the cut.
+        Messages of two publishers differ in the time stamp, which counts nanoseconds.
         """
         stamp, number = info['source_timestamp'], info['publication_sequence_number']
         if not stamp or number is None:
