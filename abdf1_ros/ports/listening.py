@@ -32,15 +32,9 @@ import select
 import termios
 
 from abdf1_ros.df1.listen import SecondPort
-from abdf1_ros.line_names import device_of, number_of
 from abdf1_ros.ports.descriptor import Port
-from abdf1_ros.ports.ownership import BUSY, own
-from abdf1_ros.ports.serial_device import (
-    is_pseudo_terminal,
-    mark_damage,
-    NOT_SERIAL,
-    SerialDevice,
-)
+from abdf1_ros.ports.ownership import BUSY
+from abdf1_ros.ports.serial_device import hold_device, NOT_SERIAL, SerialDevice
 from abdf1_ros.ports.settings import PortSettings
 from abdf1_ros.ports.socket_port import open_port as open_socket
 
@@ -117,26 +111,19 @@ def open_port(settings: PortSettings) -> Port:
 
 def open_device(settings: PortSettings) -> ListeningDevice:
     """Open a device exclusively, for reading only; raises OSError."""
-    with ExitStack() as stack:
-        number = device_of(settings.name)
-        stack.callback(own(number).close)
+    def opened(stack: ExitStack) -> int:
         descriptor = os.open(settings.name, os.O_RDONLY | os.O_NOCTTY | os.O_NONBLOCK)
         stack.callback(os.close, descriptor)
-        if number_of(os.fstat(descriptor)) != number:
-            raise OSError(f'{settings.name} leads to another device by now')
         _set_up(descriptor, settings)
-        has_parity = settings.parity != 'None'
-        if has_parity:
-            mark_damage(descriptor)
-        return ListeningDevice(descriptor, stack.pop_all().close, is_marked=has_parity)
+        return descriptor
+
+    return hold_device(settings, opened, ListeningDevice)
 
 
 def _set_up(descriptor: int, settings: PortSettings) -> None:
     """Keep other programs away, and set speed and character format."""
     try:
         fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        if not is_pseudo_terminal(settings.name):  # a pseudo-terminal lasts as long as its far end
-            fcntl.ioctl(descriptor, termios.TIOCEXCL)
         attributes = termios.tcgetattr(descriptor)
         speed, flags = getattr(termios, f'B{settings.baud}'), _flags(settings)
         termios.tcsetattr(descriptor, termios.TCSANOW, [

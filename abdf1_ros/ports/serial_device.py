@@ -29,6 +29,7 @@ import os
 import struct
 import termios
 import time
+from typing import TypeVar
 
 from abdf1_ros.df1.frames import Damaged
 from abdf1_ros.line_names import device_of, number_of
@@ -51,6 +52,8 @@ _FRAME, _OVERRUN, _PARITY, _BUFFER_OVERRUN = 6, 7, 8, 10
 
 _PSEUDO_TERMINALS = '/dev/pts/'
 
+Device = TypeVar('Device', bound='SerialDevice')
+
 # Longest time (s) that ``close`` waits for the last bytes, and the time (s) between two looks.
 _LAST_BYTES = 1.0
 _LOOK = 0.005
@@ -69,25 +72,40 @@ def is_pseudo_terminal(name: str) -> bool:
 
 def open_device(settings: PortSettings, tell: Callable[[str], None]) -> SerialDevice:
     """
-    Open a device exclusively, whatever its name (rule 25 of docs/heartbeats.md).
+    Open a device exclusively.
 
     ``tell`` is called with settings that the port does not support, which is not an error. Raises
+    OSError.
+    """
+    def opened(stack: ExitStack) -> int:
+        port = _opened(settings)
+        stack.callback(port.close)
+        _set_options(port, settings, tell)
+        return port.fileno()
+
+    return hold_device(settings, opened, SerialDevice)
+
+
+def hold_device(settings: PortSettings, opened: Callable[[ExitStack], int],
+                kind: type[Device]) -> Device:
+    """
+    Keep other programs away from a device, whatever its name (rule 25 of docs/heartbeats.md).
+
+    ``opened`` sets up the device, returns its descriptor and puts its closing on the stack. Raises
     OSError.
     """
     with ExitStack() as stack:
         number = device_of(settings.name)
         stack.callback(own(number).close)
-        port = _opened(settings)
-        stack.callback(port.close)
-        if number_of(os.fstat(port.fileno())) != number:
+        descriptor = opened(stack)
+        if number_of(os.fstat(descriptor)) != number:
             raise OSError(f'{settings.name} leads to another device by now')
         if not is_pseudo_terminal(settings.name):  # a pseudo-terminal lasts as long as its far end
-            fcntl.ioctl(port.fileno(), termios.TIOCEXCL)
-        _set_options(port, settings, tell)
+            fcntl.ioctl(descriptor, termios.TIOCEXCL)
         has_parity = settings.parity != 'None'
         if has_parity:
-            mark_damage(port.fileno())
-        return SerialDevice(port.fileno(), stack.pop_all().close, is_marked=has_parity)
+            mark_damage(descriptor)
+        return kind(descriptor, stack.pop_all().close, is_marked=has_parity)
 
 
 def _opened(settings: PortSettings) -> serial.Serial:
