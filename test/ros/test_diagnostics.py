@@ -46,7 +46,7 @@ from abdf1_ros.ros.diagnostics.dds_files import LOST
 from abdf1_ros.ros.diagnostics.events import LineEvents
 from abdf1_ros.ros.diagnostics.guests import GuestsStatus
 from abdf1_ros.ros.diagnostics.line import takes_in_silence
-from abdf1_ros.ros.diagnostics.status import Seen
+from abdf1_ros.ros.diagnostics.status import message_of, Seen
 from abdf1_ros.ros.diagnostics.statuses import Diagnostics
 from abdf1_ros.ros.diagnostics.watches import watches_of
 from abdf1_ros.ros.diagnostics.writes import WriteLog
@@ -175,6 +175,12 @@ def test_names_and_hardware_ids(bench: Bench) -> None:
 
 
 # link
+
+
+def test_status_shows_each_character_of_what_comes_from_outside() -> None:
+    status = message_of('a\n', OK, 'b\x1b', 'c\u202e', {'d\n': 'e\r'})
+    assert (status.name, status.message, status.hardware_id) == (r'a\n', r'b\x1b', r'c\u202e')
+    assert details(status) == {r'd\n': r'e\r'}
 
 
 def test_link_before_there_is_one(bench: Bench) -> None:

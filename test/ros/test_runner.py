@@ -15,7 +15,7 @@
 """The threads of callbacks, and the one sequence of an end, for one bridge or many."""
 
 from collections.abc import Callable, Iterator
-from itertools import groupby
+from itertools import groupby, pairwise
 from queue import SimpleQueue
 import threading
 import time
@@ -24,6 +24,8 @@ from typing import Any
 from abdf1_ros.ros.bridge.node import end_together
 from abdf1_ros.ros.callbacks import AnsweringNode, Callbacks
 from abdf1_ros.ros.diagnostics.log import MOST_ENTRIES
+from abdf1_ros.ros.process.runner import Line, Runner
+from abdf1_ros.ros.process.supervisor import Supervisor
 from abdf1_ros.testing import PATIENCE
 import pytest
 from rclpy.executors import SingleThreadedExecutor
@@ -73,6 +75,36 @@ class Recorder:
 
 def order(calls: list[str]) -> list[str]:
     return [name for name, _ in groupby(calls)]
+
+
+@pytest.mark.parametrize('count', [1, 3, 10, 25])
+def test_each_line_is_checked_ten_times_a_second_and_looks_come_as_often(
+        count: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    calls: dict[object, list[float]] = {}
+
+    class Ended:
+        now = 0.0
+
+        def wait(self, seconds: float) -> bool:
+            self.now += seconds
+            return self.now > 1.04
+
+        def set(self) -> None:  # noqa: A003
+            pass
+
+    class Told(Line):
+
+        def check(self) -> None:
+            calls.setdefault(self, []).append(ended.now)
+
+    ended: Any = Ended()
+    monkeypatch.setattr(Supervisor, 'look', lambda *_: calls.setdefault('threads', []).append(
+        ended.now))
+    lines = [Told() for _ in range(count)]
+    Runner(lines, lambda: calls.setdefault('look', []).append(ended.now)).run(ended)
+    assert calls.keys() == {*lines, 'look', 'threads'}
+    for times in calls.values():
+        assert [later - time for time, later in pairwise(times[:10])] == pytest.approx([0.1] * 9)
 
 
 def test_all_plcs_are_told_before_a_link_stops_and_results_come_before_the_last_words(

@@ -124,7 +124,7 @@ def test_read_now_publishes_and_answers_with_value_and_time(bench: Bench) -> Non
     recipes = bench.ros.listen(Int16MultiArray, '/abdf1/read/recipe')
     begun = datetime.now(UTC)
     success, text = bench.read('recipe')
-    assert success
+    assert success, text
     values, _, moment = text.partition(' at ')
     assert values == '[211, 222, 233]'
     assert begun.timestamp() - 0.001 <= datetime.fromisoformat(moment).timestamp() <= time.time()

@@ -200,3 +200,12 @@ def test_time_of_day_goes_on_after_midnight() -> None:
 def test_direction_holds_for_lines_without_one_until_the_next() -> None:
     lines = ['TX: 10 02', '01 02', 'RX: 10 06', 'uint8_t tx[] = { 0x10, 0x04 };']
     assert [chunk.direction for chunk in read(iter(lines))] == [OUT, OUT, IN, OUT]
+
+
+@pytest.mark.parametrize('line', [
+    '19:00:00.100 ttyS1', 'written and read:', 'in, out: 10 06',
+    'uint8_t data[] = { 0x10, 0x06 };'])
+def test_direction_does_not_hold_beyond_a_line_that_does_not_say_which(line: str) -> None:
+    chunks = read(iter(['TX: 10 02', line, '10 06']))
+    assert [chunk.direction for chunk in chunks] == [OUT] + [UNKNOWN] * (len(chunks) - 1)
+    assert chunks[-1].data == b'\x10\x06'

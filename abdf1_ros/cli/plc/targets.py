@@ -50,7 +50,7 @@ class Targets:
     Rows of a map, and addresses; ``cells`` has the values of options for addresses.
 
     - ``tags``: tags of the map, by address.
-    - ``routes``: gateways of the stations in the map.
+    - ``routes``: gateways of the stations in the map; a station on the line itself is its own.
     """
 
     entries: Sequence[Mapping | str]
@@ -101,9 +101,10 @@ def to_read(options: argparse.Namespace) -> Targets:
             of = '' if options.station is None else f' of station {options.station}'
             raise ConfigurationError([Problem(options.map, f'has no row{of} that is read')])
     routes = _routes(mappings)
-    if options.via is None and (gateway := routes.get(_station(options))) is not None:
+    gateway = routes.get(station := _station(options), station)
+    if options.via is None and gateway != station:
         cells['Via'] = str(gateway)
-    targets = Targets(entries, cells, data.tags_of(mappings, _station(options)), routes)
+    targets = Targets(entries, cells, data.tags_of(mappings, station), routes)
     try:
         data.check_for_some_family(targets.addresses, cells)
     except ConfigurationError as error:
@@ -163,7 +164,7 @@ def _cells(options: argparse.Namespace, command: Command, length: int | str | No
 
 
 def _routes(mappings: Rows) -> dict[int, int]:
-    return {row.station: row.via for row in mappings.of_plcs if row.via is not None}
+    return {row.station: row.station if row.via is None else row.via for row in mappings.of_plcs}
 
 
 def _row_to_write(mappings: Rows, path: str, tag: str) -> Mapping:
@@ -191,11 +192,15 @@ def _meant(word: str, rows: Collection[str]) -> str:
 
 def _check_options(options: argparse.Namespace, targets: Targets) -> None:
     """Raise ConfigurationError if an option contradicts rows of a map, or has no effect."""
+    station = _station(options)
     problems = [] if targets.addresses else [
         Problem(f'--{name.replace("_", "-")}', 'is for addresses; for tags the map has this value')
         for name in _FOR_ADDRESSES if getattr(options, name, None) is not None]
     if not targets.addresses:
         problems += [Problem('--station', f'the map has {row.tag} at station {row.station}')
                      for row in targets.rows if options.station not in (None, row.station)]
+    elif options.via not in (None, gateway := targets.routes.get(station, options.via)):
+        where = 'on the line itself' if gateway == station else f'behind gateway {gateway}'
+        problems.append(Problem('--via', f'the map has station {station} {where}'))
     if problems:
         raise ConfigurationError(problems)

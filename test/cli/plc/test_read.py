@@ -18,6 +18,11 @@ from pathlib import Path
 import signal
 
 from abdf1_ros.cli.plc.command import main
+from abdf1_ros.cli.plc.parser import make_parser
+from abdf1_ros.cli.plc.session import Session
+from abdf1_ros.cli.plc.targets import to_read
+from abdf1_ros.problems import ConfigurationError
+from abdf1_ros.settings.network import Network
 import pytest
 from support.commands import call, PATIENT, Plc, running_simulator
 from support.ptys import Pty, wait_until
@@ -118,6 +123,29 @@ def test_row_behind_a_gateway_is_asked_through_it(tmp_path: Path, args: tuple[st
         wait_until(lambda: process.catches(signal.SIGTERM))
         process.send(signal.SIGTERM)
         process.result()
+    line.close()
+
+
+@pytest.mark.parametrize(('map_row', 'args', 'routes'), [
+    ('near,Read,N7:0,3,SLC,', ('near', 'N7:1', '--station', '7', '--via', '9'), {3: 3, 7: 9}),
+    ('far,Read,N7:0,3,SLC,8', ('far', 'N7:1', '--station', '7', '--via', '9'), {3: 8, 7: 9}),
+    ('far,Read,N7:0,7,SLC,8', ('N7:1', '--station', '7', '--via', '9'),
+     'the map has station 7 behind gateway 8'),
+    ('near,Read,N7:0,7,SLC,', ('N7:1', '--station', '7', '--via', '9'),
+     'the map has station 7 on the line itself')])
+def test_gateway_of_addresses_is_not_that_of_rows(
+        tmp_path: Path, map_row: str, args: tuple[str, ...], routes: dict[int, int] | str) -> None:
+    path = write_csv(tmp_path / 'map.csv', 'Tag,Command,Address,Station,PLC_Type,Via', [map_row])
+    options = make_parser('').parse_args(['read', *args, '--map', str(path)])
+    if isinstance(routes, str):
+        with pytest.raises(ConfigurationError, match=f'--via: {routes}'):
+            to_read(options)
+        return
+    line = Pty(tmp_path / 'line')
+    with Session(Network(com_port=str(line.name)), via=9,
+                 routes=to_read(options).routes) as session:
+        assert {number: session.stations.via(number) for number in routes} == routes
+        assert [session.stations.via(number) for number in (0, 9, 254)] == [9, 9, 9]
     line.close()
 
 
