@@ -24,7 +24,6 @@ from abdf1_ros.df1.stations import ActiveStationList, MAX_STATION
 from abdf1_ros.errors import FormatError
 from abdf1_ros.open_line import LOG, OpenLine, plain, single, text_of, values_of
 from abdf1_ros.pccc import steps
-from abdf1_ros.pccc.steps import AddressedValues
 from abdf1_ros.pccc.values import Values
 from abdf1_ros.plan.planner import Planner
 from abdf1_ros.plan.reading import read_planned
@@ -78,7 +77,7 @@ class TaggedClient(OpenLine):
         if isinstance(tag, str):
             row = self._row(tag, 'read', lambda row: row.polls)
             with self.naming(_named(row)):
-                return _shown(row, self.ask(row.station, steps.read(_target_of(row))))
+                return _shown(row, self.ask(row.station, steps.read(row.target)))
         rows = [self._row(name, 'read', lambda row: row.polls) for name in dict.fromkeys(tag)]
         values = dict(read_planned(Planner(self.line_model, 1.0), rows, self))
         return {row.tag: _shown(row, values[row]) for row in rows}
@@ -87,7 +86,7 @@ class TaggedClient(OpenLine):
         """Write to a Write or ReadWrite row; return when the PLC has confirmed all values."""
         row = self._row(tag, 'written', lambda row: row.writes)
         with self.naming(_named(row)):
-            self.ask(row.station, steps.write(_target_of(row), raw_values(row, values_of(values))))
+            self.ask(row.station, steps.write(row.target, raw_values(row, values_of(values))))
 
     def _row(self, tag: str, what: str, fits: Callable[[Mapping], bool]) -> Mapping:
         row = self.rows.get(text_of('tag', tag))
@@ -106,7 +105,3 @@ def _shown(row: Mapping, values: Values) -> float | str | list[float]:
     if row.scaling is not None and not isinstance(values, str):
         values = row.scaling.publish(values)
     return single(plain(values, row.type), row.length == 1)
-
-
-def _target_of(row: Mapping) -> AddressedValues:
-    return AddressedValues(row.address, row.codec, row.dialect)

@@ -18,10 +18,14 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from datetime import datetime, UTC
+import math
 import re
 
 # The beginning of a cell is enough to find it.
 _SHOWN = 100
+
+# The characters of a curve, the lowest first.
+BARS = '▁▂▃▄▅▆▇█'
 
 
 def printable(text: str) -> str:
@@ -41,6 +45,13 @@ def printable(text: str) -> str:
 def value_text(value: float) -> str:
     """Return a value as text, with as many digits as a float32 has."""
     return str(value) if isinstance(value, int) else f'{value:.7g}'
+
+
+def bar(value: float, low: float, high: float, bars: str = BARS) -> str:
+    """Return the character of a value on a scale from ``low`` to ``high``; a blank for NaN."""
+    if not math.isfinite(value):
+        return ' '
+    return bars[round((value - low) / (high - low) * (len(bars) - 1))] if high > low else bars[0]
 
 
 def cut(text: str, width: int) -> str:

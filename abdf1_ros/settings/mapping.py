@@ -28,6 +28,7 @@ from abdf1_ros.pccc.extent import Extent
 from abdf1_ros.pccc.families import dialect_of, parse_address
 from abdf1_ros.pccc.file_types import FileType, PlcType
 from abdf1_ros.pccc.processor import CIF_FILES, Processor
+from abdf1_ros.pccc.steps import AddressedValues
 from abdf1_ros.pccc.values import Codec, ValueType, WordOrder
 from abdf1_ros.problems import Place, Problem
 from abdf1_ros.settings.alarms import Alarm
@@ -131,6 +132,11 @@ class Mapping:
         first = self.address.offset
         object.__setattr__(self, 'extent', Extent(
             self.station, self.address.area, first, first + codec.words))
+
+    @property
+    def target(self) -> AddressedValues:
+        """Return the values of the row in its PLC, as steps read and write them."""
+        return AddressedValues(self.address, self.codec, self.dialect)
 
     @property
     def message_type(self) -> ValueType:

@@ -44,7 +44,7 @@ import sys
 import time
 from types import FrameType
 
-from abdf1_ros.cli.monitor.curves import ASCII, BLOCKS
+from abdf1_ros.cli.monitor.curves import ASCII
 from abdf1_ros.cli.monitor.node import full_name, NodeWatch
 from abdf1_ros.cli.monitor.plant import PlantWatch, render_plant
 from abdf1_ros.cli.monitor.view import render, Style, TextLine
@@ -60,6 +60,7 @@ from abdf1_ros.cli.terminal import (
 from abdf1_ros.errors import FormatError
 from abdf1_ros.ros.observer import graph_hint
 from abdf1_ros.signals import limit_output
+from abdf1_ros.text import BARS
 from rclpy.utilities import remove_ros_args
 
 _say = partial(tell, 'monitor')
@@ -329,7 +330,7 @@ def _picture(watch: NodeWatch, width: int) -> list[TextLine]:
     # Characters that the C library cannot write would spoil a curses screen. The Linux console can
     # show few characters.
     has_blocks = locale.getencoding() == 'UTF-8' and os.environ.get('TERM') != 'linux'
-    return render(watch.snapshot(), time.monotonic(), width, BLOCKS if has_blocks else ASCII)
+    return render(watch.snapshot(), time.monotonic(), width, BARS if has_blocks else ASCII)
 
 
 def _is_screen() -> bool:

@@ -21,8 +21,9 @@ from collections.abc import Iterator, Sequence
 import math
 from typing import NamedTuple
 
+from abdf1_ros.text import bar, BARS
+
 WIDTH = 12
-BLOCKS = '▁▂▃▄▅▆▇█'
 ASCII = '_.-=*#'
 
 _STEP = 2.0  # s
@@ -67,7 +68,7 @@ class Curve:
             high = [*map(max, before.high, last)]
         self._steps.append(_Step(number, now, low, high, last))
 
-    def draw(self, now: float, promised: float | None, levels: str = BLOCKS) -> str:
+    def draw(self, now: float, promised: float | None, bars: str = BARS) -> str:
         """
         Return ``WIDTH`` characters, the newest last; a blank is a time without a good value.
 
@@ -78,7 +79,7 @@ class Curve:
         points = [*_points(shown, _changing([step for step in shown if step is not None]))]
         known = [point for point in points if math.isfinite(point)]
         bottom, top = (0.0, 1.0) if self._is_bits or not known else (min(known), max(known))
-        return ''.join(_level(point, bottom, top, levels) for point in points)
+        return ''.join(bar(point, bottom, top, bars) for point in points)
 
     def _at(self, number: int, promised: float | None) -> _Step | None:
         """Return the good values in a step; None if there was none."""
@@ -110,11 +111,3 @@ def _points(steps: Sequence[_Step | None], element: int) -> Iterator[float]:
             before = step.last[element]
         before = low if abs(low - before) > abs(high - before) else high
         yield before
-
-
-def _level(point: float, bottom: float, top: float, levels: str) -> str:
-    if not math.isfinite(point):
-        return ' '
-    if top <= bottom:
-        return levels[0]
-    return levels[round((point - bottom) / (top - bottom) * (len(levels) - 1))]

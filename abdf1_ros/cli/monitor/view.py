@@ -27,7 +27,7 @@ from enum import Enum
 import textwrap
 
 from abdf1_ros.cli.monitor import curves
-from abdf1_ros.text import counted, cut, printable, value_text
+from abdf1_ros.text import BARS, counted, cut, printable, value_text
 
 # The picture reports a longer time (s) without diagnostics. By default they come every second.
 SILENCE = 3.0
@@ -168,15 +168,15 @@ class NodeView:
 
 
 def render(snapshot: NodeView, now: float, width: int,
-           levels: str = curves.BLOCKS) -> list[TextLine]:
+           bars: str = BARS) -> list[TextLine]:
     """
     Return the lines that show ``snapshot`` at the clock value ``now`` (s), cut to ``width``.
 
-    The most important parts come first: the verdict, the values, the faults. ``levels`` are the
+    The most important parts come first: the verdict, the values, the faults. ``bars`` are the
     characters of curves.
     """
     parts = {
-        'values': [*_head(snapshot, now), *_values(snapshot, now, width, levels)],
+        'values': [*_head(snapshot, now), *_values(snapshot, now, width, bars)],
         'reasons': _reasons(snapshot, width), 'writes': _writes(snapshot, now, width),
         'link': _link(snapshot, width), 'stations': _stations(snapshot, width),
         'counters': _counters(snapshot, width)}
@@ -306,7 +306,7 @@ class _Widths:
         return ('  ' + '  '.join(shown)).rstrip()
 
 
-def _values(snapshot: NodeView, now: float, width: int, levels: str) -> Iterator[TextLine]:
+def _values(snapshot: NodeView, now: float, width: int, bars: str) -> Iterator[TextLine]:
     longest = min(_NAME_WIDTH, width // 3)
     names = [cut(printable(reading.topic), longest) for reading in snapshot.readings]
     widths = _Widths.of(max(map(len, ['topic', *names])), width)
@@ -319,7 +319,7 @@ def _values(snapshot: NodeView, now: float, width: int, levels: str) -> Iterator
         if reading.values is not None:
             age, value = f'{now - reading.received:.1f} s', show(reading.values, widths.value)
         if reading.curve and widths.curve:
-            curve = reading.curve.draw(now, reading.promised, levels)
+            curve = reading.curve.draw(now, reading.promised, bars)
         yield TextLine(widths.row(name, printable(reading.address), age, state,
                                   loads.get(reading.topic, ''), curve, value), style)
     if not snapshot.readings:

@@ -39,7 +39,6 @@ from abdf1_ros.pccc.address_range import AddressRange, is_element
 from abdf1_ros.pccc.families import FAMILIES, parse_range
 from abdf1_ros.pccc.file_types import FileType, PlcType
 from abdf1_ros.pccc.processor import Processor, USUAL
-from abdf1_ros.pccc.steps import AddressedValues
 from abdf1_ros.pccc.structures import named_runs
 from abdf1_ros.pccc.values import Values, ValueType
 from abdf1_ros.problems import ConfigurationError, Problem
@@ -195,8 +194,7 @@ def processor_cell(processor: Processor | None) -> str:
 
 def read(session: Session, mapping: Mapping) -> Values:
     """Return the values of a mapping; raises LinkError, RemoteError or FormatError."""
-    target = AddressedValues(mapping.address, mapping.codec, mapping.dialect)
-    return scaled(mapping, session.ask(mapping.station, steps.read(target)))
+    return scaled(mapping, session.ask(mapping.station, steps.read(mapping.target)))
 
 
 def scaled(mapping: Mapping, values: Values) -> Values:

@@ -38,7 +38,7 @@ from abdf1_ros.ports.link_thread import LinkThread
 from abdf1_ros.ports.wake import Wake
 from abdf1_ros.settings.mapping import Mapping
 from abdf1_ros.settings.network import Network
-from abdf1_ros.text import cut, printable
+from abdf1_ros.text import bar, BARS, cut, printable
 
 # Period (ms) to show ages and errors again without new values.
 _GLANCE = 250
@@ -55,9 +55,8 @@ _MARKED = 1.0
 # Least width of a row of values, in characters; also in a narrow window.
 _LEAST_ROOM = 16
 
-# Number of reads in a curve, and the characters of its bars.
+# Number of reads in a curve.
 _CURVE = 24
-_BARS = '▁▂▃▄▅▆▇█'
 _VALUE_AND_CURVE = f'value, and its last {_CURVE} reads'
 
 
@@ -247,7 +246,7 @@ class LiveValues:
     def _curve(self, mapping: Mapping) -> str:
         """Return the curve of a number; empty if the output cannot show it."""
         try:
-            _BARS.encode(sys.stdout.encoding or 'ascii')
+            BARS.encode(sys.stdout.encoding or 'ascii')
         except UnicodeError:
             return ''
         return curve_of(self._past[mapping], lambda number: value_texts(
@@ -332,7 +331,5 @@ def curve_of(numbers: Collection[float], text: Callable[[float], str]) -> str:
     low, high = min(known, default=0), max(known, default=0)
     if text(low) == text(high):
         return ''
-    top = len(_BARS) - 1
-    bars = [_BARS[round((number - low) / (high - low) * top)] if math.isfinite(number) else ' '
-            for number in numbers]
-    return f'{text(low)} {"".join(bars)} {text(high)}'
+    bars = ''.join(bar(number, low, high) for number in numbers)
+    return f'{text(low)} {bars} {text(high)}'

@@ -16,19 +16,20 @@
 
 import math
 
-from abdf1_ros.cli.monitor.curves import ASCII, BLOCKS, Curve, WIDTH
+from abdf1_ros.cli.monitor.curves import ASCII, Curve, WIDTH
+from abdf1_ros.text import BARS
 import pytest
 
 NOW = 1000.0  # the beginning of a step of two seconds
 
 
 def drawn(*values: tuple[float, list[float]], is_bits: bool = False, now: float = NOW,
-          promised: float | None = 3.0, levels: str = BLOCKS) -> str:
+          promised: float | None = 3.0, bars: str = BARS) -> str:
     """Return the curve of values that came so many seconds before ``NOW``."""
     curve = Curve(is_bits)
     for ago, elements in values:
         curve.take(elements, NOW - ago)
-    return curve.draw(now, promised, levels)
+    return curve.draw(now, promised, bars)
 
 
 def ramp(count: int) -> list[tuple[float, list[float]]]:
@@ -36,8 +37,8 @@ def ramp(count: int) -> list[tuple[float, list[float]]]:
 
 
 def test_newest_value_stands_last_and_the_range_is_that_of_the_curve() -> None:
-    assert drawn(*ramp(8)) == ' ' * (WIDTH - 8) + BLOCKS
-    assert drawn(*ramp(6), levels=ASCII) == ' ' * (WIDTH - 6) + ASCII
+    assert drawn(*ramp(8)) == ' ' * (WIDTH - 8) + BARS
+    assert drawn(*ramp(6), bars=ASCII) == ' ' * (WIDTH - 6) + ASCII
 
 
 def test_time_without_a_good_value_is_blank() -> None:
@@ -67,7 +68,7 @@ def test_value_that_comes_late_in_a_step_holds_from_then_on() -> None:
 
 def test_first_element_that_changes_is_drawn() -> None:
     rows = [(2.0 * ago, [5, 8 - ago, ago]) for ago in reversed(range(8))]
-    assert drawn(*rows).strip() == BLOCKS
+    assert drawn(*rows).strip() == BARS
 
 
 @pytest.mark.parametrize('value', [math.nan, math.inf, -math.inf])
