@@ -36,7 +36,7 @@ import logging
 import math
 from numbers import Real
 import os
-from typing import Any, Literal, overload, SupportsIndex, TYPE_CHECKING, TypeVar
+from typing import Literal, overload, SupportsIndex, TYPE_CHECKING, TypeVar
 
 from abdf1_ros.df1.checksum import Checksum
 from abdf1_ros.df1.machine import LineTiming
@@ -48,7 +48,7 @@ from abdf1_ros.df1.slave_link import SLAVE
 from abdf1_ros.df1.stations import MAX_STATION
 from abdf1_ros.errors import FormatError, RemoteError
 from abdf1_ros.numbers import member_of, one_of, ValueKind
-from abdf1_ros.open_line import LOG, OpenLine, plain, single, text_of, values_of
+from abdf1_ros.open_line import LOG, OpenLine, plain, PlcValue, single, text_of, values_of
 from abdf1_ros.pccc import steps
 from abdf1_ros.pccc.access import Access
 from abdf1_ros.pccc.address_range import AddressRange
@@ -140,7 +140,7 @@ class Client(OpenLine):
     # Without ``kind`` the type of the result depends on the file of the address.
     @overload
     def read(self, address: str, length: SupportsIndex | None = None, kind: None = None, *,
-             word_order: str = 'Low', station: int | None = None) -> Any: ...
+             word_order: str = 'Low', station: int | None = None) -> PlcValue: ...
 
     @overload
     def read(self, address: str, length: None = None, *, kind: Whole,
@@ -173,10 +173,10 @@ class Client(OpenLine):
 
     @overload
     def read(self, address: str, length: SupportsIndex | None = None, kind: str | None = None, *,
-             word_order: str = 'Low', station: int | None = None) -> Any: ...
+             word_order: str = 'Low', station: int | None = None) -> PlcValue: ...
 
     def read(self, address: str, length: SupportsIndex | None = None, kind: str | None = None, *,
-             word_order: str = 'Low', station: int | None = None) -> Any:
+             word_order: str = 'Low', station: int | None = None) -> PlcValue:
         """
         Return the value at an address, or a list of ``length`` values from there on.
 
@@ -190,7 +190,8 @@ class Client(OpenLine):
             found = plain(self.ask(number, steps.read(target)), target.codec.type)
         return single(found, length is None)
 
-    def read_many(self, addresses: Iterable[str], *, station: int | None = None) -> dict[str, Any]:
+    def read_many(self, addresses: Iterable[str], *,
+                  station: int | None = None) -> dict[str, PlcValue]:
         """
         Return the values at many addresses or ranges (N7:0-9), in as few packets as possible.
 
@@ -270,15 +271,15 @@ def _place(address: str, station: int) -> str:
     return f'{shown(address)} of station {station}'
 
 
-def _whole(name: str, value: Any, low: float = -math.inf, high: float = math.inf) -> int:
-    number = value.__index__() if hasattr(value, '__index__') else None  # numpy's numbers too
+def _whole(name: str, value: object, low: float = -math.inf, high: float = math.inf) -> int:
+    number = value.__index__() if isinstance(value, SupportsIndex) else None  # numpy's too
     if number is None or isinstance(value, bool) or not low <= number <= high:
         bounds = f' from {low} to {high}' if high < math.inf else ''
         raise FormatError(f'{name} {shown(repr(value))} should be a whole number{bounds}')
     return int(number)
 
 
-def _seconds(name: str, value: Any) -> float:
+def _seconds(name: str, value: float) -> float:
     is_number = isinstance(value, Real) and not isinstance(value, bool)
     if is_number and 0.0 < value <= _LONGEST:
         return float(value)
@@ -288,7 +289,7 @@ def _seconds(name: str, value: Any) -> float:
                       f'{_LONGEST:.0f}{hint}')
 
 
-def _choice(name: str, kind: ValueKind[_T], value: Any) -> _T:
+def _choice(name: str, kind: ValueKind[_T], value: object) -> _T:
     """Return the meaning of a value, which may have any letter case."""
     found = kind.read(value) if isinstance(value, str) else None
     if found is None:

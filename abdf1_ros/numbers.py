@@ -27,7 +27,7 @@ from enum import Enum
 import functools
 import math
 import re
-from typing import Generic, TypeVar
+from typing import Any, Generic, TypeAlias, TypeVar
 
 _T = TypeVar('_T')
 _Meaning_co = TypeVar('_Meaning_co', covariant=True)
@@ -81,6 +81,9 @@ class ValueKind(Generic[_Meaning_co]):
         """Return the end of an error message, which follows the text that could not be read."""
         return (self.why_not and self.why_not(text)) or f'should be {self.right}'
 
+
+Checked: TypeAlias = dict[str, Any]
+"""Values of different kinds by name; a ValueKind has read each, or a parameter has its type."""
 
 TEXT = ValueKind(str)
 

@@ -26,7 +26,7 @@ from queue import Empty, SimpleQueue
 import random
 import time
 from types import TracebackType
-from typing import Generic, Self, TYPE_CHECKING, TypeVar
+from typing import Any, Generic, Self, TYPE_CHECKING, TypeAlias, TypeVar
 
 from abdf1_ros.df1.mode import LineMode
 from abdf1_ros.df1.settings import LinkSettings
@@ -59,6 +59,9 @@ makes a request logs these events: during this request, during the next request,
 
 # Most events on the line that are kept between two requests.
 _MOST_ENTRIES = 1000
+
+PlcValue: TypeAlias = Any
+"""A bool, int, float or str, or a list of them: the address decides."""
 
 _Entry = tuple[int, object, BaseException | None]
 

@@ -18,11 +18,11 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
 import logging
-from typing import Any, overload
+from typing import overload
 
 from abdf1_ros.df1.stations import ActiveStationList, MAX_STATION
 from abdf1_ros.errors import FormatError
-from abdf1_ros.open_line import LOG, OpenLine, plain, single, text_of, values_of
+from abdf1_ros.open_line import LOG, OpenLine, plain, PlcValue, single, text_of, values_of
 from abdf1_ros.pccc import steps
 from abdf1_ros.pccc.values import Values
 from abdf1_ros.plan.planner import Planner
@@ -62,12 +62,12 @@ class TaggedClient(OpenLine):
                          trace=trace, logger=logger)
 
     @overload
-    def read(self, tag: str) -> Any: ...
+    def read(self, tag: str) -> PlcValue: ...
 
     @overload
-    def read(self, tag: Iterable[str]) -> dict[str, Any]: ...
+    def read(self, tag: Iterable[str]) -> dict[str, PlcValue]: ...
 
-    def read(self, tag: str | Iterable[str]) -> Any:
+    def read(self, tag: str | Iterable[str]) -> PlcValue:
         """
         Return the value of a Read or ReadWrite row; a list where its Length is above 1.
 

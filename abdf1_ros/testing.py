@@ -32,7 +32,7 @@ import subprocess
 import sys
 import threading
 import time
-from typing import Any, TypeVar
+from typing import TypeVar
 
 from abdf1_ros.cli.check import examine
 from abdf1_ros.df1.checksum import Checksum
@@ -44,6 +44,7 @@ from abdf1_ros.ports.link_thread import LinkThread
 from abdf1_ros.problems import ConfigurationError
 from abdf1_ros.ros import observer
 from abdf1_ros.ros.topics.messages import latched_qos
+from abdf1_ros.ros.untyped import RosMessage
 from abdf1_ros.simulator.commands import execute
 from abdf1_ros.simulator.ladder import Ladder
 from abdf1_ros.simulator.simulated_plc import load_plcs, SimulatedPlc
@@ -51,8 +52,10 @@ import pytest
 from rcl_interfaces.srv import GetParameters
 import rclpy
 from rclpy.context import Context
+from rclpy.publisher import Publisher
 from rclpy.qos import HistoryPolicy, QoSProfile
 from rclpy.signals import SignalHandlerOptions
+from rclpy.subscription import Subscription
 
 PATIENCE = 40.0  # s; longest wait for an event
 EVERYTHING = QoSProfile(history=HistoryPolicy.KEEP_ALL)
@@ -77,22 +80,23 @@ _DOMAIN, _CLAIM = _claim_domain()
 os.environ |= {'ROS_AUTOMATIC_DISCOVERY_RANGE': 'LOCALHOST', 'ROS_DOMAIN_ID': str(_DOMAIN)}
 
 
-class Messages(list[Any]):
+class Messages(list[RosMessage]):
     """The messages that a subscription has got."""
+
+    subscription: Subscription
 
     def __init__(self, observer: Observer, topic: str) -> None:
         super().__init__()
         self.topic = topic
-        self.subscription: Any = None
         self._observer = observer
 
-    def until(self, condition: Callable[[Any], bool], what: str) -> Any:
+    def until(self, condition: Callable[[RosMessage], bool], what: str) -> RosMessage:
         """Wait for a message that fulfils ``condition``; return it."""
         return self._observer.until(
             lambda: next((message for message in self if condition(message)), None),
             lambda: f'{what} on {self.topic}; got {list(self)[-3:]}')
 
-    def first(self) -> Any:
+    def first(self) -> RosMessage:
         """Wait for the first message."""
         return self.until(lambda message: True, 'a message')
 
@@ -164,14 +168,14 @@ class Observer(observer.ObservingNode):
                                  + (self._bridge.last_words() if self._bridge else ''))
         return result
 
-    def listen(self, message_type: Any, topic: str, qos: QoSProfile | None = None) -> Messages:
+    def listen(self, message_type: type, topic: str, qos: QoSProfile | None = None) -> Messages:
         """Subscribe; the default profile also gets messages that were published before."""
         inbox = Messages(self, topic)
         inbox.subscription = self.node.create_subscription(
             message_type, topic, inbox.append, qos or latched_qos())
         return inbox
 
-    def publisher(self, message_type: Any, topic: str) -> Any:
+    def publisher(self, message_type: type, topic: str) -> Publisher:
         """Return a publisher for <node>/write/... when that node knows all our endpoints."""
         publisher = self.node.create_publisher(message_type, topic, EVERYTHING)
         self.until(publisher.get_subscription_count, f'a subscriber of {topic}')

@@ -29,7 +29,7 @@ import math
 from pathlib import Path
 import shutil
 import sys
-from typing import Any
+from typing import TypedDict
 
 from abdf1_ros.cli.terminal import (
     check_page,
@@ -151,13 +151,20 @@ def _draw(options: argparse.Namespace, found: Findings, report: Report | None) -
     return True
 
 
-def _heard(found: Findings, files: Sequence[str]) -> dict[str, Any]:
+class _Heard(TypedDict):
     """
-    Return what Mode Listen would get from recordings.
+    What Mode Listen would get from recordings.
 
     ``rows`` has the tag of each Read row, with the reason why no recording fills it (empty if a
     recording does); ``reads`` has the reads of the recordings.
     """
+
+    rows: dict[str, str]
+    reads: list[str]
+
+
+def _heard(found: Findings, files: Sequence[str]) -> _Heard | None:
+    """Return what Mode Listen would get from recordings; None if a file cannot be read."""
     from abdf1_ros.cli.overhearing import overheard
     network = found.network or Network()
     rows = Rows(row for row in found.mappings if row.command is Command.READ)
@@ -166,17 +173,17 @@ def _heard(found: Findings, files: Sequence[str]) -> dict[str, Any]:
     except (Problem, OSError) as error:
         found.problems.append(error if isinstance(error, Problem) else Problem(
             error.filename, error.strerror or str(error)))
-        return {}
+        return None
     return {'rows': {row.tag: unread.get(row, '') for row in rows}, 'reads': carried}
 
 
-def _heard_text(heard: dict[str, Any]) -> str:
-    rows = heard.get('rows', {})
+def _heard_text(heard: _Heard) -> str:
+    rows = heard['rows']
     texts = [f'warning: {printable(tag)} is not filled: {why}' for tag, why in rows.items() if why]
     filled = sum(not why for why in rows.values())
     return '\n'.join(['', '', *(colour(text, YELLOW, sys.stdout) for text in texts),
                       f'the recording fills {filled} of {counted(len(rows), "row")}; it has:',
-                      *(f'  {printable(text)}' for text in heard.get('reads', []))])
+                      *(f'  {printable(text)}' for text in heard['reads'])])
 
 
 def _report(found: Findings, options: argparse.Namespace) -> Report | None:
@@ -213,7 +220,7 @@ def pairs(folder: Path) -> tuple[list[tuple[str, Path, Path]], list[str]]:
 
 def _folder(options: argparse.Namespace) -> tuple[str, bool]:
     """Return a text or an object for each line of a plant, and True if no line has an error."""
-    contents: dict[str, Any] = {}
+    contents: dict[str, object] = {}
     texts = []
     bad = warned = 0
     owners: dict[str, str] = {}
@@ -356,18 +363,33 @@ def _rows_text(report: Report) -> str:
     return table(head, rows, right=(2, 5, 7))
 
 
-def _rows(mappings: Sequence[Mapping], report: Report | None) -> list[dict[str, Any]]:
-    """Return the cells of each row, for the table and for JSON."""
+class _ShownRow(TypedDict):
+    """
+    The cells of a row, for the table and for JSON.
+
+    A heartbeat has no topics. ``stale_ms``: the deadline that the topic promises; None if it
+    promises none.
+    """
+
+    tag: str
+    command: str
+    address: str
+    station: int
+    topics: list[str]
+    message: str
+    length: int
+    value: str
+    stale_ms: int | None
+    description: str
+
+
+def _rows(mappings: Sequence[Mapping], report: Report | None) -> list[_ShownRow]:
     promised = report.promises() if report else {}
     return [_row(mapping, promised.get(mapping)) for mapping in mappings]
 
 
-def _row(mapping: Mapping, stale: float | None) -> dict[str, Any]:
-    """
-    Return the cells of a row; a heartbeat has no topic.
-
-    ``stale``: the deadline (s) that the topic promises; None if it promises none.
-    """
+def _row(mapping: Mapping, stale: float | None) -> _ShownRow:
+    """Return the cells of a row whose topic promises the deadline ``stale`` (s)."""
     topics = [f'~/{what}/{mapping.topic}' for what, is_there in (
         ('read', mapping.reads), ('write', mapping.writes)) if is_there]
     return {
@@ -391,9 +413,9 @@ def _plan_text(report: Report) -> str:
             'total ms', 'period ms', 'tags')
     rows = []
     for block in report.blocks:
-        entry = _entry(report, block)
-        tags = entry.pop('tags')
-        rows.append([*map(_cell, entry.values()), first(tags, _SHOWN_TAGS)])
+        *cells, _ = _entry(report, block).values()
+        rows.append([*map(_cell, cells), first(
+            [mapping.tag for mapping in block.mappings], _SHOWN_TAGS)])
     return table(head, rows, right=(0, 4, 5, 6, 7, 8, 9))
 
 
@@ -401,7 +423,7 @@ def _cell(value: object) -> str:
     return f'{value:.1f}' if isinstance(value, float) else str(value)
 
 
-def _entry(report: Report, block: Block) -> dict[str, Any]:
+def _entry(report: Report, block: Block) -> dict[str, object]:
     """Return the facts of a block by name, times in ms."""
     last = last_address(block.start, block.span.end - 1)
     return {
@@ -427,9 +449,9 @@ def _times_text(report: Report) -> str:
                f'{LONGEST_END * 1000:.0f} ms at most' if times.end else ''))
 
 
-def _content(found: Findings, report: Report | None) -> dict[str, Any]:
+def _content(found: Findings, report: Report | None) -> dict[str, object]:
     """Return the content for JSON; every key is always present, times are in ms."""
-    content: dict[str, Any] = {
+    content: dict[str, object] = {
         'errors': [_problem(problem) for problem in found.problems],
         'warnings': [], 'notes': [], 'network': None, 'mappings': len(found.mappings),
         'rows': _rows(found.mappings, report), 'blocks': [],
@@ -452,17 +474,17 @@ def _content(found: Findings, report: Report | None) -> dict[str, Any]:
     return content
 
 
-def _problem(problem: Problem) -> dict[str, Any]:
+def _problem(problem: Problem) -> dict[str, object]:
     return {
         **asdict(problem.place), 'number': problem.message.number if problem.message else None,
         'mnemonic': problem.message.name if problem.message else None, 'text': str(problem)}
 
 
-def _bound(bound: Bound) -> dict[str, Any]:
+def _bound(bound: Bound) -> dict[str, object]:
     return {'tag': bound.mapping.tag, 'command': bound.mapping.command.value,
             'ms': in_ms(bound.seconds), 'usual_ms': in_ms(bound.usual),
             'presets': bound.presets}
 
 
-def _remark(remark: Remark) -> dict[str, Any]:
+def _remark(remark: Remark) -> dict[str, object]:
     return {'kind': remark.kind.value, 'station': remark.station, 'text': remark.text}

@@ -34,7 +34,6 @@ import subprocess
 import sys
 import tempfile
 import time
-from typing import Any
 
 from abdf1_ros.cli.simulator import Cast, parse_options
 from abdf1_ros.cli.terminal import (
@@ -46,13 +45,15 @@ from abdf1_ros.cli.terminal import (
 )
 from abdf1_ros.driver.write import show
 from abdf1_ros.paths import config_file
+from abdf1_ros.pccc.values import Values
 from abdf1_ros.ros.observer import ObservingNode
 from abdf1_ros.ros.topics.messages import latched_qos, MESSAGES
+from abdf1_ros.ros.untyped import RosMessage
 from abdf1_ros.settings.map_file import load_mappings
 from abdf1_ros.settings.mapping import Mapping
 from abdf1_ros.simulator.ladder import Lamp
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
-from rclpy.event_handler import SubscriptionEventCallbacks
+from rclpy.event_handler import QoSRequestedDeadlineMissedInfo, SubscriptionEventCallbacks
 from rclpy.node import Node
 from rclpy.qos import QoSProfile
 
@@ -168,7 +169,7 @@ class Watcher(ObservingNode):
     def __init__(self, mappings: Sequence[Mapping], port: str) -> None:
         super().__init__('demo_watcher')
         self._port = port
-        self.values: dict[str, Any] = {}
+        self.values: dict[str, Values] = {}
         self.results: list[DiagnosticStatus] = []
         self.statuses: dict[str, DiagnosticStatus] = {}
         self.missed: Counter[str] = Counter()
@@ -185,7 +186,7 @@ class Watcher(ObservingNode):
         topic = f'/abdf1/read/{mapping.topic}'
         deadline = self.node.get_publishers_info_by_topic(topic)[0].qos_profile.deadline
 
-        def missed(event: Any) -> None:
+        def missed(event: QoSRequestedDeadlineMissedInfo) -> None:
             self.missed[mapping.tag] += event.total_count_change
 
         self.node.create_subscription(
@@ -194,8 +195,8 @@ class Watcher(ObservingNode):
             event_callbacks=SubscriptionEventCallbacks(deadline=missed))
         return float(deadline.nanoseconds / 1e9)
 
-    def _taker(self, mapping: Mapping) -> Callable[[Any], None]:
-        def take(message: Any) -> None:
+    def _taker(self, mapping: Mapping) -> Callable[[RosMessage], None]:
+        def take(message: RosMessage) -> None:
             self.values[mapping.tag] = message.data
         return take
 

@@ -25,7 +25,6 @@ from collections.abc import Callable, Iterable
 import csv
 import io
 import json
-from typing import Any
 
 from abdf1_ros.df1.packet import BROADCAST
 from abdf1_ros.errors import FormatError
@@ -50,7 +49,7 @@ _LEFT_OUT = '?'
 _HEARTBEAT = Command.HEARTBEAT.value.lower()
 _STATION = whole(0, BROADCAST)
 _FAMILIES = {family.value: family for family in FAMILIES}
-_KINDS: dict[str, ValueKind[Any]] = {
+_KINDS: dict[str, ValueKind[object]] = {
     'Station': _STATION, 'Via': _STATION, 'PLC_Type': one_of(_FAMILIES, family_name),
     'Access': one_of({way.value: way for way in Access} | {'Read': None}),
     'Processor': one_of({entry.value: entry for entry in Processor})}
@@ -104,7 +103,7 @@ def _net_rows(rows: list[Row]) -> list[list[str]]:
               for row in rows)]
 
 
-def _net_cell(column: str, text: str, kind: ValueKind[Any]) -> str:
+def _net_cell(column: str, text: str, kind: ValueKind[object]) -> str:
     if not text:
         return ''
     if column == 'Com_Port':

@@ -340,9 +340,10 @@ class Progress:
 
 
 def number_option(right: str, low: float, high: float = math.inf,
-                  parse: Callable[[str], Any] = decimal_number) -> Callable[[str], Any]:
+                  parse: Callable[[str], float | None] = decimal_number,
+                  ) -> Callable[[str], float]:
     """Return an argparse type for a number; ``right`` describes a good number."""
-    def read(text: str) -> Any:
+    def read(text: str) -> float:
         value = parse(text)
         if value is None or not low <= value <= high:
             raise argparse.ArgumentTypeError(f'"{text}" should be {right}')

@@ -19,7 +19,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, field
 from enum import Enum
-from typing import Any
+from typing import Any, Protocol, TypeAlias
 
 from abdf1_ros.conform.wire import Failed, Sent, Skipped, Wire
 
@@ -59,20 +59,30 @@ class Verdict(Enum):
     SKIP = 'SKIP'
 
 
+class End(Protocol):
+    """The end of the line that we play."""
+
+    def settle(self) -> None:
+        """Wait until the target has finished the work of the case before."""
+
+
+CaseScript: TypeAlias = Callable[[Any], None]
+"""Plays a case with the End for its targets; raises Failed or Skipped."""
+
+
 @dataclass(frozen=True, slots=True)
 class Case:
     """
     One rule.
 
     ``name`` is unique, ``rule`` is what the manual requires of the target, ``source`` is its page.
-    ``run`` raises Failed or Skipped; its argument is the end that we play.
     """
 
     name: str
     rule: str
     source: str
     targets: tuple[Target, ...]
-    run: Callable[[Any], None]
+    run: CaseScript
     permission: Permission = Permission.NOTHING
 
 
@@ -93,9 +103,6 @@ class CaseResult:
 LONGEST_CASE = 290.0
 LONGEST_RUN = 600.0
 
-CaseScript = Callable[[Any], None]
-"""Plays a case with one end of the line; raises Failed or Skipped."""
-
 
 def case(rule: str, source: str, *targets: Target,
          permission: Permission = Permission.NOTHING) -> Callable[[CaseScript], Case]:
@@ -105,13 +112,12 @@ def case(rule: str, source: str, *targets: Target,
     return made
 
 
-def run_cases(cases: Iterable[Case], wire: Wire, end: Any,
+def run_cases(cases: Iterable[Case], wire: Wire, end: End,
               allowed: frozenset[Permission]) -> Iterator[CaseResult]:
     """
     Yield the result of each case, in their order.
 
-    ``end`` is the end that we play. Before each case, ``end`` waits until the target has finished
-    the work of the case before. The caller handles OSError of the line.
+    The caller handles OSError of the line.
     """
     first = wire.now
     for entry in cases:

@@ -474,9 +474,8 @@ class Machine:
         procedure = self._procedure
         while procedure is not None:
             try:
-                # A generator is started with None; no procedure sees it.
-                step = procedure.throw(error) if error else procedure.send(
-                    heard)  # type: ignore[arg-type]
+                step = procedure.throw(error) if error else next(procedure) if heard is None \
+                    else procedure.send(heard)
             except StopIteration:
                 self._procedure, self.deadline, self._is_listening = None, None, False
                 return

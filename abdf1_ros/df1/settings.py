@@ -17,7 +17,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 
 from abdf1_ros.df1.checksum import Checksum
 from abdf1_ros.df1.machine import LineTiming
@@ -110,8 +110,7 @@ class LinkSettings(LinkOptions):
     avoids_collisions: bool = False
     """The radios wait for a quiet line and buffer both directions, so we need not wait."""
 
-    @classmethod
-    def of(cls, options: LinkOptions, **line: object) -> LinkSettings:
-        """Return the settings of ``line`` with these options."""
-        same = {entry.name: getattr(options, entry.name) for entry in fields(LinkOptions)}
-        return cls(**same, **line)  # type: ignore[arg-type]
+    def having(self, options: LinkOptions) -> LinkSettings:
+        """Return these settings with other options."""
+        return replace(self, **{
+            entry.name: getattr(options, entry.name) for entry in fields(LinkOptions)})

@@ -23,7 +23,7 @@ from __future__ import annotations
 from collections.abc import Callable, Container
 from contextlib import suppress
 from dataclasses import replace
-from typing import Any, TypeVar
+from typing import TypeVar
 
 from abdf1_ros.counters import Counters
 from abdf1_ros.df1.machine import Procedure
@@ -50,21 +50,16 @@ _LONGEST_UNPOLLED = 5.0
 
 
 class _RequestJob(Job):
-    """Steps with a station, and the callbacks for their end."""
+    """Steps with a station, which report their end; ``fail`` is called if they do not begin."""
 
-    def __init__(self, station: int, work: Steps[Any], succeed: Callable[[Any], None],
+    def __init__(self, station: int, work: Steps[None],
                  fail: Callable[[Exception], None]) -> None:
         self.station = station
-        self._work, self._succeed, self.give_up = work, succeed, fail
+        self._work, self.give_up = work, fail
 
     def steps(self, now: float) -> Steps[None]:
-        """Carry out the request and report its end; a bug in it ends no other request."""
-        try:
-            result = yield from self._work
-        except Exception as error:
-            self.give_up(error)
-        else:
-            self._succeed(result)
+        """Return the steps."""
+        return self._work
 
     def ended(self, error: Exception | None) -> None:
         """Do nothing: the steps have reported the end."""
@@ -133,7 +128,16 @@ class Requests(TaskSource):
                 self._tasks.connect()
             fail(error)
 
-        request = _RequestJob(station, work, succeed, failed)
+        def reported() -> Steps[None]:
+            """Carry out the work and report its end; a bug in it ends no other request."""
+            try:
+                result = yield from work
+            except Exception as error:
+                failed(error)
+            else:
+                succeed(result)
+
+        request = _RequestJob(station, reported(), failed)
         if not self._waiting.put(request):
             _refuse(request, self._lost)
 

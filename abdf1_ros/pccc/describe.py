@@ -19,7 +19,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from copy import copy
 from dataclasses import dataclass
-from typing import Any
+from typing import TypeVar
 
 from abdf1_ros.df1.packet import Packet, PRIORITY_BIT, REPLY_BIT
 from abdf1_ros.errors import FormatError, RemoteError
@@ -127,6 +127,7 @@ class _SymbolicName:
         return b'\0' + self.name.encode('latin-1', 'replace') + b'\0'
 
 
+_Request = TypeVar('_Request')
 _Range = SystemAddress | ExtendedAddress | _SymbolicName
 
 
@@ -200,7 +201,8 @@ def _words_reply(request: object, data: bytes) -> str:
     return notation.words_text(data)
 
 
-def _ranged(read: Callable[[Reader, Callable[[Reader], _Range]], Any]) -> Callable[[Reader], Any]:
+def _ranged(read: Callable[[Reader, Callable[[Reader], _Range]], _Request],
+            ) -> Callable[[Reader], _Request]:
     return lambda reader: read(reader, _range_address)
 
 

@@ -21,7 +21,7 @@ from dataclasses import dataclass, replace
 from enum import Enum
 from functools import partial
 import struct
-from typing import Any
+from typing import Any, TypeAlias
 
 from abdf1_ros.pccc.address import Address, Addressing
 from abdf1_ros.pccc.fields import Reader
@@ -30,6 +30,9 @@ from abdf1_ros.text import counted, value_text
 
 CommandCode = tuple[int, int | None]
 """CMD and FNC; None for a command without FNC."""
+
+Fields: TypeAlias = Any
+"""What the reader of a command returns; only the texts of the same command know its class."""
 
 
 class Effect(Enum):
@@ -51,9 +54,9 @@ class KnownCommand:
 
     name: str
     effect: Effect = Effect.OTHER
-    read: Callable[[Reader], Any] = Reader.rest
-    words: Callable[[Any], str] = hexadecimal
-    values: Callable[[Any, bytes], str] = lambda request, data: hexadecimal(data)
+    read: Callable[[Reader], Fields] = Reader.rest
+    words: Callable[[Fields], str] = hexadecimal
+    values: Callable[[Fields, bytes], str] = lambda request, data: hexadecimal(data)
 
 
 def part_of(offset: int, size: int, total: int) -> str:
@@ -89,7 +92,7 @@ def floats_text(data: bytes) -> str:
     return _listed(data, 'f', value_text)
 
 
-def _listed(data: bytes, code: str, show: Callable[[Any], str] = str) -> str:
+def _listed(data: bytes, code: str, show: Callable[[float], str] = str) -> str:
     """Return values by a code of ``struct``, or bytes if they are not a whole number of values."""
     if len(data) % struct.calcsize(code):
         return hexadecimal(data)

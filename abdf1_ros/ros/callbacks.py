@@ -21,14 +21,17 @@ entry in the log. A call that fails is still answered.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Awaitable, Callable
 import threading
 import time
 import traceback
-from typing import Any
+from typing import TypedDict, Unpack
 
 from abdf1_ros.ros.diagnostics.log import LimitedLog
+from abdf1_ros.ros.untyped import RosEntity, RosMessage, RosType
 from rcl_interfaces.msg import SetParametersResult
+from rclpy.callback_groups import CallbackGroup
+from rclpy.context import Context
 from rclpy.executors import (
     await_or_execute,
     ShutdownException,
@@ -37,6 +40,9 @@ from rclpy.executors import (
 )
 from rclpy.impl.implementation_singleton import rclpy_implementation
 from rclpy.node import Node
+from rclpy.parameter import Parameter
+from rclpy.qos import qos_profile_services_default, QoSProfile
+from rclpy.service import Service
 
 # An executor that fails while it waits for callbacks tries again after a pause (s).
 # ``_MOST_FAILED_WAITS`` failures in a row end the executor.
@@ -50,6 +56,17 @@ def failure_text(error: BaseException) -> str:
     return repr(error) + ''.join(f' in {frame.filename}:{frame.lineno}' for frame in place)
 
 
+class NodeOptions(TypedDict, total=False):
+    """The options of a node of rclpy that we use."""
+
+    automatically_declare_parameters_from_overrides: bool
+    cli_args: list[str]
+    context: Context
+    namespace: str
+    parameter_overrides: list[Parameter]
+    use_global_arguments: bool
+
+
 class AnsweringNode(Node):
     """
     A node whose services answer each call: without success if the callback fails.
@@ -58,22 +75,24 @@ class AnsweringNode(Node):
     0 means unknown.
     """
 
-    def __init__(self, name: str, **options: Any) -> None:
+    def __init__(self, name: str, **options: Unpack[NodeOptions]) -> None:
         super().__init__(name, **options)
         self.call_stamps = 0, 0
         self._failures = LimitedLog(self.get_logger(), time.monotonic)
 
-    def create_service(self, srv_type: Any, srv_name: str, callback: Callable[..., Any],
-                       **options: Any) -> Any:
+    def create_service(self, srv_type: RosType, srv_name: str, callback: Callable[..., object], *,
+                       qos_profile: QoSProfile = qos_profile_services_default,
+                       callback_group: CallbackGroup | None = None) -> Service:
         """Create a service; rclpy uses this method for the services of parameters too."""
-        async def answer(request: Any, response: Any) -> Any:
+        async def answer(request: RosMessage, response: RosMessage) -> RosMessage:
             try:
                 return await await_or_execute(callback, request, response)
             except Exception as error:  # a call from outside caused it
                 self.tell_failure(f'a call of {srv_name}', error)
                 return _refusal(srv_type, request, f'refused: {error!r}')
 
-        return super().create_service(srv_type, srv_name, answer, **options)
+        return super().create_service(srv_type, srv_name, answer, qos_profile=qos_profile,
+                                      callback_group=callback_group)
 
     def tell_failure(self, what: str, error: BaseException) -> None:
         """Log that the handling of a message or call, or a periodic check, has failed."""
@@ -81,7 +100,7 @@ class AnsweringNode(Node):
             f'{what} has failed, all else goes on: {failure_text(error)}'))
 
 
-def _refusal(srv_type: Any, request: Any, reason: str) -> Any:
+def _refusal(srv_type: RosType, request: RosMessage, reason: str) -> RosMessage:
     """Return the response to a failed call, with the reason if the type has a field for it."""
     response = srv_type.Response()
     if hasattr(response, 'message'):
@@ -106,7 +125,7 @@ class Executor(SingleThreadedExecutor):
         self.add_node(node)
 
     def spin_once(self, timeout_sec: float | None = None) -> None:
-        entity: Any
+        entity: RosEntity
         try:
             handler, entity, _ = self.wait_for_ready_callbacks(timeout_sec)
         except (ShutdownException, TimeoutException):
@@ -117,7 +136,7 @@ class Executor(SingleThreadedExecutor):
             name = getattr(entity, 'srv_name', None) or getattr(entity, 'topic_name', None)
             self._node.tell_failure(f'a message on {name}' if name else 'a callback', error)
 
-    def _take_service(self, srv: Any) -> Callable[[], Any] | None:
+    def _take_service(self, srv: RosEntity) -> Callable[[], Awaitable[None]] | None:
         """Take a call as rclpy does, but keep its stamps for the callback."""
         try:
             with srv.handle:
@@ -134,7 +153,7 @@ class Executor(SingleThreadedExecutor):
         return execute
 
 
-def _give_back(entity: Any) -> None:
+def _give_back(entity: RosEntity) -> None:
     """Let the executor wait for an entity again: rclpy does not, if a take has failed."""
     if entity is not None and entity._executor_event:  # noqa: SLF001
         entity._executor_event = False  # noqa: SLF001

@@ -20,7 +20,7 @@ from collections.abc import Callable, Sequence
 from contextlib import ExitStack
 import os
 import time
-from typing import Any, Self, TypeVar
+from typing import Self, TypeVar
 
 from rclpy.context import Context
 from rclpy.executors import SingleThreadedExecutor
@@ -44,17 +44,18 @@ class ObservingNode:
     """
     A node with an executor of its own; nodes that are added to the executor run too.
 
-    Without ``context``, it makes a context from ``args``, and ends it too. ``options``: of the
-    node.
+    Without ``context``, it makes a context from ``args``, and ends it too. If ``is_quiet``, the
+    node has no services and no /rosout.
     """
 
     def __init__(self, name: str, context: Context | None = None, args: Sequence[str] = (),
-                 **options: Any) -> None:
+                 is_quiet: bool = False) -> None:
         self._owns_context = context is None
         self.context = context or Context()
         if self._owns_context:
             self.context.init(args=[*args])
-        self.node = Node(name, context=self.context, **options)
+        self.node = Node(name, context=self.context, enable_rosout=not is_quiet,
+                         start_parameter_services=not is_quiet)
         self.executor = SingleThreadedExecutor(context=self.context)
         self.executor.add_node(self.node)
 

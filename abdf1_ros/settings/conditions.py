@@ -17,14 +17,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from collections.abc import Mapping as MappingType
 from dataclasses import replace
 import difflib
-from typing import Any, Protocol, TypeAlias
+from typing import Protocol
 
 from abdf1_ros.df1.packet import BROADCAST
 from abdf1_ros.errors import FormatError
-from abdf1_ros.numbers import decimal_number
+from abdf1_ros.numbers import Checked, decimal_number
 from abdf1_ros.pccc.file_types import FileType
 from abdf1_ros.pccc.values import ValueType
 from abdf1_ros.settings.columns import BY_NAME, milliseconds_from
@@ -39,9 +38,6 @@ from abdf1_ros.settings.heartbeats import (
 from abdf1_ros.settings.limits import raw_values
 from abdf1_ros.settings.mapping import Mapping, ON_DEMAND, Publish
 from abdf1_ros.text import counted, shown
-
-# The values in a row by column, without empty cells.
-Cells: TypeAlias = MappingType[str, Any]
 
 _PERIODS = milliseconds_from(100, 60_000)
 
@@ -60,7 +56,7 @@ class ReportFault(Protocol):
 _NEEDS_READS = 'Alarm', 'Confirms'
 
 
-def with_conditions(row: Row, values: Cells, mapping: Mapping, fault: ReportFault) -> Mapping:
+def with_conditions(row: Row, values: Checked, mapping: Mapping, fault: ReportFault) -> Mapping:
     """Return a mapping with its fallback and its condition."""
     if mapping.is_on_demand:
         _check_on_demand(row, mapping, fault)
@@ -95,7 +91,7 @@ def _check_on_demand(row: Row, mapping: Mapping, fault: ReportFault) -> None:
                           f'Period "{ON_DEMAND}"')
 
 
-def _needed(values: Cells, column: str, fault: ReportFault) -> int | None:
+def _needed(values: Checked, column: str, fault: ReportFault) -> int | None:
     """Return a needed number; report a fault where it is missing."""
     value: int | None = values.get(column)
     if value is None and (kind := BY_NAME[column].kind):
@@ -121,7 +117,7 @@ def _check_heartbeat(row: Row, mapping: Mapping, fault: ReportFault) -> None:
                          'N7:0')
 
 
-def _fallback(cells: Cells, mapping: Mapping, fault: ReportFault) -> Fallback | None:
+def _fallback(cells: Checked, mapping: Mapping, fault: ReportFault) -> Fallback | None:
     """Return the fallback of a row, None where it has none (rule 12)."""
     given = [column for column in ('Fallback', 'Fallback_After') if column in cells]
     if not given:
@@ -163,7 +159,7 @@ def _fallback_values(texts: Sequence[str], mapping: Mapping,
             yield value
 
 
-def _condition(cells: Cells, mapping: Mapping, fault: ReportFault) -> While | None:
+def _condition(cells: Checked, mapping: Mapping, fault: ReportFault) -> While | None:
     """Return the condition of a row, None for none (rules 3, 13 and 14)."""
     text, timeout = cells.get('While', ''), cells.get('While_Timeout')
     if not text:

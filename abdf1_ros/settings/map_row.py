@@ -17,12 +17,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Any, TypeVar
+from typing import TypeVar
 
 from abdf1_ros.df1.packet import BROADCAST
 from abdf1_ros.df1.stations import MAX_STATION
 from abdf1_ros.messages import Message
-from abdf1_ros.numbers import is_digits, member_of, one_of, ValueKind, whole
+from abdf1_ros.numbers import Checked, is_digits, member_of, one_of, ValueKind, whole
 from abdf1_ros.pccc.access import Access
 from abdf1_ros.pccc.address import Address, AddressRangeError, AddressSyntaxError
 from abdf1_ros.pccc.address_range import AddressRange
@@ -110,7 +110,7 @@ class RowReader:
         remarks = tuple(row_remarks(self._row, mapping))
         return replace(mapping, remarks=remarks) if remarks else mapping
 
-    def _values(self) -> dict[str, Any]:
+    def _values(self) -> Checked:
         """Return the values of the cells that are not empty, by column."""
         command = self._value('Command', COMMAND)
         # 255 is a broadcast: all stations take the command, and no station answers.
@@ -121,7 +121,7 @@ class RowReader:
         access = self._access(plc_type, command) if plc_type else None
         place = self._place(plc_type, access) if plc_type else None
         address = place.first if isinstance(place, AddressRange) else place
-        values: dict[str, Any] = {
+        values: Checked = {
             'Tag': self._row.get('Tag'), 'Command': command, 'Station': station,
             'Via': self._via(station), 'PLC_Type': plc_type, 'Access': access,
             'Address': address, 'Processor': self._processor(plc_type, address)}
@@ -133,7 +133,7 @@ class RowReader:
             values['Length'] = self._length_of(place, values.get('Type'), values.get('Length'))
         return {column: value for column, value in values.items() if value is not None}
 
-    def _mapping(self, values: dict[str, Any]) -> Mapping | None:
+    def _mapping(self, values: Checked) -> Mapping | None:
         """Return the mapping without its conditions, None where a cell has a fault."""
         name = self._name('Tag', self._row.get('Tag'))
         topic = self._name('Topic', self._row.get('Topic')) if self._row.get('Topic') else name
@@ -177,7 +177,7 @@ class RowReader:
             self._bad_value(column, kind.fault(text), message, shown(text), *args)
         return value
 
-    def _scaling(self, values: dict[str, Any]) -> Scaling | None:
+    def _scaling(self, values: Checked) -> Scaling | None:
         if not self._row.get('Scale') and not self._row.get('Offset'):
             return None
         scaling = Scaling(values.get('Scale', 1.0), values.get('Offset', 0.0))

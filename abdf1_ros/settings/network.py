@@ -21,7 +21,7 @@ from collections.abc import Iterator
 from collections.abc import Mapping as MappingType
 from dataclasses import dataclass, field, fields, replace
 import re
-from typing import Any
+from typing import TypedDict, TypeVar, Unpack
 from urllib.parse import urlsplit
 
 from abdf1_ros.df1.checksum import Checksum
@@ -46,6 +46,7 @@ from abdf1_ros.settings.station_lists import octal_remarks, parse_stations
 from abdf1_ros.text import shown
 
 MODE_NAMES = tuple(dict.fromkeys(mode.name for mode in MODES))
+_Cell = TypeVar('_Cell', int, str, bool)
 POLLING_MODES = tuple(mode.polling for mode in MODES if mode.polling)
 _HOST = re.compile(r'(?P<scheme>\w+://)?(?P<host>(?!tcp:)[\w.-]+?)(?P<port>:\d{2,5})?')
 PLC_TYPES = tuple(entry.value for entry in FAMILIES)
@@ -67,9 +68,9 @@ class NetField:
     column: str
     default: int | str | bool
     description: str
-    kind: ValueKind[Any]
+    kind: ValueKind[int | str | bool]
     message: Message | None = None
-    message_args: tuple[Any, ...] = ()
+    message_args: tuple[object, ...] = ()
     other_words: MappingType[str, str] = field(default_factory=dict)
 
     @property
@@ -91,8 +92,14 @@ class NetField:
         return value
 
 
-def _net(column: str, default: int | str, description: str, kind: ValueKind[Any] = TEXT,
-         **details: Any) -> Any:
+class _Details(TypedDict, total=False):
+    message: Message
+    message_args: tuple[object, ...]
+    other_words: MappingType[str, str]
+
+
+def _net(column: str, default: _Cell, description: str,
+         kind: ValueKind[int | str | bool] = TEXT, **details: Unpack[_Details]) -> _Cell:
     entry = NetField(column, default, description, kind, **details)
     return field(default=default, metadata={'net': entry})
 
@@ -182,12 +189,13 @@ class Network:
 
     def link(self, options: LinkOptions) -> LinkSettings:
         """Return the settings of the link with these options."""
-        return LinkSettings.of(
-            options, station=self.station, checksum=self.checksum, timing=self.timing,
+        return LinkSettings(
+            station=self.station, checksum=self.checksum, timing=self.timing,
             nak_retries=self.nak_retries, enq_retries=self.enq_retries,
             timeout=self.timeout / 1000, cmd_timeout=self.cmd_timeout / 1000,
             store_forward=parse_stations(self.store_forward, BROADCAST)[0],
-            avoids_collisions=self.duplex is Duplex.RADIO and self.collision_avoidance)
+            avoids_collisions=self.duplex is Duplex.RADIO and self.collision_avoidance,
+        ).having(options)
 
     @property
     def line_mode(self) -> LineMode:
@@ -278,7 +286,7 @@ def make_network(values: MappingType[str, tuple[str, Place | str]],
     are taken from ``base``. Raises ConfigurationError.
     """
     base = base or Network()
-    checked: dict[str, Any] = {entry.name: getattr(base, entry.name) for entry in fields(base)}
+    checked = {entry.name: getattr(base, entry.name) for entry in fields(base)}
     problems: list[Problem] = []
     for name, (text, where) in values.items():
         try:

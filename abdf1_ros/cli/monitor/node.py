@@ -17,21 +17,23 @@
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 import time
-from typing import Any
 
 from abdf1_ros.cli.monitor.curves import Curve
 from abdf1_ros.cli.monitor.view import NodeView, Reading, ShownStatus, SILENCE, Style
 from abdf1_ros.errors import FormatError
 from abdf1_ros.ros.observer import graph_hint, ObservingNode
 from abdf1_ros.ros.topics.messages import latched_qos, MESSAGES
+from abdf1_ros.ros.untyped import MessageInfo, RosMessage
 from abdf1_ros.text import by_number
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from rclpy.duration import Infinite
 from rclpy.event_handler import SubscriptionEventCallbacks
 from rclpy.exceptions import InvalidTopicNameException
+from rclpy.qos import QoSProfile
+from rclpy.subscription import Subscription
 from rclpy.validate_full_topic_name import validate_full_topic_name
 from std_msgs.msg import String, UInt16MultiArray  # noqa: I101
 
@@ -65,7 +67,7 @@ def full_name(text: str) -> str:
 @dataclass(slots=True)
 class _Subscription:
     type_name: str
-    handle: Any
+    handle: Subscription
     reading: Reading
 
 
@@ -73,10 +75,10 @@ class Listening(ObservingNode):
     """A node that subscribes, in a ROS context of its own; use it in a with statement."""
 
     def __init__(self, ros_arguments: list[str]) -> None:
-        super().__init__('abdf1_monitor', args=ros_arguments, start_parameter_services=False,
-                         enable_rosout=False)
+        super().__init__('abdf1_monitor', args=ros_arguments, is_quiet=True)
 
-    def subscribe(self, message_type: Any, topic: str, callback: Any, qos: Any) -> Any:
+    def subscribe(self, message_type: type, topic: str, callback: Callable[..., None],
+                  qos: QoSProfile | int) -> Subscription:
         """Call ``callback`` with each message."""
         return self.node.create_subscription(
             message_type, topic, callback, qos, event_callbacks=_QUIET)
@@ -173,8 +175,8 @@ class NodeWatch(Listening):
             return None
         return float(deadlines[0].nanoseconds) / 1e9
 
-    def _taker(self, topic: str) -> Any:  # the types of rclpy allow callbacks of one argument only
-        def take(message: Any, info: Any) -> None:
+    def _taker(self, topic: str) -> Callable[[RosMessage, MessageInfo], None]:
+        def take(message: RosMessage, info: MessageInfo) -> None:
             subscription = self._subscriptions[topic]
             reading, received = subscription.reading, time.monotonic()
             if reading.promised is None and info['source_timestamp']:

@@ -23,7 +23,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from functools import partial
 import time
-from typing import Any
+from typing import Unpack
 
 from abdf1_ros.driver.driver import ENDS
 from abdf1_ros.driver.writes.queue import MAX_WAITING_WRITES
@@ -38,7 +38,7 @@ from abdf1_ros.ros.bridge.port_owners import PortOwners
 from abdf1_ros.ros.bridge.reload import changes, refuse_harm
 from abdf1_ros.ros.bridge.session import BridgeSession, Surroundings, tell_plcs
 from abdf1_ros.ros.bridge.standby import Service, Standby
-from abdf1_ros.ros.callbacks import AnsweringNode
+from abdf1_ros.ros.callbacks import AnsweringNode, NodeOptions
 from abdf1_ros.ros.diagnostics.graph import DISCOVERY, Graph, NameWatch
 from abdf1_ros.ros.diagnostics.log import bug_text
 from abdf1_ros.ros.parameters.arguments import Arguments
@@ -81,8 +81,9 @@ class BridgeNode(AnsweringNode):
 
     def __init__(self, name: str = NODE_NAME, *, graph: Graph | None = None,
                  port_owners: PortOwners | None = None,
-                 arguments: Arguments = NO_ARGUMENTS, **kwargs: Any) -> None:
-        super().__init__(name, automatically_declare_parameters_from_overrides=True, **kwargs)
+                 arguments: Arguments = NO_ARGUMENTS, **options: Unpack[NodeOptions]) -> None:
+        options['automatically_declare_parameters_from_overrides'] = True
+        super().__init__(name, **options)
         self._is_stuck = self._is_ending = False
         self._hold_ports = partial(
             (port_owners or PortOwners()).hold, self.get_fully_qualified_name())

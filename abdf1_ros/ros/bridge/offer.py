@@ -23,11 +23,13 @@ from __future__ import annotations
 
 from collections import deque
 from contextlib import suppress
-from typing import Any
 
+from abdf1_ros.ros.untyped import RosMessage
 from rclpy.duration import Duration
 from rclpy.impl.implementation_singleton import rclpy_implementation
 from rclpy.node import Node
+from rclpy.publisher import Publisher
+from rclpy.qos import QoSProfile
 
 
 class OfferedPublisher:
@@ -39,11 +41,12 @@ class OfferedPublisher:
     ``offer`` and ``withdraw``.
     """
 
-    def __init__(self, node: Node, kind: type, topic: str, qos: Any, most: int) -> None:
+    def __init__(self, node: Node, kind: type, topic: str, qos: QoSProfile | int,
+                 most: int) -> None:
         self._node = node
         self._make = kind, topic, qos
-        self._waiting: deque[Any] = deque(maxlen=most)
-        self._publisher: Any = None
+        self._waiting: deque[RosMessage] = deque(maxlen=most)
+        self._publisher: Publisher | None = None
 
     def offer(self) -> None:
         """Make the publisher, and publish the waiting messages."""
@@ -53,10 +56,11 @@ class OfferedPublisher:
     def withdraw(self) -> None:
         """Close the publisher and drop waiting messages: the bridge has lost the line."""
         publisher, self._publisher = self._publisher, None
-        self._node.destroy_publisher(publisher)
+        if publisher is not None:
+            self._node.destroy_publisher(publisher)
         self._waiting.clear()
 
-    def publish(self, message: Any) -> None:
+    def publish(self, message: RosMessage) -> None:
         """Publish a message now, or keep it until the publisher exists."""
         self._waiting.append(message)
         self._publish_waiting()

@@ -26,7 +26,6 @@ from dataclasses import dataclass, field
 import math
 import random
 import time
-from typing import Any
 
 from abdf1_ros.df1.packet import BROADCAST
 from abdf1_ros.driver.driver import Driver
@@ -53,12 +52,14 @@ from abdf1_ros.ros.topics.reads import ReadTopic, ReadTopics
 from abdf1_ros.ros.topics.services import RowServices
 from abdf1_ros.ros.topics.snapshot import Snapshot
 from abdf1_ros.ros.topics.writes import WriteTopic, WriteTopics
+from abdf1_ros.ros.untyped import RosPublisher
 from abdf1_ros.settings.mapping import Mapping
 from abdf1_ros.settings.rows import Rows
 from abdf1_ros.text import first, printable
 from diagnostic_msgs.msg import DiagnosticArray
 from rclpy.clock import Clock, ClockType
 from rclpy.impl.rcutils_logger import RcutilsLogger
+from rclpy.publisher import Publisher
 from std_msgs.msg import UInt16MultiArray
 
 _MOST_REMARKS = 20  # most remarks on both files in the log
@@ -82,7 +83,7 @@ class Surroundings:
     opener: PortOpener
     results: OfferedPublisher
     active_stations: OfferedPublisher
-    diagnostics: Any
+    diagnostics: Publisher
     snapshot: OfferedPublisher
     writes: WriteTopics
     services: RowServices = field(init=False)
@@ -321,7 +322,7 @@ class BridgeSession:
             self._snapshot = self._snapshot or Snapshot(self.driver.points, self.reads.latest)
             self._publish(self._surroundings.snapshot, self._snapshot.message(now))
 
-    def _publish(self, publisher: Any, message: DiagnosticArray) -> None:
+    def _publish(self, publisher: RosPublisher, message: DiagnosticArray) -> None:
         # While simulated time is 0, use system time: otherwise this message would sort before all
         # earlier messages.
         now = self._surroundings.node.get_clock().now()

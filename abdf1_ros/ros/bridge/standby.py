@@ -17,10 +17,11 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 from abdf1_ros.ros.bridge.session import BridgeSession, Surroundings
 from rclpy.callback_groups import CallbackGroup
+from rclpy.service import Service as Offered
 
 
 class Service(NamedTuple):
@@ -28,7 +29,7 @@ class Service(NamedTuple):
 
     name: str
     kind: type
-    answer: Callable[..., Any]
+    answer: Callable[..., object]
     group: CallbackGroup | None = None
     stays: bool = False
 
@@ -47,7 +48,7 @@ class Standby:
         self._services = services
         self._publishers = (
             surroundings.results, surroundings.active_stations, surroundings.snapshot)
-        self._made: dict[Service, Any] = {}
+        self._made: dict[Service, Offered] = {}
         self._is_changing = False
 
     def offer(self) -> None:

@@ -17,7 +17,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Sequence
-from typing import Any
 
 from abdf1_ros.df1.stations import Station
 from abdf1_ros.driver.write import Outcome, WriteResult
@@ -27,6 +26,7 @@ from abdf1_ros.ports.clock import line_time
 from abdf1_ros.ros.diagnostics.log import EventLog, LimitedLog, UnreadableRows, where
 from abdf1_ros.ros.diagnostics.status import ERROR, message_of, OK, Seen, WARN
 from abdf1_ros.ros.diagnostics.writes import is_usual_fallback, WriteLog
+from abdf1_ros.ros.untyped import RosPublisher
 from abdf1_ros.settings.mapping import Mapping
 from rclpy.impl.rcutils_logger import RcutilsLogger
 
@@ -51,8 +51,8 @@ class LineEvents:
     """
 
     def __init__(self, logger: RcutilsLogger, port: str, stations: Collection[int], *,
-                 scans: bool, seen: Seen, read: Callable[[Mapping, Values], None], results: Any,
-                 table_changed: Callable[[], None],
+                 scans: bool, seen: Seen, read: Callable[[Mapping, Values], None],
+                 results: RosPublisher, table_changed: Callable[[], None],
                  answer: Callable[[WriteResult], None] = lambda result: None,
                  clock: Callable[[], float] = line_time) -> None:
         self.read = read

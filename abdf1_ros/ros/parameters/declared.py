@@ -23,11 +23,12 @@ import difflib
 import os
 from pathlib import Path
 import random
-from typing import Any
+from typing import TypeVar
 
 from abdf1_ros.df1.polling import STANDARD
 from abdf1_ros.df1.settings import PollingSettings
 from abdf1_ros.driver.settings import DriverSettings
+from abdf1_ros.numbers import Checked
 from abdf1_ros.paths import config_file
 from abdf1_ros.plan.forecast import USUAL_STALE_AFTER
 from abdf1_ros.plan.usable_rows import usable_rows
@@ -47,9 +48,11 @@ from rcl_interfaces.msg import ParameterDescriptor
 from rclpy.exceptions import ParameterException
 from rclpy.node import Node
 
+_Default = TypeVar('_Default', bound=bool | float | str)
 
-def _parameter(default: bool | float | str, description: str, low: float | None = None,
-               high: float | None = None) -> Any:
+
+def _parameter(default: _Default, description: str, low: float | None = None,
+               high: float | None = None) -> _Default:
     return field(default=default, metadata={'description': description, 'low': low, 'high': high})
 
 
@@ -115,7 +118,7 @@ class Parameters:
         10.0, 'most MB that the capture takes on the disk', 0.01, 10_000.0)
 
 
-Given = MappingType[str, Any]
+Given = MappingType[str, object]
 """The values that the user has set, by name of the parameter."""
 
 NO_ARGUMENTS = Arguments()
@@ -206,9 +209,8 @@ def take_given(node: Node) -> Given:
     Make the node with ``automatically_declare_parameters_from_overrides``: otherwise rclpy
     silently drops a parameter that is not declared.
     """
-    declared: Any = node.get_parameters_by_prefix('')
-    given = {name: parameter.value for name, parameter in declared.items()
-             if name not in _OF_RCLPY}
+    given = {parameter.name: parameter.value for parameter in node.get_parameters([
+        name for name in node.get_parameters_by_prefix('') if name not in _OF_RCLPY])}
     for name in given:
         node.undeclare_parameter(name)
     return given
@@ -392,8 +394,8 @@ def _stations(name: str, text: str, problems: list[Problem]) -> tuple[int, ...]:
     return stations
 
 
-def _declare(node: Node, given: Given, name: str, default: Any,
-             descriptor: ParameterDescriptor) -> Any:
+def _declare(node: Node, given: Given, name: str, default: object,
+             descriptor: ParameterDescriptor) -> object:
     """
     Declare a parameter and return its value, even a value of a wrong type or range.
 
@@ -413,13 +415,13 @@ def _declare(node: Node, given: Given, name: str, default: Any,
 
 
 def _declare_own(node: Node, given: Given, problems: list[Problem]) -> Parameters:
-    values: dict[str, Any] = {}
+    usual, values = Parameters(), Checked()
     for entry in fields(Parameters):
         low, high = entry.metadata['low'], entry.metadata['high']
-        default: Any = entry.default
+        default = getattr(usual, entry.name)
         value = _declare(node, given, entry.name, default, descriptor_of(
             default, entry.metadata['description'], low, high, read_only=True))
-        kind = type(entry.default)
+        kind = type(default)
         if kind is float and type(value) is int:
             value = float(value)
         if kind is str and isinstance(value, int | float):
@@ -432,6 +434,6 @@ def _declare_own(node: Node, given: Given, problems: list[Problem]) -> Parameter
                 right += f' from {low:.15g} to {high:.15g}'
             problems.append(Problem(
                 f'parameter {entry.name}', f'{entry.name} = {value!r} should be {right}'))
-            value = entry.default
+            value = default
         values[entry.name] = value
     return Parameters(**values)

@@ -17,7 +17,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
-from typing import Any
 
 from abdf1_ros.settings.columns import MAP_COLUMNS
 from abdf1_ros.settings.mapping import Mapping
@@ -34,7 +33,7 @@ from rclpy.parameter import Parameter
 # rclpy sends an event for each parameter: 120,000 events for 5000 rows take 12 s.
 MOST_SHOWN_ROWS = 100
 
-_Cell = tuple[str, Any, ParameterDescriptor]
+_Cell = tuple[str, object, ParameterDescriptor]
 
 _REASON = 'read-only: it shows the files; change the files and call ~/reload'
 
@@ -53,7 +52,7 @@ def descriptor_of(default: bool | float | str, description: str, low: float | No
     return descriptor
 
 
-def text_of(value: Any) -> str:
+def text_of(value: object) -> str:
     """Return a value as a CSV cell has it; YAML turns Yes and No into bools."""
     if isinstance(value, bool):
         return 'Yes' if value else 'No'
@@ -94,12 +93,12 @@ class ShownFiles:
         """Show these settings and rows in place of the old ones."""
         for name in self._shown:
             self._node.undeclare_parameter(name)
-        cells: Any = [*_net_cells(network), *(
+        cells: list[_Cell] = [*_net_cells(network), *(
             (name, value, descriptor_of(value, description))
             for name, value, description in map_cells(mappings))]
         self._is_showing = True
         try:
-            self._node.declare_parameters('', cells, ignore_override=True)
+            self._node.declare_parameters('', [*cells], ignore_override=True)
         finally:
             self._is_showing = False
         self._shown = [name for name, _, _ in cells]

@@ -19,11 +19,11 @@ from __future__ import annotations
 from array import array
 from collections.abc import Callable
 import math
-from typing import Any
 
 from abdf1_ros.driver.writes.queue import MAX_WAITING_WRITES
 from abdf1_ros.errors import FormatError
 from abdf1_ros.pccc.values import Values, ValueType
+from abdf1_ros.ros.untyped import RosMessage
 from abdf1_ros.settings.mapping import Mapping
 from rclpy.duration import Duration
 from rclpy.qos import DurabilityPolicy, LivelinessPolicy, QoSProfile, ReliabilityPolicy
@@ -31,7 +31,7 @@ from rclpy.serialization import serialize_message
 from std_msgs import msg as std_msgs
 from std_msgs.msg import MultiArrayDimension, MultiArrayLayout, String
 
-MESSAGES: dict[ValueType, Any] = {kind: getattr(std_msgs, kind.message) for kind in ValueType}
+MESSAGES: dict[ValueType, type] = {kind: getattr(std_msgs, kind.message) for kind in ValueType}
 
 ACTIVE_LAYOUT = MultiArrayLayout(dim=[MultiArrayDimension(
     label='station n is active where bit n % 16 of word n / 16 is 1', size=16, stride=16)])
@@ -45,7 +45,7 @@ _WRITE_DEPTH = 1000
 _RESULT_LIFESPAN = 10.0
 
 
-def new_message(mapping: Mapping) -> Any:
+def new_message(mapping: Mapping) -> RosMessage:
     """
     Return a message for the values of ``mapping``, with its layout filled in.
 
@@ -60,7 +60,7 @@ def new_message(mapping: Mapping) -> Any:
     return message
 
 
-def encoder(mapping: Mapping) -> Callable[[Values], Any]:
+def encoder(mapping: Mapping) -> Callable[[Values], RosMessage | bytes]:
     """
     Return a function that encodes values of ``mapping`` for its publisher.
 
@@ -78,7 +78,7 @@ def encoder(mapping: Mapping) -> Callable[[Values], Any]:
     return encode
 
 
-def values_of(message: Any) -> Values:
+def values_of(message: RosMessage) -> Values:
     """Return the values that a message writes; FormatError if its data_offset is not 0."""
     if isinstance(message, String):
         return str(message.data)

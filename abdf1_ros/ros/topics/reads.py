@@ -21,14 +21,15 @@ from collections.abc import Callable
 from collections.abc import Mapping as MappingType
 from dataclasses import dataclass
 import math
-from typing import Any
 
 from abdf1_ros.driver.reads.point import ReadPoint
 from abdf1_ros.pccc.values import Values
 from abdf1_ros.ros.topics.messages import encoder, MESSAGES, read_qos
+from abdf1_ros.ros.untyped import RosMessage
 from abdf1_ros.settings.mapping import Mapping
 from rclpy.event_handler import PublisherEventCallbacks
 from rclpy.node import Node
+from rclpy.publisher import Publisher
 
 # Number of values published at once, while the ACK (two characters) is on the line. All other
 # values of a reply are published during the next command, because a hundred values would delay the
@@ -50,8 +51,8 @@ class ReadTopic:
     - ``promise``: longest time (s) between two values; infinite if the row promises none
     """
 
-    publisher: Any
-    encode: Callable[[Values], Any]
+    publisher: Publisher
+    encode: Callable[[Values], RosMessage | bytes]
     shape: tuple[object, ...]
     promise: float
 
@@ -74,7 +75,7 @@ class ReadTopics:
         self._node = node
         self._published = published
         self._at_once = _VALUES_AT_ONCE
-        self._later: deque[tuple[Any, Any]] = deque()
+        self._later: deque[tuple[Publisher, RosMessage | bytes]] = deque()
         self.latest: dict[str, Values] = {}
         self._topics: dict[str, ReadTopic] = {}
         self._to_come: list[tuple[Mapping, ReadPoint]] = []

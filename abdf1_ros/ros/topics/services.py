@@ -26,7 +26,6 @@ from contextlib import contextmanager
 from functools import partial
 import math
 import time
-from typing import Any
 import uuid
 
 from abdf1_ros.driver.driver import Driver, ENDS
@@ -36,11 +35,13 @@ from abdf1_ros.pccc.values import Values, ValueType
 from abdf1_ros.ports.clock import line_time
 from abdf1_ros.ros.callbacks import AnsweringNode
 from abdf1_ros.ros.topics.writes import WriteTopics
+from abdf1_ros.ros.untyped import RosMessage
 from abdf1_ros.settings.mapping import Mapping
 from abdf1_ros.settings.rows import Rows
 from abdf1_ros.text import printable, utc_text, value_text
 from rclpy.callback_groups import ReentrantCallbackGroup
 from rclpy.qos import QoSProfile
+from rclpy.service import Service
 from rclpy.task import Future
 from std_msgs.msg import MultiArrayDimension, MultiArrayLayout, UInt8MultiArray
 from std_srvs.srv import SetBool, Trigger
@@ -59,13 +60,13 @@ class _Call:
     """A call that waits for ``count`` results, at the longest until a clock value (s)."""
 
     def __init__(self, count: int, until: float, wake: Callable[[], None]) -> None:
-        self.results: list[Any] = []
+        self.results: list[WriteResult | ReadAnswer] = []
         self.until = until
         self.done = Future()
         self._count = count
         self._wake = wake
 
-    def take(self, result: Any) -> None:
+    def take(self, result: WriteResult | ReadAnswer) -> None:
         """Take a result, in any thread."""
         self.results.append(result)
         if len(self.results) == self._count:
@@ -94,8 +95,8 @@ class RowServices:
         self._writes = writes
         self._wake_executor = wake_executor
         self._group = ReentrantCallbackGroup()
-        self._services: dict[str, Any] = {}
-        self._retired: list[Any] = []
+        self._services: dict[str, Service] = {}
+        self._retired: list[Service] = []
         self._rows: dict[str, tuple[Mapping, ...]] = {}
         self._calls: dict[str, _Call] = {}
 
@@ -168,7 +169,7 @@ class RowServices:
                     'source_timestamp': published, 'received_timestamp': received,
                     'publication_sequence_number': None})
             await call.done
-        results: list[WriteResult] = call.results
+        results = [result for result in call.results if isinstance(result, WriteResult)]
         response.success = len(results) == len(rows) and all(
             result.outcome in (Outcome.WRITTEN, Outcome.STANDS) for result in results)
         response.message = '; '.join(
@@ -187,7 +188,8 @@ class RowServices:
             self._driver.read_now(rows[0], line_time(), call.take)
             self._wake_link()
             await call.done
-        answer: ReadAnswer = (call.results or [ReadAnswer(error=ENDS)])[0]
+        answer = next((result for result in call.results if isinstance(result, ReadAnswer)),
+                      ReadAnswer(error=ENDS))
         response.success = answer.values is not None
         response.message = printable(answer.error) if answer.values is None else \
             f'{_text(answer.values)} at {_moment(answer.read)}'
@@ -202,7 +204,7 @@ class RowServices:
         finally:
             del self._calls[label]
 
-    def _new(self, count: int, until: float, response: Any) -> _Call | None:
+    def _new(self, count: int, until: float, response: RosMessage) -> _Call | None:
         """Return a call that waits for ``count`` results; None if it is refused."""
         if not count or len(self._calls) >= MOST_CALLS:
             response.message = f'refused: {_TOO_MANY if count else _GONE}'

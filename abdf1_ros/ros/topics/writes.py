@@ -27,7 +27,7 @@ from collections.abc import Callable, Sequence
 from functools import partial
 import math
 import time
-from typing import Any, Protocol
+from typing import Protocol
 
 from abdf1_ros.driver.driver import Driver, TOO_MANY
 from abdf1_ros.driver.writes.ages import Ages, most_ahead, Standstills
@@ -36,9 +36,11 @@ from abdf1_ros.errors import FormatError
 from abdf1_ros.ports.clock import line_time
 from abdf1_ros.ros.callbacks import AnsweringNode
 from abdf1_ros.ros.topics.messages import MESSAGES, values_of, write_qos
+from abdf1_ros.ros.untyped import MessageInfo, RosMessage
 from abdf1_ros.settings.mapping import Mapping
 from abdf1_ros.text import printable
 from rclpy.node import Node
+from rclpy.subscription import Subscription
 from std_msgs.msg import String
 
 _LONGEST_LABEL = 100
@@ -86,7 +88,7 @@ class LossCounter:
         return number - nearest - 1
 
 
-def _request(message: Any, info: Any) -> str:
+def _request(message: RosMessage, info: MessageInfo) -> str:
     """
     Return the text that identifies a message in its result.
 
@@ -131,12 +133,12 @@ class WriteTopic:
         self._wake = wake
         self._next_ahead = -math.inf
 
-    def arrived(self, info: Any) -> None:
+    def arrived(self, info: MessageInfo) -> None:
         """Report the messages that were lost before this message."""
         if lost := self._losses.lost_before(info['publication_sequence_number']):
             self._listener.lost(self._topic, lost)
 
-    def take(self, message: Any, info: Any, reject_reason: str = '') -> None:
+    def take(self, message: RosMessage, info: MessageInfo, reject_reason: str = '') -> None:
         """Write a message to every mapping of the topic, or refuse it for a ``reject_reason``."""
         now, wall = line_time(), time.time_ns() / 1e9
         stamps = [stamp / 1e9 for stamp in (
@@ -169,9 +171,9 @@ class WriteTopics:
 
     def __init__(self, node: AnsweringNode) -> None:
         self._node = node
-        self._waiting: list[tuple[str, Any, Any]] = []
+        self._waiting: list[tuple[str, RosMessage, MessageInfo]] = []
         self._has_begun = self._is_open = False
-        self._subscriptions: dict[str, tuple[Any, Any]] = {}
+        self._subscriptions: dict[str, tuple[type, Subscription]] = {}
         self._topics: dict[str, WriteTopic] = {}
         self._latest: dict[tuple[str, int, int], None] = {}  # topic, stamp and number of messages
         self.standstills = Standstills()
@@ -231,7 +233,7 @@ class WriteTopics:
         return [f'{end.node_namespace.rstrip("/")}/{end.node_name}'
                 for end in self._node.get_publishers_info_by_topic(_name(topic))]
 
-    def take(self, topic: str, message: Any, info: Any) -> None:
+    def take(self, topic: str, message: RosMessage, info: MessageInfo) -> None:
         """Count messages lost before a message; then hand it on, let it wait, or refuse it."""
         if self._came_before(topic, info):
             return
@@ -243,7 +245,7 @@ class WriteTopics:
         self.taken += 1
         self._topics[topic].take(message, info, reject_reason)
 
-    def _came_before(self, topic: str, info: Any) -> bool:
+    def _came_before(self, topic: str, info: MessageInfo) -> bool:
         """
         Record a message; return True if DDS has delivered it before.
 
@@ -260,8 +262,8 @@ class WriteTopics:
             del self._latest[next(iter(self._latest))]
         return came_before
 
-    def _subscription(self, topic: str, kind: Any) -> Any:
-        callback: Any = partial(self.take, topic)
+    def _subscription(self, topic: str, kind: type) -> Subscription:
+        callback: Callable[..., None] = partial(self.take, topic)
         return self._node.create_subscription(kind, _name(topic), callback, write_qos())
 
 

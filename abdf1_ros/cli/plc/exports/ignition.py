@@ -24,7 +24,6 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 import json
 import re
-from typing import Any
 
 from abdf1_ros.cli.plc.exports.form import (
     Cells,
@@ -69,7 +68,7 @@ def records_of(text: str) -> list[Record]:
     return records
 
 
-def _tags(node: Any, folder: str, depth: int) -> Iterator[tuple[str, dict[str, Any]]]:
+def _tags(node: object, folder: str, depth: int) -> Iterator[tuple[str, dict[str, object]]]:
     """Yield each tag with its name; the names of its folders are before it: folder/tag."""
     if isinstance(node, list):
         for part in node:
