@@ -97,6 +97,13 @@ def test_writes_and_reads_take_turns_at_a_silent_station() -> None:
     assert turns in 'wr' * len(turns)
 
 
+def test_station_that_has_replied_once_goes_first_after_a_death() -> None:
+    bench = Bench(make_job(station=1), proven := make_job(station=2))
+    bench.stations[2].replies = 1
+    bench.stations.probes.died(PROBE_TIME, 0.0)
+    assert bench.next(0.0) is proven
+
+
 def test_station_that_replies_in_time_again_has_all_its_reads_at_once() -> None:
     late, other, living = make_job(), make_job('N9:0'), make_job(station=2)
     bench = Bench(late, other, living)

@@ -25,6 +25,7 @@ from abdf1_ros.pccc.emulated import Setting
 from abdf1_ros.pccc.families import dialect_of, parse_address
 from abdf1_ros.pccc.file_types import PlcType
 from abdf1_ros.pccc.identity import Mode
+from abdf1_ros.pccc.slc.identity import FULL_DUPLEX_PORT
 from abdf1_ros.settings.mapping import Mapping
 from abdf1_ros.settings.network import Network
 import pytest
@@ -293,3 +294,5 @@ def test_processor_and_counters_of_the_other_end(outstanding: int) -> None:
     assert identity.mode is Mode.REMOTE_PROGRAM
     assert int(health.known(PLC).counters['messages sent']) > 0
     assert health.counters_wanted == set()
+    ours = bench.driver._served.serve(Packet(US, PLC, 0x06, 0, 1, b'\3'))
+    assert ours.data[2] == FULL_DUPLEX_PORT

@@ -74,7 +74,9 @@ def test_rule_1_counts_to_32767_and_begins_again_with_1() -> None:
 @pytest.mark.parametrize('period', [200, 700])
 def test_rule_2_the_0_of_a_first_contact_stands_for_a_period_and_half_a_second(
         period: int) -> None:
-    cell = Cell(beat_row(period), run=2.0)
+    cell = Cell(beat_row(period))
+    assert cell.bench.driver.interlocks.heartbeats[0].why_not(cell.now)
+    cell.run(2.0)
     zero, one = [when for when, _, value in cell.writes if value in (0, 1)]
     assert max(period / 1000, 0.5) < one - zero < max(period / 1000, 0.5) + 0.05
     assert cell.bench.driver.interlocks.heartbeats[0].why_not(cell.now) == ''
