@@ -15,7 +15,7 @@
 """Commands and replies in words."""
 
 from abdf1_ros.df1.packet import Packet
-from abdf1_ros.pccc.describe import command_name, describe, Effect, effect_of
+from abdf1_ros.pccc.describe import command_codes, command_name, describe, Effect, effect_of
 from hypothesis import given, strategies
 import pytest
 from support.cases import for_all
@@ -95,6 +95,36 @@ def test_data_table_commands(data: str, text: str) -> None:
     (0x0F, '', 'command 0F'), (0x0E, '01 02', 'command 0E 01 02')])
 def test_command_without_fnc_is_described(cmd: int, data: str, text: str) -> None:
     assert describe(command(data, cmd)) == text
+
+
+def test_codes_of_commands_are_those_of_the_manual() -> None:
+    """M 7-2, 7-3; 0A and 0B: 1756-PM020F p. 75; 0F/94 and 0F/A3: practice."""
+    expected = """
+        00 protected write, 01 unprotected read, 02 protected bit write, 03 physical write,
+        04 physical read, 05 unprotected bit write, 08 unprotected write,
+        0A connected CIP message, 0B unconnected CIP message,
+        06/00 echo, 06/01 read diagnostic counters, 06/02 set variables, 06/03 diagnostic status,
+        06/04 set timeout, 06/05 set NAKs, 06/06 set ENQs, 06/07 reset diagnostic counters,
+        06/08 set data table size, 06/09 read link parameters, 06/0A set link parameters,
+        07/00 disable outputs, 07/01 enable outputs, 07/03 enable scan,
+        07/04 enter download mode, 07/05 exit download or upload mode, 07/06 enter upload mode,
+        0F/00 word range write, 0F/01 word range read, 0F/02 bit write, 0F/03 file write,
+        0F/04 file read, 0F/05 download request, 0F/06 upload request, 0F/07 shut down,
+        0F/08 physical write, 0F/09 physical read, 0F/0A restart, 0F/11 get edit resource,
+        0F/12 return edit resource, 0F/17 read bytes physical, 0F/18 write bytes physical,
+        0F/26 read-modify-write, 0F/29 read section size, 0F/3A set CPU mode,
+        0F/41 disable forces, 0F/50 download all, 0F/52 download completed, 0F/53 upload all,
+        0F/55 upload completed, 0F/57 initialize memory, 0F/5E modify compatibility file,
+        0F/67 typed write, 0F/68 typed read, 0F/79 read-modify-write N, 0F/80 change mode,
+        0F/81 open file, 0F/82 close file, 0F/88 execute command list,
+        0F/8F apply port configuration, 0F/94 read file information,
+        0F/A1 protected typed logical read, 0F/A2 protected typed logical read,
+        0F/A3 read of words by physical address, 0F/A7 protected typed file read,
+        0F/A9 protected typed logical write, 0F/AA protected typed logical write,
+        0F/AB masked write, 0F/AF protected typed file write"""
+    assert {f'{cmd:02X}' + ('' if fnc is None else f'/{fnc:02X}') + f' {name}'
+            for (cmd, fnc), name in command_codes().items()} == {
+                *' '.join(expected.split()).split(', ')}
 
 
 @pytest.mark.parametrize(('cmd', 'effect', 'functions'), [

@@ -16,6 +16,7 @@
 
 from collections.abc import Callable
 from functools import partial
+from typing import TypeVar
 
 from abdf1_ros.df1.packet import Packet
 from abdf1_ros.errors import FormatError, RemoteError
@@ -47,6 +48,7 @@ from support.processors import ML1400
 from support.tables import ask, counting, table, words_at
 
 Command = LogicalRead | LogicalWrite | MaskedWrite
+_Found = TypeVar('_Found')
 
 READERS: dict[int, Callable[[Reader], Command]] = {
     0xA1: partial(LogicalRead.read, is_short=True), 0xA2: LogicalRead.read,
@@ -132,17 +134,25 @@ def steps_of(processor: Processor) -> Steps[list[DataFile]]:
     return steps
 
 
-def carried_out(steps: Steps[list[DataFile]],
-                answer: Callable[[bytes], Packet]) -> list[DataFile]:
+def carried_out(steps: Steps[_Found], answer: Callable[[bytes], Packet]) -> _Found:
     """Answer each command."""
     request = next(steps)
-    for _ in range(10):
+    for _ in range(40):
         try:
             request = steps.send(answer(request[1]))
         except StopIteration as done:
-            files: list[DataFile] = done.value
-            return files
+            found: _Found = done.value
+            return found
     raise AssertionError('the steps do not end')
+
+
+def served(*places: tuple[str, int]) -> Callable[[bytes], Packet]:
+    """Return what a server answers that has these words."""
+    table = DataTable(PlcType.SLC)
+    for text, words in places:
+        table.create(parse_address(text, PlcType.SLC), words)
+    server = Server(table)
+    return lambda data: server.serve(Packet(1, 0, 0x0F, 0, 7, data))
 
 
 def test_files_of_a_recorded_micrologix_1400() -> None:
@@ -154,13 +164,20 @@ def test_files_of_a_recorded_micrologix_1400() -> None:
 
 
 def test_files_of_an_emulated_slc() -> None:
-    table = DataTable(PlcType.SLC)
-    for text, words in ALL_SLC:
-        table.create(parse_address(text, PlcType.SLC), words)
-    files = carried_out(steps_of(Processor.SLC_5_03), lambda data: Server(table).serve(
-        Packet(1, 0, 0x0F, 0, 7, data)))
+    files = carried_out(steps_of(Processor.SLC_5_03), served(*ALL_SLC))
     assert {str(entry): entry.elements for entry in files} == {
         'O0': 2, 'I1': 5, 'S2': 33, 'N7': 90, 'ST20': 2}
+
+
+def test_files_that_reads_find() -> None:
+    """Files 0 to 2 have fixed types; a file has at most 256 elements (M 13-13)."""
+    answer = served(('I:7.0', 1), ('S:0', 33), ('N3:0', 2), ('N7:0', 256), ('B8:0', 255),
+                    *((f'{kind}{number}:0', 84) for number, kind in enumerate(
+                        ('F', 'T', 'C', 'R', 'L', 'ST', 'A', 'D'), 9)))
+    found = [carried_out(SlcFileSearch().look_for(number), answer) for number in range(18)]
+    assert [(str(entry), entry.elements) for entry in found if entry] == [
+        ('I1', 0), ('S2', 33), ('N3', 2), ('N7', 256), ('B8', 255), ('F9', 42), ('T10', 28),
+        ('C11', 28), ('R12', 28), ('L13', 42), ('ST14', 2), ('A15', 84), ('D16', 84)]
 
 
 @pytest.mark.parametrize('processor', [None, *(

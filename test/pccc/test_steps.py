@@ -21,15 +21,10 @@ from abdf1_ros.pccc.access import Access
 from abdf1_ros.pccc.dialect import Steps
 from abdf1_ros.pccc.file_types import PlcType
 from abdf1_ros.pccc.processor import Processor
-from abdf1_ros.pccc.status import (
-    check_status,
-    is_address_fault,
-    Meanings,
-    status_text,
-    USUAL_MEANINGS,
-)
+from abdf1_ros.pccc.status import check_status, is_address_fault, Meanings, USUAL_MEANINGS
 from abdf1_ros.pccc.steps import AddressedValues, read, write
 import pytest
+from support.cases import for_all
 
 SLC = PlcType.SLC
 
@@ -90,10 +85,10 @@ def test_refused_inputs_and_outputs_by_slot_lead_to_flat(
     assert ('Access Flat' in str(refusal.value)) is is_told
 
 
-def failure(sts: int, data: bytes = b'') -> RemoteError:
+def failure(sts: int, data: bytes = b'', meanings: Meanings = USUAL_MEANINGS) -> RemoteError:
     """Return the error that a reply with this status is."""
     with pytest.raises(RemoteError) as caught:
-        check_status(Packet(0, 1, 0x4F, sts, 1, data))
+        check_status(Packet(0, 1, 0x4F, sts, 1, data), meanings)
     return caught.value
 
 
@@ -134,19 +129,36 @@ def test_refusal_of_the_address_and_for_another_reason() -> None:
         (0x05,), (0x60,), (0x70,), (0xF0,), (0xF0, b'\x0B'), (0xF0, b'\x1F')))
 
 
-@pytest.mark.parametrize(('meanings', 'sts', 'ext_sts', 'meaning'), [
-    (plc2.MEANINGS, 0x80, None, 'protected commands are inhibited'),
-    (plc2.MEANINGS, 0x70, None, 'processor is in program mode'),
-    (plc3.MEANINGS, 0x30, None, 'a shutdown was requested'),
-    (plc3.MEANINGS, 0xF0, 0x09, 'past the end of the file'),
-    (slc.MEANINGS, 0xF0, 0x0B, 'access denied'),
-    (slc.MEANINGS, 0xF0, 0x0E, 'command cannot be executed'),
-    (USUAL_MEANINGS, 0xF0, 0x0D, 'condition exists already, resource is already available'),
-    (USUAL_MEANINGS, 0xF0, 0x0B, 'no access: privilege missing')])
-def test_meanings_of_a_family(meanings: Meanings, sts: int, ext_sts: int | None,
-                              meaning: str) -> None:
-    """M 8-4, and M 8-5..8-10 for those that differ."""
-    assert status_text(sts, ext_sts, meanings).endswith(f': {meaning}')
-    data = b'' if ext_sts is None else bytes((ext_sts,))
-    with pytest.raises(RemoteError, match=f': {meaning}$'):
-        check_status(Packet(5, 1, 0x4F, sts, 1, data), meanings)
+@for_all(('meanings', 'of', 'codes'), [
+    # M 8-2, 8-3
+    (USUAL_MEANINGS, '', """
+        01 buffer, 02 acknowledge, 03 token, 04 disconnected, 05 timeout, 06 duplicate,
+        07 off line, 08 hardware, 10 illegal, 20 does not communicate, 30 missing, 40 in the host,
+        50 memory protected, 60 protection setting, 70 program mode, 80 compatibility,
+        90 cannot buffer, A0 buffer full, B0 download, C0 buffer full"""),
+    # M 8-4
+    (USUAL_MEANINGS, 'F0 EXT STS ', """
+        01 illegal value, 02 fewer, 03 more, 04 not found, 05 badly formed, 06 usable,
+        07 wrong size, 08 changed, 09 too large, 0A plus word address, 0B privilege,
+        0C cannot be produced, 0D exists already, 0E executed, 0F histogram, 10 no access,
+        11 data type, 12 parameter, 13 deleted, 14 unknown reason, 15 conversion, 16 rack adapter,
+        17 type mismatch, 18 from the module, 19 label, 1A file is open, 1B program is owned,
+        1E is protected, 1F temporary, 22 rack fault, 23 timeout, 24 unknown error"""),
+    # M 8-5
+    (plc2.MEANINGS, '', """
+        20 verified, 30 attention, 40 between module and PLC, 50 window, 60 switch,
+        70 program mode, 80 inhibited"""),
+    (slc.MEANINGS, 'F0 EXT STS ', """
+        07 memory module, 0B denied, 0C not available, 0E executed, 12 bad parameter,
+        14 while it was, 19 label, 1A file is open, 1B program is owned"""),
+    # M 8-6..8-10
+    (plc3.MEANINGS, '', '30 shutdown, 40 backplane, 50 65535 words, 60 keyswitch, 70 program'),
+    (plc3.MEANINGS, 'F0 EXT STS ', """
+        04 symbol, 05 symbol, 06 file or word, 07 words of the transaction, 09 past the end,
+        0A 65535, 1E is protected""")])
+def test_meanings_of_the_manual(meanings: Meanings, of: str, codes: str) -> None:
+    for code, words in (entry.split(' ', 1) for entry in ' '.join(codes.split()).split(', ')):
+        number = int(code, 16)
+        error = failure(0xF0, bytes((number,)), meanings) if of else failure(number, b'', meanings)
+        assert str(error).startswith(f'STS {of}{code}: ')
+        assert words in str(error)

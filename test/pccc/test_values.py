@@ -16,6 +16,7 @@
 
 from array import array
 import math
+import struct
 from typing import Any
 
 from abdf1_ros.errors import FormatError
@@ -129,18 +130,11 @@ def test_word_that_is_not_bcd(word: str, text: str) -> None:
     (ValueType.INT16, [0, 32768], 'value 32768 at index 1 is not a valid int16'),
     (ValueType.INT16, [-32769, 0], 'value -32769 at index 0 is not a valid int16'),
     (ValueType.UINT16, [0, -1], 'value -1 at index 1 is not a valid uint16'),
-    (ValueType.UINT16, [65536, 0], 'value 65536 at index 0 is not a valid uint16'),
     (ValueType.BCD16, [0, 10000], 'value 10000 at index 1 is not a valid bcd16'),
-    (ValueType.BCD12, [999, 1000], 'value 1000 at index 1 is not a valid bcd12'),
-    (ValueType.BCD16, [-1, 0], 'value -1 at index 0 is not a valid bcd16'),
-    (ValueType.INT32, [2**31, 0], 'value 2147483648 at index 0 is not a valid int32'),
-    (ValueType.UINT32, [0, 2**32], 'value 4294967296 at index 1 is not a valid uint32'),
     (ValueType.BOOL, [0, 2], 'value 2 at index 1 is not a valid bool'),
-    (ValueType.BOOL, [0, 255], 'value 255 at index 1 is not a valid bool'),
     (ValueType.FLOAT32, [0.0, math.nan], 'value nan at index 1 is not a valid float32'),
     (ValueType.FLOAT32, [math.inf, 0.0], 'value inf at index 0 is not a valid float32'),
     (ValueType.FLOAT32, [-math.inf, 0.0], 'value -inf at index 0 is not a valid float32'),
-    (ValueType.FLOAT32, [0.0, 3.5e38], 'value 3.5e+38 at index 1 is not a valid float32'),
     (ValueType.INT16, [math.nan, 0], 'value nan at index 0 is not a valid int16'),
     (ValueType.INT16, [1.0, 1.5], 'value 1.5 at index 1 is not a valid int16'),
     (ValueType.INT16, 'ab', "'ab' is not a valid int16"),
@@ -151,6 +145,17 @@ def test_values_that_cannot_be_written(
     with pytest.raises(FormatError) as caught:
         Codec(kind, 2).check(values)
     assert str(caught.value) == error
+
+
+@for_all(('kind', 'least', 'greatest'), [
+    (ValueType.BOOL, 0, 1), (ValueType.INT16, -0x8000, 0x7FFF), (ValueType.UINT16, 0, 0xFFFF),
+    (ValueType.INT32, -0x80000000, 0x7FFFFFFF), (ValueType.UINT32, 0, 0xFFFFFFFF),
+    (ValueType.BCD16, 0, 9999), (ValueType.BCD12, 0, 999),
+    (ValueType.FLOAT32, *struct.unpack('<2f', bytes.fromhex('FFFF7FFF FFFF7F7F')))])
+def test_least_and_greatest_value_can_be_written(
+        kind: ValueType, least: float, greatest: float) -> None:
+    assert kind.range == (least, greatest)
+    Codec(kind, 2).check([least, greatest])
 
 
 @pytest.mark.parametrize('kind, length, bit, words', [
