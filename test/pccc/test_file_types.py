@@ -139,6 +139,8 @@ def values(table: Members) -> dict[str, int]:
     (members.COUNTER, 0, {'CU': 15, 'CD': 14, 'DN': 13, 'OV': 12, 'UN': 11, 'UA': 10}),
     (members.CONTROL, 0, {'EN': 15, 'EU': 14, 'DN': 13, 'EM': 12, 'ER': 11, 'UL': 10, 'IN': 9,
                           'FD': 8}),
+    (members.PLC3_TIMER, 0, {'EN': 15, 'TT': 14, 'DN': 13}),
+    (members.PLC3_COUNTER, 0, {'CU': 15, 'CD': 14, 'DN': 13, 'OV': 12, 'UF': 11}),
     (members.PLC5_SFC, 0, {'SA': 15, 'FS': 14, 'LS': 13, 'OV': 12, 'ER': 11, 'DN': 10}),
     (members.PLC5_BLOCK_TRANSFER, 0, {'EN': 15, 'ST': 14, 'DN': 13, 'ER': 12, 'CO': 11,
                                       'EW': 10, 'NR': 9, 'TO': 8, 'RW': 7}),

@@ -243,21 +243,24 @@ class Waits:
         pass
 
 
+class Queue(GuestQueue):
+
+    def __init__(self, put: Callable[[GuestCommand], None]) -> None:
+        self.put = put
+
+
+def guest_line(place: str, put: Callable[[GuestCommand], None],
+               clock: Callable[[], float] = line_time) -> GuestLine:
+    network = Network(share=place, parity='Even')
+    return GuestLine(*share_places(place), network, Queue(put), lambda: None, GuestListener(),
+                     lambda error: None, clock)
+
+
 def requested(*reads: tuple[float, bytes]) -> list[tuple[float, float]]:
     """Return when each command may have come at the earliest, and when it was here."""
-    network = Network(share='tcp:4501')
     port, found = Waits(*((0.1, b''),) * 5, *reads), list[tuple[float, float]]()
-
-    class Queue(GuestQueue):
-
-        def __init__(self) -> None:
-            pass
-
-        def put(self, command: GuestCommand) -> None:
-            found.append((round(command.requested - 100.5, 3), round(port.now - 100.5, 3)))
-
-    line = GuestLine(*share_places(network.share), network, Queue(), lambda: None, GuestListener(),
-                     lambda error: None, port.clock)
+    line = guest_line('tcp:4501', lambda command: found.append((
+        round(command.requested - 100.5, 3), round(port.now - 100.5, 3))), port.clock)
     with pytest.raises(OSError, match='the end'):
         line.link._serve(port)
     line.link.stop()
@@ -278,3 +281,12 @@ def test_command_in_a_flood_is_as_old_as_the_flood() -> None:
     noise = (0.1, bytes(READ_SIZE))
     (came, here), = requested((0.1, framed(1)), *(noise,) * 20, (0.1, framed(2)))[1:]
     assert came <= 0.1 and here >= 2.0
+
+
+@pytest.mark.parametrize(('place', 'bits', 'baud'), [
+    ('/dev/ttyS9?baud=1200&parity=None', 10, 1200), ('/dev/ttyS9', 11, 9600),
+    ('pty:/tmp/hmi', 0, 1), ('tcp:4501', 0, 1)])
+def test_characters_take_time_on_a_serial_device(place: str, bits: int, baud: int) -> None:
+    """A reply that leaves slowly is not asked for with ENQ before it can have come."""
+    timing = guest_line(place, lambda command: None)._machine.timing
+    assert timing.char_time == pytest.approx(bits / baud)
