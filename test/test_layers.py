@@ -14,6 +14,7 @@
 
 """The arrows between the layers point one way, as the imports tell."""
 
+import ast
 import subprocess
 import sys
 
@@ -209,3 +210,20 @@ def test_library_has_neither_ros_nor_files() -> None:
     unwanted = ('abdf1_ros.settings', 'abdf1_ros.plan', 'abdf1_ros.ros', 'abdf1_ros.cli.',
                 'abdf1_ros.simulator', 'abdf1_ros.sniffer', 'yaml', 'rclpy', 'std_msgs')
     assert [name for name in loaded if name.startswith(unwanted)] == []
+
+
+def test_dataclasses_have_slots_and_are_frozen_unless_a_field_is_assigned() -> None:
+    nodes = [node for module in MODULES for node in ast.walk(ast.parse(
+        (PACKAGE / module).read_text(encoding='utf-8')))]
+    assigned = {node.attr for node in nodes
+                if isinstance(node, ast.Attribute) and isinstance(node.ctx, ast.Store)}
+    for node in nodes:
+        for made in node.decorator_list if isinstance(node, ast.ClassDef) else ():
+            if ast.unparse(made).startswith('dataclass'):
+                assert isinstance(made, ast.Call), node.name
+                options = {option.arg: ast.literal_eval(option.value) for option in made.keywords}
+                assert options.pop('slots') and not options.pop('eq', False), node.name
+                assert all(options.values()), node.name
+                fields = {ast.unparse(part.target) for part in node.body
+                          if isinstance(part, ast.AnnAssign)}
+                assert options.get('frozen') or fields & assigned, node.name

@@ -273,8 +273,10 @@ def framed(tns: int) -> bytes:
 
 
 def test_command_is_as_old_as_it_can_be_where_this_process_stood_still() -> None:
-    assert requested((0.05, framed(1)), (3.0, framed(2)), (0.1, b''), (0.05, framed(3))) == [
-        (0.05, 0.05), (0.0, 3.05), (3.2, 3.2)]
+    idle = (0.1, b'')
+    assert requested((0.05, framed(1)), (3.0, framed(2)), idle, (0.05, framed(3)), idle,
+                     (0.29, framed(4)), idle, (0.31, framed(5))) == [
+        (0.05, 0.05), (0.0, 3.05), (3.2, 3.2), (3.59, 3.59), (3.59, 4.0)]
 
 
 def test_command_in_a_flood_is_as_old_as_the_flood() -> None:

@@ -31,7 +31,7 @@ from abdf1_ros.pccc.word_range.commands import (
 )
 
 
-@dataclass(slots=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False)
 class WordRangeDialect(Dialect):
     """
     Word range read and write; each packet of a transfer contains its offset.
