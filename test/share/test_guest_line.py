@@ -19,9 +19,11 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
+import select
 import socket
 import threading
 import time
+from types import SimpleNamespace
 
 from abdf1_ros.cli.conform import main as conform
 from abdf1_ros.client import Client
@@ -38,7 +40,7 @@ from abdf1_ros.driver.driver import Driver
 from abdf1_ros.driver.guests import GuestCommand, GuestListener, GuestQueue
 from abdf1_ros.driver.settings import DriverSettings
 from abdf1_ros.ports.clock import line_time
-from abdf1_ros.ports.descriptor import READ_SIZE
+from abdf1_ros.ports.descriptor import NoClient, READ_SIZE
 from abdf1_ros.ports.endpoints import PtyEndpoint
 from abdf1_ros.ports.link_thread import LinkThread
 from abdf1_ros.ports.opening import open_port
@@ -158,6 +160,7 @@ def test_two_guests_read_and_write_and_none_gets_the_other_ones_values(
         assert [line.guest.commands for line in line.guests] == [120, 120]
         assert [line.guest.unanswered for line in line.guests] == [0, 0]
         assert stored(line.plc, 'N10:1') == b'\x27\x00'
+    assert not (tmp_path / 'hmi').is_symlink()
 
 
 def test_place_is_a_peer_of_the_manual(
@@ -292,3 +295,15 @@ def test_characters_take_time_on_a_serial_device(place: str, bits: int, baud: in
     """A reply that leaves slowly is not asked for with ENQ before it can have come."""
     timing = guest_line(place, lambda command: None)._machine.timing
     assert timing.char_time == pytest.approx(bits / baud)
+
+
+def test_look_for_a_program_takes_no_time(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A wait would count into the age of a program's first command."""
+    waits: list[float] = []
+    monkeypatch.setattr(select, 'poll', lambda: SimpleNamespace(
+        register=lambda *of: None, poll=waits.append))
+    line = guest_line(f'tcp:{OWN_HOST}:{free_port()}', lambda command: None)
+    with pytest.raises(NoClient):
+        line._open()
+    line.stop()
+    assert waits == [0]
