@@ -252,21 +252,25 @@ class Queue(GuestQueue):
         self.put = put
 
 
-def guest_line(place: str, put: Callable[[GuestCommand], None],
+def guest_line(place: str, put: Callable[[GuestCommand], None] = lambda command: None,
+               wake: Callable[[], None] = lambda: None,
                clock: Callable[[], float] = line_time) -> GuestLine:
     network = Network(share=place, parity='Even')
-    return GuestLine(*share_places(place), network, Queue(put), lambda: None, GuestListener(),
+    return GuestLine(*share_places(place), network, Queue(put), wake, GuestListener(),
                      lambda error: None, clock)
 
 
 def requested(*reads: tuple[float, bytes]) -> list[tuple[float, float]]:
     """Return when each command may have come at the earliest, and when it was here."""
     port, found = Waits(*((0.1, b''),) * 5, *reads), list[tuple[float, float]]()
+    woken: list[int] = []
     line = guest_line('tcp:4501', lambda command: found.append((
-        round(command.requested - 100.5, 3), round(port.now - 100.5, 3))), port.clock)
+        round(command.requested - 100.5, 3), round(port.now - 100.5, 3))),
+        lambda: woken.append(len(found)), port.clock)
     with pytest.raises(OSError, match='the end'):
         line.link._serve(port)
     line.link.stop()
+    assert woken == [*range(1, len(found) + 1)]
     return found
 
 
@@ -293,7 +297,7 @@ def test_command_in_a_flood_is_as_old_as_the_flood() -> None:
     ('pty:/tmp/hmi', 0, 1), ('tcp:4501', 0, 1)])
 def test_characters_take_time_on_a_serial_device(place: str, bits: int, baud: int) -> None:
     """A reply that leaves slowly is not asked for with ENQ before it can have come."""
-    timing = guest_line(place, lambda command: None)._machine.timing
+    timing = guest_line(place)._machine.timing
     assert timing.char_time == pytest.approx(bits / baud)
 
 
@@ -302,7 +306,7 @@ def test_look_for_a_program_takes_no_time(monkeypatch: pytest.MonkeyPatch) -> No
     waits: list[float] = []
     monkeypatch.setattr(select, 'poll', lambda: SimpleNamespace(
         register=lambda *of: None, poll=waits.append))
-    line = guest_line(f'tcp:{OWN_HOST}:{free_port()}', lambda command: None)
+    line = guest_line(f'tcp:{OWN_HOST}:{free_port()}')
     with pytest.raises(NoClient):
         line._open()
     line.stop()
