@@ -55,7 +55,7 @@ from support.mappings import make_mapping
 from support.ptys import Pty
 
 # The rules themselves are those of a peer, played in test/conform; here that a place is one.
-QUICK = ('bad-check-refused', 'masked-write')
+QUICK = ('bad-check-refused', 'enquiry-after-ack', 'masked-write')
 
 
 class Shared:
@@ -254,10 +254,11 @@ class Queue(GuestQueue):
 
 def guest_line(place: str, put: Callable[[GuestCommand], None] = lambda command: None,
                wake: Callable[[], None] = lambda: None,
-               clock: Callable[[], float] = line_time) -> GuestLine:
+               clock: Callable[[], float] = line_time,
+               fault: Callable[[Exception], None] = lambda error: None) -> GuestLine:
     network = Network(share=place, parity='Even')
-    return GuestLine(*share_places(place), network, Queue(put), wake, GuestListener(),
-                     lambda error: None, clock)
+    return GuestLine(*share_places(place), network, Queue(put), wake, GuestListener(), fault,
+                     clock)
 
 
 def requested(*reads: tuple[float, bytes]) -> list[tuple[float, float]]:
@@ -290,6 +291,14 @@ def test_command_in_a_flood_is_as_old_as_the_flood() -> None:
     noise = (0.1, bytes(READ_SIZE))
     (came, here), = requested((0.1, framed(1)), *(noise,) * 20, (0.1, framed(2)))[1:]
     assert came <= 0.1 and here >= 2.0
+
+
+def test_internal_error_is_told() -> None:
+    faults: list[Exception] = []
+    line = guest_line('tcp:4501', lambda command: 1 / 0, fault=faults.append)
+    line._endpoint = SimpleNamespace(open=lambda: Waits((0.0, framed(1))), close=lambda: None)
+    line.link.run()
+    assert [*map(type, faults)] == 3 * [ZeroDivisionError]
 
 
 @pytest.mark.parametrize(('place', 'bits', 'baud'), [
