@@ -164,7 +164,11 @@ def test_files_of_a_recorded_micrologix_1400() -> None:
 
 
 def test_files_of_an_emulated_slc() -> None:
-    files = carried_out(steps_of(Processor.SLC_5_03), served(*ALL_SLC))
+    answer = served(*ALL_SLC)
+    # Type 1 at byte 69, the length after it, first file at 79: so pycomm3 reads that of a 5/05.
+    assert answer(bytes.fromhex('A1 0E 00 01 22')).data == bytes.fromhex(
+        '00 01 21 01 00 00 00 00 00 00 00 82 04 00')
+    files = carried_out(steps_of(Processor.SLC_5_03), answer)
     assert {str(entry): entry.elements for entry in files} == {
         'O0': 2, 'I1': 5, 'S2': 33, 'N7': 90, 'ST20': 2}
 

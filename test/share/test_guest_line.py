@@ -306,12 +306,14 @@ def test_internal_error_is_told() -> None:
     ('pty:/tmp/hmi', 0, 1), ('tcp:4501', 0, 1)])
 def test_characters_take_time_on_a_serial_device(place: str, bits: int, baud: int) -> None:
     """A reply that leaves slowly is not asked for with ENQ before it can have come."""
-    timing = guest_line(place)._machine.timing
-    assert timing.char_time == pytest.approx(bits / baud)
+    line = guest_line(place)
+    line.stop()
+    assert line._machine.timing.char_time == pytest.approx(bits / baud)
 
 
-def test_look_for_a_program_takes_no_time(monkeypatch: pytest.MonkeyPatch) -> None:
-    """A wait would count into the age of a program's first command."""
+def test_looks_for_a_program_are_frequent_and_without_a_wait(
+        monkeypatch: pytest.MonkeyPatch) -> None:
+    """The time between them counts into the age of a program's first command."""
     waits: list[float] = []
     monkeypatch.setattr(select, 'poll', lambda: SimpleNamespace(
         register=lambda *of: None, poll=waits.append))
@@ -319,4 +321,4 @@ def test_look_for_a_program_takes_no_time(monkeypatch: pytest.MonkeyPatch) -> No
     with pytest.raises(NoClient):
         line._open()
     line.stop()
-    assert waits == [0]
+    assert (waits, line.link._retry_period) == ([0], 0.1)
