@@ -126,7 +126,8 @@ def test_bits_counted_through_a_file_have_limits_of_their_own(
     ('b/17', SLC, 'B3:1/1'), ('i:17/2', PLC5, 'I:017/02'), ('o:3', SLC, 'O:3.0'),
     ('I:3/3', SLC, 'I:3.0/3'), ('T4:1.2', SLC, 'T4:1.ACC'), ('T4:1/13', SLC, 'T4:1/DN'),
     ('T4:1.0/2', SLC, 'T4:1.0/2'), ('T4:1/13', PLC5, 'T4:1/DN'), ('N7/20', SLC, 'N7:1/4'),
-    ('A10/20', PLC5, 'A10:1/4'), ('T4:1.con', SLC, 'T4:1'), ('T4:1.1/3', SLC, 'T4:1.1/3'),
+    ('A10/20', PLC5, 'A10:1/4'), ('D10/20', SLC, 'D10:1/4'), ('T4:1.con', SLC, 'T4:1'),
+    ('T4:1.1/3', SLC, 'T4:1.1/3'),
     ('#N7;3', PLC5, 'N7:3'), ('S:1', PLC5, 'S2:1')])
 def test_str_is_the_plain_form(text: str, family: PlcType, shown: str) -> None:
     assert str(parse_address(text, family)) == shown
