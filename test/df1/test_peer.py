@@ -240,6 +240,24 @@ def test_repetition_comes_within_the_time_of_the_retries(timeout: float, enq_ret
         assert len(peer.served) == served
 
 
+@pytest.mark.parametrize('timeout', [0.1, 2.0])
+@pytest.mark.parametrize('is_counted', [True, False])
+def test_repetition_of_a_command_whose_reply_was_acknowledged(timeout: float,
+                                                              is_counted: bool) -> None:
+    """AdvancedHMI repeats commands 0.95 to 1.06 s later; other programs always send TNS 0."""
+    seconds = max(1.0, timeout) + 0.25 * is_counted
+    for pause, executed in ((seconds - 0.01, 1), (seconds + 0.01, 2)):
+        peer = bench(timeout=timeout)
+        if is_counted:
+            peer.hear_packet(later(THEIRS, -1))
+            peer.hear(ACK)
+        peer.hear_packet(THEIRS)
+        peer.hear(ACK)
+        peer.wait(pause)
+        assert peer.hear_packet(THEIRS).startswith(ACK)
+        assert peer.served.count(THEIRS) == executed
+
+
 def test_error_replies_are_counted() -> None:
     peer, _ = acknowledged(serve=lambda command: command.reply(b'\x06', 0xF0))
     assert peer.hear_packet(THEIRS) == ACK + peer.frame(THEIRS.reply(b'\x06', 0xF0))
