@@ -28,13 +28,16 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, ExitStack, suppress
 from dataclasses import dataclass
 import json
+import os
 from pathlib import Path
+import select
 import socket
 import subprocess
 import sys
 import tempfile
 import threading
 import time
+import tty
 from typing import Any
 
 _HERE = Path(__file__).resolve().parent
@@ -58,11 +61,12 @@ PATIENCE = 60.0  # s for an answer of a player
 
 
 class Player:
-    """A program of players/, as a process under a Python that has the product."""
+    """A program of players/, as a process under an interpreter that has the product."""
 
-    def __init__(self, python: str, program: str, *args: str) -> None:
+    def __init__(self, interpreter: str, program: str, *args: str) -> None:
+        name = program if '.' in program else f'{program}.py'
         self._process = subprocess.Popen(
-            [python, '-u', str(_HERE / 'players' / f'{program}.py'), *args], text=True,
+            [interpreter, str(_HERE / 'players' / name), *args], text=True,
             stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.PIPE)
         self._said: list[str] = []
         threading.Thread(target=self._listen, daemon=True).start()
@@ -417,7 +421,48 @@ def abdf1_runs(options: argparse.Namespace) -> list[Run]:
             ('N7:30', 'N7:40/3', 'F8:6', 'S:10'))]
 
 
-def ethernet_client(program: str, python: str, *args: str
+@contextmanager
+def device_server(device: str) -> Iterator[int]:
+    """Put a port behind a TCP port, as a raw device server does; give the number of that."""
+    descriptor = os.open(device, os.O_RDWR | os.O_NOCTTY)
+    tty.setraw(descriptor)
+    ended = threading.Event()
+
+    def relay(listening: socket.socket) -> None:
+        connection, _ = listening.accept()
+        with connection:
+            while not ended.is_set():
+                ready, _, _ = select.select([descriptor, connection], [], [], 0.1)
+                if descriptor in ready:
+                    connection.sendall(os.read(descriptor, 4096))
+                if connection in ready:
+                    data = connection.recv(4096)
+                    if not data:
+                        return
+                    os.write(descriptor, data)
+
+    with socket.create_server(('127.0.0.1', 0)) as listening:
+        thread = threading.Thread(target=relay, args=(listening,), daemon=True)
+        thread.start()
+        yield listening.getsockname()[1]
+        ended.set()
+        thread.join(1)
+    os.close(descriptor)
+
+
+def advancedhmi_runs(options: argparse.Namespace) -> list[Run]:
+    """Return the runs with AdvancedHMI's driver for DF1 over TCP, for an SLC and a PLC-5."""
+    def start(setup: Setup, port: str, stack: ExitStack) -> Partner:
+        number = stack.enter_context(device_server(port))
+        return Player(options.python, 'advancedhmi_client', options.assembly, str(number),
+                      setup.check.value, setup.family.value)
+
+    return [Run('advancedhmi', family, check, ours, start)
+            for family in (PlcType.SLC, PlcType.PLC5) for ours in ('plc', 'node')
+            for check in Checksum]
+
+
+def ethernet_client(program: str, interpreter: str, *args: str
                     ) -> Callable[[Setup, str, ExitStack], Partner]:
     """Return what starts an EtherNet/IP client with the shim before the line."""
     def start(setup: Setup, port: str, stack: ExitStack) -> Partner:
@@ -428,7 +473,7 @@ def ethernet_client(program: str, python: str, *args: str
         threading.Thread(target=serve, daemon=True, args=(
             listening, lambda command: line.execute(command, 0, station))).start()
         name = f'127.0.0.1:{listening.getsockname()[1]}'
-        return Player(python, program, *(name if arg == 'HOST' else arg for arg in args))
+        return Player(interpreter, program, *(name if arg == 'HOST' else arg for arg in args))
 
     return start
 
@@ -440,6 +485,15 @@ def pycomm3_runs(options: argparse.Namespace) -> list[Run]:
     rows = tuple(case.address for case in CASES if '.' not in case.address)
     return [Run('pycomm3', PlcType.SLC, check, ours, start, rows if ours == 'node' else ())
             for ours in ('plc', 'node') for check in Checksum]
+
+
+def node_runs(options: argparse.Namespace) -> list[Run]:
+    """Return the runs with node-drivers, for a PLC-5, and nodepccc, for an SLC."""
+    return [
+        Run(product.replace('-', '_'), family, check, ours, ethernet_client(
+            'node_client.mjs', options.node, options.modules, product, 'HOST'))
+        for product, family in (('node-drivers', PlcType.PLC5), ('nodepccc', PlcType.SLC))
+        for ours in ('plc', 'node') for check in Checksum]
 
 
 def libplctag_runs(options: argparse.Namespace) -> list[Run]:
@@ -499,7 +553,14 @@ def main() -> int:
     entry.add_argument('--library', required=True, help='libAbDf1.so')
     entry.add_argument('--check', choices=[check.value for check in Checksum], default='CRC',
                        help='the check that the library was made for')
+    entry = products.add_parser('advancedhmi')
+    entry.set_defaults(runs=advancedhmi_runs)
+    entry.add_argument('--assembly', required=True, help='MfgControl.AdvancedHMI.Drivers.dll')
     products.add_parser('pycomm3').set_defaults(runs=pycomm3_runs)
+    entry = products.add_parser('node')
+    entry.set_defaults(runs=node_runs)
+    entry.add_argument('--node', default='node', help='Node.js')
+    entry.add_argument('--modules', required=True, help='node_modules with both products')
     entry = products.add_parser('libplctag')
     entry.set_defaults(runs=libplctag_runs)
     entry.add_argument('--library', required=True, help='libplctag.so')

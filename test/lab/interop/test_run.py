@@ -22,6 +22,7 @@ from importlib.util import module_from_spec, spec_from_file_location
 import os
 from pathlib import Path
 import pty
+import socket
 import sys
 import time
 from types import ModuleType
@@ -161,3 +162,15 @@ def test_players_are_programs_that_need_nothing_of_this_package(path: Path) -> N
         for name in ([node.module or ''] if isinstance(node, ast.ImportFrom) else
                      [alias.name for alias in node.names] if isinstance(node, ast.Import) else [])}
     assert 'abdf1_ros' not in imported
+
+
+def test_a_port_behind_tcp_passes_bytes_both_ways(run: ModuleType) -> None:
+    ours, theirs = pty.openpty()
+    with run.device_server(os.ttyname(theirs)) as number, \
+            socket.create_connection(('127.0.0.1', number), timeout=5) as connection:
+        connection.sendall(b'\x10\x02\x03\x04\r')
+        assert os.read(ours, 5) == b'\x10\x02\x03\x04\r'
+        os.write(ours, b'\x10\x06\x11\n')
+        assert connection.recv(4) == b'\x10\x06\x11\n'
+    for descriptor in (ours, theirs):
+        os.close(descriptor)
