@@ -52,7 +52,7 @@ _BYTES = re.compile(rf'(?:^|(?<=[\s,\[({{"\'])){_BYTE}(?:[\s,;-]+{_BYTE})*{_AFTE
 _GAP = re.compile(r'\s{2,}|\t')
 _REST = re.compile(r'[\s,;\])}"\']*')
 # A line with a direction but without bytes is refused if it contains this.
-_LEFT_OVER = re.compile(r'(?<![\w=(.])[0-9A-Fa-f]{1,4}(?![\w=)]| bytes?\b)')
+_LEFT_OVER = re.compile(r'(?<![\w=(.])[0-9A-Fa-f]{1,4}(?![\w=)]| bytes?\b| *\|)')
 _LITERAL = re.compile(r'\bb(?P<sign>[\'"])(?:\\.|(?!(?P=sign)).)*(?P=sign)')
 
 

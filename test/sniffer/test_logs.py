@@ -115,8 +115,15 @@ def two_ports(said: list[tuple[Direction, bytes]]) -> Iterator[str]:
             yield f'{row.hex(" ").upper():<47}       {characters(row)}'
 
 
-WITH_WAYS = [terminal, docklight, monitor, driver, spy, python, relay]
-WITH_TIMES = [docklight, monitor, driver, spy, relay, two_ports, analyser]
+def modem(said: list[tuple[Direction, bytes]]) -> Iterator[str]:
+    for number, (way, data) in enumerate(said):
+        yield f'13:33:33.{number:03} {word(way, "tx rx;i"):<4}   {len(data):>3} | S00'
+        text = data.hex().upper()
+        yield ' '.join(text[at:at + 4] for at in range(0, len(text), 4)) + ' '
+
+
+WITH_WAYS = [terminal, docklight, monitor, driver, spy, python, relay, modem]
+WITH_TIMES = [docklight, monitor, driver, spy, relay, two_ports, analyser, modem]
 FORMS = [*WITH_WAYS, array, dashes, analyser, two_ports]
 
 
