@@ -159,6 +159,11 @@ class ActiveStationList:
         """Return the record of a station (0-254), whether it is in the list or not."""
         return self.records[number]
 
+    @property
+    def all_reply_in_time(self) -> bool:
+        """Tell whether no station is silent."""
+        return all(station.replies_in_time for station in self.records.values())
+
     def via(self, number: int) -> int:
         """Return the station of this line that is polled for a station: its gateway, or itself."""
         return self.routes.get(number, number)

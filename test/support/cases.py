@@ -19,7 +19,9 @@ import functools
 import inspect
 from typing import Any
 
+from _pytest.mark import ParameterSet
 from hypothesis import strategies as st
+import pytest
 
 ANY_CHARACTER = st.characters(exclude_categories=())
 """Without a class left out hypothesis needs no table of all characters, which takes it seconds."""
@@ -53,6 +55,13 @@ def for_all(names: str | Sequence[str], items: Iterable[Any],
         return run
 
     return decorate
+
+
+def long_unless(is_quick: Callable[..., bool], cases: Iterable[tuple[Any, ...]],
+                ) -> list[ParameterSet]:
+    """Return cases for ``parametrize``; only "make long" runs those that are not quick."""
+    return [pytest.param(*case, marks=() if is_quick(*case) else pytest.mark.long)
+            for case in cases]
 
 
 def _shown(case: dict[str, Any]) -> str:

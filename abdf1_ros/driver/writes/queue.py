@@ -186,6 +186,8 @@ class WriteQueue:
 
     def expire(self, now: float) -> None:
         """End the writes and messages that must not be sent any more."""
+        if now < self.next_expiry and self._stations.all_reply_in_time:
+            return
         self.next_expiry = math.inf
         for write in list(self.waiting):
             if reason := self._reject_reason(write, now):
