@@ -27,6 +27,7 @@ from bisect import bisect_right
 from collections import defaultdict
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 import math
 
 from abdf1_ros.pccc.address import Address, Area
@@ -125,7 +126,7 @@ class Planner:
         self._refused: defaultdict[StationArea, set[Span]] = defaultdict(set)
         # Words per packet, for each block that was refused with longer packets.
         self._limits: dict[tuple[StationArea, Span], int] = {}
-        self._costs: dict[tuple[Dialect, FileType], list[float]] = {}
+        self._costs: dict[tuple[Dialect, FileType], Sequence[float]] = {}
 
     def plan(self, mappings: Iterable[Mapping]) -> list[Block]:
         """Return the blocks that serve every mapping that reads, and read heartbeats back."""
@@ -223,20 +224,9 @@ class Planner:
         """Return the cost model of the area of ``example``."""
         key = self.dialect(example), example.address.file_type
         if key not in self._costs:
-            self._costs[key] = self._costs_of(example)
+            self._costs[key] = _costs_of(self.line_model, example.dialect,
+                                         example.address.at_offset(0), self._max_words(example))
         return CostModel(self._costs[key], _per_element(example), refused)
-
-    def _costs_of(self, example: Mapping) -> list[float]:
-        """Return the seconds that a read takes, by its number of words."""
-        start, per_element = example.address.at_offset(0), _per_element(example)
-        costs = [0.0] * (self._max_words(example) + 1)
-        for words in {1, *range(per_element, len(costs), per_element)}:
-            costs[words] = self.line_model.read_time(example.dialect, ReadRequest(start, words))
-        value = next((place for place in map(start.at_offset, range(per_element))
-                      if place.is_value(2)), None)
-        if value is not None:  # a float32 within a structure is read by itself
-            costs[2] = self.line_model.read_time(example.dialect, ReadRequest(value, 2))
-        return costs
 
     def _block(self, mappings: Sequence[Mapping], span: Span) -> Block:
         first = mappings[0]
@@ -251,6 +241,19 @@ class Planner:
                         for request in requests)
         period = min(map(self._period, mappings))
         return Block(first.station, requests, tuple(mappings), period, line_time)
+
+
+@lru_cache(maxsize=256)
+def _costs_of(line: LineModel, dialect: Dialect, start: Address, most: int) -> Sequence[float]:
+    """Return the seconds that a read takes, by its number of words, ``most`` at most."""
+    per_element, costs = start.layout.words, [0.0] * (most + 1)
+    for words in {1, *range(per_element, len(costs), per_element)}:
+        costs[words] = line.read_time(dialect, ReadRequest(start, words))
+    value = next((place for place in map(start.at_offset, range(per_element))
+                  if place.is_value(2)), None)
+    if value is not None:  # a float32 within a structure is read by itself
+        costs[2] = line.read_time(dialect, ReadRequest(value, 2))
+    return costs
 
 
 def _station_area(mapping: Mapping) -> StationArea:
