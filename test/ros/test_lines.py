@@ -338,12 +338,14 @@ def test_line_with_faulty_files_is_told_and_the_others_run(plant: Plant) -> None
     assert line_status(plant, OK)['running'] == '3'
 
 
-def test_line_whose_name_ros_refuses_is_told_and_the_others_run(plant: Plant) -> None:
+def test_line_whose_name_ros_refuses_is_told_and_the_others_run(
+        plant: Plant, recwarn: pytest.WarningsRecorder) -> None:
     plant.plcs['b-1'] = plant.plcs.pop('b')
     plant.start(reads='ac')
     values = line_status(plant, ERROR)
     assert values['running'] == '2'
     assert 'must not contain characters other than alphanumerics' in values['/hall/b-1']
+    assert [warning for warning in recwarn if 'rosout' in str(warning.message)] == []
 
 
 def test_faulty_line_ends_all_where_that_is_asked_for(plant: Plant) -> None:

@@ -21,6 +21,7 @@ the line when the first client has gone. Nothing here shares code with the packa
 
 from __future__ import annotations
 
+from contextlib import suppress
 import socket
 import threading
 import time
@@ -39,7 +40,8 @@ class QueueingServer:
         self._lock = threading.Lock()
         self._client: socket.socket | None = None
         self.url = f'socket://127.0.0.1:{self._listening.getsockname()[1]}'
-        threading.Thread(target=self._serve, daemon=True).start()
+        self._thread = threading.Thread(target=self._serve, daemon=True)
+        self._thread.start()
 
     def _serve(self) -> None:
         while True:
@@ -47,18 +49,11 @@ class QueueingServer:
                 client, _ = self._listening.accept()
             except OSError:
                 return
-            with client:
+            with client, suppress(OSError):  # it may go at any time
                 self._client = client
-                while data := self._received(client):
+                while data := client.recv(4096):
                     with self._lock:
                         self._pass_on(data)
-
-    @staticmethod
-    def _received(client: socket.socket) -> bytes:
-        try:
-            return client.recv(4096)
-        except OSError:
-            return b''
 
     def _pass_on(self, data: bytes) -> None:
         if self._waits:
@@ -87,6 +82,9 @@ class QueueingServer:
 
     def close(self) -> None:
         """End."""
+        for end in (self._listening, self._client):
+            if end is not None:
+                with suppress(OSError):  # it has gone
+                    end.shutdown(socket.SHUT_RDWR)
+        self._thread.join(5.0)
         self._listening.close()
-        if self._client is not None:
-            self._client.close()

@@ -58,6 +58,7 @@ from abdf1_ros.text import printable
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from rclpy.callback_groups import MutuallyExclusiveCallbackGroup
 from rclpy.duration import Duration
+from rclpy.validate_node_name import validate_node_name
 from std_msgs.msg import UInt16MultiArray
 from std_srvs.srv import SetBool, Trigger
 
@@ -82,6 +83,7 @@ class BridgeNode(AnsweringNode):
     def __init__(self, name: str = NODE_NAME, *, graph: Graph | None = None,
                  port_owners: PortOwners | None = None,
                  arguments: Arguments = NO_ARGUMENTS, **options: Unpack[NodeOptions]) -> None:
+        validate_node_name(name)  # if rclpy refuses the name, it also warns about its own cleanup
         options['automatically_declare_parameters_from_overrides'] = True
         super().__init__(name, **options)
         self._is_stuck = self._is_ending = False
