@@ -253,7 +253,8 @@ image: ## Build the image of deploy/Dockerfile, where there is a docker
 
 .PHONY: clean
 clean: ## Remove what build, lint and test have made
-	rm -rf build install log dist *.egg-info .coverage .hypothesis .mypy_cache .pytest_cache .ruff_cache
+	rm -rf build install log dist *.egg-info .coverage .hypothesis .mypy_cache .pytest_cache .ruff_cache \
+	    $(COMPILED)
 	find abdf1_ros launch test -name __pycache__ -type d -prune -exec rm -rf {} +
 
 .PHONY: distclean

@@ -35,6 +35,7 @@ NEEDS_NAMESPACES = pytest.mark.skipif(not has_namespaces(), reason='namespaces n
 
 
 @NEEDS_NAMESPACES
+@pytest.mark.long  # test/ros/test_standby.py has both on one host
 def test_spare_takes_over_the_lines_of_a_host_that_dies() -> None:
     done = subprocess.run(
         [sys.executable, str(PROGRAM), '--hosts', '2', '--lines', '1', '--faults', '1',

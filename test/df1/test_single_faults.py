@@ -29,15 +29,14 @@ CASES = dict.fromkeys(MODES, 5) | {'Standard': 1, 'Slave': 1}
 def test_no_fault_of_one_or_two_bytes_does_harm(mode: str) -> None:
     seed = secrets.randbelow(1 << 31)
     random = Random(seed)
-    for check in CHECKS:
-        for kind in KINDS:
-            tally = Tally(mode, check, kind)
-            count = max(1, CASES[mode] // (5 if kind == 'two packets' else 1))
-            for fault in random.sample(tally.all_singles(), count):
-                tally.carry_out(fault)
-            for _ in range(count):
-                tally.carry_out(*tally.pair(random))
-            assert not tally.wrong, f'seed {seed}, {tally}'
+    for kind in KINDS:
+        tally = Tally(mode, random.choice(CHECKS), kind)
+        count = max(1, CASES[mode] // (5 if kind == 'two packets' else 1))
+        for fault in random.sample(tally.all_singles(), count):
+            tally.carry_out(fault)
+        for _ in range(count):
+            tally.carry_out(*tally.pair(random))
+        assert not tally.wrong, f'seed {seed}, {tally}'
 
 
 def test_slave_that_executes_repetitions_is_found(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -44,9 +44,12 @@ def bench_of(device: Device, mode: str, check: str, *rows: Mapping
     return bench, plc
 
 
-@pytest.mark.parametrize(('device', 'mode'), [
-    (device, mode) for device in DEVICES for mode in device.modes], ids=str)
-@pytest.mark.parametrize('check', ['CRC', 'BCC'])
+@pytest.mark.parametrize(('device', 'mode', 'check'), [
+    pytest.param(device, mode, check, id=f'{device}-{mode}-{check}',
+                 marks=() if is_quick else pytest.mark.long)
+    for number, (device, mode) in enumerate(
+        (device, mode) for device in DEVICES for mode in device.modes)
+    for check, is_quick in (('CRC', number % 2), ('BCC', not number % 2))])
 def test_values_are_right_and_writes_are_told_as_they_ended(
         device: Device, mode: str, check: str) -> None:
     words = make_mapping('N7:0', plc='SLC', length=3)

@@ -33,7 +33,7 @@ from support.multidrop import Slave
 
 LIVING, STRANGERS = 254, (252, 253)
 PROBES = 10
-SLOTS = 16
+SLOTS = 8
 
 
 class Bench(DriverBench):

@@ -20,6 +20,7 @@ of the rules in docs/heartbeats.md.
 """
 
 from collections.abc import Callable
+from itertools import product
 from random import Random
 
 from abdf1_ros.driver.settings import DriverSettings
@@ -28,6 +29,7 @@ from abdf1_ros.settings.heartbeats import Fallback
 from abdf1_ros.settings.network import Network
 from abdf1_ros.simulator.ladder import Ladder, Lamp
 import pytest
+from support.cases import long_unless
 from support.driver_bench import DriverBench, store, stored
 from support.mappings import make_mapping
 
@@ -87,9 +89,10 @@ def _restart(cell: Cell) -> None:
     cell.bench.restart()
 
 
-@pytest.mark.parametrize('mode', MODES)
-@pytest.mark.parametrize('happens', [_open_again, _restart])
-@pytest.mark.parametrize('scan_time', [0.06, 0.25])
+@pytest.mark.parametrize('mode, happens, scan_time', long_unless(
+    lambda mode, happens, scan_time:
+        [*MODES].index(mode) % 2 == (happens is _restart) ^ (scan_time > 0.1),
+    product(MODES, (_open_again, _restart), (0.06, 0.25))))
 def test_rule_2_every_plc_sees_a_restart_that_is_quicker_than_its_timer(
         mode: str, happens: Callable[[Cell], None], scan_time: float) -> None:
     cell, dice = Cell(mode, scan_time), Random(1)
@@ -102,8 +105,8 @@ def test_rule_2_every_plc_sees_a_restart_that_is_quicker_than_its_timer(
         assert not cell.ladder.is_on(Lamp.IN_CONTROL)
 
 
-@pytest.mark.parametrize('mode', MODES)
-@pytest.mark.parametrize('stop', [0.6, 0.9])
+@pytest.mark.parametrize('mode, stop', long_unless(
+    lambda mode, stop: [*MODES].index(mode) % 2 == (stop > 0.7), product(MODES, (0.6, 0.9))))
 def test_rule_8_commands_of_a_short_download_do_not_stay_where_fallbacks_stand(
         mode: str, stop: float) -> None:
     cell = Cell(mode, 0.06)

@@ -14,12 +14,11 @@
 
 """Each reply that begins in time is heard to its end, on a healthy line of any speed."""
 
-from collections.abc import Iterator
 from functools import partial
 from itertools import product
 
 from abdf1_ros.settings.network import Network
-from support.cases import for_all
+import pytest
 from support.driver_bench import DriverBench
 from support.mappings import make_mapping
 
@@ -30,13 +29,19 @@ _LIMIT = 30.0  # s of line time
 _REPLY_RECEIVED = 2523
 
 
-def lines() -> Iterator[tuple[str, int, int, int]]:
-    """Return mode, Baud, Timeout and Cmd_Timeout of each line."""
-    return product(MODES, BAUDS, (100, 300), (500, 1000))
+TIMES = [*product((100, 300), (500, 1000))]  # Timeout and Cmd_Timeout
 
 
-@for_all(('mode', 'baud', 'timeout', 'cmd_timeout'), [*lines()])
-def test_long_replies_are_heard(mode: str, baud: int, timeout: int, cmd_timeout: int) -> None:
+# Each mode and each speed meets all of these times in the first quarter of all lines.
+@pytest.mark.parametrize('quarter', [
+    0, *(pytest.param(number, marks=pytest.mark.long) for number in range(1, 4))])
+@pytest.mark.parametrize('mode', MODES)
+def test_long_replies_are_heard(mode: str, quarter: int) -> None:
+    for at, baud in enumerate(BAUDS, [*MODES].index(mode) + quarter):
+        hear_long_replies(mode, baud, *TIMES[at % 4])
+
+
+def hear_long_replies(mode: str, baud: int, timeout: int, cmd_timeout: int) -> None:
     for words in (10, 25, 40, 60, 80, 117):
         row = make_mapping('N7:0', length=words)
         bench = DriverBench([row], chunk=1, network=Network(

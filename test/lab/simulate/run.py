@@ -53,10 +53,16 @@ RECOVERY = 40.0  # s at most; an inactive station is probed every few seconds
 
 
 class Story:
-    """What happens to one plant: so many ``turns`` of trouble and calm, and the end."""
+    """
+    What happens to one plant: so many ``turns`` of trouble and calm, and the end.
 
-    def __init__(self, seed: int, mode: str = '', turns: int = TURNS) -> None:
+    Before it, if ``is_steady``, topics are published at a rate on a line of their own.
+    """
+
+    def __init__(self, seed: int, mode: str = '', turns: int = TURNS, *,
+                 is_steady: bool = True) -> None:
         self.dice = Random(seed)
+        self._is_steady = is_steady
         self._turns = turns
         self.world = World(Plant.drawn(self.dice, mode), seed)
         self.judge = Judge(self.world)
@@ -67,8 +73,7 @@ class Story:
 
     def run(self) -> None:
         """Let it happen; raise Broken where a rule does not hold."""
-        steady = Steady(self.world.seed)
-        if text := steady.fault():
+        if self._is_steady and (text := Steady(self.world.seed).fault()):
             raise Broken('Steady', text, self.world)
         self.wait(2.0)
         for _ in range(self._turns):
@@ -409,11 +414,11 @@ class Totals:
 
 
 def simulate(seed: int, is_enough: Callable[[Totals], bool], mode: str = '',
-             turns: int = TURNS) -> Totals:
+             turns: int = TURNS, *, is_steady: bool = True) -> Totals:
     """Simulate plants of any or one mode, ``seed`` first and then the next; raise Broken."""
     totals = Totals()
     while not is_enough(totals):
-        story = Story(seed + totals.plants, mode, turns)
+        story = Story(seed + totals.plants, mode, turns, is_steady=is_steady)
         story.run()
         totals.add(story)
     return totals

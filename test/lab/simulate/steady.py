@@ -21,11 +21,13 @@ of a topic the words hold it, each message has one result, and that is true.
 
 from __future__ import annotations
 
+from bisect import bisect_left, bisect_right
 from collections import defaultdict
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from functools import partial
 from itertools import groupby, takewhile
+from operator import itemgetter
 from random import Random
 
 from abdf1_ros.df1.packet import Packet
@@ -73,6 +75,13 @@ class Said:
     when: float
     message: Message
     results: list[WriteResult] = field(default_factory=list)
+
+
+def within(entries: list[tuple[float, bytes]], since: float, until: float,
+           ) -> list[tuple[float, bytes]]:
+    """Return what was from one time to another, of entries in their order."""
+    return entries[bisect_left(entries, since, key=itemgetter(0)):
+                   bisect_right(entries, until, key=itemgetter(0))]
 
 
 class Steady(DriverBench):
@@ -192,13 +201,12 @@ class Steady(DriverBench):
             if len(each.results) != 1:
                 return f'message {number} of {name} has {len(each.results)} results'
             result, = each.results
-            ended = each.when + result.latency
-            was_held = any(each.when <= when <= ended and words == self._wanted(name, each.message)
-                           for when, words in self.held[name])
-            if result.outcome is Outcome.WRITTEN and not was_held:
+            ended, wanted = each.when + result.latency, self._wanted(name, each.message)
+            held = within(self.held[name], each.when, ended)
+            if result.outcome is Outcome.WRITTEN and wanted not in [words for _, words in held]:
                 return f'{name}: {result} at {ended:.3f} s, but nothing was executed'
             if result.outcome is Outcome.STANDS:
-                if text := self._why_unproven(name, self._wanted(name, each.message), ended):
+                if text := self._why_unproven(name, wanted, ended):
                     return f'{name}: {result} at {ended:.3f} s, but {text}'
                 continue
             may_give_way = not self._is_light or self._rows[name].address.bit is None
@@ -211,13 +219,14 @@ class Steady(DriverBench):
         """Return why a value that is told to stand had to be written (27)."""
         row = self._rows[name]
         again = (row.write_again or 0) / 1000
-        held = [entry for entry in reversed(self.held[name]) if entry[0] <= now]
-        stood = [when for when, words in takewhile(lambda entry: entry[1] == wanted, held)]
+        held = within(self.held[name], -1.0, now)
+        stood = [when for when, words in takewhile(lambda entry: entry[1] == wanted, held[::-1])]
         if not stood:
             return 'the PLC holds another value'
         patience = row.fallback.after / 1000 if row.fallback else PATIENCE
         since = max(stood[-1], now - min(again, patience))
-        if not any(since < when <= now and words == wanted for when, words in self.shown[name]):
+        if not any(since < when and words == wanted
+                   for when, words in within(self.shown[name], since, now)):
             return f'no read has shown it since {since:.3f} s'
         confirmed = max((each.when + result.latency for each in self.said[name]
                          for result in each.results if result.outcome is Outcome.WRITTEN
