@@ -283,7 +283,8 @@ class _Parser(argparse.ArgumentParser):
 
     def error(self, message: str) -> NoReturn:
         """End with status 2."""
-        self.exit(2, f'{self.prog}: error: {message}\n"{self.prog} --help" lists the arguments\n')
+        self.exit(2, f'{self.prog}: error: {printable(message)}\n'
+                     f'"{self.prog} --help" lists the arguments\n')
 
 
 def is_port(word: str) -> bool:

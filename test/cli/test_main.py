@@ -185,6 +185,8 @@ def test_signal_where_nothing_is_under_way_ends_quietly(
 
 @pytest.mark.parametrize(('given', 'status', 'told'), [
     (['plcc'], 2, '"plcc" is not a command; did you mean plc?'), (['--version'], 0, 'abdf1_ros '),
+    (['plc\x1b'], 2, r'"plc\x1b" is not a command'),
+    (['plc', '\x1b'], 2, r'"\x1b" is not a command'),
     (['help'], 0, 'plc        read, write'), ([], 2, 'plc        read, write')])
 def test_first_word_that_is_no_command(given: list[str], status: int, told: str) -> None:
     said = subprocess.run([sys.executable, '-m', 'abdf1_ros', *given], text=True, timeout=60,

@@ -86,7 +86,9 @@ def test_anonymous_bundle_has_no_values_and_no_names(tmp_path: Path, capture: st
     for secret in ('1234 -2', 'd204', 'feff', '10935', 'b72a', 'paint', 'booth'):
         assert secret not in everything.lower(), secret
     assert 'tag_1,Read,N7:0,2,SLC,topic_1' in files['settings/map.csv']
-    assert '"command": "0F/A2"' in files['entries.json']
+    told = [json.loads(line) for line in files['entries.json'].splitlines()]
+    assert [(entry['command'], entry['data']) for entry in told if 'data' in entry] == [
+        ('0F/A2', 'a2'), ('0F', ''), ('0F/AA', 'aa'), ('0F', '')]
     assert 'numbered' in files['README.txt']
 
 

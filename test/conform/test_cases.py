@@ -18,7 +18,7 @@ from collections.abc import Callable
 from functools import cache
 
 from abdf1_ros.conform import codec
-from abdf1_ros.conform.case import Permission, run_cases, Target, Verdict
+from abdf1_ros.conform.case import CaseResult, Permission, run_cases, Target, Verdict
 from abdf1_ros.conform.cases import CASES
 from abdf1_ros.conform.codec import BlockCheck
 from abdf1_ros.conform.ends import MasterEnd
@@ -26,6 +26,7 @@ from abdf1_ros.conform.wire import Wire
 from abdf1_ros.df1.checksum import Checksum
 from abdf1_ros.df1.frames import Duplex
 from abdf1_ros.df1.machine import Machine, Procedure
+from abdf1_ros.df1.packet import Packet
 from abdf1_ros.df1.peer import FullDuplexPeer
 from abdf1_ros.df1.radio import RadioNode
 from abdf1_ros.df1.settings import LinkSettings
@@ -33,6 +34,8 @@ from abdf1_ros.df1.slave import multidrop
 from abdf1_ros.df1.stations import ActiveStationList
 from abdf1_ros.driver.driver import Driver
 from abdf1_ros.driver.settings import DriverSettings
+from abdf1_ros.pccc.describe import effect_of
+from abdf1_ros.pccc.notation import Effect
 from abdf1_ros.settings.network import Network
 import pytest
 from support.cases import for_all
@@ -86,12 +89,26 @@ def asking(check: str, mode: str) -> SpoiledLine:
     return SpoiledLine(driver.machine)
 
 
+def _needed(result: CaseResult, target: Target) -> Permission:
+    """Return the permission that the bytes sent by a case need."""
+    sent = [bytes.fromhex(line.partition(' we ')[2]) for line in result.transcript
+            if ' we ' in line]
+    for raw in sent:
+        body = raw.partition(b'\x10\x02')[2].rpartition(b'\x10\x03')[0]
+        if len(body) > codec.HEADER_SIZE \
+                and effect_of(Packet.decode(body.replace(b'\x10\x10', b'\x10'))) is Effect.WRITES:
+            return Permission.WRITE
+    return Permission.RESET if target.is_half_duplex and codec.NAK in sent else Permission.NOTHING
+
+
 @pytest.mark.parametrize('check', CHECKS)
 @pytest.mark.parametrize('family', ['SLC', 'PLC5'])
 @pytest.mark.parametrize('target', [Target.SLAVE, Target.PEER, Target.RADIO])
 def test_simulated_plc_conforms(target: Target, family: str, check: str) -> None:
     results = results_of(answering(family, check, target), target, check, family)
     assert failures(results) == []
+    assert [result.case.name for result in results
+            if result.case.permission is not _needed(result, target)] == []
     skipped = {result.case.name for result in results if result.verdict is Verdict.SKIP}
     assert skipped <= {'poll-stuffing', 'crc-covers-station', 'address-forms'}
 

@@ -317,8 +317,12 @@ def test_bits_that_go_on_without_the_program_are_noted_and_are_not_odd() -> None
 def test_rows_promise_three_intervals_and_a_read() -> None:
     row, silent = make_mapping('N7:0', length=2), make_mapping('N7:0', publish='Change')
     assert report_of(row, silent).promises() == {row: pytest.approx(3 + TWO_WORDS + ANSWERS)}
+    guarded = make_mapping('B3:0', period=200, condition=While(('RUN',)))
+    fast, slow = report_of(row, guarded), report_of(row, guarded, response=0.1)
     # The node does not know how slow the PLC is, and so promises the same.
-    assert report_of(row, response=0.1).promises() == report_of(row).promises()
+    assert slow.promises() == fast.promises()
+    assert slow.poll_cycle > fast.poll_cycle and slow.load > fast.load
+    assert slow.intervals() != fast.intervals()
 
 
 def test_write_again_is_held_against_the_reads_that_slow_plcs_allow() -> None:

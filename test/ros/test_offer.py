@@ -14,6 +14,7 @@
 
 """Publishers that a bridge offers only while it has the line, in the moment when it loses it."""
 
+from collections import deque
 from typing import Any
 
 from abdf1_ros.ros.bridge.offer import OfferedPublisher
@@ -67,6 +68,16 @@ def test_message_that_meets_the_loss_of_the_line_is_no_error(offered: LosingPubl
     offered.is_losing = True
     offered.publish(UInt8())
     assert not offered.is_losing
+
+
+def test_message_that_another_thread_has_taken_is_no_error(offered: LosingPublisher) -> None:
+    class Raced(deque[UInt8]):
+
+        def __bool__(self) -> bool:
+            return True  # as the thread saw it a moment ago
+
+    offered._waiting = Raced()
+    offered._publish_waiting()
 
 
 def test_closed_publisher_has_no_subscribers(offered: LosingPublisher) -> None:

@@ -248,6 +248,8 @@ def test_command_writes_a_map_once_and_says_how_to_go_on(
     assert f'{target}: exists already' in capsys.readouterr().err
     source.write_text(f'{RSLOGIX}"N7:999",,"FAR"\n', encoding='utf-8')
     other = tmp_path / 'other' / 'map.csv'
+    assert main([*options[:3], str(tmp_path / 'third')]) == 1
+    capsys.readouterr()
     (tmp_path / 'net.csv').write_text('Station\n5\n', encoding='utf-8')
     assert main([*options[:3], str(other.parent)]) == 1
     said = capsys.readouterr()
