@@ -68,6 +68,33 @@ def test_bytes_become_symbols(raw: str, is_half_duplex: bool, symbol: Symbol | N
     assert codec.next_symbol(bytes.fromhex(raw), BlockCheck.BCC, is_half_duplex) == symbol
 
 
+@pytest.mark.parametrize('is_half_duplex', [True, False])
+def test_frame_is_awaited_to_its_last_byte(is_half_duplex: bool) -> None:
+    master = [codec.master_message(0x10, LINK_DATA, BlockCheck.CRC), codec.poll(0x10),
+              codec.poll(0x11)] if is_half_duplex else []
+    for frame in (codec.message(LINK_DATA, BlockCheck.CRC), codec.EOT, *master):
+        found = [codec.next_symbol(frame[:size], BlockCheck.CRC, is_half_duplex)
+                 for size in range(len(frame) + 1)]
+        assert found[:-1] == [None] * len(frame)
+        assert found[-1] is not None and (found[-1].raw, found[-1].is_good) == (frame, True)
+
+
+def test_frame_is_divided_and_damaged_where_a_case_says() -> None:
+    for data in (b'\x08\x09', b'\x10\x09'):
+        frame = codec.message(data, BlockCheck.CRC)
+        begun, rest = codec.divided(frame)
+        assert codec.next_symbol(begun + codec.ACK + rest, BlockCheck.CRC, False) == Symbol(
+            SymbolKind.MESSAGE, begun + codec.ACK + rest, data, embedded=(SymbolKind.ACK,))
+        assert [[at - len(frame) for at, byte in enumerate(other) if byte != frame[at]]
+                for other in codec.all_damaged(frame, BlockCheck.CRC)] == [[-2], [-1]]
+
+
+def test_symbol_is_shown_in_words() -> None:
+    assert [str(codec.next_symbol(codec.damaged(frame), BlockCheck.BCC, True)) for frame in (
+        codec.message(LINK_DATA, BlockCheck.BCC), codec.poll(1))] == [
+        'a message with a wrong check', 'a poll with a wrong check']
+
+
 @for_all('conversation', CONVERSATIONS)
 def test_conversations_are_read_as_they_say(conversation: Conversation) -> None:
     for line, words in said_by_codec(conversation):

@@ -347,6 +347,12 @@ def test_wait_for_a_symbol_ends_though_others_come_for_ever() -> None:
     assert (line.now, line.sent) == (pytest.approx(2.0), b'')
 
 
+def test_numbers_of_commands_begin_again_after_the_last() -> None:
+    line = Babble()
+    end = PeerEnd(Wire(line, BlockCheck.CRC, line.clock, is_half_duplex=False), 1, 0, 0xFFFF)
+    assert [end.command()[4:6] for _ in range(2)] == [b'\xFF\xFF', b'\0\0']
+
+
 @pytest.mark.parametrize('kind', [MasterEnd, PeerEnd])
 def test_line_that_is_never_quiet_keeps_no_case_waiting(kind: type[AskingEnd]) -> None:
     line = Babble(b'\x55')

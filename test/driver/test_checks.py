@@ -296,6 +296,20 @@ def test_station_that_is_heard_needs_no_echo() -> None:
     assert len(ears.times(ECHO)) in (3, 4)
 
 
+def test_check_of_a_station_that_is_back_is_no_probe() -> None:
+    bench, (plc,), _ = make_bench(word(1, 'Write'), period=0.0, run=2.0)
+
+    def are_probes() -> list[bool]:
+        return [check.is_probe for check in bench.driver.checks._checks]
+
+    plc.faults = InjectedFaults(silent=True)
+    bench.run_until(lambda: are_probes() == [True])
+    plc.faults = InjectedFaults()
+    bench.run_until(lambda: bench.driver.stations[1].replies_in_time)
+    bench.run(5.0)
+    assert are_probes() == [False]
+
+
 def test_broadcast_is_no_station_to_be_watched() -> None:
     bench = DriverBench([word(255, 'Write')], settings=DriverSettings(processor_period=1.0))
     bench.run(10.0)

@@ -18,6 +18,7 @@ from functools import partial
 import math
 
 from abdf1_ros.df1.packet import Packet
+from abdf1_ros.df1.stations import MOST_OVERDUE
 from abdf1_ros.driver.reads.demands import ReadAnswer, ReadCall, ReadCalls
 from abdf1_ros.driver.reads.point import Freshness
 from abdf1_ros.driver.settings import DriverSettings
@@ -197,6 +198,14 @@ def test_silent_station_is_answered_at_once_and_takes_nothing() -> None:
     line.ask(RECIPE)
     line.run(0.5)
     assert line.errors[-1] == ''
+
+
+def test_station_that_has_become_late_is_answered_at_once() -> None:
+    line = Line(RECIPE)
+    line.driver.stations[1].overdue = MOST_OVERDUE
+    begun = line.clock()
+    line.ask(RECIPE)
+    assert [(when, answer.error[:4]) for when, _, answer in line.answers] == [(begun, '2508')]
 
 
 def test_station_that_dies_during_the_read_is_told() -> None:

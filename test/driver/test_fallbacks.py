@@ -84,6 +84,18 @@ class OneRow:
                           may_land=outcome in (Outcome.UNKNOWN, Outcome.PARTLY))
 
 
+@pytest.mark.parametrize(('begun', 'again'), [(1.5, 2.0), (2.0, math.inf)])
+def test_rule_10_write_that_may_land_after_the_begin_of_a_fallback_has_it_written_again(
+        begun: float, again: float) -> None:
+    one = OneRow()
+    one.message(0.5, 1.0, Outcome.UNKNOWN)  # may land until 2.0
+    one.row.make_due(FallbackCause.TIMEOUT, begun)
+    one.fallback(one.row.take(begun), begun + 1.0)
+    assert one.row.words.again_at == again
+    assert one.row.is_confirmed is (again == math.inf)
+    assert one.row.judge(begun + 1.0, -math.inf) is (again < math.inf)
+
+
 def test_rule_11_only_the_first_try_over_a_guest_is_not_held_up_by_a_pause() -> None:
     one = OneRow()
     row = one.row

@@ -240,6 +240,10 @@ def test_overheard_write_makes_a_value_unknown_until_the_next_read() -> None:
     exchange(bench, 10, READ_N7_0, '01 00 2A 00 03 00 04 00')
     assert bench.values(mapping) == [[1, 2, 3, 4], [1, 42, 3, 4]]
     assert point_of(bench, mapping) is Freshness.FRESH
+    bench.hear(frame(command(11, WRITE_N7_1), 1))  # it may be executed after the read
+    exchange(bench, 12, READ_N7_0, VALUES)
+    bench.hear(frame(reply(11, '')))
+    assert point_of(bench, mapping) is Freshness.FAILED
 
 
 @pytest.mark.parametrize(('station', 'asked', 'cmd'), [
