@@ -21,11 +21,11 @@ import subprocess
 import sys
 import threading
 import time
-from typing import Any
+from typing import Any, BinaryIO
 
 from abdf1_ros.problems import ConfigurationError
 from abdf1_ros.ros.topics.messages import latched_qos
-from abdf1_ros.testing import abdf1_cell, Bridge, Observer, PATIENCE, SimulatedCell
+from abdf1_ros.testing import abdf1_cell, Bridge, Observer, PATIENCE, Plcs, SimulatedCell
 import pytest
 from rclpy.node import Node
 from std_msgs.msg import Int16MultiArray
@@ -38,6 +38,7 @@ TUTORIAL = (SOURCE / 'docs' / 'tutorials' / 'testing.md').read_text(encoding='ut
 __all__ = ['abdf1_cell']
 
 Cells = Callable[..., SimulatedCell]
+START = Bridge.start
 
 
 def _run(text: str) -> dict[str, Any]:
@@ -121,6 +122,30 @@ def test_node_of_the_test_needs_no_context(abdf1_cell: Cells) -> None:  # noqa: 
     assert cell.end() == 0
     assert 'abdf1' not in node.get_node_names()  # no publisher goes while a subscription does
     node.destroy_node()
+
+
+def test_log_of_a_bridge_has_all_starts_and_its_end_is_shown(
+        tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    class Told:
+
+        def __init__(self, words: object, stdout: BinaryIO, stderr: object) -> None:
+            stdout.write(b''.join(b'line %d\n' % number for number in range(8)))
+
+    monkeypatch.setattr(Bridge, 'start', START)
+    monkeypatch.setattr(subprocess, 'Popen', Told)
+    bridge = Bridge([], tmp_path / 'log')
+    bridge.start()
+    bridge.start()
+    assert bridge.last_words().splitlines()[1:] == [
+        'line 6', 'line 7', *(f'line {number}' for number in range(8))]
+
+
+def test_program_of_a_ladder_runs_in_the_station_that_is_named(tmp_path: Path) -> None:
+    (tmp_path / 'data.csv').write_text(
+        'Station,PLC_Type,Address,Length\n1,SLC,N7:0,2\n2,SLC,N7:0,2\n', encoding='utf-8')
+    plcs = Plcs(tmp_path / 'data.csv', ladders=[2])
+    assert [plcs[number].ladder is None for number in (1, 2)] == [True, False]
+    plcs.lose()
 
 
 SMALL = ('Station,PLC_Type,Address,Length\n1,SLC,N7:0,2\n',

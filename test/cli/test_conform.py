@@ -128,12 +128,17 @@ def test_port_that_cannot_be_opened_is_one_and_what_is_wrong_in_options_two(
 
 @pytest.mark.parametrize('args', [
     ['slave', '--only', 'nothing'], ['slave', '--station', '255'], ['slave', '--count', '0'],
-    ['slave', '--tcp', 'nowhere'], ['slave', '--tcp', 'a:99999'],
+    ['slave', '--count', '101'], ['slave', '--tcp', 'nowhere'], ['slave', '--tcp', 'a:99999'],
     ['peer', '--words', 'F8:0'], ['peer', '--echo'], []])
 def test_usage_is_shown_for_impossible_options(args: list[str]) -> None:
     with pytest.raises(SystemExit) as end:
         main(args)
     assert end.value.code == 2
+
+
+@pytest.mark.parametrize('args', [('--station', '0'), ('--station', '254'), ('--count', '100')])
+def test_numbers_up_to_their_bounds_are_taken(args: tuple[str, str]) -> None:
+    assert main(['slave', '--list', *args]) == 0
 
 
 def test_cases_are_listed(capsys: pytest.CaptureFixture[str]) -> None:

@@ -207,6 +207,7 @@ ALLOWED = [(target, habit, names) for targets, habit, names in [
     ((Target.MASTER,), Habit.POLLS_OTHERS, set()),
     ((Target.MASTER,), Habit.POLLS_LATE, set()),
     (RADIO, Habit.REPEATS_REPLY, set()),
+    (RADIO, Habit.COUNTS_NOTHING, {'duplicate-executed-once'}),
     (RADIO, Habit.SENDS_ON, set()),
     (SENDER, Habit.NO_REPETITION, set()),
     (SENDER, Habit.NEVER_GIVES_UP, {'repetitions-limited'}),  # in the time that a case has

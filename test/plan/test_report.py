@@ -325,6 +325,15 @@ def test_rows_promise_three_intervals_and_a_read() -> None:
     assert slow.intervals() != fast.intervals()
 
 
+def test_time_of_an_end_is_that_of_slow_plcs() -> None:
+    fallback = Fallback((0,), 60_000)
+    rows = [make_mapping(f'N7:{number}', 'Write', tag=f'w{number}', fallback=fallback)
+            for number in range(6)]
+    assert texts(report_of(*rows), RemarkKind.INTERLOCK) == []
+    text, _ = texts(report_of(*rows, response=0.3), RemarkKind.INTERLOCK)
+    assert text.startswith('an orderly end needs 4')
+
+
 def test_write_again_is_held_against_the_reads_that_slow_plcs_allow() -> None:
     rows = [make_mapping('N7:0', 'Write', tag='w', write_again=1000),
             make_mapping('N7:0', tag='r', length=4, period=200)]

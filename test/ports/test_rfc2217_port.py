@@ -136,6 +136,26 @@ def test_server_that_does_not_answer(
         port.negotiate(EVEN)
 
 
+def test_server_that_says_something_else_for_ever_is_given_up(
+        ends: tuple[Rfc2217Port, socket.socket], monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(rfc2217_port, '_NEGOTIATION_TIMEOUT', 0.2)
+    port, server = ends
+    is_over = threading.Event()
+
+    def drip() -> None:
+        while not is_over.wait(0.02):
+            server.sendall(b'.')
+
+    dripping = threading.Timer(PATIENCE, is_over.set)
+    dripping.start()
+    threading.Thread(target=drip, daemon=True).start()
+    with pytest.raises(OSError, match='does not speak RFC 2217'):
+        port.negotiate(EVEN)
+    assert not is_over.is_set()
+    is_over.set()
+    dripping.cancel()
+
+
 def test_connection_to_a_server_that_does_not_answer_is_closed(
         monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(rfc2217_port, '_NEGOTIATION_TIMEOUT', 0.05)

@@ -17,8 +17,12 @@
 from pathlib import Path
 import signal
 import time
+from types import SimpleNamespace
+from typing import Any
 
+from abdf1_ros.ros.process.main import _destroy
 import pytest
+import rclpy
 from support.ros import EXAMPLE_FILES, PATIENCE, Process, ros_args, write_csv
 
 # Before the program sets its own handlers a signal ends it like this.
@@ -107,6 +111,14 @@ def test_clock_ends_what_does_not_come_back(
         process.send(signal.SIGTERM)
         assert process.result() == status, process.text  # it hangs for longer than this waits
         assert ('in hang' in process.text) is bool(status)  # it says where
+
+
+def test_nodes_have_their_time_to_leave_the_network(monkeypatch: pytest.MonkeyPatch) -> None:
+    done: list[str] = []
+    monkeypatch.setattr(rclpy, 'try_shutdown', lambda: done.append('shut down'))
+    program: Any = SimpleNamespace(destroy=lambda: (time.sleep(0.1), done.append('destroyed')))
+    _destroy(program, time.monotonic() + PATIENCE)
+    assert done == ['destroyed', 'shut down']
 
 
 # What the node takes to be made, without what DDS does for its publishers and subscriptions: that

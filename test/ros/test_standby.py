@@ -18,9 +18,11 @@ from collections import Counter
 from collections.abc import Iterator
 from pathlib import Path
 import socket
+from types import SimpleNamespace
 from typing import Any
 
 from abdf1_ros.ros.bridge.node import BridgeNode
+from abdf1_ros.ros.bridge.standby import Standby
 from diagnostic_msgs.msg import DiagnosticStatus
 import pytest
 from std_msgs.msg import Int16MultiArray, UInt16MultiArray
@@ -167,6 +169,18 @@ def test_line_that_was_lost_for_a_moment_has_its_active_stations_again(pair: Pai
     pair.ros.until(lambda: pair.counts == (1, 1), 'the bridge to have the line again')
     stations = pair.ros.listen(UInt16MultiArray, '/abdf1/active_stations')
     stations.values([2] + 15 * [0])
+
+
+def test_change_that_waits_for_the_executor_is_not_begun_again() -> None:
+    tasks: list[object] = []
+    around: Any = SimpleNamespace(
+        results=None, active_stations=None, snapshot=None, is_offered=True,
+        node=SimpleNamespace(executor=SimpleNamespace(create_task=tasks.append)))
+    session: Any = SimpleNamespace(has_line=False)
+    standby = Standby(around, lambda: session, [])
+    for _ in range(2):
+        standby.look()
+    assert tasks == [standby._leave_line]
 
 
 def test_spare_in_the_queue_of_a_device_server_waits_and_blames_no_plc(

@@ -294,6 +294,12 @@ def test_rule_15_a_row_left_out_takes_along_what_depends_on_it() -> None:
     assert len(faults(*rows)) == 2
 
 
+def test_rule_15_a_row_left_out_takes_along_what_depends_on_it_by_another() -> None:
+    rows = (row(**BIT), row(**BEAT, While='speed', While_Timeout='500'),
+            row(**WRITE | {'Length': '0'}))
+    assert (tags_of(*rows), len(faults(*rows))) == ([], 3)
+
+
 def test_rule_22_bit_confirms_a_heartbeat_of_its_station() -> None:
     bit, rest = load_rows(row(**BIT), row(**BEAT))[0]
     assert bit.confirms == 'beat'

@@ -287,6 +287,10 @@ GOOD = Network(timeout=300)
         'Collision_Avoidance is for Mode Radio; in Mode Master it has no effect']),
     (Network(mode='Peer', polling='Standard'), [
         'Polling is for Mode Master; in Mode Peer it has no effect']),
+    (Network(mode='Radio', station=1, store_forward='10-12'), []),
+    (Network(mode='Radio', station=11, store_forward='10-12'), [
+        'Store_Forward names our own Station 11; it is for nodes that hear each other only '
+        'through us']),
     (Network(mode='Radio', store_forward='5,6'), [
         'Store_Forward names our own Station 5; it is for nodes that hear each other only through '
         'us']),

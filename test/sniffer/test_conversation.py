@@ -16,7 +16,7 @@
 
 from abdf1_ros.df1.packet import Packet
 from abdf1_ros.sniffer.capture import Direction
-from abdf1_ros.sniffer.conversation import Conversation, MessageFacts
+from abdf1_ros.sniffer.conversation import Conversation, Copies, MessageFacts
 from abdf1_ros.sniffer.entries import Mark
 import pytest
 
@@ -140,3 +140,13 @@ def test_without_times_there_is_a_limit_too() -> None:
         given_up += [entry.command.tns for entry in talk.expired(None)]
     assert given_up == list(range(1000))
     assert len(talk.unanswered()) == 1000
+
+
+def test_packet_that_was_sent_again_is_remembered_from_then_on() -> None:
+    copies, again = Copies(), Packet(1, 5, 0x0F, 0, 7)
+    marks = []
+    for tns, time in ((100, 0.0), (200, 1.5), (300, 1.6)):
+        marks.append(copies.mark(again, time, Direction.IN))
+        for number in range(15):
+            copies.mark(again._replace(tns=tns + number), time, Direction.IN)
+    assert marks == [None, Mark.RETRANSMISSION, Mark.FORWARDED]

@@ -51,6 +51,7 @@ class Habit(Enum):
     LOST_AFTER_BROKEN_MESSAGE = auto()
     LOST_AFTER_NOISE = auto()
     EXECUTES_DUPLICATES = auto()
+    COUNTS_NOTHING = auto()
     DUPLICATE_WITHOUT_ACK = auto()
     DUPLICATE_BY_TNS = auto()
     DUPLICATE_WITHOUT_SOURCE = auto()
@@ -883,7 +884,8 @@ class MutatedRadioNode(_Radio):
         if len(data) < 6:
             return self.say(self.frame(data))
         reply = self._plc.serve(data)
-        if data[6:7] == b'\x01' and data[2] == 0x06:  # this counter counts what is executed
+        # This counter counts what is executed.
+        if data[2:3] + data[6:7] == b'\x06\x01' and not self.has(Habit.COUNTS_NOTHING):
             reply = reply[:8] + self._executed.to_bytes(2, 'little') + reply[10:]
         self._replies[data] = reply
         if is_ours or self.has(Habit.REPLIES_FOR_OTHERS) and not is_broadcast or \

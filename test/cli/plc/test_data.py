@@ -68,6 +68,9 @@ def test_columns_are_those_of_a_map_file() -> None:
      'VALUE: 9 elements do not fit at N7:250; the last word there can be is N7:255'),
     ('N7:0', {'Type': 'bool'}, '--type: N7:0 can be int16, uint16, bcd16, bcd12, int32, '
      'uint32, float32, string; a bool needs a bit address such as B3:0/5'),
+    ('N7:0', {'Length': '0', 'Access': 'x', 'Command': 'Read'},
+     '--access: "x" of a SLC should be one of Slot, Flat\n'
+     '--length: "0" should be a whole number from 1 to 65535'),
     ('N7:0', {'Access': 'Typed'}, '--access: "Typed" of a SLC should be one of Slot, Flat'),
     ('N7:0', {'Station': 'x'}, 'Station: "x" should be a whole number from 0 to 254'),
     ('N7:0', {'PLC_Type': 'PLC5', 'Processor': '5/02'}, '--processor: Processor is for PLCs of '

@@ -100,6 +100,8 @@ def test_map_says_of_each_tag_what_options_say_of_addresses(plc: Plc, tmp_path: 
         'plc: --length: is for addresses; for tags the map has this value\n')
     assert plc('read', 'level', '--station', '1', '--map', path).err == (
         'plc: --station: the map has level at station 2\n')
+    assert plc('read', 'level', 'speed', '--station', '2', '--map', path).err == (
+        'plc: --station: the map has speed at station 1\n')
     assert plc('read', '--station', '2', '--map', path).lines == ['N7:30 level 2330 % Tank 4 [%]']
     assert plc('read', '--station', '3', '--map', path).err == (
         f'plc: {path}: has no row of station 3 that is read\n')
@@ -108,6 +110,14 @@ def test_map_says_of_each_tag_what_options_say_of_addresses(plc: Plc, tmp_path: 
     assert plc('read', 'level', '--map', path, '--own-station', '2').err == (
         f'plc: {path}:3: Item: 2, Station 2 is our own Station in the net file; write the '
         'station of the PLC here\n')
+
+
+@pytest.mark.parametrize('args', [('read',), ('read', 'recipe'), ('watch', '--count', '1')])
+def test_row_that_a_bridge_reads_on_demand_is_read(
+        plc: Plc, tmp_path: Path, args: tuple[str, ...]) -> None:
+    path = write_csv(tmp_path / 'map.csv', 'Tag,Command,Address,Station,PLC_Type,Period',
+                     ['recipe,Read,N7:0,1,PLC5,on demand'])
+    assert plc(*args, '--map', str(path)).lines[-1].split()[-3:] == ['N7:0', 'recipe', '1200']
 
 
 @pytest.mark.parametrize('args', [
