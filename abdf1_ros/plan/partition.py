@@ -48,9 +48,7 @@ class Span:
         return self.first <= other.first and other.end <= self.end
 
     def aligned(self, per_element: int) -> Span:
-        """Return the span in whole elements: a read of more than one word needs them."""
-        if self.words <= 1:
-            return self
+        """Return the span in whole elements: a read of more than one value needs them."""
         return Span(self.first - self.first % per_element, self.end + -self.end % per_element)
 
 

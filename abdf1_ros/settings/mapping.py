@@ -251,9 +251,7 @@ class Mapping:
         """Tell whether both rows have a word, or for bits a bit, with the same number."""
         first = max(self.extent.first, other.extent.first)
         end = min(self.extent.end, other.extent.end)
-        if first >= end or not self.type.is_part or not other.type.is_part:
-            return first < end
-        return any(mine & theirs for mine, theirs in zip(
+        return first < end and any(mine & theirs for mine, theirs in zip(
             self._masks(first, end), other._masks(first, end), strict=True))
 
     def _masks(self, first: int, end: int) -> list[int]:

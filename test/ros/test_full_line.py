@@ -23,9 +23,9 @@ def test_rows_whose_messages_fill_the_line_are_named_the_fullest_first() -> None
     spent = dict.fromkeys(rows, 0.0)
     line = FullLine(spent)
     assert line.text(100.0) == ''
-    spent[rows[0]], spent[rows[1]] = 2.0, 7.0
+    spent[rows[0]], spent[rows[1]] = 1.0, 3.5
     assert line.text(104.0) == ''  # it is not looked at all the time
-    assert line.text(110.0) == (
+    assert line.text(105.0) == (
         'messages fill 90% of the line: w1 (70%), w0 (20%); set Write_Again to leave out '
         'unchanged values')
     spent[rows[1]] = 9.0

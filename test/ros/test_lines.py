@@ -192,6 +192,10 @@ def test_line_is_started_again_once_after_each_internal_error(
     for _ in range(5):
         line.check()
     assert (len(made), line.restarts) == (3, 2)
+    line._closing = threading.Timer(0.1, list)
+    line._closing.start()
+    line.end_callbacks(time.monotonic() + PATIENCE)
+    assert not line._closing.is_alive()
 
 
 class Plant:
