@@ -17,9 +17,11 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+import os
 from pathlib import Path
 import re
 import sys
+import tempfile
 import time
 from typing import Any
 
@@ -35,7 +37,7 @@ LOST = {'C5:2.PRE': 'it asks for 4 bytes and returns nothing',
 def main() -> None:
     """Play through the assembly, a TCP port, a check and the PLC family in the arguments."""
     assembly, port, check, family = sys.argv[1:]
-    driver = driver_of(Path(assembly), port, check, family)
+    driver = driver_of(Path(assembly).resolve(), port, check, family)
 
     def read(address: str, count: int) -> object:
         if is_structure(address):
@@ -73,6 +75,7 @@ def again(request: Callable[[], Any]) -> Any:
 
 def driver_of(assembly: Path, port: str, check: str, family: str) -> object:
     """Return the driver of the assembly, at a TCP port, as node 0 towards node 1."""
+    os.chdir(tempfile.gettempdir())  # for its log of errors
     pythonnet.load('mono')
     import clr
     clr.AddReference(str(assembly.with_suffix('')))
