@@ -168,7 +168,11 @@ def test_named_bits_are_told_in_their_order(
     (members.SLC_MESSAGE, {'RBL': 5, 'LBN': 6, 'RBN': 7, 'CHN': 8, 'NOD': 9, 'MTO': 10,
                            'TFN': 13, 'ELE': 14, 'ERR': 18}),
     (members.SLC_PID, {'SPS': 2, 'KC': 3, 'TI': 4, 'TD': 5, 'MAXS': 7, 'MINS': 8, 'CVH': 11,
-                       'CVL': 12, 'SPV': 14, 'CVP': 16})])
+                       'CVL': 12, 'SPV': 14, 'CVP': 16}),
+    # A recording of a MicroLogix 1400 confirms EII.IS; of the other places there is no manual.
+    (members.HSC, {'PFN': 0, 'ER': 1, 'MOD': 4, 'OMB': 15, 'HPO': 16, 'LPO': 17}),
+    (members.STI, {'PFN': 0, 'ER': 1, 'SPM': 3}), (members.EII, {'PFN': 0, 'ER': 1, 'IS': 3}),
+    (members.PULSES, {'OUT': 0})])
 def test_named_words_have_their_places(table: Members, expected: dict[str, int]) -> None:
     assert values(table) == expected
 
