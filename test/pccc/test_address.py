@@ -107,7 +107,10 @@ def test_out_of_range_in_both_families(text: str, family: PlcType) -> None:
     (SLC, 'I:30', 'I:31'), (SLC, 'O:30', 'O:31'),
     (SLC, 'I:0.255', 'I:0.256'), (PLC5, 'B3/31999', 'B3/32000'), (SLC, 'B3/4095', 'B3/4096'),
     (SLC, 'I1:0', 'I2:0'), (PLC5, 'O0:0', 'O1:0'), (PLC5, 'N3:0', 'N2:0'),
-    (SLC, 'T255:255.ACC', 'T256:0.ACC')])
+    (SLC, 'T255:255.ACC', 'T256:0.ACC'),
+    # As many as a recorded MicroLogix 1400 has.
+    *((SLC, f'{kind}:{last}', f'{kind}:{last + 1}') for kind, last in (
+        ('HSC', 5), ('PTO', 2), ('PWM', 2), ('STI', 0), ('EII', 7)))])
 def test_last_and_first_beyond(family: PlcType, last: str, beyond: str) -> None:
     parse_address(last, family)
     with pytest.raises(AddressRangeError):
