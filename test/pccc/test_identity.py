@@ -217,8 +217,6 @@ def test_each_bit_of_a_plc5_has_one_remark_or_none() -> None:
     *((bytes((0, 0xFE, kind, 0, 0)) + name.ljust(9, b'\0') + b'xx' + bytes(8), None,
        f'{name.decode()} series A revision 1', 0, size)
       for kind, name, size in ((0x2C, b'1770-KF3', 20), (0x24, b'1784-KR', 55))),
-    (bytes.fromhex('00 FE 24').ljust(23, b'\0'), None,
-     'unknown processor (00 FE 24 00 00 00 00 00)', 0, 55),
     (bytes.fromhex('00 99 12 34'), None, 'unknown processor (00 99 12 34)', 0, 55)])
 def test_modules_and_where_their_counters_are(
         data: bytes, family: PlcType | None, text: str, address: int, size: int) -> None:
@@ -226,6 +224,12 @@ def test_modules_and_where_their_counters_are(
     assert (identity.plc_type, str(identity)) == (family, text)
     assert identity.counters == ReadCounters(address, size)
     assert identity.is_running is {'RUN': True, 'TEST': False}.get(text.rpartition(' ')[2])
+
+
+@for_all('data', [SLC, PLC2, PLC2_KA3, PLC3, bytes.fromhex('00 FE 24').ljust(24, b'\0')])
+def test_status_without_its_last_byte_is_of_no_known_processor(data: bytes) -> None:
+    assert not str(decode_identity(data)).startswith('unknown')
+    assert str(decode_identity(data[:-1])).startswith('unknown processor (')
 
 
 def test_unknown_processor_is_named_and_not_interpreted() -> None:
