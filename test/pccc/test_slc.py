@@ -184,6 +184,19 @@ def test_files_that_reads_find() -> None:
         ('C11', 28), ('R12', 28), ('L13', 42), ('ST14', 2), ('A15', 84), ('D16', 84)]
 
 
+@for_all(('code', 'own_row', 'names'), [
+    (1, 69, ('5/03', '5/04', '5/05')), (2, 103, ('ML1100', 'ML1200', 'ML1500'))])
+def test_place_of_the_directory(code: int, own_row: int, names: tuple[str, ...]) -> None:
+    """Type and place as pycomm3 reads them on a 5/05 and a MicroLogix 1100."""
+    rows = f'{code:02X} {own_row + 20:02X}00 {14 * "0"} 82 0600 {14 * "0"}'
+    data = bytes(own_row) + bytes.fromhex(rows)
+    for name in names:
+        files = carried_out(steps_of(Processor(name)), lambda request: Packet(
+            0, 1, 0x4F, 0, 7, data[2 * request[-1]:].ljust(80, b'\0')[:request[1]]
+            if request[3] == code else b''))
+        assert [(str(entry), entry.elements) for entry in files] == [('O0', 3)]
+
+
 @pytest.mark.parametrize('processor', [None, *(
     Processor(name) for name in ('5/01', '5/02', 'ML1000'))])
 def test_processors_without_a_known_directory(processor: Processor | None) -> None:
