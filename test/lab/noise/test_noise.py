@@ -65,7 +65,7 @@ def test_noise_gives_no_wrong_value_that_a_check_could_see(
 @pytest.mark.parametrize('kind', Kind)
 def test_bcc_misses_as_many_as_theory_says(kind: Kind) -> None:
     case = Case('Message', 'BCC', (kind,), 1e-2, trials=1000)
-    assert case.run(seed=5, hours=0.05) == 0
+    assert case.run(seed=5, hours=0.03) == 0
     assert case.theory is not None
     expected = case.theory.expected(
         case.sums['singles'], case.sums['several'], case.sums['refused'])
