@@ -358,8 +358,11 @@ def test_numbers_of_commands_begin_again_after_the_last() -> None:
 def test_line_that_is_never_quiet_keeps_no_case_waiting(kind: type[AskingEnd]) -> None:
     line = Babble(b'\x55')
     wire = Wire(line, BlockCheck.CRC, line.clock, is_half_duplex=kind is MasterEnd)
-    kind(wire, 1, 0, 0).settle()
+    end = kind(wire, 1, 0, 0)
+    end.owed.add(b'\1\0')
+    end.settle()
     assert line.now <= 12.0
+    assert not end.owed
 
 
 def test_damaged_reply_that_a_case_has_left_is_not_the_fault_of_the_next_case() -> None:
@@ -371,3 +374,4 @@ def test_damaged_reply_that_a_case_has_left_is_not_the_fault_of_the_next_case() 
     end.offer(command)
     line.data = b''
     end.settle()
+    assert end.further(0.1) is None

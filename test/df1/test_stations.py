@@ -103,6 +103,13 @@ def test_only_the_last_message_counts_as_repeated(other: Packet) -> None:
     assert station.note_new(REPLY)
 
 
+def test_station_may_be_absent_beside_another_that_has_replied() -> None:
+    stations = ActiveStationList((1, 2))
+    assert not stations.is_new(1)
+    stations[2].replies = 1
+    assert (stations.is_new(1), stations.is_new(2)) == (True, False)
+
+
 def test_one_late_reply_is_an_accident_and_two_are_not() -> None:
     station = Station(7)
     assert station.replies_in_time

@@ -227,6 +227,42 @@ def test_scan_asks_more_often_while_frames_come_damaged(tmp_path: Path) -> None:
         '148 characters, 4 damaged frames, 0 NAK']
 
 
+class DamagesOnce(Damages):
+    """A line on which the first message comes with a wrong check, and no other comes."""
+
+    is_first = True
+
+    def write(self, data: bytes) -> None:
+        if b'\x10\x02' not in data or self.is_first:
+            super().write(data)
+            self.is_first = b'\x10\x02' not in data
+
+
+class Echoes(PortAround):
+    """A line on which no station is, and our own bytes come back."""
+
+    def read(self, timeout: float | None, wake: int) -> bytes:
+        self.write(super().read(timeout, wake))
+        return b''
+
+
+def test_scan_takes_our_own_bytes_for_no_loss(tmp_path: Path) -> None:
+    plc = simulated_plc(1, 'SLC', time.monotonic)
+    with plc_line(tmp_path / 'line', plc, around=Echoes) as name:
+        seen, = scan(Network(com_port=name, timeout=300, nak_retries=0, enq_retries=0), [1])
+    assert (seen.is_there, seen.asked) == (False, 2)
+
+
+def test_scan_says_what_was_lost_at_first_and_does_not_go_on_for_it(tmp_path: Path) -> None:
+    plc = simulated_plc(1, 'SLC', time.monotonic)
+    with plc_line(tmp_path / 'line', plc, around=DamagesOnce) as name:
+        said: list[str] = []
+        seen, = scan(Network(com_port=name, timeout=300, nak_retries=0, enq_retries=0), [1],
+                     complain=said.append)
+    assert seen.asked == 2
+    assert [', 1 damaged frame, ' in text for text in said] == [True]
+
+
 def test_scan_says_what_came_where_noise_makes_symbols_of_the_answers(
         tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     device = OddDevice(Wiring.HALF, 1)
