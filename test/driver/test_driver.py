@@ -405,7 +405,9 @@ def test_write_does_not_wait_for_all_packets_of_a_long_read() -> None:
 
 def test_stale_time_follows_the_period_or_the_line() -> None:
     fast, slow = make_mapping('N7:0', period=10), make_mapping('F8:0', period=1000)
-    bench, _ = make_bench(fast, slow, stale_after=5.0, network=Network(baud=1200), start=False)
+    wanted = make_mapping('N9:0', is_on_demand=True)
+    bench, _ = make_bench(
+        fast, slow, wanted, stale_after=5.0, network=Network(baud=1200), start=False)
     scan = bench.driver.readings.expected_poll_cycle
     blocks = bench.driver.readings.blocks
     assert scan == pytest.approx(sum(block.line_time + 0.02 for block in blocks))
@@ -415,6 +417,7 @@ def test_stale_time_follows_the_period_or_the_line() -> None:
     longest = max(times.values())
     assert bench.driver.points[fast].stale_time == pytest.approx(5 * 0.01 * needed + longest)
     assert bench.driver.points[slow].stale_time == pytest.approx(5 * (1.0 + scan) + longest)
+    assert bench.driver.points[wanted].stale_time == 5.0  # as if it were read once a second
 
 
 def test_slow_rows_do_not_make_the_stale_time_of_fast_ones_longer() -> None:

@@ -26,6 +26,7 @@ import threading
 import time
 from typing import Any
 
+from abdf1_ros.df1.stations import Station
 from abdf1_ros.driver.driver import Driver
 from abdf1_ros.driver.writes.queue import MAX_WAITING_WRITES
 from abdf1_ros.messages import Event, Message
@@ -220,10 +221,15 @@ def test_reply_to_a_command_of_an_earlier_run_is_no_error(
     bench.node.session._events.port_changed()
     for _ in range(2):
         bench.node.session._events.happened(left_over)
+    for number in (8, 9):
+        bench.node.session.port_changed(bench.node.link.state)
+        bench.node.session._events.station_changed(Station(number, active=False))
     lines = [line.partition('[abdf1]: ')[2] for line in ''.join(capfd.readouterr()).splitlines()]
     told = str(left_over)
     assert f'{told}; it may answer a command sent before the port was opened' in lines
     assert told.startswith('2510') and lines.count(told) == 1
+    assert sum(line.endswith(bench.node.link.state.text) for line in lines) == 1
+    assert sum(' has never been heard: ' in line for line in lines) == 1
 
 
 def test_station_with_another_error_code_is_told_once(

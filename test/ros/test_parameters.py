@@ -243,7 +243,8 @@ def test_gateway_is_polled_for_the_stations_behind_it(
             for tag, station, via in (('a', 1, 8), ('b', 9, 8), ('c', 2, ''))]
     files['map_file'] = str(write_csv(
         tmp_path / 'via.csv', 'Tag,Command,Address,Station,PLC_Type,Via', rows))
-    assert configured().driver_settings().polling == PollingSettings((2, 8))
+    settings = configured().driver_settings()
+    assert (settings.polling, settings.default_period) == (PollingSettings((2, 8)), 0.1)
     assert problems_of(make_node(files | {'poll_list': '8,9'})) == [
         'parameter poll_list: station 9 is behind gateway 8, which is polled in its place']
     assert problems_of(make_node(files | {'priority_poll_list': '1'})) == [
@@ -392,7 +393,8 @@ def test_number_that_yaml_takes_for_octal_is_told(
         make_node: Nodes, files: dict[str, str], tmp_path: Path, section: str) -> None:
     path = tmp_path / 'shared.yaml'
     path.write_text(f'{section}:\n  ros__parameters:\n    net:\n      station: 010\n'
-                    '      baud: 9600\n      timeout: "0500"\n      nak_retries: 03\n',
+                    '      baud: 9600\n      timeout: "0500"\n      nak_retries: 03\n'
+                    '/other:\n  ros__parameters:\n    write_timeout: 010\n',
                     encoding='utf-8')
     node = make_node(files)
     with pytest.raises(ConfigurationError) as caught:
