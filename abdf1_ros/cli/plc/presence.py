@@ -103,13 +103,7 @@ def look_at(session: Session, station: int) -> Presence:
     """Ask a station for its identity; raises PortLost."""
     session.settle()
     started = time.monotonic()
-    identity, error = None, None
-    try:
-        identity = session.ask(station, identify())
-    except PortLost:
-        raise
-    except Abdf1Error as caught:
-        error = caught
+    identity, error = session.attempt(station, identify())
     seconds = time.monotonic() - started
     if identity is not None and _may_be_of_gateway(session, station, identity):
         error = _refusal_of_gateway(session, station)
@@ -141,15 +135,9 @@ def _refusal_of_gateway(session: Session, station: int) -> Abdf1Error | None:
     A gateway may answer diagnostic commands itself, for every number (a switch of the 1770-KF2).
     All families know the read command of a PLC-2.
     """
-    try:
-        session.ask(station, _basic_read())
-    except PortLost:
-        raise
-    except RemoteError as error:
-        return error if is_local_status(error.sts) else None
-    except LinkError as error:
-        return error
-    return None
+    _, error = session.attempt(station, _basic_read())
+    is_of_plc = isinstance(error, RemoteError) and not is_local_status(error.sts)
+    return None if is_of_plc else error
 
 
 def _basic_read() -> Steps[None]:
@@ -212,15 +200,8 @@ def understands(session: Session, station: int) -> bool:
     Only such a reply proves a station. An echo of the line, or a device that acknowledges every
     message, does not give it.
     """
-    try:
-        session.ask(station, echo(os.urandom(len(_ECHO))))
-    except PortLost:
-        raise
-    except RemoteError:
-        return True
-    except Abdf1Error:
-        return False
-    return True
+    _, error = session.attempt(station, echo(os.urandom(len(_ECHO))))
+    return error is None or isinstance(error, RemoteError)
 
 
 def io_access(session: Session, there: Presence) -> list[str]:
@@ -305,14 +286,7 @@ def traffic(counters: Counters, stray: str = '') -> str:
 
 def type_hint(session: Session, station: int, plc_type: str | None) -> str:
     """Return a remark if a PLC is not of the given type; empty if that is unknown."""
-    if plc_type is None:
-        return ''
-    try:
-        identity = session.ask(station, identify())
-    except PortLost:
-        raise
-    except Abdf1Error:
-        return ''
-    if identity.plc_type is None or identity.plc_type.value == plc_type:
+    identity, _ = session.attempt(station, identify()) if plc_type else (None, None)
+    if identity is None or identity.plc_type is None or identity.plc_type.value == plc_type:
         return ''
     return f'station {station} is {identity}; --plc-type says {plc_type}'

@@ -19,15 +19,20 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 import time
+from typing import TypeVar
 
 from abdf1_ros import open_line
 from abdf1_ros.cli.terminal import NoPort, RED, tell
 from abdf1_ros.df1.stations import ActiveStationList, MAX_STATION
+from abdf1_ros.errors import Abdf1Error, PortLost
+from abdf1_ros.pccc.dialect import Steps
 from abdf1_ros.pccc.file_types import PlcType
 from abdf1_ros.ports.descriptor import Port
 from abdf1_ros.ports.settings import PortSettings
 from abdf1_ros.ports.trace import begun_now, Trace, TracedPort
 from abdf1_ros.settings.network import Network
+
+_Result = TypeVar('_Result')
 
 complain = partial(tell, 'plc', code=RED)
 """Print a text about a failure on standard error."""
@@ -77,3 +82,13 @@ class Session(open_line.OpenLine):
                              PlcType(network.plc_type), record)
         except OSError as error:
             raise NoPort(network.port, error) from None
+
+    def attempt(self, station: int,
+                work: Steps[_Result]) -> tuple[_Result | None, Abdf1Error | None]:
+        """Carry out a request; return its result or its error. Raises PortLost."""
+        try:
+            return self.ask(station, work), None
+        except PortLost:
+            raise
+        except Abdf1Error as error:
+            return None, error
