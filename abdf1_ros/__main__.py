@@ -22,13 +22,6 @@ import sys
 from abdf1_ros.cli.main import COMMANDS, run
 
 _HELP = ('-h', '--help', 'help')
-_TEXTS = {
-    'plc': 'read, write and look for PLCs, without ROS',
-    'sniff': 'record and decode a line', 'check': 'check net.csv and map.csv, and forecast',
-    'simulator': 'PLCs to try things with',
-    'conform': 'check a PLC or a driver against the manual',
-    'node': 'the bridge: a ROS 2 node', 'lines': 'bridges for several lines in one process',
-    'monitor': 'show a running bridge', 'demo': 'all together, without a PLC'}
 
 
 def main() -> int:
@@ -53,8 +46,8 @@ def _help(name: str, called: str) -> int:
         meant = get_close_matches(name, COMMANDS, 1)
         print(f'{called}: "{printable(name)}" is not a command'
               + (f'; did you mean {meant[0]}?' if meant else ''), file=sys.stderr)
-    print(f'usage: {called} COMMAND ...\n\n' + '\n'.join(
-        f'  {command:10} {text}' for command, text in _TEXTS.items()) + '\n\neach has --help',
+    listed = '\n'.join(f'  {command:10} {purpose}' for command, (_, purpose) in COMMANDS.items())
+    print(f'usage: {called} COMMAND ...\n\n{listed}\n\neach has --help',
           file=sys.stdout if name in _HELP else sys.stderr)
     return 0 if name in _HELP else 2
 

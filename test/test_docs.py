@@ -67,7 +67,7 @@ def help_of(*command: str) -> str:
     with pytest.MonkeyPatch.context() as patch, redirect_stdout(said), \
             pytest.raises(SystemExit) as ending:
         patch.setenv('COLUMNS', '200')
-        import_module(MAINS[name]).main([*words, '--help'])
+        import_module(MAINS[name][0]).main([*words, '--help'])
     assert ending.value.code == 0
     return said.getvalue()
 

@@ -68,7 +68,7 @@ def test_marked_blocks_do_what_they_show(
             line, *shown = part.splitlines()
             command, *args = shlex.split(line.removeprefix('abdf1 '))
             if command in COMMANDS:
-                said = call(import_module(COMMANDS[command]).main, capsys, *args)
+                said = call(import_module(COMMANDS[command][0]).main, capsys, *args)
                 assert said.status == 0, f'{line}: {said}'
                 expect(shown, [*said.err.splitlines(), *said.out.splitlines()])
             else:

@@ -38,17 +38,17 @@ _NOT_INSTALLED = 2
 _INTERRUPTED = 130  # for commands whose exit status means success or failure
 
 COMMANDS = {
-    'node': 'abdf1_ros.ros.node',
-    'lines': 'abdf1_ros.ros.lines',
-    'monitor': 'abdf1_ros.cli.monitor.command',
-    'demo': 'abdf1_ros.cli.demo',
-    'simulator': 'abdf1_ros.cli.simulator',
-    'sniff': 'abdf1_ros.cli.sniff',
-    'check': 'abdf1_ros.cli.check',
-    'plc': 'abdf1_ros.cli.plc.command',
-    'conform': 'abdf1_ros.cli.conform',
+    'plc': ('abdf1_ros.cli.plc.command', 'read, write and look for PLCs, without ROS'),
+    'sniff': ('abdf1_ros.cli.sniff', 'record and decode a line'),
+    'check': ('abdf1_ros.cli.check', 'check net.csv and map.csv, and forecast'),
+    'simulator': ('abdf1_ros.cli.simulator', 'PLCs to try things with'),
+    'conform': ('abdf1_ros.cli.conform', 'check a PLC or a driver against the manual'),
+    'node': ('abdf1_ros.ros.node', 'the bridge: a ROS 2 node'),
+    'lines': ('abdf1_ros.ros.lines', 'bridges for several lines in one process'),
+    'monitor': ('abdf1_ros.cli.monitor.command', 'show a running bridge'),
+    'demo': ('abdf1_ros.cli.demo', 'all together, without a PLC'),
 }
-"""The module with the ``main`` of each command."""
+"""The module with the ``main`` of each command, and its purpose, in the order of the help."""
 
 _TELLING = ('check', 'plc', 'conform')
 
@@ -61,8 +61,9 @@ def run(name: str) -> int:
     """Run a command with the arguments of this process; return its exit status."""
     _end_quietly(_INTERRUPTED if name in _TELLING else 0)
     _open_standard_streams()
+    module, _ = COMMANDS[name]
     try:
-        status: int = import_module(COMMANDS[name]).main()
+        status: int = import_module(module).main()
     except ModuleNotFoundError as error:  # also a module that a command imports later
         if error.name is None or error.name.startswith('abdf1_ros'):
             raise

@@ -130,7 +130,7 @@ def test_signal_before_a_command_has_its_own_handlers_ends_quietly(
 
     handlers = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)}
     fake = SimpleNamespace(main=lambda: os.kill(os.getpid(), signal.SIGTERM))
-    monkeypatch.setitem(sys.modules, COMMANDS[name], fake)
+    monkeypatch.setitem(sys.modules, COMMANDS[name][0], fake)
     monkeypatch.setattr(os, '_exit', leave)
     for number in handlers:  # without a handler of ours the test fails, and goes on
         signal.signal(number, signal.SIG_IGN)
@@ -164,7 +164,7 @@ def test_every_command_tells_its_version_and_what_it_takes(
     for option, texts in (('--version', {'abdf1_ros '}), ('--help', helps)):
         monkeypatch.setattr(sys, 'argv', [name, option])
         with pytest.raises(SystemExit) as end:
-            import_module(COMMANDS[name]).main()
+            import_module(COMMANDS[name][0]).main()
         assert end.value.code == 0
         said = capsys.readouterr().out
         assert [text for text in texts if text not in said] == []
@@ -178,7 +178,7 @@ def test_signal_where_nothing_is_under_way_ends_quietly(
     def interrupted() -> None:
         raise KeyboardInterrupt
 
-    module = import_module(COMMANDS[name])
+    module = import_module(COMMANDS[name][0])
     monkeypatch.setattr(module if name == 'demo' else terminal, 'interruptible', interrupted)
     assert module.main(args) == status
 
