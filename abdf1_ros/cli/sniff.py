@@ -161,32 +161,22 @@ class _Output:
         if self._packets:
             self._packets.close()
         self.sum_up()
-        if self._bundle:
-            self._write_bundle(self._bundle)
+        if self._bundle and self._has_written(self._bundle, 'report'):
+            _say(f'{self._options.report}: its README.txt lists the contents; look through the '
+                 'bundle before you pass it on')
         if self._timeline:
-            self._write_timeline(self._timeline)
+            self._has_written(self._timeline, 'html')
 
-    def _write_timeline(self, timeline: Timeline) -> None:
-        """Write the page of --html."""
-        options = self._options
-        title = ', '.join(options.files or options.tap or [options.port])
+    def _has_written(self, picture: ReportBundle | Timeline, option: str) -> bool:
+        """Write the file of an option; return True on success."""
+        path = getattr(self._options, option)
         try:
-            timeline.write(options.html, title, self._summary, self.begin({}).kind)
+            picture.write(path, self._summary, self.begin({}).kind)
         except OSError as error:
             self.has_failed = True
-            _say(f'--html: {reason_of(options.html, error)}')
-
-    def _write_bundle(self, bundle: ReportBundle) -> None:
-        """Write the bundle of --report."""
-        path = self._options.report
-        try:
-            bundle.write(path, self._summary, self.begin({}).kind)
-        except OSError as error:
-            self.has_failed = True
-            _say(f'--report: {reason_of(error.filename or path, error)}')
-        else:
-            _say(f'{path}: its README.txt lists the contents; look through the bundle before you '
-                 'pass it on')
+            _say(f'--{option}: {reason_of(error.filename or path, error)}')
+            return False
+        return True
 
     def sum_up(self) -> None:
         """Print the summary."""
@@ -224,7 +214,7 @@ def _bundle(options: argparse.Namespace) -> ReportBundle:
 
 def _timeline(options: argparse.Namespace) -> Timeline:
     from abdf1_ros.cli.sniff_picture import Timeline
-    return Timeline(options.anonymous)
+    return Timeline(', '.join(options.files or options.tap or [options.port]), options.anonymous)
 
 
 def _is_bundle(path: Path) -> bool:

@@ -118,9 +118,10 @@ class _Drawing:
 
 
 class Timeline:
-    """Collect decoded entries, then write the page; ``is_anonymous`` leaves values out."""
+    """Collect decoded entries, then write the page; ``is_anonymous`` leaves names, values out."""
 
-    def __init__(self, is_anonymous: bool = False) -> None:
+    def __init__(self, title: str, is_anonymous: bool = False) -> None:
+        self._title = 'A recorded DF1 line' if is_anonymous else title
         self._is_anonymous = is_anonymous
         self._recordings: list[_Drawing] = []
         self._episodes: list[_Episode] = []
@@ -222,11 +223,10 @@ class Timeline:
             lanes, start, start + recording.length, recording.clock(start) or recording.unit,
             name=recording.name(strip.number))
 
-    def write(self, path: str, title: str, summary: Summary, kind: LineKind) -> None:
+    def write(self, path: str, summary: Summary, kind: LineKind) -> None:
         """Write the page; raises OSError."""
         self._close()
-        shown = 'A recorded DF1 line' if self._is_anonymous else title
-        write_page(path, shown, self._page(summary, kind))
+        write_page(path, self._title, self._page(summary, kind))
 
     def _page(self, summary: Summary, kind: LineKind) -> Iterator[str]:
         verdict = f'{counted(self._count, "fault")} on the line' if self._count else 'no fault'

@@ -44,8 +44,9 @@ def text_line(entry: Entry, colour: bool = False) -> str:
 def words(entry: Entry) -> str:
     """Return text, guest, check, latency and marks of an entry."""
     guest = f'guest {entry.guest}' if entry.guest else ''
-    parts = [part for part in (entry.text, guest, _check(entry), _latency(entry)) if part]
-    return ' | '.join([*parts, *(mark.value.upper() for mark in entry.marks)])
+    latency = '' if entry.latency is None else f'{entry.latency * 1000:.1f} ms'
+    marks = (mark.value.upper() for mark in entry.marks)
+    return ' | '.join(filter(None, (entry.text, guest, _check(entry), latency, *marks)))
 
 
 def _check(entry: Entry) -> str:
@@ -53,10 +54,6 @@ def _check(entry: Entry) -> str:
         return ''
     name = entry.checksum.value if entry.checksum else 'check'
     return f'{name} {"good" if entry.valid else "BAD"}'
-
-
-def _latency(entry: Entry) -> str:
-    return '' if entry.latency is None else f'{entry.latency * 1000:.1f} ms'
 
 
 def _shade(entry: Entry) -> str:
