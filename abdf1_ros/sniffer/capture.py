@@ -107,7 +107,7 @@ class CaptureWriter:
             setting_line(name, value) for name, value in (settings or {}).items())])
         self._written = 0
         for place in (path, Path(f'{path}.1')):
-            if place.exists() and not _is_capture(place):
+            if place.exists() and not may_replace(place, _MAGIC.encode()):
                 raise OSError(f'{place} exists and is not a capture; give another name')
         self._begin()
 
@@ -147,12 +147,12 @@ def setting_line(name: str, value: str) -> str:
     return line.encode('ascii', 'backslashreplace').decode('ascii')
 
 
-def _is_capture(path: Path) -> bool:
-    """Return True if a file may be renamed or replaced: a capture, or an empty file."""
+def may_replace(path: Path, head: bytes) -> bool:
+    """Return True for a file that begins with ``head``, or is empty: it may be replaced."""
     if not path.is_file():
         return False
     with path.open('rb') as file:
-        return file.readline(100).startswith(_MAGIC.encode()) or path.stat().st_size == 0
+        return file.read(len(head)) in (b'', head)
 
 
 def is_capture_line(line: str) -> bool:

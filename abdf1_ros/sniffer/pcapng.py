@@ -34,7 +34,7 @@ from pathlib import Path
 import struct
 
 from abdf1_ros.df1.checksum import Checksum
-from abdf1_ros.sniffer.capture import Direction
+from abdf1_ros.sniffer.capture import Direction, may_replace
 from abdf1_ros.sniffer.entries import Entry
 
 VERSION = 1
@@ -66,7 +66,7 @@ class PcapngWriter:
 
     def __init__(self, path: str) -> None:
         place = Path(path)
-        if place.exists() and not place.is_fifo() and not _is_ours(place):
+        if place.exists() and not place.is_fifo() and not may_replace(place, _head()):
             raise OSError(f'{path} exists and was not made by --pcapng; give another name')
         self.begun = 0.0
         place.touch(0o640)
@@ -101,13 +101,6 @@ def _head() -> bytes:
     return _block(_SECTION, struct.pack('<IHHQ', _BYTE_ORDER, 1, 0, _NO_LENGTH)) + _block(
         _INTERFACE, struct.pack('<HHI', LINK_TYPE, 0, _SNAP_LENGTH)
         + _option(_NAME, b'DF1') + _option(0, b''))
-
-
-def _is_ours(path: Path) -> bool:
-    if not path.is_file():
-        return False
-    with path.open('rb') as file:
-        return file.read(len(_head())) in (b'', _head())
 
 
 def _padded(data: bytes) -> bytes:
