@@ -373,14 +373,16 @@ def _section(snapshot: NodeView, name: str) -> Iterator[ShownStatus]:
 
 def _summary(name: str, status: ShownStatus, width: int) -> Iterator[TextLine]:
     """Yield the name and the message of a status; the message is never cut."""
-    room = max(_LEAST_VALUE_WIDTH, width - 15)
-    for number, part in enumerate(textwrap.wrap(printable(status.message), room) or ['']):
-        yield TextLine(f'  {"" if number else printable(name):<12} {part}', status.style)
+    return _wrapped(status.message, width, status.style, f'  {printable(name):<12} ')
 
 
-def _wrapped(text: str, width: int, style: Style = Style.PLAIN) -> Iterator[TextLine]:
-    for part in textwrap.wrap(printable(text), max(_LEAST_VALUE_WIDTH, width - 6)):
-        yield TextLine(f'      {part}', style)
+def _wrapped(text: str, width: int, style: Style = Style.PLAIN,
+             head: str = '      ') -> Iterator[TextLine]:
+    """Yield a text in as many lines as it needs; ``head`` stands before the first."""
+    room = max(_LEAST_VALUE_WIDTH, width - len(head))
+    for part in textwrap.wrap(printable(text), room) or ['']:
+        yield TextLine(head + part, style)
+        head = ' ' * len(head)
 
 
 def _says_something(value: str) -> bool:
@@ -392,6 +394,4 @@ def _table(values: Mapping[str, str], keys: Sequence[str], width: int) -> Iterat
     known = [key for key in keys if _says_something(values.get(key, ''))]
     longest = max(map(len, known), default=0)
     for key in known:
-        room = max(_LEAST_VALUE_WIDTH, width - longest - 8)
-        for number, part in enumerate(textwrap.wrap(printable(values[key]), room)):
-            yield TextLine(f'      {"" if number else key:<{longest}}  {part}')
+        yield from _wrapped(values[key], width, head=f'      {key:<{longest}}  ')
