@@ -19,7 +19,7 @@ from __future__ import annotations
 from abdf1_ros.conform import codec
 from abdf1_ros.conform.case import case, Permission, Target
 from abdf1_ros.conform.data import changes_nothing
-from abdf1_ros.conform.ends import AskingEnd, check_reply
+from abdf1_ros.conform.ends import AskingEnd
 
 _SILENT = (Target.SLAVE, Target.RADIO)
 _SOURCE = 'KF2 4-31, SLC 13-76 to 13-80'
@@ -55,14 +55,10 @@ def broken_message(end: AskingEnd) -> None:
         end.wire.send(frame[:len(frame) // 2])
         end.wire.expect_silence('the message was not complete', 0.3)
 
-    command = end.command()
-    end.deliver(command, break_off)
-    check_reply(command, end.collect())
+    end.carry_out(end.command(), break_off)
 
 
 @case('Bytes outside of a message do not spoil the next one.', 'M 3-4, 4-7 to 4-9',
       Target.PEER, *_SILENT)
 def noise_before_message(end: AskingEnd) -> None:
-    command = end.command()
-    end.deliver(command, lambda: end.wire.send(b'\x55\x00\xFF\x03'))
-    check_reply(command, end.collect())
+    end.carry_out(end.command(), lambda: end.wire.send(b'\x55\x00\xFF\x03'))

@@ -26,7 +26,7 @@ from dataclasses import replace
 
 from abdf1_ros.conform.case import case, Permission, Target
 from abdf1_ros.conform.codec import has_10_in_check, HEADER_SIZE, message, REPLY_BIT
-from abdf1_ros.conform.ends import AskingEnd, check_reply, Words
+from abdf1_ros.conform.ends import AskingEnd, Words
 from abdf1_ros.conform.wire import Failed, Skipped
 
 _ANSWERING = (Target.SLAVE, Target.PEER, Target.RADIO)
@@ -79,8 +79,7 @@ def check_not_doubled(end: AskingEnd) -> None:
         command = end.command()
         while not has_10_in_check(frame_of(command), end.wire.check):
             command = end.command()
-        end.deliver(command)
-        check_reply(command, end.collect())
+        end.carry_out(command)
         end.wire.expect_silence('the reply has ended')
 
 

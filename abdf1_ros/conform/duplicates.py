@@ -23,7 +23,7 @@ from __future__ import annotations
 
 from abdf1_ros.conform.case import case, Target
 from abdf1_ros.conform.codec import SymbolKind
-from abdf1_ros.conform.ends import AskingEnd, check_reply
+from abdf1_ros.conform.ends import AskingEnd
 from abdf1_ros.conform.wire import Skipped
 
 _ANSWERING = (Target.SLAVE, Target.PEER)
@@ -34,17 +34,12 @@ _ECHO = b'\x00twice'
 _OTHER_CMD = 0x0C  # a CMD that no PLC knows: the answer is STS 10 (M 8-2)
 
 
-def _carried_out(end: AskingEnd, command: bytes) -> None:
-    end.deliver(command)
-    check_reply(command, end.collect())
-
-
 @case('A message with the header of the last one is acknowledged and discarded.',
       _SOURCE, *_ANSWERING)
 def duplicate_discarded(end: AskingEnd) -> None:
     begun = end.wire.now
     command = end.command(body=_ECHO)
-    _carried_out(end, command)
+    end.carry_out(command)
     taken = end.wire.now - begun
     end.deliver(command)
     end.owed.clear()
@@ -57,27 +52,27 @@ def duplicate_discarded(end: AskingEnd) -> None:
 @case('A message with another TNS is not a duplicate.', _SOURCE, *_EVERYBODY)
 def new_tns_executed(end: AskingEnd) -> None:
     for _ in range(2):
-        _carried_out(end, end.command(body=_ECHO))
+        end.carry_out(end.command(body=_ECHO))
 
 
 @case('A message with the TNS of the last one and another CMD is not a duplicate.',
       _SOURCE, *_EVERYBODY)
 def other_command_executed(end: AskingEnd) -> None:
     first = end.command(body=_ECHO)
-    _carried_out(end, first)
-    _carried_out(end, first[:2] + bytes((_OTHER_CMD,)) + first[3:6])
+    end.carry_out(first)
+    end.carry_out(first[:2] + bytes((_OTHER_CMD,)) + first[3:6])
 
 
 @case('A message with the TNS of the last one and another SRC is not a duplicate.',
       _SOURCE, *_EVERYBODY)
 def other_source_executed(end: AskingEnd) -> None:
     first = end.command(body=_ECHO)
-    _carried_out(end, first)
-    _carried_out(end, first[:1] + bytes((end.own ^ 0x02,)) + first[2:])
+    end.carry_out(first)
+    end.carry_out(first[:1] + bytes((end.own ^ 0x02,)) + first[2:])
 
 
 @case('A message with the header of the last but one is not a duplicate.', _SOURCE, *_ANSWERING)
 def older_header_executed(end: AskingEnd) -> None:
     first = end.command(body=_ECHO)
     for command in (first, end.command(body=_ECHO), first):
-        _carried_out(end, command)
+        end.carry_out(command)

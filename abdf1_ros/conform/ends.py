@@ -186,6 +186,11 @@ class AskingEnd(ABC):
             return None
         return check_reply(command, self.collect())
 
+    def carry_out(self, command: bytes, before: Callable[[], object] = lambda: None) -> bytes:
+        """Call ``before``, send a command, and return the link data of its reply."""
+        self.deliver(command, before)
+        return check_reply(command, self.collect())
+
     def taken(self, symbol: Symbol, acknowledge: bool = True) -> bytes:
         """Acknowledge a message, and return its link data."""
         self.owed.discard(symbol.data[4:6])
@@ -194,10 +199,8 @@ class AskingEnd(ABC):
         return symbol.data
 
     def ask(self, cmd: int, body: bytes, tns: int | None = None) -> bytes:
-        """Send a command, with FNC in ``body``; return the link data of its reply."""
-        command = self.command(cmd, body, tns)
-        self.deliver(command)
-        return check_reply(command, self.collect())
+        """Make a command, with FNC in ``body``; return the link data of its reply."""
+        return self.carry_out(self.command(cmd, body, tns))
 
 
 class MasterEnd(AskingEnd):

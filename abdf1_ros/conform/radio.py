@@ -25,7 +25,7 @@ from abdf1_ros.conform import codec
 from abdf1_ros.conform.case import case, Permission, Target
 from abdf1_ros.conform.codec import Symbol, SymbolKind
 from abdf1_ros.conform.data import changes_nothing
-from abdf1_ros.conform.ends import check_reply, header, PATIENCE, RadioEnd, RadioServerEnd
+from abdf1_ros.conform.ends import header, PATIENCE, RadioEnd, RadioServerEnd
 from abdf1_ros.conform.wire import expect_same, Failed, Skipped
 
 _NODE, _SENDER = Target.RADIO, Target.RADIO_CLIENT
@@ -93,8 +93,7 @@ def broadcast_unanswered(end: RadioEnd) -> None:
 def duplicate_executed_once(end: RadioEnd) -> None:
     before = end.ask(0x06, _COUNTERS)
     command = end.command(0x06, _COUNTERS)
-    end.deliver(command)
-    first = check_reply(command, end.collect())
+    first = end.carry_out(command)
     if first[3] or first[codec.HEADER_SIZE:] == before[codec.HEADER_SIZE:]:
         raise Skipped('only counters that count (CMD 06, FNC 01) show what is executed')
     again = end.attempt(command)
