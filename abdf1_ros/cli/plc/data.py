@@ -375,9 +375,7 @@ def _with_bits(mapping: Mapping, number: int, value: float, text: str) -> str:
     named = [name for name, member in place.layout.members.items()
              if member.bit is not None and member.word == place.word
              and int(value) >> member.bit & 1]
-    is_bits = any(member.word == place.word and member.bit is not None
-                  for member in place.layout.members.values())
-    return f'{text}  {" ".join(named)}' if is_bits and named else text
+    return f'{text}  {" ".join(named)}' if named else text
 
 
 def value_texts(mapping: Mapping, values: Sequence[float], radix: Radix) -> list[str]:

@@ -17,7 +17,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 import time
 
@@ -84,17 +84,23 @@ def silent(network: Network) -> Network:
 def heard_reads(network: Network, seconds: float) -> list[Carried]:
     """Listen for ``seconds``; return the answered reads of other nodes. Raises OSError."""
     overhearing = Overhearing(network)
+    for at, data in _bytes_of(network, seconds):
+        direction = Direction.IN if isinstance(data, SecondPort) else Direction.UNKNOWN
+        overhearing.hear(Chunk(at, direction, data))
+    return overhearing.carried
+
+
+def _bytes_of(network: Network, seconds: float) -> Iterator[tuple[float, bytes]]:
+    """Open the port for ``seconds``; yield bytes as they come, with their time (s) since then."""
     port, wake = opened(network)(), Wake()
     try:
         begun = time.monotonic()
         while (now := time.monotonic() - begun) < seconds:
             data = port.read(seconds - now, wake.descriptor)
-            direction = Direction.IN if isinstance(data, SecondPort) else Direction.UNKNOWN
-            overhearing.hear(Chunk(time.monotonic() - begun, direction, data))
+            yield time.monotonic() - begun, data
     finally:
         port.close()
         wake.close()
-    return overhearing.carried
 
 
 def _heard(network: Network) -> tuple[int, Counter[int], Checksum | None]:
@@ -102,17 +108,10 @@ def _heard(network: Network) -> tuple[int, Counter[int], Checksum | None]:
     kind = LineKind()
     decoder = ListeningDecoder(kind)
     characters, polls = 0, Counter[int]()
-    port, wake = opened(network)(), Wake()
-    try:
-        end = time.monotonic() + LISTENED
-        while (left := end - time.monotonic()) > 0:
-            data = port.read(left, wake.descriptor)
-            characters += len(data)
-            decoder.feed(data)
-            while (symbol := decoder.next_symbol()) is not None:
-                if isinstance(symbol, Poll) and symbol.valid:
-                    polls[symbol.station] += 1
-    finally:
-        port.close()
-        wake.close()
+    for _, data in _bytes_of(network, LISTENED):
+        characters += len(data)
+        decoder.feed(data)
+        while (symbol := decoder.next_symbol()) is not None:
+            if isinstance(symbol, Poll) and symbol.valid:
+                polls[symbol.station] += 1
     return characters, polls, kind.checksum
