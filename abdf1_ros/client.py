@@ -41,14 +41,13 @@ from typing import Literal, overload, SupportsIndex, TYPE_CHECKING, TypeVar
 from abdf1_ros.df1.checksum import Checksum
 from abdf1_ros.df1.machine import LineTiming
 from abdf1_ros.df1.master import MASTER
-from abdf1_ros.df1.packet import is_local_status
 from abdf1_ros.df1.peer import PEER
 from abdf1_ros.df1.settings import LinkSettings
 from abdf1_ros.df1.slave_link import SLAVE
 from abdf1_ros.df1.stations import MAX_STATION
-from abdf1_ros.errors import FormatError, RemoteError
+from abdf1_ros.errors import FormatError
 from abdf1_ros.numbers import member_of, one_of, ValueKind
-from abdf1_ros.open_line import LOG, OpenLine, plain, PlcValue, single, text_of, values_of
+from abdf1_ros.open_line import kind_of, LOG, OpenLine, plain, PlcValue, single, text_of, values_of
 from abdf1_ros.pccc import steps
 from abdf1_ros.pccc.access import Access
 from abdf1_ros.pccc.address_range import AddressRange
@@ -253,17 +252,8 @@ class Client(OpenLine):
     def _asked(self, station: int) -> tuple[PlcType, Processor | None]:
         """Return family and processor of a station; the station is asked for them only once."""
         if station not in self._kinds:
-            try:
-                identity = self.identify(station)
-            except RemoteError as error:
-                if is_local_status(error.sts):
-                    raise
-                raise FormatError(f'station {station} does not identify itself (STS '
-                                  f'{error.sts:02X} to the question); name plc_type') from None
-            if identity.plc_type is None:
-                raise FormatError(f'station {station} is "{identity}", and its family is not '
-                                  'known; name plc_type')
-            self._kinds[station] = identity.plc_type, identity.processor
+            self._kinds[station] = kind_of(
+                lambda: self.identify(station), 'name plc_type', f'station {station} ')
         return self._kinds[station]
 
 

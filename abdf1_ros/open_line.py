@@ -28,14 +28,18 @@ import time
 from types import TracebackType
 from typing import Any, Generic, Self, TYPE_CHECKING, TypeAlias, TypeVar
 
+from abdf1_ros.df1.frames import Duplex
 from abdf1_ros.df1.mode import LineMode
+from abdf1_ros.df1.packet import is_local_status
 from abdf1_ros.df1.settings import LinkSettings
 from abdf1_ros.df1.stations import ActiveStationList
 from abdf1_ros.driver.requests import Requests
-from abdf1_ros.errors import Abdf1Error, FormatError, PortLost
+from abdf1_ros.errors import Abdf1Error, FormatError, PortLost, RemoteError
 from abdf1_ros.messages import Event, Severity
 from abdf1_ros.pccc.dialect import Steps
 from abdf1_ros.pccc.file_types import PlcType
+from abdf1_ros.pccc.identity import Identity
+from abdf1_ros.pccc.processor import Processor
 from abdf1_ros.pccc.values import Values, ValueType
 from abdf1_ros.ports.descriptor import Port
 from abdf1_ros.ports.link_thread import LinkThread
@@ -158,7 +162,8 @@ class OpenLine:
         self._trace: Trace | None = None
         port_of = opened(port)
         if trace is not None:
-            port_of = self._traced(trace, port, port_of)
+            port_of, self._trace = traced(
+                trace, port, line.checksum.value, mode.duplex, port_of, self.log.error)
         self._link = LinkThread(self._requests.machine, port_of,
                                 on_fault=lambda error: self._note(
                                     logging.CRITICAL, 'internal error', error))
@@ -261,16 +266,34 @@ class OpenLine:
             self._lost_reported += lost
             self.log.warning('%d entries were lost here: nothing was asked meanwhile', lost)
 
-    def _traced(self, path: str, port: PortSettings,
-                open_it: Callable[[], Port]) -> Callable[[], Port]:
-        """Begin the trace; return a function that opens the port and records its bytes."""
-        from abdf1_ros.ports.trace import begun_now, Trace, TracedPort
-        trace = self._trace = Trace(path, {
-            'begun': begun_now(), 'port': port.name, 'baud': str(port.baud),
-            'check': self._settings.checksum.value,
-            'duplex': self._mode.duplex.name.lower()}, self.log.error)
-        begun = time.monotonic()
-        return lambda: TracedPort(open_it(), trace, begun)
+
+def traced(path: str, port: PortSettings, check: str, duplex: Duplex, open_it: Callable[[], Port],
+           on_error: Callable[[str], None]) -> tuple[Callable[[], Port], Trace]:
+    """Begin a trace; return it after a function that opens the port and records its bytes."""
+    from abdf1_ros.ports.trace import begun_now, Trace, TracedPort
+    trace = Trace(path, {'begun': begun_now(), 'port': port.name, 'baud': str(port.baud),
+                         'check': check, 'duplex': duplex.name.lower()}, on_error)
+    begun = time.monotonic()
+    return lambda: TracedPort(open_it(), trace, begun), trace
+
+
+def kind_of(identify: Callable[[], Identity], cure: str,
+            subject: str = '') -> tuple[PlcType, Processor | None]:
+    """
+    Return family and processor of a station, from its own identity.
+
+    Raises FormatError, about the ``subject`` and with a ``cure``, if the family is unknown.
+    """
+    try:
+        identity = identify()
+    except RemoteError as error:
+        if is_local_status(error.sts):
+            raise
+        raise FormatError(f'{subject}does not identify itself (STS {error.sts:02X} to the '
+                          f'question); {cure}') from None
+    if identity.plc_type is None:
+        raise FormatError(f'{subject}is "{identity}", and its family is not known; {cure}')
+    return identity.plc_type, identity.processor
 
 
 def _nothing() -> Steps[None]:

@@ -27,12 +27,11 @@ import time
 from typing import TypeAlias
 
 from abdf1_ros.cli.plc.session import Session
-from abdf1_ros.df1.packet import is_local_status
 from abdf1_ros.driver.write import Outcome, show, Write, WriteResult
 from abdf1_ros.driver.writes.packets import carry_out
-from abdf1_ros.errors import Abdf1Error, FormatError, PortLost, RemoteError
+from abdf1_ros.errors import Abdf1Error, FormatError, PortLost
 from abdf1_ros.numbers import decimal_number, two_readings, whole_number
-from abdf1_ros.open_line import Pending
+from abdf1_ros.open_line import kind_of, Pending
 from abdf1_ros.pccc import steps
 from abdf1_ros.pccc.address import Address, BITS
 from abdf1_ros.pccc.address_range import AddressRange, is_element
@@ -175,16 +174,7 @@ def ask_family(session: Session, station: int) -> tuple[PlcType, Processor | Non
 
     Raises LinkError, RemoteError, or FormatError if they are unknown.
     """
-    try:
-        identity = session.ask(station, steps.identify())
-    except RemoteError as error:
-        if is_local_status(error.sts):
-            raise
-        raise FormatError('does not identify itself (STS '
-                          f'{error.sts:02X} to the question); give --plc-type') from None
-    if identity.plc_type is None:
-        raise FormatError(f'is "{identity}", and its family is not known; give --plc-type')
-    return identity.plc_type, identity.processor
+    return kind_of(lambda: session.ask(station, steps.identify()), 'give --plc-type')
 
 
 def processor_cell(processor: Processor | None) -> str:

@@ -18,7 +18,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
-import time
 from typing import TypeVar
 
 from abdf1_ros import open_line
@@ -29,7 +28,6 @@ from abdf1_ros.pccc.dialect import Steps
 from abdf1_ros.pccc.file_types import PlcType
 from abdf1_ros.ports.descriptor import Port
 from abdf1_ros.ports.settings import PortSettings
-from abdf1_ros.ports.trace import begun_now, Trace, TracedPort
 from abdf1_ros.settings.network import Network
 
 _Result = TypeVar('_Result')
@@ -44,16 +42,6 @@ def opened(network: Network) -> Callable[[], Port]:
         return open_line.opened(PortSettings.of(network))
     except OSError as error:
         raise NoPort(network.port, error) from None
-
-
-def recorded(network: Network, open_it: Callable[[], Port],
-             path: str) -> tuple[Callable[[], Port], Trace]:
-    """Return a function that opens a port with a capture of its bytes, and the capture."""
-    trace = Trace(path, {'begun': begun_now(), 'port': network.port, 'baud': str(network.baud),
-                         'check': network.error_code, 'duplex': network.duplex.name.lower()},
-                  partial(tell, 'plc'))
-    begun = time.monotonic()
-    return lambda: TracedPort(open_it(), trace, begun), trace
 
 
 class Session(open_line.OpenLine):

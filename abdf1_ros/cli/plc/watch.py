@@ -20,6 +20,7 @@ from collections import Counter, defaultdict, deque
 from collections.abc import Callable, Collection, Iterator, Sequence
 from dataclasses import dataclass
 from datetime import datetime
+from functools import partial
 import math
 import random
 import shutil
@@ -28,13 +29,15 @@ import textwrap
 from typing import NamedTuple
 
 from abdf1_ros.cli.plc.data import labels, Radix, rows, tag_of, Tags, value_texts
-from abdf1_ros.cli.plc.session import opened, recorded
+from abdf1_ros.cli.plc.session import opened
 from abdf1_ros.cli.terminal import is_terminal, table, tell
 from abdf1_ros.df1.stations import Station
 from abdf1_ros.driver.driver import Driver
 from abdf1_ros.driver.settings import DriverSettings
+from abdf1_ros.open_line import traced
 from abdf1_ros.pccc.values import Values
 from abdf1_ros.ports.link_thread import LinkThread
+from abdf1_ros.ports.settings import PortSettings
 from abdf1_ros.ports.wake import Wake
 from abdf1_ros.settings.mapping import Mapping
 from abdf1_ros.settings.network import Network
@@ -104,7 +107,8 @@ class LiveValues:
         self.counters = self._driver.counters
         port, self._trace = opened(network), None
         if record is not None:
-            port, self._trace = recorded(network, port, record)
+            port, self._trace = traced(record, PortSettings.of(network), network.error_code,
+                                       network.duplex, port, partial(tell, 'plc'))
         self._link = LinkThread(self._driver.machine, port)
         self._news: deque[_WatchedRead] = deque(maxlen=_MAX_NEWS)
         self._lost = self._lost_reported = 0
