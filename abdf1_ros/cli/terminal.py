@@ -52,10 +52,11 @@ EXIT_INTERRUPTED = 130
 
 _ENDING = (signal.SIGINT, signal.SIGTERM)
 
-_ADVICE = {
+ADVICE: dict[int | None, str] = {
     errno.EACCES: 'serial ports belong to a group: "sudo usermod -aG dialout $USER", then log in '
                   'again',
     errno.ENOENT: '"plc ports" lists the ports of this machine'}
+"""Advice by the number of an operating system error of a serial port."""
 
 _ALIKE = 0.7  # --perod suggests --period, but --force does not suggest --port
 
@@ -185,7 +186,7 @@ def has_reader_left(error: OSError, tell: Callable[[str], None]) -> bool:
 def reason_of(name: str, error: OSError) -> str:
     """Return why ``name`` cannot be used, with advice; the text has the name once."""
     text = error.strerror or str(error)
-    advice = advice_for(error.errno) if name.startswith('/dev/') else \
+    advice = ADVICE.get(error.errno, '') if name.startswith('/dev/') else \
         f'a device path is /dev/{name}' if name.startswith('tty') else ''
     return (text if name in text else f'{name}: {text}') + (f'; {advice}' if advice else '')
 
@@ -220,11 +221,6 @@ def called(name: str) -> str:
         if script and Path(script).is_file() and b'abdf1_ros' in Path(script).read_bytes()[:1000]:
             return words
     return f'{shlex.quote(sys.executable)} -m abdf1_ros {name}'
-
-
-def advice_for(number: int | None) -> str:
-    """Return advice for an operating system error of a serial port; empty for none."""
-    return _ADVICE.get(number or 0, '')
 
 
 def table(head: Sequence[str], rows: Sequence[Sequence[str]], right: Sequence[int] = ()) -> str:

@@ -30,6 +30,7 @@ have a time base of 10 ms, and count from the scan that starts them.
 from __future__ import annotations
 
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import dataclass
 from enum import IntEnum
 
@@ -164,7 +165,7 @@ class Ladder:
         is_changed = heartbeat != before  # 1
         self._put(11, 1, heartbeat)  # 2
         self._watchdog.scan(not is_changed, self.scan_time)  # 3
-        is_alive = (is_changed or self.is_on(Lamp.ALIVE)) and _signed(heartbeat) > 0 \
+        is_alive = (is_changed or self.is_on(Lamp.ALIVE)) and 0 < heartbeat < 0x8000 \
             and not self._watchdog.is_done and not self._is_first_pass  # 4
         self._stable.scan(is_alive, self.scan_time)  # 5
         is_reset = self._button and not self._button_before  # 6
@@ -197,10 +198,8 @@ class Ladder:
 
     def _show_first_pass(self) -> None:
         place = Address(self._addressing, FileType.STATUS, 2, 1)
-        try:
+        with suppress(NoSuchFile, OutOfRange):  # a data table may lack the status file
             self._table.write_bits(place, _FIRST_PASS, _FIRST_PASS * self._is_first_pass)
-        except (NoSuchFile, OutOfRange):  # a data table may lack the status file
-            return
 
     def _get(self, file: int, element: int) -> int:
         place = Address(self._addressing, FileType.INTEGER, file, element)
@@ -212,7 +211,3 @@ class Ladder:
     def _write(self, kind: FileType, file: int, element: int, value: int, word: int = 0) -> None:
         place = Address(self._addressing, kind, file, element, word)
         self._table.write(place, value.to_bytes(2, 'little'))
-
-
-def _signed(word: int) -> int:
-    return word - 0x10000 if word & 0x8000 else word

@@ -49,6 +49,7 @@ from abdf1_ros.cli.monitor.node import full_name, NodeWatch
 from abdf1_ros.cli.monitor.plant import PlantWatch, render_plant
 from abdf1_ros.cli.monitor.view import render, Style, TextLine
 from abdf1_ros.cli.terminal import (
+    colour,
     command_parser,
     EXIT_FAILED,
     EXIT_USAGE,
@@ -363,10 +364,8 @@ def _print_pictures(watch: NodeWatch | PlantWatch, picture: Callable[[int], list
 
 
 def _print(picture: Callable[[int], list[TextLine]]) -> None:
-    is_terminal = sys.stdout.isatty()
-    colours = is_terminal and 'NO_COLOR' not in os.environ
-    width = shutil.get_terminal_size((100, 24)).columns if is_terminal else 200
+    width = shutil.get_terminal_size((100, 24)).columns if sys.stdout.isatty() else 200
     for line in picture(width):
         number = _COLOURS.get(line.style)
-        print(f'\x1b[3{number}m{line.text}\x1b[0m' if colours and number else line.text)
+        print(colour(line.text, 30 + number, sys.stdout) if number else line.text)
     print(flush=True)

@@ -119,12 +119,10 @@ def _add_duplex(group: argparse._ArgumentGroup, defaults: LineDefaults) -> None:
                         help='half: several stations on a line; full: one PLC; radio: DF1 radio '
                              'modem; slave: another master polls us '
                              f'(default: {defaults.duplex})')
-    either.add_argument('--peer', action='store_const', const='full', dest='duplex',
-                        help='the same as --duplex full')
-    either.add_argument('--radio', action='store_const', const='radio', dest='duplex',
-                        help='the same as --duplex radio')
-    either.add_argument('--slave', action='store_const', const='slave', dest='duplex',
-                        help='the same as --duplex slave; the master must poll our --own-station')
+    for name, duplex, note in (('--peer', 'full', ''), ('--radio', 'radio', ''),
+                               ('--slave', 'slave', '; the master must poll our --own-station')):
+        either.add_argument(name, action='store_const', const=duplex, dest='duplex',
+                            help=f'the same as --duplex {duplex}{note}')
 
 
 def add_data_options(parser: argparse.ArgumentParser,

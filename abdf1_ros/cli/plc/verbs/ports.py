@@ -24,7 +24,7 @@ import argparse
 import errno
 
 from abdf1_ros.cli.plc.session import complain
-from abdf1_ros.cli.terminal import advice_for, EXIT_FAILED, table
+from abdf1_ros.cli.terminal import ADVICE, EXIT_FAILED, table
 from abdf1_ros.ports.listing import serial_ports
 
 
@@ -43,5 +43,5 @@ def run(options: argparse.Namespace) -> int:
         return EXIT_FAILED
     print(table(('port', 'adapter', 'stable name', ''), rows))
     if not all(port.may_open for port in ports):
-        complain(advice_for(errno.EACCES))
+        complain(ADVICE[errno.EACCES])
     return 0
