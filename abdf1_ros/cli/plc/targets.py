@@ -80,18 +80,10 @@ def to_read(options: argparse.Namespace) -> Targets:
 
     Raises ConfigurationError if no PLC could have the addresses.
     """
+    if not options.map and not options.addresses:
+        raise ConfigurationError([Problem(
+            'ADDRESS', 'give an address such as N7:0, or --map FILE for all rows of a map')])
     cells = _cells(options, Command.READ, options.length)
-    if not options.map:
-        if not options.addresses:
-            raise ConfigurationError([Problem(
-                'ADDRESS', 'give an address such as N7:0, or --map FILE for all rows of a map')])
-        try:
-            data.check_for_some_family(options.addresses, cells)
-        except ConfigurationError as error:
-            hints = [Problem('--map', f'if {shown(word)} is a tag, give its map with --map FILE')
-                     for word in options.addresses if _LIKE_A_TAG.fullmatch(word)]
-            raise ConfigurationError([*error.problems, *hints]) from None
-        return Targets(options.addresses, cells)
     mappings = rows_of_map(options.map)
     rows = {row.tag: replace(row, is_on_demand=False) for row in mappings.of_plcs if row.polls}
     entries: list[Mapping | str] = [rows.get(word, word) for word in options.addresses]
@@ -104,13 +96,18 @@ def to_read(options: argparse.Namespace) -> Targets:
     gateway = routes.get(station := _station(options), station)
     if options.via is None and gateway != station:
         cells['Via'] = str(gateway)
-    targets = Targets(entries, cells, data.tags_of(mappings, station), routes)
+    tags = data.tags_of(mappings, station) if options.map else None
+    targets = Targets(entries, cells, tags, routes)
     try:
         data.check_for_some_family(targets.addresses, cells)
     except ConfigurationError as error:
-        raise ConfigurationError([*error.problems, Problem(options.map, (
-            f'tags that are read: {first(list(rows)) or "none"}'
-            f'{"".join(_meant(word, rows) for word in targets.addresses)}'))]) from None
+        hints = [Problem('--map', f'if {shown(word)} is a tag, give its map with --map FILE')
+                 for word in targets.addresses if _LIKE_A_TAG.fullmatch(word)]
+        if options.map:
+            hints = [Problem(options.map, (
+                f'tags that are read: {first(list(rows)) or "none"}'
+                f'{"".join(_meant(word, rows) for word in targets.addresses)}'))]
+        raise ConfigurationError([*error.problems, *hints]) from None
     _check_options(options, targets)
     return targets
 
