@@ -351,45 +351,25 @@ def _listening_text(report: Report) -> str:
 
 def _rows_text(report: Report) -> str:
     """Return a table of the rows, with topic and message type of each."""
-    head = ['tag', 'address', 'station', 'topic', 'message', 'Length', 'value', 'stale ms']
-    entries = _rows(report.mappings, report)
-    rows = [[printable(entry['tag']), entry['address'], str(entry['station']),
-             ' '.join(entry['topics']), entry['message'], str(entry['length']), entry['value'],
-             '' if entry['stale_ms'] is None else str(entry['stale_ms'])] for entry in entries]
-    if any(entry['description'] for entry in entries):
-        head.append('description')
-        for row, entry in zip(rows, entries, strict=True):
-            row.append(printable(entry['description']))
+    rows = [[_cell(value) for name, value in row.items() if name != 'command']
+            for row in _rows(report.mappings, report)]
+    last = 'description' if any(row[-1] for row in rows) else ''
+    head = 'tag', 'address', 'station', 'topic', 'message', 'Length', 'value', 'stale ms', last
     return table(head, rows, right=(2, 5, 7))
 
 
-class _ShownRow(TypedDict):
-    """
-    The cells of a row, for the table and for JSON.
-
-    A heartbeat has no topics. ``stale_ms``: the deadline that the topic promises; None if it
-    promises none.
-    """
-
-    tag: str
-    command: str
-    address: str
-    station: int
-    topics: list[str]
-    message: str
-    length: int
-    value: str
-    stale_ms: int | None
-    description: str
-
-
-def _rows(mappings: Sequence[Mapping], report: Report | None) -> list[_ShownRow]:
+def _rows(mappings: Sequence[Mapping], report: Report | None) -> list[dict[str, object]]:
     promised = report.promises() if report else {}
     return [_row(mapping, promised.get(mapping)) for mapping in mappings]
 
 
-def _row(mapping: Mapping, stale: float | None) -> _ShownRow:
-    """Return the cells of a row whose topic promises the deadline ``stale`` (s)."""
+def _row(mapping: Mapping, stale: float | None) -> dict[str, object]:
+    """
+    Return the cells of a row by name, for the table and for JSON.
+
+    A heartbeat has no topics. ``stale``: the deadline (s) that the topic promises; None if it
+    promises none.
+    """
     topics = [f'~/{what}/{mapping.topic}' for what, is_there in (
         ('read', mapping.reads), ('write', mapping.writes)) if is_there]
     return {
@@ -420,7 +400,11 @@ def _plan_text(report: Report) -> str:
 
 
 def _cell(value: object) -> str:
-    return f'{value:.1f}' if isinstance(value, float) else str(value)
+    """Return a value of JSON as the cell of a table."""
+    if isinstance(value, list):
+        return ' '.join(map(str, value))
+    return '' if value is None else \
+        f'{value:.1f}' if isinstance(value, float) else printable(str(value))
 
 
 def _entry(report: Report, block: Block) -> dict[str, object]:
