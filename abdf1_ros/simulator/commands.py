@@ -64,10 +64,6 @@ def _ladder(plc: SimulatedPlc) -> Ladder:
     return plc.ladder
 
 
-def _press_reset(plc: SimulatedPlc) -> None:
-    _ladder(plc).press_reset()
-
-
 def _set_scan_time(plc: SimulatedPlc, text: str) -> str:
     value = whole_number(text)
     low, high = _SCANS
@@ -80,7 +76,8 @@ def _set_scan_time(plc: SimulatedPlc, text: str) -> str:
 
 
 _ACTIONS: dict[str, Callable[[SimulatedPlc], None]] = {
-    'download': SimulatedPlc.download, 'power': SimulatedPlc.cycle_power, 'reset': _press_reset}
+    'download': SimulatedPlc.download, 'power': SimulatedPlc.cycle_power,
+    'reset': lambda plc: _ladder(plc).press_reset()}
 
 
 class CommandError(Exception):

@@ -56,19 +56,13 @@ _EXECUTE_PCCC, _UNCONNECTED_SEND, _REPLY = 0x4B, 0x52, 0x80  # services
 _PCCC_OBJECT = b'\x20\x67', b'\x21\x00\x67\x00'  # a path begins with its class
 
 
-class _Stations:
+class _Stations(dict[bytes, int]):
     """Station numbers for IP addresses: the last number of the address, or a free number."""
 
-    def __init__(self) -> None:
-        self._numbers: dict[bytes, int] = {}
-
-    def number(self, address: bytes) -> int:
-        """Return the number of an address."""
-        if address not in self._numbers:
-            taken = set(self._numbers.values())
-            free = (number for number in (address[3], *range(254, 0, -1)) if number not in taken)
-            self._numbers[address] = next(free, address[3])
-        return self._numbers[address]
+    def __missing__(self, address: bytes) -> int:
+        taken = set(self.values())
+        free = (number for number in (address[3], *range(254, 0, -1)) if number not in taken)
+        return self.setdefault(address, next(free, address[3]))
 
 
 class _Stream:
@@ -179,7 +173,7 @@ class _Connections:
                 self._asked.add(key)
             elif key not in self._asked:
                 continue
-            ours = bytes(map(self._stations.number, (ends[4:8], ends[:4])))
+            ours = bytes((self._stations[ends[4:8]], self._stations[ends[:4]]))
             yield Chunk(time, way, ours + pccc, is_message=True)
 
 

@@ -27,6 +27,8 @@ from abdf1_ros.cli.plc.session import complain, Session
 from abdf1_ros.cli.plc.targets import Targets
 from abdf1_ros.cli.terminal import EXIT_FAILED
 from abdf1_ros.errors import Abdf1Error, LinkError, PortLost, RemoteError
+from abdf1_ros.open_line import kind_of
+from abdf1_ros.pccc import steps
 from abdf1_ros.pccc.file_types import PlcType
 from abdf1_ros.pccc.processor import Processor
 from abdf1_ros.pccc.status import is_address_fault
@@ -78,7 +80,7 @@ def family_of(options: argparse.Namespace,
     """Return family and processor: from the option, or from the station's reply."""
     if options.plc_type:
         return PlcType(options.plc_type), None
-    return data.ask_family(session, options.station)
+    return kind_of(lambda: session.ask(options.station, steps.identify()), 'give --plc-type')
 
 
 def failed(options: argparse.Namespace, session: Session, error: Abdf1Error, place: str = '',

@@ -31,7 +31,7 @@ from abdf1_ros.driver.write import Outcome, show, Write, WriteResult
 from abdf1_ros.driver.writes.packets import carry_out
 from abdf1_ros.errors import Abdf1Error, FormatError, PortLost
 from abdf1_ros.numbers import decimal_number, two_readings, whole_number
-from abdf1_ros.open_line import kind_of, Pending
+from abdf1_ros.open_line import Pending
 from abdf1_ros.pccc import steps
 from abdf1_ros.pccc.address import Address, BITS
 from abdf1_ros.pccc.address_range import AddressRange, is_element
@@ -166,15 +166,6 @@ def length_of(address: str, kind: str | None, texts: Sequence[str]) -> int:
         return 1
     is_packed = kind == ValueType.STRING.value
     return max(1, (len(texts[0]) + 1) // 2) if is_packed else len(texts)
-
-
-def ask_family(session: Session, station: int) -> tuple[PlcType, Processor | None]:
-    """
-    Return family and processor of a station, from its own identity.
-
-    Raises LinkError, RemoteError, or FormatError if they are unknown.
-    """
-    return kind_of(lambda: session.ask(station, steps.identify()), 'give --plc-type')
 
 
 def processor_cell(processor: Processor | None) -> str:
