@@ -136,11 +136,6 @@ class Client(OpenLine):
         return TaggedClient(text_of('net_file', net_file), text_of('map_file', map_file),
                             None if trace is None else text_of('trace', trace), logger)
 
-    # Without ``kind`` the type of the result depends on the file of the address.
-    @overload
-    def read(self, address: str, length: SupportsIndex | None = None, kind: None = None, *,
-             word_order: str = 'Low', station: int | None = None) -> PlcValue: ...
-
     @overload
     def read(self, address: str, length: None = None, *, kind: Whole,
              word_order: str = 'Low', station: int | None = None) -> int: ...
@@ -170,6 +165,7 @@ class Client(OpenLine):
              kind: Literal['string'], word_order: str = 'Low',
              station: int | None = None) -> str: ...
 
+    # Without ``kind`` the type of the result depends on the file of the address.
     @overload
     def read(self, address: str, length: SupportsIndex | None = None, kind: str | None = None, *,
              word_order: str = 'Low', station: int | None = None) -> PlcValue: ...

@@ -44,7 +44,7 @@ from abdf1_ros.cli.terminal import (
     tell,
     whole_option,
 )
-from abdf1_ros.conform.case import Case, CaseResult, Permission, run_cases, Target, Verdict
+from abdf1_ros.conform.case import Case, CaseResult, End, Permission, run_cases, Target, Verdict
 from abdf1_ros.conform.cases import CASES
 from abdf1_ros.conform.codec import BlockCheck, HEADER_SIZE
 from abdf1_ros.conform.ends import (
@@ -82,8 +82,6 @@ _NEAR = 2.0  # in units of --answer-time: an earlier DLE ENQ may look like an an
 
 _NOTHING_TRIED = 'no rule was tried: each case has its reason'
 _NOBODY = 'no byte was received: check cable, port, speed and power'
-
-End = MasterEnd | PeerEnd | SlaveEnd | ServerEnd
 
 _EPILOG = """\
 exit status: 0 if no case failed, 1 if a case failed, no case was tried, no byte was heard or the
