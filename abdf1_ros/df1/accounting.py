@@ -48,13 +48,18 @@ def count_fault(frame: Frame, checksum: Checksum, counters: Counters,
     return Event(Message.NTC_RCVD_MSG_TOO_LONG, (MAX_LINK_DATA,), station)
 
 
+def count_control(symbol: object, counters: Counters) -> None:
+    """Count DLE ACK, NAK, EOT and ENQ."""
+    counters.acks_received += symbol is Control.ACK
+    counters.naks_received += symbol is Control.NAK
+    counters.eots_received += symbol is Control.EOT
+    counters.enqs_received += symbol is Control.ENQ
+
+
 def count_unheard(symbol: Symbol, checksum: Checksum, counters: Counters) -> None:
     """Count a symbol of a slave that comes while the master does not wait for an answer."""
-    if isinstance(symbol, Control):
-        counters.acks_received += symbol is Control.ACK
-        counters.naks_received += symbol is Control.NAK
-        counters.eots_received += symbol is Control.EOT
-    elif isinstance(symbol, Frame) and symbol.station is None:
+    count_control(symbol, counters)
+    if isinstance(symbol, Frame) and symbol.station is None:
         if symbol.fault is not None:
             count_fault(symbol, checksum, counters)
             return
@@ -69,19 +74,12 @@ def wrong_message(packet: Packet, station: int) -> Event:
     return Event(Message.ERR_WRONG_MESSAGE, (packet.src, packet.dst, packet.tns), station)
 
 
-class Accounting:
-    """
-    Update the counters and the records of stations of one link, and report its events.
+class Tally:
+    """Count the messages of one node, and report its events."""
 
-    ``number`` is our own station, None if messages to any station are ours.
-    """
-
-    def __init__(self, counters: Counters, stations: ActiveStationList,
-                 report: ReportEvent, number: int | None) -> None:
+    def __init__(self, counters: Counters, report: ReportEvent) -> None:
         self.counters = counters
         self.report = report
-        self._stations = stations
-        self._number = number
 
     def note(self, message: Message, *args: int, station: int | None) -> None:
         """Report a numbered error or notice at a station."""
@@ -103,6 +101,35 @@ class Accounting:
         else:
             self.counters.commands_received += 1
 
+    def repeated(self, tries: int, cause: Message, station: int | None) -> None:
+        """Count and report that a message is sent again, after this number of tries."""
+        self.counters.nak_retries += 1
+        self.note(Message.NTC_NAK_RETRY, tries, cause.number, station=station)
+
+    def given_up(self, retries: int, station: int | None) -> None:
+        """Count and report that a message is not sent again, after this number of repetitions."""
+        self.counters.nak_limit_exceeded += 1
+        self.note(Message.NTC_NAK_LIMIT_EXCEEDED, retries, station=station)
+
+    def wrong(self, packet: Packet, station: int) -> None:
+        """Count and report a message with wrong addresses (S0, counter 2550, message 2510)."""
+        self.counters.invalid_messages += 1
+        self.report(wrong_message(packet, station))
+
+
+class Accounting(Tally):
+    """
+    Update the counters and the records of stations of one link, and report its events.
+
+    ``number`` is our own station, None if messages to any station are ours.
+    """
+
+    def __init__(self, counters: Counters, stations: ActiveStationList,
+                 report: ReportEvent, number: int | None) -> None:
+        super().__init__(counters, report)
+        self._stations = stations
+        self._number = number
+
     def unexpected(self, reply: Packet, now: float) -> None:
         """
         Count and report a reply that no command waits for (S0, message 2510).
@@ -117,11 +144,6 @@ class Accounting:
         if may_answer and not is_local_status(reply.sts):
             self._stations.heard(reply.src, now)
         self.report(wrong_message(reply, reply.src))
-
-    def misdirected(self, command: Packet) -> None:
-        """Count and report a command for another node (S0, counter 2550 and message 2510)."""
-        self.counters.invalid_messages += 1
-        self.report(wrong_message(command, command.src))
 
     def nak_received(self, station: int | None) -> None:
         """Report that a message of ours has been answered with DLE NAK."""

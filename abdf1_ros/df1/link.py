@@ -22,8 +22,8 @@ from functools import cache
 from typing import Protocol
 
 from abdf1_ros.df1.accounting import Accounting
-from abdf1_ros.df1.frames import ACK, Control, Frame, Symbol
-from abdf1_ros.df1.machine import Heard, Machine, MIN_RESPONSE_TIME, Procedure
+from abdf1_ros.df1.frames import ACK, Frame, Symbol
+from abdf1_ros.df1.machine import Machine, MIN_RESPONSE_TIME, Procedure
 from abdf1_ros.df1.packet import Packet, REPLY_BIT
 from abdf1_ros.df1.sender import Reflex
 from abdf1_ros.df1.stations import ActiveStationList
@@ -104,13 +104,5 @@ class EqualNode(Link):
         self._counters = machine.counters
         self._stations = stations
         self._serve = serve
-        self._report = report
         self._accounting = Accounting(machine.counters, stations, report, number)
         self._note = self._accounting.note
-
-    def _count_symbol(self, symbol: Heard) -> None:
-        """Count DLE ACK, NAK, EOT and ENQ."""
-        self._counters.acks_received += symbol is Control.ACK
-        self._counters.naks_received += symbol is Control.NAK
-        self._counters.eots_received += symbol is Control.EOT
-        self._counters.enqs_received += symbol is Control.ENQ

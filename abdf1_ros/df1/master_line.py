@@ -33,7 +33,7 @@ import math
 from typing import TypeGuard
 
 from abdf1_ros.df1 import frames
-from abdf1_ros.df1.accounting import Accounting, count_fault, wrong_message
+from abdf1_ros.df1.accounting import Accounting, count_control, count_fault, wrong_message
 from abdf1_ros.df1.frames import Code, Control, Frame, FrameFault, Unknown
 from abdf1_ros.df1.link import ack_on_reply, quiet_time
 from abdf1_ros.df1.machine import (
@@ -106,7 +106,6 @@ class MasterLine:
         self.stations = stations
         self.accounting = Accounting(machine.counters, stations, report, settings.station)
         self.note = self.accounting.note
-        self._report = report
         self._serve = serve
         self._take_reply = take_reply
         self._timeout = answer_time(settings)
@@ -164,11 +163,9 @@ class MasterLine:
             if is_once:
                 break
             if retry <= self.settings.nak_retries:
-                self.counters.nak_retries += 1
-                self.note(Message.NTC_NAK_RETRY, retry, cause.number, station=number)
+                self.accounting.repeated(retry, cause, number)
         else:
-            self.counters.nak_limit_exceeded += 1
-            self.note(Message.NTC_NAK_LIMIT_EXCEEDED, self.settings.nak_retries, station=number)
+            self.accounting.given_up(self.settings.nak_retries, number)
         if gateway.active and len(self.stations.behind(number)) > 1:
             yield from self.probe(number)
             raise CommandTimeout if packet.dst == number else StationInactive(packet.dst)
@@ -248,7 +245,7 @@ class MasterLine:
         while not isinstance(symbol := (yield step), Silence):
             step = LISTEN_ON
             if isinstance(symbol, Control):
-                self._count_control(symbol)
+                count_control(symbol, self.counters)
                 self._last_code = symbol.code
                 if symbol in wanted:
                     return symbol
@@ -329,8 +326,7 @@ class MasterLine:
         if is_other or packet.dst == packet.src:
             if frame.data != station.last_refused:
                 station.last_refused = frame.data
-                self.counters.invalid_messages += 1
-                self._report(wrong_message(packet, number))
+                self.accounting.wrong(packet, number)
                 return None
             self.counters.acks_sent += 1
             yield _ACKNOWLEDGE
@@ -403,7 +399,7 @@ class MasterLine:
             self.forwards.append(self._serve(packet))
         else:
             self.counters.invalid_messages += not is_ours
-            self._report(wrong_message(packet, packet.src))
+            self.accounting.report(wrong_message(packet, packet.src))
 
     def forward(self, busy: Container[int] = (),
                 collect: Callable[[int, Packet], Procedure] | None = None
@@ -461,18 +457,10 @@ class MasterLine:
         """Tell whether there is no room for further messages to be passed on."""
         return len(self.forwards) >= MAX_FORWARDS
 
-    def _count_control(self, control: Control) -> None:
-        if control is Control.ACK:
-            self.counters.acks_received += 1
-        elif control is Control.EOT:
-            self.counters.eots_received += 1
-        else:
-            self.counters.naks_received += control is Control.NAK
-
     def _note_fault(self, frame: Frame, number: int) -> Message:
         """Count and report the fault of a frame; return the message that names it."""
         event = count_fault(frame, self.settings.checksum, self.counters, number)
-        self._report(event)
+        self.accounting.report(event)
         return event.message
 
 

@@ -51,7 +51,7 @@ from dataclasses import dataclass
 import math
 
 from abdf1_ros.df1 import frames
-from abdf1_ros.df1.accounting import count_fault, wrong_message
+from abdf1_ros.df1.accounting import count_control, count_fault
 from abdf1_ros.df1.frames import Code, Control, Duplex, Frame, FrameFault, Symbol, Unknown
 from abdf1_ros.df1.link import ack_on_reply, EqualNode
 from abdf1_ros.df1.machine import Heard, Listen, Machine, Procedure, Rest, Send, Silence, Step
@@ -236,12 +236,9 @@ class FullDuplexPeer(EqualNode):
     def _note_nak(self, naks: int, station: int) -> bool:
         """Count and report that a message is sent again, or is given up."""
         if naks > self._settings.nak_retries:
-            self._counters.nak_limit_exceeded += 1
-            self._note(Message.NTC_NAK_LIMIT_EXCEEDED, self._settings.nak_retries, station=station)
+            self._accounting.given_up(self._settings.nak_retries, station)
             return False
-        self._counters.nak_retries += 1
-        self._note(Message.NTC_NAK_RETRY, naks, Message.ERR_RCVD_NAK_SYMBOL.number,
-                   station=station)
+        self._accounting.repeated(naks, Message.ERR_RCVD_NAK_SYMBOL, station)
         return True
 
     def _note_silence(self, enqs: int, station: int) -> bool:
@@ -264,7 +261,7 @@ class FullDuplexPeer(EqualNode):
         while not isinstance(symbol, Silence) or self._left(end) > 0:
             if symbol in (Control.ACK, Control.NAK) and machine.sender.has_left(position):
                 assert isinstance(symbol, Control)
-                self._count_symbol(symbol)
+                count_control(symbol, self._counters)
                 return symbol.code
             if isinstance(symbol, Silence):
                 last_byte = self._heard_since(begun, symbol) or last_byte
@@ -332,9 +329,9 @@ class FullDuplexPeer(EqualNode):
             return self._message(symbol)
         if symbol is Control.ENQ:
             self._expect_repetition()
-            self._count_symbol(symbol)
+            count_control(symbol, self._counters)
             return self._respond(self._last_response)
-        self._count_symbol(symbol)
+        count_control(symbol, self._counters)
         if symbol is Control.ACK or symbol is Control.NAK:
             return b''
         self._last_response = frames.NAK
@@ -345,7 +342,7 @@ class FullDuplexPeer(EqualNode):
     def _message(self, frame: Frame) -> bytes:
         """Judge a message and return the response to it."""
         if frame.fault is not None:
-            self._report(count_fault(frame, self._settings.checksum, self._counters))
+            self._accounting.report(count_fault(frame, self._settings.checksum, self._counters))
             is_given_up = frame.fault is FrameFault.NO_ETX and frame.received in (
                 Code.STX, Code.ENQ)  # its sender begins again, or sends an ENQ
             if is_given_up or frame.has_stopped:
@@ -356,8 +353,7 @@ class FullDuplexPeer(EqualNode):
         self._counters.messages_received += 1
         # On a line with an echo, a command may be our own with damage that no check shows.
         if not packet.is_sound or (self._machine.echoes and not packet.is_reply):
-            self._counters.invalid_messages += 1
-            self._report(wrong_message(packet, packet.src))
+            self._accounting.wrong(packet, packet.src)
             return self._respond(frames.NAK)
         if self._is_repetition(packet):
             self._counters.duplicate_messages += 1

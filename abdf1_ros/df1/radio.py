@@ -39,7 +39,7 @@ import math
 from random import Random
 
 from abdf1_ros.df1 import frames
-from abdf1_ros.df1.accounting import count_fault, wrong_message
+from abdf1_ros.df1.accounting import count_control, count_fault
 from abdf1_ros.df1.frames import Duplex, Frame, MAX_LINK_DATA
 from abdf1_ros.df1.link import EqualNode, LinkState
 from abdf1_ros.df1.machine import (
@@ -221,9 +221,7 @@ class RadioNode(EqualNode):
             del self._under_way[number]
             self._accounting.late(task, keeps_others_waiting=True)
             if self._stations[number].active:  # not after the one try of a probe
-                self._counters.nak_limit_exceeded += 1
-                self._note(Message.NTC_NAK_LIMIT_EXCEEDED, self._settings.nak_retries,
-                           station=number)
+                self._accounting.given_up(self._settings.nak_retries, number)
             if task.blames:
                 self._accounting.lost(number, self._machine.now)
             task.fail(StationInactive(number))
@@ -246,7 +244,9 @@ class RadioNode(EqualNode):
         if command is not None:
             if self._is_over(command):
                 return
-            self._count_try(command)
+            if command.tries:
+                self._accounting.repeated(command.tries, Message.ERR_COMMAND_TIMEOUT,
+                                          command.task.command.dst)
             command.task.sent, expires = True, command.task.expires
         self._counters.messages_sent += 1
         self._sent.append(data)
@@ -283,13 +283,6 @@ class RadioNode(EqualNode):
     def _is_over(self, command: _SentCommand) -> bool:
         return self._under_way.get(command.task.command.dst) is not command
 
-    def _count_try(self, command: _SentCommand) -> None:
-        """Count and report a command that is sent again."""
-        if command.tries:
-            self._counters.nak_retries += 1
-            self._note(Message.NTC_NAK_RETRY, command.tries, Message.ERR_COMMAND_TIMEOUT.number,
-                       station=command.task.command.dst)
-
     def _note_heard(self, data: bytes) -> bool:
         """Keep link data; return True if they were among the last link data heard."""
         now = self._machine.now
@@ -301,10 +294,10 @@ class RadioNode(EqualNode):
     def _hear(self, symbol: Heard) -> None:
         """Take a packet; a symbol of another mode is noise."""
         if not isinstance(symbol, Frame):
-            self._count_symbol(symbol)
+            count_control(symbol, self._counters)
             return
         if symbol.fault is not None:
-            self._report(count_fault(symbol, self._settings.checksum, self._counters))
+            self._accounting.report(count_fault(symbol, self._settings.checksum, self._counters))
             return
         packet = Packet.decode(symbol.data)
         if packet.src in self._numbers:
@@ -319,8 +312,7 @@ class RadioNode(EqualNode):
             return
         self._counters.messages_received += 1
         if not packet.is_sound:
-            self._counters.invalid_messages += 1
-            self._report(wrong_message(packet, packet.src))
+            self._accounting.wrong(packet, packet.src)
         elif packet.is_reply:
             self._take_reply(packet, is_repetition=is_known)
         else:
@@ -331,8 +323,7 @@ class RadioNode(EqualNode):
         if data in self._sent or self._machine.now < self._begun + _RECENT:
             return  # just after a start it may be a packet of the last run
         self._same_number = self._machine.now
-        self._counters.invalid_messages += 1
-        self._report(wrong_message(packet, packet.dst))
+        self._accounting.wrong(packet, packet.dst)
         command = self._under_way.get(packet.dst)
         if command is not None and command.task.command.duplicate_key == packet.duplicate_key:
             command.is_doubtful = True

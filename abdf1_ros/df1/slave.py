@@ -30,7 +30,7 @@ from typing import Protocol
 
 from abdf1_ros.counters import Counters
 from abdf1_ros.df1 import frames
-from abdf1_ros.df1.accounting import count_fault, wrong_message
+from abdf1_ros.df1.accounting import count_control, count_fault, Tally
 from abdf1_ros.df1.frames import Control, Frame, Poll, Symbol, Unknown
 from abdf1_ros.df1.machine import (
     Heard,
@@ -98,7 +98,7 @@ class HalfDuplexSlave:
                  report: Callable[[Event], None] = lambda event: None) -> None:
         self.counters = counters or Counters()
         self._initiator = initiator or Initiator()
-        self._report = report
+        self._tally = Tally(self.counters, report)
         self._settings = settings
         self._serve = serve
         self._queue: deque[Packet] = deque()
@@ -121,19 +121,15 @@ class HalfDuplexSlave:
             return self._polled(symbol)
         if isinstance(symbol, Frame):
             return self._received(symbol)
-        if symbol is Control.ACK:
-            self.counters.acks_received += 1
-            if just_sent:  # an ACK names no station: it is ours only straight after our message
-                self._release()
+        count_control(symbol, self.counters)
+        if symbol is Control.ACK and just_sent:
+            self._release()  # an ACK names no station: it is ours only straight after our message
         elif symbol is Control.NAK:
-            self.counters.naks_received += 1
-            self._report(Event(Message.NTC_RCVD_NAK_SYMBOL))
+            self._tally.note(Message.NTC_RCVD_NAK_SYMBOL, station=None)
             self._release(LineReset())
             self._queue.clear()  # a NAK resets all slaves of the line (M 2-7, 3-11)
-        elif symbol is Control.EOT:
-            self.counters.eots_received += 1
         elif isinstance(symbol, Unknown) and not symbol.is_misplaced:
-            self._report(Event(Message.NTC_INVALID_SYMBOL, (symbol.byte,)))
+            self._tally.note(Message.NTC_INVALID_SYMBOL, symbol.byte, station=None)
         return b''
 
     def reset(self) -> None:
@@ -183,17 +179,16 @@ class HalfDuplexSlave:
         if frame.station not in (self._settings.station, BROADCAST):
             return b''
         if frame.fault is not None:
-            self._report(count_fault(frame, self._settings.checksum, self.counters))
+            self._tally.report(count_fault(frame, self._settings.checksum, self.counters))
             return b''
         packet = Packet.decode(frame.data)
         self.counters.messages_received += 1
         if not packet.is_sound or frame.station == 0 != packet.dst:
-            self.counters.invalid_messages += 1
-            self._report(wrong_message(packet, packet.src))
+            self._tally.wrong(packet, packet.src)
             return b''
         if packet.duplicate_key == self._last_key and self._settings.duplicate_detection:
             self.counters.duplicate_messages += 1
-            self._report(Event(Message.NTC_DUPLICATE_MSG_RCVD, (packet.src,), packet.src))
+            self._tally.note(Message.NTC_DUPLICATE_MSG_RCVD, packet.src, station=packet.src)
             return self._ack(frame)
         wants_reply = frame.station != BROADCAST and not packet.is_reply
         if wants_reply and len(self._queue) >= self._settings.queue_size:
@@ -208,12 +203,10 @@ class HalfDuplexSlave:
         if self._unused is None:
             return
         (packet, wants_reply), self._unused = self._unused, None
+        self._tally.received(packet)
         if packet.is_reply:
-            self.counters.replies_received += 1
-            self.counters.error_messages_received += packet.sts != 0
             self._initiator.replied(packet)
             return
-        self.counters.commands_received += 1
         reply = self._serve(packet)
         if wants_reply:
             self._queue.append(reply)
@@ -230,8 +223,7 @@ class HalfDuplexSlave:
             return b''
         self.counters.polls_received += 1
         if self._held is not None and self._held.sent > self._settings.nak_retries:
-            self.counters.nak_limit_exceeded += 1
-            self._report(Event(Message.NTC_NAK_LIMIT_EXCEEDED, (self._settings.nak_retries,)))
+            self._tally.given_up(self._settings.nak_retries, None)
             self._release(NeverTaken(self._settings.nak_retries))
         self._initiator.polled()
         if self._held is None:
@@ -263,9 +255,7 @@ class HalfDuplexSlave:
         if held.sent:
             self.counters.nak_retries += 1
         else:
-            self.counters.replies_sent += held.packet.is_reply
-            self.counters.commands_sent += not held.packet.is_reply
-            self.counters.error_messages_sent += held.packet.sts != 0
+            self._tally.sent(held.packet)
         held.sent += 1
         self.counters.messages_sent += 1
         self._just_sent = True

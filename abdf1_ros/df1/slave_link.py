@@ -90,7 +90,7 @@ class SlaveLink(Link, Initiator):
         """Execute a command for us; refuse a command for another node: we are not a gateway."""
         if command.dst in (self._settings.station, BROADCAST):
             return self._serve(command)
-        self._accounting.misdirected(command)
+        self._accounting.wrong(command, command.src)
         return command.reply(sts=STS_NOT_DELIVERED)
 
     def _expiry(self) -> float:
