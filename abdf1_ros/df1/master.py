@@ -81,8 +81,7 @@ class HalfDuplexMaster(Link):
             if task is not None:
                 yield from self.carry_out(task)
             elif not self._line.forwards:
-                due = source.next_due()
-                yield Rest(None if due is None else max(due - now, 0.0))
+                yield Rest(max(source.next_due() - now, 0.0))
 
     def carry_out(self, task: Task) -> Procedure:
         """Send the command of a task and end the task; for a broadcast, we make a reply."""

@@ -155,14 +155,12 @@ class FullDuplexPeer(EqualNode):
             return None
         return source.next_task(self._machine.now)
 
-    def _idle_time(self, source: TaskSource) -> float | None:
-        """Return the seconds until a reply is overdue or a task may be sent; None for never."""
-        moments: list[float | None] = [
-            self._given_up(entry) for entry in self._outstanding.values()]
+    def _idle_time(self, source: TaskSource) -> float:
+        """Return the seconds until a reply is overdue or a task is due; infinite for never."""
+        moments = [self._given_up(entry) for entry in self._outstanding.values()]
         if len(self._outstanding) < self._settings.max_outstanding:
             moments.append(source.next_due())
-        known = [moment for moment in moments if moment is not None]
-        return max(0.0, min(known) - self._machine.now) if known else None
+        return max(0.0, min(moments, default=math.inf) - self._machine.now)
 
     def _send_command(self, task: Task) -> Procedure:
         number = task.command.dst

@@ -192,8 +192,7 @@ class RadioNode(EqualNode):
     def _rest(self, source: TaskSource) -> Step:
         """Return the step that waits until a command is overdue or a task is due."""
         if not self._under_way:
-            due = source.next_due()
-            return Rest(None if due is None else max(due - self._machine.now, 0.0))
+            return Rest(max(source.next_due() - self._machine.now, 0.0))
         first = min(command.deadline for command in self._under_way.values())
         left = max(first - self._machine.now, 0.0)
         return Listen(min(left, _TICK) if self._has_room else left)

@@ -79,6 +79,6 @@ class TaskSource(Protocol):
         """Return the next task that is not for a ``busy`` station, or None."""
         return None
 
-    def next_due(self) -> float | None:
-        """Return when the next task will be due (clock value in s), None for never."""
-        return None
+    def next_due(self) -> float:
+        """Return when the next task will be due (clock value in s), infinite for never."""
+        return math.inf

@@ -285,14 +285,9 @@ class Agenda:
             self._writes_in_a_row = self._own_in_a_row = 0
         return job
 
-    def next_due(self) -> float | None:
-        """Return when the next job is due (clock value in s), None for never."""
-        moments = [moment for moment in (self._reads.next_due(), self._checks.next_due())
-                   if moment is not None]
-        if self._held_until < math.inf:
-            moments.append(self._held_until)
+    def next_due(self) -> float:
+        """Return when the next job is due (clock value in s), infinite for never."""
+        due = min(self._reads.next_due(), self._checks.next_due, self._held_until)
         if not self._tasks.is_heard and self._questions >= _QUICK_QUESTIONS:
-            moments = [max(moment, self._next_question) for moment in moments]
-        if self._has_own and (own := self._interlocks.next_due()) < math.inf:
-            moments.append(own)
-        return min(moments, default=None)
+            due = max(due, self._next_question)
+        return min(due, self._interlocks.next_due()) if self._has_own else due

@@ -114,6 +114,7 @@ class Checks:
     - ``link_failed``: called for a transaction without a reply.
     - ``told``: called after each question for the diagnostic status, with the answer, None for
       none, and the clock value (s) of the question.
+    - ``next_due``: when the next check is due (clock value in s), infinite for never.
 
     The objects that ``known`` returns never change. Only ``request_counters`` may be called from
     another thread.
@@ -139,7 +140,7 @@ class Checks:
         self._asked = {check.station for check in self._checks}
         self._checks += [Check(self, station.number, CheckKind.ECHO, ECHO_PERIOD)
                          for station in stations if station.number not in read]
-        self._next_due = 0.0
+        self.next_due = 0.0
 
     def known(self, station: int) -> StationHealth:
         """Return the reports of a station about itself."""
@@ -186,16 +187,12 @@ class Checks:
         self._forget(station, 'the station does not answer')
         self.ask_status(station, math.inf)
 
-    def next_due(self) -> float | None:
-        """Return when the next check is due (clock value in s), None for never."""
-        return None if math.isinf(self._next_due) else self._next_due
-
     def find_due(self, now: float) -> bool:
         """Take new requests; return True if a check is due."""
         if self._requests.items:
             for station in self._requests.take():
                 self._add_request(station, now)
-        return now >= self._next_due
+        return now >= self.next_due
 
     def next(self, now: float, busy: Container[int], probe_from: float,  # noqa: A003
              may_go: Callable[[Check], bool]) -> Check | None:
@@ -312,4 +309,4 @@ class Checks:
         self._plan()
 
     def _plan(self) -> None:
-        self._next_due = min((check.due for check in self._checks), default=math.inf)
+        self.next_due = min((check.due for check in self._checks), default=math.inf)

@@ -245,8 +245,8 @@ class Driver:
             self.readings.take_demands(now)
         return self._agenda.next(now, busy)
 
-    def next_due(self) -> float | None:
-        """Return when the next job is due (clock value in s), None for never."""
+    def next_due(self) -> float:
+        """Return when the next job is due (clock value in s), infinite for never."""
         return self._agenda.next_due()
 
     def expire(self, now: float) -> None:

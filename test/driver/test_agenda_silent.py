@@ -46,9 +46,7 @@ def _simulate(dead: list[ReadJob], living: list[ReadJob], seconds: float,
     while now < seconds:
         job = bench.next_read(now)
         if job is None:
-            due = bench.agenda.next_due()
-            assert due is not None
-            now = max(now + 1e-3, due)
+            now = max(now + 1e-3, bench.agenda.next_due())
             continue
         started = now
         if job.station in lost:

@@ -16,6 +16,7 @@
 
 from collections.abc import Callable
 from dataclasses import replace
+import math
 
 from abdf1_ros.df1.frames import Symbol
 from abdf1_ros.df1.packet import Packet
@@ -314,7 +315,7 @@ def test_broadcast_is_no_station_to_be_watched() -> None:
     bench = DriverBench([word(255, 'Write')], settings=DriverSettings(processor_period=1.0))
     bench.run(10.0)
     assert bench.driver.counters.commands_sent == 0
-    assert bench.driver.next_due() is None
+    assert bench.driver.next_due() == math.inf
 
 
 def test_dead_station_with_reads_is_not_forgotten_for_those_without() -> None:

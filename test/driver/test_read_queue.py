@@ -80,7 +80,7 @@ def starts(periods: dict[int, int], seconds: float,
     while now < seconds:
         job = queue.take(now)
         if job is None:
-            now = queue.next_due() or now
+            now = queue.next_due()
             continue
         found[job].append(now)
         queue.put(job, max(job.due + job.block.period, now))

@@ -17,6 +17,7 @@
 from collections import Counter, deque
 from collections.abc import Callable, Container, Iterable
 from dataclasses import replace
+import math
 from typing import Any
 
 from abdf1_ros.df1 import frames
@@ -60,9 +61,9 @@ class CommandTasks(Recorded):
                 return task
         return None
 
-    def next_due(self) -> float | None:
-        """Return None: there is something to do when there is."""
-        return None
+    def next_due(self) -> float:
+        """Return infinity: there is something to do when there is."""
+        return math.inf
 
 
 class Told(Machine):

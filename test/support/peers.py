@@ -131,9 +131,9 @@ class PeerNode(Recorded):
         task.begun = now
         return task
 
-    def next_due(self) -> float | None:
-        """Return None: there is something to do when there is."""
-        return None
+    def next_due(self) -> float:
+        """Return infinity: there is something to do when there is."""
+        return math.inf
 
 
 class PeerBench(PeerNode):

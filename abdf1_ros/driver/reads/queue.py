@@ -118,9 +118,9 @@ class ReadQueue:
         heap = self._next_heap(now)
         return None if heap is None else heap[0][2]
 
-    def next_due(self) -> float | None:
-        """Return when the next job is due (clock value in s), None for never."""
-        return min((heap[0][0] for heap in self._heaps_due(math.inf)), default=None)
+    def next_due(self) -> float:
+        """Return when the next job is due (clock value in s), infinite for never."""
+        return min((heap[0][0] for heap in self._heaps_due(math.inf)), default=math.inf)
 
     def _next_heap(self, now: float) -> list[_QueueEntry] | None:
         """Return the heap that begins with the job that goes next."""

@@ -154,12 +154,12 @@ class Reads(WriteListener):
             self._set_aside(job)
         return False
 
-    def next_due(self) -> float | None:
-        """Return when the next read or probe is due (clock value in s), None for never."""
+    def next_due(self) -> float:
+        """Return when the next read or probe is due (clock value in s), infinite for never."""
         due = self._due.next_due()
         if all(map(self._stations.is_polled, self._aside)):
             return due
-        return self._next_probe() if due is None else min(due, self._next_probe())
+        return min(due, self._next_probe())
 
     def _next_probe(self) -> float:
         return max(self._stations.probes.next, self._put_off)
