@@ -157,7 +157,7 @@ class Driver:
                                  self._station_of_guest, self._words_of_guest, record)
         compares = (self.interlocks,) if self.interlocks.heartbeats else ()
         repeated = [row for row in self.mappings if row.write_again]
-        self._standing = Standing(repeated, settings.write_timeout, machine)
+        self._standing = Standing(repeated, settings.write_timeout)
         stands = (self._standing,) if repeated else ()
         record.connect((self._read_backs, self.readings.reads, self.interlocks, *stands),
                        (self._read_backs, *compares, *stands))

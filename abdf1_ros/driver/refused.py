@@ -16,7 +16,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections import Counter
 
 from abdf1_ros.df1.packet import Packet
 from abdf1_ros.errors import RemoteError
@@ -31,14 +31,6 @@ _MOST = 8
 _LATELY = 60.0  # s
 
 
-@dataclass(slots=True)
-class _Refused:
-    """How often a command was refused, and when last (clock value in s)."""
-
-    count: int
-    last: float
-
-
 class RefusedCommands:
     """
     Refused commands, by a text with station, address and reason.
@@ -48,7 +40,8 @@ class RefusedCommands:
 
     def __init__(self, plc_type: PlcType) -> None:
         self._meanings = FAMILIES[plc_type].meanings
-        self._found: dict[str, _Refused] = {}
+        self._counts: Counter[str] = Counter()
+        self._last: dict[str, float] = {}  # when each was refused last (clock value in s)
 
     def add(self, command: Packet, reply: Packet, now: float) -> None:
         """Keep a refused command, without the values that it would have written."""
@@ -57,16 +50,14 @@ class RefusedCommands:
         except RemoteError as error:
             asked = describe(command).partition(' = ')[0]
             text = f'station {command.src}: {asked}: {error}'
-            entry = self._found.get(text)
-            if entry is not None:
-                entry.count, entry.last = entry.count + 1, now
-            elif len(self._found) < _MOST:
-                self._found[text] = _Refused(1, now)
+            if text in self._last or len(self._last) < _MOST:
+                self._counts[text] += 1
+                self._last[text] = now
 
     def lately(self, now: float) -> list[str]:
         """Return the commands that were refused within the last minute."""
-        return [text for text, entry in [*self._found.items()] if now - entry.last < _LATELY]
+        return [text for text, last in [*self._last.items()] if now - last < _LATELY]
 
     def counted(self) -> dict[str, int]:
         """Return how often each command was refused."""
-        return {text: entry.count for text, entry in [*self._found.items()]}
+        return dict(self._counts)

@@ -108,7 +108,7 @@ class AnyOrder(RuleBasedStateMachine):
     @invariant()
     def every_write_is_in_one_place(self) -> None:
         assert len(self.accepted) == len(self.sent) + len(self.bench.results) \
-            + len(self.bench.writes)
+            + len(self.bench.writes.waiting)
 
     @invariant()
     def every_job_is_in_one_place(self) -> None:

@@ -209,17 +209,15 @@ def test_unconfirmed_write_and_what_follows_prove_nothing() -> None:
 
 def test_unconfirmed_write_may_land_over_the_confirmed_one_that_follows() -> None:
     block, = Line(WORD, READ).driver.readings.blocks
-    clock = OneClock()
-    standing = Standing([WORD], 2.0, clock)
+    standing = Standing([WORD], 2.0)
 
     def end(value: int, begun: float, outcome: Outcome, may_land_for: float) -> Write:
         write = Write(WORD, [value], begun)
         claim = Claim(1, [WORD.extent], write, begun)
         standing.write_begins(claim)
-        clock.now = begun + 0.1
-        claim.end(outcome, clock.now, may_land_for)
+        claim.end(outcome, begun + 0.1, may_land_for)
         standing.write_ended(claim)
-        standing.words_read(block, bytes((value, *7 * [0])), clock.now + 0.01)
+        standing.words_read(block, bytes((value, *7 * [0])), begun + 0.11)
         return write
 
     end(8, 1.0, Outcome.UNKNOWN, 1.0)

@@ -65,9 +65,8 @@ class WriteQueue:
 
     Writes are in ``waiting``. ``report`` gets the results. ``tx_delay`` (s) passes before each
     transmission. A write to a silent station is a probe; if ``stations.probes`` does not admit it,
-    it ends unsent. ``next_expiry`` is when ``expire`` has work (clock value in s). Another thread
-    may only call ``len``. ``leave_out`` returns why a write that would have the line now is not
-    needed, empty if it is needed.
+    it ends unsent. ``next_expiry`` is when ``expire`` has work (clock value in s). ``leave_out``
+    returns why a write that would have the line now is not needed, empty if it is needed.
     """
 
     def __init__(self, stations: ActiveStationList, writing: WritesUnderWay, patience: float,
@@ -84,10 +83,6 @@ class WriteQueue:
         self._begun: dict[Mapping, float] = {}  # when a write of a row had the line last
         self._shared: dict[tuple[Mapping, Mapping], bool] = {}
         self.next_expiry = math.inf
-
-    def __len__(self) -> int:
-        """Return the number of writes that wait."""
-        return len(self.waiting)
 
     def add(self, write: Write, now: float) -> None:
         """

@@ -25,7 +25,6 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 import math
 
-from abdf1_ros.driver.job_tasks import LineTime
 from abdf1_ros.driver.record import Claim, WriteListener
 from abdf1_ros.driver.write import Outcome, Write
 from abdf1_ros.plan.planner import Block
@@ -53,10 +52,9 @@ class _Value:
 class Standing(WriteListener):
     """The values of ``rows`` with Write_Again; a message waits ``patience`` s at most."""
 
-    def __init__(self, rows: Iterable[Mapping], patience: float, line: LineTime) -> None:
+    def __init__(self, rows: Iterable[Mapping], patience: float) -> None:
         self._patience = {row: row.fallback.after / 1000 if row.fallback else patience
                           for row in rows}
-        self._line = line
         self._values: dict[Mapping, _Value] = {}
         self._settled: dict[Mapping, float] = {}  # no other write can land after it (clock, s)
         self._sharing: dict[Mapping, list[Mapping]] = {}  # cached, as it takes long to find out
@@ -70,7 +68,7 @@ class Standing(WriteListener):
         """Take the value of a confirmed message; forget all values that the write may change."""
         for row in self._disturbed(claim):
             self._unsettle(row, claim)
-        write, now = claim.write, self._line.now
+        write, now = claim.write, claim.done
         if write is None or write.is_own or write.mapping not in self._patience:
             return
         row = write.mapping
