@@ -20,17 +20,17 @@ from pathlib import Path
 import subprocess
 import sys
 
-from abdf1_ros.ros.diagnostics.dds_files import DdsFiles, lost_locks
+from abdf1_ros.ros.diagnostics.dds import DdsWatch, lost_locks
 from support.ros import PROFILES_VARIABLE
 
 # A node that uses shared memory, as at the home of a user. It removes its own files.
 NODE = """
 import os
-from abdf1_ros.ros.diagnostics.dds_files import DdsFiles
+from abdf1_ros.ros.diagnostics.dds import DdsWatch
 import rclpy
 rclpy.init()
 node = rclpy.create_node('lonely')
-files = DdsFiles()
+files = DdsWatch()
 print(repr(files.look(1.0) + files.look(20.0)))
 for name in os.listdir('/proc/self/fd'):
     try:
@@ -67,7 +67,7 @@ def test_lock_of_a_removed_file_counts_and_no_other() -> None:
 def looks(*lost: Iterable[str]) -> list[bool]:
     """Return at which looks the files count as gone, if these locks are lost one after another."""
     found = iter(map(frozenset, lost))
-    files = DdsFiles(lambda: next(found))
+    files = DdsWatch(lambda: next(found))
     return [bool(files.look(20.0 * number)) for number in range(1, len(lost) + 1)]
 
 
@@ -77,7 +77,7 @@ def test_port_that_fast_dds_makes_anew_is_no_fault() -> None:
 
 def test_looks_are_five_seconds_apart() -> None:
     times: list[float] = []
-    files = DdsFiles(lambda: frozenset(str(times.append(now))))
+    files = DdsWatch(lambda: frozenset(str(times.append(now))))
     for now in (1.0, 3.0, 5.9, 6.0, 7.0):
         files.look(now)
     assert times == [1.0, 6.0]

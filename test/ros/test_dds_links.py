@@ -18,14 +18,14 @@ from pathlib import Path
 import subprocess
 import sys
 
-from abdf1_ros.ros.diagnostics.dds_links import BEGAN_EARLY, DdsLinks
+from abdf1_ros.ros.diagnostics.dds import BEGAN_EARLY, DdsWatch
 import pytest
 from test_rehearsal import NEEDS_NAMESPACES
 
 UNSET = ('ROS_AUTOMATIC_DISCOVERY_RANGE', 'ROS_LOCALHOST_ONLY')
 PROGRAM = """
 import subprocess
-from abdf1_ros.ros.diagnostics.dds_links import has_network
+from abdf1_ros.ros.diagnostics.dds import has_network
 def ip(*words): subprocess.run(['ip', *words], check=True)
 print(has_network())
 ip('link', 'set', 'lo', 'up')
@@ -50,18 +50,18 @@ def _reaches_other_hosts(monkeypatch: pytest.MonkeyPatch) -> None:
 def looks(*found: bool) -> list[str]:
     """Return what looks say, 6 s apart, that find a network or none; the first is the start."""
     finds = iter(found)
-    links = DdsLinks(lambda: next(finds))
+    links = DdsWatch(has_links=lambda: next(finds))
     return [links.look(6.0 * number) for number in range(1, len(found))]
 
 
 def test_network_that_comes_after_the_start_is_told_of_from_then_on() -> None:
     assert looks(False, False, True) == ['', BEGAN_EARLY]
-    links = DdsLinks(iter([False, True]).__next__)
+    links = DdsWatch(has_links=iter([False, True, False]).__next__)
     assert [links.look(0.0), links.look(2.0), links.look(60.0)] == [BEGAN_EARLY] * 3
 
 
 def test_network_that_was_there_at_the_start_may_come_and_go() -> None:
-    links = DdsLinks(iter([True]).__next__)
+    links = DdsWatch(has_links=iter([True]).__next__)
     assert [links.look(1.0), links.look(60.0)] == ['', '']
 
 
@@ -71,7 +71,7 @@ def test_network_that_was_there_at_the_start_may_come_and_go() -> None:
 def test_process_for_this_host_needs_no_network(
         monkeypatch: pytest.MonkeyPatch, name: str, value: str) -> None:
     monkeypatch.setenv(name, value)
-    links = DdsLinks(iter([False, True]).__next__)
+    links = DdsWatch(has_links=iter([False, True]).__next__)
     assert links.look(1.0) == ''
 
 

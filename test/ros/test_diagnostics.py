@@ -42,7 +42,7 @@ from abdf1_ros.ports.link_thread import LinkThread, PortState
 from abdf1_ros.ports.settings import PortSettings
 from abdf1_ros.ports.trace import PortOpener
 from abdf1_ros.ros.bridge.session import stations_of
-from abdf1_ros.ros.diagnostics.dds_files import LOST
+from abdf1_ros.ros.diagnostics.dds import LOST
 from abdf1_ros.ros.diagnostics.events import LineEvents
 from abdf1_ros.ros.diagnostics.guests import GuestsStatus
 from abdf1_ros.ros.diagnostics.line import takes_in_silence

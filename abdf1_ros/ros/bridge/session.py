@@ -140,7 +140,7 @@ class BridgeSession:
             TypeWatch(surroundings.graph, node.resolve_topic_name, mappings),
             *watches_of(self.diagnostics.line, self.port, seen, self.guests.lines,
                         configuration.files.changed, self._interlocks.look,
-                        surroundings.graph.dds_fault)]
+                        surroundings.graph.dds.look)]
         self.link_counters = LinkCounterService(
             self.driver, self._wake_link, surroundings.wake_executor)
         self._port_text = ''

@@ -27,8 +27,7 @@ from collections.abc import Callable, Iterable, Iterator
 from collections.abc import Mapping as MappingType
 from time import thread_time
 
-from abdf1_ros.ros.diagnostics.dds_files import DdsFiles
-from abdf1_ros.ros.diagnostics.dds_links import DdsLinks
+from abdf1_ros.ros.diagnostics.dds import DdsWatch
 from abdf1_ros.ros.diagnostics.log import INFO, News, WARN
 from abdf1_ros.settings.mapping import Mapping
 from rclpy.node import Node
@@ -55,16 +54,11 @@ class Graph:
     """The nodes and topics of the domain, as the node ``source`` sees them; for one thread."""
 
     def __init__(self, source: Node) -> None:
-        self._files = DdsFiles()
-        self._links = DdsLinks()
+        self.dds = DdsWatch()
         self._source = source
         self._nodes: Counter[tuple[str, str]] = Counter()
         self._clashes: dict[str, list[str]] = {}
         self._next_names = self._next_topics = 0.0
-
-    def dds_fault(self, now: float) -> str:
-        """Return why other programs cannot hear this process; empty if no reason is known."""
-        return self._files.look(now) or self._links.look(now)
 
     def nodes(self, name: str, namespace: str, now: float) -> int:
         """Return how many nodes have this name, at the clock value ``now`` (s)."""

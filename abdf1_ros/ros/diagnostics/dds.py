@@ -13,7 +13,12 @@
 # limitations under the License.
 
 """
-Find out whether the process began before its host had a network.
+Find out why other programs cannot hear this process.
+
+Fast DDS exchanges messages between processes of a host through files in /dev/shm, and a process
+keeps a lock on each file that it has made. If another program removes the files, Fast DDS reports
+no error. Programs that start later get no messages. After some seconds, connected programs get no
+messages either. logind removes the files of a user at the last logout.
 
 Fast DDS looks at the network links of the host once, when the process begins. If no link was up
 then, programs on other hosts never hear the process, even after the network is up.
@@ -28,15 +33,33 @@ import os
 import socket
 import struct
 
-_PERIOD = 5.0  # s between two looks
+_PERIOD = 5.0  # s between two looks: a look takes some 0.2 ms
 
-# Of Linux: requests of ioctl, their struct, and the flags of a link (linux/if.h, netdevice(7)).
+_FIRST, _LAST = '/dev/shm/fast', '_el (deleted)'
+
 _GET_ADDRESS, _GET_FLAGS = 0x8915, 0x8913
 _REQUEST = struct.Struct('16sH14x8x')
 _UP, _LOOPBACK, _RUNNING = 0x1, 0x8, 0x40
 
+LOST = ('the files of Fast DDS in /dev/shm are gone, so this node and other programs of this host '
+        'do not hear each other. logind removes the files when a user logs out (RemoveIPC). Start '
+        'all programs again')
+
 BEGAN_EARLY = ('this process began before its host had a network, so programs on other hosts do '
                'not hear it: start it again')
+
+
+def lost_locks() -> frozenset[str]:
+    """Return the locks of this process whose files were removed."""
+    folder = '/proc/self/fd'
+    links = set()
+    try:
+        for name in os.listdir(folder):
+            with suppress(OSError):  # closed since
+                links.add(os.readlink(f'{folder}/{name}'))
+    except OSError:
+        return frozenset()  # a container without /proc
+    return frozenset(link for link in links if link.startswith(_FIRST) and link.endswith(_LAST))
 
 
 def has_network() -> bool:
@@ -58,18 +81,31 @@ def stays_on_host() -> bool:
         'LOCALHOST', 'OFF') or os.environ.get('ROS_LOCALHOST_ONLY') == '1'
 
 
-class DdsLinks:
-    """The network links of the host when this process began, and now; for one thread."""
+class DdsWatch:
+    """
+    The files of Fast DDS that this process has made, and the links of its host; for one thread.
 
-    def __init__(self, has_links: Callable[[], bool] = has_network) -> None:
+    If another process has treated a port as dead, Fast DDS makes the port anew. So a lock counts
+    as lost only if two looks in a row find it lost. Links count only if there was none when this
+    process began.
+    """
+
+    def __init__(self, find_lost: Callable[[], frozenset[str]] = lost_locks,
+                 has_links: Callable[[], bool] = has_network) -> None:
+        self._find_lost = find_lost
         self._has_links = has_links
+        self._lost: frozenset[str] = frozenset()
         self._may_be_early = not stays_on_host() and not has_links()
+        self._began_early = False
         self._next_look = 0.0
-        self.fault = ''
+        self._fault = ''
 
     def look(self, now: float) -> str:
         """Return the fault at the clock value ``now`` (s) as a text; empty if there is none."""
-        if self._may_be_early and not self.fault and now >= self._next_look:
+        if now >= self._next_look:
             self._next_look = now + _PERIOD
-            self.fault = BEGAN_EARLY if self._has_links() else ''
-        return self.fault
+            before, self._lost = self._lost, self._find_lost()
+            self._began_early |= self._may_be_early and self._has_links()
+            early = BEGAN_EARLY if self._began_early else ''
+            self._fault = LOST if before & self._lost else early
+        return self._fault
