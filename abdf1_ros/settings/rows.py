@@ -16,41 +16,50 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from functools import cached_property
 
 from abdf1_ros.df1.packet import BROADCAST
 from abdf1_ros.settings.mapping import Mapping
 
 
+def _group(belongs: Callable[[Mapping], object]) -> cached_property[Rows]:
+    """Return a group of a map: the rows that belong to it."""
+    return cached_property(lambda rows: Rows(filter(belongs, rows)))
+
+
 class Rows(tuple[Mapping, ...]):
     """The rows of a map in their order; each group is in this order, too."""
 
-    @cached_property
-    def served(self) -> Rows:
-        """Return the rows of our own data table."""
-        return Rows(row for row in self if row.serves)
+    served = _group(lambda row: row.serves)
+    """The rows of our own data table."""
 
-    @cached_property
-    def of_plcs(self) -> Rows:
-        """Return the rows of the PLCs."""
-        return Rows(row for row in self if not row.serves)
+    of_plcs = _group(lambda row: not row.serves)
+    """The rows of the PLCs."""
 
-    @cached_property
-    def stations(self) -> tuple[int, ...]:
-        """Return the stations of all PLCs, each once."""
-        return tuple(dict.fromkeys(row.station for row in self.of_plcs
-                                   if row.station != BROADCAST))
+    published = _group(lambda row: row.reads)
+    """The rows whose values are published."""
 
-    @cached_property
-    def published(self) -> Rows:
-        """Return the rows whose values are published."""
-        return Rows(row for row in self if row.reads)
+    on_demand = _group(lambda row: row.is_on_demand)
+    """The rows that are read only when a call asks for them."""
 
-    @cached_property
-    def on_demand(self) -> Rows:
-        """Return the rows that are read only when a call asks for them."""
-        return Rows(row for row in self if row.is_on_demand)
+    messages = _group(lambda row: row.writes)
+    """The rows that take messages."""
+
+    written = _group(lambda row: row.changes and not row.serves)
+    """The rows that we write to a PLC, for messages or by ourselves."""
+
+    own = _group(lambda row: row.is_own)
+    """The rows that we write to a PLC by ourselves."""
+
+    heartbeats = _group(lambda row: row.is_heartbeat)
+    """The Heartbeat rows."""
+
+    fallbacks = _group(lambda row: row.fallback)
+    """The rows with a Fallback."""
+
+    guarded = _group(lambda row: row.is_guarded)
+    """The rows whose values are published only while a condition holds."""
 
     @cached_property
     def repeated(self) -> Rows:
@@ -58,34 +67,10 @@ class Rows(tuple[Mapping, ...]):
         return self.without(self.on_demand) if self.on_demand else self
 
     @cached_property
-    def messages(self) -> Rows:
-        """Return the rows that take messages."""
-        return Rows(row for row in self if row.writes)
-
-    @cached_property
-    def written(self) -> Rows:
-        """Return the rows that we write to a PLC, for messages or by ourselves."""
-        return Rows(row for row in self.of_plcs if row.changes)
-
-    @cached_property
-    def own(self) -> Rows:
-        """Return the rows that we write to a PLC by ourselves."""
-        return Rows(row for row in self if row.is_own)
-
-    @cached_property
-    def heartbeats(self) -> Rows:
-        """Return the Heartbeat rows."""
-        return Rows(row for row in self if row.is_heartbeat)
-
-    @cached_property
-    def fallbacks(self) -> Rows:
-        """Return the rows with a Fallback."""
-        return Rows(row for row in self if row.fallback)
-
-    @cached_property
-    def guarded(self) -> Rows:
-        """Return the rows whose values are published only while a condition holds."""
-        return Rows(row for row in self if row.is_guarded)
+    def stations(self) -> tuple[int, ...]:
+        """Return the stations of all PLCs, each once."""
+        return tuple(dict.fromkeys(row.station for row in self.of_plcs
+                                   if row.station != BROADCAST))
 
     def without(self, others: Iterable[Mapping]) -> Rows:
         """Return the rows that are not among ``others``."""
