@@ -34,29 +34,31 @@ from abdf1_ros.settings.rows import Rows
 
 def line_problems(mappings: Iterable[Mapping], network: Network) -> list[tuple[Mapping, Problem]]:
     """Return the rows that clash with ``network`` or an earlier Serve row, and why."""
-    found: list[tuple[Mapping, Problem]] = []
-    mode = network.line_mode
     table = DataTable(PlcType(network.plc_type))
-    for mapping in mappings:
-        text = None
-        if mode.only_listens:
-            if fault := _listen_fault(mapping):
-                column, text = fault
-                where = replace(mapping.place, column=column)
-                found.append((mapping, Problem(where, f'Item: {mapping.item}, {text}')))
-            continue
-        if mapping.serves:
-            text = _fault(mapping, network, table)
-        elif mapping.station == BROADCAST and mode.has_one_plc:
-            text = 'Station 255 is for a line with many stations, not for Mode Peer'
-        elif mapping.station == network.station and not mode.has_one_plc:
-            text = (f'Station {mapping.station} is our own Station in the net file; write the '
-                    'station of the PLC here')
-        elif mapping.via == network.station and mode.is_master:
-            text = f'Via {mapping.via} is our own Station in the net file, not a gateway'
-        if text is not None:
-            found.append((mapping, Problem(mapping.place, f'Item: {mapping.item}, {text}')))
-    return found
+    return [(mapping, _problem(mapping, *fault)) for mapping in mappings
+            if (fault := _fault(mapping, network, table))]
+
+
+def _problem(mapping: Mapping, column: str | None, text: str) -> Problem:
+    return Problem(replace(mapping.place, column=column), f'Item: {mapping.item}, {text}')
+
+
+def _fault(mapping: Mapping, network: Network,
+           table: DataTable) -> tuple[str | None, str] | None:
+    """Return the column, if there is one, and the fault of a row; None for a row without fault."""
+    mode, text = network.line_mode, None
+    if mode.only_listens:
+        return _listen_fault(mapping)
+    if mapping.serves:
+        text = _serve_fault(mapping, network, table)
+    elif mapping.station == BROADCAST and mode.has_one_plc:
+        text = 'Station 255 is for a line with many stations, not for Mode Peer'
+    elif mapping.station == network.station and not mode.has_one_plc:
+        text = (f'Station {mapping.station} is our own Station in the net file; write the '
+                'station of the PLC here')
+    elif mapping.via == network.station and mode.is_master:
+        text = f'Via {mapping.via} is our own Station in the net file, not a gateway'
+    return (None, text) if text else None
 
 
 def usable_rows(mappings: Rows, network: Network,
@@ -74,8 +76,7 @@ def usable_rows(mappings: Rows, network: Network,
     faults = [*guard_faults(line_model(network), left, default_period)] or [*broken_links(left)]
     while faults:
         for mapping, fault in faults:
-            where = replace(mapping.place, column=fault.column)
-            problems.append(Problem(where, f'Item: {mapping.item}, {fault.text}'))
+            problems.append(_problem(mapping, fault.column, fault.text))
         left = left.without(mapping for mapping, _ in faults)
         faults = [*broken_links(left)]
     return left, problems
@@ -99,7 +100,7 @@ def _listen_fault(mapping: Mapping) -> tuple[str, str] | None:
     return None
 
 
-def _fault(mapping: Mapping, network: Network, table: DataTable) -> str | None:
+def _serve_fault(mapping: Mapping, network: Network, table: DataTable) -> str | None:
     if mapping.plc_type.value != network.plc_type:
         return (f'a Serve row has the PLC_Type we emulate, which is {network.plc_type} '
                 'in the net file')
