@@ -38,10 +38,10 @@ Steps = Generator[Request, Packet, _Result]
 @dataclass(frozen=True, slots=True)
 class Transfer:
     """
-    The words that several packets move together: ``words`` words from ``start`` on.
+    The words that one packet moves, or several together: ``words`` words from ``start`` on.
 
-    Commands with an offset and a total name the transfer. All other commands have only the address
-    and size of their own packet.
+    Commands with an offset and a total name the whole transfer of several packets. All other
+    commands have only the address and size of their own packet.
     """
 
     start: Address

@@ -16,7 +16,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 from abdf1_ros.df1.packet import Packet
@@ -80,13 +80,20 @@ def read(target: AddressedValues) -> Steps[Values]:
         count = -(-(address.offset + words - first) // size) * size
     whole = Transfer(address.at_offset(first), count)
     most = target.dialect.max_read(address.file_type)
-    data = b''
-    for at in range(first, first + count, most):
-        place, part = address.at_offset(at), min(most, first + count - at)
-        reply = yield target.dialect.read(place, part, whole)
-        data += words_in(reply, place, part, target.dialect)
+    packets = (Transfer(address.at_offset(at), min(most, first + count - at))
+               for at in range(first, first + count, most))
+    data = yield from read_packets(packets, whole, target.dialect)
     skipped = 2 * (address.offset - first)
     return target.codec.decode(data[skipped:skipped + 2 * words])
+
+
+def read_packets(packets: Iterable[Transfer], whole: Transfer, dialect: Dialect) -> Steps[bytes]:
+    """Return the words of packets of a transfer; raises RemoteError, LinkError or FormatError."""
+    data = b''
+    for packet in packets:
+        reply = yield dialect.read(packet.start, packet.words, whole)
+        data += words_in(reply, packet.start, packet.words, dialect)
+    return data
 
 
 def words_in(reply: Packet, start: Address, words: int, dialect: Dialect) -> bytes:

@@ -29,16 +29,7 @@ from abdf1_ros.df1.checksum import Checksum
 from abdf1_ros.df1.frames import Duplex
 from abdf1_ros.df1.machine import LineTiming
 from abdf1_ros.df1.packet import HEADER_SIZE
-from abdf1_ros.pccc.address import Address
-from abdf1_ros.pccc.dialect import Dialect
-
-
-@dataclass(frozen=True, slots=True)
-class ReadRequest:
-    """One read command: ``words`` words from ``start`` on."""
-
-    start: Address
-    words: int
+from abdf1_ros.pccc.dialect import Dialect, Transfer
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,7 +41,7 @@ class LineModel:
     timing: LineTiming
     wait: float = 0.0
 
-    def read_time(self, dialect: Dialect, request: ReadRequest, station: int = 0) -> float:
+    def read_time(self, dialect: Dialect, request: Transfer, station: int = 0) -> float:
         """Return the seconds of a read from a station that answers at once."""
         _, body = dialect.read(request.start, request.words)
         stuffed = len(frames.stuff(body))

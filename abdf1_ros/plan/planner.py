@@ -36,7 +36,7 @@ from abdf1_ros.pccc.extent import Extent
 from abdf1_ros.pccc.families import FAMILIES
 from abdf1_ros.pccc.file_types import FileType
 from abdf1_ros.pccc.processor import Processor
-from abdf1_ros.plan.line_model import LineModel, ReadRequest
+from abdf1_ros.plan.line_model import LineModel
 from abdf1_ros.plan.partition import Candidate, CostModel, partition, Span
 from abdf1_ros.settings.mapping import Mapping
 
@@ -55,7 +55,7 @@ class Block:
     """
 
     station: int
-    requests: tuple[ReadRequest, ...]
+    requests: tuple[Transfer, ...]
     mappings: tuple[Mapping, ...]
     period: float
     line_time: float
@@ -235,7 +235,7 @@ class Planner:
         if span.words > limit:  # a long mapping: no packet ends within a value
             limit -= limit % _whole(mappings)
         requests = tuple(
-            ReadRequest(first.address.at_offset(at), min(limit, span.end - at))
+            Transfer(first.address.at_offset(at), min(limit, span.end - at))
             for at in range(span.first, span.end, limit))
         line_time = sum(self.line_model.read_time(first.dialect, request, first.station)
                         for request in requests)
@@ -248,11 +248,11 @@ def _costs_of(line: LineModel, dialect: Dialect, start: Address, most: int) -> S
     """Return the seconds that a read takes, by its number of words, ``most`` at most."""
     per_element, costs = start.layout.words, [0.0] * (most + 1)
     for words in {1, *range(per_element, len(costs), per_element)}:
-        costs[words] = line.read_time(dialect, ReadRequest(start, words))
+        costs[words] = line.read_time(dialect, Transfer(start, words))
     value = next((place for place in map(start.at_offset, range(per_element))
                   if place.is_value(2)), None)
     if value is not None:  # a float32 within a structure is read by itself
-        costs[2] = line.read_time(dialect, ReadRequest(value, 2))
+        costs[2] = line.read_time(dialect, Transfer(value, 2))
     return costs
 
 

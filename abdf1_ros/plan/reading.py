@@ -24,9 +24,9 @@ from abdf1_ros.pccc.access import Access
 from abdf1_ros.pccc.dialect import Steps
 from abdf1_ros.pccc.processor import Processor
 from abdf1_ros.pccc.status import is_address_fault
-from abdf1_ros.pccc.steps import AddressedValues, words_in
+from abdf1_ros.pccc.steps import AddressedValues, read_packets
 from abdf1_ros.pccc.values import Values
-from abdf1_ros.plan.planner import Block, Planner
+from abdf1_ros.plan.planner import Planner
 from abdf1_ros.problems import Place
 from abdf1_ros.settings.mapping import Command, Mapping
 from abdf1_ros.text import first
@@ -52,7 +52,8 @@ def read_planned(planner: Planner, mappings: Iterable[Mapping],
     while waiting:
         block = waiting.pop(0)
         try:
-            data = line.ask(block.station, read_block(block))
+            data = line.ask(block.station, read_packets(
+                block.requests, block.transfer, block.dialect))
         except Abdf1Error as error:
             parts = planner.split(block) \
                 if isinstance(error, RemoteError) and is_address_fault(error) else []
@@ -73,12 +74,3 @@ def row_of(text: str, item: int, station: int, target: AddressedValues, access: 
         item=item, place=Place(text), tag=text, name=text, topic=text, command=Command.READ,
         address=target.address, station=station, plc_type=target.address.plc_type,
         length=target.codec.length, type=target.codec.type, access=access, processor=processor)
-
-
-def read_block(block: Block) -> Steps[bytes]:
-    """Return the words of a block; raises RemoteError, LinkError or FormatError."""
-    data = b''
-    for request in block.requests:
-        reply = yield block.dialect.read(request.start, request.words, block.transfer)
-        data += words_in(reply, request.start, request.words, block.dialect)
-    return data

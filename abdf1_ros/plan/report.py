@@ -31,11 +31,11 @@ import math
 from abdf1_ros.df1.packet import BROADCAST
 from abdf1_ros.pccc.access import Access
 from abdf1_ros.pccc.address import Address
+from abdf1_ros.pccc.dialect import Transfer
 from abdf1_ros.pccc.file_types import FileType, PlcType
 from abdf1_ros.pccc.values import ValueType
 from abdf1_ros.plan import bounds, forecast
 from abdf1_ros.plan.bounds import OURS_BESIDE_GUESTS, Times
-from abdf1_ros.plan.line_model import ReadRequest
 from abdf1_ros.plan.planner import Block, Planner, StationArea
 from abdf1_ros.settings import BAUD_RATES
 from abdf1_ros.settings.mapping import Command, Mapping
@@ -456,7 +456,7 @@ def _time_side_by_side(report: Report, blocks: Sequence[Block]) -> float:
     if needed > 1:
         needed += -needed % example.start.layout.words
     packets = [limit] * (needed // limit) + [needed % limit] * (needed % limit > 0)
-    requests = tuple(ReadRequest(example.start, words) for words in packets)
+    requests = tuple(Transfer(example.start, words) for words in packets)
     model = forecast.line_model(report.network)
     line_time = sum(model.read_time(example.dialect, request, example.station)
                     for request in requests)

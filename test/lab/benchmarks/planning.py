@@ -44,9 +44,9 @@ import time
 
 sys.path[:0] = map(str, Path(__file__).resolve().parents[1:4])
 
+from abdf1_ros.pccc.dialect import Transfer  # noqa: E402
 from abdf1_ros.pccc.file_types import PlcType  # noqa: E402
 from abdf1_ros.plan.forecast import line_model  # noqa: E402
-from abdf1_ros.plan.line_model import ReadRequest  # noqa: E402
 from abdf1_ros.plan.partition import Span  # noqa: E402
 from abdf1_ros.plan.planner import Block, Planner  # noqa: E402
 from abdf1_ros.settings import BAUD_RATES  # noqa: E402
@@ -115,7 +115,7 @@ class Search:
         self._limit = example.dialect.max_read(example.address.file_type)
         start = example.address.at_offset(0)
         self._costs = {words: planner.line_model.read_time(
-            example.dialect, ReadRequest(start, words), example.station)
+            example.dialect, Transfer(start, words), example.station)
             for words in {1, *range(self._element, self._limit + 1, self._element)}}
         self._needed: dict[Span, float] = {}
         for entry in rows:
