@@ -52,7 +52,7 @@ from abdf1_ros.df1.stations import ActiveStationList, Station
 from abdf1_ros.df1.tasks import Task
 from abdf1_ros.driver.agenda import Agenda, QUESTION_PERIOD
 from abdf1_ros.driver.checks import Checks
-from abdf1_ros.driver.guest_words import written_extents
+from abdf1_ros.driver.foreign_words import written_extents
 from abdf1_ros.driver.guests import GuestQueue
 from abdf1_ros.driver.inbox import Inbox
 from abdf1_ros.driver.interlocks.queue import Interlocks

@@ -33,8 +33,7 @@ from abdf1_ros.df1.listen import SecondPort
 from abdf1_ros.df1.packet import BROADCAST, is_local_status, Packet
 from abdf1_ros.df1.stations import ActiveStationList
 from abdf1_ros.driver.checks import Checks
-from abdf1_ros.driver.guest_words import written_extents
-from abdf1_ros.driver.heard_words import ReplyWords, words_in_reply
+from abdf1_ros.driver.foreign_words import ReplyWords, words_in_reply, written_extents
 from abdf1_ros.driver.job_tasks import JobTasks
 from abdf1_ros.driver.reads.point import ReadPoint
 from abdf1_ros.driver.reads.readings import Readings

@@ -19,7 +19,7 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from abdf1_ros.df1.packet import BROADCAST, Packet
-from abdf1_ros.driver.guest_words import written_extents
+from abdf1_ros.driver.foreign_words import written_extents
 from abdf1_ros.driver.guests import _outcome, Guest, GuestListener, ShareAccess
 from abdf1_ros.driver.interlocks.heartbeat import BeatState
 from abdf1_ros.driver.settings import DriverSettings

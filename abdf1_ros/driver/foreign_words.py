@@ -12,29 +12,39 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Which words of a PLC a foreign command writes."""
+"""Which words of a PLC a foreign command writes, and which words its reply has."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 
 from abdf1_ros.df1.packet import BROADCAST, Packet, PRIORITY_BIT
+from abdf1_ros.errors import FormatError
 from abdf1_ros.pccc.access import Access
-from abdf1_ros.pccc.address import Address
+from abdf1_ros.pccc.address import Address, Area
 from abdf1_ros.pccc.data_table import DataTable
 from abdf1_ros.pccc.extent import Extent
 from abdf1_ros.pccc.file_types import FileType, PlcType
 from abdf1_ros.pccc.plc2 import commands as plc2
+from abdf1_ros.pccc.plc5 import commands as plc5
 from abdf1_ros.pccc.processor import CIF_FILES
 from abdf1_ros.pccc.server import Server
+from abdf1_ros.pccc.typed_data import TypedData
 from abdf1_ros.settings.mapping import Mapping
 from abdf1_ros.settings.rows import Rows
+
+ReplyWords = dict[tuple[Area, int], bytes]
+"""Words by area and offset."""
+
+# A word of the coded table has its number in both bytes: the low byte from 80 to BF, the high byte
+# from C0 to FF. So no code can be found across two words, nor in a descriptor.
+_DIGIT = 64
 
 _BASIC = (plc2.READ, plc2.UNPROTECTED_WRITE, plc2.PROTECTED_WRITE, plc2.PROTECTED_BIT_WRITE,
           plc2.UNPROTECTED_BIT_WRITE)
 
 
-class NotedTable(DataTable):
+class _NotedTable(DataTable):
     """
     The files of some rows, each of unlimited size; writes are noted, and their data dropped.
 
@@ -61,7 +71,7 @@ class NotedTable(DataTable):
         self.written.append((address, len(data) // 2))
 
 
-def uses_common_file(command: Packet, rows: Sequence[Mapping]) -> bool:
+def _uses_common_file(command: Packet, rows: Sequence[Mapping]) -> bool:
     """
     Tell whether a command uses the common interface file of an SLC.
 
@@ -93,13 +103,65 @@ def written_extents(command: Packet, station: int,
     found: list[Extent] = []
     for number, plc_type in {(row.station, row.plc_type): None for row in rows}:
         there = [row for row in rows if row.station == number]
-        if uses_common_file(command, there):
+        if _uses_common_file(command, there):
             found += [row.extent for row in there if _may_be_common(row)]
             continue
-        table = NotedTable(plc_type, there)
+        table = _NotedTable(plc_type, there)
         reply = Server(table).serve(command)
         if reply.sts and not table.is_elsewhere:
             return None
         found += [Extent(number, address.area, address.offset, address.offset + words)
                   for address, words in table.written]
     return found
+
+
+class _CodedTable(_NotedTable):
+    """A table that returns a different code for each word."""
+
+    def __init__(self, plc_type: PlcType, rows: Sequence[Mapping]) -> None:
+        super().__init__(plc_type, rows)
+        self.places: list[Address] = []
+
+    def read(self, address: Address, words: int) -> bytes:
+        """Return codes for words, and note their places."""
+        first = len(self.places)
+        if first + words > _DIGIT**2:
+            raise FormatError('more words than there are codes')
+        self.places += (address.at_offset(address.offset + n) for n in range(words))
+        return b''.join(map(_code, range(first, first + words)))
+
+
+def _code(number: int) -> bytes:
+    high, low = divmod(number, _DIGIT)
+    return bytes((0x80 + low, 0xC0 + high))
+
+
+def words_in_reply(command: Packet, reply: Packet, rows: Sequence[Mapping]) -> ReplyWords:
+    """
+    Return the words of files of ``rows`` that a good reply has; none if unknown.
+
+    The rows have one PLC type of the station. A server of the family executes the command. Where
+    its reply has the code of a word, the heard reply has the value of this word.
+    """
+    if _uses_common_file(command, rows):
+        return {}
+    table = _CodedTable(rows[0].plc_type, rows)
+    expected = Server(table).serve(command)
+    if expected.sts or expected.cmd != reply.cmd or not table.places:
+        return {}
+    try:
+        data = _same_form(command, reply.data)
+    except FormatError:
+        return {}
+    places = {at: place for number, place in enumerate(table.places)
+              if (at := expected.data.find(_code(number))) >= 0}
+    begin = min(places, default=0)
+    if len(data) != len(expected.data) or data[:begin] != expected.data[:begin]:
+        return {}
+    return {(place.area, place.offset): data[at:at + 2] for at, place in places.items()}
+
+
+def _same_form(command: Packet, data: bytes) -> bytes:
+    """Return the data of a reply; a typed read gets the descriptors of our server."""
+    code = command.cmd & ~PRIORITY_BIT, *command.data[:1]
+    return TypedData.decode(data).encode() if code == (plc5.CMD, plc5.TYPED_READ) else data
