@@ -23,7 +23,7 @@ writes words of a row, these words are unknown until the reply to a later read.
 from __future__ import annotations
 
 from collections import defaultdict
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 import math
 from operator import attrgetter
 from typing import NamedTuple
@@ -86,19 +86,6 @@ class _Path(NamedTuple):
     tns: int
 
 
-@dataclass(slots=True)
-class _ValidFrom:
-    """
-    A reply counts only if its read began after this moment (clock value, s).
-
-    ``sound`` is the moment for all points, after damage; ``written`` has the moments for points
-    whose words were written.
-    """
-
-    sound: float
-    written: dict[ReadPoint, float] = field(default_factory=dict)
-
-
 class Overheard:
     """
     Fill the points of ``readings`` from heard replies.
@@ -121,7 +108,10 @@ class Overheard:
         self._parts: dict[ReadPoint, str] = {}
         self._unread: set[ReadPoint] = set()  # since the port was opened
         self._told: set[ReadPoint] = set()
-        self._valid_from = _ValidFrom(-math.inf)
+        # A reply counts only if its read began after these moments (clock values, s): the last
+        # damage, and for each point the last write of its words.
+        self._damaged = -math.inf
+        self._written_at: dict[ReadPoint, float] = {}
         self._last: dict[_Path, Packet] = {}
         self._ambiguous: set[_Path] = set()
         self._traffic = self._decoder()
@@ -138,7 +128,7 @@ class Overheard:
     def forget(self, now: float) -> None:
         """Begin anew: bytes are missing."""
         self._traffic = self._decoder()
-        self._valid_from.sound = now
+        self._damaged = now
 
     def hear(self, data: bytes, now: float) -> None:
         """Take bytes, read at a clock value (s)."""
@@ -170,7 +160,7 @@ class Overheard:
     def _take(self, entry: Entry, now: float) -> None:
         is_rest = entry.kind is Kind.NOISE and entry.size >= _REST_OF_FRAME
         if is_rest or entry.valid is False or entry.kind in (Kind.DAMAGED, Kind.UNKNOWN):
-            self._valid_from.sound = now
+            self._damaged = now
         elif entry.kind is Kind.EOT and entry.station is not None \
                 and entry.station in self._stations:
             self._stations.heard(entry.station, now)  # it answers polls
@@ -203,7 +193,7 @@ class Overheard:
             self._heard(command.dst, now)
         asked = now - entry.latency
         path = _Path(command.src, command.dst, command.tns)
-        if asked <= self._valid_from.sound or entry.latency > self._network.cmd_timeout / 1000 \
+        if asked <= self._damaged or entry.latency > self._network.cmd_timeout / 1000 \
                 or path in self._ambiguous or reply.sts:
             return
         if command.cmd == diagnostics.CMD and command.data == _STATUS:
@@ -237,7 +227,7 @@ class Overheard:
                 point = self._readings.points[mapping]
                 here = _words_of(mapping, words)
                 if len(here) == mapping.codec.words:
-                    if asked > self._valid_from.written.get(point, -math.inf):
+                    if asked > self._written_at.get(point, -math.inf):
                         found[point] = b''.join(here)
                 elif here:
                     self._parts[point] = text
@@ -264,7 +254,7 @@ class Overheard:
             is_there = command.dst in (mapping.station, BROADCAST)
             if is_there and (extents is None
                              or any(extent.meets(mapping.extent) for extent in extents)):
-                self._valid_from.written[point] = now
+                self._written_at[point] = now
                 point.fail(f'not read since station {command.src} has sent "{what}"')
 
 
