@@ -34,7 +34,7 @@ from abdf1_ros.problems import ConfigurationError, Place, Problem
 from abdf1_ros.ros.bridge.node import BridgeNode
 from abdf1_ros.ros.bridge.port_owners import PortOwners
 from abdf1_ros.ros.callbacks import AnsweringNode, Executor
-from abdf1_ros.ros.diagnostics.graph import DISCOVERY, Graph, NameWatch
+from abdf1_ros.ros.diagnostics.graph import Graph
 from abdf1_ros.ros.diagnostics.log import bug_text, LimitedLog
 from abdf1_ros.ros.diagnostics.status import ERROR, message_of, OK, WARN, WORDS
 from abdf1_ros.ros.parameters.arguments import Arguments
@@ -176,10 +176,7 @@ class LinesNode(AnsweringNode):
         self.is_asked_again = False
         self.graph = Graph(self)
         self._notes = LimitedLog(self.get_logger(), line_time)
-        self._names = NameWatch(
-            self.get_fully_qualified_name(),
-            lambda now: self.graph.nodes(self.get_name(), self.get_namespace(), now),
-            line_time() + DISCOVERY, f'-r {NODE_NAME}:__node:=lines_2')
+        self._names = self.graph.name_watch(self, f'-r {NODE_NAME}:__node:=lines_2')
         self._publisher = self.create_publisher(DiagnosticArray, '/diagnostics', 10)
         self.create_service(Trigger, '~/reload', self._reload)
 

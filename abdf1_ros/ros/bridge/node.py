@@ -39,7 +39,7 @@ from abdf1_ros.ros.bridge.reload import changes, refuse_harm
 from abdf1_ros.ros.bridge.session import BridgeSession, Surroundings, tell_plcs
 from abdf1_ros.ros.bridge.standby import Service, Standby
 from abdf1_ros.ros.callbacks import AnsweringNode, NodeOptions
-from abdf1_ros.ros.diagnostics.graph import DISCOVERY, Graph, NameWatch
+from abdf1_ros.ros.diagnostics.graph import Graph
 from abdf1_ros.ros.diagnostics.log import bug_text
 from abdf1_ros.ros.parameters.arguments import Arguments
 from abdf1_ros.ros.parameters.declared import (
@@ -106,8 +106,9 @@ class BridgeNode(AnsweringNode):
     def _set_up(self, configuration: Configuration, graph: Graph) -> None:
         self._opener = self._make_opener(configuration)
         self.writes = WriteTopics(self)
+        names = graph.name_watch(self, is_spare=configuration.parameters.standby)
         self._surroundings = Surroundings(
-            self, graph, self._name_watch(graph, configuration), self._opener,
+            self, graph, names, self._opener,
             OfferedPublisher(self, DiagnosticStatus, '~/write_results', results_qos(),
                              most=MAX_WAITING_WRITES),
             OfferedPublisher(self, UInt16MultiArray, '~/active_stations', latched_qos(), most=1),
@@ -142,15 +143,6 @@ class BridgeNode(AnsweringNode):
                 _head(network),
                 lambda text: self.get_logger().error(f'trace_file: {printable(text)}'))
         return opener
-
-    def _name_watch(self, graph: Graph, configuration: Configuration) -> NameWatch:
-        """Return a watch for a second node with our name; a spare has the same name on purpose."""
-        name, namespace = self.get_name(), self.get_namespace()
-        is_spare = configuration.parameters.standby
-        return NameWatch(
-            self.get_fully_qualified_name(),
-            lambda now: 1 if is_spare else graph.nodes(name, namespace, now),
-            line_time() + DISCOVERY)
 
     @property
     def has_failed(self) -> bool:

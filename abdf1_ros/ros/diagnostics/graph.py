@@ -25,8 +25,10 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator
 from collections.abc import Mapping as MappingType
+from functools import partial
 from time import thread_time
 
+from abdf1_ros.ports.clock import line_time
 from abdf1_ros.ros.diagnostics.dds import DdsWatch
 from abdf1_ros.ros.diagnostics.log import INFO, News, WARN
 from abdf1_ros.settings.mapping import Mapping
@@ -38,7 +40,7 @@ _NAMES_PERIOD = 0.25
 
 # Longest time (s) that a new node needs to find the nodes that run already; usually a fifth of it
 # is enough.
-DISCOVERY = 0.5
+_DISCOVERY = 0.5
 
 # Pause between two queries for topics: at least ``_LEAST`` s, and at least ``_MULTIPLE`` times the
 # processor time of a query.
@@ -59,6 +61,13 @@ class Graph:
         self._nodes: Counter[tuple[str, str]] = Counter()
         self._clashes: dict[str, list[str]] = {}
         self._next_names = self._next_topics = 0.0
+
+    def name_watch(self, node: Node, renaming: str = '-r __node:=line_2', *,
+                   is_spare: bool = False) -> NameWatch:
+        """Return a watch for a second node with our name; a spare has our name on purpose."""
+        count = partial(self.nodes, node.get_name(), node.get_namespace())
+        return NameWatch(node.get_fully_qualified_name(), (lambda now: 1) if is_spare else count,
+                         line_time() + _DISCOVERY, renaming)
 
     def nodes(self, name: str, namespace: str, now: float) -> int:
         """Return how many nodes have this name, at the clock value ``now`` (s)."""
@@ -91,7 +100,7 @@ class NameWatch:
     """
 
     def __init__(self, name: str, count: Callable[[float], int], first_look: float = 0.0,
-                 renaming: str = '-r __node:=line_2') -> None:
+                 renaming: str = '') -> None:
         self.text = ''
         self.has_looked = False
         self._name = name
