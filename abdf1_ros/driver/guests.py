@@ -250,11 +250,10 @@ class GuestQueue:
         was_sent = error is None or getattr(error, 'sent', True)
         if error is not None:
             self._silent(station, self.line.now)
-            self._give_up(command, _sent_status(error) if was_sent else _unsent_status(error))
+            self._give_up(command, _status_of(error, was_sent))
         if (claim := job.claim) is not None:
-            self._record.ended(
-                claim, _outcome(station, job.sts, error, was_sent),
-                may_land=was_sent and (error is not None or is_local_status(job.sts)))
+            outcome = _outcome(station, job.sts, error, was_sent)
+            self._record.ended(claim, outcome, may_land=outcome is Outcome.UNKNOWN)
             if was_sent:
                 command.guest.listener.wrote(
                     command.guest, command.packet, station, list(claim.extents or ()))
@@ -307,11 +306,9 @@ def _outcome(station: int, sts: int, error: Exception | None, was_sent: bool) ->
     return Outcome.BROADCAST if station == BROADCAST else Outcome.WRITTEN
 
 
-def _sent_status(error: Exception) -> int:
-    return _NOT_ACKNOWLEDGED if isinstance(error, StationInactive) else _NO_REPLY
-
-
-def _unsent_status(error: Exception) -> int:
+def _status_of(error: Exception, was_sent: bool) -> int:
+    if was_sent:
+        return _NOT_ACKNOWLEDGED if isinstance(error, StationInactive) else _NO_REPLY
     if isinstance(error, PortLost):
         return _NOT_CONNECTED
     return _NO_BUFFER if isinstance(error, CommandExpired) else _OFF_LINE

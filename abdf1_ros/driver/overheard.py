@@ -114,10 +114,7 @@ class Overheard:
         self._written_at: dict[ReadPoint, float] = {}
         self._last: dict[_Path, Packet] = {}
         self._ambiguous: set[_Path] = set()
-        self._traffic = self._decoder()
-
-    def _decoder(self) -> TrafficDecoder:
-        return TrafficDecoder(self._network.checksum)
+        self._traffic = TrafficDecoder(network.checksum)
 
     def begin(self, now: float) -> None:
         """Begin on an opened port: earlier bytes are not continued."""
@@ -127,7 +124,7 @@ class Overheard:
 
     def forget(self, now: float) -> None:
         """Begin anew: bytes are missing."""
-        self._traffic = self._decoder()
+        self._traffic = TrafficDecoder(self._network.checksum)
         self._damaged = now
 
     def hear(self, data: bytes, now: float) -> None:
