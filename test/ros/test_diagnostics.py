@@ -714,9 +714,11 @@ def test_bit_of_the_plc_confirms_control_while_it_is_fresh_and_1(
 
 def test_guests_that_are_connected_are_counted() -> None:
     guests = [Guest('pty:a', is_connected=True), Guest('tcp:7')]
-    status = GuestsStatus([cast(GuestLine, SimpleNamespace(guest=guest, fault=''))
-                           for guest in guests], PORT)
+    lines = [SimpleNamespace(guest=guest, fault='') for guest in guests]
+    status = GuestsStatus(cast(list[GuestLine], lines), PORT)
     assert status.judge(NOW) == (OK, '1 of 2 guests are connected')
+    lines[1].fault = 'in use'
+    assert status.judge(NOW) == (ERROR, 'tcp:7: in use')
 
 
 def test_value_of_a_guest_over_a_fallback_is_a_warning(make_bench: Callable[..., Bench]) -> None:

@@ -248,9 +248,21 @@ def test_station_with_another_error_code_is_told_once(
         'station 1 answers polls': 1}
 
 
-def test_end_waits_until_results_and_diagnostics_have_arrived(
+def test_level_that_changes_is_published_at_once(
         make_bench: Benches, monkeypatch: pytest.MonkeyPatch) -> None:
     bench = make_bench(PULSES)
+    bench.node.link.stop()
+    session, published = bench.node.session, []
+    monkeypatch.setattr(session, 'publish_diagnostics', published.append)
+    session._levels, session._next_diagnostics = [], math.inf
+    for _ in range(2):
+        session.check()
+    assert len(published) == 1
+
+
+def test_end_waits_until_results_and_diagnostics_have_arrived(
+        make_bench: Benches, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    bench = make_bench(PULSES, parameters=(f'trace_file:={tmp_path / "line.cap"}',))
     waits: list[tuple[str, float]] = []
 
     def wait(publisher: Publisher, timeout: Duration) -> bool:
@@ -263,6 +275,7 @@ def test_end_waits_until_results_and_diagnostics_have_arrived(
     (first, patience), (second, rest) = waits
     assert (first, second) == ('/abdf1/write_results', '/diagnostics')
     assert patience <= 0.3 and 0.0 <= rest <= 0.2  # of a subscriber that is stuck, for both
+    assert 'trace' not in {thread.name for thread in threading.enumerate()}
 
 
 # Maps with faults

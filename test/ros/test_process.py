@@ -15,11 +15,14 @@
 """The node as a process: how it starts, ends, finds its port, and takes other names."""
 
 from collections.abc import Iterator
+import os
 from pathlib import Path
 import re
 import signal
+from typing import cast
 
 from abdf1_ros.ros.bridge.last_writes import LAST_WRITES, take_last_writes
+from abdf1_ros.ros.process import main
 import pytest
 from rclpy.duration import Infinite
 from std_msgs.msg import (  # noqa: I101
@@ -137,6 +140,12 @@ def refused_start(*arguments: str, status: int = 2) -> list[str]:
         assert node.result() == status, node.text
         assert 'Traceback' not in node.text
         return node.lines
+
+
+def test_log_file_has_the_name_that_was_given() -> None:
+    descriptor = main._log_file('abdf1', ['--log-file-name', 'mine', '-p', 'read_only:=true'])
+    assert Path(f'/proc/self/fd/{descriptor}').readlink().name.startswith('mine_')
+    os.close(cast(int, descriptor))
 
 
 @pytest.mark.parametrize('directory', ['/proc/none', '/proc'])
