@@ -26,6 +26,7 @@ from __future__ import annotations
 
 from collections import deque
 import errno
+import re
 import socket
 import time
 from urllib.parse import urlsplit
@@ -57,6 +58,12 @@ _ENDS_CAUSE = (
 # By URL: the times (s) at which the server has ended our last connections.
 _ends: dict[str, deque[float]] = {}
 
+# How a telnet server begins: IAC, WILL to DONT, and the number of an option (RFC 854).
+_NEGOTIATION = re.compile(b'\xFF[\xFB-\xFE][\0-\x31]')
+_TELNET = ('the port of the device server is a telnet port (its first bytes are %s), which '
+           'doubles each byte FF: set it to raw TCP, or write rfc2217:// if the server has '
+           'RFC 2217')
+
 
 class ServerPort(DescriptorPort):
     """A port of a device server; its error names the cause if connections end repeatedly."""
@@ -87,9 +94,22 @@ class ServerPort(DescriptorPort):
         return OSError(f'{error.strerror or error}, {_ENDS_CAUSE}')
 
 
+class RawPort(ServerPort):
+    """A port of raw TCP; it is lost if the server begins with a negotiation of telnet."""
+
+    _is_begun = False
+
+    def _take(self) -> bytes:
+        data = super()._take()
+        if not self._is_begun and (found := _NEGOTIATION.match(data)):
+            raise OSError(_TELNET % found[0].hex(' ').upper())
+        self._is_begun = self._is_begun or bool(data)
+        return data
+
+
 def open_port(settings: PortSettings) -> DescriptorPort:
     """Connect to a device server; raises OSError."""
-    return ServerPort(connected(settings.name), settings.name)
+    return RawPort(connected(settings.name), settings.name)
 
 
 def connected(url: str) -> socket.socket:

@@ -152,3 +152,21 @@ def test_client_that_is_thrown_out_again_and_again_is_told_of_the_other_one() ->
         'the other end has closed the connection, 3 times within 10 s: another client has this '
         'line, or takes it each time (then let the device server refuse a second client), or the '
         'inactivity time of the server is too short']
+
+
+@pytest.mark.parametrize(('pieces', 'is_telnet'), [
+    ([b'\xFF\xFD\x03\xFF\xFB\x01'], True), ([b'\xFF\xFB\x2C'], True),
+    ([b'\x10\x06', b'\xFF\xFD\x03'], False), ([b'\xFF\xFF\x03'], False)])
+def test_telnet_port_is_named(pieces: list[bytes], is_telnet: bool) -> None:
+    """A device server begins a telnet connection with options; DF1 has such bytes inside data."""
+    with socket.create_server(('127.0.0.1', 0)) as listening:
+        port = open_port(PortSettings(f'socket://127.0.0.1:{listening.getsockname()[1]}'))
+        with listening.accept()[0] as server:
+            for piece in pieces:
+                server.sendall(piece)
+                if is_telnet:
+                    with pytest.raises(OSError, match='telnet port .its first bytes are FF F'):
+                        port.read(PATIENCE, server.fileno())
+                else:
+                    assert port.read(PATIENCE, server.fileno()) == piece
+        port.close()
