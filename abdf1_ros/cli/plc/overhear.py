@@ -28,6 +28,7 @@ from abdf1_ros.df1.frames import Poll
 from abdf1_ros.df1.listen import SecondPort
 from abdf1_ros.df1.listener import LineKind, ListeningDecoder
 from abdf1_ros.driver.overheard import Carried
+from abdf1_ros.errors import PortLost
 from abdf1_ros.ports.wake import Wake
 from abdf1_ros.settings.network import Network
 from abdf1_ros.sniffer.capture import Chunk, Direction
@@ -64,7 +65,9 @@ def overhear(network: Network, bauds: Sequence[int],
     """
     Listen at each speed; stop at a speed without a character.
 
-    Return the first master that is heard, None for none. Sends nothing; raises OSError.
+    Return the first master that is heard, None for none. Sends nothing.
+
+    Raises NoPort and PortLost.
     """
     for baud in bauds:
         show(f'listening at {baud} baud')
@@ -82,7 +85,11 @@ def silent(network: Network) -> Network:
 
 
 def heard_reads(network: Network, seconds: float) -> list[Carried]:
-    """Listen for ``seconds``; return the answered reads of other nodes. Raises OSError."""
+    """
+    Listen for ``seconds``; return the answered reads of other nodes.
+
+    Raises NoPort and PortLost.
+    """
     overhearing = Overhearing(network)
     for at, data in _bytes_of(network, seconds):
         direction = Direction.IN if isinstance(data, SecondPort) else Direction.UNKNOWN
@@ -98,6 +105,8 @@ def _bytes_of(network: Network, seconds: float) -> Iterator[tuple[float, bytes]]
         while (now := time.monotonic() - begun) < seconds:
             data = port.read(seconds - now, wake.descriptor)
             yield time.monotonic() - begun, data
+    except OSError as error:
+        raise PortLost(error.strerror or str(error)) from None
     finally:
         port.close()
         wake.close()

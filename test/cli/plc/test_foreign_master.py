@@ -19,6 +19,7 @@ from contextlib import contextmanager
 import os
 from pathlib import Path
 import select
+import socket
 import threading
 
 from abdf1_ros import client
@@ -203,3 +204,20 @@ class Asking(threading.Thread):
                          b'\x10\x02' + answer + b'\x10\x03' + crc(answer + b'\x03'),
                          b'\x10\x06'):
                 self._line.write(said)
+
+
+@pytest.mark.parametrize(('first', 'reason'), [
+    (b'', 'the other end has closed'), (b'\xFF\xFD\x03', 'is a telnet port')])
+def test_device_server_that_ends_the_listening_is_named(
+        first: bytes, reason: str, capsys: Output) -> None:
+    with socket.create_server(('127.0.0.1', 0)) as server:
+        def serve() -> None:
+            with server.accept()[0] as connection:
+                connection.sendall(first)
+                connection.shutdown(socket.SHUT_WR)
+                connection.recv(1)
+        threading.Thread(target=serve, daemon=True).start()
+        port = f'socket://127.0.0.1:{server.getsockname()[1]}'
+        assert main(['detect', '--port', port]) == 1
+    said = capsys.readouterr().err
+    assert 'port lost: the' in said and reason in said
