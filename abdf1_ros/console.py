@@ -51,7 +51,7 @@ _PIPE_SIZE = 1 << 20
 _LAST_ENTRIES = 1.0
 _PATIENCE = 0.5
 
-_PAUSE = 1.0  # after a write that has failed (s)
+PAUSE = 1.0  # after a write that has failed (s)
 
 _COLOURS = re.compile(rb'\x1b\[[0-9;]*m')
 
@@ -100,7 +100,7 @@ class Sink(threading.Thread):
             except OSError:  # the disk is full, or the terminal gone
                 with self._news:  # our own last line stands for ``lost`` lines
                     self._lost += data.count(b'\n') + max(0, lost - 1)
-                time.sleep(_PAUSE)
+                time.sleep(PAUSE)
 
     def _take(self) -> tuple[bytes, int]:
         """Wait for lines; return them, and the number of lines that were lost after them."""

@@ -62,7 +62,7 @@ makes a request logs these events: during this request, during the next request,
 """
 
 # Most events on the line that are kept between two requests.
-_MOST_ENTRIES = 1000
+MOST_ENTRIES = 1000
 
 PlcValue: TypeAlias = Any
 """A bool, int, float or str, or a list of them: the address decides."""
@@ -251,7 +251,7 @@ class OpenLine:
         """Keep a log entry for later: a handler may wait for a disk or pipe, the link must not."""
         if not self.log.isEnabledFor(level):
             return
-        if len(self._entries) < _MOST_ENTRIES:
+        if len(self._entries) < MOST_ENTRIES:
             self._entries.append((level, text, error))
         else:
             self._lost += 1

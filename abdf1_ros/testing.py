@@ -88,11 +88,11 @@ class Messages(list[RosMessage]):
     def __init__(self, observer: Observer, topic: str) -> None:
         super().__init__()
         self.topic = topic
-        self._observer = observer
+        self.observer = observer
 
     def until(self, condition: Callable[[RosMessage], bool], what: str) -> RosMessage:
         """Wait for a message that fulfils ``condition``; return it."""
-        return self._observer.until(
+        return self.observer.until(
             lambda: next((message for message in self if condition(message)), None),
             lambda: f'{what} on {self.topic}; got {list(self)[-3:]}')
 
@@ -105,39 +105,39 @@ class Bridge:
     """A bridge as a process, with its output in the file ``log``."""
 
     def __init__(self, assignments: Sequence[str], log: Path) -> None:
-        self._words = [word for text in assignments for word in ('-p', text)]
-        self._log = log
-        self._process: subprocess.Popen[bytes] | None = None
+        self.words = [word for text in assignments for word in ('-p', text)]
+        self.log = log
+        self.process: subprocess.Popen[bytes] | None = None
 
     def start(self) -> None:
         """Start the process, also again after its end."""
-        with self._log.open('ab') as log:
-            self._process = subprocess.Popen(
-                [sys.executable, '-m', 'abdf1_ros', 'node', '--ros-args', *self._words],
+        with self.log.open('ab') as log:
+            self.process = subprocess.Popen(
+                [sys.executable, '-m', 'abdf1_ros', 'node', '--ros-args', *self.words],
                 stdout=log, stderr=log)
 
     @property
     def is_running(self) -> bool:
         """Tell whether the process has been started and has not ended."""
-        return self._process is not None and self._process.poll() is None
+        return self.process is not None and self.process.poll() is None
 
     def end(self, number: signal.Signals) -> int:
         """End the process by a signal, if it runs; return its exit status."""
-        if self._process is None:
+        if self.process is None:
             return 0
         if self.is_running:
-            self._process.send_signal(number)
-        process, self._process = self._process, None
+            self.process.send_signal(number)
+        process, self.process = self.process, None
         return process.wait(PATIENCE)
 
     def check(self) -> None:
         """Raise AssertionError if the process has ended by itself."""
-        if self._process is not None and (status := self._process.poll()) is not None:
+        if self.process is not None and (status := self.process.poll()) is not None:
             raise AssertionError(f'the bridge has ended with {status}{self.last_words()}')
 
     def last_words(self) -> str:
         """Return the last lines of the log."""
-        lines = self._log.read_text(errors='replace').splitlines() if self._log.exists() else []
+        lines = self.log.read_text(errors='replace').splitlines() if self.log.exists() else []
         return '; its last words:\n' + '\n'.join(lines[-10:]) if lines else ''
 
 
@@ -222,14 +222,14 @@ class Plcs:
         self.port = self._line.name
         self.faults: list[Exception] = []
         machine = Machine(multidrop(self._plcs), checksum=Checksum.CRC)
-        self._link = LinkThread(machine, self._line.open, on_fault=self.faults.append)
+        self.link = LinkThread(machine, self._line.open, on_fault=self.faults.append)
 
     def __enter__(self) -> Plcs:
-        self._link.start()
+        self.link.start()
         return self
 
     def __exit__(self, *exception: object) -> None:
-        if self._link.is_alive():
+        if self.link.is_alive():
             self.lose()
         assert not self.faults
 
@@ -242,7 +242,7 @@ class Plcs:
 
     def lose(self) -> None:
         """Take the line away, as when an adapter is unplugged."""
-        self._link.stop()
+        self.link.stop()
         self._line.close()
 
     def say(self, command: str) -> None:
@@ -287,9 +287,9 @@ class SimulatedCell:
         if problems := examine(net_file, map_file).problems:
             raise ConfigurationError(problems)
         self.plcs = Plcs(folder / 'data.csv', ladders)
-        self._assignments = [f'net_file:={net_file}', f'map_file:={map_file}',
-                             f'port:={self.plcs.port}', *parameters]
-        self._bridge = Bridge(self._assignments, folder / 'bridge.log')
+        self.assignments = [f'net_file:={net_file}', f'map_file:={map_file}',
+                            f'port:={self.plcs.port}', *parameters]
+        self._bridge = Bridge(self.assignments, folder / 'bridge.log')
         self.ros = self.observer(context=context, bridge=self._bridge)
 
     def __enter__(self) -> SimulatedCell:

@@ -80,7 +80,7 @@ class InterlockConsumer(Node):
             liveliness=LivelinessPolicy.MANUAL_BY_TOPIC, liveliness_lease_duration=time)
         try:
             self._subscribe(topic, qos, SubscriptionEventCallbacks(
-                deadline=lambda event: self._stopped(), liveliness=self._liveliness,
+                deadline=lambda event: self._stopped(), liveliness=self.publishers_changed,
                 incompatible_qos=self._incompatible))
         except UnsupportedEventTypeError:  # rmw_zenoh lacks these events
             self._subscribe(topic, qos, SubscriptionEventCallbacks())
@@ -88,14 +88,14 @@ class InterlockConsumer(Node):
         # The node's own clock may be simulated and stop, so the timer uses a steady clock.
         self._silence = self.create_timer(
             patience, self._silent, clock=Clock(clock_type=ClockType.STEADY_TIME))
-        self.create_service(Trigger, '~/reset', self._reset)
+        self.create_service(Trigger, '~/reset', self.reset)
         self._decide(False, self._why_not)
 
     def _subscribe(self, topic: str, qos: QoSProfile, events: SubscriptionEventCallbacks) -> None:
         self._subscription = self.create_subscription(
-            UInt8MultiArray, topic, self._received, qos, event_callbacks=events)
+            UInt8MultiArray, topic, self.receive, qos, event_callbacks=events)
 
-    def _received(self, message: UInt8MultiArray) -> None:
+    def receive(self, message: UInt8MultiArray) -> None:
         self._silence.reset()
         self._is_fresh = True
         self._why_not = self._missing_in(message)
@@ -119,7 +119,7 @@ class InterlockConsumer(Node):
                 return f'bit {bit} is 0'
         return ''
 
-    def _liveliness(self, event: Any) -> None:
+    def publishers_changed(self, event: Any) -> None:
         if event.alive_count <= 0:  # -1 if this subscriber joined late (Fast DDS)
             self._stopped()
 
@@ -140,7 +140,7 @@ class InterlockConsumer(Node):
         elif self._is_fresh:
             self._stopped()
 
-    def _reset(self, request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
+    def reset(self, request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
         """
         Accept the reset of a person who sees the cell; it holds from the next value on.
 

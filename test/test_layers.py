@@ -16,6 +16,7 @@
 
 import ast
 from functools import cache
+import re
 import subprocess
 import sys
 
@@ -234,3 +235,14 @@ def test_dataclasses_have_slots_and_are_frozen_unless_a_field_is_assigned() -> N
                 fields = {ast.unparse(part.target) for part in node.body
                           if isinstance(part, ast.AnnAssign)}
                 assert options.get('frozen') or fields & assigned, node.name
+
+
+def test_no_test_replaces_a_private_name() -> None:
+    """Find names in text, which ruff's SLF001 does not see."""
+    texts = {path.name: path.read_text() for path in PACKAGE.parent.glob('test/**/*.py')}
+    found = [(name, str(word.value)) for name, text in texts.items() if 'setattr' in text
+             for call in ast.walk(ast.parse(text))
+             if isinstance(call, ast.Call) and ast.unparse(call.func).endswith('setattr')
+             for word in call.args[:2] if isinstance(word, ast.Constant)]
+    assert sorted(entry for entry in found if re.search(r'(^|\.)_[^_]', entry[1])) == [
+        ('test_main.py', '_exit'), ('test_runner.py', '_take_subscription')]

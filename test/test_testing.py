@@ -57,8 +57,8 @@ globals().update({name: thing for name, thing in _run(
 def _forks(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> None:
     """Let bridges be forks, but for one test that has them as users do."""
     def start(bridge: Bridge) -> None:
-        with bridge._log.open('ab') as log:
-            bridge._process = Forked('node', ['--ros-args', *bridge._words], log.fileno())
+        with bridge.log.open('ab') as log:
+            bridge.process = Forked('node', ['--ros-args', *bridge.words], log.fileno())
 
     if request.node.name != 'test_test_of_the_tutorial_passes':
         monkeypatch.setattr(Bridge, 'start', start)
@@ -199,6 +199,6 @@ def test_cell_that_fails_leaves_no_thread_and_no_context(
         assert at == 'end'
         cell.plcs.word('N7:0')
     assert not cell.ros.context.ok()
-    assert not [thread for thread in threading.enumerate() if thread is cell.plcs._link]
+    assert not [thread for thread in threading.enumerate() if thread is cell.plcs.link]
     monkeypatch.undo()
     cell.end()

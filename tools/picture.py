@@ -54,8 +54,8 @@ _COLOURS = {Style.PLAIN: '#cad3f5', Style.TITLE: '#ffffff', Style.GOOD: '#a6da95
             Style.WARNING: '#eed49f', Style.BAD: '#ed8796'}
 
 # Commands to the simulator (s after its start), and the time of the picture.
-_STORY = ('22 silent 1', '28 normal 1')
-_SHOT = 40.0
+STORY = ('22 silent 1', '28 normal 1')
+SHOT = 40.0
 
 
 class Point(NamedTuple):
@@ -226,7 +226,7 @@ def main(args: Sequence[str] | None = None) -> int:
     options = parser.parse_args(args)
     os.environ.setdefault('ROS_AUTOMATIC_DISCOVERY_RANGE', 'LOCALHOST')
     os.environ.setdefault('ROS_DOMAIN_ID', str(1 + os.getpid() % 100))
-    options.file.write_text(watch(_SHOT, _STORY), encoding='utf-8')
+    options.file.write_text(watch(SHOT, STORY), encoding='utf-8')
     return 0
 
 

@@ -535,12 +535,12 @@ def main(args: Sequence[str] | None = None) -> int:
     scene = FULL_DUPLEX if options.peer else HALF_DUPLEX
     try:
         with tempfile.TemporaryDirectory(prefix='abdf1_') as folder, interruptible():
-            return _tell(Demo(scene, Path(folder) / 'line'), options.seconds)
+            return tell_steps(Demo(scene, Path(folder) / 'line'), options.seconds)
     except KeyboardInterrupt:  # before the first step, or after the last step
         return 0
 
 
-def _tell(demo: Demo, seconds: float) -> int:
+def tell_steps(demo: Demo, seconds: float) -> int:
     """Run the demo and end it; print the verdict."""
     status, verdict = 0, ''
     try:

@@ -431,7 +431,7 @@ def _converse(cast: Cast, script: TimedCommands, options: argparse.Namespace,
             carry_out(script.pop(0)[1])
         cast.advance()
         if select.select(inputs, [], [], _GLANCE)[0]:
-            data = _input(inputs[0])
+            data = input_of(inputs[0])
             if data is None:
                 time.sleep(_GLANCE)
                 continue
@@ -443,7 +443,7 @@ def _converse(cast: Cast, script: TimedCommands, options: argparse.Namespace,
                 carry_out(line.decode(errors='replace'))
 
 
-def _input(descriptor: int) -> bytes | None:
+def input_of(descriptor: int) -> bytes | None:
     """Return the typed text; None while the terminal belongs to another job."""
     try:
         return os.read(descriptor, 4096)

@@ -84,7 +84,7 @@ _AUTO = 'auto'
 _CHECKS = {check.value.lower(): check for check in Checksum}
 _DUPLEX = {duplex.name.lower(): duplex for duplex in Duplex}
 _DEFAULT_BAUD = Network().baud
-_PROGRESS_PERIOD = 2.0
+PROGRESS_PERIOD = 2.0
 
 _EPILOG = """\
 exit status: 0 at the end, 1 if a port cannot be opened or is lost, 2 for bad options or files
@@ -102,7 +102,7 @@ examples:
 """
 
 
-class _Output:
+class Output:
     """Decode chunks and print the entries."""
 
     def __init__(self, options: argparse.Namespace) -> None:
@@ -115,7 +115,7 @@ class _Output:
         self.has_failed = False
         self._colour = sys.stdout.isatty() and 'NO_COLOR' not in os.environ
         self._shows_progress = sys.stderr.isatty() and (options.summary or not sys.stdout.isatty())
-        self._next_progress = time.monotonic() + _PROGRESS_PERIOD
+        self._next_progress = time.monotonic() + PROGRESS_PERIOD
 
     def begin(self, settings: dict[str, str]) -> TrafficDecoder:
         """Return the decoder; without an option, settings come from the head of a capture."""
@@ -151,7 +151,7 @@ class _Output:
     def show_progress(self, done: str) -> None:
         """Show the progress every two seconds on a terminal without other output."""
         if self._shows_progress and time.monotonic() >= self._next_progress:
-            self._next_progress = time.monotonic() + _PROGRESS_PERIOD
+            self._next_progress = time.monotonic() + PROGRESS_PERIOD
             _say(f'{done}, {self._summary.bytes.total()} bytes so far')
 
     def end(self) -> None:
@@ -229,19 +229,19 @@ def main(args: Sequence[str] | None = None) -> int:
     Returns one of the exit statuses that --help lists.
     """
     prepare_output()
-    options = _parse(args)
+    options = parse(args)
     return run_command('sniff', lambda: _decode(options))
 
 
 def _decode(options: argparse.Namespace) -> int:
     try:
-        output = _Output(options)
+        output = Output(options)
     except OSError as error:
         raise ConfigurationError([Problem('--pcapng', reason_of(options.pcapng, error))]) from None
     return _decode_files(options, output) if options.files else _listen(options, output)
 
 
-def _parse(args: Sequence[str] | None) -> argparse.Namespace:
+def parse(args: Sequence[str] | None) -> argparse.Namespace:
     parser = command_parser('sniff', __doc__, _EPILOG)
     parser.add_argument('files', metavar='FILE', nargs='*',
                         help='captures, pcap, pcapng or hex dumps, decoded in this order')
@@ -303,7 +303,7 @@ def _parse(args: Sequence[str] | None) -> argparse.Namespace:
     return options
 
 
-def _decode_files(options: argparse.Namespace, output: _Output) -> int:
+def _decode_files(options: argparse.Namespace, output: Output) -> int:
     status = 0
     end = time.monotonic() + options.seconds
     try:
@@ -340,7 +340,7 @@ def _recorded(name: str, is_binary: bool) -> Iterator[tuple[Recording, Chunk]]:
         raise Problem(name, f'cannot be read: {error.strerror or error}') from None
 
 
-def _listen(options: argparse.Namespace, output: _Output) -> int:
+def _listen(options: argparse.Namespace, output: Output) -> int:
     names = options.tap or [options.port]
     settings = {'begun': begun_now(), 'ports': ' '.join(names), 'check': options.check,
                 'duplex': options.duplex}
@@ -370,7 +370,7 @@ def _listen(options: argparse.Namespace, output: _Output) -> int:
     return status
 
 
-def _print_heard(tap: Tap, trace: Trace | None, output: _Output, settings: dict[str, str],
+def _print_heard(tap: Tap, trace: Trace | None, output: Output, settings: dict[str, str],
                  options: argparse.Namespace) -> int:
     """
     Print the traffic of the tap until the time is up, a signal comes, or a port is lost.
@@ -381,7 +381,7 @@ def _print_heard(tap: Tap, trace: Trace | None, output: _Output, settings: dict[
         output.show_progress('listening')
 
     status = told = 0
-    chunks = tap.chunks(options.seconds, _PROGRESS_PERIOD, idle)
+    chunks = tap.chunks(options.seconds, PROGRESS_PERIOD, idle)
     while True:
         try:
             chunk = next(chunks, None)

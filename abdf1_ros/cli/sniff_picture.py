@@ -37,7 +37,7 @@ from abdf1_ros.sniffer.report import summary_lines, words
 from abdf1_ros.sniffer.summary import BITS_PER_CHARACTER, Summary
 from abdf1_ros.text import counted
 
-_MOST_DRAWN = 20_000  # entries; then up to the same number again, only in strips with faults
+MOST_DRAWN = 20_000  # entries; then up to the same number again, only in strips with faults
 _MOST_EPISODES = 200
 _PAUSE = 5.0  # s; after a longer pause the same fault starts a new episode
 _MOST_LANES = 40
@@ -211,7 +211,7 @@ class Timeline:
             return
         recording = self._recordings[-1]
         bars = [bar for found in strip.bars.values() for bar in found]
-        most = _MOST_DRAWN * (1 + any(bar.look in _FAULTS for bar in bars))
+        most = MOST_DRAWN * (1 + any(bar.look in _FAULTS for bar in bars))
         if self._drawn >= most:
             recording.strips[strip.number] = None
             return

@@ -125,13 +125,12 @@ class RadioNode(EqualNode):
 
     ``serve`` executes a command and returns its reply, if it gives one; it is called once for each
     command.
-    ``report`` is called with every numbered error and notice. ``random`` gives random times.
+    ``report`` is called with every numbered error and notice.
     """
 
     def __init__(self, machine: Machine, settings: LinkSettings, stations: ActiveStationList,
                  serve: Callable[[Packet], Packet | None],
-                 report: Callable[[Event], None] = lambda event: None,
-                 random: Random | None = None) -> None:
+                 report: Callable[[Event], None] = lambda event: None) -> None:
         super().__init__(machine, stations, serve, report, settings.station)
         self._settings = settings
         self._numbers = {settings.station, *settings.also}
@@ -139,7 +138,7 @@ class RadioNode(EqualNode):
         # Seconds within which a node of these settings repeats a command.
         self._repetition_time = (settings.nak_retries + 1) * (
             settings.cmd_timeout + 2 * LONGEST_WAIT)
-        self._random = random or Random()
+        self._random = Random(settings.seed)
         self._same_number: float | None = None
         self._forget()
 

@@ -59,6 +59,9 @@ class LinkOptions:
     max_outstanding: int = 1
     """Number of commands of a full-duplex peer that may wait for replies at the same time."""
 
+    seed: int | None = None
+    """The seed of a radio modem node's random times; None for other times at each start."""
+
     eot_suppression: bool = False
     """
     A slave without a message does not answer a poll. For the master it looks like a dead station.

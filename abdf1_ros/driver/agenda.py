@@ -179,7 +179,7 @@ class Agenda:
         return own
 
     def _check_or_read(self, now: float, busy: Container[int]) -> Job | None:
-        return self._checks.find_due(now) and self._check(now, busy) or self._read(now, busy)
+        return self._checks.find_due(now) and self._check(now, busy) or self.read(now, busy)
 
     def _usual(self, now: float, busy: Container[int]) -> Job | None:
         has_writes = self._writes.waiting or self._tasks.waiting
@@ -197,7 +197,7 @@ class Agenda:
         if self._stations.probes.died_at > -math.inf and (late := self._after_death(now, busy)):
             return late
         job = self._checks.find_due(now) and self._check(now, busy) \
-            or self._has_own and self._refresh(now, busy) or self._read(now, busy)
+            or self._has_own and self._refresh(now, busy) or self.read(now, busy)
         if job and self._share.owed > 0:
             self._share.counted.append(job.start(self._tasks, now))
         return job or has_writes and self._write(now, busy) \
@@ -276,7 +276,7 @@ class Agenda:
         is_reads_turn = self._last_probe_was_check and self._reads.has_silent
         return now + probes.pause if is_reads_turn and now >= probes.next else probes.next
 
-    def _read(self, now: float, busy: Container[int]) -> Job | None:
+    def read(self, now: float, busy: Container[int]) -> Job | None:
         """Return a probe or read that is due."""
         job = self._reads.next(now, busy)
         if job is not None:

@@ -134,12 +134,12 @@ class Checks:
         self._wanted = wanted or {}
         periods = {station.number: min(self._wanted.get(station.number, math.inf),
                                        period or math.inf) for station in stations}
-        self._checks = [Check(self, number, CheckKind.STATUS, often,
-                              is_planned=number in self._wanted)
-                        for number, often in periods.items() if not math.isinf(often)]
-        self._asked = {check.station for check in self._checks}
-        self._checks += [Check(self, station.number, CheckKind.ECHO, ECHO_PERIOD)
-                         for station in stations if station.number not in read]
+        self.jobs = [Check(self, number, CheckKind.STATUS, often,
+                           is_planned=number in self._wanted)
+                     for number, often in periods.items() if not math.isinf(often)]
+        self._asked = {check.station for check in self.jobs}
+        self.jobs += [Check(self, station.number, CheckKind.ECHO, ECHO_PERIOD)
+                      for station in stations if station.number not in read]
         self.next_due = 0.0
 
     def known(self, station: int) -> StationHealth:
@@ -164,7 +164,7 @@ class Checks:
     def begin(self, now: float) -> None:
         """Make all checks due: the port has been opened."""
         self._requests.open()
-        for check in self._checks:
+        for check in self.jobs:
             check.due = now
         self._plan()
 
@@ -177,7 +177,7 @@ class Checks:
 
     def ask_status(self, station: int, due: float) -> None:
         """Ask a station at a clock value (s): it may be a different PLC or in a different mode."""
-        for check in self._checks:
+        for check in self.jobs:
             if check.kind is CheckKind.STATUS and check.station == station:
                 check.due = due
         self._plan()
@@ -201,7 +201,7 @@ class Checks:
 
         It may be a probe from the clock value ``probe_from`` (s) on.
         """
-        due = [check for check in self._checks if check.due <= now]
+        due = [check for check in self.jobs if check.due <= now]
         for check in filter(may_go, sorted(due, key=attrgetter('due'))):
             if check.station in busy:
                 return None  # no other check instead: the reads have their turn after each check
@@ -271,7 +271,7 @@ class Checks:
     def _finish(self, check: Check, next_due: float) -> None:
         """Plan the next check of this kind; a silent station gets only echoes until it answers."""
         if check.kind is CheckKind.COUNTERS:
-            self._checks.remove(check)
+            self.jobs.remove(check)
         elif self._stations[check.station].active:
             check.due = next_due
         elif check.kind is CheckKind.ECHO:
@@ -292,8 +292,8 @@ class Checks:
         if not self._stations[station].active:
             self._take_counters(station, {}, 'the station does not answer')
         elif not any(other.station == station and other.kind is CheckKind.COUNTERS
-                     for other in self._checks):
-            self._checks.append(check)
+                     for other in self.jobs):
+            self.jobs.append(check)
             self._plan()
 
     def _forget(self, station: int, reason: str) -> None:
@@ -302,11 +302,11 @@ class Checks:
         self._known[station] = StationHealth(
             processor=self._unknown(station, f'unknown ({reason})'), counters=known.counters,
             no_counters=known.no_counters)
-        for check in [check for check in self._checks if check.station == station
+        for check in [check for check in self.jobs if check.station == station
                       and check.kind is CheckKind.COUNTERS and not math.isinf(check.due)]:
             self._take_counters(station, {}, reason)
-            self._checks.remove(check)
+            self.jobs.remove(check)
         self._plan()
 
     def _plan(self) -> None:
-        self.next_due = min((check.due for check in self._checks), default=math.inf)
+        self.next_due = min((check.due for check in self.jobs), default=math.inf)

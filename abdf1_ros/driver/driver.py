@@ -123,7 +123,7 @@ class Driver:
         self._inbox: Inbox[Write] = Inbox(is_open=False)
         self._make_queues()
         self.link = network.line_mode.make_link(
-            self.machine, network.link(settings), self.stations, self._serve, listener.happened)
+            self.machine, network.link(settings), self.stations, self.serve, listener.happened)
         self.overheard: Overheard | None = None
         if isinstance(self.machine, ListeningMachine):
             self.overheard = self.machine.listener = Overheard(
@@ -138,7 +138,7 @@ class Driver:
             network, self._active_rows(), settings, self.stations, machine, self._listener, record)
         self.points = self.readings.points
         self._demands = self.readings.demands
-        self._served = self._make_served()
+        self.served = self._make_served()
         self.refused = RefusedCommands(PlcType(network.plc_type))
         writing = WritesUnderWay(
             self.stations, record, self.readings, settings.write_timeout, report)
@@ -151,7 +151,7 @@ class Driver:
             settings.processor_period, machine, self.readings.link_failed,
             self._station_told, self.readings.mode_periods)
         self.interlocks = Interlocks(
-            Rows() if settings.read_only else self.mappings, self._writes, writing, self._served,
+            Rows() if settings.read_only else self.mappings, self._writes, writing, self.served,
             self._listener, self._foreign_value, settings.first_tns)
         self.guests = GuestQueue(self.stations, machine, network.cmd_timeout / 1000,
                                  self._station_of_guest, self._words_of_guest, record)
@@ -308,7 +308,7 @@ class Driver:
                 else:
                     self._end_write(write, Outcome.NOT_SENT, _NOT_HEARD)
             else:
-                self._served.store(write.mapping, write.raw)
+                self.served.store(write.mapping, write.raw)
                 self._record.ended(self._record.begin(
                     write.mapping.station, (write.mapping.extent,), write), Outcome.WRITTEN)
                 self._end_write(write, Outcome.WRITTEN)
@@ -324,10 +324,10 @@ class Driver:
     def _end_write(self, write: Write, outcome: Outcome, detail: str = '') -> None:
         self._listener.written(write.result(outcome, detail, self.machine.now))
 
-    def _serve(self, command: Packet) -> Packet:
+    def serve(self, command: Packet) -> Packet:
         """Execute a command of a PLC or master, after all messages that came before it."""
         self._sort_inbox(self.machine.now)
-        reply = self._served.serve(command)
+        reply = self.served.serve(command)
         if reply.sts:
             self.refused.add(command, reply, self.machine.now)
         return reply

@@ -252,7 +252,7 @@ class GuestQueue:
             self._silent(station, self.line.now)
             self._give_up(command, _status_of(error, was_sent))
         if (claim := job.claim) is not None:
-            outcome = _outcome(station, job.sts, error, was_sent)
+            outcome = outcome_of(station, job.sts, error, was_sent)
             self._record.ended(claim, outcome, may_land=outcome is Outcome.UNKNOWN)
             if was_sent:
                 command.guest.listener.wrote(
@@ -296,7 +296,7 @@ def _refuse(command: GuestCommand, sts: int) -> None:
     command.answer(command.packet.reply(sts=sts))
 
 
-def _outcome(station: int, sts: int, error: Exception | None, was_sent: bool) -> Outcome:
+def outcome_of(station: int, sts: int, error: Exception | None, was_sent: bool) -> Outcome:
     if not was_sent:
         return Outcome.NOT_SENT
     if error is not None or is_local_status(sts):

@@ -113,7 +113,7 @@ class Overheard:
         self._damaged = -math.inf
         self._written_at: dict[ReadPoint, float] = {}
         self._last: dict[_Path, Packet] = {}
-        self._ambiguous: set[_Path] = set()
+        self.ambiguous: set[_Path] = set()
         self._traffic = TrafficDecoder(network.checksum)
 
     def begin(self, now: float) -> None:
@@ -172,11 +172,11 @@ class Overheard:
         before = self._last.pop(path, command)
         self._last[path] = command
         if len(self._last) > _MOST_CARRIED:
-            self._ambiguous.discard(oldest := next(iter(self._last)))
+            self.ambiguous.discard(oldest := next(iter(self._last)))
             del self._last[oldest]
         # On two ports a reply may be read after the command that follows it.
         if self._network.listen_port and before != command:
-            self._ambiguous.add(path)
+            self.ambiguous.add(path)
         self._written(command, now)
 
     def _reply(self, entry: Entry, reply: Packet, now: float) -> None:
@@ -191,7 +191,7 @@ class Overheard:
         asked = now - entry.latency
         path = _Path(command.src, command.dst, command.tns)
         if asked <= self._damaged or entry.latency > self._network.cmd_timeout / 1000 \
-                or path in self._ambiguous or reply.sts:
+                or path in self.ambiguous or reply.sts:
             return
         if command.cmd == diagnostics.CMD and command.data == _STATUS:
             self._identity(command.dst, reply, asked)

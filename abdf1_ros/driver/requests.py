@@ -46,7 +46,7 @@ from abdf1_ros.pccc.steps import echo
 _Result = TypeVar('_Result')
 
 # Seconds without a poll after which a slave ends its request, because a person waits.
-_LONGEST_UNPOLLED = 5.0
+LONGEST_UNPOLLED = 5.0
 
 
 class _RequestJob(Job):
@@ -112,7 +112,7 @@ class Requests(TaskSource):
         # Without DLE NAK, which would make other stations of a line in use drop their replies.
         self._link = mode.make_link(
             self.machine, replace(
-                line, nak_on_command_timeout=False, poll_timeout=_LONGEST_UNPOLLED), self.stations,
+                line, nak_on_command_timeout=False, poll_timeout=LONGEST_UNPOLLED), self.stations,
             Server(DataTable(plc_type)).serve, self._report)
 
     def add(self, station: int, work: Steps[_Result], succeed: Callable[[_Result], None],

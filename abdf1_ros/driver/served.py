@@ -31,7 +31,7 @@ from abdf1_ros.settings.mapping import Mapping
 from abdf1_ros.settings.rows import Rows
 
 
-class _MappedTable(DataTable):
+class MappedTable(DataTable):
     """
     A data table that has only the mapped words, and remembers writes.
 
@@ -111,17 +111,17 @@ class Served:
                  counters: ServedCounters | None = None, is_full_duplex: bool = False) -> None:
         self._mappings = mappings.served
         self._on_write = on_write
-        self._table = _MappedTable(plc_type)
+        self.table = MappedTable(plc_type)
         for mapping in self._mappings:
-            self._table.create(_first_word(mapping), mapping.codec.words)
+            self.table.create(_first_word(mapping), mapping.codec.words)
             if mapping.is_read_only:
-                self._table.protect(_first_word(mapping), mapping.codec.words)
+                self.table.protect(_first_word(mapping), mapping.codec.words)
         self._server = Server(
-            self._table, EmulatedProcessor(is_full_duplex=is_full_duplex), counters)
+            self.table, EmulatedProcessor(is_full_duplex=is_full_duplex), counters)
 
     def serve(self, command: Packet) -> Packet:
         """Execute a command from outside and return its reply."""
-        table = self._table
+        table = self.table
         table.changed.clear()
         table.is_guarded = True
         try:
@@ -139,12 +139,12 @@ class Served:
 
     def words_of(self, mapping: Mapping) -> bytes:
         """Return the words of a mapping as they are now."""
-        return self._table.read(_first_word(mapping), mapping.codec.words)
+        return self.table.read(_first_word(mapping), mapping.codec.words)
 
     def store(self, mapping: Mapping, values: Sequence[float] | str) -> None:
         """Store checked raw values where a PLC reads them."""
-        mapping.codec.store(self._table, _first_word(mapping), values)
-        self._table.changed.clear()  # our own writes are not reported
+        mapping.codec.store(self.table, _first_word(mapping), values)
+        self.table.changed.clear()  # our own writes are not reported
 
 
 def _first_word(mapping: Mapping) -> Address:

@@ -45,26 +45,26 @@ class DataTable:
 
     def __init__(self, plc_type: PlcType) -> None:
         self.plc_type = plc_type
-        self._words: dict[Area, bytearray] = {}
+        self.words: dict[Area, bytearray] = {}
         self._types: dict[int, FileType] = {}
 
     def __iter__(self) -> Iterator[Area]:
         """Iterate over the files (for SLC I/O, the slots)."""
-        return iter(self._words)
+        return iter(self.words)
 
     def create(self, address: Address, words: int) -> None:
         """Make the file of ``address`` long enough for ``words`` words from there on."""
         known = self._types.setdefault(address.file, address.file_type)
         if known is not address.file_type and not address.addressing.has_sections:
             raise NoSuchFile(f'file {address.file} is of type {known.value} already')
-        store = self._words.setdefault(address.area, bytearray())
+        store = self.words.setdefault(address.area, bytearray())
         per_element = address.layout.words
         end = -(-(address.offset + words) // per_element) * per_element  # whole elements
         store.extend(bytes(max(0, 2 * end - len(store))))
 
     def length(self, area: Area) -> int:
         """Return how many words a file (for SLC I/O, a slot) has."""
-        return len(self._words[area]) // 2
+        return len(self.words[area]) // 2
 
     def file_type(self, file: int) -> FileType:
         """Return the type of a file by its number."""
@@ -89,12 +89,12 @@ class DataTable:
 
     def restore(self, saved: DataTable) -> None:
         """Take over all words of a copy of this table."""
-        for area, words in saved._words.items():
-            self._words[area][:len(words)] = words
+        for area, words in saved.words.items():
+            self.words[area][:len(words)] = words
 
     def find(self, address: Address, words: int) -> tuple[bytearray, int]:
         """Return the bytes of the area and where in them the words begin."""
-        store = self._words.get(address.area)
+        store = self.words.get(address.area)
         if store is None:
             raise NoSuchFile(f'there is no {address}')
         start = 2 * address.offset

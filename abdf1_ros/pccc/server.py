@@ -44,8 +44,8 @@ class Server:
                  counters: ServedCounters | None = None) -> None:
         family = FAMILIES[table.plc_type]
         processor = processor or EmulatedProcessor()
-        self._family = family.commands(table, processor)
-        self._commands: Commands = self._family.commands | _diagnostics(
+        self.family = family.commands(table, processor)
+        self.commands: Commands = self.family.commands | _diagnostics(
             family, processor, counters)
 
     def serve(self, command: Packet) -> Packet:
@@ -62,19 +62,19 @@ class Server:
         reader = Reader(command.data)
         cmd = command.cmd & ~PRIORITY_BIT
         try:
-            basic = self._family.basic_commands.get(cmd)
+            basic = self.family.basic_commands.get(cmd)
             if basic is not None:
                 return basic(reader, command.src)
-            function = self._commands.get((cmd, reader.byte()))
+            function = self.commands.get((cmd, reader.byte()))
             if function is None:
                 raise Refusal(status.STS_ILLEGAL_COMMAND)
             return function(reader)
         except NoSuchFile:
-            raise Refusal(*self._family.no_such_file) from None
+            raise Refusal(*self.family.no_such_file) from None
         except OutOfRange:
-            raise Refusal(*self._family.out_of_range) from None
+            raise Refusal(*self.family.out_of_range) from None
         except Protected:
-            raise Refusal(*self._family.protected) from None
+            raise Refusal(*self.family.protected) from None
         except AddressRefusal as error:
             raise extended(error.ext_sts) from None
         except FormatError:

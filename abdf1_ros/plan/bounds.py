@@ -143,12 +143,12 @@ class Times:
         # The command of a guest that is under way may be the longest that exists.
         guest = model.transaction_time(MAX_LINK_DATA, MAX_LINK_DATA) if network.share else 0.0
         written = map(max, self._written.values())
-        self._any_frames = max(*reads, *written, guest, _question_time(model, 0.0))
+        self.any_frames = max(*reads, *written, guest, _question_time(model, 0.0))
         served = [2 * mapping.codec.words for mapping in mappings.served]
         self._serves = bool(served)
         self._reply = model.transaction_time(0, min(max(served, default=0), MAX_LINK_DATA))
         self._longest_reply = model.transaction_time(0, MAX_LINK_DATA)
-        self.longest = self._repeated(self._any_frames)
+        self.longest = self._repeated(self.any_frames)
 
     def bounds(self) -> Iterator[Bound]:
         """Yield the bound of every row with Fallback, and the preset for every heartbeat."""
@@ -183,7 +183,7 @@ class Times:
         reads = self._reads_between(count) if count > 1 else 0
         # The transaction under way, the reads with a turn in between, all heartbeats, and the
         # fallbacks of other PLCs. The response time is used as the scan time of the PLC.
-        wait = (1 + reads) * self._at_most(self._any_frames) + sum(map(self._at_most, beats)) \
+        wait = (1 + reads) * self.at_most(self.any_frames) + sum(map(self.at_most, beats)) \
             + sum(map(self._undisturbed, fallbacks)) + self._response_time
         return max(3 * period, period + wait)
 
@@ -193,7 +193,7 @@ class Times:
         if self._mode.is_polled:
             return None
         writes = self._own_packets
-        return sum(map(self._undisturbed, [self._any_frames, *writes])) if writes else 0.0
+        return sum(map(self._undisturbed, [self.any_frames, *writes])) if writes else 0.0
 
     @property
     def end_in_silence(self) -> float | None:
@@ -222,8 +222,8 @@ class Times:
         for turn, writes in turns.items():
             reads = self._reads_between(len(writes))
             # The transaction under way, the reads with a turn in between, and all our own writes.
-            at_most, usual = ((1 + reads) * time(self._any_frames) + sum(map(time, writes))
-                              for time in (self._at_most, self._undisturbed))
+            at_most, usual = ((1 + reads) * time(self.any_frames) + sum(map(time, writes))
+                              for time in (self.at_most, self._undisturbed))
             found[turn] = at_most, usual
         return found
 
@@ -237,7 +237,7 @@ class Times:
         return self._mode.most_under_way(self._line) > 1 or len(
             {self._turn(own) for own in self._mappings.own}) > 1
 
-    def _at_most(self, frames: float) -> float:
+    def at_most(self, frames: float) -> float:
         """Return the most seconds of a transaction, with one reply of ours in between."""
         reply = self._mode.longest_reply(self._line, self._longest_reply) \
             if self._serves or self._mode.answers_by_itself else 0.0
@@ -245,13 +245,13 @@ class Times:
 
     def _repeated(self, frames: float) -> float:
         return self._mode.longest_transaction(
-            self._line, frames, self._any_frames, len(self._mappings.stations))
+            self._line, frames, self.any_frames, len(self._mappings.stations))
 
     def _undisturbed(self, frames: float) -> float:
         """Return the seconds of a transaction in which no frame gets lost."""
         reply = self._reply + self._response_time if self._serves else 0.0
         return reply + self._mode.undisturbed(
-            self._line, frames, self._response_time, self._any_frames,
+            self._line, frames, self._response_time, self.any_frames,
             len(self._mappings.stations))
 
     def advice(self) -> Iterator[str]:

@@ -35,7 +35,7 @@ _INT = struct.Struct('i')
 READ_SIZE = 512
 """Most bytes of one read. Fewer bytes arrive while the thread of a line sleeps."""
 
-_WRITE_TIMEOUT = 2.0
+WRITE_TIMEOUT = 2.0
 
 
 class NoClient(OSError):
@@ -148,7 +148,7 @@ class DescriptorPort:
             try:
                 data = data[os.write(self._descriptor, data):]
             except BlockingIOError:
-                give_up = min(give_up, time.monotonic() + _WRITE_TIMEOUT)
+                give_up = min(give_up, time.monotonic() + WRITE_TIMEOUT)
                 poll = select.poll()
                 poll.register(self._descriptor, select.POLLOUT)
                 left = give_up - time.monotonic()

@@ -64,7 +64,7 @@ RELEASED = 'polling is off, so other programs may use the port'
 
 # The error for all commands that are under way when files are read again.
 _READ_AGAIN = 'the files have been read again'
-_EXCHANGE_LIMIT = 5.0
+EXCHANGE_LIMIT = 5.0
 _GLANCE = 0.1
 
 
@@ -83,7 +83,7 @@ class _Exchange:
         return self._claim.acquire(blocking=False)
 
 
-class _Attempt(threading.Thread):
+class Attempt(threading.Thread):
     """
     Open a port in a thread of its own, because a name server may take minutes.
 
@@ -162,7 +162,7 @@ class LinkThread(threading.Thread):
         self._on_state = on_state
         self._on_fault = on_fault
         self._while_sending = while_sending
-        self._retry_period = retry_period
+        self.retry_period = retry_period
         self._longest_wait = longest_wait
         self.came_after = -math.inf
         self._clock = clock
@@ -217,7 +217,7 @@ class LinkThread(threading.Thread):
 
     def _has_happened(self, event: threading.Event) -> bool:
         """Wait up to 5 s until this thread has set an event, but only while the thread runs."""
-        give_up = time.monotonic() + _EXCHANGE_LIMIT
+        give_up = time.monotonic() + EXCHANGE_LIMIT
         while not event.wait(_GLANCE) and self.is_alive() and time.monotonic() < give_up:
             pass
         return event.is_set()
@@ -246,7 +246,7 @@ class LinkThread(threading.Thread):
                 self._is_free.set()
                 self._wait()
             elif not self._use_port() and not self.has_failed:
-                self._pause(self._retry_period)
+                self._pause(self.retry_period)
         if self.state.is_open:
             self.state = PortState(False, 'closed')
 
@@ -267,7 +267,7 @@ class LinkThread(threading.Thread):
 
     def _opened_port(self) -> Port | None:
         """Return the port, or None if it is no longer needed; raises OSError."""
-        attempt = _Attempt(self._open_port, self.wake)
+        attempt = Attempt(self._open_port, self.wake)
         attempt.start()
         while not attempt.is_over and not self._is_interrupted:
             self._exchange()

@@ -22,7 +22,7 @@ from pathlib import Path
 
 from serial.tools import list_ports
 
-_BY_ID = Path('/dev/serial/by-id')
+BY_ID = Path('/dev/serial/by-id')
 
 
 @dataclass(frozen=True, slots=True)
@@ -56,9 +56,9 @@ def serial_ports() -> list[SerialPortInfo]:
 
 def _stable_names() -> dict[str, str]:
     """Return the names that udev has made, by the device that they point to."""
-    if not _BY_ID.is_dir():
+    if not BY_ID.is_dir():
         return {}
-    return {os.path.realpath(link): str(link) for link in sorted(_BY_ID.iterdir())}
+    return {os.path.realpath(link): str(link) for link in sorted(BY_ID.iterdir())}
 
 
 def _has_uart(device: str) -> bool:

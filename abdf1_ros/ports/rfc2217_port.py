@@ -33,7 +33,7 @@ from abdf1_ros.ports.descriptor import DescriptorPort
 from abdf1_ros.ports.settings import PortSettings
 from abdf1_ros.ports.socket_port import connected, ServerPort
 
-_NEGOTIATION_TIMEOUT = 3.0
+NEGOTIATION_TIMEOUT = 3.0
 
 
 class _Telnet(IntEnum):
@@ -140,7 +140,7 @@ class Rfc2217Port(ServerPort):
         Raises OSError with ``failure`` after 3 s, or with ``silence`` if no byte came at all.
         """
         has_come = False
-        give_up = time.monotonic() + _NEGOTIATION_TIMEOUT
+        give_up = time.monotonic() + NEGOTIATION_TIMEOUT
         while not condition():
             left = give_up - time.monotonic()
             if left <= 0:

@@ -55,11 +55,11 @@ _PSEUDO_TERMINALS = '/dev/pts/'
 Device = TypeVar('Device', bound='SerialDevice')
 
 # Longest time (s) that ``close`` waits for the last bytes, and the time (s) between two looks.
-_LAST_BYTES = 1.0
+LAST_BYTES = 1.0
 _LOOK = 0.005
 
 # Interval (s) at which we check whether another program has changed the settings.
-_SETTINGS_LOOK = 1.0
+SETTINGS_LOOK = 1.0
 
 # The byte that the system puts before a damaged character, and doubles if it is data (PARMRK).
 _MARK = 0xFF
@@ -181,7 +181,7 @@ class SerialDevice(DescriptorPort):
     def write(self, data: bytes) -> None:
         """Send; raise OSError if another program has changed the settings, so we open again."""
         if (now := time.monotonic()) >= self._next_look:
-            self._next_look = now + _SETTINGS_LOOK
+            self._next_look = now + SETTINGS_LOOK
             if self._current_settings() not in ([], self._settings):
                 raise OSError('another program has changed the settings of the port')
         super().write(data)
@@ -238,7 +238,7 @@ class SerialDevice(DescriptorPort):
 
     def close(self) -> None:
         """Close the device; drop bytes that cannot be sent within 1 s, as without CTS."""
-        give_up = time.monotonic() + _LAST_BYTES
+        give_up = time.monotonic() + LAST_BYTES
         with suppress(OSError, termios.error):  # the device is gone
             while self.unsent() and time.monotonic() < give_up:
                 time.sleep(_LOOK)

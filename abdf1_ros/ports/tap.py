@@ -33,7 +33,7 @@ from abdf1_ros.sniffer.capture import Chunk, Direction
 _PTY = 'pty'
 
 # Most chunks that wait for the output: some minutes of a busy line.
-_MOST_WAITING = 10_000
+MOST_WAITING = 10_000
 
 _TapQueue = SimpleQueue[Chunk | OSError | None]
 
@@ -64,7 +64,7 @@ class _TapReader(threading.Thread):
                 data = self._port.read(None, self._wake)
                 if data:
                     # Queued before it is passed on. Otherwise an answer could be queued before it.
-                    if self._heard.qsize() < _MOST_WAITING:
+                    if self._heard.qsize() < MOST_WAITING:
                         self._heard.put(Chunk(time.monotonic(), self._direction, data))
                     else:
                         self.lost += 1

@@ -32,7 +32,7 @@ from abdf1_ros.ports.settings import PortSettings
 from abdf1_ros.sniffer.capture import CaptureWriter, Chunk, Direction, setting_line
 
 # Most chunks that wait for the disk: some minutes of a busy line.
-_MOST_WAITING = 10_000
+MOST_WAITING = 10_000
 
 _LAST_CHUNKS = 1.0  # s; longest wait for the disk at the end
 
@@ -63,7 +63,7 @@ class Trace:
 
     def write(self, chunk: Chunk | str) -> None:
         """Queue a chunk or a setting for the disk, from any thread; no effect after an error."""
-        if self._waiting.qsize() < _MOST_WAITING:
+        if self._waiting.qsize() < MOST_WAITING:
             self._waiting.put(chunk)
         else:
             self._lost += 1
@@ -138,7 +138,7 @@ class PortOpener:
 
     def __init__(self, settings: PortSettings,
                  tell: Callable[[str], None] = lambda text: None) -> None:
-        self._settings = settings
+        self.settings = settings
         self._tell = tell
         self._port: Port | None = None
         self._trace: Trace | None = None
@@ -146,7 +146,7 @@ class PortOpener:
 
     def use(self, settings: PortSettings) -> bool:
         """Open with these settings from now on; return True if they differ from the last ones."""
-        before, self._settings = self._settings, settings
+        before, self.settings = self.settings, settings
         return settings != before
 
     def errors(self) -> dict[str, int]:
@@ -156,8 +156,8 @@ class PortOpener:
     def trace(self, path: str, limit: float, head: dict[str, str],
               on_error: Callable[[str], None]) -> None:
         """Begin a capture of at most ``limit`` bytes; ``head`` has the settings of the line."""
-        settings = {'begun': begun_now(), 'port': self._settings.name,
-                    'baud': str(self._settings.baud), **head}
+        settings = {'begun': begun_now(), 'port': self.settings.name,
+                    'baud': str(self.settings.baud), **head}
         self._begun = time.monotonic()
         try:
             self._trace = Trace(path, settings, on_error, limit)
@@ -171,11 +171,11 @@ class PortOpener:
 
     def open(self) -> Port:  # noqa: A003
         """Open the port; raises OSError."""
-        self._port = port = open_port(self._settings, self._tell)
+        self._port = port = open_port(self.settings, self._tell)
         if self._trace is None:
             return port
-        first = Direction.IN if not self._settings.listens else \
-            Direction.OUT if self._settings.second else Direction.UNKNOWN
+        first = Direction.IN if not self.settings.listens else \
+            Direction.OUT if self.settings.second else Direction.UNKNOWN
         return TracedPort(port, self._trace, self._begun, first=first)
 
     def close(self) -> None:

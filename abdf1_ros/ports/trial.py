@@ -37,7 +37,7 @@ def why_not(settings: PortSettings, patience: float = _PATIENCE) -> str:
     is opened and closed again. For a URL, only the name of the host is resolved: a connection
     could end the connection of another client of the device server.
     """
-    attempt = _look_up if '://' in settings.name else _open
+    attempt = _look_up if '://' in settings.name else try_port
     reasons: list[str] = []
     thread = threading.Thread(target=_note, args=(attempt, settings, reasons), daemon=True)
     thread.start()
@@ -53,7 +53,7 @@ def _note(attempt: Callable[[PortSettings], None], settings: PortSettings,
         reasons.append(error.strerror or str(error))
 
 
-def _open(settings: PortSettings) -> None:
+def try_port(settings: PortSettings) -> None:
     open_port(settings).close()
 
 

@@ -72,7 +72,7 @@ exit status: 0 after Ctrl-C, SIGTERM or SIGHUP, 2 if parameters are faulty or no
 OPTIONS: dict[str, object] = {'lines': [], 'strict_lines': False}
 
 # Pause (s) before a line is started again after an internal error.
-_RESTART_AFTER = 2.0
+RESTART_AFTER = 2.0
 
 _STATUS_PERIOD = 1.0
 
@@ -96,7 +96,7 @@ class RestartedLine(Line):
         self.faults: tuple[str, ...] = ()
         self.restarts = 0
         self._make = make
-        self._closing: threading.Thread | None = None
+        self.closing: threading.Thread | None = None
         self._again: float | None = None
         self._logger = get_logger(printable(name).strip('/').replace('/', '.'))
 
@@ -126,7 +126,7 @@ class RestartedLine(Line):
             super().check()
         except Exception as error:  # a bug ends only this line
             self._begin_again(error)
-        is_closing = self._closing is not None and self._closing.is_alive()
+        is_closing = self.closing is not None and self.closing.is_alive()
         if self._again is not None and time.monotonic() >= self._again and not is_closing:
             self._again = None
             self.start()
@@ -136,17 +136,17 @@ class RestartedLine(Line):
         self.restarts += 1
         text = printable(str(error)) if isinstance(error, LinkFailed) else bug_text(error)
         self._logger.error(f'has ended by an internal error and is started again: {text}')
-        self._again = time.monotonic() + _RESTART_AFTER
+        self._again = time.monotonic() + RESTART_AFTER
         if self.node is not None:
             gone = Line(self.node, self._callbacks)
             self.node, self._callbacks = None, None
-            self._closing = threading.Thread(target=gone.close, name='closing', daemon=True)
-            self._closing.start()
+            self.closing = threading.Thread(target=gone.close, name='closing', daemon=True)
+            self.closing.start()
 
     def end_callbacks(self, give_up: float) -> None:
         """End the callbacks; wait also for an old node that is being closed."""
-        if self._closing is not None:
-            self._closing.join(max(0.0, give_up - time.monotonic()))
+        if self.closing is not None:
+            self.closing.join(max(0.0, give_up - time.monotonic()))
         super().end_callbacks(give_up)
 
 

@@ -71,13 +71,14 @@ class GuestLine:
             place.name, place.baud or network.baud, parity=place.parity or network.parity)
         checksum = place.check or network.checksum
         char_time = self._port.char_time if place.kind == 'serial' else 0.0
-        self._machine = Machine(self._run, checksum=checksum, duplex=Duplex.FULL,
-                                timing=LineTiming(char_time))
+        self.machine = Machine(self._run, checksum=checksum, duplex=Duplex.FULL,
+                               timing=LineTiming(char_time))
         self._peer = FullDuplexPeer(
-            self._machine, LinkSettings(station=None, checksum=checksum), ActiveStationList(),
+            self.machine, LinkSettings(station=None, checksum=checksum), ActiveStationList(),
             self._take)
-        self.link = LinkThread(self._machine, self._open, on_state=self._changed, on_fault=fault,
-                               retry_period=_GLANCE, longest_wait=_GLANCE, clock=clock)
+        self.link = LinkThread(self.machine, self.open_port, on_state=self._changed,
+                               on_fault=fault, retry_period=_GLANCE, longest_wait=_GLANCE,
+                               clock=clock)
         self.link.daemon = True  # a guest never keeps the process alive
 
     @property
@@ -106,7 +107,7 @@ class GuestLine:
 
     def _take(self, command: Packet) -> None:
         answer = partial(self._answer, self._peer.replies.append)
-        requested, came_after = self._machine.now, self.link.came_after
+        requested, came_after = self.machine.now, self.link.came_after
         if requested - came_after > 2 * _GLANCE + MOST_LATE:
             requested = came_after
         self._queue.put(GuestCommand(self.guest, command, requested, answer))
@@ -117,7 +118,7 @@ class GuestLine:
         append(reply)
         self.link.wake()
 
-    def _open(self) -> Port:
+    def open_port(self) -> Port:
         if self._endpoint is None:
             self._endpoint = self._made()
         return self._endpoint.open()

@@ -159,11 +159,11 @@ class Ladder:
 
     def _scan(self, now: float) -> None:
         self._show_first_pass()
-        before, heartbeat = self._get(11, 1), self._get(10, 0)
-        commands = {used: self._get(10, word) for word, used in _COMMANDS.items()}
-        self._put(11, 0, heartbeat)  # 0
+        before, heartbeat = self.get(11, 1), self.get(10, 0)
+        commands = {used: self.get(10, word) for word, used in _COMMANDS.items()}
+        self.put(11, 0, heartbeat)  # 0
         is_changed = heartbeat != before  # 1
-        self._put(11, 1, heartbeat)  # 2
+        self.put(11, 1, heartbeat)  # 2
         self._watchdog.scan(not is_changed, self.scan_time)  # 3
         is_alive = (is_changed or self.is_on(Lamp.ALIVE)) and 0 < heartbeat < 0x8000 \
             and not self._watchdog.is_done and not self._is_first_pass  # 4
@@ -173,15 +173,15 @@ class Ladder:
             is_reset and self._stable.is_done and not any(commands.values())
             or self.is_on(Lamp.IN_CONTROL))  # 7
         for used, command in commands.items():
-            self._put(11, used, command if in_control else 0)  # 8, 9
+            self.put(11, used, command if in_control else 0)  # 8, 9
         lamps = {Lamp.CHANGED: is_changed, Lamp.ALIVE: is_alive, Lamp.IN_CONTROL: in_control,
                  Lamp.RESET: is_reset, Lamp.STOPPED: heartbeat == 0,  # 10
                  Lamp.LOST: self._watchdog.is_done}  # 11
         self._clock.scan(not self._clock.is_done, self.scan_time)  # 12
-        count = self._get(11, 3)
+        count = self.get(11, 3)
         if count >= _LAST_COUNT:  # 13
             count = 0
-        self._put(11, 3, count + self._clock.is_done)  # 14
+        self.put(11, 3, count + self._clock.is_done)  # 14
         self._light(sum(is_on << lamp for lamp, is_on in lamps.items()), now)
         for number, timer in enumerate((self._watchdog, self._stable, self._clock)):
             for word, value in enumerate(timer.words):
@@ -201,11 +201,11 @@ class Ladder:
         with suppress(NoSuchFile, OutOfRange):  # a data table may lack the status file
             self._table.write_bits(place, _FIRST_PASS, _FIRST_PASS * self._is_first_pass)
 
-    def _get(self, file: int, element: int) -> int:
+    def get(self, file: int, element: int) -> int:
         place = Address(self._addressing, FileType.INTEGER, file, element)
         return int.from_bytes(self._table.read(place, 1), 'little')
 
-    def _put(self, file: int, element: int, value: int) -> None:
+    def put(self, file: int, element: int, value: int) -> None:
         self._write(FileType.INTEGER, file, element, value)
 
     def _write(self, kind: FileType, file: int, element: int, value: int, word: int = 0) -> None:

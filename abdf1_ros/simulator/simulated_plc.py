@@ -153,18 +153,19 @@ class SimulatedPlc(TaskSource):
 
     def __init__(self, station: int, table: DataTable, checksum: Checksum,
                  clock: Callable[[], float], via: int | None = None,
-                 lock: AbstractContextManager[object] = _NO_LOCK) -> None:
+                 lock: AbstractContextManager[object] = _NO_LOCK,
+                 processor: EmulatedProcessor | None = None) -> None:
         self.station = station
         self.via = via
         self.table = table
         self.faults = InjectedFaults()
-        self.processor = EmulatedProcessor()
+        self.processor = processor or EmulatedProcessor()
         self.slave = HalfDuplexSlave(LinkSettings(station=station, checksum=checksum), self.serve)
         self.counters = self.slave.counters  # of our port
         self.outbox: deque[Sending] = deque()
         self._server = self._make_server('Slave')
         self._tns = random.Random(0).randrange(0x10000)
-        self._clock = clock
+        self.clock = clock
         self._movers: list[_Mover] = []
         self._random = random.Random(station)
         self.ladder: Ladder | None = None
@@ -193,7 +194,7 @@ class SimulatedPlc(TaskSource):
         if self.faults.silent or (self.faults.full and isinstance(symbol, Frame)):
             return b''
         is_poll = isinstance(symbol, Poll) and symbol.valid and symbol.station == self.station
-        if is_poll and (self._polls_to_refuse > 0 or self._clock() < self._ready):
+        if is_poll and (self._polls_to_refuse > 0 or self.clock() < self._ready):
             self._polls_to_refuse = max(0, self._polls_to_refuse - 1)
             return self.damaged(frames.EOT)
         return self.damaged(self.slave.handle(symbol))
@@ -230,7 +231,7 @@ class SimulatedPlc(TaskSource):
         self._set_ladder()
 
     def _set_ladder(self) -> None:
-        now = self._clock()
+        now = self.clock()
         for mover in self._movers:
             mover.next_time = max(mover.next_time, now)
         if self.ladder is None:
@@ -245,7 +246,7 @@ class SimulatedPlc(TaskSource):
         if not self.is_running:
             return
         with self.lock:
-            now = self._clock()
+            now = self.clock()
             for mover in self._movers:
                 mover.advance(self.table, now)
             if self.ladder is not None:
@@ -253,7 +254,7 @@ class SimulatedPlc(TaskSource):
 
     def move(self, mover: _Mover) -> None:
         """Let ``mover`` change values from now on."""
-        mover.next_time = self._clock() + mover.period
+        mover.next_time = self.clock() + mover.period
         self._movers.append(mover)
 
     def send(self, address: Address, values: list[float], station: int,
@@ -285,7 +286,7 @@ class SimulatedPlc(TaskSource):
 
     def serve(self, command: Packet) -> Packet:
         """Execute a command and return its reply."""
-        now = self._clock()
+        now = self.clock()
         self._polls_to_refuse = self.faults.slow
         self._ready = now + self.faults.delay if self.faults.delay else -math.inf
         self.advance()

@@ -79,7 +79,7 @@ class TrafficDecoder:
     def __init__(self, checksum: Checksum | None = None, duplex: Duplex | None = None, *,
                  is_certain: bool = True) -> None:
         self.kind = LineKind(checksum, duplex, is_certain and checksum is not None)
-        self._wires: dict[Direction, _OneDirection] = {}
+        self.wires: dict[Direction, _OneDirection] = {}
         self._conversation = Conversation()
         self._station: int | None = None  # the last station that the master sent to
         self._awaited: tuple[Direction, str] | None = None  # asker, and question
@@ -100,10 +100,10 @@ class TrafficDecoder:
 
     def _line(self, chunk: Chunk) -> Iterator[Entry]:
         """Yield the symbols that the bytes of a line complete."""
-        wire = self._wires.get(chunk.direction)
+        wire = self.wires.get(chunk.direction)
         if wire is None:
-            wire = self._wires[chunk.direction] = _OneDirection(self.kind)
-        for direction, other in self._wires.items():
+            wire = self.wires[chunk.direction] = _OneDirection(self.kind)
+        for direction, other in self.wires.items():
             is_end = other is wire and wire.ends_before(chunk)
             if is_end or other is not wire:  # an answer shows that the check was complete
                 yield from self._whole(other, direction, is_end)
@@ -116,9 +116,9 @@ class TrafficDecoder:
 
     def finish(self) -> Iterator[Entry]:
         """Yield the entries that remain at the end."""
-        for direction, wire in self._wires.items():
+        for direction, wire in self.wires.items():
             yield from self._whole(wire, direction, is_end=True)
-        times = [wire.last_time for wire in self._wires.values() if wire.last_time is not None]
+        times = [wire.last_time for wire in self.wires.values() if wire.last_time is not None]
         for transaction in self._conversation.unanswered():
             yield self._unanswered(transaction, max(times, default=None))
 

@@ -96,5 +96,5 @@ def test_the_last_line_says_what_was_not_seen(
         end: BaseException | None, status: int, text: str) -> None:
     monkeypatch.setattr(demo, 'ignore_further', lambda: None)
     told: Any = Told(end)
-    assert demo._tell(told, 0.0) == status
+    assert demo.tell_steps(told, 0.0) == status
     assert capsys.readouterr().out.splitlines()[-1] == text

@@ -27,7 +27,7 @@ import sys
 import termios
 import time
 
-from abdf1_ros.cli.simulator import _input, main
+from abdf1_ros.cli.simulator import input_of, main
 from abdf1_ros.df1 import frames
 from abdf1_ros.df1.checksum import Checksum
 import pytest
@@ -312,7 +312,7 @@ def test_input_of_a_job_in_the_background_is_none(monkeypatch: pytest.MonkeyPatc
         raise OSError(errno.EIO, 'Input/output error')
 
     monkeypatch.setattr(os, 'read', refuse)
-    assert _input(0) is None
+    assert input_of(0) is None
 
 
 def test_input_goes_on_when_a_job_comes_back_from_the_background(

@@ -155,7 +155,7 @@ def test_endless_file_does_not_fill_the_memory(
 
 def test_progress_has_a_percentage_where_the_size_is_known(
         capsys: Output, capture: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(sniff, '_PROGRESS_PERIOD', 0.0)
+    monkeypatch.setattr(sniff, 'PROGRESS_PERIOD', 0.0)
     monkeypatch.setattr(sys.stderr, 'isatty', lambda: True)
     assert main(['--summary', capture]) == 0
     assert capsys.readouterr().err.splitlines()[-1] == f'sniff: {capture}: 100 %, 45 bytes so far'

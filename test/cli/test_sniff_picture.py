@@ -115,7 +115,7 @@ def test_no_answer_is_drawn_as_long_as_it_was_waited_for(tmp_path: Path, capsys:
 
 def test_long_recording_keeps_its_faults(
         tmp_path: Path, capsys: Output, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(sniff_picture, '_MOST_DRAWN', 20)
+    monkeypatch.setattr(sniff_picture, 'MOST_DRAWN', 20)
     parts = [exchange(float(second), second) for second in range(1, 35)]
     found = drawn(tmp_path, capsys, capture(
         tmp_path / 'line.cap', *parts[:29], silence(30.5), *parts[30:]))

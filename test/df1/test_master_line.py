@@ -20,6 +20,7 @@ import itertools
 from abdf1_ros.df1.master_line import MAX_FORWARDS
 from abdf1_ros.df1.packet import Packet
 from abdf1_ros.df1.settings import LinkSettings, PollingSettings
+from abdf1_ros.df1.slave import HalfDuplexSlave
 import pytest
 from support.multidrop import MasterBench, Slave
 
@@ -84,6 +85,15 @@ def test_reply_that_cannot_be_passed_on_is_dropped(standard: bool) -> None:
     assert isinstance(rig.master.all[-1].result, Packet)
 
 
+class CommandsFirst(HalfDuplexSlave):
+    """A slave that ``holds_replies`` back for a while."""
+
+    holds_replies = True
+
+    def _next_packet(self) -> Packet | None:
+        return self._initiator.next_command() if self.holds_replies else super()._next_packet()
+
+
 @pytest.mark.parametrize('dst', [8, MASTER])
 def test_no_ack_for_a_command_that_cannot_be_kept(dst: int) -> None:
     # Without the NAK, which would make the slave drop what it holds.
@@ -92,21 +102,18 @@ def test_no_ack_for_a_command_that_cannot_be_kept(dst: int) -> None:
     for _ in range(MAX_FORWARDS + 1):
         rig.message(7, dst)
     rig[7].delay = 0.0
+    slave = rig[7].slave = CommandsFirst(
+        LinkSettings(station=7, nak_retries=200), rig[7].serve, initiator=rig[7])
     rig.start()
-    slave = rig[7].slave
-    # The reply to the master's own command comes last, by taking away the turn of replies.
-    slave._next_packet = rig[7].next_command  # type: ignore[method-assign]
     task = rig.ask(7, run=0.49)
     assert slave.counters.acks_received == MAX_FORWARDS
     assert slave.counters.nak_retries > 0
-    assert slave._held is not None
     assert task.result is None
     assert 'duplicate_messages' not in rig.master.counts()
-    del slave._next_packet
+    slave.holds_replies = False
     rig.run(0.5)  # the transaction ends, and what waits is passed on
     poll(rig, 7, times=3)
     assert slave.counters.acks_received > MAX_FORWARDS
-    assert slave._held is None
     rig.run(1.0)
     served = rig.master.served if dst == MASTER else rig[dst].served
     assert len({packet.tns for packet in served}) == MAX_FORWARDS + 1

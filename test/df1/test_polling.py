@@ -119,7 +119,7 @@ def test_value_is_never_older_than_its_transaction(
     """The PLC executes the first copy of a command; ACKs, polls and reply may be lost later."""
     rig = MasterBench(1, 2, 3, settings=SETTINGS, polling=polling)
     for slave in rig.slaves.values():
-        setattr(slave, '_execute', lambda command: command.reply(struct.pack('<d', rig.clock())))
+        slave.execute = lambda command: command.reply(struct.pack('<d', rig.clock()))
     rig.line.noise = Losses(share)
     rig.start()
     tasks = {number: rig.ask(number) for number in rig.slaves}

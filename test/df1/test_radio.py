@@ -61,8 +61,8 @@ class Node(CommandTasks):
         self.stations = ActiveStationList()
         self.machine = Machine(lambda machine: self.link.run(self), checksum=settings.checksum,
                                duplex=Duplex.FULL, timing=LineTiming(char_time(BAUD)))
-        self.link = RadioNode(self.machine, settings, self.stations, self._serve,
-                              self.events.append, Random(seed))
+        self.link = RadioNode(self.machine, replace(settings, seed=seed), self.stations,
+                              self._serve, self.events.append)
 
     def _serve(self, command: Packet) -> Packet:
         self.executed[command.src, command.tns] += 1
@@ -276,7 +276,7 @@ class Air(VirtualLine):
         end = self._free[sender] = begin + len(data) * self.char_time
         for receiver in range(len(self._machines)):
             if receiver == sender or self._reach(sender, receiver):
-                signal = Signal(begin, end, self._random.random() < self._loss)
+                signal = Signal(begin, end, self.random.random() < self._loss)
                 for other in self._signals[receiver]:
                     other.meets(begin, end)
                     signal.meets(other.begin, other.end)

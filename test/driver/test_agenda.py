@@ -265,7 +265,7 @@ def test_writes_that_refresh_a_slow_read_leave_no_entries() -> None:
         assert bench.next(float(second)) is write
         bench.reads.write_ended(written(write, float(second)))
         assert [bench.read(float(second)), bench.read(float(second))] == [slow, None]
-        assert len(bench.reads._due._heaps[86_400.0]) <= 8
+        assert len(bench.reads.queue.heaps[86_400.0]) <= 8
     assert (slow.due, other.due) == (86_400.0 + 999.0, 86_400.0)
     assert bench.read(86_400.0) is other
 

@@ -113,10 +113,10 @@ class AnyOrder(RuleBasedStateMachine):
     @invariant()
     def every_job_is_in_one_place(self) -> None:
         reads = self.bench.reads
-        entries = itertools.chain(*reads._due._heaps.values())
+        entries = itertools.chain(*reads.queue.heaps.values())
         queued = [job for _, ticket, job in entries
                   if ticket == job.ticket and job in reads.jobs and job not in self.taken]
-        parked = [job for jobs in reads._aside.values() for job in jobs]
+        parked = [job for jobs in reads.aside.values() for job in jobs]
         assert reads.jobs == set(self.jobs)
         # A job that was popped and parked keeps its ticket, but its entry is gone.
         assert Counter(queued + parked + self.taken) == Counter(self.jobs)

@@ -433,7 +433,7 @@ def test_rule_16_nothing_can_be_left_out_of_the_bound() -> None:
         'heartbeats': limit(network, [row for row in rows if not row.is_heartbeat]),
         'other fallbacks': limit(network, [row for row in rows if not row.fallback or row is
                                            rows[1]]),
-        'one transaction': limit(network) - once._at_most(once._any_frames),
+        'one transaction': limit(network) - once.at_most(once.any_frames),
         'frames': limit(replace(network, baud=115200))}
     assert took <= limit(network)
     assert {name: late for name, late in mistaken.items() if took <= late} == {}

@@ -301,7 +301,7 @@ def test_check_of_a_station_that_is_back_is_no_probe() -> None:
     bench, (plc,), _ = make_bench(word(1, 'Write'), period=0.0, run=2.0)
 
     def are_probes() -> list[bool]:
-        return [check.is_probe for check in bench.driver.checks._checks]
+        return [check.is_probe for check in bench.driver.checks.jobs]
 
     plc.faults = InjectedFaults(silent=True)
     bench.run_until(lambda: are_probes() == [True])

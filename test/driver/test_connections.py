@@ -44,7 +44,7 @@ class Queue(DriverBench):
         self.device = OddDevice(_WIRING.get(mode, Wiring.HALF))
         self.stored: list[tuple[float, bytes]] = []
         if not is_open:
-            self.device.hear = self._keep
+            self.device.hear = self.keep
         super().__init__(
             [self.order, make_mapping('N9:0', plc='SLC', period=200)] if rows is None else rows,
             network=Network(station=200, baud=19200, timeout=100, cmd_timeout=500, nak_retries=1,
@@ -52,7 +52,7 @@ class Queue(DriverBench):
                             **MODES[mode]),  # type: ignore[arg-type]
             settings=DriverSettings(may_store=True), far=self.device)
 
-    def _keep(self, data: bytes) -> bytes:
+    def keep(self, data: bytes) -> bytes:
         self.stored.append((self.clock(), data))
         return b''
 
@@ -105,7 +105,7 @@ def test_fallback_that_stands_calls_for_nothing_while_all_are_silent(mode: str) 
     speed = make_mapping('N7:0', 'Write', plc='SLC', fallback=Fallback((SAFE,), 1000))
     bench = Queue(mode, [speed, make_mapping('N9:0', plc='SLC', period=200)], is_open=True)
     bench.run(3.0)
-    bench.device.hear = bench._keep  # noqa: SLF001
+    bench.device.hear = bench.keep
     bench.run(20.0)  # it is to be written again after 5 s
     bench.let_through()
     bench.run(3.0)

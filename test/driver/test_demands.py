@@ -18,6 +18,8 @@ from functools import partial
 import math
 
 from abdf1_ros.df1.packet import Packet
+from abdf1_ros.df1.settings import LinkSettings
+from abdf1_ros.df1.slave import HalfDuplexSlave
 from abdf1_ros.df1.stations import MOST_OVERDUE
 from abdf1_ros.driver.reads.demands import ReadAnswer, ReadCall, ReadCalls
 from abdf1_ros.driver.reads.point import Freshness
@@ -242,13 +244,13 @@ def test_shorter_packets_of_a_small_processor_are_found() -> None:
     plc = line.plc(1, 'SLC', ('N7:0', 100))
     serve = plc.serve
 
-    def serve_short(command: Packet) -> Packet | None:
+    def serve_short(command: Packet) -> Packet:
         reply = serve(command)
         if command.cmd == 0x0F and len(reply.data) > 82:
             return reply._replace(sts=0x10, data=b'')
         return reply
 
-    plc.slave._serve = serve_short  # type: ignore[attr-defined]
+    plc.slave = HalfDuplexSlave(LinkSettings(station=1), serve_short)
     answers: list[ReadAnswer] = []
     line.run(1.0)
     line.driver.read_now(row, line.clock(), answers.append)
@@ -328,7 +330,9 @@ def test_write_of_a_row_on_demand_is_not_read_back() -> None:
     line.write(row, [5], run=1.0)
     assert line.listener.outcomes() == [Outcome.WRITTEN]
     assert line.listener.values(row) == []  # nor is it read for what the write has changed
-    line.there.slave._serve = lambda command: None  # type: ignore[attr-defined]
+    line.there.slave = HalfDuplexSlave(
+        LinkSettings(station=1),
+        lambda command: command.reply()._replace(tns=command.tns ^ 0x8000))
     line.write(row, [6], run=10.0)
     result = line.listener.results[-1]
     assert result.outcome is Outcome.UNKNOWN

@@ -45,7 +45,7 @@ class RecordingPlc:
     def __init__(self, bench: DriverBench, plc: SimulatedPlc) -> None:
         self.commands: list[tuple[float, Packet]] = []
         self._bench, self._plc = bench, plc
-        bench._stations[bench._stations.index(plc)] = self
+        bench.far_stations[bench.far_stations.index(plc)] = self
 
     def handle(self, symbol: Symbol) -> bytes:
         """Answer as the PLC does."""
@@ -514,7 +514,7 @@ class DeafPlc:
 def test_station_that_answers_polls_alone_is_told_from_one_that_comes_back(polling: str) -> None:
     bench, plc = make_bench(make_mapping('N7:0'), network=Network(baud=115200, polling=polling))
     deaf = DeafPlc(plc)
-    bench._stations[:] = [deaf]
+    bench.far_stations[:] = [deaf]
     station = bench.driver.stations[1]
     bench.run_until(lambda: station.takes_no_commands)
     assert bench.listener.changes == [(1, False), (1, True)] * 2

@@ -46,7 +46,7 @@ class ClockPlc:
         self._plc = SimulatedPlc(1, bench.plc(1, 'PLC5', ('N7:0', WORDS), ('N9:0', WORDS)).table,
                                  bench.network.checksum, bench.clock)
         self._plc.slave = HalfDuplexSlave(LinkSettings(station=1), self._serve)
-        bench._stations[:] = [self]
+        bench.far_stations[:] = [self]
 
     def handle(self, symbol: Symbol) -> bytes:
         """Answer as the PLC does."""

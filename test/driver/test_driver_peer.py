@@ -294,5 +294,5 @@ def test_processor_and_counters_of_the_other_end(outstanding: int) -> None:
     assert identity.mode is Mode.REMOTE_PROGRAM
     assert int(health.known(PLC).counters['messages sent']) > 0
     assert health.counters_wanted == set()
-    ours = bench.driver._served.serve(Packet(US, PLC, 0x06, 0, 1, b'\3'))
+    ours = bench.driver.served.serve(Packet(US, PLC, 0x06, 0, 1, b'\3'))
     assert ours.data[2] == FULL_DUPLEX_PORT

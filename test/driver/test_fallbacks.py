@@ -27,6 +27,7 @@ from abdf1_ros.driver.interlocks.heartbeat import HeartbeatRow
 from abdf1_ros.driver.interlocks.plc import Conditions, Plc
 from abdf1_ros.driver.record import Claim, WriteRecord
 from abdf1_ros.driver.write import Outcome, Write
+from abdf1_ros.driver.writes.queue import WriteQueue
 from abdf1_ros.pccc.address import Address
 from abdf1_ros.pccc.emulated import Setting
 from abdf1_ros.plan.bounds import MODE_PERIOD
@@ -181,7 +182,7 @@ def test_rule_7_messages_that_the_plc_refuses_do_not_keep_an_output_alive(gap: f
 def test_rule_7_fallback_waits_for_a_message_that_waits() -> None:
     cell, speed = speed_cell()
     cell.publish(speed, 3, run=0.1)
-    plc, (row,) = cell.bench.driver.interlocks._plcs[1], cell.bench.driver.interlocks.fallbacks
+    plc, (row,) = cell.bench.driver.interlocks.plcs[1], cell.bench.driver.interlocks.fallbacks
     row.due = due = row.refreshed + AFTER
     assert plc.ready({speed: due - 0.1}, due) == []
     assert row.due == due - 0.1 + AFTER
@@ -189,11 +190,12 @@ def test_rule_7_fallback_waits_for_a_message_that_waits() -> None:
     assert plc.ready({}, due) == [row]
 
 
-def test_rule_7_fallback_waits_no_longer_for_a_message_that_has_expired() -> None:
+def test_rule_7_fallback_waits_no_longer_for_a_message_that_has_expired(
+        monkeypatch: pytest.MonkeyPatch) -> None:
     speed = speed_row(Fallback((7,), 2000))
     cell = Cell(speed, run=1.0, write_timeout=0.5)
     cell.publish(speed, 3, run=1.9)
-    cell.bench.driver._writes._first_free = lambda busy: None  # type: ignore[method-assign]
+    monkeypatch.setattr(WriteQueue, 'next', lambda queue, now, busy: None)
     cell.publish(speed, 4, run=0.2)
     assert cell.word('N7:0') == 3  # the fallback waits for it
     cell.run(0.35)
@@ -321,12 +323,13 @@ def test_rule_8_message_that_is_lost_with_the_port_is_not_waited_for() -> None:
     assert cell.word('N7:0') == 7
 
 
-def test_rule_9_messages_that_wait_end_when_the_fallback_goes_out() -> None:
+def test_rule_9_messages_that_wait_end_when_the_fallback_goes_out(
+        monkeypatch: pytest.MonkeyPatch) -> None:
     speed = speed_row(Fallback((7,), 60_000))
     cell = Cell(speed, start=False)
-    cell.bench.driver.is_online = True
-    cell.bench.driver._inbox.open()
-    cell.bench.driver.write([speed], [3], 0.0)
+    driver, run = cell.bench.driver, cell.bench.driver.link.run
+    monkeypatch.setattr(driver.link, 'run', lambda source: (
+        driver.write([speed], [3], 0.0), run(source))[1])
     cell.bench.open()
     cell.run(1.0)
     assert cell.written('N7:0') == [7]
@@ -353,8 +356,8 @@ def test_rule_9_write_of_another_row_to_the_same_words_holds_up_for_its_own_time
     assert cell.word('N7:0') == 3
     cell.bench.write(recipe, [4] * 200)  # under way when the fallback is due
     row, = cell.bench.driver.interlocks.fallbacks
-    record = cell.bench.driver._record
-    cell.bench.run_until(lambda: row.cause is not None and not record.may_begin(speed))
+    tasks = cell.bench.driver.tasks
+    cell.bench.run_until(lambda: row.cause is not None and bool(tasks.under_way))
     cell.run(0.5)
     assert cell.results()[-1] == TIMEOUT
     assert cell.word('N7:0') == 7
@@ -560,11 +563,11 @@ def test_rule_10_pause_of_this_process_does_not_put_off_a_silent_plc() -> None:
     line.run(2.0)
     line.write(speed, [42])
     line.run(0.1)
-    line._stations[1].faults.silent = True
+    line.far_stations[1].faults.silent = True
     line.run(4.0)
     line.run_until(lambda: any(task.station == 2 for task in line.driver.tasks.under_way))
     line.line.pause(line.driver.machine, 600.0)
-    line._stations[1].faults.silent = False
+    line.far_stations[1].faults.silent = False
     asked = len(line.asked)
     line.run(603.0)
     assert (2, 0) in [(station, word) for _, station, word in line.asked[asked:]]
@@ -599,15 +602,15 @@ def test_rule_7_old_message_of_a_serve_row_is_not_stored() -> None:
     bench = DriverBench([row])
     bench.run(3.0)
     bench.driver.write([row], [42], bench.clock() - 2 * AFTER)
-    bench.driver._sort_inbox(bench.clock())
-    assert bench.driver._served.words_of(row) == b'\7\0'
+    bench.driver.expire(bench.clock())
+    assert bench.driver.served.words_of(row) == b'\7\0'
     assert bench.listener.results[-1].outcome is Outcome.NOT_SENT
 
 
 def test_rule_12_fallback_of_a_serve_row_goes_into_our_own_table() -> None:
     served = make_mapping('N9:0', 'Serve', station=5, fallback=FALLBACK)
     cell = Cell(served, run=0.1)
-    words = cell.bench.driver._served.words_of
+    words = cell.bench.driver.served.words_of
     assert words(served) == b'\7\0'
     cell.publish(served, 3, run=0.3)
     assert words(served) == b'\3\0'

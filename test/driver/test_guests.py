@@ -20,7 +20,7 @@ from collections.abc import Callable
 
 from abdf1_ros.df1.packet import BROADCAST, Packet
 from abdf1_ros.driver.foreign_words import written_extents
-from abdf1_ros.driver.guests import _outcome, Guest, GuestListener, ShareAccess
+from abdf1_ros.driver.guests import Guest, GuestListener, outcome_of, ShareAccess
 from abdf1_ros.driver.interlocks.heartbeat import BeatState
 from abdf1_ros.driver.settings import DriverSettings
 from abdf1_ros.driver.write import Outcome
@@ -311,8 +311,8 @@ def beating_bench(mode: str, polling: str = 'Message') -> DriverBench:
 def test_what_has_come_of_a_write_of_a_guest(
         entry: tuple[int, int, Exception | None, Outcome]) -> None:
     station, sts, error, outcome = entry
-    assert _outcome(station, sts, error, was_sent=True) is outcome
-    assert _outcome(station, sts, error, was_sent=False) is Outcome.NOT_SENT
+    assert outcome_of(station, sts, error, was_sent=True) is outcome
+    assert outcome_of(station, sts, error, was_sent=False) is Outcome.NOT_SENT
 
 
 MARK = b'GUEST'  # what is easily known in a command and in its reply
@@ -368,11 +368,12 @@ def test_lost_port_is_told_and_what_waits_is_not_sent_later() -> None:
 
 
 def test_peer_has_one_plc_whatever_number_a_guest_gives_it() -> None:
-    queue = bench_of().driver
-    assert queue._station_of_guest(77) == 77
-    mapping = make_mapping('N7:0', station=3, plc='SLC')
-    peer = DriverBench([mapping], network=Network(mode='Peer'))
-    assert peer.driver._station_of_guest(77) == 3
+    bench = bench_of('Peer')
+    bench.open()
+    program = Program(bench)
+    program.ask(READ_N7, dst=77)
+    bench.run(1.0)
+    assert program.statuses == [0]
 
 
 def test_message_of_a_peer_to_the_number_of_a_guest_is_one_to_us() -> None:

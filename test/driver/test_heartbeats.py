@@ -23,9 +23,9 @@ from random import Random
 
 from abdf1_ros.df1.checksum import Checksum
 from abdf1_ros.driver.interlocks.heartbeat import (
-    _OtherWriter,
     BeatState,
     LARGEST,
+    OtherWriter,
 )
 from abdf1_ros.driver.settings import DriverSettings
 from abdf1_ros.driver.write import Outcome
@@ -54,7 +54,7 @@ def test_rule_2_first_contact_is_0_then_the_fallbacks_then_1(polling: str) -> No
 
 def test_rule_1_nothing_is_kept_of_beats_that_have_been_written() -> None:
     cell = Cell(beat_row(), speed_row(), run=2.0)
-    plc, = cell.bench.driver.interlocks._plcs.values()
+    plc, = cell.bench.driver.interlocks.plcs.values()
     before = len(gc.get_referrers(plc))
     cell.run(20.0)
     assert len(gc.get_referrers(plc)) <= before
@@ -171,9 +171,9 @@ def test_rule_3_beat_is_not_sent_when_it_may_be_wrong_by_then() -> None:
     def expires(executor: float, message: float) -> float:
         """Return until when a beat may be sent that is due now."""
         interlocks.executor_ran(executor)
-        interlocks._conditions.messages['speed'] = message
-        beat._next = now
-        interlocks._plcs[1].look_again(beat)
+        interlocks.conditions.messages['speed'] = message
+        beat.next_beat = now
+        interlocks.plcs[1].look_again(beat)
         own = interlocks.next(now)
         assert own is not None
         assert own.row is beat
@@ -216,7 +216,7 @@ def test_rule_3d_lapse_that_nobody_saw_is_0_as_well() -> None:
         line.at(0.1 * number, lambda: line.write(speed, [3]))
     line.run(4.88)
     first, second = line.driver.interlocks.heartbeats
-    line._stations[0].faults.silent = True
+    line.far_stations[0].faults.silent = True
     before = second.value
     for number in range(12, 30):
         line.at(line.clock() + 0.01 * number, lambda: line.write(speed, [3]))
@@ -392,7 +392,7 @@ def test_rule_19_second_foreign_value_stays_until_a_new_start(event: str) -> Non
 
 def test_rule_19_second_foreign_value_is_one_within_a_minute_or_20_periods() -> None:
     for period, time in ((0.5, 60.0), (10.0, 200.0)):
-        other = _OtherWriter(period, Random(0))
+        other = OtherWriter(period, Random(0))
         told = [other.note_value(now) for now in (0.0, time - 1.0, 2 * time)]
         assert told == [False, True, False]
 

@@ -73,8 +73,7 @@ def test_rule_5_write_of_a_guest_that_a_gateway_holds_does_not_stay(
 
 def test_rule_5_what_may_still_land_after_the_end_is_named() -> None:
     speed = make_mapping('N7:0', 'Write', tag='speed', fallback=FALLBACK, via=7)
-    cell = GuestCell(speed, start=False)
-    cell.bench.driver._record._settle_time = 20.0  # as with a Cmd_Timeout of 10 s
+    cell = GuestCell(speed, start=False, cmd_timeout=10_000)
     cell.put_behind_gateway()
     cell.run(30.0)
     cell.hold_guests(1.9)
@@ -117,7 +116,7 @@ def test_rule_19_own_heartbeats_that_a_gateway_holds_are_no_other_program(
     left = [count]
 
     def is_meant(command: Packet) -> bool:
-        left[0] -= command.data[-2:] != b'\0\0' and 'N10:0' in cell._named(command)
+        left[0] -= command.data[-2:] != b'\0\0' and 'N10:0' in cell.named(command)
         return 0 <= left[0] < count
 
     hold(cell, held, is_meant)
@@ -133,7 +132,7 @@ def test_rule_2_plc_behind_a_gateway_that_answers_at_all_is_a_first_contact(
     cell = Cell(make_mapping('N10:0', 'Heartbeat', tag='beat', period=200, via=7), start=False)
     cell.put_behind_gateway()
     cell.run(3.0)
-    plc = cell.bench.driver.interlocks._plcs[1]
+    plc = cell.bench.driver.interlocks.plcs[1]
     beat, = plc.heartbeats
     assert not beat.wants_zero
     plc.failures = 2
@@ -188,7 +187,7 @@ def test_rule_11_plc_is_not_left_alone_any_more_once_it_answers_a_write_of_anybo
     cell = GuestCell(speed, start=False)
     cell.is_undelivered = lambda command: command.data.endswith(b'\7\0')
     cell.bench.open()
-    plc = cell.bench.driver.interlocks._plcs[1]
+    plc = cell.bench.driver.interlocks.plcs[1]
     cell.bench.run_until(lambda: plc.is_lost)
     cell.is_undelivered = lambda command: False
     assert cell.now < 0.2 < plc.pause_end

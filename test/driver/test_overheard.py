@@ -147,7 +147,7 @@ def test_numbers_that_tell_nothing_are_forgotten_with_their_commands() -> None:
         for asked in (READ_N7_0, 'A2 02 07 89 04 00'):
             bench.hear(frame(command(tns, asked)))
     assert bench.driver.overheard is not None
-    assert 0 < len(bench.driver.overheard._ambiguous) <= 200
+    assert 0 < len(bench.driver.overheard.ambiguous) <= 200
 
 
 def test_reply_counts_only_with_its_command() -> None:

@@ -50,6 +50,6 @@ def test_flood_of_different_commands_is_bounded() -> None:
 def test_driver_keeps_what_it_refuses() -> None:
     bench = DriverBench([make_mapping('N7:0', 'Serve', station=5, plc='SLC')],
                         network=Network(plc_type='SLC'))
-    assert [bench.driver._serve(write(element)).sts for element in (0, 9)] == [0, 0x50]
+    assert [bench.driver.serve(write(element)).sts for element in (0, 9)] == [0, 0x50]
     text, = bench.driver.refused.counted()
     assert ' N7:9: STS 50: ' in text

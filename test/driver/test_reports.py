@@ -142,13 +142,13 @@ def test_slave_whose_sink_is_full_until_it_is_polled_keeps_its_writes(mode: str)
 def test_reply_with_another_number_of_bytes_is_no_value(
         mode: str, change: Callable[[bytes], bytes]) -> None:
     device = device_of(mode)
-    answer = device._answer
+    answer = device.answer
 
     def wrong(data: bytes) -> tuple[int, bytes]:
         status, result = answer(data)
         return status, change(result) if data[2] == 0x0F else result
 
-    device._answer = wrong  # type: ignore[method-assign]
+    device.answer = wrong  # type: ignore[method-assign]
     words = make_mapping('N7:0', plc='SLC', length=3)
     bench = bench_of(mode, device, words)
     bench.open(run=2.0)

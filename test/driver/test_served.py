@@ -60,7 +60,7 @@ class Bench:
         self._dialect = dialect_of(self.plc)
         self._tns = 0
 
-    def _place(self, text: str) -> Address:
+    def place(self, text: str) -> Address:
         return parse_address(text, self.plc)
 
     def ask(self, cmd: int, data: bytes) -> tuple[int, bytes]:
@@ -72,23 +72,23 @@ class Bench:
 
     def read(self, text: str, words: int = 1) -> bytes:
         """Return words that the other end reads."""
-        place = self._place(text)
+        place = self.place(text)
         sts, data = self.ask(*self._dialect.read(place, words))
         assert sts == 0, (sts, data)
         return self._dialect.read_data(place, words, data)
 
     def refused_read(self, text: str, words: int = 1) -> tuple[int, bytes]:
         """Return what the other end is told that reads what it must not."""
-        return self.ask(*self._dialect.read(self._place(text), words))
+        return self.ask(*self._dialect.read(self.place(text), words))
 
     def write(self, text: str, *words: int) -> tuple[int, bytes]:
         """Let the other end write words; return STS and data."""
         data = b''.join(word.to_bytes(2, 'little') for word in words)
-        return self.ask(*self._dialect.write(self._place(text), data))
+        return self.ask(*self._dialect.write(self.place(text), data))
 
     def write_bits(self, text: str, mask: int, bits: int) -> tuple[int, bytes]:
         """Let the other end write bits of a word; return STS and data."""
-        return self.ask(*self._dialect.write_bits(self._place(text), mask, bits))
+        return self.ask(*self._dialect.write_bits(self.place(text), mask, bits))
 
     def heard(self) -> list[tuple[str, list[int]]]:
         """Return, once, name and values of all that was published."""
@@ -320,9 +320,9 @@ def test_refused_command_is_undone_in_each_of_its_words() -> None:
     bench = Bench('SLC', row('B3:0', 'SLC', 3), replace(row('B3:3', 'SLC'), is_read_only=True))
     assert bench.write('B3:0', 1, 2, 3) == (0, b'')
     bench.heard()
-    table = bench.served._table
+    table = bench.served.table
     table.changed.clear()
-    table.write(bench._place('B3:0'), bytes.fromhex('04 00 05 00 06 00'))
+    table.write(bench.place('B3:0'), bytes.fromhex('04 00 05 00 06 00'))
     table.take_back()
     assert bench.read('B3:0', 3) == bytes.fromhex('01 00 02 00 03 00')
     assert bench.heard() == []

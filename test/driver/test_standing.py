@@ -18,6 +18,8 @@ from collections.abc import Sequence
 from itertools import pairwise
 
 from abdf1_ros.df1.packet import Packet
+from abdf1_ros.df1.settings import LinkSettings
+from abdf1_ros.df1.slave import HalfDuplexSlave
 from abdf1_ros.driver.record import Claim
 from abdf1_ros.driver.settings import DriverSettings
 from abdf1_ros.driver.write import Outcome, Write
@@ -47,16 +49,15 @@ class Line(DriverBench):
                          settings=DriverSettings(processor_period=0.0))
         self.there = self.plc(1, 'PLC5', ('N7:0', 40), ('B3:0', 4), ('ST9:0', 84))
         self.executed: list[float] = []
-        serve = self.there.slave._serve  # type: ignore[attr-defined]
-
-        def watch(command: Packet) -> Packet:
-            reply: Packet = serve(command)
-            if command.cmd == 0x0F and not reply.data:
-                self.executed.append(self.clock())
-            return reply
-
-        self.there.slave._serve = watch  # type: ignore[attr-defined]
+        self.there.slave = HalfDuplexSlave(LinkSettings(station=1), self._serve)
+        self.is_late = False
         self.run(1.0)
+
+    def _serve(self, command: Packet) -> Packet:
+        reply = self.there.serve(command)
+        if command.cmd == 0x0F and not reply.data:
+            self.executed.append(self.clock())
+        return reply._replace(tns=reply.tns ^ 0x8000) if self.is_late else reply
 
     def say(self, row: Mapping, values: Sequence[float] | str, run: float = 0.0) -> None:
         self.driver.write([row], values, self.clock())
@@ -135,7 +136,7 @@ def test_change_goes_at_once() -> None:
 
 def test_word_that_the_plc_clears_is_back_within_one_read() -> None:
     line = Line(make_mapping('N7:0', 'Write', write_again=60_000), READ)
-    row = line._mappings[0]
+    row = line.mappings[0]
     line.keep_saying(row, [7], 6.0)
     line.run(3.0)
     store(line.there, 'N7:0', [0])
@@ -196,11 +197,9 @@ def test_unconfirmed_write_and_what_follows_prove_nothing() -> None:
     line = Line(WORD, READ)
     line.keep_saying(WORD, [7], 1.0)
     line.run(1.1)
-    serve = line.there.slave._serve  # type: ignore[attr-defined]
-    line.there.slave._serve = lambda command: (  # type: ignore[attr-defined]
-        serve(command), None)[1]
+    line.is_late = True
     line.say(WORD, [8], run=2.5)
-    line.there.slave._serve = serve  # type: ignore[attr-defined]
+    line.is_late = False
     line.run(2.0)
     del line.listener.results[:]
     line.say(WORD, [8], run=0.3)
@@ -233,7 +232,7 @@ def test_unconfirmed_write_may_land_over_the_confirmed_one_that_follows() -> Non
 
 def test_station_that_was_away_gets_the_value_again() -> None:
     line = Line(make_mapping('N7:0', 'Write', write_again=60_000), READ)
-    row = line._mappings[0]
+    row = line.mappings[0]
     line.keep_saying(row, [7], 1.0)
     line.run(1.1)
     line.there.faults.silent = True

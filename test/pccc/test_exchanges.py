@@ -158,7 +158,7 @@ def test_our_end_takes_a_refusal_for_one(entry: Exchange) -> None:
 @pytest.mark.parametrize('family', FAMILIES)
 def test_no_command_that_a_family_serves_is_left_out(family: PlcType) -> None:
     _, server = plc(family, {})
-    served = {(cmd, None) for cmd in server._family.basic_commands} | set(server._commands)
+    served = {(cmd, None) for cmd in server.family.basic_commands} | set(server.commands)
     assert {entry.code for entry in EXCHANGES if entry.family == family} == served
 
 

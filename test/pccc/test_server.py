@@ -147,20 +147,19 @@ def test_any_bytes_have_one_reply(data: bytes, family: PlcType, cmd: int, tns: i
 @pytest.mark.parametrize(('family', 'data'), [
     (PLC5, '68 00 00 01 00 07 00 09 00 01 00'), (PLC5, '68 00 00 01 00 07 00 07 04 01 00'),
     (SLC, 'A2 02 09 89 00 00'), (SLC, 'A2 02 07 85 00 00'), (SLC, 'A2 02 07 89 04 00')])
-def test_refusals_leave_nothing_behind(family: PlcType, data: str,
-                                       monkeypatch: pytest.MonkeyPatch) -> None:
+def test_refusals_leave_nothing_behind(family: PlcType, data: str) -> None:
     depths = []
-    server = Server(table(family, N7_0='00 00'))
-    execute = server._execute
 
-    def spy(command: Packet) -> bytes:
-        try:
-            return execute(command)
-        except Refusal as refusal:
-            depths.append(len(list(traceback.walk_tb(refusal.__traceback__))))
-            raise
+    class Spied(Server):
 
-    monkeypatch.setattr(server, '_execute', spy)
+        def _execute(self, command: Packet) -> bytes:
+            try:
+                return super()._execute(command)
+            except Refusal as refusal:
+                depths.append(len(list(traceback.walk_tb(refusal.__traceback__))))
+                raise
+
+    server = Spied(table(family, N7_0='00 00'))
     for _ in range(10):
         server.serve(Packet(1, 5, 0x0F, 0, 7, bytes.fromhex(data)))
     assert depths == [depths[0]] * 10

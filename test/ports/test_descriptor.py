@@ -64,7 +64,7 @@ def test_write_to_a_closed_line(sockets: tuple[DescriptorPort, socket.socket]) -
 
 def test_write_to_a_line_that_takes_no_more_does_not_hang(
         sockets: tuple[DescriptorPort, socket.socket], monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr('abdf1_ros.ports.descriptor._WRITE_TIMEOUT', 0.05)
+    monkeypatch.setattr('abdf1_ros.ports.descriptor.WRITE_TIMEOUT', 0.05)
     with pytest.raises(OSError, match='the line takes no data; is Handshake right'):
         sockets[0].write(bytes(10_000_000))
 

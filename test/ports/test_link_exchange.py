@@ -28,7 +28,7 @@ from abdf1_ros.df1.machine import (
 )
 from abdf1_ros.errors import PortLost
 from abdf1_ros.ports.descriptor import Port
-from abdf1_ros.ports.link_thread import _Attempt, LinkThread, PortState
+from abdf1_ros.ports.link_thread import Attempt, LinkThread, PortState
 from abdf1_ros.ports.opening import open_port
 from abdf1_ros.ports.settings import PortSettings
 import pytest
@@ -78,7 +78,7 @@ def test_neither_another_machine_nor_the_end_waits_for_a_name_server() -> None:
 def test_port_that_opens_while_the_end_begins_is_closed() -> None:
     stuck = Stuck()
     stuck.go_on.set()
-    attempt = _Attempt(stuck.open, lambda: None)
+    attempt = Attempt(stuck.open, lambda: None)
     attempt.run()
     attempt.abandon()
     assert stuck.closed.is_set()
@@ -156,7 +156,7 @@ class _Stuck(NoLine):
 
 
 def test_machine_that_came_to_nothing_does_not_come_later(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr('abdf1_ros.ports.link_thread._EXCHANGE_LIMIT', 0.0)
+    monkeypatch.setattr('abdf1_ros.ports.link_thread.EXCHANGE_LIMIT', 0.0)
     port, before, after = _Stuck(), Script(Rest()), Script(Rest())
     thread = LinkThread(before.machine, lambda: port)
     thread.start()

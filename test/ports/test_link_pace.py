@@ -92,7 +92,8 @@ class Late(LinkThread):
     """A link thread on a host that lets it run 20 ms after each pause."""
 
     def __init__(self, machine: Machine, port: SlowLine) -> None:
-        super().__init__(machine, lambda: port, clock=port.clock)
+        super().__init__(machine, lambda: port, clock=port.clock,
+                         on_state=lambda state: state.is_open or self.ask_to_stop())
         self._port = port
 
     def _pause(self, seconds: float) -> None:
@@ -105,7 +106,7 @@ def test_long_reply_at_a_low_speed_is_heard_to_its_end(char_time: float) -> None
     script = Script(Send(b'?', 0.3, reply_size=234), timing=LineTiming(char_time=char_time))
     port = SlowLine(message_frame(packet.encode(), Checksum.CRC), char_time)
     thread = Late(script.machine, port)
-    assert not thread._run_on(port)
+    thread.run()
     assert isinstance(script.next(), Frame)
     thread.stop()
 

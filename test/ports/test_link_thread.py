@@ -172,19 +172,19 @@ class Counted(Wake):
         super().wait(milliseconds)
 
 
-def test_missing_port_is_waited_for_asleep() -> None:
+def test_missing_port_is_waited_for_asleep(monkeypatch: pytest.MonkeyPatch) -> None:
     """A thread that looks at the clock over and over would take a whole core."""
     attempts = []
 
     def refuse() -> Port:
         attempts.append(time.monotonic())
         if len(attempts) == 4:
-            thread._stopping = True
+            thread.ask_to_stop()
         raise OSError('no')
 
+    counted = Counted()
+    monkeypatch.setattr('abdf1_ros.ports.link_thread.Wake', lambda: counted)
     thread = LinkThread(Script().machine, refuse, retry_period=0.05)
-    thread._wake.close()
-    thread._wake = counted = Counted()
     thread.run()
     pauses = [wait for wait in counted.waits if wait != math.inf]
     assert sum(pauses) >= 3 * 45
@@ -283,7 +283,7 @@ def test_busy_port_is_reported_and_opened_when_it_is_free(pty: Pty, link: Link) 
 
 
 def test_full_pty_is_a_lost_port(pty: Pty, link: Link, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr('abdf1_ros.ports.descriptor._WRITE_TIMEOUT', 0.05)
+    monkeypatch.setattr('abdf1_ros.ports.descriptor.WRITE_TIMEOUT', 0.05)
     script = Script(Send(bytes(1_000_000), None))
     link.start(script.machine, pty.name)
     assert link.state().is_open

@@ -160,12 +160,13 @@ def test_pty_has_no_parity(ptys: list[Pty]) -> None:
 
 
 def test_damaged_characters_of_either_port_are_damaged(ptys: list[Pty]) -> None:
-    ports = [listening.open_device(listening_to(pty)) for pty in ptys]
+    opened = [listening.open_device(listening_to(pty)) for pty in ptys]
+    ports = [listening.ListeningDevice(port.fileno(), port.close, is_marked=True)
+             for port in opened]  # a pty has no parity
     wake, end = os.pipe()
-    for number, port in enumerate(ports):
-        port._is_marked = True  # a pty has no parity
+    for pty in ptys:
         pair = listening.TwoPorts(ports[0], ports[1])
-        ptys[number].write(b'\xFF\x00A')
+        pty.write(b'\xFF\x00A')
         assert isinstance(pair.read(5.0, wake), Damaged)
     for port in ports:
         port.close()

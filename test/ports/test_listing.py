@@ -33,7 +33,7 @@ def test_adapters_come_first_with_a_name_that_stays(
     (tmp_path / 'by-id').mkdir()
     link = tmp_path / 'by-id' / 'usb-adapter'
     link.symlink_to(device)
-    monkeypatch.setattr(listing, '_BY_ID', tmp_path / 'by-id')
+    monkeypatch.setattr(listing, 'BY_ID', tmp_path / 'by-id')
     monkeypatch.setattr(listing.list_ports, 'comports', lambda: [
         _port('/dev/ttyAMA0', 'ttyAMA0', 'PNP'), _port('/dev/ttyS31'),
         _port(str(device), 'FT232R USB UART', 'USB VID:PID=0403:6001')])

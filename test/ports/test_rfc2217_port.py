@@ -59,7 +59,7 @@ def ends() -> Iterator[tuple[Rfc2217Port, socket.socket]]:
 def is_watched_and_sends_at_once(port: DescriptorPort) -> bool:
     options = (socket.TCP_NODELAY, socket.TCP_KEEPIDLE, socket.TCP_KEEPINTVL,
                socket.TCP_USER_TIMEOUT)
-    with socket.socket(fileno=os.dup(port._descriptor)) as connection:
+    with socket.socket(fileno=os.dup(port.fileno())) as connection:
         values = [connection.getsockopt(socket.IPPROTO_TCP, option) for option in options]
         return values == [1, 5, 1, 5000] and \
             connection.getsockopt(socket.SOL_SOCKET, socket.SO_KEEPALIVE) == 1
@@ -129,7 +129,7 @@ def test_server_that_refuses(ends: tuple[Rfc2217Port, socket.socket]) -> None:
 def test_server_that_does_not_answer(
         ends: tuple[Rfc2217Port, socket.socket], monkeypatch: pytest.MonkeyPatch, answer: bytes,
         text: str) -> None:
-    monkeypatch.setattr(rfc2217_port, '_NEGOTIATION_TIMEOUT', 1.0)
+    monkeypatch.setattr(rfc2217_port, 'NEGOTIATION_TIMEOUT', 1.0)
     port, server = ends
     server.sendall(answer)
     with pytest.raises(OSError, match=text):
@@ -138,7 +138,7 @@ def test_server_that_does_not_answer(
 
 def test_server_that_says_something_else_for_ever_is_given_up(
         ends: tuple[Rfc2217Port, socket.socket], monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(rfc2217_port, '_NEGOTIATION_TIMEOUT', 0.2)
+    monkeypatch.setattr(rfc2217_port, 'NEGOTIATION_TIMEOUT', 0.2)
     port, server = ends
     is_over = threading.Event()
 
@@ -158,7 +158,7 @@ def test_server_that_says_something_else_for_ever_is_given_up(
 
 def test_connection_to_a_server_that_does_not_answer_is_closed(
         monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(rfc2217_port, '_NEGOTIATION_TIMEOUT', 0.05)
+    monkeypatch.setattr(rfc2217_port, 'NEGOTIATION_TIMEOUT', 0.05)
     with socket.create_server(('127.0.0.1', 0)) as server:
         with pytest.raises(OSError) as error:  # it keeps the port from being thrown away
             open_port(PortSettings(f'rfc2217://127.0.0.1:{server.getsockname()[1]}'))
@@ -238,4 +238,3 @@ def test_data_that_nobody_reads_stay_with_the_server(
     time.sleep(0)
     assert not any('2217' in name for name in before)  # nobody reads behind our back
     assert sent < 10_000_000
-    assert port._left == b''

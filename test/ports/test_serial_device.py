@@ -98,8 +98,8 @@ def test_option_that_a_port_has_is_set(pty: Pty, monkeypatch: pytest.MonkeyPatch
     asked = []
     monkeypatch.setattr(serial.Serial, 'set_low_latency_mode',
                         lambda port, mode: asked.append(mode))
-    monkeypatch.setattr(serial.Serial, '_set_rs485_mode',
-                        lambda port, settings: asked.append(settings.rts_level_for_tx))
+    monkeypatch.setattr(serial.Serial, 'rs485_mode', property(
+        fset=lambda port, settings: asked.append(settings.rts_level_for_tx)))
     assert told_by_open(PortSettings(str(pty.name), rs485=True)) == []
     assert asked == [True, True]
 
@@ -207,7 +207,7 @@ def close_with(pty: Pty, monkeypatch: pytest.MonkeyPatch) -> Callable[..., list[
         descriptor = os.open(pty.name, os.O_RDWR | os.O_NOCTTY)
         port = SerialDevice(descriptor, lambda: done.append('closed'))
         monkeypatch.setattr(fcntl, 'ioctl', ioctl)
-        monkeypatch.setattr(serial_device, '_LAST_BYTES', 0.05 if unsent[-1] else PATIENCE)
+        monkeypatch.setattr(serial_device, 'LAST_BYTES', 0.05 if unsent[-1] else PATIENCE)
         monkeypatch.setattr(termios, 'tcflush', lambda descriptor, queue: done.append(
             'dropped' if queue == termios.TCOFLUSH else 'something else'))
         monkeypatch.setattr(termios, 'tcsetattr', lambda descriptor, when, attributes: done.append(
@@ -296,7 +296,7 @@ def test_device_is_kept_from_other_users(pty: Pty, monkeypatch: pytest.MonkeyPat
 
 def test_settings_that_another_program_changes_are_a_lost_port(
         pty: Pty, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(serial_device, '_SETTINGS_LOOK', 0.0)
+    monkeypatch.setattr(serial_device, 'SETTINGS_LOOK', 0.0)
     port = open_port(PortSettings(str(pty.name)))
     port.write(b'\x01')
     assert pty.read(1) == b'\x01'

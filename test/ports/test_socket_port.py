@@ -32,15 +32,15 @@ class NewestClientServer:
     """A server that throws its client out for the next one, as ser2net does with kickolduser."""
 
     def __init__(self) -> None:
-        self._listening = socket.create_server(('127.0.0.1', 0))
-        self.address = self._listening.getsockname()
+        self.listening = socket.create_server(('127.0.0.1', 0))
+        self.address = self.listening.getsockname()
         threading.Thread(target=self._accept, daemon=True).start()
 
     def _accept(self) -> None:
         client: socket.socket | None = None
         while True:
             try:
-                newest, _ = self._listening.accept()
+                newest, _ = self.listening.accept()
             except OSError:
                 return
             newest.sendall(b'!')
@@ -49,22 +49,22 @@ class NewestClientServer:
             client = newest
 
     def close(self) -> None:
-        self._listening.close()
+        self.listening.close()
 
 
 class OneClientServer:
     """A server that takes one client, and closes the connections of all others at once."""
 
     def __init__(self) -> None:
-        self._listening = socket.create_server(('127.0.0.1', 0))
-        self.url = f'socket://127.0.0.1:{self._listening.getsockname()[1]}'
+        self.listening = socket.create_server(('127.0.0.1', 0))
+        self.url = f'socket://127.0.0.1:{self.listening.getsockname()[1]}'
         self._client: socket.socket | None = None
         threading.Thread(target=self._accept, daemon=True).start()
 
     def _accept(self) -> None:
         while True:
             try:
-                connection, _ = self._listening.accept()
+                connection, _ = self.listening.accept()
             except OSError:
                 return
             if self._client is None:
@@ -83,7 +83,7 @@ class OneClientServer:
         self._client = None
 
     def close(self) -> None:
-        self._listening.close()
+        self.listening.close()
         if self._client is not None:
             self._client.close()
 
@@ -122,7 +122,7 @@ def cut(server: OneClientServer) -> None:
 
 def test_connection_whose_end_the_server_did_not_hear_is_freed(server: OneClientServer) -> None:
     cut(server)
-    with socket.create_connection(server._listening.getsockname()) as other:  # noqa: SLF001
+    with socket.create_connection(server.listening.getsockname()) as other:
         assert not other.recv(1)  # a stranger has no place
     # The server's thread may need a moment; more tries would hit the port of before by chance.
     assert any(answers(server) or time.sleep(0.1) for _ in range(_TRIES))

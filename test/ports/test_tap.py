@@ -116,7 +116,7 @@ def test_word_pty_and_its_file_name_ask_for_a_pseudo_terminal(name: str, expecte
 def test_what_nothing_takes_is_passed_on_and_counted(
         ptys: list[Pty], monkeypatch: pytest.MonkeyPatch) -> None:
     """After Ctrl-S it was all kept, without a bound."""
-    monkeypatch.setattr('abdf1_ros.ports.tap._MOST_WAITING', 3)
+    monkeypatch.setattr('abdf1_ros.ports.tap.MOST_WAITING', 3)
     with tap(ptys[0].name, ptys[1].name) as listening:
         for number in range(8):
             ptys[0].write(bytes([number]))

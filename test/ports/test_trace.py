@@ -114,7 +114,7 @@ def test_line_does_not_wait_for_a_disk_that_stands_still(
         write(writer, chunk)
 
     monkeypatch.setattr(CaptureWriter, 'write', slow)
-    monkeypatch.setattr(trace_module, '_MOST_WAITING', 3)
+    monkeypatch.setattr(trace_module, 'MOST_WAITING', 3)
     trace = Trace(str(tmp_path / 'x'), {}, errors.append)
     port = TracedPort(Loop(), trace, 0.0, lambda: 0.0)
     port.write(b'\x01')

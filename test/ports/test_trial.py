@@ -60,6 +60,6 @@ def test_host_is_looked_up_and_not_connected_to(
 
 def test_port_that_does_not_say_in_time_is_not_refused(monkeypatch: pytest.MonkeyPatch) -> None:
     ended = threading.Event()
-    monkeypatch.setattr(trial, '_open', lambda settings: ended.wait())
+    monkeypatch.setattr(trial, 'try_port', lambda settings: ended.wait())
     assert why_not(PortSettings('/dev/ttyS0'), 0.0) == ''
     ended.set()

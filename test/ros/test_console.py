@@ -143,7 +143,7 @@ def test_lines_that_nothing_takes_are_counted_and_told_when_they_are_taken_again
 
 def test_count_of_lost_lines_outlives_a_write_that_fails(monkeypatch: pytest.MonkeyPatch) -> None:
     """A full disk took the count of the lines before with it."""
-    monkeypatch.setattr(console, '_PAUSE', 0.01)
+    monkeypatch.setattr(console, 'PAUSE', 0.01)
     taken: list[bytes] = []
     answers: list[int | OSError] = [7, OSError(errno.ENOSPC, 'No space left on device')]
 

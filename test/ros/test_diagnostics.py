@@ -583,7 +583,7 @@ def test_map_without_reads_is_ok(make_bench: Callable[..., Bench]) -> None:
 
 def test_blocks_may_be_divided_while_the_poll_cycle_is_asked_for(bench: Bench) -> None:
     # That is what the link thread does when a PLC refuses an address.
-    jobs: Any = bench.driver.readings.reads._due.jobs
+    jobs: Any = bench.driver.readings.reads.queue.jobs
 
     class Part:
         """A job that has not been done yet."""
@@ -673,7 +673,7 @@ def test_heartbeat_that_the_plc_does_not_confirm_does_not_count(
 
 
 def test_bit_of_the_plc_confirms_control_while_it_is_fresh_and_1(
-        make_bench: Callable[..., Bench]) -> None:
+        make_bench: Callable[..., Bench], monkeypatch: pytest.MonkeyPatch) -> None:
     bench = make_bench('alive,Heartbeat,N10:0,1,PLC5,60000,',
                        'ruled,Read,B12:0/2,1,PLC5,1000,alive', header=f'{HEADER},Confirms')
     beat, bit = bench.driver.interlocks.heartbeats[0], bench.point('ruled')
@@ -707,7 +707,8 @@ def test_bit_of_the_plc_confirms_control_while_it_is_fresh_and_1(
     beat.reason = ''
     assert station(1, NOW + 32) == (OK, 'in control for 0.0 s')
     stopped = Identity(PlcType.PLC5, 'PLC-5/40', mode=Mode.REMOTE_PROGRAM, mode_text='REM PROG')
-    bench.driver.checks._known[1] = StationHealth('PLC-5/40', stopped, NOW + 33)
+    monkeypatch.setattr(bench.driver.checks, 'known', lambda station: StationHealth(
+        'PLC-5/40', stopped, NOW + 33))
     assert station(1, NOW + 33) == (
         WARN, 'not in control: ruled is 1, but the PLC is in program mode (REM PROG)')
 
@@ -800,8 +801,8 @@ def test_failed_write_is_a_warning_for_ten_seconds(bench: Bench) -> None:
 
 
 def test_monitor_looks_for_values_that_there_are(bench: Bench) -> None:
-    columns = {key for *_, key in plant._COLUMNS} - {'state'}
-    expected = {*view._LINK_KEYS, view._LOAD_BY_TOPIC, *columns, 'last error'}
+    columns = {key for *_, key in plant.COLUMNS} - {'state'}
+    expected = {*view.LINK_KEYS, view.LOAD_BY_TOPIC, *columns, 'last error'}
     assert expected <= details(bench.status('link')).keys()
-    assert {*view._STATION_KEYS} <= details(bench.status('station 1')).keys()
+    assert {*view.STATION_KEYS} <= details(bench.status('station 1')).keys()
     assert 'total' in details(bench.status('mappings'))

@@ -179,7 +179,7 @@ def test_no_line_at_all() -> None:
 
 def test_line_is_started_again_once_after_each_internal_error(
         monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(module, '_RESTART_AFTER', 0.0)
+    monkeypatch.setattr(module, 'RESTART_AFTER', 0.0)
     made: list[Exception] = []
     ends = iter([AttributeError('a bug'), AttributeError('a bug'), ConfigurationError([])])
 
@@ -192,10 +192,10 @@ def test_line_is_started_again_once_after_each_internal_error(
     for _ in range(5):
         line.check()
     assert (len(made), line.restarts) == (3, 2)
-    line._closing = threading.Timer(0.1, list)
-    line._closing.start()
+    line.closing = threading.Timer(0.1, list)
+    line.closing.start()
     line.end_callbacks(time.monotonic() + PATIENCE)
-    assert not line._closing.is_alive()
+    assert not line.closing.is_alive()
 
 
 class Plant:
@@ -214,7 +214,7 @@ class Plant:
                 [f'1,PLC5,N7:0,16,7 {ord(name)}'])
             self.plcs[name] = stack.enter_context(Plcs(data))
         self.status = 0
-        self._thread = threading.Thread()
+        self.thread = threading.Thread()
         for name in self.plcs:
             self.write_map(name, 'speed,Read,N7:0,1,PLC5,2')
             self.write_net(name, self.plcs[name].port)
@@ -236,8 +236,8 @@ class Plant:
             f'    net_file: {self.folder}/{name}_net.csv\n'
             f'    map_file: {self.folder}/{name}_map.csv\n' for name in self.plcs)
         given = ['lines', '--ros-args', '--params-file', yaml_file(self.folder, text), *arguments]
-        self._thread = threading.Thread(target=lambda: setattr(self, 'status', main(given)))
-        self._thread.start()
+        self.thread = threading.Thread(target=lambda: setattr(self, 'status', main(given)))
+        self.thread.start()
         assert [self.speeds(name) for name in reads] == [[7, ord(name)] for name in reads]
 
     def speeds(self, name: str) -> list[float] | str:
@@ -258,10 +258,10 @@ class Plant:
 
     def end(self) -> int:
         """End the process as SIGTERM does; return its exit status."""
-        if self._thread.is_alive():
+        if self.thread.is_alive():
             self._request.set()
-            self._thread.join(PATIENCE)
-            assert not self._thread.is_alive()
+            self.thread.join(PATIENCE)
+            assert not self.thread.is_alive()
         return self.status
 
 
@@ -270,7 +270,7 @@ def end_request(monkeypatch: pytest.MonkeyPatch) -> EndRequest:
     """Return what asks the process to end: only the main thread could take signals."""
     event = EndRequest(())
     monkeypatch.setattr(process, 'EndRequest', lambda *arguments: nullcontext(event))
-    monkeypatch.setattr(process, '_end_by_the_clock', lambda: None)  # it would end all tests too
+    monkeypatch.setattr(process, 'end_by_the_clock', lambda: None)  # it would end all tests too
     return event
 
 
@@ -355,7 +355,7 @@ def test_line_whose_name_ros_refuses_is_told_and_the_others_run(
 def test_faulty_line_ends_all_where_that_is_asked_for(plant: Plant) -> None:
     (plant.folder / 'b_net.csv').write_text('Baud\n9601\n')
     plant.start('-p', 'strict_lines:=true')
-    plant._thread.join(PATIENCE)
+    plant.thread.join(PATIENCE)
     assert plant.end() == 2
 
 
@@ -397,7 +397,7 @@ def test_new_files_do_not_make_a_line_the_second_master_on_the_port_of_another(
 def test_internal_error_at_the_start_of_a_line(
         plant: Plant, monkeypatch: pytest.MonkeyPatch,
         capfd: pytest.CaptureFixture[str]) -> None:
-    monkeypatch.setattr(module, '_RESTART_AFTER', 0.5)
+    monkeypatch.setattr(module, 'RESTART_AFTER', 0.5)
     made: list[float] = []
 
     def make(name: str, **named: Any) -> BridgeNode:
@@ -417,7 +417,7 @@ def test_internal_error_at_the_start_of_a_line(
 def test_internal_error_restarts_its_line_only_and_its_slow_end_holds_up_no_other(
         plant: Plant, monkeypatch: pytest.MonkeyPatch,
         capfd: pytest.CaptureFixture[str]) -> None:
-    monkeypatch.setattr(module, '_RESTART_AFTER', 0.1)
+    monkeypatch.setattr(module, 'RESTART_AFTER', 0.1)
     slow, ended = threading.Event(), threading.Event()
 
     def publish_last_diagnostics(node: BridgeNode, give_up: float) -> None:

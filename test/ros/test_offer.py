@@ -76,8 +76,8 @@ def test_message_that_another_thread_has_taken_is_no_error(offered: LosingPublis
         def __bool__(self) -> bool:
             return True  # as the thread saw it a moment ago
 
-    offered._waiting = Raced()
-    offered._publish_waiting()
+    offered.waiting = Raced()
+    offered.offer()
 
 
 def test_closed_publisher_has_no_subscribers(offered: LosingPublisher) -> None:

@@ -143,7 +143,7 @@ def refused_start(*arguments: str, status: int = 2) -> list[str]:
 
 
 def test_log_file_has_the_name_that_was_given() -> None:
-    descriptor = main._log_file('abdf1', ['--log-file-name', 'mine', '-p', 'read_only:=true'])
+    descriptor = main.log_file('abdf1', ['--log-file-name', 'mine', '-p', 'read_only:=true'])
     assert Path(f'/proc/self/fd/{descriptor}').readlink().name.startswith('mine_')
     os.close(cast(int, descriptor))
 

@@ -20,7 +20,7 @@ import time
 from types import SimpleNamespace
 from typing import Any
 
-from abdf1_ros.ros.process.main import _destroy
+from abdf1_ros.ros.process.main import destroy
 import pytest
 import rclpy
 from support.ros import EXAMPLE_FILES, PATIENCE, Process, ros_args, write_csv
@@ -117,7 +117,7 @@ def test_nodes_have_their_time_to_leave_the_network(monkeypatch: pytest.MonkeyPa
     done: list[str] = []
     monkeypatch.setattr(rclpy, 'try_shutdown', lambda: done.append('shut down'))
     program: Any = SimpleNamespace(destroy=lambda: (time.sleep(0.1), done.append('destroyed')))
-    _destroy(program, time.monotonic() + PATIENCE)
+    destroy(program, time.monotonic() + PATIENCE)
     assert done == ['destroyed', 'shut down']
 
 

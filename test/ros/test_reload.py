@@ -22,6 +22,7 @@ from typing import Any
 from abdf1_ros.ports.link_thread import LinkThread
 from abdf1_ros.ports.opening import open_port
 from abdf1_ros.ports.settings import PortSettings
+from abdf1_ros.problems import ConfigurationError
 from abdf1_ros.ros.bridge.guests import GuestPlaces
 from abdf1_ros.ros.bridge.session import BridgeSession
 from abdf1_ros.ros.diagnostics.graph import Graph
@@ -87,7 +88,7 @@ class Bench(BridgeCell):
 
 @pytest.fixture
 def bench(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Bench]:
-    monkeypatch.setattr('abdf1_ros.ros.parameters.file_watch._PERIOD', 0.3)
+    monkeypatch.setattr('abdf1_ros.ros.parameters.file_watch.PERIOD', 0.3)
     with Bench(tmp_path, DATA, '\n'.join((HEADER, SPEED, RECIPE)),
                'Baud,Timeout\n115200,100') as bench:
         yield bench
@@ -96,14 +97,14 @@ def bench(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Bench]:
 def test_rows_come_and_go_and_those_that_stay_are_not_disturbed(bench: Bench) -> None:
     speeds = bench.ros.listen(Int16MultiArray, '/abdf1/read/speed', EVERYTHING)
     speeds.values([7, 8])
-    publisher = bench.node.session.reads._topics['speed'].publisher
+    publisher, = (each for each in bench.node.publishers if each.topic_name == speeds.topic)
     bench.write_map(SPEED, LEVEL)
     assert bench.reload() == (True, (
         f'{bench.node.session.configuration}; new: level; gone: recipe'))
     levels = bench.ros.listen(Float32MultiArray, '/abdf1/read/level')
     assert values_in(levels.first()) == [1.5]
     assert values_in(speeds.next()) == [7, 8]
-    assert bench.node.session.reads._topics['speed'].publisher is publisher
+    assert publisher in bench.node.publishers
     node = bench.ros.node
     bench.ros.until(lambda: node.count_subscribers('/abdf1/write/level'), 'a topic')
     bench.ros.until(lambda: not node.count_subscribers('/abdf1/write/recipe'), 'its end')
@@ -173,17 +174,15 @@ def test_fault_in_one_row_changes_nothing(bench: Bench) -> None:
     assert values_in(speeds.first()) == [7, 8]
 
 
-def test_files_that_would_stop_the_line_change_nothing(
-        bench: Bench, monkeypatch: pytest.MonkeyPatch) -> None:
-    session, held = bench.node.session, []
-    monkeypatch.setattr(bench.node, '_hold_ports', lambda *names: held.append(names))
+def test_files_that_would_stop_the_line_change_nothing(bench: Bench) -> None:
+    session = bench.node.session
     bench.write_map()
     assert bench.reload() == (False, (
         f'goes on as before: {bench.map}: it has no row, so all topics would end; only a line '
         'with Share may have no row'))
     assert bench.node.session is session
-    assert held[-1] == session.configuration.held
-    monkeypatch.undo()
+    with pytest.raises(ConfigurationError, match='is the port of /abdf1'):
+        bench.port_owners.hold('/other', *session.configuration.held)
 
 
 def test_link_that_does_not_take_the_files_is_the_end(
@@ -204,7 +203,7 @@ def test_files_that_cannot_be_taken_leave_messages_to_the_old_driver(
 
     monkeypatch.setattr('abdf1_ros.ros.bridge.session.LinkCounterService', fail)
     with pytest.raises(KeyError):
-        bench.node._hand_over(bench.node.session.configuration)
+        bench.node.hand_over(bench.node.session.configuration)
     publisher.publish(Int16MultiArray(data=[5, 6]))
     assert results.next().message == 'not written: refused: this node ends'
 
@@ -296,7 +295,7 @@ def test_other_speed_opens_the_port_anew(bench: Bench, capfd: pytest.CaptureFixt
     assert bench.reload()[0]
     speeds = bench.ros.listen(Int16MultiArray, '/abdf1/read/speed', EVERYTHING)
     assert values_in(speeds.first()) == [7, 8]
-    assert bench.node._opener._settings.baud == 19200
+    assert bench.node.surroundings.opener.settings.baud == 19200
 
 
 def test_file_that_has_changed_is_told_once(
@@ -320,7 +319,7 @@ def test_whoever_waits_for_link_counters_is_told_of_the_new_files(bench: Bench) 
     client = bench.ros.node.create_client(Trigger, '/abdf1/read_link_counters')
     bench.ros.until(client.service_is_ready, 'the service')
     future = client.call_async(Trigger.Request())
-    bench.ros.until(lambda: bench.node.session.link_counters._done, 'the question')
+    bench.ros.until(lambda: bench.node.session.driver.checks.counters_wanted, 'the question')
     active = bench.ros.listen(UInt16MultiArray, '/abdf1/active_stations')
     bench.write_map('speed,Read,N7:0,2,PLC5,2')
     assert bench.reload()[0]

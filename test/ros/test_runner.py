@@ -212,7 +212,7 @@ def test_subscription_is_heard_again_after_a_message_that_cannot_be_taken(
         node: AnsweringNode, monkeypatch: pytest.MonkeyPatch,
         capfd: pytest.CaptureFixture[str]) -> None:
     heard: SimpleQueue[bool] = SimpleQueue()
-    take = SingleThreadedExecutor._take_subscription
+    take = SingleThreadedExecutor._take_subscription  # noqa: SLF001  # rclpy has no other way
     broken = iter([True, True])
 
     def take_or_fail(executor: SingleThreadedExecutor, subscription: Any) -> Any:

@@ -56,7 +56,7 @@ class Bench(BridgeCell):
     def start(self) -> None:
         super().start()
         self.ros.until(lambda: self.node.session.driver.is_online, 'the port')
-        self.ros.until(lambda: self.node.writes._is_open, 'writes are taken')
+        self.ros.until(lambda: self.node.writes.is_open, 'writes are taken')
 
     def put(self, topic: str, data: bool) -> tuple[bool, str]:
         response = self.call(SetBool, f'set/{topic}', SetBool.Request(data=data))
@@ -168,14 +168,14 @@ def test_hundred_callers_at_once_have_an_answer_each_and_more_are_refused(bench:
     refused = {answer.message for answer in answers if not answer.success}
     assert len(good) >= 100
     assert refused <= {'refused: 100 calls wait already'}
-    assert not bench.node._surroundings.services._calls
+    assert not bench.node.surroundings.services.calls
 
 
 def test_reload_answers_who_waits_and_closes_what_is_gone(bench: Bench) -> None:
     bench.plcs.say('delay 1 1500')
     read = bench.hold(Trigger, READ + 'recipe', Trigger.Request())
     written = bench.hold(SetBool, SET + 'horn', SetBool.Request(data=True))
-    calls = bench.node._surroundings.services._calls
+    calls = bench.node.surroundings.services.calls
     bench.ros.until(lambda: len(calls) == 2, 'both calls')
     write_csv(bench.map, HEADER, ROWS[:1])
     assert bench.call(Trigger, 'reload', Trigger.Request()).success
@@ -209,7 +209,7 @@ def test_publisher_and_caller_of_one_fallback_row_are_two_owners(bench: Bench) -
     client = bench.ros.node.create_client(SetBool, SET + 'motor')
     bench.ros.until(client.service_is_ready, 'the service')
     publisher = bench.ros.publisher(UInt8MultiArray, '/abdf1/write/motor')
-    bench.ros.until(lambda: bench.node.session._interlocks.look(float('inf')) == ('motor',),
+    bench.ros.until(lambda: bench.node.session.owners.look(float('inf')) == ('motor',),
                     'both owners')
     bench.ros.node.destroy_client(client)
     bench.ros.node.destroy_publisher(publisher)
@@ -298,4 +298,4 @@ def test_line_that_is_only_listened_to_has_no_services_of_rows(tmp_path: Path) -
     rows = (HEADER, 'speed,Read,N7:0,1,PLC5,2,,500,,,')
     with Bench(tmp_path, DATA, '\n'.join(rows), 'Mode,Baud\nListen,115200') as bench:
         bench.ros.until(lambda: bench.ros.node.count_publishers('/abdf1/read/speed'), 'the topic')
-        assert bench.node._surroundings.services._services == {}
+        assert bench.services() == set()

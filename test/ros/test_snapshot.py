@@ -105,7 +105,7 @@ def test_snapshot_comes_to_who_subscribes(inbox: Inbox) -> None:
 
 def test_snapshot_is_made_for_nobody(inbox: Inbox, monkeypatch: pytest.MonkeyPatch) -> None:
     inbox.first()
-    observer, made = inbox._observer, list[float]()
+    observer, made = inbox.observer, list[float]()
     observer.forget(inbox)
     observer.until(lambda: not observer.node.count_subscribers('/abdf1/snapshot'), 'its end')
     monkeypatch.setattr(Snapshot, 'message', lambda snapshot, now: made.append(now))

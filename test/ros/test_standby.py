@@ -57,7 +57,7 @@ class Pair(BridgeCell):
         super().start()
         self.ros.until(lambda: self.counts == (1, 1), 'the bridge to have the line')
         self.spare = BridgeNode(context=self.ros.context, use_global_arguments=False,
-                                cli_args=ros_args(*self._assignments))
+                                cli_args=ros_args(*self.assignments))
         self.ros.run(self.spare)
 
     def end(self, *args: Any) -> int:
@@ -139,7 +139,7 @@ def test_line_that_is_left_goes_to_the_spare(pair: Pair) -> None:
     pair.publish(3)
     assert pair.node.link.is_released
     pair.ros.call(Trigger, '/abdf1/reset_counters', Trigger.Request())
-    pair.node._set_polling(SetBool.Request(data=True), SetBool.Response())
+    pair.node.set_polling(SetBool.Request(data=True), SetBool.Response())
     pair.ros.end(pair.spare)
     pair.spare = None
     pair.ros.until(lambda: pair.counts == (1, 1), 'the first bridge to have the line again')
@@ -163,8 +163,8 @@ def test_line_that_is_lost_is_offered_no_longer(pair: Pair) -> None:
 def test_line_that_was_lost_for_a_moment_has_its_active_stations_again(pair: Pair) -> None:
     """The table is latched, and the new publisher has nothing of what the old one published."""
     bridge = pair.node
-    pair.ros.until(lambda: bridge._surroundings.active_words == [2] + 15 * [0], 'station 1')
-    left = bridge.executor.create_task(bridge._standby._leave_line)
+    pair.ros.until(lambda: bridge.surroundings.active_words == [2] + 15 * [0], 'station 1')
+    left = bridge.executor.create_task(bridge.standby.leave_line)
     pair.ros.until(left.done, 'the line to be left')
     pair.ros.until(lambda: pair.counts == (1, 1), 'the bridge to have the line again')
     stations = pair.ros.listen(UInt16MultiArray, '/abdf1/active_stations')
@@ -180,7 +180,7 @@ def test_change_that_waits_for_the_executor_is_not_begun_again() -> None:
     standby = Standby(around, lambda: session, [])
     for _ in range(2):
         standby.look()
-    assert tasks == [standby._leave_line]
+    assert tasks == [standby.leave_line]
 
 
 def test_spare_in_the_queue_of_a_device_server_waits_and_blames_no_plc(

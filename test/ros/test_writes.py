@@ -69,7 +69,7 @@ def test_numbers_of_a_few_publishers_only_are_kept(publishers: int) -> None:
     counter = LossCounter(lambda: publishers)
     for number in range(10_000, 0, -3):
         assert counter.lost_before(number) == 0
-    assert len(counter._latest) == 16
+    assert len(counter.latest) == 16
 
 
 class Taker:
@@ -176,7 +176,7 @@ def test_message_that_dds_delivers_again_after_a_cut_is_not_written_again(
     for number in range(2, 2000):
         node.publish('a', number, times=2)
     assert len(node.said) == 4 + 1998
-    assert len(topics._latest) == 1000
+    assert len(topics.latest) == 1000
 
 
 def test_message_wakes_the_link(node: Taker, topics: WriteTopics) -> None:

@@ -222,7 +222,11 @@ class Waits:
 
     def __init__(self, *reads: tuple[float, bytes]) -> None:
         self.now, self.has_more = 100.0, False
+        self.end = lambda: None
         self._reads = iter(reads)
+
+    def open(self) -> Waits:  # noqa: A003
+        return self
 
     def clock(self) -> float:
         return self.now
@@ -230,6 +234,7 @@ class Waits:
     def read(self, timeout: float | None, wake: int) -> bytes:
         seconds, data = next(self._reads, (0.0, None))
         if data is None:
+            self.end()
             raise OSError('the end')
         assert data or timeout is not None and timeout <= 0.1
         self.now += seconds if data else timeout or 0.0
@@ -268,8 +273,10 @@ def requested(*reads: tuple[float, bytes]) -> list[tuple[float, float]]:
     line = guest_line('tcp:4501', lambda command: found.append((
         round(command.requested - 100.5, 3), round(port.now - 100.5, 3))),
         lambda: woken.append(len(found)), port.clock)
-    with pytest.raises(OSError, match='the end'):
-        line.link._serve(port)
+    port.end = line.link.ask_to_stop
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr('abdf1_ros.share.guest_line.TcpEndpoint', lambda *_: port)
+        line.link.run()
     line.link.stop()
     assert woken == [*range(1, len(found) + 1)]
     return found
@@ -293,10 +300,11 @@ def test_command_in_a_flood_is_as_old_as_the_flood() -> None:
     assert came <= 0.1 and here >= 2.0
 
 
-def test_internal_error_is_told() -> None:
+def test_internal_error_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
     faults: list[Exception] = []
     line = guest_line('tcp:4501', lambda command: 1 / 0, fault=faults.append)
-    line._endpoint = SimpleNamespace(open=lambda: Waits((0.0, framed(1))), close=lambda: None)
+    monkeypatch.setattr('abdf1_ros.share.guest_line.TcpEndpoint', lambda *_: SimpleNamespace(
+        open=lambda: Waits((0.0, framed(1))), close=lambda: None))
     line.link.run()
     assert [*map(type, faults)] == 3 * [ZeroDivisionError]
 
@@ -308,7 +316,7 @@ def test_characters_take_time_on_a_serial_device(place: str, bits: int, baud: in
     """A reply that leaves slowly is not asked for with ENQ before it can have come."""
     line = guest_line(place)
     line.stop()
-    assert line._machine.timing.char_time == pytest.approx(bits / baud)
+    assert line.machine.timing.char_time == pytest.approx(bits / baud)
 
 
 def test_looks_for_a_program_are_frequent_and_without_a_wait(
@@ -319,6 +327,6 @@ def test_looks_for_a_program_are_frequent_and_without_a_wait(
         register=lambda *of: None, poll=waits.append))
     line = guest_line(f'tcp:{OWN_HOST}:{free_port()}')
     with pytest.raises(NoClient):
-        line._open()
+        line.open_port()
     line.stop()
-    assert (waits, line.link._retry_period) == ([0], 0.1)
+    assert (waits, line.link.retry_period) == ([0], 0.1)

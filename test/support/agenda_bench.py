@@ -131,7 +131,7 @@ class Bench:
 
     def next_read(self, now: float, busy: Container[int] = ()) -> ReadJob | None:
         """Take the next probe or read."""
-        job = self.agenda._read(now, busy)
+        job = self.agenda.read(now, busy)
         assert job is None or isinstance(job, ReadJob)
         return job
 

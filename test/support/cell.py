@@ -20,6 +20,7 @@ from typing import Any
 
 from abdf1_ros import testing
 from abdf1_ros.ros.bridge.node import BridgeNode
+from abdf1_ros.ros.bridge.port_owners import PortOwners
 from support.ros import Observer, ros_args
 
 
@@ -37,8 +38,10 @@ class BridgeCell(testing.SimulatedCell):
         """Start the bridge."""
         self.results = self.ros.results()
         self.diagnostics = self.ros.diagnostics(self.plcs.port)
+        self.port_owners = PortOwners()
         self.node = BridgeNode(context=self.ros.context, use_global_arguments=False,
-                               cli_args=ros_args(*self._assignments))
+                               port_owners=self.port_owners,
+                               cli_args=ros_args(*self.assignments))
         self.ros.run(self.node)
 
     def end(self, number: signal.Signals = signal.SIGTERM) -> int:

@@ -62,7 +62,7 @@ class Death(DriverBench):
                           if bound.mapping is self.speed)
         self.seen: list[int] = []
         self.refuses = False  # each write
-        self.line._random.seed(seed)
+        self.line.random.seed(seed)
         self.breathe()
         self.publish_for(math.inf)
         self.open()

@@ -18,7 +18,6 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 import heapq
 import itertools
-from random import Random
 from typing import Any
 
 from abdf1_ros.df1.frames import Duplex
@@ -156,10 +155,10 @@ class FarEnd(Machine):
 
             if is_radio:
                 settings = LinkSettings(
-                    station=first.station, checksum=network.checksum, also=plcs,
+                    station=first.station, checksum=network.checksum, also=plcs, seed=1,
                     cmd_timeout=self.answers_again,
                     avoids_collisions=network.line.avoids_collisions)
-                node = RadioNode(machine, settings, ActiveStationList(), serve, random=Random(1))
+                node = RadioNode(machine, settings, ActiveStationList(), serve)
                 return node.run(first)
             settings = LinkSettings(station=None, checksum=network.checksum)
             return FullDuplexPeer(machine, settings, ActiveStationList(), serve).run(first)
@@ -196,14 +195,14 @@ class DriverBench:
         # Not faster: a line that is read all the time has as much to show with fewer reads.
         self.network = network or Network(baud=19200, timeout=200)
         self.listener = Recorder(self.clock)
-        self.driver = Driver(
-            self.network, mappings, settings or DriverSettings(), listener or self.listener)
-        self._stations: list[Responder] = []
-        self.far = far or FarEnd(self._stations, self.network)
+        self._settings = replace(settings or DriverSettings(), seed=1)
+        self.driver = Driver(self.network, mappings, self._settings, listener or self.listener)
+        self.far_stations: list[Responder] = []
+        self.far = far or FarEnd(self.far_stations, self.network)
         self.line = VirtualLine(self.driver.machine, self.far, baud=self.network.baud, chunk=chunk)
         self._actions: list[tuple[float, int, Callable[[], object]]] = []
         self._count = itertools.count()
-        self._mappings, self._settings = mappings, settings or DriverSettings()
+        self.mappings = mappings
         self.is_alive = True
         if self.network.duplex is Duplex.HALF:
             self.far.start(0.0)
@@ -224,14 +223,12 @@ class DriverBench:
 
     def connect(self, station: Responder) -> None:
         """Put any station on the line."""
-        self._stations.append(station)
+        self.far_stations.append(station)
         if self.network.duplex is not Duplex.HALF:
             self.far.start(self.line.now)
 
     def open(self, run: float = 0.0) -> None:  # noqa: A003
         """Open the port; let so many seconds pass."""
-        if isinstance(self.driver.link, RadioNode):
-            self.driver.link._random = Random(1)
         self.driver.machine.start(self.line.now, self.line.outlet(self.driver.machine))
         self.line.wake(self.driver.machine)
         if run:
@@ -240,7 +237,7 @@ class DriverBench:
     def restart(self, first_tns: int = 0) -> None:
         """Kill the driver, and put a fresh one in its place."""
         settings = replace(self._settings, first_tns=first_tns)
-        driver = Driver(self.network, self._mappings, settings, self.listener)
+        driver = Driver(self.network, self.mappings, settings, self.listener)
         self.line.exchange(self.driver.machine, driver.machine)
         self.driver = driver
         self.open()

@@ -54,10 +54,10 @@ class Cell:
     """A driver, a PLC whose writes are kept, and a ROS executor that can stand still."""
 
     def __init__(self, *rows: Mapping, polling: str = 'Message', start: bool = True,
-                 run: float = 0.0, **settings: object) -> None:
+                 run: float = 0.0, cmd_timeout: int = 500, **settings: object) -> None:
         self.bench = DriverBench(rows, network=Network(
             # Polled without a pause, a slow line shows the same with fewer polls.
-            baud=115200 if polling == 'Message' else 19200, timeout=200, cmd_timeout=500,
+            baud=115200 if polling == 'Message' else 19200, timeout=200, cmd_timeout=cmd_timeout,
             nak_retries=1, enq_retries=1, polling=polling),
             settings=DriverSettings(**settings), start=False)  # type: ignore
         self.plc = self.bench.plc(1, 'PLC5', ('N7:0', 200), ('N10:0', 20), ('N11:0', 20),
@@ -90,7 +90,7 @@ class Cell:
         before = self._words()
         is_spared = int.from_bytes(command.data[-2:], 'little') == self.spared
         if command.cmd == 0x0F and command.data[0] == 0x67 and not is_spared \
-                and self.refused & self._named(command):
+                and self.refused & self.named(command):
             self.refusals += 1
             return command.reply(sts=0x10)
         reply = self.plc.serve(command)
@@ -98,7 +98,7 @@ class Cell:
             reply = reply._replace(tns=reply.tns ^ 0x8000)
         after = self._words()
         if command.cmd == 0x0F and command.data[0] == 0x67:
-            for name in self._named(command):
+            for name in self.named(command):
                 self.writes.append((self.now, name, after[name]))
         elif before != after:
             for name in after:
@@ -106,7 +106,7 @@ class Cell:
                     self.writes.append((self.now, name, after[name]))
         return reply
 
-    def _named(self, command: Packet) -> set[str]:
+    def named(self, command: Packet) -> set[str]:
         """Return the word that a typed write goes to."""
         files = {7: 'N7:0', 10: 'N10:0'}
         return {files[number] for number in files if bytes((6, number)) in command.data[:9]
@@ -158,8 +158,8 @@ class GuestCell(Cell):
     """A cell with a guest who writes there."""
 
     def __init__(self, *rows: Mapping, start: bool = True, run: float = 1.0,
-                 polling: str = 'Message') -> None:
-        super().__init__(*rows, start=False, polling=polling)
+                 polling: str = 'Message', cmd_timeout: int = 500) -> None:
+        super().__init__(*rows, start=False, polling=polling, cmd_timeout=cmd_timeout)
         self.replies: list[int] = []
         if start:
             self.bench.open()

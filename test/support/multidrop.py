@@ -109,8 +109,8 @@ class MasterNode(CommandTasks):
         self.served: list[Packet] = []
         self.stations = ActiveStationList(numbers, self.change)
         self.machine = Told(lambda machine: self.link.run(self), settings, timing)
-        served = None if serve is None else self._serve
-        self._execute = serve
+        served = None if serve is None else self.serve
+        self.execute = serve
         self.link: HalfDuplexMaster | StandardPollingMaster
         if polling is None:
             self.link = HalfDuplexMaster(
@@ -120,10 +120,10 @@ class MasterNode(CommandTasks):
                 self.machine, replace(settings, polling=polling), self.stations,
                 served, self.events.append)
 
-    def _serve(self, command: Packet) -> Packet:
+    def serve(self, command: Packet) -> Packet:
         self.served.append(command)
-        assert self._execute is not None
-        return self._execute(command)
+        assert self.execute is not None
+        return self.execute(command)
 
     @property
     def said(self) -> str:
@@ -154,10 +154,10 @@ class Slave(Initiator):
         self.heard: list[Packet] = []
         self.polls = 0
         self._clock = clock
-        self._execute = serve
+        self.execute = serve
         self._ready = 0.0
         self.slave = HalfDuplexSlave(
-            LinkSettings(station=number, queue_size=queue_size, nak_retries=retries), self._serve,
+            LinkSettings(station=number, queue_size=queue_size, nak_retries=retries), self.serve,
             initiator=self)
 
     def handle(self, symbol: Symbol) -> bytes:
@@ -171,10 +171,10 @@ class Slave(Initiator):
             return b''
         return self.slave.handle(symbol)
 
-    def _serve(self, command: Packet) -> Packet:
+    def serve(self, command: Packet) -> Packet:
         self.served.append(command)
         self._ready = self._clock() + self.delay
-        return self._execute(command)
+        return self.execute(command)
 
     def polled(self) -> None:
         """Do nothing."""
@@ -271,15 +271,15 @@ class SlaveNode(CommandTasks):
         self.served: list[Packet] = []
         self.executed: Counter[tuple[int, int]] = Counter()
         self.replies: dict[tuple[int, int], Packet] = {}
-        self._execute = serve
+        self.execute = serve
         self.stations = ActiveStationList()
         self.machine = Machine(lambda machine: self.link.run(self), checksum=settings.checksum,
                                timing=timing)
         self.link = SlaveLink(
-            self.machine, settings, self.stations, self._serve, self.events.append)
+            self.machine, settings, self.stations, self.serve, self.events.append)
 
-    def _serve(self, command: Packet) -> Packet:
-        reply = self._execute(command)
+    def serve(self, command: Packet) -> Packet:
+        reply = self.execute(command)
         self.served.append(command)
         self.executed[command.src, command.tns] += 1
         self.replies[command.src, command.tns] = reply

@@ -209,7 +209,7 @@ class OddDevice:
             status = _ILLEGAL
         elif data[0] in self.nodes | {self.station} or (
                 self.executes_diagnostics and data[2] == _ECHO):
-            status, result = self._answer(data)
+            status, result = self.answer(data)
         self._send(_reply_to(data, status) + result)
 
     def _send(self, reply: bytes) -> None:
@@ -221,7 +221,7 @@ class OddDevice:
         else:
             self._out += frame(reply)
 
-    def _answer(self, data: bytes) -> tuple[int, bytes]:
+    def answer(self, data: bytes) -> tuple[int, bytes]:
         """Return status and data of a reply: to echo, status, typed reads and writes of words."""
         node, command, function, rest = data[0], data[2] & 0x0F, data[6], data[7:]
         if command == _ECHO:

@@ -233,13 +233,13 @@ class Inbox(testing.Messages):
         """
         self.clear()
         now = time.time()
-        return self._observer.until(
+        return self.observer.until(
             lambda: [array for array in self if stamp(array) > now][1:], 'new diagnostics')[0]
 
     def until_well(self) -> None:
         """Wait until the last diagnostics say that every mapping is read."""
-        self._observer.until(lambda: self and is_fresh(find_status(self[-1], 'mappings'))
-                             and find_status(self[-1], 'link').level == OK, 'all well')
+        self.observer.until(lambda: self and is_fresh(find_status(self[-1], 'mappings'))
+                            and find_status(self[-1], 'link').level == OK, 'all well')
 
     def until_fresh(self) -> None:
         """Wait until diagnostics say that every mapping is read."""

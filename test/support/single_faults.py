@@ -34,7 +34,6 @@ from random import Random
 
 from abdf1_ros.df1.frames import Duplex, Frame, FrameDecoder, NAK
 from abdf1_ros.df1.packet import Packet
-from abdf1_ros.df1.radio import RadioNode
 from abdf1_ros.driver.driver import Driver
 from abdf1_ros.driver.guests import Guest, GuestCommand, ShareAccess
 from abdf1_ros.driver.settings import DriverSettings
@@ -102,7 +101,8 @@ class FaultyLine(VirtualLine):
         self.frames: list[tuple[int, int, bytes]] = []  # who hears it, from which byte on
         self._latest = [self.now, self.now]
 
-    def _send(self, data: bytes, start: float, receiver: int) -> None:
+    def send(self, data: bytes, start: float, receiver: int) -> None:
+        """Put bytes on the wire, with the faults."""
         begun, at = len(self.said[receiver]), 0
         self.said[receiver] += data
         self.frames.append((receiver, begun, data))
@@ -164,8 +164,9 @@ class End:
 class Bench:
     """Two drivers that carry out one kind of transaction again and again."""
 
-    def __init__(self, mode: str, check: str, kind: str) -> None:
+    def __init__(self, mode: str, check: str, kind: str, detects_duplicates: bool = True) -> None:
         self.kind, self.mode = kind, mode
+        self._detects_duplicates = detects_duplicates
         near, far = (Network(
             station=station, mode=name, polling=polling, error_code=check, plc_type='SLC',
             baud=38400, timeout=int(1000 * _TIMEOUT), cmd_timeout=500)
@@ -214,9 +215,9 @@ class Bench:
 
     def _end(self, network: Network, rows: tuple[Mapping, ...]) -> End:
         listener = Recorder(lambda: self.line.now)
-        driver = Driver(network, rows, DriverSettings(nak_on_command_timeout=False), listener)
-        if isinstance(driver.link, RadioNode):
-            driver.link._random = Random(network.station)
+        driver = Driver(network, rows, DriverSettings(
+            nak_on_command_timeout=False, seed=network.station,
+            duplicate_detection=self._detects_duplicates), listener)
         return End(driver, listener)
 
     @property
@@ -315,11 +316,11 @@ class Bench:
 class Tally:
     """The cases of one kind of transaction, and what came of them."""
 
-    def __init__(self, mode: str, check: str, kind: str) -> None:
+    def __init__(self, mode: str, check: str, kind: str, detects_duplicates: bool = True) -> None:
         self.name = f'{mode} {check} {kind}'
         self.singles = self.pairs = self.unseen = 0
         self.wrong: list[str] = []
-        self._make = partial(Bench, mode, check, kind)
+        self._make = partial(Bench, mode, check, kind, detects_duplicates)
         self._bench = self._make()
 
     def all_singles(self) -> list[Fault]:

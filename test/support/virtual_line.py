@@ -115,11 +115,12 @@ class VirtualLine:
         self.now = 0.0
         self.noise = noise
         self.echoes = False
+        self.on_send: Callable[[bytes, float, int], None] = lambda data, start, receiver: None
         self.char_time = char_time(baud)
         self._machines = list(machines)
         self.propagation = propagation
         self.chunks = [chunk] * len(machines)
-        self._random = Random(seed)
+        self.random = Random(seed)
         self._free = [0.0] * len(machines)  # when each sender's last byte has left
         self._away = [0.0] * len(machines)  # until when
         self._calls = [math.inf] * len(machines)  # when each wants to be called next
@@ -232,16 +233,18 @@ class VirtualLine:
         self._free[sender] = start + len(data) * self.char_time
         for receiver in range(len(self._machines)):
             if receiver != sender or self.echoes:
-                self._send(data, start, receiver)
+                self.send(data, start, receiver)
 
-    def _send(self, data: bytes, start: float, receiver: int) -> None:
+    def send(self, data: bytes, start: float, receiver: int) -> None:
+        """Put bytes on the wire, and tell of them."""
+        self.on_send(data, start, receiver)
         noise = None if self.noise is QUIET else self.noise
         chunk = self.chunks[receiver]
         for at in range(0, len(data), chunk):
             part = data[at:at + chunk]
             here = start + (at + len(part)) * self.char_time + self.propagation
             if noise is not None:
-                part = noise.damage(part, self._random)
+                part = noise.damage(part, self.random)
             if part:
                 self._count += 1  # keeps the order of what arrives at one instant
                 heapq.heappush(self._arrivals, (here, self._count, receiver, part))

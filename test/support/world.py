@@ -471,9 +471,8 @@ class World(DriverBench):
         self._begins = {  # how each write begins on the line, by tag without the station
             row.tag[:-2]: stuff(row.dialect.write(row.address, b'\0\0')[1][:-2])
             for row in self.rows_of(1, ('w', 'free', 'beat'))}
-        self._send, self.line._send = (  # type: ignore[method-assign]
-            self.line._send, self._note_sent)
-        self.line._random = Random(seed)
+        self.line.on_send = self._note_sent
+        self.line.random = Random(seed)
         self.executor_ran = 0.0
         self.open()
 
@@ -504,7 +503,7 @@ class World(DriverBench):
         serve = plc.serve
 
         def execute(command: Packet, *, is_late: bool = False) -> Packet:
-            return self._execute(watched, command, serve, is_late)
+            return self.execute(watched, command, serve, is_late)
 
         plc.serve = execute  # type: ignore[method-assign]
         plc.slave = HalfDuplexSlave(
@@ -597,11 +596,11 @@ class World(DriverBench):
         """Return for how long (s) a gateway may keep a write."""
         return 2 * self.network.line.cmd_timeout
 
-    def _execute(self, watched: WatchedPlc, command: Packet,
-                 serve: Callable[[Packet], Packet], is_late: bool) -> Packet:
+    def execute(self, watched: WatchedPlc, command: Packet,
+                serve: Callable[[Packet], Packet], is_late: bool) -> Packet:
         """Execute a command, unless it is refused; keep what it has written."""
         watched.run_program(self.line.now)
-        now = watched.plc._clock()
+        now = watched.plc.clock()
         self.commands.append((now, watched.plc.station, command))
         if command.data[:1] not in _WRITES:
             return self._read_out(watched, command, serve)
@@ -653,7 +652,6 @@ class World(DriverBench):
         return reply
 
     def _note_sent(self, data: bytes, start: float, receiver: int) -> None:
-        self._send(data, start, receiver)
         if receiver == _FAR and not self.master:
             self.said += data
         if receiver != _FAR or len(data) < _LEAST_COMMAND or \
@@ -893,7 +891,7 @@ class World(DriverBench):
             if row.tag.startswith(('clock', 'held')):
                 length = self.dice.choice([row.length, row.length // 2])
                 self.rows[row.tag] = replace(self.rows[row.tag], length=length)
-        self._mappings = [*self.rows.values()]
+        self.mappings = [*self.rows.values()]
         self.drivers += 1
         self.killed_at = self.opened = self.line.now
         self.said.clear()
@@ -922,14 +920,13 @@ class OtherBridge(DriverBench):
                                     first_tns=world.dice.randrange(0x10000)),
             start=False, chunk=_FIFO)
         self.line.now = world.line.now
-        plc = SimulatedPlc(station, first.plc.table, self.network.checksum, self.clock)
-        plc.processor = first.plc.processor
-        plc._server = plc._make_server('Slave')
+        plc = SimulatedPlc(station, first.plc.table, self.network.checksum, self.clock,
+                           processor=first.plc.processor)
         watched = WatchedPlc(plc, {row.tag: BEAT})
         serve = plc.serve
 
         def execute(command: Packet) -> Packet:
-            return world._execute(watched, command, serve, is_late=False)
+            return world.execute(watched, command, serve, is_late=False)
 
         plc.serve = execute  # type: ignore[method-assign]
         plc.slave = HalfDuplexSlave(

@@ -79,8 +79,8 @@ def test_stations_are_named_by_their_processors() -> None:
 @pytest.mark.long
 def test_run_of_a_bridge_becomes_a_file(
         tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(picture, '_SHOT', 15.0)
-    monkeypatch.setattr(picture, '_STORY', ())
+    monkeypatch.setattr(picture, 'SHOT', 15.0)
+    monkeypatch.setattr(picture, 'STORY', ())
     assert picture.main([str(tmp_path / 'run.svg')]) == 0
     found = texts((tmp_path / 'run.svg').read_text(encoding='utf-8'))
     assert any(text.startswith('/abdf1  ') for text in found)

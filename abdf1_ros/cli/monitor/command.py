@@ -72,7 +72,7 @@ _RENEWAL = 0.25
 # Longest wait (s) of a single picture for promised values, after the node is found.
 _COMPLETION = 3.0
 
-_PROGRESS_PERIOD = 2.0
+PROGRESS_PERIOD = 2.0
 
 # This key draws the whole picture again, after another program wrote to the terminal.
 _CONTROL_L = 12
@@ -121,7 +121,7 @@ class _Ending:
         limit_output()
 
 
-class _Screen:
+class Screen:
     """A terminal that shows lines in place, for curses.wrapper."""
 
     def __init__(self, window: curses.window, keys: str = _KEYS, marked: str = '') -> None:
@@ -272,7 +272,7 @@ def _print_all(plant: PlantWatch, options: argparse.Namespace, has_ended: _Endin
 
 
 def _draw_all(window: curses.window, plant: PlantWatch, has_ended: _Ending, marked: str) -> str:
-    screen = _Screen(window, _PLANT_KEYS, marked)
+    screen = Screen(window, _PLANT_KEYS, marked)
     while not has_ended() and not screen.wants_other_list():
         screen.show_list(render_plant(plant.lines(), time.monotonic(), screen.width))
         plant.wait(has_ended, _RENEWAL)
@@ -300,7 +300,7 @@ def _find(watch: NodeWatch, seconds: float, has_ended: _Ending) -> bool:
     said = time.monotonic()
     while not watch.is_there and not has_ended() and time.monotonic() < end:
         watch.wait(has_ended, 0.1)
-        if time.monotonic() - said >= _PROGRESS_PERIOD:
+        if time.monotonic() - said >= PROGRESS_PERIOD:
             said = time.monotonic()
             _say(f'looking for {watch.name}, {max(0.0, end - said):.0f} s more')
     return watch.is_there
@@ -347,7 +347,7 @@ def _is_screen() -> bool:
 
 
 def _draw(window: curses.window, watch: NodeWatch, has_ended: _Ending) -> None:
-    screen = _Screen(window)
+    screen = Screen(window)
     while not has_ended() and not screen.wants_end():
         screen.show(_picture(watch, screen.width))
         watch.wait(has_ended, _RENEWAL)

@@ -31,7 +31,7 @@ from abdf1_ros.text import by_number, counted, cut, printable
 from diagnostic_msgs.msg import DiagnosticArray
 
 _NAME_WIDTH = 34
-_COLUMNS = ('state', 5, 'state'), ('load', 5, 'line load'), ('cycle', 8, 'poll cycle with Periods')
+COLUMNS = ('state', 5, 'state'), ('load', 5, 'line load'), ('cycle', 8, 'poll cycle with Periods')
 
 
 @dataclass(frozen=True, slots=True)
@@ -116,10 +116,10 @@ def render_plant(lines: Iterable[LineState], now: float, width: int) -> list[Tex
     name_width = max(map(len, ['line', *names]))
 
     def row(name: str, values: dict[str, str], text: str) -> str:
-        cells = '  '.join(f'{printable(values.get(key, "")):>{size}}' for _, size, key in _COLUMNS)
+        cells = '  '.join(f'{printable(values.get(key, "")):>{size}}' for _, size, key in COLUMNS)
         return cut(f'  {name:<{name_width}}  {cells}  {printable(text)}'.rstrip(), width)
 
-    titles = {key: title for title, _, key in _COLUMNS}
+    titles = {key: title for title, _, key in COLUMNS}
     title = f'{counted(len(found), "line")}: {told}' if found else \
         'no line is heard; diagnostics come every second'
     return [TextLine(cut(title, width), Style.TITLE),

@@ -46,12 +46,12 @@ _LEAST_VALUE_WIDTH = 12
 _STATION = 'station '
 # Words for values of the link in the second line.
 _FACTS = (('load', 'line load'), ('cycle', 'poll cycle with Periods'))
-_LINK_KEYS = ('settings', 'transactions per second', 'line load', 'poll cycle with Periods',
-              'longest poll cycle with Periods', 'expected poll cycle, line time alone')
+LINK_KEYS = ('settings', 'transactions per second', 'line load', 'poll cycle with Periods',
+             'longest poll cycle with Periods', 'expected poll cycle, line time alone')
 _PERIOD = 'period '  # beginning of keys of the link about a Period
-_LOAD_BY_TOPIC = 'line load by topic'
-_STATION_KEYS = ('last answer', 'transactions without reply', 'error replies', 'processor',
-                 'mode', 'faults')
+LOAD_BY_TOPIC = 'line load by topic'
+STATION_KEYS = ('last answer', 'transactions without reply', 'error replies', 'processor',
+                'mode', 'faults')
 
 
 class Style(Enum):
@@ -251,7 +251,7 @@ def _link(snapshot: NodeView, width: int) -> Iterator[TextLine]:
     for status in _section(snapshot, 'link'):
         yield from _summary('link', status, width)
         periods = [key for key in status.values if key.startswith(_PERIOD)]
-        yield from _table(status.values, [*_LINK_KEYS, *periods], width)
+        yield from _table(status.values, [*LINK_KEYS, *periods], width)
         error = status.values.get('last error', 'none')
         if error != 'none':
             yield from _wrapped(f'last error: {error}', width, Style.WARNING)
@@ -266,7 +266,7 @@ def _stations(snapshot: NodeView, width: int) -> Iterator[TextLine]:
     for status in snapshot.statuses:
         if status.section.startswith(_STATION):
             yield from _summary(status.section, status, width)
-            yield from _table(status.values, _STATION_KEYS, width)
+            yield from _table(status.values, STATION_KEYS, width)
 
 
 @dataclass(frozen=True, slots=True)
@@ -328,7 +328,7 @@ def _values(snapshot: NodeView, now: float, width: int, bars: str) -> Iterator[T
 
 def _loads(snapshot: NodeView) -> dict[str, str]:
     """Return the part of the line's time for each topic, by its name."""
-    told = ', '.join(status.values.get(_LOAD_BY_TOPIC, '')
+    told = ', '.join(status.values.get(LOAD_BY_TOPIC, '')
                      for status in _section(snapshot, 'link'))
     pairs = (entry.rpartition(' ') for entry in printable(told).split(', '))
     return {topic: load for topic, _, load in pairs}

@@ -60,7 +60,7 @@ _WORDS = {'Peer': 'full duplex', 'Master': 'half duplex',
 # Number of echoes that show a radio modem line, and the time (s) within which a full-duplex PLC
 # sends ENQ for a missing ACK (M 7-25, 7-27).
 _RADIO_ECHOES = 3
-_ENQ_TIME = 5.0
+ENQ_TIME = 5.0
 
 ROUNDS = 2
 """Number of attempts with the same settings: a lost frame does not prove absence."""
@@ -171,7 +171,7 @@ class Search:
         with Session(settings.on(self._network)) as session:
             if not all(understands(session, station) for _ in range(_RADIO_ECHOES)):
                 return False
-            time.sleep(_ENQ_TIME)
+            time.sleep(ENQ_TIME)
             seen = session.counters
             return not seen.acks_received + seen.naks_received + seen.enqs_received
 

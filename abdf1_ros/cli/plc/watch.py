@@ -47,7 +47,7 @@ from abdf1_ros.text import bar, BARS, cut, printable
 _GLANCE = 250
 
 # Most values that wait to be shown; older values are dropped and counted.
-_MAX_NEWS = 1000
+MAX_NEWS = 1000
 
 # Period (s) of questions for the mode of a PLC.
 _MODE_PERIOD = 3.0
@@ -64,18 +64,18 @@ _VALUE_AND_CURVE = f'value, and its last {_CURVE} reads'
 
 
 @dataclass(frozen=True, slots=True)
-class _NoValue:
+class NoValue:
     """The reason for a missing value."""
 
     error: str
 
 
-class _WatchedRead(NamedTuple):
+class WatchedRead(NamedTuple):
     """The result of a read, with its time."""
 
     when: datetime
     mapping: Mapping
-    what: Values | _NoValue
+    what: Values | NoValue
 
 
 class LiveValues:
@@ -110,11 +110,11 @@ class LiveValues:
             port, self._trace = traced(record, PortSettings.of(network), network.error_code,
                                        network.duplex, port, partial(tell, 'plc'))
         self._link = LinkThread(self._driver.machine, port)
-        self._news: deque[_WatchedRead] = deque(maxlen=_MAX_NEWS)
+        self._news: deque[WatchedRead] = deque(maxlen=MAX_NEWS)
         self._lost = self._lost_reported = 0
         self._has_news = Wake()  # not an Event: an interrupt in it may leave its lock locked
         self._reads: Counter[Mapping] = Counter()
-        self._shown: dict[Mapping, Values | _NoValue] = {}
+        self._shown: dict[Mapping, Values | NoValue] = {}
         self._height = 0
         self._size: tuple[int, int] | None = None
 
@@ -131,8 +131,8 @@ class LiveValues:
             while not self._link.has_failed and not self._is_done(count):
                 self._has_news.wait(_GLANCE)
                 self._has_news.take()
-                self._show()
-            self._show()
+                self.show()
+            self.show()
         except KeyboardInterrupt:
             pass
         finally:
@@ -147,8 +147,8 @@ class LiveValues:
 
     def read(self, mapping: Mapping, values: Values) -> None:
         """Record the values of a read; called in the link thread."""
-        self._lost += len(self._news) == _MAX_NEWS
-        self._news.append(_WatchedRead(datetime.now(), mapping, values))
+        self._lost += len(self._news) == MAX_NEWS
+        self._news.append(WatchedRead(datetime.now(), mapping, values))
         self._reads[mapping] += 1
         self._has_news.set()
 
@@ -168,8 +168,8 @@ class LiveValues:
         return all(self._reads[mapping] + points[mapping].failures >= count
                    for mapping in self._mappings)
 
-    def _show(self) -> None:
-        changed: list[_WatchedRead] = []
+    def show(self) -> None:
+        changed: list[WatchedRead] = []
         while self._news:
             changed.append(self._news.popleft())
         is_live = is_terminal(sys.stdout) and not self._csv
@@ -179,16 +179,16 @@ class LiveValues:
         for mapping in self._mappings:
             error = self._driver.points[mapping].error
             if error is not None:
-                changed.append(_WatchedRead(datetime.now(), mapping, _NoValue(error)))
+                changed.append(WatchedRead(datetime.now(), mapping, NoValue(error)))
         if self._csv:
             self._print_csv(changed)
         elif is_live:
-            self._note_changes(changed)
-            self._redraw()
+            self.note_changes(changed)
+            self.redraw()
         else:
             self._print(changed)
 
-    def _print(self, changed: Sequence[_WatchedRead]) -> None:
+    def _print(self, changed: Sequence[WatchedRead]) -> None:
         """Print the rows of each mapping that changed since the last call."""
         for when, mapping, what in changed:
             if mapping not in self._shown or self._shown[mapping] != what:
@@ -197,14 +197,14 @@ class LiveValues:
                 for address, text in self._rows(mapping):
                     print(f'{time}  {address}  {text}', flush=True)
 
-    def _print_csv(self, news: Sequence[_WatchedRead]) -> None:
+    def _print_csv(self, news: Sequence[WatchedRead]) -> None:
         """Print each value with date, time and address; empty for a read that has failed."""
         for when, mapping, what in news:
             time = when.isoformat(timespec='milliseconds')
-            if isinstance(what, _NoValue) and self._shown.get(mapping) == what:
+            if isinstance(what, NoValue) and self._shown.get(mapping) == what:
                 continue  # print a failure once only
             self._shown[mapping] = what
-            texts = [''] if isinstance(what, _NoValue) else \
+            texts = [''] if isinstance(what, NoValue) else \
                 [_quoted(printable(what))] if isinstance(what, str) else \
                 value_texts(mapping, what, self._radix)
             for number, text in enumerate(texts):
@@ -213,14 +213,14 @@ class LiveValues:
                     _quoted(tag_of(mapping, number, self._tags))]
                 print(time, mapping.station, place, *tag, text, sep=',', flush=True)
 
-    def _note_changes(self, news: Sequence[_WatchedRead]) -> None:
+    def note_changes(self, news: Sequence[WatchedRead]) -> None:
         """Record the values to show, and the times of their last changes."""
         for _, mapping, what in news:
             before = self._shown.get(mapping)
             if before is not None and before != what:
                 self._changed[mapping] = self._driver.machine.now
             self._shown[mapping] = what
-            if isinstance(what, _NoValue):
+            if isinstance(what, NoValue):
                 # one gap per silence, so that the curve keeps the values before it
                 if before != what:
                     self._past[mapping].append(math.nan)
@@ -232,7 +232,7 @@ class LiveValues:
         what, names = self._shown.get(mapping), self._names[mapping]
         if what is None:
             return [(names[0], '')]
-        if isinstance(what, _NoValue):
+        if isinstance(what, NoValue):
             text = f'no value: {printable(what.error)}'
             lines = textwrap.wrap(text, room) if room else [text]
             return [(names[0] if line is lines[0] else '', line) for line in lines]
@@ -268,14 +268,14 @@ class LiveValues:
             yield printable(f'station {station}: {health.processor}{stands}'
                             + (f'; {faults}' if faults else ''))
 
-    def _faults_of_line(self) -> list[str]:
+    def faults_of_line(self) -> list[str]:
         """Return the repetitions and damaged frames so far; empty if there were none."""
         counters = self.counters
         repeated = counters.nak_retries + counters.enq_retries
         damaged = counters.bcc_errors + counters.crc_errors
         return [f'line: {repeated} repeated, {damaged} damaged'] if repeated or damaged else []
 
-    def _redraw(self) -> None:
+    def redraw(self) -> None:
         """Draw the table over the table before."""
         size = width, height = shutil.get_terminal_size()
         heads = [self._head(mapping) for mapping in self._mappings]
@@ -295,7 +295,7 @@ class LiveValues:
             cells.append((name, *head, text, printable(mapping.description)))
             cells += [(name, *[''] * len(head), text, '') for name, text in more]
         lines = _with_descriptions(('address', *titles, value), cells, width - taken)
-        above, below = [*self._modes()], self._faults_of_line()
+        above, below = [*self._modes()], self.faults_of_line()
         left = height - 1 - len(above) - len(below)
         if len(lines) > left:
             hidden = len(lines) - (left - 1)

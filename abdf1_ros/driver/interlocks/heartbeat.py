@@ -60,7 +60,7 @@ class BeatState(Enum):
     CONFLICT = '0, because another program writes this word'
 
 
-class _OtherWriter:
+class OtherWriter:
     """
     What we know of another writer of our heartbeat word, mostly a bridge (rule 19).
 
@@ -134,8 +134,8 @@ class HeartbeatRow:
         self._timeout = (mapping.condition and mapping.condition.timeout or 0) / 1000
         self._period = mapping.period / 1000
         self._is_confirmed = False
-        self._next = -math.inf
-        self._other = _OtherWriter(self._period, dice)
+        self.next_beat = -math.inf
+        self._other = OtherWriter(self._period, dice)
         self._holds_at = math.inf  # until when all ``topics`` have a message in time
 
     def why_not(self, now: float) -> str:
@@ -178,7 +178,7 @@ class HeartbeatRow:
 
     def _write_zero(self, now: float) -> None:
         self._is_confirmed, self.is_first_try = False, True
-        self._next = self.due = now
+        self.next_beat = self.due = now
 
     def end(self, now: float) -> None:
         """Let 0 be written at the end, also a second time if another write may still land."""
@@ -232,7 +232,7 @@ class HeartbeatRow:
         ``executor`` is when the executor ran last.
         """
         self.reason, self._holds_at = why_held, self.topics_until(messages)
-        if self.state is BeatState.SHOWN and now >= self._next:
+        if self.state is BeatState.SHOWN and now >= self.next_beat:
             self.state = BeatState.COUNTS
         if why_held:
             self.hold()
@@ -244,17 +244,17 @@ class HeartbeatRow:
             self.due = now
             return True
         elif self.state in (BeatState.HELD, BeatState.CONFLICT):
-            again = self._next if self.value == 0 else now
+            again = self.next_beat if self.value == 0 else now
             self.due = self.words.again_at if self.is_at_rest else again
         elif self.state is BeatState.SHOWN:
-            self.due = min(self._next, self.words.again_at)
+            self.due = min(self.next_beat, self.words.again_at)
         elif self.state is not BeatState.COUNTS:
-            self.due = self._next
+            self.due = self.next_beat
         else:
-            self.due = self._next
+            self.due = self.next_beat
             if now >= self.executor_until(executor):
                 self.reason = 'the executor of the node stands still'  # nothing is written then
-                self.due = max(self._next, now + _GLANCE)
+                self.due = max(self.next_beat, now + _GLANCE)
             if self.value:
                 self.due = min(self.due, self._holds_at)
         return self.due <= now and self.state is not BeatState.SHOWN
@@ -293,7 +293,7 @@ class HeartbeatRow:
             self.state = BeatState.CONFLICT
         self.begin(now)
         if was_known:
-            self._next = self.due = now + self._other.next_zero()
+            self.next_beat = self.due = now + self._other.next_zero()
             return ''
         if is_again:
             return (f'another program writes this word: {text}; the bridge writes 0 until the '
@@ -319,7 +319,7 @@ class HeartbeatRow:
             self.value, self._is_confirmed = before % LARGEST + 1, False
         # The other bridge has to see our 0 between two of its own values.
         is_urgent = self.wants_zero and self.state is not BeatState.CONFLICT
-        self._next = now + (min(self._period, _REPEAT_ZERO) if is_urgent else self._period)
+        self.next_beat = now + (min(self._period, _REPEAT_ZERO) if is_urgent else self._period)
         return Write(self.mapping, [self.value], now)
 
     def ended(self, outcome: Outcome, now: float) -> None:
@@ -333,7 +333,7 @@ class HeartbeatRow:
             return
         self.words.plan_again(self.tried)
         if self.state is not BeatState.CONFLICT:
-            self._next = now + max(self._period, _LEAST_ZERO) + self._other.take_extra_zero()
+            self.next_beat = now + max(self._period, _LEAST_ZERO) + self._other.take_extra_zero()
         if self.state is BeatState.CONTACT:
             self.state = BeatState.SHOWN
         if self.words.are_guests:

@@ -102,15 +102,15 @@ class Interlocks(WriteListener):
                            for mapping in mappings.heartbeats]
         self.fallbacks = [FallbackRow(record.words_of(mapping))
                           for mapping in mappings.fallbacks]
-        self._conditions = Conditions()
+        self.conditions = Conditions()
         rows: list[OwnRow] = [*self.heartbeats, *self.fallbacks]
         stations_of = {row: _OURS if row.mapping.serves else row.mapping.station for row in rows}
-        self._plcs = {number: Plc(
+        self.plcs = {number: Plc(
             number, [row for row in rows if stations_of[row] == number], writing.stations, record,
-            self._conditions)
+            self.conditions)
             for number in dict.fromkeys((_OURS, *stations_of.values()))}
-        self._plc_of = {row: self._plcs[number] for row, number in stations_of.items()}
-        self.ours = self._plcs.pop(_OURS)
+        self._plc_of = {row: self.plcs[number] for row, number in stations_of.items()}
+        self.ours = self.plcs.pop(_OURS)
         self._by_mapping = {row.mapping: row for row in self.fallbacks}
         self._writes = writes
         self._writing = writing
@@ -125,13 +125,13 @@ class Interlocks(WriteListener):
     @property
     def is_ending(self) -> bool:
         """Tell whether the bridge is to end."""
-        return self._conditions.is_ending
+        return self.conditions.is_ending
 
     # What happens
 
     def executor_ran(self, now: float) -> None:
         """Record that the executor runs: a hung process must not look alive (rule 3 c)."""
-        self._conditions.executor = now
+        self.conditions.executor = now
 
     def wind_down(self) -> None:
         """
@@ -140,11 +140,11 @@ class Interlocks(WriteListener):
         Then the caller has to wake the link. ``is_over`` tells whether all these writes are done;
         ``unconfirmed`` returns the rows that are not confirmed.
         """
-        self._conditions.is_ending = True
+        self.conditions.is_ending = True
 
     def resume(self) -> None:
         """Continue after ``wind_down``: the next opening of the port is a first contact."""
-        self._conditions.is_ending, self._conditions.ended = False, math.inf
+        self.conditions.is_ending, self.conditions.ended = False, math.inf
         for row in self._plc_of:
             row.words.resume()
 
@@ -156,15 +156,15 @@ class Interlocks(WriteListener):
         Stations that were active when the end began have confirmed all their rows. At silent
         stations each row has had its try.
         """
-        return not self._plc_of or self._conditions.are_all_due and not any(
+        return not self._plc_of or self.conditions.are_all_due and not any(
             row.mapping.station in self._awaited or row.is_under_way
-            or row.tried < self._conditions.ended
+            or row.tried < self.conditions.ended
             for row in self._plc_of if not row.is_confirmed)
 
     def unconfirmed(self) -> list[str]:
         """Return the tags of rows that are not confirmed at the end, or may be overwritten."""
         now = self._writing.record.line.now
-        held = {row.mapping.tag: row.words.lands_until - now for plc in self._plcs.values()
+        held = {row.mapping.tag: row.words.lands_until - now for plc in self.plcs.values()
                 for row in plc.rows if row.is_confirmed and row.words.lands_until > now}
         return [*(row.mapping.tag for row in self._plc_of if not row.is_confirmed), *(
             f'{tag} (a gateway may hold a write to it for {seconds:.1f} s)'
@@ -177,19 +177,19 @@ class Interlocks(WriteListener):
             for row in self.fallbacks:
                 row.make_due(FallbackCause.START, now)
         self._has_begun = True
-        for plc in self._plcs.values():
+        for plc in self.plcs.values():
             plc.contact(now, is_new=True)
         self.ours.plan()
 
     def contact(self, station: int, now: float) -> None:
         """Begin a first contact with a station that is active again (rules 2, 8)."""
-        if self._has_begun and station in self._plcs:
-            self._plcs[station].contact(now)
+        if self._has_begun and station in self.plcs:
+            self.plcs[station].contact(now)
 
     def mode_seen(self, station: int, is_running: bool, now: float) -> None:
         """Record the mode of a station; a change to RUN is a first contact (rules 2, 8)."""
-        if station in self._plcs:
-            self._plcs[station].mode_seen(is_running, now)
+        if station in self.plcs:
+            self.plcs[station].mode_seen(is_running, now)
 
     def words_read(self, block: Block, data: bytes, started: float) -> None:
         """Compare the heartbeats of a block that was read from ``started`` on (rule 19)."""
@@ -203,7 +203,7 @@ class Interlocks(WriteListener):
 
     def message_came(self, write: Write) -> None:
         """Record an accepted message (rule 3 d)."""
-        topic, messages = write.mapping.topic, self._conditions.messages
+        topic, messages = write.mapping.topic, self.conditions.messages
         for beat in self.heartbeats:
             if topic in beat.topics:
                 if beat.missing(messages, write.requested):
@@ -215,7 +215,7 @@ class Interlocks(WriteListener):
     def is_overruled(self, write: Write) -> bool:
         """Tell whether the end has begun, or a fallback was sent after a message (rules 5, 9)."""
         row = self._by_mapping.get(write.mapping)
-        return row is not None and (self._conditions.are_all_due or write.requested <= row.sent)
+        return row is not None and (self.conditions.are_all_due or write.requested <= row.sent)
 
     def is_put_off(self, write: Write) -> bool:
         """
@@ -240,23 +240,23 @@ class Interlocks(WriteListener):
     def write_ended(self, claim: Claim) -> None:
         """Record how any write ended: fallbacks may wait for its end (rules 7, 9)."""
         now = self._writing.record.line.now
-        if claim.station in self._plcs:
-            self._plcs[claim.station].write_ended(claim, now)
+        if claim.station in self.plcs:
+            self.plcs[claim.station].write_ended(claim, now)
         rows: list[OwnRow] = []
         if claim.write is None:
-            rows += (row for plc in self._plcs.values() for row in plc.rows
+            rows += (row for plc in self.plcs.values() for row in plc.rows
                      if claim.meets(row.mapping.extent))
         elif claim.write.mapping in self._by_mapping and not claim.write.is_own:
             rows.append(self._by_mapping[claim.write.mapping])
         for row in rows:
             row.write_ended(claim, now)
             if isinstance(row, FallbackRow):
-                if not row.stands and self._conditions.are_all_due:
+                if not row.stands and self.conditions.are_all_due:
                     row.make_due(FallbackCause.END, now)
                 elif row.stands and row.refresh_at <= now:
                     self._plan_refresh(row, now)
             self._plc_of[row].look_again(row)
-        for plc in self._plcs.values():
+        for plc in self.plcs.values():
             plc.release()
 
     def write_expired(self, write: Write) -> None:
@@ -271,16 +271,16 @@ class Interlocks(WriteListener):
              only_active: bool = False) -> OwnWrite | None:
         """Return the next own write, None for none; ``only_active``: not for silent PLCs."""
         self.expire(now)
-        if self._conditions.are_all_due:
+        if self.conditions.are_all_due:
             # Silent PLCs have no later chance, but PLCs that answer go first.
             only_active |= any(row.is_under_way and plc.is_active
                                for row, plc in self._plc_of.items())
             self._writing.stations.probes.keep_none_waiting(now)
-        if now < min(map(_due_of, self._plcs.values()), default=math.inf):
+        if now < min(map(_due_of, self.plcs.values()), default=math.inf):
             return None
         best: tuple[TurnRank, Plc, OwnRow] | None = None
         youngest: dict[Mapping, float] | None = None
-        for plc in self._plcs.values():
+        for plc in self.plcs.values():
             if plc.due > now or plc.station in busy or only_active and not plc.is_active:
                 continue
             youngest = self._writes.youngest() if youngest is None else youngest
@@ -304,7 +304,7 @@ class Interlocks(WriteListener):
         row.due = math.inf
         plc.plan()
         return OwnWrite(row, write, self._writing, self, expires, is_free=is_first,
-                        is_last=self._conditions.are_all_due and not plc.is_active)
+                        is_last=self.conditions.are_all_due and not plc.is_active)
 
     def refresh(self, now: float, busy: Container[int] = ()) -> OwnWrite | None:
         """
@@ -371,7 +371,7 @@ class Interlocks(WriteListener):
         """Do the work that needs no line: begin the end, store due fallbacks of our own table."""
         if not self._has_begun:
             return
-        if self.is_ending and not self._conditions.are_all_due:
+        if self.is_ending and not self.conditions.are_all_due:
             self._make_all_due(now)
         if now < self.ours.due:
             return
@@ -388,16 +388,16 @@ class Interlocks(WriteListener):
         for row in self.fallbacks:
             self._writes.drop('fallback', now, row.mapping)
             row.end(now)
-        self._awaited = frozenset(plc.station for plc in self._plcs.values() if plc.is_active)
+        self._awaited = frozenset(plc.station for plc in self.plcs.values() if plc.is_active)
         for beat in self.heartbeats:
             beat.end(now)
-        self._conditions.ended = now
-        for plc in (*self._plcs.values(), self.ours):
+        self.conditions.ended = now
+        for plc in (*self.plcs.values(), self.ours):
             plc.plan()
 
     def next_due(self) -> float:
         """Return when the next write is due (clock value in s), infinite for never."""
         due = self._refreshes[0][0] if self._refreshes else math.inf
-        for plc in self._plcs.values():
+        for plc in self.plcs.values():
             due = plc.next_due(due)
         return due

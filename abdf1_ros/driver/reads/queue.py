@@ -54,21 +54,22 @@ class ReadQueue:
     """
     All read jobs; the jobs of one period are in the order in which they are due.
 
-    ``jobs`` are all jobs, also jobs that are set aside or under way.
+    ``jobs`` are all jobs, also jobs that are set aside or under way. ``heaps`` has the entries by
+    period; an entry is void if its job has another ticket.
     """
 
     def __init__(self) -> None:
         self.jobs: set[ReadJob] = set()
         self._poll_cycle = 0.0
         self._wanted: list[_QueueEntry] = []
-        self._heaps: dict[float, list[_QueueEntry]] = {_WANTED: self._wanted}
+        self.heaps: dict[float, list[_QueueEntry]] = {_WANTED: self._wanted}
         self._wanted_from = -math.inf  # until then other due reads go first (clock value in s)
         self._tickets = itertools.count(1)
         self._turn = 0
 
     def __bool__(self) -> bool:
         """Tell whether a job waits, due or not."""
-        return any(self._heaps.values())
+        return any(self.heaps.values())
 
     def replace(self, old: Iterable[ReadJob], new: Iterable[ReadJob], now: float) -> None:
         """Forget ``old`` jobs and add ``new`` ones, all due at once."""
@@ -87,7 +88,7 @@ class ReadQueue:
             return
         job.due, job.ticket = due, next(self._tickets)
         is_wanted = job.wanted > -math.inf
-        heap = self._heaps.setdefault(_WANTED if is_wanted else job.block.period, [])
+        heap = self.heaps.setdefault(_WANTED if is_wanted else job.block.period, [])
         heapq.heappush(heap, (due, job.ticket, job))
         if len(heap) > _MOST_ENTRIES * len(self.jobs):
             # A refresh of a slow read leaves an old entry, which would stay until its old due
@@ -97,7 +98,7 @@ class ReadQueue:
 
     def waiting(self) -> list[ReadJob]:
         """Return the jobs that wait, due or not."""
-        return [job for heap in self._heaps.values() for _, ticket, job in heap
+        return [job for heap in self.heaps.values() for _, ticket, job in heap
                 if ticket == job.ticket]
 
     def take(self, now: float) -> ReadJob | None:
@@ -146,7 +147,7 @@ class ReadQueue:
     def _heaps_due(self, now: float) -> list[list[_QueueEntry]]:
         """Return the heaps that begin with a job that is due, each with a valid entry."""
         heaps = []
-        for heap in self._heaps.values():
+        for heap in self.heaps.values():
             while heap and heap[0][1] != heap[0][2].ticket:
                 heapq.heappop(heap)
             if heap and heap[0][0] <= now:

@@ -33,22 +33,26 @@ from abdf1_ros.driver.record import Claim, WriteListener
 
 
 class Reads(WriteListener):
-    """Keep all read jobs; ``stations.probes`` decides when a silent station may be read."""
+    """
+    Keep all read jobs; ``stations.probes`` decides when a silent station may be read.
+
+    ``queue`` has the jobs that wait for their time, ``aside`` those of silent stations.
+    """
 
     def __init__(self, stations: ActiveStationList) -> None:
         self._stations = stations
-        self._due = ReadQueue()
-        self._aside: dict[int, deque[ReadJob]] = {}
+        self.queue = ReadQueue()
+        self.aside: dict[int, deque[ReadJob]] = {}
         self._put_off = 0.0  # no probe before it: no station replies (clock value, s)
 
     @property
     def jobs(self) -> frozenset[ReadJob]:
-        return frozenset(self._due.jobs)
+        return frozenset(self.queue.jobs)
 
     @property
     def has_silent(self) -> bool:
         """Tell whether reads of silent stations wait for their probe."""
-        return bool(self._aside)
+        return bool(self.aside)
 
     @property
     def poll_cycle(self) -> float | None:
@@ -64,25 +68,25 @@ class Reads(WriteListener):
 
     def replace(self, old: Iterable[ReadJob], new: Iterable[ReadJob], now: float) -> None:
         """Put ``new`` jobs, due at once, in the place of ``old`` ones."""
-        self._due.replace(old, new, now)
+        self.queue.replace(old, new, now)
 
     def want(self, job: ReadJob, now: float) -> None:
         """Make a read that a call has asked for due at once; add it if it is new."""
         job.wanted = now
-        if job not in self._due.jobs:
-            self._due.replace((), [job], now)
+        if job not in self.queue.jobs:
+            self.queue.replace((), [job], now)
         elif job.ticket:  # else it is under way, or set aside
-            self._due.put(job, now)
+            self.queue.put(job, now)
 
     def drop(self, jobs: Iterable[ReadJob], now: float) -> None:
         """Forget reads."""
-        self._due.replace(jobs, (), now)
+        self.queue.replace(jobs, (), now)
 
     def begin(self, now: float) -> None:
         """Make all reads due at once: the port has been opened."""
-        waiting = self._due.jobs.difference(*self._aside.values())
+        waiting = self.queue.jobs.difference(*self.aside.values())
         for job in sorted(waiting, key=lambda job: (job.due, job.ticket)):
-            self._due.put(job, now)
+            self.queue.put(job, now)
 
     def next(self, now: float, busy: Container[int] = ()) -> ReadJob | None:  # noqa: A003
         """
@@ -90,12 +94,12 @@ class Reads(WriteListener):
 
         The read is for a station that answers and is not ``busy``.
         """
-        if self._aside:
+        if self.aside:
             self.find_due(now)  # a station may have become silent by another command
             if job := self._probe(now, busy):
                 return job
         passed_over = []
-        while (job := self._due.take(now)) is not None:
+        while (job := self.queue.take(now)) is not None:
             if not self._stations.records[job.station].replies_in_time:
                 self._set_aside(job)
             elif job.station in busy:
@@ -104,7 +108,7 @@ class Reads(WriteListener):
                 job.is_probe = False
                 break
         for other in passed_over:
-            self._due.put(other, other.due)
+            self.queue.put(other, other.due)
         return job
 
     def next_proven(self, due: float, busy: Container[int]) -> tuple[ReadJob | None, bool]:
@@ -114,7 +118,7 @@ class Reads(WriteListener):
         Return also whether such a read waits for a ``busy`` station.
         """
         passed_over, is_kept_waiting = [], False
-        while (job := self._due.take(due)) is not None:
+        while (job := self.queue.take(due)) is not None:
             station = self._stations.records[job.station]
             is_proven = station.replies > 0 and station.replies_in_time
             if is_proven and job.station not in busy:
@@ -123,41 +127,41 @@ class Reads(WriteListener):
             is_kept_waiting |= is_proven
             passed_over.append(job)
         for other in passed_over:
-            self._due.put(other, other.due)
+            self.queue.put(other, other.due)
         return job, is_kept_waiting
 
     def _probe(self, now: float, busy: Container[int]) -> ReadJob | None:
         """Return the next read of a silent station, None while no probe may be sent."""
-        for number in list(self._aside):
+        for number in list(self.aside):
             if self._stations[number].replies_in_time:  # e.g. to a write or a guest
                 self.release(number, now)
         if now < self._next_probe():
             return None
-        station = next((number for number in self._aside
+        station = next((number for number in self.aside
                         if number not in busy and not self._stations.is_polled(number)), None)
         if station is None:
             return None
-        jobs = self._aside.pop(station)
+        jobs = self.aside.pop(station)
         job = jobs.popleft()
         job.due, job.is_probe = now, True
         if jobs:
             # moved to the end, so that the next probe goes to another station
-            self._aside[station] = jobs
+            self.aside[station] = jobs
         return job
 
     def find_due(self, now: float) -> bool:
         """Set reads of silent stations aside; return True if another read is due."""
-        while (job := self._due.first(now)) is not None:
+        while (job := self.queue.first(now)) is not None:
             if self._stations[job.station].replies_in_time:
                 return True
-            self._due.take(now)
+            self.queue.take(now)
             self._set_aside(job)
         return False
 
     def next_due(self) -> float:
         """Return when the next read or probe is due (clock value in s), infinite for never."""
-        due = self._due.next_due()
-        if all(map(self._stations.is_polled, self._aside)):
+        due = self.queue.next_due()
+        if all(map(self._stations.is_polled, self.aside)):
             return due
         return min(due, self._next_probe())
 
@@ -166,50 +170,50 @@ class Reads(WriteListener):
 
     def ended(self, job: ReadJob, now: float) -> None:
         """Take a job back after a good or failed read, unless it has been replaced."""
-        if job not in self._due.jobs:
+        if job not in self.queue.jobs:
             return
         station = self._stations.records[job.station]
         if not station.replies_in_time:
             self._stations.tried(job.station, job.asked, now, was_silent=job.is_probe)
-            self._put_off = now if self._due else now + job.block.period
+            self._put_off = now if self.queue else now + job.block.period
             self._set_aside(job)
             return
-        if self._aside:
+        if self.aside:
             self.release(job.station, now)
         if job.is_unfinished:
-            self._due.put(job, job.due)
+            self.queue.put(job, job.due)
         elif job.started < job.refreshed or job.started < job.wanted:  # before the write or call
-            self._due.put(job, now)
+            self.queue.put(job, now)
         elif job.is_on_demand:
             self.drop([job], now)
         else:
-            self._due.put(job, max(job.due + job.block.period, job.started))
+            self.queue.put(job, max(job.due + job.block.period, job.started))
 
     def write_ended(self, claim: Claim) -> None:
         """Make the reads of all words that the write may have changed due at once."""
         now = claim.done
         if not claim.has_changed or claim.write is not None and claim.write.mapping.is_heartbeat:
             return
-        for job in self._due.jobs:
+        for job in self.queue.jobs:
             if claim.meets(job.extent):
                 job.refreshed = now
                 if job.due > now:
-                    self._due.put(job, now)
+                    self.queue.put(job, now)
 
     def go_first(self, points: Set[ReadPoint]) -> None:
         """Let the waiting reads of these points go before all others."""
-        for job in self._due.waiting():
+        for job in self.queue.waiting():
             if not points.isdisjoint(job.points):
-                self._due.put(job, -math.inf)
+                self.queue.put(job, -math.inf)
 
     def release(self, station: int, now: float) -> None:
         """Make the reads of a station that were set aside due at once."""
-        for job in self._aside.pop(station, ()):
-            self._due.put(job, now)
+        for job in self.aside.pop(station, ()):
+            self.queue.put(job, now)
 
     def _set_aside(self, job: ReadJob) -> None:
         job.interrupted()
         if job.is_on_demand:  # no call waits for the station to come back
             self.drop([job], job.due)
             return
-        self._aside.setdefault(job.station, deque()).append(job)
+        self.aside.setdefault(job.station, deque()).append(job)

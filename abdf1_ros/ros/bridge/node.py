@@ -107,26 +107,26 @@ class BridgeNode(AnsweringNode):
         self._opener = self._make_opener(configuration)
         self.writes = WriteTopics(self)
         names = graph.name_watch(self, is_spare=configuration.parameters.standby)
-        self._surroundings = Surroundings(
+        self.surroundings = Surroundings(
             self, graph, names, self._opener,
             OfferedPublisher(self, DiagnosticStatus, '~/write_results', results_qos(),
                              most=MAX_WAITING_WRITES),
             OfferedPublisher(self, UInt16MultiArray, '~/active_stations', latched_qos(), most=1),
             self.create_publisher(DiagnosticArray, '/diagnostics', 10),
             OfferedPublisher(self, DiagnosticArray, '~/snapshot', 1, most=1), self.writes)
-        self._standby = Standby(self._surroundings, lambda: self.session, (
+        self.standby = Standby(self.surroundings, lambda: self.session, (
             Service('~/reset_counters', Trigger, self._reset_counters),
             Service('~/reload', Trigger, self._reload),
-            Service('~/polling', SetBool, self._set_polling, stays=True),
+            Service('~/polling', SetBool, self.set_polling, stays=True),
             Service('~/read_link_counters', Trigger, self._read_link_counters,
                     MutuallyExclusiveCallbackGroup())))
         if configuration.parameters.standby:
             self.get_logger().info('waits for the line; offers no topics and services until then')
         else:
-            self._standby.offer()
-        self.session = BridgeSession(self._surroundings, configuration)
+            self.standby.offer()
+        self.session = BridgeSession(self.surroundings, configuration)
         self.writes.give_to(self.session.writers)
-        self.link = self._surroundings.link = LinkThread(
+        self.link = self.surroundings.link = LinkThread(
             self.session.driver.machine, self._opener.open,
             on_state=self._port_changed, on_fault=self._fault,
             while_sending=self.session.reads.publish_later_values)
@@ -152,7 +152,7 @@ class BridgeNode(AnsweringNode):
     def start(self) -> None:
         """Open the port and begin to read."""
         self.link.start()
-        if self._surroundings.is_offered:
+        if self.surroundings.is_offered:
             self.session.guests.start()
 
     def begin_end(self) -> None:
@@ -163,7 +163,7 @@ class BridgeNode(AnsweringNode):
 
     def end_calls(self) -> None:
         """Answer all waiting calls: the link has ended."""
-        self._surroundings.services.end()
+        self.surroundings.services.end()
         self.session.link_counters.end()
 
     def publish_last_diagnostics(self, give_up: float) -> None:
@@ -172,16 +172,16 @@ class BridgeNode(AnsweringNode):
         self._opener.close()
         self.session.publish_diagnostics(line_time())
         # DDS would lose messages that are still under way when their publisher ends.
-        self._surroundings.results.wait_for_all_acked(max(0.0, give_up - time.monotonic()))
-        self._surroundings.diagnostics.wait_for_all_acked(
+        self.surroundings.results.wait_for_all_acked(max(0.0, give_up - time.monotonic()))
+        self.surroundings.diagnostics.wait_for_all_acked(
             Duration(seconds=max(0.0, give_up - time.monotonic())))
 
     def check(self) -> None:
         """Publish what is due; take writes after the first look for a node of our name."""
         self.session.check()
         if self.session.configuration.parameters.standby and not self._is_ending:
-            self._standby.look()
-        if self._surroundings.names.has_looked:
+            self.standby.look()
+        if self.surroundings.names.has_looked:
             self.writes.begin()
 
     def _port_changed(self, state: PortState) -> None:
@@ -208,7 +208,7 @@ class BridgeNode(AnsweringNode):
             texts = [printable(str(problem)) for problem in error.problems]
             response.message = 'goes on as before: ' + '; '.join(texts[:_MOST_PROBLEMS])
             return response
-        if self._hand_over(configuration):
+        if self.hand_over(configuration):
             response.success = True
             response.message = f'{printable(str(configuration))}; {changes(before, configuration)}'
         else:
@@ -217,7 +217,7 @@ class BridgeNode(AnsweringNode):
             self._is_stuck = True
         return response
 
-    def _hand_over(self, configuration: Configuration) -> bool:
+    def hand_over(self, configuration: Configuration) -> bool:
         """
         Hand the line over to new files; return False if the link does not accept them.
 
@@ -228,7 +228,7 @@ class BridgeNode(AnsweringNode):
         4. Let guests connect, and give up the old port.
         """
         tell_plcs([self.session], 'goes on with new files', HAND_OVER)
-        before, session = self.session, BridgeSession(self._surroundings, configuration)
+        before, session = self.session, BridgeSession(self.surroundings, configuration)
         self.session = session
         self.writes.give_to(session.writers)
         if not self.link.exchange(session.driver.machine, session.reads.publish_later_values,
@@ -243,8 +243,8 @@ class BridgeNode(AnsweringNode):
         self._hold_ports(*configuration.held)
         return True
 
-    def _set_polling(self, request: SetBool.Request,
-                     response: SetBool.Response) -> SetBool.Response:
+    def set_polling(self, request: SetBool.Request,
+                    response: SetBool.Response) -> SetBool.Response:
         """Release the port for other programs, or take it back."""
         if self._is_ending:
             response.message = ENDS

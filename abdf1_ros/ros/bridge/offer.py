@@ -45,7 +45,7 @@ class OfferedPublisher:
                  most: int) -> None:
         self._node = node
         self._make = kind, topic, qos
-        self._waiting: deque[RosMessage] = deque(maxlen=most)
+        self.waiting: deque[RosMessage] = deque(maxlen=most)
         self._publisher: Publisher | None = None
 
     def offer(self) -> None:
@@ -58,11 +58,11 @@ class OfferedPublisher:
         publisher, self._publisher = self._publisher, None
         if publisher is not None:
             self._node.destroy_publisher(publisher)
-        self._waiting.clear()
+        self.waiting.clear()
 
     def publish(self, message: RosMessage) -> None:
         """Publish a message now, or keep it until the publisher exists."""
-        self._waiting.append(message)
+        self.waiting.append(message)
         self._publish_waiting()
 
     def _publish_waiting(self) -> None:
@@ -71,7 +71,7 @@ class OfferedPublisher:
         # Another thread may have taken the last message, or have closed the publisher.
         with suppress(IndexError, rclpy_implementation.InvalidHandle):
             while True:
-                publisher.publish(self._waiting.popleft())
+                publisher.publish(self.waiting.popleft())
 
     def has_subscribers(self) -> bool:
         """Return True if there is a subscriber."""

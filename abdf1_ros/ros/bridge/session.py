@@ -117,12 +117,12 @@ class BridgeSession:
         network, mappings = configuration.network, configuration.mappings
         self.reads = ReadTopics(node, surroundings.published)
         seen = Seen(lambda: surroundings.names.text, latest=self.reads.latest)
-        self._events = LineEvents(
+        self.events = LineEvents(
             node.get_logger(), self.port, stations_of(mappings),
             scans=not network.line_mode.has_one_plc, seen=seen, read=self._reader(),
             results=surroundings.results, table_changed=self._publish_active,
             answer=surroundings.services.take)
-        self.driver = Driver(network, mappings, configuration.driver_settings(), self._events)
+        self.driver = Driver(network, mappings, configuration.driver_settings(), self.events)
         self._alarms = Alarms(self.driver.points.values(), self.port, line_time)
         self.writers: dict[str, WriteTopic] = {}
         if surroundings.is_offered:
@@ -130,23 +130,23 @@ class BridgeSession:
             self.writers = self._open_writers()
             self.reads.open(self.driver.points)
         self.guests = GuestPlaces(configuration, self.driver, surroundings.opener,
-                                  self._events.notes, self._wake_link)
+                                  self.events.notes, self._wake_link)
         self.diagnostics = Diagnostics(
             node.get_fully_qualified_name().lstrip('/'), self.driver, self.port,
-            self._events, configuration.map_problems, self.guests.lines, self._alarms.statuses)
-        self._interlocks = InterlockWatch(node, self.driver)
+            self.events, configuration.map_problems, self.guests.lines, self._alarms.statuses)
+        self.owners = InterlockWatch(node, self.driver)
         self._watches: list[Watch] = [
             surroundings.names,
             TypeWatch(surroundings.graph, node.resolve_topic_name, mappings),
             *watches_of(self.diagnostics.line, self.port, seen, self.guests.lines,
-                        configuration.files.changed, self._interlocks.look,
+                        configuration.files.changed, self.owners.look,
                         surroundings.graph.dds.look)]
         self.link_counters = LinkCounterService(
             self.driver, self._wake_link, surroundings.wake_executor)
         self._port_text = ''
         self._opened = math.inf
-        self._levels: list[bytes] = []
-        self._next_diagnostics = self._next_snapshot = 0.0
+        self.levels: list[bytes] = []
+        self.next_diagnostics = self._next_snapshot = 0.0
         self._snapshot: Snapshot | None = None
         # A random start, so that the nodes of a process do not publish all at the same moment.
         self._phase = random.uniform(0.0, parameters.diagnostics_period)
@@ -170,7 +170,7 @@ class BridgeSession:
         surroundings.services.open(
             self.driver, parameters.most_services, parameters.write_timeout, self._wake_link)
         return surroundings.writes.open(
-            self.driver, parameters.write_timeout, self._events, self._wake_link)
+            self.driver, parameters.write_timeout, self.events, self._wake_link)
 
     @property
     def is_waiting(self) -> bool:
@@ -226,14 +226,14 @@ class BridgeSession:
 
     def end(self) -> None:
         """End all calls and watches; a new session has taken over the topics."""
-        self._events.unreadable_rows.tell()
+        self.events.unreadable_rows.tell()
         self.guests.stop()
         self.link_counters.end()
-        self._interlocks.end()
+        self.owners.end()
 
     def begin_end(self) -> None:
         """Begin to set heartbeats to 0 and write fallbacks (rule 5); ``tell_plcs`` waits."""
-        self._events.unreadable_rows.tell()
+        self.events.unreadable_rows.tell()
         self.driver.interlocks.wind_down()
         self._wake_link()
 
@@ -269,14 +269,14 @@ class BridgeSession:
             return  # the attempt has failed for the same reason as the last one
         self._port_text = state.text
         self._opened = line_time() if state.is_open else math.inf
-        self._events.port_changed()
+        self.events.port_changed()
         self._publish_active()
         # a spare does not log this: a device server may accept and close its connection every
         # second; the status shows it
         if self.is_waiting:
             return
         is_meant = state.is_open or self._surroundings.link.is_released
-        notes = self._events.notes
+        notes = self.events.notes
         tell = notes.info if is_meant else notes.error
         tell('the port', f'{self.port}: {state.text}')
 
@@ -286,12 +286,12 @@ class BridgeSession:
         self._surroundings.writes.standstills.look(now)
         self.link_counters.check(now)
         self._surroundings.services.look(now)
-        self._events.unreadable_rows.look(now)
+        self.events.unreadable_rows.look(now)
         for watch in self._watches:
             self._look(watch, now)
         levels = self.diagnostics.levels(now, is_waiting=self.is_waiting)
-        if now >= self._next_diagnostics or levels != self._levels:
-            self._levels = levels
+        if now >= self.next_diagnostics or levels != self.levels:
+            self.levels = levels
             self.publish_diagnostics(now)
         self._publish_snapshot(now)
 
@@ -299,14 +299,14 @@ class BridgeSession:
         """Log the news of a watch; a watch fails if DDS reports a name that rclpy cannot read."""
         try:
             for news in watch.look(now):
-                self._events.notes.tell(news)
+                self.events.notes.tell(news)
         except Exception as error:
             self._surroundings.node.tell_failure('a periodic check', error)
 
     def publish_diagnostics(self, now: float) -> None:
         """Publish all statuses at the clock value ``now`` (s)."""
         period = self.configuration.parameters.diagnostics_period
-        self._next_diagnostics = now + period - (now - self._phase) % period
+        self.next_diagnostics = now + period - (now - self._phase) % period
         statuses = self.diagnostics.statuses(now, is_waiting=self.is_waiting)
         if not self.is_waiting:
             self._alarms.forget()

@@ -67,7 +67,7 @@ class Standby:
         if has_line is self._surroundings.is_offered or self._is_changing or executor is None:
             return
         self._is_changing = True
-        executor.create_task(self._take_line if has_line else self._leave_line)
+        executor.create_task(self._take_line if has_line else self.leave_line)
 
     def _take_line(self) -> None:
         """Offer everything: the bridge has the line."""
@@ -77,7 +77,7 @@ class Standby:
         self._session().offer()
         self._is_changing = False
 
-    def _leave_line(self) -> None:
+    def leave_line(self) -> None:
         """Withdraw all but the services that ``stays`` keeps: another bridge may have the line."""
         node = self._surroundings.node
         node.get_logger().warning('has lost the line: waits, and offers no topics and services')

@@ -21,7 +21,7 @@ from pathlib import Path
 
 _Stamp = tuple[int, int, int]
 
-_PERIOD = 2.0  # s between two looks
+PERIOD = 2.0  # s between two looks
 
 
 class FileWatch:
@@ -35,7 +35,7 @@ class FileWatch:
     def changed(self, now: float) -> list[str]:
         """Return the names of files that have changed or gone, as of the last look."""
         if now >= self._next_look:
-            self._next_look = now + _PERIOD
+            self._next_look = now + PERIOD
             self._changed = [Path(path).name for path, stamp in self._stamps.items()
                              if _stamp(path) != stamp]
         return self._changed

@@ -130,14 +130,14 @@ def run_ros(name: str, parser: argparse.ArgumentParser,
     def begin_end() -> None:
         if program is None:  # no port is open yet, so no PLC has to be informed
             os._exit(0)
-        _end_by_the_clock()
+        end_by_the_clock()
 
     given = list(sys.argv if args is None else args)
     with EndRequest(_ending_signals(), begin_end) as ended, ExitStack() as stack:
         try:
             with usable_files(given, leaves_out) as usable:
                 _check_arguments(parser, usable)
-                stack.enter_context(Console(_log_file(name, usable)))
+                stack.enter_context(Console(log_file(name, usable)))
                 _begin(usable)
             if _wants_security() and os.environ.get('ROS_SECURITY_STRATEGY') != 'Enforce':
                 get_logger(name).warning(_NOT_ENFORCED)
@@ -157,7 +157,7 @@ def run_ros(name: str, parser: argparse.ArgumentParser,
             get_logger(name).fatal(f'internal error: {bug_text(error)}')
             status = EXIT_FAULT
         ended.set()
-        _destroy(program, ended.when + _DESTRUCTION_LIMIT)
+        destroy(program, ended.when + _DESTRUCTION_LIMIT)
         faulthandler.cancel_dump_traceback_later()
         return status
 
@@ -175,7 +175,7 @@ def _check_arguments(parser: argparse.ArgumentParser, given: list[str]) -> None:
                      '--ros-args')
 
 
-def _log_file(name: str, given: Sequence[str]) -> int | None:
+def log_file(name: str, given: Sequence[str]) -> int | None:
     """
     Return the descriptor of a new log file; None if the user wants no log file.
 
@@ -221,13 +221,13 @@ def _made(make: Callable[[Sequence[str]], Program], given: list[str]) -> Program
         raise
 
 
-def _end_by_the_clock() -> None:
+def end_by_the_clock() -> None:
     """Set a timer that prints all threads and ends the process, even if the process hangs."""
     # A Python thread could not do this: C code that hangs may hold the GIL.
     faulthandler.dump_traceback_later(_END_LIMIT, exit=True, file=2)
 
 
-def _destroy(program: Program, give_up: float) -> None:
+def destroy(program: Program, give_up: float) -> None:
     """
     Take the nodes off the network; give up at a monotonic clock value.
 

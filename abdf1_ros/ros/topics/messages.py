@@ -39,7 +39,7 @@ ACTIVE_LAYOUT = MultiArrayLayout(dim=[MultiArrayDimension(
 
 # Publishers send bits one by one, so the queue needs room for a burst of messages. Unused places
 # take no memory.
-_WRITE_DEPTH = 1000
+WRITE_DEPTH = 1000
 
 # Seconds for which a result is repeated to a subscriber that did not acknowledge it.
 _RESULT_LIFESPAN = 10.0
@@ -109,7 +109,7 @@ def read_qos(mapping: Mapping, stale_time: float) -> QoSProfile:
 def write_qos() -> QoSProfile:
     """Return the QoS of write topics: no message from before our start is executed."""
     return QoSProfile(
-        depth=_WRITE_DEPTH, reliability=ReliabilityPolicy.RELIABLE,
+        depth=WRITE_DEPTH, reliability=ReliabilityPolicy.RELIABLE,
         durability=DurabilityPolicy.VOLATILE)
 
 

@@ -98,7 +98,7 @@ class RowServices:
         self._services: dict[str, Service] = {}
         self._retired: list[Service] = []
         self._rows: dict[str, tuple[Mapping, ...]] = {}
-        self._calls: dict[str, _Call] = {}
+        self.calls: dict[str, _Call] = {}
 
     def open(self, driver: Driver, most: int, patience: float,  # noqa: A003
              wake_link: Callable[[], None]) -> None:
@@ -127,20 +127,20 @@ class RowServices:
 
     def end(self) -> None:
         """Answer all calls now: no more results come from the link."""
-        for call in [*self._calls.values()]:
+        for call in [*self.calls.values()]:
             call.end()
 
     def take(self, result: WriteResult) -> None:
         """Hand the result of a write to the call that waits for it, if any."""
-        if call := self._calls.get(result.request):
+        if call := self.calls.get(result.request):
             call.take(result)
 
     def look(self, now: float) -> None:
         """End calls that have waited too long; close retired services once no call waits."""
-        for call in [*self._calls.values()]:
+        for call in [*self.calls.values()]:
             if now >= call.until:
                 call.end()
-        if self._retired and not self._calls and self._node.executor is not None:
+        if self._retired and not self.calls and self._node.executor is not None:
             self._node.executor.create_task(self._close_retired)
 
     def _retire(self) -> None:
@@ -198,15 +198,15 @@ class RowServices:
     @contextmanager
     def _waiting(self, label: str, call: _Call) -> Iterator[str]:
         """Let a call wait under a label, until its results have come or an error ends it."""
-        self._calls[label] = call
+        self.calls[label] = call
         try:
             yield label
         finally:
-            del self._calls[label]
+            del self.calls[label]
 
     def _new(self, count: int, until: float, response: RosMessage) -> _Call | None:
         """Return a call that waits for ``count`` results; None if it is refused."""
-        if not count or len(self._calls) >= MOST_CALLS:
+        if not count or len(self.calls) >= MOST_CALLS:
             response.message = f'refused: {_TOO_MANY if count else _GONE}'
             return None
         return _Call(count, until, self._wake_executor)

@@ -67,13 +67,13 @@ class LossCounter:
 
     def __init__(self, count_publishers: Callable[[], int]) -> None:
         self._count_publishers = count_publishers
-        self._latest: list[int] = []  # number of the latest message of each publisher
+        self.latest: list[int] = []  # number of the latest message of each publisher
 
     def lost_before(self, number: int | None) -> int:
         """Record a message's number (None: it has none); return how many were lost before it."""
         if number is None:
             return 0
-        latest = self._latest
+        latest = self.latest
         if number - 1 in latest:
             latest[latest.index(number - 1)] = number
             return 0
@@ -172,10 +172,10 @@ class WriteTopics:
     def __init__(self, node: AnsweringNode) -> None:
         self._node = node
         self._waiting: list[tuple[str, RosMessage, MessageInfo]] = []
-        self._has_begun = self._is_open = False
+        self._has_begun = self.is_open = False
         self._subscriptions: dict[str, tuple[type, Subscription]] = {}
         self._topics: dict[str, WriteTopic] = {}
-        self._latest: dict[tuple[str, int, int], None] = {}  # topic, stamp and number of messages
+        self.latest: dict[tuple[str, int, int], None] = {}  # topic, stamp and number of messages
         self.standstills = Standstills()
         self.taken = 0
 
@@ -187,7 +187,7 @@ class WriteTopics:
 
     def _take_waiting(self) -> None:
         waiting, self._waiting = self._waiting, []
-        self._is_open = True
+        self.is_open = True
         for topic, message, info in waiting:
             self.taken += 1
             try:
@@ -238,7 +238,7 @@ class WriteTopics:
         if self._came_before(topic, info):
             return
         self._topics[topic].arrived(info)
-        reject_reason = '' if self._is_open else TOO_MANY
+        reject_reason = '' if self.is_open else TOO_MANY
         if reject_reason and len(self._waiting) < MAX_WAITING_WRITES:
             self._waiting.append((topic, message, info))
             return
@@ -256,10 +256,10 @@ class WriteTopics:
         stamp, number = info['source_timestamp'], info['publication_sequence_number']
         if not stamp or number is None:
             return False
-        came_before = (topic, stamp, number) in self._latest
-        self._latest[topic, stamp, number] = None
-        if len(self._latest) > MAX_WAITING_WRITES:
-            del self._latest[next(iter(self._latest))]
+        came_before = (topic, stamp, number) in self.latest
+        self.latest[topic, stamp, number] = None
+        if len(self.latest) > MAX_WAITING_WRITES:
+            del self.latest[next(iter(self.latest))]
         return came_before
 
     def _subscription(self, topic: str, kind: type) -> Subscription:

@@ -27,7 +27,7 @@ import termios
 import time
 from typing import Any
 
-from abdf1_ros.cli.monitor.command import _Screen, main
+from abdf1_ros.cli.monitor.command import main, Screen
 from abdf1_ros.cli.monitor.view import TextLine
 import pytest
 from std_msgs.msg import UInt16MultiArray
@@ -263,7 +263,7 @@ class Window:
 def test_mark_stays_at_its_line_where_others_come(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr('curses.has_colors', lambda: False)
     window = Window()
-    screen = _Screen(window, marked='paint')  # type: ignore[arg-type]
+    screen = Screen(window, marked='paint')  # type: ignore[arg-type]
 
     def chosen(names: str, *keys: int) -> str:
         screen.show_list([TextLine('heading'), *(
@@ -326,7 +326,7 @@ def refused(capsys: pytest.CaptureFixture[str]) -> Refused:
 
 def test_a_node_that_is_not_there_is_said_with_those_that_are(
         simulator: Process, refused: Refused, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr('abdf1_ros.cli.monitor.command._PROGRESS_PERIOD', 0.2)
+    monkeypatch.setattr('abdf1_ros.cli.monitor.command.PROGRESS_PERIOD', 0.2)
     *progress, told = refused(1, '--node', '/abdf1', '--wait', '3')
     assert progress and all('monitor: looking for /abdf1, ' in line for line in progress)
     assert told == 'monitor: there is no node /abdf1 within 3 s: --node may be one of ' + NODE

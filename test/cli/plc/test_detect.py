@@ -164,7 +164,7 @@ def test_full_duplex_port_with_station_0_is_found_and_named(
 
 def test_radio_modem_is_found_by_replies_without_ack(
         tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(detect, '_ENQ_TIME', 0.5)
+    monkeypatch.setattr(detect, 'ENQ_TIME', 0.5)
     trying = Trying()
     with plc_on(tmp_path / 'line', 'BCC', Duplex.FULL, RadioNode) as network:
         found = Search(network, [1], trying).run([9600])
@@ -195,7 +195,7 @@ class UnheardForAWhile(Unheard):
 @pytest.mark.parametrize('kind', [Unheard, UnheardForAWhile])
 def test_full_duplex_port_whose_acks_are_lost_is_not_radio(
         tmp_path: Path, kind: type[Unheard], monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(detect, '_ENQ_TIME', 2.5)  # it asks after 0.1 s
+    monkeypatch.setattr(detect, 'ENQ_TIME', 2.5)  # it asks after 0.1 s
     with plc_on(tmp_path / 'line', 'CRC', Duplex.FULL, kind) as network:
         found = Search(network, [1]).run([9600])
     assert found is not None

@@ -145,7 +145,7 @@ def test_plc_asks_through_the_master_of_a_line(tmp_path: Path, capsys: Output) -
 
 def test_slave_that_nobody_polls_says_so(
         tmp_path: Path, capsys: Output, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(requests, '_LONGEST_UNPOLLED', 0.3)
+    monkeypatch.setattr(requests, 'LONGEST_UNPOLLED', 0.3)
     with master_on(tmp_path / 'line', 3) as (port, master):
         assert main(['ping', '1', '--count', '1', '--slave', '--port', port]) == 1
     assert 'no master has polled us, station 5: "plc detect" lists the stations' in (

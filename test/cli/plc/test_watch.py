@@ -17,7 +17,6 @@
 from __future__ import annotations
 
 from array import array
-from collections import deque
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
 from datetime import datetime
@@ -28,7 +27,7 @@ from pathlib import Path
 import re
 
 from abdf1_ros.cli.plc.data import mapping_of, Tags
-from abdf1_ros.cli.plc.watch import _NoValue, _WatchedRead, curve_of, LiveValues
+from abdf1_ros.cli.plc.watch import curve_of, LiveValues, NoValue, WatchedRead
 from abdf1_ros.driver.checks import Checks, StationHealth
 from abdf1_ros.pccc.file_types import PlcType
 from abdf1_ros.pccc.identity import Identity, Mode
@@ -114,13 +113,12 @@ def test_each_read_is_a_line_of_csv_for_each_value(
 
 def test_reads_that_the_output_does_not_take_are_counted_and_others_keep_their_times(
         plcs: Plcs, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr('abdf1_ros.cli.plc.watch._MAX_NEWS', 2)
+    monkeypatch.setattr('abdf1_ros.cli.plc.watch.MAX_NEWS', 2)
     watch = LiveValues(network_on(plcs), [SPEED], 0.01, csv=True)
-    watch._news = deque(maxlen=2)
     for value in range(5):
         watch.read(SPEED, array('h', [value]))
     shown = datetime.now()
-    watch._show()
+    watch.show()
     said, told = capsys.readouterr()
     assert told == 'plc: 3 reads were lost: this output was too slow for them\n'
     times, values = zip(*((line.split(',')[0], line.split(',')[-1])
@@ -161,9 +159,12 @@ def test_silent_station_is_shown(plcs: Plcs, capsys: pytest.CaptureFixture[str])
 
 def test_interrupt_of_the_start_leaves_no_thread(
         plcs: Plcs, monkeypatch: pytest.MonkeyPatch) -> None:
+    begun: list[LinkThread] = []
+
     class Interrupted(LinkThread):
 
         def start(self) -> None:
+            begun.append(self)
             self.daemon = True  # or a thread that is left would hold up the end of all tests
             super().start()
             raise KeyboardInterrupt
@@ -172,7 +173,7 @@ def test_interrupt_of_the_start_leaves_no_thread(
     watch = LiveValues(network_on(plcs), [SPEED], 0.01)
     with suppress(KeyboardInterrupt):
         watch.run(1)
-    assert not watch._link.is_alive()
+    assert not any(thread.is_alive() for thread in begun)
 
 
 Draw = Callable[..., list[str]]
@@ -181,7 +182,7 @@ Draw = Callable[..., list[str]]
 @pytest.fixture
 def draw(monkeypatch: pytest.MonkeyPatch) -> Draw:
     """Return what gives the lines of the table of a watch after some news."""
-    def lines_of(mappings: Sequence[Mapping], *news: tuple[Mapping, Values | _NoValue],
+    def lines_of(mappings: Sequence[Mapping], *news: tuple[Mapping, Values | NoValue],
                  size: tuple[int, int] = (100, 9), encoding: str = 'utf-8',
                  tags: Tags | None = None) -> list[str]:
         screen = io.TextIOWrapper(io.BytesIO(), encoding, errors='backslashreplace')
@@ -191,8 +192,8 @@ def draw(monkeypatch: pytest.MonkeyPatch) -> Draw:
             patch.setattr('sys.stdout', screen)
             patch.setattr('shutil.get_terminal_size', lambda: os.terminal_size(size))
             for each in news:
-                watch._note_changes([_WatchedRead(NOW, *each)])
-            watch._redraw()
+                watch.note_changes([WatchedRead(NOW, *each)])
+            watch.redraw()
             screen.flush()
         text = screen.buffer.getvalue().decode(encoding)  # type: ignore[attr-defined]
         return text.replace('\x1b[K', '').removesuffix('\x1b[J').splitlines()
@@ -230,15 +231,15 @@ def test_nothing_old_stays_below_a_table_that_shrinks(
     monkeypatch.setattr('abdf1_ros.cli.plc.watch.opened', lambda network: None)
     rows = SPEED, make_mapping('C5:0.ACC', item=2)
 
-    def show(size: tuple[int, int], *news: tuple[Mapping, Values | _NoValue]) -> list[str]:
+    def show(size: tuple[int, int], *news: tuple[Mapping, Values | NoValue]) -> list[str]:
         monkeypatch.setattr('shutil.get_terminal_size', lambda: os.terminal_size(size))
-        watch._note_changes([_WatchedRead(NOW, *each) for each in news])
-        watch._redraw()
+        watch.note_changes([WatchedRead(NOW, *each) for each in news])
+        watch.redraw()
         screen.take(capsys.readouterr().out)
         return [' '.join(line.split()) for line in screen.lines if line.strip()]
 
     watch = LiveValues(Network(), rows, 0.01)
-    fault = _NoValue('2509 ERR_INACTIVE_STATION: Slave Station (1) Inactive')
+    fault = NoValue('2509 ERR_INACTIVE_STATION: Slave Station (1) Inactive')
     assert len(show((60, 9), *((row, fault) for row in rows))) > 4
     healed = show((60, 9), *((row, array('h', [5])) for row in rows))
     assert healed[1:] == [
@@ -277,7 +278,7 @@ def test_description_stands_where_there_is_room(draw: Draw) -> None:
 
 def test_number_has_a_curve_where_it_fits_and_can_be_shown(draw: Draw) -> None:
     news = [(SPEED, array('h', [value])) for value in (9, *range(1, 25), 12)]
-    silence = (SPEED, _NoValue('silent'))
+    silence = (SPEED, NoValue('silent'))
     news = [*news[:-1], silence, silence, news[-1]]
     head, line = draw([SPEED], *news, size=(75, 9))
     assert head.endswith('value, and its last 24 reads')
@@ -322,7 +323,7 @@ def test_mode_of_each_plc_and_faults_of_the_line_stand_around_the_values(
                         'still; memory lost')
     assert lines[1].startswith('address') and len(lines) == 3
     monkeypatch.setattr(
-        LiveValues, '_faults_of_line', lambda self: ['line: 3 repeated, 1 damaged'])
+        LiveValues, 'faults_of_line', lambda self: ['line: 3 repeated, 1 damaged'])
     assert draw([SPEED], (SPEED, array('h', [5])))[-1] == 'line: 3 repeated, 1 damaged'
 
 

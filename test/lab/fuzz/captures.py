@@ -39,7 +39,7 @@ from fuzz.files import path_of
 _MOST_CHUNKS = 200
 
 _WAYS, _CHECKSUMS = list(Direction), list(Checksum)
-_AS_TEXT, _AS_JSON = (sniff._parse([*words, 'x']) for words in ([], ['--json']))
+_AS_TEXT, _AS_JSON = (sniff.parse([*words, 'x']) for words in ([], ['--json']))
 
 
 def one_input(data: bytes) -> None:
@@ -123,7 +123,7 @@ def _check_told(chunks: Sequence[Chunk], settings: dict[str, str]) -> None:
 
 def _told(chunks: Sequence[Chunk], settings: dict[str, str], options: Any) -> list[str]:
     """Return the lines that are printed."""
-    output = sniff._Output(options)
+    output = sniff.Output(options)
     with redirect_stdout(io.StringIO()) as told:
         for chunk in chunks:
             output.take(chunk, settings)
@@ -139,7 +139,7 @@ def _entries(parts: Sequence[bytes]) -> list[Entry]:
     entries: list[Entry] = []
     for part in parts:
         entries += session.feed(Chunk(None, Direction.UNKNOWN, part))
-        for wire in session._wires.values():
+        for wire in session.wires.values():
             assert len(wire.decoder.waiting) <= 2
             assert len(wire.decoder.link_data) <= frames.MAX_LINK_DATA + 1
     return [*entries, *session.finish()]

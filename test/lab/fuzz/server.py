@@ -49,7 +49,7 @@ class _Plc:
     def __init__(self, plc_type: PlcType) -> None:
         table = _table(plc_type)
         self.server = Server(table)
-        self.words = table._words
+        self.words = table.words
         self._new = {area: bytes(store) for area, store in self.words.items()}
 
     def begin(self) -> None:
@@ -90,7 +90,7 @@ class _Own:
     @property
     def store(self) -> bytes:
         """Return the file in which the words lie, as long as it has been made."""
-        return bytes(self.served._table._words[self.mapping.address.area])
+        return bytes(self.served.table.words[self.mapping.address.area])
 
 
 _PLCS = [_Plc(plc_type) for plc_type in FAMILIES]

@@ -36,7 +36,7 @@ from ours import BEAT, NodeEnd, PlcEnd, Setup
 
 _GUESTS = Case('N7:0', [0.0] * 60, []), Case('N7:100', [0.0] * 60, [])
 _OURS = Case('N7:200', [1, 2, 3, 4], [4112, -1, 16, 0])
-_PATIENCE = 10.0  # s until words are written: AbDf1 does not say when
+PATIENCE = 10.0  # s until words are written: AbDf1 does not say when
 _LONGEST_BEAT = 1.0  # s between two changes of a heartbeat of 200 ms, on a busy machine
 
 
@@ -90,7 +90,7 @@ def share(setup: Setup, lines: tuple[str, str], start: Callable[[Setup, str, Exi
         stack.callback(guests[-1][0].close)
     tally, ended = Tally(), Event()
     with ThreadPoolExecutor() as pool:
-        work = [pool.submit(_work, guest, case, plc, rounds) for guest, case in guests]
+        work = [pool.submit(work, guest, case, plc, rounds) for guest, case in guests]
         watch = pool.submit(_watch, plc, tally, ended)
         while not all(future.done() for future in work):
             for values in (_OURS.before, _OURS.after):
@@ -105,7 +105,7 @@ def share(setup: Setup, lines: tuple[str, str], start: Callable[[Setup, str, Exi
     return replace(tally, **counts)
 
 
-def _work(guest: Any, case: Case, plc: PlcEnd, rounds: int) -> Counter[str]:
+def work(guest: Any, case: Case, plc: PlcEnd, rounds: int) -> Counter[str]:
     """
     Write values of chance, look at them in the PLC, and read them again.
 
@@ -119,7 +119,7 @@ def _work(guest: Any, case: Case, plc: PlcEnd, rounds: int) -> Counter[str]:
                           for _ in range(case.count)]
         known.append(values)
         is_given = 'done' in guest.write(case, values)
-        end = time.monotonic() + _PATIENCE * is_given
+        end = time.monotonic() + PATIENCE * is_given
         while not same(values, there := plc.take(case, values)) and time.monotonic() < end:
             time.sleep(0.01)
         answer = guest.read(case)

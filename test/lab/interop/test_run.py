@@ -130,14 +130,14 @@ class LateGuest:
 def test_a_late_write_of_a_guest_is_a_failure_and_no_wrong_value(
         run: ModuleType, monkeypatch: pytest.MonkeyPatch, delay: int) -> None:
     shared = sys.modules['shared']
-    monkeypatch.setattr(shared, '_PATIENCE', 0.0)
+    monkeypatch.setattr(shared, 'PATIENCE', 0.0)
     case = shared.Case('N7:0', [0.0] * 4, [])
     late = LateGuest(4, delay)
-    counts = shared._work(late, case, late, 10)
+    counts = shared.work(late, case, late, 10)
     assert counts['wrong'] == 0 and counts['right'] // 4 + counts['failures'] == 10
     assert bool(counts['failures']) is bool(delay)
     mixed = LateGuest(4, 0, add=1)
-    assert shared._work(mixed, case, mixed, 10) == {'wrong': 40}
+    assert shared.work(mixed, case, mixed, 10) == {'wrong': 40}
 
 
 def test_a_damaged_message_is_refused_and_the_shim_goes_on(run: ModuleType) -> None:

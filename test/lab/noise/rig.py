@@ -26,7 +26,7 @@ from random import Random
 from abdf1_ros.df1.frames import Duplex
 from abdf1_ros.df1.machine import Machine
 from abdf1_ros.df1.packet import Packet
-from abdf1_ros.df1.radio import RADIO, RadioNode
+from abdf1_ros.df1.radio import RADIO
 from abdf1_ros.df1.tasks import Task
 from abdf1_ros.driver.driver import Driver, Listener
 from abdf1_ros.driver.settings import DriverSettings
@@ -275,9 +275,7 @@ class Rig:
                 make_mapping('N9:0', 'ReadWrite', length=WORDS, **cells)]
         if self.mode == 'Peer':
             mappings.append(make_mapping('N20:0', 'Serve', station=US, plc='SLC', length=WORDS))
-        link = self._add_driver(self.network, mappings).driver.link
-        if isinstance(link, RadioNode):
-            link._random = self.random
+        self._add_driver(self.network, mappings)
         self._plcs = [_WatchedPlc(number, kind, mappings, self)
                       for number, kind in _STATIONS[self.mode].items()]
         far = FarEnd(self._plcs, self.network)

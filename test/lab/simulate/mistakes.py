@@ -58,7 +58,7 @@ from abdf1_ros.driver.reads import job
 from abdf1_ros.driver.reads.guards import CounterGuard, RunGuard
 from abdf1_ros.driver.reads.point import ReadPoint
 from abdf1_ros.driver.record import Claim, OwnWords
-from abdf1_ros.driver.served import _MappedTable
+from abdf1_ros.driver.served import MappedTable
 from abdf1_ros.driver.write import Outcome, Write, WriteResult
 from abdf1_ros.driver.writes.ages import RecentMax, Standstills
 from abdf1_ros.driver.writes.queue import MessageJob, WriteQueue
@@ -105,7 +105,7 @@ def _counts_unconfirmed(take: Any) -> Any:
 def _begins_to_count(begin: Any) -> Any:
     def begin_wrongly(self: HeartbeatRow, now: float, *, is_new: bool = False) -> None:
         self.state, self._is_confirmed = BeatState.COUNTS, True
-        self._next = self.due = now
+        self.next_beat = self.due = now
 
     return begin_wrongly
 
@@ -114,7 +114,7 @@ def _short_zero(ended: Any) -> Any:
     def end_wrongly(self: HeartbeatRow, outcome: Outcome, now: float) -> None:
         ended(self, outcome, now)
         if not self.value and self.state is BeatState.SHOWN:
-            self._next = self.due = now + 0.1
+            self.next_beat = self.due = now + 0.1
 
     return end_wrongly
 
@@ -246,7 +246,7 @@ def _polls_before(carry_out: Any) -> Any:
 
 
 def _awaits_those_that_answer(before: Any) -> Any:
-    return property(lambda self: not self._plc_of or self._are_all_due and not any(
+    return property(lambda self: not self._plc_of or self.conditions.are_all_due and not any(
         row.mapping.station in self._awaited for row in self._plc_of if not row.is_confirmed))
 
 
@@ -286,7 +286,7 @@ def _keeps_places(slice_of: Any) -> Any:
 
 
 def _undoes_one_word(take_back: Any) -> Any:
-    def take_back_wrongly(self: _MappedTable) -> None:
+    def take_back_wrongly(self: MappedTable) -> None:
         del self.changed[1:]
         take_back(self)
 
@@ -354,8 +354,8 @@ MISTAKES = (
     Mistake('12', 'the fallback of a Serve row is not stored', Interlocks, '__init__',
             _stores_nothing),
     Mistake('15', 'rows are withheld in silence', ReadPoint, 'withhold', _always(False)),
-    Mistake('16', 'the bound is Fallback_After alone', Times, '_at_most', _always(0.0)),
-    Mistake('16', 'the bound counts no repetitions', Times, '_at_most', _undisturbed),
+    Mistake('16', 'the bound is Fallback_After alone', Times, 'at_most', _always(0.0)),
+    Mistake('16', 'the bound counts no repetitions', Times, 'at_most', _undisturbed),
     Mistake('16', 'the preset is a Period', Times, '_preset', _preset_of_a_period),
     Mistake('26', 'messages go out before the connection was heard', Driver, '_connect',
             _always(None)),
@@ -412,7 +412,7 @@ MISTAKES = (
             _looks_too_late),
     Mistake('link', 'what comes again is not known', Packet, 'duplicate_key',
             lambda before: property(lambda self: object())),
-    Mistake('served', 'a refused command is undone in its first word', _MappedTable, 'take_back',
+    Mistake('served', 'a refused command is undone in its first word', MappedTable, 'take_back',
             _undoes_one_word),
     Mistake('results', 'no read-back shows the value', Write, 'is_held', _always(False)),
     Mistake('27', 'a confirmation alone is the proof', Standing, 'write_ended', _proves_itself),

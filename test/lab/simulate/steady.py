@@ -91,19 +91,19 @@ class Steady(DriverBench):
         self._dice = dice = Random(seed)
         mode = dice.choice(MODES)
         self._names = dice.sample([*KINDS], dice.randrange(2, 7))
-        self._rows: dict[str, Mapping] = {
+        self.rows: dict[str, Mapping] = {
             name: make_mapping(KINDS[name][0], tag=name, **(  # type: ignore[arg-type]
                 {'command': 'Write', 'plc': 'PLC5'} | KINDS[name][1])) for name in self._names}
         self._is_light = dice.random() < 0.5
         if dice.random() < 0.5:  # an unchanged value is written again only now and then
             again, period = dice.choice([300, 1000, 60_000]), dice.choice([50, 200])
-            self._rows = {
-                name: replace(row, write_again=again) for name, row in self._rows.items()}
+            self.rows = {
+                name: replace(row, write_again=again) for name, row in self.rows.items()}
             reads = [make_mapping(place, length=length, tag=place, period=period)
                      for place, length in _READ]
         else:
             reads = []
-        super().__init__([*self._rows.values(), *reads], network=Network(
+        super().__init__([*self.rows.values(), *reads], network=Network(
             baud=dice.choice([9600, 19200]), timeout=200, **mode),  # type: ignore[arg-type]
             settings=DriverSettings(processor_period=0.0, write_timeout=PATIENCE))
         areas = ('B3:0', 4), ('N7:0', 24), ('F8:0', 4), ('ST9:0', 42)
@@ -143,19 +143,19 @@ class Steady(DriverBench):
         reply = serve(command)
         del table.read
         for name in self._names:
-            if any(extent.holds(self._rows[name].extent) for extent in found):
+            if any(extent.holds(self.rows[name].extent) for extent in found):
                 self.shown[name].append((self.clock(), self._words(name)))
         return reply
 
     def _words(self, name: str) -> bytes:
         """Return what the PLC holds of a row; of bits only these."""
-        row = self._rows[name]
+        row = self.rows[name]
         words = self._plc.table.read(row.address, row.codec.words)
         values = row.codec.decode(words)
         return values.encode() if isinstance(values, str) else bytes(str([*values]), 'ascii')
 
     def _wanted(self, name: str, message: Message) -> bytes:
-        row = self._rows[name]
+        row = self.rows[name]
         if isinstance(message, str):
             return message.encode()
         return bytes(str([*row.codec.decode(row.codec.encode(message))]), 'ascii') \
@@ -165,7 +165,7 @@ class Steady(DriverBench):
         number = len(self.said[name])
         self.said[name].append(Said(self.clock(), message))
         values = message if isinstance(message, str) else [*message]
-        self.driver.write([self._rows[name]], values, self.clock(), str(number))
+        self.driver.write([self.rows[name]], values, self.clock(), str(number))
         self.line.wake(self.driver.machine)
 
     def _publish(self, name: str, seconds: float) -> None:
@@ -206,18 +206,18 @@ class Steady(DriverBench):
             if result.outcome is Outcome.WRITTEN and wanted not in [words for _, words in held]:
                 return f'{name}: {result} at {ended:.3f} s, but nothing was executed'
             if result.outcome is Outcome.STANDS:
-                if text := self._why_unproven(name, wanted, ended):
+                if text := self.why_unproven(name, wanted, ended):
                     return f'{name}: {result} at {ended:.3f} s, but {text}'
                 continue
-            may_give_way = not self._is_light or self._rows[name].address.bit is None
+            may_give_way = not self._is_light or self.rows[name].address.bit is None
             if result.outcome is not Outcome.WRITTEN and not (
                     result.outcome is Outcome.SUPERSEDED and may_give_way):
                 return f'{name}: {result}, on a line without a fault'
         return ''
 
-    def _why_unproven(self, name: str, wanted: bytes, now: float) -> str:
+    def why_unproven(self, name: str, wanted: bytes, now: float) -> str:
         """Return why a value that is told to stand had to be written (27)."""
-        row = self._rows[name]
+        row = self.rows[name]
         again = (row.write_again or 0) / 1000
         held = within(self.held[name], -1.0, now)
         stood = [when for when, words in takewhile(lambda entry: entry[1] == wanted, held[::-1])]
@@ -236,7 +236,7 @@ class Steady(DriverBench):
     def _wrong_end(self, name: str) -> str:
         """Return that the words do not hold the newest message of all rows that share them."""
         sharing = [other for other in self._names
-                   if self._rows[other].shares_words(self._rows[name]) and self.said[other]]
+                   if self.rows[other].shares_words(self.rows[name]) and self.said[other]]
         newest = max(sharing, key=lambda other: self.said[other][-1].when, default='')
         if newest != name:
             return ''
@@ -246,7 +246,7 @@ class Steady(DriverBench):
 
     def _wrong_order(self, name: str) -> str:
         """Return that a change of bits is missing on a line that can carry all."""
-        if not self._is_light or self._rows[name].address.bit is None or not self.said[name]:
+        if not self._is_light or self.rows[name].address.bit is None or not self.said[name]:
             return ''
         changes = [words for words, _ in groupby(
             self._wanted(name, each.message) for each in self.said[name])]

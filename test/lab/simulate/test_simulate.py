@@ -132,7 +132,7 @@ def test_responses_that_go_out_together_are_no_command() -> None:
     world = World(Plant('Peer'), seed=1)
     world.run(2.0)
     count = len(world.sent)
-    world.line._send(ENQ + 4 * ACK, world.line.now, 1)
+    world.line.send(ENQ + 4 * ACK, world.line.now, 1)
     assert len(world.sent) == count
 
 
@@ -216,13 +216,13 @@ def test_reload_may_bring_other_lengths() -> None:
 def test_value_that_no_read_has_shown_does_not_stand() -> None:
     steady = Steady(104)
     assert not steady.fault()
-    steady._rows['word'] = replace(steady._rows['word'], write_again=60_000)
+    steady.rows['word'] = replace(steady.rows['word'], write_again=60_000)
     now, wanted = steady.held['word'][-1][0] + 0.2, steady.held['word'][-1][1]
     steady.shown['word'] = [(now - 0.1, wanted)]
-    assert steady._why_unproven('word', wanted, now) == ''
+    assert steady.why_unproven('word', wanted, now) == ''
     steady.shown['word'] = [(now - 9.0, wanted)]  # before it was confirmed
-    assert steady._why_unproven('word', wanted, now).startswith('no read has shown it')
-    assert 'another value' in steady._why_unproven('word', b'[9]', now)
+    assert steady.why_unproven('word', wanted, now).startswith('no read has shown it')
+    assert 'another value' in steady.why_unproven('word', b'[9]', now)
 
 
 def test_mistakes_are_made_where_something_is() -> None:

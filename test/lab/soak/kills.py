@@ -169,11 +169,11 @@ class Cell:
 
     def used(self) -> set[int]:
         """Return the commands that the machine uses, N11:2 and N11:4."""
-        return {self.ladder._get(11, 2), self.ladder._get(11, 4)}
+        return {self.ladder.get(11, 2), self.ladder.get(11, 4)}
 
     def written(self) -> set[int]:
         """Return the commands that the bridge has written, N10:1 and N10:2."""
-        return {self.ladder._get(10, 1), self.ladder._get(10, 2)}
+        return {self.ladder.get(10, 1), self.ladder.get(10, 2)}
 
     def start_bridge(self) -> None:
         self.bridge = subprocess.Popen(
@@ -322,7 +322,7 @@ def _download_commands(cell: Cell) -> None:
     cell.rest(cell.dice.uniform(0.5, 5.5))
     cell.plc.download()
     for word in (1, 2):
-        cell.ladder._put(10, word, 888)
+        cell.ladder.put(10, word, 888)
     cell.rest(cell.dice.choice([0.6, 0.9]))
     cell.died = time.monotonic()
     cell.plc.set_mode(Setting.REMOTE)
