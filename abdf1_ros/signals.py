@@ -16,11 +16,13 @@
 
 from __future__ import annotations
 
+import atexit
 from collections.abc import Callable, Iterable
 from contextlib import suppress
 import os
 import select
 import signal
+import sys
 import threading
 import time
 from types import FrameType
@@ -79,16 +81,25 @@ class EndRequest(threading.Event):
         os.close(self._reader)
 
 
-def limit_output() -> None:
+def limit_output(seconds: float = _LAST_OUTPUT) -> None:
     """
-    Drop output that still waits for its reader 2 s after a signal to end.
+    Drop output that still waits for its reader some ``seconds`` after a signal to end.
 
     Without this, Ctrl-S or a pipe without a reader would delay the end for ever. An alarm
     interrupts the write, which then continues to the null device. A signal handler may call this
     function.
     """
     signal.signal(signal.SIGALRM, _drop_stuck)
-    signal.setitimer(signal.ITIMER_REAL, _LAST_OUTPUT, _GLANCE)
+    signal.setitimer(signal.ITIMER_REAL, seconds, _GLANCE)
+    atexit.register(_stop_alarm)
+
+
+def _stop_alarm() -> None:
+    """Write all output, and stop the alarm: near its end Python has no handler for it any more."""
+    for stream in (sys.stdout, sys.stderr):
+        with suppress(OSError, ValueError):  # its reader has left, or it is closed
+            stream.flush()
+    signal.setitimer(signal.ITIMER_REAL, 0)
 
 
 def _drop_stuck(number: int, frame: FrameType | None) -> None:

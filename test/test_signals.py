@@ -14,7 +14,24 @@
 
 """The end of a process that a signal asks for."""
 
+import subprocess
+import sys
+
 from abdf1_ros.signals import EndRequest
+
+# What stays until the interpreter takes its modules apart, when it has no signal handler any more.
+SLOW_END = """
+import time
+from abdf1_ros.signals import limit_output
+
+class Slow:
+    def __del__(self, sleep=time.sleep):
+        sleep(0.5)
+
+slow = Slow()
+limit_output(0.2)
+print('last words')
+"""
 
 
 def test_second_signal_does_not_begin_the_end_again() -> None:
@@ -24,3 +41,9 @@ def test_second_signal_does_not_begin_the_end_again() -> None:
         end.set()
     assert begun == [end.when]
     assert end.is_set()
+
+
+def test_alarm_of_the_last_output_does_not_kill_a_slow_end() -> None:
+    ended = subprocess.run(
+        [sys.executable, '-c', SLOW_END], capture_output=True, text=True, check=False)
+    assert (ended.returncode, ended.stdout, ended.stderr) == (0, 'last words\n', '')
