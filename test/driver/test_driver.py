@@ -14,6 +14,7 @@
 
 """The driver against simulated PLCs on a virtual line."""
 
+import math
 import random
 
 from abdf1_ros.df1 import frames
@@ -466,7 +467,7 @@ def test_poll_cycle_is_close_to_the_expected_one_on_a_saturated_line(baud: int) 
 def test_driver_without_stations_rests_until_a_write_comes() -> None:
     mapping = make_mapping('N7:0', 'Write', station=255)
     bench, plc = make_bench(mapping)
-    assert bench.driver.machine.deadline is None
+    assert bench.driver.machine.deadline == math.inf
     bench.run(100.0)
     assert bench.driver.counters.chars_sent == 0
     bench.write(mapping, [3], run=0.1)

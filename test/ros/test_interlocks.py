@@ -116,12 +116,12 @@ class ProcessCell(Cell):
     def start(self) -> None:
         """Start it."""
         self.results = self.ros.results()
-        self._process = Process('node', *ros_args(*self._assignments))
+        self.process = Process('node', *ros_args(*self.assignments))
 
     def end(self, number: signal.Signals = signal.SIGTERM) -> int:
         """End it by a signal."""
-        self._process.send(number)
-        return self._process.result()
+        self.process.send(number)
+        return self.process.result()
 
 
 @pytest.fixture

@@ -33,8 +33,8 @@ from abdf1_ros.messages import Event, Message
 from abdf1_ros.pccc.families import parse_address
 from abdf1_ros.pccc.file_types import PlcType
 from abdf1_ros.ports.link_thread import PortState
-from abdf1_ros.ros.bridge import node as node_module
 from abdf1_ros.ros.bridge.node import end_together
+from abdf1_ros.ros.diagnostics import graph
 from abdf1_ros.ros.node import main
 from diagnostic_msgs.msg import DiagnosticStatus
 import pytest
@@ -459,7 +459,7 @@ def test_duplicate_name_is_told_and_forgotten(
 def test_other_node_of_our_name_is_told_before_the_first_write_is_taken(
         tmp_path: Path, monkeypatch: pytest.MonkeyPatch,
         capfd: pytest.CaptureFixture[str]) -> None:
-    monkeypatch.setattr(node_module, 'DISCOVERY', 2.0)
+    monkeypatch.setattr(graph, 'DISCOVERY', 2.0)
     bench = Bench(tmp_path, (RECIPE,))
     other = Node('abdf1', context=bench.ros.context, use_global_arguments=False,
                  start_parameter_services=False)
@@ -473,7 +473,7 @@ def test_other_node_of_our_name_is_told_before_the_first_write_is_taken(
 
 def test_messages_wait_for_the_first_look_and_have_a_result_at_an_end_before_it(
         make_bench: Benches, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(node_module, 'DISCOVERY', math.inf)
+    monkeypatch.setattr(graph, 'DISCOVERY', math.inf)
     bench = make_bench(RECIPE)
     bench.publisher(Int16MultiArray, 'recipe')(1, 2)
     refuse = bench.node.session.begin_end

@@ -25,12 +25,12 @@ from abdf1_ros.ports.settings import PortSettings
 from abdf1_ros.problems import ConfigurationError
 from abdf1_ros.ros.bridge.guests import GuestPlaces
 from abdf1_ros.ros.bridge.session import BridgeSession
-from abdf1_ros.ros.diagnostics.graph import Graph
 from abdf1_ros.ros.diagnostics.line import LineView
 from abdf1_ros.ros.parameters.file_watch import FileWatch
 from abdf1_ros.ros.parameters.shown import ShownFiles
 import pytest
 from rcl_interfaces.srv import GetParameters
+from rclpy.node import Node
 from rclpy.parameter import parameter_value_to_python
 from std_msgs.msg import Float32MultiArray, Int16MultiArray, UInt16MultiArray
 from std_srvs.srv import SetBool, Trigger
@@ -270,14 +270,16 @@ def test_line_is_handed_over_in_order(bench: Bench, monkeypatch: pytest.MonkeyPa
                      'begin the new', 'guests', 'parameters']
 
 
-def test_other_node_of_our_name_stays_known(bench: Bench, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(Graph, 'nodes', lambda *arguments: 2)
+def test_other_node_of_our_name_stays_known(bench: Bench) -> None:
+    other = Node('abdf1', context=bench.ros.context, use_global_arguments=False,
+                 start_parameter_services=False)
     text = 'another node is called /abdf1 too'
     until_status(bench.diagnostics, 'link', WARN, lambda status: text in status.message)
     assert bench.reload()[0]
     for _ in range(2):
         bench.diagnostics.next()
         assert text in find_status(bench.diagnostics[-1], 'link').message
+    other.destroy_node()
 
 
 def test_parameters_tell_what_is_in_the_files_now(bench: Bench) -> None:

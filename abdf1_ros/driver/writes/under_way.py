@@ -55,8 +55,7 @@ class WriteJob(Job):
         # port.
         bug = PortLost(INTERNAL_ERROR)
         self.result = self.write.result(Outcome.UNKNOWN, str(bug), now, error=bug)
-        line = self._writing.line
-        self.result = yield from carry_out(self.write, lambda: line.now, goes_on=self.goes_on)
+        self.result = yield from self._writing.carry_out(self.write, self.goes_on)
 
 
 class WritesUnderWay:
@@ -73,11 +72,15 @@ class WritesUnderWay:
         self.spent: dict[Mapping, float] = {}  # line time (s) of each row's messages
 
     def begin(self, write: Write) -> Claim:
-        """Record that a write is under way, in packets that its station accepts."""
+        """Record that a write is under way, until it has ``ended``."""
         station = write.mapping.station
-        write.speak(self._readings.planner.dialect(write.mapping))
         write.is_probe = station != BROADCAST and not self.stations[station].replies_in_time
         return self.record.begin(station, (write.mapping.extent,), write)
+
+    def carry_out(self, write: Write, goes_on: bool) -> Steps[WriteResult]:
+        """Send a write in the packets that its station accepts."""
+        write.speak(self._readings.planner.dialect(write.mapping))
+        return (yield from carry_out(write, lambda: self.line.now, goes_on=goes_on))
 
     def ended(self, job: WriteJob) -> None:
         """Record the end of a write."""

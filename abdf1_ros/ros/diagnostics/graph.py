@@ -40,7 +40,7 @@ _NAMES_PERIOD = 0.25
 
 # Longest time (s) that a new node needs to find the nodes that run already; usually a fifth of it
 # is enough.
-_DISCOVERY = 0.5
+DISCOVERY = 0.5
 
 # Pause between two queries for topics: at least ``_LEAST`` s, and at least ``_MULTIPLE`` times the
 # processor time of a query.
@@ -67,7 +67,7 @@ class Graph:
         """Return a watch for a second node with our name; a spare has our name on purpose."""
         count = partial(self.nodes, node.get_name(), node.get_namespace())
         return NameWatch(node.get_fully_qualified_name(), (lambda now: 1) if is_spare else count,
-                         line_time() + _DISCOVERY, renaming)
+                         line_time() + DISCOVERY, renaming)
 
     def nodes(self, name: str, namespace: str, now: float) -> int:
         """Return how many nodes have this name, at the clock value ``now`` (s)."""

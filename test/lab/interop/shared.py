@@ -90,9 +90,9 @@ def share(setup: Setup, lines: tuple[str, str], start: Callable[[Setup, str, Exi
         stack.callback(guests[-1][0].close)
     tally, ended = Tally(), Event()
     with ThreadPoolExecutor() as pool:
-        work = [pool.submit(work, guest, case, plc, rounds) for guest, case in guests]
+        done = [pool.submit(work, guest, case, plc, rounds) for guest, case in guests]
         watch = pool.submit(_watch, plc, tally, ended)
-        while not all(future.done() for future in work):
+        while not all(future.done() for future in done):
             for values in (_OURS.before, _OURS.after):
                 node.give(_OURS, values)
                 good = same(values, plc.take(_OURS, values)) and same(
@@ -101,7 +101,7 @@ def share(setup: Setup, lines: tuple[str, str], start: Callable[[Setup, str, Exi
                 tally.wrong_ours += not good
         ended.set()
     watch.result()
-    counts = sum((future.result() for future in work), Counter())
+    counts = sum((future.result() for future in done), Counter())
     return replace(tally, **counts)
 
 
