@@ -108,7 +108,7 @@ class LineEvents:
 
     def unreadable(self, mapping: Mapping, reason: str) -> None:
         """Collect for the log why a row has no value although its station answers."""
-        self.unreadable_rows.add(line_time(), mapping, reason)
+        self.unreadable_rows.add(self._clock(), mapping, reason)
 
     def published_again(self, mapping: Mapping, seconds: float) -> None:
         """Log that a row, and all rows with the same condition, are published again."""
