@@ -89,7 +89,12 @@ def test_fallback_and_end_come_in_time_where_nothing_reads_the_log(
             publisher.publish(Int16MultiArray(data=[777]))
             refused.publish(Int16MultiArray(data=[turn]))  # each refusal is logged, ten a minute
             observer.wait(lambda: None, 0.05)
-        observer.until(lambda: plcs.word('N7:0') == 777, 'the message')
+
+        def has_come() -> bool:
+            publisher.publish(Int16MultiArray(data=[777]))  # it stands for 0.5 s
+            return plcs.word('N7:0') == 777
+
+        observer.until(has_come, 'the message')
         observer.node.destroy_publisher(publisher)
         observer.until(lambda: plcs.word('N7:0') == 0xFFFF, 'the fallback')
         node.send_signal(signal.SIGTERM)
