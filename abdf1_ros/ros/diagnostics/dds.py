@@ -35,8 +35,10 @@ import struct
 
 _PERIOD = 5.0  # s between two looks: a look takes some 0.2 ms
 
+# Locks on the process's own files; Fast DDS 2 calls them fastrtps_..., and 3 fastdds_...
 _FIRST, _LAST = '/dev/shm/fast', '_el (deleted)'
 
+# Of Linux: requests of ioctl, their struct, and the flags of a link (linux/if.h, netdevice(7)).
 _GET_ADDRESS, _GET_FLAGS = 0x8915, 0x8913
 _REQUEST = struct.Struct('16sH14x8x')
 _UP, _LOOPBACK, _RUNNING = 0x1, 0x8, 0x40
