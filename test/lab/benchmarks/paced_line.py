@@ -34,6 +34,7 @@ import signal
 import socket
 import threading
 import time
+import traceback
 import tty
 
 from abdf1_ros.df1.frames import ACK, Duplex
@@ -223,7 +224,7 @@ class _AnsweringLine:
         _go_ahead()
         self._far.start(time.monotonic())
         while True:
-            deadline = self._far.deadline
+            deadline = self._far.next_call
             timeout = None if deadline is None else max(0.0, deadline - time.monotonic())
             if select.select([self._descriptor], [], [], timeout)[0]:
                 data = os.read(self._descriptor, 4096)
@@ -306,6 +307,8 @@ def _answering(theirs: int, ours: int, far: Machine, char_time: float, response_
         try:
             os.close(ours)
             _AnsweringLine(theirs, far, char_time, response_time, sent).run()
+        except Exception:
+            traceback.print_exc()
         finally:
             os._exit(1)
     try:

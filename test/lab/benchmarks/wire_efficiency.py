@@ -69,6 +69,7 @@ SIZES = (1, 10, 50, 110)
 SPEEDS = (9600, 19200, 38400, 115200)
 STATION = 1
 WARM_UP = 3
+LONGEST_READ = 2.0  # s
 
 
 class Watch(Listener):
@@ -97,8 +98,10 @@ def measure(network: Network, words: int, count: int) -> tuple[float, list[float
         port.is_terminal = True
         link = LinkThread(driver.machine, lambda: port)
         link.start()
-        watch.is_full.wait()
+        is_full = watch.is_full.wait(LONGEST_READ * (count + WARM_UP))
         link.stop()
+    if not is_full:
+        raise SystemExit(f'{len(watch.times)} of {count + WARM_UP} reads came')
     block, = driver.readings.blocks
     return block.line_time, _steps(watch.times, count), watch.troubles
 
