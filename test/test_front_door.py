@@ -37,8 +37,7 @@ def example() -> str:
     return textwrap.dedent('\n'.join(lines[first:last + 1]))
 
 
-def test_example_of_the_manual_runs(
-        tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_example_of_the_manual_runs(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     plc = simulated_plc(1, 'SLC', lambda: 0.0, ('N7:0', 10), ('B3:0', 1))
     with plc_line(tmp_path / 'line', plc) as port:
         program = example().replace("'/dev/ttyUSB0'", f"'{port}', duplex='half', baud=115200")

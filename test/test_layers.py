@@ -98,8 +98,7 @@ def circles(arrows: dict[str, set[str]]) -> set[str]:
 
 
 def test_no_module_imports_itself_by_others() -> None:
-    arrows = {module.removesuffix('.py').replace('/', '.'): imported(module)
-              for module in MODULES}
+    arrows = {module.removesuffix('.py').replace('/', '.'): imported(module) for module in MODULES}
     assert circles({name: to - {name} for name, to in arrows.items()}) == set()
     assert circles({'a': {'b'}, 'b': {'a'}, 'c': {'a'}, 'd': set()}) == {'a', 'b', 'c'}
 

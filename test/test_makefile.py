@@ -51,8 +51,7 @@ def setup(tmp_path: Path, programs: Path) -> subprocess.CompletedProcess[str]:
 pytestmark = pytest.mark.skipif(shutil.which('make') is None, reason='there is no make')
 
 
-def test_machine_without_wheels_is_told_at_once_what_to_do(
-        tmp_path: Path, programs: Path) -> None:
+def test_machine_without_wheels_is_told_at_once_what_to_do(tmp_path: Path, programs: Path) -> None:
     script(programs / 'uname', 'echo aarch64')
     script(programs / 'python3', f'echo "$@" >> {tmp_path}/calls')
     result = setup(tmp_path, programs)

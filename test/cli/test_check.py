@@ -151,8 +151,7 @@ def test_rows_tell_what_a_ros_user_gets(files: tuple[Path, Path],
     assert level == {
         'tag': 'level', 'command': 'ReadWrite', 'address': 'N7:1', 'station': 1,
         'topics': ['~/read/tank/level', '~/write/tank/level'], 'message': 'Float32MultiArray',
-        'length': 1, 'value': 'int16 * 0.1 -40', 'stale_ms': level['stale_ms'],
-        'description': ''}
+        'length': 1, 'value': 'int16 * 0.1 -40', 'stale_ms': level['stale_ms'], 'description': ''}
     assert 300 < level['stale_ms'] < 600
     assert (alive['topics'], alive['message'], alive['stale_ms']) == ([], '', None)
 

@@ -318,8 +318,7 @@ def test_input_of_a_job_in_the_background_is_none(monkeypatch: pytest.MonkeyPatc
 def test_input_goes_on_when_a_job_comes_back_from_the_background(
         data: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """The first EIO was taken for the end of the input, so "fg" led to a deaf terminal."""
-    texts: list[bytes | OSError] = [
-        OSError(errno.EIO, 'Input/output error'), b'silent 1\nquit\n']
+    texts: list[bytes | OSError] = [OSError(errno.EIO, 'Input/output error'), b'silent 1\nquit\n']
 
     real_read = os.read
 

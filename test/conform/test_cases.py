@@ -71,8 +71,7 @@ def answering(family: str, check: str, target: Target) -> SpoiledLine:
                 station=1, checksum=Checksum[check], store_forward={1, 5, 254, 255})
             return RadioNode(machine, settings, ActiveStationList(), plc.serve).run(plc)
         return FullDuplexPeer(machine, LinkSettings(station=None, checksum=Checksum[check]),
-                              ActiveStationList(),
-                              plc.serve).run(plc)
+                              ActiveStationList(), plc.serve).run(plc)
 
     plc.be_full_duplex()
     return SpoiledLine(Machine(

@@ -38,8 +38,7 @@ def frame(checksum: Checksum, tns: int = 0) -> bytes:
 
 
 @for_all('vector', [
-    vector for vector in MESSAGES
-    if vector.valid and not vector.has_embedded_response])
+    vector for vector in MESSAGES if vector.valid and not vector.has_embedded_response])
 def test_every_vector_is_read_without_being_told_its_check(vector: Vector) -> None:
     kind = LineKind()
     decoder = ListeningDecoder(kind)

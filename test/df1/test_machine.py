@@ -151,8 +151,7 @@ def test_timeout_zero_does_not_wait() -> None:
 def test_frame_that_nothing_is_waited_for_is_sent_before_the_procedure_goes_on() -> None:
     bench = Bench(Send(ACK), Send(EOT), Send(FRAME, 1.0), start=None)
     sent: list[tuple[bytes, int]] = []
-    bench.machine.start(0.0, Wire(bench.machine, lambda data: sent.append(
-        (data, len(bench.got)))))
+    bench.machine.start(0.0, Wire(bench.machine, lambda data: sent.append((data, len(bench.got)))))
     assert sent == [(ACK, 0), (EOT, 1)]
     assert bench.machine.data_to_send() == FRAME
 
@@ -171,8 +170,7 @@ def sends_of(bench: Bench) -> list[tuple[bytes, int]]:
 
 
 @pytest.mark.parametrize('step', [Send(FRAME, 1.0, reflex=eot_on_ack), Rest(1.0, eot_on_ack)])
-def test_reflex_is_on_the_line_before_the_procedure_hears_of_the_symbol(
-        step: Send | Rest) -> None:
+def test_reflex_is_on_the_line_before_the_procedure_hears_of_the_symbol(step: Send | Rest) -> None:
     bench = Bench(step, Send(EOT, 1.0), timing=LineTiming(0.25))
     sent = sends_of(bench)
     machine = bench.machine
@@ -188,16 +186,14 @@ def test_reflex_is_on_the_line_before_the_procedure_hears_of_the_symbol(
 @pytest.mark.parametrize(('tx_delay', 'heard'), [(0.0, EOT), (0.0, EOT + ACK), (0.5, ACK)])
 def test_reflex_is_for_its_symbol_if_that_is_the_next_and_has_no_delay(
         tx_delay: float, heard: bytes) -> None:
-    bench = Bench(Listen(1.0, reflex=eot_on_ack), LISTEN_ON,
-                  timing=LineTiming(tx_delay=tx_delay))
+    bench = Bench(Listen(1.0, reflex=eot_on_ack), LISTEN_ON, timing=LineTiming(tx_delay=tx_delay))
     sent = sends_of(bench)
     bench.machine.receive_data(heard, 0.5)
     assert (sent, bench.machine.data_to_send()) == ([], b'')
 
 
 def test_reflex_does_not_overtake_what_still_has_to_go_out() -> None:
-    bench = Bench(Listen(1.0), Send(FRAME, 1.0, reflex=eot_on_ack), Send(EOT),
-                  duplex=Duplex.FULL)
+    bench = Bench(Listen(1.0), Send(FRAME, 1.0, reflex=eot_on_ack), Send(EOT), duplex=Duplex.FULL)
     sent = sends_of(bench)
     bench.machine.receive_data(ACK + ACK, 0.5)
     assert sent == [(FRAME + EOT, 2)]

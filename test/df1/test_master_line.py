@@ -25,14 +25,12 @@ import pytest
 from support.multidrop import MasterBench, Slave
 
 MASTER = 5
-SETTINGS = LinkSettings(
-    station=MASTER, nak_retries=1, enq_retries=1, timeout=0.1, cmd_timeout=0.5)
+SETTINGS = LinkSettings(station=MASTER, nak_retries=1, enq_retries=1, timeout=0.1, cmd_timeout=0.5)
 BOTH = pytest.mark.parametrize('standard', [False, True], ids=['message', 'standard'])
 
 
 def bench(standard: bool, *numbers: int, dead: tuple[int, ...] = (),
-          settings: LinkSettings = SETTINGS, serves: bool = True,
-          retries: int = 3) -> MasterBench:
+          settings: LinkSettings = SETTINGS, serves: bool = True, retries: int = 3) -> MasterBench:
     """Return a master of either kind and its stations."""
     polling = PollingSettings(numbers) if standard else None
     return MasterBench(*numbers, settings=settings, polling=polling, dead=dead,
@@ -97,8 +95,7 @@ class CommandsFirst(HalfDuplexSlave):
 @pytest.mark.parametrize('dst', [8, MASTER])
 def test_no_ack_for_a_command_that_cannot_be_kept(dst: int) -> None:
     # Without the NAK, which would make the slave drop what it holds.
-    rig = bench(False, 7, 8, settings=replace(SETTINGS, nak_on_command_timeout=False),
-                retries=200)
+    rig = bench(False, 7, 8, settings=replace(SETTINGS, nak_on_command_timeout=False), retries=200)
     for _ in range(MAX_FORWARDS + 1):
         rig.message(7, dst)
     rig[7].delay = 0.0

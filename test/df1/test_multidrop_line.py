@@ -60,12 +60,10 @@ class Rig:
         timing = LineTiming(char_time(BAUD))
         settings = LinkSettings(station=MASTER, checksum=checksum, timeout=0.1, cmd_timeout=0.5)
         self.master = MasterNode(settings, self.clock, MODES[mode], numbers=SLAVES,
-                                 serve=lambda command: self.serve(MASTER, command),
-                                 timing=timing)
+                                 serve=lambda command: self.serve(MASTER, command), timing=timing)
         self.slaves = {number: SlaveNode(
             LinkSettings(station=number, checksum=checksum, cmd_timeout=2.0, poll_timeout=5.0),
-            self.clock,
-            serve=lambda command, number=number: self.serve(number, command),
+            self.clock, serve=lambda command, number=number: self.serve(number, command),
             timing=timing) for number in SLAVES}
         self.nodes: dict[int, MasterNode | SlaveNode] = {MASTER: self.master, **self.slaves}
         self.tns = dict.fromkeys(self.nodes, 0x0F00)
@@ -213,8 +211,7 @@ def test_counters_of_all_ends_agree_on_a_clean_line(mode: str, chunk: int) -> No
         assert not any((
             counters.naks_sent, counters.nak_retries, counters.enq_retries, counters.crc_errors,
             counters.stale_messages, counters.duplicate_messages, counters.invalid_messages,
-            counters.command_timeouts, counters.nak_limit_exceeded,
-            counters.enq_limit_exceeded))
+            counters.command_timeouts, counters.nak_limit_exceeded, counters.enq_limit_exceeded))
     assert rig.master.changes == []
     assert_recovers(rig)
 

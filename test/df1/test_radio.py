@@ -357,8 +357,7 @@ def test_nothing_is_executed_twice_nothing_is_wrong_and_everything_ends(
         assert air.sent.count(framed(command)) <= count * (retries + 1)
         reply = command.reply(bytes((command.dst,)) + command.data)
         assert air.sent.count(framed(reply)) <= count * (retries + 1)
-    if loss == 0.0 and (
-            holds_back and reach is everybody or count == 3 and not avoids_collisions):
+    if loss == 0.0 and (holds_back and reach is everybody or count == 3 and not avoids_collisions):
         assert good >= 15
 
 

@@ -108,8 +108,7 @@ def plant_with(polling: str, answer: Answer, count: int) -> Plant:
 
 
 @pytest.mark.parametrize('polling, answer, count', CASES)
-def test_living_node_keeps_its_reads_and_writes(
-        polling: str, answer: Answer, count: int) -> None:
+def test_living_node_keeps_its_reads_and_writes(polling: str, answer: Answer, count: int) -> None:
     plant, alone = plant_with(polling, answer, count), plant_with(polling, STATUS, 0)
     reads = [len(bench.listener.times(bench.read)) for bench in (alone, plant)]
     assert reads[1] >= 0.75 * reads[0], reads

@@ -84,8 +84,7 @@ def test_writes_and_reads_take_turns_at_a_silent_station() -> None:
         job, begun = bench.next(now), now
         now += 0.02 if job is living else 1.0
         if isinstance(job, Write):
-            bench.stations.tried(
-                2, begun, now, was_silent=job.is_probe, asker=Asker.MESSAGE)
+            bench.stations.tried(2, begun, now, was_silent=job.is_probe, asker=Asker.MESSAGE)
             turns += 'w'
         else:
             assert isinstance(job, ReadJob)

@@ -42,8 +42,7 @@ class Host:
         """Take a message of a publisher whose clock is ahead; return its age, or a reason."""
         wall = self.now + NEVER_SET + self.set_by
         try:
-            return round(self.ages.of(
-                [published + NEVER_SET + lead, wall], wall, self.now), 3)
+            return round(self.ages.of([published + NEVER_SET + lead, wall], wall, self.now), 3)
         except FormatError as error:
             return str(error).partition(';')[0]
 

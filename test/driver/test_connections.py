@@ -109,8 +109,7 @@ def test_fallback_that_stands_calls_for_nothing_while_all_are_silent(mode: str) 
     bench.run(20.0)  # it is to be written again after 5 s
     bench.let_through()
     bench.run(3.0)
-    assert bench.results() == [
-        f'fallback value written: {cause}' for cause in ('start', 'return')]
+    assert bench.results() == [f'fallback value written: {cause}' for cause in ('start', 'return')]
 
 
 @pytest.mark.parametrize('mode', MODES)

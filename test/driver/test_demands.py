@@ -84,8 +84,7 @@ def test_row_on_demand_takes_no_line_time_until_a_call_asks_for_it() -> None:
     assert line.listener.values(RECIPE) == [[*range(200, 210)]]
     line.run(20.0)
     assert len(line.listener.values(RECIPE)) == len(line.answers) == 1
-    assert line.driver.readings.blocks == [
-        job.block for job in line.driver.readings.reads.jobs]
+    assert line.driver.readings.blocks == [job.block for job in line.driver.readings.reads.jobs]
 
 
 def test_row_that_is_read_seldom_is_read_at_once() -> None:

@@ -74,8 +74,7 @@ def test_values_are_right_and_writes_are_told_as_they_ended(
 
 @pytest.mark.parametrize(('device', 'mode'), [
     (device, mode) for device in WRONG for mode in device.modes], ids=str)
-def test_what_is_no_reply_is_no_value_and_confirms_nothing(
-        device: Device, mode: str) -> None:
+def test_what_is_no_reply_is_no_value_and_confirms_nothing(device: Device, mode: str) -> None:
     words = make_mapping('N7:0', plc='SLC', length=3)
     target = make_mapping('N7:5', 'Write', plc='SLC')
     bench, _ = bench_of(device, mode, 'CRC', words, target)

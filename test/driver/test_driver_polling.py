@@ -80,8 +80,7 @@ def test_long_reply_is_not_looked_at_while_it_cannot_be_complete(
     assert len([size for size in sizes if size == 8]) <= 4  # the reply has more than 200 bytes
 
 
-def test_read_of_several_commands_is_put_together_in_order_and_others_are_read_beside_it(
-        ) -> None:
+def test_read_of_several_commands_is_put_together_in_order_and_others_are_read_beside_it() -> None:
     long, other = make_mapping('N7:0', length=300), make_mapping('N7:0', station=2)
     bench = DriverBench([long, other], network=STANDARD)
     plc = bench.plc(1, 'PLC5', ('N7:0', 300))

@@ -81,8 +81,7 @@ class OneRow:
         self.now = write.requested
         claim = self.record.begin(1, [self.mapping.extent], write)
         self.now = done
-        self.record.ended(claim, outcome,
-                          may_land=outcome in (Outcome.UNKNOWN, Outcome.PARTLY))
+        self.record.ended(claim, outcome, may_land=outcome in (Outcome.UNKNOWN, Outcome.PARTLY))
 
 
 @pytest.mark.parametrize(('begun', 'again'), [(1.5, 2.0), (2.0, math.inf)])
@@ -253,8 +252,7 @@ def test_rule_8_row_is_fresh_by_a_confirmed_message_only() -> None:
 
 
 @pytest.mark.parametrize('silent', [0.4, 1.0])
-def test_rule_8_plc_that_comes_back_with_an_old_word_has_its_fallback_first(
-        silent: float) -> None:
+def test_rule_8_plc_that_comes_back_with_an_old_word_has_its_fallback_first(silent: float) -> None:
     beat, speed = beat_row(), speed_row(Fallback((7,), 800))
     cell = Cell(beat, speed, run=3.0)
     cell.publish(speed, 3, run=0.2)

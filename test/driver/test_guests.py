@@ -96,8 +96,7 @@ def test_guest_waits_on_an_idle_line_no_longer_than_its_last_failure_asks_for() 
     (ShareAccess.WRITE, 0x0F, WRITE_N7, True), (ShareAccess.WRITE, 0x08, b'\0\0\1\2', True),
     (ShareAccess.WRITE, 0x0F, b'\x80\x01', False), (ShareAccess.WRITE, 0x0F, b'\x50', False),
     (ShareAccess.ALL, 0x0F, b'\x80\x01', True), (ShareAccess.ALL, 0x07, b'\x00', True)])
-def test_access_says_what_goes_to_the_line(
-        entry: tuple[ShareAccess, int, bytes, bool]) -> None:
+def test_access_says_what_goes_to_the_line(entry: tuple[ShareAccess, int, bytes, bool]) -> None:
     access, cmd, data, is_allowed = entry
     assert access.allows(Packet(1, 9, cmd, 0, 1, data)) is is_allowed
 

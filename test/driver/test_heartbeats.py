@@ -22,11 +22,7 @@ import gc
 from random import Random
 
 from abdf1_ros.df1.checksum import Checksum
-from abdf1_ros.driver.interlocks.heartbeat import (
-    BeatState,
-    LARGEST,
-    OtherWriter,
-)
+from abdf1_ros.driver.interlocks.heartbeat import BeatState, LARGEST, OtherWriter
 from abdf1_ros.driver.settings import DriverSettings
 from abdf1_ros.driver.write import Outcome
 from abdf1_ros.pccc.data_table import DataTable

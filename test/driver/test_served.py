@@ -262,8 +262,7 @@ def test_whole_element_of_which_a_word_is_served(plc: str, access: str) -> None:
 
 
 @pytest.mark.parametrize(('text', 'words'), [('T4:0.PRE', 3), ('T4:0', 5)])
-def test_words_that_are_no_whole_elements_are_all_mapped_or_refused(
-        text: str, words: int) -> None:
+def test_words_that_are_no_whole_elements_are_all_mapped_or_refused(text: str, words: int) -> None:
     bench = Bench('SLC', row('T4:0.ACC', 'SLC'), row('T4:1.PRE', 'SLC'))
     dialect = dialect_of(PlcType.SLC)
     assert bench.ask(*dialect.read(parse_address(text, PlcType.SLC), words))[0] != 0
@@ -394,8 +393,7 @@ def test_serve_row_of_a_file() -> None:
 
 def test_topic_of_a_serve_row_has_no_other_reader_and_writers_of_its_length_only() -> None:
     _, problems = loaded('a,Serve,N7:50,5,PLC5,4,,x,,,,', 'b,Read,N7:0,1,PLC5,4,,x,,,,')
-    assert problems == [
-        'Item: 2, read topic "x" is the topic of item 1 (line 2, tag "a")']
+    assert problems == ['Item: 2, read topic "x" is the topic of item 1 (line 2, tag "a")']
     _, problems = loaded('a,Serve,N7:50,5,PLC5,4,,x,,,,', 'b,Write,N7:0,1,PLC5,3,,x,,,,')
     assert problems == [
         'Item: 2, write topic "x" needs the message type (int16) and Length (4) of item 1 '

@@ -24,14 +24,7 @@ from abdf1_ros.df1.checksum import Checksum
 from abdf1_ros.df1.packet import Packet
 import pytest
 from support.fault_box import FaultBox
-from support.fault_rig import (
-    boxed,
-    is_unanswered,
-    NOT_SENT,
-    Rig,
-    SETPOINT,
-    UNKNOWN,
-)
+from support.fault_rig import boxed, is_unanswered, NOT_SENT, Rig, SETPOINT, UNKNOWN
 from support.renewed import Renewed
 from support.ros import ERROR, Observer
 

@@ -87,9 +87,8 @@ def test_what_is_no_address(family: PlcType, text: str) -> None:
 
 
 @for_all('text', [
-    'N7:0/16', 'B3:0/16', 'N2:0', 'N7:123456', 'N7:100000',
-    'N1000:0', 'N1234567:0', 'N7/32000', 'B0:0', 'T1:0', 'S3:0', 'T4:0.3', 'T4:0.255',
-    'ST9:99999'])
+    'N7:0/16', 'B3:0/16', 'N2:0', 'N7:123456', 'N7:100000', 'N1000:0', 'N1234567:0', 'N7/32000',
+    'B0:0', 'T1:0', 'S3:0', 'T4:0.3', 'T4:0.255', 'ST9:99999'])
 @for_all('family', BOTH)
 def test_out_of_range_in_both_families(text: str, family: PlcType) -> None:
     with pytest.raises(AddressRangeError):

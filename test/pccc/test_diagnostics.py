@@ -85,8 +85,7 @@ def test_status_is_that_of_the_processor_at_the_moment(plc_type: PlcType) -> Non
     processor = EmulatedProcessor()
     server = Server(DataTable(plc_type), processor)
     command = Packet(1, 9, 0x06, 0, 0x1234, STATUS_REQUEST)
-    assert server.serve(command) == reply(
-        FAMILIES[plc_type].encode_identity(processor))
+    assert server.serve(command) == reply(FAMILIES[plc_type].encode_identity(processor))
     processor.setting = Setting.RUN
     assert decode_identity(server.serve(command).data).mode is Mode.RUN
 

@@ -59,8 +59,7 @@ def test_slc_of_the_vectors() -> None:
 def test_plc5_of_the_vectors() -> None:
     identity = decode_identity(PLC5)
     assert str(identity) == 'PLC-5/40 series C revision C, REM RUN'
-    assert (identity.plc_type, identity.memory) == (
-        PlcType.PLC5, '98304 (unit not documented)')
+    assert (identity.plc_type, identity.memory) == (PlcType.PLC5, '98304 (unit not documented)')
     assert identity.is_running
     assert (identity.faults, identity.remarks) == ((), ())
 

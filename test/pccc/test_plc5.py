@@ -23,12 +23,7 @@ from abdf1_ros.pccc.fields import Reader
 from abdf1_ros.pccc.file_search import DataFile
 from abdf1_ros.pccc.file_types import FileType, PlcType
 from abdf1_ros.pccc.plc5.address import ADDRESSING
-from abdf1_ros.pccc.plc5.commands import (
-    BitSet,
-    element_of,
-    ReadModifyWrite,
-    SystemAddress,
-)
+from abdf1_ros.pccc.plc5.commands import BitSet, element_of, ReadModifyWrite, SystemAddress
 from abdf1_ros.pccc.plc5.dialect import Plc5Dialect
 from abdf1_ros.pccc.plc5.file_search import Plc5FileSearch
 from abdf1_ros.pccc.server import Server

@@ -129,8 +129,7 @@ FILES = {
 
 
 @given(requests, st.sampled_from([*FAMILIES]),
-       st.one_of(st.sampled_from((0x0F, 1, 2, 5, 8)), st.integers(0, 255)),
-       st.integers(0, 0xFFFF))
+       st.one_of(st.sampled_from((0x0F, 1, 2, 5, 8)), st.integers(0, 255)), st.integers(0, 0xFFFF))
 def test_any_bytes_have_one_reply(data: bytes, family: PlcType, cmd: int, tns: int) -> None:
     words = table(family, **FILES[family])
     files = set(words)

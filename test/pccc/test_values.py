@@ -24,11 +24,7 @@ from abdf1_ros.pccc.address import Address
 from abdf1_ros.pccc.data_table import DataTable
 from abdf1_ros.pccc.families import parse_address
 from abdf1_ros.pccc.file_types import PlcType
-from abdf1_ros.pccc.strings import (
-    decode_counted,
-    encode_counted,
-    encode_packed,
-)
+from abdf1_ros.pccc.strings import decode_counted, encode_counted, encode_packed
 from abdf1_ros.pccc.structures import type_fault, write_fault
 from abdf1_ros.pccc.values import Codec, types_of, ValueType, WordOrder
 from hypothesis import given, settings

@@ -19,10 +19,7 @@ from abdf1_ros.pccc.families import parse_address
 from abdf1_ros.pccc.file_types import FileType, PlcType
 from abdf1_ros.pccc.plc3.dialect import PLC3
 from abdf1_ros.pccc.plc5.dialect import PLC5_WORD_RANGE
-from abdf1_ros.pccc.word_range.commands import (
-    in_line_order,
-    word_on_line,
-)
+from abdf1_ros.pccc.word_range.commands import in_line_order, word_on_line
 from abdf1_ros.pccc.word_range.dialect import WordRangeDialect
 import pytest
 from support.tables import ask, counting, table, words_at

@@ -16,14 +16,7 @@
 
 from dataclasses import replace
 
-from abdf1_ros.plan.forecast import (
-    block_time,
-    intervals,
-    line_model,
-    load,
-    PATIENCE,
-    poll_cycle,
-)
+from abdf1_ros.plan.forecast import block_time, intervals, line_model, load, PATIENCE, poll_cycle
 from abdf1_ros.plan.planner import Planner
 from abdf1_ros.settings.network import Network
 import pytest

@@ -18,13 +18,7 @@ from collections import defaultdict
 from collections.abc import Iterable, Sequence
 import math
 
-from abdf1_ros.plan.partition import (
-    Candidate,
-    cheapest,
-    CostModel,
-    partition,
-    Span,
-)
+from abdf1_ros.plan.partition import Candidate, cheapest, CostModel, partition, Span
 from hypothesis import given
 from hypothesis import strategies as st
 import pytest

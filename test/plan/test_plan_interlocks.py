@@ -292,8 +292,7 @@ def test_rule_16_rows_that_are_fast_enough_are_not_warned_of() -> None:
 
 def test_rule_14_timeout_is_three_planned_intervals() -> None:
     counter = make_mapping('N11:3', tag='alive', period=100)
-    guarded = make_mapping('N7:0', tag='level', period=1000,
-                           condition=While(('alive',), 250))
+    guarded = make_mapping('N7:0', tag='level', period=1000, condition=While(('alive',), 250))
     (mapping, fault), = guard_faults(line_model(QUICK), Rows([counter, guarded]), 0.1)
     assert mapping is guarded
     assert (fault.column, fault.text) == (

@@ -21,11 +21,7 @@ import threading
 import time
 
 from abdf1_ros.df1.frames import ACK, Code, Control
-from abdf1_ros.df1.machine import (
-    Listen,
-    Rest,
-    Send,
-)
+from abdf1_ros.df1.machine import Listen, Rest, Send
 from abdf1_ros.errors import PortLost
 from abdf1_ros.ports.descriptor import Port
 from abdf1_ros.ports.link_thread import Attempt, LinkThread, PortState

@@ -22,13 +22,7 @@ import time
 
 from abdf1_ros.df1.checksum import Checksum
 from abdf1_ros.df1.frames import ACK, Frame, message_frame
-from abdf1_ros.df1.machine import (
-    LineTiming,
-    Listen,
-    Machine,
-    Rest,
-    Send,
-)
+from abdf1_ros.df1.machine import LineTiming, Listen, Machine, Rest, Send
 from abdf1_ros.df1.packet import Packet
 from abdf1_ros.ports.descriptor import DescriptorPort, READ_SIZE
 from abdf1_ros.ports.link_thread import LinkThread

@@ -26,12 +26,7 @@ import threading
 import time
 
 from abdf1_ros.df1.frames import ACK, Code, Control, EOT, Symbol
-from abdf1_ros.df1.machine import (
-    Listen,
-    Rest,
-    Send,
-    Step,
-)
+from abdf1_ros.df1.machine import Listen, Rest, Send, Step
 from abdf1_ros.errors import PortLost
 from abdf1_ros.ports.descriptor import Port
 from abdf1_ros.ports.link_thread import LinkThread, PortState
@@ -192,8 +187,7 @@ def test_missing_port_is_waited_for_asleep(monkeypatch: pytest.MonkeyPatch) -> N
     thread.stop()
 
 
-@pytest.mark.parametrize('step', [
-    Rest(), Rest(3600.0), Listen(None), Send(b'x', 3600.0)])
+@pytest.mark.parametrize('step', [Rest(), Rest(3600.0), Listen(None), Send(b'x', 3600.0)])
 def test_stop_ends_what_runs_with_an_error(pty: Pty, link: Link, step: Step) -> None:
     script, thread = link.begin(pty, step)
     thread.stop()

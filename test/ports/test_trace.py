@@ -87,8 +87,7 @@ def test_trace_that_fails_says_so_once_and_the_port_goes_on(tmp_path: Path) -> N
     assert error.endswith('; nothing more is recorded')
 
 
-def test_trace_that_cannot_grow_costs_neither_the_port_nor_its_whole_lines(
-        tmp_path: Path) -> None:
+def test_trace_that_cannot_grow_costs_neither_the_port_nor_its_whole_lines(tmp_path: Path) -> None:
     errors: list[str] = []
     trace = Trace(str(tmp_path / 'x'), {}, errors.append)
     port = TracedPort(Loop(), trace, 0.0, lambda: 0.0)

@@ -58,8 +58,7 @@ def test_bits_are_alarms_each_for_itself() -> None:
     bench.read(0, 1)
     bench.read(0, 1, after=0.4)
     assert bench.says() == (ERROR, 'B3:0/4 for 0.4 s, 1 time: Guard doors')
-    assert bench.status.values(bench.now) == {
-        'B3:0/3': 'never', 'B3:0/4': 'for 0.4 s, 1 time'}
+    assert bench.status.values(bench.now) == {'B3:0/3': 'never', 'B3:0/4': 'for 0.4 s, 1 time'}
     bench.read(1, 1)
     assert bench.says()[1].startswith('B3:0/3 for 0.0 s, 1 time, B3:0/4 for 0.5 s, 1 time')
 

@@ -87,8 +87,7 @@ class Bench:
             clock=lambda: self.now)
         self.driver = Driver(Network(mode=mode), mappings, DriverSettings(), self.events)
         self.link = LinkThread(self.driver.machine, lambda: pytest.fail('no port here'))
-        self.diagnostics = Diagnostics(
-            'line_a', self.driver, PORT, self.events, left_out)
+        self.diagnostics = Diagnostics('line_a', self.driver, PORT, self.events, left_out)
         self.opener = PortOpener(PortSettings.of(Network(), PORT))
         self.diagnostics.line.attach(self.link, self.opener)
         self.set_port(True, 'open')
@@ -249,8 +248,7 @@ def test_link_of_a_node_that_new_programs_cannot_hear(bench: Bench) -> None:
     told = [[news.text for watch in watches for news in watch.look(now)]
             for now in (0.0, 1.0, 2.0)]
     assert told == [[], [LOST], []]
-    assert bench.says('link') == (
-        WARN, f'WARN: port open, 0 of 2 stations have answered; {LOST}')
+    assert bench.says('link') == (WARN, f'WARN: port open, 0 of 2 stations have answered; {LOST}')
 
 
 def test_slave_that_nobody_polls_is_a_warning(make_bench: Callable[..., Bench]) -> None:

@@ -356,8 +356,7 @@ def test_rule_21_an_echo_is_no_plc(tmp_path: Path) -> None:
             for value in range(1, 6):
                 speed.publish(Int16MultiArray(data=[value]))
             observer.until(lambda: len(results) >= 5 or None, 'five results')
-            until_status(diagnostics, 'link', ERROR,
-                         lambda status: COMES_BACK in status.message)
+            until_status(diagnostics, 'link', ERROR, lambda status: COMES_BACK in status.message)
             assert 'inactive' in until_status(diagnostics, 'station 1', ERROR).message
             until_status(diagnostics, 'mappings', ERROR)
             status = until_status(diagnostics, 'interlocks', WARN)

@@ -316,8 +316,7 @@ def test_second_process_of_the_same_name_is_a_warning(plant: Plant) -> None:
         status = until_status(plant.observer.diagnostics(''), 'lines', WARN)
     finally:
         other.destroy_node()
-    assert status.message.startswith(
-        'WARN: 1 of 1 lines run; another node is called /lines too')
+    assert status.message.startswith('WARN: 1 of 1 lines run; another node is called /lines too')
 
 
 def test_process_may_open_as_many_files_as_the_system_allows(
@@ -378,8 +377,7 @@ def test_new_files_do_not_make_a_line_the_second_master_on_the_port_of_another(
     plant.write_net('a', taken, place)
     plant.start('-p', 'lines:=[a, b]', reads='ab')
 
-    for net, why in [((taken,), f'{taken} is the port'),
-                     ((free, place), f'{place} is the place')]:
+    for net, why in [((taken,), f'{taken} is the port'), ((free, place), f'{place} is the place')]:
         plant.write_net('b', *net)
         response = plant.observer.call(Trigger, '/hall/b/reload', Trigger.Request())
         assert (response.success, response.message) == (
@@ -395,8 +393,7 @@ def test_new_files_do_not_make_a_line_the_second_master_on_the_port_of_another(
 
 
 def test_internal_error_at_the_start_of_a_line(
-        plant: Plant, monkeypatch: pytest.MonkeyPatch,
-        capfd: pytest.CaptureFixture[str]) -> None:
+        plant: Plant, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]) -> None:
     monkeypatch.setattr(module, 'RESTART_AFTER', 0.5)
     made: list[float] = []
 
@@ -415,8 +412,7 @@ def test_internal_error_at_the_start_of_a_line(
 
 
 def test_internal_error_restarts_its_line_only_and_its_slow_end_holds_up_no_other(
-        plant: Plant, monkeypatch: pytest.MonkeyPatch,
-        capfd: pytest.CaptureFixture[str]) -> None:
+        plant: Plant, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]) -> None:
     monkeypatch.setattr(module, 'RESTART_AFTER', 0.1)
     slow, ended = threading.Event(), threading.Event()
 
@@ -502,8 +498,7 @@ def test_one_name_for_all_lines_is_refused(capfd: pytest.CaptureFixture[str]) ->
     ('strict_line:=true', 'there is no such parameter; did you mean strict_lines?'),
     ('line:=[a]', 'there is no such parameter; did you mean lines?')])
 def test_options_that_cannot_be_meant(
-        tmp_path: Path, option: str, text: str,
-        capfd: pytest.CaptureFixture[str]) -> None:
+        tmp_path: Path, option: str, text: str, capfd: pytest.CaptureFixture[str]) -> None:
     path = yaml_file(tmp_path, 'a: {ros__parameters: {port: x}}')
     assert main(['lines', '--ros-args', '--params-file', path, '-p', option]) == 2
     assert text in capfd.readouterr().err

@@ -66,8 +66,7 @@ class ForeignMaster(threading.Thread):
                 self._say(self._theirs, checked(ask, b'\x10\x02' + ask))
                 self._say(self._far, b'\x10\x06')
             else:
-                self._say(self._theirs, checked(
-                    b'\x01\x02' + ask, b'\x10\x01\x01\x10\x02' + ask))
+                self._say(self._theirs, checked(b'\x01\x02' + ask, b'\x10\x01\x01\x10\x02' + ask))
                 self._say(self._far, b'\x10\x06')
                 self._say(self._theirs, b'\x10\x05\x01\xFF')
             self._say(self._far, checked(answer, b'\x10\x02' + answer))

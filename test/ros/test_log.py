@@ -18,12 +18,7 @@ from collections.abc import Callable, Iterator
 import re
 
 from abdf1_ros.messages import Event, Message, Severity
-from abdf1_ros.ros.diagnostics.log import (
-    EventLog,
-    LimitedLog,
-    MOST_ENTRIES,
-    UnreadableRows,
-)
+from abdf1_ros.ros.diagnostics.log import EventLog, LimitedLog, MOST_ENTRIES, UnreadableRows
 from abdf1_ros.settings.mapping import Mapping
 import pytest
 from rclpy.logging import get_logger, LoggingSeverity
@@ -256,9 +251,8 @@ def test_rows_of_a_file_that_fail_for_one_reason_are_one_line(
     assert logged() == []
     rows.look(2.2)
     assert [text for _, text in logged()] == [
-        '2 rows from N7:2 to N7:5 at station 1 (N7:2, N7:5): no',
-        'N7:1 (N7:1 at station 2): no', 'N7:3 (N7:3 at station 1): never',
-        'N9:3 (N9:3 at station 1): no']
+        '2 rows from N7:2 to N7:5 at station 1 (N7:2, N7:5): no', 'N7:1 (N7:1 at station 2): no',
+        'N7:3 (N7:3 at station 1): never', 'N9:3 (N9:3 at station 1): no']
     for tick in range(101):  # they never pause
         rows.add(10 + tick / 10, make_mapping('N7:0', tag='a'), f'{tick}')
         rows.look(10 + tick / 10)

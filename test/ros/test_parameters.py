@@ -344,8 +344,7 @@ def test_parameter_file_sets_parameters_of_node_and_net(
     configuration = configure(make_node(cli_args=arguments))
     assert configuration.parameters.default_period == 250
     assert configuration.parameters.stale_after == 4.0
-    assert configuration.network == Network(
-        baud=38400, com_port='3', handshake=True, parity='Odd')
+    assert configuration.network == Network(baud=38400, com_port='3', handshake=True, parity='Odd')
 
 
 @pytest.mark.parametrize(('name', 'right'), [

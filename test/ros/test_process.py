@@ -40,14 +40,7 @@ from support.ros import (
     values_in,
     write_csv,
 )
-from support.simulator_process import (
-    Files,
-    make_files,
-    MAP_HEADER,
-    NET_HEADER,
-    NET_ROW,
-    STATUSES,
-)
+from support.simulator_process import Files, make_files, MAP_HEADER, NET_HEADER, NET_ROW, STATUSES
 
 
 @pytest.fixture

@@ -168,8 +168,7 @@ def cost_to_make(process: Process, count: int) -> float:
 
 
 @pytest.mark.timeout(300)  # two of them begin at once, on a busy host
-def test_time_to_start_grows_with_the_rows_and_a_thousand_end_in_time(
-        tmp_path: Path) -> None:
+def test_time_to_start_grows_with_the_rows_and_a_thousand_end_in_time(tmp_path: Path) -> None:
     file = patched(tmp_path, 'node', EARLY + COSTS)  # once: the other process may be reading it
     with many_rows(file, 200) as small, many_rows(file, 1000) as large:
         took = {count: cost_to_make(process, count)

@@ -228,8 +228,7 @@ def test_second_publisher_is_found_again(bench: Bench, capfd: pytest.CaptureFixt
 
 
 def test_station_that_took_no_commands_does_not_answer_by_new_files(
-        bench: Bench, monkeypatch: pytest.MonkeyPatch,
-        capfd: pytest.CaptureFixture[str]) -> None:
+        bench: Bench, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]) -> None:
     asked: list[LineView] = []
 
     def deaf_stations(line: LineView, now: float) -> list[int]:

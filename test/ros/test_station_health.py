@@ -26,11 +26,7 @@ from abdf1_ros.pccc.identity import Identity, Mode
 from abdf1_ros.pccc.processor import Processor
 from abdf1_ros.ports.link_thread import LinkThread
 from abdf1_ros.ros.diagnostics.line import wrong_type
-from abdf1_ros.ros.diagnostics.stations import (
-    health_values,
-    LinkCounterService,
-    processor_fault,
-)
+from abdf1_ros.ros.diagnostics.stations import health_values, LinkCounterService, processor_fault
 from abdf1_ros.settings.mapping import Mapping
 from abdf1_ros.settings.network import Network
 import pytest

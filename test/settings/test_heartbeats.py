@@ -38,8 +38,7 @@ def tags_of(*rows: str) -> list[str]:
 
 def test_rule_1_heartbeat_is_one_word_without_a_topic() -> None:
     mapping = one(**BEAT)
-    assert (mapping.command, mapping.period, mapping.condition) == (
-        Command.HEARTBEAT, 1000, None)
+    assert (mapping.command, mapping.period, mapping.condition) == (Command.HEARTBEAT, 1000, None)
     assert not mapping.reads and not mapping.writes and not mapping.polls
 
 
@@ -306,8 +305,7 @@ def test_rule_22_bit_confirms_a_heartbeat_of_its_station() -> None:
     assert [cell_of(mapping, 'Confirms') for mapping in (bit, rest)] == ['beat', '']
 
 
-@pytest.mark.parametrize('cells', [
-    {'Length': '2'}, {'Address': 'N12:0'}])
+@pytest.mark.parametrize('cells', [{'Length': '2'}, {'Address': 'N12:0'}])
 def test_rule_22_what_is_not_a_bit_that_is_read_confirms_nothing(cells: dict[str, str]) -> None:
     assert 'Confirms is for a Read row of one bit' in faults(row(**BIT | cells), row(**BEAT))[0]
 

@@ -33,9 +33,8 @@ from support.mappings import cell_of, fault, faults, load_rows, one, row
 
 def test_row_with_every_column() -> None:
     mapping = one(Tag='Line speed', Command='readwrite', Address='n7:10', Station='254',
-                  PLC_Type='slc', Length='4', Type='FLOAT32', Topic='cell/1 speed',
-                  Period='250', Publish='change', Min='-1.5', Max='99',
-                  Description='"Roller, hall 3"')
+                  PLC_Type='slc', Length='4', Type='FLOAT32', Topic='cell/1 speed', Period='250',
+                  Publish='change', Min='-1.5', Max='99', Description='"Roller, hall 3"')
     expected = {
         'item': 1, 'tag': 'Line speed', 'name': 'Line_speed', 'command': Command.READ_WRITE,
         'station': 254, 'plc_type': PlcType.SLC, 'length': 4, 'type': ValueType.FLOAT32,

@@ -23,13 +23,7 @@ from abdf1_ros.df1.frames import Duplex
 from abdf1_ros.messages import Severity
 from abdf1_ros.problems import ConfigurationError
 from abdf1_ros.settings import BAUD_RATES
-from abdf1_ros.settings.network import (
-    FIELDS,
-    load_network,
-    make_network,
-    MODE_NAMES,
-    Network,
-)
+from abdf1_ros.settings.network import FIELDS, load_network, make_network, MODE_NAMES, Network
 from abdf1_ros.settings.remarks import network_remarks
 from abdf1_ros.settings.share import share_places, SharePlace
 from abdf1_ros.settings.station_lists import parse_stations
@@ -77,10 +71,9 @@ def faults(path: Path, header: str, row: str) -> list[str]:
 
 def test_columns_are_those_of_the_specification_polling_and_radio() -> None:
     assert [entry.column for entry in FIELDS.values()] == [
-        'Station', 'Mode', 'PLC_Type', 'Error_Code', 'NAK_Retries', 'ENQ_Retries',
-        'Cmd_Timeout', 'Com_Port', 'Baud', 'Data_Bits', 'Stop_Bits', 'Parity', 'Timeout',
-        'TX_Delay', 'Handshake', 'Polling', 'Share', 'Share_Access', 'Store_Forward',
-        'Collision_Avoidance', 'Listen_Port']
+        'Station', 'Mode', 'PLC_Type', 'Error_Code', 'NAK_Retries', 'ENQ_Retries', 'Cmd_Timeout',
+        'Com_Port', 'Baud', 'Data_Bits', 'Stop_Bits', 'Parity', 'Timeout', 'TX_Delay', 'Handshake',
+        'Polling', 'Share', 'Share_Access', 'Store_Forward', 'Collision_Avoidance', 'Listen_Port']
 
 
 @for_all(('column', 'field', 'default', 'good', 'bad'), NUMBERS)

@@ -163,8 +163,7 @@ def test_two_guests_read_and_write_and_none_gets_the_other_ones_values(
     assert not (tmp_path / 'hmi').is_symlink()
 
 
-def test_place_is_a_peer_of_the_manual(
-        tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_place_is_a_peer_of_the_manual(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """The link rules at a place, judged by the kit; BCC there, CRC on the line."""
     with shared(tmp_path, f'pty:{tmp_path}/hmi?check=BCC', 'All'):
         wait_for((tmp_path / 'hmi').exists)
@@ -258,8 +257,7 @@ class Queue(GuestQueue):
 
 
 def guest_line(place: str, put: Callable[[GuestCommand], None] = lambda command: None,
-               wake: Callable[[], None] = lambda: None,
-               clock: Callable[[], float] = line_time,
+               wake: Callable[[], None] = lambda: None, clock: Callable[[], float] = line_time,
                fault: Callable[[Exception], None] = lambda error: None) -> GuestLine:
     network = Network(share=place, parity='Even')
     return GuestLine(*share_places(place), network, Queue(put), wake, GuestListener(), fault,

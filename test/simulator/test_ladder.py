@@ -195,8 +195,7 @@ def test_page_and_simulator_are_the_same_program() -> None:
             now += dice.choice([0.01, 0.1, 0.3])
             is_counting ^= dice.random() < 0.02
             beat = beat % 32767 + 1 if is_counting else dice.choice([beat, beat, beat, 0, -3])
-            commands = {word: dice.choice([0, 0, 7]) for word in COMMANDS
-                        if dice.random() < 0.2}
+            commands = {word: dice.choice([0, 0, 7]) for word in COMMANDS if dice.random() < 0.2}
             is_pressed = dice.random() < 0.2
             is_begin = dice.random() < 0.005
             for program in pair:

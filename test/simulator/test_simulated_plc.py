@@ -384,8 +384,7 @@ def test_plcs_behind_a_gateway_are_one_station_of_the_line(tmp_path: Path) -> No
         assert direct.handle(frame) == b''
         assert gateway.handle(frame) == frames.ACK
         reply = plc.serve(identify)
-        assert gateway.handle(Poll(10, True)) == frames.message_frame(
-            reply.encode(), Checksum.CRC)
+        assert gateway.handle(Poll(10, True)) == frames.message_frame(reply.encode(), Checksum.CRC)
         gateway.handle(ACKNOWLEDGED)
 
 

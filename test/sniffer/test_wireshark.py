@@ -41,8 +41,7 @@ from support.vectors import load_json, VECTORS
 _SCRIPT = Path(__file__).resolve().parents[2] / 'wireshark' / 'abdf1.lua'
 _FIELDS = (
     'direction', 'kind', 'check', 'valid', 'computed', 'station', 'dst', 'src', 'sts', 'tns',
-    'code', 'data', 'command', 'address', 'status', 'request', 'latency',
-    'copy_of')
+    'code', 'data', 'command', 'address', 'status', 'request', 'latency', 'copy_of')
 _ADDRESSED = (
     '00', '01', '02', '05', '08', '0F/00', '0F/01', '0F/02', '0F/04', '0F/26', '0F/67', '0F/68',
     '0F/A1', '0F/A2', '0F/A9', '0F/AA', '0F/AB')

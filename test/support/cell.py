@@ -40,8 +40,7 @@ class BridgeCell(testing.SimulatedCell):
         self.diagnostics = self.ros.diagnostics(self.plcs.port)
         self.port_owners = PortOwners()
         self.node = BridgeNode(context=self.ros.context, use_global_arguments=False,
-                               port_owners=self.port_owners,
-                               cli_args=ros_args(*self.assignments))
+                               port_owners=self.port_owners, cli_args=ros_args(*self.assignments))
         self.ros.run(self.node)
 
     def end(self, number: signal.Signals = signal.SIGTERM) -> int:

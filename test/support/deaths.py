@@ -44,8 +44,7 @@ class Death(DriverBench):
     def __init__(self, mode: str, seed: int = 1, *, words: int = 100, is_behind: bool = False,
                  has_beat: bool = False, length: int = 1) -> None:
         via = GATEWAY if is_behind else None
-        self.speed = make_mapping('N7:0', 'Write', plc='SLC', tag='speed', via=via,
-                                  length=length,
+        self.speed = make_mapping('N7:0', 'Write', plc='SLC', tag='speed', via=via, length=length,
                                   fallback=Fallback(length * (SAFE,), int(AFTER * 1000)))
         beat = make_mapping('N10:0', 'Heartbeat', plc='SLC', tag='beat', via=via, period=500,
                             condition=While(('speed',), 1500))

@@ -370,8 +370,7 @@ def _message_of(reply: bytes, tns: int, dst: int | None = None) -> bytes:
 @says('MSG instructions of a PLC without a condition', FULL, 'silence-is-enquired')
 def message_after_each_reply() -> Filter:
     numbers = itertools.count(0x1000)
-    return lambda data: (
-        data + _message_of(data, next(numbers)) if data.startswith(STX) else data)
+    return lambda data: (data + _message_of(data, next(numbers)) if data.startswith(STX) else data)
 
 
 @says('the same by radio', RADIO)

@@ -25,14 +25,7 @@ from typing import Any
 from diagnostic_msgs.msg import DiagnosticStatus
 from std_msgs.msg import Float32MultiArray, Int16MultiArray
 from support.fault_box import FaultBox
-from support.ros import (
-    EVERYTHING,
-    Observer,
-    Process,
-    ros_args,
-    until_status,
-    values_in,
-)
+from support.ros import EVERYTHING, Observer, Process, ros_args, until_status, values_in
 from support.simulator_process import Files, IMPATIENT_ROW, make_files, OFTEN
 
 SPEEDS = (1200, -800)  # of station 1
@@ -140,8 +133,7 @@ class Rig(HeardNode):
         self.diagnostics.clear()
         before = len(self.speeds), len(self.setpoint)
         self.observer.until(
-            lambda: len(self.speeds) > before[0] and len(self.setpoint) > before[1],
-            'new values')
+            lambda: len(self.speeds) > before[0] and len(self.setpoint) > before[1], 'new values')
         self.until_well()
 
     def write(self, value: float) -> str:
@@ -175,9 +167,8 @@ class Rig(HeardNode):
 
 
 @contextmanager
-def rigged(observer: Observer, files: Files, port: str, simulator: Process,
-           *assignments: str, program: str | Path = 'node',
-           name: str = 'abdf1') -> Iterator[Rig]:
+def rigged(observer: Observer, files: Files, port: str, simulator: Process, *assignments: str,
+           program: str | Path = 'node', name: str = 'abdf1') -> Iterator[Rig]:
     """
     Run the node on ``port`` while the block runs, against a simulator that runs already.
 

@@ -41,9 +41,7 @@ class Program:
         """Send a command."""
         command = Packet(dst, self._src, cmd, 0, next(self._tns), data)
         bench = self._bench
-        bench.driver.guests.put(GuestCommand(
-            self.guest, command, bench.clock(),
-            self._answered))
+        bench.driver.guests.put(GuestCommand(self.guest, command, bench.clock(), self._answered))
         bench.line.wake(bench.driver.machine)
         return command
 

@@ -292,8 +292,7 @@ class SlaveBench(SlaveNode):
     def __init__(self, settings: LinkSettings, *, serve: Serve = Packet.reply,
                  timing: LineTiming | None = None, **others: Any) -> None:
         self.now = 100.0
-        super().__init__(
-            replace(settings, **others), lambda: self.now, serve=serve, timing=timing)
+        super().__init__(replace(settings, **others), lambda: self.now, serve=serve, timing=timing)
         self.machine.start(self.now)
 
     def hear(self, *data: bytes) -> bytes:

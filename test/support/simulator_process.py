@@ -158,8 +158,6 @@ class Files:
 
 def make_files(folder: Path, net_row: str = NET_ROW) -> Files:
     return Files(
-        folder,
-        write_csv(folder / 'net.csv', NET_HEADER, [net_row]),
+        folder, write_csv(folder / 'net.csv', NET_HEADER, [net_row]),
         write_csv(folder / 'map.csv', MAP_HEADER, MAP_ROWS),
-        write_csv(folder / 'simulator.csv', SIMULATOR_HEADER, SIMULATOR_ROWS),
-        folder / 'plc')
+        write_csv(folder / 'simulator.csv', SIMULATOR_HEADER, SIMULATOR_ROWS), folder / 'plc')

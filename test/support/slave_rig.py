@@ -28,13 +28,7 @@ from std_msgs.msg import Int16MultiArray
 from support.fault_box import FaultBox
 from support.fault_rig import HeardNode
 from support.ptys import Pty
-from support.ros import (
-    Observer,
-    Process,
-    ros_args,
-    values_in,
-    write_csv,
-)
+from support.ros import Observer, Process, ros_args, values_in, write_csv
 from support.simulator_process import NET_HEADER, OFTEN
 
 STATIONS = {'Master': 5, 'Slave': 9}
@@ -156,8 +150,7 @@ class Line:
     def works(self) -> None:
         """Let each end write to the other."""
         for writer, reader in ((self.master, self.slave), (self.slave, self.master)):
-            value = self.observer.until(
-                partial(writer.write_one_of, self.values), 'a write')
+            value = self.observer.until(partial(writer.write_one_of, self.values), 'a write')
             self.observer.until(partial(reader.was_told, value), 'what was written')
             assert reader.was_told(value) == 1
 

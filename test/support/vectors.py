@@ -79,9 +79,8 @@ def _vector(entry: dict[str, Any]) -> Vector:
         name=entry['name'], kind=entry['kind'], duplex=Duplex(entry['discipline']),
         checksum=Checksum.CRC if entry['check'] == 'CRC' else Checksum.BCC,
         valid=entry['verdict'] != 'wrong check', frame=bytes.fromhex(entry['bytes']),
-        link_data=bytes.fromhex(decoded.get('link_data', '')),
-        station=decoded.get('station'), header=header,
-        fnc=int(decoded['fnc'], 16) if 'fnc' in decoded else None,
+        link_data=bytes.fromhex(decoded.get('link_data', '')), station=decoded.get('station'),
+        header=header, fnc=int(decoded['fnc'], 16) if 'fnc' in decoded else None,
         expected=None if expected is None else int.from_bytes(bytes.fromhex(expected), 'little'),
         pair=entry.get('pair'))
 

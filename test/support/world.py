@@ -424,8 +424,7 @@ class World(DriverBench):
         rows = plant.mappings()
         settings = DriverSettings(
             write_timeout=plant.write_timeout, read_only=plant.is_read_only, processor_period=0.0,
-            may_store=plant.may_store,
-            first_tns=self.dice.randrange(0x10000))
+            may_store=plant.may_store, first_tns=self.dice.randrange(0x10000))
         super().__init__(rows, network=plant.network, settings=settings, start=False, chunk=_FIFO)
         self.rows = {row.tag: row for row in rows}
         self.messages = [row for row in rows if row.tag[0] in 'wfs']

@@ -77,8 +77,7 @@ def test_stations_are_named_by_their_processors() -> None:
 
 
 @pytest.mark.long
-def test_run_of_a_bridge_becomes_a_file(
-        tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_run_of_a_bridge_becomes_a_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(picture, 'SHOT', 15.0)
     monkeypatch.setattr(picture, 'STORY', ())
     assert picture.main([str(tmp_path / 'run.svg')]) == 0

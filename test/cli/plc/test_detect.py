@@ -78,8 +78,7 @@ def _everybody_sends(plc: SimulatedPlc, checksum: Checksum,
         if issubclass(kind, FullDuplexPeer):
             timeout = 0.1 if issubclass(kind, Unheard) else 1.0  # until it asks with ENQ
             return kind(machine, LinkSettings(station=None, checksum=checksum, timeout=timeout),
-                        ActiveStationList(),
-                        plc.serve).run(plc)
+                        ActiveStationList(), plc.serve).run(plc)
         return RadioNode(
             machine, LinkSettings(station=1, checksum=checksum), ActiveStationList(),
             plc.serve).run(plc)

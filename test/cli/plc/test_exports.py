@@ -283,8 +283,7 @@ def test_columns_of_a_list_are_found_by_their_names(tmp_path: Path) -> None:
         ('SPEED', 'Read', 'N7:0', 'Conveyor speed'), ('RUN', 'Read', 'B3:0/5', '')]
     drawing = ('sep=;\nAddress;Description 1;Description 2;Wire No;Device Tag\n'
                'I:1.0/0;START;CONVEYOR;1000;PB100\n')
-    assert told(imported(tmp_path, drawing)[0]) == [
-        ('PB100', 'Read', 'I:1.0/0', 'START CONVEYOR')]
+    assert told(imported(tmp_path, drawing)[0]) == [('PB100', 'Read', 'I:1.0/0', 'START CONVEYOR')]
     access = ('Tag Name,Data Type,Address,Read Only\na,INT,N7:0,no\nb,DINT,N7:2,Yes\n'
               'c,Real,F8:0,R/W\nd,Word,N7:4,perhaps\ne,LWORD,N7:5,no\n')
     mappings, left_out = imported(tmp_path, access)
@@ -307,8 +306,7 @@ def test_list_that_says_nothing_of_access_is_only_read(tmp_path: Path) -> None:
 def test_columns_of_a_list_are_given_by_options(
         tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     source = tmp_path / 'list.csv'
-    source.write_text('Place,What,Kind,Text,May\nN7:0,speed,INT,Speed of 1,RW\n',
-                      encoding='utf-8')
+    source.write_text('Place,What,Kind,Text,May\nN7:0,speed,INT,Speed of 1,RW\n', encoding='utf-8')
     options = ['import', str(source), '--into', str(tmp_path), '--address', 'Place',
                '--type', 'Kind', '--access', 'may']
     assert main([*options, '--tag', 'Name']) == 2
@@ -471,8 +469,7 @@ def test_list_with_comments_and_whole_timers(tmp_path: Path) -> None:
                                             'write one, such as Address,Tag'),
     ('remark,"CSV-Import-Export"\n0.3\nTYPE,SCOPE,NAME\nTAG,,Speed\n',
      'has tags of a Logix controller, which are not addresses')])
-def test_file_that_is_not_known_is_told_with_a_cure(
-        tmp_path: Path, text: str, told: str) -> None:
+def test_file_that_is_not_known_is_told_with_a_cure(tmp_path: Path, text: str, told: str) -> None:
     with pytest.raises(ConfigurationError) as caught:
         imported(tmp_path, text)
     assert told in str(caught.value)

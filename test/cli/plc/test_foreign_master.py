@@ -138,8 +138,7 @@ def test_plc_asks_through_the_master_of_a_line(tmp_path: Path, capsys: Output) -
         assert capsys.readouterr().out.split() == ['N7:0', '42']
         assert main(['read', 'N7:0', '--station', '2', '--port', port, *line]) == 1
         assert 'STS 02' in capsys.readouterr().err
-        with client.Client(port, plc_type='SLC', station=1, duplex='slave',
-                           own_station=7) as plc:
+        with client.Client(port, plc_type='SLC', station=1, duplex='slave', own_station=7) as plc:
             assert plc.read('N7:0') == 42
 
 

@@ -134,8 +134,7 @@ def test_no_time_for_an_answer_is_refused() -> None:
 @pytest.mark.parametrize('said, kind, family', [
     ('INT SLC500', 'int16', 'SLC'), ('REAL PLC-5', 'float32', 'PLC5'),
     ('DINT MicroLogix', 'int32', 'SLC'), ('uint16 plc2', 'uint16', 'PLC2')])
-def test_types_and_families_have_the_names_of_the_field(
-        said: str, kind: str, family: str) -> None:
+def test_types_and_families_have_the_names_of_the_field(said: str, kind: str, family: str) -> None:
     words = said.split()
     options = make_parser(None).parse_args([
         'read', 'N7:0', '--type', words[0], '--plc-type', words[1]])

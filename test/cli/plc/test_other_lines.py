@@ -154,8 +154,7 @@ def test_detect_tells_of_the_echo_and_finds_the_plcs_behind_it(
     for station in (1, 2):
         echoing.say(f'normal {station}')
     port = echoing_port(echoing)
-    said = call(main, capsys, 'detect', '--port', port, '--stations', '1,2', '--timeout',
-                '2000')
+    said = call(main, capsys, 'detect', '--port', port, '--stations', '1,2', '--timeout', '2000')
     assert (said.status, said.err.splitlines()[-1]) == (0, f'plc: {COMES_BACK}')
     assert said.lines[0].startswith('19200 baud, half duplex, CRC: station 1 PLC-5/40')
     assert call(main, capsys, 'read', 'N7:0', '--port', port, *PATIENT).good_lines == ['N7:0 1200']

@@ -52,10 +52,9 @@ IDENTITY = Identity(
 def test_everything_a_station_has_said() -> None:
     seen = Presence(2, 0.0312, IDENTITY, None, True, True)
     assert describe(seen) == [
-        'station 2: SLC 5/03 series B revision 3, REM PROG',
-        '  mode       REM PROG', '  faults     major error 0x0021', '  remarks    forces active',
-        '  own name   CELL_3', '  program ID 0x1A2B', '  memory     16 K',
-        '  reply      after 31 ms']
+        'station 2: SLC 5/03 series B revision 3, REM PROG', '  mode       REM PROG',
+        '  faults     major error 0x0021', '  remarks    forces active', '  own name   CELL_3',
+        '  program ID 0x1A2B', '  memory     16 K', '  reply      after 31 ms']
 
 
 def test_station_that_does_not_say_what_it_is() -> None:

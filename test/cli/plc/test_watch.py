@@ -322,8 +322,7 @@ def test_mode_of_each_plc_and_faults_of_the_line_stand_around_the_values(
     assert lines[0] == ('station 1: PLC-5/40, PROG: its program does not run, values may stand '
                         'still; memory lost')
     assert lines[1].startswith('address') and len(lines) == 3
-    monkeypatch.setattr(
-        LiveValues, 'faults_of_line', lambda self: ['line: 3 repeated, 1 damaged'])
+    monkeypatch.setattr(LiveValues, 'faults_of_line', lambda self: ['line: 3 repeated, 1 damaged'])
     assert draw([SPEED], (SPEED, array('h', [5])))[-1] == 'line: 3 repeated, 1 damaged'
 
 
