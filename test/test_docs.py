@@ -74,7 +74,6 @@ def help_of(*command: str) -> str:
 
 @cache
 def subcommands(command: str) -> frozenset[str]:
-    """Return the subcommands of a command."""
     return frozenset(re.findall(r'^    (\w+)  ', help_of(command).partition('options:')[0],
                                 re.MULTILINE))
 

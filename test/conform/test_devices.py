@@ -80,11 +80,9 @@ class DeviceLine:
         machine.start(0.0)
 
     def clock(self) -> float:
-        """Return the time."""
         return self.now
 
     def write(self, data: bytes) -> None:
-        """Send bytes."""
         self._travel(data, to_device=True)
         self._pass(self.now)
 
@@ -150,11 +148,9 @@ class OddLine:
         self._device, self._unread = device, b''
 
     def clock(self) -> float:
-        """Return the time."""
         return self.now
 
     def write(self, data: bytes) -> None:
-        """Send bytes."""
         self._device.receive_data(data, self.now)
         self._unread += self._device.data_to_send()
 

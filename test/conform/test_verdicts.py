@@ -279,7 +279,6 @@ class Babble:
         self.data = data
 
     def clock(self) -> float:
-        """Return the time."""
         return self.now
 
     def read(self, timeout: float) -> bytes:
@@ -301,7 +300,6 @@ class TwoMasters:
         self._masters[1].after(0.02, lambda: None)
 
     def clock(self) -> float:
-        """Return the time."""
         return self._masters[0].clock()
 
     def read(self, timeout: float) -> bytes:

@@ -73,7 +73,6 @@ class Rig:
         self.line.start()
 
     def clock(self) -> float:
-        """Return the time."""
         return self.line.now if hasattr(self, 'line') else 0.0
 
     def serve(self, number: int, command: Packet) -> Packet:

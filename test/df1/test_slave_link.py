@@ -26,7 +26,6 @@ from support.multidrop import SlaveBench
 US, MASTER, OTHER = 7, 5, 8
 SETTINGS = LinkSettings(station=US, nak_retries=2)
 FROM_MASTER = Packet(US, MASTER, 0x0F, 0, 0x0102, b'\xA2\x01')
-OTHERS_TRAFFIC = poll_frame(OTHER) + EOT
 
 
 def own(tns: int = 1, dst: int = OTHER) -> Packet:

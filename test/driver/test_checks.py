@@ -92,7 +92,6 @@ def make_bench(*mappings: Mapping, network: Network | None = None, period: float
 
 def word(station: int = 1, command: str = 'Read', period: int | None = None,
          text: str = 'N7:0', plc: str = 'SLC') -> Mapping:
-    """Return a mapping of one word."""
     return make_mapping(text, command, station=station, plc=plc, period=period)
 
 

@@ -67,7 +67,6 @@ def milliseconds(seconds: float) -> int:
 
 
 def bench_of(*mappings: Mapping, polling: str) -> tuple[DriverBench, ClockPlc]:
-    """Return a driver and its PLC."""
     bench = DriverBench(mappings, network=Network(
         baud=19200, timeout=300, cmd_timeout=500, polling=polling),
         settings=DriverSettings(default_period=0.3))

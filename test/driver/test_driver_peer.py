@@ -77,7 +77,6 @@ class Bench(DriverBench):
 
 
 def serve_row(text: str, family: str = 'PLC5', length: int = 1, **other: object) -> Mapping:
-    """Return a Serve row."""
     return make_mapping(text, 'Serve', station=US, plc=family, length=length,
                         **other)  # type: ignore[arg-type]
 

@@ -61,7 +61,6 @@ class Bench:
         self._tns = 0
 
     def clock(self) -> float:
-        """Return the time."""
         return self.line.now
 
     def run(self, seconds: float) -> None:
@@ -82,7 +81,6 @@ class Bench:
         return self.master.add(Packet(station, MASTER, cmd, 0, self._tns, body))
 
     def master_reads(self, text: str, words: int) -> bytes:
-        """Return words that the master reads from us."""
         place = parse_address(text, SLC)
         task = self.ask(DIALECT.read(place, words))
         self.line.run(lambda: task.result is not None, 5.0)
@@ -92,7 +90,6 @@ class Bench:
 
 
 def serve_row(text: str, length: int = 1) -> Mapping:
-    """Return a Serve row."""
     return make_mapping(text, 'Serve', station=US, plc='SLC', length=length)
 
 

@@ -34,6 +34,7 @@ from abdf1_ros.plan.bounds import MODE_PERIOD
 from abdf1_ros.settings.heartbeats import Fallback
 from abdf1_ros.settings.network import Network
 import pytest
+from support.clock import StillClock
 from support.driver_bench import DriverBench, store
 from support.interlocks import (
     AFTER,
@@ -51,19 +52,14 @@ from support.interlocks import (
 from support.mappings import make_mapping
 
 
-class OneRow:
+class OneRow(StillClock):
     """A row with Fallback by itself, and writes of it that end as they are told."""
 
-    now = late = 0.0
-
     def __init__(self, cmd_timeout: float = 0.5) -> None:
+        super().__init__()
         self.mapping = speed_row()
         self.record = WriteRecord(self, 2 * cmd_timeout)
         self.row = FallbackRow(self.record.words_of(self.mapping))
-
-    def took(self, begun: float, now: float) -> float:
-        """Return the time between two clock values."""
-        return now - begun
 
     def message(self, begun: float, done: float, outcome: Outcome) -> None:
         """Let a message end that was published when it began."""
@@ -72,7 +68,6 @@ class OneRow:
 
     def fallback(self, write: Write, done: float, outcome: Outcome = Outcome.WRITTEN
                  ) -> float | None:
-        """Let a write of the fallback end."""
         write.is_own = True
         self._write(write, done, outcome)
         return self.row.ended(outcome, done)

@@ -28,6 +28,7 @@ from abdf1_ros.plan.planner import Block, Planner
 from abdf1_ros.settings.mapping import Mapping
 from abdf1_ros.settings.network import Network
 import pytest
+from support.clock import StillClock
 from support.driver_bench import DriverBench
 from support.mappings import make_mapping
 
@@ -41,30 +42,19 @@ def block_of(mapping: Mapping) -> Block:
     return block
 
 
-class StillLine:
-    """The time of a line, which the test sets."""
-
-    now, late = EARLY, 0.0
-
-    def took(self, begun: float, now: float) -> float:
-        """Return the seconds between two clock values."""
-        return now - begun
-
-
 class Unconfirmed:
     """One write without a reply, which some block reads."""
 
     def __init__(self, read: Mapping, mapping: Mapping, values: list[float] | str) -> None:
         self.block = block_of(read)
         self.results: list[WriteResult] = []
-        self.line = StillLine()
+        self.line = StillClock(EARLY)
         self.backs = ReadBacks(self.line, PATIENCE, self.results.append)
         write = Write(mapping, values, EARLY)
         lost = write.result(Outcome.UNKNOWN, 'lost', EARLY, 0, CommandTimeout())
         self.backs.add(write, lost, [self.block], EARLY)
 
     def read(self, data: bytes, started: float = EARLY) -> None:
-        """Read the block."""
         self.line.now = EARLY + 1
         self.backs.words_read(self.block, data, started)
 

@@ -34,6 +34,7 @@ from abdf1_ros.plan.planner import Block, Planner
 from hypothesis import given, settings
 from hypothesis import strategies as st
 import pytest
+from support.clock import StillClock
 from support.mappings import make_mapping
 
 LINE = LineModel(Checksum.CRC, Duplex.HALF, LineTiming(0.0001))
@@ -44,16 +45,6 @@ def make_block(period: int, text: str, length: int) -> Block:
     mapping = make_mapping(text, plc='SLC', length=length, period=period)
     block, = Planner(LINE, 0.1).plan([mapping])
     return block
-
-
-class StillClock:
-    """The time of a line, which stands still."""
-
-    now = late = 0.0
-
-    def took(self, begun: float, now: float) -> float:
-        """Return the seconds between two clock values."""
-        return now - begun
 
 
 def make_job(period: int = 100, text: str = 'N7:0', length: int = 1) -> ReadJob:

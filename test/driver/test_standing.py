@@ -82,16 +82,6 @@ class Line(DriverBench):
         return self.listener.outcomes()
 
 
-class OneClock:
-    """A clock of a line on which nothing else happens."""
-
-    now = late = 0.0
-
-    def took(self, begun: float, now: float) -> float:
-        """Return the time between two clock values."""
-        return now - begun
-
-
 def test_unchanged_value_is_written_again_after_its_time_only() -> None:
     line = Line(WORD, READ)
     line.keep_saying(WORD, [7], 10.0)

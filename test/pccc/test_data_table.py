@@ -29,7 +29,6 @@ SLC, PLC5 = PlcType.SLC, PlcType.PLC5
 
 
 def at(text: str, family: PlcType = SLC) -> Address:
-    """Return an address."""
     return parse_address(text, family)
 
 

@@ -67,7 +67,6 @@ CIF = Plc2Dialect(Access.CIF)
 
 
 def at(text: str) -> Address:
-    """Return an address."""
     return parse_address(text, PlcType.PLC2)
 
 

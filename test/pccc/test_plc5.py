@@ -110,7 +110,6 @@ DIALECT = Plc5Dialect()
 
 
 def at(text: str) -> Address:
-    """Return an address."""
     return parse_address(text, PLC5)
 
 

@@ -92,7 +92,6 @@ DIALECT = SlcDialect()
 
 
 def at(text: str) -> Address:
-    """Return an address."""
     return parse_address(text, SLC)
 
 

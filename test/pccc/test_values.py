@@ -209,9 +209,6 @@ def test_bits_are_bool_only(text: str) -> None:
     assert types_of(parse_address(text, PlcType.PLC5)) == (ValueType.BOOL,)
 
 
-_TEXTS = st.text(st.characters(max_codepoint=255), max_size=82)
-
-
 @for_all(('text', 'words'), [
     ('', '00 00 00 00'), ('a', '01 00 00 61'), ('\0' * 5, '05 00'), ('ä', '01 00 00 e4'),
     ('abc', '03 00 62 61 00 63'),  # the first character is the high byte of the first word
@@ -249,7 +246,6 @@ PLC3, PLC5, SLC = PlcType.PLC3, PlcType.PLC5, PlcType.SLC
 
 
 def at(text: str, family: PlcType = PLC5) -> Address:
-    """Return an address."""
     return parse_address(text, family)
 
 

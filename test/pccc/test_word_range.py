@@ -28,7 +28,6 @@ FAMILIES = {PlcType.PLC3: PLC3, PlcType.PLC5: PLC5_WORD_RANGE}
 
 
 def at(text: str, family: str = 'PLC3') -> Address:
-    """Return an address."""
     return parse_address(text, PlcType(family))
 
 

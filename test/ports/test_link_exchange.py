@@ -146,7 +146,6 @@ class _Stuck(NoLine):
         self.free = threading.Event()
 
     def write(self, data: bytes) -> None:
-        """Wait."""
         self.is_used.set()
         assert self.free.wait(PATIENCE)
 

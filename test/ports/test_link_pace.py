@@ -40,7 +40,6 @@ class Paused(NoLine):
         self.now = 0.0
 
     def clock(self) -> float:
-        """Return the time."""
         return self.now
 
     def read(self, timeout: float | None, wake: int) -> bytes:
@@ -70,7 +69,6 @@ class SlowLine(NoLine):
         self._taken = 0
 
     def clock(self) -> float:
-        """Return the time."""
         return self.now
 
     def read(self, timeout: float | None, wake: int) -> bytes:
@@ -131,7 +129,6 @@ class Diary(NoLine):
         return ACK
 
     def write(self, data: bytes) -> None:
-        """Note the bytes."""
         self.notes.append(data.decode('ascii'))
 
     def close(self) -> None:
@@ -204,7 +201,6 @@ class Babbler(NoLine):
         self._reads = reads
 
     def clock(self) -> float:
-        """Return the time."""
         return self.now
 
     def read(self, timeout: float | None, wake: int) -> bytes:

@@ -162,7 +162,6 @@ class Counted(Wake):
         self.waits: list[float] = []
 
     def wait(self, milliseconds: int | None = None) -> None:
-        """Wait."""
         self.waits.append(math.inf if milliseconds is None else milliseconds)
         super().wait(milliseconds)
 

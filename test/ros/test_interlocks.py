@@ -73,7 +73,6 @@ class Cell(BridgeCell):
         super().__init__(folder, SIMULATOR, MAP, NET, *assignments)
 
     def word(self, address: str) -> int:
-        """Return a word of the PLC."""
         return self.plcs.word(address)
 
     def until(self, condition: Callable[[], bool], what: str) -> None:
@@ -114,12 +113,10 @@ class ProcessCell(Cell):
     """The same with the bridge as a process."""
 
     def start(self) -> None:
-        """Start it."""
         self.results = self.ros.results()
         self.process = Process('node', *ros_args(*self.assignments))
 
     def end(self, number: signal.Signals = signal.SIGTERM) -> int:
-        """End it by a signal."""
         self.process.send(number)
         return self.process.result()
 

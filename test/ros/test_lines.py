@@ -225,7 +225,6 @@ class Plant:
                   [f'{port},115200,100,{share}'])
 
     def write_map(self, name: str, row: str) -> None:
-        """Write the map of a line."""
         write_csv(self.folder / f'{name}_map.csv',
                   'Tag,Command,Address,Station,PLC_Type,Length', [row])
 
@@ -248,7 +247,6 @@ class Plant:
         return value
 
     def make_node(self, name: str, **named: Any) -> BridgeNode:
-        """Make the node of a line."""
         self.nodes[name] = node = BridgeNode(name, **named)
         return node
 

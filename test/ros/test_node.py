@@ -119,7 +119,6 @@ class Bench(BridgeCell):
         return self.results
 
     def words(self, address: str, count: int = 1, station: int = 1) -> list[int]:
-        """Return words of a PLC."""
         table = self.plcs[station].table
         data = table.read(parse_address(address, table.plc_type), count)
         return [int.from_bytes(data[at:at + 2], 'little') for at in range(0, 2 * count, 2)]

@@ -62,11 +62,9 @@ class Bench(BridgeCell):
         self.ros.until(lambda: self.node.session.driver.is_online, 'the port')
 
     def write_net(self, timeout: int, baud: int = 115200) -> None:
-        """Write the net file."""
         write_csv(self.net, 'Baud,Timeout', [f'{baud},{timeout}'])
 
     def write_map(self, *rows: str) -> None:
-        """Write the map file."""
         write_csv(self.map, HEADER, rows)
 
     def reload(self) -> tuple[bool, str]:

@@ -61,7 +61,6 @@ class Pair(BridgeCell):
         self.ros.run(self.spare)
 
     def end(self, *args: Any) -> int:
-        """End both."""
         if self.spare is not None:
             self.ros.end(self.spare)
         return super().end(*args)

@@ -43,21 +43,12 @@ from abdf1_ros.plan.planner import Planner
 from abdf1_ros.settings.mapping import Mapping
 from abdf1_ros.settings.network import Network
 from abdf1_ros.settings.rows import Rows
+from support.clock import StillClock
 from support.driver_bench import Recorder
 from support.mappings import make_mapping
 
 PROBE_TIME = 0.5
 LINE = LineModel(Checksum.CRC, Duplex.HALF, LineTiming(0.001))
-
-
-class StillClock:
-    """The time of a line, which stands still."""
-
-    now = late = 0.0
-
-    def took(self, begun: float, now: float) -> float:
-        """Return the seconds between two clock values."""
-        return now - begun
 
 
 def make_job(text: str = 'N7:0', station: int = 1, period: int = 100) -> ReadJob:

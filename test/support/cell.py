@@ -35,7 +35,6 @@ class BridgeCell(testing.SimulatedCell):
         self.net, self.map = folder / 'net.csv', folder / 'map.csv'
 
     def start(self) -> None:
-        """Start the bridge."""
         self.results = self.ros.results()
         self.diagnostics = self.ros.diagnostics(self.plcs.port)
         self.port_owners = PortOwners()
@@ -49,5 +48,4 @@ class BridgeCell(testing.SimulatedCell):
         return 0
 
     def call(self, kind: Any, name: str, request: Any) -> Any:
-        """Call a service of the bridge."""
         return self.ros.call(kind, f'/abdf1/{name}', request)

@@ -12,13 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""A clock that tests set themselves, and one that does not count what a busy host takes."""
-
-from collections import defaultdict
-from contextlib import suppress
-import os
-from pathlib import Path
-import time
+"""Clocks that stand still until a test sets them."""
 
 
 class Clock:
@@ -31,33 +25,14 @@ class Clock:
         return self.now
 
 
-class Stopwatch:
-    """
-    The time since it was made, less what the processes in question waited for a processor.
+class StillClock:
+    """The time of a line, which stands still until a test sets it."""
 
-    So a bound on what they do holds beside any load, which is measured and not guessed. Threads of
-    one process wait at the same time, so that one counts which waited longest.
-    """
+    late = 0.0
 
-    def __init__(self, *processes: int) -> None:
-        """Begin; ``processes`` count beside this one."""
-        self._processes = {os.getpid(), *processes}
-        self._began, self._waited = time.monotonic(), self._waits()
+    def __init__(self, now: float = 0.0) -> None:
+        self.now = now
 
-    @property
-    def seconds(self) -> float:
-        """Return the time without the waits, in s."""
-        lost: defaultdict[int, int] = defaultdict(int)
-        for (process, thread), wait in self._waits().items():
-            waited = wait - self._waited.get((process, thread), 0)
-            lost[process] = max(lost[process], waited)
-        return time.monotonic() - self._began - sum(lost.values()) / 1e9
-
-    def _waits(self) -> dict[tuple[int, str], int]:
-        """Return how long (ns) each thread has waited for a processor so far."""
-        waits = {}
-        for process in self._processes:
-            for file in Path(f'/proc/{process}/task').glob('*/schedstat'):
-                with suppress(OSError):  # the thread has ended
-                    waits[process, file.parent.name] = int(file.read_text('ascii').split()[1])
-        return waits
+    def took(self, begun: float, now: float) -> float:
+        """Return the seconds between two clock values."""
+        return now - begun

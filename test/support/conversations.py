@@ -54,7 +54,6 @@ class Conversation:
 
     @property
     def name(self) -> str:
-        """Return its name."""
         return str(self.entry['name'])
 
     @property
@@ -79,7 +78,6 @@ class Conversation:
         return sum(len(data) for line, data in self.said() if side in line)
 
     def link_settings(self) -> LinkSettings:
-        """Return the settings of the link."""
         given: dict[str, Any] = {
             name: value / 1000 if name in _MS else value
             for name, value in self.settings.items() if name not in _OF_THE_RUN}

@@ -86,7 +86,6 @@ class Death(DriverBench):
             self.at(self.clock() + 0.1, self._publish)
 
     def word(self, file: int, element: int = 0) -> int:
-        """Return a word of the PLC."""
         return self.device.words.get((STATION, file, element), 0)
 
     def break_wire(self) -> None:

@@ -98,7 +98,6 @@ class Recorder:
         return [when for when, which, _ in self.reads if which is mapping]
 
     def numbers(self) -> set[int]:
-        """Return the numbers of all events."""
         return {event.message.number for event in self.events}
 
     def outcomes(self) -> list[Outcome]:
@@ -210,7 +209,6 @@ class DriverBench:
             self.open()
 
     def clock(self) -> float:
-        """Return the time."""
         return self.line.now
 
     def plc(self, station: int, plc: str, *areas: tuple[str, int]) -> SimulatedPlc:
@@ -249,7 +247,6 @@ class DriverBench:
         self.at(self.line.now + 0.1, self.breathe)
 
     def lose_port(self, reason: str = 'unplugged') -> None:
-        """Lose the port."""
         self.driver.machine.stop(PortLost(reason))
 
     def at(self, when: float, action: Callable[[], object]) -> None:

@@ -76,7 +76,6 @@ class Cell:
 
     @property
     def now(self) -> float:
-        """Return the clock."""
         return self.bench.clock()
 
     def put_behind_gateway(self) -> None:
@@ -116,7 +115,6 @@ class Cell:
         return {name: self.word(name) for name in WORDS}
 
     def word(self, text: str) -> int:
-        """Return a word of the PLC."""
         return int.from_bytes(
             self.plc.table.read(parse_address(text, self.plc.table.plc_type), 1), 'little')
 

@@ -212,7 +212,6 @@ class MasterBench:
         self._tns = 0x0100
 
     def clock(self) -> float:
-        """Return the time."""
         return self.line.now
 
     def put(self, number: int) -> None:
@@ -221,7 +220,6 @@ class MasterBench:
         self._there.append(self.slaves[number])
 
     def __getitem__(self, number: int) -> Slave:
-        """Return a station."""
         return self.slaves[number]
 
     def ask(self, number: int, master: int = 5, cmd: int = 0x0F, run: float = 0.0) -> CommandTask:
@@ -305,7 +303,6 @@ class SlaveBench(SlaveNode):
         return answer
 
     def poll(self) -> bytes:
-        """Poll it."""
         return self.hear(frames.poll_frame(self.number))
 
     def frame(self, packet: Packet, station: int | None = None) -> bytes:

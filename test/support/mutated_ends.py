@@ -193,7 +193,6 @@ class Wire:
         next(self._receiver)
 
     def clock(self) -> float:
-        """Return the time."""
         return self.now
 
     def write(self, data: bytes) -> None:
@@ -241,7 +240,6 @@ class Wire:
         self.after(delay + (0.3 if Habit.SLOW in self.habits else 0.0), leave)
 
     def has(self, habit: Habit) -> bool:
-        """Tell whether this end has a habit."""
         return habit in self.habits
 
     def noise(self) -> None:

@@ -116,7 +116,6 @@ class OddDevice:
             self._send(reply)
 
     def receive_data(self, data: bytes, now: float) -> None:
-        """Take bytes."""
         self._now = now
         self._buffer += self.hear(data)
         while self._take_symbol():

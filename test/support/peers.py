@@ -124,7 +124,6 @@ class PeerNode(Recorded):
         return task
 
     def next_task(self, now: float, busy: Container[int] = ()) -> CommandTask | None:
-        """Return the next command."""
         if not self.tasks or self.tasks[0].command.dst in busy:
             return None
         task = self.tasks.popleft()

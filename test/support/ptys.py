@@ -69,7 +69,6 @@ def full_pipe() -> tuple[int, int]:
 
 
 def read_exactly(descriptor: int, count: int) -> bytes:
-    """Return the next ``count`` bytes."""
     data = b''
     while len(data) < count:
         assert select.select([descriptor], [], [], PATIENCE)[0], f'only {data.hex(" ")} came'

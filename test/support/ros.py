@@ -117,7 +117,6 @@ class Process:
 
     @property
     def is_running(self) -> bool:
-        """Tell whether it has not ended."""
         return self._process.poll() is None
 
     def catches(self, number: signal.Signals) -> bool:
@@ -180,7 +179,6 @@ class Process:
             self.send(signal.SIGSTOP)
 
     def go_on(self) -> None:
-        """Let it continue."""
         self._goes_on.set()
         if self._keeper is not None:  # its last SIGSTOP has to come before
             self._keeper.join()
@@ -313,7 +311,6 @@ class Observer(testing.Observer):
         return inbox
 
     def call(self, service_type: Any, name: str, request: Any) -> Any:
-        """Call a service and return its response."""
         client = self.node.create_client(service_type, name)
         self.until(client.service_is_ready, f'the service {name}')
         future = client.call_async(request)
@@ -341,7 +338,6 @@ def find_status(array: DiagnosticArray, name: str) -> DiagnosticStatus:
 
 
 def details(status: DiagnosticStatus) -> dict[str, str]:
-    """Return the values of a status."""
     return {value.key: value.value for value in status.values}
 
 

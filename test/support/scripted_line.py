@@ -29,7 +29,6 @@ class ScriptedLine:
         machine.start(0.0)
 
     def clock(self) -> float:
-        """Return the time."""
         return self.now
 
     def write(self, data: bytes) -> None:

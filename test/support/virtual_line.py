@@ -173,7 +173,6 @@ class VirtualLine:
             assert self.now <= end, f'not done after {limit} s of line time'
 
     def run_for(self, seconds: float) -> None:
-        """Let ``seconds`` pass."""
         end = self.now + seconds
         self._look_at_all()
         while self._advance(end):

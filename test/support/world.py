@@ -284,7 +284,6 @@ class WatchedPlc:
         self.place_of = cache(partial(parse_address, plc_type=self.plc.table.plc_type))
 
     def word(self, text: str) -> int:
-        """Return a word of its table."""
         return int.from_bytes(self.plc.table.read(self.place_of(text), 1), 'little')
 
     def set(self, text: str, *words: int) -> None:  # noqa: A003

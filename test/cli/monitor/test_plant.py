@@ -69,7 +69,6 @@ def test_lines_are_no_longer_than_the_terminal_is_wide(width: int) -> None:
 
 
 def array(node: str, **sections: bytes) -> DiagnosticArray:
-    """Return diagnostics of a node."""
     return DiagnosticArray(status=[DiagnosticStatus(name=f'{node}: {section}', level=level)
                                    for section, level in sections.items()])
 
