@@ -28,25 +28,9 @@ import pytest
 from support.captures import Capture, CAPTURES
 from support.listening import ListeningBench
 from support.mappings import make_mapping
+from support.odd_device import frame
 
 ACK, EOT = b'\x10\x06', b'\x10\x04'
-
-
-def crc(data: bytes) -> bytes:
-    """Return the CRC of a message (1770-6.5.16), computed bit by bit."""
-    value = 0
-    for byte in (*data, 0x03):
-        value ^= byte
-        for _ in range(8):
-            value = value >> 1 ^ (0xA001 if value & 1 else 0)
-    return value.to_bytes(2, 'little')
-
-
-def frame(data: bytes, station: int | None = None) -> bytes:
-    """Return a frame; with ``station`` that of a half-duplex master."""
-    head = b'' if station is None else bytes((0x10, 0x01, station))
-    checked = data if station is None else bytes((station, 0x02)) + data
-    return head + b'\x10\x02' + data.replace(b'\x10', b'\x10\x10') + b'\x10\x03' + crc(checked)
 
 
 def poll(station: int) -> bytes:

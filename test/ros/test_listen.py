@@ -25,21 +25,12 @@ from abdf1_ros.ros.diagnostics.status import ERROR, OK
 import pytest
 from std_msgs.msg import Int16MultiArray
 from std_srvs.srv import SetBool, Trigger
+from support.odd_device import frame
 from support.ptys import Pty
 from support.ros import details, Observer, ros_args, until_status, write_csv
 
 NET = 'Mode,Com_Port,Listen_Port,Baud'
 MAP = 'Tag,Command,Address,Station,PLC_Type,Length,Period'
-
-
-def checked(body: bytes, sent: bytes) -> bytes:
-    """Return a message with its CRC, without a DLE to double."""
-    value = 0
-    for byte in (*body, 3):
-        value ^= byte
-        for _ in range(8):
-            value = value >> 1 ^ (0xA001 if value & 1 else 0)
-    return sent + b'\x10\x03' + value.to_bytes(2, 'little')
 
 
 class ForeignMaster(threading.Thread):
@@ -63,13 +54,13 @@ class ForeignMaster(threading.Thread):
             ask = b'\x01\x00\x0F\x00' + tns + b'\xA2\x04\x07\x89\x00\x00'
             answer = b'\x00\x01\x4F\x00' + tns + bytes((self.count, 0, 0x2A, 0))
             if self._is_full:
-                self._say(self._theirs, checked(ask, b'\x10\x02' + ask))
+                self._say(self._theirs, frame(ask))
                 self._say(self._far, b'\x10\x06')
             else:
-                self._say(self._theirs, checked(b'\x01\x02' + ask, b'\x10\x01\x01\x10\x02' + ask))
+                self._say(self._theirs, frame(ask, 1))
                 self._say(self._far, b'\x10\x06')
                 self._say(self._theirs, b'\x10\x05\x01\xFF')
-            self._say(self._far, checked(answer, b'\x10\x02' + answer))
+            self._say(self._far, frame(answer))
             self._say(self._theirs, b'\x10\x06')
 
     @staticmethod

@@ -61,9 +61,11 @@ def crc(data: bytes) -> bytes:
     return check.to_bytes(2, 'little')
 
 
-def frame(data: bytes) -> bytes:
-    """Return a message as a slave or a full-duplex node sends it."""
-    return _STX + data.replace(b'\x10', b'\x10\x10') + b'\x10\x03' + crc(data + b'\x03')
+def frame(data: bytes, station: int | None = None) -> bytes:
+    """Return a message on the line; with ``station`` that of a half-duplex master (M 5-3)."""
+    head = b'' if station is None else _SOH + bytes((station,))
+    checked = data if station is None else bytes((station, 0x02)) + data
+    return head + _STX + data.replace(_DLE, 2 * _DLE) + b'\x10\x03' + crc(checked + b'\x03')
 
 
 def _reply_to(data: bytes, status: int) -> bytes:

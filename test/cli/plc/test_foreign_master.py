@@ -31,19 +31,10 @@ from abdf1_ros.df1.checksum import Checksum
 from abdf1_ros.driver import requests
 from abdf1_ros.settings.network import Network
 import pytest
+from support.odd_device import frame
 from support.ptys import Pty
 
 Output = pytest.CaptureFixture[str]
-
-
-def crc(data: bytes) -> bytes:
-    """Return the CRC-16 of M 5-1, low byte first."""
-    value = 0
-    for byte in data:
-        value ^= byte
-        for _ in range(8):
-            value = value >> 1 ^ (0xA001 if value & 1 else 0)
-    return value.to_bytes(2, 'little')
 
 
 class Master(threading.Thread):
@@ -79,14 +70,10 @@ class Master(threading.Thread):
         dst, src, cmd, _, *tns = data[2:8]
         value = b'\x2a\x00' if dst == 1 else b''
         reply = bytes((src, dst, cmd | 0x40, 0 if dst == 1 else 2, *tns)) + value
-        # The check of a master's frame covers STN, STX, the data and ETX (M 5-3).
-        body = bytes((station, 0x02)) + reply
         self._line.write(b'\x10\x06')
         if self.over.wait(0.02):
             return
-        self._line.write(bytes((0x10, 0x01, station, 0x10, 0x02))
-                         + reply.replace(b'\x10', b'\x10\x10') + b'\x10\x03'
-                         + crc(body + b'\x03'))
+        self._line.write(frame(reply, station))
 
 
 @contextmanager
@@ -198,9 +185,7 @@ class Asking(threading.Thread):
             tns = tns % 90 + 0x21
             ask = bytes((1, 0, 0x0F, 0, tns, 0, 0xA2, 4, 7, 0x89, 0, 0))
             answer = bytes((0, 1, 0x4F, 0, tns, 0, 42, 0, 43, 0))
-            for said in (b'\x10\x01\x01\x10\x02' + ask + b'\x10\x03'
-                         + crc(b'\x01\x02' + ask + b'\x03'), b'\x10\x06', b'\x10\x05\x01\xFF',
-                         b'\x10\x02' + answer + b'\x10\x03' + crc(answer + b'\x03'),
+            for said in (frame(ask, 1), b'\x10\x06', b'\x10\x05\x01\xFF', frame(answer),
                          b'\x10\x06'):
                 self._line.write(said)
 
