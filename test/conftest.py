@@ -19,6 +19,7 @@ from collections.abc import Iterator, Sequence
 import gc
 import os
 from pathlib import Path
+from typing import Any
 
 from hypothesis import HealthCheck, settings
 import pytest
@@ -43,6 +44,13 @@ _COMMON = {'deadline': None, 'suppress_health_check': [HealthCheck.too_slow]}
 settings.register_profile('same', max_examples=60, derandomize=True, database=None, **_COMMON)
 settings.register_profile('new', max_examples=150, **_COMMON)
 settings.load_profile(os.environ.get('ABDF1_ROS_EXAMPLES', 'same'))
+
+
+@pytest.fixture(scope='module')
+def observer() -> Iterator[Any]:
+    from support.ros import Observer
+    with Observer() as observer:
+        yield observer
 
 
 @pytest.fixture

@@ -14,13 +14,11 @@
 
 """What happens to processes and clocks, done to a real node; see docs/troubleshooting.md."""
 
-from collections.abc import Iterator
 from pathlib import Path
 import re
 import signal
 import time
 
-import pytest
 from rclpy.duration import Duration
 from rclpy.qos import QoSProfile
 from std_msgs.msg import Int16MultiArray, UInt8MultiArray
@@ -31,12 +29,6 @@ from support.simulator_process import make_files
 TOO_OLD = re.compile(
     r'not written: refused: it came \d+\.\d s after it was published, write_timeout is ')
 HERE = Path(__file__).resolve().parent.parent
-
-
-@pytest.fixture(scope='module')
-def observer() -> Iterator[Observer]:
-    with Observer() as observer:
-        yield observer
 
 
 def test_node_is_stopped_and_goes_on(observer: Observer, tmp_path: Path) -> None:

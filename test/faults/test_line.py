@@ -36,12 +36,6 @@ Boxed = tuple[Rig, FaultBox]
 
 
 @pytest.fixture(scope='module')
-def observer() -> Iterator[Observer]:
-    with Observer() as observer:
-        yield observer
-
-
-@pytest.fixture(scope='module')
 def shared(observer: Observer, tmp_path_factory: pytest.TempPathFactory
            ) -> Iterator[Renewed[Boxed]]:
     names = count(1)

@@ -14,22 +14,14 @@
 
 """What happens to ports, done to a real node and a real simulator; see docs/troubleshooting.md."""
 
-from collections.abc import Iterator
 import os
 from pathlib import Path
 
-import pytest
 from support.fault_rig import boxed, is_unanswered, NOT_SENT, rigged, SETPOINT
 from support.ros import ERROR, Observer, Process
 from support.simulator_process import IMPATIENT_ROW, make_files
 
 REFUSED = 'not written: refused: the port is not open'
-
-
-@pytest.fixture(scope='module')
-def observer() -> Iterator[Observer]:
-    with Observer() as observer:
-        yield observer
 
 
 def test_device_vanishes_and_returns_as_another_of_its_name(

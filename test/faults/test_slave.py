@@ -34,12 +34,6 @@ WRITE_TIMEOUT = 'write_timeout:=1.5'  # of the slave
 
 
 @pytest.fixture(scope='module')
-def observer() -> Iterator[Observer]:
-    with Observer() as observer:
-        yield observer
-
-
-@pytest.fixture(scope='module')
 def lines(observer: Observer, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Renewed[Line]]:
     renewed = Renewed(lambda: two_nodes(observer, tmp_path_factory.mktemp('line'), WRITE_TIMEOUT))
     yield renewed

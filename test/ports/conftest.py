@@ -12,9 +12,10 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""A pseudo-terminal, a connection, and link threads that end with the test."""
+"""A pseudo-terminal, a pipe, a connection, and link threads that end with the test."""
 
 from collections.abc import Iterator
+import os
 from pathlib import Path
 import socket
 
@@ -29,6 +30,20 @@ def pty(tmp_path: Path) -> Iterator[Pty]:
     line = Pty(tmp_path / 'line')
     yield line
     line.close()
+
+
+@pytest.fixture
+def pipe() -> Iterator[tuple[int, int]]:
+    ends = os.pipe()
+    yield ends
+    for end in ends:
+        os.close(end)
+
+
+@pytest.fixture
+def wake(pipe: tuple[int, int]) -> int:
+    """Return a descriptor that comes to life when ``pipe`` is written to."""
+    return pipe[0]
 
 
 @pytest.fixture

@@ -14,7 +14,6 @@
 
 """Reading from and writing to descriptors."""
 
-from collections.abc import Iterator
 import os
 import socket
 import threading
@@ -24,35 +23,26 @@ import pytest
 from support.ptys import PATIENCE
 
 
-@pytest.fixture
-def wake() -> Iterator[tuple[int, int]]:
-    pipe = os.pipe()
-    yield pipe
-    for descriptor in pipe:
-        os.close(descriptor)
-
-
 def test_read_returns_what_is_there(
-        sockets: tuple[DescriptorPort, socket.socket], wake: tuple[int, int]) -> None:
+        sockets: tuple[DescriptorPort, socket.socket], wake: int) -> None:
     port, other = sockets
     other.send(b'abc')
-    assert port.read(None, wake[0]) == b'abc'
-    assert port.read(0.0, wake[0]) == b''
-    assert port.read(0.001, wake[0]) == b''
+    assert port.read(None, wake) == b'abc'
+    assert port.read(0.0, wake) == b''
+    assert port.read(0.001, wake) == b''
 
 
 def test_read_ends_when_woken(
-        sockets: tuple[DescriptorPort, socket.socket], wake: tuple[int, int]) -> None:
-    os.write(wake[1], b'w')
-    assert sockets[0].read(None, wake[0]) == b''
+        sockets: tuple[DescriptorPort, socket.socket], pipe: tuple[int, int]) -> None:
+    os.write(pipe[1], b'w')
+    assert sockets[0].read(None, pipe[0]) == b''
 
 
-def test_read_from_a_closed_line(
-        sockets: tuple[DescriptorPort, socket.socket], wake: tuple[int, int]) -> None:
+def test_read_from_a_closed_line(sockets: tuple[DescriptorPort, socket.socket], wake: int) -> None:
     port, other = sockets
     other.close()
     with pytest.raises(OSError, match='the other end has closed the connection'):
-        port.read(None, wake[0])
+        port.read(None, wake)
 
 
 def test_write_to_a_closed_line(sockets: tuple[DescriptorPort, socket.socket]) -> None:
@@ -95,5 +85,5 @@ def test_port_tells_that_bytes_have_still_to_leave(
     assert port.unsent() == 0
 
 
-def test_port_that_cannot_tell_what_has_still_to_leave_says_none(wake: tuple[int, int]) -> None:
-    assert DescriptorPort(wake[1], lambda: None).unsent() == 0
+def test_port_that_cannot_tell_what_has_still_to_leave_says_none(pipe: tuple[int, int]) -> None:
+    assert DescriptorPort(pipe[1], lambda: None).unsent() == 0

@@ -14,7 +14,6 @@
 
 """Lines that are made or opened here: their names, who gets them, and what they leave behind."""
 
-from collections.abc import Iterator
 from contextlib import closing, suppress
 import os
 from pathlib import Path
@@ -29,15 +28,6 @@ import pytest
 from support.counting import open_files
 from support.device_server import OWN_HOST
 from support.ptys import PATIENCE, Pty, read_exactly
-
-
-@pytest.fixture
-def wake() -> Iterator[int]:
-    """Give a descriptor that nobody writes to."""
-    reader, writer = os.pipe()
-    yield reader
-    os.close(reader)
-    os.close(writer)
 
 
 def exchange(port: Port, other: int, wake: int) -> None:

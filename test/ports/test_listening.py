@@ -114,9 +114,9 @@ def test_what_a_program_leaves_at_its_end_is_not_changed(ptys: list[Pty]) -> Non
     os.close(descriptor)
 
 
-def test_two_ports_are_told_apart(ptys: list[Pty]) -> None:
+def test_two_ports_are_told_apart(ptys: list[Pty], pipe: tuple[int, int]) -> None:
     port = open_port(listening_to(*ptys))
-    wake, end = os.pipe()
+    wake, end = pipe
     ptys[0].write(b'first')
     assert (data := port.read(5.0, wake)) == b'first'
     assert not isinstance(data, SecondPort)
@@ -127,8 +127,6 @@ def test_two_ports_are_told_apart(ptys: list[Pty]) -> None:
     os.write(end, b'!')
     assert port.read(5.0, wake) == b''
     port.close()
-    os.close(wake)
-    os.close(end)
 
 
 def test_both_ports_are_for_one_program(ptys: list[Pty]) -> None:
@@ -159,19 +157,16 @@ def test_pty_has_no_parity(ptys: list[Pty]) -> None:
         open_port(listening_to(ptys[0], parity='Even'))
 
 
-def test_damaged_characters_of_either_port_are_damaged(ptys: list[Pty]) -> None:
+def test_damaged_characters_of_either_port_are_damaged(ptys: list[Pty], wake: int) -> None:
     opened = [listening.open_device(listening_to(pty)) for pty in ptys]
     ports = [listening.ListeningDevice(port.fileno(), port.close, is_marked=True)
              for port in opened]  # a pty has no parity
-    wake, end = os.pipe()
     for pty in ptys:
         pair = listening.TwoPorts(ports[0], ports[1])
         pty.write(b'\xFF\x00A')
         assert isinstance(pair.read(5.0, wake), Damaged)
     for port in ports:
         port.close()
-    os.close(wake)
-    os.close(end)
 
 
 def test_errors_of_both_ports_are_counted(

@@ -40,14 +40,6 @@ EVEN = PortSettings('', 115200, parity='Even')
 
 
 @pytest.fixture
-def wake() -> Iterator[int]:
-    ends = os.pipe()
-    yield ends[0]
-    for end in ends:
-        os.close(end)
-
-
-@pytest.fixture
 def ends() -> Iterator[tuple[Rfc2217Port, socket.socket]]:
     ours, theirs = socket.socketpair()
     theirs.settimeout(PATIENCE)

@@ -14,7 +14,7 @@
 
 """Serial devices: how they are opened, damaged characters, counts, and the end."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 import errno
 import fcntl
 import os
@@ -34,14 +34,6 @@ from abdf1_ros.ports.settings import PortSettings
 import pytest
 import serial
 from support.ptys import PATIENCE, Pty
-
-
-@pytest.fixture
-def wake() -> Iterator[int]:
-    ends = os.pipe()
-    yield ends[0]
-    for end in ends:
-        os.close(end)
 
 
 @pytest.mark.parametrize('name, text', [

@@ -48,12 +48,6 @@ def files(tmp_path: Path) -> Files:
     return make_files(tmp_path)
 
 
-@pytest.fixture(scope='module')
-def observer() -> Iterator[Observer]:
-    with Observer() as observer:
-        yield observer
-
-
 # Ends
 
 
