@@ -38,15 +38,13 @@ from abdf1_ros.df1.tasks import TaskSource
 from abdf1_ros.errors import FormatError, LinkError, RemoteError
 from abdf1_ros.open_line import Pending
 from abdf1_ros.pccc.identity import Mode
-from abdf1_ros.ports.endpoints import PtyEndpoint
-from abdf1_ros.ports.link_thread import LinkThread
 from abdf1_ros.problems import ConfigurationError
 from abdf1_ros.settings.network import FIELDS, Network
 from abdf1_ros.simulator.simulated_plc import SimulatedPlc
 import numpy
 import pytest
 from support.driver_bench import simulated_plc, store, stored
-from support.plc_line import plc_line
+from support.plc_line import machine_line, plc_line
 from support.ptys import PATIENCE
 
 FILES = (('N7:0', 250), ('B3:0', 4), ('F8:0', 8), ('T4:0', 9), ('ST9:0', 42), ('A10:0', 4))
@@ -345,17 +343,11 @@ def peer(tmp_path: Path) -> Iterator[str]:
     """Return the port of an SLC in full duplex."""
     plc = simulated_plc(1, 'SLC', time.monotonic, *FILES)
     plc.be_full_duplex()
-    line = PtyEndpoint(str(tmp_path / 'line'))
     settings = Network(baud=9600, station=1).line
     machine = PEER.make_machine(settings, lambda: link.run(Nothing()), Counters())
     link = PEER.make_link(machine, settings, ActiveStationList(()), plc.serve, lambda event: None)
-    thread = LinkThread(machine, line.open)
-    thread.start()
-    try:
-        yield line.name
-    finally:
-        thread.stop()
-        line.close()
+    with machine_line(tmp_path / 'line', machine) as name:
+        yield name
 
 
 def test_plc_without_diagnostic_status_needs_its_family(tmp_path: Path) -> None:

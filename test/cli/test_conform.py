@@ -20,14 +20,10 @@ from pathlib import Path
 import time
 
 from abdf1_ros.cli.conform import main
-from abdf1_ros.df1.checksum import Checksum
-from abdf1_ros.df1.machine import Machine
-from abdf1_ros.df1.slave import multidrop
-from abdf1_ros.ports.endpoints import PtyEndpoint
-from abdf1_ros.ports.link_thread import LinkThread
 import pytest
 from support.commands import running_simulator
 from support.driver_bench import simulated_plc
+from support.plc_line import plc_line
 from support.ptys import Pty
 
 QUICK = ('--only', 'poll-idle', '--only', 'message-acknowledged', '--only', 'nak-resets')
@@ -36,13 +32,8 @@ QUICK = ('--only', 'poll-idle', '--only', 'message-acknowledged', '--only', 'nak
 @pytest.fixture
 def port(tmp_path: Path) -> Iterator[str]:
     """Return a pseudo-terminal with a simulated SLC 1 at its other end."""
-    plc = simulated_plc(1, 'SLC', time.monotonic, ('N7:0', 4))
-    line = PtyEndpoint(str(tmp_path / 'plc'))
-    link = LinkThread(Machine(multidrop([plc]), checksum=Checksum.CRC), line.open)
-    link.start()
-    yield line.name
-    link.stop()
-    line.close()
+    with plc_line(tmp_path / 'plc', simulated_plc(1, 'SLC', time.monotonic, ('N7:0', 4))) as name:
+        yield name
 
 
 def test_result_is_told_in_lines(port: str, capsys: pytest.CaptureFixture[str]) -> None:

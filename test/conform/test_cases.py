@@ -23,15 +23,7 @@ from abdf1_ros.conform.cases import CASES
 from abdf1_ros.conform.codec import BlockCheck
 from abdf1_ros.conform.ends import MasterEnd
 from abdf1_ros.conform.wire import Wire
-from abdf1_ros.df1.checksum import Checksum
-from abdf1_ros.df1.frames import Duplex
-from abdf1_ros.df1.machine import Machine, Procedure
 from abdf1_ros.df1.packet import Packet
-from abdf1_ros.df1.peer import FullDuplexPeer
-from abdf1_ros.df1.radio import RadioNode
-from abdf1_ros.df1.settings import LinkSettings
-from abdf1_ros.df1.slave import multidrop
-from abdf1_ros.df1.stations import ActiveStationList
 from abdf1_ros.driver.driver import Driver
 from abdf1_ros.driver.settings import DriverSettings
 from abdf1_ros.pccc.describe import effect_of
@@ -39,9 +31,9 @@ from abdf1_ros.pccc.notation import Effect
 from abdf1_ros.settings.network import Network
 import pytest
 from support.cases import for_all
-from support.conformance import failures, results_of
+from support.conformance import failures, plc_of, results_of
 from support.conversations import Conversation, CONVERSATIONS
-from support.driver_bench import Recorder, simulated_plc
+from support.driver_bench import Recorder
 from support.mappings import make_mapping
 from support.scripted_line import ScriptedLine
 
@@ -59,33 +51,14 @@ class SpoiledLine(ScriptedLine):
         return self.spoil(super().read(timeout))
 
 
-def answering(family: str, check: str, target: Target) -> SpoiledLine:
-    """Return a line with a simulated PLC 1 at its end."""
-    plc = simulated_plc(1, family, lambda: 0.0, ('N7:0', 20), checksum=check)
-    if target.is_half_duplex:
-        return SpoiledLine(Machine(multidrop([plc]), checksum=Checksum[check]))
-
-    def run(machine: Machine) -> Procedure:
-        if target.is_radio:
-            settings = LinkSettings(
-                station=1, checksum=Checksum[check], store_forward={1, 5, 254, 255})
-            return RadioNode(machine, settings, ActiveStationList(), plc.serve).run(plc)
-        return FullDuplexPeer(machine, LinkSettings(station=None, checksum=Checksum[check]),
-                              ActiveStationList(), plc.serve).run(plc)
-
-    plc.be_full_duplex()
-    return SpoiledLine(Machine(
-        run, checksum=Checksum[check], duplex=Duplex.FULL, counters=plc.counters))
-
-
-def asking(check: str, mode: str) -> SpoiledLine:
+def asking(check: str, mode: str) -> ScriptedLine:
     """Return a line with a driver at its end that reads station 1 all the time."""
     network = Network(mode=mode, error_code=check, baud=115200, timeout=300, cmd_timeout=2000,
                       station=5)
     listener = Recorder(lambda: 0.0)
     driver = Driver(network, [make_mapping('N7:0', length=2, period=0)],
                     DriverSettings(processor_period=0), listener)
-    return SpoiledLine(driver.machine)
+    return ScriptedLine(driver.machine)
 
 
 def _needed(result: CaseResult, target: Target) -> Permission:
@@ -104,7 +77,8 @@ def _needed(result: CaseResult, target: Target) -> Permission:
 @pytest.mark.parametrize('family', ['SLC', 'PLC5'])
 @pytest.mark.parametrize('target', [Target.SLAVE, Target.PEER, Target.RADIO])
 def test_simulated_plc_conforms(target: Target, family: str, check: str) -> None:
-    results = results_of(answering(family, check, target), target, check, family)
+    line = ScriptedLine(plc_of(target, check, family))
+    results = results_of(line, target, check, family)
     assert failures(results) == []
     assert [result.case.name for result in results
             if result.case.permission is not _needed(result, target)] == []
@@ -123,7 +97,8 @@ def test_our_driver_passes_every_case(target: Target, mode: str, check: str) -> 
 @cache
 def passed(target: Target) -> dict[str, str]:
     """Return the cases that our link passes, with their sources."""
-    line = asking('CRC', ASKING[target]) if target in ASKING else answering('SLC', 'CRC', target)
+    line = asking('CRC', ASKING[target]) if target in ASKING \
+        else ScriptedLine(plc_of(target, 'CRC'))
     return {result.case.name: result.case.source for result in results_of(line, target, 'CRC')
             if result.verdict is Verdict.PASS}
 
@@ -159,7 +134,7 @@ def _flipped(raw: bytes) -> bytes:
 ])
 def test_broken_rule_fails_its_case(target: Target, name: str, spoil: Callable[[bytes], bytes],
                                     expected: str) -> None:
-    line = answering('SLC', 'CRC', target)
+    line = SpoiledLine(plc_of(target, 'CRC'))
     line.spoil = spoil
     result, = results_of(line, target, 'CRC', only=name)
     assert result.verdict is Verdict.FAIL
@@ -170,13 +145,13 @@ def test_broken_rule_fails_its_case(target: Target, name: str, spoil: Callable[[
 @pytest.mark.parametrize('name', ['read-words', 'write-and-read'])
 def test_other_family_refuses(name: str) -> None:
     """A PLC-5 does not know the commands of an SLC, and says so."""
-    line = answering('PLC5', 'CRC', Target.SLAVE)
+    line = ScriptedLine(plc_of(Target.SLAVE, 'CRC', 'PLC5'))
     result, = results_of(line, Target.SLAVE, 'CRC', 'SLC', only=name)
     assert (result.verdict, result.expected, result.got) == (Verdict.FAIL, 'STS 00', 'STS 10')
 
 
 def test_case_that_needs_leave_is_skipped() -> None:
-    line = answering('SLC', 'CRC', Target.SLAVE)
+    line = ScriptedLine(plc_of(Target.SLAVE, 'CRC'))
     wire = Wire(line, BlockCheck.CRC, line.clock, is_half_duplex=True)
     case = next(case for case in CASES if case.name == 'nak-resets')
     result, = run_cases([case], wire, MasterEnd(wire, 1, 5, first_tns=1),

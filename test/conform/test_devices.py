@@ -23,18 +23,10 @@ import math
 from abdf1_ros.conform import codec
 from abdf1_ros.conform.case import Target, Verdict
 from abdf1_ros.conform.cases import CASES
-from abdf1_ros.df1.checksum import Checksum
-from abdf1_ros.df1.frames import Duplex
-from abdf1_ros.df1.machine import Machine, Procedure
-from abdf1_ros.df1.peer import FullDuplexPeer
-from abdf1_ros.df1.radio import RadioNode
-from abdf1_ros.df1.settings import LinkSettings
-from abdf1_ros.df1.slave import HalfDuplexSlave, multidrop
-from abdf1_ros.df1.stations import ActiveStationList
+from abdf1_ros.df1.machine import Machine
 import pytest
-from support.conformance import failures, results_of
+from support.conformance import failures, plc_of, results_of
 from support.devices import Device, DEVICES, WRONG
-from support.driver_bench import simulated_plc
 from support.odd_device import OddDevice, Wiring
 
 TARGETS = {'Message': Target.SLAVE, 'Peer': Target.PEER, 'Radio': Target.RADIO}
@@ -47,24 +39,6 @@ BYTE_TIME = 0.005  # s, where each byte comes by itself
 # cannot be asked for.
 NOT_HERE = {'address-forms', 'poll-stuffing', 'crc-covers-station'}
 NOT_ASKED = {'loses_every_third_answer': {'other-ack-ignored'}, 'no_eot': {'poll-idle'}}
-
-
-def plc_of(target: Target, check: str) -> Machine:
-    """Return an SLC, station 1, that keeps the rules."""
-    settings = LinkSettings(
-        station=1 if target.is_half_duplex or target.is_radio else None,
-        checksum=Checksum[check], nak_retries=TRIES, store_forward={1, 5, 254, 255})
-    plc = simulated_plc(1, 'SLC', lambda: 0.0, ('N7:0', 20), checksum=check)
-    if target.is_half_duplex:
-        plc.slave = HalfDuplexSlave(settings, plc.serve)
-        return Machine(multidrop([plc]), checksum=Checksum[check])
-    plc.be_full_duplex()
-
-    def run(machine: Machine) -> Procedure:
-        kind = RadioNode if target.is_radio else FullDuplexPeer
-        return kind(machine, settings, ActiveStationList(), plc.serve).run(plc)
-
-    return Machine(run, checksum=Checksum[check], duplex=Duplex.FULL, counters=plc.counters)
 
 
 class DeviceLine:
@@ -127,7 +101,7 @@ class DeviceLine:
 def test_right_device_passes_and_wrong_one_fails_its_case(
         device: Device, mode: str, check: str) -> None:
     target = TARGETS[mode]
-    line = DeviceLine(device, plc_of(target, check))
+    line = DeviceLine(device, plc_of(target, check, nak_retries=TRIES))
     results = results_of(line, target, check)
     assert len(results) == sum(target in case.targets for case in CASES)
     assert line.now < 15 * 60

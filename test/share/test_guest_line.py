@@ -29,13 +29,7 @@ from abdf1_ros.cli.conform import main as conform
 from abdf1_ros.client import Client
 from abdf1_ros.df1 import frames
 from abdf1_ros.df1.checksum import Checksum
-from abdf1_ros.df1.frames import Duplex
-from abdf1_ros.df1.machine import Machine
 from abdf1_ros.df1.packet import Packet
-from abdf1_ros.df1.peer import FullDuplexPeer
-from abdf1_ros.df1.settings import LinkSettings
-from abdf1_ros.df1.slave import multidrop
-from abdf1_ros.df1.stations import ActiveStationList
 from abdf1_ros.driver.driver import Driver
 from abdf1_ros.driver.guests import GuestCommand, GuestListener, GuestQueue
 from abdf1_ros.driver.settings import DriverSettings
@@ -50,7 +44,7 @@ from abdf1_ros.settings.share import share_places
 from abdf1_ros.share.guest_line import GuestLine
 import pytest
 from support.device_server import OWN_HOST
-from support.driver_bench import Recorder, simulated_plc, store, stored
+from support.driver_bench import FarEnd, Recorder, simulated_plc, store, stored
 from support.mappings import make_mapping
 from support.ptys import Pty
 
@@ -64,11 +58,13 @@ class Shared:
     def __init__(self, folder: Path, places: str, access: str, mode: str) -> None:
         self.plc = simulated_plc(1, 'SLC', line_time, ('N7:0', 50), ('N10:0', 20))
         store(self.plc, 'N7:0', range(50))
-        self._line = PtyEndpoint(str(folder / 'plc'))
-        self._far = LinkThread(self._machine(mode), self._line.open)
+        if mode == 'Peer':
+            self.plc.be_full_duplex()
         # All are threads of this process, which a busy host may let stand still for 2 s.
         network = Network(mode=mode, timeout=3000, cmd_timeout=5000, baud=115200, share=places,
                           share_access=access)
+        self._line = PtyEndpoint(str(folder / 'plc'))
+        self._far = LinkThread(FarEnd([self.plc], network), self._line.open)
         self.listener = Recorder(line_time)
         rows = [make_mapping('N10:0', plc='SLC', period=50), make_mapping(
             'N10:10', 'Heartbeat', plc='SLC', period=200)]
@@ -79,16 +75,6 @@ class Shared:
         self.guests = [GuestLine(place, network, self.driver.guests, self._near.wake,
                                  GuestListener(), self.faults.append)
                        for place in share_places(places)]
-
-    def _machine(self, mode: str) -> Machine:
-        if mode == 'Master':
-            return Machine(multidrop([self.plc]), checksum=Checksum.CRC)
-        self.plc.be_full_duplex()
-        return Machine(
-            lambda machine: FullDuplexPeer(machine, LinkSettings(station=None),
-                                           ActiveStationList(),
-                                           self.plc.serve).run(self.plc),
-            checksum=Checksum.CRC, duplex=Duplex.FULL)
 
     def start(self) -> None:
         for thread in (self._far, self._near, *self.guests):

@@ -30,7 +30,15 @@ from abdf1_ros.conform.ends import (
     Words,
 )
 from abdf1_ros.conform.wire import RawLine, Wire
+from abdf1_ros.df1.checksum import Checksum
+from abdf1_ros.df1.frames import Duplex
+from abdf1_ros.df1.machine import Machine, Procedure
 from abdf1_ros.df1.packet import Packet
+from abdf1_ros.df1.peer import FullDuplexPeer
+from abdf1_ros.df1.radio import RadioNode
+from abdf1_ros.df1.settings import LinkSettings
+from abdf1_ros.df1.slave import HalfDuplexSlave, multidrop
+from abdf1_ros.df1.stations import ActiveStationList
 from support.driver_bench import simulated_plc
 
 
@@ -62,6 +70,24 @@ def results_of(line: TimedLine, target: Target, check: str, family: str = 'SLC',
         Target.RADIO_CLIENT: lambda: RadioServerEnd(wire, serve)}
     cases = [case for case in CASES if target in case.targets and only in ('', case.name)]
     return list(run_cases(cases, wire, ends[target](), frozenset(Permission)))
+
+
+def plc_of(target: Target, check: str, family: str = 'SLC', nak_retries: int = 3) -> Machine:
+    """Return a simulated PLC, station 1, that keeps the rules."""
+    settings = LinkSettings(
+        station=1 if target.is_half_duplex or target.is_radio else None,
+        checksum=Checksum[check], nak_retries=nak_retries, store_forward={1, 5, 254, 255})
+    plc = simulated_plc(1, family, lambda: 0.0, ('N7:0', 20), checksum=check)
+    if target.is_half_duplex:
+        plc.slave = HalfDuplexSlave(settings, plc.serve, plc.counters)
+        return Machine(multidrop([plc]), checksum=settings.checksum)
+    plc.be_full_duplex()
+
+    def run(machine: Machine) -> Procedure:
+        kind = RadioNode if target.is_radio else FullDuplexPeer
+        return kind(machine, settings, ActiveStationList(), plc.serve).run(plc)
+
+    return Machine(run, checksum=settings.checksum, duplex=Duplex.FULL, counters=plc.counters)
 
 
 def failures(results: list[CaseResult]) -> list[str]:

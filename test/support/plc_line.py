@@ -35,19 +35,26 @@ from support.ptys import Pty
 
 
 @contextmanager
-def plc_line(path: Path, *plcs: SimulatedPlc,
-             around: Callable[[Port], Port] = lambda port: port) -> Iterator[str]:
-    """Put PLCs on a half-duplex line with CRC, ``around`` their port; yield the name of ours."""
+def machine_line(path: Path, machine: Machine,
+                 around: Callable[[Port], Port] = lambda port: port) -> Iterator[str]:
+    """Run a machine on a line, ``around`` its port; yield the name of ours."""
     line = PtyEndpoint(str(path))
-    stations = stations_of(plcs, Checksum.CRC)
-    link = LinkThread(Machine(multidrop(stations), checksum=Checksum.CRC),
-                      lambda: around(line.open()))
+    link = LinkThread(machine, lambda: around(line.open()))
     link.start()
     try:
         yield line.name
     finally:
         link.stop()
         line.close()
+
+
+@contextmanager
+def plc_line(path: Path, *plcs: SimulatedPlc,
+             around: Callable[[Port], Port] = lambda port: port) -> Iterator[str]:
+    """Put PLCs on a half-duplex line with CRC, ``around`` their port; yield the name of ours."""
+    machine = Machine(multidrop(stations_of(plcs, Checksum.CRC)), checksum=Checksum.CRC)
+    with machine_line(path, machine, around) as name:
+        yield name
 
 
 @contextmanager

@@ -36,14 +36,12 @@ from abdf1_ros.df1.radio import RadioNode
 from abdf1_ros.df1.settings import LinkSettings
 from abdf1_ros.df1.slave import multidrop
 from abdf1_ros.df1.stations import ActiveStationList
-from abdf1_ros.ports.endpoints import PtyEndpoint
-from abdf1_ros.ports.link_thread import LinkThread
 from abdf1_ros.settings.network import Network
 from abdf1_ros.simulator.simulated_plc import SimulatedPlc
 import pytest
 from support.driver_bench import simulated_plc
 from support.odd_device import OddDevice, Wiring
-from support.plc_line import LosesPolls, odd_line, plc_line
+from support.plc_line import LosesPolls, machine_line, odd_line, plc_line
 from support.ptys import Pty
 
 
@@ -60,16 +58,10 @@ def plc_on(path: Path, check: str, duplex: Duplex,
     """Put an SLC that is station 1 on a pseudo-terminal."""
     plc = simulated_plc(1, 'SLC', lambda: 0.0, ('N7:0', 10), checksum=check)
     checksum = Network(error_code=check).checksum
-    line = PtyEndpoint(str(path))
     procedure = multidrop([plc]) if duplex is Duplex.HALF \
         else _everybody_sends(plc, checksum, kind)
-    link = LinkThread(Machine(procedure, checksum=checksum, duplex=duplex), line.open)
-    link.start()
-    try:
+    with machine_line(path, Machine(procedure, checksum=checksum, duplex=duplex)):
         yield Network(com_port=str(path), timeout=1500)
-    finally:
-        link.stop()
-        line.close()
 
 
 def _everybody_sends(plc: SimulatedPlc, checksum: Checksum,

@@ -25,13 +25,12 @@ from abdf1_ros.df1.echo import COMES_BACK
 from abdf1_ros.driver.driver import Driver
 from abdf1_ros.driver.settings import DriverSettings
 from abdf1_ros.plan.report import make_report
-from abdf1_ros.ports.endpoints import PtyEndpoint
-from abdf1_ros.ports.link_thread import LinkThread
 from abdf1_ros.settings.network import Network
 import pytest
 from support.commands import call, PATIENT, running_simulator, Said
 from support.driver_bench import Recorder
 from support.mappings import make_mapping
+from support.plc_line import machine_line
 from support.ptys import Pty
 from support.ros import Process, write_csv
 from support.simulator_process import Files
@@ -213,19 +212,13 @@ def test_plcs_behind_a_radio_modem(
 
 def test_words_of_a_node_on_a_radio_modem(
         tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    line = PtyEndpoint(str(tmp_path / 'line'))
     network = Network(mode='Radio', plc_type='SLC', station=9)
     words = make_mapping('N7:0', 'Serve', station=9, length=2, plc='SLC')
     driver = Driver(network, [words], DriverSettings(), Recorder(time.monotonic))
-    thread = LinkThread(driver.machine, line.open)
-    thread.start()
-    options = '--radio', '--port', line.name
-    try:
+    with machine_line(tmp_path / 'line', driver.machine) as name:
+        options = '--radio', '--port', name
         write = call(main, capsys, 'write', 'N7:1', '5', '--yes', '--station', '9', *options)
         assert write.good_lines[-1] == 'N7:1 5'
         read = call(main, capsys, 'read', 'N7:0', '--length', '2', '--station', '9', *options)
         assert read.good_lines == ['N7:0 0 5']
         assert call(main, capsys, 'ping', '9', '--count', '1', *options).status == 0
-    finally:
-        thread.stop()
-        line.close()

@@ -24,24 +24,16 @@ from abdf1_ros.cli.plc import presence
 from abdf1_ros.cli.plc.command import main
 from abdf1_ros.cli.plc.presence import describe, hint, look_at, Presence, scan, type_to_say
 from abdf1_ros.cli.plc.session import Session
-from abdf1_ros.df1.checksum import Checksum
-from abdf1_ros.df1.frames import Duplex
-from abdf1_ros.df1.machine import Machine
 from abdf1_ros.df1.packet import Packet
-from abdf1_ros.df1.peer import FullDuplexPeer
-from abdf1_ros.df1.settings import LinkSettings
-from abdf1_ros.df1.stations import ActiveStationList
 from abdf1_ros.errors import FormatError, StationInactive
 from abdf1_ros.pccc.identity import Identity, Mode
 from abdf1_ros.ports.descriptor import PortAround
-from abdf1_ros.ports.endpoints import PtyEndpoint
-from abdf1_ros.ports.link_thread import LinkThread
 from abdf1_ros.settings.network import Network
 from abdf1_ros.simulator.gateway import SimulatedGateway
 import pytest
-from support.driver_bench import simulated_plc
+from support.driver_bench import FarEnd, simulated_plc
 from support.odd_device import OddDevice, Wiring
-from support.plc_line import LosesPolls, odd_line, plc_line
+from support.plc_line import LosesPolls, machine_line, odd_line, plc_line
 from support.ptys import Pty
 
 IDENTITY = Identity(
@@ -179,16 +171,9 @@ def test_scan_in_full_duplex_does_not_count_what_a_gateway_refuses(tmp_path: Pat
     def gateway(command: Packet) -> Packet:
         return serve(command) if command.dst == 1 else command.reply(sts=0x02)
 
-    line = PtyEndpoint(str(tmp_path / 'line'))
-    link = LinkThread(Machine(lambda machine: FullDuplexPeer(
-        machine, LinkSettings(station=None), ActiveStationList(), gateway).run(plc),
-        checksum=Checksum.CRC, duplex=Duplex.FULL), line.open)
-    link.start()
-    try:
-        found = list(scan(Network(com_port=line.name, mode='Peer', timeout=2000), [1, 2, 3]))
-    finally:
-        link.stop()
-        line.close()
+    plc.serve = gateway  # type: ignore[method-assign]
+    with machine_line(tmp_path / 'line', FarEnd([plc], Network(mode='Peer'))) as name:
+        found = list(scan(Network(com_port=name, mode='Peer', timeout=2000), [1, 2, 3]))
     assert [seen.is_there for seen in found] == [True, False, False]
 
 
