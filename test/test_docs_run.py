@@ -25,7 +25,7 @@ import subprocess
 from abdf1_ros.cli.main import COMMANDS
 import pytest
 from support import documents
-from support.commands import call
+from support.commands import call, Output
 from support.ros import Process
 
 PORT = '/tmp/plc'
@@ -57,7 +57,7 @@ def expect(shown: list[str], said: list[str]) -> None:
 @pytest.mark.parametrize('name', PAGES)
 def test_marked_blocks_do_what_they_show(
         name: str, port: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch,
-        capsys: pytest.CaptureFixture[str]) -> None:
+        capsys: Output) -> None:
     monkeypatch.chdir(tmp_path)
     script = tmp_path / 'plc'  # where the command has its short name
     script.write_text('#!/bin/sh\n# of abdf1_ros\n')

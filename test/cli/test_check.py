@@ -31,28 +31,29 @@ NET_HEADER = 'Station,Mode,Baud,Cmd_Timeout,Timeout,Com_Port'
 MAP_HEADER = 'Tag,Command,Address,Station,PLC_Type,Length,Period'
 GOOD_NET = '5,Master,9600,500,300,1'
 GOOD_ROW = 'speed,Read,N7:0,1,PLC5,2,1000'
+Output = pytest.CaptureFixture[str]
+Paths = tuple[Path, Path]
 BAD_ROWS = ('a,Read,N7,1,PLC5,,', 'b,Rad,N7:1,256,PLC5,,', 'c,Serve,N7:0,6,PLC5,,',
             'a,Read,N7:9999,1,PLC5,,')
 
 
 @pytest.fixture
-def files(tmp_path: Path) -> tuple[Path, Path]:
+def files(tmp_path: Path) -> Paths:
     return tmp_path / 'net.csv', tmp_path / 'map.csv'
 
 
-def check(files: tuple[Path, Path], net: str, rows: tuple[str, ...], *options: str) -> int:
+def check(files: Paths, net: str, rows: tuple[str, ...], *options: str) -> int:
     write_csv(files[0], NET_HEADER, [net])
     write_csv(files[1], MAP_HEADER, rows)
     return main([*map(str, files), *options])
 
 
-def parsed(capsys: pytest.CaptureFixture[str]) -> dict[str, Any]:
+def parsed(capsys: Output) -> dict[str, Any]:
     content: dict[str, Any] = json.loads(capsys.readouterr().out)
     return content
 
 
-def test_good_files_show_their_plan_and_no_error(
-        files: tuple[Path, Path], capsys: pytest.CaptureFixture[str]) -> None:
+def test_good_files_show_their_plan_and_no_error(files: Paths, capsys: Output) -> None:
     assert check(files, GOOD_NET, (GOOD_ROW,)) == 0
     out = capsys.readouterr().out
     assert 'error' not in out.replace('no errors', '')
@@ -69,8 +70,7 @@ def test_good_files_show_their_plan_and_no_error(
     assert out.endswith('no errors, no warnings\n')
 
 
-def test_descriptions_are_shown_where_there_are_any(
-        files: tuple[Path, Path], capsys: pytest.CaptureFixture[str]) -> None:
+def test_descriptions_are_shown_where_there_are_any(files: Paths, capsys: Output) -> None:
     write_csv(files[0], NET_HEADER, [GOOD_NET])
     write_csv(files[1], MAP_HEADER + ',Description', [
         GOOD_ROW + ',"Roller, hall 3"', 'door,Read,B3:0/1,1,PLC5,1,100,'])
@@ -82,7 +82,7 @@ def test_descriptions_are_shown_where_there_are_any(
 
 @pytest.mark.parametrize('prefix', ['', 'peer_', 'heartbeat_'])
 def test_files_of_the_package_are_good_and_follow_our_own_advice(
-        prefix: str, capsys: pytest.CaptureFixture[str]) -> None:
+        prefix: str, capsys: Output) -> None:
     names = [str(config_file(f'{prefix}{kind}.csv')) for kind in ('net', 'map')]
     assert main([*names, '--json']) == 0
     content = parsed(capsys)
@@ -91,8 +91,7 @@ def test_files_of_the_package_are_good_and_follow_our_own_advice(
     assert not [note for note in content['notes'] if 'without While' in note]
 
 
-def test_every_error_of_both_files_at_once(files: tuple[Path, Path],
-                                           capsys: pytest.CaptureFixture[str]) -> None:
+def test_every_error_of_both_files_at_once(files: Paths, capsys: Output) -> None:
     assert check(files, '5,Mastr,9601,100', BAD_ROWS) == 2
     lines = capsys.readouterr().out.splitlines()
     net, rows = (str(path) for path in files)
@@ -109,8 +108,7 @@ def test_every_error_of_both_files_at_once(files: tuple[Path, Path],
     assert lines[7:] == ['no plan without a good net file']
 
 
-def test_plan_of_the_good_rows(files: tuple[Path, Path],
-                               capsys: pytest.CaptureFixture[str]) -> None:
+def test_plan_of_the_good_rows(files: Paths, capsys: Output) -> None:
     assert check(files, GOOD_NET, (GOOD_ROW, *BAD_ROWS)) == 2
     out = capsys.readouterr().out
     assert f'error: {files[1]}:5: Item: 4, a Serve row has our own Station, which is 5' in out
@@ -118,8 +116,7 @@ def test_plan_of_the_good_rows(files: tuple[Path, Path],
     assert '1 mapping is read with 1 block' in out
 
 
-def test_files_in_the_wrong_order_are_told_once_each(
-        files: tuple[Path, Path], capsys: pytest.CaptureFixture[str]) -> None:
+def test_files_in_the_wrong_order_are_told_once_each(files: Paths, capsys: Output) -> None:
     check(files, GOOD_NET, (GOOD_ROW,))
     capsys.readouterr()
     assert main([*map(str, reversed(files))]) == 2
@@ -127,8 +124,7 @@ def test_files_in_the_wrong_order_are_told_once_each(
     assert ['is this the right file?' in line for line in told] == [True, True]
 
 
-def test_json_of_errors_names_place_and_number_of_each(
-        files: tuple[Path, Path], capsys: pytest.CaptureFixture[str]) -> None:
+def test_json_of_errors_names_place_and_number_of_each(files: Paths, capsys: Output) -> None:
     assert check(files, '5,Mastr,9600,500', BAD_ROWS[:1], '--json') == 2
     content = parsed(capsys)
     mode, address = content['errors']
@@ -141,8 +137,7 @@ def test_json_of_errors_names_place_and_number_of_each(
     assert content['blocks'] == content['warnings'] == []
 
 
-def test_rows_tell_what_a_ros_user_gets(files: tuple[Path, Path],
-                                        capsys: pytest.CaptureFixture[str]) -> None:
+def test_rows_tell_what_a_ros_user_gets(files: Paths, capsys: Output) -> None:
     write_csv(files[0], NET_HEADER, [GOOD_NET])
     write_csv(files[1], 'Tag,Command,Address,Station,PLC_Type,Topic,Scale,Offset', [
         'level,ReadWrite,N7:1,1,PLC5,tank/level,0.1,-40', 'alive,Heartbeat,N10:0,1,PLC5,,,'])
@@ -156,8 +151,7 @@ def test_rows_tell_what_a_ros_user_gets(files: tuple[Path, Path],
     assert (alive['topics'], alive['message'], alive['stale_ms']) == ([], '', None)
 
 
-def test_notes_are_no_warnings(files: tuple[Path, Path],
-                               capsys: pytest.CaptureFixture[str]) -> None:
+def test_notes_are_no_warnings(files: Paths, capsys: Output) -> None:
     bits = 'bits,Read,B3:0/0,1,PLC5,3,1000'
     assert check(files, GOOD_NET, (bits,)) == 0
     note = 'bits without While: bits; their values go on when the program of the PLC stops'
@@ -167,8 +161,7 @@ def test_notes_are_no_warnings(files: tuple[Path, Path],
     assert (content['notes'], content['warnings']) == ([note], [])
 
 
-def test_mode_slave_has_no_time_that_its_master_decides(
-        files: tuple[Path, Path], capsys: pytest.CaptureFixture[str]) -> None:
+def test_mode_slave_has_no_time_that_its_master_decides(files: Paths, capsys: Output) -> None:
     net = GOOD_NET.replace('Master', 'Slave')
     assert check(files, net, (GOOD_ROW,), '--json') == 0
     content = parsed(capsys)
@@ -180,7 +173,7 @@ def test_mode_slave_has_no_time_that_its_master_decides(
     assert 'expected poll cycle' not in said
 
 
-def test_json_of_a_plan(files: tuple[Path, Path], capsys: pytest.CaptureFixture[str]) -> None:
+def test_json_of_a_plan(files: Paths, capsys: Output) -> None:
     rows = (GOOD_ROW, 'fast,Read,F8:0,1,SLC,,50')
     assert check(files, GOOD_NET, rows, '--json', '--response-time', '20') == 0
     content = parsed(capsys)
@@ -201,8 +194,7 @@ def test_json_of_a_plan(files: tuple[Path, Path], capsys: pytest.CaptureFixture[
     assert content['needed_baud'] == 115200
 
 
-def test_many_tags_of_a_block(files: tuple[Path, Path],
-                              capsys: pytest.CaptureFixture[str]) -> None:
+def test_many_tags_of_a_block(files: Paths, capsys: Output) -> None:
     rows = tuple(f't{number},Read,N7:{number},1,PLC5,,1000' for number in range(10))
     assert check(files, GOOD_NET, rows) == 0
     assert 't6, t7 and 2 more\n' in capsys.readouterr().out
@@ -210,8 +202,7 @@ def test_many_tags_of_a_block(files: tuple[Path, Path],
     assert parsed(capsys)['blocks'][0]['tags'] == [f't{number}' for number in range(10)]
 
 
-def test_warnings_come_first_and_long_tables_are_folded(
-        files: tuple[Path, Path], capsys: pytest.CaptureFixture[str]) -> None:
+def test_warnings_come_first_and_long_tables_are_folded(files: Paths, capsys: Output) -> None:
     rows = tuple(f't{number},Read,N7:{number},1,PLC5,,100' for number in range(90))
     assert check(files, GOOD_NET, (*rows, 't90,Read,B3:0,1,PLC5,,20')) == 0
     lines = capsys.readouterr().out.splitlines()
@@ -219,8 +210,7 @@ def test_warnings_come_first_and_long_tables_are_folded(
     assert '... and 51 more; --json has them all' in lines and len(lines) < 70
 
 
-def test_row_without_a_period_has_the_default_one(
-        files: tuple[Path, Path], capsys: pytest.CaptureFixture[str]) -> None:
+def test_row_without_a_period_has_the_default_one(files: Paths, capsys: Output) -> None:
     row = GOOD_ROW.removesuffix('1000')
     check(files, GOOD_NET, (row,), '--json')
     assert parsed(capsys)['blocks'][0]['period_ms'] == 100
@@ -228,8 +218,7 @@ def test_row_without_a_period_has_the_default_one(
     assert parsed(capsys)['blocks'][0]['period_ms'] == 2000
 
 
-def test_odd_settings_are_warnings_with_their_places(
-        files: tuple[Path, Path], capsys: pytest.CaptureFixture[str]) -> None:
+def test_odd_settings_are_warnings_with_their_places(files: Paths, capsys: Output) -> None:
     row = 'N7:0,Write,I:1.0,017,SLC,1,'
     assert check(files, GOOD_NET, (row,)) == 0
     warnings = [line for line in capsys.readouterr().out.splitlines() if 'warning: ' in line]
@@ -240,16 +229,14 @@ def test_odd_settings_are_warnings_with_their_places(
         'with its next scan']
 
 
-def test_both_files_that_are_missing_are_named(
-        tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_both_files_that_are_missing_are_named(tmp_path: Path, capsys: Output) -> None:
     assert main([str(tmp_path / 'a.csv'), str(tmp_path / 'b.csv')]) == 2
     out = capsys.readouterr().out
     assert 'a.csv: cannot be read' in out
     assert 'b.csv: cannot be read' in out
 
 
-def test_what_stands_in_files_forges_no_line(files: tuple[Path, Path],
-                                             capsys: pytest.CaptureFixture[str]) -> None:
+def test_what_stands_in_files_forges_no_line(files: Paths, capsys: Output) -> None:
     row = '"a\x1b[2J\u2028error: x",Read,N7:0,1,PLC5,2,10'
     assert check(files, GOOD_NET, (row,)) == 0
     out = capsys.readouterr().out
@@ -259,15 +246,14 @@ def test_what_stands_in_files_forges_no_line(files: tuple[Path, Path],
 
 @pytest.mark.parametrize('option', ['--default-period', '--response-time'])
 @pytest.mark.parametrize('text', ['x', '-1', 'nan', '1e12', '1_0', '\u0661'])
-def test_time_that_is_no_number_of_ms_is_told(
-        option: str, text: str, capsys: pytest.CaptureFixture[str]) -> None:
+def test_time_that_is_no_number_of_ms_is_told(option: str, text: str, capsys: Output) -> None:
     with pytest.raises(SystemExit) as ending:
         main(['net.csv', 'map.csv', f'{option}={text}'])
     assert ending.value.code == 2
     assert f'"{text}" should be ms from 0 to 86400000' in capsys.readouterr().err
 
 
-def test_output_that_cannot_take_it_is_no_traceback(files: tuple[Path, Path]) -> None:
+def test_output_that_cannot_take_it_is_no_traceback(files: Paths) -> None:
     write_csv(files[0], NET_HEADER, ['5,Master,9600,500'])
     write_csv(files[1], MAP_HEADER, [GOOD_ROW])
     command = shlex.join([sys.executable, '-m', 'abdf1_ros', 'check', *map(str, files)])
@@ -289,8 +275,7 @@ def plant(folder: Path, **lines: tuple[str, str]) -> None:
         write_csv(folder / f'{name}_map.csv', MAP_HEADER, [row])
 
 
-def test_folder_has_a_line_of_text_for_each_pair(
-        tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_folder_has_a_line_of_text_for_each_pair(tmp_path: Path, capsys: Output) -> None:
     plant(tmp_path, press=(GOOD_NET, GOOD_ROW), glue=(GOOD_NET, GOOD_ROW))
     (tmp_path / 'hall' / 'paint').mkdir(parents=True)
     write_csv(tmp_path / 'hall' / 'paint' / 'net.csv', NET_HEADER, [GOOD_NET])
@@ -304,8 +289,7 @@ def test_folder_has_a_line_of_text_for_each_pair(
     assert lines[0].startswith('glue: 1 row, port /dev/ttyS0, poll cycle ')
 
 
-def test_lines_stand_in_the_order_of_their_numbers(
-        tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_lines_stand_in_the_order_of_their_numbers(tmp_path: Path, capsys: Output) -> None:
     for name in ('line10_', 'line2.', 'line1-'):
         write_csv(tmp_path / f'{name}net.csv', NET_HEADER, [GOOD_NET])
         write_csv(tmp_path / f'{name}map.csv', MAP_HEADER, [GOOD_ROW])
@@ -318,7 +302,7 @@ def test_lines_stand_in_the_order_of_their_numbers(
 
 
 def test_error_of_one_pair_is_named_and_the_others_are_told(
-        tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+        tmp_path: Path, capsys: Output) -> None:
     plant(tmp_path, press=(GOOD_NET, GOOD_ROW), glue=('255,Master,9600,500,300', GOOD_ROW))
     (tmp_path / 'lone_net.csv').write_text((tmp_path / 'press_net.csv').read_text())
     assert main([str(tmp_path)]) == 2
@@ -328,8 +312,7 @@ def test_error_of_one_pair_is_named_and_the_others_are_told(
     assert '\npress: 1 row, ' in out
 
 
-def test_two_lines_of_a_folder_on_one_port_are_an_error(
-        tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_two_lines_of_a_folder_on_one_port_are_an_error(tmp_path: Path, capsys: Output) -> None:
     for name, port in (('glue', '/dev/ttyUSB0'), ('paint', 'socket://localhost:4001'),
                        ('press', 'rfc2217://127.1:4001')):
         write_csv(tmp_path / f'{name}_net.csv', NET_HEADER, [f'{GOOD_NET[:-1]}{port}'])
@@ -340,7 +323,7 @@ def test_two_lines_of_a_folder_on_one_port_are_an_error(
                       'of paint too', '3 lines: 2 good (0 of them with warnings), 1 with errors']
 
 
-def test_json_of_a_folder(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_json_of_a_folder(tmp_path: Path, capsys: Output) -> None:
     plant(tmp_path, press=(GOOD_NET, GOOD_ROW), glue=(GOOD_NET, BAD_ROWS[0]))
     assert main(['--json', str(tmp_path)]) == 2
     content = parsed(capsys)
@@ -351,14 +334,12 @@ def test_json_of_a_folder(tmp_path: Path, capsys: pytest.CaptureFixture[str]) ->
     assert lines['press']['blocks'][0]['tags'] == ['speed']
 
 
-def test_folder_without_lines_is_refused(
-        tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_folder_without_lines_is_refused(tmp_path: Path, capsys: Output) -> None:
     assert main([str(tmp_path)]) == 2
     assert 'no files NAME_net.csv and NAME_map.csv' in capsys.readouterr().out
 
 
-def test_one_file_is_not_enough(
-        files: tuple[Path, Path], capsys: pytest.CaptureFixture[str]) -> None:
+def test_one_file_is_not_enough(files: Paths, capsys: Output) -> None:
     write_csv(files[0], NET_HEADER, [GOOD_NET])
     with pytest.raises(SystemExit):
         main([str(files[0])])
@@ -366,8 +347,7 @@ def test_one_file_is_not_enough(
 
 
 def test_folder_of_this_place_has_its_own_name(
-        tmp_path: Path, monkeypatch: pytest.MonkeyPatch,
-        capsys: pytest.CaptureFixture[str]) -> None:
+        tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: Output) -> None:
     write_csv(tmp_path / 'net.csv', 'Com_Port', ['/dev/ttyUSB0'])
     write_csv(tmp_path / 'map.csv', 'Tag,Command,Address,Station,PLC_Type', ['a,Read,N7:0,1,SLC'])
     monkeypatch.chdir(tmp_path)
@@ -375,8 +355,7 @@ def test_folder_of_this_place_has_its_own_name(
     assert capsys.readouterr().out.startswith(f'{tmp_path.name}: 1 row, port /dev/ttyUSB0')
 
 
-def test_rows_that_a_recording_fills_are_told(tmp_path: Path,
-                                              capsys: pytest.CaptureFixture[str]) -> None:
+def test_rows_that_a_recording_fills_are_told(tmp_path: Path, capsys: Output) -> None:
     net, rows = tmp_path / 'net.csv', tmp_path / 'map.csv'
     net.write_text('Mode,Com_Port\nListen,/dev/ttyUSB0\n', encoding='utf-8')
     rows.write_text(

@@ -20,7 +20,7 @@ from abdf1_ros.cli.check import main
 from abdf1_ros.cli.lanes import Bar, drawing, Lane, Look, NAMES
 import pytest
 from support import browser
-from support.commands import call, Said
+from support.commands import call, Output, Said
 from support.ros import write_csv
 
 NET_HEADER = 'Station,Mode,Baud,Com_Port'
@@ -31,8 +31,6 @@ HASTY = 'hasty,Read,N10:0,3,SLC,100,50,'
 EVIL = '"<script>document.title=1</script><img src=x onerror=alert(1)>"'
 
 RED, BLUE = (0xC6, 0x28, 0x28), (0x2F, 0x6D, 0xB5)
-
-Output = pytest.CaptureFixture[str]
 
 
 def drawn(folder: Path, capsys: Output, rows: tuple[str, ...] = ROWS,

@@ -21,7 +21,7 @@ import time
 
 from abdf1_ros.cli.conform import main
 import pytest
-from support.commands import running_simulator
+from support.commands import Output, running_simulator
 from support.driver_bench import simulated_plc
 from support.plc_line import plc_line
 from support.ptys import Pty
@@ -36,7 +36,7 @@ def port(tmp_path: Path) -> Iterator[str]:
         yield name
 
 
-def test_result_is_told_in_lines(port: str, capsys: pytest.CaptureFixture[str]) -> None:
+def test_result_is_told_in_lines(port: str, capsys: Output) -> None:
     assert main(['slave', '--port', port, *QUICK]) == 0
     lines = capsys.readouterr().out.splitlines()
     assert [line.split()[:2] for line in lines if line[:4] in ('PASS', 'SKIP')] == [
@@ -44,14 +44,12 @@ def test_result_is_told_in_lines(port: str, capsys: pytest.CaptureFixture[str]) 
     assert lines[-1] == '2 passed, 0 failed, 1 skipped'
 
 
-def test_run_in_which_nothing_was_tried_has_not_passed(
-        port: str, capsys: pytest.CaptureFixture[str]) -> None:
+def test_run_in_which_nothing_was_tried_has_not_passed(port: str, capsys: Output) -> None:
     assert main(['slave', '--port', port, '--only', 'nak-resets']) == 1
     assert 'conform: no rule was tried: each case has its reason' in capsys.readouterr().err
 
 
-def test_failure_is_the_exit_status_and_shows_the_bytes(
-        port: str, capsys: pytest.CaptureFixture[str]) -> None:
+def test_failure_is_the_exit_status_and_shows_the_bytes(port: str, capsys: Output) -> None:
     options = ('--port', port, '--station', '2', '--answer-time', '0.05', '--only',
                'message-acknowledged')
     assert main(['slave', *options, '--json']) == 1
@@ -61,7 +59,7 @@ def test_failure_is_the_exit_status_and_shows_the_bytes(
     assert case['transcript'][0].split(' ms ')[1].startswith('we   10 01 02 10 02 02 05 06 00')
 
 
-def test_report_is_markdown(port: str, capsys: pytest.CaptureFixture[str]) -> None:
+def test_report_is_markdown(port: str, capsys: Output) -> None:
     assert main(['slave', '--port', port, '--report', *QUICK]) == 0
     text = capsys.readouterr().out
     assert text.startswith('### Conformance run\n')
@@ -73,7 +71,7 @@ def test_report_is_markdown(port: str, capsys: pytest.CaptureFixture[str]) -> No
     assert '| PASS | poll-idle | KF2 4-31 |  |' in text
 
 
-def test_nobody_there_is_said(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_nobody_there_is_said(tmp_path: Path, capsys: Output) -> None:
     dead = Pty(tmp_path / 'dead')
     assert main(['slave', '--port', str(dead.name), '--answer-time', '0.05', '--only',
                  'poll-idle']) == 1
@@ -81,8 +79,7 @@ def test_nobody_there_is_said(tmp_path: Path, capsys: pytest.CaptureFixture[str]
     dead.close()
 
 
-def test_slave_behind_an_adapter_that_echoes(
-        tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_slave_behind_an_adapter_that_echoes(tmp_path: Path, capsys: Output) -> None:
     port = str(tmp_path / 'line')
     with running_simulator('--pty', port, '--echo'):
         options = ['slave', '--port', port, *QUICK]
@@ -96,7 +93,7 @@ def test_slave_behind_an_adapter_that_echoes(
 
 
 def test_simulator_is_a_node_of_a_radio_network_and_not_a_peer(
-        tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+        tmp_path: Path, capsys: Output) -> None:
     port = str(tmp_path / 'plc')
     options = ('--port', port, '--only')
     with running_simulator('--pty', port, '--radio'):
@@ -112,7 +109,7 @@ def test_simulator_is_a_node_of_a_radio_network_and_not_a_peer(
     (['master', '--tcp', '127.0.0.1:0', '--data', '/none'], 2, '/none: cannot be read'),
     (['client', '--tcp', '[::1]:0', '--station', '9'], 2, 'the example data has stations')])
 def test_port_that_cannot_be_opened_is_one_and_what_is_wrong_in_options_two(
-        args: list[str], status: int, text: str, capsys: pytest.CaptureFixture[str]) -> None:
+        args: list[str], status: int, text: str, capsys: Output) -> None:
     assert main(args) == status
     assert text in capsys.readouterr().err
 
@@ -132,6 +129,6 @@ def test_numbers_up_to_their_bounds_are_taken(args: tuple[str, str]) -> None:
     assert main(['slave', '--list', *args]) == 0
 
 
-def test_cases_are_listed(capsys: pytest.CaptureFixture[str]) -> None:
+def test_cases_are_listed(capsys: Output) -> None:
     assert main(['client', '--list']) == 0
     assert 'silence-enquired' in capsys.readouterr().out

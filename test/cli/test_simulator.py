@@ -31,7 +31,7 @@ from abdf1_ros.cli.simulator import input_of, main
 from abdf1_ros.df1 import frames
 from abdf1_ros.df1.checksum import Checksum
 import pytest
-from support.commands import call
+from support.commands import call, Output
 from support.forked import Forked
 from support.ptys import full_pipe, PATIENCE, read_exactly
 from support.ros import Process
@@ -169,7 +169,7 @@ def test_commands_by_the_clock_keep_their_order(start: Start) -> None:
                      '2: silent', '1: delay 5', '1: slow 2')))
 
 
-def _refused(capsys: pytest.CaptureFixture[str], *options: str, status: int = 2) -> str:
+def _refused(capsys: Output, *options: str, status: int = 2) -> str:
     said = call(main, capsys, *options)
     assert (said.status, said.out) == (status, '')
     assert said.err.startswith('simulator: ')
@@ -195,14 +195,12 @@ def _refused(capsys: pytest.CaptureFixture[str], *options: str, status: int = 2)
     (('--port', '/dev/null'), 1, '/dev/null: this is not a serial port'),
     (('--port', 'socket://127.0.0.1:1'), 1, 'socket://127.0.0.1:1: Connection refused')])
 def test_what_cannot_be_had_is_told_at_once(
-        capsys: pytest.CaptureFixture[str], data: Path, options: tuple[str, ...], status: int,
-        text: str) -> None:
+        capsys: Output, data: Path, options: tuple[str, ...], status: int, text: str) -> None:
     said = _refused(capsys, '--data', str(data), *options, status=status)
     assert said.startswith(f'simulator: {text}') and len(said.splitlines()) == 1
 
 
-def test_faults_of_a_data_file_are_told_with_their_cells(
-        capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+def test_faults_of_a_data_file_are_told_with_their_cells(capsys: Output, tmp_path: Path) -> None:
     path = tmp_path / 'data.csv'
     path.write_text(DATA + '3,PLC7,N7:0,,,,\n3,SLC,Q7:0,,,,\n', encoding='utf-8')
     assert _refused(capsys, '--data', str(path)).splitlines() == [
@@ -212,7 +210,7 @@ def test_faults_of_a_data_file_are_told_with_their_cells(
         'N, F, ST, A, D, L, PD, MG, HSC, PTO, PWM, STI, EII']
 
 
-def test_tcp_port_in_use(capsys: pytest.CaptureFixture[str], data: Path) -> None:
+def test_tcp_port_in_use(capsys: Output, data: Path) -> None:
     with socket.create_server(('127.0.0.1', 0)) as server:
         where = f'127.0.0.1:{server.getsockname()[1]}'
         said = _refused(capsys, '--data', str(data), '--tcp', where, status=1)
@@ -220,7 +218,7 @@ def test_tcp_port_in_use(capsys: pytest.CaptureFixture[str], data: Path) -> None
 
 
 def test_name_is_not_shared_and_what_a_killed_simulator_left_is_taken_by_the_next_and_removed(
-        capsys: pytest.CaptureFixture[str], start: Start, data: Path, tmp_path: Path) -> None:
+        capsys: Output, start: Start, data: Path, tmp_path: Path) -> None:
     name = tmp_path / 'plc'
     killed = start('--pty', str(name))
     killed.wait_for(READY)
@@ -243,8 +241,7 @@ def test_name_is_not_shared_and_what_a_killed_simulator_left_is_taken_by_the_nex
 @pytest.mark.parametrize('option', [
     '--check=XOR', '--baud=9601', '--baud=9_600', '--seconds=x', '--seconds=-1', '--what',
     '--pty=', '--port='])
-def test_option_that_is_wrong_is_told_with_status_2(
-        capsys: pytest.CaptureFixture[str], option: str) -> None:
+def test_option_that_is_wrong_is_told_with_status_2(capsys: Output, option: str) -> None:
     said = call(main, capsys, option)
     assert said.status == 2
     assert said.err.startswith('simulator: error: ')

@@ -33,7 +33,7 @@ from abdf1_ros.df1.checksum import Checksum
 from abdf1_ros.df1.packet import Packet
 from abdf1_ros.sniffer.capture import read_capture
 import pytest
-from support.commands import running_simulator
+from support.commands import Output, running_simulator
 from support.forked import Forked
 from support.ptys import full_pipe, PATIENCE, Pty, read_exactly, wait_until
 from support.ros import Process
@@ -70,9 +70,6 @@ def capture(tmp_path: Path) -> str:
               for count, (way, data) in enumerate(zip(WAYS, SAID))]
     path.write_text('\n'.join([*lines, '']), encoding='ascii')
     return str(path)
-
-
-Output = pytest.CaptureFixture[str]
 
 
 def lines_of(capsys: Output, *args: str) -> list[str]:
@@ -394,7 +391,7 @@ def test_reader_that_leaves_does_not_cut_a_tap(tmp_path: Path, way: str, goes_on
     (('--port', 'ttyUSB99'), 'ttyUSB99: No such file or directory; a device path is '
                              '/dev/ttyUSB99')])
 def test_port_that_is_named_in_another_way(
-        args: tuple[str, ...], text: str, capsys: pytest.CaptureFixture[str]) -> None:
+        args: tuple[str, ...], text: str, capsys: Output) -> None:
     with suppress(SystemExit):
         main(args)
     assert text in capsys.readouterr().err

@@ -23,9 +23,7 @@ from abdf1_ros.df1.checksum import Checksum
 from abdf1_ros.df1.packet import Packet
 import pytest
 from support import browser
-from support.commands import call
-
-Output = pytest.CaptureFixture[str]
+from support.commands import call, Output
 
 HEAD = '# abdf1_ros capture 1', '# begun: 2026-03-01T14:05:09.000+01:00', '# baud: 19200', \
     '# check: CRC', '# duplex: half'

@@ -308,8 +308,7 @@ class BoundBench:
     def late(self) -> dict[str, tuple[float, float]]:
         """Return bound, and the time it took, of each row that took longer, by its tag."""
         times = self.run()
-        times['T'] = make_report(self.plant.network, self.rows, 0.1).times.longest, \
-            self.longest
+        times['T'] = make_report(self.plant.network, self.rows, 0.1).times.longest, self.longest
         return {tag: (round(limit, 3), round(took, 3))
                 for tag, (limit, took) in times.items() if took > limit + 1e-6}
 

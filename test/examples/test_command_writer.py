@@ -24,7 +24,7 @@ from abdf1_ros.ros.observer import graph_hint
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 import pytest
 from std_msgs.msg import Int16MultiArray
-from support.commands import call
+from support.commands import call, Output
 from support.ptys import wait_until
 from support.ros import Observer, Process
 from support.ros_tools import SOURCE
@@ -41,8 +41,7 @@ def files(tmp_path_factory: pytest.TempPathFactory) -> Files:
 
 @pytest.fixture(scope='module')
 def bridge(files: Files) -> Iterator[Process]:
-    with files.start_simulator(), \
-            Process('node', *files.args(), '-r', '__ns:=/writing') as node:
+    with files.start_simulator(), Process('node', *files.args(), '-r', '__ns:=/writing') as node:
         node.wait_for(f'{files.port}: open')
         yield node
         node.end()
@@ -52,7 +51,7 @@ Write = Callable[..., tuple[int, list[str]]]
 
 
 @pytest.fixture
-def write(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> Write:
+def write(capsys: Output, monkeypatch: pytest.MonkeyPatch) -> Write:
     """Return what runs the example, and returns exit status and lines."""
     main = runpy.run_path(str(EXAMPLE))['main']
 
@@ -92,8 +91,7 @@ def test_client_of_a_discovery_server_is_told_what_it_lacks(
     hint = runpy.run_path(str(EXAMPLE.with_stem(name)))['hint']
     monkeypatch.setenv('ROS_DISCOVERY_SERVER', '127.0.0.1:11811')
     monkeypatch.delenv('ROS_SUPER_CLIENT', raising=False)
-    assert hint() == graph_hint() == \
-        '; ROS_DISCOVERY_SERVER is set: set ROS_SUPER_CLIENT=TRUE too'
+    assert hint() == graph_hint() == '; ROS_DISCOVERY_SERVER is set: set ROS_SUPER_CLIENT=TRUE too'
     monkeypatch.setenv('ROS_SUPER_CLIENT', 'TRUE')
     assert not hint()
 

@@ -22,9 +22,10 @@ from abdf1_ros.ports.descriptor import DescriptorPort
 import pytest
 from support.ptys import PATIENCE
 
+Sockets = tuple[DescriptorPort, socket.socket]
 
-def test_read_returns_what_is_there(
-        sockets: tuple[DescriptorPort, socket.socket], wake: int) -> None:
+
+def test_read_returns_what_is_there(sockets: Sockets, wake: int) -> None:
     port, other = sockets
     other.send(b'abc')
     assert port.read(None, wake) == b'abc'
@@ -32,20 +33,19 @@ def test_read_returns_what_is_there(
     assert port.read(0.001, wake) == b''
 
 
-def test_read_ends_when_woken(
-        sockets: tuple[DescriptorPort, socket.socket], pipe: tuple[int, int]) -> None:
+def test_read_ends_when_woken(sockets: Sockets, pipe: tuple[int, int]) -> None:
     os.write(pipe[1], b'w')
     assert sockets[0].read(None, pipe[0]) == b''
 
 
-def test_read_from_a_closed_line(sockets: tuple[DescriptorPort, socket.socket], wake: int) -> None:
+def test_read_from_a_closed_line(sockets: Sockets, wake: int) -> None:
     port, other = sockets
     other.close()
     with pytest.raises(OSError, match='the other end has closed the connection'):
         port.read(None, wake)
 
 
-def test_write_to_a_closed_line(sockets: tuple[DescriptorPort, socket.socket]) -> None:
+def test_write_to_a_closed_line(sockets: Sockets) -> None:
     port, other = sockets
     other.close()
     with pytest.raises(BrokenPipeError):
@@ -53,14 +53,13 @@ def test_write_to_a_closed_line(sockets: tuple[DescriptorPort, socket.socket]) -
 
 
 def test_write_to_a_line_that_takes_no_more_does_not_hang(
-        sockets: tuple[DescriptorPort, socket.socket], monkeypatch: pytest.MonkeyPatch) -> None:
+        sockets: Sockets, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr('abdf1_ros.ports.descriptor.WRITE_TIMEOUT', 0.05)
     with pytest.raises(OSError, match='the line takes no data; is Handshake right'):
         sockets[0].write(bytes(10_000_000))
 
 
-def test_write_waits_for_a_line_that_is_slow(
-        sockets: tuple[DescriptorPort, socket.socket]) -> None:
+def test_write_waits_for_a_line_that_is_slow(sockets: Sockets) -> None:
     port, other = sockets
     received = bytearray()
 
@@ -75,8 +74,7 @@ def test_write_waits_for_a_line_that_is_slow(
     assert len(received) == 1_000_000
 
 
-def test_port_tells_that_bytes_have_still_to_leave(
-        sockets: tuple[DescriptorPort, socket.socket]) -> None:
+def test_port_tells_that_bytes_have_still_to_leave(sockets: Sockets) -> None:
     port, other = sockets
     assert port.unsent() == 0
     port.write(bytes(300))

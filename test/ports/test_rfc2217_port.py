@@ -37,10 +37,11 @@ BAUD_115200 = bytes([255, 250, 44, 101, 0, 1, 0xC2, 0, 255, 240])
 REST = b''.join(bytes([255, 250, 44, command, value, 255, 240])
                 for command, value in ((102, 8), (103, 3), (104, 1)))
 EVEN = PortSettings('', 115200, parity='Even')
+Ends = tuple[Rfc2217Port, socket.socket]
 
 
 @pytest.fixture
-def ends() -> Iterator[tuple[Rfc2217Port, socket.socket]]:
+def ends() -> Iterator[Ends]:
     ours, theirs = socket.socketpair()
     theirs.settimeout(PATIENCE)
     yield Rfc2217Port(ours, 'rfc2217://here'), theirs
@@ -79,8 +80,7 @@ def test_host_that_can_have_no_name() -> None:
         open_port(PortSettings(f'socket://{"x" * 70}.local:4001'))
 
 
-def test_settings_are_sent_and_their_answers_taken(
-        ends: tuple[Rfc2217Port, socket.socket]) -> None:
+def test_settings_are_sent_and_their_answers_taken(ends: Ends) -> None:
     port, server = ends
     server.sendall(DO_COM_PORT + b'old data' + BAUD_115200 + REST)
     port.negotiate(EVEN)
@@ -94,21 +94,20 @@ def test_settings_are_sent_and_their_answers_taken(
 @pytest.mark.parametrize('short', [
     bytes([255, 250, 255, 240]), bytes([255, 250, 44, 255, 240]),
     bytes([255, 250, 44, 101, 255, 240]), bytes([255, 250, 1, 101, 5, 255, 240])])
-def test_option_that_is_short_or_another_answers_nothing(
-        ends: tuple[Rfc2217Port, socket.socket], short: bytes) -> None:
+def test_option_that_is_short_or_another_answers_nothing(ends: Ends, short: bytes) -> None:
     port, server = ends
     server.sendall(DO_COM_PORT + BAUD_115200 + REST + short)
     port.negotiate(EVEN)
 
 
-def test_setting_that_the_server_does_not_take(ends: tuple[Rfc2217Port, socket.socket]) -> None:
+def test_setting_that_the_server_does_not_take(ends: Ends) -> None:
     port, server = ends
     server.sendall(DO_COM_PORT + BAUD_115200.replace(b'\x01\xc2\x00', b'\x00\x25\x80') + REST)
     with pytest.raises(OSError, match='does not take Baudrate 115200, its port has 9600'):
         port.negotiate(EVEN)
 
 
-def test_server_that_refuses(ends: tuple[Rfc2217Port, socket.socket]) -> None:
+def test_server_that_refuses(ends: Ends) -> None:
     port, server = ends
     server.sendall(DONT_COM_PORT)
     with pytest.raises(OSError, match='the device server refuses RFC 2217'):
@@ -119,8 +118,7 @@ def test_server_that_refuses(ends: tuple[Rfc2217Port, socket.socket]) -> None:
     (b'login: ', 'the other end does not speak RFC 2217'),
     (DO_COM_PORT + BAUD_115200, 'does not answer to settings of its port')])
 def test_server_that_does_not_answer(
-        ends: tuple[Rfc2217Port, socket.socket], monkeypatch: pytest.MonkeyPatch, answer: bytes,
-        text: str) -> None:
+        ends: Ends, monkeypatch: pytest.MonkeyPatch, answer: bytes, text: str) -> None:
     monkeypatch.setattr(rfc2217_port, 'NEGOTIATION_TIMEOUT', 1.0)
     port, server = ends
     server.sendall(answer)
@@ -129,7 +127,7 @@ def test_server_that_does_not_answer(
 
 
 def test_server_that_says_something_else_for_ever_is_given_up(
-        ends: tuple[Rfc2217Port, socket.socket], monkeypatch: pytest.MonkeyPatch) -> None:
+        ends: Ends, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(rfc2217_port, 'NEGOTIATION_TIMEOUT', 0.2)
     port, server = ends
     is_over = threading.Event()
@@ -171,8 +169,7 @@ def read(port: Rfc2217Port, wake: int, size: int) -> bytes:
 
 
 @pytest.mark.parametrize('stream', [b'\xff\xf1' * READ_SIZE, b'\xff\xff' * READ_SIZE])
-def test_commands_count_for_whether_there_is_more(
-        ends: tuple[Rfc2217Port, socket.socket], wake: int, stream: bytes) -> None:
+def test_commands_count_for_whether_there_is_more(ends: Ends, wake: int, stream: bytes) -> None:
     port, server = ends
     server.sendall(stream)
     for _ in range(2):
@@ -184,8 +181,7 @@ def test_commands_count_for_whether_there_is_more(
 
 
 @pytest.mark.parametrize('chunk', [1, 2, 3, 1000])
-def test_data_are_what_is_no_command(
-        ends: tuple[Rfc2217Port, socket.socket], wake: int, chunk: int) -> None:
+def test_data_are_what_is_no_command(ends: Ends, wake: int, chunk: int) -> None:
     port, server = ends
     stream = b'a\xff\xffb' + bytes([255, 253, 1]) + b'c' + bytes([255, 241]) + \
         bytes([255, 250, 44, 107, 255, 255, 255, 240]) + b'd\xff\xff'
@@ -195,22 +191,20 @@ def test_data_are_what_is_no_command(
     assert server.recv(100) == bytes([255, 252, 1])  # WONT ECHO
 
 
-def test_offer_that_is_not_ours_is_refused_once(
-        ends: tuple[Rfc2217Port, socket.socket], wake: int) -> None:
+def test_offer_that_is_not_ours_is_refused_once(ends: Ends, wake: int) -> None:
     port, server = ends
     server.sendall(bytes([255, 251, 1, 255, 252, 5, 255, 251, 3]) + b'x')
     assert read(port, wake, 1) == b'x'
     assert server.recv(100) == bytes([255, 254, 1])  # DONT ECHO; SGA was asked for
 
 
-def test_data_that_look_like_commands_are_doubled(ends: tuple[Rfc2217Port, socket.socket]) -> None:
+def test_data_that_look_like_commands_are_doubled(ends: Ends) -> None:
     port, server = ends
     port.write(b'\x10\xff\x02')
     assert server.recv(100) == b'\x10\xff\xff\x02'
 
 
-def test_suboption_without_an_end_is_given_up(
-        ends: tuple[Rfc2217Port, socket.socket], wake: int) -> None:
+def test_suboption_without_an_end_is_given_up(ends: Ends, wake: int) -> None:
     port, server = ends
     server.sendall(bytes([255, 250, 44]) + bytes(400))
     with pytest.raises(OSError, match='sends bytes that are not RFC 2217'):
@@ -218,8 +212,7 @@ def test_suboption_without_an_end_is_given_up(
             port.read(PATIENCE, wake)
 
 
-def test_data_that_nobody_reads_stay_with_the_server(
-        ends: tuple[Rfc2217Port, socket.socket]) -> None:
+def test_data_that_nobody_reads_stay_with_the_server(ends: Ends) -> None:
     port, server = ends
     server.settimeout(0.2)
     sent = 0

@@ -125,12 +125,18 @@ class Bench:
         status = self.status(name, now)
         return status.level, status.message
 
+    def details(self, name: str, now: float = NOW) -> dict[str, str]:
+        return details(self.status(name, now))
+
     def close(self) -> None:
         self.link.stop()
 
 
+Benches = Callable[..., Bench]
+
+
 @pytest.fixture
-def make_bench(tmp_path: Path, request: pytest.FixtureRequest) -> Callable[..., Bench]:
+def make_bench(tmp_path: Path, request: pytest.FixtureRequest) -> Benches:
     def make(*rows: str, mode: str = 'Master', header: str = HEADER) -> Bench:
         bench = Bench(tmp_path, rows or ROWS, mode, header)
         request.addfinalizer(bench.close)
@@ -139,13 +145,13 @@ def make_bench(tmp_path: Path, request: pytest.FixtureRequest) -> Callable[..., 
 
 
 @pytest.fixture
-def bench(make_bench: Callable[..., Bench]) -> Bench:
+def bench(make_bench: Benches) -> Bench:
     return make_bench()
 
 
 @pytest.mark.parametrize('mode, expected', [('Master', None), ('Radio', '2')])
 def test_counters_of_a_radio_modem_port_without_a_number_are_shown(
-        make_bench: Callable[..., Bench], mode: str, expected: str | None) -> None:
+        make_bench: Benches, mode: str, expected: str | None) -> None:
     bench = make_bench(mode=mode)
     bench.driver.counters.unsent_messages = bench.driver.counters.refused_for_memory = 2
     values = {entry.key: entry.value for entry in bench.status('link').values}
@@ -153,8 +159,7 @@ def test_counters_of_a_radio_modem_port_without_a_number_are_shown(
         assert values.get(f'messages {name}') == expected
 
 
-def test_node_on_the_air_with_our_number_is_an_error_for_a_minute(
-        make_bench: Callable[..., Bench]) -> None:
+def test_node_on_the_air_with_our_number_is_an_error_for_a_minute(make_bench: Benches) -> None:
     bench = make_bench(mode='Radio')
     machine, packet = bench.driver.machine, Packet(2, Network().station, 0x0F, 0, 1, b'\x68')
     machine.start(NOW - 20)
@@ -192,7 +197,7 @@ def test_link_before_there_is_one(bench: Bench) -> None:
 def test_link_without_a_port(bench: Bench) -> None:
     bench.set_port(False, 'cannot open the port: No such file or directory')
     assert bench.says('link') == (ERROR, 'ERROR: cannot open the port: No such file or directory')
-    assert details(bench.status('link'))['port'] == 'closed'
+    assert bench.details('link')['port'] == 'closed'
 
 
 def test_link_is_as_good_as_its_stations(bench: Bench) -> None:
@@ -251,7 +256,7 @@ def test_link_of_a_node_that_new_programs_cannot_hear(bench: Bench) -> None:
     assert bench.says('link') == (WARN, f'WARN: port open, 0 of 2 stations have answered; {LOST}')
 
 
-def test_slave_that_nobody_polls_is_a_warning(make_bench: Callable[..., Bench]) -> None:
+def test_slave_that_nobody_polls_is_a_warning(make_bench: Benches) -> None:
     bench = make_bench(mode='Slave')
     link = bench.driver.link
     assert isinstance(link, SlaveLink)
@@ -265,7 +270,7 @@ def test_slave_that_nobody_polls_is_a_warning(make_bench: Callable[..., Bench]) 
 
 def test_last_numbered_error_has_its_age(bench: Bench) -> None:
     def last_error(now: float) -> str:
-        return details(bench.status('link', now))['last error']
+        return bench.details('link', now)['last error']
 
     assert last_error(NOW) == 'none'
     bench.happened(Message.ERR_COMMAND_TIMEOUT, (), 2, NOW)
@@ -277,9 +282,9 @@ def test_last_numbered_error_has_its_age(bench: Bench) -> None:
 
 def test_link_tells_what_the_uart_has_counted(
         bench: Bench, monkeypatch: pytest.MonkeyPatch) -> None:
-    assert 'framing errors' not in details(bench.status('link'))
+    assert 'framing errors' not in bench.details('link')
     monkeypatch.setattr(bench.opener, 'errors', lambda: {'framing errors': 3})
-    assert details(bench.status('link'))['framing errors'] == '3'
+    assert bench.details('link')['framing errors'] == '3'
 
 
 def test_rates_are_those_since_the_last_look(bench: Bench) -> None:
@@ -287,24 +292,24 @@ def test_rates_are_those_since_the_last_look(bench: Bench) -> None:
     bench.driver.tasks.transactions += 30
     bench.driver.counters.chars_sent += 480
     bench.driver.counters.chars_received += 480
-    values = details(bench.status('link', NOW + 2))
+    values = bench.details('link', NOW + 2)
     assert values['transactions per second'] == '15.0'
     assert values['line load'] == '50 %'  # 960 characters of 10 bits at 9600 baud, in 2 s
     assert values['settings'] == '9600 baud, 8 data bits, parity None, 1 stop bits, CRC'
-    values = details(bench.status('link', NOW + 3))
+    values = bench.details('link', NOW + 3)
     assert (values['transactions per second'], values['line load']) == ('0.0', '0 %')
 
 
 def test_load_of_the_line_is_told_by_topic_the_largest_first(tmp_path: Path) -> None:
     bench = Bench(tmp_path, ('slow,Read,N9:0,1,PLC5,1000,1', 'short,Read,N7:0,1,PLC5,100,1',
                              'long,Read,N7:1,1,PLC5,100,3'), header=f'{HEADER},Length')
-    assert details(bench.status('link'))['line load by topic'] == ''  # nothing was read twice
+    assert bench.details('link')['line load by topic'] == ''  # nothing was read twice
     for job in bench.driver.readings.reads.jobs:
         for now in (NOW, NOW + job.block.period):
             job.done(now)
     fast, = (job.block for job in bench.driver.readings.reads.jobs if job.block.period < 1)
     slow, = (job.block for job in bench.driver.readings.reads.jobs if job.block.period >= 1)
-    assert details(bench.status('link'))['line load by topic'] == (
+    assert bench.details('link')['line load by topic'] == (
         f'long {fast.line_time / 0.1 * 3 / 4:.1%}, short {fast.line_time / 0.1 / 4:.1%}, '
         f'slow {slow.line_time / 1.0:.1%}')
 
@@ -314,11 +319,11 @@ def test_load_by_topic_names_no_more_than_forty(tmp_path: Path) -> None:
     for job in bench.driver.readings.reads.jobs:
         job.done(NOW)
         job.done(NOW + 1)
-    assert details(bench.status('link'))['line load by topic'].count('%') == 40
+    assert bench.details('link')['line load by topic'].count('%') == 40
 
 
 def test_poll_cycle_is_unknown_before_the_second_read(bench: Bench) -> None:
-    values = details(bench.status('link'))
+    values = bench.details('link')
     assert values['poll cycle with Periods'] == \
         values['longest poll cycle with Periods'] == 'unknown'
     expected = round(bench.driver.readings.expected_poll_cycle * 1000)
@@ -327,7 +332,7 @@ def test_poll_cycle_is_unknown_before_the_second_read(bench: Bench) -> None:
 
 def test_link_tells_how_far_behind_each_period_is(bench: Bench) -> None:
     def periods() -> dict[str, str]:
-        values = details(bench.status('link'))
+        values = bench.details('link')
         return {key: value for key, value in values.items() if key.startswith('period')}
 
     points = list(bench.driver.points.values())
@@ -353,10 +358,10 @@ def test_counters_begin_again_after_a_reset(bench: Bench) -> None:
     counters.commands_sent, counters.replies_received, counters.crc_errors = 7, 6, 2
     assert bench.says('counters') == (OK, 'OK: 7 commands sent, 6 replies received')
     bench.diagnostics.counters.reset()
-    assert set(details(bench.status('counters')).values()) == {'0'}
+    assert set(bench.details('counters').values()) == {'0'}
     counters.commands_sent += 1
     assert bench.says('counters') == (OK, 'OK: 1 command sent, 0 replies received')
-    values = details(bench.status('counters'))
+    values = bench.details('counters')
     assert (values['CNT_CMD_MSGS_SENT'], values['CNT_CRC_ERRORS']) == ('1', '0')
 
 
@@ -365,7 +370,7 @@ def test_counters_begin_again_after_a_reset(bench: Bench) -> None:
 
 def test_station_before_its_first_answer(bench: Bench) -> None:
     assert bench.says('station 1') == (OK, 'OK: station 1 not heard yet')
-    assert details(bench.status('station 1')) == {
+    assert bench.details('station 1') == {
         'active': 'yes', 'last answer': 'none yet', 'last TNS': 'none yet', 'replies': '0',
         'transactions without reply': '0', 'error replies': '0', 'last event': 'none',
         'processor': 'unknown (not asked: processor_period is 0)', 'mode': 'unknown',
@@ -377,7 +382,7 @@ def test_station_that_answers_is_ok_and_tells_its_last_answer(bench: Bench) -> N
     station = bench.driver.stations[1]
     station.last_tns, station.replies, station.remote_errors = 0xAB, 4, 1
     assert bench.says('station 1') == (OK, 'OK: station 1 active')
-    values = details(bench.status('station 1'))
+    values = bench.details('station 1')
     assert values['last answer'] == '0.3 s ago'
     assert (values['last TNS'], values['replies'], values['error replies']) == ('0x00AB', '4', '1')
 
@@ -388,7 +393,7 @@ def test_station_that_is_silent(bench: Bench) -> None:
     bench.happened(Message.NTC_ENQ_LIMIT_EXCEEDED, (3,), 2, NOW - 12.3)
     bench.happened(Message.ERR_INACTIVE_STATION, (2,), 2, NOW - 12.3)
     assert bench.says('station 2') == (ERROR, 'ERROR: station 2 inactive for 12.3 s')
-    values = details(bench.status('station 2'))
+    values = bench.details('station 2')
     assert (values['active'], values['last answer']) == ('no', '20.0 s ago')
     assert values['last event'] == (  # what it has become inactive by
         '2520 NTC_ENQ_LIMIT_EXCEEDED: ENQ Retry Limit (3) exceeded [station 2] (12.3 s ago)')
@@ -417,7 +422,7 @@ def test_station_that_answers_polls_and_no_command(bench: Bench) -> None:
     ('Peer', 0, '; it answers DLE NAK to all: is Error_Code right?'), ('Peer', 1, ''),
     ('Master', 0, '')])
 def test_full_duplex_plc_that_refuses_all_has_another_check(
-        mode: str, acks: int, why: str, make_bench: Callable[..., Bench]) -> None:
+        mode: str, acks: int, why: str, make_bench: Benches) -> None:
     bench = make_bench('speed,Read,N7:0,1,PLC5,1000', mode=mode)
     bench.driver.counters.naks_received += 3
     bench.driver.counters.acks_received += acks
@@ -463,39 +468,38 @@ def test_refused_command_of_a_plc_is_told_for_a_minute(bench: Bench) -> None:
     assert bench.says('link', NOW + 61.0) == (
         WARN, f'WARN: port open, but the bridge has refused a command of {text}')
     assert bench.says('link', NOW + 62.1)[0] == OK
-    assert details(bench.status('link', NOW + 62.1))[f'refused: {text}'] == '3 times'
+    assert bench.details('link', NOW + 62.1)[f'refused: {text}'] == '3 times'
 
 
 def test_routine_is_no_event_of_a_station(bench: Bench) -> None:
     bench.happened(Message.NTC_NAK_LIMIT_EXCEEDED, (3,), 1, NOW)
     bench.happened(Message.NTC_REPLY_MSG_RCVD, (1,), 1, NOW)
-    assert details(bench.status('station 1'))['last event'].startswith(
-        '2519 NTC_NAK_LIMIT_EXCEEDED: ')
+    assert bench.details('station 1')['last event'].startswith('2519 NTC_NAK_LIMIT_EXCEEDED: ')
 
 
 # mappings
 
 
-def test_rows_left_out_of_the_map_stay_visible(make_bench: Callable[..., Bench]) -> None:
+def test_rows_left_out_of_the_map_stay_visible(make_bench: Benches) -> None:
     bench = make_bench(ROWS[0], 'pump,Read,N7:0,300,PLC5,-1', 'fan,Read,N7:0,1,PLC6,')
     file = bench.folder / 'map.csv'
     bench.point('speed').update(b'\x01\x00', NOW)
     assert bench.says('mappings', NOW + 0.1) == (
         WARN, f'WARN: of 1 mappings 1 fresh; 2 rows left out of the map, the first at {file}:3:4 '
               '(Station)')
-    values = details(bench.status('mappings', NOW + 0.1))
+    values = bench.details('mappings', NOW + 0.1)
     assert values['left out 1'].startswith(f'{file}:3:4 (Station): 2501 ERR_BAD_STATION')
     assert values['left out 2'].startswith(f'{file}:3:6 (Period): Item: 2, Period = "-1" should')
     assert values['left out 3'].startswith(f'{file}:4:5 (PLC_Type): 2502 ERR_BAD_PLC_TYPE')
     assert bench.says('mappings', NOW + 4.0)[0] == ERROR
 
 
-def test_many_faults_of_the_map_are_not_all_repeated(make_bench: Callable[..., Bench]) -> None:
+def test_many_faults_of_the_map_are_not_all_repeated(make_bench: Benches) -> None:
     bench = make_bench(*['pump,Read,N7:0,300,PLC5,'] * 23)
     level, text = bench.says('mappings')
     assert level == WARN
     assert text.startswith('WARN: no mapping reads; 23 rows left out of the map, the first at')
-    values = details(bench.status('mappings'))
+    values = bench.details('mappings')
     assert 'left out 20' in values
     assert 'left out 21' not in values
     assert values['left out, more'] == '3 more faults; the log and "check" have them all'
@@ -503,23 +507,23 @@ def test_many_faults_of_the_map_are_not_all_repeated(make_bench: Callable[..., B
 
 def test_mappings_from_the_start_until_they_are_stale(bench: Bench) -> None:
     assert bench.says('mappings') == (WARN, 'WARN: of 2 mappings 2 waiting for the first read')
-    assert details(bench.status('mappings'))['speed'] == \
+    assert bench.details('mappings')['speed'] == \
         'waiting for the first read: N7:0 at station 1, never read'
     bench.point('speed').update(b'\x01\x00', NOW)
     bench.point('level').update(bytes(4), NOW)
     assert bench.says('mappings', NOW + 1.0) == (OK, 'OK: of 2 mappings 2 fresh')
-    assert details(bench.status('mappings', NOW + 1.0)) == {
+    assert bench.details('mappings', NOW + 1.0) == {
         'total': '2', 'fresh': '2', 'late': '0', 'stale': '0', 'failed': '0', 'withheld': '0',
         'waiting': '0'}
     bench.point('level').update(bytes(4), NOW + 1.0)
     assert bench.says('mappings', NOW + 2.0) == (WARN, 'WARN: of 2 mappings 1 fresh, 1 late')
-    assert details(bench.status('mappings', NOW + 2.0))['speed'] == \
+    assert bench.details('mappings', NOW + 2.0)['speed'] == \
         'late: N7:0 at station 1, last read 2.0 s ago'
     assert bench.says('mappings', NOW + 3.1) == (ERROR, 'ERROR: of 2 mappings 1 late, 1 stale')
 
 
 def test_rows_that_cannot_keep_their_period_are_named_with_one_that_would_do(
-        make_bench: Callable[..., Bench]) -> None:
+        make_bench: Benches) -> None:
     bench = make_bench('fast,Read,N7:0,1,PLC5,100', 'slow,Read,N7:100,1,PLC5,1000',
                        'free,Read,N9:0,1,PLC5,0', 'faster,Read,N9:100,1,PLC5,50')
 
@@ -551,7 +555,7 @@ def test_failed_mapping_is_named_with_the_reason(bench: Bench) -> None:
     bench.point('level').update(bytes(4), NOW)
     bench.point('level').fail('STS 10: illegal command or format')
     assert bench.says('mappings', NOW + 0.5) == (ERROR, 'ERROR: of 2 mappings 1 failed, 1 fresh')
-    values = details(bench.status('mappings', NOW + 0.5))
+    values = bench.details('mappings', NOW + 0.5)
     assert values['level'] == \
         'failed: F8:4 at station 2, last read 0.5 s ago; STS 10: illegal command or format'
     assert 'speed' not in values
@@ -564,18 +568,18 @@ def test_withheld_mapping_tells_why_since_when_and_how_often(bench: Bench) -> No
     speed.update(b'\x01\x00', NOW + 1)
     speed.withhold('not in RUN', NOW + 2)
     assert bench.says('mappings', NOW + 2)[0] == ERROR
-    assert details(bench.status('mappings', NOW + 5))['speed'] == (
+    assert bench.details('mappings', NOW + 5)['speed'] == (
         'withheld: N7:0 at station 1, last read 4.0 s ago; not in RUN, for 3.0 s; '
         'times withheld: 2')
 
 
-def test_tag_does_not_stand_in_for_a_count(make_bench: Callable[..., Bench]) -> None:
-    values = details(make_bench('total,Read,N7:0,1,PLC5,1000').status('mappings'))
+def test_tag_does_not_stand_in_for_a_count(make_bench: Benches) -> None:
+    values = make_bench('total,Read,N7:0,1,PLC5,1000').details('mappings')
     assert values['total'] == '1'
     assert values['tag total'] == 'waiting for the first read: N7:0 at station 1, never read'
 
 
-def test_map_without_reads_is_ok(make_bench: Callable[..., Bench]) -> None:
+def test_map_without_reads_is_ok(make_bench: Benches) -> None:
     assert make_bench(ROWS[2]).says('mappings') == (OK, 'OK: no mapping reads')
 
 
@@ -598,7 +602,7 @@ def test_blocks_may_be_divided_while_the_poll_cycle_is_asked_for(bench: Bench) -
 
     jobs.clear()
     jobs.add(Divided())
-    assert details(bench.status('link'))['poll cycle with Periods'] == '250 ms'
+    assert bench.details('link')['poll cycle with Periods'] == '250 ms'
 
 
 # writes
@@ -654,24 +658,22 @@ def test_fallback_value_is_no_message_and_usual_at_start_and_end(
     assert logged.endswith(f': fallback value written: {cause.value}')
 
 
-def test_heartbeat_that_the_plc_does_not_confirm_does_not_count(
-        make_bench: Callable[..., Bench]) -> None:
+def test_heartbeat_that_the_plc_does_not_confirm_does_not_count(make_bench: Benches) -> None:
     bench = make_bench('alive,Heartbeat,N10:0,1,PLC5,500')
     assert bench.says('interlocks')[1].endswith('alive: heartbeat does not count')
     beat = bench.driver.interlocks.heartbeats[0]
     beat.confirmed, beat.state, beat.value = NOW, BeatState.COUNTS, 1
     assert bench.says('interlocks', NOW) == (OK, 'OK: 1 of 1 heartbeats count')
-    assert details(bench.status('interlocks', NOW + 1.5))['station 1'] == \
-        'heartbeat counts (for 1.5 s)'
+    assert bench.details('interlocks', NOW + 1.5)['station 1'] == 'heartbeat counts (for 1.5 s)'
     assert bench.says('interlocks', NOW + 1.6)[0] == WARN
-    values = details(bench.status('interlocks', NOW + 4))
+    values = bench.details('interlocks', NOW + 4)
     assert values['alive'] == 'heartbeat 1, 4.0 s ago; does not count: not confirmed for 4.0 s'
     assert values['station 1'] == 'not in control: not confirmed for 4.0 s'
     assert values['bound of alive'].startswith('PLC timer presets ')
 
 
 def test_bit_of_the_plc_confirms_control_while_it_is_fresh_and_1(
-        make_bench: Callable[..., Bench], monkeypatch: pytest.MonkeyPatch) -> None:
+        make_bench: Benches, monkeypatch: pytest.MonkeyPatch) -> None:
     bench = make_bench('alive,Heartbeat,N10:0,1,PLC5,60000,',
                        'ruled,Read,B12:0/2,1,PLC5,1000,alive', header=f'{HEADER},Confirms')
     beat, bit = bench.driver.interlocks.heartbeats[0], bench.point('ruled')
@@ -720,7 +722,7 @@ def test_guests_that_are_connected_are_counted() -> None:
     assert status.judge(NOW) == (ERROR, 'tcp:7: in use')
 
 
-def test_value_of_a_guest_over_a_fallback_is_a_warning(make_bench: Callable[..., Bench]) -> None:
+def test_value_of_a_guest_over_a_fallback_is_a_warning(make_bench: Benches) -> None:
     bench = make_bench('speed,Write,N10:1,1,PLC5,7,500',
                        header='Tag,Command,Address,Station,PLC_Type,Fallback,Fallback_After')
     row, = bench.driver.interlocks.fallbacks
@@ -731,33 +733,31 @@ def test_value_of_a_guest_over_a_fallback_is_a_warning(make_bench: Callable[...,
     row.write_ended(guest, NOW)
     assert bench.says('interlocks') == (WARN, (
         'WARN: 0 of 0 heartbeats count; speed: a guest has written over the fallback value'))
-    assert details(bench.status('interlocks'))['speed'] == \
-        'a guest has written over the fallback value'
+    assert bench.details('interlocks')['speed'] == 'a guest has written over the fallback value'
 
 
-def test_station_is_told_by_the_worst_of_its_heartbeats(make_bench: Callable[..., Bench]) -> None:
+def test_station_is_told_by_the_worst_of_its_heartbeats(make_bench: Benches) -> None:
     bench = make_bench(*(f'beat_{word},Heartbeat,N10:{word},1,PLC5,1000' for word in range(3)))
     beats = bench.driver.interlocks.heartbeats
     for beat in beats[::2]:
         beat.confirmed, beat.state, beat.value = NOW, BeatState.COUNTS, 1
-    assert details(bench.status('interlocks'))['station 1'].startswith('not in control: ')
+    assert bench.details('interlocks')['station 1'].startswith('not in control: ')
     beats[1].confirmed, beats[1].state, beats[1].value = NOW, BeatState.COUNTS, 1
-    assert details(bench.status('interlocks'))['station 1'].startswith('heartbeat counts (for ')
+    assert bench.details('interlocks')['station 1'].startswith('heartbeat counts (for ')
 
 
 def test_heartbeat_that_another_program_writes_is_an_error_with_what_it_wrote(
-        make_bench: Callable[..., Bench]) -> None:
+        make_bench: Benches) -> None:
     bench = make_bench('alive,Heartbeat,N10:0,1,PLC5,500')
     beat = bench.driver.interlocks.heartbeats[0]
     beat.confirmed, beat.state = NOW, BeatState.CONFLICT
     assert bench.says('interlocks')[0] == ERROR
     text = 'N10:0: another program writes this word: 7 was read where 3 was written'
     bench.events.foreign_value(beat.mapping, text.removeprefix('N10:0: '), is_conflict=True)
-    assert details(bench.status('interlocks'))['station 1'] == f'not in control: {text}'
+    assert bench.details('interlocks')['station 1'] == f'not in control: {text}'
 
 
-def test_last_fallback_value_of_a_station_is_told_with_its_cause(
-        make_bench: Callable[..., Bench]) -> None:
+def test_last_fallback_value_of_a_station_is_told_with_its_cause(make_bench: Benches) -> None:
     bench = make_bench('speed,Write,N10:1,1,PLC5,')
     row, = bench.driver.mappings
     assert 'line_a: interlocks' not in [status.name for status in bench.diagnostics.statuses(NOW)]
@@ -770,7 +770,7 @@ def test_publisher_whose_clock_is_ahead_is_named_for_ten_seconds(bench: Bench) -
     bench.events.ahead('level', 1.9, ['/panel'])
     text = '~/write/level: the clock of /panel is 1.90 s ahead of the clock here'
     assert bench.says('writes') == (WARN, f'WARN: 0 of 0 writes confirmed; {text}')
-    assert details(bench.status('writes'))['clock ahead'] == f'{text} (0.0 s ago)'
+    assert bench.details('writes')['clock ahead'] == f'{text} (0.0 s ago)'
     assert bench.says('writes', NOW + 10)[0] == OK
 
 
@@ -781,7 +781,7 @@ def test_lost_message_is_counted_and_a_warning_for_ten_seconds(bench: Bench) -> 
     assert bench.says('writes', NOW + 10.9) == (
         WARN, 'WARN: 0 of 0 writes confirmed; 4 messages were lost on their way here')
     assert bench.says('writes', NOW + 11) == (OK, 'OK: 0 of 0 writes confirmed')
-    values = details(bench.status('writes', NOW + 11))
+    values = bench.details('writes', NOW + 11)
     assert values['lost on their way'] == '4'
     assert values['last loss'] == '1 to ~/write/pulses (10.0 s ago)'
 
@@ -794,13 +794,13 @@ def test_failed_write_is_a_warning_for_ten_seconds(bench: Bench) -> None:
     assert bench.says('writes', NOW + 1) == (WARN, warning)
     assert bench.says('writes', NOW + 9.9) == (WARN, warning)
     assert bench.says('writes', NOW + 10) == (OK, 'OK: 2 of 3 writes confirmed')
-    assert details(bench.status('writes', NOW + 10))['last failure'] == \
+    assert bench.details('writes', NOW + 10)['last failure'] == \
         'level unknown whether written: no reply (10.0 s ago)'
 
 
 def test_monitor_looks_for_values_that_there_are(bench: Bench) -> None:
     columns = {key for *_, key in plant.COLUMNS} - {'state'}
     expected = {*view.LINK_KEYS, view.LOAD_BY_TOPIC, *columns, 'last error'}
-    assert expected <= details(bench.status('link')).keys()
-    assert {*view.STATION_KEYS} <= details(bench.status('station 1')).keys()
-    assert 'total' in details(bench.status('mappings'))
+    assert expected <= bench.details('link').keys()
+    assert {*view.STATION_KEYS} <= bench.details('station 1').keys()
+    assert 'total' in bench.details('mappings')

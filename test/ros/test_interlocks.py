@@ -32,7 +32,7 @@ import pytest
 from std_msgs.msg import Int16MultiArray
 from std_srvs.srv import SetBool, Trigger
 from support.cell import BridgeCell
-from support.commands import running_simulator
+from support.commands import Output, running_simulator
 from support.ros import (
     details,
     ERROR,
@@ -170,7 +170,7 @@ def test_rule_5_orderly_end_leaves_zero_and_fallback(cell: Cell) -> None:
 
 
 def test_rule_5_port_that_is_left_to_others_is_left_with_zero(
-        cell: Cell, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]) -> None:
+        cell: Cell, monkeypatch: pytest.MonkeyPatch, capfd: Output) -> None:
     cell.until_counting()
     assert cell.call(SetBool, 'polling', SetBool.Request(data=False)).success
     assert (cell.word('N10:0'), cell.word('N10:1')) == (0, 7)
@@ -228,7 +228,7 @@ def watched(cell: Cell, address: str,
 
 @pytest.mark.parametrize('answer', [NAK, b''])
 def test_rule_3_guests_command_that_the_plc_does_not_take_changes_no_heartbeat_and_no_read(
-        tmp_path: Path, answer: bytes, capfd: pytest.CaptureFixture[str]) -> None:
+        tmp_path: Path, answer: bytes, capfd: Output) -> None:
     place = tmp_path / 'hmi'
 
     def answered(symbol: Symbol) -> bytes | None:
@@ -257,7 +257,7 @@ def test_rule_3_guests_command_that_the_plc_does_not_take_changes_no_heartbeat_a
 
 
 def test_rule_8_broadcast_of_a_guest_over_a_fallback_is_told_and_written_over(
-        tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+        tmp_path: Path, capfd: Output) -> None:
     place = tmp_path / 'hmi'
     with Cell(tmp_path, f'net.share:="pty:{place}"', 'net.share_access:=Write') as cell:
         cell.until_counting()
@@ -320,8 +320,7 @@ def test_rules_13_and_15_guarded_row_is_withheld_and_named(cell: Cell) -> None:
     cell.until(lambda: len(doors) > count, 'a value after RUN')
 
 
-def test_rule_18_read_only_writes_nothing_and_says_so(
-        tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+def test_rule_18_read_only_writes_nothing_and_says_so(tmp_path: Path, capfd: Output) -> None:
     with Cell(tmp_path, 'read_only:=true') as cell:
         doors = cell.ros.listen(Int16MultiArray, '/abdf1/read/doors')
         cell.until(lambda: len(doors) > 10, 'values')

@@ -41,6 +41,7 @@ from rclpy.node import Node
 from rclpy.utilities import get_default_context
 from std_msgs.msg import Int16MultiArray
 from std_srvs.srv import Trigger
+from support.commands import Output
 from support.ptys import PATIENCE
 from support.ros import (
     details,
@@ -391,7 +392,7 @@ def test_new_files_do_not_make_a_line_the_second_master_on_the_port_of_another(
 
 
 def test_internal_error_at_the_start_of_a_line(
-        plant: Plant, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]) -> None:
+        plant: Plant, monkeypatch: pytest.MonkeyPatch, capfd: Output) -> None:
     monkeypatch.setattr(module, 'RESTART_AFTER', 0.5)
     made: list[float] = []
 
@@ -410,7 +411,7 @@ def test_internal_error_at_the_start_of_a_line(
 
 
 def test_internal_error_restarts_its_line_only_and_its_slow_end_holds_up_no_other(
-        plant: Plant, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]) -> None:
+        plant: Plant, monkeypatch: pytest.MonkeyPatch, capfd: Output) -> None:
     monkeypatch.setattr(module, 'RESTART_AFTER', 0.1)
     slow, ended = threading.Event(), threading.Event()
 
@@ -474,7 +475,7 @@ def test_name_servers_that_do_not_answer_hold_up_neither_the_others_nor_the_end(
     over.set()
 
 
-def test_argument_that_is_not_of_ros_is_refused(capsys: pytest.CaptureFixture[str]) -> None:
+def test_argument_that_is_not_of_ros_is_refused(capsys: Output) -> None:
     with pytest.raises(SystemExit) as ending:
         main(['lines', 'map.csv'])
     assert ending.value.code == 2
@@ -483,7 +484,7 @@ def test_argument_that_is_not_of_ros_is_refused(capsys: pytest.CaptureFixture[st
     assert 'map.csv: unknown argument; write parameters after --ros-args' in told
 
 
-def test_one_name_for_all_lines_is_refused(capfd: pytest.CaptureFixture[str]) -> None:
+def test_one_name_for_all_lines_is_refused(capfd: Output) -> None:
     assert main(['lines', '--ros-args', '-r', '__node:=x']) == 2
     assert 'the sections of the parameter file name the lines, and -r lines:__node:=NAME the ' \
         'process' in capfd.readouterr().err
@@ -496,14 +497,13 @@ def test_one_name_for_all_lines_is_refused(capfd: pytest.CaptureFixture[str]) ->
     ('strict_line:=true', 'there is no such parameter; did you mean strict_lines?'),
     ('line:=[a]', 'there is no such parameter; did you mean lines?')])
 def test_options_that_cannot_be_meant(
-        tmp_path: Path, option: str, text: str, capfd: pytest.CaptureFixture[str]) -> None:
+        tmp_path: Path, option: str, text: str, capfd: Output) -> None:
     path = yaml_file(tmp_path, 'a: {ros__parameters: {port: x}}')
     assert main(['lines', '--ros-args', '--params-file', path, '-p', option]) == 2
     assert text in capfd.readouterr().err
 
 
-def test_options_in_a_section_for_another_node_are_refused(
-        tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+def test_options_in_a_section_for_another_node_are_refused(tmp_path: Path, capfd: Output) -> None:
     path = yaml_file(tmp_path, 'cell:\n  a: {ros__parameters: {port: x}}\n'
                                '  lines: {ros__parameters: {strict_lines: true}}')
     assert main(['lines', '--ros-args', '--params-file', path]) == 2

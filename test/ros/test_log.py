@@ -32,6 +32,7 @@ ROUTINE = (Message.NTC_REPLY_MSG_RCVD, Message.NTC_NAK_RETRY, Message.NTC_ENQ_RE
 LEVELS = {Severity.CRITICAL: 'FATAL', Severity.ERROR: 'ERROR', Severity.NOTICE: 'INFO'}
 
 Lines = list[tuple[str, str]]
+Logged = Callable[[], Lines]
 
 
 @pytest.fixture
@@ -45,7 +46,7 @@ def log(clock: Clock) -> EventLog:
 
 
 @pytest.fixture
-def logged(capfd: pytest.CaptureFixture[str]) -> Iterator[Callable[[], Lines]]:
+def logged(capfd: pytest.CaptureFixture[str]) -> Iterator[Logged]:
     """Return level and text of all that has been logged since the last call."""
     def read() -> Lines:
         output = ''.join(capfd.readouterr())
@@ -61,7 +62,7 @@ def event(message: Message, station: int | None = 2) -> Event:
 
 @pytest.mark.parametrize('message', [entry for entry in Message if entry not in ROUTINE])
 def test_every_message_has_the_level_of_its_table(
-        log: EventLog, logged: Callable[[], Lines], message: Message) -> None:
+        log: EventLog, logged: Logged, message: Message) -> None:
     log.add(event(message))
     ((level, text),) = logged()
     assert level == LEVELS[message.severity]
@@ -69,20 +70,20 @@ def test_every_message_has_the_level_of_its_table(
     assert text.endswith(' [station 2]')
 
 
-def test_one_logger_takes_events_of_all_levels(log: EventLog, logged: Callable[[], Lines]) -> None:
+def test_one_logger_takes_events_of_all_levels(log: EventLog, logged: Logged) -> None:
     for message in Message:
         log.add(event(message))
     assert {level for level, _ in logged()} == {'FATAL', 'ERROR', 'INFO'}
 
 
-def test_cause_is_logged_once(log: EventLog, clock: Clock, logged: Callable[[], Lines]) -> None:
+def test_cause_is_logged_once(log: EventLog, clock: Clock, logged: Logged) -> None:
     for _ in range(100):
         log.add(event(Message.ERR_BAD_CRC))
         clock.now += 1.0
     assert [text.split(':')[0] for _, text in logged()] == ['2506 ERR_BAD_CRC']
 
 
-def test_details_do_not_make_another_cause(log: EventLog, logged: Callable[[], Lines]) -> None:
+def test_details_do_not_make_another_cause(log: EventLog, logged: Logged) -> None:
     log.add(Event(Message.ERR_WRONG_MESSAGE, (1, 5, 10), 1))
     log.add(Event(Message.ERR_WRONG_MESSAGE, (1, 5, 11), 1))
     assert logged() == [
@@ -90,8 +91,7 @@ def test_details_do_not_make_another_cause(log: EventLog, logged: Callable[[], L
                   'Tns:0x000a [station 1]')]
 
 
-def test_another_station_or_message_is_another_cause(
-        log: EventLog, logged: Callable[[], Lines]) -> None:
+def test_another_station_or_message_is_another_cause(log: EventLog, logged: Logged) -> None:
     for _ in range(2):
         log.add(event(Message.ERR_COMMAND_TIMEOUT, 1))
         log.add(event(Message.ERR_COMMAND_TIMEOUT, 2))
@@ -105,7 +105,7 @@ def test_another_station_or_message_is_another_cause(
 
 
 def test_cause_is_news_after_a_quiet_minute_and_its_repetitions_are_counted(
-        log: EventLog, clock: Clock, logged: Callable[[], Lines]) -> None:
+        log: EventLog, clock: Clock, logged: Logged) -> None:
     text = '2508 ERR_COMMAND_TIMEOUT: Command Timed Out [station 2]'
     log.add(event(Message.ERR_COMMAND_TIMEOUT))
     for _ in range(3):
@@ -121,7 +121,7 @@ def test_cause_is_news_after_a_quiet_minute_and_its_repetitions_are_counted(
 
 
 def test_cause_that_lasts_is_logged_again_every_ten_minutes(
-        log: EventLog, clock: Clock, logged: Callable[[], Lines]) -> None:
+        log: EventLog, clock: Clock, logged: Logged) -> None:
     for _ in range(1201):
         log.add(event(Message.ERR_BAD_CRC))
         clock.now += 1.0
@@ -131,7 +131,7 @@ def test_cause_that_lasts_is_logged_again_every_ten_minutes(
 
 
 def test_station_that_comes_and_goes_does_not_fill_the_log(
-        log: EventLog, clock: Clock, logged: Callable[[], Lines]) -> None:
+        log: EventLog, clock: Clock, logged: Logged) -> None:
     for _ in range(60):
         log.forget(2)
         log.add(event(Message.NTC_NAK_LIMIT_EXCEEDED))
@@ -142,8 +142,7 @@ def test_station_that_comes_and_goes_does_not_fill_the_log(
     assert text.endswith('[station 2] (50 more like it were not logged)')
 
 
-def test_forgetting_a_station_makes_its_causes_news(
-        log: EventLog, logged: Callable[[], Lines]) -> None:
+def test_forgetting_a_station_makes_its_causes_news(log: EventLog, logged: Logged) -> None:
     def happen() -> list[tuple[str, str]]:
         log.add(event(Message.ERR_BAD_CRC, 1))
         log.add(event(Message.ERR_COMMAND_TIMEOUT, 1))
@@ -161,7 +160,7 @@ def test_forgetting_a_station_makes_its_causes_news(
 
 
 def test_routine_is_for_debugging_only(
-        clock: Clock, logged: Callable[[], Lines], request: pytest.FixtureRequest) -> None:
+        clock: Clock, logged: Logged, request: pytest.FixtureRequest) -> None:
     logger = get_logger('log_test')
     quiet = EventLog(logger, clock)
     for message in ROUTINE:
@@ -178,8 +177,7 @@ def test_routine_is_for_debugging_only(
 
 
 def test_forged_senders_neither_fill_the_memory_nor_the_log(
-        log: EventLog, clock: Clock, logged: Callable[[], Lines],
-        monkeypatch: pytest.MonkeyPatch) -> None:
+        log: EventLog, clock: Clock, logged: Logged, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr('abdf1_ros.ros.diagnostics.log.MOST_CAUSES', 50)
     for number in range(70):
         log.add(event(Message.ERR_WRONG_MESSAGE, number))
@@ -200,8 +198,7 @@ def lines(clock: Clock) -> LimitedLog:
     return LimitedLog(get_logger('log_test'), clock)
 
 
-def test_lines_have_the_level_they_are_given(
-        lines: LimitedLog, logged: Callable[[], Lines]) -> None:
+def test_lines_have_the_level_they_are_given(lines: LimitedLog, logged: Logged) -> None:
     lines.info('a', 'one')
     lines.warning('a', 'two')
     lines.error('a', 'three')
@@ -209,8 +206,7 @@ def test_lines_have_the_level_they_are_given(
 
 
 @pytest.mark.parametrize('level', ['info', 'warning', 'error'])
-def test_line_cannot_pass_for_another(
-        lines: LimitedLog, logged: Callable[[], Lines], level: str) -> None:
+def test_line_cannot_pass_for_another(lines: LimitedLog, logged: Logged, level: str) -> None:
     forged = 'tag\n[FATAL] [1.0] [log_test]: \x1b[31mall is lost\u2028'
     getattr(lines, level)('a', forged)
     ((_, text),) = logged()
@@ -219,7 +215,7 @@ def test_line_cannot_pass_for_another(
 
 @pytest.mark.parametrize('level', ['info', 'warning', 'error'])
 def test_only_a_few_lines_a_minute_are_about_one_thing(
-        lines: LimitedLog, clock: Clock, logged: Callable[[], Lines], level: str) -> None:
+        lines: LimitedLog, clock: Clock, logged: Logged, level: str) -> None:
     write = getattr(lines, level)
     for number in range(MOST_ENTRIES + 5):
         write('one\n', str(number))
@@ -237,7 +233,7 @@ def test_only_a_few_lines_a_minute_are_about_one_thing(
 
 
 def test_rows_of_a_file_that_fail_for_one_reason_are_one_line(
-        lines: LimitedLog, logged: Callable[[], Lines]) -> None:
+        lines: LimitedLog, logged: Logged) -> None:
     rows = UnreadableRows(lines)
     mappings: dict[tuple[str, int], Mapping] = {}
     for now, address, station, reason in (

@@ -53,6 +53,7 @@ from std_msgs.msg import (  # noqa: I101
 )
 from std_srvs.srv import SetBool, Trigger
 from support.cell import BridgeCell
+from support.commands import Output
 from support.ros import (
     details,
     ERROR,
@@ -188,8 +189,7 @@ def test_every_pulse_of_a_burst_is_sent_in_order(make_bench: Benches) -> None:
 
 
 def test_messages_that_dds_drops_are_counted(
-        make_bench: Benches, monkeypatch: pytest.MonkeyPatch,
-        capfd: pytest.CaptureFixture[str]) -> None:
+        make_bench: Benches, monkeypatch: pytest.MonkeyPatch, capfd: Output) -> None:
     monkeypatch.setattr('abdf1_ros.ros.topics.messages.WRITE_DEPTH', 50)
     bench = make_bench(RECIPE)
     publish = bench.publisher(Int16MultiArray, 'recipe')
@@ -213,7 +213,7 @@ def test_results_of_all_writes_that_wait_fit_into_their_queue(make_bench: Benche
 
 
 def test_reply_to_a_command_of_an_earlier_run_is_no_error(
-        make_bench: Benches, capfd: pytest.CaptureFixture[str]) -> None:
+        make_bench: Benches, capfd: Output) -> None:
     bench = make_bench(SPEED)
     left_over = Event(Message.ERR_WRONG_MESSAGE, (1, 0, 7), 1)
     bench.node.link.stop()  # nothing else comes, which would show that the station answers us
@@ -231,8 +231,7 @@ def test_reply_to_a_command_of_an_earlier_run_is_no_error(
     assert sum(' has never been heard: ' in line for line in lines) == 1
 
 
-def test_station_with_another_error_code_is_told_once(
-        make_bench: Benches, capfd: pytest.CaptureFixture[str]) -> None:
+def test_station_with_another_error_code_is_told_once(make_bench: Benches, capfd: Output) -> None:
     bench = make_bench(SPEED, parameters=('net.error_code:=BCC', 'net.timeout:=100'))
     until_status(bench.diagnostics, 'station 1', WARN)
     stations = bench.node.session.driver.stations
@@ -281,7 +280,7 @@ def test_end_waits_until_results_and_diagnostics_have_arrived(
 
 
 def test_bad_row_is_told_and_left_out_and_the_rest_runs(
-        make_bench: Benches, capfd: pytest.CaptureFixture[str]) -> None:
+        make_bench: Benches, capfd: Output) -> None:
     bench = make_bench('bad_station,Read,N7:0,255,SLC,1,', 'bad_type,Read,N7:0,2,PLC9,1,',
                        'missing,Read,N99:0,1,PLC5,1,', SPEED)
     speed = bench.ros.listen(Int16MultiArray, '/abdf1/read/speed')
@@ -310,8 +309,7 @@ def test_bad_row_is_told_and_left_out_and_the_rest_runs(
     assert read_topics == {'/abdf1/read/missing', '/abdf1/read/speed'}
 
 
-def test_tag_cannot_forge_lines_or_statuses(
-        make_bench: Benches, capfd: pytest.CaptureFixture[str]) -> None:
+def test_tag_cannot_forge_lines_or_statuses(make_bench: Benches, capfd: Output) -> None:
     tag, shown = 'lamp\x0b[FATAL] all is lost\x1b[2J', r'lamp\x0b[FATAL] all is lost\x1b[2J'
     bench = make_bench(f'"{tag}",ReadWrite,N99:0,1,PLC5,1,recipe')
     status = until_status(bench.diagnostics, 'mappings', ERROR)
@@ -368,7 +366,7 @@ def test_end_is_not_taken_back_by_a_request(make_bench: Benches) -> None:
 
 
 def test_internal_errors_are_told_and_the_third_is_the_end(
-        make_bench: Benches, capfd: pytest.CaptureFixture[str]) -> None:
+        make_bench: Benches, capfd: Output) -> None:
     bench = make_bench(SPEED)
     bench.node.session.reads.latest = None  # a bug
     bench.ros.until(lambda: bench.node.link.has_failed, 'the third fault')
@@ -419,8 +417,7 @@ def test_node_whose_name_cannot_be_read_keeps_no_message_back(
 
 @pytest.mark.parametrize('arguments', [
     ['net.csv'], ['net.csv', 'map.csv'], ['-p', 'net_file:=net.csv']])
-def test_argument_outside_of_ros_arguments(
-        arguments: list[str], capsys: pytest.CaptureFixture[str]) -> None:
+def test_argument_outside_of_ros_arguments(arguments: list[str], capsys: Output) -> None:
     with pytest.raises(SystemExit) as ending:
         main(['node', *arguments])
     assert ending.value.code == 2
@@ -440,8 +437,7 @@ def test_third_internal_error_ends_the_node_with_status_1(
     assert sum("internal error: KeyError('a bug'); please report it" in line for line in told) == 3
 
 
-def test_duplicate_name_is_told_and_forgotten(
-        make_bench: Benches, capfd: pytest.CaptureFixture[str]) -> None:
+def test_duplicate_name_is_told_and_forgotten(make_bench: Benches, capfd: Output) -> None:
     bench = make_bench(SPEED)
     until_status(bench.diagnostics, 'link', OK)
     other = Node('abdf1', context=bench.ros.context, use_global_arguments=False)
@@ -456,8 +452,7 @@ def test_duplicate_name_is_told_and_forgotten(
 
 
 def test_other_node_of_our_name_is_told_before_the_first_write_is_taken(
-        tmp_path: Path, monkeypatch: pytest.MonkeyPatch,
-        capfd: pytest.CaptureFixture[str]) -> None:
+        tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: Output) -> None:
     monkeypatch.setattr(graph, 'DISCOVERY', 2.0)
     bench = Bench(tmp_path, (RECIPE,))
     other = Node('abdf1', context=bench.ros.context, use_global_arguments=False,
@@ -488,8 +483,7 @@ def test_messages_wait_for_the_first_look_and_have_a_result_at_an_end_before_it(
     assert bench.until_results(1)[0].message.startswith('not written: ')
 
 
-def test_end_of_another_type_on_a_topic_is_told(
-        make_bench: Benches, capfd: pytest.CaptureFixture[str]) -> None:
+def test_end_of_another_type_on_a_topic_is_told(make_bench: Benches, capfd: Output) -> None:
     bench = make_bench(SPEED)
     said = ['']
 
@@ -526,7 +520,7 @@ def test_simulated_time_that_has_not_begun_is_not_put_into_stamps(make_bench: Be
 
 
 def test_odd_settings_are_told_in_the_log_but_not_without_end(
-        make_bench: Benches, capfd: pytest.CaptureFixture[str]) -> None:
+        make_bench: Benches, capfd: Output) -> None:
     make_bench(*(f'N7:{number},Read,N7:{number},1,PLC5,1,' for number in range(23)))
     warnings = [line for line in ''.join(capfd.readouterr()).splitlines() if 'WARN' in line]
     assert warnings[0].endswith('map.csv:2:1 (Tag): Tag "N7:0" becomes the topic N7_0')
@@ -535,7 +529,7 @@ def test_odd_settings_are_told_in_the_log_but_not_without_end(
 
 
 def test_load_that_the_line_cannot_carry_is_told_before_other_remarks(
-        make_bench: Benches, capfd: pytest.CaptureFixture[str]) -> None:
+        make_bench: Benches, capfd: Output) -> None:
     rows = [f'N{number}:7,Read,N{number}:0,1,PLC5,1,' for number in range(10, 40)]
     make_bench(*rows, parameters=('default_period:=50',))
     warnings = [line for line in ''.join(capfd.readouterr()).splitlines() if 'WARN' in line]
@@ -543,7 +537,7 @@ def test_load_that_the_line_cannot_carry_is_told_before_other_remarks(
     assert '; or Period ' in warnings[0]
 
 
-def test_map_without_a_row_is_told(make_bench: Benches, capfd: pytest.CaptureFixture[str]) -> None:
+def test_map_without_a_row_is_told(make_bench: Benches, capfd: Output) -> None:
     make_bench()
     assert 'the map has no usable row' in ''.join(capfd.readouterr())
 

@@ -47,6 +47,7 @@ def context() -> Iterator[Context]:
 
 
 Nodes = Callable[..., Node]
+Configured = Callable[..., Configuration]
 
 
 @pytest.fixture
@@ -74,7 +75,7 @@ def files(tmp_path: Path) -> dict[str, str]:
 
 
 @pytest.fixture
-def configured(make_node: Nodes, files: dict[str, str]) -> Callable[..., Configuration]:
+def configured(make_node: Nodes, files: dict[str, str]) -> Configured:
     return lambda **values: configure(make_node(files | values))
 
 
@@ -107,14 +108,14 @@ def test_files_are_shown_as_resolved_paths(
 
 
 def test_one_line_tells_what_the_node_runs_with(
-        configured: Callable[..., Configuration], files: dict[str, str]) -> None:
+        configured: Configured, files: dict[str, str]) -> None:
     assert str(configured(port='/dev/ttyUSB0')) == (
         f'{files["net_file"]} and {files["map_file"]}: port /dev/ttyUSB0, Mode Master, 9600 '
         'baud, CRC; 2 rows, topics: 2 to read, 1 to write')
 
 
 def test_no_path_and_no_port_forges_a_line_of_the_log(
-        configured: Callable[..., Configuration], files: dict[str, str], tmp_path: Path) -> None:
+        configured: Configured, files: dict[str, str], tmp_path: Path) -> None:
     forged = tmp_path / 'net\n[FATAL] [abdf1]: \x1b[2J.csv'
     Path(files['net_file']).rename(forged)
     told = str(configured(net_file=str(forged), port='/dev/tty\n[FATAL]'))
@@ -171,7 +172,7 @@ def test_what_the_files_say_is_shown_and_nobody_else_sets_it(
         next(column.description for column in MAP_COLUMNS if column.name == 'PLC_Type')
 
 
-def test_net_file_and_its_overrides(configured: Callable[..., Configuration]) -> None:
+def test_net_file_and_its_overrides(configured: Configured) -> None:
     network = configured().network
     assert network == Network(baud=9600, com_port='3')
     network = configured(**{'net.baud': 19200, 'net.timeout': 0}).network
@@ -184,8 +185,7 @@ def test_net_file_and_its_overrides(configured: Callable[..., Configuration]) ->
     ('net.com_port', 2, 'com_port', '2'),
     ('net.station', '7', 'station', 7)])
 def test_link_parameters_are_read_as_the_file_is(
-        configured: Callable[..., Configuration], name: str, value: Any, field: str,
-        expected: Any) -> None:
+        configured: Configured, name: str, value: Any, field: str, expected: Any) -> None:
     assert getattr(configured(**{name: value}).network, field) == expected
 
 
@@ -195,7 +195,7 @@ def test_link_parameters_are_read_as_the_file_is(
     ({'port': '/dev/ttyUSB7', 'net.com_port': 1}, '/dev/ttyUSB7'),
     ({'port': 7}, '/dev/ttyS6')])
 def test_port_is_the_parameter_or_else_com_port(
-        configured: Callable[..., Configuration], values: dict[str, Any], port: str) -> None:
+        configured: Configured, values: dict[str, Any], port: str) -> None:
     assert configured(**values).port == port
 
 
@@ -205,7 +205,7 @@ def test_port_is_the_parameter_or_else_com_port(
     ('read_only', True, True), ('write_timeout', 0.05, 0.05), ('poll_list', [1, 2], '1,2'),
     ('poll_list', 3, '3')])
 def test_own_parameter_has_the_value_and_type_that_was_given(
-        configured: Callable[..., Configuration], name: str, value: Any, expected: Any) -> None:
+        configured: Configured, name: str, value: Any, expected: Any) -> None:
     found = getattr(configured(**{name: value}).parameters, name)
     assert found == expected
     assert type(found) is type(expected)
@@ -218,13 +218,11 @@ def test_own_parameter_has_the_value_and_type_that_was_given(
       'poll_multiple': True}, PollingSettings((7, 1, 2), (9,), 2, multiple=True)),
     ({'send_in_sequence': True}, PollingSettings((1, 2), in_sequence=True))])
 def test_parameters_tell_how_stations_are_polled(
-        configured: Callable[..., Configuration], values: dict[str, Any],
-        expected: PollingSettings) -> None:
+        configured: Configured, values: dict[str, Any], expected: PollingSettings) -> None:
     assert configured(**values).driver_settings().polling == expected
 
 
-def test_poll_list_without_standard_polling_is_told(
-        configured: Callable[..., Configuration]) -> None:
+def test_poll_list_without_standard_polling_is_told(configured: Configured) -> None:
     given = {'poll_list': '1-2', 'poll_multiple': True, 'poll_group_size': 0}
     assert configured(**given).idle == ['poll_list', 'poll_multiple']
     assert configured(**given | {'net.polling': 'Standard'}).idle == []
@@ -237,8 +235,7 @@ def test_csv_as_a_parameter_file_is_told(tmp_path: Path) -> None:
 
 
 def test_gateway_is_polled_for_the_stations_behind_it(
-        configured: Callable[..., Configuration], make_node: Nodes, files: dict[str, str],
-        tmp_path: Path) -> None:
+        configured: Configured, make_node: Nodes, files: dict[str, str], tmp_path: Path) -> None:
     rows = [f'{tag},Read,N7:0,{station},PLC5,{via}'
             for tag, station, via in (('a', 1, 8), ('b', 9, 8), ('c', 2, ''))]
     files['map_file'] = str(write_csv(
@@ -301,7 +298,7 @@ def test_bad_row_is_left_out_unless_the_map_is_strict(
     assert problems_of(make_node(files | {'strict_map': True})) == [str(problem)]
 
 
-def test_mappings_are_shown_with_their_defaults(configured: Callable[..., Configuration]) -> None:
+def test_mappings_are_shown_with_their_defaults(configured: Configured) -> None:
     cells = {name: value for name, value, _ in map_cells(configured().shown_rows())}
     assert {name: value for name, value in cells.items() if value and 'door' in name} == {
         f'map.line.door.{column}': value for column, value in {
@@ -314,7 +311,7 @@ def test_mappings_are_shown_with_their_defaults(configured: Callable[..., Config
     (100, {}, True), (101, {}, False), (101, {'expose_map_parameters': True}, True),
     (1, {'expose_map_parameters': False}, False)])
 def test_maps_of_up_to_a_hundred_rows_are_shown_unless_the_user_says_otherwise(
-        configured: Callable[..., Configuration], files: dict[str, str], rows: int,
+        configured: Configured, files: dict[str, str], rows: int,
         given: dict[str, Any], is_shown: bool) -> None:
     write_csv(Path(files['map_file']), MAP_HEADER,
               [f'row{row},Read,N7:{row},1,SLC,,,' for row in range(rows)])
@@ -398,8 +395,7 @@ def test_number_that_yaml_takes_for_octal_is_told(
     node = make_node(files)
     with pytest.raises(ConfigurationError) as caught:
         configure(node, Arguments([str(path)]))
-    assert str(caught.value) == \
-        f'{path}:4:7: net.station: 010 is octal in YAML; write 10 or 8'
+    assert str(caught.value) == f'{path}:4:7: net.station: 010 is octal in YAML; write 10 or 8'
 
 
 @pytest.mark.parametrize(('rule', 'expected'), [

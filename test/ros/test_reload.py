@@ -35,6 +35,7 @@ from rclpy.parameter import parameter_value_to_python
 from std_msgs.msg import Float32MultiArray, Int16MultiArray, UInt16MultiArray
 from std_srvs.srv import SetBool, Trigger
 from support.cell import BridgeCell
+from support.commands import Output
 from support.ros import (
     details,
     EVERYTHING,
@@ -147,7 +148,7 @@ def test_row_of_another_message_type_or_address_has_a_new_topic(bench: Bench) ->
         bench.ros.forget(echo)
 
 
-def test_faulty_files_change_nothing(bench: Bench, capfd: pytest.CaptureFixture[str]) -> None:
+def test_faulty_files_change_nothing(bench: Bench, capfd: Output) -> None:
     bench.write_map(SPEED)
     bench.write_net(100, 9601)
     driver = bench.node.session.driver
@@ -212,7 +213,7 @@ def test_files_that_cannot_be_taken_leave_messages_to_the_old_driver(
 CROWD = '~/write/recipe has more than one publisher'
 
 
-def test_second_publisher_is_found_again(bench: Bench, capfd: pytest.CaptureFixture[str]) -> None:
+def test_second_publisher_is_found_again(bench: Bench, capfd: Output) -> None:
     write_csv(bench.map, f'{HEADER},Fallback,Fallback_After', [f'{RECIPE},0 0,60000'])
     publishers = []
     for _ in range(2):
@@ -226,7 +227,7 @@ def test_second_publisher_is_found_again(bench: Bench, capfd: pytest.CaptureFixt
 
 
 def test_station_that_took_no_commands_does_not_answer_by_new_files(
-        bench: Bench, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]) -> None:
+        bench: Bench, monkeypatch: pytest.MonkeyPatch, capfd: Output) -> None:
     asked: list[LineView] = []
 
     def deaf_stations(line: LineView, now: float) -> list[int]:
@@ -289,7 +290,7 @@ def test_parameters_tell_what_is_in_the_files_now(bench: Bench) -> None:
     assert bench.node.session.driver.network.timeout == 250
 
 
-def test_other_speed_opens_the_port_anew(bench: Bench, capfd: pytest.CaptureFixture[str]) -> None:
+def test_other_speed_opens_the_port_anew(bench: Bench, capfd: Output) -> None:
     bench.write_net(100, 19200)
     assert bench.reload()[0]
     speeds = bench.ros.listen(Int16MultiArray, '/abdf1/read/speed', EVERYTHING)
@@ -297,8 +298,7 @@ def test_other_speed_opens_the_port_anew(bench: Bench, capfd: pytest.CaptureFixt
     assert bench.node.surroundings.opener.settings.baud == 19200
 
 
-def test_file_that_has_changed_is_told_once(
-        bench: Bench, capfd: pytest.CaptureFixture[str]) -> None:
+def test_file_that_has_changed_is_told_once(bench: Bench, capfd: Output) -> None:
     link = until_status(bench.diagnostics, 'link', OK)
     assert details(link)['files'] == 'as read'
     bench.write_map(SPEED)

@@ -25,6 +25,8 @@ from support.ros import Process
 FAST = ('--timeout', '250')  # ms; for who is silent
 PATIENT = ('--timeout', '3000')  # for who is there, but may be late on a busy host
 
+Output = pytest.CaptureFixture[str]
+
 
 @dataclass(frozen=True, slots=True)
 class Said:
@@ -49,8 +51,7 @@ class Said:
 Plc = Callable[..., Said]
 
 
-def call(main: Callable[[Sequence[str]], int], capsys: pytest.CaptureFixture[str],
-         *args: str) -> Said:
+def call(main: Callable[[Sequence[str]], int], capsys: Output, *args: str) -> Said:
     """Run a command; its signal handlers are taken away again, and options may be wrong."""
     handlers = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)}
     capsys.readouterr()

@@ -31,7 +31,7 @@ from abdf1_ros.cli.monitor.command import main, Screen
 from abdf1_ros.cli.monitor.view import TextLine
 import pytest
 from std_msgs.msg import UInt16MultiArray
-from support.commands import call
+from support.commands import call, Output
 from support.forked import Forked
 from support.ros import Observer, PATIENCE, Process
 from support.simulator_process import Files, IMPATIENT_ROW, make_files, READS, STATUSES
@@ -57,8 +57,7 @@ def simulator(files: Files) -> Iterator[Process]:
         node.end()
 
 
-def test_one_picture_shows_every_topic_and_status(
-        simulator: Process, capsys: pytest.CaptureFixture[str]) -> None:
+def test_one_picture_shows_every_topic_and_status(simulator: Process, capsys: Output) -> None:
     give_up = time.monotonic() + PATIENCE
     said = call(main, capsys, '--node', NODE, '--once')
     while re.search('STALE|WARN: |ERROR: ', said.out) and time.monotonic() < give_up:
@@ -99,8 +98,7 @@ def test_pictures_follow_the_loss_of_a_station(simulator: Process) -> None:
         monitor.end(signal.SIGTERM)
 
 
-def test_it_ends_after_the_time_it_is_given(
-        simulator: Process, capsys: pytest.CaptureFixture[str]) -> None:
+def test_it_ends_after_the_time_it_is_given(simulator: Process, capsys: Output) -> None:
     began = time.monotonic()
     said = call(main, capsys, '--node', NODE, '--seconds', '1', '--period', '0.1')
     assert said.status == 0
@@ -314,7 +312,7 @@ Refused = Callable[..., list[str]]
 
 
 @pytest.fixture
-def refused(capsys: pytest.CaptureFixture[str]) -> Refused:
+def refused(capsys: Output) -> Refused:
     """Return what runs a monitor that refuses, and returns all that it says."""
     def run(status: int, *args: str) -> list[str]:
         said = call(main, capsys, *args)

@@ -24,7 +24,7 @@ from abdf1_ros.cli.monitor.view import ShownStatus, SILENCE, Style
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 import pytest
 from rclpy.node import Node
-from support.commands import call
+from support.commands import call, Output
 from support.ros import ERROR, Observer, OK
 
 NOW = 1000.0
@@ -132,7 +132,7 @@ def test_spare_is_named() -> None:
         '/a OK 93 % 34 ms of 10 mappings 10 fresh; spare: beta'
 
 
-def test_nobody_is_heard(capsys: pytest.CaptureFixture[str]) -> None:
+def test_nobody_is_heard(capsys: Output) -> None:
     said = call(main, capsys, '--all', '--once', '--wait', '0.1', '--seconds', '0.2')
     assert (said.status, said.out.splitlines()[0]) == (
         1, 'no line is heard; diagnostics come every second')

@@ -21,7 +21,7 @@ from abdf1_ros.cli.plc.command import main
 from abdf1_ros.cli.plc.detect import LineSettings
 from abdf1_ros.settings.network import Network
 import pytest
-from support.commands import call, PATIENT, Plc
+from support.commands import call, Output, PATIENT, Plc
 from support.ros import Process
 from support.simulator_process import Files, make_files
 
@@ -58,5 +58,5 @@ def line(simulator: Process, files: Files) -> str:
 
 
 @pytest.fixture
-def plc(line: str, capsys: pytest.CaptureFixture[str]) -> Plc:
+def plc(line: str, capsys: Output) -> Plc:
     return lambda command, *args: call(main, capsys, command, '--port', line, *PATIENT, *args)

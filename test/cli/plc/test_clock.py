@@ -29,12 +29,11 @@ from abdf1_ros.pccc.file_types import PlcType
 from abdf1_ros.pccc.processor import Processor
 from abdf1_ros.simulator.simulated_plc import SimulatedPlc
 import pytest
-from support.commands import call
+from support.commands import call, Output
 from support.driver_bench import simulated_plc, store, stored
 from support.plc_line import plc_line
 
 WORDS = {1: 'S:37', 2: 'S:18'}
-Output = pytest.CaptureFixture[str]
 
 
 @pytest.fixture

@@ -23,7 +23,7 @@ import sys
 
 from abdf1_ros.cli.plc.command import main
 import pytest
-from support.commands import call, FAST, PATIENT, Plc, running_simulator
+from support.commands import call, FAST, Output, PATIENT, Plc, running_simulator
 from support.ptys import Pty, wait_until
 from support.ros import Process
 from support.simulator_process import Files
@@ -170,8 +170,7 @@ def test_watch_redraws_a_table_on_a_terminal(line: str) -> None:
 
 
 @pytest.mark.usefixtures('half_duplex_only')
-def test_commands_work_over_a_tcp_connection(
-        files: Files, capsys: pytest.CaptureFixture[str]) -> None:
+def test_commands_work_over_a_tcp_connection(files: Files, capsys: Output) -> None:
     with running_simulator('--tcp', '127.0.0.1:0', '--data', str(files.simulator)) as process:
         url = process.wait_for('socket://').partition(' on ')[2].partition(',')[0]
         assert call(main, capsys, 'read', 'N7:0', '--port', url, *PATIENT).lines == ['N7:0 1200']
@@ -210,15 +209,14 @@ def test_signal_ends_it(tmp_path: Path) -> None:
     (('write', 'N7:0', '5', '--force'), 'unrecognized arguments: --force\n'),
     ((), 'the following arguments are required: COMMAND')])
 def test_option_that_is_wrong_is_told_with_status_2(
-        args: tuple[str, ...], text: str, capsys: pytest.CaptureFixture[str]) -> None:
+        args: tuple[str, ...], text: str, capsys: Output) -> None:
     said = call(main, capsys, *args)
     assert said.status == 2
     assert text in said.err
 
 
 @pytest.mark.parametrize('port', ['/nowhere/tty', '/dev/null'])
-def test_port_that_cannot_be_opened_is_told_with_status_1(
-        port: str, capsys: pytest.CaptureFixture[str]) -> None:
+def test_port_that_cannot_be_opened_is_told_with_status_1(port: str, capsys: Output) -> None:
     for args in (['read', 'N7:0'], ['watch', 'N7:0'], ['detect']):
         said = call(main, capsys, *args, '--port', port)
         assert said.status == 1 and said.err.startswith(f'plc: {port}: ')
@@ -226,8 +224,7 @@ def test_port_that_cannot_be_opened_is_told_with_status_1(
 
 @pytest.mark.parametrize('command', [
     '', 'read', 'write', 'watch', 'status', 'ping', 'scan', 'detect', 'import', 'ports'])
-def test_help_has_examples_and_exit_statuses(command: str,
-                                             capsys: pytest.CaptureFixture[str]) -> None:
+def test_help_has_examples_and_exit_statuses(command: str, capsys: Output) -> None:
     said = call(main, capsys, *command.split(), '--help')
     assert said.status == 0
     assert 'exit status:' in said.out

@@ -27,7 +27,7 @@ from abdf1_ros.driver.settings import DriverSettings
 from abdf1_ros.plan.report import make_report
 from abdf1_ros.settings.network import Network
 import pytest
-from support.commands import call, PATIENT, running_simulator, Said
+from support.commands import call, Output, PATIENT, running_simulator, Said
 from support.driver_bench import Recorder
 from support.mappings import make_mapping
 from support.plc_line import machine_line
@@ -48,14 +48,14 @@ def peer(files: Files) -> Iterator[str]:
 FULL_DUPLEX = ('--peer', '--check', 'bcc', *PATIENT)
 
 
-def test_write_and_read_in_full_duplex(peer: str, capsys: pytest.CaptureFixture[str]) -> None:
+def test_write_and_read_in_full_duplex(peer: str, capsys: Output) -> None:
     line = ('--port', peer, *FULL_DUPLEX, '--station', '2')
     assert call(main, capsys, 'write', 'N7:10', '7', '--yes', *line).status == 0
     assert call(main, capsys, 'read', 'N7:10', *line).good_lines == ['N7:10 7']
 
 
 def test_init_does_not_call_a_full_duplex_port_0_that_answers_to_all(
-        peer: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+        peer: str, tmp_path: Path, capsys: Output) -> None:
     said = call(main, capsys, 'init', '--port', peer, '--into', str(tmp_path), *FULL_DUPLEX)
     assert said.status == 0 and 'watch S:0 --station 1 --net' in said.out
     found = examine(str(tmp_path / 'net.csv'), str(tmp_path / 'map.csv'))
@@ -64,15 +64,14 @@ def test_init_does_not_call_a_full_duplex_port_0_that_answers_to_all(
     assert make_report(found.network, found.mappings, 0.1).remarks() == []
 
 
-def test_scan_in_full_duplex_tells_what_it_cannot_know(
-        peer: str, capsys: pytest.CaptureFixture[str]) -> None:
+def test_scan_in_full_duplex_tells_what_it_cannot_know(peer: str, capsys: Output) -> None:
     scanned = call(main, capsys, 'scan', '2-3', '--port', peer, *FULL_DUPLEX)
     assert scanned.good_lines[-2:] == [
         '2 of 2 stations answer', 'in full duplex most PLCs answer to every station '
         'number, so these may be one PLC']
 
 
-def test_detect_finds_a_full_duplex_port(peer: str, capsys: pytest.CaptureFixture[str]) -> None:
+def test_detect_finds_a_full_duplex_port(peer: str, capsys: Output) -> None:
     found = call(main, capsys, 'detect', '--port', peer, '--stations', '2', '--baud', '9600',
                  *PATIENT)
     assert found.status == 0, found.err
@@ -81,7 +80,7 @@ def test_detect_finds_a_full_duplex_port(peer: str, capsys: pytest.CaptureFixtur
 
 @pytest.mark.usefixtures('half_duplex_only')
 def test_detect_shows_what_it_has_found_and_how_to_go_on(
-        tmp_path: Path, files: Files, capsys: pytest.CaptureFixture[str]) -> None:
+        tmp_path: Path, files: Files, capsys: Output) -> None:
     port = str(tmp_path / 'line')
     with running_simulator('--pty', port, '--data', str(files.simulator), '--check', 'BCC'):
         said = call(main, capsys, 'detect', '--port', port, '--stations', '2', '--duplex', 'half',
@@ -103,7 +102,7 @@ def told(said: Said) -> list[str]:
 
 
 def test_detect_of_nobody_has_status_1_and_says_what_was_tried(
-        tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+        tmp_path: Path, capsys: Output) -> None:
     line = Pty(tmp_path / 'line')
     said = call(main, capsys, 'detect', '--port', str(line.name), '--stations', '1', '--timeout',
                 '30', '--baud', '9600')
@@ -116,8 +115,7 @@ def test_detect_of_nobody_has_status_1_and_says_what_was_tried(
         'plc: --baud: no other value was tried; leave the option out to try all']
 
 
-def test_detect_of_what_is_not_understood(tmp_path: Path, files: Files,
-                                          capsys: pytest.CaptureFixture[str]) -> None:
+def test_detect_of_what_is_not_understood(tmp_path: Path, files: Files, capsys: Output) -> None:
     port = str(tmp_path / 'line')
     with running_simulator('--pty', port, '--data', str(files.simulator), '--check', 'BCC'):
         said = call(main, capsys, 'detect', '--port', port, '--stations', '2', '--check', 'CRC',
@@ -142,14 +140,14 @@ def echoing_port(process: Process) -> str:
     return process.wait_for(' on ').partition(' on ')[2].partition(',')[0]
 
 
-def call_in_echo(capsys: pytest.CaptureFixture[str], *args: str) -> Said:
+def call_in_echo(capsys: Output, *args: str) -> Said:
     """Run a command that nobody answers; wait longer where the echo came too late."""
     said = call(main, capsys, *args, '--timeout', '50')
     return said if COMES_BACK in said.err else call(main, capsys, *args, *PATIENT)
 
 
 def test_detect_tells_of_the_echo_and_finds_the_plcs_behind_it(
-        echoing: Process, capsys: pytest.CaptureFixture[str]) -> None:
+        echoing: Process, capsys: Output) -> None:
     for station in (1, 2):
         echoing.say(f'normal {station}')
     port = echoing_port(echoing)
@@ -161,7 +159,7 @@ def test_detect_tells_of_the_echo_and_finds_the_plcs_behind_it(
 
 @pytest.mark.parametrize('args', [('ping', '1'), ('write', 'N7:0', '1', '--station', '1')])
 @pytest.mark.parametrize('duplex', ['full', 'half'])
-def test_echo_alone_is_no_plc(echoing: Process, capsys: pytest.CaptureFixture[str],
+def test_echo_alone_is_no_plc(echoing: Process, capsys: Output,
                               args: tuple[str, ...], duplex: str) -> None:
     for station in (1, 2):
         echoing.say(f'silent {station}')
@@ -172,7 +170,7 @@ def test_echo_alone_is_no_plc(echoing: Process, capsys: pytest.CaptureFixture[st
 
 @pytest.mark.parametrize('args', [('detect',), ('init', '--into', 'new')])
 def test_detect_finds_nobody_in_an_echo(
-        echoing: Process, capsys: pytest.CaptureFixture[str], args: tuple[str, ...],
+        echoing: Process, capsys: Output, args: tuple[str, ...],
         tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     for station in (1, 2):
@@ -185,8 +183,7 @@ def test_detect_finds_nobody_in_an_echo(
     assert 'character' not in said.err  # what came was our own
 
 
-def test_plcs_behind_a_radio_modem(
-        tmp_path: Path, files: Files, capsys: pytest.CaptureFixture[str]) -> None:
+def test_plcs_behind_a_radio_modem(tmp_path: Path, files: Files, capsys: Output) -> None:
     port = str(tmp_path / 'line')
     net = write_csv(tmp_path / 'net.csv', 'Mode,Cmd_Timeout', ['Radio,1000'])
     line = '--radio', '--port', port
@@ -210,8 +207,7 @@ def test_plcs_behind_a_radio_modem(
         assert 'Slave Station (2) Inactive' in silent.err and 'radio modem, CRC' in silent.err
 
 
-def test_words_of_a_node_on_a_radio_modem(
-        tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_words_of_a_node_on_a_radio_modem(tmp_path: Path, capsys: Output) -> None:
     network = Network(mode='Radio', plc_type='SLC', station=9)
     words = make_mapping('N7:0', 'Serve', station=9, length=2, plc='SLC')
     driver = Driver(network, [words], DriverSettings(), Recorder(time.monotonic))

@@ -24,7 +24,7 @@ from abdf1_ros.cli.plc.targets import to_read
 from abdf1_ros.problems import ConfigurationError
 from abdf1_ros.settings.network import Network
 import pytest
-from support.commands import call, PATIENT, Plc, running_simulator
+from support.commands import call, Output, PATIENT, Plc, running_simulator
 from support.ptys import Pty, wait_until
 from support.ros import Process, write_csv
 from support.simulator_process import Files
@@ -173,7 +173,7 @@ Station,PLC_Type,Address,Length,Values
 
 
 def test_element_of_a_structure_is_a_block_of_its_named_words(
-        tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+        tmp_path: Path, capsys: Output) -> None:
     (tmp_path / 'data.csv').write_text(STRUCTURES)
     port = str(tmp_path / 'line')
     with running_simulator('--pty', port, '--data', str(tmp_path / 'data.csv')):
@@ -221,6 +221,6 @@ def test_read_in_another_radix(plc: Plc) -> None:
     assert said.lines == ['N7:10 0065 0066 0067']
 
 
-def test_read_over_a_net_file(line: str, files: Files, capsys: pytest.CaptureFixture[str]) -> None:
+def test_read_over_a_net_file(line: str, files: Files, capsys: Output) -> None:
     net = write_csv(files.folder / 'plc.csv', 'Com_Port,Baud,Timeout', [f'{line},115200,1000'])
     assert call(main, capsys, 'read', 'N7:0', '--net', str(net)).lines == ['N7:0 1200']

@@ -46,6 +46,7 @@ from support.ros import write_csv
 SPEED = make_mapping('N7:0', item=1)
 NOW = datetime(2026, 3, 1)
 NAME = make_mapping('ST9:0', item=2)
+Output = pytest.CaptureFixture[str]
 
 
 @pytest.fixture
@@ -76,19 +77,18 @@ class Counting(LiveValues):
             self._plcs.lose()
 
 
-def shown(capsys: pytest.CaptureFixture[str]) -> list[str]:
+def shown(capsys: Output) -> list[str]:
     """Return the lines without their times."""
     return [line.partition('  ')[2] for line in capsys.readouterr().out.splitlines()]
 
 
-def test_every_change_is_shown_with_its_time(plcs: Plcs,
-                                             capsys: pytest.CaptureFixture[str]) -> None:
+def test_every_change_is_shown_with_its_time(plcs: Plcs, capsys: Output) -> None:
     assert Counting(plcs).run(5) == 0
     lines = shown(capsys)
     assert lines[:5] == [f'N7:0  {number}' for number in range(5)]
 
 
-def test_what_stays_is_shown_once(plcs: Plcs, capsys: pytest.CaptureFixture[str]) -> None:
+def test_what_stays_is_shown_once(plcs: Plcs, capsys: Output) -> None:
     assert LiveValues(network_on(plcs), [SPEED, NAME], 0.01).run(4) == 0
     assert sorted(shown(capsys)) == ['N7:0  0', "ST9:0  'Tank'"]
 
@@ -98,8 +98,7 @@ def test_what_stays_is_shown_once(plcs: Plcs, capsys: pytest.CaptureFixture[str]
 @pytest.mark.parametrize(('tags', 'title', 'first', 'other'), [
     (None, '', '', ''), ({'N7:0': 'a, b'}, 'tag,', '"a, b",', '"",')])
 def test_each_read_is_a_line_of_csv_for_each_value(
-        plcs: Plcs, capsys: pytest.CaptureFixture[str], tags: Tags | None, title: str,
-        first: str, other: str) -> None:
+        plcs: Plcs, capsys: Output, tags: Tags | None, title: str, first: str, other: str) -> None:
     store(plcs[1], 'ST9:0', 'a,"b"')
     words, name = (mapping_of(text, {'Command': 'Read', 'Station': '1', 'PLC_Type': 'PLC5'})
                    for text in ('N7:0-1', 'ST9:0'))
@@ -112,7 +111,7 @@ def test_each_read_is_a_line_of_csv_for_each_value(
 
 
 def test_reads_that_the_output_does_not_take_are_counted_and_others_keep_their_times(
-        plcs: Plcs, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> None:
+        plcs: Plcs, capsys: Output, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr('abdf1_ros.cli.plc.watch.MAX_NEWS', 2)
     watch = LiveValues(network_on(plcs), [SPEED], 0.01, csv=True)
     for value in range(5):
@@ -127,22 +126,20 @@ def test_reads_that_the_output_does_not_take_are_counted_and_others_keep_their_t
     assert max(map(datetime.fromisoformat, times)) <= shown
 
 
-def test_read_that_fails_is_a_line_of_csv_without_a_value(
-        plcs: Plcs, capsys: pytest.CaptureFixture[str]) -> None:
+def test_read_that_fails_is_a_line_of_csv_without_a_value(plcs: Plcs, capsys: Output) -> None:
     plcs.say('silent 1')
     assert LiveValues(network_on(plcs, 100), [SPEED], 0.01, csv=True).run(2) == 1
     assert [line.partition(',')[2] for line in capsys.readouterr().out.splitlines()[1:]] == [
         '1,N7:0,']
 
 
-def test_control_characters_of_a_plc_do_not_reach_the_screen(
-        plcs: Plcs, capsys: pytest.CaptureFixture[str]) -> None:
+def test_control_characters_of_a_plc_do_not_reach_the_screen(plcs: Plcs, capsys: Output) -> None:
     store(plcs[1], 'ST9:0', 'a\x1b[2J\x9b')
     assert LiveValues(network_on(plcs), [NAME], 0.01).run(1) == 0
     assert shown(capsys) == [r"ST9:0  'a\x1b[2J\x9b'"]
 
 
-def test_lost_line_is_shown(plcs: Plcs, capsys: pytest.CaptureFixture[str]) -> None:
+def test_lost_line_is_shown(plcs: Plcs, capsys: Output) -> None:
     assert Counting(plcs, reads=3).run(4) == 1  # the loss counts like a read that fails
     lines = shown(capsys)
     assert lines[:3] == [f'N7:0  {number}' for number in range(3)]
@@ -150,7 +147,7 @@ def test_lost_line_is_shown(plcs: Plcs, capsys: pytest.CaptureFixture[str]) -> N
     assert len(lines) == 4
 
 
-def test_silent_station_is_shown(plcs: Plcs, capsys: pytest.CaptureFixture[str]) -> None:
+def test_silent_station_is_shown(plcs: Plcs, capsys: Output) -> None:
     plcs.say('silent 1')
     assert LiveValues(network_on(plcs, 100), [SPEED], 0.01).run(2) == 1
     assert shown(capsys) == [
@@ -226,7 +223,7 @@ class Screen:
 
 
 def test_nothing_old_stays_below_a_table_that_shrinks(
-        monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
+        monkeypatch: pytest.MonkeyPatch, capsys: Output) -> None:
     screen = Screen('$ plc watch N7:0 C5:0.ACC')
     monkeypatch.setattr('abdf1_ros.cli.plc.watch.opened', lambda network: None)
     rows = SPEED, make_mapping('C5:0.ACC', item=2)
@@ -300,7 +297,7 @@ def test_curve_lies_between_its_lowest_and_highest_number(
 
 
 def test_rows_of_a_map_have_their_own_tags_and_scaled_values(
-        plcs: Plcs, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+        plcs: Plcs, tmp_path: Path, capsys: Output) -> None:
     store(plcs[1], 'N7:1', [125])
     row = make_mapping('N7:1', tag='height', scaling=Scaling(0.1, -2.0))
     capture = tmp_path / 'line.cap'

@@ -24,7 +24,7 @@ import sys
 from abdf1_ros.cli.plc.command import main
 import pytest
 from support.cases import for_all
-from support.commands import PATIENT, Plc
+from support.commands import Output, PATIENT, Plc
 from support.ptys import PATIENCE, Pty, wait_until
 from support.ros import Process, write_csv
 
@@ -58,8 +58,7 @@ def test_row_of_a_map_is_written_by_its_tag(plc: Plc, tmp_path: Path) -> None:
     (('Level', '1', '--station', '1'), '--station: the map has Level at station 2'),
     (('Level', '1', '--type', 'int32'), '--type: is for addresses; for tags the map')])
 def test_what_a_row_does_not_allow_is_told_before_the_port_is_opened(
-        tmp_path: Path, capsys: pytest.CaptureFixture[str], args: tuple[str, ...],
-        text: str) -> None:
+        tmp_path: Path, capsys: Output, args: tuple[str, ...], text: str) -> None:
     path = write_csv(tmp_path / 'map.csv', *MAP_TO_WRITE)
     assert main(['write', *args, '--yes', '--map', str(path), '--port', '/nowhere/plc']) == 2
     assert text in capsys.readouterr().err
@@ -188,7 +187,7 @@ def test_write_of_what_cannot_be_written(plc: Plc, args: tuple[str, ...], text: 
     (('write', 'N7:250', *'0123456', '--plc-type', 'SLC'),
      'VALUE: 7 elements do not fit at N7:250; the last word there can be is N7:255')])
 def test_what_no_plc_could_take_is_told_before_the_port_is_opened(
-        capsys: pytest.CaptureFixture[str], args: tuple[str, ...], text: str) -> None:
+        capsys: Output, args: tuple[str, ...], text: str) -> None:
     assert main([*args, '--port', '/nowhere/plc', '--station', '1']) == 2
     assert capsys.readouterr().err == f'plc: {text}\n'
 
