@@ -1,0 +1,147 @@
+# Copyright 2026 abdf1_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Why no program hears Fast DDS: its files in /dev/shm are gone, or the network came after it."""
+
+from collections.abc import Iterable
+import os
+from pathlib import Path
+import subprocess
+import sys
+
+from abdf1_ros.ros.diagnostics.dds import BEGAN_EARLY, DdsWatch, lost_locks
+import pytest
+from support.ros import PROFILES_VARIABLE
+from test_rehearsal import NEEDS_NAMESPACES
+
+# A node that uses shared memory, as at the home of a user. It removes its own files.
+NODE = """
+import os
+from abdf1_ros.ros.diagnostics.dds import DdsWatch
+import rclpy
+rclpy.init()
+node = rclpy.create_node('lonely')
+files = DdsWatch()
+print(repr(files.look(1.0) + files.look(20.0)))
+for name in os.listdir('/proc/self/fd'):
+    try:
+        path = os.readlink(f'/proc/self/fd/{name}')
+    except OSError:
+        continue
+    if path.startswith('/dev/shm/') and path.endswith('_el'):
+        os.remove(path)
+        os.remove(path.removesuffix('_el'))
+print(repr(files.look(40.0)))
+print(files.look(60.0))
+"""
+# How a host gets a network.
+NETWORK_COMES = """
+import subprocess
+from abdf1_ros.ros.diagnostics.dds import has_network
+def ip(*words): subprocess.run(['ip', *words], check=True)
+print(has_network())
+ip('link', 'set', 'lo', 'up')
+ip('link', 'add', 'here', 'type', 'veth', 'peer', 'name', 'there')
+ip('addr', 'add', '10.74.0.1/24', 'dev', 'here')
+print(has_network())
+ip('link', 'set', 'here', 'up')
+print(has_network())  # the other end is down: no carrier
+ip('link', 'set', 'there', 'up')
+print(has_network())
+ip('addr', 'flush', 'dev', 'here')
+print(has_network())
+"""
+UNSET = ('ROS_AUTOMATIC_DISCOVERY_RANGE', 'ROS_LOCALHOST_ONLY')
+
+
+def test_node_notices_that_its_files_are_gone() -> None:
+    environment = os.environ | {'ROS_AUTOMATIC_DISCOVERY_RANGE': 'LOCALHOST'}
+    del environment[PROFILES_VARIABLE]
+    done = subprocess.run([sys.executable, '-c', NODE], env=environment, capture_output=True,
+                          text=True, check=True, timeout=60)
+    before, once, twice = done.stdout.splitlines()
+    assert (before, once) == ("''", "''")
+    assert twice.startswith('the files of Fast DDS in /dev/shm are gone')
+
+
+def test_lock_of_a_removed_file_counts_and_no_other() -> None:
+    lock = Path(f'/dev/shm/fastrtps_test{os.getpid()}_el')
+    with lock.open('w'):
+        assert lost_locks() == frozenset()
+        lock.unlink()
+        assert lost_locks() == {f'{lock} (deleted)'}
+    assert lost_locks() == frozenset()
+
+
+def losses_seen(*lost: Iterable[str]) -> list[bool]:
+    """Return at which looks the files count as gone, if these locks are lost one after another."""
+    found = iter(map(frozenset, lost))
+    files = DdsWatch(lambda: next(found))
+    return [bool(files.look(20.0 * number)) for number in range(1, len(lost) + 1)]
+
+
+def test_port_that_fast_dds_makes_anew_is_no_fault() -> None:
+    assert losses_seen('', 'a', '', 'b', 'c', 'cd', 'cd', '') == [False] * 5 + [True, True, False]
+
+
+def test_looks_are_five_seconds_apart() -> None:
+    times: list[float] = []
+    files = DdsWatch(lambda: frozenset(str(times.append(now))))
+    for now in (1.0, 3.0, 5.9, 6.0, 7.0):
+        files.look(now)
+    assert times == [1.0, 6.0]
+
+
+@pytest.fixture
+def reaches_other_hosts(monkeypatch: pytest.MonkeyPatch) -> None:
+    for name in UNSET:
+        monkeypatch.delenv(name, raising=False)
+
+
+def links_seen(*found: bool) -> list[str]:
+    """Return what looks say, 6 s apart, that find a network or none; the first is the start."""
+    finds = iter(found)
+    links = DdsWatch(has_links=lambda: next(finds))
+    return [links.look(6.0 * number) for number in range(1, len(found))]
+
+
+@pytest.mark.usefixtures('reaches_other_hosts')
+def test_network_that_comes_after_the_start_is_told_of_from_then_on() -> None:
+    assert links_seen(False, False, True) == ['', BEGAN_EARLY]
+    links = DdsWatch(has_links=iter([False, True, False]).__next__)
+    assert [links.look(0.0), links.look(2.0), links.look(60.0)] == [BEGAN_EARLY] * 3
+
+
+@pytest.mark.usefixtures('reaches_other_hosts')
+def test_network_that_was_there_at_the_start_may_come_and_go() -> None:
+    links = DdsWatch(has_links=iter([True]).__next__)
+    assert [links.look(1.0), links.look(60.0)] == ['', '']
+
+
+@pytest.mark.usefixtures('reaches_other_hosts')
+@pytest.mark.parametrize(('name', 'value'), [
+    ('ROS_AUTOMATIC_DISCOVERY_RANGE', 'LOCALHOST'), ('ROS_AUTOMATIC_DISCOVERY_RANGE', 'off'),
+    ('ROS_LOCALHOST_ONLY', '1')])
+def test_process_for_this_host_needs_no_network(
+        monkeypatch: pytest.MonkeyPatch, name: str, value: str) -> None:
+    monkeypatch.setenv(name, value)
+    links = DdsWatch(has_links=iter([False, True]).__next__)
+    assert links.look(1.0) == ''
+
+
+@NEEDS_NAMESPACES
+def test_network_is_a_link_that_is_up_with_a_carrier_and_an_address() -> None:
+    done = subprocess.run(['unshare', '--net', sys.executable, '-c', NETWORK_COMES], check=False,
+                          capture_output=True, text=True, cwd=Path(__file__).parents[2])
+    assert done.stdout.split() == ['False', 'False', 'False', 'True', 'False'], done.stderr
