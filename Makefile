@@ -130,7 +130,7 @@ ros-tools: $(INSTALLED) ## Get ros2 launch, topic, security and the linters of a
 test-ros: $(INSTALLED) ## Run the tests that need these tools; what is missing fails
 	PATH="$(CURDIR)/$(VENV)/bin:$$PATH" ABDF1_ROS_TOOLS=1 \
 	    AMENT_PREFIX_PATH="$(CURDIR)/$(VENV):$${AMENT_PREFIX_PATH:-}" $(TEST_ENV) $(PY) -m pytest \
-	    test/test_ros_tools.py test/test_launch_files.py test/test_ros2_topic.py \
+	    test/test_launch_files.py test/test_ros2_topic.py \
 	    test/test_security_policy.py test/test_ament.py test/examples/test_recorder.py $(PYTEST_ARGS)
 
 .PHONY: lint

@@ -17,7 +17,7 @@
 from pathlib import Path
 
 import pytest
-from support.ros_tools import needs
+from support.ros_tools import are_demanded, found, needs, TOOLS
 
 ROOT = Path(__file__).resolve().parent.parent
 # What is ours; a build or an environment may lie beside it.
@@ -44,3 +44,11 @@ def test_ament_xmllint_finds_nothing_wrong() -> None:
     # package.xml names a schema on a server; that is for those who have the Internet.
     folders = [str(ROOT / name) for name in ('config', 'examples', 'launch')]
     assert needs('ament_xmllint.main').main(argv=folders) == 0
+
+
+def test_which_ros_tools_are_here(capsys: pytest.CaptureFixture[str]) -> None:
+    missing = [name for name in TOOLS if name not in found()]
+    with capsys.disabled():
+        print(f'\nROS tools found: {", ".join(found()) or "none"}; '
+              f'missing: {", ".join(missing) or "none"}')
+    assert not (are_demanded() and missing)

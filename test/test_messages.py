@@ -12,14 +12,16 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The numbered messages: numbers, names and texts are those of the specification."""
+"""The numbered messages and the status counters are those of the specification."""
 
+from abdf1_ros.counters import Counters, numbered
 from abdf1_ros.messages import Event, Message, Severity
 import pytest
 from support.cases import for_all
 from support.vectors import load_tables
 
 SPECIFIED: list[tuple[int, str, str]] = [tuple(row) for row in load_tables()['messages']]
+COUNTERS = [(number, name) for number, name in load_tables()['counters']]
 
 
 def test_exactly_the_specified_messages_exist() -> None:
@@ -71,3 +73,25 @@ def test_text_takes_as_many_arguments_as_it_has_places(message: Message) -> None
      '2521 NTC_NAK_RETRY: NAK Retry #2, due to error 2515')])
 def test_entries_and_events(shown: str | Event, text: str) -> None:
     assert str(shown) == text
+
+
+def test_by_mnemonic_shows_each_counter_under_its_own_name() -> None:
+    counters = Counters()
+    for entry in numbered():
+        setattr(counters, entry.name, entry.metadata['number'])
+    assert list(counters.by_mnemonic().items()) == [(name, number) for number, name in COUNTERS]
+
+
+def test_counters_are_those_of_the_specification_each_described() -> None:
+    assert COUNTERS == [
+        (entry.metadata['number'], entry.metadata['mnemonic']) for entry in numbered()]
+    descriptions = {entry.metadata['description'] for entry in numbered()}
+    assert '' not in descriptions
+    assert len(descriptions) == len(COUNTERS) == 29
+    assert set(Counters().by_mnemonic().values()) == {0}
+    with pytest.raises(AttributeError):
+        setattr(Counters(), 'polls', 1)
+
+
+def test_frames_are_damaged_whichever_check_is_wrong() -> None:
+    assert Counters(bcc_errors=2, crc_errors=3).damaged_frames == 5

@@ -12,16 +12,21 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Slaves that share a line; the rules of one of them are conversations (vectors/)."""
+"""Slaves that share a line, and what one does beside its rules: these are conversations."""
 
 from abdf1_ros.df1.checksum import Checksum
 from abdf1_ros.df1.frames import ACK, EOT, master_frame, message_frame, poll_frame
-from abdf1_ros.df1.machine import Machine
+from abdf1_ros.df1.machine import LineTiming, Machine
 from abdf1_ros.df1.packet import BROADCAST, Packet
 from abdf1_ros.df1.settings import LinkSettings
 from abdf1_ros.df1.slave import HalfDuplexSlave, multidrop
+from abdf1_ros.errors import CommandExpired, CommandTimeout
+import pytest
+from support.multidrop import SlaveBench
 
-COMMAND = Packet(dst=7, src=5, cmd=0x0F, sts=0, tns=0x0102, data=b'\xA2\x01')
+US, MASTER, OTHER = 7, 5, 8
+SETTINGS = LinkSettings(station=US, nak_retries=2)
+FROM_MASTER = Packet(US, MASTER, 0x0F, 0, 0x0102, b'\xA2\x01')
 
 
 class Line:
@@ -60,39 +65,129 @@ class Line:
 
 def test_only_the_addressed_station_answers() -> None:
     line = Line(1, 7, 8)
-    assert line.send(COMMAND) == ACK
+    assert line.send(FROM_MASTER) == ACK
     assert line.say(poll_frame(8)) == EOT
-    assert line.say(poll_frame(7)) == line.frame(COMMAND)
+    assert line.say(poll_frame(7)) == line.frame(FROM_MASTER)
     assert line.say(poll_frame(9)) == b''
     assert line.machine.deadline is None
 
 
 def test_ack_goes_to_the_station_that_spoke() -> None:
-    line, other = Line(7, 8), COMMAND._replace(dst=8)
-    assert (line.send(COMMAND), line.send(other)) == (ACK, ACK)
-    assert line.say(poll_frame(7)) == line.frame(COMMAND)
+    line, other = Line(7, 8), FROM_MASTER._replace(dst=8)
+    assert (line.send(FROM_MASTER), line.send(other)) == (ACK, ACK)
+    assert line.say(poll_frame(7)) == line.frame(FROM_MASTER)
     assert line.say(poll_frame(8)) == line.frame(other)
     assert line.say(ACK) == b''
     assert [slave.counters.acks_received for slave in line.slaves] == [1, 1]
-    assert (line.say(poll_frame(7)), line.say(poll_frame(8))) == (line.frame(COMMAND), EOT)
+    assert (line.say(poll_frame(7)), line.say(poll_frame(8))) == (line.frame(FROM_MASTER), EOT)
 
 
 def test_broadcast_reaches_every_station() -> None:
     line = Line(7, 8)
-    assert line.send(COMMAND._replace(dst=BROADCAST)) == b''
+    assert line.send(FROM_MASTER._replace(dst=BROADCAST)) == b''
     assert line.served == [7, 8]
 
 
 def test_reply_with_an_error_is_counted_once() -> None:
     line = Line(7, sts=0x10)
-    line.send(COMMAND)
-    assert [line.say(poll_frame(7)) for _ in range(2)] == [line.frame(COMMAND)] * 2
+    line.send(FROM_MASTER)
+    assert [line.say(poll_frame(7)) for _ in range(2)] == [line.frame(FROM_MASTER)] * 2
     assert line.slaves[0].counters.error_messages_sent == 1
 
 
 def test_withdraw_does_not_touch_replies() -> None:
     line = Line(7)
-    line.send(COMMAND)
+    line.send(FROM_MASTER)
     line.say(poll_frame(7))
     line.slaves[0].withdraw()
-    assert line.say(poll_frame(7)) == line.frame(COMMAND)
+    assert line.say(poll_frame(7)) == line.frame(FROM_MASTER)
+
+
+def own(tns: int = 1, dst: int = OTHER) -> Packet:
+    """Return a command of our own."""
+    return Packet(dst, US, 0x0F, 0, tns, b'\x67')
+
+
+@pytest.mark.parametrize('sent_before', [0, 1])
+def test_command_that_is_too_old_when_the_port_is_to_have_it_does_not_leave(
+        sent_before: int) -> None:
+    bench = SlaveBench(SETTINGS)
+    task = bench.add(own())
+    task.expires = bench.now + 2.0
+    assert [bench.poll() for _ in range(sent_before)] == [bench.own(own())] * sent_before
+    bench.machine.receive_data(poll_frame(US), bench.now)
+    assert bench.machine.sender.send_before == task.expires
+    bench.machine.withdraw(bench.now + 3.0)  # this process was stopped just then
+    assert bench.machine.data_to_send() == b''
+    assert isinstance(task.result, CommandExpired)
+    assert task.sent is bool(sent_before)
+    counts = bench.counts()
+    assert [counts.get(name, 0) for name in ('messages_sent', 'commands_sent', 'nak_retries')] == [
+        sent_before, sent_before, 0]
+    bench.now += 3.0
+    assert bench.poll() == EOT
+    bench.hear(bench.frame(FROM_MASTER))
+    assert bench.poll() == bench.own(FROM_MASTER.reply())
+
+
+def test_command_whose_reply_has_come_is_not_sent_again() -> None:
+    bench = SlaveBench(SETTINGS)
+    task = bench.add(own())
+    assert bench.poll() == bench.own(own())  # the master takes it, and its ACK gets lost
+    assert bench.hear(bench.frame(own().reply(sts=0x02))) == ACK
+    assert isinstance(task.result, Packet) and task.result.sts == 0x02
+    assert bench.poll() == EOT
+
+
+def test_message_that_just_stops_is_counted_once() -> None:
+    bench = SlaveBench(SETTINGS)
+    assert bench.hear(bench.frame(FROM_MASTER)[:9]) == b''
+    bench.wait(60.0)
+    assert bench.counts()['invalid_messages'] == 1
+    assert bench.hear(bench.frame(FROM_MASTER)) == ACK
+
+
+def test_reply_to_another_node_does_not_make_ours_a_repetition() -> None:
+    bench = SlaveBench(SETTINGS)
+    task = bench.add(own())
+    bench.poll()
+    bench.hear(ACK)
+    assert bench.hear(bench.frame(own().reply()._replace(dst=9), US)) == ACK
+    assert task.result is None
+    assert bench.hear(bench.frame(own().reply())) == ACK
+    assert task.result == own().reply()
+    assert bench.counts().get('duplicate_messages', 0) == 0
+
+
+def test_command_for_a_node_behind_us_is_refused_and_counted() -> None:
+    bench = SlaveBench(SETTINGS)
+    astray = FROM_MASTER._replace(dst=OTHER)
+    assert bench.hear(bench.frame(astray, US)) == ACK
+    assert bench.poll() == bench.own(astray.reply(sts=0x02))
+    assert bench.served == []
+    assert bench.counts()['invalid_messages'] == 1
+
+
+def said_within(bench: SlaveBench, seconds: float) -> list[tuple[float, bytes]]:
+    """Return what the slave says by itself, each with the time from now."""
+    start, end, said = bench.now, bench.now + seconds, []
+    while bench.machine.deadline is not None and bench.machine.deadline <= end:
+        bench.now = bench.machine.deadline
+        bench.machine.handle_timeout(bench.now)
+        if data := bench.machine.data_to_send():
+            said.append((round(bench.now - start, 6), data))
+    bench.now = end
+    return said
+
+
+def test_what_is_overdue_ends_in_time_during_a_long_tx_delay() -> None:
+    bench = SlaveBench(SETTINGS, timing=LineTiming(tx_delay=30.0), cmd_timeout=1.0)
+    task = bench.add(own())
+    bench.poll()
+    assert said_within(bench, 30.1) == [(30.0, bench.own(own()))]
+    bench.hear(ACK)
+    begun = bench.now
+    bench.poll()
+    assert said_within(bench, 29.0) == []
+    assert isinstance(task.result, CommandTimeout)
+    assert task.ended is not None and 1.0 <= task.ended - begun <= 1.26

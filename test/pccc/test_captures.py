@@ -46,8 +46,7 @@ from abdf1_ros.pccc.word_range import commands as word_range
 import pytest
 from support.captures import Capture, CAPTURES
 from support.cases import for_all
-from support.processors import Exchange, exchanges, ML1400, PROCESSORS
-from support.vectors import commands, Vector, without_area
+from support.vectors import commands, Exchange, exchanges, ML1400, PROCESSORS, Vector, without_area
 
 
 def place_of(command: Packet) -> tuple[Address, int] | None:

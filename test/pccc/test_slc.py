@@ -44,8 +44,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 import pytest
 from support.cases import for_all
-from support.processors import ML1400
 from support.tables import ask, counting, table, words_at
+from support.vectors import ML1400
 
 Command = LogicalRead | LogicalWrite | MaskedWrite
 _Found = TypeVar('_Found')

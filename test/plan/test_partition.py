@@ -22,7 +22,7 @@ from abdf1_ros.plan.partition import Candidate, cheapest, CostModel, partition, 
 from hypothesis import given
 from hypothesis import strategies as st
 import pytest
-from support.groupings import groupings
+from support.cases import groupings
 
 COMMAND, WORD, LIMIT = 50.0, 2.0, 110
 COSTS = [COMMAND + WORD * words for words in range(LIMIT + 1)]

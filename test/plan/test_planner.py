@@ -31,8 +31,7 @@ from abdf1_ros.settings.mapping import Mapping
 from hypothesis import given
 from hypothesis import strategies as st
 import pytest
-from support.cases import for_all
-from support.groupings import groupings
+from support.cases import for_all, groupings
 from support.mappings import make_mapping
 
 CHARACTER = 0.001

@@ -15,6 +15,7 @@
 """The link thread, on pseudo-terminals and sockets."""
 
 from collections.abc import Callable
+import inspect
 import itertools
 import math
 import os
@@ -28,6 +29,7 @@ import time
 from abdf1_ros.df1.frames import ACK, Code, Control, EOT, Symbol
 from abdf1_ros.df1.machine import Listen, Rest, Send, Step
 from abdf1_ros.errors import PortLost
+from abdf1_ros.ports.clock import line_time
 from abdf1_ros.ports.descriptor import Port
 from abdf1_ros.ports.link_thread import LinkThread, PortState
 from abdf1_ros.ports.opening import open_port
@@ -304,3 +306,12 @@ def test_machine_runs_on_a_socket_url(link: Link) -> None:
         assert link.state().text == 'the port was lost: the other end has closed the connection'
         again, _ = server.accept()
         again.close()
+
+
+def test_rule_6_clock_counts_a_suspend() -> None:
+    before = time.clock_gettime(time.CLOCK_BOOTTIME)
+    assert before <= line_time() <= time.clock_gettime(time.CLOCK_BOOTTIME)
+
+
+def test_rule_6_link_thread_has_that_clock() -> None:
+    assert inspect.signature(LinkThread).parameters['clock'].default is line_time

@@ -22,8 +22,7 @@ from abdf1_ros.ports.settings import PortSettings
 from abdf1_ros.ports.trace import PortOpener, Trace, TracedPort
 from abdf1_ros.sniffer.capture import CaptureWriter, Chunk, Direction, read_capture
 import pytest
-from support.disks import no_file_longer_than
-from support.ptys import PATIENCE, Pty
+from support.ptys import no_file_longer_than, PATIENCE, Pty
 
 
 class Loop:

@@ -46,6 +46,7 @@ from abdf1_ros.ros.diagnostics.dds import LOST
 from abdf1_ros.ros.diagnostics.events import LineEvents
 from abdf1_ros.ros.diagnostics.guests import GuestsStatus
 from abdf1_ros.ros.diagnostics.line import takes_in_silence
+from abdf1_ros.ros.diagnostics.load import FullLine
 from abdf1_ros.ros.diagnostics.status import message_of, Seen
 from abdf1_ros.ros.diagnostics.statuses import Diagnostics
 from abdf1_ros.ros.diagnostics.watches import watches_of
@@ -804,3 +805,17 @@ def test_monitor_looks_for_values_that_there_are(bench: Bench) -> None:
     assert expected <= bench.details('link').keys()
     assert {*view.STATION_KEYS} <= bench.details('station 1').keys()
     assert 'total' in bench.details('mappings')
+
+
+def test_rows_whose_messages_fill_the_line_are_named_the_fullest_first() -> None:
+    rows = [make_mapping(f'N7:{number}', 'Write', tag=f'w{number}') for number in range(2)]
+    spent = dict.fromkeys(rows, 0.0)
+    line = FullLine(spent)
+    assert line.text(100.0) == ''
+    spent[rows[0]], spent[rows[1]] = 1.0, 3.5
+    assert line.text(104.0) == ''  # it is not looked at all the time
+    assert line.text(105.0) == (
+        'messages fill 90% of the line: w1 (70%), w0 (20%); set Write_Again to leave out '
+        'unchanged values')
+    spent[rows[1]] = 9.0
+    assert line.text(120.0) == ''

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""From bytes to entries: on vectors, whole conversations, and anything else."""
+"""From bytes to entries: on vectors, conversations, recordings, and anything else."""
 
 from collections.abc import Iterable, Iterator
 
@@ -27,6 +27,7 @@ from abdf1_ros.sniffer.entries import Entry, Kind, Mark
 from abdf1_ros.sniffer.traffic import TrafficDecoder
 from hypothesis import given, strategies
 import pytest
+from support.captures import Capture, CAPTURES, FOLDER
 from support.cases import for_all
 from support.conversations import Conversation, CONVERSATIONS
 from support.listeners import heard_by_sniffer, said_by_sniffer
@@ -38,6 +39,7 @@ OUT, IN, UNKNOWN = Direction.OUT, Direction.IN, Direction.UNKNOWN
 COMMAND = Packet(1, 5, 0x0F, 0, 0x1234, bytes.fromhex('A2 04 07 89 00 00'))
 REPLY = COMMAND.reply(bytes.fromhex('34 12 FE FF'))
 WORDS = 'protected typed logical read N7:0, 2 words'
+_BAD = (Kind.DAMAGED, Kind.UNKNOWN, Kind.NOISE)
 
 
 def master(packet: Packet, checksum: Checksum = Checksum.CRC) -> bytes:
@@ -336,3 +338,28 @@ def test_command_of_a_guest_and_its_reply_name_him() -> None:
         for entry in session.feed(chunk)]
     assert [(entry.guest, entry.request) for entry in found] == [
         ('pty:/tmp/hmi', None), ('pty:/tmp/hmi', COMMAND)]
+
+
+@for_all('capture', CAPTURES)
+def test_everything_is_understood_and_the_check_is_found(capture: Capture) -> None:
+    session = TrafficDecoder()
+    entries = [entry for chunk in capture.chunks for entry in session.feed(chunk)]
+    assert session.kind.checksum is capture.check
+    by_radio = capture.name.startswith('radio')
+    assert (session.kind.duplex is Duplex.RADIO) is by_radio
+    bad = [entry for entry in entries if entry.kind in _BAD or entry.valid is False]
+    assert len(bad) == (2 if by_radio else 0)
+
+
+def test_who_sent_what_on_by_radio() -> None:
+    capture, = (entry for entry in CAPTURES if entry.name.startswith('radio'))
+    marked = {mark: [entry for entry in capture.entries if mark in entry.marks] for mark in Mark}
+    assert {mark.name: len(found) for mark, found in marked.items() if found} == {
+        'RETRANSMISSION': 5, 'FORWARDED': 38}  # one came before the mode was known
+    for entry in marked[Mark.FORWARDED]:
+        assert ', sent on by 9: ' in entry.text
+    assert {entry.packet and entry.packet.src for entry in marked[Mark.RETRANSMISSION]} == {5}
+
+
+def test_every_recorded_file_is_in_the_index() -> None:
+    assert {path.stem for path in FOLDER.glob('*.cap')} == {entry.name for entry in CAPTURES}

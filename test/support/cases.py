@@ -12,16 +12,19 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Many cases of plain data in one test."""
+"""Many cases of plain data in one test, and searches that leave nothing out."""
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 import functools
 import inspect
-from typing import Any
+import itertools
+from typing import Any, TypeVar
 
 from _pytest.mark import ParameterSet
 from hypothesis import strategies as st
 import pytest
+
+_Item = TypeVar('_Item')
 
 ANY_CHARACTER = st.characters(exclude_categories=())
 """Without a class left out hypothesis needs no table of all characters, which takes it seconds."""
@@ -67,3 +70,16 @@ def long_unless(is_quick: Callable[..., bool], cases: Iterable[tuple[Any, ...]],
 def _shown(case: dict[str, Any]) -> str:
     return ', '.join(f'{name} = {getattr(value, "name", None) or repr(value)}'
                      for name, value in case.items())
+
+
+def groupings(items: Sequence[_Item]) -> Iterator[list[list[_Item]]]:
+    """Yield every way to put ``items``, all different, into groups."""
+    if not items:
+        yield []
+        return
+    head, *rest = items
+    for size in range(len(rest) + 1):
+        for others in itertools.combinations(rest, size):
+            left = [item for item in rest if item not in others]
+            for groups in groupings(left):
+                yield [[head, *others], *groups]

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The frames of vectors/, with types, and the tables of the driver's specification."""
+"""Frames and processors of vectors/, with types, and tables of the driver's specification."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -155,3 +155,30 @@ def _captured() -> Iterator[Captured]:
 
 
 CAPTURED = tuple(_captured())
+
+
+PROCESSORS: list[dict[str, Any]] = load_json('processors.json')['processors']
+
+
+@dataclass(frozen=True, slots=True)
+class Exchange:
+    """A command and its reply, without link header."""
+
+    meaning: str
+    command: Packet
+    reply: Packet
+
+
+def exchanges(name: str) -> list[Exchange]:
+    """Return what a processor has been asked, and has answered."""
+    entry = next(processor for processor in PROCESSORS if processor['name'] == name)
+    found = []
+    for exchange in entry['exchanges']:
+        raw = bytes.fromhex(exchange['command'])
+        command = Packet(1, 0, raw[0], 0, 7, raw[1:])
+        reply = command.reply(bytes.fromhex(exchange['data']), int(exchange['sts'], 16))
+        found.append(Exchange(exchange['meaning'], command, reply))
+    return found
+
+
+ML1400 = exchanges('micrologix_1400')

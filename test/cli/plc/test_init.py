@@ -34,11 +34,11 @@ from abdf1_ros.problems import ConfigurationError
 from abdf1_ros.settings.map_file import load_mappings
 from abdf1_ros.settings.network import load_network, Network
 import pytest
-from support.disks import no_file_longer_than
 from support.driver_bench import simulated_plc, store, stored
 from support.mappings import cell_of
 from support.odd_device import OddDevice, Wiring
 from support.plc_line import LosesPolls, odd_line, plc_line
+from support.ptys import no_file_longer_than
 
 PATIENT = ('--timeout', '2000', '--duplex', 'half')  # ms; a busy host may be late
 
