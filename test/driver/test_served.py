@@ -12,12 +12,13 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The words of Serve rows: what the other end reads and writes, and who hears of it."""
+"""The words of Serve rows: what the other end reads and writes, and what is refused to it."""
 
 from collections.abc import Sequence
 from dataclasses import replace
 
 from abdf1_ros.df1.packet import Packet
+from abdf1_ros.driver.refused import RefusedCommands
 from abdf1_ros.driver.served import Served
 from abdf1_ros.pccc import families
 from abdf1_ros.pccc.access import Access
@@ -26,11 +27,13 @@ from abdf1_ros.pccc.emulated import EmulatedProcessor
 from abdf1_ros.pccc.families import dialect_of, parse_address
 from abdf1_ros.pccc.file_types import PlcType
 from abdf1_ros.settings.mapping import Mapping
+from abdf1_ros.settings.network import Network
 from abdf1_ros.settings.rows import Rows
 from hypothesis import given
 from hypothesis import strategies as st
 import pytest
 from support.cases import for_all
+from support.driver_bench import DriverBench
 from support.mappings import cell_of, load_rows, make_mapping
 
 STATION = 5
@@ -400,3 +403,36 @@ def test_topic_of_a_serve_row_has_no_other_reader_and_writers_of_its_length_only
         '(line 2, tag "a")']
     _, problems = loaded('a,Serve,N7:50,5,PLC5,4,,x,,,,', 'b,Write,N7:0,1,PLC5,4,,x,,,,')
     assert problems == []
+
+
+def write(element: int, value: int = 1, src: int = 1) -> Packet:
+    """Return a typed write of one word to N7."""
+    data = bytes((0xAA, 2, 7, 0x89, element, 0, value, 0))
+    return Packet(5, src, 0x0F, 0, 1, data)
+
+
+def test_other_values_and_later_times_are_the_same_command() -> None:
+    refused = RefusedCommands(PlcType.SLC)
+    for now in range(3):
+        refused.add(write(0, now), write(0).reply(sts=0x10), float(now))
+    refused.add(write(0), write(0).reply(), 3.0)  # is not refused
+    (text, count), = refused.counted().items()
+    assert (text.startswith('station 1: '), ' N7:0: STS 10: ' in text, count) == (True, True, 3)
+    assert refused.lately(61.9) == [text]
+    assert refused.lately(62.0) == []
+
+
+def test_flood_of_different_commands_is_bounded() -> None:
+    refused = RefusedCommands(PlcType.PLC5)
+    for element in range(200):
+        refused.add(write(element), write(element).reply(b'\x06', 0xF0), 0.0)
+    assert len(refused.counted()) == 8
+    assert 'STS F0 EXT STS 06' in refused.lately(0.0)[0]
+
+
+def test_driver_keeps_what_it_refuses() -> None:
+    bench = DriverBench([make_mapping('N7:0', 'Serve', station=5, plc='SLC')],
+                        network=Network(plc_type='SLC'))
+    assert [bench.driver.serve(write(element)).sts for element in (0, 9)] == [0, 0x50]
+    text, = bench.driver.refused.counted()
+    assert ' N7:9: STS 50: ' in text

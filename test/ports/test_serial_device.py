@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Serial devices: how they are opened, damaged characters, counts, and the end."""
+"""Serial devices: how they are listed and opened, damaged characters, counts, and the end."""
 
 from collections.abc import Callable
 import errno
@@ -22,11 +22,12 @@ from pathlib import Path
 import stat
 import struct
 import termios
+from types import SimpleNamespace
 from typing import Any
 
 from abdf1_ros.df1.frames import Damaged
 from abdf1_ros.line_names import number_of
-from abdf1_ros.ports import serial_device
+from abdf1_ros.ports import listing, serial_device
 from abdf1_ros.ports.opening import open_port
 from abdf1_ros.ports.ownership import own
 from abdf1_ros.ports.serial_device import mark_damage, SerialDevice
@@ -304,3 +305,24 @@ def test_settings_that_another_program_changes_are_a_lost_port(
     assert pty.read(1) == b'\x03'
     port.close()
     os.close(theirs)
+
+
+def _port(device: str, description: str = 'n/a', hwid: str = 'n/a') -> SimpleNamespace:
+    return SimpleNamespace(device=device, name=Path(device).name, description=description,
+                           hwid=hwid)
+
+
+def test_adapters_come_first_with_a_name_that_stays(
+        tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    device = tmp_path / 'ttyUSB0'
+    device.touch()
+    (tmp_path / 'by-id').mkdir()
+    link = tmp_path / 'by-id' / 'usb-adapter'
+    link.symlink_to(device)
+    monkeypatch.setattr(listing, 'BY_ID', tmp_path / 'by-id')
+    monkeypatch.setattr(listing.list_ports, 'comports', lambda: [
+        _port('/dev/ttyAMA0', 'ttyAMA0', 'PNP'), _port('/dev/ttyS31'),
+        _port(str(device), 'FT232R USB UART', 'USB VID:PID=0403:6001')])
+    first, second = listing.serial_ports()
+    assert (first.stable, first.adapter, first.may_open) == (str(link), 'FT232R USB UART', True)
+    assert (second.device, second.adapter, second.may_open) == ('/dev/ttyAMA0', '', False)
