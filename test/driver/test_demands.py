@@ -50,10 +50,12 @@ class Line(DriverBench):
         store(self.there, 'N7:0', range(200, 210))
         self.run(run)
 
-    def ask(self, mapping: Mapping) -> None:
+    def ask(self, mapping: Mapping, run: float = 0.0) -> None:
         self.driver.read_now(mapping, self.clock(), lambda answer: self.answers.append(
             (self.clock(), mapping, answer)))
         self.line.wake(self.driver.machine)
+        if run:
+            self.run(run)
 
     @property
     def errors(self) -> list[str]:
@@ -75,8 +77,7 @@ def test_row_on_demand_takes_no_line_time_until_a_call_asks_for_it() -> None:
     before = line.packets
     assert line.listener.values(RECIPE) == []
     assert line.driver.points[RECIPE].freshness(line.clock()) is Freshness.FRESH
-    line.ask(RECIPE)
-    line.run(0.2)
+    line.ask(RECIPE, run=0.2)
     assert line.packets == before + 1
     (when, _, answer), = line.answers
     assert values_of(answer) == [*range(200, 210)]
@@ -91,8 +92,7 @@ def test_row_that_is_read_seldom_is_read_at_once() -> None:
     line = Line(SPEED, run=6.0)
     store(line.there, 'N12:0', [77])
     begun = line.clock()
-    line.ask(SPEED)
-    line.run(0.2)
+    line.ask(SPEED, run=0.2)
     (when, _, answer), = line.answers
     assert (values_of(answer), when < begun + 0.1) == ([77], True)
     assert line.listener.reads[-1][2] == [77]
@@ -101,8 +101,7 @@ def test_row_that_is_read_seldom_is_read_at_once() -> None:
 def test_row_that_was_asked_for_keeps_its_period_afterwards() -> None:
     line = Line(SPEED, make_mapping('N12:1', period=500), run=6.2)
     before = len(line.listener.values(SPEED))
-    line.ask(SPEED)
-    line.run(4.5)
+    line.ask(SPEED, run=4.5)
     assert len(line.listener.values(SPEED)) - before == 1
 
 
@@ -113,8 +112,7 @@ def test_answer_is_never_older_than_the_call() -> None:
     line.run(0.03)  # its command is on the line
     store(line.there, 'N12:0', [78])
     asked = line.clock()
-    line.ask(SPEED)
-    line.run(0.5)
+    line.ask(SPEED, run=0.5)
     assert [values_of(answer) for _, _, answer in line.answers][-1] == [78]
     assert line.answers[-1][2].read > asked
 
@@ -135,8 +133,7 @@ def test_long_table_is_read_packet_by_packet() -> None:
     line = Line(TABLE)
     before = line.packets
     store(line.there, 'N9:0', range(300))
-    line.ask(TABLE)
-    line.run(2.0)
+    line.ask(TABLE, run=2.0)
     assert [values_of(answer) for _, _, answer in line.answers] == [[*range(300)]]
     assert line.packets == before + 3
 
@@ -176,8 +173,7 @@ def test_full_line_answers_a_call_soon() -> None:
     line = Line(*rows, SPEED, run=10.0)
     for _ in range(20):
         begun = line.clock()
-        line.ask(SPEED)
-        line.run(1.0)
+        line.ask(SPEED, run=1.0)
         assert line.answers[-1][0] - begun < 0.4, line.answers[-1]
 
 
@@ -188,16 +184,14 @@ def test_silent_station_is_answered_at_once_and_takes_nothing() -> None:
     assert not line.driver.stations[1].active
     begun, sent = line.clock(), line.driver.counters.chars_sent
     line.ask(RECIPE)
-    line.ask(SPEED)
-    line.run(0.01)
+    line.ask(SPEED, run=0.01)
     assert [error[:4] for error in line.errors] == [INACTIVE] * 2
     assert {when for when, _, _ in line.answers} == {begun}
     assert line.driver.counters.chars_sent - sent < 40
     line.there.faults.silent = False
     line.run(20.0)
     assert line.listener.values(RECIPE) == []  # its call is over
-    line.ask(RECIPE)
-    line.run(0.5)
+    line.ask(RECIPE, run=0.5)
     assert line.errors[-1] == ''
 
 
@@ -213,14 +207,12 @@ def test_station_that_dies_during_the_read_is_told() -> None:
     for row in (RECIPE, SPEED, TABLE):
         line = Line(row, run=6.0)
         line.there.faults.silent = True
-        line.ask(row)
-        line.run(30.0)
+        line.ask(row, run=30.0)
         (when, _, answer), = line.answers
         assert answer.error[:4] in (INACTIVE, '2508')
         line.there.faults.silent = False
         line.run(10.0)
-        line.ask(row)
-        line.run(1.0)
+        line.ask(row, run=1.0)
         assert line.errors[-1] == ''
         assert line.driver.points[row].freshness(line.clock()) is Freshness.FRESH
 
@@ -228,8 +220,7 @@ def test_station_that_dies_during_the_read_is_told() -> None:
 def test_refusal_is_told_with_its_number_and_the_row_stays_failed() -> None:
     missing = make_mapping('N99:0', length=4, is_on_demand=True)
     line = Line(missing, SPEED)
-    line.ask(missing)
-    line.run(1.0)
+    line.ask(missing, run=1.0)
     assert 'STS' in line.errors[0]
     assert line.driver.points[missing].freshness(line.clock()) is Freshness.FAILED
     before = line.packets

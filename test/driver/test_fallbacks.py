@@ -150,8 +150,7 @@ def test_rule_11_first_tries_go_first_then_plcs_that_answer() -> None:
 
 def test_rule_7_message_refreshes_from_its_own_time_when_it_is_confirmed() -> None:
     cell, speed = speed_cell()
-    cell.bench.driver.write([speed], [3], cell.now - 0.3)
-    cell.bench.line.wake(cell.bench.driver.machine)
+    cell.bench.write(speed, [3], age=0.3)
     begun = cell.now
     cell.run(1.0)
     assert cell.written('N7:0') == [7, 3, 7]
@@ -200,9 +199,7 @@ def test_rule_7_fallback_waits_no_longer_for_a_message_that_has_expired(
 
 def test_rule_7_message_that_is_older_than_fallback_after_is_not_sent() -> None:
     cell, speed = speed_cell()
-    cell.bench.driver.write([speed], [3], cell.now - 0.6)
-    cell.bench.line.wake(cell.bench.driver.machine)
-    cell.run(1.0)
+    cell.bench.write(speed, [3], run=1.0, age=0.6)
     assert cell.written('N7:0') == [7]
     assert cell.results() == [
         START, 'not written: not sent: waited longer than 0.5 s for the line']
@@ -309,8 +306,7 @@ def test_rule_8_message_that_is_lost_with_the_port_is_not_waited_for() -> None:
     assert row.judge(cell.now, cell.now) is False  # it is waited for
     cell.bench.lose_port()
     cell.bench.far.hear = hear
-    cell.bench.open()
-    cell.run(row.refreshed + 5.0 - cell.now - 0.05)
+    cell.bench.open(run=row.refreshed + 5.0 - cell.now - 0.05)
     assert cell.word('N7:0') == 3
     cell.run(0.1)
     assert cell.word('N7:0') == 7
@@ -323,8 +319,7 @@ def test_rule_9_messages_that_wait_end_when_the_fallback_goes_out(
     driver, run = cell.bench.driver, cell.bench.driver.link.run
     monkeypatch.setattr(driver.link, 'run', lambda source: (
         driver.write([speed], [3], 0.0), run(source))[1])
-    cell.bench.open()
-    cell.run(1.0)
+    cell.bench.open(run=1.0)
     assert cell.written('N7:0') == [7]
     assert cell.results() == ['not written: not sent: fallback', START]
 
@@ -332,9 +327,7 @@ def test_rule_9_messages_that_wait_end_when_the_fallback_goes_out(
 def test_rule_9_second_packet_of_a_message_is_not_sent_when_its_fallback_is_due() -> None:
     speed = speed_row(Fallback((7,) * 200, int(AFTER * 1000)), length=200)
     cell = Cell(speed, run=1.0)
-    cell.bench.driver.write([speed], [3] * 200, cell.now - AFTER + 0.01)
-    cell.bench.line.wake(cell.bench.driver.machine)
-    cell.run(1.0)
+    cell.bench.write(speed, [3] * 200, run=1.0, age=AFTER - 0.01)
     assert cell.written('N7:0') == [7, 7, 3, 7, 7]  # two packets each, but the message
     assert cell.results()[1:] == [
         'only partly written: too old to be sent (after 1 of 2 packets were written)', TIMEOUT]
@@ -383,8 +376,7 @@ def test_rule_10_fallback_of_two_packets_does_not_wait_for_itself() -> None:
     cell = Cell(speed_row(Fallback((7,) * 200, int(AFTER * 1000)), length=200), run=1.0)
     cell.bench.lose_port()
     cell.run(1.0)
-    cell.bench.open()
-    cell.run(1.0)
+    cell.bench.open(run=1.0)
     assert cell.results() == [START, RETURN]
 
 
@@ -520,8 +512,7 @@ def test_rule_10_first_try_is_not_held_up_by_the_pause_of_another_row() -> None:
                            fallback=Fallback((7,), 500 + 100 * number)) for number in range(2)]
     for offset in range(10):  # the pauses begin with the retries, a second before they end
         cell = Cell(*speeds, start=False)
-        cell.put_behind_gateway()
-        cell.run(7.0 + 0.1 * offset)
+        cell.put_behind_gateway(run=7.0 + 0.1 * offset)
         for speed in speeds:
             cell.bench.write(speed, [5])
             cell.run(0.1)
@@ -534,8 +525,7 @@ def test_rule_10_first_try_is_not_held_up_by_the_pause_of_another_row() -> None:
 def test_rule_10_pause_of_this_process_is_no_pause_of_a_gateway() -> None:
     speed = make_mapping('N7:0', 'Write', tag='speed', fallback=FALLBACK, via=7)
     cell = Cell(speed, start=False)
-    cell.put_behind_gateway()
-    cell.run(6.0)
+    cell.put_behind_gateway(run=6.0)
     cell.publish(speed, 42, run=0.1)
     row, = cell.bench.driver.interlocks.fallbacks
     cell.is_undelivered = lambda command: True

@@ -260,9 +260,7 @@ def test_rule_3d_message_that_a_fallback_has_overruled_does_not_count() -> None:
     assert set(cell.written('N10:0')) == {0}
     row = cell.bench.driver.interlocks.fallbacks[0]
     row.sent = cell.now
-    cell.bench.driver.write([speed], [3], cell.now - 0.1)
-    cell.bench.line.wake(cell.bench.driver.machine)
-    cell.run(1.0)
+    cell.bench.write(speed, [3], run=1.0, age=0.1)
     assert cell.results()[-1] == 'not written: not sent: fallback'
     assert set(cell.written('N10:0')) == {0}
 

@@ -112,8 +112,7 @@ def test_rule_5_end_waits_for_the_second_write_of_rule_10(is_followed: bool) -> 
     """A gateway delivers 0.9 s later what it has called undelivered."""
     speed = make_mapping('N7:0', 'Write', tag='speed', fallback=FALLBACK, via=7)
     cell = Cell(speed, start=False)
-    cell.put_behind_gateway()
-    cell.run(6.0)
+    cell.put_behind_gateway(run=6.0)
 
     def is_held(command: Packet) -> bool:
         if command.data[-2:] != b'\x2a\x00':
@@ -145,8 +144,7 @@ def test_rule_5_end_asks_a_silent_plc_at_once_where_another_answers() -> None:
     cell = Cell(beat_row(), speed, make_mapping('N7:9', station=2, period=100),
                 polling='Standard', start=False)
     cell.bench.plc(2, 'PLC5', ('N7:0', 20))
-    cell.bench.open()
-    cell.run(1.0)
+    cell.bench.open(run=1.0)
     cell.publish(speed, 42, times=20, run=1.95)
     cell.plc.faults.silent = True
     cell.bench.at(cell.now + 1.0, lambda: setattr(cell.plc.faults, 'silent', False))

@@ -61,8 +61,7 @@ def test_rule_5_write_of_a_guest_that_a_gateway_holds_does_not_stay(
     speed = make_mapping('N7:0', 'Write', tag='speed', fallback=FALLBACK, via=7)
     beat = make_mapping('N10:0', 'Heartbeat', tag='beat', period=200, via=7)
     cell = GuestCell(beat, speed, start=False)
-    cell.put_behind_gateway()
-    cell.run(4.0)
+    cell.put_behind_gateway(run=4.0)
     cell.hold_guests(held)
     cell.ask(text, 99)
     cell.run(0.02)
@@ -74,8 +73,7 @@ def test_rule_5_write_of_a_guest_that_a_gateway_holds_does_not_stay(
 def test_rule_5_what_may_still_land_after_the_end_is_named() -> None:
     speed = make_mapping('N7:0', 'Write', tag='speed', fallback=FALLBACK, via=7)
     cell = GuestCell(speed, start=False, cmd_timeout=10_000)
-    cell.put_behind_gateway()
-    cell.run(30.0)
+    cell.put_behind_gateway(run=30.0)
     cell.hold_guests(1.9)
     cell.ask('N7:0', 99)
     cell.run(0.02)
@@ -111,8 +109,7 @@ def test_rule_19_own_heartbeats_that_a_gateway_holds_are_no_other_program(
         held: float, count: int) -> None:
     beat = make_mapping('N10:0', 'Heartbeat', tag='beat', period=200, via=7)
     cell = Cell(beat, start=False)
-    cell.put_behind_gateway()
-    cell.run(5.0)
+    cell.put_behind_gateway(run=5.0)
     left = [count]
 
     def is_meant(command: Packet) -> bool:
@@ -130,8 +127,7 @@ def test_rule_19_own_heartbeats_that_a_gateway_holds_are_no_other_program(
 def test_rule_2_plc_behind_a_gateway_that_answers_at_all_is_a_first_contact(
         outcome: Outcome) -> None:
     cell = Cell(make_mapping('N10:0', 'Heartbeat', tag='beat', period=200, via=7), start=False)
-    cell.put_behind_gateway()
-    cell.run(3.0)
+    cell.put_behind_gateway(run=3.0)
     plc = cell.bench.driver.interlocks.plcs[1]
     beat, = plc.heartbeats
     assert not beat.wants_zero

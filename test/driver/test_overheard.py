@@ -65,6 +65,12 @@ def row(text: str = 'N7:0', length: int = 2, **cells: object) -> Mapping:
     return make_mapping(text, plc='SLC', length=length, period=500, **cells)  # type: ignore
 
 
+def listening(**settings: int) -> tuple[ListeningBench, Mapping]:
+    """Return a bench with a row of four words, and the row."""
+    mapping = row(length=4)
+    return ListeningBench([mapping], **settings), mapping
+
+
 def point_of(bench: ListeningBench, mapping: Mapping) -> Freshness:
     return bench.driver.points[mapping].freshness(bench.now)
 
@@ -135,8 +141,7 @@ def test_numbers_that_tell_nothing_are_forgotten_with_their_commands() -> None:
 
 
 def test_reply_counts_only_with_its_command() -> None:
-    mapping = row(length=4)
-    bench = ListeningBench([mapping])
+    bench, mapping = listening()
     asked, answered = frame(command(7, READ_N7_0), 1), frame(reply(7, VALUES))
     bench.hear(answered)  # the command was said before we listened
     bad = bytearray(asked)
@@ -158,8 +163,7 @@ def test_reply_counts_only_with_its_command() -> None:
     b'\x10\x02\x01\x00\x0F\x00\x07\x00\xA2\x10\x03\x00\x00',  # a frame with a wrong check
     b'\xAA\x55\xAA\x55', Damaged(b'A'), b'\x10\x02\x01\x05'])
 def test_damage_between_command_and_reply_makes_it_unsure(between: bytes) -> None:
-    mapping = row(length=4)
-    bench = ListeningBench([mapping])
+    bench, mapping = listening()
     # A master that never changes its number: what was damaged may have been another command.
     bench.hear(frame(command(7, READ_N7_0), 1))
     bench.hear(ACK)
@@ -171,8 +175,7 @@ def test_damage_between_command_and_reply_makes_it_unsure(between: bytes) -> Non
 
 
 def test_a_glitch_of_a_transmitter_does_no_harm() -> None:
-    mapping = row(length=4)
-    bench = ListeningBench([mapping])
+    bench, mapping = listening()
     bench.hear(frame(command(7, READ_N7_0), 1))
     bench.hear(b'\x00')
     bench.hear(frame(reply(7, VALUES)))
@@ -180,8 +183,7 @@ def test_a_glitch_of_a_transmitter_does_no_harm() -> None:
 
 
 def test_repeated_reply_does_not_renew_the_age() -> None:
-    mapping = row(length=4)
-    bench = ListeningBench([mapping])
+    bench, mapping = listening()
     exchange(bench, 7, READ_N7_0, VALUES)
     for _ in range(20):  # the master has not acknowledged it
         bench.hear(poll(1), after=0.05)
@@ -192,8 +194,7 @@ def test_repeated_reply_does_not_renew_the_age() -> None:
 
 
 def test_master_that_never_changes_its_number_is_heard() -> None:
-    mapping = row(length=4)
-    bench = ListeningBench([mapping])
+    bench, mapping = listening()
     for _ in range(3):
         exchange(bench, 7, READ_N7_0, VALUES)
         exchange(bench, 7, 'A2 08 09 89 00 00', '09 00 09 00 09 00 09 00')
@@ -201,8 +202,7 @@ def test_master_that_never_changes_its_number_is_heard() -> None:
 
 
 def test_reply_that_comes_too_late_is_not_new() -> None:
-    mapping = row(length=4)
-    bench = ListeningBench([mapping], cmd_timeout=500)
+    bench, mapping = listening(cmd_timeout=500)
     bench.hear(frame(command(7, READ_N7_0), 1))
     bench.hear(frame(reply(7, VALUES)), after=0.6)
     assert bench.values(mapping) == []
@@ -234,16 +234,14 @@ def test_overheard_write_makes_a_value_unknown_until_the_next_read() -> None:
     (255, WRITE_N7_1, 0x0F), (1, 'AA 02 07 85 01 00', 0x0F), (1, '80 07', 0x0F),
     (1, '02 00 2A 00', 0x08)])
 def test_commands_that_may_have_changed_a_value(station: int, asked: str, cmd: int) -> None:
-    mapping = row(length=4)
-    bench = ListeningBench([mapping])
+    bench, mapping = listening()
     exchange(bench, 7, READ_N7_0, VALUES)
     bench.hear(frame(command(8, asked, station=station, cmd=cmd), station))
     assert point_of(bench, mapping) is Freshness.FAILED
 
 
 def test_refused_read_fills_nothing() -> None:
-    mapping = row(length=4)
-    bench = ListeningBench([mapping])
+    bench, mapping = listening()
     exchange(bench, 7, READ_N7_0, '', sts=0x10)
     assert bench.values(mapping) == []
 
@@ -302,8 +300,7 @@ def test_stations_come_and_go_as_they_are_heard() -> None:
 
 
 def test_what_lay_in_a_buffer_while_the_process_stood_still_is_dropped() -> None:
-    mapping = row(length=4)
-    bench = ListeningBench([mapping])
+    bench, mapping = listening()
     bench.hear(frame(command(7, READ_N7_0), 1))
     bench.now += 5.0
     bench.machine.handle_timeout(bench.now)
@@ -317,8 +314,7 @@ def test_what_lay_in_a_buffer_while_the_process_stood_still_is_dropped() -> None
 
 
 def test_port_that_was_lost_begins_anew() -> None:
-    mapping = row(length=4)
-    bench = ListeningBench([mapping])
+    bench, mapping = listening()
     bench.hear(frame(command(7, READ_N7_0), 1))
     bench.machine.start(bench.now)
     bench.hear(frame(reply(7, VALUES)))

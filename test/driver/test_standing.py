@@ -59,15 +59,10 @@ class Line(DriverBench):
             self.executed.append(self.clock())
         return reply._replace(tns=reply.tns ^ 0x8000) if self.is_late else reply
 
-    def say(self, row: Mapping, values: Sequence[float] | str, run: float = 0.0) -> None:
-        self.driver.write([row], values, self.clock())
-        self.line.wake(self.driver.machine)
-        self.run(run)
-
     def keep_saying(self, row: Mapping, values: Sequence[float] | str, seconds: float,
                     rate: float = 50.0) -> None:
         for number in range(int(rate * seconds)):
-            self.at(self.clock() + number / rate, lambda: self.say(row, values))
+            self.at(self.clock() + number / rate, lambda: self.write(row, values))
 
     def load(self, seconds: float) -> float:
         """Let time pass; return the part of it in which characters were on the line."""
@@ -117,10 +112,10 @@ def test_change_goes_at_once() -> None:
     line.run(3.0)
     assert line.outcomes[-1] is STANDS
     begun = line.clock()
-    line.say(WORD, [8], run=0.2)
+    line.write(WORD, [8], run=0.2)
     assert line.outcomes[-1] is WRITTEN
     assert line.executed[-1] - begun < 0.1
-    line.say(WORD, [7], run=0.2)
+    line.write(WORD, [7], run=0.2)
     assert line.outcomes[-1] is WRITTEN
 
 
@@ -164,8 +159,8 @@ def test_other_write_of_the_words_ends_it(how: str) -> None:
     line.keep_saying(WORD, [7], 1.0)
     line.run(1.1)
     assert line.outcomes[-1] is STANDS
-    line.say(other, [9] * other.length)
-    line.say(WORD, [7], run=0.5)
+    line.write(other, [9] * other.length)
+    line.write(WORD, [7], run=0.5)
     assert line.outcomes[-1] is WRITTEN
     assert stored(line.there, 'N7:0') == b'\x07\x00'
 
@@ -178,7 +173,7 @@ def test_neighbour_bits_do_not_disturb_each_other() -> None:
     line.keep_saying(rows[1], [0], 2.0)
     line.run(2.0)
     del line.listener.results[:]
-    line.say(rows[1], [1], run=0.5)
+    line.write(rows[1], [1], run=0.5)
     assert [result.outcome for result in line.listener.results if result.mapping is rows[0]][
         5:] == [STANDS] * (len(line.listener.results) - 6)
 
@@ -188,11 +183,11 @@ def test_unconfirmed_write_and_what_follows_prove_nothing() -> None:
     line.keep_saying(WORD, [7], 1.0)
     line.run(1.1)
     line.is_late = True
-    line.say(WORD, [8], run=2.5)
+    line.write(WORD, [8], run=2.5)
     line.is_late = False
     line.run(2.0)
     del line.listener.results[:]
-    line.say(WORD, [8], run=0.3)
+    line.write(WORD, [8], run=0.3)
     assert line.outcomes == [WRITTEN]
 
 
@@ -230,7 +225,7 @@ def test_station_that_was_away_gets_the_value_again() -> None:
     line.there.faults.silent = False
     line.run(10.0)
     del line.listener.results[:]
-    line.say(row, [7], run=0.5)
+    line.write(row, [7], run=0.5)
     assert line.outcomes == [WRITTEN]
 
 
@@ -240,7 +235,7 @@ def test_text_and_read_write_rows_stand_too() -> None:
     line.keep_saying(text, 'on', 2.0)
     line.run(2.1)
     assert line.outcomes[-1] is STANDS
-    line.say(text, 'off', run=0.5)
+    line.write(text, 'off', run=0.5)
     assert line.outcomes[-1] is WRITTEN
 
 
@@ -267,9 +262,7 @@ def test_message_that_stands_feeds_its_fallback_from_when_it_was_published() -> 
     cell = Cell(row, READ, run=3.0)
     bench = cell.bench
     bench.write(row, [7], run=0.5)
-    bench.driver.write([row], [7], cell.now - 0.4)
-    bench.line.wake(bench.driver.machine)
-    cell.run(0.5)
+    bench.write(row, [7], run=0.5, age=0.4)
     assert bench.listener.outcomes()[-1] is STANDS
     cell.run(0.2)
     assert bench.listener.outcomes()[-1] is Outcome.FALLBACK

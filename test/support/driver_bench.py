@@ -253,9 +253,10 @@ class DriverBench:
         """Do something at a moment of the clock, while ``run`` lets time pass."""
         heapq.heappush(self._actions, (when, next(self._count), action))
 
-    def write(self, mapping: Mapping, values: Sequence[float] | str, run: float = 0.0) -> None:
-        """Ask for a write, as the node does; let so many seconds pass."""
-        self.driver.write([mapping], values, self.line.now)
+    def write(self, mapping: Mapping, values: Sequence[float] | str, run: float = 0.0,
+              age: float = 0.0) -> None:
+        """Hand over a message of so many seconds, as the node does; let seconds pass."""
+        self.driver.write([mapping], values, self.line.now - age)
         self.line.wake(self.driver.machine)
         if run:
             self.run(run)

@@ -71,17 +71,16 @@ class Cell:
         self.writes: list[tuple[float, str, int]] = []
         self.bench.breathe()
         if start:
-            self.bench.open()
-            self.run(run)
+            self.bench.open(run=run)
 
     @property
     def now(self) -> float:
         return self.bench.clock()
 
-    def put_behind_gateway(self) -> None:
-        """Let station 7 answer for the PLC, and open the port."""
+    def put_behind_gateway(self, run: float = 0.0) -> None:
+        """Let station 7 answer for the PLC, and open the port; let so many seconds pass."""
         self.plc.slave, self.plc.station = HalfDuplexSlave(LinkSettings(station=7), self._serve), 7
-        self.bench.open()
+        self.bench.open(run=run)
 
     def _serve(self, command: Packet) -> Packet:
         if self.is_undelivered(command):
@@ -160,8 +159,7 @@ class GuestCell(Cell):
         super().__init__(*rows, start=False, polling=polling, cmd_timeout=cmd_timeout)
         self.replies: list[int] = []
         if start:
-            self.bench.open()
-            self.run(run)
+            self.bench.open(run=run)
 
     def ask(self, text: str, value: int, dst: int = 1) -> None:
         """Let the guest write a word."""
