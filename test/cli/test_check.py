@@ -14,12 +14,12 @@
 
 """The command ``check``: every error of both files, the plan, and the exit status."""
 
+from collections.abc import Callable, Sequence
 import json
 from pathlib import Path
 import shlex
 import subprocess
 import sys
-from typing import Any
 
 from abdf1_ros.cli.check import main
 from abdf1_ros.paths import config_file
@@ -42,20 +42,23 @@ def files(tmp_path: Path) -> Paths:
     return tmp_path / 'net.csv', tmp_path / 'map.csv'
 
 
-def check(files: Paths, net: str, rows: tuple[str, ...], *options: str) -> int:
-    write_csv(files[0], NET_HEADER, [net])
-    write_csv(files[1], MAP_HEADER, rows)
-    return main([*map(str, files), *options])
+Check = Callable[..., str]
 
 
-def parsed(capsys: Output) -> dict[str, Any]:
-    content: dict[str, Any] = json.loads(capsys.readouterr().out)
-    return content
+@pytest.fixture
+def check(files: Paths, capsys: Output) -> Check:
+    """Return what checks a net file of one row and a map, and returns the output."""
+    def run(net: str, rows: Sequence[str], *options: str, status: int = 0) -> str:
+        write_csv(files[0], NET_HEADER, [net])
+        write_csv(files[1], MAP_HEADER, rows)
+        assert main([*map(str, files), *options]) == status
+        return capsys.readouterr().out
+
+    return run
 
 
-def test_good_files_show_their_plan_and_no_error(files: Paths, capsys: Output) -> None:
-    assert check(files, GOOD_NET, (GOOD_ROW,)) == 0
-    out = capsys.readouterr().out
+def test_good_files_show_their_plan_and_no_error(check: Check) -> None:
+    out = check(GOOD_NET, (GOOD_ROW,))
     assert 'error' not in out.replace('no errors', '')
     assert 'Mode Master, 9600 baud' in out
     cells = out.splitlines()[7].split()
@@ -85,15 +88,14 @@ def test_files_of_the_package_are_good_and_follow_our_own_advice(
         prefix: str, capsys: Output) -> None:
     names = [str(config_file(f'{prefix}{kind}.csv')) for kind in ('net', 'map')]
     assert main([*names, '--json']) == 0
-    content = parsed(capsys)
+    content = json.loads(capsys.readouterr().out)
     assert content['errors'] == content['warnings'] == []
     assert {block['station'] for block in content['blocks']} <= {1, 2}
     assert not [note for note in content['notes'] if 'without While' in note]
 
 
-def test_every_error_of_both_files_at_once(files: Paths, capsys: Output) -> None:
-    assert check(files, '5,Mastr,9601,100', BAD_ROWS) == 2
-    lines = capsys.readouterr().out.splitlines()
+def test_every_error_of_both_files_at_once(check: Check, files: Paths) -> None:
+    lines = check('5,Mastr,9601,100', BAD_ROWS, status=2).splitlines()
     net, rows = (str(path) for path in files)
     beginnings = [
         f'error: {net}:2:2 (Mode): 2553 CRT_BAD_DRIVER_MODE: ',
@@ -108,25 +110,23 @@ def test_every_error_of_both_files_at_once(files: Paths, capsys: Output) -> None
     assert lines[7:] == ['no plan without a good net file']
 
 
-def test_plan_of_the_good_rows(files: Paths, capsys: Output) -> None:
-    assert check(files, GOOD_NET, (GOOD_ROW, *BAD_ROWS)) == 2
-    out = capsys.readouterr().out
+def test_plan_of_the_good_rows(check: Check, files: Paths) -> None:
+    out = check(GOOD_NET, (GOOD_ROW, *BAD_ROWS), status=2)
     assert f'error: {files[1]}:5: Item: 4, a Serve row has our own Station, which is 5' in out
     assert 'this plan has only the rows without errors' in out
     assert '1 mapping is read with 1 block' in out
 
 
-def test_files_in_the_wrong_order_are_told_once_each(files: Paths, capsys: Output) -> None:
-    check(files, GOOD_NET, (GOOD_ROW,))
-    capsys.readouterr()
+def test_files_in_the_wrong_order_are_told_once_each(
+        check: Check, files: Paths, capsys: Output) -> None:
+    check(GOOD_NET, (GOOD_ROW,))
     assert main([*map(str, reversed(files))]) == 2
     told = [line for line in capsys.readouterr().out.splitlines() if 'error: ' in line]
     assert ['is this the right file?' in line for line in told] == [True, True]
 
 
-def test_json_of_errors_names_place_and_number_of_each(files: Paths, capsys: Output) -> None:
-    assert check(files, '5,Mastr,9600,500', BAD_ROWS[:1], '--json') == 2
-    content = parsed(capsys)
+def test_json_of_errors_names_place_and_number_of_each(check: Check, files: Paths) -> None:
+    content = json.loads(check('5,Mastr,9600,500', BAD_ROWS[:1], '--json', status=2))
     mode, address = content['errors']
     assert mode['file'] == str(files[0])
     assert (mode['line'], mode['cell'], mode['column']) == (2, 2, 'Mode')
@@ -142,7 +142,7 @@ def test_rows_tell_what_a_ros_user_gets(files: Paths, capsys: Output) -> None:
     write_csv(files[1], 'Tag,Command,Address,Station,PLC_Type,Topic,Scale,Offset', [
         'level,ReadWrite,N7:1,1,PLC5,tank/level,0.1,-40', 'alive,Heartbeat,N10:0,1,PLC5,,,'])
     assert main([*map(str, files), '--json']) == 0
-    level, alive = parsed(capsys)['rows']
+    level, alive = json.loads(capsys.readouterr().out)['rows']
     assert level == {
         'tag': 'level', 'command': 'ReadWrite', 'address': 'N7:1', 'station': 1,
         'topics': ['~/read/tank/level', '~/write/tank/level'], 'message': 'Float32MultiArray',
@@ -151,32 +151,27 @@ def test_rows_tell_what_a_ros_user_gets(files: Paths, capsys: Output) -> None:
     assert (alive['topics'], alive['message'], alive['stale_ms']) == ([], '', None)
 
 
-def test_notes_are_no_warnings(files: Paths, capsys: Output) -> None:
+def test_notes_are_no_warnings(check: Check) -> None:
     bits = 'bits,Read,B3:0/0,1,PLC5,3,1000'
-    assert check(files, GOOD_NET, (bits,)) == 0
     note = 'bits without While: bits; their values go on when the program of the PLC stops'
-    assert capsys.readouterr().out.endswith(f'\nnote: {note}\nno errors, no warnings\n')
-    assert check(files, GOOD_NET, (bits,), '--json') == 0
-    content = parsed(capsys)
+    assert check(GOOD_NET, (bits,)).endswith(f'\nnote: {note}\nno errors, no warnings\n')
+    content = json.loads(check(GOOD_NET, (bits,), '--json'))
     assert (content['notes'], content['warnings']) == ([note], [])
 
 
-def test_mode_slave_has_no_time_that_its_master_decides(files: Paths, capsys: Output) -> None:
+def test_mode_slave_has_no_time_that_its_master_decides(check: Check) -> None:
     net = GOOD_NET.replace('Master', 'Slave')
-    assert check(files, net, (GOOD_ROW,), '--json') == 0
-    content = parsed(capsys)
+    content = json.loads(check(net, (GOOD_ROW,), '--json'))
     assert [content[name] for name in ('scan_time_ms', 'longest_transaction_ms', 'end_ms')] == [
         None, None, None]
-    assert check(files, net, (GOOD_ROW,)) == 0
-    said = capsys.readouterr().out
+    said = check(net, (GOOD_ROW,))
     assert 'the master of this line decides when we read and write, so no time is known' in said
     assert 'expected poll cycle' not in said
 
 
-def test_json_of_a_plan(files: Paths, capsys: Output) -> None:
+def test_json_of_a_plan(check: Check) -> None:
     rows = (GOOD_ROW, 'fast,Read,F8:0,1,SLC,,50')
-    assert check(files, GOOD_NET, rows, '--json', '--response-time', '20') == 0
-    content = parsed(capsys)
+    content = json.loads(check(GOOD_NET, rows, '--json', '--response-time', '20'))
     assert list(content) == [
         'errors', 'warnings', 'notes', 'network', 'mappings', 'rows', 'blocks', 'scan_time_ms',
         'load', 'longest_transaction_ms', 'needed_baud', 'bounds', 'end_ms', 'end_in_silence_ms',
@@ -194,34 +189,30 @@ def test_json_of_a_plan(files: Paths, capsys: Output) -> None:
     assert content['needed_baud'] == 115200
 
 
-def test_many_tags_of_a_block(files: Paths, capsys: Output) -> None:
+def test_many_tags_of_a_block(check: Check) -> None:
     rows = tuple(f't{number},Read,N7:{number},1,PLC5,,1000' for number in range(10))
-    assert check(files, GOOD_NET, rows) == 0
-    assert 't6, t7 and 2 more\n' in capsys.readouterr().out
-    assert check(files, GOOD_NET, rows, '--json') == 0
-    assert parsed(capsys)['blocks'][0]['tags'] == [f't{number}' for number in range(10)]
+    assert 't6, t7 and 2 more\n' in check(GOOD_NET, rows)
+    block, = json.loads(check(GOOD_NET, rows, '--json'))['blocks']
+    assert block['tags'] == [f't{number}' for number in range(10)]
 
 
-def test_warnings_come_first_and_long_tables_are_folded(files: Paths, capsys: Output) -> None:
+def test_warnings_come_first_and_long_tables_are_folded(check: Check) -> None:
     rows = tuple(f't{number},Read,N7:{number},1,PLC5,,100' for number in range(90))
-    assert check(files, GOOD_NET, (*rows, 't90,Read,B3:0,1,PLC5,,20')) == 0
-    lines = capsys.readouterr().out.splitlines()
+    lines = check(GOOD_NET, (*rows, 't90,Read,B3:0,1,PLC5,,20')).splitlines()
     assert lines[0].startswith('warning: ')
     assert '... and 51 more; --json has them all' in lines and len(lines) < 70
 
 
-def test_row_without_a_period_has_the_default_one(files: Paths, capsys: Output) -> None:
+def test_row_without_a_period_has_the_default_one(check: Check) -> None:
     row = GOOD_ROW.removesuffix('1000')
-    check(files, GOOD_NET, (row,), '--json')
-    assert parsed(capsys)['blocks'][0]['period_ms'] == 100
-    check(files, GOOD_NET, (row,), '--json', '--default-period', '2000')
-    assert parsed(capsys)['blocks'][0]['period_ms'] == 2000
+    for options, period in (((), 100), (('--default-period', '2000'), 2000)):
+        block, = json.loads(check(GOOD_NET, (row,), '--json', *options))['blocks']
+        assert block['period_ms'] == period
 
 
-def test_odd_settings_are_warnings_with_their_places(files: Paths, capsys: Output) -> None:
+def test_odd_settings_are_warnings_with_their_places(check: Check, files: Paths) -> None:
     row = 'N7:0,Write,I:1.0,017,SLC,1,'
-    assert check(files, GOOD_NET, (row,)) == 0
-    warnings = [line for line in capsys.readouterr().out.splitlines() if 'warning: ' in line]
+    warnings = [line for line in check(GOOD_NET, (row,)).splitlines() if 'warning: ' in line]
     assert [warning.removeprefix('warning: ') for warning in warnings] == [
         f'{files[1]}:2:4 (Station): Station = "017" is 17, decimal; an octal 017 would be 15',
         f'{files[1]}:2:1 (Tag): Tag "N7:0" becomes the topic N7_0',
@@ -236,10 +227,9 @@ def test_both_files_that_are_missing_are_named(tmp_path: Path, capsys: Output) -
     assert 'b.csv: cannot be read' in out
 
 
-def test_what_stands_in_files_forges_no_line(files: Paths, capsys: Output) -> None:
+def test_what_stands_in_files_forges_no_line(check: Check) -> None:
     row = '"a\x1b[2J\u2028error: x",Read,N7:0,1,PLC5,2,10'
-    assert check(files, GOOD_NET, (row,)) == 0
-    out = capsys.readouterr().out
+    out = check(GOOD_NET, (row,))
     assert '\x1b' not in out
     assert '\u2028' not in out
 
@@ -326,7 +316,7 @@ def test_two_lines_of_a_folder_on_one_port_are_an_error(tmp_path: Path, capsys: 
 def test_json_of_a_folder(tmp_path: Path, capsys: Output) -> None:
     plant(tmp_path, press=(GOOD_NET, GOOD_ROW), glue=(GOOD_NET, BAD_ROWS[0]))
     assert main(['--json', str(tmp_path)]) == 2
-    content = parsed(capsys)
+    content = json.loads(capsys.readouterr().out)
     assert content['others'] == []
     lines = content['lines']
     assert list(lines) == ['glue', 'press']
