@@ -47,17 +47,18 @@ from support.driver_bench import simulated_plc, store, stored
 from support.plc_line import machine_line, plc_line
 from support.ptys import PATIENCE
 
+PlcPair = tuple[SimulatedPlc, SimulatedPlc]
 FILES = (('N7:0', 250), ('B3:0', 4), ('F8:0', 8), ('T4:0', 9), ('ST9:0', 42), ('A10:0', 4))
 
 
 @pytest.fixture
-def plcs() -> tuple[SimulatedPlc, SimulatedPlc]:
+def plcs() -> PlcPair:
     return (simulated_plc(1, 'SLC', time.monotonic, *FILES, ('I:1.0', 2)),
             simulated_plc(2, 'PLC5', time.monotonic, *FILES))
 
 
 @pytest.fixture
-def port(tmp_path: Path, plcs: tuple[SimulatedPlc, SimulatedPlc]) -> Iterator[str]:
+def port(tmp_path: Path, plcs: PlcPair) -> Iterator[str]:
     with plc_line(tmp_path / 'line', *plcs) as name:
         yield name
 
@@ -65,6 +66,10 @@ def port(tmp_path: Path, plcs: tuple[SimulatedPlc, SimulatedPlc]) -> Iterator[st
 def client(port: str, station: int = 1, plc_type: str | None = None) -> Client:
     return Client(port, plc_type=plc_type, station=station, duplex='half', baud=115200,
                   timeout=1.0, cmd_timeout=1.0)
+
+
+def client_with(port: str, **more: Any) -> Client:
+    return Client(port, plc_type='SLC', duplex='half', baud=115200, **more)
 
 
 @pytest.mark.parametrize(('station', 'plc_type'), [(1, 'SLC'), (1, None), (2, 'plc5'), (2, None)])
@@ -93,8 +98,7 @@ def test_what_is_written_is_read(port: str, station: int, plc_type: str | None) 
         assert plc.read('A10:0', 2, 'string') == 'wxyz'
 
 
-def test_values_of_several_packets_are_written_and_read(
-        port: str, plcs: tuple[SimulatedPlc, SimulatedPlc]) -> None:
+def test_values_of_several_packets_are_written_and_read(port: str, plcs: PlcPair) -> None:
     values = [*range(-125, 125)]
     with client(port) as plc:
         for station in (1, 2):
@@ -103,11 +107,11 @@ def test_values_of_several_packets_are_written_and_read(
     assert stored(plcs[1], 'N7:249') == (124).to_bytes(2, 'little')
 
 
-def test_inputs_by_slot_and_flat(port: str, plcs: tuple[SimulatedPlc, SimulatedPlc]) -> None:
+def test_inputs_by_slot_and_flat(port: str, plcs: PlcPair) -> None:
     store(plcs[0], 'I:1.0', [7, 9])
     with client(port) as plc:
         assert plc.read('I:1.1') == 9
-    with Client(port, plc_type='SLC', access='Flat', duplex='half', baud=115200) as plc:
+    with client_with(port, access='Flat') as plc:
         assert plc.read('I:0', 2) == [7, 9]
 
 
@@ -121,7 +125,7 @@ def test_errors_are_those_of_the_bridge(port: str) -> None:
             plc.read('N7:x')
         with pytest.raises(FormatError, match='station 300'):
             plc.read('N7:0', station=300)
-    with Client(port, plc_type='SLC', duplex='half', baud=115200, timeout=0.1) as plc:
+    with client_with(port, timeout=0.1) as plc:
         for ask, place in ((lambda: plc.read('N7:0', station=9), 'N7:0 of'),
                            (lambda: plc.identify(station=9), 'status of')):
             with pytest.raises(LinkError, match=f'^{place} station 9: 2509') as error:
@@ -129,8 +133,7 @@ def test_errors_are_those_of_the_bridge(port: str) -> None:
             assert error.value.words().startswith('2509')
 
 
-def test_many_addresses_are_read_by_the_plan(
-        port: str, plcs: tuple[SimulatedPlc, SimulatedPlc]) -> None:
+def test_many_addresses_are_read_by_the_plan(port: str, plcs: PlcPair) -> None:
     store(plcs[0], 'N7:0', [*range(100, 120)])
     store(plcs[0], 'T4:1', [0, 7, 5])
     wanted = ['N7:9', 'B3:0/1', 'N7:0-2', 'F8:1', 'N7:12', 'T4:1.ACC', 'N7:5-5', 'T4:1-1']
@@ -152,8 +155,7 @@ def test_retries_trace_and_log_are_arguments(port: str, tmp_path: Path,
                                              caplog: pytest.LogCaptureFixture) -> None:
     trace = tmp_path / 'line.cap'
     caplog.set_level('DEBUG', 'abdf1_ros')
-    with Client(port, plc_type='SLC', duplex='half', baud=115200, timeout=0.1, retries=1,
-                trace=trace) as plc:
+    with client_with(port, timeout=0.1, retries=1, trace=trace) as plc:
         plc.read('N7:0')
         with pytest.raises(LinkError):
             plc.read('N7:0', station=9)
@@ -177,8 +179,7 @@ def test_link_does_not_wait_for_a_handler_of_the_log(port: str) -> None:
     threads: set[threading.Thread] = set()
     logger = logging.Logger('test', logging.DEBUG)
     logger.addHandler(Stuck())
-    with Client(port, plc_type='SLC', duplex='half', baud=115200, timeout=0.1, retries=1,
-                logger=logger) as plc, pytest.raises(LinkError):
+    with client_with(port, timeout=0.1, retries=1, logger=logger) as plc, pytest.raises(LinkError):
         plc.read('N7:0', station=9)
     assert threads == {threading.current_thread()}
 
@@ -190,10 +191,6 @@ def test_entries_of_the_log_that_nothing_takes_are_counted(
     with client_with(port, timeout=0.05, retries=2) as plc, pytest.raises(LinkError):
         plc.read('N7:0', station=9)
     assert re.search(r'\d entries were lost here: nothing was asked meanwhile', caplog.text)
-
-
-def client_with(port: str, **more: Any) -> Client:
-    return Client(port, plc_type='SLC', duplex='half', baud=115200, **more)
 
 
 @pytest.mark.parametrize(('address', 'arguments', 'text'), [
@@ -268,8 +265,7 @@ def test_forgotten_close_is_told_and_closed_client_refuses(port: str) -> None:
         assert plc.read('N7:0') == 0
 
 
-def test_line_that_comes_back_is_used_again(tmp_path: Path,
-                                            plcs: tuple[SimulatedPlc, SimulatedPlc]) -> None:
+def test_line_that_comes_back_is_used_again(tmp_path: Path, plcs: PlcPair) -> None:
     name = tmp_path / 'line'
     with ExitStack() as first:
         port = first.enter_context(plc_line(name, *plcs))
@@ -308,7 +304,7 @@ def files(folder: Path, port: str, rows: str = MAP, more: str = '') -> tuple[Pat
 
 
 def test_rows_of_a_map_are_read_and_written_by_their_tags(
-        port: str, tmp_path: Path, plcs: tuple[SimulatedPlc, SimulatedPlc]) -> None:
+        port: str, tmp_path: Path, plcs: PlcPair) -> None:
     with Client.from_files(*files(tmp_path, port)) as plant:
         assert list(plant.rows) == ['speed', 'doors', 'recipe', 'name']
         plant.write('speed', 12.34)
