@@ -365,8 +365,7 @@ def test_packets_are_those_of_the_processor_that_a_station_says_to_be(network: N
     bench.connect(old)
     bench.run(1.0)
     planned = bench.driver.readings.blocks
-    bench.write(rows[0], list(range(100)))
-    bench.run(2 * PERIOD)
+    bench.write(rows[0], list(range(100)), run=2 * PERIOD)
     assert old.refused == 0
     assert all(bench.listener.values(row) for row in rows)
     assert old.writes == [82, 82, 36]

@@ -265,8 +265,7 @@ def test_withheld_row_answers_withheld_and_publishes_nothing() -> None:
     assert len(line.listener.reads) == before
     line.there.processor.setting = Setting.RUN
     line.run(5.0)
-    line.ask(rows[0])
-    line.run(0.5)
+    line.ask(rows[0], run=0.5)
     assert line.errors[-1] == ''
     assert line.listener.ends[-1][0] == 'often'
 

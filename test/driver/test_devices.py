@@ -106,8 +106,7 @@ def test_reply_of_a_slave_that_waits_for_no_poll_is_taken(mode: str) -> None:
     device.words[1, 7, 0] = 1234
     bench = odd_bench(mode, device, words, target)
     bench.open(run=1.0)
-    bench.write(target, [7])
-    bench.run(1.0)
+    bench.write(target, [7], run=1.0)
     assert {tuple(values) for values in bench.listener.values(words)} == {(1234,)}
     assert (bench.listener.outcomes(), device.words[1, 7, 5]) == ([Outcome.WRITTEN], 7)
 
@@ -120,8 +119,7 @@ def test_controller_that_knows_no_command_is_told_as_it_is(mode: str) -> None:
     words, target = make_mapping('N7:0', plc='SLC'), make_mapping('N7:5', 'Write', plc='SLC')
     bench = odd_bench(mode, device, words, target)
     bench.open(run=1.0)
-    bench.write(target, [7])
-    bench.run(2.0)
+    bench.write(target, [7], run=2.0)
     assert bench.listener.values(words) == []
     assert bench.listener.outcomes() == [Outcome.FAILED]
     assert 'STS 10' in str(bench.listener.results[0])
@@ -138,8 +136,7 @@ def test_stations_0_and_16_and_254_are_like_any_other(mode: str, station: int) -
     target = make_mapping('N7:5', 'Write', plc='SLC', station=station)
     bench = odd_bench(mode, device, words, target)
     bench.open(run=1.0)
-    bench.write(target, [0x1003])
-    bench.run(1.0)
+    bench.write(target, [0x1003], run=1.0)
     assert {tuple(values) for values in bench.listener.values(words)} == {(0x1010,)}
     assert bench.listener.outcomes() == [Outcome.WRITTEN]
     assert device.words[station, 7, 5] == 0x1003

@@ -129,8 +129,7 @@ def write_results(bench: DriverBench) -> list[str]:
 
 def written(bench: DriverBench, row: Mapping, values: list[float], seconds: float) -> list[str]:
     """Write, let time pass, and return all results."""
-    bench.write(row, values)
-    bench.run(seconds)
+    bench.write(row, values, run=seconds)
     return write_results(bench)
 
 

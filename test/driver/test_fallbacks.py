@@ -164,8 +164,7 @@ def test_rule_7_messages_that_the_plc_refuses_do_not_keep_an_output_alive(gap: f
     cell, speed = speed_cell()
     cell.publish(speed, 3, run=0.1)
     cell.refused, cell.spared = {'N7:0'}, 7
-    cell.publish(speed, 99, times=round(2.0 / gap), gap=gap)
-    cell.run(AFTER + 0.1)
+    cell.publish(speed, 99, times=round(2.0 / gap), gap=gap, run=AFTER + 0.1)
     assert cell.word('N7:0') == 7
     assert cell.results().count(TIMEOUT) == 1
     cell.run(1.0)
@@ -337,8 +336,7 @@ def test_rule_9_write_of_another_row_to_the_same_words_holds_up_for_its_own_time
     recipe = speed_row(None, length=200, tag='recipe')  # of several packets
     speed = speed_row()
     cell = Cell(recipe, speed, run=1.0)
-    cell.bench.write(speed, [3])
-    cell.run(AFTER - 0.01)
+    cell.bench.write(speed, [3], run=AFTER - 0.01)
     assert cell.word('N7:0') == 3
     cell.bench.write(recipe, [4] * 200)  # under way when the fallback is due
     row, = cell.bench.driver.interlocks.fallbacks
@@ -514,8 +512,7 @@ def test_rule_10_first_try_is_not_held_up_by_the_pause_of_another_row() -> None:
         cell = Cell(*speeds, start=False)
         cell.put_behind_gateway(run=7.0 + 0.1 * offset)
         for speed in speeds:
-            cell.bench.write(speed, [5])
-            cell.run(0.1)
+            cell.bench.write(speed, [5], run=0.1)
         _, second = cell.bench.driver.interlocks.fallbacks
         cell.is_undelivered = lambda command: command.data[7:8] == b'\0'
         cell.bench.run_until(lambda row=second: row.sent > row.refreshed)
@@ -544,8 +541,7 @@ def test_rule_10_pause_of_this_process_does_not_put_off_a_silent_plc() -> None:
     speed = make_mapping('N7:0', 'Write', station=2, fallback=FALLBACK)
     line = Line([*rows, speed], (1, 2))
     line.run(2.0)
-    line.write(speed, [42])
-    line.run(0.1)
+    line.write(speed, [42], run=0.1)
     line.far_stations[1].faults.silent = True
     line.run(4.0)
     line.run_until(lambda: any(task.station == 2 for task in line.driver.tasks.under_way))

@@ -361,8 +361,7 @@ def test_lost_port_is_told_and_what_waits_is_not_sent_later() -> None:
     program.ask(READ_N7)
     assert len(program.replies) == 3
     assert set(program.statuses) <= {0x04, 0x05}
-    bench.open()
-    bench.run(2.0)
+    bench.open(run=2.0)
     assert len(program.replies) == 3
 
 

@@ -47,8 +47,7 @@ def test_rule_5_orderly_end_is_0_then_the_fallbacks() -> None:
     assert not driver.interlocks.is_over
     driver.interlocks.wind_down()
     cell.bench.line.wake(driver.machine)
-    cell.bench.write(speed, [4])
-    cell.run(0.3)
+    cell.bench.write(speed, [4], run=0.3)
     assert [(name, value) for when, name, value in cell.writes if when >= since] == [
         ('N10:0', 0), ('N7:0', 7)]
     assert driver.interlocks.is_over
