@@ -31,6 +31,7 @@ from abdf1_ros.console import pass_on, Sink
 from abdf1_ros.testing import PATIENCE, Plcs
 import pytest
 from std_msgs.msg import Int16MultiArray
+from support.ptys import full_pipe
 from support.ros import Observer, ros_args, write_csv
 
 ROWS = ('speed,Write,N7:0,1,PLC5,1,speed,-1,500', 'refused,Write,N7:99,1,PLC5,1,refused,,')
@@ -39,21 +40,10 @@ NET = 'Com_Port,Baud,Timeout,Cmd_Timeout\n/dev/plc,115200,300,3000\n'
 LOST = b'[WARN] abdf1_ros: %d lines were lost here: they were not taken\n'
 
 
-def fill(descriptor: int) -> None:
-    """Write until no more is taken, as many log lines would."""
-    os.set_blocking(descriptor, False)
-    try:
-        while True:
-            os.write(descriptor, b'x' * 4096)
-    except BlockingIOError:
-        os.set_blocking(descriptor, True)
-
-
-def full_pipe(stack: ExitStack) -> int:
+def unread_pipe(stack: ExitStack) -> int:
     """Return a pipe that nothing reads."""
-    reader, writer = os.pipe()
+    reader, writer = full_pipe()
     stack.callback(os.close, reader)
-    fill(writer)
     return writer
 
 
@@ -65,24 +55,29 @@ def stopped_terminal(stack: ExitStack) -> int:
     return slave
 
 
-@pytest.mark.parametrize('make', [full_pipe, stopped_terminal])
+def start(stack: ExitStack, folder: Path, said: int, port: str, *program: str,
+          ) -> subprocess.Popen[bytes]:
+    """Start a node in ``folder`` whose output goes to ``said``, which is closed here."""
+    (folder / 'net.csv').write_text(NET)
+    write_csv(folder / 'map.csv', 'Tag,Command,Address,Station,PLC_Type,Length,Topic,'
+              'Fallback,Fallback_After', ROWS)
+    arguments = ros_args(*(f'{name}_file:={folder}/{name}.csv' for name in ('net', 'map')),
+                         f'port:={port}')
+    node = subprocess.Popen([sys.executable, *program, *arguments], stdout=said, stderr=said,
+                            env=os.environ | {'ROS_LOG_DIR': str(folder / 'log')})
+    stack.callback(node.kill)
+    os.close(said)
+    return node
+
+
+@pytest.mark.parametrize('make', [unread_pipe, stopped_terminal])
 def test_fallback_and_end_come_in_time_where_nothing_reads_the_log(
         make: Any, tmp_path: Path) -> None:
     with ExitStack() as stack:
         observer = stack.enter_context(Observer())
         (tmp_path / 'data.csv').write_text(DATA)
         plcs = stack.enter_context(Plcs(tmp_path / 'data.csv'))
-        write_csv(tmp_path / 'map.csv', 'Tag,Command,Address,Station,PLC_Type,Length,Topic,'
-                  'Fallback,Fallback_After', ROWS)
-        (tmp_path / 'net.csv').write_text(NET)
-        said = make(stack)
-        node = subprocess.Popen(
-            [sys.executable, '-m', 'abdf1_ros', 'node', *ros_args(
-                f'net_file:={tmp_path}/net.csv', f'map_file:={tmp_path}/map.csv',
-                f'port:={plcs.port}')], stdout=said, stderr=said,
-            env=os.environ | {'ROS_LOG_DIR': str(tmp_path / 'log')})
-        stack.callback(node.kill)
-        os.close(said)
+        node = start(stack, tmp_path, make(stack), plcs.port, '-m', 'abdf1_ros', 'node')
         publisher = observer.publisher(Int16MultiArray, '/abdf1/write/speed')
         refused = observer.publisher(Int16MultiArray, '/abdf1/write/refused')
         for turn in range(20):
@@ -115,23 +110,14 @@ sys.exit(run('node'))
 def test_process_that_hangs_is_ended_though_nothing_reads_its_log(tmp_path: Path) -> None:
     with ExitStack() as stack:
         observer = stack.enter_context(Observer())
-        (tmp_path / 'net.csv').write_text(NET)
-        write_csv(tmp_path / 'map.csv', 'Tag,Command,Address,Station,PLC_Type,Length,Topic,'
-                  'Fallback,Fallback_After', ROWS)
-        said = full_pipe(stack)
-        node = subprocess.Popen([sys.executable, '-c', HANGS, *ros_args(
-            f'net_file:={tmp_path}/net.csv', f'map_file:={tmp_path}/map.csv',
-            f'port:={tmp_path}/none')], stdout=said, stderr=said)
-        stack.callback(node.kill)
-        os.close(said)
+        node = start(stack, tmp_path, unread_pipe(stack), f'{tmp_path}/none', '-c', HANGS)
         observer.meet('/abdf1')
         node.send_signal(signal.SIGTERM)
         assert node.wait(PATIENCE) == 1
 
 
 def test_lines_that_nothing_takes_are_counted_and_told_when_they_are_taken_again() -> None:
-    reader, writer = os.pipe()
-    fill(writer)
+    reader, writer = full_pipe()
     sink = Sink(writer, most=40)
     for number in range(10):
         sink.put(b'line %d\n' % number)  # 7 bytes: five fit
@@ -139,7 +125,7 @@ def test_lines_that_nothing_takes_are_counted_and_told_when_they_are_taken_again
     sink.end()
     text = b''
     while b'lost' not in text:
-        text += os.read(reader, 65536).replace(b'x', b'')
+        text += os.read(reader, 65536).replace(b'\0', b'')
     sink.join(PATIENCE)
     assert text == b''.join(b'line %d\n' % number for number in range(5)) + LOST % 5
     for descriptor in (reader, writer):
