@@ -393,12 +393,10 @@ class _Executor:
         """Execute a command."""
         has = self._wire.has
         cmd, fnc = data[2], data[6:7]
-        is_write = data[6:7] in (b'\xAA', b'\x67')
-        if is_write and has(Habit.WRITES_NOTHING):
+        if fnc in (b'\xAA', b'\x67') and has(Habit.WRITES_NOTHING):
             return self._done(data)
         data = self._misread(data)
-        if cmd == 0x0F and data[6:7] == b'\x68' and data[11:12] == b'\x07' and \
-                has(Habit.REFUSES_AREA):
+        if cmd == 0x0F and fnc == b'\x68' and data[11:12] == b'\x07' and has(Habit.REFUSES_AREA):
             return self._done(data, sts=0x10)
         reply = self._plc.serve(Packet.decode(data)).encode()
         if fnc == b'\xAB' and has(Habit.MASK_CHANGES_NEXT_WORD):
@@ -631,14 +629,9 @@ class _FullDuplex(Wire):
             if not self.has(Habit.IGNORES_BAD_CHECK):
                 self._respond(_NAK)
             return self.refused(data)
-        if self.is_full:
+        if self.is_full or len(data) < 6 and not self.has(Habit.TAKES_SHORT) or \
+                len(data) > 110 and self.has(Habit.SMALL_PACKETS):
             return self._respond(_NAK)
-        if len(data) < 6 and not self.has(Habit.TAKES_SHORT):
-            self._respond(_NAK)
-            return
-        if self.has(Habit.SMALL_PACKETS) and len(data) > 110:
-            self._respond(_NAK)
-            return
         is_duplicate = self.is_duplicate(data)
         if not (is_duplicate and self.has(Habit.DUPLICATE_WITHOUT_ACK)):
             self._respond(_ACK, is_followed=not is_duplicate)
@@ -684,11 +677,9 @@ class _FullDuplex(Wire):
         if self._enquiries > _LIMIT and not self.habits & {
                 Habit.NEVER_GIVES_UP, Habit.ENQUIRES_FOR_EVER}:
             self._end(is_taken=False)
-        elif self.has(Habit.SILENCE_REPEATED):
-            self.say(self.frame(self._outgoing[0]))
-            self._wait()
         else:
-            self.say(bytes((_DLE, _ENQ)))
+            is_repeated = self.has(Habit.SILENCE_REPEATED)
+            self.say(self.frame(self._outgoing[0]) if is_repeated else bytes((_DLE, _ENQ)))
             self._wait()
 
     def _end(self, is_taken: bool = True) -> None:

@@ -98,9 +98,9 @@ OURS, OTHER_BRIDGE, MASTER = 200, 201, 9  # stations
 GATEWAY = 5  # the station on the line, behind which the PLC is
 DAMAGED = b'ZZZZ'  # what the line does not carry: only guests send it
 
-# The words of each PLC: outputs, a row without Fallback after them, its program's own, heartbeat.
 USUAL: tuple[Filter, Filter] = bytes, bytes
 
+# The words of each PLC: outputs, a row without Fallback after them, its program's own, heartbeat.
 OUTPUTS, FREE, CLOCK, COUNTER, BEAT = 'N7:0', 'N7:20', 'N9:0', 'N9:4', 'N10:0'
 # Words of our own table: that the master only reads, and those that it writes.
 SERVED, TAKEN, TAKEN_WORDS = 'N7:50', 'N7:51', 2
