@@ -246,6 +246,7 @@ def test_served_word_that_nobody_has_to_write_is_not_late() -> None:
     bench.open(run=5.0)
     now = bench.clock()
     assert bench.driver.points[free].freshness(now) is Freshness.FRESH
+    assert bench.driver.points[free].age(now) is None
     assert bench.driver.points[expected].freshness(now) is Freshness.WAITING
     bench.message('N7:60', 1)
     bench.run(0.1)

@@ -208,7 +208,7 @@ class ReadPoint:
         if self.mapping.is_on_demand:
             return Freshness.FRESH
         if self.last_good is None:
-            return Freshness.WAITING
+            return Freshness.WAITING if self.stale_time < math.inf else Freshness.FRESH
         age = now - self.last_good
         if age <= self._usual_age:
             return Freshness.FRESH

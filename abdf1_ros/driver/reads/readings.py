@@ -334,6 +334,4 @@ def _points(mappings: Rows, blocks: Sequence[Block], settings: DriverSettings, g
 def _served_point(mapping: Mapping, settings: DriverSettings) -> ReadPoint:
     # Without a Period a PLC may write at any time, or never.
     expected = mapping.period / 1000 if mapping.period else math.inf
-    point = ReadPoint(mapping, expected, settings.stale_after * expected)
-    point.last_good = None if mapping.period else 0.0
-    return point
+    return ReadPoint(mapping, expected, settings.stale_after * expected)
