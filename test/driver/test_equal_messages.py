@@ -15,7 +15,7 @@
 """Topics that are published steadily: equal messages are one write, and no change is late."""
 
 from collections.abc import Callable, Sequence
-from itertools import groupby
+from itertools import count, groupby
 from random import Random
 
 from abdf1_ros.df1.packet import Packet
@@ -243,6 +243,23 @@ def test_more_changes_than_may_wait_never_keep_the_newest_out() -> None:
     assert line.value == 1
     assert {('lone', WRITTEN), ('newest', WRITTEN)} <= {*line.told()}
     assert len(line.listener.results) == 2 * MAX_WAITING_WRITES + 3
+
+
+@pytest.mark.parametrize(('step', 'dropped'), [(0.0001, 2), (0.0, 0)])
+def test_too_many_equal_messages_lose_the_oldest_unless_all_are_as_old(
+        step: float, dropped: int) -> None:
+    line = Line(BIT)
+    moments = count(line.clock(), step)
+    line.say(BIT, [0])
+    for _ in range(2):
+        line.run(0.001)
+        for _ in range(MAX_WAITING_WRITES // 2 + 1):
+            line.driver.write([BIT], [1], next(moments))
+        line.line.wake(line.driver.machine)
+    line.run(1.0)
+    outcomes = [result.outcome for result in line.listener.results]
+    assert outcomes[:dropped + 1].count(Outcome.SUPERSEDED) == dropped
+    assert outcomes.count(Outcome.WRITTEN) == MAX_WAITING_WRITES + 3 - dropped
 
 
 def test_message_that_is_too_old_takes_no_place_of_a_younger_one() -> None:
