@@ -66,7 +66,6 @@ class WriteResult:
       unconfirmed write it also says what a later read has found, or why there was no read.
     - ``latency``: seconds from the request.
     - ``request``: the name that the requester gave.
-    - ``packets_done``: number of its packets that were confirmed.
     """
 
     mapping: Mapping
@@ -75,7 +74,6 @@ class WriteResult:
     value: str
     latency: float
     request: str = ''
-    packets_done: int = 0
     error: LinkError | RemoteError | None = field(default=None, compare=False)
 
     @property
@@ -173,12 +171,12 @@ class Write:
             return held == self.raw if isinstance(held, str) else [*held] == [*self.raw]
         return words == codec.encode(self.raw)
 
-    def result(self, outcome: Outcome, detail: str, now: float, packets_done: int = 0,
+    def result(self, outcome: Outcome, detail: str, now: float,
                error: LinkError | RemoteError | None = None) -> WriteResult:
         """Return how this write ended, for the first of its messages."""
         first = self.origins[0]
         return WriteResult(self.mapping, outcome, detail, self.value, now - first.published,
-                           first.request, packets_done, error)
+                           first.request, error)
 
 
 def show(values: Sequence[float] | str) -> str:

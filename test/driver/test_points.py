@@ -377,11 +377,11 @@ def test_writes_of_bits_are_pulses(text: str, pulse: bool) -> None:
     assert Write(make_mapping(text, 'Write'), [1], 0.0).is_pulse is pulse
 
 
-def test_result_tells_value_latency_request_and_packets() -> None:
+def test_result_tells_value_latency_and_request() -> None:
     write = Write(make_mapping(command='Write', length=2), [1, -2], 10.0, 'r7')
-    result = write.result(Outcome.UNKNOWN, 'no reply', 12.5, 3)
-    assert (result.request, result.packets_done) == ('r7', 3)
-    assert (result.value, result.latency, result.mapping) == ('[1, -2]', 2.5, write.mapping)
+    result = write.result(Outcome.UNKNOWN, 'no reply', 12.5)
+    assert (result.request, result.value, result.latency) == ('r7', '[1, -2]', 2.5)
+    assert result.mapping is write.mapping
     assert str(result) == 'unknown whether written: no reply'
     assert str(write.result(Outcome.WRITTEN, '', 10.5)) == 'written'
 

@@ -51,7 +51,7 @@ class Unconfirmed:
         self.line = StillClock(EARLY)
         self.backs = ReadBacks(self.line, PATIENCE, self.results.append)
         write = Write(mapping, values, EARLY)
-        lost = write.result(Outcome.UNKNOWN, 'lost', EARLY, 0, CommandTimeout())
+        lost = write.result(Outcome.UNKNOWN, 'lost', EARLY, CommandTimeout())
         self.backs.add(write, lost, [self.block], EARLY)
 
     def read(self, data: bytes, started: float = EARLY) -> None:

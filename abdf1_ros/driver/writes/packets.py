@@ -60,7 +60,7 @@ def carry_out(write: Write, clock: Callable[[], float], *,
         return _ended_early(write, _outcome_of(failed), clock(), done, failed)
     is_broadcast = write.mapping.station == BROADCAST
     outcome = Outcome.BROADCAST if is_broadcast else Outcome.WRITTEN
-    return write.result(outcome, detail, clock(), done)
+    return write.result(outcome, detail, clock())
 
 
 def _outcome_of(error: RemoteError | LinkError) -> Outcome:
@@ -101,6 +101,6 @@ def _rewrite(write: Write, packet: int,
 def _ended_early(write: Write, outcome: Outcome, now: float, done: int,
                  error: LinkError | RemoteError) -> WriteResult:
     if not done:
-        return write.result(outcome, str(error), now, done, error)
+        return write.result(outcome, str(error), now, error)
     detail = f'{error} (after {done} of {len(write.commands)} packets were written)'
-    return write.result(Outcome.PARTLY, detail, now, done, error)
+    return write.result(Outcome.PARTLY, detail, now, error)
