@@ -389,6 +389,8 @@ def test_rule_19_second_foreign_value_is_one_within_a_minute_or_20_periods() -> 
         other = OtherWriter(period, Random(0))
         told = [other.note_value(now) for now in (0.0, time - 1.0, 2 * time)]
         assert told == [False, True, False]
+        zeros = {other.next_zero() / period for _ in range(9)}
+        assert len(zeros) == 9 and 0.5 <= min(zeros) < max(zeros) < 1.5
 
 
 @pytest.mark.parametrize('polling', POLLING_MODES)

@@ -154,7 +154,9 @@ def test_rule_5_end_asks_a_silent_plc_at_once_where_another_answers() -> None:
 
 
 def test_rule_5_what_was_not_confirmed_at_the_end_is_named() -> None:
-    cell = Cell(beat_row(), speed_row(), run=1.0)
+    cell = Cell(beat_row(), speed_row(), start=False)
+    assert cell.bench.driver.interlocks.unconfirmed() == ['beat']
+    cell.bench.open(run=1.0)
     cell.refused = {'N10:0'}
     cell.bench.driver.interlocks.wind_down()
     cell.bench.line.wake(cell.bench.driver.machine)

@@ -128,7 +128,7 @@ class Ages:
         waited = max([0.0, *ages])
         if self._allowed is not None:
             waited = max([least, *(age + behind for age in ages)])
-        if waited > self._patience:
+        if waited >= self._patience:
             raise FormatError(
                 f'it came {waited:.1f} s after it was published, write_timeout is '
                 f'{self._patience:g} s; the network is slow, this node stood still or had '
