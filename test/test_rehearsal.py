@@ -35,21 +35,13 @@ NEEDS_NAMESPACES = pytest.mark.skipif(not has_namespaces(), reason='namespaces n
 
 
 @NEEDS_NAMESPACES
-@pytest.mark.long  # test/ros/test_standby.py has both on one host
-def test_spare_takes_over_the_lines_of_a_host_that_dies() -> None:
+@pytest.mark.long  # test/ros/test_standby.py has both hosts in one
+@pytest.mark.parametrize(('fault', 'options'), [
+    ('kill ', ()),  # a spare takes over the lines of a host that dies
+    ('apart', ('--only', 'apart', '--discovery-server'))])  # no result comes a second time
+def test_two_hosts_and_a_fault_between_them(fault: str, options: tuple[str, ...]) -> None:
     done = subprocess.run(
         [sys.executable, str(PROGRAM), '--hosts', '2', '--lines', '1', '--faults', '1',
-         '--seed', '1'], check=False, capture_output=True, text=True, timeout=110)
+         '--seed', '1', *options], check=False, capture_output=True, text=True, timeout=110)
     assert done.returncode == 0, done.stdout + done.stderr
-    assert 'kill     1 times, all lines read and written to after ' in done.stdout
-
-
-@NEEDS_NAMESPACES
-@pytest.mark.long
-def test_no_result_comes_a_second_time_after_a_long_cut() -> None:
-    done = subprocess.run(
-        [sys.executable, str(PROGRAM), '--hosts', '2', '--lines', '1', '--faults', '1',
-         '--only', 'apart', '--discovery-server', '--seed', '1'], check=False,
-        capture_output=True, text=True, timeout=110)
-    assert done.returncode == 0, done.stdout + done.stderr
-    assert 'apart    1 times, all lines read and written to after ' in done.stdout
+    assert f'{fault}    1 times, all lines read and written to after ' in done.stdout

@@ -308,7 +308,7 @@ def test_number_after_a_timer_is_no_bit_unless_it_has_a_name(
     assert str(caught.value) == right
 
 
-@pytest.mark.parametrize(('text', 'family', 'right'), [
+@for_all(('text', 'family', 'expected'), [
     ('ST9:0.LEN', SLC, 'the length is part of the string; read ST9:0, which is as long as that'),
     ('L10:0/5', SLC, 'bits of an L file have no address; read L10:0 as int32 and take bit 5 '
                      'from it'),
@@ -316,15 +316,7 @@ def test_number_after_a_timer_is_no_bit_unless_it_has_a_name(
                      'of PLC-5: O, I, S, B, T, C, R, N, F, ST, A, D, PD, MG, BT, SC'),
     ('PLS9:0', SLC, 'PLS files (programmable limit switch) cannot be read or written here; file '
                     'types of SLC: O, I, S, B, T, C, R, N, F, ST, A, D, L, PD, MG, HSC, PTO, PWM, '
-                    'STI, EII')])
-def test_what_is_not_supported_is_refused_with_what_would_be_right(
-        text: str, family: PlcType, right: str) -> None:
-    with pytest.raises(AddressSyntaxError) as caught:
-        parse_address(text, family)
-    assert str(caught.value) == right
-
-
-@for_all(('text', 'family', 'expected'), [
+                    'STI, EII'),
     ('I:1.0/3', PLC5, 'this is the form of an SLC; a PLC-5 has rack, group and bit in octal, as '
                       'in I:017/12'),
     ('O:2.0', PLC5, 'this is the form of an SLC; a PLC-5 has rack, group and bit in octal, as in '
@@ -345,7 +337,8 @@ def test_what_is_not_supported_is_refused_with_what_would_be_right(
     ('CS0:4', SLC, 'CS is a function file whose type code is not known; let the program copy what '
                    'is needed into an N file'),
 ])
-def test_other_forms_are_told_what_to_write(text: str, family: PlcType, expected: str) -> None:
+def test_what_nothing_supports_and_other_forms_are_told_what_to_write(
+        text: str, family: PlcType, expected: str) -> None:
     with pytest.raises(AddressSyntaxError) as fault:
         parse_address(text, family)
     assert str(fault.value) == expected

@@ -100,17 +100,14 @@ def test_option_that_is_short_or_another_answers_nothing(ends: Ends, short: byte
     port.negotiate(EVEN)
 
 
-def test_setting_that_the_server_does_not_take(ends: Ends) -> None:
+@pytest.mark.parametrize(('answer', 'text'), [
+    (DO_COM_PORT + BAUD_115200.replace(b'\x01\xc2\x00', b'\x00\x25\x80') + REST,
+     'does not take Baudrate 115200, its port has 9600'),
+    (DONT_COM_PORT, 'the device server refuses RFC 2217')])
+def test_server_that_refuses(ends: Ends, answer: bytes, text: str) -> None:
     port, server = ends
-    server.sendall(DO_COM_PORT + BAUD_115200.replace(b'\x01\xc2\x00', b'\x00\x25\x80') + REST)
-    with pytest.raises(OSError, match='does not take Baudrate 115200, its port has 9600'):
-        port.negotiate(EVEN)
-
-
-def test_server_that_refuses(ends: Ends) -> None:
-    port, server = ends
-    server.sendall(DONT_COM_PORT)
-    with pytest.raises(OSError, match='the device server refuses RFC 2217'):
+    server.sendall(answer)
+    with pytest.raises(OSError, match=text):
         port.negotiate(EVEN)
 
 

@@ -192,18 +192,15 @@ def test_what_no_plc_could_take_is_told_before_the_port_is_opened(
     assert capsys.readouterr().err == f'plc: {text}\n'
 
 
-def test_write_that_the_plc_refuses_says_why(plc: Plc, simulator: Process) -> None:
-    simulator.say('error 2 F0 0B')
+@pytest.mark.parametrize(('fault', 'status', 'text'), [
+    ('error 2 F0 0B', 1, 'not written: the PLC refused it: STS F0 EXT STS 0B'),
+    ('slow 2 100000', 3, 'unknown whether written: 2508 ERR_COMMAND_TIMEOUT')])
+def test_write_that_fails_says_what_came_of_it(
+        plc: Plc, simulator: Process, fault: str, status: int, text: str) -> None:
+    simulator.say(fault)
     said = plc('write', 'N7:0', '1', '--yes', '--station', '2', '--plc-type', 'SLC')
-    assert said.status == 1
-    assert 'not written: the PLC refused it: STS F0 EXT STS 0B' in said.err
-
-
-def test_write_without_a_reply_is_unknown(plc: Plc, simulator: Process) -> None:
-    simulator.say('slow 2 100000')
-    said = plc('write', 'N7:0', '1', '--yes', '--station', '2', '--plc-type', 'SLC')
-    assert said.status == 3
-    assert 'unknown whether written: 2508 ERR_COMMAND_TIMEOUT' in said.err
+    assert said.status == status
+    assert text in said.err
 
 
 def test_write_broken_off_is_unknown(tmp_path: Path) -> None:
