@@ -146,6 +146,10 @@ def test_rule_11_first_tries_go_first_then_plcs_that_answer() -> None:
     left_alone = plc.rank(one.row, 4.0)
     assert first and answers and left_alone
     assert first < answers < (2,) < (3,) < left_alone
+    one.fallback(one.row.take(4.0), 4.1)
+    one.row.make_due(FallbackCause.RUN, 5.0)
+    one.fallback(one.row.take(5.0), 5.1, Outcome.UNKNOWN)
+    assert plc.rank(one.row, 8.0) == (*left_alone[:3], 5.0)  # its first try again
 
 
 def test_rule_7_message_refreshes_from_its_own_time_when_it_is_confirmed() -> None:
