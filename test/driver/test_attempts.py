@@ -89,14 +89,20 @@ def test_rule_8_guest_who_writes_over_a_fallback_all_the_time_moves_nothing_for_
 
 
 def test_rules_5_and_8_port_given_away_and_taken_ten_times_has_its_fallback_each_time() -> None:
-    cell, _ = speed_cell()
+    cell, speed = speed_cell()
     for _ in range(10):
         end(cell)
         store(cell.plc, 'N7:0', [OLD])  # as the program that has the port does
         cell.bench.driver.interlocks.resume()
         cell.bench.open(run=0.3)
         assert cell.word('N7:0') == 7
-    assert {*cell.results()} <= {START, RETURN, END}
+        cell.bench.write(speed, [3], run=0.1)
+        assert cell.word('N7:0') == 3
+    assert {*cell.results()} <= {START, RETURN, END, 'written'}
+    words = cell.bench.driver.interlocks.fallbacks[0].words
+    words.may_land((), cell.now + 60.0)
+    words.plan_again(cell.now)
+    assert words.again_at == cell.now + 60.0  # the end does not bound it any more
 
 
 def test_rule_3d_messages_of_the_wrong_length_keep_no_heartbeat_alive() -> None:

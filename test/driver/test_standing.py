@@ -209,6 +209,8 @@ def test_unconfirmed_write_may_land_over_the_confirmed_one_that_follows() -> Non
     assert not standing.proof(early, 1.4)
     late = end(9, 2.2, WRITTEN, 0.0)
     assert standing.proof(late, 2.4)
+    standing.write_begins(Claim(1, [WORD.extent], begun=2.5))  # of a guest
+    assert not standing.proof(late, 2.6)
     end(8, 3.0, Outcome.UNKNOWN, 5.0)
     end(7, 3.2, Outcome.UNKNOWN, 0.5)  # the write before it may land after it
     assert not standing.proof(end(9, 4.0, WRITTEN, 0.0), 4.2)
