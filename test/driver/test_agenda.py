@@ -211,7 +211,8 @@ def test_write_that_was_old_when_it_came_is_not_sent_late_behind_a_younger_one()
     bench = Bench(write_timeout=2.0)
     young = bench.write(WORD, 1, 1.0)
     bench.write(OTHER, 2, 0.0)
-    assert bench.next(2.5) is young
+    assert bench.begin_write(2.5) is young
+    assert bench.begun[young].expires == 1.0 + 2.0 + 2 * 0.25  # TX_Delay comes twice
     assert bench.next(2.5) is None
     assert [str(result.mapping.address) for result in bench.results] == ['N7:6']
     assert bench.outcomes() == [Outcome.NOT_SENT]

@@ -81,7 +81,7 @@ class Bench:
                                  self.results.append)
         self.reads = readings.reads
         self.writes = WriteQueue(self.stations, writing, write_timeout, self.results.append,
-                                 lambda write, now: '')
+                                 lambda write, now: '', tx_delay=0.25)
         checks = Checks(self.stations, {job.station for job in jobs}, 0.0, line,
                         readings.link_failed, lambda station, identity, asked: None)
         checks.begin(0.0)
