@@ -424,6 +424,7 @@ def test_lost_port_ends_a_request_that_waits_for_its_turn(is_taken: bool) -> Non
     if is_taken:
         assert health.find_due(bench.clock())  # it is among the checks, and not on the line yet
     bench.lose_port()
+    health.request_counters(1)
     assert health.known(1).no_counters == 'port lost: unplugged'
     assert health.counters_wanted == set()
     bench.open(run=2.0)

@@ -102,7 +102,9 @@ def test_rule_11_only_the_first_try_over_a_guest_is_not_held_up_by_a_pause() -> 
     row.write_ended(guest, 1.0)
     assert row.judge(1.0, -math.inf)
     assert row.first_due == 1.0
-    one.fallback(row.refresh(1.0), 1.2, Outcome.UNKNOWN)
+    again = row.refresh(1.0)
+    assert not row.judge(1.1, -math.inf)
+    one.fallback(again, 1.2, Outcome.UNKNOWN)
     assert row.judge(1.2, -math.inf)
     assert row.first_due == math.inf
 
@@ -447,6 +449,18 @@ def test_rule_10_once_more_after_a_message_that_may_have_been_written(
     assert row.judge(60.0, -math.inf) is again
 
 
+def test_rule_8_0_that_a_guest_may_have_written_over_meanwhile_is_written_once_more() -> None:
+    words = OneRow().record.words_of(beat_row())
+    beat = HeartbeatRow(words, 1, Random(0))
+    beat.begin(0.0, is_new=True)
+    beat.take(0.0)
+    guest = Claim(1, [words.row.extent])
+    guest.end(Outcome.UNKNOWN, 0.1, 1.0)
+    words.ended(guest)
+    beat.ended(Outcome.WRITTEN, 0.2)
+    assert beat.judge(0.2, '', 0.2, {})
+
+
 def test_rule_10_heartbeat_counts_after_a_0_that_is_written_once_more() -> None:
     beat = HeartbeatRow(OneRow().record.words_of(beat_row()), 1, Random(0))
     beat.begin(0.0, is_new=True)
@@ -458,6 +472,7 @@ def test_rule_10_heartbeat_counts_after_a_0_that_is_written_once_more() -> None:
     assert not beat.judge(0.8, '', 0.8, {})  # the 0 stands for half a second
     assert beat.judge(0.95, '', 0.95, {})
     assert beat.take(0.95).value == '[1]'
+    assert not beat.judge(9.0, '', 9.0, {})  # under way
 
 
 def test_rule_10_why_the_plc_refuses_is_told_once() -> None:

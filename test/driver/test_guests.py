@@ -20,7 +20,7 @@ from collections.abc import Callable
 
 from abdf1_ros.df1.packet import BROADCAST, Packet
 from abdf1_ros.driver.foreign_words import written_extents
-from abdf1_ros.driver.guests import Guest, GuestListener, outcome_of, ShareAccess
+from abdf1_ros.driver.guests import Guest, GuestCommand, GuestListener, outcome_of, ShareAccess
 from abdf1_ros.driver.interlocks.heartbeat import BeatState
 from abdf1_ros.driver.settings import DriverSettings
 from abdf1_ros.driver.write import Outcome
@@ -357,7 +357,11 @@ def test_lost_port_is_told_and_what_waits_is_not_sent_later() -> None:
     program = Program(bench)
     program.ask(READ_N7)
     program.ask(READ_N7)
+    fresh: list[Packet] = []
+    bench.driver.guests.put(GuestCommand(
+        program.guest, Packet(1, 9, 0x0F, 0, 1, READ_N7), bench.clock(), fresh.append))
     bench.lose_port()
+    assert [reply.sts for reply in fresh] == [0x04]
     program.ask(READ_N7)
     assert len(program.replies) == 3
     assert set(program.statuses) <= {0x04, 0x05}

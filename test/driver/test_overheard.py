@@ -240,9 +240,15 @@ def test_commands_that_may_have_changed_a_value(station: int, asked: str, cmd: i
     assert point_of(bench, mapping) is Freshness.FAILED
 
 
-def test_refused_read_fills_nothing() -> None:
-    bench, mapping = listening()
-    exchange(bench, 7, READ_N7_0, '', sts=0x10)
+@pytest.mark.parametrize(('plc', 'text', 'cmd', 'asked', 'answered', 'sts'), [
+    ('SLC', 'N7:0', 0x0F, READ_N7_0, '', 0x10),
+    ('SLC', 'N9:0', 0x01, '00 00 04', '01 00 02 00', 0),  # S:2/8 decides which words these are
+    ('PLC5', 'N7:0', 0x0F, '68 00 00 02 00 06 07 00 02 00', '99', 0)])
+def test_refused_read_and_reply_without_known_words_fill_nothing(
+        plc: str, text: str, cmd: int, asked: str, answered: str, sts: int) -> None:
+    mapping = make_mapping(text, plc=plc, length=2, period=500)
+    bench = ListeningBench([mapping])
+    exchange(bench, 7, asked, answered, cmd=cmd, sts=sts)
     assert bench.values(mapping) == []
 
 
@@ -267,6 +273,7 @@ def test_run_holds_only_from_a_status_reply_that_was_heard() -> None:
     bench = ListeningBench([mapping])
     exchange(bench, 7, READ_N7_0, VALUES)
     assert bench.values(mapping) == []
+    exchange(bench, 6, '03', '00', cmd=0x06)  # no status
     for tns, mode in ((8, '11'), (9, '06'), (10, '06')):  # PROGRAM, then REMOTE RUN twice
         status = f'00 EE 34 49 25 {b"5/03       ".hex()} 00 00 {mode} 00 00 00 00 FC'
         exchange(bench, tns, '03', status, cmd=0x06)

@@ -170,6 +170,8 @@ def test_job_that_is_put_again_is_there_once() -> None:
     queue.put(job, 2.0)
     assert queue.next_due() == 2.0
     assert [queue.take(9.0), queue.take(9.0)] == [job, None]
+    queue.replace([job], (), 9.0)
+    queue.put(job, 9.0)
     assert not queue
 
 

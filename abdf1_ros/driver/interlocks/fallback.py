@@ -138,14 +138,12 @@ class FallbackRow:
 
     def deadline(self, youngest: float) -> float:
         """
-        Return when the fallback becomes due (clock value in s), infinite for never.
+        Return until when messages delay the fallback (clock value in s), infinite without one.
 
         ``youngest``: publication time of the youngest message that waits or is under way. It
         delays the fallback only while writes are confirmed. Otherwise a fast publisher whose
         messages the PLC refuses would delay the fallback for ever.
         """
-        if self.state is FallbackState.DUE:
-            return self._due_since
         if self.state is not FallbackState.MESSAGE:
             return math.inf
         return self.after + (

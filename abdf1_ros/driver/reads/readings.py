@@ -21,7 +21,6 @@ from collections.abc import Mapping as MappingType
 import math
 from typing import Protocol
 
-from abdf1_ros.df1.packet import BROADCAST
 from abdf1_ros.df1.stations import ActiveStationList
 from abdf1_ros.driver.job_tasks import LineTime
 from abdf1_ros.driver.reads.demands import ReadAnswer, ReadCall, ReadCalls
@@ -287,8 +286,6 @@ class Readings:
     def link_failed(self, station: int, error: LinkError,
                     points: Iterable[ReadPoint] = ()) -> None:
         """Fail the points of a transaction without a reply."""
-        if station == BROADCAST:
-            return
         self._stations[station].failures += 1
         for point in self._affected(station, points):
             if not point.mapping.is_on_demand:  # the call gets the error
