@@ -172,6 +172,19 @@ def test_station_is_brought_back_by_a_message_for_it(standard: bool) -> None:
 
 
 @BOTH
+def test_message_that_a_gateway_does_not_take_says_nothing_about_the_gateway(
+        standard: bool) -> None:
+    rig = bench(standard, 7, 9)
+    rig.master.stations.routes[8] = 7
+    rig[7].deaf = True
+    rig.message(9, 8)
+    rig.start()
+    poll(rig, 9, times=3)
+    assert [reply.sts for reply in rig[9].heard] == [2]
+    assert rig.master.stations[7].active
+
+
+@BOTH
 @pytest.mark.parametrize('is_there', [False, True])
 def test_station_that_a_message_names_is_no_station_of_ours(
         standard: bool, is_there: bool) -> None:

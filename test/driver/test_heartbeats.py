@@ -128,7 +128,8 @@ def test_rule_3c_hung_executor_stops_the_beat_where_it_is(polling: str) -> None:
 
 def test_rule_3d_topic_that_falls_silent_is_0_at_once_though_the_executor_stands_still() -> None:
     speed = speed_row()
-    cell = Cell(beat_row(200, ['speed'], 2000), speed)
+    cell = Cell(beat_row(200, ['speed', 'later'], 2000), speed)
+    cell.bench.driver.interlocks.conditions.messages['later'] = cell.now + 9.0
     cell.run(2.0)
     lapses = cell.now + 2.0
     cell.publish(speed, 3, run=0.3)

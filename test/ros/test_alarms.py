@@ -16,6 +16,7 @@
 
 from array import array
 from pathlib import Path
+import re
 
 from abdf1_ros.driver.reads.point import ReadPoint
 from abdf1_ros.plan.report import make_report
@@ -110,11 +111,12 @@ def test_bridge_reports_the_alarm_of_a_plc(tmp_path: Path) -> None:
     data = 'Station,PLC_Type,Address,Length,Values\n1,PLC5,B3:0,1,0\n'
     net = 'NAK_Retries,ENQ_Retries,Cmd_Timeout,Baud,Timeout\n1,1,5000,115200,3000\n'
 
-    def level_of(array: object) -> bytes | None:
-        return next((status.level for status in array.status  # type: ignore[attr-defined]
-                     if status.name == 'abdf1: alarm door'), None)
+    def text_of(array: object) -> str:
+        return next((status.message for status in array.status  # type: ignore[attr-defined]
+                     if status.name == 'abdf1: alarm door'), '')
 
     with BridgeCell(tmp_path, data, rows, net) as cell:
-        cell.diagnostics.until(lambda array: level_of(array) == OK, 'no alarm')
+        cell.diagnostics.until(lambda array: text_of(array) == 'OK: no alarm', 'no alarm')
         cell.plcs.set('B3:0', 2)
-        cell.diagnostics.until(lambda array: level_of(array) == ERROR, 'the alarm')
+        cell.diagnostics.until(lambda array: re.fullmatch(
+            r'ERROR: B3:0/1 for \d+\.\d s, 1 time', text_of(array)) is not None, 'the alarm')

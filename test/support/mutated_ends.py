@@ -22,7 +22,7 @@ Time is virtual.
 """
 
 from collections import deque
-from collections.abc import Callable, Generator
+from collections.abc import Callable, Collection, Generator
 from enum import auto, Enum
 import heapq
 from itertools import count
@@ -179,10 +179,12 @@ class Wire:
     """
     One end of a line in virtual time, as ``conform`` uses it.
 
-    What ``say`` is given leaves ``delay`` s later; ``after`` calls something then.
+    What ``say`` is given leaves ``delay`` s later; ``after`` calls something then. ``files`` are
+    the words of a PLC behind it.
     """
 
     def __init__(self, check: str, habits: frozenset[Habit], is_half_duplex: bool) -> None:
+        self.files: Collection[bytearray] = ()
         self.check, self.habits, self.is_half_duplex = check, habits, is_half_duplex
         self.now = 0.0
         self._due: list[tuple[float, int, Callable[[], None]]] = []
@@ -355,6 +357,7 @@ class _Executor:
     def __init__(self, wire: Wire, station: int, family: str) -> None:
         self._wire = wire
         self._plc = simulated_plc(station, family, wire.clock, ('N7:0', 20), checksum=wire.check)
+        wire.files = self._plc.table.words.values()
         self._seen: deque[bytes] = deque(maxlen=99 if wire.has(Habit.REMEMBERS_99) else 1)
         self._count = 0
         self._tns = 0x6000
