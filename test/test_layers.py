@@ -219,6 +219,16 @@ def test_library_has_neither_ros_nor_files() -> None:
     assert [name for name in loaded if name.startswith(unwanted)] == []
 
 
+def test_only_what_shows_the_time_of_day_asks_for_it() -> None:
+    """A wait by a clock that is set may last for ever."""
+    asked = {module: len(re.findall(r'\btime\.time(?:_ns)?\b|\bdatetime\.now\b', (
+        PACKAGE / module).read_text(encoding='utf-8'))) for module in MODULES}
+    assert {module: count for module, count in asked.items() if count} == {
+        'cli/monitor/node.py': 1, 'cli/plc/verbs/clock.py': 3, 'cli/plc/watch.py': 2,
+        'ports/trace.py': 1, 'ros/process/main.py': 1, 'ros/topics/services.py': 1,
+        'ros/topics/snapshot.py': 1, 'ros/topics/writes.py': 1}
+
+
 def test_dataclasses_have_slots_and_are_frozen_unless_a_field_is_assigned() -> None:
     nodes = [node for module in MODULES for node in ast.walk(ast.parse(
         (PACKAGE / module).read_text(encoding='utf-8')))]

@@ -380,7 +380,7 @@ def _print_heard(tap: Tap, trace: Trace | None, output: Output, settings: dict[s
     def idle() -> None:
         output.show_progress('listening')
 
-    status = told = 0
+    status = 0
     chunks = tap.chunks(options.seconds, PROGRESS_PERIOD, idle)
     while True:
         try:
@@ -403,21 +403,20 @@ def _print_heard(tap: Tap, trace: Trace | None, output: Output, settings: dict[s
                 break
             else:
                 _say('this output is no longer read; the bytes are passed on until Ctrl-C')
-        told = _tell_lost(tap, trace, told)
+        _tell_lost(tap, trace)
         idle()
     if trace:
         trace.close()
     return status
 
 
-def _tell_lost(tap: Tap, trace: Trace | None, told: int) -> int:
-    """Report lost pieces beyond the ``told`` pieces; return the number of all lost pieces."""
-    if (lost := tap.lost) > told:
-        text = f'{lost - told} pieces of traffic were lost: this output was too slow for them'
+def _tell_lost(tap: Tap, trace: Trace | None) -> None:
+    """Report the pieces that were lost since the last call."""
+    if lost := tap.new_losses():
+        text = f'{lost} pieces of traffic were lost: this output was too slow for them'
         _say(text)
         if trace:
             trace.write(f'# {text}')
-    return lost
 
 
 _say = partial(tell, 'sniff')

@@ -92,6 +92,7 @@ class Tap:
             ports = [self._open(name, stack) for name in names]
             self._open_ports = stack.pop_all()
         self._begun = time.monotonic()
+        self._lost = 0
         self._wake = Wake()
         if len(ports) == 1:
             self._readers = [self._reader(ports[0], Direction.UNKNOWN, None)]
@@ -114,10 +115,10 @@ class Tap:
         self._wake.close()
         self._open_ports.close()
 
-    @property
-    def lost(self) -> int:
-        """Return how many chunks were lost, because the user of ``chunks`` was too slow."""
-        return sum(reader.lost for reader in self._readers)
+    def new_losses(self) -> int:
+        """Return how many chunks were lost since the last call; ``chunks`` was used too slowly."""
+        before, self._lost = self._lost, sum(reader.lost for reader in self._readers)
+        return self._lost - before
 
     def stop(self) -> None:
         """End ``chunks``; may be called by a signal handler."""

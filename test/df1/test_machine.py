@@ -510,6 +510,7 @@ def test_command_that_expires_before_its_repetition_is_not_repeated() -> None:
     asked = Asked(expires=5.5)
     asked.machine.start(5.0)
     assert asked.machine.data_to_send() == FRAME
+    assert asked.machine.sender.send_before == math.inf  # it has gone out
     asked.machine.handle_timeout(6.0)
     assert (asked.told, asked.machine.data_to_send()) == (['silence', 'expired'], b'')
 

@@ -182,6 +182,7 @@ def test_message_that_a_gateway_does_not_take_says_nothing_about_the_gateway(
     poll(rig, 9, times=3)
     assert [reply.sts for reply in rig[9].heard] == [2]
     assert rig.master.stations[7].active
+    assert rig.master.stations.probes.died_at > 0.0  # the PLC was not silent before
 
 
 @BOTH

@@ -39,6 +39,7 @@ def test_refusal_leaves_a_line_what_it_has() -> None:
     owners.hold('/b', '/dev/two')
     with pytest.raises(ConfigurationError):
         owners.hold('/b', '/dev/two', '/dev/one')
+    owners.hold('/a', '/dev/one')
     with pytest.raises(ConfigurationError):
         owners.hold('/c', '/dev/two')
 

@@ -366,8 +366,10 @@ def test_download_brings_back_the_words_of_the_start() -> None:
 def test_power_cycle_keeps_words_and_begins_anew() -> None:
     clock, plc = _with_ladder()
     store(plc, 'N10:0', [5, 42])
+    plc.handle(Frame(Packet(1, 5, 0x06, 0, 1, b'\x03').encode(), 1))
     clock.now += 1.0
     plc.cycle_power()
+    assert plc.handle(Poll(1, True)) == frames.EOT
     plc.advance()
     assert stored(plc, 'N10:0', 2) == bytes([5, 0, 42, 0])
     assert stored(plc, 'S:1')[1] >> 7 == 1
