@@ -95,11 +95,6 @@ class Bench(BridgeCell):
                          'write_timeout:=30.0', *assignments)
         write_csv(self.map, MAP_HEADER, rows)
 
-    def start(self) -> None:
-        """Start the bridge; wait for its port."""
-        super().start()
-        self.ros.until(lambda: self.node.session.driver.is_online, 'the port')
-
     def end(self, number: signal.Signals = signal.SIGTERM) -> int:
         """End the bridge, unless it has ended."""
         status = super().end(number)

@@ -57,11 +57,6 @@ RECIPE = 'recipe,Write,N7:4,1,PLC5,2'
 class Bench(BridgeCell):
     """A bridge on simulated PLCs, whose files can be written anew."""
 
-    def start(self) -> None:
-        """Start the bridge; wait for its port."""
-        super().start()
-        self.ros.until(lambda: self.node.session.driver.is_online, 'the port')
-
     def write_net(self, timeout: int, baud: int = 115200) -> None:
         write_csv(self.net, 'Baud,Timeout', [f'{baud},{timeout}'])
 

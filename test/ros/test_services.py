@@ -55,7 +55,6 @@ class Bench(BridgeCell):
 
     def start(self) -> None:
         super().start()
-        self.ros.until(lambda: self.node.session.driver.is_online, 'the port')
         self.ros.until(lambda: self.node.writes.is_open, 'writes are taken')
 
     def put(self, topic: str, data: bool) -> tuple[bool, str]:

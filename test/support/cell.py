@@ -35,12 +35,14 @@ class BridgeCell(testing.SimulatedCell):
         self.net, self.map = folder / 'net.csv', folder / 'map.csv'
 
     def start(self) -> None:
+        """Start the bridge; wait for its port."""
         self.results = self.ros.results()
         self.diagnostics = self.ros.diagnostics(self.plcs.port)
         self.port_owners = PortOwners()
         self.node = BridgeNode(context=self.ros.context, use_global_arguments=False,
                                port_owners=self.port_owners, cli_args=ros_args(*self.assignments))
         self.ros.run(self.node)
+        self.ros.until(lambda: self.node.session.driver.is_online, 'the port')
 
     def end(self, number: signal.Signals = signal.SIGTERM) -> int:
         """End the bridge in order, if it runs."""
