@@ -46,11 +46,10 @@ _MOST_WAITING = 1 << 20
 # Size of our own pipes (bytes): some time may pass before the relay can run and read them.
 _PIPE_SIZE = 1 << 20
 
-# Time (s) in which the relay may write the last lines after the pipes are closed, and time (s)
-# that the main process waits for the relay.
+# Time (s) in which the relay may write the last lines after the pipes are closed.
 _LAST_ENTRIES = 1.0
-_PATIENCE = 0.5
 
+PATIENCE = 0.5  # time that the main process waits for the relay (s)
 PAUSE = 1.0  # after a write that has failed (s)
 
 _COLOURS = re.compile(rb'\x1b\[[0-9;]*m')
@@ -209,7 +208,7 @@ class Console:
             os.dup2(before, number)
             os.close(before)
         try:
-            self._process.wait(_PATIENCE)
+            self._process.wait(PATIENCE)
         except subprocess.TimeoutExpired:
             nowhere = os.open(os.devnull, os.O_WRONLY)
             for number in self._before:

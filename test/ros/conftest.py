@@ -18,8 +18,18 @@
 from collections.abc import Callable, Iterator
 import signal
 
+from abdf1_ros import console
 from abdf1_ros.ros.node import main
 import pytest
+from support.ptys import PATIENCE
+
+
+@pytest.fixture(autouse=True)
+def _patient_console() -> Iterator[None]:
+    """Let ``main`` wait for all lines that it has said: on a busy host the relay starts late."""
+    before, console.PATIENCE = console.PATIENCE, PATIENCE
+    yield
+    console.PATIENCE = before
 
 
 @pytest.fixture
