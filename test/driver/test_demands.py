@@ -303,14 +303,15 @@ def test_lost_port_and_the_end_answer_every_call() -> None:
 def test_each_call_ends_at_its_own_time_whatever_came_after_it() -> None:
     ended: list[str] = []
     demands = ReadCalls(1.0)
-    for name, now in (('first', 0.0), ('second', 0.4)):
+    for name, now in (('first', 0.0), ('second', 0.4), ('third', 0.8)):
         demands.add(ReadCall(RECIPE, now, lambda answer, name=name: ended.append(name)), now, 0.5)
     assert demands.next_expiry == 1.5
     demands.expire(demands.next_expiry)
     assert ended == ['first']
     assert demands.next_expiry == 1.9
     demands.expire(demands.next_expiry)
-    assert ended == ['first', 'second']
+    demands.expire(demands.next_expiry)
+    assert ended == ['first', 'second', 'third']
     assert demands.next_expiry == math.inf
 
 

@@ -193,7 +193,7 @@ def test_unconfirmed_write_and_what_follows_prove_nothing() -> None:
 
 def test_unconfirmed_write_may_land_over_the_confirmed_one_that_follows() -> None:
     block, = Line(WORD, READ).driver.readings.blocks
-    standing = Standing([WORD], 2.0)
+    standing = Standing([WORD], 0.5)
 
     def end(value: int, begun: float, outcome: Outcome, may_land_for: float) -> Write:
         write = Write(WORD, [value], begun)
@@ -201,16 +201,24 @@ def test_unconfirmed_write_may_land_over_the_confirmed_one_that_follows() -> Non
         standing.write_begins(claim)
         claim.end(outcome, begun + 0.1, may_land_for)
         standing.write_ended(claim)
-        standing.words_read(block, bytes((value, *7 * [0])), begun + 0.11)
+        standing.words_read(block, bytes((value, *7 * [0])), begun + 0.1)
         return write
 
     end(8, 1.0, Outcome.UNKNOWN, 1.0)
     early = end(9, 1.2, WRITTEN, 0.0)
     assert not standing.proof(early, 1.4)
-    late = end(9, 2.2, WRITTEN, 0.0)
-    assert standing.proof(late, 2.4)
-    standing.write_begins(Claim(1, [WORD.extent], begun=2.5))  # of a guest
-    assert not standing.proof(late, 2.6)
+    late = end(9, 2.1, WRITTEN, 0.0)  # confirmed at 2.2
+    standing.words_read(block, bytes(8), 2.1)
+    assert standing.proof(late, 2.69) and not standing.proof(late, 2.7)
+    standing.words_read(block, bytes((9, *7 * [0])), 2.75)
+    assert standing.proof(late, 3.1995) and not standing.proof(late, 3.2)
+    guest = Claim(1, [WORD.extent], begun=2.8)
+    standing.write_begins(guest)
+    assert not standing.proof(late, 2.8)
+    meanwhile = end(9, 2.8, WRITTEN, 0.0)
+    guest.end(WRITTEN, 2.9, 0.0)
+    standing.write_ended(guest)
+    assert not standing.proof(meanwhile, 2.9)
     end(8, 3.0, Outcome.UNKNOWN, 5.0)
     end(7, 3.2, Outcome.UNKNOWN, 0.5)  # the write before it may land after it
     assert not standing.proof(end(9, 4.0, WRITTEN, 0.0), 4.2)

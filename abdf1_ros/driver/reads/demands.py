@@ -92,7 +92,6 @@ class ReadCalls:
         for demand in self.inbox.close():
             demand.answer(ReadAnswer(error=error))
         self.fail([*self.waiting], error)
-        self.next_expiry = math.inf
 
     def _end(self, mapping: Mapping, answer: ReadAnswer,
              is_over: Callable[[float, ReadCall], bool]) -> None:
