@@ -254,6 +254,13 @@ def test_command_to_a_station_that_is_never_polled_ends_by_the_clock(number: int
     assert rig.master.numbers() == [(2508,)]
 
 
+def test_group_is_filled_with_active_stations() -> None:
+    rig = bench(PollingSettings((1, 2, 3, 4), (9,), group_size=2), dead=(1, 2))
+    rig.start(1, 2, run=1.0)
+    polls = [text for text in rig.master.said.split() if text not in ('P1', 'P2')]
+    assert polls[:9] == 3 * ['P9', 'P3', 'P4']
+
+
 def test_fault_heard_while_probing_is_counted_and_told() -> None:
     rig = bench(PollingSettings((1, 2)), dead=(1,))
     rig.start(1)
