@@ -170,8 +170,11 @@ def test_job_that_is_put_again_is_there_once() -> None:
     queue.put(job, 2.0)
     assert queue.next_due() == 2.0
     assert [queue.take(9.0), queue.take(9.0)] == [job, None]
+    assert job.ticket == 0
+    queue = make_queue(job)
     queue.replace([job], (), 9.0)
     queue.put(job, 9.0)
+    assert queue.take(9.0) is None
     assert not queue
 
 
