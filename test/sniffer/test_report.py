@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Entries and summaries as text and as JSON."""
+"""Entries and summaries: what they count, as text and as JSON."""
 
 import json
 
@@ -39,6 +39,8 @@ REFUSAL = Entry(1.0, IN, Kind.REPLY, 'STS 50: no', 1, Checksum.CRC, True,
 DAMAGED = Entry(2.0, IN, Kind.DAMAGED, 'wrong check', 1, Checksum.BCC, False)
 POLL = Entry(None, Direction.UNKNOWN, Kind.POLL, '', 16, Checksum.BCC, True)
 NOISE = Entry(3.0, IN, Kind.NOISE, '2 bytes outside of any frame', size=2)
+GOOD = Packet(5, 1, 0x4F, 0, 1)
+REFUSED = Packet(5, 1, 0x4F, 0x50, 1)
 
 
 @pytest.mark.parametrize(('entry', 'text'), [
@@ -104,3 +106,48 @@ def test_json_has_all_that_the_summary_tells(summary: Summary) -> None:
     assert found['stations']['1']['latency_ms'] == {'mean': 750.0, 'max': 750.0}
     assert found['stations']['16']['counts'] == {'poll': 1, 'silence': 1}
     assert found['marks'] == {'retransmission': 1}
+
+
+def test_entries_are_counted_for_the_line_and_for_their_station() -> None:
+    summary = Summary()
+    for entry in (
+            Entry(0, OUT, Kind.POLL, station=1, valid=True),
+            Entry(0, OUT, Kind.POLL, station=2, valid=False),
+            Entry(0, IN, Kind.REPLY, station=1, packet=GOOD, latency=0.25),
+            Entry(0, IN, Kind.REPLY, station=1, packet=REFUSED, latency=0.75,
+                  marks=(Mark.DUPLICATE,)),
+            Entry(0, IN, Kind.DAMAGED, station=2, valid=False),
+            Entry(0, IN, Kind.NOISE, size=7)):
+        summary.add(entry)
+    every, one, two = summary.all, summary.stations[1], summary.stations[2]
+    assert (every.kinds[Kind.POLL], one.kinds[Kind.POLL], two.kinds[Kind.POLL]) == (2, 1, 1)
+    assert (every.errors, one.errors, two.errors) == (1, 1, 0)
+    assert (every.damaged, one.damaged, two.damaged) == (2, 0, 2)
+    assert (every.noise, one.noise) == (7, 0)
+    assert one.marks[Mark.DUPLICATE] == 1
+    assert (one.latency.mean, one.latency.longest) == (0.5, 0.75)
+    assert two.latency.count == 0
+    assert sorted(summary.stations) == [1, 2]
+
+
+def _heard(summary: Summary) -> Summary:
+    summary.take(Chunk(10.0, OUT, bytes(300)))
+    summary.take(Chunk(11.0, IN, bytes(180)))
+    return summary
+
+
+@pytest.mark.parametrize(('baud', 'duplex', 'load'), [
+    (9600, Duplex.HALF, 0.5), (9600, Duplex.FULL, 0.3125), (9600, None, 0.5),
+    (4800, Duplex.HALF, 1.0), (1200, Duplex.HALF, None), (None, Duplex.HALF, None)])
+def test_load_is_known_where_baud_and_duplex_are(
+        baud: int | None, duplex: Duplex | None, load: float | None) -> None:
+    summary = _heard(Summary(baud))
+    assert summary.load(duplex) == load
+    assert summary.seconds == 1.0
+    assert summary.bytes == {OUT: 300, IN: 180}
+
+
+def test_recordings_one_after_the_other() -> None:
+    summary = _heard(_heard(Summary(9600)))
+    assert summary.seconds == 2.0
+    assert summary.load(Duplex.HALF) == 0.5
