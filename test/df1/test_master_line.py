@@ -21,6 +21,7 @@ from abdf1_ros.df1.master_line import MAX_FORWARDS
 from abdf1_ros.df1.packet import Packet
 from abdf1_ros.df1.settings import LinkSettings, PollingSettings
 from abdf1_ros.df1.slave import HalfDuplexSlave
+from abdf1_ros.errors import StationInactive
 import pytest
 from support.multidrop import MasterBench, Slave
 
@@ -181,7 +182,8 @@ def test_message_that_a_gateway_does_not_take_says_nothing_about_the_gateway(
     rig.start()
     poll(rig, 9, times=3)
     assert [reply.sts for reply in rig[9].heard] == [2]
-    assert rig.master.stations[7].active
+    assert str(rig.ask(8, run=0.5).result) == str(StationInactive(8))
+    assert (7, False) not in rig.master.changes
     assert rig.master.stations.probes.died_at > 0.0  # the PLC was not silent before
 
 
