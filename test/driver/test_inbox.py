@@ -14,6 +14,7 @@
 
 """What other threads hand to the link comes once, whatever they do at the same moment."""
 
+from collections import deque
 from collections.abc import Iterator
 import sys
 import threading
@@ -23,6 +24,13 @@ import pytest
 
 SENDERS = 4
 ITEMS = 4000
+
+
+class Emptied(deque[str]):
+    """Items that another thread takes as soon as they come."""
+
+    def append(self, item: str) -> None:
+        """Keep nothing."""
 
 
 @pytest.fixture
@@ -62,6 +70,9 @@ def test_closed_inbox_takes_nothing_and_gives_what_waited() -> None:
     assert list(inbox.take()) == []
     assert inbox.put('c')
     assert list(inbox.take()) == ['c']
+    inbox.close()
+    inbox.items = Emptied()
+    assert inbox.put('d')  # it was taken
 
 
 def test_no_item_is_lost_or_taken_twice_under_stress(restless: None) -> None:
