@@ -156,8 +156,14 @@ class Files:
         return simulator
 
 
-def make_files(folder: Path, net_row: str = NET_ROW) -> Files:
+def make_files(folder: Path, net_row: str = NET_ROW, period: int = 100) -> Files:
     return Files(
         folder, write_csv(folder / 'net.csv', NET_HEADER, [net_row]),
-        write_csv(folder / 'map.csv', MAP_HEADER, MAP_ROWS),
+        write_csv(folder / 'map.csv', MAP_HEADER, [_every(period, row) for row in MAP_ROWS]),
         write_csv(folder / 'simulator.csv', SIMULATOR_HEADER, SIMULATOR_ROWS), folder / 'plc')
+
+
+def _every(period: int, row: str) -> str:
+    """Return a row with a Period (ms), its own if it has one."""
+    cells = [*row.split(','), *8 * ['']]
+    return ','.join([*cells[:7], cells[7] or str(period), *cells[8:14]])

@@ -45,7 +45,7 @@ _SIZES = ('LINES', 'COLUMNS')
 
 @pytest.fixture(scope='module')
 def files(tmp_path_factory: pytest.TempPathFactory) -> Files:
-    return make_files(tmp_path_factory.mktemp('monitor'), IMPATIENT_ROW)
+    return make_files(tmp_path_factory.mktemp('monitor'), IMPATIENT_ROW, period=500)
 
 
 @pytest.fixture(scope='module')
@@ -192,7 +192,7 @@ def terminal(*args: str, **options: Any) -> Iterator[Terminal]:
 def test_picture_is_drawn_in_place_and_keys_lead_to_its_parts(simulator: Process) -> None:
     with terminal('--node', NODE) as screen:
         screen.wait_for('\x1b[?1049h')  # the screen beside that of the shell
-        screen.wait_for('CRD_CHAR_RECV')
+        screen.redraw_until('CRD_CHAR_RECV')
         screen.resize(8, 60)
         screen.wait_for(NODE)
         # As often as it takes, for the picture may grow meanwhile.
