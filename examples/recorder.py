@@ -100,18 +100,23 @@ class Recorder(Node):
 
 
 def record(node: Recorder, seconds: float, wait: float, ended: list[int]) -> bool:
-    """Spin until time is over or a signal comes; return False if the bridge was not found."""
+    """
+    Record for ``seconds`` or until a signal comes; return False if the bridge was not found.
+
+    The time begins when the bridge is found, within ``wait`` s.
+    """
     begin = said = time.monotonic()
-    while time.monotonic() < begin + seconds:
-        if ended:
-            return True
+    end = math.inf
+    while (now := time.monotonic()) < end and not ended:
         rclpy.spin_once(node, timeout_sec=0.1)
-        if not node.has_found_topics and time.monotonic() > begin + wait:
+        if not node.has_found_topics and now > begin + wait:
             return False
-        if sys.stderr.isatty() and time.monotonic() > said + _PROGRESS_PERIOD:
-            said = time.monotonic()
+        if node.has_found_topics and end == math.inf:
+            end = now + seconds
+        if sys.stderr.isatty() and now > said + _PROGRESS_PERIOD:
+            said = now
             print(f'\r{node.rows} messages', end='', file=sys.stderr, flush=True)
-    return node.has_found_topics
+    return True
 
 
 def main() -> int:
@@ -122,7 +127,7 @@ def main() -> int:
     parser.add_argument('file', help='CSV file to write; must not exist yet')
     parser.add_argument('--node', default='/abdf1', help='the bridge (default: %(default)s)')
     parser.add_argument('--seconds', type=float, default=math.inf,
-                        help='end after this many seconds')
+                        help='end this many seconds after the bridge was found')
     parser.add_argument('--wait', type=float, default=10.0,
                         help='seconds to look for the bridge (default: %(default)g)')
     options = parser.parse_args(remove_ros_args(sys.argv)[1:])

@@ -77,7 +77,7 @@ def test_every_read_topic_is_recorded_until_a_signal(bridge: Process, tmp_path: 
 
 def test_it_ends_after_the_time_it_is_given(bridge: Process, tmp_path: Path) -> None:
     path = tmp_path / 'line.csv'
-    with Process(EXAMPLE, str(path), '--node', '/recorded/abdf1', '--seconds', '5') as recorder:
+    with Process(EXAMPLE, str(path), '--node', '/recorded/abdf1', '--seconds', '0.1') as recorder:
         assert recorder.result() == 0, recorder.text
     assert recorder.lines == [f'{len(rows_of(path))} messages in {path}']
 
