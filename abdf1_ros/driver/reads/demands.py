@@ -53,8 +53,8 @@ class ReadCalls:
     The calls that wait for a read, for ``patience`` s plus the longest time of the read.
 
     ``inbox`` takes calls from any thread. All else belongs to the link thread. ``waiting`` has the
-    calls of each row, each with the clock value (s) until which it waits. ``next_expiry`` is the
-    earliest of these clock values.
+    calls of each row, each with the clock value (s) until which it waits. ``next_expiry`` is not
+    later than any of these clock values.
     """
 
     def __init__(self, patience: float) -> None:
