@@ -24,6 +24,7 @@ import sys
 from abdf1_ros.cli.check import main
 from abdf1_ros.paths import config_file
 import pytest
+from support.commands import Output
 from support.ros import write_csv
 from support.vectors import VECTOR_FOLDER
 
@@ -31,7 +32,6 @@ NET_HEADER = 'Station,Mode,Baud,Cmd_Timeout,Timeout,Com_Port'
 MAP_HEADER = 'Tag,Command,Address,Station,PLC_Type,Length,Period'
 GOOD_NET = '5,Master,9600,500,300,1'
 GOOD_ROW = 'speed,Read,N7:0,1,PLC5,2,1000'
-Output = pytest.CaptureFixture[str]
 Paths = tuple[Path, Path]
 BAD_ROWS = ('a,Read,N7,1,PLC5,,', 'b,Rad,N7:1,256,PLC5,,', 'c,Serve,N7:0,6,PLC5,,',
             'a,Read,N7:9999,1,PLC5,,')

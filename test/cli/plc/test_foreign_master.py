@@ -31,10 +31,9 @@ from abdf1_ros.df1.checksum import Checksum
 from abdf1_ros.driver import requests
 from abdf1_ros.settings.network import Network
 import pytest
+from support.commands import Output
 from support.odd_device import frame
 from support.ptys import Pty
-
-Output = pytest.CaptureFixture[str]
 
 
 class Master(threading.Thread):

@@ -34,6 +34,7 @@ from abdf1_ros.problems import ConfigurationError
 from abdf1_ros.settings.map_file import load_mappings
 from abdf1_ros.settings.network import load_network, Network
 import pytest
+from support.commands import Output
 from support.driver_bench import simulated_plc, store, stored
 from support.mappings import cell_of
 from support.odd_device import OddDevice, Wiring
@@ -41,8 +42,6 @@ from support.plc_line import LosesPolls, odd_line, plc_line
 from support.ptys import no_file_longer_than
 
 PATIENT = ('--timeout', '2000', '--duplex', 'half')  # ms; a busy host may be late
-
-Output = pytest.CaptureFixture[str]
 
 PLC5 = (('O:000', 2), ('S:0', 32), ('B3:0', 5), ('T4:0', 30), ('N7:0', 256), ('F8:0', 20),
         ('ST9:0', 84), ('A12:0', 7), ('D13:0', 1), ('C20:0', 3))

@@ -39,6 +39,7 @@ from abdf1_ros.settings.scaling import Scaling
 from abdf1_ros.sniffer.dumps import Recording
 from abdf1_ros.testing import Plcs
 import pytest
+from support.commands import Output
 from support.driver_bench import store
 from support.mappings import make_mapping
 from support.ros import write_csv
@@ -46,7 +47,6 @@ from support.ros import write_csv
 SPEED = make_mapping('N7:0', item=1)
 NOW = datetime(2026, 3, 1)
 NAME = make_mapping('ST9:0', item=2)
-Output = pytest.CaptureFixture[str]
 
 
 @pytest.fixture
