@@ -31,6 +31,7 @@ from typing import Protocol
 from abdf1_ros.df1.packet import BROADCAST
 from abdf1_ros.driver.job_tasks import LineTime
 from abdf1_ros.driver.write import Outcome, Write
+from abdf1_ros.errors import LinkError, RemoteError
 from abdf1_ros.pccc.extent import Extent
 from abdf1_ros.plan.planner import Block
 from abdf1_ros.settings.mapping import Mapping
@@ -69,7 +70,7 @@ class Claim:
     - ``begun``, ``done``: when it got the line, and when it ended.
     - ``lands_until``: until when it may land. Infinite while it is under way, -inf if nothing was
       written.
-    - ``outcome``: how it ended.
+    - ``outcome``: how it ended; ``error``: why it is not confirmed.
     """
 
     def __init__(self, station: int, extents: Sequence[Extent] | None,
@@ -78,6 +79,7 @@ class Claim:
         self.extents = extents
         self.write = write
         self.outcome: Outcome | None = None
+        self.error: LinkError | RemoteError | None = None
         self.begun, self.done, self.lands_until = begun, -math.inf, math.inf
 
     def end(self, outcome: Outcome, now: float, may_land_for: float) -> None:
@@ -243,8 +245,10 @@ class WriteRecord:
             listener.write_begins(claim)
         return claim
 
-    def ended(self, claim: Claim, outcome: Outcome, *, may_land: bool = False) -> None:
+    def ended(self, claim: Claim, outcome: Outcome,
+              error: LinkError | RemoteError | None = None, *, may_land: bool = False) -> None:
         """Record the end of a write; ``may_land`` tells whether a part of it may still land."""
+        claim.error = error
         self._under_way.remove(claim)
         landed = 0.0 if outcome in _CHANGED else -math.inf
         may_land |= outcome is Outcome.BROADCAST  # no station answers it

@@ -110,11 +110,11 @@ class Write:
     """
 
     def __init__(self, mapping: Mapping, values: Sequence[float] | str, now: float,
-                 request: str = '') -> None:
+                 request: str = '', *, is_own: bool = False) -> None:
         self.mapping = mapping
         self.origins = [Origin(request, now)]
         self.requested = self.oldest = self.came = now
-        self.is_probe = self.is_own = False
+        self.is_probe, self.is_own = False, is_own
         self.value = show(values)
         self.raw = raw_values(mapping, values)
         self.commands = self._usual = write_requests(

@@ -68,7 +68,6 @@ class OneRow(StillClock):
 
     def fallback(self, write: Write, done: float, outcome: Outcome = Outcome.WRITTEN
                  ) -> float | None:
-        write.is_own = True
         self._write(write, done, outcome)
         return self.row.ended(outcome, done)
 
@@ -293,8 +292,8 @@ def test_rule_8_fallback_that_stands_does_not_wait_for_one_of_a_busy_station() -
     line.run(4.0)
     interlocks = line.driver.interlocks
     first, second = (interlocks.refresh(9.0, busy) for busy in ({1}, set()))
-    assert first is not None and first.row.mapping is speeds[1]
-    assert second is not None and second.row.mapping is speeds[0]
+    assert first is not None and first.write.mapping is speeds[1]
+    assert second is not None and second.write.mapping is speeds[0]
 
 
 def test_rule_8_message_that_is_lost_with_the_port_is_not_waited_for() -> None:

@@ -15,7 +15,7 @@
 """The orderly end of a bridge on a virtual line: rule 5 of docs/heartbeats.md."""
 
 from abdf1_ros.df1.packet import Packet
-from abdf1_ros.driver.writes.queue import MessageJob
+from abdf1_ros.driver.writes.under_way import WriteJob
 from abdf1_ros.settings.heartbeats import Fallback
 import pytest
 from support.interlocks import beat_row, Cell, END, end, FALLBACK, speed_row
@@ -75,7 +75,7 @@ def test_rule_5_message_does_not_outlive_the_end(moment: str) -> None:
         cell.bench.run_until(lambda: cell.word('N7:0') == 42)
     elif moment == 'on the line':
         cell.bench.run_until(lambda: any(
-            isinstance(job, MessageJob) for job in driver.tasks.under_way))
+            isinstance(job, WriteJob) and not job.is_own for job in driver.tasks.under_way))
         assert cell.word('N7:0') == 7
     end(cell, 0.3)
     assert (cell.word('N10:0'), cell.word('N7:0')) == (0, 7)

@@ -85,10 +85,11 @@ def test_write_of_two_packets(answers: list[Packet | LinkError], outcome: Outcom
     ([CommandTimeout(), CommandTimeout()], Outcome.UNKNOWN),
     ([reply(sts=0x10), reply()], Outcome.PARTLY),
     ([StationInactive(1), reply()], Outcome.PARTLY)])
-def test_write_that_goes_on_sends_each_packet(
+def test_own_write_sends_each_packet(
         answers: list[Packet | LinkError], outcome: Outcome) -> None:
-    write = Write(make_mapping('N7:0', 'Write', plc='SLC', length=130), [7] * 130, 0.0)
-    requests, result = converse(carry_out(write, clock, goes_on=True), answers)
+    mapping = make_mapping('N7:0', 'Write', plc='SLC', length=130)
+    write = Write(mapping, [7] * 130, 0.0, is_own=True)
+    requests, result = converse(carry_out(write, clock), answers)
     assert isinstance(result, WriteResult)
     assert requests == write.commands[:len(answers)]
     assert result.outcome is outcome

@@ -35,8 +35,8 @@ from abdf1_ros.driver.record import Claim, WriteRecord
 from abdf1_ros.driver.served import Served
 from abdf1_ros.driver.settings import DriverSettings
 from abdf1_ros.driver.write import Outcome, Write, WriteResult
-from abdf1_ros.driver.writes.queue import MessageJob, WriteQueue
-from abdf1_ros.driver.writes.under_way import WritesUnderWay
+from abdf1_ros.driver.writes.queue import WriteQueue
+from abdf1_ros.driver.writes.under_way import WriteJob, WritesUnderWay
 from abdf1_ros.pccc.file_types import PlcType
 from abdf1_ros.plan.line_model import LineModel
 from abdf1_ros.plan.planner import Planner
@@ -70,7 +70,7 @@ class Bench:
 
     def __init__(self, *jobs: ReadJob, write_timeout: float = 2.0) -> None:
         self.results: list[WriteResult] = []
-        self.begun: dict[Write, MessageJob] = {}
+        self.begun: dict[Write, WriteJob] = {}
         self.stations = ActiveStationList([job.station for job in jobs], probe_time=PROBE_TIME)
         self.tasks, line = JobTasks(5, 0), StillClock()
         listener = Recorder(lambda: 0.0)
@@ -97,12 +97,12 @@ class Bench:
     def next(self, now: float) -> object:  # noqa: A003
         """Return who has the line next; a write ends at once."""
         job = self.agenda.next(now)
-        if not isinstance(job, MessageJob):
+        if not isinstance(job, WriteJob):
             return job
         self.end(job)
         return job.write
 
-    def end(self, job: MessageJob) -> None:
+    def end(self, job: WriteJob) -> None:
         """Let a write end unsent."""
         self.record.ended(job.claim, Outcome.NOT_SENT)
 

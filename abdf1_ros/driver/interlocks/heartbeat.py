@@ -320,7 +320,8 @@ class HeartbeatRow:
         # The other bridge has to see our 0 between two of its own values.
         is_urgent = self.wants_zero and self.state is not BeatState.CONFLICT
         self.next_beat = now + (min(self._period, _REPEAT_ZERO) if is_urgent else self._period)
-        return Write(self.mapping, [self.value], now)
+        self.due = math.inf
+        return Write(self.mapping, [self.value], now, is_own=True)
 
     def ended(self, outcome: Outcome, now: float) -> None:
         """Record how the write ended."""

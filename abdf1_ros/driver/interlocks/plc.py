@@ -24,6 +24,7 @@ from collections.abc import Iterable
 from collections.abc import Mapping as MappingType
 from dataclasses import dataclass, field
 import math
+from operator import attrgetter
 
 from abdf1_ros.df1.probes import OTHERS_SHARE
 from abdf1_ros.df1.stations import ActiveStationList
@@ -46,6 +47,8 @@ _LEAST_PAUSE = 1.0
 _QUICK_TRIES = 3
 
 _ANSWERED = (Outcome.WRITTEN, Outcome.PARTLY, Outcome.FAILED)
+
+_refresh_of = attrgetter('refresh_at')
 
 OwnRow = HeartbeatRow | FallbackRow
 TurnRank = tuple[float, ...]
@@ -82,6 +85,7 @@ class Plc:
 
     - ``due``: when to look at its rows next.
     - ``first_due``: the same for first tries of a 0 or a fallback; a pause does not delay these.
+    - ``refresh_due``: when to look for fallbacks to be written again (rule 8).
     - ``failures``: number of our own writes without an answer since the last answered write. That
       may also be the write of a message or a guest.
     - ``pause_end``: after the second and each later failure, only first tries are sent until then.
@@ -93,7 +97,7 @@ class Plc:
         self.rows = [*rows]
         self.heartbeats = [row for row in self.rows if isinstance(row, HeartbeatRow)]
         self.fallbacks = [row for row in self.rows if isinstance(row, FallbackRow)]
-        self.due = self.first_due = math.inf
+        self.due = self.first_due = self.refresh_due = math.inf
         self.failures = 0
         self.pause_end = -math.inf
         self._is_running: bool | None = None
@@ -116,6 +120,11 @@ class Plc:
         """Plan the next look at its rows, at the earliest ``due`` of them."""
         self.due = min([row.due for row in self.rows], default=math.inf)
         self.first_due = min([row.first_due for row in self.rows], default=math.inf)
+
+    def plan_refresh(self, row: FallbackRow) -> None:
+        """Plan when a fallback is to be written again, if the PLC holds it."""
+        if row.stands:
+            self.refresh_due = min(self.refresh_due, row.refresh_at)
 
     def look_again(self, *rows: OwnRow) -> None:
         """Look at these rows at once."""
@@ -223,6 +232,20 @@ class Plc:
             return None
         return 3, is_beat, min(row.tries, _QUICK_TRIES), row.tried
 
+    def to_refresh(self, youngest: MappingType[Mapping, float], now: float) -> FallbackRow | None:
+        """Return the next fallback to be written again (rule 8); put off those that must wait."""
+        standing = [row for row in self.fallbacks if row.stands]
+        for row in sorted(standing, key=_refresh_of):
+            if row.refresh_at > now:
+                break
+            is_put_off = row.mapping in youngest and not row.has_failed
+            if not is_put_off and self._record.may_begin(row.mapping) \
+                    and self._stations[self.station].replies_in_time:
+                return row
+            row.refresh_at = now + row.after
+        self.refresh_due = min(map(_refresh_of, standing), default=math.inf)
+        return None
+
     @property
     def _has_last_try(self) -> bool:
         """Tell whether the bridge ends and the PLC is silent."""
@@ -240,7 +263,8 @@ class Plc:
     def next_due(self, least: float) -> float:
         """Return when the next write may be sent, if before ``least`` (clock values, s)."""
         if self.due >= least:
-            return least
+            return min(least, self.refresh_due)
+        least = min(least, self.refresh_due)
         if self._has_last_try:
             return min([row.due for row in self.rows if row.tried < self._conditions.ended],
                        default=least)

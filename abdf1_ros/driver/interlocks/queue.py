@@ -24,8 +24,6 @@ clock that also counts while the host sleeps (rule 6). None of this is a safety 
 from __future__ import annotations
 
 from collections.abc import Callable, Container
-import heapq
-import itertools
 import math
 from operator import attrgetter
 from random import Random
@@ -46,36 +44,7 @@ from abdf1_ros.settings.mapping import Mapping
 from abdf1_ros.settings.rows import Rows
 
 _OURS = -1  # means our own table
-_due_of = attrgetter('due')
-
-
-class OwnWrite(WriteJob):
-    """
-    A write that no message has asked for.
-
-    It must not be sent after ``expires`` (clock value in s): its value may be wrong by then. With
-    ``is_last`` the bridge ends, the PLC is silent, and this write is the only try of its row.
-    """
-
-    is_own = True
-
-    def __init__(self, row: OwnRow, write: Write, writing: WritesUnderWay, interlocks: Interlocks,
-                 expires: float = math.inf, *, is_free: bool = False,
-                 is_last: bool = False) -> None:
-        write.is_own = True
-        super().__init__(write, writing)
-        self.is_free = is_free
-        self.answer_within = LAST_ANSWER if is_last else math.inf
-        # Each packet of a fallback is sent: the PLC may execute a packet that it does not answer.
-        self.goes_on = isinstance(row, FallbackRow)
-        self.row = row
-        self.expires = expires
-        self._interlocks = interlocks
-
-    def ended(self, error: Exception | None) -> None:
-        """Record the end of the write, also for its row."""
-        self._writing.ended(self)
-        self._interlocks.ended(self)
+_due_of, _refresh_due_of = attrgetter('due'), attrgetter('refresh_due')
 
 
 class Interlocks(WriteListener):
@@ -112,12 +81,11 @@ class Interlocks(WriteListener):
         self._plc_of = {row: self.plcs[number] for row, number in stations_of.items()}
         self.ours = self.plcs.pop(_OURS)
         self._by_mapping = {row.mapping: row for row in self.fallbacks}
+        self._row_of = {row.mapping: row for row in rows}
         self._writes = writes
         self._writing = writing
         self._served = served
         self._listener, self._warn = listener, warn
-        self._refreshes: list[tuple[float, int, FallbackRow]] = []
-        self._tickets = itertools.count()
         self._has_begun = False
         # stations that answered when the end began
         self._awaited: frozenset[int] = frozenset()
@@ -253,11 +221,13 @@ class Interlocks(WriteListener):
             if isinstance(row, FallbackRow):
                 if not row.stands and self.conditions.are_all_due:
                     row.make_due(FallbackCause.END, now)
-                elif row.stands and row.refresh_at <= now:
-                    self._plan_refresh(row, now)
+                else:
+                    self._plc_of[row].plan_refresh(row)
             self._plc_of[row].look_again(row)
         for plc in self.plcs.values():
             plc.release()
+        if (write := claim.write) is not None and write.is_own:
+            self._own_ended(claim, write, now)
 
     def write_expired(self, write: Write) -> None:
         """Let the fallback stop waiting for a message that was too old to have the line."""
@@ -268,7 +238,7 @@ class Interlocks(WriteListener):
     # Who goes next
 
     def next(self, now: float, busy: Container[int] = (), *,  # noqa: A003
-             only_active: bool = False) -> OwnWrite | None:
+             only_active: bool = False) -> WriteJob | None:
         """Return the next own write, None for none; ``only_active``: not for silent PLCs."""
         self.expire(now)
         if self.conditions.are_all_due:
@@ -293,7 +263,7 @@ class Interlocks(WriteListener):
         return self._begin(best[1], best[2], youngest, now)
 
     def _begin(self, plc: Plc, row: OwnRow, youngest: dict[Mapping, float],
-               now: float) -> OwnWrite:
+               now: float) -> WriteJob:
         expires = math.inf
         if isinstance(row, FallbackRow):
             self._writes.drop('fallback', now, row.mapping)
@@ -301,59 +271,41 @@ class Interlocks(WriteListener):
             expires = plc.good_until(row, youngest)
         is_first = row.is_first_try
         write = row.take(now)
-        row.due = math.inf
         plc.plan()
-        return OwnWrite(row, write, self._writing, self, expires, is_free=is_first,
-                        is_last=self.conditions.are_all_due and not plc.is_active)
+        is_last = self.conditions.are_all_due and not plc.is_active
+        return WriteJob(write, self._writing, expires, is_free=is_first,
+                        answer_within=LAST_ANSWER if is_last else math.inf)
 
-    def refresh(self, now: float, busy: Container[int] = ()) -> OwnWrite | None:
+    def refresh(self, now: float, busy: Container[int] = ()) -> WriteJob | None:
         """
         Return the next confirmed fallback that has to be written again; None for none (rule 8).
 
         It does not go before messages. It waits while a message of its row waits, unless the last
         message of the row was not confirmed.
         """
-        passed_over = []
-        found = None
-        while found is None and self._refreshes and self._refreshes[0][0] <= now:
-            entry = heapq.heappop(self._refreshes)
-            when, _, row = entry
-            if when != row.refresh_at or not row.stands:
-                continue
-            if row.mapping.station in busy:
-                passed_over.append(entry)
-                continue
-            is_waiting = row.mapping in self._writes.youngest()
-            if row.is_under_way or is_waiting and not row.has_failed \
-                    or not self._writing.record.may_begin(row.mapping) \
-                    or not self._writing.stations[row.mapping.station].replies_in_time:
-                self._plan_refresh(row, now + row.after)
-                continue
-            row.due = math.inf
-            found = OwnWrite(row, row.refresh(now), self._writing, self)
-        for entry in passed_over:
-            heapq.heappush(self._refreshes, entry)
-        return found
+        due = [plc for plc in self.plcs.values()
+               if plc.refresh_due <= now and plc.station not in busy]
+        for plc in sorted(due, key=_refresh_due_of):
+            row = plc.to_refresh(self._writes.youngest(), now)
+            if row is not None:
+                return WriteJob(row.refresh(now), self._writing, math.inf)
+        return None
 
-    def _plan_refresh(self, row: FallbackRow, when: float) -> None:
-        row.refresh_at = when
-        heapq.heappush(self._refreshes, (when, next(self._tickets), row))
-
-    def ended(self, own: OwnWrite) -> None:
+    def _own_ended(self, claim: Claim, write: Write, now: float) -> None:
         """Record how one of our own writes ended."""
-        row, result, now = own.row, own.result, self._writing.line.now
-        outcome = result.outcome
+        assert claim.outcome is not None
+        row, outcome = self._row_of[write.mapping], claim.outcome
         plc = self._plc_of[row]
         if isinstance(row, HeartbeatRow):
             row.ended(outcome, now)
         else:
-            self._fallback_ended(row, own.write, outcome, now)
+            self._fallback_ended(row, write, outcome, now)
         for beat in plc.heartbeats:  # they may depend on the fallback (rule 3 b)
             beat.due = min(beat.due, now)
         plc.plan()
         if outcome is not Outcome.NOT_SENT:
-            refusal = '' if outcome is Outcome.WRITTEN else str(result.error)
-            if isinstance(result.error, RemoteError) and refusal != row.refusal:
+            refusal = '' if outcome is Outcome.WRITTEN else str(claim.error)
+            if isinstance(claim.error, RemoteError) and refusal != row.refusal:
                 self._listener.unreadable(row.mapping, f'not written: {refusal}')
             row.refusal = refusal
 
@@ -361,8 +313,7 @@ class Interlocks(WriteListener):
                         now: float) -> None:
         cause = row.cause
         seconds = row.ended(outcome, now)
-        if row.stands and not row.mapping.serves:
-            self._plan_refresh(row, row.refresh_at)
+        self._plc_of[row].plan_refresh(row)
         if seconds is not None and cause is not None:
             self._listener.written(WriteResult(
                 row.mapping, Outcome.FALLBACK, cause.value, write.value, seconds))
@@ -397,7 +348,7 @@ class Interlocks(WriteListener):
 
     def next_due(self) -> float:
         """Return when the next write is due (clock value in s), infinite for never."""
-        due = self._refreshes[0][0] if self._refreshes else math.inf
+        due = math.inf
         for plc in self.plcs.values():
             due = plc.next_due(due)
         return due

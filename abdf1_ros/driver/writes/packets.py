@@ -39,13 +39,12 @@ REWRITTEN = ('by reading the word and writing it back; a change that the PLC mad
              'lost')
 
 
-def carry_out(write: Write, clock: Callable[[], float], *,
-              goes_on: bool = False) -> Steps[WriteResult]:
+def carry_out(write: Write, clock: Callable[[], float]) -> Steps[WriteResult]:
     """
     Send every packet of a write, as long as each is confirmed; ``clock`` gives seconds.
 
-    With ``goes_on`` it continues after a packet that was refused or not answered: the station may
-    execute the remaining packets.
+    A fallback continues after a packet that was refused or not answered: the PLC may execute the
+    remaining packets.
     """
     done, detail, failed = 0, '', None
     for packet in range(len(write.commands)):
@@ -54,7 +53,7 @@ def carry_out(write: Write, clock: Callable[[], float], *,
             done += 1
         except (RemoteError, LinkError) as error:
             failed = failed or error
-            if not goes_on or not isinstance(error, _TAKEN_OR_NOT):
+            if not write.is_own or not isinstance(error, _TAKEN_OR_NOT):
                 break
     if failed is not None:
         return _ended_early(write, _outcome_of(failed), clock(), done, failed)

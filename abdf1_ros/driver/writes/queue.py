@@ -40,25 +40,6 @@ MAX_WAITING_WRITES = 1000
 _WAITED_LONGER = 'waited longer than %g s for the line'
 
 
-class MessageJob(WriteJob):
-    """A write that a message has asked for."""
-
-    def __init__(self, write: Write, writing: WritesUnderWay, queue: WriteQueue,
-                 slack: float) -> None:
-        super().__init__(write, writing)
-        patience = queue.patience_of(write.mapping) + slack
-        self.expires = write.requested + patience
-        # If the row has a fallback, all packets of a long write have to be sent before the
-        # fallback is due.
-        self.patience = 0.0 if write.mapping.fallback else patience
-        self._queue = queue
-
-    def ended(self, error: Exception | None) -> None:
-        """Report the result."""
-        self._writing.report(self)
-        self._writing.ended(self)
-
-
 class WriteQueue:
     """
     Keep writes until they have the line, for ``patience`` seconds at most.
@@ -130,7 +111,7 @@ class WriteQueue:
             known = self._shared[one, other] = one.shares_words(other)
         return known
 
-    def next(self, now: float, busy: Container[int] = ()) -> MessageJob | None:  # noqa: A003
+    def next(self, now: float, busy: Container[int] = ()) -> WriteJob | None:  # noqa: A003
         """
         Return the next write.
 
@@ -145,9 +126,16 @@ class WriteQueue:
             if not self._gives_way(write, now):
                 self.waiting.remove(write)
                 self._begun[write.mapping] = now
-                return MessageJob(write, self._writing, self, self._slack)
+                return self._job(write)
             self._end(write, Outcome.SUPERSEDED, '', now)
         return None
+
+    def _job(self, write: Write) -> WriteJob:
+        patience = self.patience_of(write.mapping) + self._slack
+        # If the row has a fallback, all packets of a long write have to be sent before the
+        # fallback is due.
+        return WriteJob(write, self._writing, write.requested + patience,
+                        patience=0.0 if write.mapping.fallback else patience)
 
     def _gives_way(self, write: Write, now: float) -> bool:
         """Tell whether a write is superseded: the line cannot send all changes of its row."""

@@ -21,22 +21,13 @@ The results of such a write wait for that read, at most as long as a write may w
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 import math
 
 from abdf1_ros.driver.job_tasks import LineTime
 from abdf1_ros.driver.record import Claim, WriteListener
 from abdf1_ros.driver.write import Write, WriteResult
 from abdf1_ros.plan.planner import Block
-
-
-@dataclass(frozen=True, slots=True)
-class _UnconfirmedWrite:
-    """A write and its unconfirmed ``result``, which came at the clock value ``since`` (s)."""
-
-    write: Write
-    result: WriteResult
-    since: float
 
 
 class ReadBacks(WriteListener):
@@ -53,55 +44,55 @@ class ReadBacks(WriteListener):
         self._line = line
         self._patience = patience
         self._report = report
-        self._waiting: list[_UnconfirmedWrite] = []
+        # the result of each write, and when it came (clock value in s)
+        self._waiting: dict[Write, tuple[WriteResult, float]] = {}
         self.next_expiry = math.inf
 
     def add(self, write: Write, result: WriteResult, blocks: Iterable[Block],
             now: float) -> None:
         """Take an unconfirmed write; report at once if none of ``blocks`` reads its words."""
-        entry = _UnconfirmedWrite(write, result, now)
         if any(block.extent.holds(write.mapping.extent) for block in blocks):
-            self._waiting.append(entry)
+            self._waiting[write] = result, now
             self._plan()
         else:
-            self._tell(entry, 'not read back: no row reads all of these words', now)
+            self._tell(write, result, 'not read back: no row reads all of these words', now)
 
     def words_read(self, block: Block, data: bytes, started: float) -> None:
         """Compare the data of a block; its read began at ``started`` (clock value, s)."""
-        for entry in self._waiting[:]:
-            mapping = entry.write.mapping
-            if started >= entry.since and block.extent.holds(mapping.extent):
-                is_held = entry.write.is_held(data[block.slice_of(mapping)])
+        for write, (_, since) in [*self._waiting.items()]:
+            if started >= since and block.extent.holds(write.mapping.extent):
+                is_held = write.is_held(data[block.slice_of(write.mapping)])
                 which = 'the value' if is_held else 'another value'
-                self._end(entry, f'read back: the PLC holds {which}', self._line.now)
+                self._end(write, f'read back: the PLC holds {which}', self._line.now)
 
     def write_begins(self, claim: Claim) -> None:
         """End the writes whose words a newer write changes; it is sent now."""
-        for entry in self._waiting[:]:
-            if claim.meets(entry.write.mapping.extent):
-                self._end(entry, 'not read back: a newer write of these words has gone out',
+        for write in [*self._waiting]:
+            if claim.meets(write.mapping.extent):
+                self._end(write, 'not read back: a newer write of these words has gone out',
                           claim.begun)
 
     def expire(self, now: float) -> None:
         """End the writes that have waited too long."""
-        for entry in self._waiting[:]:
-            if now >= entry.since + self._patience:
-                self._end(entry, f'not read back within {self._patience:g} s', now)
+        for write, (_, since) in [*self._waiting.items()]:
+            if now >= since + self._patience:
+                self._end(write, f'not read back within {self._patience:g} s', now)
 
     def end(self, now: float) -> None:
         """End all writes: the port is lost."""
-        for entry in self._waiting[:]:
-            self._end(entry, 'not read back before the line went down', now)
+        for write in [*self._waiting]:
+            self._end(write, 'not read back before the line went down', now)
 
-    def _end(self, entry: _UnconfirmedWrite, finding: str, now: float) -> None:
-        self._waiting.remove(entry)
+    def _end(self, write: Write, finding: str, now: float) -> None:
+        result, _ = self._waiting.pop(write)
         self._plan()
-        self._tell(entry, finding, now)
+        self._tell(write, result, finding, now)
 
     def _plan(self) -> None:
-        self.next_expiry = self._waiting[0].since + self._patience if self._waiting else math.inf
+        _, first = next(iter(self._waiting.values()), (None, math.inf))
+        self.next_expiry = first + self._patience
 
-    def _tell(self, entry: _UnconfirmedWrite, finding: str, now: float) -> None:
-        told = replace(entry.result, detail=f'{entry.result.detail}; {finding}')
-        for result in told.of(entry.write.origins, now):
-            self._report(result)
+    def _tell(self, write: Write, result: WriteResult, finding: str, now: float) -> None:
+        found = replace(result, detail=f'{result.detail}; {finding}')
+        for each in found.of(write.origins, now):
+            self._report(each)

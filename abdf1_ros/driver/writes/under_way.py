@@ -12,11 +12,12 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The common part of all writes, of messages and our own: their begin, sending and end."""
+"""The writes that have the line, of messages and our own: their begin, sending and end."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
+import math
 
 from abdf1_ros.df1.packet import BROADCAST
 from abdf1_ros.df1.probes import Asker
@@ -36,16 +37,21 @@ class WriteJob(Job):
     """
     A write that has the line; ``result`` is final when the write has ended.
 
-    With ``is_free`` its time at a silent station does not count as time of probes.
+    With ``is_free`` its time at a silent station does not count as time of probes. ``Job``
+    describes the other arguments.
     """
 
     result: WriteResult
-    is_free = False
 
-    def __init__(self, write: Write, writing: WritesUnderWay) -> None:
+    def __init__(self, write: Write, writing: WritesUnderWay, expires: float, *,
+                 patience: float = 0.0, is_free: bool = False,
+                 answer_within: float = math.inf) -> None:
         self.write = write
         self.station = write.mapping.station
-        self.goes_on = False  # continue after a packet that is not confirmed
+        self.is_own = write.is_own
+        self.expires, self.patience = expires, patience
+        self.is_free = is_free
+        self.answer_within = answer_within
         self._writing = writing
         self.claim = writing.begin(write)
 
@@ -55,7 +61,11 @@ class WriteJob(Job):
         # port.
         bug = PortLost(INTERNAL_ERROR)
         self.result = self.write.result(Outcome.UNKNOWN, str(bug), now, error=bug)
-        self.result = yield from self._writing.carry_out(self.write, self.goes_on)
+        self.result = yield from self._writing.carry_out(self.write)
+
+    def ended(self, error: Exception | None) -> None:
+        """Report and record the result."""
+        self._writing.ended(self)
 
 
 class WritesUnderWay:
@@ -77,14 +87,16 @@ class WritesUnderWay:
         write.is_probe = station != BROADCAST and not self.stations[station].replies_in_time
         return self.record.begin(station, (write.mapping.extent,), write)
 
-    def carry_out(self, write: Write, goes_on: bool) -> Steps[WriteResult]:
+    def carry_out(self, write: Write) -> Steps[WriteResult]:
         """Send a write in the packets that its station accepts."""
         write.speak(self._readings.planner.dialect(write.mapping))
-        return (yield from carry_out(write, lambda: self.line.now, goes_on=goes_on))
+        return (yield from carry_out(write, lambda: self.line.now))
 
     def ended(self, job: WriteJob) -> None:
-        """Record the end of a write."""
+        """Report the result of each message, then record the end of the write."""
         write, result, station = job.write, job.result, job.station
+        if not write.is_own:
+            self._tell(write, result)
         if station != BROADCAST and not (job.is_free and write.is_probe):
             self.stations.tried(station, job.claim.begun, self.line.now, was_silent=write.is_probe,
                                 asker=Asker.OWN if write.is_own else Asker.MESSAGE)
@@ -95,12 +107,13 @@ class WritesUnderWay:
         if not write.is_own:
             took = self.line.took(job.claim.begun, self.line.now)
             self.spent[write.mapping] = self.spent.get(write.mapping, 0.0) + took
-        self.record.ended(job.claim, result.outcome, may_land=result.is_unconfirmed)
+        self.record.ended(job.claim, result.outcome, result.error,
+                          may_land=result.is_unconfirmed)
 
-    def report(self, job: WriteJob) -> None:
+    def _tell(self, write: Write, result: WriteResult) -> None:
         """Report the result of each message; an unconfirmed result waits for a read."""
-        if job.result.is_unconfirmed:
-            self.read_backs.add(job.write, job.result, self._readings.blocks, self.line.now)
+        if result.is_unconfirmed:
+            self.read_backs.add(write, result, self._readings.blocks, self.line.now)
         else:
-            for result in job.result.of(job.write.origins, self.line.now):
-                self._report(result)
+            for each in result.of(write.origins, self.line.now):
+                self._report(each)

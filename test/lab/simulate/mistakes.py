@@ -53,7 +53,7 @@ from abdf1_ros.driver.guests import GuestJob
 from abdf1_ros.driver.interlocks.fallback import FallbackCause, FallbackRow
 from abdf1_ros.driver.interlocks.heartbeat import BeatState, HeartbeatRow
 from abdf1_ros.driver.interlocks.plc import Plc
-from abdf1_ros.driver.interlocks.queue import Interlocks, OwnWrite
+from abdf1_ros.driver.interlocks.queue import Interlocks
 from abdf1_ros.driver.reads import job
 from abdf1_ros.driver.reads.guards import CounterGuard, RunGuard
 from abdf1_ros.driver.reads.point import ReadPoint
@@ -61,8 +61,9 @@ from abdf1_ros.driver.record import Claim, OwnWords
 from abdf1_ros.driver.served import MappedTable
 from abdf1_ros.driver.write import Outcome, Write, WriteResult
 from abdf1_ros.driver.writes.ages import RecentMax, Standstills
-from abdf1_ros.driver.writes.queue import MessageJob, WriteQueue
+from abdf1_ros.driver.writes.queue import WriteQueue
 from abdf1_ros.driver.writes.standing import Standing
+from abdf1_ros.driver.writes.under_way import WriteJob
 from abdf1_ros.pccc.values import Codec
 from abdf1_ros.plan.bounds import Times
 from abdf1_ros.plan.planner import Block
@@ -198,10 +199,10 @@ def _meets_one_station(meets: Any) -> Any:
 
 
 def _beats_are_told(ended: Any) -> Any:
-    def end_wrongly(self: Interlocks, own: OwnWrite) -> None:
-        ended(self, own)
-        if own.result is not None and own.row in self.heartbeats:
-            self._listener.written(own.result)
+    def end_wrongly(self: Interlocks, claim: Claim, write: Write, now: float) -> None:
+        ended(self, claim, write, now)
+        if write.mapping.is_heartbeat:
+            self._listener.written(write.result(claim.outcome or Outcome.UNKNOWN, '', now))
 
     return end_wrongly
 
@@ -215,9 +216,9 @@ def _told_each_time(ended: Any) -> Any:
 
 
 def _never_too_old(init: Any) -> Any:
-    def init_wrongly(self: MessageJob, *arguments: Any) -> None:
-        init(self, *arguments)
-        self.expires = math.inf
+    def init_wrongly(self: WriteJob, *arguments: Any, **named: Any) -> None:
+        init(self, *arguments, **named)
+        self.expires = self.expires if self.is_own else math.inf
 
     return init_wrongly
 
@@ -339,14 +340,14 @@ MISTAKES = (
             _always(math.inf)),
     Mistake('3 d', 'it counts without the topics that it requires', HeartbeatRow, '__init__',
             _requires_nothing),
-    Mistake('4', 'heartbeats have results', Interlocks, 'ended', _beats_are_told),
+    Mistake('4', 'heartbeats have results', Interlocks, '_own_ended', _beats_are_told),
     Mistake('4', 'a silent station is probed with heartbeats', Plc, 'is_active',
             lambda before: property(lambda self: True)),
     Mistake('4', 'a silent PLC is polled before its fallback', HalfDuplexMaster, 'carry_out',
             _polls_before),
     Mistake('5', 'the end does not wait for silent PLCs', Interlocks, 'is_over',
             _awaits_those_that_answer),
-    Mistake('6', 'a message is not too old when it is sent', MessageJob, '__init__',
+    Mistake('6', 'a message is not too old when it is sent', WriteJob, '__init__',
             _never_too_old),
     Mistake('11', 'messages go before heartbeats and fallbacks', Agenda, '_own_first',
             _messages_first),
@@ -379,7 +380,7 @@ MISTAKES = (
     Mistake('7', 'messages wait for ever', WriteQueue, 'patience_of', _always(60.0)),
     Mistake('8', 'no fallback after the timeout', FallbackRow, 'deadline', _always(math.inf)),
     Mistake('8', 'a change to RUN is not seen', Interlocks, 'mode_seen', _always(None)),
-    Mistake('8', 'a fallback that stands is not written again', Interlocks, '_plan_refresh',
+    Mistake('8', 'a fallback that stands is not written again', Plc, 'plan_refresh',
             _always(None)),
     Mistake('9', 'a message from before the fallback is sent after it', Interlocks,
             'is_overruled', _always(False)),
