@@ -131,6 +131,14 @@ def test_rule_11_answered_write_of_a_guest_ends_the_pause() -> None:
     assert plc.rank(one.row, 0.3) is not None
 
 
+def test_rule_5_waiting_row_of_a_silent_plc_hides_no_earlier_time() -> None:
+    one, stations = OneRow(), ActiveStationList([1], probe_time=1.0)
+    plc = Plc(1, [one.row], stations, one.record, Conditions(ended=0.0))
+    stations.lost(1, 0.0)
+    plc.due = 1.0
+    assert plc.next_due(2.0) == 2.0
+
+
 def test_rule_11_first_tries_go_first_then_plcs_that_answer() -> None:
     one = OneRow()
     stations = ActiveStationList([1], probe_time=1.0)

@@ -266,8 +266,8 @@ class Plc:
             return min(least, self.refresh_due)
         least = min(least, self.refresh_due)
         if self._has_last_try:
-            return min([row.due for row in self.rows if row.tried < self._conditions.ended],
-                       default=least)
+            return min([least, *(row.due for row in self.rows
+                                 if row.tried < self._conditions.ended)])
         return min(least, self.first_due, max(self.due, self._free_from))
 
     def good_until(self, beat: HeartbeatRow, youngest: MappingType[Mapping, float]) -> float:
