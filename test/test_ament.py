@@ -25,10 +25,6 @@ SOURCES = [str(ROOT / name) for name in (
     'abdf1_ros', 'examples', 'launch', 'test', 'tools', 'setup.py')]
 
 
-def test_ament_finds_a_licence_header_in_every_file() -> None:
-    assert needs('ament_copyright.main').main(argv=SOURCES) == 0
-
-
 @pytest.mark.timeout(1800)  # 100 s of processor time for 600 files
 def test_ament_flake8_finds_nothing_wrong() -> None:
     status, errors = needs('ament_flake8.main').main_with_errors(argv=SOURCES)
@@ -36,8 +32,9 @@ def test_ament_flake8_finds_nothing_wrong() -> None:
 
 
 @pytest.mark.timeout(600)
-def test_ament_pep257_finds_nothing_wrong() -> None:
-    assert needs('ament_pep257.main').main(argv=SOURCES) == 0
+@pytest.mark.parametrize('name', ['ament_copyright', 'ament_pep257'])
+def test_ament_finds_a_licence_header_in_every_file_and_sound_docstrings(name: str) -> None:
+    assert needs(f'{name}.main').main(argv=SOURCES) == 0
 
 
 def test_ament_xmllint_finds_nothing_wrong() -> None:

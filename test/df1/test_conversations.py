@@ -14,8 +14,16 @@
 
 """Every rule of vectors/conversations.json, played with a link of its mode."""
 
+from abdf1_ros.df1 import radio
 import pytest
-from support.conversations import Conversation, CONVERSATIONS, expected, played, Player
+from support.conversations import (
+    begun_again,
+    Conversation,
+    CONVERSATIONS,
+    expected,
+    played,
+    Player,
+)
 
 
 @pytest.mark.parametrize('conversation', CONVERSATIONS, ids=lambda entry: entry.name)
@@ -28,6 +36,18 @@ def test_node_does_exactly_what_the_conversation_says(conversation: Conversation
     counters = player.machine.counters
     assert (counters.chars_sent, counters.chars_received) == (
         conversation.size_of('we'), conversation.size_of('they'))
+
+
+def test_node_keeps_nothing_of_an_earlier_connection(monkeypatch: pytest.MonkeyPatch) -> None:
+    # the pauses of a radio are drawn, and a poll list goes on where it was
+    monkeypatch.setattr(radio.Random, 'uniform', lambda self, low, high: (low + high) / 2)
+    for conversation in (each for each in CONVERSATIONS if not each.mode.takes_turns):
+        for cut in (-(-len(conversation.lines) // 2), len(conversation.lines)):
+            again = begun_again(conversation, cut)
+            nodes = Player(again), Player(again, is_new=True)
+            for node in nodes:
+                node.play()
+            assert nodes[0].done == nodes[1].done, (again.name, cut)
 
 
 def test_station_keeps_what_was_heard_of_it() -> None:

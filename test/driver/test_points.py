@@ -228,13 +228,6 @@ def test_bytes_of_a_write_of_words(
     ('I:017/12', 1, [1], ['26 06 01 0f ff fb 00 04']),
     ('T4:7/DN', 1, [1], ['26 0e 04 07 00 ff df 00 20']),
     ('MG9:3/TO', 1, [1], ['26 0e 09 03 00 ff fe 00 01']),
-])
-def test_bits_of_a_plc5_are_a_read_modify_write(
-        text: str, length: int, values: list[float], expected: list[str]) -> None:
-    assert commands(text, values, 'PLC5', length) == expected
-
-
-@pytest.mark.parametrize('text, length, values, expected', [
     # FNC AB, size, file, type, element, sub-element, mask, bits.
     ('B3:1/5', 1, [1], ['ab 02 03 85 01 00 20 00 20 00']),
     ('B3:1/5', 1, [0], ['ab 02 03 85 01 00 20 00 00 00']),
@@ -243,9 +236,10 @@ def test_bits_of_a_plc5_are_a_read_modify_write(
     ('I:1.2/3', 1, [1], ['ab 02 01 8c 01 02 08 00 08 00']),
     ('T4:7/DN', 1, [0], ['ab 02 04 86 07 00 00 20 00 00']),
 ])
-def test_bits_of_an_slc_are_a_masked_write(
+def test_bits_are_a_read_modify_write_of_a_plc5_and_a_masked_write_of_an_slc(
         text: str, length: int, values: list[float], expected: list[str]) -> None:
-    assert commands(text, values, 'SLC', length) == expected
+    plc = 'PLC5' if expected[0].startswith('26') else 'SLC'
+    assert commands(text, values, plc, length) == expected
 
 
 @pytest.mark.parametrize('plc, limit', [('PLC5', 110), ('SLC', 117)])

@@ -25,6 +25,7 @@ from abdf1_ros.plan.refusals import Refusals
 from abdf1_ros.settings.mapping import Mapping
 from hypothesis import given
 from hypothesis import strategies as st
+import pytest
 from support.mappings import make_mapping
 
 LINE = LineModel(Checksum.CRC, Duplex.HALF, LineTiming(0.001))
@@ -111,12 +112,15 @@ def test_bits_of_one_bad_word_stay_in_one_block() -> None:
     assert plc.spans() == [(3, 4), (4, 5), (5, 6)]
 
 
-def test_mapping_that_has_recovered_is_read_with_its_neighbours_again() -> None:
-    plc = Plc(words(*range(20)), 7)
+@pytest.mark.parametrize(('numbers', 'missing'), [(range(20), 7), ((3,), 3)])
+def test_mapping_that_has_recovered_is_read_with_its_neighbours_again(
+        numbers: Sequence[int], missing: int) -> None:
+    plc = Plc(words(*numbers), missing)
     plc.settle()
+    assert (missing, missing + 1) in plc.spans()
     plc.missing.clear()
     plc.settle()
-    assert plc.spans() == [(0, 20)]
+    assert plc.spans() == [(numbers[0], numbers[-1] + 1)]
     assert not plc.failed
 
 
@@ -161,16 +165,6 @@ def test_file_that_comes_back_is_planned_once() -> None:
                if block in plc.blocks]
     assert changes.count(True) == 1
     assert plc.spans() == [(0, 100)]
-
-
-def test_single_mapping_that_is_refused_is_asked_for_again() -> None:
-    plc = Plc(words(3), 3)
-    plc.settle()
-    assert plc.spans() == [(3, 4)]
-    plc.missing.clear()
-    plc.settle()
-    assert plc.spans() == [(3, 4)]
-    assert not plc.failed
 
 
 @given(st.lists(st.tuples(st.integers(0, 80), st.sampled_from([1, 1, 1, 2, 5])), min_size=1,

@@ -29,7 +29,7 @@ from abdf1_ros.ports.opening import open_port
 from abdf1_ros.ports.settings import PortSettings
 import pytest
 from support.link_threads import Broken, Impatient, Link, NoLine, READY, Script
-from support.ptys import PATIENCE, Pty
+from support.ptys import PATIENCE, Pty, wait_until
 
 
 class Stuck(NoLine):
@@ -87,11 +87,15 @@ def test_port_that_is_released_is_free_until_it_is_taken_again(pty: Pty, link: L
     assert link.state() == PortState(False, 'polling is off, so other programs may use the port')
     assert script.end() == repr(PortLost('polling is off, so other programs may use the port'))
     open_port(PortSettings(str(pty.name))).close()
+    thread.has_turned = False
     thread.wake()
+    wait_until(lambda: thread.has_turned)
     thread.take()
     while not link.state().is_open:
         pass
     assert pty.read(5) == READY
+    assert thread.release()
+    assert not thread.state.is_open
 
 
 def test_release_while_the_port_cannot_be_opened() -> None:
@@ -115,15 +119,16 @@ def test_release_while_the_port_cannot_be_opened() -> None:
 
 def test_other_machine_goes_on_with_the_same_port(pty: Pty, link: Link) -> None:
     before, after = Script(Send(b'before', None)), Script(Send(b'after', None))
-    thread = link.start(before.machine, pty.name)
-    assert pty.read(11) == READY + b'before'
     done: list[str] = []
+    thread = link.start(before.machine, pty.name, while_sending=lambda: done.append(
+        f'{before.ended.qsize()} ended'))
+    assert pty.read(11) == READY + b'before'
     assert thread.exchange(after.machine, lambda: done.append('sent'), reopen=False)
     assert before.end() == repr(PortLost('the files have been read again'))
     assert pty.read(10) == READY + b'after'
     pty.write(ACK)
     assert after.next() == Control(Code.ACK)
-    assert 'sent' in done
+    assert {'1 ended', 'sent'} <= {*done}
     assert link.state() == PortState(True, 'open')
     assert link.states.empty()  # the port has not been closed
 

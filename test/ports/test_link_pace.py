@@ -193,10 +193,11 @@ def test_bytes_of_a_connection_are_read_as_they_come(
 class Babbler(NoLine):
     """A connection with bytes at every read but the last; what it costs is told to its clocks."""
 
-    def __init__(self, data: bytes, reads: int, *, has_more: bool = True) -> None:
+    def __init__(self, data: bytes, reads: int, *, has_more: bool = True, quiet: int = 0) -> None:
         self.now = 100.0
         self.worked = 0.0
         self.has_more = has_more
+        self._quiet = quiet  # the number of a read after a minute, that takes all
         self._data = data
         self._reads = reads
 
@@ -208,6 +209,9 @@ class Babbler(NoLine):
         self._reads -= 1
         if not self._reads:
             raise OSError('the end')
+        if self._quiet:
+            self.has_more = self._reads != self._quiet
+            self.now += 60.0 * (not self.has_more)
         return self._data
 
 
@@ -244,10 +248,11 @@ class Restful(Impatient):
 def test_connection_that_babbles_leaves_time_to_others(
         work: float, host: float, rest: float) -> None:
     script = Script(Listen(None), timing=LineTiming(0.001))
-    thread = Restful(script, Babbler(bytes(READ_SIZE), 11), work=work, host=host)
+    thread = Restful(script, Babbler(bytes(READ_SIZE), 11, quiet=6), work=work, host=host)
     thread.run_out()
-    assert thread.taken == [64] * 10 * 8
-    assert thread.rests == [pytest.approx(rest)] * 10 * 8
+    assert thread.taken == [*[64] * 4 * 8, READ_SIZE, *[64] * 5 * 8]
+    del thread.rests[4 * 8]  # after the work of the read before it too
+    assert thread.rests == [pytest.approx(rest)] * 71
 
 
 def test_burst_beside_load_takes_the_time_of_the_line() -> None:

@@ -180,7 +180,8 @@ def test_missing_port_is_waited_for_asleep(monkeypatch: pytest.MonkeyPatch) -> N
 
     counted = Counted()
     monkeypatch.setattr('abdf1_ros.ports.link_thread.Wake', lambda: counted)
-    thread = LinkThread(Script().machine, refuse, retry_period=0.05)
+    thread = LinkThread(Script().machine, refuse, retry_period=0.05,
+                        on_state=lambda state: thread.wake())
     thread.run()
     pauses = [wait for wait in counted.waits if wait != math.inf]
     assert sum(pauses) >= 3 * 45

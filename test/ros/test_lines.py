@@ -163,14 +163,8 @@ def test_lines_are_chosen_by_name() -> None:
     assert chosen([PRESS, PAINT], ['paint']) == [PAINT]  # a part of its name, and of no other
     with pytest.raises(ConfigurationError, match='no section is called hall'):
         chosen(['/hall/a/plc_a', '/hall/b/plc_b'], ['hall'])
-
-
-def test_line_that_is_not_there_is_named() -> None:
     with pytest.raises(ConfigurationError, match='called glue; the sections are /press/'):
         chosen([PRESS, PAINT], ['press_plc', 'glue'])
-
-
-def test_no_line_at_all() -> None:
     with pytest.raises(ConfigurationError, match='no line to run: give a parameter file'):
         chosen([], [])
 

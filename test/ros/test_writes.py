@@ -30,38 +30,15 @@ from support.mappings import make_mapping
 from support.ros import Observer
 
 
-def losses(numbers: Sequence[int | None], publishers: int = 1) -> list[int]:
-    """Return how many messages are missing before each of those with these numbers."""
+@pytest.mark.parametrize(('numbers', 'publishers', 'lost'), [
+    ([1, 2, 3, 4], 1, [0, 0, 0, 0]), ([51, 52, 53], 1, [0, 0, 0]),  # published before we came
+    ([1, 2, 5, 6, 10], 1, [0, 0, 2, 0, 3]), ([7, 8, 9, 1, 2, 3, 5], 1, [0, 0, 0, 0, 0, 0, 1]),
+    ([1, 101, 2, 102, 103, 3], 2, [0] * 6), ([1, 101, 2, 105, 3, 106], 2, [0, 0, 0, 3, 0, 0]),
+    ([None, None], 1, [0, 0])])  # a middleware without numbers
+def test_messages_that_are_missing_before_each(
+        numbers: Sequence[int | None], publishers: int, lost: list[int]) -> None:
     counter = LossCounter(lambda: publishers)
-    return [counter.lost_before(number) for number in numbers]
-
-
-def test_numbers_without_a_gap() -> None:
-    assert losses([1, 2, 3, 4]) == [0, 0, 0, 0]
-
-
-def test_publisher_that_has_published_before_we_came_has_lost_nothing() -> None:
-    assert losses([51, 52, 53]) == [0, 0, 0]
-
-
-def test_gap_is_what_was_lost() -> None:
-    assert losses([1, 2, 5, 6, 10]) == [0, 0, 2, 0, 3]
-
-
-def test_publisher_that_begins_anew_has_lost_nothing() -> None:
-    assert losses([7, 8, 9, 1, 2, 3, 5]) == [0, 0, 0, 0, 0, 0, 1]
-
-
-def test_publishers_do_not_disturb_each_other() -> None:
-    assert losses([1, 101, 2, 102, 103, 3], publishers=2) == [0] * 6
-
-
-def test_gap_of_one_among_several_publishers() -> None:
-    assert losses([1, 101, 2, 105, 3, 106], publishers=2) == [0, 0, 0, 3, 0, 0]
-
-
-def test_middleware_without_numbers_tells_nothing() -> None:
-    assert losses([None, None]) == [0, 0]
+    assert [counter.lost_before(number) for number in numbers] == lost
 
 
 @pytest.mark.parametrize('publishers', [1, 1000])

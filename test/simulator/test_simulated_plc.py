@@ -251,19 +251,13 @@ def plc(clock: Clock) -> SimulatedPlc:
 READ = (0x0F, bytes.fromhex('a2 02 07 89 00 00'))
 
 
-def test_silent_plc_hears_and_says_nothing(plc: SimulatedPlc) -> None:
-    plc.faults = InjectedFaults(silent=True)
+@pytest.mark.parametrize(('faults', 'polled'), [
+    (InjectedFaults(silent=True), b''), (InjectedFaults(full=True), frames.EOT)])
+def test_silent_plc_says_nothing_and_neither_it_nor_a_full_one_takes_a_command(
+        plc: SimulatedPlc, faults: InjectedFaults, polled: bytes) -> None:
+    plc.faults = faults
     master = Master(plc)
-    assert (master.deliver(READ), master.poll()) == (b'', b'')
-    plc.faults = InjectedFaults()
-    assert master.poll() == frames.EOT  # it has not heard anything
-    assert master.number('N7:0') == 0
-
-
-def test_full_plc_answers_polls_and_takes_no_command(plc: SimulatedPlc) -> None:
-    plc.faults = InjectedFaults(full=True)
-    master = Master(plc)
-    assert (master.deliver(READ), master.poll()) == (b'', frames.EOT)
+    assert (master.deliver(READ), master.poll()) == (b'', polled)
     plc.faults = InjectedFaults()
     assert master.poll() == frames.EOT  # it has not kept the command
     assert master.number('N7:0') == 0

@@ -17,7 +17,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import zip_longest
 from typing import Any
 
@@ -112,24 +112,29 @@ class Player(CommandTasks):
     """
     A node of any mode that has its part in a conversation.
 
-    ``done`` becomes the lines of what is done to it, and of all that it does.
+    ``done`` becomes the lines of what is done to it, and of all that it does. With ``is_new`` it
+    is made anew where its port is opened again.
     """
 
-    def __init__(self, conversation: Conversation) -> None:
+    def __init__(self, conversation: Conversation, *, is_new: bool = False) -> None:
+        self._is_new = is_new
         self._now = _BEGIN - conversation.settings.get('running', 0) / 1000
         super().__init__(lambda: self._now)
         self.done: list[Line] = []
         self._conversation = conversation
-        settings, options = conversation.link_settings(), conversation.settings
+        options = conversation.settings
         self.stations = ActiveStationList(
             on_change=self._changed,
             routes={int(number): by for number, by in options.get('routes', {}).items()})
         for number in options.get('inactive', ()):
             self.stations.lost(number, self._now)
         self.done.clear()
-        self.machine = conversation.mode.make_machine(
-            settings, lambda: self._link.run(self), Counters())
-        self._link = conversation.mode.make_link(
+        self._make_link()
+
+    def _make_link(self) -> None:
+        mode, settings = self._conversation.mode, self._conversation.link_settings()
+        self.machine = mode.make_machine(settings, lambda: self._link.run(self), Counters())
+        self._link = mode.make_link(
             self.machine, settings, self.stations, self._serve, self.events.append)
 
     def play(self) -> None:
@@ -155,6 +160,9 @@ class Player(CommandTasks):
             self._watch(self.add(command))
             self.machine.wake(self._now)
         else:
+            if self._is_new:
+                self.machine.stop()
+                self._make_link()
             self.machine.start(self._now, self)
 
     def _watch(self, task: CommandTask) -> None:
@@ -224,6 +232,16 @@ class Player(CommandTasks):
 def end_of(line: Line) -> float:
     """Return when the last moment of a line is."""
     return float(line['by'] if 'by' in line else line['at'])
+
+
+def begun_again(conversation: Conversation, cut: int) -> Conversation:
+    """Return the first lines of a conversation, the port opened again, and then all of it."""
+    entry, lines = conversation.entry, conversation.lines
+    end = end_of(lines[cut - 1])
+    until = end + 999 + end_of(lines[-1])
+    lines = [*lines[:cut], {'at': end + 1, 'port': 'again'}, *(
+        {**line, 'at': line['at'] + end + 150} for line in lines)]
+    return replace(conversation, entry=entry | {'lines': lines, 'until': until})
 
 
 def played(name: str) -> Player:

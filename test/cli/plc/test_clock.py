@@ -95,16 +95,13 @@ def test_drift_counts_from_the_middle_of_the_read(monkeypatch: pytest.MonkeyPatc
     assert Clock(session, 1, PlcType.PLC5, None).read()[1] == timedelta(0)
 
 
-def test_clock_that_holds_no_time(port: str, capsys: Output) -> None:
-    said = call(main, capsys, 'clock', '1', '--port', port)
-    assert (said.status, said.err) == (
-        1, 'plc: S2:37 of station 1: holds no date and time: 0 0 0 0 0 0; is its clock '
-           'switched off?\n')
-
-
-def test_family_without_a_known_clock(port: str, capsys: Output) -> None:
-    said = call(main, capsys, 'clock', '3', '--port', port)
-    assert (said.status, said.err) == (1, 'plc: station 3: is a PLC-2, whose clock is not known\n')
+@pytest.mark.parametrize(('station', 'text'), [
+    ('1', 'S2:37 of station 1: holds no date and time: 0 0 0 0 0 0; is its clock switched off?'),
+    ('3', 'station 3: is a PLC-2, whose clock is not known')])
+def test_clock_that_holds_no_time_or_is_not_known(
+        port: str, capsys: Output, station: str, text: str) -> None:
+    said = call(main, capsys, 'clock', station, '--port', port)
+    assert (said.status, said.err) == (1, f'plc: {text}\n')
 
 
 @pytest.mark.parametrize(('processor', 'text'), [

@@ -14,6 +14,7 @@
 
 """The command ``plc`` on simulated lines: output and exit status of the other verbs."""
 
+from collections.abc import Sequence
 import os
 from pathlib import Path
 import pty
@@ -133,21 +134,16 @@ def test_watch_tells_why_there_is_no_value(plc: Plc) -> None:
     assert any(line.endswith('N7:0 1200') for line in said.lines)
 
 
-def test_watch_goes_on_until_it_is_interrupted(line: str) -> None:
-    with Process('plc', 'watch', 'N7:10', '--station', '2', '--period', '0.05', '--timeout',
-                 '5000', '--port', line) as process:
-        process.wait_for('N7:10  ')
+@pytest.mark.parametrize(('args', 'begin', 'end'), [
+    (('watch', 'N7:10', '--station', '2', '--period', '0.05'), 'N7:10  ', ''),
+    (('ping', '2', '--count', '1000000'), 'station 2: ', ' answered; shortest ')])
+def test_watch_and_ping_go_on_until_they_are_interrupted(
+        line: str, args: Sequence[str], begin: str, end: str) -> None:
+    with Process('plc', *args, '--timeout', '5000', '--port', line) as process:
+        process.wait_for(begin)
         process.send(signal.SIGINT)
         assert process.result() == 0
-
-
-def test_ping_goes_on_until_it_is_interrupted(line: str) -> None:
-    with Process('plc', 'ping', '2', '--count', '1000000', '--timeout', '5000', '--port',
-                 line) as process:
-        process.wait_for('station 2: ')
-        process.send(signal.SIGINT)
-        assert process.result() == 0
-    assert ' answered; shortest ' in process.text
+    assert end in process.text
 
 
 def test_watch_redraws_a_table_on_a_terminal(line: str) -> None:
