@@ -78,10 +78,11 @@ class PtyEndpoint:
         if self._link:
             # Done before we make a terminal, because it may get the number in an old link.
             _remove_left_over(self._link)
-        self._ours, self._theirs = os.openpty()
+        self._ours, theirs = os.openpty()
         # Both ends stay open. Otherwise a read fails while no client is connected.
-        tty.setraw(self._theirs)
-        self._target = os.ttyname(self._theirs)
+        self._ends = [self._ours, theirs]
+        tty.setraw(theirs)
+        self._target = os.ttyname(theirs)
         self.name = link or self._target
         if self._link:
             try:
@@ -99,13 +100,10 @@ class PtyEndpoint:
         """Remove the pseudo-terminal and its name."""
         if self._link and _target_of(self._link) == self._target:
             self._link.unlink()
-        self._close_ends()
+        for end in self._ends:
+            os.close(end)
         if self._lock is not None:
             self._lock.close()
-
-    def _close_ends(self) -> None:
-        os.close(self._ours)
-        os.close(self._theirs)
 
 
 class PtyPlace(PtyEndpoint):
@@ -118,7 +116,7 @@ class PtyPlace(PtyEndpoint):
 
     def __init__(self, link: str) -> None:
         super().__init__(link)
-        os.close(self._theirs)  # so that our end shows when no program has opened the far end
+        os.close(self._ends.pop())  # so that our end shows when no program has opened the far end
         self._hangs_up = select.poll()
         self._hangs_up.register(self._ours, 0)
 
@@ -141,9 +139,6 @@ class PtyPlace(PtyEndpoint):
         theirs = os.open(self._target, os.O_RDWR | os.O_NOCTTY)
         termios.tcflush(theirs, termios.TCIFLUSH)
         os.close(theirs)
-
-    def _close_ends(self) -> None:
-        os.close(self._ours)
 
 
 def _own(link: Path) -> socket.socket:

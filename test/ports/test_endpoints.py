@@ -82,11 +82,6 @@ def test_place_has_nothing_of_the_program_before(tmp_path: Path, wake: int) -> N
     assert not os.path.lexists(name)
 
 
-def test_pseudo_terminal_without_a_link() -> None:
-    with closing(PtyEndpoint(None)) as line:
-        assert Path(line.name).is_char_device()
-
-
 def test_name_of_an_earlier_pty_is_taken_over(tmp_path: Path) -> None:
     name = tmp_path / 'plc'
     # One that is gone, and one whose number another program has by now.
@@ -107,16 +102,17 @@ def test_link_that_has_been_replaced_stays_at_the_end(tmp_path: Path) -> None:
     assert os.readlink(name) == '/dev/ttyUSB0'
 
 
+@pytest.mark.parametrize('kind', [PtyEndpoint, PtyPlace])
 @pytest.mark.parametrize('link, text', [
     ('taken', 'taken exists already'), ('adapter', 'adapter exists already'),
     ('none/plc', 'none/plc cannot be made: No such file')])
 def test_name_that_cannot_be_had_leaves_no_terminal_open(
-        tmp_path: Path, link: str, text: str) -> None:
+        tmp_path: Path, kind: type[PtyEndpoint], link: str, text: str) -> None:
     (tmp_path / 'taken').touch()
     (tmp_path / 'adapter').symlink_to('/dev/ttyUSB0')
     before = open_files()
     with pytest.raises(OSError, match=text):
-        PtyEndpoint(str(tmp_path / link))
+        kind(str(tmp_path / link))
     assert not open_files() - before
     assert sorted(os.listdir(tmp_path)) == ['adapter', 'taken']
 
