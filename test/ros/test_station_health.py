@@ -25,7 +25,7 @@ from abdf1_ros.pccc.file_types import PlcType
 from abdf1_ros.pccc.identity import Identity, Mode
 from abdf1_ros.pccc.processor import Processor
 from abdf1_ros.ports.link_thread import LinkThread
-from abdf1_ros.ros.diagnostics.line import wrong_type
+from abdf1_ros.ros.diagnostics.line import LineView
 from abdf1_ros.ros.diagnostics.stations import health_values, LinkCounterService, processor_fault
 from abdf1_ros.settings.mapping import Mapping
 from abdf1_ros.settings.network import Network
@@ -72,18 +72,21 @@ LEVEL = make_mapping('N7:0', plc='SLC', item=6)
     (replace(SLC, processor=Processor.SLC_5_03),
      [make_mapping('N7:0', plc='SLC', item=6, processor='5/02')],
      'station 1 is an SLC 5/03, map.csv:7 says 5/02 in the column Processor'),
-    (SLC, [make_mapping('N7:0', plc='SLC', item=6, processor='5/02')], None)])
+    (SLC, [make_mapping('N7:0', plc='SLC', item=6, processor='5/02')], None),
+    (replace(SLC, model='SLC 5/02', processor=Processor.SLC_5_02),
+     [LEVEL, make_mapping('N7:1', plc='SLC', processor='5/03')],  # fits the empty cell of LEVEL
+     'station 1 is an SLC 5/02, map.csv:2 says 5/03 in the column Processor')])
 def test_plc_of_another_family_than_its_rows(
         identity: Identity | None, rows: list[Mapping], text: str | None) -> None:
-    assert wrong_type(1, identity, rows) == text
-
-
-def test_values_before_anything_is_known() -> None:
-    assert health_values(StationHealth(), NOW) == {
-        'processor': 'unknown (not asked yet)', 'mode': 'unknown', 'faults': 'unknown'}
+    driver = Driver(Network(), rows, DriverSettings(), Recorder(lambda: NOW))
+    if identity is not None:
+        driver.checks.heard(1, identity, NOW)
+    assert LineView(driver).wrong_type(1) == text
 
 
 def test_values_of_a_processor() -> None:
+    assert health_values(StationHealth(), NOW) == {
+        'processor': 'unknown (not asked yet)', 'mode': 'unknown', 'faults': 'unknown'}
     identity = Identity(PlcType.SLC, 'SLC 5/03', 'B', '3', Mode.RUN, 'RUN', ('halted',),
                         ('forces active', 'testing edits'))
     health = StationHealth(str(identity), identity, NOW - 2.5, {'messages sent': '7'})

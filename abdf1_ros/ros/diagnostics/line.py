@@ -25,7 +25,6 @@ from abdf1_ros.df1.frames import Duplex
 from abdf1_ros.df1.stations import Station
 from abdf1_ros.driver.driver import Driver
 from abdf1_ros.pccc.families import FAMILIES
-from abdf1_ros.pccc.file_types import PlcType
 from abdf1_ros.pccc.identity import Identity
 from abdf1_ros.ports.link_thread import LinkThread
 from abdf1_ros.ports.trace import PortOpener
@@ -49,7 +48,7 @@ class LineView:
         self.driver = driver
         self.link: LinkThread | None = None
         self.opener: PortOpener | None = None
-        self._rows_by_type = _rows_by_type(driver.mappings)
+        self._rows_by_kind = _rows_by_kind(driver.mappings)
 
     def attach(self, link: LinkThread, opener: PortOpener) -> None:
         """Set the thread whose port is reported, and the opener of this port."""
@@ -96,7 +95,7 @@ class LineView:
 
     def wrong_type(self, station: int) -> str | None:
         identity = self.driver.checks.known(station).identity
-        return wrong_type(station, identity, self._rows_by_type[station].values())
+        return wrong_type(station, identity, self._rows_by_kind[station].values())
 
 
 def wrong_type(station: int, identity: Identity | None, rows: Iterable[Mapping]) -> str | None:
@@ -120,12 +119,12 @@ def wrong_type(station: int, identity: Identity | None, rows: Iterable[Mapping])
     return None
 
 
-def _rows_by_type(mappings: Iterable[Mapping]) -> dict[int, dict[PlcType, Mapping]]:
-    """Return the first row of each PLC type at each station."""
-    rows: defaultdict[int, dict[PlcType, Mapping]] = defaultdict(dict)
+def _rows_by_kind(mappings: Iterable[Mapping]) -> dict[int, dict[object, Mapping]]:
+    """Return the first row of each PLC type and processor at each station."""
+    rows: defaultdict[int, dict[object, Mapping]] = defaultdict(dict)
     for mapping in mappings:
         if not mapping.serves:
-            rows[mapping.station].setdefault(mapping.plc_type, mapping)
+            rows[mapping.station].setdefault((mapping.plc_type, mapping.processor), mapping)
     return rows
 
 
