@@ -27,7 +27,7 @@ import sys
 import termios
 import time
 
-from abdf1_ros.cli.simulator import input_of, main
+from abdf1_ros.cli.simulator import main
 from abdf1_ros.df1 import frames
 from abdf1_ros.df1.checksum import Checksum
 import pytest
@@ -152,15 +152,21 @@ def test_commands_on_input_several_at_once(
     reply = frames.message_frame(bytes.fromhex('05 02 4f 50 10 02'), Checksum.CRC)
     assert read_exactly(line, len(reply)) == reply
     simulator.type('normal 2\nqu')
-    simulator.type('it\n')
+    simulator.type('it')
+    simulator.close_input()  # without a line end
     assert simulator.result() == 0
 
 
-def test_last_command_without_line_end(start: Start) -> None:
-    simulator = start()
-    simulator.type('silent 1\nquit')
-    simulator.close_input()
-    _ended(simulator, 'simulator: station 1: silent')
+def test_message_goes_out_though_nothing_comes_in(
+        start: Start, tmp_path: Path, descriptor: Callable[[Path], int]) -> None:
+    simulator = start('--full-duplex', '1', '--pty', str(tmp_path / 'plc'))
+    simulator.wait_for('on ')
+    line = descriptor(tmp_path / 'plc')
+    os.write(line, frames.ENQ)
+    assert read_exactly(line, 2) == frames.NAK  # the simulator waits for bytes now
+    time.sleep(0.2)
+    simulator.type('msg 1 N7:50 11\n')
+    assert read_exactly(line, 5) == frames.STX + bytes((5, 1, 0x0F))
 
 
 def test_commands_by_the_clock_keep_their_order(start: Start) -> None:
@@ -191,6 +197,7 @@ def _refused(capsys: Output, *options: str, status: int = 2) -> str:
     (('--pty', '/nowhere/plc'), 1, '/nowhere/plc cannot be made: No such file or directory'),
     (('--pty', '/dev/null'), 1, '/dev/null exists already, and no simulator has made it; '
      'give another name'),
+    (('--tcp', '192.0.2.1:0'), 1, '--tcp "192.0.2.1:0": Cannot assign requested address'),
     (('--port', '/nowhere/tty'), 1, '/nowhere/tty: No such file or directory'),
     (('--port', '/dev/null'), 1, '/dev/null: this is not a serial port'),
     (('--port', 'socket://127.0.0.1:1'), 1, 'socket://127.0.0.1:1: Connection refused')])
@@ -208,13 +215,6 @@ def test_faults_of_a_data_file_are_told_with_their_cells(capsys: Output, tmp_pat
         'SLC',
         f'simulator: {path}:5:3 (Address): SLC has no Q files; file types: O, I, S, B, T, C, R, '
         'N, F, ST, A, D, L, PD, MG, HSC, PTO, PWM, STI, EII']
-
-
-def test_tcp_port_in_use(capsys: Output, data: Path) -> None:
-    with socket.create_server(('127.0.0.1', 0)) as server:
-        where = f'127.0.0.1:{server.getsockname()[1]}'
-        said = _refused(capsys, '--data', str(data), '--tcp', where, status=1)
-    assert said.startswith(f'simulator: --tcp "{where}": Address already in use')
 
 
 def test_name_is_not_shared_and_what_a_killed_simulator_left_is_taken_by_the_next_and_removed(
@@ -301,15 +301,6 @@ def test_simulator_answers_and_ends_while_its_output_is_not_taken(
         assert simulator.wait(PATIENCE) == 0
     os.close(reader)
     os.close(writer)
-
-
-def test_input_of_a_job_in_the_background_is_none(monkeypatch: pytest.MonkeyPatch) -> None:
-    """A terminal that belongs to another job gives EIO once SIGTTIN is ignored."""
-    def refuse(descriptor: int, size: int) -> bytes:
-        raise OSError(errno.EIO, 'Input/output error')
-
-    monkeypatch.setattr(os, 'read', refuse)
-    assert input_of(0) is None
 
 
 def test_input_goes_on_when_a_job_comes_back_from_the_background(

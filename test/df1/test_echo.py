@@ -121,7 +121,9 @@ def test_full_duplex_plc_behind_an_adapter_that_echoes_is_heard_but_asks_in_vain
     for number in range(3):
         command = COMMAND._replace(tns=number)
         task = peer.begin(command)
-        assert behind_an_adapter(peer, peer.said(), ACK, peer.frame(command.reply())) == ACK
+        said = bytearray(peer.said())
+        said[-1] ^= number  # the check of an echo may be damaged
+        assert behind_an_adapter(peer, bytes(said), ACK, peer.frame(command.reply())) == ACK
         assert task.result == command.reply()
         assert peer.machine.echoes
     # It may be ours, with damage that no check shows.

@@ -125,10 +125,10 @@ def test_rule_13_guarded_rows_come_on_a_line_that_is_slower_than_their_stale_tim
     assert not [row for row in guarded if bench.listener.times(row)[-1] > since]
 
 
-def counter_cell() -> tuple[Cell, Mapping]:
+def counter_cell(words: int = 1) -> tuple[Cell, Mapping]:
     """Return a cell whose rows depend on a counter, which stands still."""
-    counter = make_mapping('N11:3', tag='alive', period=100)
-    read = make_mapping('N7:0', period=100, condition=While(('alive',), 500))
+    counter = make_mapping('N11:3', tag='alive', period=50)
+    read = make_mapping('N7:0', length=words, period=100, condition=While(('alive',), 500))
     return Cell(counter, read), read
 
 
@@ -168,6 +168,19 @@ def test_rule_14_late_change_ends_what_two_in_time_have_permitted() -> None:
     guard.read(b'y', 5.2)
     assert [guard.why_not(point, 5.2, 5.3), guard.why_not(point, 5.3, 5.3)] == [
         'alive has begun to change during this read', '']
+
+
+def test_rule_14_counter_that_changes_between_two_packets_permits_the_next_read() -> None:
+    cell, read = counter_cell(200)
+    cell.run(1.0)
+    job, = (job for job in cell.bench.driver.readings.reads.jobs if read in job.block.mappings)
+    for number in (1, 2):
+        cell.bench.run_until(lambda: job.is_unfinished)
+        for address, count in (('N7:0', 200), ('N11:3', 1)):
+            store(cell.plc, address, [number] * count)
+        cell.run(0.3)
+    values = cell.bench.listener.values(read)
+    assert values and all(value == [2] * 200 for value in values)
 
 
 def withheld(cell: Cell) -> list[str]:
