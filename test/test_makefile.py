@@ -12,12 +12,14 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""What ``make setup`` does on machines that are not as expected; nothing is installed here."""
+"""``make setup`` on odd machines (nothing is installed), and ``make test`` in a crash."""
 
 import os
 from pathlib import Path
+import re
 import shutil
 import subprocess
+import sys
 
 import pytest
 from support.ros_tools import SOURCE
@@ -70,3 +72,23 @@ def test_environment_that_was_interrupted_is_made_again(
         script(tmp_path / 'venv' / 'bin' / 'python', 'exit 1')  # no module named pip
     assert setup(tmp_path, programs).returncode != 0
     assert (tmp_path / 'calls').read_text(encoding='utf-8') == f'-m venv --clear {tmp_path}/venv\n'
+
+
+ROOT = Path(__file__).resolve().parents[1]
+CRASHING = 'import os, signal\ndef test_crash():\n    os.kill(os.getpid(), signal.SIGKILL)\n'
+
+
+def test_crashed_worker_ends_the_run_with_a_failure(tmp_path: Path) -> None:
+    pytest.importorskip('xdist')
+    recipe = re.search(r'-m pytest (-n \$\(TEST_WORKERS\).+?) \$\(PYTEST_ARGS\)',
+                       (ROOT / 'Makefile').read_text(encoding='utf-8'), re.DOTALL)
+    assert recipe
+    options = recipe[1].replace('\\\n', ' ').replace('$(TEST_WORKERS)', '2').split()
+    (tmp_path / 'test_a.py').write_text(CRASHING, encoding='utf-8')
+    for name in 'bcd':
+        (tmp_path / f'test_{name}.py').write_text('def test_ok():\n    pass\n', encoding='utf-8')
+    ended = subprocess.run(
+        [sys.executable, '-m', 'pytest', '-p', 'no:cacheprovider', *options, str(tmp_path)],
+        cwd=tmp_path, capture_output=True, text=True, timeout=100, check=False)
+    assert ended.returncode == 1, ended.stdout
+    assert re.search(r"worker 'gw\d' crashed while running", ended.stdout)

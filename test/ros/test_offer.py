@@ -12,16 +12,23 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Publishers that a bridge offers only while it has the line, in the moment when it loses it."""
+"""Publishers that a bridge has only while it has the line, and what is left when it is lost."""
 
+from array import array
 from collections import deque
+from collections.abc import Callable
+import math
+from types import SimpleNamespace
 from typing import Any
 
 from abdf1_ros.ros.bridge.offer import OfferedPublisher
+from abdf1_ros.ros.topics.reads import ReadTopic, ReadTopics
+from abdf1_ros.settings.mapping import Mapping
 import pytest
 from rclpy.impl.implementation_singleton import rclpy_implementation
 from rclpy.qos import QoSProfile
 from std_msgs.msg import UInt8
+from support.mappings import make_mapping
 
 
 class LostPublisher:
@@ -82,3 +89,61 @@ def test_message_that_another_thread_has_taken_is_no_error(offered: LosingPublis
 
 def test_closed_publisher_has_no_subscribers(offered: LosingPublisher) -> None:
     assert not offered.has_subscribers()
+
+
+class Recorder:
+    """A node that notes which publishers it makes, uses and destroys."""
+
+    def __init__(self) -> None:
+        self.notes: list[str] = []
+
+    def create_publisher(self, kind: type, topic: str, qos: object, **options: object) -> Any:
+        self.notes.append(f'+{topic}')
+        return SimpleNamespace(topic=topic, publish=lambda message: self.notes.append(topic))
+
+    def destroy_publisher(self, publisher: Any) -> None:
+        self.notes.append(f'-{publisher.topic}')
+
+    def noted(self, step: Callable[..., object], *args: object) -> list[str]:
+        """Return what is noted during a step."""
+        self.notes.clear()
+        step(*args)
+        return [note.replace('~/read/', '') for note in self.notes]
+
+
+def test_values_of_a_line_that_was_lost_do_not_come_when_it_is_back() -> None:
+    node: Any = Recorder()
+    points: dict[Mapping, Any] = {make_mapping(f'N7:{number}', tag=f'n{number}'): SimpleNamespace(
+        stale_time=1.0) for number in range(6)}
+    tags, row = [row.tag for row in points], next(iter(points))
+    published: dict[str, ReadTopic] = {}
+    topics = ReadTopics(node, published)
+
+    def read_all() -> None:
+        for each in points:
+            topics.read(each, array('h', [7]))
+
+    assert node.noted(read_all) == []  # it waits for the line
+    assert node.noted(topics.offer, points) == [sign + tag for tag in tags for sign in ('+', '')]
+    for _ in range(2):
+        assert node.noted(read_all) == tags[:4]
+        assert node.noted(topics.publish_later_values) == tags[4:]
+    read_all()
+    assert node.noted(topics.withdraw) == [f'-{tag}' for tag in tags]
+    assert node.noted(topics.publish_later_values) == []
+    assert node.noted(topics.read, row, array('h', [7])) == []
+    assert node.noted(topics.offer, points) == [
+        '+n0', 'n0', *(f'+{tag}' for tag in tags[1:])]
+    after = ReadTopics(node, published)
+    after.open({row: points[row]})
+    for gone in [f'-{tag}' for tag in tags[1:]], []:
+        assert node.noted(after.take_over) == gone
+
+
+@pytest.mark.parametrize(('old', 'new', 'is_fit'), [
+    (2.0, 3.0, True), (2.0, 3.1, False), (3.0, 2.0, True), (math.inf, 2.0, False),
+    (2.0, math.inf, False), (math.inf, math.inf, True)])
+def test_publisher_is_kept_where_the_promise_is_about_the_same(
+        old: float, new: float, is_fit: bool) -> None:
+    publisher: Any = None
+    assert ReadTopic(publisher, publisher, ('a',), old).is_fit_for(('a',), new) is is_fit

@@ -22,6 +22,7 @@ from typing import Any
 from abdf1_ros.df1.settings import PollingSettings
 from abdf1_ros.paths import config_file
 from abdf1_ros.problems import ConfigurationError
+from abdf1_ros.ros.launching import descriptions, parameter_types, unknown_arguments
 from abdf1_ros.ros.parameters.arguments import Arguments, is_for
 from abdf1_ros.ros.parameters.declared import Configuration, configure, Parameters
 from abdf1_ros.ros.parameters.files import parameter_tree
@@ -477,3 +478,27 @@ def test_ros_gives_a_node_the_same_sections_as_we_think(
                 automatically_declare_parameters_from_overrides=True)
     assert is_for(section, node.get_fully_qualified_name()) == node.has_parameter('gain')
     node.destroy_node()
+
+
+FILE = '/ws/share/abdf1_ros/launch/bridge.launch.py'
+
+
+@pytest.mark.parametrize('command', [
+    ['ros2', 'launch', 'abdf1_ros', 'bridge.launch.py'], ['ros2', 'launch', './bridge.launch.py']])
+def test_unknown_arguments_are_told_with_what_would_be_right(command: list[str]) -> None:
+    given = [*command, 'port:=/dev/x', 'mapfile:=map.csv', 'a:=b:=c']
+    assert unknown_arguments(FILE, ['port', 'map_file'], given) == [
+        'mapfile: there is no such argument; did you mean map_file?',
+        'a: there is no such argument; --show-args lists them']
+
+
+def test_arguments_of_a_file_that_includes_this_one_are_its_own() -> None:
+    assert not unknown_arguments(FILE, [], ['ros2', 'launch', 'cell', 'cell.launch.py', 'x:=1'])
+
+
+def test_every_parameter_has_a_type_and_a_description() -> None:
+    assert parameter_types()['read_only'] is bool
+    assert parameter_types()['stale_after'] is float
+    assert parameter_types()['default_period'] is int
+    assert descriptions()['stale_after'].endswith('; default: 3.0')
+    assert descriptions().keys() == parameter_types().keys()

@@ -20,8 +20,10 @@ from types import SimpleNamespace
 from typing import Any, cast
 
 from abdf1_ros.driver.driver import Driver
+from abdf1_ros.ports.clock import line_time
 from abdf1_ros.ros.callbacks import AnsweringNode
 from abdf1_ros.ros.topics.writes import count_publishers, LossCounter, WriteTopics
+from abdf1_ros.settings.heartbeats import Fallback
 from abdf1_ros.settings.mapping import Mapping
 import pytest
 from rclpy.node import Node
@@ -55,6 +57,7 @@ class Taker:
     def __init__(self, *tags: str) -> None:
         self.mappings = [make_mapping('N7:0', 'Write', tag=tag) for tag in tags]
         self.executor, self.tasks, self.said = self, list[Callable[[], None]](), list[str]()
+        self.stamps, self.requests = list[str](), list[str]()
         self.callbacks: dict[str, Callable[[Any, Any], None]] = {}
         self.kinds: dict[str, type] = {}
         self.wakes = 0
@@ -75,18 +78,29 @@ class Taker:
     def create_task(self, task: Callable[[], None]) -> None:
         self.tasks.append(task)
 
-    def write(self, mappings: Sequence[Mapping], values: Any, *times: object) -> None:
-        self.said.append(f'{mappings[0].tag} {values[0]}')
+    def write(self, mappings: Sequence[Mapping], values: Any, requested: float,
+              request: str) -> None:
+        if values[0] == 0:
+            raise ValueError
+        age = line_time() - requested
+        self.said.append(f'{mappings[0].tag} {values[0]}' + f' of {age:.1f} s ago' * (age > 0.5))
+        self.requests.append(request)
 
-    def refuse(self, mappings: Sequence[Mapping], reason: str, values: Any, *why: object) -> None:
+    def tell_failure(self, what: str, error: BaseException) -> None:
+        self.said.append(what)
+
+    def refuse(self, mappings: Sequence[Mapping], reason: str, values: Any, request: str) -> None:
         self.said.append(f'{mappings[0].tag} {values[0]}: {reason}')
+        self.requests.append(request)
 
-    def publish(self, topic: str, number: int, age: float = 0.0, times: int = 1) -> None:
+    def publish(self, topic: str, number: int, age: float = 0.0, times: int = 1,
+                waited: float = 0.0) -> None:
         now = time.time_ns()
+        self.stamps.append(str(now - int(age * 1e9)))
         for _ in range(times):
             self.callbacks[topic](Int16MultiArray(data=[number]), {
-                'publication_sequence_number': number, 'source_timestamp': now - int(age * 1e9),
-                'received_timestamp': now})
+                'publication_sequence_number': number, 'source_timestamp': int(self.stamps[-1]),
+                'received_timestamp': now - int(waited * 1e9)})
 
     def get_publishers_info_by_topic(self, name: str) -> list[Any]:
         return [SimpleNamespace(node_namespace='/cell', node_name='panel')]
@@ -127,17 +141,20 @@ def test_messages_wait_in_their_order_until_the_node_has_begun(
     assert (node.said, topics.taken) == (['a: 1 lost'], 0)
     task, = node.tasks
     task()
-    node.publish('a', 4)
+    node.publish('a', 4, age=1.2)
+    node.publish('a', 5, waited=0.7)
     node.publish('b', 3, age=7.4)
     node.publish('b', 4, age=-1.5)
     node.publish('b', 5, age=-2.6)
     too_old = ('s after it was published, write_timeout is 2 s; the network is slow, this node '
                'stood still or had just begun, or the clocks differ')
-    assert node.said == ['a: 1 lost', 'a 1', f'b 2: it came 3.0 {too_old}', 'a 3', 'a 4',
-                         f'b 3: it came 7.4 {too_old}', 'b 4', "b: ['/cell/panel'] ahead by 1.5 s",
+    assert node.said == ['a: 1 lost', 'a 1', f'b 2: it came 3.0 {too_old}', 'a 3',
+                         'a 4 of 1.2 s ago', 'a 5 of 0.7 s ago', f'b 3: it came 7.4 {too_old}',
+                         'b 4', "b: ['/cell/panel'] ahead by 1.5 s",
                          'b 5: its time stamp is 2.6 s ahead of the clock here, write_timeout is '
                          '2 s; the clocks differ, so its age is unknown']
-    assert topics.taken == 7
+    assert topics.taken == 8
+    assert node.requests == node.stamps
 
 
 def test_message_that_dds_delivers_again_after_a_cut_is_not_written_again(
@@ -184,15 +201,20 @@ def test_messages_go_to_the_old_driver_until_the_new_one_has_the_line(
     assert (node.said, new.said) == (['a 1'], ['a 2'])
 
 
-def test_message_that_waits_for_rows_which_a_reload_takes_away_ends_nothing(
+def test_message_that_waits_for_rows_which_a_reload_takes_away_or_that_fails_ends_nothing(
         node: Taker, topics: WriteTopics) -> None:
     node.publish('a', 1)
+    node.publish('b', 0)
     node.publish('b', 1)
-    del node.mappings[0]
+    node.mappings[0] = make_mapping('N7:9', 'Write', tag='c', fallback=Fallback((7,), 1000))
     topics.give_to(node.open(topics))
     topics.begin()
     node.tasks[0]()
-    assert node.said == ['b 1']
+    assert node.said == ['a message on ~/write/b', 'b 1']
+    for before in 9.0, 0.0:
+        topics.standstills.look(line_time() - before)
+    node.publish('c', 1)
+    assert node.said[2].startswith('c 1: it came 9.0 s after it was published')
 
 
 def test_row_of_another_message_type_has_another_subscription(

@@ -12,7 +12,9 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The generated tables leave nothing out."""
+"""The generated tables leave nothing out; the drawing shows the arrows, and none leads back."""
+
+import re
 
 from abdf1_ros.pccc.families import FAMILIES, parse_address
 from abdf1_ros.pccc.file_types import FileType, PlcType
@@ -20,7 +22,8 @@ from abdf1_ros.pccc.values import types_of
 import pytest
 from support.cases import for_all
 
-from tools import tables
+from tools import drawing, tables
+from tools.rooms import Room, room_of, ROOMS
 
 
 def rows(text: str) -> list[list[str]]:
@@ -70,3 +73,39 @@ def test_numbers_of_messages_are_links() -> None:
     crc = next(row for row in rows(tables.counters()) if row[1] == 'CNT_CRC_ERRORS')
     assert crc == ['2547', 'CNT_CRC_ERRORS', 'frames received with a wrong CRC',
                    'See [2506](messages.md#2506).']
+
+
+A, B, C = Room(('a.py',), ''), Room(('b.py',), ''), Room(('c.py',), '')
+
+
+def test_what_a_longer_way_implies_is_left_out() -> None:
+    assert drawing.reduced({A: {B, C}, B: {C}, C: set()}) == {A: {B}, B: {C}, C: set()}
+
+
+@pytest.fixture(scope='module')
+def found() -> dict[Room, set[Room]]:
+    return drawing.arrows()
+
+
+def test_arrows_are_the_imports(found: dict[Room, set[Room]]) -> None:
+    assert room_of('pccc/address.py') in found[room_of('settings/mapping.py')]
+    assert room_of('ports/link_thread.py') in found[room_of('ros/node.py')]
+    assert found[room_of('messages.py')] == set()
+
+
+def test_no_room_leads_back_to_itself(found: dict[Room, set[Room]]) -> None:
+    for room in ROOMS:
+        reached: set[Room] = set()
+        waiting = [room]
+        while waiting:
+            for target in found[waiting.pop()] - reached:
+                assert target is not room, room.name
+                reached.add(target)
+                waiting.append(target)
+
+
+def test_drawing_names_every_room_once() -> None:
+    text = drawing.mermaid()
+    labels = re.findall(r'\["(.*?)"\]', text)
+    assert [label.replace('<br>', ', ') for label in labels] == [room.name for room in ROOMS]
+    assert re.search(r'r\d+ --> r\d+', text)
