@@ -35,6 +35,8 @@ _COMPUTING = (
 
 _HERE = Path(__file__).parent
 
+gc.disable()  # until all tests are collected
+
 # Each process of the tests that imports numpy would start a thread a processor for its algebra,
 # and let them spin for 0.1 s.
 os.environ['OPENBLAS_NUM_THREADS'] = '1'
@@ -81,11 +83,12 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
 
 def pytest_collection_finish() -> None:
     """
-    Let garbage be collected less often, and not looked for among the tests.
+    Let garbage be collected from here on, but less often, and not looked for among the tests.
 
     Each worker holds all of them, and nearly all that they make has no cycles: the collector took
     a sixth of the processor time.
     """
+    gc.enable()
     gc.freeze()
     gc.set_threshold(20_000, 20, 20)
 

@@ -22,6 +22,7 @@ import sys
 from xml.etree import ElementTree
 
 import pytest
+from support.cases import for_all
 
 ROOT = Path(__file__).resolve().parent.parent
 MANIFEST = ElementTree.parse(ROOT / 'package.xml').getroot()
@@ -78,7 +79,7 @@ def test_users_get_no_more_than_is_imported() -> None:
     assert keys('exec_depend') == used | {'ros2launch'}  # of every package with launch files
 
 
-@pytest.mark.parametrize('name', PINNED)
+@for_all('name', PINNED)
 def test_tools_of_developers_are_pinned(name: str) -> None:
     lines = (ROOT / 'requirements' / name).read_text(encoding='utf-8').splitlines()
     needs = [line for line in lines if line and not line.startswith('#')]
@@ -99,7 +100,7 @@ def versions(name: str) -> dict[str, str]:
     return dict(re.findall(r'^([\w.-]+)(?:\[\w+\])?==([\d.]+)', text, re.MULTILINE))
 
 
-@pytest.mark.parametrize('name', LOCKED)
+@for_all('name', LOCKED)
 def test_what_is_installed_has_hashes(name: str) -> None:
     text = (ROOT / 'requirements' / f'{name}.txt').read_text(encoding='utf-8')
     lines = [line for line in text.splitlines() if line and not line.startswith('#')]

@@ -34,6 +34,7 @@ from unittest import mock
 
 from abdf1_ros.cli.main import COMMANDS
 import pytest
+from support.cases import for_all
 from support.ros import get_parameters, Observer, PATIENCE
 from support.ros_tools import SOURCE
 
@@ -84,7 +85,7 @@ def test_package_index_has_what_a_reader_looks_for() -> None:
     assert 'Typing :: Typed' in said['classifiers']
 
 
-@pytest.mark.parametrize('line', described('install')['entry_points']['console_scripts'])
+@for_all('line', described('install')['entry_points']['console_scripts'])
 def test_executables_are_there(line: str) -> None:
     module, _, name = line.partition(' = ')[2].partition(':')
     assert callable(getattr(importlib.import_module(module), name))

@@ -26,7 +26,7 @@ from abdf1_ros.errors import (
 )
 from abdf1_ros.messages import Message
 from abdf1_ros.problems import ConfigurationError, Place, Problem
-import pytest
+from support.cases import for_all
 
 
 def test_what_callers_can_catch() -> None:
@@ -39,7 +39,7 @@ def test_what_callers_can_catch() -> None:
     assert (error.sts, error.ext_sts, str(error)) == (0xF0, 0x06, 'no such place')
 
 
-@pytest.mark.parametrize(('error', 'text'), [
+@for_all(('error', 'text'), [
     (CommandTimeout(), '2508 ERR_COMMAND_TIMEOUT: Command Timed Out'),
     (StationInactive(9), '2509 ERR_INACTIVE_STATION: Slave Station (9) Inactive'),
     (WrongCommandCode(9, 0x41, 0x4F),
@@ -51,7 +51,7 @@ def test_link_error_reads_as_its_numbered_text(error: LinkError, text: str) -> N
     assert str(error) == text
 
 
-@pytest.mark.parametrize('error', [
+@for_all('error', [
     CommandTimeout(), StationInactive(9), WrongCommandCode(9, 0x41, 0x4F), PortLost('unplugged')])
 def test_copy_of_a_link_error_says_whether_the_command_was_sent(error: LinkError) -> None:
     for is_sent in (True, False):  # as driver/job_tasks.py makes it
@@ -59,7 +59,7 @@ def test_copy_of_a_link_error_says_whether_the_command_was_sent(error: LinkError
         assert (str(copy), copy.sent) == (str(error), is_sent)
 
 
-@pytest.mark.parametrize(('place', 'text'), [
+@for_all(('place', 'text'), [
     (Place('net.csv', 2, 1, 'Station'), 'net.csv:2:1 (Station)'),
     (Place('net.csv', 2, None, 'Station'), 'net.csv:2 (Station)'),
     (Place('net.csv', 2, 1), 'net.csv:2:1'), (Place('net.csv', 2), 'net.csv:2'),

@@ -23,6 +23,7 @@ import abdf1_ros
 from abdf1_ros.client import Client
 from abdf1_ros.paths import package_version
 import pytest
+from support.cases import for_all
 from support.driver_bench import simulated_plc, stored
 from support.plc_line import plc_line
 
@@ -72,7 +73,7 @@ def test_abdf1_tells_its_version() -> None:
     assert done.stdout == f'abdf1_ros {package_version()}\n'
 
 
-@pytest.mark.parametrize('folder', [
+@for_all('folder', [
     'driver', 'driver/interlocks', 'driver/reads', 'driver/writes', 'plan', 'ports', 'settings'])
 def test_map_of_a_folder_names_what_is_there(folder: str) -> None:
     text = (PACKAGE / folder / '__init__.py').read_text(encoding='utf-8')

@@ -20,7 +20,6 @@ import re
 import subprocess
 import sys
 
-import pytest
 from support.cases import for_all
 
 from tools.rooms import imports, MODULES, PACKAGE, room_of, ROOMS
@@ -103,7 +102,7 @@ def test_no_module_imports_itself_by_others() -> None:
     assert circles({'a': {'b'}, 'b': {'a'}, 'c': {'a'}, 'd': set()}) == {'a', 'b', 'c'}
 
 
-@pytest.mark.parametrize('room', ['ros', 'driver', 'pccc', 'cli'])
+@for_all('room', ['ros', 'driver', 'pccc', 'cli'])
 def test_folders_of_a_room_import_one_way(room: str) -> None:
     arrows: dict[str, set[str]] = {}
 
@@ -178,7 +177,7 @@ def test_import_against_the_arrows_is_found(module: str, source: str) -> None:
     assert len(violations(module, source)) == 1
 
 
-@pytest.mark.parametrize(('module', 'source'), [
+@for_all(('module', 'source'), [
     ('df1/master.py', 'from abdf1_ros.df1 import frames'),
     ('df1/master.py', 'from . import frames'),
     ('df1/master.py', 'from ..errors import LinkError'),

@@ -18,16 +18,15 @@ from abdf1_ros.numbers import decimal_number, two_readings, whole_number
 from abdf1_ros.text import by_number, first, printable
 from hypothesis import given
 from hypothesis import strategies as st
-import pytest
 from support.cases import ANY_CHARACTER, for_all
 
 
-@pytest.mark.parametrize('text', ['', 'N7:0', 'Größe 5 °C', 'скорость', '速度', 'a "b" \\n'])
+@for_all('text', ['', 'N7:0', 'Größe 5 °C', 'скорость', '速度', 'a "b" \\n'])
 def test_what_can_be_seen_stays(text: str) -> None:
     assert printable(text) == text
 
 
-@pytest.mark.parametrize(('text', 'shown'), [
+@for_all(('text', 'shown'), [
     ('one\n[FATAL] two', r'one\n[FATAL] two'),
     ('one\r\ntwo', r'one\r\ntwo'),
     ('\x1b[2J', r'\x1b[2J'),          # a terminal would clear its screen
@@ -61,7 +60,7 @@ def test_of_many_names_the_first_are_shown_and_the_others_counted() -> None:
     assert first(['a', 'b', 'c', 'd'], 2) == 'a, b and 2 more'
 
 
-@pytest.mark.parametrize('text, value', [
+@for_all(('text', 'value'), [
     ('0', 0), ('-7', -7), ('+7', 7), ('007', 7), ('65535', 65535),
     ('', None), ('1.0', None), ('1e3', None), ('0x10', None), ('1 0', None), ('1_0', None),
     ('²', None), ('٣', None), ('-', None), ('5\n', None), ('9' * 5000, None)])
@@ -69,7 +68,7 @@ def test_whole_number_is_decimal_digits_with_a_sign_at_most(text: str, value: in
     assert whole_number(text) == value
 
 
-@pytest.mark.parametrize(('text', 'value'), [
+@for_all(('text', 'value'), [
     ('0', 0.0), ('-1.5', -1.5), ('+2', 2.0), ('.5', 0.5), ('5.', 5.0), ('1e3', 1000.0),
     ('2.5E-1', 0.25), ('007', 7.0), ('1e-400', 0.0)])
 def test_decimal_number_is_read_as_people_write_it(text: str, value: float) -> None:
@@ -88,7 +87,7 @@ def test_every_number_in_the_form_of_python(value: float) -> None:
     assert decimal_number(repr(value)) == value
 
 
-@pytest.mark.parametrize(('text', 'right'), [
+@for_all(('text', 'right'), [
     ('1,000', '1000 or 1.000'), ('-12,500', '-12500 or -12.500'), ('1,5', ''), ('1,0000', ''),
     ('1000', ''), ('1.000', ''), ('', '')])
 def test_comma_that_may_be_of_thousands(text: str, right: str) -> None:

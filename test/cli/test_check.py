@@ -24,6 +24,7 @@ import sys
 from abdf1_ros.cli.check import main
 from abdf1_ros.paths import config_file
 import pytest
+from support.cases import for_all
 from support.commands import Output
 from support.ros import write_csv
 from support.vectors import VECTOR_FOLDER
@@ -234,8 +235,8 @@ def test_what_stands_in_files_forges_no_line(check: Check) -> None:
     assert '\u2028' not in out
 
 
-@pytest.mark.parametrize('option', ['--default-period', '--response-time'])
-@pytest.mark.parametrize('text', ['x', '-1', 'nan', '1e12', '1_0', '\u0661'])
+@for_all('option', ['--default-period', '--response-time'])
+@for_all('text', ['x', '-1', 'nan', '1e12', '1_0', '\u0661'])
 def test_time_that_is_no_number_of_ms_is_told(option: str, text: str, capsys: Output) -> None:
     with pytest.raises(SystemExit) as ending:
         main(['net.csv', 'map.csv', f'{option}={text}'])

@@ -21,6 +21,7 @@ import time
 
 from abdf1_ros.cli.conform import main
 import pytest
+from support.cases import for_all
 from support.commands import Output, running_simulator
 from support.driver_bench import simulated_plc
 from support.plc_line import plc_line
@@ -114,7 +115,7 @@ def test_port_that_cannot_be_opened_is_one_and_what_is_wrong_in_options_two(
     assert text in capsys.readouterr().err
 
 
-@pytest.mark.parametrize('args', [
+@for_all('args', [
     ['slave', '--only', 'nothing'], ['slave', '--station', '255'], ['slave', '--count', '0'],
     ['slave', '--count', '101'], ['slave', '--tcp', 'nowhere'], ['slave', '--tcp', 'a:99999'],
     ['peer', '--words', 'F8:0'], ['peer', '--echo'], []])

@@ -31,6 +31,7 @@ from abdf1_ros.cli.simulator import main
 from abdf1_ros.df1 import frames
 from abdf1_ros.df1.checksum import Checksum
 import pytest
+from support.cases import for_all
 from support.commands import call, Output
 from support.forked import Forked
 from support.ptys import full_pipe, PATIENCE, read_exactly
@@ -182,7 +183,7 @@ def _refused(capsys: Output, *options: str, status: int = 2) -> str:
     return said.err
 
 
-@pytest.mark.parametrize(('options', 'status', 'text'), [
+@for_all(('options', 'status', 'text'), [
     *(((f'--at={at}',), 2, f'--at "{at}" should be seconds from 0 and a command, as in "5 silent '
        '1"') for at in ('soon silent 1', 'silent 1', '', 'x', '-1 silent 1', 'nan silent 1',
                         'inf silent 1', '1_0 silent 1', '\u0661 silent 1', '5', '5 ')),
@@ -238,7 +239,7 @@ def test_name_is_not_shared_and_what_a_killed_simulator_left_is_taken_by_the_nex
     assert not os.path.lexists(name)
 
 
-@pytest.mark.parametrize('option', [
+@for_all('option', [
     '--check=XOR', '--baud=9601', '--baud=9_600', '--seconds=x', '--seconds=-1', '--what',
     '--pty=', '--port='])
 def test_option_that_is_wrong_is_told_with_status_2(capsys: Output, option: str) -> None:

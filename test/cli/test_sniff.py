@@ -33,6 +33,7 @@ from abdf1_ros.df1.checksum import Checksum
 from abdf1_ros.df1.packet import Packet
 from abdf1_ros.sniffer.capture import read_capture
 import pytest
+from support.cases import for_all
 from support.commands import Output, running_simulator
 from support.forked import Forked
 from support.ptys import full_pipe, PATIENCE, Pty, read_exactly, wait_until
@@ -212,7 +213,7 @@ def test_packets_go_nowhere_else_than_into_pcapng(capsys: Output, capture: str) 
     assert 'exists and was not made by --pcapng' in refused(capsys, '--pcapng', capture, capture)
 
 
-@pytest.mark.parametrize('args', [
+@for_all('args', [
     [], ['x', '--port', 'y'], ['--port', 'x', '--tap', 'y', 'z'], ['x', '--save', 'y'],
     ['--port', 'x', '--binary'], ['--tap', 'x'], ['--tap', 'x', 'x'],
     ['x', '--check', 'md5'], ['x', '--baud', '7'],

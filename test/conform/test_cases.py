@@ -122,7 +122,7 @@ def _flipped(raw: bytes) -> bytes:
     return codec.damaged(raw) if b'\x10\x02' in raw else raw
 
 
-@pytest.mark.parametrize(('target', 'name', 'spoil', 'expected'), [
+@for_all(('target', 'name', 'spoil', 'expected'), [
     (Target.SLAVE, 'message-acknowledged', _nothing, 'DLE ACK'),
     (Target.SLAVE, 'message-acknowledged', _replaced(codec.ACK, codec.NAK), 'DLE ACK'),
     (Target.SLAVE, 'poll-idle', _replaced(codec.EOT, codec.ACK), 'DLE EOT'),
@@ -142,8 +142,8 @@ def test_broken_rule_fails_its_case(target: Target, name: str, spoil: Callable[[
     assert result.transcript
 
 
-@pytest.mark.parametrize('name', ['read-words', 'write-and-read'])
-@pytest.mark.parametrize(('family', 'outcome'), [
+@for_all('name', ['read-words', 'write-and-read'])
+@for_all(('family', 'outcome'), [
     ('SLC', (Verdict.FAIL, 'STS 00', 'STS 10')),
     ('', (Verdict.SKIP, '', 'needs --family PLC5 or SLC'))])
 def test_other_family_refuses(family: str, outcome: tuple[Verdict, str, str], name: str) -> None:

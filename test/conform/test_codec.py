@@ -29,7 +29,7 @@ def test_crc_has_the_check_value_of_its_polynomial() -> None:
     assert codec.crc(b'123456789') == 0xBB3D
 
 
-@pytest.mark.parametrize(('frame', 'printed'), [
+@for_all(('frame', 'printed'), [
     (codec.message(LINK_DATA, BlockCheck.BCC), '10 02 08 09 06 00 10 10 04 03 10 03 D2'),
     (codec.master_message(0x20, LINK_DATA, BlockCheck.BCC),
      '10 01 20 10 02 08 09 06 00 10 10 04 03 10 03 B2'),
@@ -45,7 +45,7 @@ def test_frames_are_those_of_the_manual(frame: bytes, printed: str) -> None:
     assert frame == bytes.fromhex(printed)
 
 
-@pytest.mark.parametrize(('raw', 'is_half_duplex', 'symbol'), [
+@for_all(('raw', 'is_half_duplex', 'symbol'), [
     ('10 06 10', True, Symbol(SymbolKind.ACK, codec.ACK)),
     ('10 05', False, Symbol(SymbolKind.ENQ, codec.ENQ)),
     ('10 05 11 EF', True, Symbol(SymbolKind.POLL, bytes.fromhex('100511EF'), station=0x11)),

@@ -24,6 +24,7 @@ from abdf1_ros.df1.packet import Packet
 from abdf1_ros.df1.stations import ActiveStationList
 from abdf1_ros.messages import Event
 import pytest
+from support.cases import for_all
 from support.peers import CommandTask
 from support.vectors import vector
 
@@ -33,13 +34,13 @@ def counted(counters: Counters) -> dict[str, int]:
     return {name: count for name, count in asdict(counters).items() if count}
 
 
-@pytest.mark.parametrize(('fault', 'checksum', 'counter', 'event'), [
+@for_all(('fault', 'checksum', 'counter', 'event'), [
     (FrameFault.BAD_CHECK, Checksum.CRC, 'crc_errors', (2506, 0x12, 0x34, 0xAB, 0xCD)),
     (FrameFault.BAD_CHECK, Checksum.BCC, 'bcc_errors', (2507, 0x12, 0x34, 0xAB, 0xCD)),
     (FrameFault.NO_ETX, Checksum.CRC, 'invalid_messages', (2518,)),
     (FrameFault.TOO_SHORT, Checksum.BCC, 'invalid_messages', (2513, 6)),
     (FrameFault.TOO_LONG, Checksum.CRC, 'invalid_messages', (2512, 261))])
-@pytest.mark.parametrize('station', [None, 7])
+@for_all('station', [None, 7])
 def test_fault_has_its_counter_and_its_event(
         fault: FrameFault, checksum: Checksum, counter: str, event: tuple[int, ...], station: int |
         None) -> None:

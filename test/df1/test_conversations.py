@@ -16,6 +16,7 @@
 
 from abdf1_ros.df1 import radio
 import pytest
+from support.cases import for_all
 from support.conversations import (
     begun_again,
     Conversation,
@@ -26,7 +27,7 @@ from support.conversations import (
 )
 
 
-@pytest.mark.parametrize('conversation', CONVERSATIONS, ids=lambda entry: entry.name)
+@for_all('conversation', CONVERSATIONS)
 def test_node_does_exactly_what_the_conversation_says(conversation: Conversation) -> None:
     player = Player(conversation)
     player.play()

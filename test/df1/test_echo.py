@@ -24,6 +24,7 @@ from abdf1_ros.df1.packet import Packet
 from abdf1_ros.df1.settings import LinkSettings, PollingSettings
 from abdf1_ros.errors import StationInactive
 import pytest
+from support.cases import for_all
 from support.multidrop import MasterBench, MasterNode, SlaveBench
 from support.peers import CommandTask, PeerBench, PeerNode, single_bytes
 from support.virtual_line import char_time, VirtualLine
@@ -52,9 +53,9 @@ def run_alone(node: PeerNode | MasterNode, line: VirtualLine) -> list[CommandTas
     return tasks
 
 
-@pytest.mark.parametrize('checksum', Checksum)
-@pytest.mark.parametrize('delay', [0.0, 0.05, 0.29, 0.31, 1.0, 2.0])
-@pytest.mark.parametrize('chunk', [1, 16, 1000])
+@for_all('checksum', Checksum)
+@for_all('delay', [0.0, 0.05, 0.29, 0.31, 1.0, 2.0])
+@for_all('chunk', [1, 16, 1000])
 def test_full_duplex_alone_with_its_echo_hears_nobody(
         checksum: Checksum, delay: float, chunk: int) -> None:
     node = PeerNode(replace(SETTINGS, checksum=checksum), lambda: line.now,

@@ -124,8 +124,8 @@ def test_captured_frame_decodes_and_encodes(entry: Captured) -> None:
     assert message_frame(symbol.data, entry.checksum) == entry.frame
 
 
-@pytest.mark.parametrize(('frame', 'code'), [(ACK, Code.ACK), (NAK, Code.NAK), (EOT, Code.EOT)])
-@pytest.mark.parametrize('duplex', Duplex)
+@for_all(('frame', 'code'), [(ACK, Code.ACK), (NAK, Code.NAK), (EOT, Code.EOT)])
+@for_all('duplex', Duplex)
 def test_control_symbols_are_told_apart(frame: bytes, code: Code, duplex: Duplex) -> None:
     assert len(frame) == 2
     assert decode(frame, duplex=duplex, chunk=1) == [Control(code)]
@@ -142,7 +142,7 @@ def test_master_frame_is_none_in_full_duplex() -> None:
     assert all(getattr(symbol, 'fault', 1) is not None for symbol in symbols)
 
 
-@pytest.mark.parametrize('byte', [0x00, 0x03, 0x07, 0x7F, 0xFF])
+@for_all('byte', [0x00, 0x03, 0x07, 0x7F, 0xFF])
 def test_unknown_symbol_tells_its_byte(byte: int) -> None:
     assert decode(bytes((0x10, byte)), chunk=1) == [Unknown(byte)]
 
@@ -151,8 +151,8 @@ def test_doubled_dle_outside_of_a_message_is_no_symbol() -> None:
     assert decode(b'\x10\x10\x10\x06') == [Control(Code.ACK)]
 
 
-@pytest.mark.parametrize('noise', [b'\x55\xAA', b'\x10\x10', b'\x55\x10\x10'])
-@pytest.mark.parametrize('chunk', [None, 1])
+@for_all('noise', [b'\x55\xAA', b'\x10\x10', b'\x55\x10\x10'])
+@for_all('chunk', [None, 1])
 def test_noise_since_the_last_message_is_told_before_an_enq(noise: bytes,
                                                             chunk: int | None) -> None:
     ack, enq, frame = Control(Code.ACK), Control(Code.ENQ), message_frame(DATA, CRC)
@@ -173,8 +173,8 @@ def test_noise_between_symbols_is_skipped_and_its_last_byte_kept() -> None:
     assert (decoder.last_byte, decoder.noise) == (0x66, before + 1)
 
 
-@pytest.mark.parametrize('station', [0, 1, 0x0F, 0x10, 0x11, 0x20, 0xF0, 0xFE])
-@pytest.mark.parametrize('chunk', [None, 1])
+@for_all('station', [0, 1, 0x0F, 0x10, 0x11, 0x20, 0xF0, 0xFE])
+@for_all('chunk', [None, 1])
 def test_poll_of_any_station(station: int, chunk: int | None) -> None:
     assert decode(poll_frame(station), chunk=chunk) == [Poll(station, True)]
 
@@ -190,7 +190,7 @@ def test_poll_of_a_master_that_does_not_double_station_10(chunk: int | None) -> 
         Poll(0x10, True), Poll(1, True)]
 
 
-@pytest.mark.parametrize('start', [b'\x10\x05', b'\x10\x01', b'\x10\x01\x07', b'\x10\x01\x07\x55'])
+@for_all('start', [b'\x10\x05', b'\x10\x01', b'\x10\x01\x07', b'\x10\x01\x07\x55'])
 def test_symbol_breaks_into_a_multidrop_header(start: bytes) -> None:
     assert decode(start + ACK, chunk=1) == [Control(Code.ACK)]
 
@@ -202,8 +202,8 @@ def test_etx_pair_among_the_check_bytes_is_check() -> None:
     assert ack == Control(Code.ACK)
 
 
-@pytest.mark.parametrize('size', [0, 1, 5])
-@pytest.mark.parametrize('checksum', Checksum)
+@for_all('size', [0, 1, 5])
+@for_all('checksum', Checksum)
 def test_message_shorter_than_a_header(size: int, checksum: Checksum) -> None:
     (frame,) = decode(message_frame(bytes(size), checksum), checksum)
     assert isinstance(frame, Frame)
@@ -314,7 +314,7 @@ def test_bytes_that_nobody_reads_are_not_kept_without_end() -> None:
 MESSAGE = bytes.fromhex('10 02 01 00 06 00 01 00 00 10 03 F8')
 
 
-@pytest.mark.parametrize('at', range(len(MESSAGE)))
+@for_all('at', range(len(MESSAGE)))
 def test_message_with_a_damaged_character_is_not_a_good_one(at: int) -> None:
     decoder = FrameDecoder(BCC, FULL)
     decoder.feed(MESSAGE)
@@ -341,7 +341,7 @@ def test_crc_check_value_of_the_literature() -> None:
     assert crc16(b'123456789') == 0xBB3D
 
 
-@pytest.mark.parametrize(('data', 'value'), [
+@for_all(('data', 'value'), [
     ('08 09 06 00 02 04 03', 0xE0), ('08 09 06 00 10 04 03', 0xD2), ('', 0), ('80 80', 0)])
 def test_bcc_of_the_manual(data: str, value: int) -> None:
     assert bcc(bytes.fromhex(data)) == value

@@ -132,8 +132,8 @@ def test_any_bytes_are_symbols_or_noise(chunks: list[bytes]) -> None:
     assert pieces.finish() == whole.finish()
 
 
-@pytest.mark.parametrize('size', [1, 1000])
-@pytest.mark.parametrize(('wrong', 'right', 'damaged'), [
+@for_all('size', [1, 1000])
+@for_all(('wrong', 'right', 'damaged'), [
     (Checksum.CRC, Checksum.BCC, 2), (Checksum.BCC, Checksum.CRC, 0)])
 def test_a_guess_that_frames_contradict_is_changed(
         wrong: Checksum, right: Checksum, damaged: int, size: int) -> None:

@@ -48,6 +48,7 @@ from abdf1_ros.df1.machine import (
 from abdf1_ros.df1.packet import Packet
 from abdf1_ros.errors import CommandExpired
 import pytest
+from support.cases import for_all
 from support.virtual_line import Wire
 
 FRAME = b'0123456789'
@@ -286,7 +287,7 @@ def test_what_has_come_before_a_frame_could_leave_is_no_answer_to_it() -> None:
 REPLY = Packet(1, 5, 0x0F, 0, 7).reply(bytes(94))  # with DLE STX, 102 bytes before DLE ETX
 
 
-@pytest.mark.parametrize(('size', 'characters'), [
+@for_all(('size', 'characters'), [
     (7, 0),  # of the header, a byte is missing
     (8, 78), (28, 58), (85, 1), (86, 0), (101, 0)])
 def test_reply_of_known_size_need_not_be_looked_at_until_its_last_characters(
@@ -390,10 +391,10 @@ def test_pause_ends_an_answer_that_has_begun() -> None:
     assert bench.got == [None]
 
 
-@pytest.mark.parametrize(('broken', 'limit'), [
+@for_all(('broken', 'limit'), [
     *((broken, limit) for broken in (b'\x10', b'\x10\x01', b'\x10\x05\x10')
       for limit in (None, 9.0)), (MESSAGE[:-1], None)])  # with a limit a message is heard out
-@pytest.mark.parametrize(('pause', 'forgotten'), [(0.05, False), (0.31, True)])
+@for_all(('pause', 'forgotten'), [(0.05, False), (0.31, True)])
 def test_pause_ends_what_broke_off(broken: bytes, limit: float | None, pause: float,
                                    forgotten: bool) -> None:
     bench = Bench(*[Listen(limit)] * 3, timing=LineTiming(char_time=0.01))

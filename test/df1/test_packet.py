@@ -47,7 +47,7 @@ def test_decode_and_encode_are_inverse(link_data: bytes) -> None:
     assert Packet.decode(link_data).encode() == link_data
 
 
-@pytest.mark.parametrize('size', range(6))
+@for_all('size', range(6))
 def test_less_than_a_header_is_a_format_error(size: int) -> None:
     with pytest.raises(FormatError, match=f'^{size} bytes'):
         Packet.decode(bytes(size))
@@ -66,7 +66,7 @@ def test_reply_answers_its_command() -> None:
     assert COMMAND.reply(b'data', 0x10).answers(COMMAND)
 
 
-@pytest.mark.parametrize('change', [
+@for_all('change', [
     {'dst': 6}, {'src': 18}, {'tns': 0x0103}, {'tns': 0x0202}, {'cmd': 0x0F}])
 def test_other_messages_do_not_answer(change: dict[str, Any]) -> None:
     assert not COMMAND.reply()._replace(**change).answers(COMMAND)
@@ -76,7 +76,7 @@ def test_answers_leaves_the_command_code_to_the_caller() -> None:
     assert COMMAND.reply()._replace(cmd=0x41).answers(COMMAND)
 
 
-@pytest.mark.parametrize('change', [{'src': 6}, {'cmd': 0x0E}, {'tns': 0x0103}, {'tns': 0x0202}])
+@for_all('change', [{'src': 6}, {'cmd': 0x0E}, {'tns': 0x0103}, {'tns': 0x0202}])
 def test_duplicate_key_tells_messages_apart_by_src_cmd_and_tns(change: dict[str, Any]) -> None:
     assert COMMAND._replace(**change).duplicate_key != COMMAND.duplicate_key
 
@@ -86,7 +86,7 @@ def test_duplicate_key_passes_over_dst_sts_and_data() -> None:
     assert other.duplicate_key == COMMAND.duplicate_key
 
 
-@pytest.mark.parametrize(('packet', 'size', 'begins'), [
+@for_all(('packet', 'size', 'begins'), [
     (COMMAND.reply(b'words'), 11, True), (COMMAND.reply(b'words'), 6, True),
     (COMMAND.reply(b'words'), 5, False), (COMMAND.reply(b'words'), 0, False),
     (COMMAND.reply(sts=0x10), 6, False), (COMMAND, 7, False)])

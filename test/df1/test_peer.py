@@ -212,8 +212,8 @@ def test_command_with_a_status_is_told_and_not_accepted() -> None:
         (Message.ERR_WRONG_MESSAGE.number, THEIRS.src)]
 
 
-@pytest.mark.parametrize('byte', [0x00, 0x10, 0x55])
-@pytest.mark.parametrize('more', [1, 2, 3, 50, 700])
+@for_all('byte', [0x00, 0x10, 0x55])
+@for_all('more', [1, 2, 3, 50, 700])
 def test_message_too_long(byte: int, more: int) -> None:
     peer = bench()
     command = THEIRS._replace(data=bytes((byte,)) * (MAX_LINK_DATA - 6 + more))
@@ -240,8 +240,8 @@ def test_repetition_comes_within_the_time_of_the_retries(timeout: float, enq_ret
         assert len(peer.served) == served
 
 
-@pytest.mark.parametrize('timeout', [0.1, 2.0])
-@pytest.mark.parametrize('is_counted', [True, False])
+@for_all('timeout', [0.1, 2.0])
+@for_all('is_counted', [True, False])
 def test_repetition_of_a_command_whose_reply_was_acknowledged(timeout: float,
                                                               is_counted: bool) -> None:
     """AdvancedHMI repeats commands 0.95 to 1.06 s later; other programs always send TNS 0."""

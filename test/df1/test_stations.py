@@ -17,6 +17,7 @@
 from abdf1_ros.df1.packet import Packet
 from abdf1_ros.df1.stations import ActiveStationList, Station
 import pytest
+from support.cases import for_all
 
 REPLY = Packet(dst=5, src=7, cmd=0x4F, sts=0, tns=0x0102)
 
@@ -77,7 +78,7 @@ def test_silence_counts_from_the_loss_until_the_next_answer() -> None:
     assert (stations[7].last_heard, stations[7].silent_since) == (4.0, None)
 
 
-@pytest.mark.parametrize(('number', 'word', 'bit'), [
+@for_all(('number', 'word', 'bit'), [
     (0, 0, 0), (15, 0, 15), (16, 1, 0), (17, 1, 1), (254, 15, 14)])
 def test_active_node_table_has_a_bit_for_each_station(number: int, word: int, bit: int) -> None:
     stations = ActiveStationList([number])

@@ -18,6 +18,7 @@ from abdf1_ros.driver.writes.ages import Ages, most_ahead, RecentMax, Standstill
 from abdf1_ros.errors import FormatError
 from abdf1_ros.settings.heartbeats import Fallback, While
 import pytest
+from support.cases import for_all
 from support.mappings import make_mapping
 
 NEVER_SET = 1000.0  # how far the clock of the host is ahead of that of the line
@@ -122,7 +123,7 @@ def test_rows_without_a_fallback_take_what_is_not_ahead_by_more_than_write_timeo
         'its time stamp is 2.5 s ahead of the clock here, write_timeout is 2 s'
 
 
-@pytest.mark.parametrize(('topic', 'expected'), [
+@for_all(('topic', 'expected'), [
     ('free', None), ('short', 0.05), ('long', 0.2), ('needed', 0.125)])
 def test_what_is_allowed_is_a_quarter_of_the_time_that_depends_on_it(
         topic: str, expected: float | None) -> None:

@@ -21,6 +21,7 @@ from abdf1_ros.settings.mapping import Mapping
 from abdf1_ros.settings.network import Network
 from abdf1_ros.simulator.simulated_plc import SimulatedPlc
 import pytest
+from support.cases import for_all
 from support.devices import Device, DEVICES, link_of, WRONG
 from support.driver_bench import DriverBench, store, stored
 from support.guests import Program, READ_N7
@@ -176,7 +177,7 @@ def test_late_replies_of_a_site_are_no_values_of_another(mode: str) -> None:
     assert len(bench.listener.values(first)) > 50
 
 
-@pytest.mark.parametrize('mode', NETWORKS)
+@for_all('mode', NETWORKS)
 def test_strings_that_no_program_has_written_are_not_values(mode: str) -> None:
     """ST elements with LEN 65535, LEN 100, and LEN 3 before old text."""
     rows = [make_mapping(f'ST9:{number}', plc='SLC', tag=f's{number}') for number in range(3)]

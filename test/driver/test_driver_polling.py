@@ -22,6 +22,7 @@ from abdf1_ros.driver.write import Outcome
 from abdf1_ros.settings.network import Network, POLLING_MODES
 from abdf1_ros.simulator.simulated_plc import InjectedFaults
 import pytest
+from support.cases import for_all
 from support.driver_bench import DriverBench, store, stored
 from support.mappings import load_rows, make_mapping
 
@@ -138,7 +139,7 @@ def test_broadcast_row_is_written_to_every_station(polling: str) -> None:
     assert bench.listener.numbers() == {2523}
 
 
-@pytest.mark.parametrize(('command', 'good'), [
+@for_all(('command', 'good'), [
     ('Write', True), ('Read', False), ('ReadWrite', False), ('Serve', False)])
 def test_only_a_write_row_may_name_station_255(command: str, good: bool) -> None:
     mappings, problems = load_rows(f'a,{command},N7:0,255,SLC,,,,,,,')

@@ -34,6 +34,7 @@ from abdf1_ros.plan.bounds import MODE_PERIOD
 from abdf1_ros.settings.heartbeats import Fallback
 from abdf1_ros.settings.network import Network
 import pytest
+from support.cases import for_all
 from support.clock import StillClock
 from support.driver_bench import DriverBench, store
 from support.interlocks import (
@@ -441,7 +442,7 @@ def test_rule_10_first_try_of_each_row_goes_before_the_second_of_any() -> None:
     assert line.asked[7][0] - begun < 1.0 + 8 * (0.5 + 0.1)
 
 
-@pytest.mark.parametrize(('outcome', 'done', 'again'), [
+@for_all(('outcome', 'done', 'again'), [
     (Outcome.PARTLY, 1.9, True), (Outcome.UNKNOWN, 1.9, True), (Outcome.FAILED, 1.9, False),
     (Outcome.UNKNOWN, 1.0, False)])  # nothing can land any more
 def test_rule_10_once_more_after_a_message_that_may_have_been_written(

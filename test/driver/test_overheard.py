@@ -26,6 +26,7 @@ from abdf1_ros.settings.heartbeats import While
 from abdf1_ros.settings.mapping import Mapping
 import pytest
 from support.captures import Capture, CAPTURES
+from support.cases import for_all
 from support.listening import ListeningBench
 from support.mappings import make_mapping
 from support.odd_device import frame
@@ -87,7 +88,7 @@ def test_row_is_filled_from_a_reply_that_has_more_words() -> None:
     assert point_of(bench, whole) is Freshness.FRESH
 
 
-@pytest.mark.parametrize(('plc', 'text', 'cmd', 'asked', 'answered', 'values'), [
+@for_all(('plc', 'text', 'cmd', 'asked', 'answered', 'values'), [
     ('SLC', 'N7:1', 0x0F, 'A1 04 07 89 01', '05 00 06 00', [5, 6]),
     ('SLC', 'F8:0', 0x0F, 'A2 08 08 8A 00 00', '00 00 80 3F 00 00 00 C0', [1.0, -2.0]),
     ('PLC5', 'N7:0', 0x0F, '68 00 00 02 00 06 07 00 02 00', '99 09 05 42 05 00 06 00', [5, 6]),
@@ -159,7 +160,7 @@ def test_reply_counts_only_with_its_command() -> None:
     assert bench.values(mapping) == [[1, 2, 3, 4]]
 
 
-@pytest.mark.parametrize('between', [
+@for_all('between', [
     b'\x10\x02\x01\x00\x0F\x00\x07\x00\xA2\x10\x03\x00\x00',  # a frame with a wrong check
     b'\xAA\x55\xAA\x55', Damaged(b'A'), b'\x10\x02\x01\x05'])
 def test_damage_between_command_and_reply_makes_it_unsure(between: bytes) -> None:
@@ -227,7 +228,7 @@ def test_overheard_write_makes_a_value_unknown_until_the_next_read() -> None:
     assert point_of(bench, mapping) is Freshness.FAILED
 
 
-@pytest.mark.parametrize(('station', 'asked', 'cmd'), [
+@for_all(('station', 'asked', 'cmd'), [
     (255, WRITE_N7_1, 0x0F), (1, 'AA 02 07 85 01 00', 0x0F), (1, '80 07', 0x0F),
     (1, '02 00 2A 00', 0x08)])
 def test_commands_that_may_have_changed_a_value(station: int, asked: str, cmd: int) -> None:

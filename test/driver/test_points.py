@@ -28,6 +28,7 @@ from abdf1_ros.settings.scaling import Scaling
 from hypothesis import given
 from hypothesis import strategies as st
 import pytest
+from support.cases import for_all
 from support.driver_bench import simulated_plc
 from support.mappings import fault, make_mapping, one
 
@@ -42,7 +43,7 @@ def test_value_is_waited_for_at_first() -> None:
     assert new.age(5.0) is None
 
 
-@pytest.mark.parametrize('age, freshness', [
+@for_all(('age', 'freshness'), [
     (0.0, Freshness.FRESH), (0.29, Freshness.FRESH), (0.31, Freshness.LATE),
     (0.6, Freshness.LATE), (0.61, Freshness.STALE), (1e6, Freshness.STALE)])
 def test_value_becomes_late_and_then_stale(age: float, freshness: Freshness) -> None:
@@ -167,7 +168,7 @@ def test_value_that_does_not_change_is_published_again_after_the_longest_silence
     assert level.update(b'\3\0', 2.9) is None
 
 
-@pytest.mark.parametrize(('cells', 'text'), [
+@for_all(('cells', 'text'), [
     ({'Deadband': '3'}, 'Deadband is for rows with Publish Change'),
     ({'Max_Silence': '500'}, 'Max_Silence is for rows with Publish Change'),
     ({'Publish': 'Change', 'Max_Silence': '50'}, 'should be ms from 100 to 3600000'),
@@ -192,7 +193,7 @@ def commands(text: str, values: list[float] | str, plc: str = 'PLC5', length: in
     return [data.hex(' ') for _, data in Write(mapping, values, 0.0).commands]
 
 
-@pytest.mark.parametrize('plc, text, length, values, expected', [
+@for_all(('plc', 'text', 'length', 'values', 'expected'), [
     # Typed write: FNC 67, offset, total, address 07 area file element, descriptor, data.
     ('PLC5', 'N7:3', 1, [0x1234], ['67 00 00 01 00 06 07 03 93 09 42 34 12']),
     ('PLC5', 'N7:300', 2, [1, -1],
@@ -218,7 +219,7 @@ def test_bytes_of_a_write_of_words(
     assert commands(text, values, plc, length) == expected
 
 
-@pytest.mark.parametrize('text, length, values, expected', [
+@for_all(('text', 'length', 'values', 'expected'), [
     # FNC 26, address, AND mask, OR mask.
     ('B3:1/5', 1, [1], ['26 06 03 01 df ff 20 00']),
     ('B3:1/5', 1, [0], ['26 06 03 01 df ff 00 00']),
@@ -248,8 +249,8 @@ def test_long_write_is_divided_at_the_limit_of_a_packet(plc: str, limit: int) ->
     assert len(commands('N7:0', [0] * (limit + 1), plc, limit + 1)) == 2
 
 
-@pytest.mark.parametrize('plc', ['PLC5', 'SLC'])
-@pytest.mark.parametrize('text, length, kind, natural', [
+@for_all('plc', ['PLC5', 'SLC'])
+@for_all(('text', 'length', 'kind', 'natural'), [
     ('N7:0', 250, None, -5), ('F8:0', 120, None, 0.5), ('N7:1', 60, 'int32', 70000),
     ('D9:3', 10, 'bcd16', 1234), ('N7:7', 3, 'uint16', 40000), ('T4:1.PRE', 2, None, 9),
     ('B3:0/3', 40, None, 1)])
@@ -297,7 +298,7 @@ def test_bit_writes_touch_only_their_bits(
     assert [after >> 16 + bit + n & 1 for n in range(length)] == values
 
 
-@pytest.mark.parametrize('values, error', [
+@for_all(('values', 'error'), [
     ([11, 20], None), ([10, 20], None), ([10, 21], 'value 21 at index 1 is outside Min 10, '
                                                    'Max 20'),
     ([9, 20], 'value 9 at index 0 is outside Min 10, Max 20'),
@@ -313,7 +314,7 @@ def test_limits_hold_for_every_element(values: list[float], error: str | None) -
     assert str(caught.value) == error
 
 
-@pytest.mark.parametrize(('text', 'values', 'reason'), [
+@for_all(('text', 'values', 'reason'), [
     ('N7:0', [1, 2], 'the mapping has 1'), ('N7:0', [], 'the mapping has 1'),
     ('N7:0', [32768], '32768'), ('N7:0', [11], 'Max 10'), ('N7:0', [-11], 'Min -10'),
     ('F8:0', [math.nan], 'nan'), ('F8:0', [math.inf], 'inf'), ('F8:0', [1e39], '1e+39'),
@@ -344,7 +345,7 @@ def test_word_comes_back_from_the_value_that_was_published(
     assert command[-2:] == words
 
 
-@pytest.mark.parametrize('values, error', [
+@for_all(('values', 'error'), [
     ([0.3, 10.0], None), ([0.2, 0.3], 'value 0.2 at index 0 is outside Min 0.3, Max 10.1'),
     ([1, 10.2], 'value 10.2 at index 1 is outside Min 0.3, Max 10.1'),
     ([1, 10.1], 'value 10.2 at index 1, the nearest that can be written, is outside Min 0.3, '
@@ -365,7 +366,7 @@ def test_limits_of_engineering_values(values: list[float] | str, error: str | No
     assert str(caught.value) == error
 
 
-@pytest.mark.parametrize('text, pulse', [
+@for_all(('text', 'pulse'), [
     ('B3:0/1', True), ('T4:0/DN', True), ('N7:0', False), ('B3:0', False), ('F8:0', False)])
 def test_writes_of_bits_are_pulses(text: str, pulse: bool) -> None:
     assert Write(make_mapping(text, 'Write'), [1], 0.0).is_pulse is pulse
@@ -380,7 +381,7 @@ def test_result_tells_value_latency_and_request() -> None:
     assert str(write.result(Outcome.WRITTEN, '', 10.5)) == 'written'
 
 
-@pytest.mark.parametrize('values, text', [
+@for_all(('values', 'text'), [
     ([1, 0, 1], '[1, 0, 1]'), ([], '[]'), ("it's", '"it\'s"'),
     ('\x1b[2J\r\n\0\x9bä', r"'\x1b[2J\r\n\x00\x9bä'"), ([0.1, -2.5], '[0.1, -2.5]'),
     (array('f', [0.1]), '[0.1]'), ([1234567, -2147483648], '[1234567, -2147483648]'),

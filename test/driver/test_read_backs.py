@@ -28,6 +28,7 @@ from abdf1_ros.plan.planner import Block, Planner
 from abdf1_ros.settings.mapping import Mapping
 from abdf1_ros.settings.network import Network
 import pytest
+from support.cases import for_all
 from support.clock import StillClock
 from support.driver_bench import DriverBench
 from support.mappings import make_mapping
@@ -70,7 +71,7 @@ OVERTAKEN = 'lost; not read back: a newer write of these words has gone out'
 OTHER = 'lost; read back: the PLC holds another value'
 
 
-@pytest.mark.parametrize(('cells', 'values', 'data', 'detail'), [
+@for_all(('cells', 'values', 'data', 'detail'), [
     ({}, [-2], b'\xfe\xff', HELD), ({}, [-2], b'\xff\xff', OTHER),
     ({'kind': 'bcd16'}, [1234], b'\x34\x12', HELD),
     ({'kind': 'bcd16'}, [1234], b'\x3a\x12', OTHER),
@@ -98,7 +99,7 @@ def test_words_are_found_within_a_larger_block() -> None:
     assert unconfirmed.details == [HELD]
 
 
-@pytest.mark.parametrize(('text', 'length', 'station'), [
+@for_all(('text', 'length', 'station'), [
     ('N7:1', 2, 1), ('N7:0', 1, 2), ('N8:0', 1, 1), ('N7:2', 1, 1)])
 def test_nothing_reads_all_of_the_words(text: str, length: int, station: int) -> None:
     mapping = make_mapping(text, 'Write', length=length, station=station)

@@ -24,6 +24,7 @@ from abdf1_ros.driver.write import Outcome
 from abdf1_ros.settings.mapping import Mapping
 from abdf1_ros.settings.network import Network
 import pytest
+from support.cases import for_all
 from support.driver_bench import DriverBench, store
 from support.mappings import make_mapping
 from support.odd_device import Answer, OddDevice, Wiring
@@ -253,7 +254,7 @@ def test_whole_file_of_256_words_is_one_row(mode: str) -> None:
     assert bench.listener.values(words)[-1] == list(range(256))
 
 
-@pytest.mark.parametrize(('address', 'length'), [
+@for_all(('address', 'length'), [
     ('N7:0/0', 8), ('N7:0/0', 16), ('N7:0/8', 8), ('N7:0/4', 20)])
 def test_bits_of_integers_in_any_number(address: str, length: int) -> None:
     device = device_of('Peer')

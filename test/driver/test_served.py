@@ -120,8 +120,8 @@ def test_part_of_a_mapping_publishes_all_of_it(plc: str) -> None:
     assert bench.read('N7:52') == b'\x02\0'
 
 
-@pytest.mark.parametrize('plc', FAMILIES)
-@pytest.mark.parametrize(('start', 'words', 'names'), [
+@for_all('plc', FAMILIES)
+@for_all(('start', 'words', 'names'), [
     (10, 1, ['a']), (10, 4, ['a', 'b']), (12, 2, ['b']), (13, 3, ['b', 'c']), (14, 2, ['c']),
     (14, 1, []), (10, 6, ['a', 'b', 'c']), (16, 1, [])])
 def test_exactly_the_mappings_that_overlap_are_published(plc: str, start: int, words: int,
@@ -151,8 +151,8 @@ def test_words_between_and_beside_the_mappings_are_not_there(plc: str) -> None:
     assert bench.read('N7:2', 2) + bench.read('N7:6', 2) == bytes(8)
 
 
-@pytest.mark.parametrize('plc', FAMILIES)
-@pytest.mark.parametrize('text', ['N9:0', 'B3:0', 'T4:0', 'F8:0', 'S:0'])
+@for_all('plc', FAMILIES)
+@for_all('text', ['N9:0', 'B3:0', 'T4:0', 'F8:0', 'S:0'])
 def test_files_without_a_mapping_are_not_there(plc: str, text: str) -> None:
     bench = Bench(plc, row('N7:0', plc, 2))
     words = 2 if text == 'F8:0' else 3 if text == 'T4:0' else 1
@@ -349,7 +349,7 @@ PROTECTED = {'PLC5': (0xF0, b'\x0B'), 'SLC': (0x50, b''), 'PLC3': (0xF0, b'\x1E'
              'PLC2': (0x50, b'')}
 
 
-@pytest.mark.parametrize('plc', PROTECTED)
+@for_all('plc', PROTECTED)
 def test_row_that_the_other_end_may_only_read(plc: str) -> None:
     first, second = ('020', '021') if plc == 'PLC2' else ('N7:0', 'N7:1')
     mine = replace(row(first, plc), is_read_only=True)

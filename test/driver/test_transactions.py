@@ -27,6 +27,7 @@ from abdf1_ros.pccc.identity import Identity
 from abdf1_ros.pccc.slc.dialect import SlcDialect
 from abdf1_ros.pccc.steps import identify, words_in
 import pytest
+from support.cases import for_all
 from support.mappings import make_mapping
 
 LATER = 2.5
@@ -62,7 +63,7 @@ def unsent() -> LinkError:
     return error
 
 
-@pytest.mark.parametrize('answers, outcome', [
+@for_all(('answers', 'outcome'), [
     ([reply(), reply()], Outcome.WRITTEN),
     ([reply(sts=0x10)], Outcome.FAILED),
     ([reply(sts=0x02)], Outcome.UNKNOWN),  # a node on the way has lost it, or its reply
@@ -95,7 +96,7 @@ def test_own_write_sends_each_packet(
     assert result.outcome is outcome
 
 
-@pytest.mark.parametrize('answers, is_unconfirmed', [
+@for_all(('answers', 'is_unconfirmed'), [
     ([reply(), reply()], False), ([reply(sts=0x10)], False), ([unsent()], False),
     ([reply(), reply(sts=0x10)], False), ([reply(), unsent()], False),
     ([reply(sts=0x02)], True), ([CommandTimeout()], True), ([reply(), CommandTimeout()], True)])
@@ -136,7 +137,7 @@ def test_other_refusals_of_bits_stay_failures(processor: str | None, sts: int) -
     assert (len(requests), result.outcome) == (1, Outcome.FAILED)
 
 
-@pytest.mark.parametrize('answers, outcome', [
+@for_all(('answers', 'outcome'), [
     ([reply(sts=0x50)], Outcome.FAILED), ([reply(sts=0x02)], Outcome.FAILED),
     ([reply(b'\1')], Outcome.FAILED), ([CommandTimeout()], Outcome.NOT_SENT),
     ([reply(b'\1\2'), reply(sts=0x10)], Outcome.FAILED),

@@ -24,6 +24,7 @@ from abdf1_ros.ros.observer import graph_hint
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 import pytest
 from std_msgs.msg import Int16MultiArray
+from support.cases import for_all
 from support.commands import call, Output
 from support.ptys import wait_until
 from support.ros import Observer, Process
@@ -170,7 +171,7 @@ def test_every_mapping_of_the_topic_has_to_be_written(answered: Answered) -> Non
         3, ['north: written (1.0 ms)', 'unknown whether written: no result within 1.5 s'])
 
 
-@pytest.mark.parametrize(('message', 'status'), [
+@for_all(('message', 'status'), [
     ('written', 0),
     (f'written: {REWRITTEN}', 0),
     ('not written: superseded by a newer value', 1),

@@ -19,9 +19,9 @@ from pathlib import Path
 import runpy
 
 from diagnostic_msgs.msg import DiagnosticStatus, KeyValue
-import pytest
 from rclpy.qos import DurabilityPolicy, QoSProfile
 from std_msgs.msg import Int16MultiArray, UInt8MultiArray
+from support.cases import for_all
 from support.ros import Observer, Process
 
 EXAMPLE = Path(__file__).resolve().parents[2] / 'examples' / 'handshake.py'
@@ -130,7 +130,7 @@ def test_job_that_is_not_done_in_time_is_unknown() -> None:
     assert (status, lines[-1]) == (3, 'job 1: the PLC is busy with it')
 
 
-@pytest.mark.parametrize(('busy', 'done', 'number'), [
+@for_all(('busy', 'done', 'number'), [
     (0, 0, 1), (4, 4, 5), (5, 4, 6), (32767, 32767, 1), (32767, 1, 2), (-5, -5, 1)])
 def test_number_is_one_that_was_not_used_last(busy: int, done: int, number: int) -> None:
     assert HANDSHAKE['next_number'](busy, done) == number

@@ -53,7 +53,7 @@ def test_address_has_the_parts_that_its_text_names(
         FAMILIES[family].addressing, FileType(kind), file, element, word, bit)
 
 
-@pytest.mark.parametrize(('text', 'file', 'element', 'bit'), [
+@for_all(('text', 'file', 'element', 'bit'), [
     ('I:017/12', 1, 0o17, 0o12), ('O:0', 0, 0, None), ('I:277/17', 1, 0o277, 15),
     ('O0:012', 0, 0o12, None), ('I1:007/07', 1, 7, 7)])
 def test_plc5_io_is_octal(text: str, file: int, element: int, bit: int | None) -> None:
@@ -61,7 +61,7 @@ def test_plc5_io_is_octal(text: str, file: int, element: int, bit: int | None) -
     assert (address.file, address.element, address.word, address.bit) == (file, element, 0, bit)
 
 
-@pytest.mark.parametrize(('text', 'file', 'slot', 'word', 'bit'), [
+@for_all(('text', 'file', 'slot', 'word', 'bit'), [
     ('I:1.0/3', 1, 1, 0, 3), ('I:1/3', 1, 1, 0, 3), ('O:30.255/15', 0, 30, 255, 15),
     ('I1:8.2', 1, 8, 2, None), ('O:2', 0, 2, 0, None)])
 def test_slc_io_is_slot_word_bit(text: str, file: int, slot: int, word: int,
@@ -124,7 +124,7 @@ def test_bits_counted_through_a_file_have_limits_of_their_own(
         parse_address(text, family)
 
 
-@pytest.mark.parametrize(('text', 'family', 'shown'), [
+@for_all(('text', 'family', 'shown'), [
     ('b/17', SLC, 'B3:1/1'), ('i:17/2', PLC5, 'I:017/02'), ('o:3', SLC, 'O:3.0'),
     ('I:3/3', SLC, 'I:3.0/3'), ('T4:1.2', SLC, 'T4:1.ACC'), ('T4:1/13', SLC, 'T4:1/DN'),
     ('T4:1.0/2', SLC, 'T4:1.0/2'), ('T4:1/13', PLC5, 'T4:1/DN'), ('N7/20', SLC, 'N7:1/4'),
@@ -135,7 +135,7 @@ def test_str_is_the_plain_form(text: str, family: PlcType, shown: str) -> None:
     assert str(parse_address(text, family)) == shown
 
 
-@pytest.mark.parametrize(('text', 'family', 'advice'), [
+@for_all(('text', 'family', 'advice'), [
     ('S/26', SLC, 'the word of the status file comes first; write S:1/10'),
     ('s2/15', PLC5, 'the word of the status file comes first; write S:0/15'),
     ('N11[1]', SLC, 'an element stands after ":"; write N11:1'),
@@ -214,7 +214,7 @@ def test_members_of_large_structures(family: PlcType, text: str, word: int, bit:
     assert (address.word, address.bit, str(address)) == (word, bit, shown)
 
 
-@pytest.mark.parametrize(('text', 'reason'), [
+@for_all(('text', 'reason'), [
     ('PD10:0.3', 'word 3 is the second half of a float32; write the first, 2'),
     ('PD10:0.SP/3', 'PD10:0.SP is a float32, which has no bits to address'),
     ('PD10:0.2/3', 'PD10:0.SP is a float32, which has no bits to address'),
@@ -227,7 +227,7 @@ def test_what_is_no_part_of_a_structure(text: str, reason: str) -> None:
         parse_address(text, PLC5)
 
 
-@pytest.mark.parametrize(('letters', 'family'), [
+@for_all(('letters', 'family'), [
     ('L', PLC5), ('BT', SLC), ('SC', SLC), ('X', PLC5), ('X', SLC)])
 def test_letters_of_no_file_of_the_family(letters: str, family: PlcType) -> None:
     known = ', '.join(kind.value for kind in FAMILIES[family].file_types)
@@ -237,7 +237,7 @@ def test_letters_of_no_file_of_the_family(letters: str, family: PlcType) -> None
         parse_address(f'{letters}9:0', family)
 
 
-@pytest.mark.parametrize(('text', 'element', 'bit', 'shown'), [
+@for_all(('text', 'element', 'bit', 'shown'), [
     ('I:5', 5, None, 'I:5'), ('o:0/3', 0, 3, 'O:0/3'), ('I1:300/15', 300, 15, 'I:300/15'),
     ('I:7935', 7935, None, 'I:7935')])
 def test_flat_io_counts_the_words_of_the_image(text: str, element: int, bit: int | None,
@@ -270,7 +270,7 @@ def test_any_text_is_an_address_or_a_format_error(text: str, family: PlcType) ->
         assert address.offset < address.area_size
 
 
-@pytest.mark.parametrize(('text', 'family', 'offset', 'size'), [
+@for_all(('text', 'family', 'offset', 'size'), [
     ('N7:5', SLC, 5, 256), ('N7:5', PLC5, 5, 2000), ('T4:2.ACC', SLC, 8, 768),
     ('F8:3', PLC5, 6, 4000), ('ST9:1', SLC, 42, 256 * 42), ('I:3.2', SLC, 2, 256),
     ('I:012', PLC5, 10, 192), ('S:1', PLC5, 1, 128), ('L9:2', SLC, 4, 512),
@@ -294,8 +294,8 @@ def test_area_is_a_file_or_a_slot() -> None:
     assert parse_address('N7:0', SLC).area != parse_address('N7:0', PLC5).area
 
 
-@pytest.mark.parametrize('family', BOTH)
-@pytest.mark.parametrize(('text', 'right'), [
+@for_all('family', BOTH)
+@for_all(('text', 'right'), [
     ('T4;0/2', 'bit 2 of a T element has no name; word 2 is T4:0.ACC; bits: EN, TT, DN'),
     ('C5:3/1', 'bit 1 of a C element has no name; word 1 is C5:3.PRE; '
                'bits: CU, CD, DN, OV, UN, UA'),
@@ -344,7 +344,7 @@ def test_what_nothing_supports_and_other_forms_are_told_what_to_write(
     assert str(fault.value) == expected
 
 
-@pytest.mark.parametrize('text', ['T4:0.FOO', 'B3:0.16', 'XYZ:0', 'N7:0 10', 'N7:O.O'])
+@for_all('text', ['T4:0.FOO', 'B3:0.16', 'XYZ:0', 'N7:0 10', 'N7:O.O'])
 def test_what_nobody_can_mean_is_left_to_the_grammar(text: str) -> None:
     with pytest.raises(AddressSyntaxError, match='^(?!.*; write)'):
         parse_address(text, SLC)

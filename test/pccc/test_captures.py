@@ -78,7 +78,7 @@ def test_kinds_of_files_that_were_read() -> None:
         'O', 'I', 'S', 'B', 'T', 'C', 'R', 'N', 'F', 'HSC', 'PTO', 'PWM', 'STI', 'EII'}
 
 
-@pytest.mark.parametrize(('place', 'words', 'exchange'), KNOWN, ids=lambda part: str(part)[:20])
+@for_all(('place', 'words', 'exchange'), KNOWN)
 def test_our_read_is_the_command_that_was_accepted(place: Address, words: int,
                                                    exchange: Exchange) -> None:
     dialect = dialect_of(PlcType.SLC, None, Processor.ML1400)
@@ -220,7 +220,7 @@ def test_our_server_answers_as_it_was_answered(capture: Capture) -> None:
     assert compared
 
 
-@pytest.mark.parametrize('capture', OURS, ids=lambda capture: capture.name)
+@for_all('capture', OURS)
 def test_what_they_have_accepted_of_ours_is_what_we_would_send(capture: Capture) -> None:
     compared = 0
     for exchange in capture.exchanges():

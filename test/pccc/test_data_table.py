@@ -23,6 +23,7 @@ from abdf1_ros.pccc.families import parse_address
 from abdf1_ros.pccc.file_types import FileType, PlcType
 from abdf1_ros.settings.mapping import Mapping
 import pytest
+from support.cases import for_all
 from support.mappings import make_mapping
 
 SLC, PLC5 = PlcType.SLC, PlcType.PLC5
@@ -57,7 +58,7 @@ def test_create_makes_a_file_longer_and_keeps_its_words() -> None:
         words.read(at('N7:6'), 1)
 
 
-@pytest.mark.parametrize(('text', 'words', 'length'), [
+@for_all(('text', 'words', 'length'), [
     ('T4:0.ACC', 1, 3), ('T4:1.PRE', 1, 6), ('F8:0', 1, 2), ('ST9:0', 1, 42), ('N7:0', 1, 1)])
 def test_file_has_whole_elements(text: str, words: int, length: int) -> None:
     created = table((text, words))
@@ -78,11 +79,11 @@ def test_slots_are_files_of_their_own() -> None:
     assert [(area.file, area.slot) for area in words] == [(1, 1), (1, 2)]
 
 
-@pytest.mark.parametrize('act', [
+@for_all('act', [
     lambda words, place: words.read(place, 1),
     lambda words, place: words.write(place, b'\x01\x00'),
     lambda words, place: words.write_bits(place, 1, 1)])
-@pytest.mark.parametrize(('text', 'error'), [
+@for_all(('text', 'error'), [
     ('N7:3', OutOfRange), ('N9:0', NoSuchFile), ('B7:0', NoSuchFile)])
 def test_bad_place_changes_nothing(act: Callable[[DataTable, Address], object], text: str,
                                    error: type[Exception]) -> None:
@@ -100,7 +101,7 @@ def test_write_across_the_end_changes_nothing() -> None:
     assert words.read(at('N7:0'), 3) == bytes(6)
 
 
-@pytest.mark.parametrize(('old', 'mask', 'bits', 'new'), [
+@for_all(('old', 'mask', 'bits', 'new'), [
     (0x0008, 0x0108, 0x0100, 0x0100), (0xFFFF, 0x0001, 0x0000, 0xFFFE),
     (0x0000, 0x0001, 0xFFFF, 0x0001), (0x1234, 0xFFFF, 0x4321, 0x4321),
     (0x1234, 0x0000, 0xFFFF, 0x1234), (0x8000, 0x7FFF, 0x0000, 0x8000)])
@@ -127,7 +128,7 @@ def extent(text: str, length: int = 1, station: int = 1) -> Extent:
     return row.extent
 
 
-@pytest.mark.parametrize(('text', 'length', 'meets', 'holds'), [
+@for_all(('text', 'length', 'meets', 'holds'), [
     ('N7:5', 2, True, True), ('N7:4', 1, False, False), ('N7:7', 1, False, False),
     ('N7:4', 2, True, False), ('N7:6', 2, True, False), ('N7:4', 9, True, False),
     ('N7:6', 1, True, True), ('N7:5/3', 1, True, True), ('N7:4/15', 2, True, False),

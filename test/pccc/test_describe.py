@@ -17,7 +17,6 @@
 from abdf1_ros.df1.packet import Packet
 from abdf1_ros.pccc.describe import command_codes, command_name, describe, Effect, effect_of
 from hypothesis import given, strategies
-import pytest
 from support.cases import for_all
 
 
@@ -80,7 +79,7 @@ def test_data_table_commands(data: str, text: str) -> None:
     assert describe(command(data, 0x2F)) == text  # with high priority
 
 
-@pytest.mark.parametrize(('cmd', 'data', 'text'), [
+@for_all(('cmd', 'data', 'text'), [
     (0x01, '20 00 02', 'unprotected read 020 (ADDR 32), 2 bytes'),
     (0x08, '12 00 FF FF', 'unprotected write 011 (ADDR 18) = FFFF'),
     (0x00, '12 00 01 02 03', 'protected write 011 (ADDR 18) = 01 02 03'),
@@ -127,7 +126,7 @@ def test_codes_of_commands_are_those_of_the_manual() -> None:
                 *' '.join(expected.split()).split(', ')}
 
 
-@pytest.mark.parametrize(('cmd', 'effect', 'functions'), [
+@for_all(('cmd', 'effect', 'functions'), [
     (0x06, Effect.READS, '00 01 03'), (0x06, Effect.WRITES, ''),
     (0x07, Effect.READS, ''), (0x07, Effect.WRITES, ''),
     (0x0F, Effect.READS, '01 04 29 68 94 A1 A2 A3'),
@@ -144,7 +143,7 @@ def test_areas_of_a_plc5_beside_the_data_table_are_whole() -> None:
         'typed read, memory area 3 is not the data table: 68 00 00 01 00 0F 03 03 0A 00 01 00')
 
 
-@pytest.mark.parametrize('data', [
+@for_all('data', [
     'A2', 'A2 08 07', 'A2 08 07 89 1E 00 01', 'AA 04 07 89 00 00 01', '68 00 00 01 00 10',
     '67 00 00 01 00 07 00 07 00 42 01', '26', 'A9 02 07 89 1E 05 00 01'])
 def test_malformed_commands_are_given_as_bytes(data: str) -> None:
@@ -153,7 +152,7 @@ def test_malformed_commands_are_given_as_bytes(data: str) -> None:
     assert text.endswith(f'): {data}')
 
 
-@pytest.mark.parametrize(('asked', 'data', 'text'), [
+@for_all(('asked', 'data', 'text'), [
     ('A2 04 07 89 00 00', '34 12 FE FF', '4660 -2'),
     ('A2 04 03 85 00 00', '34 12 FE FF', '1234 FFFE'),
     ('A2 04 08 8A 00 00', '00 00 AC 41', '21.5'),
@@ -171,7 +170,7 @@ def test_reply_is_described_by_what_was_asked(asked: str, data: str, text: str) 
     assert describe(request.reply(bytes.fromhex(data)), request) == text
 
 
-@pytest.mark.parametrize(('data', 'text'), [
+@for_all(('data', 'text'), [
     ('00 EE 34 49 22 35 2F 30 33 20 20 20 20 20 20 20 00 00 06 00 00 00 10 00',
      'SLC 5/03 series B revision 3, REM RUN'),
     ('40 EE 34 95 22 35 2F 30 39 20 20 20 20 20 20 20 16 01 01 20 00 00 10 00',

@@ -42,7 +42,7 @@ from support.cases import for_all
 from support.vectors import pair
 
 
-@pytest.mark.parametrize('data', [b'', b'\0', b'\0\0', b'\0\0\x1A\x01'])
+@for_all('data', [b'', b'\0', b'\0\0', b'\0\0\x1A\x01'])
 def test_read_counters_of_another_length_is_refused(data: bytes) -> None:
     with pytest.raises(FormatError):
         ReadCounters.read(Reader(data))
@@ -72,7 +72,7 @@ def counters() -> Counters:
     return Counters(messages_sent=300, messages_received=2, polls_received=70_000)
 
 
-@pytest.mark.parametrize('plc_type', FAMILIES)
+@for_all('plc_type', FAMILIES)
 def test_echo_up_to_the_limit_of_the_family(plc_type: PlcType) -> None:
     limit = FAMILIES[plc_type].max_echo
     for data in (b'', b'\0', b'\x10\x10\x02\x03', bytes(limit)):
@@ -80,7 +80,7 @@ def test_echo_up_to_the_limit_of_the_family(plc_type: PlcType) -> None:
     assert answer(plc_type, bytes(limit + 2)) == reply(sts=REFUSED)
 
 
-@pytest.mark.parametrize('plc_type', FAMILIES)
+@for_all('plc_type', FAMILIES)
 def test_status_is_that_of_the_processor_at_the_moment(plc_type: PlcType) -> None:
     processor = EmulatedProcessor()
     server = Server(DataTable(plc_type), processor)
@@ -169,7 +169,7 @@ def test_older_families_tell_of_themselves_in_their_own_layout(
     assert (len(data), data[:2]) == (size, first)
 
 
-@pytest.mark.parametrize(('plc_type', 'texts'), [
+@for_all(('plc_type', 'texts'), [
     (PlcType.SLC, ('RUN', 'REM PROG', 'REM RUN', 'REM TEST')),
     (PlcType.PLC5, ('RUN', 'REM PROG', 'REM RUN', 'REM TEST')),
     (PlcType.PLC3, ('RUN', 'PROG', 'RUN', 'TEST')),
@@ -183,7 +183,7 @@ def test_every_setting_is_read_back(plc_type: PlcType, texts: tuple[str, ...]) -
     assert not any(identity.faults for identity in identities)
 
 
-@pytest.mark.parametrize(('plc_type', 'fault'), [
+@for_all(('plc_type', 'fault'), [
     (PlcType.SLC, 'major error 0x0020 (minor error at the end of a scan), processor halted'),
     (PlcType.PLC5, 'major processor fault (word S:11 says which)'),
     (PlcType.PLC3, 'major processor fault'),
@@ -246,7 +246,7 @@ def test_any_bytes_are_counters_or_a_format_error(data: bytes,
     assert all(name and value for name, value in counters.items())
 
 
-@pytest.mark.parametrize(('layout', 'expected'), [
+@for_all(('layout', 'expected'), [
     (COUNTERS, {'ENQ sent, or messages sent again': '11', 'NAK received': '16',
                 'ENQ received': '14', 'NAK sent': '12'}),
     (FULL_DUPLEX_COUNTERS, {'ENQ sent': '5', 'NAK received': '16', 'ENQ received': '14',
@@ -278,7 +278,7 @@ def test_own_counters_begin_again_behind_16_bits() -> None:
     assert decode_counters(served.encode(), COUNTERS)['messages sent'] == '1'
 
 
-@pytest.mark.parametrize(('plc_type', 'mode', 'size', 'expected'), [
+@for_all(('plc_type', 'mode', 'size', 'expected'), [
     (PlcType.PLC5, 'Master', 26, 3), (PlcType.SLC, 'Peer', 26, 1), (PlcType.SLC, 'Slave', 26, 2),
     (PlcType.SLC, 'Master', 28, 2), (PlcType.SLC, 'Radio', 20, 0)])
 def test_block_by_family_and_mode(plc_type: PlcType, mode: str, size: int, expected: int) -> None:

@@ -55,12 +55,12 @@ def bench(family: PlcType, access: Access, text: str,
     return address, dialect_of(family, access), table
 
 
-@pytest.mark.parametrize('family', FAMILIES)
+@for_all('family', FAMILIES)
 def test_every_family_has_a_dialect_for_every_access_it_serves(family: PlcType) -> None:
     assert dialect_of(family) is dialect_of(family, FAMILIES[family].accesses[0])
 
 
-@pytest.mark.parametrize(('family', 'access', 'right'), [
+@for_all(('family', 'access', 'right'), [
     (PlcType.PLC5, Access.SLOT, 'PLC-5 is Typed, WordRange, not Slot'),
     (PlcType.PLC3, Access.TYPED, 'PLC-3 is WordRange, not Typed'),
     (PlcType.PLC2, Access.FLAT, 'PLC-2 is Unprotected, Protected, CIF, not Flat'),
@@ -86,7 +86,7 @@ def test_write_read_and_write_bits_come_back(place: tuple[PlcType, Access, str],
     assert not any(table.read(address.at_offset(address.offset + 1), 4))
 
 
-@pytest.mark.parametrize('place', list(PLACES), ids=str)
+@for_all('place', PLACES)
 def test_bits_outside_of_the_mask_do_not_count(place: tuple[PlcType, Access]) -> None:
     address = parse_address(PLACES[place][0], place[0])
     dialect = dialect_of(*place)
@@ -107,7 +107,7 @@ def test_largest_packets_are_served(place: tuple[PlcType, Access, str]) -> None:
     assert dialect.read_data(address, words, reply) == table.read(address, words)
 
 
-@pytest.mark.parametrize('place', FLOATS, ids=str)
+@for_all('place', FLOATS)
 def test_every_value_of_every_file_type_goes_there_and_back(place: tuple[PlcType, Access]) -> None:
     family, dialect = place[0], dialect_of(*place)
     for kind in FAMILIES[family].file_types:
@@ -132,7 +132,7 @@ def test_every_value_of_every_file_type_goes_there_and_back(place: tuple[PlcType
         assert dialect.read_data(start, layout.words, reply) == stored[:2 * layout.words]
 
 
-@pytest.mark.parametrize('place', FLOATS, ids=str)
+@for_all('place', FLOATS)
 def test_every_named_bit_is_set_alone(place: tuple[PlcType, Access]) -> None:
     family, dialect = place[0], dialect_of(*place)
     for kind in FAMILIES[family].file_types:

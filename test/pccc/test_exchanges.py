@@ -118,9 +118,7 @@ def test_our_end_sends_the_command(entry: Exchange) -> None:
     assert entry.call.request() == (entry.command.cmd, entry.command.data)
 
 
-@pytest.mark.parametrize('entry', [
-    entry for entry in CALLS if entry.call and entry.call.method == 'read'],
-    ids=lambda entry: entry.name)
+@for_all('entry', [entry for entry in CALLS if entry.call and entry.call.method == 'read'])
 def test_our_end_takes_the_words_off_the_reply_and_nothing_else(entry: Exchange) -> None:
     assert entry.call
     dialect, (words,) = dialect_of(entry.call.plc_type, entry.call.access), entry.call.arguments
@@ -146,8 +144,7 @@ def test_the_other_end_executes_the_command_and_replies(entry: Exchange) -> None
         assert words.read(address, len(bytes.fromhex(text)) // 2) == bytes.fromhex(text)
 
 
-@pytest.mark.parametrize('entry', [
-    entry for entry in EXCHANGES if entry.reply.sts], ids=lambda entry: entry.name)
+@for_all('entry', [entry for entry in EXCHANGES if entry.reply.sts])
 def test_our_end_takes_a_refusal_for_one(entry: Exchange) -> None:
     with pytest.raises(RemoteError) as raised:
         check_status(entry.reply)
@@ -155,7 +152,7 @@ def test_our_end_takes_a_refusal_for_one(entry: Exchange) -> None:
     assert raised.value.ext_sts == (entry.reply.data[0] if entry.reply.data else None)
 
 
-@pytest.mark.parametrize('family', FAMILIES)
+@for_all('family', FAMILIES)
 def test_no_command_that_a_family_serves_is_left_out(family: PlcType) -> None:
     _, server = plc(family, {})
     served = {(cmd, None) for cmd in server.family.basic_commands} | set(server.commands)

@@ -25,7 +25,7 @@ import pytest
 from support.cases import for_all
 
 
-@pytest.mark.parametrize(('value', 'encoded'), [
+@for_all(('value', 'encoded'), [
     (0, '00'), (1, '01'), (254, 'FE'), (255, 'FF FF 00'), (256, 'FF 00 01'), (300, 'FF 2C 01'),
     (65535, 'FF FF FF')])
 def test_number_is_short_up_to_254(value: int, encoded: str) -> None:
@@ -43,7 +43,7 @@ def test_reader_takes_fields_in_order() -> None:
     reader.end()
 
 
-@pytest.mark.parametrize(('data', 'take'), [
+@for_all(('data', 'take'), [
     (b'', Reader.byte), (b'\x01', Reader.word), (b'', Reader.number), (b'\xFF', Reader.number),
     (b'\xFF\x01', Reader.number), (b'ab', lambda reader: reader.take(3))])
 def test_missing_bytes_are_a_format_error(data: bytes, take: Callable[[Reader], object]) -> None:
@@ -58,7 +58,7 @@ def test_end_names_what_is_too_much() -> None:
         reader.end()
 
 
-@pytest.mark.parametrize(('type_id', 'size', 'data', 'encoded'), [
+@for_all(('type_id', 'size', 'data', 'encoded'), [
     (4, 2, 'D2 04', '93 09 42 D2 04'),
     (4, 2, '01 00 02 00', '95 09 42 01 00 02 00'),
     (4, 2, '00 00 FE FF FF 00', '97 09 42 00 00 FE FF FF 00'),

@@ -22,12 +22,13 @@ from abdf1_ros.pccc.members import Members
 from abdf1_ros.pccc.processor import Processor, USUAL
 from abdf1_ros.pccc.slc.address import BY_CODE
 import pytest
+from support.cases import for_all
 
 PLC5, SLC = PlcType.PLC5, PlcType.SLC
 FUNCTION = ('HSC', 'PTO', 'PWM', 'STI', 'EII')
 
 
-@pytest.mark.parametrize(('letters', 'file'), [
+@for_all(('letters', 'file'), [
     ('O', 0), ('I', 1), ('S', 2), ('B', 3), ('T', 4), ('C', 5), ('R', 6), ('N', 7), ('F', 8),
     ('ST', None), ('A', None), ('D', None), ('L', None), ('PD', None), ('MG', None),
     ('BT', None), ('SC', None)])
@@ -35,7 +36,7 @@ def test_default_files_are_those_of_the_specification(letters: str, file: int | 
     assert FileType(letters).default_file == file
 
 
-@pytest.mark.parametrize(('letters', 'code', 'words'), [
+@for_all(('letters', 'code', 'words'), [
     ('S', 0x84, 1), ('B', 0x85, 1), ('T', 0x86, 3), ('C', 0x87, 3), ('R', 0x88, 3),
     ('N', 0x89, 1), ('F', 0x8A, 2), ('HSC', 0xE0, 18), ('STI', 0xE2, 4), ('EII', 0xE3, 4),
     ('PTO', 0xED, 15), ('PWM', 0xEE, 10), ('O', 0x8B, 1), ('I', 0x8C, 1), ('ST', 0x8D, 42),
@@ -66,7 +67,7 @@ def test_kinds_of_files() -> None:
     assert {kind.value for kind in FileType if not kind.has_bits} == {'F', 'ST', 'L'}
 
 
-@pytest.mark.parametrize('family', FAMILIES)
+@for_all('family', FAMILIES)
 def test_members_lie_inside_of_structures_apart_from_each_other(family: PlcType) -> None:
     for kind in FAMILIES[family].file_types:
         layout = FAMILIES[family].layout(kind)
@@ -91,7 +92,7 @@ def writable(letters: str, family: PlcType) -> str:
                     if layout.may_write(member.word, member.bit))
 
 
-@pytest.mark.parametrize(('letters', 'family', 'names'), [
+@for_all(('letters', 'family', 'names'), [
     ('T', PLC5, 'PRE ACC EN TT DN'), ('T', SLC, 'PRE ACC EN TT DN'),
     ('C', SLC, 'PRE ACC CU CD DN OV UN UA'), ('R', PLC5, 'LEN POS EN EU DN EM ER UL IN FD'),
     ('BT', PLC5, 'CO TO'), ('MG', PLC5, 'TO CO'), ('MG', SLC, ''), ('SC', PLC5, 'PRE'),
@@ -102,7 +103,7 @@ def test_what_may_be_written(letters: str, family: PlcType, names: str) -> None:
     assert writable(letters, family) == names
 
 
-@pytest.mark.parametrize(('letters', 'family', 'word', 'bit'), [
+@for_all(('letters', 'family', 'word', 'bit'), [
     ('T', PLC5, 0, 3), ('MG', PLC5, 0, 15), ('MG', PLC5, 4, None), ('PD', PLC5, 1, 12),
     ('PD', PLC5, 50, None), ('PD', PLC5, 81, 0), ('PD', SLC, 10, None), ('PD', SLC, 17, None),
     ('MG', SLC, 16, 15), ('HSC', SLC, 5, None), ('PWM', SLC, 4, None)])
@@ -134,7 +135,7 @@ def values(table: Members) -> dict[str, int]:
             if member.bit is None and member.words == 1 and name != 'CON'}
 
 
-@pytest.mark.parametrize(('table', 'word', 'expected'), [
+@for_all(('table', 'word', 'expected'), [
     (members.TIMER, 0, {'EN': 15, 'TT': 14, 'DN': 13}),
     (members.COUNTER, 0, {'CU': 15, 'CD': 14, 'DN': 13, 'OV': 12, 'UN': 11, 'UA': 10}),
     (members.CONTROL, 0, {'EN': 15, 'EU': 14, 'DN': 13, 'EM': 12, 'ER': 11, 'UL': 10, 'IN': 9,
@@ -160,7 +161,7 @@ def test_named_bits_are_told_in_their_order(
     assert list(bits(table, word)) == list(expected)
 
 
-@pytest.mark.parametrize(('table', 'expected'), [
+@for_all(('table', 'expected'), [
     (members.TIMER, {'PRE': 1, 'ACC': 2}), (members.COUNTER, {'PRE': 1, 'ACC': 2}),
     (members.CONTROL, {'LEN': 1, 'POS': 2}), (members.PLC5_SFC, {'PRE': 1, 'TIM': 2}),
     (members.PLC5_BLOCK_TRANSFER, {'RLEN': 1, 'DLEN': 2, 'FILE': 3, 'ELEM': 4, 'RGS': 5}),
@@ -228,7 +229,7 @@ def test_every_file_fits_into_a_packet_of_the_processors_that_have_it() -> None:
                 assert dialect.max_read(kind) > 0 and dialect.max_write(kind) > 0
 
 
-@pytest.mark.parametrize(('family', 'names'), [
+@for_all(('family', 'names'), [
     ('PLC2', ['Unprotected', 'Protected', 'CIF']), ('PLC3', ['WordRange']),
     ('PLC5', ['Typed', 'WordRange']), ('SLC', ['Slot', 'Flat'])])
 def test_ways_of_a_family_the_usual_one_first(family: str, names: list[str]) -> None:

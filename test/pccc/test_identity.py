@@ -100,14 +100,14 @@ def test_model_is_read_from_its_code(data: bytes, at: int, start: str,
         assert changed(data, **{f'byte{at}': code}).model == start + model
 
 
-@pytest.mark.parametrize(('mode', 'words'), [
+@for_all(('mode', 'words'), [
     (Mode.REMOTE_PROGRAM, 'program'), (Mode.REMOTE_TEST_SCAN, 'test'), (Mode.TEST, 'test'),
     (Mode.SUSPEND, 'suspend'), (Mode.REMOTE_DOWNLOAD, 'download'), (Mode.RUN, 'run')])
 def test_modes_in_a_sentence(mode: Mode, words: str) -> None:
     assert mode.words == words
 
 
-@pytest.mark.parametrize(('code', 'name', 'model', 'processor', 'remarks'), [
+@for_all(('code', 'name', 'model', 'processor', 'remarks'), [
     (0xB9, b'5/01       ', 'SLC 5/01', Processor.SLC_5_01, ()),
     (0xB9, b'5/02       ', 'SLC 5/02', Processor.SLC_5_02, ()),
     (0xB9, b'5/03       ', 'SLC 5/03', Processor.SLC_5_03, ()),
@@ -133,7 +133,7 @@ def test_name_of_an_slc_counts_more_than_its_code(
 
 
 # Those of modules of another type or size also stand in 1747-UM005B, 7-3.
-@pytest.mark.parametrize(('code', 'text'), [
+@for_all(('code', 'text'), [
     (0x0022, 'major error 0x0022 (watchdog: scan time exceeded)'),
     (0x1E54, 'major error 0x1E54 (slot 30: module is not of the configured type)'),
     (0x0056, 'major error 0x0056 (slot 0: chassis configuration is not that of the program)'),
@@ -245,7 +245,7 @@ def test_unknown_processor_is_named_and_not_interpreted() -> None:
 _OLD_FIELDS = '00 80 01 00 42 07 FD 00 0C 00 05 00 11 01 01'
 
 
-@pytest.mark.parametrize(('start', 'model'), [
+@for_all(('start', 'model'), [
     ('0A EB 13', 'PLC-5/12'), ('0A EB 14', 'PLC-5/25'), ('0A BB', 'PLC-5/15'),
     ('0A CB', 'PLC-5 VME (6008-LTV)')])
 def test_old_plc5_ends_with_the_byte_about_its_ram(start: str, model: str) -> None:
@@ -273,7 +273,7 @@ def test_fault_of_a_plc5_is_asked_for_and_named() -> None:
         'major processor fault: S:11 is 0; fault code 0 (S:12)'
 
 
-@pytest.mark.parametrize('data', [b'', b'\0', PLC5[:17], PLC5[:2]])
+@for_all('data', [b'', b'\0', PLC5[:17], PLC5[:2]])
 def test_reply_that_is_too_short_is_a_format_error(data: bytes) -> None:
     with pytest.raises(FormatError, match='a diagnostic status of'):
         decode_identity(data)
@@ -304,7 +304,7 @@ def test_any_bytes_are_an_identity_or_a_format_error(data: bytes) -> None:
         assert text.isprintable()
 
 
-@pytest.mark.parametrize(('data', 'layout', 'asked'), [
+@for_all(('data', 'layout', 'asked'), [
     (SLC, FULL_DUPLEX_COUNTERS, ReadCounters(0, 26)),
     (SLC[:2] + b'\x36' + SLC[3:], SLAVE_COUNTERS, ReadCounters(0, 26)),
     (SLC[:3] + b'\x58\0' + b'1761'.ljust(11) + SLC[16:], ML1000_COUNTERS, ReadCounters(0, 22)),

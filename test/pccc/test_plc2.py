@@ -30,7 +30,7 @@ from support.tables import ask, counting, table, words_at
 PLC2 = PlcType.PLC2
 
 
-@pytest.mark.parametrize(('text', 'word', 'bit', 'shown'), [
+@for_all(('text', 'word', 'bit', 'shown'), [
     ('020', 16, None, '020'), ('110/17', 72, 15, '110/17'), ('0', 0, None, '000'),
     ('7/3', 7, 3, '007/03'), ('077777', 0x7FFF, None, '077777'), ('11017', 72, 15, '110/17'),
     ('7777', 0o7777, None, '7777'), ('10000/1', 0o10000, 1, '010000/01'),
@@ -40,7 +40,7 @@ def test_words_and_bits_are_octal(text: str, word: int, bit: int | None, shown: 
     assert (address.offset, address.bit, str(address)) == (word, bit, shown)
 
 
-@pytest.mark.parametrize('text', ['', 'N7:0', '020:1', '20/', '/1', '018', '20/9', '-1', '٢'])
+@for_all('text', ['', 'N7:0', '020:1', '20/', '/1', '018', '20/9', '-1', '٢'])
 def test_what_is_no_address(text: str) -> None:
     with pytest.raises(AddressSyntaxError, match='as in 020 or 110/17$'):
         parse_address(text, PLC2)
@@ -70,11 +70,11 @@ def at(text: str) -> Address:
     return parse_address(text, PlcType.PLC2)
 
 
-@pytest.mark.parametrize(('mask', 'bits', 'encoded'), [
+@for_all(('mask', 'bits', 'encoded'), [
     (0x0001, 0x0001, '20 00 01 00'), (0x0080, 0x0000, '20 00 00 80'),
     (0x0100, 0x0100, '21 00 01 00'), (0x8000, 0x0000, '21 00 00 80'),
     (0x0180, 0xFF00, '20 00 00 80 21 00 01 00'), (0xFFFF, 0x00FF, '20 00 FF 00 21 00 00 FF')])
-@pytest.mark.parametrize(('dialect', 'cmd'), [(UNPROTECTED, 0x05), (PROTECTED, 0x02)])
+@for_all(('dialect', 'cmd'), [(UNPROTECTED, 0x05), (PROTECTED, 0x02)])
 def test_bits_from_10_octal_on_are_in_the_odd_byte(dialect: Plc2Dialect, cmd: int, mask: int,
                                                    bits: int, encoded: str) -> None:
     assert dialect.write_bits(at('020'), mask, bits) == (cmd, bytes.fromhex(encoded))
@@ -137,8 +137,8 @@ def test_structures_of_a_compatibility_file_are_words() -> None:
     assert ask(memory, '08 00 04', 0x01) == (0, '04 00 05 00')
 
 
-@pytest.mark.parametrize('family', [PLC3, PLC5, SLC])
-@pytest.mark.parametrize(('cmd', 'data'), [(0x01, '00 00 02'), (0x08, '00 00 01 00')])
+@for_all('family', [PLC3, PLC5, SLC])
+@for_all(('cmd', 'data'), [(0x01, '00 00 02'), (0x08, '00 00 01 00')])
 def test_without_a_compatibility_file(family: PlcType, cmd: int, data: str) -> None:
     assert ask(table(family, N7_0='00 00'), data, cmd) == (0x50, '')
 
@@ -167,7 +167,7 @@ def test_common_interface_file_gives_an_odd_number_of_bytes() -> None:
     assert ask(memory, '00 00 05', 0x01) == (0x50, '')
 
 
-@pytest.mark.parametrize(('cmd', 'data'), [
+@for_all(('cmd', 'data'), [
     (0x00, '00 00 01 00'), (0x02, '00 00 01 00'), (0x05, '00 00 01 00'),
     (0x01, '00 00 ED'), (0x08, '00 00' + ' 00' * 236)])
 def test_what_an_slc_has_not(cmd: int, data: str) -> None:

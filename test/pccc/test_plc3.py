@@ -25,12 +25,13 @@ from abdf1_ros.pccc.plc3.commands import ExtendedAddress
 from hypothesis import given
 from hypothesis import strategies as st
 import pytest
+from support.cases import for_all
 from support.tables import ask, counting, table, words_at
 
 PLC3 = PlcType.PLC3
 
 
-@pytest.mark.parametrize(('text', 'levels', 'shown', 'offset'), [
+@for_all(('text', 'levels', 'shown', 'offset'), [
     ('B10:0', 'E3.1.8.10.0.0', 'B10:0', 0), ('b260;5/3', 'E3.1.8.260.0.5/3', 'B260:5/03', 5),
     ('N0:9999', 'E3.1.5.0.0.9999', 'N0:9999', 9999), ('D7:1', 'E3.1.7.7.0.1', 'D7:1', 1),
     ('A9:8', 'E3.1.9.9.0.8', 'A9:8', 8), ('S:5', 'E3.1.13.0.0.5', 'S:5', 5),
@@ -59,7 +60,7 @@ def test_offset_leads_back_to_its_word(kind: FileType, data: st.DataObject,
     assert address.at_offset(address.offset) == replace(address, bit=None)
 
 
-@pytest.mark.parametrize(('text', 'right'), [
+@for_all(('text', 'right'), [
     ('N7', 'as in N7:0'), ('020', 'as in N7:0'), ('N:0', 'give the file number, as in N7:0'),
     ('F8:0', 'F is not a file type of a PLC-3'), ('ST9:0', 'ST is not a file type of a PLC-3'),
     ('I:018', 'octal, as in I:017'), ('E3.1.2.0.0.18', 'octal, as in I:017'),
@@ -74,7 +75,7 @@ def test_what_is_no_address(text: str, right: str) -> None:
     assert right in str(fault.value)
 
 
-@pytest.mark.parametrize(('text', 'right'), [
+@for_all(('text', 'right'), [
     ('E2.1.8.10.0.0', 'only the data table, E3.1, can be read'),
     ('E3.2.8.10.0.0', 'only the data table, E3.1, can be read'),
     ('E3.1.6.0.0.0', 'section 6 is not known; sections: 1 (O), 2 (I), 3 (T)'),
@@ -90,7 +91,7 @@ def test_out_of_range(text: str, right: str) -> None:
     assert right in str(fault.value)
 
 
-@pytest.mark.parametrize(('address', 'encoded'), [
+@for_all(('address', 'encoded'), [
     (ExtendedAddress(8, 10), '2C 08 0A 00'), (ExtendedAddress(8, 260), '2C 08 FF 04 01 00'),
     (ExtendedAddress(3, 0, 9, 2), '3C 03 00 09 02'), (ExtendedAddress(5, 7, 0, 255),
                                                       '2C 05 07 FF FF 00')])
@@ -121,7 +122,7 @@ def test_timer_is_three_words_of_a_structure() -> None:
     assert words_at(memory, 'T:2.PRE') == '77 00'
 
 
-@pytest.mark.parametrize(('data', 'ext_sts'), [
+@for_all(('data', 'ext_sts'), [
     ('01 00 00 01 00 2C 10 0A 00 02', '01'), ('01 00 00 01 00 04 08 02', '02'),
     ('01 00 00 01 00 6C 08 0A 00 00 02', '03'), ('01 00 00 01 00 00 41 42 00 02', '04'),
     ('01 00 00 01 00 00 00 02', '05'), ('01 00 00 01 00 00 414243444546474849 00 02', '05'),
@@ -137,7 +138,7 @@ def test_addresses_that_lead_nowhere(data: str, ext_sts: str) -> None:
     assert words_at(memory, 'B10:0', 4) == '00 00 01 00 02 00 03 00'
 
 
-@pytest.mark.parametrize('data', [
+@for_all('data', [
     '01 00 00 01 00 2C 08 0A 00 00', '01 00 00 01 00 2C 08 0A 00 01',
     '01 00 00 01 00 2C 08 0A 00 04', '01 01 00 01 00 2C 08 0A 00 02',
     '01 00 00 00 00 2C 08 0A 00 02', '00 00 00 01 00 2C 08 0A 00',

@@ -38,7 +38,7 @@ def parameters(data: str | bytes) -> Reader:
     return Reader(bytes.fromhex(data) if isinstance(data, str) else data)
 
 
-@pytest.mark.parametrize(('address', 'encoded'), [
+@for_all(('address', 'encoded'), [
     (SystemAddress(7, 30), '06 07 1E'), (SystemAddress(3, 300), '06 03 FF 2C 01'),
     (SystemAddress(4, 2, 2), '0E 04 02 02'), (SystemAddress(12, 10, 2), '0E 0C 0A 02'),
     (SystemAddress(1, 10), '06 01 0A'), (SystemAddress(4, 2, 0), '0E 04 02 00'),
@@ -69,7 +69,7 @@ def test_address_in_other_forms(encoded: str, address: SystemAddress) -> None:
     assert reader.is_empty
 
 
-@pytest.mark.parametrize('encoded', [
+@for_all('encoded', [
     '', '07', '07 00', '07 00 07', '07 00 07 FF 2C', '17 00 07 00', '80 07', '07 01 07 00',
     '00', '00 25 4E 00', '00 24 4E 37 3A 30', '00 24 00', '00 24 58 37 3A 30 00',
     '00 24 4E 37 3A 30 2F 31 00', '00 24 FF 37 3A 30 00'])
@@ -78,7 +78,7 @@ def test_what_is_no_address(encoded: str) -> None:
         SystemAddress.read(parameters(encoded))
 
 
-@pytest.mark.parametrize(('letters', 'descriptor', 'words', 'size'), [
+@for_all(('letters', 'descriptor', 'words', 'size'), [
     ('N', '42', 1, 2), ('B', '42', 1, 2), ('A', '31', 1, 2), ('D', '92 10', 1, 2),
     ('S', '42', 1, 2), ('I', '42', 1, 2), ('O', '42', 1, 2), ('T', '59 0A', 3, 10),
     ('C', '66', 3, 6), ('R', '76', 3, 6), ('F', '94 08', 2, 4), ('ST', '39 54', 42, 84),
@@ -113,7 +113,7 @@ def at(text: str) -> Address:
     return parse_address(text, PLC5)
 
 
-@pytest.mark.parametrize(('letters', 'read', 'written'), [
+@for_all(('letters', 'read', 'written'), [
     ('N', 110, 110), ('B', 110, 110), ('F', 58, 57), ('T', 23, 22), ('C', 39, 38), ('R', 39, 38),
     ('ST', 2, 2), ('PD', 1, 1), ('MG', 2, 2), ('BT', 19, 18), ('SC', 39, 38)])
 def test_limits_in_elements(letters: str, read: int, written: int) -> None:
@@ -133,14 +133,14 @@ def test_timer_of_six_bytes_is_taken_too() -> None:
     assert DIALECT.read_data(at('T4:0'), 6, timers) == bytes(range(12))
 
 
-@pytest.mark.parametrize(('text', 'typed'), [
+@for_all(('text', 'typed'), [
     ('B3:0', TypedData(2, 2, b'\1\2\3\4')), ('A9:0', TypedData(3, 1, b'\1\2\3\4')),
     ('D9:0', TypedData(0x10, 2, b'\1\2\3\4')), ('S:0', TypedData(4, 2, b'\1\2\3\4'))])
 def test_words_may_come_as_bits_characters_or_bcd(text: str, typed: TypedData) -> None:
     assert DIALECT.read_data(at(text), 2, typed.encode()) == b'\1\2\3\4'
 
 
-@pytest.mark.parametrize(('text', 'words', 'typed'), [
+@for_all(('text', 'words', 'typed'), [
     ('PD9:0.SP', 2, TypedData(4, 2, bytes(4))), ('PD9:0.SP', 2, TypedData(0x15, 164, bytes(164))),
     ('PD9:0', 82, TypedData(8, 4, bytes(164))), ('PD9:0', 1, TypedData(8, 4, bytes(4))),
     ('MG9:0', 56, TypedData(0x16, 112, bytes(224)))])
@@ -176,7 +176,7 @@ def test_plc5_float_of_a_pid_is_a_float() -> None:
     assert ask(words, '67 00 00 01 00 0F 00 0C 0A 02 93 09 42 01 00') == (0xF0, '17')
 
 
-@pytest.mark.parametrize(('name', 'words', 'number', 'descriptor'), [
+@for_all(('name', 'words', 'number', 'descriptor'), [
     ('PD9_0', 82, 1, '99 09 A7 99 15 A4'), ('MG9_0', 56, 2, '99 09 E3 99 16 70'),
     ('SC9_0', 3, 2, '99 09 0E 96 1D'), ('BT9_0', 6, 2, '99 09 1B 99 20 0C'),
     ('ST9_0', 42, 2, '99 09 AA 39 54')])

@@ -65,8 +65,8 @@ def contents(words: DataTable, family: PlcType) -> list[bytes]:
                        len(bytes.fromhex(data)) // 2) for name, data in FILES[family].items()]
 
 
-@pytest.mark.parametrize('family', FAMILIES)
-@pytest.mark.parametrize('sts', [0x01, 0x10, 0xF0])
+@for_all('family', FAMILIES)
+@for_all('sts', [0x01, 0x10, 0xF0])
 def test_command_with_a_status_is_not_executed(family: PlcType, sts: int) -> None:
     words = table(family, **FILES[family])
     before = contents(words, family)
@@ -77,8 +77,8 @@ def test_command_with_a_status_is_not_executed(family: PlcType, sts: int) -> Non
     assert contents(words, family) == before
 
 
-@pytest.mark.parametrize('family', FAMILIES)
-@pytest.mark.parametrize('tns', [0x0000, 0x0100, 0x1234])
+@for_all('family', FAMILIES)
+@for_all('tns', [0x0000, 0x0100, 0x1234])
 def test_command_that_lost_its_leading_00_changes_nothing(family: PlcType, tns: int) -> None:
     """Station 0 is asked; what stands where SRC should is CMD, and the command becomes 00."""
     words = table(family, **FILES[family])
@@ -143,7 +143,7 @@ def test_any_bytes_have_one_reply(data: bytes, family: PlcType, cmd: int, tns: i
         words.read(parse_address('000' if family == PlcType.PLC2 else 'N7:0', family), 5)
 
 
-@pytest.mark.parametrize(('family', 'data'), [
+@for_all(('family', 'data'), [
     (PLC5, '68 00 00 01 00 07 00 09 00 01 00'), (PLC5, '68 00 00 01 00 07 00 07 04 01 00'),
     (SLC, 'A2 02 09 89 00 00'), (SLC, 'A2 02 07 85 00 00'), (SLC, 'A2 02 07 89 04 00')])
 def test_refusals_leave_nothing_behind(family: PlcType, data: str) -> None:

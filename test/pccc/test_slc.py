@@ -56,7 +56,7 @@ READERS: dict[int, Callable[[Reader], Command]] = {
     0xAB: MaskedWrite.read}
 
 
-@pytest.mark.parametrize(('command', 'encoded'), [
+@for_all(('command', 'encoded'), [
     (LogicalRead(LogicalAddress(7, 0x89, 0, 0), 20), 'A2 14 07 89 00 00'),
     (LogicalRead(LogicalAddress(10, 0x89, 300, 0), 2), 'A2 02 0A 89 FF 2C 01 00'),
     (LogicalRead(LogicalAddress(255, 0x89, 254, 255), 255), 'A2 FF FF FF 00 89 FE FF FF 00'),
@@ -95,7 +95,7 @@ def at(text: str) -> Address:
     return parse_address(text, SLC)
 
 
-@pytest.mark.parametrize(('letters', 'read', 'write'), [
+@for_all(('letters', 'read', 'write'), [
     ('N', 118, 117), ('B', 118, 117), ('F', 118, 116), ('T', 117, 117), ('C', 117, 117),
     ('ST', 84, 84), ('PD', 115, 115), ('MG', 100, 100)])
 def test_limits_are_whole_elements(letters: str, read: int, write: int) -> None:
@@ -103,7 +103,7 @@ def test_limits_are_whole_elements(letters: str, read: int, write: int) -> None:
     assert (DIALECT.max_read(kind), DIALECT.max_write(kind)) == (read, write)
 
 
-@pytest.mark.parametrize(('name', 'read', 'write'), [
+@for_all(('name', 'read', 'write'), [
     ('5/01', 82, 82), ('5/02', 82, 82), ('ML1000', 82, 82), ('5/03', 236, 234),
     ('5/04', 236, 234), ('5/05', 236, 234), ('ML1100', 206, 206), ('ML1200', 206, 206),
     ('ML1400', 206, 206), ('ML1500', 206, 206)])
@@ -196,7 +196,7 @@ def test_place_of_the_directory(code: int, own_row: int, names: tuple[str, ...])
         assert [(str(entry), entry.elements) for entry in files] == [('O0', 3)]
 
 
-@pytest.mark.parametrize('processor', [None, *(
+@for_all('processor', [None, *(
     Processor(name) for name in ('5/01', '5/02', 'ML1000'))])
 def test_processors_without_a_known_directory(processor: Processor | None) -> None:
     assert SlcFileSearch().directory(processor) is None

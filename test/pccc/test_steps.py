@@ -73,7 +73,7 @@ def test_what_must_not_be_written_is_refused_before_the_first_step() -> None:
         write(AddressedValues.of('N7:0', SLC), [1, 2])
 
 
-@pytest.mark.parametrize(('text', 'access', 'sts', 'is_told'), [
+@for_all(('text', 'access', 'sts', 'is_told'), [
     ('I:1.0', None, 0x10, True), ('O:2.0', Access.SLOT, 0x50, True),
     ('I:1.0', None, 0x60, False), ('I:5', Access.FLAT, 0x10, False), ('N7:0', None, 0x10, False)])
 def test_refused_inputs_and_outputs_by_slot_lead_to_flat(
@@ -92,7 +92,7 @@ def failure(sts: int, data: bytes = b'', meanings: Meanings = USUAL_MEANINGS) ->
     return caught.value
 
 
-@pytest.mark.parametrize(('sts', 'data', 'ext_sts', 'text'), [
+@for_all(('sts', 'data', 'ext_sts', 'text'), [
     (0x50, b'\x01', None, 'STS 50: address not there, or memory protected'),
     (0x15, b'', None, 'STS 15: illegal command, format or length, or the file does not exist; '
                       'no reply in time (application timeout)'),

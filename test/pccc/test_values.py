@@ -154,7 +154,7 @@ def test_least_and_greatest_value_can_be_written(
     Codec(kind, 2).check([least, greatest])
 
 
-@pytest.mark.parametrize('kind, length, bit, words', [
+@for_all(('kind', 'length', 'bit', 'words'), [
     (ValueType.BOOL, 1, 0, 1), (ValueType.BOOL, 16, 0, 1), (ValueType.BOOL, 17, 0, 2),
     (ValueType.BOOL, 1, 15, 1), (ValueType.BOOL, 2, 15, 2), (ValueType.BOOL, 33, 15, 3),
     (ValueType.INT16, 7, 0, 7), (ValueType.BCD16, 7, 0, 7), (ValueType.INT32, 7, 0, 14),
@@ -163,7 +163,7 @@ def test_words_that_elements_take(kind: ValueType, length: int, bit: int, words:
     assert Codec(kind, length, bit).words == words
 
 
-@pytest.mark.parametrize('status', ['0', '2', 'A', 'F'])
+@for_all('status', ['0', '2', 'A', 'F'])
 def test_three_digits_below_the_status_bits_of_a_plc2(status: str) -> None:
     codec = Codec(ValueType.BCD12, 1)
     word = int(f'{status}123', 16)
@@ -204,7 +204,7 @@ def test_natural_type_of_a_place(text: str, family: str, natural: str) -> None:
     assert ValueType.BOOL not in types
 
 
-@pytest.mark.parametrize('text', ['N7:0/3', 'T4:0/DN', 'PD9:0/INI', 'O:000/17'])
+@for_all('text', ['N7:0/3', 'T4:0/DN', 'PD9:0/INI', 'O:000/17'])
 def test_bits_are_bool_only(text: str) -> None:
     assert types_of(parse_address(text, PlcType.PLC5)) == (ValueType.BOOL,)
 

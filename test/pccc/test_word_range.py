@@ -22,6 +22,7 @@ from abdf1_ros.pccc.plc5.dialect import PLC5_WORD_RANGE
 from abdf1_ros.pccc.word_range.commands import in_line_order, word_on_line
 from abdf1_ros.pccc.word_range.dialect import WordRangeDialect
 import pytest
+from support.cases import for_all
 from support.tables import ask, counting, table, words_at
 
 FAMILIES = {PlcType.PLC3: PLC3, PlcType.PLC5: PLC5_WORD_RANGE}
@@ -31,7 +32,7 @@ def at(text: str, family: str = 'PLC3') -> Address:
     return parse_address(text, PlcType(family))
 
 
-@pytest.mark.parametrize(('text', 'family', 'encoded'), [
+@for_all(('text', 'family', 'encoded'), [
     ('N7:5', 'PLC3', '2C 05 07 05'), ('B260:300', 'PLC3', '2C 08 FF 04 01 FF 2C 01'),
     ('T:9.ACC', 'PLC3', '3C 03 00 09 02'), ('C:0.PRE', 'PLC3', '2C 04 00 01'),
     ('I:017', 'PLC3', '2C 02 00 0F'), ('S:3', 'PLC3', '2C 0D 00 03'),
@@ -43,7 +44,7 @@ def test_address_is_encoded_for_its_family(text: str, family: str, encoded: str)
         0x0F, bytes.fromhex(f'01 00 00 01 00 {encoded} 02'))
 
 
-@pytest.mark.parametrize(('family', 'letters', 'read', 'write'), [
+@for_all(('family', 'letters', 'read', 'write'), [
     ('PLC3', 'N', 122, 114), ('PLC3', 'T', 120, 114), ('PLC5', 'N', 122, 116),
     ('PLC5', 'F', 122, 116), ('PLC5', 'T', 120, 114), ('PLC5', 'ST', 84, 84)])
 def test_limits_are_whole_elements(family: str, letters: str, read: int, write: int) -> None:
@@ -51,7 +52,7 @@ def test_limits_are_whole_elements(family: str, letters: str, read: int, write: 
     assert (dialect.max_read(kind), dialect.max_write(kind)) == (read, write)
 
 
-@pytest.mark.parametrize('text', ['N7:0', 'T4:0', 'B3:0', 'ST9:0', 'MG9:0'])
+@for_all('text', ['N7:0', 'T4:0', 'B3:0', 'ST9:0', 'MG9:0'])
 def test_other_words_keep_their_order(text: str) -> None:
     assert in_line_order(at(text, 'PLC5'), b'\1\2\3\4\5\6') == b'\1\2\3\4\5\6'
     assert word_on_line(at(text, 'PLC5')) == at(text, 'PLC5')
@@ -103,7 +104,7 @@ def test_structures_are_words_in_the_order_of_storage() -> None:
     assert words_at(memory, 'T4:1', 3) == '03 00 04 00 FF 00'
 
 
-@pytest.mark.parametrize(('data', 'sts', 'ext_sts'), [
+@for_all(('data', 'sts', 'ext_sts'), [
     ('01 00 00 01 00 06 09 00 02', 0xF0, '06'), ('01 00 00 05 00 06 07 00 02', 0xF0, '0A'),
     ('01 00 00 01 00 06 07 04 02', 0xF0, '0A'), ('01 00 00 01 00 06 07 00 00', 0xF0, '01'),
     ('01 00 00 02 00 06 07 00 03', 0xF0, '01'), ('01 00 00 01 00 06 07 00 04', 0xF0, '01'),

@@ -35,6 +35,7 @@ from abdf1_ros.settings.mapping import Mapping
 from abdf1_ros.settings.network import Network
 from abdf1_ros.settings.rows import Rows
 import pytest
+from support.cases import for_all
 from support.counting import lines_run
 from support.driver_bench import DriverBench, stored
 from support.mappings import make_mapping
@@ -54,7 +55,7 @@ def speed(after: int = 3000, command: str = 'Write', station: int = 1) -> Mappin
                         fallback=Fallback((0,), after))
 
 
-@pytest.mark.parametrize('network, seconds', [
+@for_all(('network', 'seconds'), [
     # Timeout for each try, Cmd_Timeout from the last of a command on, and for each try the pause
     # after which a frame has broken off.
     (Network(), 8.0 + 4 * (0.02 + 10 * 10 / 9600)), (QUICK, 1.1 + 2 * QUIET),
@@ -161,7 +162,7 @@ def test_rule_16_preset_of_the_timer(period: int, factor: int | None) -> None:
                           f'rung 3) and {watchdog + 100} (rung 5), time base 0.01 s')
 
 
-@pytest.mark.parametrize('network, way', [
+@for_all(('network', 'way'), [
     (Network(baud=19200), 'Timeout 100'), (replace(QUICK, cmd_timeout=5000), 'Cmd_Timeout 500'),
     (replace(QUICK, timeout=100, nak_retries=9), 'NAK_Retries 1'),
     (replace(QUICK, timeout=100, enq_retries=9), 'ENQ_Retries 1'),
@@ -329,7 +330,7 @@ def test_rule_8_mode_of_a_plc_that_we_write_to_by_ourselves_is_asked_every_two_s
     assert mode_periods(Rows([make_mapping(), make_mapping(command='Write')]), 0.1, 3.0) == {}
 
 
-@pytest.mark.parametrize(('rows', 'after', 'is_late'), [
+@for_all(('rows', 'after', 'is_late'), [
     (5, None, False), (40, None, True), (5, 3000, False), (5, 300, True)])
 def test_newest_state_that_may_be_too_old_on_a_full_line_is_named(
         rows: int, after: int | None, is_late: bool) -> None:

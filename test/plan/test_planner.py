@@ -232,7 +232,7 @@ def test_gap_is_bridged_exactly_while_that_is_cheaper(plc: str) -> None:
     assert 10 < sum(bridged) < 40
 
 
-@pytest.mark.parametrize('one, other', [
+@for_all(('one', 'other'), [
     (make_mapping('N7:0'), make_mapping('N10:1')),
     (make_mapping('N7:0'), make_mapping('N7:1', station=2)),
     (make_mapping('N7:0', period=100), make_mapping('N7:25', period=10_000)),

@@ -21,6 +21,7 @@ from abdf1_ros.settings.heartbeats import Fallback, While
 from abdf1_ros.settings.mapping import Mapping
 from abdf1_ros.settings.network import Network
 import pytest
+from support.cases import for_all
 from support.mappings import make_mapping
 
 CHARACTER = 10 / 9600  # s; 8 data bits, no parity, 1 stop bit
@@ -72,7 +73,7 @@ def texts(report: Report, kind: RemarkKind) -> list[str]:
     return [remark.text for remark in report.remarks() if remark.kind is kind]
 
 
-@pytest.mark.parametrize('plc, settings, line_time', [
+@for_all(('plc', 'settings', 'line_time'), [
     ('PLC5', {}, TWO_WORDS), ('SLC', {}, TWO_WORDS_SLC), ('PLC5', {'mode': 'Peer'}, FULL_DUPLEX),
     ('PLC5', {'baud': 19200}, TWO_WORDS / 2), ('PLC5', {'tx_delay': 5}, TWO_WORDS + 0.015),
     ('PLC5', {'mode': 'Peer', 'tx_delay': 5}, FULL_DUPLEX + 0.010),
@@ -96,9 +97,9 @@ def test_map_without_a_row_is_odd() -> None:
     assert remark.text == 'the map has no usable row: nothing is read or written'
 
 
-@pytest.mark.parametrize(('own', 'station', 'begin'), [
+@for_all(('own', 'station', 'begin'), [
     (0, 1, 'our own Station is 0'), (5, 0, 'station 0 is in the map'), (5, 1, None)])
-@pytest.mark.parametrize('mode', ['Peer', 'Master'])
+@for_all('mode', ['Peer', 'Master'])
 def test_station_0_on_a_full_duplex_line_is_odd(mode: str, own: int, station: int,
                                                 begin: str | None) -> None:
     report = report_of(make_mapping('N7:0', station=station), mode=mode, station=own)
@@ -111,7 +112,7 @@ def test_station_0_on_a_full_duplex_line_is_odd(mode: str, own: int, station: in
         assert remark.text.startswith(f'{begin}: a message to station 0 begins with 00')
 
 
-@pytest.mark.parametrize(('station', 'octal'), [
+@for_all(('station', 'octal'), [
     (10, 8), (17, 15), (77, 63), (7, None), (18, None)])
 def test_node_behind_a_gateway_may_be_octal_on_its_panel(station: int, octal: int | None) -> None:
     found = texts(report_of(make_mapping('N7:0'), make_mapping('N7:0', station=station, via=3)),
@@ -342,7 +343,7 @@ def test_write_again_is_held_against_the_reads_that_slow_plcs_allow() -> None:
     assert any('well below Write_Again, 1000 ms' in text for text in found)
 
 
-@pytest.mark.parametrize(('again', 'after', 'period', 'expected'), [
+@for_all(('again', 'after', 'period', 'expected'), [
     (1000, None, 500, ''), (1000, None, 800, 'read every 800 ms, and that has to be well below '
                                              'Write_Again, 1000 ms'),
     (5000, 1000, 800, 'read every 800 ms, and that has to be well below Fallback_After, 1000 ms'),

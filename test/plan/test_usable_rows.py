@@ -21,6 +21,7 @@ from abdf1_ros.settings.mapping import Mapping
 from abdf1_ros.settings.network import Network
 from abdf1_ros.settings.rows import Rows
 import pytest
+from support.cases import for_all
 from support.mappings import make_mapping
 
 PEER = Network(mode='Peer')
@@ -65,7 +66,7 @@ def test_full_duplex_line_has_no_broadcast() -> None:
     assert texts(everybody, network=Network()) == []
 
 
-@pytest.mark.parametrize('network, is_wrong', [
+@for_all(('network', 'is_wrong'), [
     (Network(station=1), True), (Network(station=1, polling='Standard'), True),
     (Network(station=1, mode='Slave'), True), (Network(station=1, mode='Peer'), False),
     (Network(station=2), False)])
@@ -104,7 +105,7 @@ def test_problems_go_with_their_rows() -> None:
     assert [mapping for mapping, _ in line_problems([good, bad], PEER)] == [bad]
 
 
-@pytest.mark.parametrize(('mapping', 'text'), [
+@for_all(('mapping', 'text'), [
     (make_mapping(command='Write', period=100), 'Command): Item: 1, Write sends commands, and '
      'Mode Listen sends nothing; only Read rows are possible'),
     (make_mapping(command='Serve', station=5, period=100), 'Command): Item: 1, Serve sends '

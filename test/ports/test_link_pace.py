@@ -29,6 +29,7 @@ from abdf1_ros.ports.link_thread import LinkThread
 from abdf1_ros.ports.settings import PortSettings
 from abdf1_ros.ports.trace import PortOpener
 import pytest
+from support.cases import for_all
 from support.link_threads import Impatient, NoLine, READY, Script
 from support.ptys import PATIENCE, Pty, wait_until
 
@@ -92,7 +93,7 @@ class Late(LinkThread):
         self._port.now += seconds + 0.02
 
 
-@pytest.mark.parametrize('char_time', [0.0083, 0.0042, 0.0021, 0.001])
+@for_all('char_time', [0.0083, 0.0042, 0.0021, 0.001])
 def test_long_reply_at_a_low_speed_is_heard_to_its_end(char_time: float) -> None:
     packet = Packet(1, 5, 0x0F, 0, 7).reply(bytes(234))
     script = Script(Send(b'?', 0.3, reply_size=234), timing=LineTiming(char_time=char_time))

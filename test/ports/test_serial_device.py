@@ -34,10 +34,11 @@ from abdf1_ros.ports.serial_device import mark_damage, SerialDevice
 from abdf1_ros.ports.settings import PortSettings
 import pytest
 import serial
+from support.cases import for_all
 from support.ptys import PATIENCE, Pty
 
 
-@pytest.mark.parametrize('name, text', [
+@for_all(('name', 'text'), [
     ('/nowhere/tty', 'No such file or directory'), ('/dev/null', 'this is not a serial port'),
     ('/tmp', 'Is a directory'), ('socket://127.0.0.1:1', 'Connection refused'),
     ('rfc2217://127.0.0.1:1', 'Connection refused')])
@@ -120,7 +121,7 @@ class Fed(SerialDevice):
         return found
 
 
-@pytest.mark.parametrize(('marked', 'expected'), [
+@for_all(('marked', 'expected'), [
     (b'abc', [b'abc']),
     (b'a\xff\xffb', [b'a\xffb']),
     (b'\xff\xff\xff\xff', [b'\xff\xff']),

@@ -22,6 +22,7 @@ import time
 from abdf1_ros.ports.opening import open_port
 from abdf1_ros.ports.settings import PortSettings
 import pytest
+from support.cases import for_all
 from support.ptys import PATIENCE
 
 _TCP_REPAIR = 19  # of Linux: a socket that is closed in this state sends nothing (CRIU)
@@ -154,7 +155,7 @@ def test_client_that_is_thrown_out_again_and_again_is_told_of_the_other_one() ->
         'inactivity time of the server is too short']
 
 
-@pytest.mark.parametrize(('pieces', 'is_telnet'), [
+@for_all(('pieces', 'is_telnet'), [
     ([b'\xFF\xFD\x03\xFF\xFB\x01'], True), ([b'\xFF\xFB\x2C'], True),
     ([b'\x10\x06', b'\xFF\xFD\x03'], False), ([b'\xFF\xFF\x03'], False)])
 def test_telnet_port_is_named(pieces: list[bytes], is_telnet: bool) -> None:

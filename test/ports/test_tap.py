@@ -22,6 +22,7 @@ from abdf1_ros.ports.settings import PortSettings
 from abdf1_ros.ports.tap import is_pty, Tap
 from abdf1_ros.sniffer.capture import Chunk, Direction
 import pytest
+from support.cases import for_all
 from support.ptys import PATIENCE, Pty, read_exactly
 
 
@@ -106,7 +107,7 @@ def test_silence_is_told(ptys: list[Pty]) -> None:
     assert len(told) == 3
 
 
-@pytest.mark.parametrize(('name', 'expected'), [
+@for_all(('name', 'expected'), [
     ('pty', True), ('pty:/tmp/x', True), ('/dev/ttyUSB0', False), ('socket://h:1', False),
     ('ptys', False)])
 def test_word_pty_and_its_file_name_ask_for_a_pseudo_terminal(name: str, expected: bool) -> None:

@@ -22,6 +22,7 @@ from abdf1_ros.ros.diagnostics.log import EventLog, LimitedLog, MOST_ENTRIES, Un
 from abdf1_ros.settings.mapping import Mapping
 import pytest
 from rclpy.logging import get_logger, LoggingSeverity
+from support.cases import for_all
 from support.clock import Clock
 from support.mappings import make_mapping
 
@@ -60,7 +61,7 @@ def event(message: Message, station: int | None = 2) -> Event:
     return Event(message, arguments, station)
 
 
-@pytest.mark.parametrize('message', [entry for entry in Message if entry not in ROUTINE])
+@for_all('message', [entry for entry in Message if entry not in ROUTINE])
 def test_every_message_has_the_level_of_its_table(
         log: EventLog, logged: Logged, message: Message) -> None:
     log.add(event(message))

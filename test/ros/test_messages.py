@@ -53,6 +53,7 @@ from std_msgs.msg import (  # noqa: I101
     UInt16MultiArray,
     UInt32MultiArray,
 )
+from support.cases import for_all
 from support.ros import write_csv
 
 TYPES = {
@@ -73,7 +74,7 @@ def test_every_value_type_has_its_message() -> None:
     assert MESSAGES == {ValueType(name): message for name, message in TYPES.items()}
 
 
-@pytest.mark.parametrize(('address', 'cells', 'kind'), [
+@for_all(('address', 'cells', 'kind'), [
     ('B3:1/14', {'Length': 5}, UInt8MultiArray), ('N7:3', {'Length': 5}, Int16MultiArray),
     ('B3:3', {'Length': 5}, UInt16MultiArray), ('F8:3', {'Length': 5}, Float32MultiArray),
     ('L10:3', {'Length': 5}, Int32MultiArray),
@@ -115,8 +116,8 @@ def padded(wire: bytes) -> bytes:
     return wire[:end] + bytes(count) + wire[end + count:]
 
 
-@pytest.mark.parametrize('length', [1, 2, 3, 7])
-@pytest.mark.parametrize(('address', 'cells', 'values'), [
+@for_all('length', [1, 2, 3, 7])
+@for_all(('address', 'cells', 'values'), [
     ('B3:1/3', {}, [1, 0, 0, 1, 1, 0, 1]), ('N7:3', {}, [-1, 0, 1, 256, -32768, 32767, 7]),
     ('B3:3', {}, [65535, 1, 0, 2, 3, 4, 5]), ('F8:3', {}, [1.0, -0.5, 0.0, 2.0, 3.0, 4.0, 5.0]),
     ('L10:3', {}, [-2**31, 1, 2**31 - 1, 0, 5, 6, 7]),

@@ -26,6 +26,7 @@ from abdf1_ros.ros.topics.snapshot import Snapshot
 from abdf1_ros.settings.mapping import Mapping
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 import pytest
+from support.cases import for_all
 from support.cell import BridgeCell
 from support.mappings import make_mapping
 from support.ros import details, EVERYTHING, Inbox
@@ -59,7 +60,7 @@ def test_single_value_has_all_that_is_known_of_it() -> None:
                       'topic': 'speed', 'description': 'of belt 3'}
 
 
-@pytest.mark.parametrize(('address', 'length', 'kind', 'values', 'keys'), [
+@for_all(('address', 'length', 'kind', 'values', 'keys'), [
     ('N7:10', 2, '', array('h', [1, 2]), ['value N7:10', 'value N7:11']),
     ('B3:0/15', 2, '', array('B', [1, 0]), ['value B3:0/15', 'value lamp']),
     ('N7:0', 2, 'int32', array('i', [1, 2]), ['value N7:0', 'value N7:2']),
@@ -73,7 +74,7 @@ def test_each_value_of_an_array_has_a_key(
     assert found == keys
 
 
-@pytest.mark.parametrize(('values', 'age', 'error', 'level', 'message'), [
+@for_all(('values', 'age', 'error', 'level', 'message'), [
     (array('h', [7]), 2.0, None, OK, 'OK: 7, 2.0 s ago'),  # late, and not stale yet
     (array('h', [7]), 9.0, None, STALE, 'STALE: 7, 9.0 s ago'),
     (array('h', [7]), 9.0, 'no reply', ERROR, 'ERROR: no reply; 7, 9.0 s ago'),

@@ -32,6 +32,7 @@ from abdf1_ros.settings.network import Network
 import pytest
 from rclpy.callback_groups import MutuallyExclusiveCallbackGroup
 from std_srvs.srv import Trigger
+from support.cases import for_all
 from support.driver_bench import Recorder
 from support.mappings import make_mapping
 from support.ros import Observer
@@ -45,7 +46,7 @@ def with_mode(mode: Mode | None, text: str, *faults: str) -> Identity:
     return Identity(PlcType.SLC, 'SLC 5/03', 'B', '3', mode, text, faults)
 
 
-@pytest.mark.parametrize(('identity', 'text'), [
+@for_all(('identity', 'text'), [
     (None, None), (SLC, None), (with_mode(Mode.RUN, 'RUN'), None),
     (with_mode(None, 'mode 0x05'), None), (Identity(None, '1770-KF2'), None),
     (with_mode(Mode.REMOTE_PROGRAM, 'REM PROG'), 'in program mode (REM PROG)'),
@@ -62,7 +63,7 @@ PLC5 = Identity(PlcType.PLC5, 'PLC-5/40')
 LEVEL = make_mapping('N7:0', plc='SLC', item=6)
 
 
-@pytest.mark.parametrize(('identity', 'rows', 'text'), [
+@for_all(('identity', 'rows', 'text'), [
     (PLC5, [LEVEL], 'station 1 is a PLC-5/40, map.csv:7 says SLC'), (SLC, [LEVEL], None),
     (SLC, [LEVEL, make_mapping('N7:0', plc='PLC5', item=2)],
      'station 1 is an SLC 5/03, map.csv:3 says PLC5'),

@@ -47,7 +47,7 @@ def problems_of(path: Path, content: str | bytes) -> list[str]:
     return [str(problem).replace(str(path), 'FILE') for problem in caught.value.problems]
 
 
-@pytest.mark.parametrize('content', [
+@for_all('content', [
     'Tag,Address,Length\na,N7:0,2\nb,N7:1,3\n',
     'Tag,Address,Length\na,N7:0,2\nb,N7:1,3',
     '\ufeffTag,Address,Length\na,N7:0,2\nb,N7:1,3\n',

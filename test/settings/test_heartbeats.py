@@ -21,6 +21,7 @@ from abdf1_ros.settings.heartbeats import Fallback, While
 from abdf1_ros.settings.map_file import load_mappings
 from abdf1_ros.settings.mapping import Command
 import pytest
+from support.cases import for_all
 from support.mappings import cell_of, fault, faults, load_rows, load_text, one, row
 
 BEAT = {'Tag': 'beat', 'Command': 'Heartbeat', 'Address': 'N10:0'}
@@ -42,7 +43,7 @@ def test_rule_1_heartbeat_is_one_word_without_a_topic() -> None:
     assert not mapping.reads and not mapping.writes and not mapping.polls
 
 
-@pytest.mark.parametrize(('cells', 'text'), [
+@for_all(('cells', 'text'), [
     ({'Address': 'F8:0'}, 'a heartbeat is a word of type int16 or uint16'),
     ({'Address': 'B3:0/1'}, 'a heartbeat is a word of type int16 or uint16'),
     ({'Type': 'int32'}, 'a heartbeat is a word of type int16 or uint16'),
@@ -70,9 +71,9 @@ def test_rule_1_nobody_else_writes_the_word(command: str) -> None:
 BY_NUMBER = ' (a PLC finds a file by its number, whatever Type or PLC_Type a row gives it)'
 
 
-@pytest.mark.parametrize('own', [
+@for_all('own', [
     BEAT, BEAT | {'Command': 'Write', 'Fallback': '0', 'Fallback_After': '500'}])
-@pytest.mark.parametrize(('cells', 'why'), [
+@for_all(('cells', 'why'), [
     ({'Station': '255', 'Address': 'N10:0'}, ' (a broadcast has the words of every station)'),
     ({'Station': '255', 'Address': 'B10:0', 'PLC_Type': 'SLC'},
      ' (a broadcast has the words of every station)'),
@@ -93,7 +94,7 @@ def test_rules_1_and_12_same_words_under_other_names(
     assert len(faults(*(row(**cells) for cells in reversed(rows)))) == 1
 
 
-@pytest.mark.parametrize('cells', [
+@for_all('cells', [
     {'Station': '255', 'Address': 'N10:1'}, {'Station': '255', 'Address': 'N11:0'},
     {'Address': 'D10:1'}, {'Address': 'N11:0', 'PLC_Type': 'SLC'}, {'Address': 'F8:0'},
     {'Address': 'D9:0', 'PLC_Type': 'SLC'},
@@ -128,7 +129,7 @@ def test_rule_12_slots_and_sections_are_files_of_their_own() -> None:
     assert tags_of(*rows) == ['N', 'B']
 
 
-@pytest.mark.parametrize('address', [
+@for_all('address', [
     'S:1', 'I:001', 'O:001', 'T4:0.ACC', 'C5:0.PRE', 'R6:0.POS', 'PD10:0'])
 def test_rule_1_file_with_a_meaning_is_no_place_to_count(address: str) -> None:
     found = faults(row(**BEAT | {'Address': address}, Type='int16'))
@@ -172,7 +173,7 @@ def test_rule_4_period_of_a_heartbeat(period: str) -> None:
     assert one(**BEAT | {'Period': '100'}).period == 100
 
 
-@pytest.mark.parametrize(('cells', 'fallback'), [
+@for_all(('cells', 'fallback'), [
     ({'Fallback': '0', 'Fallback_After': '500'}, Fallback((0.0,), 500)),
     ({'Fallback': '1 -2 3', 'Length': '3', 'Fallback_After': '200'},
      Fallback((1.0, -2.0, 3.0), 200)),
@@ -187,7 +188,7 @@ def test_rule_12_write_and_serve_rows_take_a_fallback(
     assert cell_of(mapping, 'Fallback_After') == str(fallback.after)
 
 
-@pytest.mark.parametrize(('cells', 'text'), [
+@for_all(('cells', 'text'), [
     ({'Fallback': '0'}, 'Fallback_After is missing: ms from 200 to 60000'),
     ({'Fallback_After': '500'}, 'Fallback is missing: the values to write'),
     ({'Fallback': '0', 'Fallback_After': '199'}, 'should be ms from 200 to 60000'),
@@ -209,7 +210,7 @@ def test_rule_12_what_a_fallback_cannot_be(cells: dict[str, str], text: str) -> 
     assert text in fault(**WRITE | cells)
 
 
-@pytest.mark.parametrize('cells', [
+@for_all('cells', [
     WRITE | {'Fallback': 'x' * 5000, 'Fallback_After': '500'},
     WRITE | {'Fallback': '0', 'Fallback_After': 'x' * 5000},
     COUNTER | {'While': 'x' * 5000},
@@ -241,7 +242,7 @@ def test_rule_13_values_depend_on_run_or_on_a_counter() -> None:
         'counter', '1000')
 
 
-@pytest.mark.parametrize(('cells', 'text'), [
+@for_all(('cells', 'text'), [
     ({'Command': 'ReadWrite'}, 'a ReadWrite row has no While: it is for Read and '
      'Heartbeat rows'),
     ({'Publish': 'Change'}, 'needs Publish Always'),
@@ -254,7 +255,7 @@ def test_rule_13_what_values_cannot_depend_on(cells: dict[str, str], text: str) 
     assert text in faults(row(**DOORS | cells), row(**COUNTER))[0]
 
 
-@pytest.mark.parametrize(('cells', 'text'), [
+@for_all(('cells', 'text'), [
     ({'Command': 'Write'}, 'is not a Read row'), ({'Length': '2'}, 'is not one int16'),
     ({'Address': 'F8:0'}, 'is not one int16'),
     ({'While': 'RUN'}, 'depends on something itself')])
@@ -310,7 +311,7 @@ def test_rule_22_what_is_not_a_bit_that_is_read_confirms_nothing(cells: dict[str
     assert 'Confirms is for a Read row of one bit' in faults(row(**BIT | cells), row(**BEAT))[0]
 
 
-@pytest.mark.parametrize('cells', [
+@for_all('cells', [
     {'Confirms': 'nobody'}, {'Confirms': 'bit'}, {'Confirms': 'speed'}, {'Station': '2'}])
 def test_rule_22_what_a_bit_cannot_confirm(cells: dict[str, str]) -> None:
     cells = BIT | cells
@@ -320,7 +321,7 @@ def test_rule_22_what_a_bit_cannot_confirm(cells: dict[str, str]) -> None:
         f'row of station {station} that no row before it confirms']
 
 
-@pytest.mark.parametrize('ours', [
+@for_all('ours', [
     BEAT | {'Address': 'B12:0'}, BEAT | {'Address': 'N12:0'}, WRITE | {'Address': 'B12:0/2'},
     WRITE | {'Address': 'B12:0', 'Station': '255'}])
 def test_rule_21_no_bit_that_we_write_confirms(ours: dict[str, str]) -> None:

@@ -76,7 +76,7 @@ def test_two_stations_behind_one_gateway() -> None:
     assert [mapping.via for mapping in mappings] == [10, 10, None, None]
 
 
-@pytest.mark.parametrize(('cells', 'text'), [
+@for_all(('cells', 'text'), [
     ({'Via': '255'}, 'Via = "255" should be a whole number from 0 to 254'),
     ({'Via': 'KF3'}, 'Via = "KF3" should be a whole number from 0 to 254'),
     ({'Via': '3', 'Command': 'Serve'}, 'a Serve row has no Via: it is for Read, Write, ReadWrite '

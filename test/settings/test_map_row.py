@@ -65,7 +65,7 @@ def test_cells_that_are_left_out_have_defaults() -> None:
     assert (mapping.minimum, mapping.maximum) == (-math.inf, math.inf)
 
 
-@pytest.mark.parametrize('text, reads, writes', [
+@for_all(('text', 'reads', 'writes'), [
     ('Read', True, False), ('Write', False, True), ('ReadWrite', True, True),
     ('READ', True, False), ('write', False, True), ('R/W', True, True), ('rw', True, True)])
 def test_command_says_whether_a_row_reads_and_writes(text: str, reads: bool, writes: bool) -> None:
@@ -190,7 +190,7 @@ def test_cells_that_just_fit() -> None:
     assert one(Address='N7:998', Type='int32')
 
 
-@pytest.mark.parametrize('column, texts', [
+@for_all(('column', 'texts'), [
     ('Command', ['Command = "{}" should be one of Read']),
     ('Station', ['Item: 1, Station = "{}" should']),
     ('PLC_Type', ['PLC Type ({}) should be one of PLC2']),
@@ -213,7 +213,7 @@ def test_remark_on_a_long_cell_is_without_its_end() -> None:
     assert len(str(remark)) < 500
 
 
-@pytest.mark.parametrize('column, texts', [
+@for_all(('column', 'texts'), [
     ('Station', ('0', '254')), ('Length', ('1', '1000')), ('Period', ('0', '86400000')),
     ('Min', ('0', '-3.5', '1e3', '-2,5')), ('Max', ('0', '1e300')), ('Topic', ('x' * 150,))])
 def test_both_ends_of_a_range(column: str, texts: tuple[str, ...]) -> None:
@@ -230,8 +230,8 @@ def test_numbered_faults_are_errors() -> None:
                for problem in problems)
 
 
-@pytest.mark.parametrize('plc', ['PLC5', 'SLC'])
-@pytest.mark.parametrize('address', ['A10:2', 'N7:2'])
+@for_all('plc', ['PLC5', 'SLC'])
+@for_all('address', ['A10:2', 'N7:2'])
 def test_string_over_words_counts_words(address: str, plc: str) -> None:
     mapping = one(Address=address, PLC_Type=plc, Type='string', Length='20')
     assert (mapping.codec.words, mapping.codec.packed) == (20, True)
@@ -239,7 +239,7 @@ def test_string_over_words_counts_words(address: str, plc: str) -> None:
     assert not one(Address='ST9:0').codec.packed
 
 
-@pytest.mark.parametrize('cells', [
+@for_all('cells', [
     {'Address': 'N7:0', 'Type': 'int32'}, {'Address': 'N7:0', 'Type': 'uint32'},
     {'Address': 'B3:0', 'Type': 'float32'}, {'Address': 'D9:0', 'Type': 'float32'},
     {'Address': 'S:0', 'Type': 'int32'}, {'Address': 'A9:0', 'Type': 'int32'},
@@ -254,7 +254,7 @@ def test_word_order_is_high_where_the_cell_says_so_and_low_without_it(
     assert mapping != low
 
 
-@pytest.mark.parametrize('cells, scaling', [
+@for_all(('cells', 'scaling'), [
     ({'Scale': '0.1'}, Scaling(0.1, 0.0)), ({'Offset': '-40'}, Scaling(1.0, -40.0)),
     ({'Scale': '-2', 'Offset': '1e3'}, Scaling(-2.0, 1000.0)),
     ({'Scale': '"0,25"', 'Offset': '0'}, Scaling(0.25, 0.0)),
@@ -270,7 +270,7 @@ def test_scale_or_offset_make_the_message_float32(
 # Families and access
 
 
-@pytest.mark.parametrize(('plc', 'text', 'access'), [
+@for_all(('plc', 'text', 'access'), [
     ('PLC2', '', 'Unprotected'), ('PLC2', 'protected', 'Protected'), ('PLC2', 'cif', 'CIF'),
     ('PLC3', '', 'WordRange'), ('PLC5', '', 'Typed'), ('PLC5', 'WORDRANGE', 'WordRange'),
     ('SLC', '', 'Slot'), ('SLC', 'flat', 'Flat')])
@@ -291,7 +291,7 @@ def test_io_by_the_word_of_the_image() -> None:
     assert text.endswith('with access Flat write the word of the whole image, as in I:5 or O:0/3')
 
 
-@pytest.mark.parametrize('processor', Processor)
+@for_all('processor', Processor)
 def test_processor_chooses_the_dialect(processor: Processor) -> None:
     mapping = one(PLC_Type='SLC', Processor=processor.value.lower())
     assert (mapping.processor, cell_of(mapping, 'Processor')) == (processor, processor.value)
@@ -304,7 +304,7 @@ def test_slc_without_a_processor_is_taken_for_a_5_03() -> None:
     assert mapping.dialect is dialect_of(PlcType.SLC, None, Processor.SLC_5_03)
 
 
-@pytest.mark.parametrize('place', ['T4:1', 'C5:1', 'R6:1', 'MG9:0/EN'])
+@for_all('place', ['T4:1', 'C5:1', 'R6:1', 'MG9:0/EN'])
 def test_structures_that_we_serve_are_ours_to_write(place: str) -> None:
     served = one(Command='Serve', Address=place, Station='5')
     assert str(served.address).startswith(place[:4])
@@ -325,7 +325,7 @@ def test_row_on_demand_is_no_counter() -> None:
     assert [text for text in told if '"counter" is read only on demand' in text]
 
 
-@pytest.mark.parametrize(('cells', 'expected'), [
+@for_all(('cells', 'expected'), [
     ({'Command': 'Read'}, 'a Read row has no Write_Again: it is for Write and ReadWrite rows'),
     ({'Command': 'Heartbeat'}, 'a Heartbeat row has no Write_Again'),
     ({'Command': 'Write', 'Station': '255'}, 'no station confirms what is written to 255'),

@@ -54,7 +54,7 @@ def test_cells_as_text_with_defaults_filled_in() -> None:
         'Publish': 'Always', 'Word_Order': 'Low', 'Access': 'Typed'}
 
 
-@pytest.mark.parametrize('text, cell', [
+@for_all(('text', 'cell'), [
     ('0', '0'), ('-5', '-5'), ('0.1', '0.1'), ('1000000', '1000000'),
     ('2147483647', '2147483647'), ('-3.25', '-3.25'), ('1234567.5', '1234567.5')])
 def test_limits_as_text_lose_nothing(text: str, cell: str) -> None:
@@ -74,7 +74,7 @@ def test_function_file_of_a_micrologix_is_no_file_of_that_number() -> None:
     assert function.shares_words(make_mapping('STI:0.PFN', 'Write', plc='SLC'))
 
 
-@pytest.mark.parametrize(('text', 'kind', 'is_shared'), [
+@for_all(('text', 'kind', 'is_shared'), [
     ('030/14', None, False), ('030/17', None, False), ('030/13', None, True),
     ('027/17', None, False), ('030', 'bcd12', True), ('030', 'uint16', True),
     ('031', 'bcd12', False)])
@@ -98,7 +98,7 @@ def test_every_column_is_there_once_and_described() -> None:
     assert [name for name, column in BY_NAME.items() if not column.description] == []
 
 
-@pytest.mark.parametrize(('name', 'choices'), [
+@for_all(('name', 'choices'), [
     ('Command', Command), ('Publish', Publish), ('Type', ValueType), ('Word_Order', WordOrder),
     ('PLC_Type', FAMILIES), ('Access', Access), ('Processor', Processor)])
 def test_every_choice_is_named(name: str, choices: type[Enum]) -> None:
@@ -131,7 +131,7 @@ def test_name_of_a_text(text: str, name: str) -> None:
     assert sanitise(text) == name
 
 
-@pytest.mark.parametrize('text', ['', '_', '__', '/', '///', ':', 'ü', '日本', ' - / - '])
+@for_all('text', ['', '_', '__', '/', '///', ':', 'ü', '日本', ' - / - '])
 def test_nothing_is_left_of_text_without_letter_or_digit(text: str) -> None:
     assert sanitise(text) == ''
 

@@ -258,7 +258,7 @@ HEADER = 'Tag,Command,Address,Station,PLC_Type,Type,Topic,Min,Max,Scale'
 GOOD = Network(timeout=300)
 
 
-@pytest.mark.parametrize(('network', 'expected'), [
+@for_all(('network', 'expected'), [
     (GOOD, []),
     (Network(timeout=300, data_bits=7), [
         'Data_Bits 7: DF1 sends bytes of 8 bits; with less the check of nearly every message '
@@ -329,7 +329,7 @@ def remarks_of(folder: Path, row: str) -> list[str]:
     return [str(remark).removeprefix(str(path)) for remark in mapping.remarks]
 
 
-@pytest.mark.parametrize(('row', 'expected'), [
+@for_all(('row', 'expected'), [
     ('lamp,Write,I:1.0/3,1,SLC,,,,,', [
         ':2:2 (Command): I:1.0/3 is an input: the PLC overwrites what is written there with its '
         'next scan']),

@@ -161,7 +161,7 @@ def test_long_cell_is_shown_without_its_end(path: Path, column: str, text: str) 
     assert len(fault) < 500
 
 
-@pytest.mark.parametrize('mode, meant', [
+@for_all(('mode', 'meant'), [
     ('Full Duplex', 'Peer'), ('full-duplex', 'Peer'), ('DF1 Full Duplex', 'Peer'),
     ('Half Duplex', 'Master, or Slave where another is the master'),
     ('DF1 HALF-DUPLEX SLAVE', 'Slave')])
@@ -181,7 +181,7 @@ def test_all_faults_are_reported_at_once_each_in_its_place(path: Path) -> None:
         f'{path}:5:{cell} ({column})' for cell, column in enumerate(header.split(','), 1)]
 
 
-@pytest.mark.parametrize('text, port', [
+@for_all(('text', 'port'), [
     ('1', '/dev/ttyS0'), ('8', '/dev/ttyS7'), ('32', '/dev/ttyS31'),
     ('/dev/ttyUSB0', '/dev/ttyUSB0'),
     ('/dev/serial/by-id/usb-FTDI_x-if00', '/dev/serial/by-id/usb-FTDI_x-if00'),
@@ -192,12 +192,12 @@ def test_com_port_may_be_a_number_a_device_or_a_url(path: Path, text: str, port:
     assert load(path, 'Com_Port', text).port == port
 
 
-@pytest.mark.parametrize('text', ['0', '-1', '1.0', 'ttyS0', 'COM3', '²', 'a b', '1 2', '³³',
-                                  'socket://', 'socket://host', 'rfc2217://host:99999',
-                                  'socket://:4001', 'sokket://host:4001', 'loop://',
-                                  '://host:1', 'hwgrep://0403:6001', 'spy:///dev/ttyUSB0',
-                                  'alt://x:1', 'cp2110://x:1', 'socket://host:1?logging=debug',
-                                  'rfc2217://host:1/x'])
+@for_all('text', ['0', '-1', '1.0', 'ttyS0', 'COM3', '²', 'a b', '1 2', '³³',
+                  'socket://', 'socket://host', 'rfc2217://host:99999',
+                  'socket://:4001', 'sokket://host:4001', 'loop://',
+                  '://host:1', 'hwgrep://0403:6001', 'spy:///dev/ttyUSB0',
+                  'alt://x:1', 'cp2110://x:1', 'socket://host:1?logging=debug',
+                  'rfc2217://host:1/x'])
 def test_com_port_that_is_no_port_is_refused(path: Path, text: str) -> None:
     fault, = faults(path, 'Com_Port', text)
     assert fault.startswith(f'FILE:2:1 (Com_Port): Com_Port = "{text}" should be a number')
@@ -268,7 +268,7 @@ def test_radio_modem_and_what_it_sends_on(path: Path) -> None:
         load(path, 'Mode,Store_Forward', 'Radio,"1,256"')
 
 
-@pytest.mark.parametrize(('text', 'place'), [
+@for_all(('text', 'place'), [
     ('pty:/tmp/hmi', SharePlace('pty:/tmp/hmi', 'pty', '/tmp/hmi')),
     ('tcp:4501', SharePlace('tcp:4501', 'tcp', '4501', '127.0.0.1', 4501)),
     ('tcp:0.0.0.0:4501?check=BCC', SharePlace(
@@ -282,7 +282,7 @@ def test_place_is_a_link_a_port_or_a_device(text: str, place: SharePlace) -> Non
     assert share_places(f' {text} ') == [place]
 
 
-@pytest.mark.parametrize(('text', 'words'), [
+@for_all(('text', 'words'), [
     ('hmi', '"hmi" should be pty:/a/name, tcp:PORT'), ('pty:hmi', 'pty:/a/name'),
     ('tcp:', 'tcp:PORT (for this machine only)'), ('tcp:70000', 'tcp:PORT'),
     ('tcp:plant.example:4501', 'the address of an interface'),
@@ -344,14 +344,14 @@ def test_place_that_is_open_to_other_machines_is_told() -> None:
     assert [*network_remarks(Network())] == []
 
 
-@pytest.mark.parametrize('text, stations', [
+@for_all(('text', 'stations'), [
     ('', ()), ('7', (7,)), ('0-3', (0, 1, 2, 3)), ('5, 1 - 3', (5, 1, 2, 3)),
     ('1-3,2,1', (1, 2, 3)), ('254', (254,)), (',1,,', (1,))])
 def test_list_may_have_single_stations_and_ranges(text: str, stations: tuple[int, ...]) -> None:
     assert parse_stations(text) == (stations, [])
 
 
-@pytest.mark.parametrize('text, part', [
+@for_all(('text', 'part'), [
     ('255', '255'), ('1 2', '1 2'), ('1 2-3', '1 2-3'), ('1-', '1-'), ('5,1- ,2', '1-'),
     ('1,x', 'x'), ('3-1', '3-1'), ('-1', '-1'), ('1-2-3', '1-2-3')])
 def test_part_of_a_list_that_is_no_station_is_named(text: str, part: str) -> None:
@@ -369,7 +369,7 @@ def test_every_fault_is_told() -> None:
 LISTENING = {'Com_Port': '/dev/ttyS0', 'Mode': 'Listen'}
 
 
-@pytest.mark.parametrize(('cells', 'text'), [
+@for_all(('cells', 'text'), [
     ({'Listen_Port': 'COM4'}, 'net.csv:2:3 (Listen_Port): Listen_Port = "COM4" should be a number '
      'from 1 or a device path such as /dev/ttyUSB1'),
     ({'Listen_Port': '0'}, 'Listen_Port = "0" should be a number from 1'),

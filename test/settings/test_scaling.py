@@ -24,6 +24,7 @@ from abdf1_ros.settings.scaling import Scaling
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 import pytest
+from support.cases import for_all
 from support.mappings import make_mapping
 
 _WHOLE = (ValueType.INT16, ValueType.UINT16, ValueType.BCD16)
@@ -67,7 +68,7 @@ def test_floats_come_back_as_near_as_their_digits_allow(
     assert back == pytest.approx(raw, rel=1e-6, abs=2e-7 * abs(offset) / scale + 1e-37)
 
 
-@pytest.mark.parametrize('scale, offset, raw, value', [
+@for_all(('scale', 'offset', 'raw', 'value'), [
     (0.1, 0.0, 215, 21.5), (0.01, -40.0, 6150, 21.5), (-0.5, 0.0, 3, -1.5), (1.0, 0.5, 1, 1.5),
     (0.001525902, -50.0, 32767, -0.000769)])
 def test_engineering_value_comes_from_scale_and_offset_and_goes_back(
@@ -78,7 +79,7 @@ def test_engineering_value_comes_from_scale_and_offset_and_goes_back(
     assert scaling.raw([value], ValueType.INT16) == [raw]
 
 
-@pytest.mark.parametrize('value, raw', [
+@for_all(('value', 'raw'), [
     (0.0, 0), (0.24, 0), (0.25, 0), (0.26, 1), (0.75, 2), (1.25, 2), (1.26, 3), (-0.25, 0),
     (-0.75, -2), (-1.25, -2), (-0.26, -1)])
 def test_nearest_raw_value_is_written_and_halves_go_to_the_even_one(
@@ -90,7 +91,7 @@ def test_floats_are_not_rounded_to_whole_numbers() -> None:
     assert Scaling(2.0, 1.0).raw([1.5], ValueType.FLOAT32) == [0.25]
 
 
-@pytest.mark.parametrize('kind, scaling, value, error', [
+@for_all(('kind', 'scaling', 'value', 'error'), [
     (ValueType.INT16, Scaling(0.1, 0.0), 3276.76,
      'value 3276.76 at index 1 is outside -3276.8 to 3276.7, the range of int16 with Scale 0.1, '
      'Offset 0'),
@@ -118,13 +119,13 @@ def test_value_that_the_raw_type_does_not_reach(
     assert str(caught.value) == error
 
 
-@pytest.mark.parametrize('value', [3276.7, 3276.74, -3276.8, -3276.84])
+@for_all('value', [3276.7, 3276.74, -3276.8, -3276.84])
 def test_value_less_than_half_a_step_outside_is_rounded_into_the_range(value: float) -> None:
     raw, = Scaling(0.1, 0.0).raw([value], ValueType.INT16)
     assert raw in ValueType.INT16.range
 
 
-@pytest.mark.parametrize('kind, scaling, error', [
+@for_all(('kind', 'scaling', 'error'), [
     (ValueType.BOOL, Scaling(), 'Scale and Offset are for numbers, not for bool'),
     (ValueType.STRING, Scaling(), 'Scale and Offset are for numbers, not for string'),
     (ValueType.INT16, Scaling(0.001, 20000.0),
@@ -141,7 +142,7 @@ def test_values_that_cannot_be_scaled(kind: ValueType, scaling: Scaling, error: 
     assert scaling.fault(kind) == error
 
 
-@pytest.mark.parametrize('kind, scaling', [
+@for_all(('kind', 'scaling'), [
     (ValueType.INT16, Scaling(0.001, 2000.0)), (ValueType.INT32, Scaling(0.001)),
     (ValueType.UINT32, Scaling(1.0)), (ValueType.FLOAT32, Scaling(1000.0, -273.15)),
     (ValueType.BCD16, Scaling(-0.01, 100.0))])
@@ -169,7 +170,7 @@ def test_limit_of_floats_is_kept_by_the_float32_that_is_written(scaling: Scaling
         raw_values(mapping, [0.1001])
 
 
-@pytest.mark.parametrize(('kind', 'scale', 'offset', 'limit'), [
+@for_all(('kind', 'scale', 'offset', 'limit'), [
     ('int32', 0.001, 0.0, 2_000_000.123), ('uint32', 0.001, 0.0, 4_000_000.377),
     ('int32', 1.0, 0.0, 2_000_000_001), ('int32', -0.01, 7.0, 12_345_678.91)])
 def test_limit_of_scaled_32_bits_is_kept_to_the_raw_step(

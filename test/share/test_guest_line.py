@@ -43,6 +43,7 @@ from abdf1_ros.settings.network import Network
 from abdf1_ros.settings.share import share_places
 from abdf1_ros.share.guest_line import GuestLine
 import pytest
+from support.cases import for_all
 from support.device_server import OWN_HOST
 from support.driver_bench import FarEnd, Recorder, simulated_plc, store, stored
 from support.mappings import make_mapping
@@ -293,7 +294,7 @@ def test_internal_error_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
     assert [*map(type, faults)] == 3 * [ZeroDivisionError]
 
 
-@pytest.mark.parametrize(('place', 'bits', 'baud'), [
+@for_all(('place', 'bits', 'baud'), [
     ('/dev/ttyS9?baud=1200&parity=None', 10, 1200), ('/dev/ttyS9', 11, 9600),
     ('pty:/tmp/hmi', 0, 1), ('tcp:4501', 0, 1)])
 def test_characters_take_time_on_a_serial_device(place: str, bits: int, baud: int) -> None:

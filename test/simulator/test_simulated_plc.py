@@ -29,6 +29,7 @@ from abdf1_ros.simulator.gateway import SimulatedGateway, stations_of
 from abdf1_ros.simulator.ladder import Ladder
 from abdf1_ros.simulator.simulated_plc import COLUMNS, InjectedFaults, load_plcs, SimulatedPlc
 import pytest
+from support.cases import for_all
 from support.clock import Clock
 from support.driver_bench import simulated_plc, store, stored
 
@@ -57,7 +58,7 @@ def faults(path: Path, *rows: str) -> list[str]:
     return [str(problem).split('simulator.csv:')[1] for problem in caught.value.problems]
 
 
-@pytest.mark.parametrize('row', [
+@for_all('row', [
     '{},PLC5,N7:0', '1,{},N7:0', '1,PLC5,T4:0.{}', '1,PLC5,N7:0,{}', '1,PLC5,N7:0,1,{}',
     '1,PLC5,N7:0,1,0,{}', '1,SLC,N7:0,1,0,,,,{}'])
 def test_fault_of_a_long_cell_is_short(path: Path, row: str) -> None:
@@ -171,7 +172,7 @@ def test_message_of_a_plc2_and_a_plc3_writes_its_value_and_tells_that_it_is_conf
     assert said == ['confirmed']
 
 
-@pytest.mark.parametrize('row, text', [
+@for_all(('row', 'text'), [
     ('1,PLC2,N7:0,,,,', '2:3 (Address): write the octal number of a word, as in 020 or 110/17'),
     ('1,PLC3,F8:0,,,,', '2:3 (Address): F is not a file type of a PLC-3; file types: O, I, T, C, '
                         'N, D, B, A, S'),
@@ -385,7 +386,7 @@ def test_plcs_behind_a_gateway_are_one_station_of_the_line(tmp_path: Path) -> No
         gateway.handle(ACKNOWLEDGED)
 
 
-@pytest.mark.parametrize(('first', 'second', 'text'), [
+@for_all(('first', 'second', 'text'), [
     ('1,PLC5,N7:0,,,,', '1,SLC,N7:0,,,,', '3:2 (PLC_Type): station 1 is a PLC5 already'),
     ('1,PLC5,N7:0,,,,', '1,PLC5,F7:0,,,,', '3:3 (Address): file 7 is of type N already'),
     *(('1,PLC5,N7:0,,,,,10', second, f'3:8 (Via): {text}') for second, text in (

@@ -28,6 +28,7 @@ from abdf1_ros.sniffer.capture import (
 )
 from hypothesis import given, strategies
 import pytest
+from support.cases import for_all
 
 CHUNKS = [Chunk(0.0, Direction.OUT, b'\x10\x05\x01\xff'),
           Chunk(0.00421, Direction.IN, b'\x10\x04'),
@@ -145,7 +146,7 @@ def test_other_files_are_left_alone(tmp_path: Path) -> None:
         CaptureWriter(tmp_path / 'nowhere' / 'x')
 
 
-@pytest.mark.parametrize('line', [
+@for_all('line', [
     '0.1 > 10 0', '0.1 > zz', '0.1 = 10 04', '0.1', 'soon > 10 04', '> 10 04', 'x',
     'nan > 10 04', '-inf > 10 04', '1_0.5 > 10 04'])
 def test_bad_line_is_named(line: str) -> None:

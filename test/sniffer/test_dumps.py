@@ -22,6 +22,7 @@ from abdf1_ros.sniffer.capture import Chunk, Direction
 from abdf1_ros.sniffer.dumps import read_hex, Recording
 from hypothesis import given, strategies
 import pytest
+from support.cases import for_all
 
 DATA = bytes.fromhex('100501ff1004') + bytes(range(256))
 
@@ -56,7 +57,7 @@ def _characters(data: bytes) -> str:
     return ''.join(chr(byte) if 32 <= byte < 127 else '.' for byte in data)
 
 
-@pytest.mark.parametrize('text', [
+@for_all('text', [
     '10 05 01 FF', '100501ff', '1005 01ff', '0x10, 0x05, 0x01, 0xFF', '10,05,01,FF',
     '  10 05 01 FF  ', '# a poll\n10 05\n\n01 FF\n'])
 def test_bytes_alone_are_read_in_any_notation(text: str) -> None:
@@ -90,7 +91,7 @@ def test_offset_that_cannot_follow_what_was_left_out(offset: str) -> None:
             next(chunks)
 
 
-@pytest.mark.parametrize('line', ['10 5', 'hello', '0000000 0510 ff01', '1 2 3', '*'])
+@for_all('line', ['10 5', 'hello', '0000000 0510 ff01', '1 2 3', '*'])
 def test_bad_line_is_named(line: str) -> None:
     with pytest.raises(Problem, match='is not a hexadecimal dump; write bytes as in') as caught:
         joined(['10 04', line])

@@ -28,6 +28,7 @@ from abdf1_ros.sniffer.report import text_line
 from abdf1_ros.sniffer.traffic import TrafficDecoder
 import pytest
 from support.captures import CAPTURES
+from support.cases import for_all
 
 ETHERNET, LOOPBACK, COOKED = 1, 0, 113
 
@@ -115,7 +116,7 @@ def exchange(begun: float = 1000.0) -> list[tuple[float, bytes]]:
                                          to_plc=False)))]
 
 
-@pytest.mark.parametrize('content', [
+@for_all('content', [
     pcap(exchange()), pcap(exchange(), order='>'), pcap(exchange(), magic=0xA1B23C4D),
     pcapng(exchange(), '<', b'', 1e6), pcapng(exchange(), '>', b'', 1e6),
     pcapng(exchange(), '<', bytes.fromhex('0200 0300 65746800 0900 0100 09000000 00000000'), 1e9),
@@ -229,7 +230,7 @@ def test_serial_port_recorded_by_an_rtac_is_read(tmp_path: Path) -> None:
     assert not any(entry.kind is Kind.NOISE for entry in entries)
 
 
-@pytest.mark.parametrize(('content', 'fault'), [
+@for_all(('content', 'fault'), [
     (pcap(exchange())[:-5], 'byte 311: the file ends inside a packet'),
     (pcap([])[:20], 'byte 20: the file ends inside a packet'),
     (pcap([]) + struct.pack('<4I', 0, 0, 1 << 30, 0), 'a size of 1073741824 bytes'),
@@ -249,7 +250,7 @@ def test_csp_is_named(tmp_path: Path) -> None:
         chunks_of(tmp_path / 'x', pcap([(0.0, ethernet(packet))]))
 
 
-@pytest.mark.parametrize('packet', [
+@for_all('packet', [
     b'', bytes(14), ethernet(b''), ethernet(bytes(60)), ethernet(tcp(b'', 0)[:30]),
     ethernet(tcp(bytes(100), 0)), ethernet(tcp(encapsulated(b''), 0)),
     ethernet(tcp(encapsulated(bytes.fromhex('4B 02 20 67 24 01')), 0)),

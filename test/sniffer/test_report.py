@@ -25,6 +25,7 @@ from abdf1_ros.sniffer.entries import Entry, Kind, Mark
 from abdf1_ros.sniffer.report import json_line, summary_json, summary_lines, text_line
 from abdf1_ros.sniffer.summary import Summary
 import pytest
+from support.cases import for_all
 
 OUT, IN = Direction.OUT, Direction.IN
 HALF = LineKind(Checksum.CRC, Duplex.HALF)
@@ -43,7 +44,7 @@ GOOD = Packet(5, 1, 0x4F, 0, 1)
 REFUSED = Packet(5, 1, 0x4F, 0x50, 1)
 
 
-@pytest.mark.parametrize(('entry', 'text'), [
+@for_all(('entry', 'text'), [
     (COMMAND, '     0.500000 >   1 command  5 to 1, TNS 1234: echo 01 | CRC good | '
               'RETRANSMISSION'),
     (REPLY, '     1.250000 <   1 reply    1 to 5, TNS 1234: 01 | CRC good | 750.0 ms'),
@@ -55,7 +56,7 @@ def test_entry_has_its_line_of_text(entry: Entry, text: str) -> None:
     assert text_line(entry) == text
 
 
-@pytest.mark.parametrize(('entry', 'shade'), [
+@for_all(('entry', 'shade'), [
     (COMMAND, '\x1b[33m'), (REFUSAL, '\x1b[31m'), (DAMAGED, '\x1b[31m'), (POLL, '\x1b[2m'),
     (NOISE, '\x1b[31m')])
 def test_line_has_the_colour_of_its_kind(entry: Entry, shade: str) -> None:
@@ -136,7 +137,7 @@ def _heard(summary: Summary) -> Summary:
     return summary
 
 
-@pytest.mark.parametrize(('baud', 'duplex', 'load'), [
+@for_all(('baud', 'duplex', 'load'), [
     (9600, Duplex.HALF, 0.5), (9600, Duplex.FULL, 0.3125), (9600, None, 0.5),
     (4800, Duplex.HALF, 1.0), (1200, Duplex.HALF, None), (None, Duplex.HALF, None)])
 def test_load_is_known_where_baud_and_duplex_are(

@@ -92,8 +92,8 @@ def test_transaction_is_told_symbol_by_symbol(
     assert not any(entry.marks for entry in entries)
 
 
-@pytest.mark.parametrize('checksum', list(Checksum))
-@pytest.mark.parametrize('given', [False, True])
+@for_all('checksum', list(Checksum))
+@for_all('given', [False, True])
 def test_check_is_found_or_given(checksum: Checksum, given: bool) -> None:
     said = [(OUT, master(COMMAND, checksum)), (IN, frames.ACK), (OUT, frames.poll_frame(1)),
             (IN, message(REPLY, checksum)), (OUT, frames.ACK)]
@@ -298,8 +298,8 @@ def test_chunks_do_not_matter(data: strategies.DataObject) -> None:
             for entry in decode([(UNKNOWN, part) for part in parts])] == expected
 
 
-@pytest.mark.parametrize('checksum', Checksum)
-@pytest.mark.parametrize('guess', [None, *Checksum])
+@for_all('checksum', Checksum)
+@for_all('guess', [None, *Checksum])
 def test_check_is_found_though_silence_follows_each_message(
         guess: Checksum | None, checksum: Checksum) -> None:
     """A dead PLC: with BCC the pause came before a second byte of check that never comes."""

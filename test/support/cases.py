@@ -33,10 +33,10 @@ ANY_CHARACTER = st.characters(exclude_categories=())
 def for_all(names: str | Sequence[str], items: Iterable[Any],
             ) -> Callable[[Callable[..., None]], Callable[..., None]]:
     """
-    Call a test with each of ``items``; what fails is named.
+    Call a test with each of ``items``; each case that fails is named.
 
-    As ``parametrize``, for hundreds of vectors or lines of a table: a test for each would cost
-    pytest many times what the test itself does.
+    As ``parametrize``, for cases that take no time: a test for each would cost pytest many times
+    what the test itself does.
     """
     names = (names,) if isinstance(names, str) else names
     cases = [dict(zip(names, (item,) if len(names) == 1 else item, strict=True)) for item in items]
@@ -45,12 +45,17 @@ def for_all(names: str | Sequence[str], items: Iterable[Any],
     def decorate(test: Callable[..., None]) -> Callable[..., None]:
         @functools.wraps(test)
         def run(**arguments: Any) -> None:
+            failures = []
             for case in cases:
                 try:
                     test(**arguments, **case)
-                except Exception as error:
+                except (Exception, pytest.fail.Exception) as error:
                     error.add_note(f'case: {_shown(case)}')
-                    raise
+                    failures.append(error)
+            if len(failures) > 1:
+                raise BaseExceptionGroup(f'{len(failures)} of {len(cases)} cases', failures)
+            if failures:
+                raise failures[0]
 
         signature = inspect.signature(test)
         run.__signature__ = signature.replace(parameters=[  # type: ignore[attr-defined]

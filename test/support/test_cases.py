@@ -43,5 +43,23 @@ def test_failure_is_named() -> None:
     with pytest.raises(AssertionError) as caught:
         check()
     assert caught.value.__notes__ == ['case: number = 7', 'case: path = bad.csv']
+
+    @for_all('text', ['7', 'a', 'b'])
+    def refuse(text: str) -> None:
+        with pytest.raises(ValueError):
+            int(text)
+
+    with pytest.raises(pytest.fail.Exception) as missing:
+        refuse()
+    assert missing.value.__notes__ == ["case: text = '7'"]
+
+    @for_all('number', [0, 5, 6])
+    def count(number: int) -> None:
+        assert not number
+
+    with pytest.raises(BaseExceptionGroup, match='2 of 3 cases') as both:
+        count()
+    assert [error.__notes__ for error in both.value.exceptions] == [
+        ['case: number = 5'], ['case: number = 6']]
     with pytest.raises(AssertionError):  # a table that was renamed would test nothing
         for_all('path', [])

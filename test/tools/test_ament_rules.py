@@ -17,13 +17,14 @@
 from pathlib import Path
 
 import pytest
+from support.cases import for_all
 
 ament = pytest.importorskip('tools.ament')
 
 HEADER = Path(__file__).read_text(encoding='utf-8').partition('""')[0]
 
 
-@pytest.mark.parametrize(('source', 'expected'), [
+@for_all(('source', 'expected'), [
     ('x = 1\n', []),
     ('class Door:\n\n    def opened(self) -> None:\n        """Open it."""\n', []),
     ('class Door:\n    """A door."""\n\n    def shut(self) -> None:\n        pass\n', []),

@@ -19,7 +19,6 @@ import re
 from abdf1_ros.pccc.families import FAMILIES, parse_address
 from abdf1_ros.pccc.file_types import FileType, PlcType
 from abdf1_ros.pccc.values import types_of
-import pytest
 from support.cases import for_all
 
 from tools import drawing, tables
@@ -32,7 +31,7 @@ def rows(text: str) -> list[list[str]]:
             for line in text.splitlines()[2:]]
 
 
-@pytest.mark.parametrize('plc_type', FAMILIES)
+@for_all('plc_type', FAMILIES)
 def test_every_file_type_of_every_family_is_shown(plc_type: PlcType) -> None:
     shown = {parse_address(examples[plc_type], plc_type).file_type
              for _, examples in tables.PLACES if plc_type in examples}

@@ -28,6 +28,7 @@ from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 import pytest
 from rclpy.node import Node
 from std_msgs.msg import Int16MultiArray, String, UInt16MultiArray
+from support.cases import for_all
 from support.mappings import make_mapping
 from support.ros import Observer, PATIENCE
 
@@ -228,13 +229,13 @@ def test_node_that_is_not_known_yet_is_not_there(watch: NodeWatch) -> None:
     assert not watch.is_there
 
 
-@pytest.mark.parametrize(('text', 'name'), [
+@for_all(('text', 'name'), [
     ('abdf1', '/abdf1'), ('/abdf1', '/abdf1'), ('cell/line_a', NAME), ('/cell/line_a/', NAME)])
 def test_names_may_lack_the_slash_in_front(text: str, name: str) -> None:
     assert full_name(text) == name
 
 
-@pytest.mark.parametrize('text', ['', '/', 'a b', '7up', 'a//b', '~/x', 'line-1'])
+@for_all('text', ['', '/', 'a b', '7up', 'a//b', '~/x', 'line-1'])
 def test_bad_names_are_refused_with_a_good_one(text: str) -> None:
     with pytest.raises(FormatError, match='it should be like /abdf1 or /cell/abdf1'):
         full_name(text)

@@ -26,8 +26,7 @@ from abdf1_ros.cli.monitor.view import (
 )
 from hypothesis import given
 from hypothesis import strategies as st
-import pytest
-from support.cases import ANY_CHARACTER
+from support.cases import ANY_CHARACTER, for_all
 
 NOW = 1000.0
 WIDTH = 120
@@ -62,7 +61,7 @@ def test_a_reading_is_shown_with_address_age_state_and_values() -> None:
     assert line.style is Style.GOOD
 
 
-@pytest.mark.parametrize('width', [44, 60, 80, 120])
+@for_all('width', [44, 60, 80, 120])
 def test_value_is_the_last_column_to_go(width: int) -> None:
     reading = Reading('a_topic_of_some_length', [12345, -12345], 'N7:0', NOW - 0.2, 1.0)
     line = next(text for text in lines(snapshot(readings=[reading]), width) if 'a_t' in text)
@@ -128,7 +127,7 @@ def test_curve_stands_beside_its_value() -> None:
     assert ascii_line.isascii()
 
 
-@pytest.mark.parametrize(('statuses', 'verdict', 'style'), [
+@for_all(('statuses', 'verdict', 'style'), [
     ((), 'OK: 1 topic', Style.GOOD),
     ((ShownStatus('mappings', Style.GOOD, 'OK: of 1 mappings 1 fresh'),
       ShownStatus('link', Style.GOOD, 'OK: port open')), 'OK: of 1 mappings 1 fresh', Style.GOOD),
@@ -150,7 +149,7 @@ def test_value_that_does_not_come_here_is_in_the_verdict_though_the_bridge_is_co
         assert told[0] == '/cell/abdf1  ERROR: topics: 1 of 2 topics without a fresh value here'
 
 
-@pytest.mark.parametrize(('reading', 'state'), [
+@for_all(('reading', 'state'), [
     (Reading('a', [1], received=NOW - 0.5, promised=0.5), ('fresh', Style.GOOD)),
     (Reading('a', [1], received=NOW - 0.51, promised=0.5), ('STALE (>0.5 s)', Style.BAD)),
     (Reading('a', [1], received=NOW - 900, promised=None), ('any age', Style.PLAIN)),
@@ -240,7 +239,7 @@ def test_only_counters_that_have_counted_are_shown() -> None:
     assert line.split() == ['CNT_A', '3', 'CNT_C', '1']
 
 
-@pytest.mark.parametrize(('changes', 'text', 'style'), [
+@for_all(('changes', 'text', 'style'), [
     ({'is_there': False}, 'the node is gone', Style.BAD),
     ({'told': None}, 'no diagnostics yet', Style.WARNING),
     ({'told': NOW - 5}, 'no diagnostics for 5.0 s', Style.BAD),
@@ -251,7 +250,7 @@ def test_what_is_missing_is_said(changes: dict[str, object], text: str, style: S
     assert line_with(text, snapshot(**changes)).style is style
 
 
-@pytest.mark.parametrize(('values', 'width', 'text'), [
+@for_all(('values', 'width', 'text'), [
     ([1, 0, 1], 20, '1 0 1'),
     ([0.10000000149011612, -3.5], 20, '0.1 -3.5'),
     (range(100), 20, '0 1 2 3 and 96 more'),

@@ -29,6 +29,7 @@ from abdf1_ros.pccc.file_types import PlcType
 from abdf1_ros.pccc.processor import Processor
 from abdf1_ros.simulator.simulated_plc import SimulatedPlc
 import pytest
+from support.cases import for_all
 from support.commands import call, Output
 from support.driver_bench import simulated_plc, store, stored
 from support.plc_line import plc_line
@@ -131,7 +132,7 @@ def test_station_is_named_where_several_may_be(port: str, capsys: Output) -> Non
     assert (said.status, 'give the station to write to' in said.err) == (2, True)
 
 
-@pytest.mark.parametrize(('seconds', 'text'), [
+@for_all(('seconds', 'text'), [
     (0.4, 'as this computer'), (-1.2, 'as this computer'),
     (90, '0:01:30 ahead of this computer'), (-3600, '1:00:00 behind this computer')])
 def test_drift_is_told_in_words(seconds: float, text: str) -> None:

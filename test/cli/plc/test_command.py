@@ -24,6 +24,7 @@ import sys
 
 from abdf1_ros.cli.plc.command import main
 import pytest
+from support.cases import for_all
 from support.commands import call, FAST, Output, PATIENT, Plc, running_simulator
 from support.ptys import Pty, wait_until
 from support.ros import Process
@@ -186,7 +187,7 @@ def test_signal_ends_it(tmp_path: Path) -> None:
     assert process.text == ''
 
 
-@pytest.mark.parametrize('args, text', [
+@for_all(('args', 'text'), [
     (('read', 'N7:0'), 'name the port, such as --port /dev/ttyUSB0'),
     (('read', 'N7:0', '--port', 'x', '--peer', '--duplex', 'half'), 'not allowed with'),
     (('read', 'N7:0', '--port', 'x', '--baud', '1'), '--baud: Baud = "1" should be one of 1200'),
@@ -218,7 +219,7 @@ def test_port_that_cannot_be_opened_is_told_with_status_1(port: str, capsys: Out
         assert said.status == 1 and said.err.startswith(f'plc: {port}: ')
 
 
-@pytest.mark.parametrize('command', [
+@for_all('command', [
     '', 'read', 'write', 'watch', 'status', 'ping', 'scan', 'detect', 'import', 'ports'])
 def test_help_has_examples_and_exit_statuses(command: str, capsys: Output) -> None:
     said = call(main, capsys, *command.split(), '--help')

@@ -41,6 +41,7 @@ from abdf1_ros.settings.rows import Rows
 from hypothesis import given
 from hypothesis import strategies as st
 import pytest
+from support.cases import for_all
 from support.mappings import make_mapping
 
 
@@ -55,7 +56,7 @@ def test_columns_are_those_of_a_map_file() -> None:
         4, 'int32', 'High', 7)
 
 
-@pytest.mark.parametrize(('address', 'cells', 'text'), [
+@for_all(('address', 'cells', 'text'), [
     ('N7', {}, 'ADDRESS "N7": an element is missing, as in N7:0'),
     ('B3/4096', {}, 'ADDRESS "B3/4096": bits of B3 run from 0 to 4095'),
     ('N7:0', {'Length': '0', 'Command': 'Read'},
@@ -81,7 +82,7 @@ def test_faults_name_the_argument(address: str, cells: dict[str, str], text: str
     assert str(caught.value) == text
 
 
-@pytest.mark.parametrize('address, kind, number, expected', [
+@for_all(('address', 'kind', 'number', 'expected'), [
     ('N7:5', '', 3, 'N7:8'), ('N7:5', 'int32', 3, 'N7:11'), ('F8:2', '', 2, 'F8:4'),
     ('B3:0/5', '', 3, 'B3:0/8'), ('B3:0/5', '', 11, 'B3:1/0'), ('I:1.0/15', '', 1, 'I:1.1/0'),
     ('T4:0.PRE', '', 1, 'T4:0.ACC')])
@@ -113,7 +114,7 @@ def test_values_have_the_tags_of_their_own_addresses() -> None:
     assert labels(bits, tags) == ['N7:0/2', 'N7:0/3 bit']
 
 
-@pytest.mark.parametrize('address, kind, texts, values', [
+@for_all(('address', 'kind', 'texts', 'values'), [
     ('N7:0', '', ['5', '-6', '0x1F', '0b11', '007'], [5, -6, 31, 3, 7]),
     ('F8:0', '', ['1.5', '1e3', '2,5'], [1.5, 1000, 2.5]), ('B3:0/0', '', ['1', '0'], [1, 0]),
     ('ST9:0', '', ['a b'], 'a b'), ('N7:0', 'bcd16', ['1234'], [1234])])
@@ -122,7 +123,7 @@ def test_text_becomes_values_of_the_type(
     assert parse_values(make(address, Type=kind), texts) == values
 
 
-@pytest.mark.parametrize('address, texts', [
+@for_all(('address', 'texts'), [
     ('N7:0', ['x']), ('N7:0', ['']), ('N7:0', ['0x']), ('N7:0', ['1.0']), ('F8:0', ['1.5.2']),
     ('ST9:0', ['a', 'b']), ('N7:0', ['1_000']), ('N7:0', ['0x1_0']), ('N7:0', ['\u0661']),
     ('N7:0', ['\uff11']), ('N7:0', [' 1']), ('F8:0', ['1_0.5']), ('F8:0', ['\u0661']),
@@ -132,7 +133,7 @@ def test_text_that_is_no_value_is_a_format_error(address: str, texts: list[str])
         parse_values(make(address), texts)
 
 
-@pytest.mark.parametrize('address, text, right', [
+@for_all(('address', 'text', 'right'), [
     ('N7:0', '1_000', '"1_000" is not a valid int16, a whole number from -32768 to 32767'),
     ('N7:0', '0xFFFF', '"0xFFFF" is not a valid int16, a whole number from -32768 to 32767; '
                        '--type uint16 allows it'),
@@ -161,14 +162,14 @@ def test_write_that_is_interrupted_while_it_begins_is_unknown() -> None:
     assert (result.outcome, result.detail) == (Outcome.UNKNOWN, 'port lost: closed')
 
 
-@pytest.mark.parametrize('processor, cell', [
+@for_all(('processor', 'cell'), [
     (None, ''), (Processor.SLC_5_02, '5/02'), (Processor.SLC_5_03, ''),
     (Processor.ML1500, 'ML1500')])
 def test_processor_that_says_what_it_is(processor: Processor | None, cell: str) -> None:
     assert processor_cell(processor) == cell
 
 
-@pytest.mark.parametrize('text, unit', [
+@for_all(('text', 'unit'), [
     ('Tank level [%]', '%'), ('speed [m/min]', 'm/min'), ('[bar]', 'bar'), ('[%] of tank', ''),
     ('a [\x1b]', r'\x1b'), ('b []', ''), ('a [plant with halls]', '')])
 def test_unit_of_a_description(text: str, unit: str) -> None:
@@ -183,7 +184,7 @@ def test_whole_numbers_in_every_notation(value: int) -> None:
         assert parse_values(mapping, [hex(value), bin(value), oct(value)]) == [value] * 3
 
 
-@pytest.mark.parametrize('address, kind, texts, length', [
+@for_all(('address', 'kind', 'texts', 'length'), [
     ('N7:0', None, ['1', '2'], 2), ('ST9:0', 'string', ['Tank 5'], 1),
     ('N7:0', 'string', ['abcde'], 3), ('A10:0', 'string', [''], 1), ('st9:0', None, ['a', 'b'], 1)
 ])
@@ -191,7 +192,7 @@ def test_length_of_a_write(address: str, kind: str | None, texts: list[str], len
     assert length_of(address, kind, texts) == length
 
 
-@pytest.mark.parametrize(('kind', 'value', 'radix', 'text'), [
+@for_all(('kind', 'value', 'radix', 'text'), [
     ('int16', -2, Radix.HEXADECIMAL, 'FFFE'), ('int16', 10, Radix.HEXADECIMAL, '000A'),
     ('int16', -1, Radix.OCTAL, '177777'), ('uint16', 5, Radix.BINARY, '0000000000000101'),
     ('int32', -1, Radix.HEXADECIMAL, 'FFFFFFFF'),

@@ -22,6 +22,7 @@ from abdf1_ros.cli.plc.line import network_of
 from abdf1_ros.cli.plc.parser import help_asked, make_parser
 from abdf1_ros.problems import ConfigurationError
 import pytest
+from support.cases import for_all
 
 
 def parse(*args: str) -> argparse.Namespace:
@@ -84,7 +85,7 @@ def test_list_of_stations_has_ranges_and_numbers() -> None:
     assert parse('scan', '0-3,9').stations == (0, 1, 2, 3, 9)
 
 
-@pytest.mark.parametrize('args', [
+@for_all('args', [
     ('scan', ''), ('scan', '300'), ('ping', '1-2'), ('ping', '1', '--count', '-1'),
     ('watch', 'N7:0', '--period', '-1'), ('watch', 'N7:0', '--period', 'nan'),
     ('watch', 'N7:0', '--count', '1.5'), ('watch', 'N7:0', '--count', '\u0661'),
@@ -119,7 +120,7 @@ def test_help_of_all_commands_loads_next_to_nothing() -> None:
     assert not {'serial', 'decimal', 'csv', 'concurrent.futures'} & set(said)
 
 
-@pytest.mark.parametrize(('words', 'parsed'), [
+@for_all(('words', 'parsed'), [
     (['help'], ['--help']), (['help', 'read'], ['read', '--help']),
     (['read', 'help'], ['read', '--help']), (['read', 'N7:0'], ['read', 'N7:0']), ([], [])])
 def test_help_is_also_a_word(words: list[str], parsed: list[str]) -> None:
@@ -131,7 +132,7 @@ def test_no_time_for_an_answer_is_refused() -> None:
         network_of(parse('read', 'N7:0', '--port', '/dev/x', '--timeout', '0'))
 
 
-@pytest.mark.parametrize('said, kind, family', [
+@for_all(('said', 'kind', 'family'), [
     ('INT SLC500', 'int16', 'SLC'), ('REAL PLC-5', 'float32', 'PLC5'),
     ('DINT MicroLogix', 'int32', 'SLC'), ('uint16 plc2', 'uint16', 'PLC2')])
 def test_types_and_families_have_the_names_of_the_field(said: str, kind: str, family: str) -> None:

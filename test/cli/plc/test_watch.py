@@ -39,6 +39,7 @@ from abdf1_ros.settings.scaling import Scaling
 from abdf1_ros.sniffer.dumps import Recording
 from abdf1_ros.testing import Plcs
 import pytest
+from support.cases import for_all
 from support.commands import Output
 from support.driver_bench import store
 from support.mappings import make_mapping
@@ -285,7 +286,7 @@ def test_number_has_a_curve_where_it_fits_and_can_be_shown(draw: Draw) -> None:
         assert (head.split()[-1], line.split()[-1]) == ('value', '12')
 
 
-@pytest.mark.parametrize('numbers, curve', [
+@for_all(('numbers', 'curve'), [
     ([], ''), ([5], ''), ([5, 5.0, 5], ''), ([nan, inf, -inf], ''), ([nan, 5, inf, 5], ''),
     ([1.0, 1.00000001], ''),  # the same as far as it is shown
     ([0, 7, 1], '0 ▁█▂ 7'), ([-32768, 32767, 0], '-32768 ▁█▅ 32767'),
