@@ -19,6 +19,7 @@ import re
 from abdf1_ros.pccc.families import FAMILIES, parse_address
 from abdf1_ros.pccc.file_types import FileType, PlcType
 from abdf1_ros.pccc.values import types_of
+import pytest
 from support.cases import for_all
 
 from tools import drawing, tables
