@@ -31,7 +31,7 @@ _WAITING = (
     'test_docs', 'test_', 'cli/')
 _COMPUTING = (
     'lab/simulate/', 'lab/noise/', 'df1/test_multidrop_line.py', 'lab/soak/',
-    'driver/', 'df1/', 'lab/fuzz/', '')
+    'driver/', 'df1/', 'lab/fuzz/', 'conform/', 'simulator/', 'sniffer/', 'tools/', 'plan/', '')
 
 _HERE = Path(__file__).parent
 
