@@ -117,9 +117,17 @@ def _exists(dotted: str) -> bool:
     return path.is_dir() or path.with_suffix('.py').is_file()
 
 
+def _statements(tree: ast.AST) -> Iterator[ast.AST]:
+    """Yield all statements of a tree; most of a tree are expressions, which hold none."""
+    for node in ast.iter_child_nodes(tree):
+        if isinstance(node, (ast.stmt, ast.excepthandler, ast.match_case)):
+            yield node
+            yield from _statements(node)
+
+
 def imports(module: str, source: str) -> Iterator[str]:
     """Yield the absolute dotted name of everything that ``module`` imports."""
-    for node in ast.walk(ast.parse(source)):
+    for node in _statements(ast.parse(source)):
         if isinstance(node, ast.Import):
             yield from (alias.name for alias in node.names)
         elif isinstance(node, ast.ImportFrom):
