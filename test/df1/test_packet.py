@@ -66,8 +66,7 @@ def test_reply_answers_its_command() -> None:
     assert COMMAND.reply(b'data', 0x10).answers(COMMAND)
 
 
-@for_all('change', [
-    {'dst': 6}, {'src': 18}, {'tns': 0x0103}, {'tns': 0x0202}, {'cmd': 0x0F}])
+@for_all('change', [{'dst': 6}, {'src': 18}, {'tns': 0x0103}, {'tns': 0x0202}, {'cmd': 0x0F}])
 def test_other_messages_do_not_answer(change: dict[str, Any]) -> None:
     assert not COMMAND.reply()._replace(**change).answers(COMMAND)
 

@@ -254,8 +254,7 @@ def test_whole_file_of_256_words_is_one_row(mode: str) -> None:
     assert bench.listener.values(words)[-1] == list(range(256))
 
 
-@for_all(('address', 'length'), [
-    ('N7:0/0', 8), ('N7:0/0', 16), ('N7:0/8', 8), ('N7:0/4', 20)])
+@for_all(('address', 'length'), [('N7:0/0', 8), ('N7:0/0', 16), ('N7:0/8', 8), ('N7:0/4', 20)])
 def test_bits_of_integers_in_any_number(address: str, length: int) -> None:
     device = device_of('Peer')
     device.words.update({(1, 7, 0): 0x1234, (1, 7, 1): 0xFFFE})

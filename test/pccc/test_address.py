@@ -227,8 +227,7 @@ def test_what_is_no_part_of_a_structure(text: str, reason: str) -> None:
         parse_address(text, PLC5)
 
 
-@for_all(('letters', 'family'), [
-    ('L', PLC5), ('BT', SLC), ('SC', SLC), ('X', PLC5), ('X', SLC)])
+@for_all(('letters', 'family'), [('L', PLC5), ('BT', SLC), ('SC', SLC), ('X', PLC5), ('X', SLC)])
 def test_letters_of_no_file_of_the_family(letters: str, family: PlcType) -> None:
     known = ', '.join(kind.value for kind in FAMILIES[family].file_types)
     title = 'PLC-5' if family == PLC5 else 'SLC'

@@ -83,8 +83,7 @@ def test_slots_are_files_of_their_own() -> None:
     lambda words, place: words.read(place, 1),
     lambda words, place: words.write(place, b'\x01\x00'),
     lambda words, place: words.write_bits(place, 1, 1)])
-@for_all(('text', 'error'), [
-    ('N7:3', OutOfRange), ('N9:0', NoSuchFile), ('B7:0', NoSuchFile)])
+@for_all(('text', 'error'), [('N7:3', OutOfRange), ('N9:0', NoSuchFile), ('B7:0', NoSuchFile)])
 def test_bad_place_changes_nothing(act: Callable[[DataTable, Address], object], text: str,
                                    error: type[Exception]) -> None:
     words = table(('N7:0', 3))

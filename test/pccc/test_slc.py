@@ -196,8 +196,7 @@ def test_place_of_the_directory(code: int, own_row: int, names: tuple[str, ...])
         assert [(str(entry), entry.elements) for entry in files] == [('O0', 3)]
 
 
-@for_all('processor', [None, *(
-    Processor(name) for name in ('5/01', '5/02', 'ML1000'))])
+@for_all('processor', [None, *(Processor(name) for name in ('5/01', '5/02', 'ML1000'))])
 def test_processors_without_a_known_directory(processor: Processor | None) -> None:
     assert SlcFileSearch().directory(processor) is None
 

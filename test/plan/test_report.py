@@ -112,8 +112,7 @@ def test_station_0_on_a_full_duplex_line_is_odd(mode: str, own: int, station: in
         assert remark.text.startswith(f'{begin}: a message to station 0 begins with 00')
 
 
-@for_all(('station', 'octal'), [
-    (10, 8), (17, 15), (77, 63), (7, None), (18, None)])
+@for_all(('station', 'octal'), [(10, 8), (17, 15), (77, 63), (7, None), (18, None)])
 def test_node_behind_a_gateway_may_be_octal_on_its_panel(station: int, octal: int | None) -> None:
     found = texts(report_of(make_mapping('N7:0'), make_mapping('N7:0', station=station, via=3)),
                   RemarkKind.STATION)

@@ -71,8 +71,7 @@ def test_rule_1_nobody_else_writes_the_word(command: str) -> None:
 BY_NUMBER = ' (a PLC finds a file by its number, whatever Type or PLC_Type a row gives it)'
 
 
-@for_all('own', [
-    BEAT, BEAT | {'Command': 'Write', 'Fallback': '0', 'Fallback_After': '500'}])
+@for_all('own', [BEAT, BEAT | {'Command': 'Write', 'Fallback': '0', 'Fallback_After': '500'}])
 @for_all(('cells', 'why'), [
     ({'Station': '255', 'Address': 'N10:0'}, ' (a broadcast has the words of every station)'),
     ({'Station': '255', 'Address': 'B10:0', 'PLC_Type': 'SLC'},
@@ -129,8 +128,7 @@ def test_rule_12_slots_and_sections_are_files_of_their_own() -> None:
     assert tags_of(*rows) == ['N', 'B']
 
 
-@for_all('address', [
-    'S:1', 'I:001', 'O:001', 'T4:0.ACC', 'C5:0.PRE', 'R6:0.POS', 'PD10:0'])
+@for_all('address', ['S:1', 'I:001', 'O:001', 'T4:0.ACC', 'C5:0.PRE', 'R6:0.POS', 'PD10:0'])
 def test_rule_1_file_with_a_meaning_is_no_place_to_count(address: str) -> None:
     found = faults(row(**BEAT | {'Address': address}, Type='int16'))
     assert any('take a word of its own in an N or B file, such as N7:0' in text
