@@ -305,6 +305,25 @@ def test_rule_8_fallback_that_stands_does_not_wait_for_one_of_a_busy_station() -
     assert second is not None and second.write.mapping is speeds[0]
 
 
+@pytest.mark.parametrize(('event', 'waits'), [
+    ('', False), ('message', True), ('message after a failure', False),
+    ('write of its words', True), ('silence', True)])
+def test_rule_8_fallback_that_stands_is_put_off(event: str, waits: bool) -> None:
+    one, stations = OneRow(), ActiveStationList([1], probe_time=1.0)
+    row = one.row
+    plc = Plc(1, [row], stations, one.record, Conditions())
+    row.make_due(FallbackCause.START, 0.0)
+    one.fallback(row.take(0.0), 1.0)
+    row.has_failed = 'failure' in event
+    if event == 'write of its words':
+        one.record.begin(1, [one.mapping.extent])
+    elif event == 'silence':
+        stations.lost(1, 2.0)
+    youngest = {one.mapping: 5.0} if 'message' in event else {}
+    assert plc.to_refresh(youngest, 6.0) is (None if waits else row)
+    assert row.refresh_at == 6.0 + waits * row.after
+
+
 def test_rule_8_message_that_is_lost_with_the_port_is_not_waited_for() -> None:
     speed = speed_row(Fallback((7,), 5000))
     recipe = make_mapping('N7:1', 'Write', length=150)
