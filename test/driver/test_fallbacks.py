@@ -305,6 +305,18 @@ def test_rule_8_fallback_that_stands_does_not_wait_for_one_of_a_busy_station() -
     assert second is not None and second.write.mapping is speeds[0]
 
 
+def test_rule_8_fallback_that_was_confirmed_first_is_written_again_first() -> None:
+    line = Line([make_mapping('N7:0', 'Write', station=number, fallback=FALLBACK)
+                 for number in (1, 2)], (1, 2))
+    line.run(4.0)
+    interlocks = line.driver.interlocks
+    for number, row in enumerate(interlocks.fallbacks, 1):
+        row.refresh_at -= number
+        interlocks.plcs[number].plan_refresh(row)
+    first = interlocks.refresh(9.0)
+    assert first is not None and first.station == 2
+
+
 @pytest.mark.parametrize(('event', 'waits'), [
     ('', False), ('message', True), ('message after a failure', False),
     ('write of its words', True), ('silence', True)])

@@ -175,7 +175,7 @@ class FallbackRow:
     def refresh(self, now: float) -> Write:
         """Return the write of a fallback that the PLC holds already."""
         self.is_under_way, self.tried, self.tries = True, now, self.tries + 1
-        self.due = self.refresh_at = math.inf
+        self.due = math.inf
         return Write(self.mapping, self._values, now, is_own=True)
 
     def ended(self, outcome: Outcome, now: float) -> float | None:

@@ -262,9 +262,9 @@ class Plc:
 
     def next_due(self, least: float) -> float:
         """Return when the next write may be sent, if before ``least`` (clock values, s)."""
-        if self.due >= least:
-            return min(least, self.refresh_due)
         least = min(least, self.refresh_due)
+        if self.due >= least:
+            return least
         if self._has_last_try:
             return min([least, *(row.due for row in self.rows
                                  if row.tried < self._conditions.ended)])
