@@ -23,7 +23,10 @@ from abdf1_ros.driver.job_tasks import Job
 from abdf1_ros.driver.reads.job import ReadJob
 from abdf1_ros.driver.write import Outcome, Write
 from abdf1_ros.pccc.dialect import Steps
+from abdf1_ros.settings.heartbeats import Fallback
+import pytest
 from support.agenda_bench import Bench, make_job, written
+from support.interlocks import FALLBACK
 from support.mappings import make_mapping
 
 WORD = make_mapping('N7:5', 'Write')
@@ -47,6 +50,16 @@ def test_period_counts_from_the_due_time_and_not_from_the_end() -> None:
     bench = Bench(job)
     assert bench.read(0.03, took=0.05) is job
     assert job.due == 0.1
+
+
+@pytest.mark.parametrize(('fallback', 'expires', 'patience'), [
+    (None, 3.5, 2.5), (FALLBACK, 2.0, 0.0)])
+def test_message_has_its_patience_and_a_fallback_bounds_all_packets(
+        fallback: Fallback | None, expires: float, patience: float) -> None:
+    bench = Bench()
+    bench.write(make_mapping('N7:5', 'Write', fallback=fallback), 1, 1.0)
+    job = bench.writes.next(1.0)
+    assert job is not None and (job.expires, job.patience) == (expires, patience)
 
 
 def test_four_writes_in_a_row_and_then_a_read_that_is_due() -> None:

@@ -14,9 +14,11 @@
 
 """The orderly end of a bridge on a virtual line: rule 5 of docs/heartbeats.md."""
 
+import math
+
 from abdf1_ros.df1.packet import Packet
 from abdf1_ros.driver.writes.under_way import WriteJob
-from abdf1_ros.settings.heartbeats import Fallback
+from abdf1_ros.settings.heartbeats import Fallback, LAST_ANSWER
 import pytest
 from support.interlocks import beat_row, Cell, END, end, FALLBACK, speed_row
 from support.mappings import make_mapping
@@ -151,6 +153,18 @@ def test_rule_5_end_asks_a_silent_plc_at_once_where_another_answers() -> None:
     cell.bench.line.wake(cell.bench.driver.machine)
     cell.run(1.5)
     assert (cell.word('N10:0'), cell.word('N7:0')) == (0, 7)
+
+
+@pytest.mark.parametrize(('ends', 'answer_within'), [(False, math.inf), (True, LAST_ANSWER)])
+def test_rule_5_last_try_at_a_silent_plc_is_short(ends: bool, answer_within: float) -> None:
+    driver = Cell(speed_row(), start=False).bench.driver
+    driver.interlocks.begin(0.0)
+    driver.stations.lost(1, 0.0)
+    if ends:
+        driver.interlocks.wind_down()
+    job = driver.interlocks.next(0.0)
+    assert job is not None and job.is_free
+    assert job.answer_within == answer_within
 
 
 def test_rule_5_what_was_not_confirmed_at_the_end_is_named() -> None:
