@@ -22,7 +22,9 @@ from types import SimpleNamespace
 from typing import Any, cast
 
 from abdf1_ros.cli.monitor import plant, view
+from abdf1_ros.df1.echo import COMES_BACK
 from abdf1_ros.df1.frames import message_frame
+from abdf1_ros.df1.machine import Machine
 from abdf1_ros.df1.packet import Packet
 from abdf1_ros.df1.slave_link import SlaveLink
 from abdf1_ros.driver.checks import StationHealth
@@ -247,14 +249,41 @@ def test_link_of_a_node_with_a_duplicate_name(bench: Bench) -> None:
     assert bench.says('link') == (ERROR, 'ERROR: gone; another node is called /line_a too')
 
 
-def test_link_of_a_node_that_new_programs_cannot_hear(bench: Bench) -> None:
-    faults = ['', LOST, LOST]
+def test_fault_is_logged_when_it_begins_and_again_after_it_was_over(bench: Bench) -> None:
+    faults, stations = ['', LOST, LOST, '', LOST], bench.driver.stations
     watches = watches_of(bench.diagnostics.line, PORT, bench.seen, (), lambda now: [],
-                         lambda now: [], lambda now: faults[int(now)])
-    told = [[news.text for watch in watches for news in watch.look(now)]
-            for now in (0.0, 1.0, 2.0)]
-    assert told == [[], [LOST], []]
+                         lambda now: [], lambda now: faults[int(now - NOW)])
+
+    def look(now: float) -> list[str]:
+        return [news.text for watch in watches for news in watch.look(NOW + now)]
+
+    assert [look(now) for now in range(5)] == [[], [LOST], [], [], [LOST]]
     assert bench.says('link') == (WARN, f'WARN: port open, 0 of 2 stations have answered; {LOST}')
+    for _ in range(2):  # it answers polls, and no command
+        stations.lost(1, NOW)
+        stations.heard(1, NOW + 4)
+    text, = look(4.0)
+    assert (text[:24], look(4.0)) == ('station 1 answers polls,', [])
+    stations.lost(1, NOW + 4)
+    faults[4:] = [''] * 20
+    assert look(15.0) == []  # it is gone
+    stations.heard(1, NOW + 16)
+    text, = look(16.0)
+    stations[1].returns = 0
+    assert (text[:24], look(16.0)) == ('station 1 answers polls,', [
+        'station 1 answers commands'])
+
+
+@pytest.mark.parametrize(('mode', 'silent', 'is_fault'), [
+    ('Peer', 0, True), ('Master', 1, False), ('Master', 2, True), ('Radio', 2, False)])
+def test_echo_is_a_fault_where_it_does_harm(
+        mode: str, silent: int, is_fault: bool, make_bench: Benches,
+        monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(Machine, 'echoes', True)
+    bench = make_bench(mode=mode)
+    for number in range(1, silent + 1):
+        bench.driver.stations.lost(number, NOW)
+    assert (COMES_BACK in bench.says('link')[1]) is is_fault
 
 
 def test_slave_that_nobody_polls_is_a_warning(make_bench: Benches) -> None:
@@ -462,6 +491,7 @@ def test_refused_command_of_a_plc_is_told_for_a_minute(bench: Bench) -> None:
         bench.driver.stations.heard(number, NOW)
     # An MSG of station 1: write one word to N7:10, as an SLC writes to an SLC (M 7-28).
     command = Packet(5, 1, 0x0F, 0, 7, bytes.fromhex('AA 02 07 89 0A 00 39 30'))
+    bench.driver.refused.add(command._replace(src=2), command.reply(sts=0x10), NOW + 1.5)
     for number in range(3):
         bench.driver.refused.add(command, command.reply(sts=0x10), NOW + number)
     text = ('station 1: protected typed logical write N7:10: STS 10: illegal command, format or '
@@ -533,13 +563,14 @@ def test_rows_that_cannot_keep_their_period_are_named_with_one_that_would_do(
             for number in range(40, -1, -1):
                 bench.point(tag).update(b'\x01\x00', end - number * interval)
 
-    read_until(NOW, {'fast': 0.345, 'slow': 1.3, 'free': 2.0, 'faster': 0.2})
+    read_until(NOW, {'fast': 0.405, 'slow': 1.3, 'free': 2.0, 'faster': 0.206})
     assert bench.says('mappings', NOW) == (WARN, (
-        'WARN: of 4 mappings 4 fresh; Period not kept: faster (Period 50 ms, kept 200 ms), '
-        'fast (Period 100 ms, kept 345 ms); the line can keep Period 500'))
+        'WARN: of 4 mappings 4 fresh; Period not kept: faster (Period 50 ms, kept 206 ms), '
+        'fast (Period 100 ms, kept 405 ms); the line can keep Period 1000'))
+    assert 'Period' not in bench.says('mappings', NOW + 50)[1]  # no row is read any more
     read_until(NOW + 100, {'fast': 0.1, 'slow': 1.0, 'free': 2.0, 'faster': 0.1})
     assert bench.says('mappings', NOW + 100) == (WARN, (
-        'WARN: of 4 mappings 4 fresh; Period not kept: faster (Period 50 ms, kept 100 ms); '
+        'WARN: of 4 mappings 4 fresh; Period not kept: faster (Period 50 ms, kept 101 ms); '
         'the line can keep Period 200'))
 
 
@@ -615,6 +646,8 @@ def result(bench: Bench, outcome: Outcome, detail: str = '') -> WriteResult:
 
 OUTCOMES: list[tuple[Outcome, dict[str, str]]] = [
     (Outcome.WRITTEN, {'accepted': '1', 'confirmed': '1'}),
+    (Outcome.STANDS, {'accepted': '1', 'not written again': '1'}),
+    (Outcome.BROADCAST, {'accepted': '1'}),
     (Outcome.SUPERSEDED, {'accepted': '1', 'superseded': '1'}),
     (Outcome.REFUSED, {'refused': '1'}),
     (Outcome.NOT_SENT, {'accepted': '1', 'failed': '1'}),
@@ -634,7 +667,8 @@ def test_every_outcome_is_counted_in_its_place(
     last = values.pop('last failure')
     assert values.pop('last loss') == values.pop('clock ahead') == 'none'
     assert {key: value for key, value in values.items() if value != '0'} == expected
-    is_failure = outcome not in (Outcome.WRITTEN, Outcome.SUPERSEDED)
+    is_failure = outcome not in (
+        Outcome.WRITTEN, Outcome.STANDS, Outcome.BROADCAST, Outcome.SUPERSEDED)
     assert last == (f'level {outcome.value}: why (1.0 s ago)' if is_failure else 'none')
     assert log.judge(NOW)[0] == (WARN if is_failure else OK)
 
@@ -817,5 +851,5 @@ def test_rows_whose_messages_fill_the_line_are_named_the_fullest_first() -> None
     assert line.text(105.0) == (
         'messages fill 90% of the line: w1 (70%), w0 (20%); set Write_Again to leave out '
         'unchanged values')
-    spent[rows[1]] = 9.0
+    spent[rows[1]] = 11.0
     assert line.text(120.0) == ''

@@ -70,6 +70,7 @@ def test_slow_callback_is_no_pause_between_writes() -> None:
     assert writes_taken(*5 * [(0.2, 1)]) == 5  # each held up, as by a busy host
     assert writes_taken(*5 * [timer], write, slow_timer, slow_timer, write) == 2
     assert writes_taken(write, *3 * [(0.025, 0)], write) == 1
+    assert writes_taken(*2 * [(0.025, 0)], write, (0.025, 0), write) == 2
     assert writes_taken(*5000 * [(0.01, 1)]) == pytest.approx(100 * LAST_WRITES, abs=1)
 
 

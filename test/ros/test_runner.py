@@ -22,6 +22,7 @@ import time
 from typing import Any
 from unittest.mock import Mock
 
+from abdf1_ros.ros.bridge.last_writes import LAST_WRITES
 from abdf1_ros.ros.bridge.node import end_together
 from abdf1_ros.ros.callbacks import AnsweringNode, Callbacks
 from abdf1_ros.ros.diagnostics.log import MOST_ENTRIES
@@ -116,7 +117,7 @@ def test_all_plcs_are_told_before_a_link_stops_and_results_come_before_the_last_
     clock = Mock(monotonic=Mock(return_value=0.0))
 
     def take(look: object, taken: Callable[[], int], give_up: float) -> None:
-        assert clock.monotonic() < give_up
+        assert give_up == LAST_WRITES
         nodes[0].taken, nodes[2].taken = 1, 2
         calls.append(f'{taken()} last writes')
         clock.monotonic.return_value = passed
@@ -162,6 +163,8 @@ def test_thread_of_callbacks_turns_when_it_is_woken_unless_a_callback_hangs() ->
         callbacks.has_turned = False
         callbacks.wake()
         observer.until(lambda: callbacks.has_turned, 'a turn')
+        bridge: Any = Mock(link='link')
+        assert Line(bridge, callbacks).threads() == ['link', callbacks]
 
         def hang() -> None:
             hangs.set()

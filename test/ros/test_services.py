@@ -14,19 +14,27 @@
 
 """Services of rows over DDS: ~/set/<topic> and ~/read_now/<topic>."""
 
-from collections.abc import Iterator
+from collections.abc import Callable, Coroutine, Iterator
 from datetime import datetime, UTC
 from pathlib import Path
 import signal
 import threading
 import time
-from typing import Any
+from typing import Any, cast
 
+from abdf1_ros.driver.driver import Driver
+from abdf1_ros.driver.reads.demands import ReadAnswer
+from abdf1_ros.ports.clock import line_time
+from abdf1_ros.ros.topics.services import RowServices
+from abdf1_ros.settings.mapping import Mapping
+from abdf1_ros.settings.network import Network
+from abdf1_ros.settings.rows import Rows
 import pytest
 from rclpy.qos import QoSProfile
 from std_msgs.msg import Int16MultiArray, UInt8MultiArray
 from std_srvs.srv import SetBool, Trigger
 from support.cell import BridgeCell
+from support.mappings import make_mapping
 from support.ros import details, Observer, Process, write_csv
 from support.simulator_process import make_files
 
@@ -298,3 +306,66 @@ def test_line_that_is_only_listened_to_has_no_services_of_rows(tmp_path: Path) -
     with Bench(tmp_path, DATA, '\n'.join(rows), 'Mode,Baud\nListen,115200') as bench:
         bench.ros.until(lambda: bench.ros.node.count_publishers('/abdf1/read/speed'), 'the topic')
         assert bench.services() == set()
+
+
+class StandIn:
+    """A node, a driver and a write topic in one, which only remember."""
+
+    def __init__(self, *rows: Mapping) -> None:
+        self.network, self.mappings, self.executor = Network(), Rows(rows), self
+        self.call_stamps = 1, 2
+        self.made: dict[str, Callable[..., Coroutine[Any, Any, Any]]] = {}
+        self.closed: list[str] = []
+        self.takes: list[Callable[[ReadAnswer], None]] = []
+
+    def create_service(self, kind: type, name: str, answer: Any, **options: object) -> str:
+        self.made[name] = answer
+        return name
+
+    def destroy_service(self, name: str) -> None:
+        self.closed.append(name)
+
+    def create_task(self, task: Callable[[], None]) -> None:
+        task()
+
+    def read_now(self, row: Mapping, now: float, take: Callable[[ReadAnswer], None]) -> None:
+        self.takes.append(take)
+
+    def take(self, topic: str, *message: object) -> None:
+        """Write nothing."""
+
+
+def test_services_of_rows_that_are_gone_close_once_when_no_call_waits() -> None:
+    rows = [make_mapping(f'N7:{number}', tag=f'n{number}') for number in range(3)]
+    node: Any = StandIn(*rows, make_mapping('B3:0/0', 'Write', tag='lamp'))
+    woken: list[str] = []
+    services = RowServices(node, node, lambda: woken.append('executor'))
+
+    def reload(*left: Mapping) -> None:
+        services.open(cast(Driver, StandIn(*left)), 100, 2.0, lambda: None)
+
+    def ended(call: Coroutine[Any, Any, Any]) -> str:
+        with pytest.raises(StopIteration) as end:
+            call.send(None)
+        return str(end.value.value.message)
+
+    services.open(node, 100, 2.0, lambda: woken.append('link'))
+    read = node.made['~/read_now/n0'](Trigger.Request(), Trigger.Response())
+    put = node.made['~/set/lamp'](SetBool.Request(), SetBool.Response())
+    for call in read, put:
+        call.send(None)
+    assert woken == ['link']
+    longest = 2.0 + Network().line_mode.longest_transaction(Network().line, 0.0)
+    services.look(line_time() + 2 * longest - 1.0)
+    assert woken == ['link']
+    reload(rows[1])
+    reload()
+    services.look(line_time())
+    assert node.closed == []
+    node.takes[0](ReadAnswer(error='late'))
+    assert ended(read) == 'late'
+    services.withdraw()
+    assert ended(put) == 'unknown whether written: no result has come'
+    for _ in range(2):
+        services.look(line_time())
+    assert sorted(node.closed) == sorted(node.made)

@@ -21,7 +21,9 @@ import socket
 from types import SimpleNamespace
 from typing import Any
 
+from abdf1_ros.ports.link_thread import PortState
 from abdf1_ros.ros.bridge.node import BridgeNode
+from abdf1_ros.ros.bridge.session import BridgeSession
 from abdf1_ros.ros.bridge.standby import Standby
 from diagnostic_msgs.msg import DiagnosticStatus
 import pytest
@@ -168,6 +170,18 @@ def test_line_that_was_lost_for_a_moment_has_its_active_stations_again(pair: Pai
     pair.ros.until(lambda: pair.counts == (1, 1), 'the bridge to have the line again')
     stations = pair.ros.listen(UInt16MultiArray, '/abdf1/active_stations')
     stations.values([2] + 15 * [0])
+
+
+@pytest.mark.parametrize(('port', 'heard', 'has_line'), [
+    ('/dev/ttyS0', [None], True), ('socket://a:1', [None, 7.0], True),
+    ('socket://a:1', [None, 4.0], False)])
+def test_line_of_a_device_server_is_ours_when_any_station_has_answered_since_it_was_opened(
+        port: str, heard: list[float | None], has_line: bool) -> None:
+    session = SimpleNamespace(
+        port=port, _opened=5.0, driver=SimpleNamespace(stations=[
+            SimpleNamespace(last_heard=when) for when in heard]),
+        _surroundings=SimpleNamespace(link=SimpleNamespace(state=PortState(True, 'open'))))
+    assert BridgeSession.has_line.fget(session) is has_line  # type: ignore[attr-defined]
 
 
 def test_change_that_waits_for_the_executor_is_not_begun_again() -> None:

@@ -174,8 +174,7 @@ def test_service_gives_up(desk: Desk) -> None:
 
 
 def test_service_ends_with_the_port(desk: Desk) -> None:
-    desk.work({})
+    desk.work({1: b'\1\2'})
     desk.driver.checks.end('port lost: unplugged')
     desk.service.check(time.monotonic())
-    assert desk.result() == (
-        False, 'station 1: port lost: unplugged; station 2: port lost: unplugged')
+    assert desk.result() == (False, 'station 1: bytes 01 02; station 2: port lost: unplugged')
