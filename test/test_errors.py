@@ -12,8 +12,9 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The exception tree: what callers catch, and the numbered texts."""
+"""The exception tree, and the numbered messages: what callers catch, and the texts."""
 
+from abdf1_ros.counters import Counters, numbered
 from abdf1_ros.errors import (
     Abdf1Error,
     CommandTimeout,
@@ -24,9 +25,11 @@ from abdf1_ros.errors import (
     StationInactive,
     WrongCommandCode,
 )
-from abdf1_ros.messages import Message
+from abdf1_ros.messages import Event, Message, Severity
 from abdf1_ros.problems import ConfigurationError, Place, Problem
+import pytest
 from support.cases import for_all
+from support.vectors import load_tables
 
 
 def test_what_callers_can_catch() -> None:
@@ -93,3 +96,80 @@ def test_configuration_error_shows_every_problem() -> None:
     error = ConfigurationError(problems)
     assert error.problems == problems
     assert str(error) == 'a:1:1: this\na:1:2: that'
+
+
+SPECIFIED: list[tuple[int, str, str]] = [tuple(row) for row in load_tables()['messages']]
+COUNTERS = [(number, name) for number, name in load_tables()['counters']]
+
+
+def test_exactly_the_specified_messages_exist() -> None:
+    assert sorted((entry.number, entry.name) for entry in Message) == [
+        (number, name) for number, name, _ in SPECIFIED]
+    assert len(SPECIFIED) == 32
+
+
+@for_all(('number', 'name', 'text'), SPECIFIED)
+def test_text_is_that_of_the_specification(number: int, name: str, text: str) -> None:
+    message = Message[name]
+    assert message.number == number
+    assert message.template == text
+
+
+@for_all('message', Message)
+def test_severity_follows_the_mnemonic(message: Message) -> None:
+    prefix = {Severity.CRITICAL: 'CRT', Severity.ERROR: 'ERR', Severity.NOTICE: 'NTC'}
+    assert message.name.startswith(prefix[message.severity] + '_')
+
+
+@for_all('message', Message)
+def test_text_takes_as_many_arguments_as_it_has_places(message: Message) -> None:
+    args = tuple(range(message.template.count('%')))
+    assert '%' not in message.text(*args)
+    if message.has_choices:
+        assert message.text(*args, 'TOY') == f'{message.text(*args)}, TOY'
+    else:
+        with pytest.raises(TypeError):
+            message.text(*args, 1)
+    if args:
+        with pytest.raises(TypeError):
+            message.text(*args[1:])
+
+
+@for_all(('shown', 'text'), [
+    (Message.ERR_BAD_CRC.text(0x0A, 0xFF, 0, 1),
+     'Response with wrong CRC (actual=0x0aff, expected=0x0001)'),
+    (Message.ERR_WRONG_MESSAGE.text(1, 0x20, 0x2A),
+     'Wrong Message Received Src:0x01, Dst:0x20, Tns:0x002a'),
+    (Message.CRT_BAD_STATION_ID.text('abc', 255),  # as a user typed it
+     'Invalid station number (abc) must be less than 255'),
+    (Message.ERR_COMMAND_TIMEOUT.entry(), '2508 ERR_COMMAND_TIMEOUT: Command Timed Out'),
+    (Event(Message.NTC_ACK_EXPECTED, (0x15,), 7),
+     '2515 NTC_ACK_EXPECTED: ACK Expected (last symbol received was 0x15) [station 7]'),
+    (Event(Message.ERR_COMMAND_TIMEOUT, (), 0),
+     '2508 ERR_COMMAND_TIMEOUT: Command Timed Out [station 0]'),
+    (Event(Message.NTC_NAK_RETRY, (2, 2515)),
+     '2521 NTC_NAK_RETRY: NAK Retry #2, due to error 2515')])
+def test_entries_and_events(shown: str | Event, text: str) -> None:
+    assert str(shown) == text
+
+
+def test_by_mnemonic_shows_each_counter_under_its_own_name() -> None:
+    counters = Counters()
+    for entry in numbered():
+        setattr(counters, entry.name, entry.metadata['number'])
+    assert list(counters.by_mnemonic().items()) == [(name, number) for number, name in COUNTERS]
+
+
+def test_counters_are_those_of_the_specification_each_described() -> None:
+    assert COUNTERS == [
+        (entry.metadata['number'], entry.metadata['mnemonic']) for entry in numbered()]
+    descriptions = {entry.metadata['description'] for entry in numbered()}
+    assert '' not in descriptions
+    assert len(descriptions) == len(COUNTERS) == 29
+    assert set(Counters().by_mnemonic().values()) == {0}
+    with pytest.raises(AttributeError):
+        setattr(Counters(), 'polls', 1)
+
+
+def test_frames_are_damaged_whichever_check_is_wrong() -> None:
+    assert Counters(bcc_errors=2, crc_errors=3).damaged_frames == 5

@@ -12,15 +12,17 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Where the files of the package are found."""
+"""Where the files of the package are found, and the end that a signal asks for."""
 
 from pathlib import Path
+import subprocess
 import sys
 from types import SimpleNamespace
 
 import abdf1_ros
 from abdf1_ros import paths
 from abdf1_ros.__main__ import main
+from abdf1_ros.signals import EndRequest
 import pytest
 
 
@@ -62,3 +64,33 @@ def test_version_of_the_package_is_that_of_its_commands(
     assert capsys.readouterr().out == f'abdf1_ros {abdf1_ros.__version__}\n'
     with pytest.raises(AttributeError, match="module 'abdf1_ros' has no attribute 'x'"):
         _ = abdf1_ros.x
+
+
+# What stays until the interpreter takes its modules apart, when it has no signal handler any more.
+SLOW_END = """
+import time
+from abdf1_ros.signals import limit_output
+
+class Slow:
+    def __del__(self, sleep=time.sleep):
+        sleep(0.5)
+
+slow = Slow()
+limit_output(0.2)
+print('last words')
+"""
+
+
+def test_second_signal_does_not_begin_the_end_again() -> None:
+    begun: list[float] = []
+    end = EndRequest((), lambda: begun.append(end.when))
+    for _ in range(2):
+        end.set()
+    assert begun == [end.when]
+    assert end.is_set()
+
+
+def test_alarm_of_the_last_output_does_not_kill_a_slow_end() -> None:
+    ended = subprocess.run(
+        [sys.executable, '-c', SLOW_END], capture_output=True, text=True, check=False)
+    assert (ended.returncode, ended.stdout, ended.stderr) == (0, 'last words\n', '')

@@ -12,8 +12,9 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""What happens to processes and clocks, done to a real node; see docs/troubleshooting.md."""
+"""What happens to processes, clocks and ports of a real node; see docs/troubleshooting.md."""
 
+import os
 from pathlib import Path
 import re
 import signal
@@ -22,9 +23,9 @@ import time
 from rclpy.duration import Duration
 from rclpy.qos import QoSProfile
 from std_msgs.msg import Int16MultiArray, UInt8MultiArray
-from support.fault_rig import rigged, SETPOINT
-from support.ros import Observer
-from support.simulator_process import make_files
+from support.fault_rig import boxed, is_unanswered, NOT_SENT, rigged, SETPOINT
+from support.ros import ERROR, Observer, Process
+from support.simulator_process import IMPATIENT_ROW, make_files
 
 TOO_OLD = re.compile(
     r'not written: refused: it came \d+\.\d s after it was published, write_timeout is ')
@@ -79,3 +80,42 @@ def test_clock_of_the_host_that_steps_changes_no_age(observer: Observer, tmp_pat
             rig.recovers()
             rig.observer.until(lambda expected=result: re.match(expected, rig.write(4.0)), result)
         assert 'ERROR' not in '\n'.join(rig.node.lines[lines:])
+
+
+REFUSED = 'not written: refused: the port is not open'
+
+
+def test_device_vanishes_and_returns_as_another_of_its_name(
+        observer: Observer, tmp_path: Path) -> None:
+    with boxed(observer, tmp_path) as (rig, box):
+        rig.writes(3.0)
+        device = os.readlink(box.name)
+        box.unplug()
+        rig.status('link', ERROR, 'cannot open the port: ')
+        rig.node.wait_for('[ERROR]', f'{box.name}: the port was lost: ')
+        rig.node.wait_for('[ERROR]', f'{box.name}: cannot open the port: ', 'No such file')
+        rig.status('mappings', ERROR, '25 failed')
+        rig.status('station 2', ERROR, 'unknown: the port is not open')
+        rig.writes(4.0, REFUSED)
+        lines = len(rig.node.lines)
+        box.plug(other_than=device)
+        assert os.readlink(box.name) != device
+        rig.recovers()
+        rig.node.wait_for('[INFO]', f'{box.name}: open', after=lines)
+        assert rig.has_read_only(SETPOINT, 3.0)
+
+
+def test_process_at_the_far_end_of_tcp_is_frozen(observer: Observer, tmp_path: Path) -> None:
+    files = make_files(tmp_path, IMPATIENT_ROW)
+    simulator = Process('simulator', '--tcp', '127.0.0.1:0', '--data', str(files.simulator))
+    url = simulator.wait_for(' on socket://').split(' on ')[1].split(',')[0]
+    with rigged(observer, files, url, simulator) as rig:
+        rig.until_well()
+        simulator.stop()
+        assert is_unanswered(rig.write(3.0))
+        rig.status('link', ERROR, 'port open, but none of 2 stations answers')
+        rig.writes(4.0, NOT_SENT + 'nothing has been heard on this connection')  # rule 26
+        simulator.go_on()
+        rig.recovers()
+        # Commands that the connection has kept are expired for the far end, and not answered.
+        assert rig.has_read_only(SETPOINT, 3.0)

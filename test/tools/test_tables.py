@@ -12,8 +12,9 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The generated tables leave nothing out; the drawing shows the arrows, and none leads back."""
+"""Tables and rules of tools leave nothing out; the drawing shows the arrows of the code."""
 
+from pathlib import Path
 import re
 
 from abdf1_ros.pccc.families import FAMILIES, parse_address
@@ -109,3 +110,37 @@ def test_drawing_names_every_room_once() -> None:
     labels = re.findall(r'\["(.*?)"\]', text)
     assert [label.replace('<br>', ', ') for label in labels] == [room.name for room in ROOMS]
     assert re.search(r'r\d+ --> r\d+', text)
+
+
+ament = pytest.importorskip('tools.ament')
+
+HEADER = Path(__file__).read_text(encoding='utf-8').partition('""')[0]
+
+
+@for_all(('source', 'expected'), [
+    ('x = 1\n', []),
+    ('class Door:\n\n    def opened(self) -> None:\n        """Open it."""\n', []),
+    ('class Door:\n    """A door."""\n\n    def shut(self) -> None:\n        pass\n', []),
+    ('class Door:\n    def shut(self) -> None:\n        pass\n', ['CNL100']),
+    ('class Door:\n\n    @final\n    def shut(self) -> None:\n        pass\n', []),
+    ('class Door:\n\n    def open(self) -> None:\n        pass\n', ['A003']),
+    ('class Door:\n\n    def open(self) -> None:  # noqa: A003\n        pass\n', []),
+    ('class Door:\n    type = 3\n', ['A003']), ('class Door:\n    type: int\n', ['A003']),
+    ("class Door:\n    __doc__ = 'a door'\n", []),
+    ('import wall\nif TYPE_CHECKING:\n    import door\n', ['I300']),
+    ('import wall\n\nx = 1\nif TYPE_CHECKING:\n    import door\n', ['I300']),
+    ('import wall\n\nx = 1\nif TYPE_CHECKING:\n    import door  # noqa: I300\n', []),
+    ('import typing\n\nif typing.TYPE_CHECKING:\n    import door\n', []),
+    ('x = "it\'s" "b"\n', ['Q000']),
+    ('x = "it\'s"\n', []), ('x = """a"""\n', []),
+    ('def sent(x: int) -> None:\n    """Judge what is sent (rule 3)."""\n', ['D402']),
+    ('def sent(x: int) -> None:\n    """Judge what goes out (rule 3)."""\n', [])])
+def test_rule(source: str, expected: list[str]) -> None:
+    found = [text.partition(':')[0] for _, text in ament.findings_in(HEADER + source)]
+    assert found == expected
+
+
+def test_licence_header_is_needed_below_the_interpreter_at_most() -> None:
+    assert [*ament.findings_in('#!/usr/bin/env python3\n' + HEADER)] == []
+    assert [line for line, _ in ament.findings_in('x = 1\n')] == [1]
+    assert [*ament.findings_in('')] == []
