@@ -285,6 +285,22 @@ def test_command_in_a_flood_is_as_old_as_the_flood() -> None:
     assert came <= 0.1 and here >= 2.0
 
 
+def test_reply_to_a_program_that_has_left_does_not_go_to_the_next() -> None:
+    asked: list[GuestCommand] = []
+    line = guest_line('tcp:4501', asked.append)
+    for now in 100.0, 200.0:  # the second program connects
+        line.machine.start(now)
+        line.machine.handle_timeout(now + 1.0)
+        line.machine.receive_data(framed(int(now)), now + 1.0)
+    assert line.machine.data_to_send() == frames.ACK
+    for command in asked:
+        command.answer(command.packet.reply())
+    line.machine.wake(202.0)
+    assert line.machine.data_to_send() == frames.message_frame(
+        asked[1].packet.reply().encode(), Checksum.CRC)
+    line.stop()
+
+
 def test_internal_error_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
     faults: list[Exception] = []
     line = guest_line('tcp:4501', lambda command: 1 / 0, fault=faults.append)
