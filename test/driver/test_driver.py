@@ -301,27 +301,18 @@ def test_value_that_is_none_fails_only_its_own_mapping() -> None:
     assert len(bench.listener.values(word)) >= 9
 
 
-def test_all_points_of_a_station_fail_as_soon_as_it_is_inactive() -> None:
-    living = make_mapping('N7:0', station=1)
-    dead = [make_mapping(f'N{file}:0', station=2) for file in (7, 9, 10)]
-    bench, _ = make_bench(living, *dead)
-    plc = bench.plc(2, 'PLC5', ('N7:0', 4), ('N9:0', 4), ('N10:0', 4))
-    bench.run(1.0)
-    plc.faults.silent = True
-    bench.run_until(lambda: bool(bench.listener.changes))
-    assert all(bench.driver.points[mapping].freshness(bench.clock()) is Freshness.FAILED
-               for mapping in dead)
-    assert bench.driver.stations[2].failures == 1
-    assert bench.driver.points[living].error is None
-
-
-def test_station_that_comes_back_is_read_again_whole() -> None:
+def test_all_points_of_a_station_fail_with_it_and_are_read_again_with_it() -> None:
     living = make_mapping('N7:0', station=1)
     mappings = [make_mapping(f'N{file}:0', station=2) for file in (7, 9, 10)]
     bench, _ = make_bench(living, *mappings)
     plc = bench.plc(2, 'PLC5', ('N7:0', 4), ('N9:0', 4), ('N10:0', 4))
     bench.run(1.0)
     plc.faults.silent = True
+    bench.run_until(lambda: bool(bench.listener.changes))
+    assert all(bench.driver.points[mapping].freshness(bench.clock()) is Freshness.FAILED
+               for mapping in mappings)
+    assert bench.driver.stations[2].failures == 1
+    assert bench.driver.points[living].error is None
     bench.run(5.0)
     assert bench.driver.stations.words()[0] == 0b10
     bench.listener.reads.clear()
