@@ -89,8 +89,9 @@ def test_bar_begins_and_ends_as_its_bytes_did(tmp_path: Path, capsys: Output) ->
 def test_faults_come_as_episodes_that_lead_to_their_strip(tmp_path: Path, capsys: Output) -> None:
     found = drawn(tmp_path, capsys, capture(
         tmp_path / 'line.cap', exchange(0.1, 1), silence(1.2), silence(1.4), silence(1.6),
-        exchange(2.0, 2, sts=0x10), silence(30.0), exchange(30.1, 3)))
-    assert '5 faults on the line' in found.texts
+        exchange(2.0, 2, sts=0x10), [(30.0, '>', 2 * frames.poll_frame(3))],
+        exchange(30.1, 3)))
+    assert '6 faults on the line' in found.texts
     links = [attributes['href'] for tag, attributes in found.found if tag == 'a']
     names = {attributes['id'] for tag, attributes in found.found
              if tag == 'svg' and 'id' in attributes}
@@ -102,6 +103,7 @@ def test_faults_come_as_episodes_that_lead_to_their_strip(tmp_path: Path, capsys
     assert [text for text in told[at + 7:] if text.startswith('reply: ')][0].startswith(
         'reply: 2 to 5, TNS 0002: STS 10')
     assert told.count('silence: no answer to the poll') == 2
+    assert '30.000 s' in told  # two polls in one chunk
 
 
 def test_no_answer_is_drawn_as_long_as_it_was_waited_for(tmp_path: Path, capsys: Output) -> None:
@@ -156,25 +158,19 @@ def test_anonymous_timeline_has_no_values_and_no_names(tmp_path: Path, capsys: O
     assert 'STS 10' in page
 
 
-def test_anonymous_without_a_file_for_others_is_refused(tmp_path: Path, capsys: Output) -> None:
-    said = call(main, capsys, '--anonymous', capture(tmp_path / 'line.cap', exchange(0.1, 1)))
+@pytest.mark.parametrize(('args', 'text'), [
+    (('--anonymous',), '--anonymous is for --report and --html'),
+    (('--html', 'line.html'), 'was not made by --html'),
+    (('--html', 'no/line.html'), 'sniff: --html: ')])
+def test_timeline_that_cannot_be_written_is_told(
+        tmp_path: Path, capsys: Output, monkeypatch: pytest.MonkeyPatch, args: tuple[str, ...],
+        text: str) -> None:
+    monkeypatch.chdir(tmp_path)
+    Path('line.html').write_text('mine', encoding='utf-8')
+    said = call(main, capsys, *args, capture(Path('line.cap'), exchange(0.1, 1)))
     assert said.status == 2
-    assert '--anonymous is for --report and --html' in said.err
-
-
-def test_file_of_another_program_is_not_replaced(tmp_path: Path, capsys: Output) -> None:
-    (tmp_path / 'line.html').write_text('mine', encoding='utf-8')
-    said = call(main, capsys, '--html', str(tmp_path / 'line.html'),
-                capture(tmp_path / 'line.cap', exchange(0.1, 1)))
-    assert said.status == 2
-    assert 'was not made by --html' in said.err
-
-
-def test_timeline_that_cannot_be_written_is_told(tmp_path: Path, capsys: Output) -> None:
-    said = call(main, capsys, '--html', str(tmp_path / 'no' / 'line.html'),
-                capture(tmp_path / 'line.cap', exchange(0.1, 1)))
-    assert said.status == 2
-    assert 'sniff: --html: ' in said.err
+    assert text in said.err
+    assert Path('line.html').read_text(encoding='utf-8') == 'mine'
 
 
 def long_line(tmp_path: Path, capsys: Output, count: int) -> Path:

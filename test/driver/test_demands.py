@@ -29,13 +29,14 @@ from abdf1_ros.pccc.emulated import Setting
 from abdf1_ros.settings.heartbeats import While
 from abdf1_ros.settings.mapping import Mapping
 from abdf1_ros.settings.network import Network
+from abdf1_ros.settings.scaling import Scaling
 import pytest
 from support.driver_bench import DriverBench, store
 from support.mappings import make_mapping
 
 RECIPE = make_mapping('N7:0', length=10, is_on_demand=True)
 TABLE = make_mapping('N9:0', length=300, is_on_demand=True)  # three packets
-SPEED = make_mapping('N12:0', period=5000)
+SPEED = make_mapping('N12:0', period=5000, scaling=Scaling(2.0, 1.0))
 INACTIVE = '2509'
 
 
@@ -94,8 +95,8 @@ def test_row_that_is_read_seldom_is_read_at_once() -> None:
     begun = line.clock()
     line.ask(SPEED, run=0.2)
     (when, _, answer), = line.answers
-    assert (values_of(answer), when < begun + 0.1) == ([77], True)
-    assert line.listener.reads[-1][2] == [77]
+    assert (values_of(answer), when < begun + 0.1) == ([155.0], True)
+    assert line.listener.reads[-1][2] == [155.0]
 
 
 def test_row_that_was_asked_for_keeps_its_period_afterwards() -> None:
@@ -113,7 +114,7 @@ def test_answer_is_never_older_than_the_call() -> None:
     store(line.there, 'N12:0', [78])
     asked = line.clock()
     line.ask(SPEED, run=0.5)
-    assert [values_of(answer) for _, _, answer in line.answers][-1] == [78]
+    assert [values_of(answer) for _, _, answer in line.answers][-1] == [157.0]
     assert line.answers[0][2].read > asked
 
 

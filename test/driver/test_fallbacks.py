@@ -32,6 +32,7 @@ from abdf1_ros.pccc.address import Address
 from abdf1_ros.pccc.emulated import Setting
 from abdf1_ros.plan.bounds import MODE_PERIOD
 from abdf1_ros.settings.heartbeats import Fallback
+from abdf1_ros.settings.mapping import Mapping
 from abdf1_ros.settings.network import Network
 import pytest
 from support.cases import for_all
@@ -72,6 +73,11 @@ class OneRow(StillClock):
         self._write(write, done, outcome)
         return self.row.ended(outcome, done)
 
+    def guest(self, now: float) -> None:
+        claim = Claim(1, [self.mapping.extent])
+        claim.done = claim.lands_until = now
+        self.row.write_ended(claim, now)
+
     def _write(self, write: Write, done: float, outcome: Outcome) -> None:
         self.now = write.requested
         claim = self.record.begin(1, [self.mapping.extent], write)
@@ -97,9 +103,7 @@ def test_rule_11_only_the_first_try_over_a_guest_is_not_held_up_by_a_pause() -> 
     row.make_due(FallbackCause.START, 0.0)
     assert row.first_due == 0.0
     one.fallback(row.take(0.0), 0.1)
-    guest = Claim(1, [one.mapping.extent])
-    guest.done = guest.lands_until = 1.0
-    row.write_ended(guest, 1.0)
+    one.guest(1.0)
     assert row.judge(1.0, -math.inf)
     assert row.first_due == 1.0
     again = row.refresh(1.0)
@@ -218,42 +222,40 @@ def test_rule_7_message_that_is_older_than_fallback_after_is_not_sent() -> None:
         START, 'not written: not sent: waited longer than 0.5 s for the line']
 
 
-def test_rule_8_change_to_run_is_a_first_contact() -> None:
+@for_all('beats', [(), (beat_row(),)])
+def test_rule_8_change_to_run_is_a_first_contact(beats: tuple[Mapping, ...]) -> None:
     speed = speed_row(Fallback((7,), 60_000))
-    cell = Cell(beat_row(), speed, run=1.0)
+    cell = Cell(*beats, speed, run=1.0)
     cell.publish(speed, 3, run=1.0)
     cell.plc.processor.setting = Setting.PROGRAM
     cell.run(2 * MODE_PERIOD)
     since = cell.now
     cell.plc.processor.setting = Setting.RUN
     cell.run(2 * MODE_PERIOD)
-    after = [(name, value) for when, name, value in cell.writes if when >= since]
-    at = after.index(('N10:0', 0))
-    assert after[at:at + 3] == [('N10:0', 0), ('N7:0', 7), ('N10:0', 1)]
-    assert cell.results()[-1] == RUN
-
-
-def test_rule_8_change_to_run_is_a_first_contact_without_a_heartbeat() -> None:
-    speed = speed_row(Fallback((7,), 60_000))
-    cell = Cell(speed, run=1.0)
-    cell.publish(speed, 3, run=1.0)
-    for setting in (Setting.PROGRAM, Setting.RUN):
-        cell.plc.processor.setting = setting
-        cell.run(2 * MODE_PERIOD)
     assert cell.written('N7:0') == [7, 3, 7]
     assert cell.results()[-1] == RUN
+    after = [(name, value) for when, name, value in cell.writes if when >= since]
+    contact = [('N10:0', 0), ('N7:0', 7), ('N10:0', 1)] if beats else [('N7:0', 7)]
+    at = after.index(contact[0])
+    assert after[at:at + len(contact)] == contact
 
 
-def test_rule_8_row_is_fresh_by_a_confirmed_message_only() -> None:
+@for_all('outcome', [Outcome.UNKNOWN, Outcome.PARTLY])
+@for_all('is_overwritten', [False, True])
+def test_rule_8_row_is_fresh_by_a_confirmed_message_only(
+        outcome: Outcome, is_overwritten: bool) -> None:
     one = OneRow()
     row = one.row
     row.make_due(FallbackCause.START, 0.0)
     one.fallback(row.take(0.0), 0.1)
-    one.message(1.0, 1.0, Outcome.UNKNOWN)  # counts once for the time that it stands (rule 7)
+    if is_overwritten:
+        one.guest(0.5)
+    one.message(1.0, 1.0, outcome)  # counts once for the time that it stands (rule 7)
     assert row.deadline(-math.inf) == 1.0 + AFTER
     assert not row.is_fresh(1.1)
-    one.message(1.2, 1.2, Outcome.WRITTEN)
-    assert row.is_fresh(1.2 + 0.9 * AFTER)
+    one.message(1.2, 1.3, Outcome.WRITTEN)
+    assert row.is_fresh(1.2 + AFTER - 0.001)
+    assert not row.is_fresh(1.2 + AFTER)
 
 
 @pytest.mark.parametrize('silent', [0.4, 1.0])
@@ -272,13 +274,6 @@ def test_rule_8_plc_that_comes_back_with_an_old_word_has_its_fallback_first(sile
     counts = [when for when, name, value in cell.writes
               if name == 'N10:0' and value and max(came_back, last_3 + 0.8) < when < fallback]
     assert counts == []
-
-
-def test_rule_8_message_is_fresh_for_fallback_after() -> None:
-    one = OneRow()
-    one.message(1.0, 1.1, Outcome.WRITTEN)
-    assert one.row.is_fresh(1.0 + AFTER - 0.001)
-    assert not one.row.is_fresh(1.0 + AFTER)
 
 
 def test_rule_8_fallback_that_stands_is_written_again_without_a_result() -> None:

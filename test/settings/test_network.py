@@ -253,11 +253,6 @@ def test_any_text_gives_a_network_or_a_configuration_error(name: str, text: str)
         assert network.timing.char_time > 0
 
 
-def test_shipped_file_is_good() -> None:
-    path = Path(__file__).resolve().parent.parent.parent / 'config' / 'net.csv'
-    assert load_network(str(path)).baud == 19200
-
-
 def test_radio_modem_and_what_it_sends_on(path: Path) -> None:
     network = load(path, 'Mode,Store_Forward', 'Radio,"1-3, 7, 255"')
     assert (network.duplex, network.line.store_forward) == (Duplex.RADIO, (1, 2, 3, 7, 255))
@@ -330,10 +325,16 @@ def test_port_of_the_line_is_no_place(port: str, place: str, tmp_path: Path) -> 
     assert f'"{place}" is the port of the line' in str(problem)
 
 
-def test_slave_has_nothing_to_share() -> None:
-    with pytest.raises(ConfigurationError) as error:
-        make_network({'mode': ('Slave', 'x'), 'share': ('tcp:4501', 'x')})
-    assert 'Share needs Mode Master or Peer' in str(error.value)
+@for_all(('base', 'name', 'text', 'fault'), [
+    (Network(share='tcp:4501'), 'mode', 'Listen', 'Share: Share needs Mode Master or Peer: in '),
+    (Network(mode='Slave'), 'share', 'tcp:4501', 'x: Share needs Mode Master or Peer: '),
+    (Network(share='tcp:4501'), 'com_port', 'socket://127.0.0.1:4501', 'Share: Share: "tcp:4501"'),
+    (Network(com_port='rfc2217://h:1'), 'mode', 'Listen', 'Com_Port: Com_Port: RFC 2217 '),
+    (Network(mode='Listen'), 'com_port', 'rfc2217://h:1', 'x: Com_Port: RFC 2217 ')])
+def test_parameter_has_to_go_with_the_rest_of_the_file(
+        base: Network, name: str, text: str, fault: str) -> None:
+    with pytest.raises(ConfigurationError, match=f'^{fault}'):
+        make_network({name: (text, 'x')}, base)
 
 
 def test_place_that_is_open_to_other_machines_is_told() -> None:
@@ -353,17 +354,11 @@ def test_list_may_have_single_stations_and_ranges(text: str, stations: tuple[int
 
 @for_all(('text', 'part'), [
     ('255', '255'), ('1 2', '1 2'), ('1 2-3', '1 2-3'), ('1-', '1-'), ('5,1- ,2', '1-'),
-    ('1,x', 'x'), ('3-1', '3-1'), ('-1', '-1'), ('1-2-3', '1-2-3')])
-def test_part_of_a_list_that_is_no_station_is_named(text: str, part: str) -> None:
+    ('1,x', 'x'), ('3-1', '3-1'), ('-1', '-1'), ('1-2-3', '1-2-3'), ('a,1,b', 'a|b')])
+def test_parts_of_a_list_that_are_no_station_are_named(text: str, part: str) -> None:
     assert parse_stations(text)[1] == [
-        f'"{part}" should be a station from 0 to 254, or a range such as 3-5; '
-        'put commas between them']
-
-
-def test_every_fault_is_told() -> None:
-    stations, faults = parse_stations('a,1,b')
-    assert stations == (1,)
-    assert len(faults) == 2
+        f'"{each}" should be a station from 0 to 254, or a range such as 3-5; '
+        'put commas between them' for each in part.split('|')]
 
 
 LISTENING = {'Com_Port': '/dev/ttyS0', 'Mode': 'Listen'}
@@ -377,8 +372,7 @@ LISTENING = {'Com_Port': '/dev/ttyS0', 'Mode': 'Listen'}
     ({'Listen_Port': '1'}, 'Listen_Port: 1 is the device of Com_Port, too'),
     ({'Com_Port': 'rfc2217://h:1'}, 'RFC 2217 sets the lines of the far port'),
     ({'Com_Port': 'socket://h:1', 'Listen_Port': '/dev/ttyS1'},
-     'both ports must be devices of this machine'),
-    ({'Share': 'tcp:6000'}, 'Share needs Mode Master or Peer: in Mode Listen nothing is sent')])
+     'both ports must be devices of this machine')])
 def test_ports_that_cannot_be_listened_to(tmp_path: Path, cells: dict[str, str],
                                           text: str) -> None:
     columns = LISTENING | cells

@@ -21,6 +21,7 @@ from pathlib import Path
 import select
 import socket
 import threading
+from types import SimpleNamespace
 
 from abdf1_ros import client
 from abdf1_ros.cli import check
@@ -110,6 +111,19 @@ def test_silent_line_is_listened_to_at_one_speed(
     assert overhear.overhear(Network(com_port=str(line.name)), (19200, 9600), shown.append) is None
     line.close()
     assert shown == ['listening at 19200 baud']
+
+
+@pytest.mark.parametrize(('polls', 'stations'), [
+    (b'\x10\x05\x01\xFF', None), (b'\x10\x05\x01\xFF\x10\x05\x03\xFD', [1, 3]),
+    (3 * b'\x10\x05\x01\xFE', None), (b'\x10\x05\x01\xFF\x10\x05\x03\xFE', None)])
+def test_two_polls_with_a_good_check_show_a_master(
+        monkeypatch: pytest.MonkeyPatch, polls: bytes, stations: list[int] | None) -> None:
+    said = iter([polls])
+    port = SimpleNamespace(read=lambda wait, wake: next(said, b''), close=lambda: None)
+    monkeypatch.setattr(overhear, 'LISTENED', 0.1)
+    monkeypatch.setattr(overhear, 'opened', lambda network: lambda: port)
+    assert overhear.overhear(Network(), [9600]) == (
+        stations and ForeignMaster(9600, stations, None))
 
 
 def test_what_is_told_of_a_master() -> None:
