@@ -29,6 +29,7 @@ from abdf1_ros.pccc.file_types import PlcType
 from abdf1_ros.pccc.steps import AddressedValues, echo, write
 from abdf1_ros.simulator.ladder import Lamp
 import pytest
+from rclpy.clock import ClockType
 from std_msgs.msg import Int16MultiArray
 from std_srvs.srv import SetBool, Trigger
 from support.cell import BridgeCell
@@ -148,6 +149,16 @@ def test_rule_3_heartbeat_stands_still_with_the_executor(cell: Cell) -> None:
     cell.until(stands, 'a heartbeat that stands still')
     cell.ros.executor.add_node(cell.node)
     cell.until_beats(1)
+
+    def clocks() -> list[ClockType]:
+        return [timer.clock.clock_type for timer in cell.node.timers
+                if timer.timer_period_ns == 10 ** 8]
+
+    ours = [ClockType.STEADY_TIME]  # a step of the clock of the host counts for none
+    assert clocks() == ours * 2
+    cell.map.write_text(MAP[:MAP.index('beat')], encoding='utf-8')
+    assert cell.call(Trigger, 'reload', Trigger.Request()).success
+    assert clocks() == ours
 
 
 def test_rule_3_simulated_time_that_does_not_run_holds_nothing_up(tmp_path: Path) -> None:
