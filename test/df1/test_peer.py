@@ -286,12 +286,33 @@ def test_messages_of_the_vectors_get_their_response_and_commands_are_served(
         assert answer == ACK + peer.frame(entry.packet.reply())
 
 
+def test_command_that_has_left_is_asked_after_however_old_it_is() -> None:
+    peer = bench()
+    task = peer.add(COMMAND)
+    task.expires = peer.now + 0.5
+    peer.machine.wake(peer.now)
+    peer.said()
+    assert peer.wait(2.1) == [(1.0, ENQ), (2.0, ENQ)]
+    assert peer.hear(ACK) == b''
+    answer(peer, task)
+
+
 def test_reply_is_not_taken_after_its_time_although_nobody_has_looked() -> None:
     peer, task = acknowledged()
     peer.now += CMD_TIMEOUT + 3.0  # the process stood still
     assert peer.hear_packet(REPLY) == ACK
     assert isinstance(task.result, CommandTimeout)
     assert peer.counts()['stale_messages'] == 1
+
+
+def test_reply_that_began_in_time_is_taken_although_nobody_has_looked_since() -> None:
+    peer, task = acknowledged()
+    frame = peer.frame(REPLY)
+    peer.wait(CMD_TIMEOUT - 0.01)
+    peer.hear(frame[:9])
+    peer.now += 0.02
+    assert peer.hear(frame[9:]) == ACK
+    assert task.result == REPLY
 
 
 def test_replies_that_do_not_come_in_time_are_counted_until_one_does() -> None:

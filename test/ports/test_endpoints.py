@@ -52,6 +52,7 @@ def test_pseudo_terminal_one_client_after_the_other(tmp_path: Path, wake: int) -
                 exchange(port, client, wake)
             os.close(client)
     assert not os.path.lexists(name)
+    PtyEndpoint(name).close()  # the name is free again
 
 
 def test_place_has_nothing_of_the_program_before(tmp_path: Path, wake: int) -> None:
@@ -169,7 +170,9 @@ def test_tcp_second_client_is_closed_at_once_and_nothing_of_it_comes_later(
         assert who.startswith('127.0.0.1:')
 
 
-def test_tcp_client_that_comes_right_after_another_has_left_is_not_turned_away(wake: int) -> None:
+@pytest.mark.parametrize('is_ended', [False, True])
+def test_tcp_client_that_comes_right_after_another_has_left_is_not_turned_away(
+        is_ended: bool, wake: int) -> None:
     told: list[str] = []
     with closing(TcpEndpoint(OWN_HOST, 0, told.append)) as line:
         address = OWN_HOST, int(line.name.rpartition(':')[2])
@@ -180,6 +183,10 @@ def test_tcp_client_that_comes_right_after_another_has_left_is_not_turned_away(w
             with socket.create_connection(address, PATIENCE) as second:
                 with pytest.raises(OSError, match='closed'):
                     port.read(PATIENCE, wake)  # what it said last, and with it both events
+                if is_ended:
+                    line.close()
+                    assert second.recv(1) == b''
+                    return
                 second.sendall(b'first')
                 with closing(line.open()) as again:
                     assert again.read(PATIENCE, wake) == b'first'
@@ -210,6 +217,11 @@ def test_tcp_client_that_says_nothing_gives_its_place_to_the_next(
                 port.close()
                 with closing(line.open()) as taken:
                     assert taken.read(PATIENCE, wake) == b'of the other'
+                    assert isinstance(taken, DescriptorPort)
+                    with socket.socket(fileno=os.dup(taken.fileno())) as ours:
+                        assert ours.getsockopt(socket.SOL_SOCKET, socket.SO_KEEPALIVE) == 1
+                with pytest.raises(NoClient):
+                    line.open()
 
 
 def test_tcp_client_that_has_vanished_is_missed_within_ten_seconds() -> None:

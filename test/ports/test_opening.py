@@ -24,7 +24,7 @@ import threading
 from types import ModuleType
 
 from abdf1_ros.ports import trial
-from abdf1_ros.ports.descriptor import DescriptorPort
+from abdf1_ros.ports.descriptor import DescriptorPort, Port
 from abdf1_ros.ports.opening import name_port, open_port
 from abdf1_ros.ports.ownership import line_of
 from abdf1_ros.ports.settings import PortSettings
@@ -81,9 +81,12 @@ def test_scheme_that_lacks_what_it_needs_says_so(monkeypatch: pytest.MonkeyPatch
         open_port(PortSettings('rfc2217://host:1'))
 
 
-def test_device_that_opens_is_left_free() -> None:
+def test_device_that_opens_is_left_free(monkeypatch: pytest.MonkeyPatch) -> None:
     master, slave = pty.openpty()
     settings = PortSettings(os.ttyname(slave))
+    kept: dict[str, Port] = {}  # so that nobody but close() closes it
+    monkeypatch.setattr(
+        trial, 'open_port', lambda asked: kept.setdefault(asked.name, open_port(asked)))
     assert why_not(settings, 10.0) == ''
     port = open_port(settings)
     assert why_not(settings, 10.0) == 'another program has it open'

@@ -16,12 +16,14 @@
 
 from pathlib import Path
 import threading
+from types import SimpleNamespace
 
 from abdf1_ros.ports import trace as trace_module
 from abdf1_ros.ports.settings import PortSettings
 from abdf1_ros.ports.trace import PortOpener, Trace, TracedPort
 from abdf1_ros.sniffer.capture import CaptureWriter, Chunk, Direction, read_capture
 import pytest
+from support.counting import open_files
 from support.ptys import no_file_longer_than, PATIENCE, Pty
 
 
@@ -96,6 +98,8 @@ def test_trace_that_cannot_grow_costs_neither_the_port_nor_its_whole_lines(tmp_p
             assert port.read(None, 0) == b'\x10\x05'
         trace.close()
     assert errors == [f'{tmp_path}/x: File too large; nothing more is recorded']
+    assert f'{tmp_path}/x' not in {name for _, name in open_files()}
+    assert f'{tmp_path}/x' not in {name for _, name in open_files()}
     assert [chunk.data for chunk in chunks_of(tmp_path / 'x')] == [b'\x10\x05'] * 4
     assert (tmp_path / 'x').read_bytes().endswith(b'10 05\n')
 
@@ -103,7 +107,7 @@ def test_trace_that_cannot_grow_costs_neither_the_port_nor_its_whole_lines(tmp_p
 def test_line_does_not_wait_for_a_disk_that_stands_still(
         tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     errors: list[str] = []
-    is_stuck, goes_on = threading.Event(), threading.Event()
+    is_stuck, goes_on, is_told = threading.Event(), threading.Event(), threading.Event()
     write = CaptureWriter.write
 
     def slow(writer: CaptureWriter, chunk: Chunk | str) -> None:
@@ -111,15 +115,20 @@ def test_line_does_not_wait_for_a_disk_that_stands_still(
         goes_on.wait(PATIENCE)
         write(writer, chunk)
 
+    def tell(text: str) -> None:
+        errors.append(text)
+        is_told.set()
+
     monkeypatch.setattr(CaptureWriter, 'write', slow)
     monkeypatch.setattr(trace_module, 'MOST_WAITING', 3)
-    trace = Trace(str(tmp_path / 'x'), {}, errors.append)
+    trace = Trace(str(tmp_path / 'x'), {}, tell)
     port = TracedPort(Loop(), trace, 0.0, lambda: 0.0)
     port.write(b'\x01')
     assert is_stuck.wait(PATIENCE)
     for _ in range(5):  # none of them waits
         port.write(b'\x02')
     goes_on.set()
+    assert is_told.wait(PATIENCE)  # and once: not when it ends
     trace.close()
     assert [chunk.data for chunk in chunks_of(tmp_path / 'x')] == [b'\x01', *[b'\x02'] * 3]
     assert (tmp_path / 'x').read_text().endswith(
@@ -137,7 +146,10 @@ def test_opener_without_a_trace_gives_the_port_itself(tmp_path: Path) -> None:
     pty.close()
 
 
-def test_opener_records_across_openings(tmp_path: Path) -> None:
+def test_opener_records_across_openings(
+        tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    # the clock is asked once for the beginning
+    monkeypatch.setattr(trace_module, 'time', SimpleNamespace(monotonic=iter([-1e6]).__next__))
     pty = Pty(tmp_path / 'line')
     opener = PortOpener(PortSettings(str(pty.name), baud=19200))
     opener.trace(str(tmp_path / 'x'), 1e6, {'check': 'CRC', 'duplex': 'full'}, pytest.fail)
@@ -146,6 +158,8 @@ def test_opener_records_across_openings(tmp_path: Path) -> None:
         port.write(data)
         assert pty.read(1) == data
         port.close()
+        with pytest.raises(OSError):
+            port.write(b'this has not left')
     opener.close()
     settings: dict[str, str] = {}
     chunks = chunks_of(tmp_path / 'x', settings)
