@@ -86,9 +86,7 @@ def test_test_of_the_tutorial_passes(abdf1_cell: Cells) -> None:  # noqa: F811
 def test_what_never_happens_is_named(
         abdf1_cell: Cells, monkeypatch: pytest.MonkeyPatch) -> None:  # noqa: F811
     monkeypatch.setattr('abdf1_ros.testing.PATIENCE', 0.2)
-    data = 'Station,PLC_Type,Address,Length,Values,Motion,Period\n1,SLC,N7:0,4,250,,\n'
-    rows = 'Tag,Command,Address,Station,PLC_Type\npressure,Read,N7:0,1,SLC\n'
-    cell = abdf1_cell(data, rows)
+    cell = abdf1_cell(*SMALL)
     with pytest.raises(AssertionError, match='waited for a word of 7'):
         cell.ros.until(lambda: cell.plcs.word('N7:0') == 7, 'a word of 7')
     monkeypatch.undo()
@@ -113,10 +111,9 @@ def test_what_can_never_come_is_told_at_once(abdf1_cell: Cells) -> None:  # noqa
 
 
 def test_node_of_the_test_needs_no_context(abdf1_cell: Cells) -> None:  # noqa: F811
-    data = 'Station,PLC_Type,Address,Length,Values,Motion,Period\n1,SLC,N7:0,4,250,,\n'
-    cell = abdf1_cell(data, 'Tag,Command,Address,Station,PLC_Type\np,Read,N7:0,1,SLC\n')
+    cell = abdf1_cell(*SMALL)
     node, heard = Node('mine'), []
-    node.create_subscription(Int16MultiArray, '/abdf1/read/p', heard.append, latched_qos())
+    node.create_subscription(Int16MultiArray, '/abdf1/read/a', heard.append, latched_qos())
     cell.ros.executor.add_node(node)
     cell.ros.until(lambda: heard, 'a value in our own node')
     assert cell.end() == 0
@@ -165,6 +162,8 @@ def test_executor_ends_before_a_node_goes_and_the_context_last(
         monkeypatch.setattr(owner, name, recorded)
 
     with Observer() as observer:
+        Observer('guest', observer.context).__exit__()
+        assert observer.context.ok()
         other = Node('other', context=observer.context)
         observer.executor.add_node(other)
         for owner, name in ((observer.executor, 'shutdown'), (observer.node, 'destroy_node'),

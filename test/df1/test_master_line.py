@@ -64,9 +64,12 @@ def test_message_based_master_gives_up_a_slow_reply_in_silence() -> None:
     assert 'NAK' not in rig.master.said
     assert rig[7].heard == []
     assert 'command_timeouts' not in rig.master.counts()
+    assert rig.master.stations[8].overdue == 1
     rig[8].delay = 0.0
-    poll(rig, 8)  # the late reply comes now, and is passed on all the same
-    assert rig[7].heard == [command.reply()]
+    second = rig.message(7, 8)
+    poll(rig, 7)  # the late reply comes now, and is passed on all the same
+    assert rig[7].heard == [command.reply(), second.reply()]
+    assert rig.master.stations[8].overdue == 0
 
 
 @BOTH

@@ -16,6 +16,7 @@
 
 from collections.abc import Callable
 from dataclasses import replace
+from itertools import pairwise
 import math
 
 from abdf1_ros.df1.frames import Symbol
@@ -27,6 +28,7 @@ from abdf1_ros.driver.reads.point import Freshness
 from abdf1_ros.driver.settings import DriverSettings
 from abdf1_ros.driver.write import Outcome
 from abdf1_ros.pccc.emulated import Setting
+from abdf1_ros.settings.heartbeats import While
 from abdf1_ros.settings.mapping import Mapping
 from abdf1_ros.settings.network import Network
 from abdf1_ros.simulator.simulated_plc import InjectedFaults, SimulatedPlc
@@ -103,7 +105,8 @@ def word(station: int = 1, command: str = 'Read', period: int | None = None,
     ('SLC', 'SLC 5/03 series A revision 1, REM RUN'),
     ('PLC5', 'PLC-5/40 series A revision A, REM RUN')])
 def test_status_at_the_start_and_every_period(network: Network, plc: str, processor: str) -> None:
-    bench, _, (ears,) = make_bench(word(plc=plc), network=network, plc=plc)
+    row = make_mapping('N7:0', plc=plc, period=60_000, condition=While(('RUN',)))  # asks seldom
+    bench, _, (ears,) = make_bench(row, network=network, plc=plc)
     assert bench.driver.checks.known(1).processor == 'unknown (not asked yet)'
     bench.run(3.2 * PERIOD)
     assert [round(when / PERIOD, 1) for when in ears.times(STATUS)] == [0, 1, 2, 3]
@@ -174,7 +177,7 @@ def test_station_that_comes_back_is_asked_at_once(network: Network) -> None:
     assert bench.driver.checks.known(1).processor == 'SLC 5/03 series A revision 1, RUN'
 
 
-def test_refusal_is_remembered_and_no_fault_of_the_station() -> None:
+def test_refusal_or_reply_that_is_no_status_is_told_and_no_fault_of_the_station() -> None:
     bench, (plc,), (ears,) = make_bench(word())
     ears.answer_diagnostics(lambda command: command.reply(sts=0x10))
     bench.run(2.2 * PERIOD)
@@ -188,12 +191,8 @@ def test_refusal_is_remembered_and_no_fault_of_the_station() -> None:
     ears.answer_diagnostics(plc.serve)
     bench.run(PERIOD)
     assert bench.driver.checks.known(1).identity is not None
-
-
-def test_reply_that_is_no_status_is_said_to_be_none() -> None:
-    bench, _, (ears,) = make_bench(word())
     ears.answer_diagnostics(lambda command: command.reply(b'\x06'))
-    bench.run(1.0)
+    bench.run(PERIOD)
     assert bench.driver.checks.known(1).processor == 'unknown (a diagnostic status of 1 bytes)'
 
 
@@ -213,12 +212,6 @@ def test_station_that_never_answers_this_is_asked_rarely() -> None:
 # beside reads and writes
 
 
-def longest_wait(bench: DriverBench, mapping: Mapping) -> float:
-    """Return the longest time between two good reads."""
-    times = bench.listener.times(mapping)
-    return max(later - earlier for earlier, later in zip(times, times[1:], strict=False))
-
-
 @pytest.mark.parametrize('network', NETWORKS, ids=['message', 'standard'])
 def test_reads_that_are_due_wait_for_one_check_at_most(network: Network) -> None:
     mappings = [word(station, period=0) for station in (1, 2, 3, 4)]
@@ -227,7 +220,8 @@ def test_reads_that_are_due_wait_for_one_check_at_most(network: Network) -> None
         bench, _, ears = make_bench(
             *mappings, network=replace(network, baud=115200), period=period)
         bench.run(2.5)
-        waits.append(max(longest_wait(bench, mapping) for mapping in mappings))
+        waits.append(max(later - earlier for mapping in mappings
+                         for earlier, later in pairwise(bench.listener.times(mapping))))
         assert all(bool(heard.times(STATUS)) == bool(period) for heard in ears)
     transaction = 0.012 if network.polling == 'Message' else 0.02
     assert waits[1] - waits[0] < transaction
@@ -242,7 +236,7 @@ def test_after_a_check_come_all_reads_that_were_due() -> None:
         for when, cmd, _ in ears.heard)]
     checks = [at for at, (cmd, _) in enumerate(order) if cmd == 0x06]
     assert len(checks) > 20
-    for first, second in zip(checks, checks[1:], strict=False):
+    for first, second in pairwise(checks):
         assert sorted(order[first + 1:second]) == [(0x0F, 0), (0x0F, 0), (0x0F, 1)]
 
 

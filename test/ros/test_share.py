@@ -42,6 +42,7 @@ def test_hmi_reads_and_writes_through_the_node(
         with Client(str(place), plc_type='SLC', station=2, timeout=3.0, cmd_timeout=3.0) as hmi:
             assert hmi.read('ST9:1') == 'Tank 4'
             assert hmi.read('N7:10', 4) == [101, 102, 103, 104]
+            hmi.write('N7:60', 8)  # a word that the bridge only reads
             until_status(diagnostics, 'guests', OK)
             hmi.write('F8:4', 30.5)
             setpoints.values([30.5])
@@ -58,8 +59,8 @@ def test_hmi_reads_and_writes_through_the_node(
     lines = capsys.readouterr().out.splitlines()
     guests = [line for line in lines if f'| guest pty:{place} |' in line
               and not line.endswith(('RETRANSMISSION', 'DUPLICATE'))]
-    # Four commands of it, and their replies.
-    assert len(guests) == 8
+    # Five commands of it, and their replies.
+    assert len(guests) == 10
     assert sum('write F8:4 = 30.5' in line for line in guests) == 1
     assert len([line for line in lines if ' command ' in line]) > 10
 
