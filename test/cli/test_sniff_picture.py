@@ -74,7 +74,8 @@ def test_each_message_is_a_bar_in_the_lane_of_its_station(tmp_path: Path, capsys
 
 
 def test_bar_begins_and_ends_as_its_bytes_did(tmp_path: Path, capsys: Output) -> None:
-    found = drawn(tmp_path, capsys, capture(tmp_path / 'line.cap', exchange(0.1, 1)))
+    found = drawn(tmp_path, capsys, capture(
+        tmp_path / 'line.cap', exchange(0.1, 1), [(0.2, '>', 2 * frames.poll_frame(3))]))
     (ask,), (_, answer) = ([rect for _, rect in found.found
                             if rect.get('class') == look and 'x' in rect]
                            for look in ('ask', 'answer'))
@@ -84,13 +85,14 @@ def test_bar_begins_and_ends_as_its_bytes_did(tmp_path: Path, capsys: Output) ->
     assert float(ask['x']) == pytest.approx(scale['NAMES'] + 0.1 * second, abs=0.2)
     assert float(answer['x']) + float(answer['width']) == pytest.approx(
         scale['NAMES'] + 0.13 * second, abs=0.2)
+    assert len({rect['x'] for _, rect in found.found
+                if rect.get('class') == 'small' and 'x' in rect}) == 3 + 2
 
 
 def test_faults_come_as_episodes_that_lead_to_their_strip(tmp_path: Path, capsys: Output) -> None:
     found = drawn(tmp_path, capsys, capture(
         tmp_path / 'line.cap', exchange(0.1, 1), silence(1.2), silence(1.4), silence(1.6),
-        exchange(2.0, 2, sts=0x10), [(30.0, '>', 2 * frames.poll_frame(3))],
-        exchange(30.1, 3)))
+        exchange(2.0, 2, sts=0x10), [(30.0, '>', 2 * frames.poll_frame(3))], exchange(30.1, 3)))
     assert '6 faults on the line' in found.texts
     links = [attributes['href'] for tag, attributes in found.found if tag == 'a']
     names = {attributes['id'] for tag, attributes in found.found
@@ -107,10 +109,11 @@ def test_faults_come_as_episodes_that_lead_to_their_strip(tmp_path: Path, capsys
 
 
 def test_no_answer_is_drawn_as_long_as_it_was_waited_for(tmp_path: Path, capsys: Output) -> None:
-    found = drawn(tmp_path, capsys, capture(tmp_path / 'line.cap', silence(0.1), silence(0.6)))
+    found = drawn(tmp_path, capsys, capture(
+        tmp_path / 'line.cap', silence(0.1), silence(0.6), silence(1.2)))
     widths = [float(rect['width']) for _, rect in found.found
               if rect.get('class') == 'missing' and 'x' in rect]
-    assert max(widths[1:]) == pytest.approx(0.5 * 1030, rel=0.02)
+    assert max(widths[2:]) == pytest.approx(0.5 * 1030, rel=0.02)
 
 
 def test_long_recording_keeps_its_faults(

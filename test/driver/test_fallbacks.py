@@ -254,6 +254,7 @@ def test_rule_8_row_is_fresh_by_a_confirmed_message_only(
     assert row.deadline(-math.inf) == 1.0 + AFTER
     assert not row.is_fresh(1.1)
     one.message(1.2, 1.3, Outcome.WRITTEN)
+    one.message(1.1, 1.4, Outcome.WRITTEN)  # of another publisher
     assert row.is_fresh(1.2 + AFTER - 0.001)
     assert not row.is_fresh(1.2 + AFTER)
 

@@ -21,7 +21,7 @@ from typing import Any
 from abdf1_ros.df1.checksum import Checksum
 from abdf1_ros.df1.frames import Duplex
 from abdf1_ros.messages import Severity
-from abdf1_ros.problems import ConfigurationError
+from abdf1_ros.problems import ConfigurationError, Place, Problem
 from abdf1_ros.settings import BAUD_RATES
 from abdf1_ros.settings.network import FIELDS, load_network, make_network, MODE_NAMES, Network
 from abdf1_ros.settings.remarks import network_remarks
@@ -225,11 +225,12 @@ def test_file_without_exactly_one_row_is_refused(path: Path, content: str, text:
 
 
 def test_overrides_keep_the_rest_of_the_base() -> None:
-    base = Network(station=9, baud=1200)
+    remark = Problem(Place('net.csv', 2, 1, 'Com_Port'), 'Com_Port is empty')
+    base = Network(station=9, baud=1200, remarks=(remark,))
     changed = make_network({'baud': ('57600', 'net.baud'), 'mode': ('master', 'net.mode')}, base)
-    assert changed == Network(station=9, baud=57600)
-    assert base.baud == 1200
+    assert (changed, changed.remarks) == (Network(station=9, baud=57600), (remark,))
     assert make_network({}, base) == base
+    assert make_network({'com_port': ('2', 'net.com_port')}, base).remarks == ()
 
 
 def test_fault_of_an_override_names_the_parameter() -> None:

@@ -27,8 +27,6 @@ from abdf1_ros import client
 from abdf1_ros.cli import check
 from abdf1_ros.cli.plc import overhear
 from abdf1_ros.cli.plc.command import main
-from abdf1_ros.cli.plc.overhear import ForeignMaster
-from abdf1_ros.df1.checksum import Checksum
 from abdf1_ros.driver import requests
 from abdf1_ros.settings.network import Network
 import pytest
@@ -113,22 +111,19 @@ def test_silent_line_is_listened_to_at_one_speed(
     assert shown == ['listening at 19200 baud']
 
 
-@pytest.mark.parametrize(('polls', 'stations'), [
-    (b'\x10\x05\x01\xFF', None), (b'\x10\x05\x01\xFF\x10\x05\x03\xFD', [1, 3]),
-    (3 * b'\x10\x05\x01\xFE', None), (b'\x10\x05\x01\xFF\x10\x05\x03\xFE', None)])
+@pytest.mark.parametrize(('polls', 'told'), [
+    (b'\x10\x05\x01\xFF', 'None'),
+    (b'\x10\x05\x01\xFF\x10\x05\x03\xFD', 'polls stations 1, 3, 9600 baud, check unknown'),
+    (2 * b'\x10\x05\x01\xFF' + frame(bytes(6), 1), 'polls station 1, 9600 baud, CRC'),
+    (3 * b'\x10\x05\x01\xFE', 'None'), (b'\x10\x05\x01\xFF\x10\x05\x03\xFE', 'None')])
 def test_two_polls_with_a_good_check_show_a_master(
-        monkeypatch: pytest.MonkeyPatch, polls: bytes, stations: list[int] | None) -> None:
-    said = iter([polls])
-    port = SimpleNamespace(read=lambda wait, wake: next(said, b''), close=lambda: None)
+        monkeypatch: pytest.MonkeyPatch, polls: bytes, told: str) -> None:
+    heard = {19200: b'\xF0', 9600: polls}
     monkeypatch.setattr(overhear, 'LISTENED', 0.1)
-    monkeypatch.setattr(overhear, 'opened', lambda network: lambda: port)
-    assert overhear.overhear(Network(), [9600]) == (
-        stations and ForeignMaster(9600, stations, None))
-
-
-def test_what_is_told_of_a_master() -> None:
-    assert str(ForeignMaster(9600, [2], Checksum.BCC)) == (
-        'another master polls station 2, 9600 baud, BCC')
+    monkeypatch.setattr(overhear, 'opened', lambda network: lambda: SimpleNamespace(
+        read=lambda wait, wake: heard.pop(network.baud, b''), close=lambda: None))
+    found = str(overhear.overhear(Network(), [19200, 9600]))
+    assert found.removeprefix('another master ') == told
 
 
 def test_plc_asks_through_the_master_of_a_line(tmp_path: Path, capsys: Output) -> None:
