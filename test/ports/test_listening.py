@@ -115,6 +115,7 @@ def test_what_a_program_leaves_at_its_end_is_not_changed(ptys: list[Pty]) -> Non
 
 
 def test_two_ports_are_told_apart(ptys: list[Pty], pipe: tuple[int, int]) -> None:
+    ptys[0].write(b'from before\n')
     port = open_port(listening_to(*ptys))
     wake, end = pipe
     ptys[0].write(b'first')

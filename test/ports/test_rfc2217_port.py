@@ -113,6 +113,7 @@ def test_server_that_refuses(ends: Ends, answer: bytes, text: str) -> None:
 
 @pytest.mark.parametrize(('answer', 'text'), [
     (b'login: ', 'the other end does not speak RFC 2217'),
+    (DO_COM_PORT[:2] + b'\1', 'the other end does not speak RFC 2217'),
     (DO_COM_PORT + BAUD_115200, 'does not answer to settings of its port')])
 def test_server_that_does_not_answer(
         ends: Ends, monkeypatch: pytest.MonkeyPatch, answer: bytes, text: str) -> None:
@@ -182,9 +183,11 @@ def test_data_are_what_is_no_command(ends: Ends, wake: int, chunk: int) -> None:
     port, server = ends
     stream = b'a\xff\xffb' + bytes([255, 253, 1]) + b'c' + bytes([255, 241]) + \
         bytes([255, 250, 44, 107, 255, 255, 255, 240]) + b'd\xff\xff'
+    data = b''
     for at in range(0, len(stream), chunk):
         server.sendall(stream[at:at + chunk])
-    assert read(port, wake, 6) == b'a\xffbcd\xff'
+        data += port.read(PATIENCE, wake)
+    assert data == b'a\xffbcd\xff'
     assert server.recv(100) == bytes([255, 252, 1])  # WONT ECHO
 
 

@@ -304,8 +304,11 @@ def test_settings_that_another_program_changes_are_a_lost_port(
     port = open_port(PortSettings(str(pty.name)))
     port.write(b'\x03')
     assert pty.read(1) == b'\x03'
-    port.close()
     os.close(theirs)
+    pty.close()
+    with pytest.raises(OSError, match='Input/output error'):
+        port.write(b'\x04')
+    port.close()
 
 
 def _port(device: str, description: str = 'n/a', hwid: str = 'n/a') -> SimpleNamespace:

@@ -185,6 +185,17 @@ def test_files_that_would_stop_the_line_change_nothing(bench: Bench) -> None:
         bench.port_owners.hold('/other', *session.configuration.held)
 
 
+def test_place_that_is_no_longer_shared_is_free_for_another_line(
+        bench: Bench, tmp_path: Path) -> None:
+    places = [f'pty:{tmp_path}/{name}' for name in ('first', 'second')]
+    for place in places:
+        write_csv(bench.net, 'Baud,Timeout,Share', [f'115200,100,{place}'])
+        assert bench.reload()[0]
+    bench.port_owners.hold('/other', places[0])
+    with pytest.raises(ConfigurationError):
+        bench.port_owners.hold('/other', places[1])
+
+
 def test_link_that_does_not_take_the_files_is_the_end(
         bench: Bench, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(LinkThread, 'exchange', lambda *arguments: False)
