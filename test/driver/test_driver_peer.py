@@ -12,9 +12,13 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The driver in Mode Peer: reads, writes and served words, in both directions at once."""
+"""The driver in Modes Peer and Radio: reads, writes, served words, heartbeats and fallbacks."""
+
+from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
+from random import Random
 
 from abdf1_ros.df1.frames import ACK, Code, Control, Duplex, Frame, FrameDecoder, message_frame
 from abdf1_ros.df1.packet import Packet
@@ -26,8 +30,12 @@ from abdf1_ros.pccc.families import dialect_of, parse_address
 from abdf1_ros.pccc.file_types import PlcType
 from abdf1_ros.pccc.identity import Mode
 from abdf1_ros.pccc.slc.identity import FULL_DUPLEX_PORT
+from abdf1_ros.plan.bounds import Times
+from abdf1_ros.plan.report import make_report
+from abdf1_ros.settings.heartbeats import Fallback, While
 from abdf1_ros.settings.mapping import Mapping
 from abdf1_ros.settings.network import Network
+from abdf1_ros.settings.rows import Rows
 import pytest
 from support.driver_bench import DriverBench, store, stored
 from support.mappings import make_mapping
@@ -296,3 +304,67 @@ def test_processor_and_counters_of_the_other_end(outstanding: int) -> None:
     assert health.counters_wanted == set()
     ours = bench.driver.served.serve(Packet(US, PLC, 0x06, 0, 1, b'\3'))
     assert ours.data[2] == FULL_DUPLEX_PORT
+
+
+FIRST, SECOND = 1, 2
+RADIO_NETWORK = Network(station=200, mode='Radio', baud=19200, cmd_timeout=500, nak_retries=1)
+
+
+class RadioBench(DriverBench):
+    """A driver, and SLCs behind one radio modem; a share ``loss`` of all packets is lost."""
+
+    def __init__(self, network: Network = RADIO_NETWORK, stations: int = SECOND) -> None:
+        numbers = range(1, stations + 1)
+        self.read = [make_mapping('N7:0', station=number, plc='SLC') for number in numbers]
+        self.beat = make_mapping('N10:0', 'Heartbeat', station=FIRST, plc='SLC', period=2000)
+        self.speed = make_mapping('N10:1', 'Write', station=FIRST, plc='SLC',
+                                  fallback=Fallback((7,), 1000))
+        rows = [*self.read, self.beat, self.speed]
+        super().__init__(rows, network=network, start=False)
+        self.loss = 0.0
+        self.plcs = {number: self.plc(number, 'SLC', ('N7:0', 4), ('N10:0', 4))
+                     for number in numbers}
+        self.line.noise = self
+        self.bound = next(bound for bound in Times(network, Rows(rows)).bounds()
+                          if bound.mapping is self.speed)
+        self.open()
+
+    def damage(self, data: bytes, random: Random) -> bytes:
+        """Return a packet, or nothing."""
+        return b'' if random.random() < self.loss else data
+
+
+def test_radios_that_avoid_collisions_carry_several_commands_as_forecast() -> None:
+    cycles = []
+    for several in (False, True):
+        bench = RadioBench(replace(RADIO_NETWORK, collision_avoidance=several), stations=8)
+        bench.line.propagation = 0.1
+        bench.run(60.0)
+        cycle = 60.0 / len(bench.listener.values(bench.read[-1]))
+        # The forecast leaves the heartbeat out, and counts waits that overlap in fact.
+        assert 0.6 < cycle / make_report(bench.network, bench.read, 0.1, 0.2).poll_cycle < 1.6
+        cycles.append(cycle)
+    assert cycles[0] > 3 * cycles[1]
+
+
+@pytest.mark.parametrize('several', [False, True])
+@pytest.mark.parametrize('loss', [0.0, 0.3])
+def test_guarded_value_ends_with_the_program_of_its_plc(several: bool, loss: float) -> None:
+    network = replace(RADIO_NETWORK, collision_avoidance=several)
+    alive = make_mapping('N11:3', plc='SLC', station=FIRST, tag='alive', period=500)
+    level = make_mapping('N7:0', plc='SLC', station=FIRST, tag='level', period=500,
+                         condition=While(('alive',), 3000))
+    bench = DriverBench([alive, level], network=network, start=False)
+    plc = bench.plc(FIRST, 'SLC', ('N7:0', 4), ('N11:0', 4))
+    dice = Random(1)
+    bench.far.hear = bench.far.say = lambda data: b'' if dice.random() < loss else data
+    bench.open()
+    for count in range(1, 150):
+        store(plc, 'N11:3', [count])
+        bench.run(0.2)
+    published = len(bench.listener.times(level))
+    stopped = bench.clock()
+    bench.run(60.0)
+    assert published >= 10
+    longest = network.line_mode.longest_transaction(network.line, 0.0)
+    assert bench.listener.times(level)[-1] <= stopped + 3.0 + longest

@@ -16,17 +16,23 @@
 
 from collections.abc import Iterator
 from itertools import count
+from pathlib import Path
 from random import Random
 import struct
+import time
 
+from abdf1_ros.client import Client
 from abdf1_ros.df1 import frames
 from abdf1_ros.df1.checksum import Checksum
 from abdf1_ros.df1.packet import Packet
+from abdf1_ros.errors import LinkError
 import pytest
+from std_msgs.msg import Int16MultiArray
 from support.fault_box import FaultBox
-from support.fault_rig import boxed, is_unanswered, NOT_SENT, Rig, SETPOINT, UNKNOWN
+from support.fault_rig import boxed, HeardNode, is_unanswered, NOT_SENT, Rig, SETPOINT, UNKNOWN
+from support.queueing_server import QueueingServer
 from support.renewed import Renewed
-from support.ros import ERROR, Observer
+from support.ros import ERROR, Observer, Process, ros_args, write_csv
 
 TOO_LATE = 'not written: refused: it came '  # from a process that a busy host let stand still
 
@@ -107,3 +113,68 @@ def test_plc_loses_power_in_the_middle_of_a_write(line: Boxed) -> None:
     rig.restart_simulator()
     rig.recovers()
     assert rig.has_read_only(SETPOINT)  # it is not written again
+
+
+# A server that keeps what it gets while another client has its line (rule 26)
+
+
+_TIMES = {'timeout': 0.1, 'cmd_timeout': 0.2, 'retries': 0}
+
+
+@pytest.fixture
+def server() -> Iterator[QueueingServer]:
+    server = QueueingServer()
+    yield server
+    server.close()
+
+
+def test_message_to_a_bridge_that_waits_never_reaches_the_line(
+        server: QueueingServer, tmp_path: Path) -> None:
+    net = write_csv(tmp_path / 'net.csv', 'Com_Port,Mode,Baud,Timeout,Cmd_Timeout',
+                    [f'{server.url},Peer,19200,200,500'])
+    rows = write_csv(tmp_path / 'map.csv', 'Tag,Command,Address,Station,PLC_Type,Period',
+                     ['order,ReadWrite,N7:0,1,SLC,200'])
+    with Observer() as observer:
+        bridge = HeardNode(observer, 'abdf1', server.url, 'order', order=Int16MultiArray)
+        with Process('node', *ros_args(f'net_file:={net}', f'map_file:={rows}')):
+            for number in range(100, 115):
+                bridge.publish(number)
+                time.sleep(0.2)
+            assert server.stored
+            observer.until(lambda: len(bridge.results) == 15, 'all results')
+            assert {result.message for result in bridge.results} == {
+                NOT_SENT + 'nothing has been heard on this connection'}
+            server.take_over()
+            bridge.until_well()
+            assert server.written() == []
+            bridge.publish(7)
+            observer.until(lambda: bridge.results[-1].message == 'written', 'a write')
+    assert server.written() == [7]
+
+
+def test_write_of_a_client_is_asked_for_first(server: QueueingServer) -> None:
+    with Client(server.url, plc_type='SLC', **_TIMES) as plc:  # type: ignore[arg-type]
+        for number in (100, 101):
+            with pytest.raises(LinkError) as error:
+                plc.write('N7:0', number)
+            assert not error.value.sent
+        assert server.stored
+        server.take_over()
+        plc.write('N7:0', 7)
+        plc.write('N7:0', 8)
+    assert server.written() == [7, 8]
+
+
+def test_client_asks_again_after_a_request_without_an_answer(server: QueueingServer) -> None:
+    server.take_over()
+    with Client(server.url, plc_type='SLC', **_TIMES) as plc:  # type: ignore[arg-type]
+        plc.write('N7:0', 7)
+        server.block()
+        with pytest.raises(LinkError):
+            plc.read('N7:0')
+        with pytest.raises(LinkError) as error:
+            plc.write('N7:0', 8)
+        assert not error.value.sent
+        server.take_over()
+        plc.write('N7:0', 9)
+    assert server.written() == [7, 9]

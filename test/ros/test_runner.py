@@ -24,6 +24,7 @@ from unittest.mock import Mock
 
 from abdf1_ros.ros.bridge.last_writes import LAST_WRITES
 from abdf1_ros.ros.bridge.node import end_together
+from abdf1_ros.ros.bridge.session import BridgeSession, tell_plcs
 from abdf1_ros.ros.callbacks import AnsweringNode, Callbacks
 from abdf1_ros.ros.diagnostics.log import MOST_ENTRIES
 from abdf1_ros.ros.process.runner import Line, Runner
@@ -43,6 +44,7 @@ class Recorder:
         self._calls = calls
         self._fails = fails
         self.taken = 0
+        self.limit = 0.0
         self.session = self.link = self.writes = self
 
     def _record(self, name: str) -> None:
@@ -69,6 +71,7 @@ class Recorder:
         self._record('answer calls')
 
     def publish_last_diagnostics(self, give_up: float) -> None:
+        self.limit = give_up
         self._record('last words')
 
     def get_logger(self) -> Any:
@@ -124,11 +127,27 @@ def test_all_plcs_are_told_before_a_link_stops_and_results_come_before_the_last_
 
     monkeypatch.setattr('abdf1_ros.ros.bridge.node.take_last_writes', take)
     monkeypatch.setattr('abdf1_ros.ros.bridge.node.time', clock)
-    end_together(nodes)
+    nodes[1].is_alive = lambda: False  # its link has failed
+    end_together(nodes, 5.0)
     assert order(calls) == [
         'begin', 'PLCs: ends', 'ask link', *('stop link', 'answer calls') * 3, '3 last writes',
         *['last words'] * (words > 0)]
-    assert (calls.count('stop link'), calls.count('last words')) == (3, words)
+    assert [calls.count(what) for what in ('PLCs: ends', 'stop link', 'last words')] == [
+        2, 3, words]
+    assert [node.limit for node in nodes] == 3 * [passed + 5.0 if words else 0.0]
+
+
+def test_plcs_of_all_lines_have_one_limit_and_a_dead_link_is_not_waited_for(
+        monkeypatch: pytest.MonkeyPatch) -> None:
+    clock = Mock(monotonic=Mock(side_effect=range(100, 200)))
+    monkeypatch.setattr('abdf1_ros.ros.bridge.session.time', clock)
+    sessions: Any = [Mock(), Mock()]
+    tell_plcs(sessions, 'ends', 6.0)
+    assert [each.wait_for_plcs.call_args.args for each in sessions] == 2 * [(106.0, 'ends')]
+    session: Any = Mock(is_waiting=True, **{
+        'driver.interlocks.is_over': False, '_surroundings.link.is_alive.return_value': False})
+    BridgeSession.wait_for_plcs(session, 199.0, 'ends')
+    clock.sleep.assert_not_called()
 
 
 def test_bridge_that_fails_at_its_end_keeps_no_other_from_it(
