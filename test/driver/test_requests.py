@@ -12,9 +12,13 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Requests on a virtual line: one after the other, over the links of both duplexes."""
+"""Requests on a virtual line, one after the other; and what other threads hand to the link."""
 
+from collections import deque
+from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
+import sys
+import threading
 from typing import Any
 
 from abdf1_ros.df1.machine import Machine
@@ -23,12 +27,14 @@ from abdf1_ros.df1.radio import RADIO
 from abdf1_ros.df1.settings import LinkSettings
 from abdf1_ros.df1.slave import HalfDuplexSlave, multidrop, Responder
 from abdf1_ros.df1.stations import ActiveStationList
+from abdf1_ros.driver.inbox import Inbox
 from abdf1_ros.driver.requests import Requests
 from abdf1_ros.errors import LinkError, PortLost, StationInactive
 from abdf1_ros.pccc import diagnostics
 from abdf1_ros.pccc.dialect import Steps
 from abdf1_ros.pccc.steps import echo, identify
 from abdf1_ros.settings.network import Network
+import pytest
 from support.driver_bench import simulated_plc
 from support.virtual_line import VirtualLine
 
@@ -219,3 +225,79 @@ def test_request_that_waits_for_its_station_ends_with_the_port() -> None:
     requests.machine.wake(0.0)
     requests.machine.stop(PortLost('gone'))
     assert [type(error) for error in ends.errors] == [PortLost] * 2
+
+
+SENDERS, ITEMS = 4, 4000
+
+
+class Emptied(deque[str]):
+    """Items that another thread takes as soon as they come."""
+
+    def append(self, item: str) -> None:
+        """Keep nothing."""
+
+
+@pytest.fixture
+def restless() -> Iterator[None]:
+    """Let threads take turns as often as Python can."""
+    before = sys.getswitchinterval()
+    sys.setswitchinterval(1e-6)
+    yield
+    sys.setswitchinterval(before)
+
+
+def test_items_come_in_order_and_once() -> None:
+    inbox: Inbox[str] = Inbox()
+    assert [inbox.put(item) for item in 'ab'] == [True, True]
+    assert len(inbox) == 2
+    assert list(inbox.take()) == ['a', 'b']
+    assert list(inbox.take()) == []
+
+
+def test_what_is_added_while_items_are_taken_comes_too() -> None:
+    inbox: Inbox[int] = Inbox()
+    inbox.put(0)
+    seen = []
+    for item in inbox.take():
+        seen.append(item)
+        if item < 3:
+            inbox.put(item + 1)
+    assert seen == [0, 1, 2, 3]
+
+
+def test_closed_inbox_takes_nothing_and_gives_what_waited() -> None:
+    inbox: Inbox[str] = Inbox()
+    inbox.put('a')
+    assert list(inbox.close()) == ['a']
+    assert not inbox.put('b')
+    inbox.open()
+    assert list(inbox.take()) == []
+    assert inbox.put('c')
+    assert list(inbox.take()) == ['c']
+    inbox.close()
+    inbox.items = Emptied()
+    assert inbox.put('d')  # it was taken
+
+
+def test_no_item_is_lost_or_taken_twice_under_stress(restless: None) -> None:
+    inbox: Inbox[tuple[int, int]] = Inbox()
+    accepted: list[list[tuple[int, int]]] = [[] for _ in range(SENDERS)]
+
+    def send(sender: int) -> None:
+        for number in range(ITEMS):
+            item = sender, number
+            if inbox.put(item):
+                accepted[sender].append(item)
+
+    senders = [threading.Thread(target=send, args=(number,)) for number in range(SENDERS)]
+    for sender in senders:
+        sender.start()
+    taken: list[tuple[int, int]] = []
+    while any(sender.is_alive() for sender in senders):
+        taken += inbox.take()
+        taken += inbox.close()  # the port is lost, and comes back
+        inbox.open()
+    taken += inbox.take()
+    assert len(taken) == len(set(taken))
+    for sender, items in enumerate(accepted):
+        assert [item for item in taken if item[0] == sender] == items

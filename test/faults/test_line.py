@@ -115,9 +115,6 @@ def test_plc_loses_power_in_the_middle_of_a_write(line: Boxed) -> None:
     assert rig.has_read_only(SETPOINT)  # it is not written again
 
 
-# A server that keeps what it gets while another client has its line (rule 26)
-
-
 _TIMES = {'timeout': 0.1, 'cmd_timeout': 0.2, 'retries': 0}
 
 

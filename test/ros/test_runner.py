@@ -22,6 +22,7 @@ import time
 from typing import Any
 from unittest.mock import Mock
 
+from abdf1_ros.ports.link_thread import PortState
 from abdf1_ros.ros.bridge.last_writes import LAST_WRITES
 from abdf1_ros.ros.bridge.node import end_together
 from abdf1_ros.ros.bridge.session import BridgeSession, tell_plcs
@@ -43,8 +44,7 @@ class Recorder:
     def __init__(self, calls: list[str], fails: str = '') -> None:
         self._calls = calls
         self._fails = fails
-        self.taken = 0
-        self.limit = 0.0
+        self.taken, self.limit = 0, 0.0
         self.session = self.link = self.writes = self
 
     def _record(self, name: str) -> None:
@@ -148,6 +148,31 @@ def test_plcs_of_all_lines_have_one_limit_and_a_dead_link_is_not_waited_for(
         'driver.interlocks.is_over': False, '_surroundings.link.is_alive.return_value': False})
     BridgeSession.wait_for_plcs(session, 199.0, 'ends')
     clock.sleep.assert_not_called()
+
+
+def test_table_of_active_stations_is_empty_without_a_port_and_each_change_is_published() -> None:
+    around = Mock(active_words=None)
+    session: Any = object.__new__(BridgeSession)
+    vars(session).update(_surroundings=around, _port_text='', events=Mock(), configuration=Mock(),
+                         driver=Mock(**{'stations.words.return_value': [6]}))
+    for is_open in (True, False, True):
+        around.link.state = PortState(is_open, str(is_open))
+        session.port_changed(around.link.state)
+    tables = around.active_stations.publish.call_args_list
+    assert [call.args[0].data[0] for call in tables] == [6, 0, 6]
+
+
+def test_failures_of_the_executor_end_it_only_in_a_row(monkeypatch: pytest.MonkeyPatch) -> None:
+    with Observer() as observer:
+        node = AnsweringNode('fails', context=observer.context)
+        callbacks = Callbacks(node)
+        bug = KeyError('a bug')
+        spun = Mock(side_effect=[bug, bug, None, bug, bug, None, bug, bug, bug])
+        monkeypatch.setattr('abdf1_ros.ros.callbacks.Executor.spin_once', spun)
+        monkeypatch.setattr('abdf1_ros.ros.callbacks.time', Mock())
+        callbacks.run()
+        assert spun.call_count == 9
+        node.destroy_node()
 
 
 def test_bridge_that_fails_at_its_end_keeps_no_other_from_it(
