@@ -176,7 +176,7 @@ def _read_text(path: str) -> str:
         if Path(path).is_fifo():
             raise Problem(path, 'is a pipe, not a file')
         with Path(path).open('rb') as file:
-            raw = file.read(_LARGEST + 1).removeprefix(codecs.BOM_UTF8)
+            raw = file.read(_LARGEST + 1)
     except OSError as error:
         where = '' if Path(path).is_absolute() else f' in the folder {Path.cwd()}'
         raise Problem(path, f'cannot be read: {error.strerror or error}{where}') from None
@@ -185,7 +185,7 @@ def _read_text(path: str) -> str:
                             'in it as "CSV UTF-8"')
     if len(raw) > _LARGEST:
         raise Problem(path, f'larger than {_LARGEST // 1_000_000} MB; is it a CSV file?')
-    return raw.decode(errors='surrogateescape')
+    return raw.removeprefix(codecs.BOM_UTF8).decode(errors='surrogateescape')
 
 
 def _check_text(place: Place, line: str) -> None:

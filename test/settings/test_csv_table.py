@@ -242,7 +242,9 @@ def test_what_is_no_file_of_text(path: Path, tmp_path: Path) -> None:
         '"CSV UTF-8"'
     for head in (b'PK\x03\x04\x14\0', b'\xd0\xcf\x11\xe0\xa1\xb1\x1a\xe1\0'):
         assert problems_of(path, head + bytes(100)) == [f'FILE: {workbook}']
+    (tmp_path / 'long').write_bytes(b'\xef\xbb\xbf' + bytes(9_999_998))
     for name, right in (
+            (tmp_path / 'long', 'larger than 10 MB; is it a CSV file?'),
             (tmp_path / 'missing', 'cannot be read: No such file or directory'),
             (tmp_path, 'cannot be read: Is a directory'),
             (tmp_path / 'pipe', 'is a pipe, not a file'),
