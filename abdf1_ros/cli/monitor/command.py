@@ -129,6 +129,7 @@ class Screen:
         self._top = 0
         self._marked = marked
         self._step = 0
+        self._page = 1  # rows, with one of the page before
         self._chosen = ''
         self.chosen = ''
         self._sections: dict[str, int] = {}
@@ -150,6 +151,7 @@ class Screen:
     def show(self, lines: Sequence[TextLine], heading: int = 0) -> None:
         """Show the lines that fit, from the scroll position on, and the keys below."""
         height = self._window.getmaxyx()[0] - 1 - heading
+        self._page = max(1, height - 1)
         self._sections = {line.section: row for row, line in enumerate(lines) if line.section}
         count = len(lines) - heading
         self._top = max(0, min(self._top, count - height))
@@ -197,9 +199,8 @@ class Screen:
 
     def _pressed(self) -> Iterator[tuple[int, int]]:
         """Yield the pressed keys, each with the number of rows that it moves down."""
-        page = self._window.getmaxyx()[0] - 2
-        rows = {curses.KEY_UP: -1, curses.KEY_DOWN: 1, curses.KEY_PPAGE: -page,
-                curses.KEY_NPAGE: page, ord(' '): page, curses.KEY_HOME: -1_000_000,
+        rows = {curses.KEY_UP: -1, curses.KEY_DOWN: 1, curses.KEY_PPAGE: -self._page,
+                curses.KEY_NPAGE: self._page, ord(' '): self._page, curses.KEY_HOME: -1_000_000,
                 curses.KEY_END: 1_000_000}
         while (key := self._window.getch()) != -1:
             if key in (_CONTROL_L, curses.KEY_RESIZE):

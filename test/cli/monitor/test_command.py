@@ -274,6 +274,10 @@ def test_mark_stays_at_its_line_where_others_come(monkeypatch: pytest.MonkeyPatc
     assert chosen('glue packing paint press', curses.KEY_DOWN) == ''
     assert chosen('glue packing paint press', ord('\n')) == 'press'
     assert chosen('glue packing', ord('\n')) == 'glue'
+    plant = ' '.join(f'line{number}' for number in range(60))  # 22 of them fit
+    for key in (curses.KEY_HOME, curses.KEY_NPAGE):
+        assert chosen(plant, key) == ''
+    assert chosen(plant, ord('\n')) == 'line21'
 
 
 def test_signal_gives_the_terminal_back(simulator: Process) -> None:
