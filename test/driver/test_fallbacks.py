@@ -290,27 +290,18 @@ def test_rule_8_fallback_that_stands_is_written_again_without_a_result() -> None
     assert cell.results() == [START, START]
 
 
-def test_rule_8_fallback_that_stands_does_not_wait_for_one_of_a_busy_station() -> None:
-    speeds = [make_mapping('N7:0', 'Write', station=number, fallback=FALLBACK)
-              for number in (1, 2)]
-    line = Line(speeds, (1, 2))
-    line.run(4.0)
-    interlocks = line.driver.interlocks
-    first, second = (interlocks.refresh(9.0, busy) for busy in ({1}, set()))
-    assert first is not None and first.write.mapping is speeds[1]
-    assert second is not None and second.write.mapping is speeds[0]
-
-
-def test_rule_8_fallback_that_was_confirmed_first_is_written_again_first() -> None:
+def test_rule_8_earliest_fallback_that_stands_of_a_station_that_is_not_busy_goes_first() -> None:
+    stations = (1, 2, 3)
     line = Line([make_mapping('N7:0', 'Write', station=number, fallback=FALLBACK)
-                 for number in (1, 2)], (1, 2))
+                 for number in stations], stations)
     line.run(4.0)
     interlocks = line.driver.interlocks
     for number, row in enumerate(interlocks.fallbacks, 1):
         row.refresh_at -= number
         interlocks.plcs[number].plan_refresh(row)
-    first = interlocks.refresh(9.0)
+    first, second = (interlocks.refresh(9.0, busy) for busy in ({3}, set()))
     assert first is not None and first.station == 2
+    assert second is not None and second.station == 3
 
 
 @pytest.mark.parametrize(('event', 'waits'), [
