@@ -121,13 +121,11 @@ def test_program_mode_and_fault_are_seen(network: Network) -> None:
     bench, (plc,), _ = make_bench(word(), network=network, run=1.0)
     plc.processor.setting = Setting.PROGRAM
     bench.run(PERIOD)
-    identity = bench.driver.checks.known(1).identity
-    assert identity is not None
+    assert (identity := bench.driver.checks.known(1).identity) is not None
     assert (identity.is_running, identity.mode_text) == (False, 'REM PROG')
     plc.processor.setting = Setting.FAULT
     bench.run(PERIOD)
-    identity = bench.driver.checks.known(1).identity
-    assert identity is not None
+    assert (identity := bench.driver.checks.known(1).identity) is not None
     assert identity.faults == (
         'major error 0x0020 (minor error at the end of a scan), processor halted',)
     assert bench.listener.changes == []
@@ -207,6 +205,20 @@ def test_station_that_never_answers_this_is_asked_rarely() -> None:
     ears.answer_diagnostics(plc.serve)
     bench.run(20.0)
     assert bench.driver.checks.known(1).identity is not None
+
+
+def test_mode_that_a_row_needs_is_asked_again_soon_and_not_known_by_an_earlier_answer() -> None:
+    guarded = make_mapping('N7:0', plc='SLC', period=1000, condition=While(('RUN',)))
+    bench, (plc,), (ears,) = make_bench(
+        guarded, network=Network(baud=115200, timeout=100, cmd_timeout=500))
+    seen = []
+    for answer in (lambda command: command._replace(tns=0).reply(), plc.serve) * 2:
+        ears.answer_diagnostics(answer)
+        bench.run(8.0)
+        seen.append((bool(bench.driver.points[guarded].withheld),
+                     bench.driver.checks.known(1).processor[:6], len(ears.times(STATUS)) > 2))
+    assert seen == [(True, 'unknow', True), (False, 'SLC 5/', True),
+                    (True, 'SLC 5/', True), (False, 'SLC 5/', True)]
 
 
 # beside reads and writes
@@ -389,8 +401,8 @@ def test_counters_are_read_once_for_each_request_and_never_else(network: Network
     assert bench.driver.checks.known(1).counters == counters
 
 
-def test_counters_that_a_station_refuses_are_told_as_refused() -> None:
-    bench, _, (ears,) = make_bench(word())
+def test_counters_that_a_station_refuses_and_those_of_an_absent_station() -> None:
+    bench, (plc,), (ears,) = make_bench(word())
     ears.answer_diagnostics(lambda command: command.reply(sts=0x10))
     bench.driver.checks.request_counters(1)
     bench.run(1.0)
@@ -398,10 +410,6 @@ def test_counters_that_a_station_refuses_are_told_as_refused() -> None:
     assert (known.counters, known.no_counters) == (
         {}, 'STS 10: illegal command, format or length, or the file does not exist')
     assert bench.driver.checks.counters_wanted == set()
-
-
-def test_absent_station_is_not_asked_for_counters() -> None:
-    bench, (plc,), _ = make_bench(word())
     plc.faults = InjectedFaults(silent=True)
     bench.run(5.0)
     bench.driver.checks.request_counters(1)

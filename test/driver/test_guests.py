@@ -56,10 +56,12 @@ def run(bench: DriverBench, seconds: float) -> None:
         bench.run(0.005)
 
 
-def test_reply_of_the_plc_comes_back_with_the_numbers_of_the_guest() -> None:
-    bench = bench_of()
+@pytest.mark.parametrize(('mode', 'dst'), [('Master', 1), ('Peer', 77)])  # a peer has one PLC
+def test_reply_of_the_plc_comes_back_with_the_numbers_of_the_guest(mode: str, dst: int) -> None:
+    bench = bench_of(mode)
+    bench.open()
     program = Program(bench)
-    command = program.ask(READ_N7)
+    command = program.ask(READ_N7, dst)
     bench.run(1.0)
     (_, reply), = program.replies
     assert reply == command.reply(b'\x10\x10')
@@ -247,7 +249,10 @@ def test_a_flood_gets_a_reply_to_each_command(how_many: int) -> None:
     program = Program(bench)
     for _ in range(how_many):
         program.ask(READ_N7)
+    other = Program(bench, src=9)
+    other.ask(READ_N7)
     bench.run(3.0)
+    assert other.replies[0][0] < program.replies[-12][0]  # the guests take turns
     # One is sent at once, 16 wait.
     assert program.statuses.count(0x00) == 17
     assert program.statuses.count(0x01) == how_many - 17
@@ -270,10 +275,10 @@ def test_silent_station_is_told_at_once_and_costs_others_little() -> None:
 def test_read_of_all_stations_is_not_sent_and_has_no_success() -> None:
     bench = bench_of()
     program = Program(bench, ShareAccess.WRITE)
-    program.ask(READ_N7, dst=255)
-    program.ask(WRITE_N7, dst=255)
+    for data in (READ_N7, WRITE_N7, WRITE_N7, WRITE_N7):
+        program.ask(data, dst=255)
     bench.run(1.0)
-    assert program.statuses == [0x07, 0x00]
+    assert program.statuses == [0x07, 0x00, 0x00, 0x00]
 
 
 def test_every_command_has_one_reply_in_time_when_replies_are_lost() -> None:
@@ -367,15 +372,6 @@ def test_lost_port_is_told_and_what_waits_is_not_sent_later() -> None:
     assert set(program.statuses) <= {0x04, 0x05}
     bench.open(run=2.0)
     assert len(program.replies) == 3
-
-
-def test_peer_has_one_plc_whatever_number_a_guest_gives_it() -> None:
-    bench = bench_of('Peer')
-    bench.open()
-    program = Program(bench)
-    program.ask(READ_N7, dst=77)
-    bench.run(1.0)
-    assert program.statuses == [0]
 
 
 def test_message_of_a_peer_to_the_number_of_a_guest_is_one_to_us() -> None:

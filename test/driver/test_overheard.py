@@ -304,6 +304,10 @@ def test_stations_come_and_go_as_they_are_heard() -> None:
     assert bench.listener.changes == [(2, False)]
     bench.hear(poll(2))
     bench.hear(EOT)
+    bench.driver.ended(PortLost('unplugged'))
+    bench.now += 60.0
+    bench.machine.start(bench.now)
+    bench.run(9.0)  # the silence counts from the opening
     assert bench.listener.changes == [(2, False), (2, True)]
 
 
