@@ -19,6 +19,7 @@ They begin at DST; frames around such bytes are those of vectors/frames.json.
 """
 
 from dataclasses import dataclass
+import traceback
 from typing import Any
 
 from abdf1_ros.counters import Counters
@@ -26,16 +27,19 @@ from abdf1_ros.df1.packet import Packet, PRIORITY_BIT
 from abdf1_ros.errors import FormatError, RemoteError
 from abdf1_ros.pccc.access import Access
 from abdf1_ros.pccc.address import Address
-from abdf1_ros.pccc.data_table import DataTable
+from abdf1_ros.pccc.data_table import DataTable, OutOfRange
 from abdf1_ros.pccc.describe import describe
 from abdf1_ros.pccc.dialect import Request
 from abdf1_ros.pccc.families import dialect_of, FAMILIES, parse_address, served_counters
 from abdf1_ros.pccc.file_types import PlcType
-from abdf1_ros.pccc.server import Server
+from abdf1_ros.pccc.server import Refusal, Server
 from abdf1_ros.pccc.status import check_status
+from hypothesis import given
+from hypothesis import strategies as st
 import pytest
 from support.cases import for_all
-from support.vectors import load_json
+from support.tables import counting, table
+from support.vectors import load_json, pair
 
 _WITH_FUNCTION = (0x06, 0x0F)
 
@@ -177,3 +181,139 @@ def test_other_bits_of_cmd_make_another_command(bit: int) -> None:
 
 def test_every_family_refuses_once() -> None:
     assert {entry.family for entry in EXCHANGES if entry.reply.sts} == set(FAMILIES)
+
+
+PLC5, SLC = PlcType.PLC5, PlcType.SLC
+TEN = '64 00 FF FF 00 00 FF 7F 00 80 10 00 10 10 05 00 06 00 07 00'
+HELLO = '05 00 45 48 4C 4C 00 4F' + ' 00' * 76
+
+
+@for_all(('name', 'words'), [
+    ('plc5_typed_read_N7_0x10', table(PLC5, N7_0=TEN)),
+    ('plc5_typed_read_N7_30_1_short', table(PLC5, N7_30='D2 04')),
+    ('plc5_typed_read_F8', table(PLC5, F8_0='00 00 7A 44 00 00 C0 BF')),
+    ('plc5_typed_read_ascii', table(PLC5, N10_360='FE FF')),
+    ('plc5_typed_read_multi_1', table(PLC5, N7_0=counting(150))),
+    ('plc5_typed_read_multi_2', table(PLC5, N7_0=counting(150))),
+    ('plc5_typed_write_badtype', table(PLC5, F8_0='00 00 00 00' * 6)),
+    ('plc5_rmw', table(PLC5, B3_4='FF 00')),
+    ('slc_A2_N7_0', table(SLC, N7_0=TEN)),
+    ('slc_A2_T4_0_whole', table(SLC, T4_0='00 E0 64 00 2A 00')),
+    ('slc_A2_F8', table(SLC, F8_0='00 00 7A 44')),
+    ('slc_A2_ST9', table(SLC, ST9_0=HELLO)),
+    ('slc_A2_O0_slot', table(SLC, O_2_0='03 00')),
+    ('slc_A2_I1_slot', table(SLC, I_1_0='10 00')),
+    ('slc_A2_max_5_03', table(SLC, N7_0='00' * 236)),
+    ('slc_AA_F8', table(SLC, F8_1='00 00 00 00')),
+    ('slc_AA_T4_PRE', table(SLC, T4_0='00 00 00 00 00 00')),
+    ('slc_AB', table(SLC, B3_4='08 00')),
+    ('slc_err_address', table(SLC, N7_0='00 00')),
+])
+def test_reply_of_the_vectors(name: str, words: DataTable) -> None:
+    command, reply = pair(name)
+    assert Server(words).serve(command) == reply
+
+
+def contents(words: DataTable, family: PlcType) -> list[bytes]:
+    """Return all words of a table that was made of FILES."""
+    return [words.read(parse_address(name.replace('_', ':', 1).replace('_', '.'), family),
+                       len(bytes.fromhex(data)) // 2) for name, data in FILES[family].items()]
+
+
+@for_all('family', FAMILIES)
+@for_all('sts', [0x01, 0x10, 0xF0])
+def test_command_with_a_status_is_not_executed(family: PlcType, sts: int) -> None:
+    words = table(family, **FILES[family])
+    before = contents(words, family)
+    for cmd, data in ((0x00, '00 00 11 11'), (0x08, '00 00 11 11'), (0x05, '00 00 FF 00'),
+                      (0x0F, 'AA 02 07 89 00 00 11 11')):
+        command = Packet(1, 5, cmd, sts, 7, bytes.fromhex(data))
+        assert Server(words).serve(command) == command.reply(sts=0x10)
+    assert contents(words, family) == before
+
+
+@for_all('family', FAMILIES)
+@for_all('tns', [0x0000, 0x0100, 0x1234])
+def test_command_that_lost_its_leading_00_changes_nothing(family: PlcType, tns: int) -> None:
+    """Station 0 is asked; what stands where SRC should is CMD, and the command becomes 00."""
+    words = table(family, **FILES[family])
+    before = contents(words, family)
+    dialect = dialect_of(family)
+    kinds = ['010'] if family == PlcType.PLC2 else ['N7:1', 'N7:0']
+    for text in kinds:
+        place = parse_address(text, family)
+        for cmd, body in (dialect.read(place, 2), dialect.write(place, b'\1\2\3\4'),
+                          dialect.write_bits(place, 0xFFFF, 0x0F0F)):
+            moved = Packet.decode(Packet(0, 5, cmd, 0, tns, body).encode()[1:])
+            assert Server(words).serve(moved).sts
+    assert contents(words, family) == before
+
+
+requests = st.one_of(
+    st.binary(max_size=30),
+    st.builds(bytes.__add__, st.sampled_from([b'\x68', b'\x67', b'\x26']), st.builds(
+        lambda offset, total, mask, levels, tail: (
+            bytes((offset, 0, total, 0, mask)) + levels + tail),
+        st.integers(0, 3), st.integers(0, 4), st.sampled_from([7, 15, 6, 2]),
+        st.binary(min_size=3, max_size=4),
+        st.one_of(st.binary(max_size=8), st.just(b'\x01\x00'), st.just(b'\x93\x09\x42\x01\x00')))),
+    st.builds(
+        lambda fnc, size, file, code, place, data: (
+            bytes((fnc, size, file, code)) + place + data[:size]),
+        st.sampled_from([0xA2, 0xAA, 0xAB]), st.sampled_from([0, 1, 2, 4, 236, 255]),
+        st.sampled_from([0, 1, 4, 7, 8, 9]), st.integers(0x80, 0x95),
+        st.binary(min_size=2, max_size=8), st.binary(max_size=8)),
+    st.builds(  # word range commands and bit writes
+        lambda fnc, offset, total, place, tail: (
+            bytes((fnc, offset, 0, total, 0)) + place + tail),
+        st.sampled_from([0, 1, 2, 4]), st.integers(0, 3), st.integers(0, 5),
+        st.sampled_from([b'\x2C\x08\x0A\x00', b'\x2C\x05\x07\x01', b'\x06\x07\x00']),
+        st.binary(max_size=8)),
+    st.builds(lambda address, tail: bytes((address, 0)) + tail,  # commands without FNC
+              st.integers(0, 9), st.binary(max_size=8)))
+
+
+FOUR = '00 00' * 4
+FILES = {
+    PlcType.PLC2: {'000': FOUR},
+    PlcType.PLC3: {'N7_0': FOUR, 'T_0_CTL': '00 00' * 6, 'I5_0': FOUR, 'B10_0': FOUR},
+    PLC5: {'N7_0': FOUR, 'T4_0': '00 00' * 6, 'F8_0': FOUR, 'ST9_0': '00 00' * 42,
+           'I_0': '00 00', 'O_1': '00 00', 'N5_0': FOUR},
+    SLC: {'N7_0': FOUR, 'T4_0': '00 00' * 6, 'F8_0': FOUR, 'N9_0': FOUR, 'ST10_0': '00 00' * 42,
+          'I_0': '00 00', 'O_1': '00 00'}}
+
+
+@given(requests, st.sampled_from([*FAMILIES]),
+       st.one_of(st.sampled_from((0x0F, 1, 2, 5, 8)), st.integers(0, 255)), st.integers(0, 0xFFFF))
+def test_any_bytes_have_one_reply(data: bytes, family: PlcType, cmd: int, tns: int) -> None:
+    words = table(family, **FILES[family])
+    files = set(words)
+    reply = Server(words).serve(Packet(1, 5, cmd, 0, tns, data))
+    assert (reply.dst, reply.src, reply.cmd, reply.tns) == (5, 1, cmd | 0x40, tns)
+    assert len(reply.data) <= 244
+    if reply.sts:
+        assert len(reply.data) == (reply.sts == 0xF0)
+    assert set(words) == files
+    with pytest.raises(OutOfRange):  # no file has grown
+        words.read(parse_address('000' if family == PlcType.PLC2 else 'N7:0', family), 5)
+
+
+@for_all(('family', 'data'), [
+    (PLC5, '68 00 00 01 00 07 00 09 00 01 00'), (PLC5, '68 00 00 01 00 07 00 07 04 01 00'),
+    (SLC, 'A2 02 09 89 00 00'), (SLC, 'A2 02 07 85 00 00'), (SLC, 'A2 02 07 89 04 00')])
+def test_refusals_leave_nothing_behind(family: PlcType, data: str) -> None:
+    depths = []
+
+    class Spied(Server):
+
+        def _execute(self, command: Packet) -> bytes:
+            try:
+                return super()._execute(command)
+            except Refusal as refusal:
+                depths.append(len(list(traceback.walk_tb(refusal.__traceback__))))
+                raise
+
+    server = Spied(table(family, N7_0='00 00'))
+    for _ in range(10):
+        server.serve(Packet(1, 5, 0x0F, 0, 7, bytes.fromhex(data)))
+    assert depths == [depths[0]] * 10
