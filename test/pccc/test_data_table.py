@@ -16,6 +16,7 @@
 
 from collections.abc import Callable
 
+from abdf1_ros.df1.packet import BROADCAST
 from abdf1_ros.pccc.address import Address
 from abdf1_ros.pccc.data_table import DataTable, NoSuchFile, OutOfRange
 from abdf1_ros.pccc.extent import Extent
@@ -139,3 +140,10 @@ def test_extents_are_by_words(text: str, length: int, meets: bool, holds: bool) 
     elsewhere = extent(text, length, station=2)
     assert not here.meets(elsewhere)
     assert not here.holds(elsewhere)
+
+
+def test_words_of_a_broadcast_meet_those_of_every_station_from_either_side() -> None:
+    area = at('N7:0').area
+    for one, other in ((BROADCAST, 2), (2, BROADCAST)):
+        assert Extent(one, area, 0, 2).meets(Extent(other, area, 1, 3))
+        assert not Extent(one, area, 0, 2).meets(Extent(other, area, 2, 3))

@@ -23,6 +23,7 @@ from abdf1_ros.pccc.file_types import PlcType
 from abdf1_ros.pccc.processor import Processor
 from abdf1_ros.pccc.status import check_status, is_address_fault, Meanings, USUAL_MEANINGS
 from abdf1_ros.pccc.steps import AddressedValues, read, write
+from abdf1_ros.pccc.values import ValueType
 import pytest
 from support.cases import for_all
 
@@ -158,3 +159,24 @@ def test_meanings_of_the_manual(meanings: Meanings, of: str, codes: str) -> None
         error = failure(0xF0, bytes((number,)), meanings) if of else failure(number, b'', meanings)
         assert str(error).startswith(f'STS {of}{code}: ')
         assert words in str(error)
+
+
+def test_members_are_written_one_by_one_and_never_into_those_of_the_processor() -> None:
+    preset = AddressedValues.of('T4:1.PRE', SLC, 2)
+    assert requests_of(write(preset, [5, 6]), reply()) == [
+        'AA 02 04 86 01 01 05 00', 'AA 02 04 86 01 02 06 00']
+    with pytest.raises(FormatError, match='^T4:2 belongs to the processor; '):
+        write(AddressedValues.of('T4:1.ACC', SLC, 2), [5, 6])
+
+
+@for_all(('kind', 'sizes'), [(ValueType.INT32, [80, 4]), (ValueType.INT16, [82, 2])])
+def test_no_packet_divides_a_value(kind: ValueType, sizes: list[int]) -> None:
+    length = sum(sizes) // 2 // kind.words
+    values = AddressedValues.of('N7:0', SLC, length, kind, processor=Processor.ML1000)
+    found = requests_of(write(values, [0] * length), reply())
+    assert [int(request.split()[1], 16) for request in found] == sizes
+
+
+def test_access_of_a_target_chooses_its_command() -> None:
+    values = AddressedValues.of('N7:0', PlcType.PLC5, access=Access.WORD_RANGE)
+    assert requests_of(read(values))[0].startswith('01 ')

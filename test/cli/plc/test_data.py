@@ -15,6 +15,7 @@
 """Addresses and values of the command line."""
 
 from array import array
+from dataclasses import replace
 from typing import cast
 
 from abdf1_ros.cli.plc.data import (
@@ -38,6 +39,7 @@ from abdf1_ros.pccc.processor import Processor
 from abdf1_ros.problems import ConfigurationError
 from abdf1_ros.settings.mapping import Mapping
 from abdf1_ros.settings.rows import Rows
+from abdf1_ros.settings.scaling import Scaling
 from hypothesis import given
 from hypothesis import strategies as st
 import pytest
@@ -137,6 +139,7 @@ def test_text_that_is_no_value_is_a_format_error(address: str, texts: list[str])
     ('N7:0', '1_000', '"1_000" is not a valid int16, a whole number from -32768 to 32767'),
     ('N7:0', '0xFFFF', '"0xFFFF" is not a valid int16, a whole number from -32768 to 32767; '
                        '--type uint16 allows it'),
+    ('N7:0', '65536', '"65536" is not a valid int16, a whole number from -32768 to 32767'),
     ('B3:0/1', '2', '"2" is not a valid bool, 0 or 1'),
     ('F8:0', '1_000', '"1_000" is not a valid float32, a number such as -1.5 or 2e3'),
     ('F8:0', '1,000', '"1,000" could be two numbers; write 1000 or 1.000')])
@@ -147,19 +150,26 @@ def test_value_that_is_none_says_what_would_be_right(address: str, text: str, ri
 
 
 class InterruptedSession:
-    """A session that is interrupted when its command is on the line already."""
+    """A session that is interrupted when its command is on the line already, or before."""
+
+    def __init__(self, sent: bool) -> None:
+        self._sent = sent
 
     def start(self, station: int, steps: object, pending: Pending[WriteResult]) -> None:
         self._pending = pending
         raise KeyboardInterrupt
 
     def close(self) -> None:
-        self._pending.fail(PortLost('closed'))
+        error = PortLost('closed')
+        error.sent = self._sent
+        self._pending.fail(error)
 
 
-def test_write_that_is_interrupted_while_it_begins_is_unknown() -> None:
-    result = Writing(make('N7:0'), ['5']).carry_out(cast(Session, InterruptedSession()))
-    assert (result.outcome, result.detail) == (Outcome.UNKNOWN, 'port lost: closed')
+@for_all(('sent', 'outcome'), [(True, Outcome.UNKNOWN), (False, Outcome.NOT_SENT)])
+def test_write_that_is_interrupted_is_unknown_if_it_was_sent(
+        sent: bool, outcome: Outcome) -> None:
+    result = Writing(make('N7:0'), ['5']).carry_out(cast(Session, InterruptedSession(sent)))
+    assert (result.outcome, result.detail) == (outcome, 'port lost: closed')
 
 
 @for_all(('processor', 'cell'), [
@@ -202,3 +212,5 @@ def test_values_are_written_in_another_radix(
         kind: str, value: float, radix: Radix, text: str) -> None:
     mapping = make_mapping('F8:0' if kind == 'float32' else 'N7:0', kind=kind)
     assert value_texts(mapping, [value], radix) == [text]
+    scaled = replace(mapping, scaling=Scaling(0.5, 0))
+    assert value_texts(scaled, [value], radix) == [f'{value:g}']

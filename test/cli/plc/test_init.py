@@ -220,8 +220,8 @@ def test_rows_of_a_map_that_lie_outside_of_the_files(
         port: str, tmp_path: Path, capsys: Output) -> None:
     path = tmp_path / 'map.csv'
     header = 'Tag,Command,Address,Station,PLC_Type,Length\n'
-    path.write_text(header + 'a,Read,N7:90,2,SLC,10\nb,Read,F10:3,2,SLC,1\nc,Read,N7:0,1,PLC5,\n'
-                    'd,Read,I:3.0,2,SLC,9\n', encoding='utf-8')
+    path.write_text(header + 'a,Read,N7:90,2,SLC,10\nb,Read,F10:3,2,SLC,1\nc,Read,N7:200,1,PLC5,\n'
+                    'd,Read,I:3.0,2,SLC,9\ne,Read,HSC:0.ACC,2,SLC,\n', encoding='utf-8')
     line = ('--map', str(path), '--port', port)
     assert main(['files', '2', *line]) == 0
     assert capsys.readouterr().out == 'all rows of station 2 lie inside\n'

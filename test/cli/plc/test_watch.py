@@ -121,6 +121,8 @@ def test_reads_that_the_output_does_not_take_are_counted_and_others_keep_their_t
     watch.show()
     said, told = capsys.readouterr()
     assert told == 'plc: 3 reads were lost: this output was too slow for them\n'
+    watch.show()
+    assert capsys.readouterr() == ('', '')
     times, values = zip(*((line.split(',')[0], line.split(',')[-1])
                           for line in said.splitlines()), strict=True)
     assert values == ('3', '4')
@@ -310,15 +312,17 @@ def test_rows_of_a_map_have_their_own_tags_and_scaled_values(
     assert Recording(capture).chunks()
 
 
+@pytest.mark.parametrize(('mode', 'text'), [
+    (Mode.PROGRAM, 'PROG: its program does not run, values may stand still; memory lost'),
+    (Mode.RUN, 'RUN; memory lost'), (None, 'mode 0x0E; memory lost')])
 def test_mode_of_each_plc_and_faults_of_the_line_stand_around_the_values(
-        draw: Draw, monkeypatch: pytest.MonkeyPatch) -> None:
-    stopped = Identity(PlcType.PLC5, 'PLC-5/40', mode=Mode.PROGRAM, mode_text='PROG',
-                       faults=('memory lost',))
+        draw: Draw, monkeypatch: pytest.MonkeyPatch, mode: Mode | None, text: str) -> None:
+    stopped = Identity(PlcType.PLC5, 'PLC-5/40', mode=mode, faults=('memory lost',),
+                       mode_text=mode.value if mode else 'mode 0x0E')
     monkeypatch.setattr(Checks, 'known', lambda self, station: StationHealth(
         str(stopped), stopped))
     lines = draw([SPEED], (SPEED, array('h', [5])))
-    assert lines[0] == ('station 1: PLC-5/40, PROG: its program does not run, values may stand '
-                        'still; memory lost')
+    assert lines[0] == f'station 1: PLC-5/40, {text}'
     assert lines[1].startswith('address') and len(lines) == 3
     monkeypatch.setattr(LiveValues, 'faults_of_line', lambda self: ['line: 3 repeated, 1 damaged'])
     assert draw([SPEED], (SPEED, array('h', [5])))[-1] == 'line: 3 repeated, 1 damaged'
