@@ -98,19 +98,21 @@ def test_rule_10_write_that_may_land_after_the_begin_of_a_fallback_has_it_writte
 
 
 def test_rule_11_only_the_first_try_over_a_guest_is_not_held_up_by_a_pause() -> None:
-    one = OneRow()
-    row = one.row
+    row = (one := OneRow()).row
     row.make_due(FallbackCause.START, 0.0)
     assert row.first_due == 0.0
     one.fallback(row.take(0.0), 0.1)
     one.guest(1.0)
-    assert row.judge(1.0, -math.inf)
-    assert row.first_due == 1.0
+    assert row.judge(1.0, -math.inf) and row.first_due == 1.0
     again = row.refresh(1.0)
     assert not row.judge(1.1, -math.inf)
     one.fallback(again, 1.2, Outcome.UNKNOWN)
-    assert row.judge(1.2, -math.inf)
-    assert row.first_due == math.inf
+    assert row.judge(1.2, -math.inf) and row.first_due == math.inf
+    again = row.refresh(2.0)
+    row.make_due(FallbackCause.RUN, 2.1)  # a new PLC, maybe: what went out before is no answer
+    assert one.fallback(again, 2.2) is None and row.why_held
+    assert one.fallback(row.take(2.3), 2.4, Outcome.PARTLY) is None
+    assert not row.judge(2.5, -math.inf)  # after a refusal there is a pause
 
 
 def test_rule_11_answered_write_of_a_guest_ends_the_pause() -> None:
@@ -244,8 +246,7 @@ def test_rule_8_change_to_run_is_a_first_contact(beats: tuple[Mapping, ...]) -> 
 @for_all('is_overwritten', [False, True])
 def test_rule_8_row_is_fresh_by_a_confirmed_message_only(
         outcome: Outcome, is_overwritten: bool) -> None:
-    one = OneRow()
-    row = one.row
+    row = (one := OneRow()).row
     row.make_due(FallbackCause.START, 0.0)
     one.fallback(row.take(0.0), 0.1)
     if is_overwritten:
@@ -255,8 +256,9 @@ def test_rule_8_row_is_fresh_by_a_confirmed_message_only(
     assert not row.is_fresh(1.1)
     one.message(1.2, 1.3, Outcome.WRITTEN)
     one.message(1.1, 1.4, Outcome.WRITTEN)  # of another publisher
-    assert row.is_fresh(1.2 + AFTER - 0.001)
-    assert not row.is_fresh(1.2 + AFTER)
+    assert row.is_fresh(1.2 + AFTER - 0.001) and not row.is_fresh(1.2 + AFTER)
+    one.guest(1.5)  # over a message, not over a fallback
+    assert not row.why_held
 
 
 @pytest.mark.parametrize('silent', [0.4, 1.0])
