@@ -104,7 +104,7 @@ Tag,Command,Address,Station,PLC_Type,Topic,While,Confirms,Fallback,Description,M
 booth_alive,Read,N7:0,2,SLC,,,,,alive of the booth,,
 booth_speed,Read,N7:1,2,SLC,acme/speed,booth_alive,,,ask jdoe,,
 booth_ros,Heartbeat,N7:9,2,SLC,,acme/setpoint acme/door,,,,,
-booth_control,Read,B3:0/1,2,SLC,,RUN,booth_ros,,,,
+booth_control,Read,B3:0/1,2,SLC,,Run,Booth_ROS,,,,
 setpoint,Write,N7:3-4,2,SLC,acme/setpoint,,,acme jdoe,,jdoe,plc-gw
 door,Read,plc-gw.acme.example,10.1.2.3,/home/jdoe,,,,,,,
 """
@@ -121,7 +121,8 @@ def test_anonymous_bundle_has_no_name_of_a_host_user_path_or_port(
         tmp_path: Path, capture: str) -> None:
     folder = tmp_path / 'home' / 'jdoe'
     folder.mkdir(parents=True)
-    files = {'acme_net.csv': NET, 'booth_map.csv': MAP, 'map2.csv': MAP.replace(',', ';'),
+    files = {'acme_net.csv': NET, 'net2.csv': NET.replace('rfc2217://plc-gw', '/dev/plc-gw'),
+             'booth_map.csv': MAP, 'map2.csv': MAP.replace(',', ';'),
              'plc-gw.txt': 'Port of jdoe\n',
              'export.csv': 'Tag Name,Address,Client Access\njdoe,,\n',
              'jdoe.json': json.dumps(RESULT), 'issue.md': '- port: /dev/ttyACME\n'}
@@ -134,7 +135,7 @@ def test_anonymous_bundle_has_no_name_of_a_host_user_path_or_port(
     report = tmp_path / 'report.zip'
     paths = [str(folder / name) for name in files]
     assert main([str(recorded), '--summary', '--report', str(report), '--anonymous',
-                 '--settings', *paths[:5], '--conformance', *paths[5:]]) == 0
+                 '--settings', *paths[:6], '--conformance', *paths[6:]]) == 0
     with ZipFile(report) as bundle:
         found = {name: bundle.read(name).decode() for name in bundle.namelist()}
     everything = '\n'.join([*found, *found.values()]).lower()
@@ -147,7 +148,7 @@ def test_anonymous_bundle_has_no_name_of_a_host_user_path_or_port(
         'tag_1,Read,N7:0,2,SLC,,,,,\n'
         'tag_2,Read,N7:1,2,SLC,topic_1,,tag_1,,\n'
         'tag_3,Heartbeat,N7:9,2,SLC,,,topic_2 topic_3,,\n'
-        'tag_4,Read,B3:0/1,2,SLC,,,RUN,tag_3,\n'
+        'tag_4,Read,B3:0/1,2,SLC,,,Run,tag_3,\n'
         'tag_5,Write,N7:3-4,2,SLC,topic_2,?,,,?\n'
         'tag_6,Read,?,?,?,,,,,\n')
     assert found['settings/unread.txt'].startswith('left out: ')
@@ -171,6 +172,9 @@ def test_processor_is_named(tmp_path: Path, capsys: pytest.CaptureFixture[str]) 
     with ZipFile(report) as bundle:
         text = bundle.read('processors.txt').decode()
     assert text.startswith(f'station {said[1].src}: SLC 5/04 series B revision 3, RUN; status ')
+    assert main([str(path), '--summary', '--report', str(report), '--anonymous']) == 0
+    with ZipFile(report) as bundle:
+        assert 'status ' not in bundle.read('processors.txt').decode()
     capsys.readouterr()
 
 

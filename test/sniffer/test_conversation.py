@@ -107,6 +107,7 @@ def test_message_from_slave_to_slave_is_relayed(talk: Talk) -> None:
     assert talk.back(command.reply()) == MessageFacts(command, 1.0)
     assert talk.out(command.reply()) == MessageFacts(command, None, (Mark.RELAYED,))
     assert talk.unanswered() == []
+    assert talk.out(command._replace(tns=10)).marks == ()
 
 
 def test_broadcast_has_no_reply(talk: Talk) -> None:
@@ -126,10 +127,15 @@ def test_another_recording_begins(talk: Talk) -> None:
 
 
 def test_tns_used_for_something_else_gives_the_first_command_up(talk: Talk) -> None:
+    other, later = Packet(2, 5, 0x0F, 0, 8), COMMAND._replace(data=b'\xaa')
+    for command in (COMMAND, other, later):
+        talk.out(command)
+    for now, given_up in ((talk.now, [COMMAND]), (talk.now, []), (talk.now + 9.7, [other])):
+        assert [entry.command for entry in talk.expired(now)] == given_up
+    assert [entry.command for entry in talk.unanswered()] == [later]
+    talk.back(later.reply())
     talk.out(COMMAND)
-    talk.out(Packet(1, 5, 0x0F, 0, 7, b'\xaa'))
-    assert [entry.command for entry in talk.expired(talk.now)] == [COMMAND]
-    assert [entry.command.data for entry in talk.unanswered()] == [b'\xaa']
+    assert list(talk.expired(talk.now)) == []
 
 
 def test_without_times_there_is_a_limit_too() -> None:
