@@ -25,11 +25,9 @@ from support.mappings import make_mapping
 MODES = {'Message': {}, 'Standard': {'polling': 'Standard'}, 'Peer': {'mode': 'Peer'},
          'Radio': {'mode': 'Radio'}}
 BAUDS = 1200, 2400, 4800, 9600, 19200, 38400
-_LIMIT = 30.0  # s of line time
-_REPLY_RECEIVED = 2523
-
-
 TIMES = [*product((100, 300), (500, 1000))]  # Timeout and Cmd_Timeout
+LONGEST = 30.0  # s of line time
+REPLY_RECEIVED = 2523
 
 
 # Each mode and each speed meets all of these times in the first quarter of all lines.
@@ -37,17 +35,14 @@ TIMES = [*product((100, 300), (500, 1000))]  # Timeout and Cmd_Timeout
     0, *(pytest.param(number, marks=pytest.mark.long) for number in range(1, 4))])
 @pytest.mark.parametrize('mode', MODES)
 def test_long_replies_are_heard(mode: str, quarter: int) -> None:
-    for at, baud in enumerate(BAUDS, [*MODES].index(mode) + quarter):
-        hear_long_replies(mode, baud, *TIMES[at % 4])
-
-
-def hear_long_replies(mode: str, baud: int, timeout: int, cmd_timeout: int) -> None:
-    for words in (10, 25, 40, 60, 80, 117):
+    lines = enumerate(BAUDS, [*MODES].index(mode) + quarter)
+    for (at, baud), words in product(lines, (10, 25, 40, 60, 80, 117)):
+        timeout, cmd_timeout = TIMES[at % 4]
         row = make_mapping('N7:0', length=words)
         bench = DriverBench([row], chunk=1, network=Network(
             baud=baud, timeout=timeout, cmd_timeout=cmd_timeout, enq_retries=0, nak_retries=0,
             **MODES[mode]))
         bench.plc(1, 'PLC5', ('N7:0', words))
-        bench.run_until(partial(bench.listener.values, row), _LIMIT)
+        bench.run_until(partial(bench.listener.values, row), LONGEST)
         # By radio a PLC waits for a quiet line, maybe for longer than Cmd_Timeout.
-        assert mode == 'Radio' or bench.listener.numbers() <= {_REPLY_RECEIVED}
+        assert mode == 'Radio' or bench.listener.numbers() <= {REPLY_RECEIVED}
