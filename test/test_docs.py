@@ -86,9 +86,11 @@ def code(name: str) -> Iterator[str]:
     yield from documents.spans(page)
 
 
-@for_all('name', documents.NAMES)
+@for_all('name', [*documents.NAMES, 'test/lab/field.md', '.ci/pythons'])
 def test_links_lead_somewhere(name: str) -> None:
     page = documents.text(name)
+    for test in re.findall(r'(?<!:)\btest/[\w/]+\.py', page):
+        assert (ROOT / test).exists(), test
     for target in re.findall(r'\]\(([^)]+)\)', page):
         if target.startswith(('http://', 'https://')):
             continue

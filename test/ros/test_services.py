@@ -122,8 +122,8 @@ def test_broadcast_is_no_success_as_no_station_confirms_it(bench: Bench) -> None
 
 def test_set_feeds_a_fallback_once(bench: Bench) -> None:
     bench.results.until(lambda result: result.message == 'fallback value written: start', 'start')
-    # On a host that stood still for Fallback_After the message is rightly too old.
-    assert any(bench.put('motor', True) == (True, 'written') for _ in range(5))
+    answers = (bench.put('motor', True) for _ in range(5))  # too old if the host stood still
+    assert (True, 'written') in answers
     bench.results.until(lambda result: result.message == 'fallback value written: timeout', 'it')
     assert bench.plcs.word('B3:1') == 0
 
