@@ -129,11 +129,11 @@ def test_folder_has_no_picture(tmp_path: Path, capsys: Output) -> None:
 
 
 def test_file_of_another_program_is_not_replaced(tmp_path: Path, capsys: Output) -> None:
-    (tmp_path / 'plan.html').write_text('<html>mine</html>', encoding='utf-8')
+    (tmp_path / 'plan.html').write_bytes(b'\x10\x02\xff\xfe')
     said, page = drawn(tmp_path, capsys)
     assert said.status == 2
     assert 'was not made by --html' in said.err
-    assert page.read_text(encoding='utf-8') == '<html>mine</html>'
+    assert page.read_bytes() == b'\x10\x02\xff\xfe'
 
 
 def test_picture_that_cannot_be_written_is_told(tmp_path: Path, capsys: Output) -> None:

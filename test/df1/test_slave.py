@@ -108,6 +108,16 @@ def own(tns: int = 1, dst: int = OTHER) -> Packet:
     return Packet(dst, US, 0x0F, 0, tns, b'\x67')
 
 
+def test_command_that_the_master_did_not_acknowledge_expires() -> None:
+    bench = SlaveBench(SETTINGS)
+    task = bench.add(own())
+    task.expires = bench.now + 2.0
+    assert bench.poll() == bench.own(own())
+    bench.now += 2.1
+    assert bench.poll() == EOT
+    assert isinstance(task.result, CommandExpired) and task.sent
+
+
 @pytest.mark.parametrize('sent_before', [0, 1])
 def test_command_that_is_too_old_when_the_port_is_to_have_it_does_not_leave(
         sent_before: int) -> None:

@@ -17,6 +17,7 @@
 from collections.abc import Iterable
 import os
 from pathlib import Path
+import shutil
 import subprocess
 import sys
 from typing import Any
@@ -28,7 +29,6 @@ from abdf1_ros.ros.diagnostics.log import News
 import pytest
 from support.mappings import make_mapping
 from support.ros import PROFILES_VARIABLE
-from test_rehearsal import NEEDS_NAMESPACES
 
 # A node that uses shared memory, as at the home of a user. It removes its own files.
 NODE = """
@@ -68,6 +68,16 @@ ip('addr', 'flush', 'dev', 'here')
 print(has_network())
 """
 UNSET = ('ROS_AUTOMATIC_DISCOVERY_RANGE', 'ROS_LOCALHOST_ONLY')
+REHEARSAL = Path(__file__).parents[1] / 'lab' / 'rehearsal' / 'run.py'
+
+
+def has_namespaces() -> bool:
+    """Tell whether this user may make network namespaces here."""
+    return not os.geteuid() and shutil.which('ip') is not None and subprocess.run(
+        ['unshare', '--net', 'true'], check=False, capture_output=True).returncode == 0
+
+
+NEEDS_NAMESPACES = pytest.mark.skipif(not has_namespaces(), reason='namespaces need root')
 
 
 def test_node_notices_that_its_files_are_gone() -> None:
@@ -248,3 +258,16 @@ def test_other_node_of_our_name_is_told_at_once_and_again_when_it_is_no_earlier_
 def test_earlier_run_that_was_killed_is_forgotten() -> None:
     assert changes_of(*[2] * 25, 1, *[2] * 25, 0) == [(0, MAYBE), (25, GONE), (26, MAYBE),
                                                       (51, GONE)]
+
+
+@NEEDS_NAMESPACES
+@pytest.mark.long  # test_standby.py has both hosts in one
+@pytest.mark.parametrize(('fault', 'options'), [
+    ('kill ', ()),  # a spare takes over the lines of a host that dies
+    ('apart', ('--only', 'apart', '--discovery-server'))])  # no result comes a second time
+def test_two_hosts_and_a_fault_between_them(fault: str, options: tuple[str, ...]) -> None:
+    done = subprocess.run(
+        [sys.executable, str(REHEARSAL), '--hosts', '2', '--lines', '1', '--faults', '1',
+         '--seed', '1', *options], check=False, capture_output=True, text=True, timeout=110)
+    assert done.returncode == 0, done.stdout + done.stderr
+    assert f'{fault}    1 times, all lines read and written to after ' in done.stdout
