@@ -43,8 +43,8 @@ def carry_out(write: Write, clock: Callable[[], float]) -> Steps[WriteResult]:
     """
     Send every packet of a write, as long as each is confirmed; ``clock`` gives seconds.
 
-    A fallback continues after a packet that was refused or not answered: the PLC may execute the
-    remaining packets.
+    A write of our own continues after a packet that was refused or not answered: the PLC may
+    execute the remaining packets.
     """
     done, detail, failed = 0, '', None
     for packet in range(len(write.commands)):
