@@ -203,8 +203,7 @@ class Driver:
             return ENDS
         return TOO_MANY if len(self._inbox) + count > MAX_WAITING_WRITES else ''
 
-    def read_now(self, mapping: Mapping, now: float,
-                 answer: Callable[[ReadAnswer], None]) -> None:
+    def read_now(self, mapping: Mapping, answer: Callable[[ReadAnswer], None]) -> None:
         """
         Ask for a row that a PLC has to be read at once.
 
@@ -215,7 +214,7 @@ class Driver:
             answer(ReadAnswer(error=f'Mode {self.network.mode}: nothing is sent'))
         elif self.interlocks.is_ending:
             answer(ReadAnswer(error=ENDS))
-        elif not self._demands.inbox.put(ReadCall(mapping, now, answer)):
+        elif not self._demands.inbox.put(ReadCall(mapping, answer)):
             answer(ReadAnswer(error=_NOT_OPEN))
 
     def refuse(self, mappings: Iterable[Mapping], reason: str,

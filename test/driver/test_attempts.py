@@ -195,7 +195,7 @@ def test_rule_5_calls_at_the_end_move_nothing_and_each_has_its_answer() -> None:
     answers: list[ReadAnswer] = []
 
     def call() -> None:
-        cell.bench.driver.read_now(asked, cell.now, answers.append)
+        cell.bench.driver.read_now(asked, answers.append)
         cell.bench.write(speed, [3])
 
     before = len(cell.results())

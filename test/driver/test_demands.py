@@ -52,7 +52,7 @@ class Line(DriverBench):
         self.run(run)
 
     def ask(self, mapping: Mapping, run: float = 0.0) -> None:
-        self.driver.read_now(mapping, self.clock(), lambda answer: self.answers.append(
+        self.driver.read_now(mapping, lambda answer: self.answers.append(
             (self.clock(), mapping, answer)))
         self.line.wake(self.driver.machine)
         if run:
@@ -152,10 +152,10 @@ def test_calls_do_not_starve_a_full_line(period: int) -> None:
     def ask_again(mapping: Mapping, answer: ReadAnswer) -> None:
         line.answers.append((line.clock(), mapping, answer))
         line.at(line.clock() + 0.001, lambda: line.driver.read_now(
-            mapping, line.clock(), partial(ask_again, mapping)))
+            mapping, partial(ask_again, mapping)))
 
     for table in tables:
-        line.driver.read_now(table, line.clock(), partial(ask_again, table))
+        line.driver.read_now(table, partial(ask_again, table))
     line.line.wake(line.driver.machine)
     before = len(line.listener.reads)
     states: set[Freshness] = set()
@@ -176,6 +176,15 @@ def test_full_line_answers_a_call_soon() -> None:
         begun = line.clock()
         line.ask(SPEED, run=1.0)
         assert line.answers[-1][0] - begun < 0.4, line.answers[-1]
+
+
+def test_call_that_comes_between_the_clock_and_its_look_is_answered() -> None:
+    for row in (RECIPE, make_mapping('N9:0', period=60_000)):
+        line, answers = Line(row), list[ReadAnswer]()
+        line.driver.read_now(row, answers.append)
+        line.driver.machine.wake(line.clock() - 0.001)  # the link thread lost the processor
+        line.run(3.0)
+        assert [answer.error for answer in answers] == ['']
 
 
 def test_silent_station_is_answered_at_once_and_takes_nothing() -> None:
@@ -244,7 +253,7 @@ def test_shorter_packets_of_a_small_processor_are_found() -> None:
     plc.slave = HalfDuplexSlave(LinkSettings(station=1), serve_short)
     answers: list[ReadAnswer] = []
     line.run(1.0)
-    line.driver.read_now(row, line.clock(), answers.append)
+    line.driver.read_now(row, answers.append)
     line.line.wake(line.driver.machine)
     line.run(3.0)
     assert [len(values_of(answer)) for answer in answers] == [100]
@@ -289,7 +298,7 @@ def test_lost_port_and_the_end_answer_every_call() -> None:
     line.ask(RECIPE)
     line.ask(SPEED)
     fresh: list[ReadAnswer] = []
-    line.driver.read_now(SPEED, line.clock(), fresh.append)
+    line.driver.read_now(SPEED, fresh.append)
     line.lose_port()
     assert [*line.errors, fresh[0].error] == ['port lost: unplugged'] * 3
     line.ask(RECIPE)
@@ -305,7 +314,7 @@ def test_each_call_ends_at_its_own_time_whatever_came_after_it() -> None:
     ended: list[str] = []
     demands = ReadCalls(1.0)
     for name, now in (('first', 0.0), ('second', 0.4), ('third', 0.8)):
-        demands.add(ReadCall(RECIPE, now, lambda answer, name=name: ended.append(name)), now, 0.5)
+        demands.add(ReadCall(RECIPE, lambda answer, name=name: ended.append(name)), now, 0.5)
     assert demands.next_expiry == 1.5
     demands.expire(demands.next_expiry)
     assert ended == ['first']

@@ -291,7 +291,7 @@ def test_read_now_is_refused() -> None:
     mapping = row()
     bench = ListeningBench([mapping])
     answers: list[ReadAnswer] = []
-    bench.driver.read_now(mapping, 0.0, answers.append)
+    bench.driver.read_now(mapping, answers.append)
     assert [answer.error for answer in answers] == ['Mode Listen: nothing is sent']
 
 

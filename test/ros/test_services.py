@@ -329,7 +329,7 @@ class StandIn:
     def create_task(self, task: Callable[[], None]) -> None:
         task()
 
-    def read_now(self, row: Mapping, now: float, take: Callable[[ReadAnswer], None]) -> None:
+    def read_now(self, row: Mapping, take: Callable[[ReadAnswer], None]) -> None:
         self.takes.append(take)
 
     def take(self, topic: str, *message: object) -> None:

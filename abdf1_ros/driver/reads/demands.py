@@ -41,10 +41,9 @@ class ReadAnswer:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ReadCall:
-    """A call for the values of a row, from a read that begins at ``since`` (clock, s) or later."""
+    """A call for the values of a row, from a read that begins after the call."""
 
     mapping: Mapping
-    since: float
     answer: Callable[[ReadAnswer], None]
 
 
@@ -53,38 +52,38 @@ class ReadCalls:
     The calls that wait for a read, for ``patience`` s plus the longest time of the read.
 
     ``inbox`` takes calls from any thread. All else belongs to the link thread. ``waiting`` has the
-    calls of each row, each with the clock value (s) until which it waits. ``next_expiry`` is not
-    later than any of these clock values.
+    calls of each row, each with two clock values (s): when the link thread took it, and until when
+    it waits. ``next_expiry`` is not later than any of these ends.
     """
 
     def __init__(self, patience: float) -> None:
         self.inbox: Inbox[ReadCall] = Inbox(is_open=False)
-        self.waiting: dict[Mapping, list[tuple[float, ReadCall]]] = {}
+        self.waiting: dict[Mapping, list[tuple[float, float, ReadCall]]] = {}
         self.next_expiry = math.inf
         self._patience = patience
 
     def add(self, demand: ReadCall, now: float, longest: float) -> None:
         """Let a call wait for a read that takes ``longest`` s at most."""
         until = now + self._patience + longest
-        self.waiting.setdefault(demand.mapping, []).append((until, demand))
+        self.waiting.setdefault(demand.mapping, []).append((now, until, demand))
         self.next_expiry = min(self.next_expiry, until)
 
     def settle(self, mapping: Mapping, answer: ReadAnswer, started: float) -> None:
-        """Answer the calls for a row that came before its read ``started`` (clock, s)."""
-        self._end(mapping, answer, lambda until, demand: demand.since <= started)
+        """Answer the calls for a row that were taken before its read ``started`` (clock, s)."""
+        self._end(mapping, answer, lambda taken, until, demand: taken <= started)
 
     def fail(self, mappings: Iterable[Mapping], error: str) -> None:
         """Answer all calls for some rows with an error."""
         for mapping in mappings:
-            self._end(mapping, ReadAnswer(error=error), lambda until, demand: True)
+            self._end(mapping, ReadAnswer(error=error), lambda taken, until, demand: True)
 
     def expire(self, now: float) -> None:
         """Answer the calls that have waited too long."""
         answer = ReadAnswer(error=f'not read in time: no turn on the line for {self._patience:g} '
                                   's, or the read was broken off')
         for mapping in [*self.waiting]:
-            self._end(mapping, answer, lambda until, demand: now >= until)
-        self.next_expiry = min((until for calls in self.waiting.values() for until, _ in calls),
+            self._end(mapping, answer, lambda taken, until, demand: now >= until)
+        self.next_expiry = min((until for calls in self.waiting.values() for _, until, _ in calls),
                                default=math.inf)
 
     def close(self, error: str) -> None:
@@ -94,10 +93,10 @@ class ReadCalls:
         self.fail([*self.waiting], error)
 
     def _end(self, mapping: Mapping, answer: ReadAnswer,
-             is_over: Callable[[float, ReadCall], bool]) -> None:
+             is_over: Callable[[float, float, ReadCall], bool]) -> None:
         calls = self.waiting.pop(mapping, ())
         if kept := [call for call in calls if not is_over(*call)]:
             self.waiting[mapping] = kept
         for call in calls:
             if is_over(*call):
-                call[1].answer(answer)
+                call[2].answer(answer)

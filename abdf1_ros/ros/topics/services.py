@@ -185,7 +185,7 @@ class RowServices:
         if (call := self._new(len(rows), math.inf, response)) is None:
             return response
         with self._waiting(f'read {uuid.uuid4()}', call):
-            self._driver.read_now(rows[0], line_time(), call.take)
+            self._driver.read_now(rows[0], call.take)
             self._wake_link()
             await call.done
         answer = next((result for result in call.results if isinstance(result, ReadAnswer)),
