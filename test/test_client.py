@@ -268,8 +268,7 @@ def test_forgotten_close_is_told_and_closed_client_refuses(port: str) -> None:
 def test_line_that_comes_back_is_used_again(tmp_path: Path, plcs: PlcPair) -> None:
     name = tmp_path / 'line'
     with ExitStack() as first:
-        port = first.enter_context(plc_line(name, *plcs))
-        here = client(port, plc_type='SLC')
+        here = client(first.enter_context(plc_line(name, *plcs)), plc_type='SLC')
         with here:
             here.write('N7:0', 5)
             first.close()

@@ -146,8 +146,7 @@ def test_policy_that_is_refused_leaves_no_keys_that_allow_everything(tmp_path: P
     needs('sros2')
     bad = tmp_path / 'policy.xml'
     bad.write_text(POLICY.read_text('utf-8').replace('enclave', 'context'), encoding='utf-8')
-    made = keys_of(tmp_path, bad)
-    assert "Element 'contexts': This element is not expected" in made.stderr
+    assert "Element 'contexts': This element is not expected" in keys_of(tmp_path, bad).stderr
     assert not list((tmp_path / 'keystore' / 'enclaves').glob('*/permissions.p7s'))
 
 

@@ -164,8 +164,7 @@ def test_executor_ends_before_a_node_goes_and_the_context_last(
     with Observer() as observer:
         Observer('guest', observer.context).__exit__()
         assert observer.context.ok()
-        other = Node('other', context=observer.context)
-        observer.executor.add_node(other)
+        observer.executor.add_node(Node('other', context=observer.context))
         for owner, name in ((observer.executor, 'shutdown'), (observer.node, 'destroy_node'),
                             (observer.context, 'try_shutdown')):
             record(owner, name)

@@ -151,8 +151,7 @@ def test_browser_shows_blocks_and_red_ones(tmp_path: Path, capsys: Output) -> No
     shown = browser.colours(page, tmp_path)
     assert BLUE in shown and RED in shown  # red in the key alone
     _, page = drawn(tmp_path, capsys, (*ROWS, HASTY))
-    found = browser.dom(page, tmp_path)
-    assert found.bars('bad') == 8
+    assert browser.dom(page, tmp_path).bars('bad') == 8
 
 
 def test_browser_runs_nothing_that_stands_in_a_file(tmp_path: Path, capsys: Output) -> None:

@@ -61,8 +61,7 @@ def test_station_keeps_what_was_heard_of_it() -> None:
 
 
 def test_station_keeps_since_when_it_is_silent() -> None:
-    player = played('master_command_limit_2')
-    assert player.stations[17].silent_since == pytest.approx(102.0)
+    assert played('master_command_limit_2').stations[17].silent_since == pytest.approx(102.0)
 
 
 def test_replies_that_are_late_in_a_row_are_counted_until_one_is_not() -> None:

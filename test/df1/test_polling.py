@@ -169,8 +169,7 @@ def test_commands_wait_no_longer_for_the_dead_when_nobody_is_polled() -> None:
     rig.start(1)
     rig.master.stations.heard(77, 0.0)  # lives, but is in no list
     rig.run(0.3)
-    task = rig.ask(BROADCAST, run=0.2)
-    assert ended(task)
+    assert ended(rig.ask(BROADCAST, run=0.2))
 
 
 def test_last_and_longest_scan_of_each_list_are_known() -> None:

@@ -366,8 +366,7 @@ def test_packets_are_those_of_the_processor_that_a_station_says_to_be(network: N
             *(word(text=f'N7:{number}') for number in range(100, 200))]
     bench = DriverBench(rows, network=network,
                         settings=DriverSettings(processor_period=PERIOD, write_timeout=10.0))
-    plc = simulated_plc(1, 'SLC', bench.clock, *FILES)
-    old = OldSlc(bench, plc)
+    old = OldSlc(bench, simulated_plc(1, 'SLC', bench.clock, *FILES))
     bench.connect(old)
     bench.run(1.0)
     planned = bench.driver.readings.blocks

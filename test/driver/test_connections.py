@@ -118,7 +118,10 @@ def test_fallback_may_be_kept_as_it_is_the_value_of_rest(mode: str) -> None:
     bench = Queue(mode, [speed, make_mapping('N9:0', plc='SLC', period=200)])
     for number in range(20):
         bench.at(0.4 * number, lambda: bench.write(speed, [777]))
-    bench.run(10.0)
+    bench.run(20.0)
+    for _ in range(100):
+        bench.run(0.1)
+        assert bench.driver.next_due() <= bench.driver.interlocks.next_due()
     bench.let_through()
     bench.run(2.0)
     assert {*bench.values_written()} == {SAFE}

@@ -95,8 +95,7 @@ def test_no_value_is_older_than_it_looks_and_no_array_mixes_ages(
 def test_no_command_of_a_write_goes_out_after_it_has_become_too_old(
         polling: str, length: int) -> None:
     write = make_mapping('N9:0', 'Write', length=length)
-    read = make_mapping('N7:0')
-    bench, plc = bench_of(read, write, polling=polling)
+    bench, plc = bench_of(make_mapping('N7:0'), write, polling=polling)
     asked = []
     for number in range(0, 20 if length > 1 else 8, 2):  # until a write has come to its end
         bench.run(1.0)

@@ -158,8 +158,7 @@ def test_message_of_the_plc_appears_at_once(family: str, check: str) -> None:
 
 
 def test_message_to_what_is_not_served_is_refused() -> None:
-    pushed = serve_row('N7:50', length=4)
-    bench = Bench([pushed])
+    bench = Bench([serve_row('N7:50', length=4)])
     bench.open()
     bench.message('N7:54', 1)
     bench.message('N7:0', 1)

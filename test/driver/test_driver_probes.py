@@ -204,3 +204,13 @@ def test_station_that_dies_on_a_write_is_probed_where_another_is_gone_already() 
     bench.listener.reads.clear()
     bench.run(20.0)
     assert bench.listener.values(rows[0])
+
+
+def test_silent_stations_with_reads_and_without_have_their_probes_in_turns() -> None:
+    rows = [make_mapping('N7:0', station=1), make_mapping('N7:0', 'Write', station=2),
+            make_mapping('N7:0', station=3, period=50)]
+    bench = DriverBench(rows, network=Network(timeout=500))
+    bench.plc(3, 'PLC5', ('N7:0', 4))
+    bench.run(60.0)
+    failures = [bench.driver.stations[number].failures for number in (1, 2)]
+    assert min(failures) > 5 and max(failures) - min(failures) <= 1

@@ -135,6 +135,7 @@ def test_rule_11_answered_write_of_a_guest_ends_the_pause() -> None:
     ended(0.2, Outcome.WRITTEN)
     assert plc.next_due(math.inf) < 0.2
     ended(0.3, Outcome.UNKNOWN, own)  # one failure is no reason for a pause
+    ended(0.3, Outcome.UNKNOWN)  # nor is one of a guest
     assert plc.rank(one.row, 0.3) is not None
 
 
@@ -487,6 +488,7 @@ def test_rule_8_0_that_a_guest_may_have_written_over_meanwhile_is_written_once_m
     words.ended(guest)
     beat.ended(Outcome.WRITTEN, 0.2)
     assert beat.judge(0.2, '', 0.2, {})
+    assert beat.is_first_try
 
 
 def test_rule_10_heartbeat_counts_after_a_0_that_is_written_once_more() -> None:
@@ -497,6 +499,7 @@ def test_rule_10_heartbeat_counts_after_a_0_that_is_written_once_more() -> None:
         assert beat.take(now).value == '[0]'
         beat.ended(Outcome.WRITTEN, now + 0.1)
         beat.words.try_again(0.3 if now < 0.3 else math.inf, now + 0.1)
+    assert not beat.read_back(5, 0.39, 0.5)  # that read began before the 0 was confirmed
     assert not beat.judge(0.8, '', 0.8, {})  # the 0 stands for half a second
     assert beat.judge(0.95, '', 0.95, {})
     assert beat.take(0.95).value == '[1]'

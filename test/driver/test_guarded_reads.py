@@ -63,8 +63,8 @@ def test_rule_13_answer_about_the_mode_is_no_older_than_the_stale_time() -> None
     assert why_not(13.0, 16.5) == 'it has not reported its mode for 3.5 s'
     guard.told(running, 16.5)  # nobody knows what it did in between
     assert [why_not(16.5, 16.6), why_not(16.6, 16.6)] == [begun, '']
-    guard.told(replace(running, faults=('bad RAM', 'low battery')), 17.0)
-    assert why_not(17.5, 17.5) == 'not in RUN: it is in RUN, bad RAM; low battery'
+    assert not guard.told(replace(running, faults=('bad RAM', 'low battery')), 20.0)
+    assert why_not(20.5, 20.5) == 'not in RUN: it is in RUN, bad RAM; low battery'
     guard.told(Identity(None, '1785-KE'), 14.6)
     assert why_not(14.7, 14.7) == (
         'not in RUN: 1785-KE has no mode; does a gateway answer for the PLC?')

@@ -24,7 +24,7 @@ from abdf1_ros.driver.guests import Guest, GuestCommand, GuestListener, outcome_
 from abdf1_ros.driver.interlocks.heartbeat import BeatState
 from abdf1_ros.driver.settings import DriverSettings
 from abdf1_ros.driver.write import Outcome
-from abdf1_ros.errors import CommandTimeout
+from abdf1_ros.errors import CommandExpired, CommandTimeout
 from abdf1_ros.messages import Message
 from abdf1_ros.pccc.extent import Extent
 from abdf1_ros.plan.bounds import OURS_BESIDE_GUESTS
@@ -39,13 +39,22 @@ from support.mappings import make_mapping
 WRITE_N7 = bytes.fromhex('AA 02 07 89 00 00 34 12')
 
 
+class Told(GuestListener):
+    """The stations and words of commands that may have written."""
+
+    def __init__(self) -> None:
+        self.words: list[tuple[int, list[Extent]]] = []
+
+    def wrote(self, guest: Guest, command: Packet, station: int, words: list[Extent]) -> None:
+        self.words.append((station, words))
+
+
 def bench_of(mode: str = 'Master', rows: int = 3, period: int = 50) -> DriverBench:
     """Return a driver that reads rows of an SLC all the time."""
     mappings = [make_mapping(f'N{7 + row}:0', station=1, plc='SLC', period=period)
                 for row in range(rows)]
     bench = DriverBench(mappings, network=Network(mode=mode, baud=19200, timeout=200))
-    plc = bench.plc(1, 'SLC', *((f'N{7 + row}:0', 20) for row in range(rows)))
-    store(plc, 'N7:0', [4112])
+    store(bench.plc(1, 'SLC', *((f'N{7 + row}:0', 20) for row in range(rows))), 'N7:0', [4112])
     bench.run(1.0)
     return bench
 
@@ -111,6 +120,9 @@ def test_command_that_has_become_too_old_after_it_was_taken_is_not_sent() -> Non
     job = guests.next(bench.clock(), ())
     assert job is not None
     assert bench.clock() < job.expires <= bench.clock() + DriverSettings().write_timeout
+    program.guest.listener = told = Told()
+    job.ended(CommandExpired(sent=False))
+    assert (program.statuses, told.words) == ([0x01], [])
 
 
 def test_what_is_not_allowed_is_refused_at_once_and_changes_nothing() -> None:
@@ -133,20 +145,13 @@ def test_a_write_of_a_guest_is_read_again_at_once(kind: str, address: str, write
     bench = DriverBench([mapping])
     plc = bench.plc(1, kind, (address, 20))
     bench.run(1.0)
-    wrote: list[tuple[int, list[Extent]]] = []
-
-    class Told(GuestListener):
-
-        def wrote(self, guest: Guest, command: Packet, station: int, words: list[Extent]) -> None:
-            wrote.append((station, words))
-
     program = Program(bench, ShareAccess.WRITE)
-    program.guest.listener = Told()
+    program.guest.listener = told = Told()
     program.ask(write)
     bench.run(0.5)
     assert stored(plc, address) == b'\x34\x12'
     assert bench.listener.values(mapping)[-1] == [0x1234]
-    assert wrote == [(1, [mapping.extent])]
+    assert told.words == [(1, [mapping.extent])]
 
 
 @for_all('entry', [
@@ -208,6 +213,16 @@ def test_guests_get_a_quarter_and_never_two_between_two_of_ours() -> None:
     counts = [len(program.replies) for program in guests]
     assert sum(counts) == pytest.approx(total / 4, rel=0.05)
     assert max(counts) - min(counts) <= 1
+
+
+def test_guest_that_had_an_idle_line_has_its_share_of_the_next_reads() -> None:
+    bench = bench_of(rows=12, period=2000)
+    program = Program(bench)
+    program.keep_asking(READ_N7)
+    run(bench, 1.0)
+    before = len(program.replies)
+    run(bench, 0.3)
+    assert before > 20 and len(program.replies) - before in (3, 4)
 
 
 @for_all('entry', [('Master', 'hear'), ('Master', 'say'), ('Peer', 'hear'), ('Peer', 'say')])

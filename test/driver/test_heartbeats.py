@@ -24,7 +24,7 @@ from random import Random
 from abdf1_ros.df1.checksum import Checksum
 from abdf1_ros.driver.interlocks.heartbeat import BeatState, LARGEST, OtherWriter
 from abdf1_ros.driver.settings import DriverSettings
-from abdf1_ros.driver.write import Outcome
+from abdf1_ros.driver.write import Outcome, Write
 from abdf1_ros.pccc.data_table import DataTable
 from abdf1_ros.pccc.families import parse_address
 from abdf1_ros.pccc.file_types import PlcType
@@ -181,6 +181,8 @@ def test_rule_3_beat_is_not_sent_when_it_may_be_wrong_by_then() -> None:
     assert expires(now - 0.5, now) == now + 1.5  # of the executor
     assert expires(now, now - 4.0) == now + 1.0  # of the topic
     assert expires(now + 9.0, now + 9.0) == now + 3.0  # of the fallback: a message waits
+    interlocks.message_came(Write(speed, [3], now))  # an older one that came late
+    assert interlocks.conditions.messages['speed'] == now + 9.0
 
 
 @pytest.mark.parametrize(('period', 'lost'), [(100, 0.0), (100, 0.35), (200, 0.2), (500, 0.2)])
@@ -207,7 +209,7 @@ def test_rule_3d_lapse_that_nobody_saw_is_0_as_well() -> None:
     """Another station's 0 has the line until the topic is back."""
     speed = speed_row(None)
     beats = [make_mapping('N10:0', 'Heartbeat', station=number, tag=f'beat{number}', period=1000,
-                          condition=While((speed.topic,), 1000)) for number in (1, 2)]
+                          condition=While((speed.topic,), 1000 + number)) for number in (1, 2)]
     line = Line([speed, *beats], (1, 2))
     for number in range(40):
         line.at(0.1 * number, lambda: line.write(speed, [3]))
@@ -397,8 +399,7 @@ def test_rule_19_second_foreign_value_is_one_within_a_minute_or_20_periods() -> 
 @pytest.mark.parametrize('polling', POLLING_MODES)
 def test_rule_19_own_values_are_never_taken_for_those_of_another(polling: str) -> None:
     cell = Cell(beat_row(100), speed_row(), make_mapping('N10:1', period=100), polling=polling)
-    speed = cell.bench.driver.mappings[1]
-    cell.publish(speed, 3, times=150)
+    cell.publish(cell.bench.driver.mappings[1], 3, times=150)
     for number in range(8):
         cell.bench.at(2.0 + number, lambda number=number: setattr(  # type: ignore[misc]
             cell, 'is_late', number % 3 == 1))

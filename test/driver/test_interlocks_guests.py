@@ -107,8 +107,7 @@ def test_rule_8_guests_write_over_a_fallback_is_written_over_at_once(dst: int) -
 @pytest.mark.parametrize('count', [1, 2, 3])
 def test_rule_19_own_heartbeats_that_a_gateway_holds_are_no_other_program(
         held: float, count: int) -> None:
-    beat = make_mapping('N10:0', 'Heartbeat', tag='beat', period=200, via=7)
-    cell = Cell(beat, start=False)
+    cell = Cell(make_mapping('N10:0', 'Heartbeat', tag='beat', period=200, via=7), start=False)
     cell.put_behind_gateway(run=5.0)
     left = [count]
 
@@ -179,8 +178,7 @@ def test_rule_5_commands_of_guests_are_not_sent_while_the_bridge_ends() -> None:
 
 
 def test_rule_11_plc_is_not_left_alone_any_more_once_it_answers_a_write_of_anybody() -> None:
-    speed = speed_row()
-    cell = GuestCell(speed, start=False)
+    cell = GuestCell(speed_row(), start=False)
     cell.is_undelivered = lambda command: command.data.endswith(b'\7\0')
     cell.bench.open()
     plc = cell.bench.driver.interlocks.plcs[1]

@@ -17,12 +17,13 @@
 import math
 from unittest.mock import Mock
 
-from abdf1_ros.df1.packet import Packet
+from abdf1_ros.df1.packet import BROADCAST, Packet
 from abdf1_ros.driver.job_tasks import Job, JobTasks
 from abdf1_ros.driver.write import Outcome
 from abdf1_ros.errors import CommandTimeout, PortLost
 from abdf1_ros.pccc.dialect import Steps
 import pytest
+from support.cases import for_all
 from support.driver_bench import DriverBench
 from support.mappings import make_mapping
 
@@ -76,6 +77,14 @@ def test_size_of_the_reply_is_that_of_the_first_command() -> None:
     assert task.reply_size == 20
     task.reply(task.command.reply(bytes(20)))
     assert task.reply_size == 0
+
+
+@for_all('station', [1, BROADCAST])
+def test_reply_of_a_station_is_heard_and_the_end_of_a_broadcast_is_not(station: int) -> None:
+    (tasks := JobTasks(OURS, 0)).connect()
+    task = TwoRequests(station).start(tasks, NOW)
+    task.reply(task.command.reply())
+    assert tasks.is_heard is (station != BROADCAST)
 
 
 def test_error_ends_the_job_and_says_whether_the_command_was_sent() -> None:
@@ -150,12 +159,13 @@ def test_job_that_the_garbage_collector_has_ended_is_left_alone() -> None:
     assert job.errors == []
 
 
-def test_command_expires_by_the_request_or_by_the_command_before() -> None:
+@for_all('expires', [NOW + 1.5, NOW + 9.0])
+def test_command_expires_by_the_request_or_by_the_command_before(expires: float) -> None:
     tasks = JobTasks(OURS, 0, char_time=0.01)
-    task = TwoRequests(expires=NOW + 1.5, patience=2.0).start(tasks, NOW)
+    task = TwoRequests(expires=expires, patience=2.0).start(tasks, NOW)
     size = len(task.command.encode())
     task.reply(task.command.reply())
-    assert task.expires == pytest.approx(NOW + 2.0 + 0.01 * size)
+    assert task.expires == pytest.approx(max(expires, NOW + 2.0 + 0.01 * size))
     assert tasks.next_expiry == task.expires
 
 

@@ -180,8 +180,7 @@ def test_cells_that_go_with_changes_only(cells: dict[str, str], text: str) -> No
 
 def test_change_is_one_of_the_raw_value() -> None:
     scaling = Scaling(0.001, 1e6)  # too fine for float32 to show every step
-    mapping = make_mapping(kind='int32', publish='Change', scaling=scaling)
-    fine = ReadPoint(mapping, 0.1, 0.6)
+    fine = ReadPoint(make_mapping(kind='int32', publish='Change', scaling=scaling), 0.1, 0.6)
     first = fine.update(b'\1\0\0\0', 0.0)
     assert fine.update(b'\1\0\0\0', 1.0) is None
     assert fine.update(b'\2\0\0\0', 2.0) == first == array('f', [1e6])

@@ -170,8 +170,7 @@ def test_lost_reply_and_lost_command_are_told_apart(
     assert result.outcome is Outcome.UNKNOWN
     assert result.detail.endswith(f'; {detail}')
     assert result.latency < 1.2
-    plc_value = bench.listener.values(mapping)[-1]
-    assert plc_value == [int.from_bytes(held, 'little')]
+    assert bench.listener.values(mapping)[-1] == [int.from_bytes(held, 'little')]
 
 
 def test_lost_port_leaves_no_write_without_a_result() -> None:

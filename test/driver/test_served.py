@@ -340,8 +340,7 @@ def test_rows_of_the_same_words_are_all_published() -> None:
 @given(cmd=st.sampled_from((0x0F, 0x06, 0x2F, 0x01)), data=st.binary(max_size=60),
        plc=st.sampled_from(FAMILIES))
 def test_any_bytes_are_answered(cmd: int, data: bytes, plc: str) -> None:
-    bench = Bench(plc, row('N7:0', plc, 20))
-    sts, _ = bench.ask(cmd, data)
+    sts, _ = Bench(plc, row('N7:0', plc, 20)).ask(cmd, data)
     assert sts in (0, 0x10, 0x50, 0xF0)
 
 

@@ -118,8 +118,7 @@ def test_change_goes_at_once() -> None:
 
 def test_word_that_the_plc_clears_is_back_within_one_read() -> None:
     line = Line(make_mapping('N7:0', 'Write', write_again=60_000), READ)
-    row = line.mappings[0]
-    line.keep_saying(row, [7], 6.0)
+    line.keep_saying(line.mappings[0], [7], 6.0)
     line.run(3.0)
     store(line.there, 'N7:0', [0])
     line.run(0.3)

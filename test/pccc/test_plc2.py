@@ -133,8 +133,7 @@ def test_compatibility_file_of_a_plc5_has_the_number_of_the_station_that_asks() 
 
 
 def test_structures_of_a_compatibility_file_are_words() -> None:
-    memory = table(PLC5, C5_0=counting(9))
-    assert ask(memory, '08 00 04', 0x01) == (0, '04 00 05 00')
+    assert ask(table(PLC5, C5_0=counting(9)), '08 00 04', 0x01) == (0, '04 00 05 00')
 
 
 @for_all('family', [PLC3, PLC5, SLC])

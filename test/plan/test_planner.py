@@ -265,8 +265,7 @@ def test_mapping_is_never_torn_when_neighbours_overlap_the_limit() -> None:
 
 
 def test_long_structures_are_split_between_elements() -> None:
-    mapping = make_mapping('T4:0', length=100)
-    block, = plan(mapping)
+    block, = plan(make_mapping('T4:0', length=100))
     assert spans([block]) == [('T4:0', 69), ('T4:23', 33)]
 
 

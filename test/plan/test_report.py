@@ -102,8 +102,7 @@ def test_map_without_a_row_is_odd() -> None:
 @for_all('mode', ['Peer', 'Master'])
 def test_station_0_on_a_full_duplex_line_is_odd(mode: str, own: int, station: int,
                                                 begin: str | None) -> None:
-    report = report_of(make_mapping('N7:0', station=station), mode=mode, station=own)
-    found = report.remarks()
+    found = report_of(make_mapping('N7:0', station=station), mode=mode, station=own).remarks()
     if mode == 'Master' or begin is None:
         assert found == []
     else:
@@ -164,8 +163,7 @@ def test_guarded_rows_of_a_full_line_are_named() -> None:
     assert texts(report_of(*rows), RemarkKind.LOAD)[1:] == [
         'on such a line rows with While come less often than other rows, because each value '
         'needs a recent mode of the PLC, or a recent counter: guarded']
-    light = [replace(row, period=2000) for row in rows]
-    assert texts(report_of(*light), RemarkKind.LOAD) == []
+    assert texts(report_of(*[replace(row, period=2000) for row in rows]), RemarkKind.LOAD) == []
 
 
 def test_baud_rate_has_to_do_for_heartbeats_and_questions_too() -> None:

@@ -53,8 +53,7 @@ class Paused(NoLine):
 
 def test_time_that_is_up_goes_before_bytes_that_lie_in_the_buffer() -> None:
     script, port = Script(Send(b'command', 1.0)), Paused()
-    thread = Impatient(script.machine, lambda: port, 1, clock=port.clock)
-    thread.run_out()
+    Impatient(script.machine, lambda: port, 1, clock=port.clock).run_out()
     assert script.next() is None
 
 
@@ -110,8 +109,7 @@ def test_process_that_stops_just_before_it_writes_sends_no_old_command() -> None
     port = Paused()
     port.write = written.append  # type: ignore[method-assign]
     looks = iter([1.0])  # at the start; then the process does not run for a while
-    thread = Impatient(script.machine, lambda: port, 1, clock=lambda: next(looks, 60.0))
-    thread.run_out()
+    Impatient(script.machine, lambda: port, 1, clock=lambda: next(looks, 60.0)).run_out()
     assert 'CommandExpired' in script.end()
     assert written == [READY]
 
@@ -260,8 +258,7 @@ def test_burst_beside_load_takes_the_time_of_the_line() -> None:
     """Some portions wait long for the processor; the others make up for it."""
     script = Script(Listen(None), timing=LineTiming(0.001))
     port = Babbler(bytes(READ_SIZE), 11)
-    thread = Restful(script, port, work=0.01, late=[0.3] * 10)
-    thread.run_out()
+    Restful(script, port, work=0.01, late=[0.3] * 10).run_out()
     assert port.now - 100.0 == pytest.approx(10 * READ_SIZE * 0.001)
 
 

@@ -75,8 +75,7 @@ def test_wake_ends_a_rest(pty: Pty, link: Link) -> None:
 
 def test_wake_may_come_in_any_number_and_before_the_start(pty: Pty, link: Link) -> None:
     script = Script(Listen(PATIENCE))
-    machine = script.machine
-    thread = LinkThread(machine, lambda: open_port(PortSettings(str(pty.name))))
+    thread = LinkThread(script.machine, lambda: open_port(PortSettings(str(pty.name))))
     link.threads.append(thread)
     for _ in range(100_000):
         thread.wake()
@@ -128,8 +127,7 @@ def test_descriptors_have_no_limit_of_their_own(pty: Pty, link: Link) -> None:
     resource.setrlimit(resource.RLIMIT_NOFILE, (max(soft, 1100), hard))
     many = [os.dup(0) for _ in range(1024)]
     try:
-        script = Script(Rest(), Send(b'awake', None))
-        thread = link.start(script.machine, pty.name)
+        thread = link.start(Script(Rest(), Send(b'awake', None)).machine, pty.name)
         assert link.state().is_open
         assert pty.read(5) == READY
         thread.wake()

@@ -162,8 +162,7 @@ def test_opener_records_across_openings(
             port.write(b'this has not left')
     opener.close()
     settings: dict[str, str] = {}
-    chunks = chunks_of(tmp_path / 'x', settings)
-    assert [chunk.data for chunk in chunks] == [b'\x01', b'\x02']
+    assert [chunk.data for chunk in chunks_of(tmp_path / 'x', settings)] == [b'\x01', b'\x02']
     assert (settings['baud'], settings['check'], settings['duplex'], settings['port']) == (
         '19200', 'CRC', 'full', str(pty.name))
     assert settings['begun'][:2] == '20'

@@ -254,8 +254,7 @@ def test_all_counters_are_there_by_mnemonic_in_order_and_start_afresh(bridge: Br
                  'CNT_POLL_MSGS_SENT', 'CNT_ACKS_SENT', 'CNT_ACKS_RCVD', 'CRD_CHAR_SENT',
                  'CRD_CHAR_RECV'):
         assert int(before[name]) > 0, name
-    response = bridge.observer.call(Trigger, '/abdf1/reset_counters', Trigger.Request())
-    assert response.success
+    assert bridge.observer.call(Trigger, '/abdf1/reset_counters', Trigger.Request()).success
     after = details(find_status(bridge.diagnostics.fresh(), 'counters'))
     assert list(after) == COUNTERS
     assert 0 <= int(after['CNT_CMD_MSGS_SENT']) < int(before['CNT_CMD_MSGS_SENT'])

@@ -191,8 +191,7 @@ def test_status_shows_each_character_of_what_comes_from_outside() -> None:
 
 
 def test_link_before_there_is_one(bench: Bench) -> None:
-    unattached = Diagnostics('line_a', bench.driver, PORT, bench.events)
-    link = unattached.statuses(NOW)[0]
+    link = Diagnostics('line_a', bench.driver, PORT, bench.events).statuses(NOW)[0]
     assert (link.level, link.message) == (ERROR, 'ERROR: not started yet')
     assert details(link)['port'] == 'closed'
 

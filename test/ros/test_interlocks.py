@@ -164,8 +164,7 @@ def test_rule_3_heartbeat_stands_still_with_the_executor(cell: Cell) -> None:
 def test_rule_3_simulated_time_that_does_not_run_holds_nothing_up(tmp_path: Path) -> None:
     with Cell(tmp_path, 'use_sim_time:=true') as cell:
         cell.until_counting()
-        speed = cell.ros.publisher(Int16MultiArray, '/abdf1/write/speed')
-        cell.until_word(speed, 3)
+        cell.until_word(cell.ros.publisher(Int16MultiArray, '/abdf1/write/speed'), 3)
         before = len(fallbacks(cell.results))
         # On a busy host a PLC may be lost for a moment: then it is that of its return.
         cell.until(lambda: len(fallbacks(cell.results)) > before, 'the fallback')
@@ -174,8 +173,7 @@ def test_rule_3_simulated_time_that_does_not_run_holds_nothing_up(tmp_path: Path
 
 def test_rule_5_orderly_end_leaves_zero_and_fallback(cell: Cell) -> None:
     cell.until_counting()
-    publisher = cell.ros.publisher(Int16MultiArray, '/abdf1/write/speed')
-    cell.until_word(publisher, 42)
+    cell.until_word(cell.ros.publisher(Int16MultiArray, '/abdf1/write/speed'), 42)
     cell.end()
     assert (cell.word('N10:0'), cell.word('N10:1')) == (0, 7)
 

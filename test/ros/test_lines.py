@@ -290,16 +290,14 @@ def test_each_line_is_a_node_of_its_own(plant: Plant) -> None:
     diagnostics = plant.observer.diagnostics(plant.plcs['c'].port)
     assert until_status(diagnostics, 'link', OK).name == 'hall/c: link'
     assert line_status(plant, OK)['running'] == '3'
-    response = plant.observer.call(Trigger, '/hall/a/reload', Trigger.Request())
-    assert response.success
+    assert plant.observer.call(Trigger, '/hall/a/reload', Trigger.Request()).success
     assert plant.end() == 0
     assert not [thread for thread in threading.enumerate() if thread.name == 'callbacks']
 
 
 def test_process_has_a_name_of_its_own(plant: Plant) -> None:
     plant.start('-r', 'lines:__node:=host_b', reads='a')
-    status = until_status(plant.observer.diagnostics(''), 'lines', OK)
-    assert status.name == 'host_b: lines'
+    assert until_status(plant.observer.diagnostics(''), 'lines', OK).name == 'host_b: lines'
     assert plant.observer.call(Trigger, '/host_b/reload', Trigger.Request()).success
 
 

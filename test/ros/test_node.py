@@ -278,8 +278,7 @@ def test_bad_row_is_told_and_left_out_and_the_rest_runs(
         make_bench: Benches, capfd: Output) -> None:
     bench = make_bench('bad_station,Read,N7:0,255,SLC,1,', 'bad_type,Read,N7:0,2,PLC9,1,',
                        'missing,Read,N99:0,1,PLC5,1,', SPEED)
-    speed = bench.ros.listen(Int16MultiArray, '/abdf1/read/speed')
-    assert values_in(speed.first()) == [0, 0]
+    assert values_in(bench.ros.listen(Int16MultiArray, '/abdf1/read/speed').first()) == [0, 0]
     # What only the PLC can know shows in the diagnostics, mapping by mapping, and in the log.
     status = until_status(bench.diagnostics, 'mappings', ERROR, lambda status: (
         'of 2 mappings 1 failed, 1 fresh; 2 rows left out of the map, the first at '
@@ -307,8 +306,7 @@ def test_bad_row_is_told_and_left_out_and_the_rest_runs(
 def test_tag_cannot_forge_lines_or_statuses(make_bench: Benches, capfd: Output) -> None:
     tag, shown = 'lamp\x0b[FATAL] all is lost\x1b[2J', r'lamp\x0b[FATAL] all is lost\x1b[2J'
     bench = make_bench(f'"{tag}",ReadWrite,N99:0,1,PLC5,1,recipe')
-    status = until_status(bench.diagnostics, 'mappings', ERROR)
-    assert shown in details(status)
+    assert shown in details(until_status(bench.diagnostics, 'mappings', ERROR))
     bench.publisher(Int16MultiArray, 'recipe')(1, 2)
     (result,) = bench.until_results(1)
     assert result.name == shown
@@ -322,8 +320,7 @@ def test_tag_cannot_forge_lines_or_statuses(make_bench: Benches, capfd: Output) 
 
 
 def test_every_value_of_a_long_block_is_published(make_bench: Benches) -> None:
-    words = [f'w{number},Read,N7:{number},1,PLC5,1' for number in range(9)]
-    bench = make_bench(*words)
+    bench = make_bench(*[f'w{number},Read,N7:{number},1,PLC5,1' for number in range(9)])
     inboxes = [bench.ros.listen(Int16MultiArray, f'/abdf1/read/w{number}') for number in range(9)]
     assert len(bench.node.session.driver.readings.blocks) == 1
     bench.plcs[1].table.write(parse_address('N7:0', PlcType.PLC5), bytes(range(18)))

@@ -101,8 +101,7 @@ def test_rows_come_and_go_and_those_that_stay_are_not_disturbed(bench: Bench) ->
     bench.write_map(SPEED, LEVEL)
     assert bench.reload() == (True, (
         f'{bench.node.session.configuration}; new: level; gone: recipe'))
-    levels = bench.ros.listen(Float32MultiArray, '/abdf1/read/level')
-    assert values_in(levels.first()) == [1.5]
+    assert values_in(bench.ros.listen(Float32MultiArray, '/abdf1/read/level').first()) == [1.5]
     assert values_in(speeds.next()) == [7, 8]
     assert publisher in bench.node.publishers
     node = bench.ros.node
@@ -311,8 +310,7 @@ def test_other_speed_opens_the_port_anew(bench: Bench, capfd: Output) -> None:
 
 
 def test_file_that_has_changed_is_told_once(bench: Bench, capfd: Output) -> None:
-    link = until_status(bench.diagnostics, 'link', OK)
-    assert details(link)['files'] == 'as read'
+    assert details(until_status(bench.diagnostics, 'link', OK))['files'] == 'as read'
     bench.write_map(SPEED)
     text = 'map.csv changed since read; call ~/reload to read again'
     until_status(bench.diagnostics, 'link', OK, lambda status: details(status)['files'] == text)
@@ -347,8 +345,7 @@ def test_files_are_read_again_while_the_port_is_left_to_others(bench: Bench) -> 
     assert bench.reload()[0]
     open_port(PortSettings(bench.plcs.port)).close()
     assert bench.polling(True)[0]
-    levels = bench.ros.listen(Float32MultiArray, '/abdf1/read/level')
-    assert values_in(levels.first()) == [1.5]
+    assert values_in(bench.ros.listen(Float32MultiArray, '/abdf1/read/level').first()) == [1.5]
 
 
 def test_port_is_left_to_others_and_taken_again(bench: Bench) -> None:

@@ -168,8 +168,7 @@ def test_line_that_was_lost_for_a_moment_has_its_active_stations_again(pair: Pai
     left = bridge.executor.create_task(bridge.standby.leave_line)
     pair.ros.until(left.done, 'the line to be left')
     pair.ros.until(lambda: pair.counts == (1, 1), 'the bridge to have the line again')
-    stations = pair.ros.listen(UInt16MultiArray, '/abdf1/active_stations')
-    stations.values([2] + 15 * [0])
+    pair.ros.listen(UInt16MultiArray, '/abdf1/active_stations').values([2] + 15 * [0])
 
 
 @pytest.mark.parametrize(('port', 'heard', 'has_line'), [

@@ -97,8 +97,7 @@ def test_values_of_a_processor() -> None:
 
 
 def test_values_without_faults_and_without_counters() -> None:
-    health = StationHealth(str(SLC), SLC, NOW, no_counters='STS 10: illegal')
-    values = health_values(health, NOW)
+    values = health_values(StationHealth(str(SLC), SLC, NOW, no_counters='STS 10: illegal'), NOW)
     assert (values['faults'], values['link counters']) == ('none', 'STS 10: illegal')
     gateway = Identity(None, '1770-KF2')
     assert health_values(StationHealth('x', gateway, NOW), NOW)['mode'] == 'none (0.0 s ago)'

@@ -306,8 +306,7 @@ def test_slc_without_a_processor_is_taken_for_a_5_03() -> None:
 
 @for_all('place', ['T4:1', 'C5:1', 'R6:1', 'MG9:0/EN'])
 def test_structures_that_we_serve_are_ours_to_write(place: str) -> None:
-    served = one(Command='Serve', Address=place, Station='5')
-    assert str(served.address).startswith(place[:4])
+    assert str(one(Command='Serve', Address=place, Station='5').address).startswith(place[:4])
     assert 'belongs to the processor' in fault(Command='ReadWrite', Address=place)
 
 

@@ -74,8 +74,7 @@ def test_floats_come_back_as_near_as_their_digits_allow(
 def test_engineering_value_comes_from_scale_and_offset_and_goes_back(
         scale: float, offset: float, raw: int, value: float) -> None:
     scaling = Scaling(scale, offset)
-    published = scaling.publish([raw])
-    assert list(published) == pytest.approx([value], abs=1e-6)
+    assert list(scaling.publish([raw])) == pytest.approx([value], abs=1e-6)
     assert scaling.raw([value], ValueType.INT16) == [raw]
 
 

@@ -114,8 +114,7 @@ def test_kinds_of_files_are_told_apart(tmp_path: Path) -> None:
 
 
 def test_binary_of_any_size_is_read_whole(tmp_path: Path) -> None:
-    found = chunks(tmp_path / 'x', DATA * 100, True)
-    assert b''.join(chunk.data for chunk in found) == DATA * 100
+    assert b''.join(chunk.data for chunk in chunks(tmp_path / 'x', DATA * 100, True)) == DATA * 100
 
 
 def test_line_of_1_mb_is_read_and_a_longer_one_refused(tmp_path: Path) -> None:

@@ -308,8 +308,7 @@ def test_what_nobody_said_is_no_packet(tmp_path: Path) -> None:
 
 def test_time_of_day_that_is_none_counts_from_0(tmp_path: Path) -> None:
     ack = Entry(None, Direction.OUT, Kind.ACK, wire=b'\x10\x06')
-    packet = written(tmp_path / 'x', ack, begun='yesterday')[len(HEAD):]
-    assert packet[12:20] == bytes(8)
+    assert written(tmp_path / 'x', ack, begun='yesterday')[len(HEAD):][12:20] == bytes(8)
 
 
 def test_only_a_file_of_ours_is_replaced_and_nobody_else_may_read_it(tmp_path: Path) -> None:

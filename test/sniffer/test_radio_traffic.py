@@ -115,8 +115,7 @@ def plain(count: int, *between: bytes) -> Iterator[Chunk]:
     for tns in range(count):
         command = Packet(1, 5, 0x0F, 0, tns, READ)
         for at, (way, packet) in enumerate(((OUT, command), (IN, command.reply(bytes(4))))):
-            frame = message_frame(packet.encode(), Checksum.CRC)
-            yield Chunk(tns + at / 10, way, frame)
+            yield Chunk(tns + at / 10, way, message_frame(packet.encode(), Checksum.CRC))
             for symbol in between:
                 yield Chunk(tns + at / 10 + 0.05, way.opposite, symbol)
 

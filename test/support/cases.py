@@ -85,6 +85,5 @@ def groupings(items: Sequence[_Item]) -> Iterator[list[list[_Item]]]:
     head, *rest = items
     for size in range(len(rest) + 1):
         for others in itertools.combinations(rest, size):
-            left = [item for item in rest if item not in others]
-            for groups in groupings(left):
+            for groups in groupings([item for item in rest if item not in others]):
                 yield [[head, *others], *groups]

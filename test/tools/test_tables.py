@@ -136,8 +136,7 @@ HEADER = Path(__file__).read_text(encoding='utf-8').partition('""')[0]
     ('def sent(x: int) -> None:\n    """Judge what is sent (rule 3)."""\n', ['D402']),
     ('def sent(x: int) -> None:\n    """Judge what goes out (rule 3)."""\n', [])])
 def test_rule(source: str, expected: list[str]) -> None:
-    found = [text.partition(':')[0] for _, text in ament.findings_in(HEADER + source)]
-    assert found == expected
+    assert [text.partition(':')[0] for _, text in ament.findings_in(HEADER + source)] == expected
 
 
 def test_licence_header_is_needed_below_the_interpreter_at_most() -> None:

@@ -55,8 +55,7 @@ def test_own_station_is_not_taken_for_one_that_nobody_named(plc: Plc) -> None:
 
 
 def test_scan_asks_a_plc_that_has_our_number(plc: Plc) -> None:
-    said = plc('scan', '1-2', '--own-station', '2')
-    assert said.lines[-1] == '2 of 2 stations answer'
+    assert plc('scan', '1-2', '--own-station', '2').lines[-1] == '2 of 2 stations answer'
 
 
 def test_status_names_processor_mode_and_faults(plc: Plc) -> None:

@@ -315,8 +315,7 @@ def test_gateway_in_half_duplex_is_named_with_the_way_to_its_nodes(
 
 def test_gateway_in_full_duplex_proves_the_settings_though_no_node_is_asked_that_is_there(
         tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    device = OddDevice(Wiring.FULL, 9)
-    said = detected(tmp_path / 'line', device, capsys, '--duplex', 'full')
+    said = detected(tmp_path / 'line', OddDevice(Wiring.FULL, 9), capsys, '--duplex', 'full')
     assert 'station 1 not reached, a gateway answers for it: STS 02' in said
     assert 'plc scan 0-63 --peer --port' in said
     assert '\n      9 ' in said and '1 of 64 stations answer' in said
