@@ -24,6 +24,7 @@ as PCCC only if its request was seen.
 
 from __future__ import annotations
 
+from collections import defaultdict
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
 import struct
@@ -70,10 +71,11 @@ class _Stream:
     The bytes of one direction of a TCP connection, in their order.
 
     An early segment waits for the segments before it. A segment of whole messages does not wait,
-    because its messages must come before their answers.
+    because its messages must come before their answers. ``asked`` has the TNS of its requests.
     """
 
     def __init__(self) -> None:
+        self.asked: set[bytes] = set()
         self._next: int | None = None
         self._waiting = b''
         self._early: dict[int, bytes] = {}
@@ -143,11 +145,10 @@ def _sent(messages: Iterable[bytes]) -> Iterator[bytes]:
 
 
 class _Connections:
-    """The TCP connections of EtherNet/IP: their streams, and the requests that were seen."""
+    """The TCP connections of EtherNet/IP, each with two streams."""
 
     def __init__(self) -> None:
-        self._streams: dict[bytes, _Stream] = {}
-        self._asked: set[bytes] = set()  # connection and TNS of requests
+        self._streams: defaultdict[bytes, _Stream] = defaultdict(_Stream)
         self._stations = _Stations()
 
     def feed(self, ends: bytes, number: int, payload: bytes,
@@ -155,26 +156,28 @@ class _Connections:
         """Take a segment between these addresses and ports; yield the PCCC that it completes."""
         if len(self._streams) > _MOST_STREAMS:
             self._streams.clear()
-            self._asked.clear()
-        for message in self._streams.setdefault(ends, _Stream()).feed(number, payload):
+        for message in self._streams[ends].feed(number, payload):
             yield from self._chunks(ends, message, time)
 
     def flush(self, time: float | None) -> Iterator[Chunk]:
         """Yield what is complete although bytes before it are missing."""
-        for ends, stream in self._streams.items():
+        for ends, stream in list(self._streams.items()):
             for message in stream.flush():
                 yield from self._chunks(ends, message, time)
 
     def _chunks(self, ends: bytes, message: bytes, time: float | None) -> Iterator[Chunk]:
         way = Direction.OUT if ends[10:12] == _PORT.to_bytes(2, 'big') else Direction.IN
         for is_reply, pccc in _pccc(message):
-            key = (ends[4:8] + ends[:4] + ends[10:] + ends[8:10] if is_reply else ends) + pccc[2:4]
             if not is_reply:
-                self._asked.add(key)
-            elif key not in self._asked:
+                self._streams[ends].asked.add(pccc[2:4])
+            elif pccc[2:4] not in self._streams[_opposite(ends)].asked:
                 continue
             ours = bytes((self._stations[ends[4:8]], self._stations[ends[:4]]))
             yield Chunk(time, way, ours + pccc, is_message=True)
+
+
+def _opposite(ends: bytes) -> bytes:
+    return ends[4:8] + ends[:4] + ends[10:] + ends[8:10]
 
 
 @dataclass(slots=True)

@@ -35,6 +35,7 @@ _TIME_OF_DAY = re.compile(
     rf'(?:{_DATE})?(?P<hours>\d\d?):(?P<minutes>\d\d):(?P<seconds>\d\d(?:[.,]\d+)?)(?!:?\d)')
 _SECONDS = re.compile(r'(?<![\d.])\d+\.\d{3,}(?![\d.])')
 _DAY = 86400.0
+_SET_BACK = 3600.0  # s; a time of day that is earlier by more than this is of the next day
 
 _OUT = {'tx', 'sent', 'send', 'sending', 'written', 'write', 'wrote', 'irp_mj_write', 'out',
         'transmit', 'transmitted', '>', '>>', '>>>', '->', '-->'}
@@ -101,7 +102,7 @@ class LogReader:
         if self._begun is None:
             self._begun = time
         later = time - self._begun
-        while self._time is not None and later < self._time - _DAY / 2:
+        while self._time is not None and later < self._time - _SET_BACK:
             later += _DAY  # a time of day starts again at midnight
         return later
 

@@ -199,9 +199,9 @@ def test_characters_that_look_like_bytes_stay_characters() -> None:
 
 
 def test_time_of_day_goes_on_after_midnight() -> None:
-    lines = ['23:59:59.900 TX: 10 05', '00:00:00.100 RX: 10 06', '00:00:01,100 RX: 10 06']
-    times = [chunk.time for chunk in read(iter(lines))]
-    assert times == [0.0, pytest.approx(0.2), pytest.approx(1.2)]
+    times = ['23:59:59.900', '00:00:00.100', '00:00:01,100', '20:00:00.000', '00:00:00.100']
+    chunks = read(iter(f'{time} TX: 10 05' for time in times))
+    assert [chunk.time for chunk in chunks] == pytest.approx([0.0, 0.2, 1.2, 72000.1, 86400.2])
 
 
 def test_direction_holds_for_lines_without_one_until_the_next() -> None:

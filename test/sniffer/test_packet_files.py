@@ -33,6 +33,7 @@ from support.captures import CAPTURES
 from support.cases import for_all
 
 ETHERNET, LOOPBACK, COOKED = 1, 0, 113
+NANOSECONDS = bytes.fromhex('0200 0300 65746800 0900 0100 09000000 00000000')
 
 # Recorded of a MicroLogix 1400 (ITI/ICS-Security-Tools, pcaps/CIP/cip_only.pcap, CC-BY-4.0).
 STATUS = bytes.fromhex('06 00 63 C5 03')
@@ -91,14 +92,16 @@ def block(order: str, kind: int, body: bytes) -> bytes:
     return struct.pack(f'{order}I', kind) + size + body + size
 
 
-def pcapng(packets: Sequence[tuple[float, bytes]], order: str, options: bytes,
-           ticks: float) -> bytes:
+def pcapng(packets: Sequence[tuple[float, bytes]], order: str, options: bytes, ticks: float,
+           others: int = 0) -> bytes:
+    """Return a section; before the interface of the packets come ``others`` of another link."""
     return b''.join((
         block(order, 0x0A0D0D0A, struct.pack(f'{order}IHHq', 0x1A2B3C4D, 1, 0, -1)),
+        *others * (block(order, 1, struct.pack(f'{order}HHI', COOKED, 0, 0)),),
         block(order, 1, struct.pack(f'{order}HHI', ETHERNET, 0, 0) + options),
         block(order, 5, bytes(20)),  # statistics
         *(block(order, 6, struct.pack(
-            f'{order}IIIII', 0, round(time * ticks) >> 32, round(time * ticks) & 0xFFFFFFFF,
+            f'{order}5I', others, round(time * ticks) >> 32, round(time * ticks) & 0xFFFFFFFF,
             len(data), len(data)) + data) for time, data in packets)))
 
 
@@ -121,8 +124,9 @@ def exchange(begun: float = 1000.0) -> list[tuple[float, bytes]]:
 @for_all('content', [
     pcap(exchange()), pcap(exchange(), order='>'), pcap(exchange(), magic=0xA1B23C4D),
     pcapng(exchange(), '<', b'', 1e6), pcapng(exchange(), '>', b'', 1e6),
-    pcapng(exchange(), '<', bytes.fromhex('0200 0300 65746800 0900 0100 09000000 00000000'), 1e9),
-    pcapng(exchange(), '>', bytes.fromhex('0009 0001 94000000 00000000'), 2 ** 20)])
+    pcapng(exchange(), '<', NANOSECONDS, 1e9, others=1),
+    pcapng(exchange()[:1], '>', bytes.fromhex('0009 0001 94000000 00000000'), 2 ** 20)
+    + block('>', 3, bytes(4)) + pcapng(exchange()[1:], '<', NANOSECONDS, 1e9)])
 def test_pccc_of_a_real_processor_is_told_in_words(tmp_path: Path, content: bytes) -> None:
     command, reply = entries_of(chunks_of(tmp_path / 'x', content))
     assert text_line(command) == ('     0.000000 >  30 command  65 to 30, TNS C563: '
@@ -174,21 +178,25 @@ def test_segments_are_put_together_and_those_that_come_again_are_dropped(tmp_pat
         (4.0, '63c5'), (4.0, '0100'), (6.0, '63c5')]
 
 
-def test_segments_that_come_out_of_order_lose_no_message(tmp_path: Path) -> None:
-    messages = [encapsulated(cip(STATUS[:2] + bytes((number, 1)) + STATUS[4:]))
-                for number in range(4)]
-    whole = b''.join(messages)
-    cuts = [(0, 30), (90, 200), (30, 60), (60, 90), (200, len(whole))]
+@for_all(('cuts', 'order'), [  # 58 bytes a message
+    ([(0, 30), (90, 200), (30, 60), (60, 90), (200, 232)], (0, 1, 2, 3)),
+    ([(0, 30), (116, 174), (116, 174), (30, 116), (174, 232)], (2, 0, 1, 3)),  # whole, twice
+    ([(0, 30), (58, 200), (200, 232)], (1, 2, 3))])  # the rest of the first is lost
+def test_segments_that_come_out_of_order_lose_no_message(
+        tmp_path: Path, cuts: list[tuple[int, int]], order: tuple[int, ...]) -> None:
+    whole = b''.join(encapsulated(cip(STATUS[:2] + bytes((number, 1)) + STATUS[4:]))
+                     for number in range(4))
     packets = [(float(at), ethernet(tcp(whole[first:end], 0xFFFFFFF0 + first)))
                for at, (first, end) in enumerate(cuts)]
     found = chunks_of(tmp_path / 'x', pcap(packets))
-    assert [chunk.data[4:6].hex() for chunk in found] == ['0001', '0101', '0201', '0301']
+    assert [chunk.data[4] for chunk in found] == [*order]
 
 
 def test_two_plcs_whose_addresses_end_alike_are_two_stations(tmp_path: Path) -> None:
     packets = [(0.0, ethernet(tcp(encapsulated(cip(STATUS)), 1))),
                (0.1, ethernet(tcp(encapsulated(cip(STATUS)), 1, net=7))),
-               (0.2, ethernet(tcp(encapsulated(cip(STATUS_REPLY, True)), 9, False, net=7)))]
+               (0.2, ethernet(tcp(encapsulated(cip(STATUS_REPLY, True)), 9, False, net=7))),
+               (0.3, ethernet(tcp(encapsulated(cip(STATUS_REPLY, True)), 9, False, net=8)))]
     entries = entries_of(chunks_of(tmp_path / 'x', pcap(packets)))
     assert [(entry.kind, entry.station) for entry in entries if entry.packet] == [
         (Kind.COMMAND, 30), (Kind.COMMAND, 254), (Kind.REPLY, 254), (Kind.UNANSWERED, 30)]
