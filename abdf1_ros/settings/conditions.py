@@ -108,7 +108,7 @@ def _check_heartbeat(row: Row, mapping: Mapping, fault: ReportFault) -> None:
         fault('Length' if has_length else 'Address', 'a heartbeat is one word',
               is_superfluous=has_length)
     address = mapping.address
-    if not counts(mapping.type, 1) or address.bit is not None:
+    if not counts(mapping.type, 1):
         fault('Type' if row.get('Type') else 'Address',
               'a heartbeat is a word of type int16 or uint16, such as N7:0')
     elif address.file_type.is_structure or address.file_type in _NO_COUNTING:

@@ -276,7 +276,7 @@ class RowReader:
             return
         self._check_values(mapping)
         self._check_extent(mapping)
-        if (mapping.writes or mapping.command is Command.HEARTBEAT) and not self.faults:
+        if mapping.writes and not self.faults:
             self._check_write(mapping)
         for column in ('Min', 'Max'):
             if mapping.type is ValueType.STRING and self._row.get(column):
@@ -319,7 +319,7 @@ class RowReader:
 
     def _check_write(self, mapping: Mapping) -> None:
         address = mapping.address
-        if mapping.type.is_part and not mapping.serves and not mapping.dialect.writes_bits:
+        if mapping.type.is_part and not mapping.dialect.writes_bits:
             self._fault('Address', f'Access {self._row.get("Access")} has no command that '
                                    'changes single bits; write the whole word, or only read')
         # Structures of our own table may be written: there the ROS program is the processor.

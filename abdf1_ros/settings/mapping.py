@@ -224,7 +224,7 @@ class Mapping:
     @property
     def needs_run(self) -> bool:
         """Tell whether values are published only while the PLC says that it is in RUN."""
-        return self.is_guarded and self.condition is not None and self.condition.is_run
+        return self.condition is not None and self.condition.is_run
 
     def shares_words(self, other: Mapping) -> bool:
         """
@@ -237,15 +237,14 @@ class Mapping:
             return False
         # If the rows count words in different ways, it is unknown which words they share.
         return any(not mine.counts_like(theirs) or self._meets(other)
-                   for mine in self._places(other) for theirs in other._places(self)
+                   for mine in self._places() for theirs in other._places()
                    if mine.may_share_file(theirs))
 
-    def _places(self, other: Mapping) -> list[Address]:
-        """Return the addresses that the first word may have for the commands of another row."""
-        if self.access is not Access.CIF or other.access is Access.CIF:
+    def _places(self) -> list[Address]:
+        """Return an address in each file that may have the words."""
+        if self.access is not Access.CIF:
             return [self.address]
-        return [parse_address(f'N{file}:0', PlcType.SLC).at_offset(self.address.offset)
-                for file in sorted(CIF_FILES)]
+        return [parse_address(f'N{file}:0', PlcType.SLC) for file in sorted(CIF_FILES)]
 
     def _meets(self, other: Mapping) -> bool:
         """Tell whether both rows have a word, or for bits a bit, with the same number."""

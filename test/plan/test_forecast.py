@@ -20,6 +20,7 @@ from abdf1_ros.plan.forecast import block_time, intervals, line_model, load, PAT
 from abdf1_ros.plan.planner import Planner
 from abdf1_ros.settings.network import Network
 import pytest
+from support.cases import for_all
 from support.driver_bench import DriverBench
 from support.mappings import make_mapping
 
@@ -51,12 +52,13 @@ def test_load_is_what_periods_need_and_leaves_out_those_without() -> None:
     assert load(blocks_of(NETWORK), 0.01) == pytest.approx(times[0.5] / 0.5 + times[2.0] / 2)
 
 
-def expected(*rows: tuple[int, int]) -> tuple[dict[float, float], float]:
+def expected(*rows: tuple[int, int], own: tuple[tuple[float, float], ...] = (),
+             ) -> tuple[dict[float, float], float]:
     """Return the intervals for so many reads of a period (ms) each, and the time of one."""
     mappings = [make_mapping(f'N{9 + 20 * group + number}:0', period=period)
                 for group, (period, count) in enumerate(rows) for number in range(count)]
     blocks = Planner(line_model(NETWORK), 0.1).plan(mappings)
-    return intervals(blocks), block_time(blocks[0])
+    return intervals(blocks, own), block_time(blocks[0])
 
 
 def test_periods_are_longer_by_the_load_of_the_line_but_by_no_more_than_a_scan() -> None:
@@ -68,6 +70,8 @@ def test_periods_are_longer_by_the_load_of_the_line_but_by_no_more_than_a_scan()
     found, time = expected((10, 10), (1000, 1))
     assert found[0.01] == pytest.approx(0.01 * (10 * time / 0.01 + time / 1.0), rel=0.01)
     assert found[1.0] == pytest.approx(1.0 + 11 * time, rel=0.01)
+    found, time = expected((1000, 1), own=((0.5, 0.1),))
+    assert found == {1.0: pytest.approx(1.0 + time + 0.5)}
 
 
 def test_reads_without_a_period_are_expected_to_have_what_is_left() -> None:
@@ -78,13 +82,15 @@ def test_reads_without_a_period_are_expected_to_have_what_is_left() -> None:
     assert found == {0.0: pytest.approx(2 * time)}
 
 
-def test_reads_without_a_period_are_expected_to_have_little_of_a_full_line() -> None:
-    found, time = expected((0, 2), (100, 4))
-    once, needed = 6 * time, 4 * time / 0.1
-    assert needed > 1
+@for_all(('period', 'is_full'), [(100, True), (300, False)])
+def test_reads_without_a_period_are_expected_to_have_little_of_a_full_line(
+        period: int, is_full: bool) -> None:
+    found, time = expected((0, 2), (period, 4))
+    once, needed = 6 * time, 4 * time / period * 1000
+    assert needed > 1 if is_full else 0.95 < needed < 1
     stretch = needed + 2 * time / (PATIENCE * once)
     assert found[0.0] == pytest.approx(min(PATIENCE * once * stretch, (PATIENCE + 1) * once))
-    assert found[0.1] == pytest.approx(min(0.1 * stretch, 0.1 + once))
+    assert found[period / 1000] == pytest.approx(min(period / 1000 * stretch, period / 1000 + once))
 
 
 @pytest.mark.parametrize('tx_delay', [0, 20])

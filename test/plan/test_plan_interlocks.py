@@ -29,6 +29,7 @@ from abdf1_ros.plan.bounds import (
     Times,
 )
 from abdf1_ros.plan.forecast import line_model
+from abdf1_ros.plan.planner import Planner
 from abdf1_ros.plan.report import make_report
 from abdf1_ros.settings.heartbeats import Fallback, LONGEST_END, While
 from abdf1_ros.settings.mapping import Mapping
@@ -91,8 +92,10 @@ def test_rule_16_bound_counts_all_that_may_go_before_a_fallback(others: int, rea
     more = [make_mapping(f'N7:{number}', 'Write', fallback=Fallback((0,), 500), station=2)
             for number in range(1, others + 1)]
     rows = [speed(), beat(), *more]
-    question = line_model(QUICK).transaction_time(1, 26)  # as long as any here
-    first = next(Times(QUICK, Rows(rows)).bounds())
+    blocks = Planner(line_model(QUICK), 0.1).plan(
+        [make_mapping('N7:0'), make_mapping('N9:0', length=50)])
+    question = blocks[1].line_time  # as long as any here
+    first = next(Times(QUICK, Rows(rows), blocks).bounds())
     own = at_most(write_time(QUICK, rows[0], 0.0))
     # What is under way, reads that have a turn, and our own writes, heartbeat 0 among them.
     assert first.seconds == pytest.approx(
@@ -107,7 +110,8 @@ def test_rule_16_bound_counts_all_that_may_go_before_a_fallback(others: int, rea
 def test_rule_16_standard_polling_adds_its_scans_and_slave_has_no_bound() -> None:
     rows = [speed(), *(make_mapping('N7:9', station=station) for station in range(2, 12))]
     message, = Times(QUICK, Rows(rows)).bounds()
-    standard, = Times(replace(QUICK, polling='Standard'), Rows(rows)).bounds()
+    # The fallback of another station has its own turn.
+    standard, _ = Times(replace(QUICK, polling='Standard'), Rows([*rows, speed(station=2)])).bounds()
     assert message.seconds and standard.seconds and message.usual and standard.usual
     # A scan for each of the three transactions below, in which every station has a command.
     question = line_model(QUICK).transaction_time(1, 26)
@@ -123,15 +127,20 @@ def test_rule_16_standard_polling_adds_its_scans_and_slave_has_no_bound() -> Non
 
 
 def test_rule_16_what_plcs_ask_of_us_takes_turns_with_our_commands() -> None:
-    served = make_mapping('N7:50', 'Serve', station=5, tag='served')
+    served, long = (make_mapping('N7:50', 'Serve', station=5, length=length)
+                    for length in (1, 101))
     alone, = Times(QUICK, Rows([speed()])).bounds()
     beside, = Times(QUICK, Rows([speed(), served])).bounds()
+    longer, = Times(QUICK, Rows([speed(), served, long])).bounds()
     assert alone.seconds and beside.seconds
     assert beside.seconds - alone.seconds > 3 * 2 * 0.2
     shared, = Times(replace(QUICK, share='/tmp/guests'), Rows([speed()])).bounds()
     assert shared.seconds and shared.seconds - alone.seconds > 2 * 2 * 400 * 10 / 19200
     assert alone.usual and shared.usual and shared.usual - alone.usual > 2 * 400 * 10 / 19200
-    assert beside.usual and beside.usual > alone.usual
+    assert beside.usual and longer.usual and beside.usual > alone.usual
+    assert longer.usual - beside.usual == pytest.approx(3 * 200 * 10 / 19200)
+    peer = Times(replace(QUICK, mode='Peer'), Rows([speed()]))
+    assert peer.at_most(peer.any_frames) > peer.longest
 
 
 def test_rule_16_bounds_of_twice_the_rows_take_twice_the_work() -> None:
@@ -144,14 +153,15 @@ def test_rule_16_bounds_of_twice_the_rows_take_twice_the_work() -> None:
 
 
 def test_rule_16_fallback_of_our_own_table_needs_no_line() -> None:
-    bound, = Times(Network(), Rows([speed(500, 'Serve', station=5)])).bounds()
-    assert bound.seconds == 0.5
+    for mode in ('Master', 'Slave'):
+        bound, = Times(Network(mode=mode), Rows([speed(500, 'Serve', station=5)])).bounds()
+        assert bound.seconds == 0.5
 
 
 @pytest.mark.parametrize('period, factor', [(100, None), (60_000, 3)])
 def test_rule_16_preset_of_the_timer(period: int, factor: int | None) -> None:
-    mapping = beat(period)
-    bound, = Times(QUICK, Rows([mapping]), (), 0.01).bounds()
+    mapping = beat(period)  # the fallback of the same PLC comes after it
+    bound, _ = Times(QUICK, Rows([mapping, speed()]), (), 0.01).bounds()
     own = write_time(QUICK, mapping, 0.0)
     question = line_model(QUICK).transaction_time(1, 26)  # as long as any here
     longer = period / 1000 + at_most(question) + at_most(own) + 0.01
@@ -170,11 +180,11 @@ def test_rule_16_preset_of_the_timer(period: int, factor: int | None) -> None:
     (replace(QUICK, timeout=100, polling='Standard'), 'Polling Message'),
     (replace(QUICK, timeout=100), '')])
 def test_rule_16_says_which_setting_shortens_the_times_most(network: Network, way: str) -> None:
-    rows = [speed(200), beat(100)]
-    advice = list(Times(network, Rows(rows)).advice())
-    assert len(advice) == bool(way)
-    assert all(text.startswith(f'{way} would shorten the longest of these times most, from ')
-               for text in advice)
+    for row in (speed(200), beat(100)):
+        advice = list(Times(network, Rows([row])).advice())
+        assert len(advice) == bool(way)
+        assert all(text.startswith(f'{way} would shorten the longest of these times most, from ')
+                   for text in advice)
 
 
 @pytest.mark.parametrize('forwards, count', [('', 1), ('1,2', 2)])
@@ -285,6 +295,7 @@ def test_rule_5_end_that_takes_longer_than_it_has_is_warned_of(
 def test_rule_5_mode_slave_has_no_time_for_an_end() -> None:
     assert Times(Network(mode='Slave'), Rows([speed()])).end is None
     assert Times(QUICK, Rows([make_mapping('N7:0')])).end == 0.0
+    assert Times(QUICK, Rows([speed(500, 'Serve', station=5)])).end == 0.0
 
 
 def test_rule_16_rows_that_are_fast_enough_are_not_warned_of() -> None:
@@ -294,11 +305,14 @@ def test_rule_16_rows_that_are_fast_enough_are_not_warned_of() -> None:
 def test_rule_14_timeout_is_three_planned_intervals() -> None:
     counter = make_mapping('N11:3', tag='alive', period=100)
     guarded = make_mapping('N7:0', tag='level', period=1000, condition=While(('alive',), 250))
-    (mapping, fault), = guard_faults(line_model(QUICK), Rows([counter, guarded]), 0.1)
-    assert mapping is guarded
-    assert (fault.column, fault.text) == (
-        'While_Timeout', 'While_Timeout 250 ms is shorter than 3 reads of alive on this '
-        'line; 300 ms would be enough')
+    for busy, enough in ([], 300), ([beat(100)], 571):
+        rows = Rows([counter, guarded, *busy])
+        assert 3000 * make_report(QUICK, rows, 0.1).intervals()[0.1] == pytest.approx(enough, abs=0.5)
+        (mapping, fault), = guard_faults(line_model(QUICK), rows, 0.1)
+        assert mapping is guarded
+        assert (fault.column, fault.text) == (
+            'While_Timeout', 'While_Timeout 250 ms is shorter than 3 reads of alive on this '
+            f'line; {enough} ms would be enough')
 
 
 def test_heartbeats_and_questions_for_run_are_counted_in_the_load() -> None:
@@ -330,12 +344,13 @@ def test_rule_8_mode_of_a_plc_that_we_write_to_by_ourselves_is_asked_every_two_s
     assert mode_periods(Rows([make_mapping(), make_mapping(command='Write')]), 0.1, 3.0) == {}
 
 
-@for_all(('rows', 'after', 'is_late'), [
-    (5, None, False), (40, None, True), (5, 3000, False), (5, 300, True)])
+@for_all(('rows', 'command', 'after', 'is_late'), [
+    (5, 'Write', None, False), (40, 'Write', None, True), (5, 'Write', 3000, False),
+    (5, 'Write', 300, True), (40, 'Serve', None, False)])
 def test_newest_state_that_may_be_too_old_on_a_full_line_is_named(
-        rows: int, after: int | None, is_late: bool) -> None:
+        rows: int, command: str, after: int | None, is_late: bool) -> None:
     map_rows = Rows([make_mapping(
-        f'N7:{number}', 'Write', tag=f'w{number}', fallback=after and Fallback((0,), after))
+        f'N7:{number}', command, tag=f'w{number}', fallback=after and Fallback((0,), after))
         for number in range(rows)])
     texts = [text for text in remarks(QUICK, map_rows) if 'newest value may be older' in text]
     assert [text.partition(':')[0] for text in texts] == ['w0'] * is_late

@@ -25,6 +25,7 @@ from abdf1_ros.df1.frames import Duplex
 from abdf1_ros.df1.machine import LineTiming
 from abdf1_ros.df1.packet import Packet
 from abdf1_ros.pccc.data_table import DataTable
+from abdf1_ros.pccc.processor import Processor
 from abdf1_ros.pccc.server import Server
 from abdf1_ros.plan.line_model import LineModel
 from abdf1_ros.plan.partition import Candidate, cheapest, CostModel, partition, Span
@@ -219,6 +220,11 @@ def test_blocks_are_as_long_as_the_processor_takes_them(name: str, limit: int) -
     words = [make_mapping(f'N7:{n}', plc='SLC', processor=name) for n in range(limit + 1)]
     assert spans(plan(*words[:limit])) == [('N7:0', limit)]
     assert max(length for _, length in spans(plan(*words))) <= limit
+    planner = Planner(LINE, 0.1)  # the map says one, the PLC the other, and the shorter one counts
+    for told in (Processor.SLC_5_05, Processor.SLC_5_01):
+        assert max(length for _, length in spans(planner.plan(words))) <= limit
+        planner.processors[1] = told
+    assert all(len(block.requests) == 1 and block.words <= 41 for block in planner.plan(words))
 
 
 @pytest.mark.parametrize('plc', ['PLC5', 'SLC'])
@@ -338,7 +344,15 @@ def test_slow_mapping_beside_a_fast_one_is_read_with_it_while_that_is_cheaper() 
         return sum(blocks(gap, period) == 1 for gap in range(1, 60))
 
     assert blocks(1, 10_000) == 2
+    assert [block.period for block in plan(make_mapping('N7:1', period=200),
+                                           make_mapping('N7:0', period=100))] == [0.1]
     assert 1 < words(1000) < words(500) < words(200) < words(100) < 40
+
+
+def test_line_that_is_full_anyhow_reads_a_slow_mapping_with_a_fast_one() -> None:
+    pair = [make_mapping('N7:0', period=100), make_mapping('N7:20', period=10_000)]
+    others = [make_mapping(f'N{file}:0', length=100) for file in range(9, 59)]
+    assert [len(plan(*pair)), len(plan(*pair, *others))] == [2, 1 + len(others)]
 
 
 # refusals
@@ -376,7 +390,7 @@ def test_allowing_is_news_only_for_what_was_refused() -> None:
     area = plan(make_mapping())[0].station_area
     planner.refuse(area, Span(4, 6))
     assert not planner.allow(area, Span(5, 9))
-    assert planner.allow(area, Span(4, 6))
+    assert planner.allow(area, Span(3, 6))
     assert not planner.allow(area, Span(4, 6))
 
 
@@ -426,6 +440,8 @@ def test_plan_of_two_periods_is_the_best_there_is() -> None:
     assert candidates == [Candidate(Span(0, 17), 0.1), Candidate(Span(60, 61), 1.0)]
     wanted = [Candidate(span, period) for period, spans in needed.items() for span in spans]
     assert load(candidates) == pytest.approx(least_load(wanted))
+    assert partition({0.1: [Span(0, 109)], 0.2: [Span(109, LIMIT)]}, MODEL, 0.0) == [
+        Candidate(Span(0, LIMIT), 0.1)]
 
 
 @given(st.lists(SPANS, min_size=1, max_size=30), st.lists(SPANS, max_size=5))
@@ -441,8 +457,8 @@ def test_blocks_hold_all_that_is_needed_within_the_limit_and_around_what_was_ref
 
 
 def test_block_that_cannot_be_has_no_price() -> None:
-    model = CostModel(COSTS, refused=[Span(5, 7)])
-    assert model.cost(Span(0, LIMIT)) == math.inf
+    model = CostModel(COSTS, refused=[Span(5, 7), Span(0, 9)])
+    assert model.cost(Span(1, LIMIT)) == math.inf
     assert model.cost(Span(6, LIMIT)) < math.inf
     assert model.cost(Span(0, 6)) < math.inf
     assert model.cost(Span(10, 11 + LIMIT)) == math.inf

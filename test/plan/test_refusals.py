@@ -23,6 +23,7 @@ from abdf1_ros.df1.machine import LineTiming
 from abdf1_ros.df1.packet import Packet
 from abdf1_ros.errors import RemoteError
 from abdf1_ros.pccc.dialect import Steps
+from abdf1_ros.pccc.processor import Processor
 from abdf1_ros.plan.line_model import LineModel
 from abdf1_ros.plan.planner import Block, Planner
 from abdf1_ros.plan.reading import read_planned
@@ -31,6 +32,7 @@ from abdf1_ros.settings.mapping import Mapping
 from hypothesis import given
 from hypothesis import strategies as st
 import pytest
+from support.cases import for_all
 from support.driver_bench import simulated_plc
 from support.mappings import make_mapping
 
@@ -100,11 +102,15 @@ class Plc:
         return set(self.blocks) == set(self._planner.plan(self._mappings))
 
 
-def test_gap_that_does_not_exist_is_not_bridged_again() -> None:
-    plc = Plc(words(0, 1, 2, 9, 10, 11), 5)
-    assert plc.spans() == [(0, 12)]
+@for_all(('rows', 'missing', 'spans'), [
+    (words(0, 1, 2, 9, 10, 11), 5, [(0, 3), (9, 12)]),
+    (words(0, 1, 8, 9, 16, 17, 24, 25), 20, [(0, 18), (24, 26)])])  # two gaps exist
+def test_gap_that_does_not_exist_is_not_bridged_again(
+        rows: list[Mapping], missing: int, spans: list[tuple[int, int]]) -> None:
+    plc = Plc(rows, missing)
+    assert len(plc.blocks) == 1
     plc.settle()
-    assert plc.spans() == [(0, 3), (9, 12)]
+    assert plc.spans() == spans
     assert not plc.failed
     before = plc.refused
     plc.settle()
@@ -148,10 +154,27 @@ def test_what_recovers_while_a_block_is_divided_leaves_its_parts_alone() -> None
     plc.missing = {12}
     whole = next(block for block in plc.blocks if block.span.end == 20)
     assert plc.read(whole)  # refused, and divided
-    for first in (14, 7):
+    for first in (14, 7, 7):
         plc.read(next(block for block in plc.blocks if block.span.first == first))
+    assert (14, 20) in plc.spans()
     plc.settle()
     assert plc.spans() == [(0, 12), (12, 13), (13, 20)]
+
+
+def test_processor_that_is_exchanged_has_its_own_packets() -> None:
+    refusals = Refusals(planner := Planner(LINE, 0.1))
+    blocks = planner.plan([make_mapping(f'N7:{word}', plc='SLC') for word in range(100)])
+    assert refusals.processor_told(1, Processor.SLC_5_05, blocks) is None
+    change = refusals.processor_told(1, Processor.SLC_5_01, blocks)
+    assert change and max(block.words for block in change.new) <= 41
+
+
+def test_rows_that_overlap_and_are_too_long_together_are_two_blocks() -> None:
+    plc = Plc([*(make_mapping(f'N7:{word}', plc='SLC', length=length)
+                 for word, length in ((0, 60), (59, 59), (59, 1)))])
+    plc.packet = 80
+    plc.settle()
+    assert plc.spans() == [(0, 60), (59, 118)]
 
 
 def test_word_that_was_refused_alone_is_not_read_with_others_after_a_search() -> None:
@@ -162,15 +185,16 @@ def test_word_that_was_refused_alone_is_not_read_with_others_after_a_search() ->
     assert all(block.words == 1 for block in plc.asked if block.span.end == 116)
 
 
-def test_file_that_comes_back_is_planned_once() -> None:
-    plc = Plc(words(*range(100)), *range(100))
+def test_each_file_that_comes_back_is_planned_once() -> None:
+    plc = Plc([make_mapping(f'N{file}:{word}') for word in range(50) for file in (7, 9)],
+              *range(50))
     plc.settle()
     assert len(plc.blocks) == 100
     plc.missing.clear()
     changes = [plc.read(block) for _ in range(2) for block in list(plc.blocks)
                if block in plc.blocks]
-    assert changes.count(True) == 1
-    assert plc.spans() == [(0, 100)]
+    assert changes.count(True) == 2
+    assert plc.spans() == [(0, 50), (0, 50)]
 
 
 @given(st.lists(st.tuples(st.integers(0, 80), st.sampled_from([1, 1, 1, 2, 5])), min_size=1,

@@ -315,6 +315,12 @@ def test_bits_that_go_on_without_the_program_are_noted_and_are_not_odd() -> None
 def test_rows_promise_three_intervals_and_a_read() -> None:
     row, silent = make_mapping('N7:0', length=2), make_mapping('N7:0', publish='Change')
     assert report_of(row, silent).promises() == {row: pytest.approx(3 + TWO_WORDS + ANSWERS)}
+    rare, beat = make_mapping('N7:2', period=1200), make_mapping('N9:0', 'Heartbeat', period=100)
+    assert report_of(row, rare).promises()[rare] == pytest.approx(
+        3.6 + TWO_WORDS + 2 * CHARACTER + ANSWERS)
+    busy = report_of(row, beat)  # of the heartbeat nobody is promised anything
+    assert busy.promises() == {row: pytest.approx(3 * busy.intervals()[1.0] + TWO_WORDS + ANSWERS)}
+    assert busy.intervals()[1.0] > 1.2
     guarded = make_mapping('B3:0', period=200, condition=While(('RUN',)))
     fast, slow = report_of(row, guarded), report_of(row, guarded, response=0.1)
     # The node does not know how slow the PLC is, and so promises the same.

@@ -77,6 +77,12 @@ def test_station_to_be_read_is_not_our_own(network: Network, is_wrong: bool) -> 
         'station of the PLC here'] * 2 * is_wrong
 
 
+@for_all(('network', 'is_wrong'), [(Network(), True), (PEER, False)])
+def test_gateway_is_not_our_own_station(network: Network, is_wrong: bool) -> None:
+    assert texts(make_mapping('N7:0', via=5), network=network) == [
+        'map.csv:2: Item: 1, Via 5 is our own Station in the net file, not a gateway'] * is_wrong
+
+
 def test_rule_14_counter_has_to_be_read_often_enough_on_this_line() -> None:
     counter = make_mapping('N11:3', tag='alive', item=1)
     guarded = make_mapping('N7:0', tag='level', item=2, condition=While(('alive',), 250))
@@ -94,10 +100,11 @@ def test_rule_15_row_that_does_not_fit_the_line_takes_along_what_depends_on_it()
     word = make_mapping('N7:5', 'Write', tag='speed', topic='speed', item=3)
     beat = make_mapping('N10:0', 'Heartbeat', tag='beat', period=500, station=2, item=4,
                         condition=While(('speed',), 500))
-    good, problems = usable_rows(Rows([counter, guarded, word, beat]), own, 0.1)
+    bit = make_mapping('B3:0/0', tag='bit', station=2, item=5, confirms='beat')
+    good, problems = usable_rows(Rows([counter, guarded, word, beat, bit]), own, 0.1)
     assert good == ()
     assert [problem.text.partition(',')[0] for problem in problems] == [
-        'Item: 1', 'Item: 2', 'Item: 3', 'Item: 4']
+        f'Item: {number}' for number in range(1, 6)]
 
 
 def test_problems_go_with_their_rows() -> None:
@@ -110,10 +117,9 @@ def test_problems_go_with_their_rows() -> None:
      'Mode Listen sends nothing; only Read rows are possible'),
     (make_mapping(command='Serve', station=5, period=100), 'Command): Item: 1, Serve sends '
      'commands, and Mode Listen sends nothing; only Read rows are possible'),
-    (make_mapping(), 'Period): Item: 1, Mode Listen needs a Period above 0: the longest time '
-     '(ms) between two reads of these words by the other master'),
-    (make_mapping(period=0), 'Period): Item: 1, Mode Listen needs a Period above 0: the longest '
-     'time (ms) between two reads of these words by the other master'),
+    *((row, 'Period): Item: 1, Mode Listen needs a Period above 0: the longest time (ms) between '
+       'two reads of these words by the other master')
+      for row in (make_mapping(), make_mapping(period=0), make_mapping(is_on_demand=True))),
     (make_mapping('I:1', plc='SLC', access='Flat', period=100), 'Access): Item: 1, Mode Listen '
      'does not understand reads with Access Flat'),
     (make_mapping(length=200, period=100), 'Length): Item: 1, 200 words never come in one reply, '

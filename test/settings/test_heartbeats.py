@@ -193,8 +193,10 @@ def test_rule_12_write_and_serve_rows_take_a_fallback(
     ({'Fallback': '0 0', 'Fallback_After': '500'}, 'Fallback has 2 values, Length is 1'),
     ({'Fallback': '40000', 'Fallback_After': '500'}, 'a number from -32768 to 32767'),
     ({'Fallback': '9', 'Max': '5', 'Fallback_After': '500'}, 'a number from -32768 to 5'),
-    ({'Fallback': 'stop', 'Fallback_After': '500'}, 'Fallback "stop" should be a number'),
-    ({'Address': 'B3:0/1', 'Fallback': '1', 'Fallback_After': '500'}, 'a bool falls back to 0'),
+    ({'Length': '2', 'Fallback': '0 stop', 'Fallback_After': '500'},
+     'Fallback "stop" should be a number'),
+    ({'Address': 'B3:0/1', 'Length': '2', 'Fallback': '0 1', 'Fallback_After': '500'},
+     'a bool falls back to 0'),
     ({'Command': 'ReadWrite', 'Fallback': '0'},
      'a ReadWrite row has no Fallback: it is for Write and Serve rows'),
     ({'Command': 'Read', 'Fallback': '0'}, 'a Read row has no '
@@ -244,6 +246,7 @@ def test_rule_13_values_depend_on_run_or_on_a_counter() -> None:
     ({'Command': 'ReadWrite'}, 'a ReadWrite row has no While: it is for Read and '
      'Heartbeat rows'),
     ({'Publish': 'Change'}, 'needs Publish Always'),
+    ({'Publish': 'Change', 'While': 'RUN', 'While_Timeout': ''}, 'needs Publish Always'),
     ({'While': 'RUN'}, 'RUN has no While_Timeout'),
     ({'While': 'doors'}, 'cannot depend on itself'),
     ({'While': 'nobody'}, 'should be RUN or the tag of one good Read row'),
@@ -351,9 +354,10 @@ def test_map_of_the_tutorial_is_that_of_the_demo() -> None:
 
 
 def test_rule_12_fallback_of_bits_of_an_old_slc_is_warned_of() -> None:
-    mapping = one(**WRITE | {'Address': 'B3:0/0'}, PLC_Type='SLC', Processor='5/02', Fallback='0',
-                  Fallback_After='500')
-    assert 'rewriting the whole word' in str(mapping.remarks[0])
+    cells = WRITE | {'Address': 'B3:0/0', 'PLC_Type': 'SLC', 'Processor': '5/02'}
+    remark, = one(**cells, Fallback='0', Fallback_After='500').remarks
+    assert 'rewriting the whole word' in str(remark)
+    assert not one(**cells).remarks
 
 
 def test_rule_13_counter_is_not_an_echo_of_our_heartbeat() -> None:

@@ -123,7 +123,8 @@ def test_command_says_whether_a_row_reads_and_writes(text: str, reads: bool, wri
     ({'Address': 'ST9:0', 'Max': '4'},
      '12 (Max): Item: 1, a string has no Max; leave the cell empty'),
     ({'Address': 'ST9:0', 'Length': '2'}, '6 (Length): Item: 1, a string mapping has Length 1'),
-    ({'Min': '5', 'Max': '4'}, '11 (Min): Item: 1, Min is greater than Max'),
+    *(({'Min': '5', 'Max': '4'} | scale, '11 (Min): Item: 1, Min is greater than Max')
+      for scale in ({}, {'Scale': '0.1'})),
     ({'Address': 'T4:0/13', 'Length': '4', 'Command': 'Read'},
      '6 (Length): 2504 ERR_ADDRESS_RANGE: Item: 1, Address is out of range (T4:0/13, len=4); bits '
      'of a structure end with their word'),

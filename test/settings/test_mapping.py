@@ -24,8 +24,9 @@ from abdf1_ros.pccc.file_types import PlcType
 from abdf1_ros.pccc.processor import Processor, USUAL
 from abdf1_ros.pccc.values import ValueType, WordOrder
 from abdf1_ros.settings.columns import BY_NAME, COLUMNS, MAP_COLUMNS
-from abdf1_ros.settings.mapping import Command, Publish
+from abdf1_ros.settings.mapping import Command, Mapping, Publish
 from abdf1_ros.settings.names import MAX_LENGTH, sanitise
+from abdf1_ros.settings.rows import Rows
 from hypothesis import given
 from hypothesis import strategies as st
 import pytest
@@ -72,6 +73,21 @@ def test_function_file_of_a_micrologix_is_no_file_of_that_number() -> None:
     assert function.address.file == binary.address.file
     assert not binary.shares_words(function) and not function.shares_words(binary)
     assert function.shares_words(make_mapping('STI:0.PFN', 'Write', plc='SLC'))
+
+
+@for_all(('one', 'other', 'is_shared'), [
+    (make_mapping('N7:0', length=10), make_mapping('N7:12', length=5), False),
+    # It is not known which words of a slot those of the whole image are.
+    (make_mapping('I:5', plc='SLC', access='Flat'), make_mapping('I:1.0', plc='SLC'), True)])
+def test_rows_share_words_of_equal_numbers_or_what_is_not_known(
+        one: Mapping, other: Mapping, is_shared: bool) -> None:
+    assert one.shares_words(other) is other.shares_words(one) is is_shared
+
+
+def test_stations_are_those_of_the_plcs() -> None:
+    rows = [make_mapping(command=command, station=station) for command, station in (
+        ('Write', 255), ('Serve', 5), ('Read', 2), ('Write', 1), ('Read', 2))]
+    assert Rows(rows).stations == (2, 1)
 
 
 @for_all(('text', 'kind', 'is_shared'), [

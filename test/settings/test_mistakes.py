@@ -349,8 +349,8 @@ def remarks_of(folder: Path, row: str) -> list[str]:
     ('wheel,Read,D11:0,1,PLC5,,,,,', [
         ':2:6 (Type): D11:0 holds BCD, so an empty Type is bcd16; uint16 shows its words as they '
         'are']),
-    ('far,Read,N7:1200,1,PLC5,,,,,', [
-        ':2:3 (Address): N7:1200: files of most PLC-5 end with element 999; those of a 5/40 to '
+    ('far,Read,N7:999-1000,1,PLC5,,,,,', [
+        ':2:3 (Address): N7:1000: files of most PLC-5 end with element 999; those of a 5/40 to '
         '5/80 may have more']),
     ('far,Read,N7:999,1,PLC5,,,,,', []), ('far,Serve,N7:1200,5,PLC5,,,,,', []),
     ('wheel,Read,D11:0,1,PLC5,uint16,,,,', []), ('wheel,Read,D11:0/3,1,PLC5,,,,,', []),

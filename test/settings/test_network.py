@@ -339,7 +339,7 @@ def test_parameter_has_to_go_with_the_rest_of_the_file(
 
 
 def test_place_that_is_open_to_other_machines_is_told() -> None:
-    remarks = [*network_remarks(Network(share='pty:/tmp/a tcp:0.0.0.0:4501'))]
+    remarks = [*network_remarks(Network(share='pty:/tmp/a tcp:127.0.0.2:1 tcp:0.0.0.0:4501'))]
     assert remarks == [
         'Share tcp:0.0.0.0:4501: every program that reaches 0.0.0.0:4501 over the network '
         'can send commands to the PLC, without a password']

@@ -104,8 +104,9 @@ def test_advice_about_a_range_is_read_as_what_it_says(
 
 
 def test_length_beside_a_range_agrees_with_it() -> None:
-    assert fault(Address='N7:0-9', Length='9') == (
-        '2:6 (Length): Item: 1, N7:0-9 has Length 10, not 9')
+    for length in (9, 11):
+        assert fault(Address='N7:0-9', Length=str(length)) == (
+            f'2:6 (Length): Item: 1, N7:0-9 has Length 10, not {length}')
     assert fault(Address='N7:0-8', Type='int32') == (
         '2:3 (Address): 2503 ERR_ADDRESS_SYNTAX: Item: 1, Invalid Address Syntax (N7:0-8); '
         'N7:0-N7:8 are 9 words, and a int32 takes 2')
