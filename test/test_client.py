@@ -43,6 +43,7 @@ from abdf1_ros.settings.network import FIELDS, Network
 from abdf1_ros.simulator.simulated_plc import SimulatedPlc
 import numpy
 import pytest
+from support.cases import for_all
 from support.driver_bench import simulated_plc, store, stored
 from support.plc_line import machine_line, plc_line
 from support.ptys import PATIENCE
@@ -193,7 +194,7 @@ def test_entries_of_the_log_that_nothing_takes_are_counted(
     assert re.search(r'\d entries were lost here: nothing was asked meanwhile', caplog.text)
 
 
-@pytest.mark.parametrize(('address', 'arguments', 'text'), [
+@for_all(('address', 'arguments', 'text'), [
     ('N7', {}, 'an element is missing, as in N7:0'),
     ('N7:0', {'length': 300}, '300 elements do not fit at N7:0; .* N7:255'),
     ('N7:0', {'length': 0}, '0 elements do not fit'),
@@ -204,24 +205,18 @@ def test_entries_of_the_log_that_nothing_takes_are_counted(
     ('N7:0', {'length': '3'}, "length '3' should be a whole number"),
     ('N7:0', {'station': '1'}, "station '1' should be"),
     ('N7:0', {'word_order': None}, 'word_order None should be one of Low, High'),
-    ('T4:0.PRE', {'length': 2, 'kind': 'string'}, 'T4:0.PRE can be int16, uint16')])
+    ('T4:0.PRE', {'length': 2, 'kind': 'string'}, 'T4:0.PRE can be int16, uint16'),
+    *((address, {'values': values}, text) for address, values, text in (
+        ('N7:0', 70000, 'value 70000 at index 0 is not a valid int16'),
+        ('T4:0.CON', 1, 'T4:0 belongs to the processor'), ('ST9:0', 5, 'not a valid string'),
+        ('N7:0', None, 'None should be a number, several, or a text'),
+        ('N7:0', [[1]], 'should be a'), ('N7:0', {1: 2}, 'should be a'),
+        ('N7:0', b'1', 'should be a'), ('N7:0', ['1'], 'should be')))])
 def test_what_is_wrong_in_a_call_is_told_before_anything_is_sent(
         port: str, address: Any, arguments: dict[str, Any], text: str) -> None:
     with client(port, plc_type='SLC') as plc:
         with pytest.raises(FormatError, match=text):
-            plc.read(address, **arguments)
-        assert plc.counters.chars_sent == 0
-
-
-@pytest.mark.parametrize(('address', 'values', 'text'), [
-    ('N7:0', 70000, 'value 70000 at index 0 is not a valid int16'),
-    ('T4:0.CON', 1, 'T4:0 belongs to the processor'), ('ST9:0', 5, 'not a valid string'),
-    ('N7:0', None, 'None should be a number, several, or a text'), ('N7:0', [[1]], 'should be a'),
-    ('N7:0', {1: 2}, 'should be a'), ('N7:0', b'1', 'should be a'), ('N7:0', ['1'], 'should be')])
-def test_what_must_not_be_written(port: str, address: str, values: Any, text: str) -> None:
-    with client(port, plc_type='SLC') as plc:
-        with pytest.raises(FormatError, match=text):
-            plc.write(address, values)
+            (plc.write if 'values' in arguments else plc.read)(address, **arguments)
         assert plc.counters.chars_sent == 0
 
 

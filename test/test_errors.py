@@ -14,17 +14,8 @@
 
 """What callers catch, the texts of the numbered messages, and how texts and numbers are shown."""
 
+from abdf1_ros import errors
 from abdf1_ros.counters import Counters, numbered
-from abdf1_ros.errors import (
-    Abdf1Error,
-    CommandTimeout,
-    FormatError,
-    LinkError,
-    PortLost,
-    RemoteError,
-    StationInactive,
-    WrongCommandCode,
-)
 from abdf1_ros.messages import Event, Message, Severity
 from abdf1_ros.numbers import decimal_number, two_readings, whole_number
 from abdf1_ros.problems import ConfigurationError, Place, Problem
@@ -37,30 +28,32 @@ from support.vectors import load_tables
 
 
 def test_what_callers_can_catch() -> None:
-    links = (CommandTimeout, StationInactive, WrongCommandCode, PortLost)
-    others = (FormatError, RemoteError, Problem, ConfigurationError)
-    assert all(issubclass(error, Abdf1Error) for error in links + others)
-    assert [issubclass(error, LinkError) for error in links + others] == 4 * [True] + 4 * [False]
-    assert issubclass(FormatError, ValueError)
-    error = RemoteError(0xF0, 0x06, 'no such place')
+    links = (errors.CommandTimeout, errors.StationInactive, errors.WrongCommandCode,
+             errors.PortLost)
+    others = (errors.FormatError, errors.RemoteError, Problem, ConfigurationError)
+    assert all(issubclass(error, errors.Abdf1Error) for error in links + others)
+    assert {error for error in links + others if issubclass(error, errors.LinkError)} == {*links}
+    assert issubclass(errors.FormatError, ValueError)
+    error = errors.RemoteError(0xF0, 0x06, 'no such place')
     assert (error.sts, error.ext_sts, str(error)) == (0xF0, 0x06, 'no such place')
 
 
 @for_all(('error', 'text'), [
-    (CommandTimeout(), '2508 ERR_COMMAND_TIMEOUT: Command Timed Out'),
-    (StationInactive(9), '2509 ERR_INACTIVE_STATION: Slave Station (9) Inactive'),
-    (WrongCommandCode(9, 0x41, 0x4F),
+    (errors.CommandTimeout(), '2508 ERR_COMMAND_TIMEOUT: Command Timed Out'),
+    (errors.StationInactive(9), '2509 ERR_INACTIVE_STATION: Slave Station (9) Inactive'),
+    (errors.WrongCommandCode(9, 0x41, 0x4F),
      '2505 ERR_BAD_FUNCTION_CODE: Response with wrong command code '
      '(slv=9, actual=65, expected=79)'),
-    (PortLost('unplugged'), 'port lost: unplugged'),
+    (errors.PortLost('unplugged'), 'port lost: unplugged'),
 ])
-def test_link_error_reads_as_its_numbered_text(error: LinkError, text: str) -> None:
+def test_link_error_reads_as_its_numbered_text(error: errors.LinkError, text: str) -> None:
     assert str(error) == text
 
 
 @for_all('error', [
-    CommandTimeout(), StationInactive(9), WrongCommandCode(9, 0x41, 0x4F), PortLost('unplugged')])
-def test_copy_of_a_link_error_says_whether_the_command_was_sent(error: LinkError) -> None:
+    errors.CommandTimeout(), errors.StationInactive(9), errors.WrongCommandCode(9, 0x41, 0x4F),
+    errors.PortLost('unplugged')])
+def test_copy_of_a_link_error_says_whether_the_command_was_sent(error: errors.LinkError) -> None:
     for is_sent in (True, False):  # as driver/job_tasks.py makes it
         copy = type(error)(*error.args, sent=is_sent)
         assert (str(copy), copy.sent) == (str(error), is_sent)

@@ -23,17 +23,11 @@ from abdf1_ros.counters import Counters
 from abdf1_ros.df1.checksum import Checksum
 from abdf1_ros.df1.frames import Control, Duplex, Frame, FrameDecoder
 from abdf1_ros.df1.packet import Packet
+from abdf1_ros.pccc import families
 from abdf1_ros.pccc.address import Address
 from abdf1_ros.pccc.data_table import DataTable
 from abdf1_ros.pccc.describe import describe
 from abdf1_ros.pccc.emulated import EmulatedProcessor, Setting
-from abdf1_ros.pccc.families import (
-    decode_identity,
-    dialect_of,
-    FAMILIES,
-    parse_address,
-    served_counters,
-)
 from abdf1_ros.pccc.fields import Reader
 from abdf1_ros.pccc.file_types import PlcType
 from abdf1_ros.pccc.identity import Mode
@@ -81,7 +75,7 @@ def test_kinds_of_files_that_were_read() -> None:
 @for_all(('place', 'words', 'exchange'), KNOWN)
 def test_our_read_is_the_command_that_was_accepted(place: Address, words: int,
                                                    exchange: Exchange) -> None:
-    dialect = dialect_of(PlcType.SLC, None, Processor.ML1400)
+    dialect = families.dialect_of(PlcType.SLC, None, Processor.ML1400)
     assert words <= dialect.max_read(place.file_type)
     cmd, data = dialect.read(place, words)
     asked, sent = (slc.LogicalRead.read(Reader(raw[1:])) for raw in (exchange.command.data, data))
@@ -97,7 +91,7 @@ def test_values_of_function_files() -> None:
     data = {place.file_type.value: exchange.reply.data for place, _, exchange in reversed(KNOWN)}
     for text, value in (('HSC:0.HIP', 0x7FFFFFFF), ('HSC:0.LOP', -0x80000000),
                         ('HSC:0.ACC', 0), ('EII:5.IS', 5), ('STI:0.SPM', 0), ('PWM:0.OUT', -1)):
-        place = parse_address(text, PlcType.SLC)
+        place = families.parse_address(text, PlcType.SLC)
         at = 2 * place.offset
         words = place.layout.value_words(place.word)
         found = data[place.file_type.value][at:at + 2 * words]
@@ -110,7 +104,7 @@ def test_values_of_function_files() -> None:
 def test_identity_of_a_micrologix_1400(mode: int, known: Mode, remarks: tuple[str, ...]) -> None:
     reply = next(exchange.reply for exchange in ML1400
                  if exchange.command.cmd == 6 and exchange.reply.data[18] == mode)
-    identity = decode_identity(reply.data)
+    identity = families.decode_identity(reply.data)
     assert (identity.model, identity.processor) == ('MicroLogix 1400', Processor.ML1400)
     assert (identity.series, identity.revision, identity.name) == ('B', '4', '1766-LEC')
     assert (identity.mode, identity.faults, identity.remarks) == (known, (), remarks)
@@ -119,7 +113,7 @@ def test_identity_of_a_micrologix_1400(mode: int, known: Mode, remarks: tuple[st
 
 def simulated(setting: Setting) -> bytes:
     """Return the reply of a simulated MicroLogix 1400 to 06/03."""
-    return FAMILIES[PlcType.SLC].encode_identity(EmulatedProcessor(
+    return families.FAMILIES[PlcType.SLC].encode_identity(EmulatedProcessor(
         setting, is_full_duplex=True, processor=Processor.ML1400))
 
 
@@ -138,8 +132,8 @@ def test_simulated_data_files_answer_the_same() -> None:
     table = DataTable(PlcType.SLC)
     data_files = [entry for entry in KNOWN if not entry[0].file_type.is_function]
     for place, words, exchange in data_files:
-        start = parse_address(f'{place.file_type.value}:0.0', PlcType.SLC) if place.is_flat \
-            else place
+        start = place if not place.is_flat else families.parse_address(
+            f'{place.file_type.value}:0.0', PlcType.SLC)
         table.create(start, words)
         table.write(start, exchange.reply.data)
     server = Server(table, EmulatedProcessor(processor=Processor.ML1400))
@@ -152,7 +146,7 @@ def test_masked_write_of_two_words_has_one_mask_and_spares_the_other_bits() -> N
     masked = [exchange.command.data for exchange in ML1400 if exchange.command.data[:1] == b'\xAB']
     assert len(masked) == 4
     table = DataTable(PlcType.SLC)
-    start = parse_address('N7:0', PlcType.SLC)
+    start = families.parse_address('N7:0', PlcType.SLC)
     table.create(start, 2)
     table.write(start, b'\0\0\xFF\xFF')
     server, words = Server(table), []
@@ -174,7 +168,7 @@ def test_frames_of_a_serial_line_are_an_ack_and_a_good_message() -> None:
         message = decoder.next_symbol()
         assert isinstance(message, Frame)
         assert message.fault is None
-    identity = decode_identity(bytes.fromhex(frames[2]['bytes'])[10:-4])
+    identity = families.decode_identity(bytes.fromhex(frames[2]['bytes'])[10:-4])
     assert (identity.model, identity.mode, identity.remarks) == (
         'MicroLogix 1100', Mode.REMOTE_RUN, ())
 
@@ -198,7 +192,7 @@ def server_of(capture: Capture) -> Server:
     """Return a server that has the words of the capture's server."""
     return Server(
         capture.table(), EmulatedProcessor(is_full_duplex=True),
-        served_counters(Counters(), capture.family, 'Peer'))
+        families.served_counters(Counters(), capture.family, 'Peer'))
 
 
 @pytest.mark.parametrize('capture', CAPTURES, ids=lambda capture: capture.name)

@@ -86,11 +86,11 @@ def test_reads_without_a_period_are_expected_to_have_what_is_left() -> None:
 def test_reads_without_a_period_are_expected_to_have_little_of_a_full_line(
         period: int, is_full: bool) -> None:
     found, time = expected((0, 2), (period, 4))
-    once, needed = 6 * time, 4 * time / period * 1000
+    once, needed, short = 6 * time, 4 * time / period * 1000, period / 1000
     assert needed > 1 if is_full else 0.95 < needed < 1
     stretch = needed + 2 * time / (PATIENCE * once)
     assert found[0.0] == pytest.approx(min(PATIENCE * once * stretch, (PATIENCE + 1) * once))
-    assert found[period / 1000] == pytest.approx(min(period / 1000 * stretch, period / 1000 + once))
+    assert found[short] == pytest.approx(min(short * stretch, short + once))
 
 
 @pytest.mark.parametrize('tx_delay', [0, 20])

@@ -21,45 +21,21 @@ from typing import Any
 
 from abdf1_ros.errors import FormatError
 from abdf1_ros.pccc.values import ValueType
-from abdf1_ros.ros.topics.messages import (
-    encoder,
-    latched_qos,
-    MESSAGES,
-    new_message,
-    read_qos,
-    results_qos,
-    values_of,
-    write_qos,
-)
+from abdf1_ros.ros.topics import messages
 from abdf1_ros.settings.map_file import load_mappings
 from abdf1_ros.settings.mapping import Mapping
 import pytest
+from rclpy import qos
 from rclpy.duration import Duration
-from rclpy.qos import (
-    DurabilityPolicy,
-    HistoryPolicy,
-    LivelinessPolicy,
-    QoSProfile,
-    ReliabilityPolicy,
-)
 from rclpy.serialization import deserialize_message, serialize_message
-from std_msgs.msg import (  # noqa: I101
-    Float32MultiArray,
-    Int16MultiArray,
-    Int32MultiArray,
-    MultiArrayLayout,
-    String,
-    UInt8MultiArray,
-    UInt16MultiArray,
-    UInt32MultiArray,
-)
+from std_msgs import msg
 from support.cases import for_all
 from support.ros import write_csv
 
 TYPES = {
-    'bool': UInt8MultiArray, 'int16': Int16MultiArray, 'uint16': UInt16MultiArray,
-    'bcd16': UInt16MultiArray, 'bcd12': UInt16MultiArray, 'int32': Int32MultiArray,
-    'uint32': UInt32MultiArray, 'float32': Float32MultiArray, 'string': String}
+    'bool': msg.UInt8MultiArray, 'int16': msg.Int16MultiArray, 'uint16': msg.UInt16MultiArray,
+    'bcd16': msg.UInt16MultiArray, 'bcd12': msg.UInt16MultiArray, 'int32': msg.Int32MultiArray,
+    'uint32': msg.UInt32MultiArray, 'float32': msg.Float32MultiArray, 'string': msg.String}
 
 
 def make_mapping(folder: Path, address: str, **cells: object) -> Mapping:
@@ -71,18 +47,18 @@ def make_mapping(folder: Path, address: str, **cells: object) -> Mapping:
 
 
 def test_every_value_type_has_its_message() -> None:
-    assert MESSAGES == {ValueType(name): message for name, message in TYPES.items()}
+    assert messages.MESSAGES == {ValueType(name): message for name, message in TYPES.items()}
 
 
 @for_all(('address', 'cells', 'kind'), [
-    ('B3:1/14', {'Length': 5}, UInt8MultiArray), ('N7:3', {'Length': 5}, Int16MultiArray),
-    ('B3:3', {'Length': 5}, UInt16MultiArray), ('F8:3', {'Length': 5}, Float32MultiArray),
-    ('L10:3', {'Length': 5}, Int32MultiArray),
-    ('N7:3', {'Length': 5, 'Type': 'uint32'}, UInt32MultiArray),
-    ('N7:3', {'Length': 5, 'Type': 'bcd16'}, UInt16MultiArray)])
+    ('B3:1/14', {'Length': 5}, msg.UInt8MultiArray), ('N7:3', {'Length': 5}, msg.Int16MultiArray),
+    ('B3:3', {'Length': 5}, msg.UInt16MultiArray), ('F8:3', {'Length': 5}, msg.Float32MultiArray),
+    ('L10:3', {'Length': 5}, msg.Int32MultiArray),
+    ('N7:3', {'Length': 5, 'Type': 'uint32'}, msg.UInt32MultiArray),
+    ('N7:3', {'Length': 5, 'Type': 'bcd16'}, msg.UInt16MultiArray)])
 def test_layout_says_what_the_values_are(
         tmp_path: Path, address: str, cells: dict[str, object], kind: Any) -> None:
-    message = new_message(make_mapping(tmp_path, address, **cells))
+    message = messages.new_message(make_mapping(tmp_path, address, **cells))
     assert type(message) is kind
     (dimension,) = message.layout.dim
     assert (dimension.label, dimension.size, dimension.stride) == (address, 5, 5)
@@ -93,15 +69,15 @@ def test_layout_says_what_the_values_are(
     ('N7:3', {'Scale': 0.1}), ('N7:3', {'Offset': 1, 'Type': 'uint32'}), ('F8:3', {'Scale': 2})])
 def test_engineering_values_are_float32(
         tmp_path: Path, address: str, cells: dict[str, object]) -> None:
-    message = new_message(make_mapping(tmp_path, address, Length=2, **cells))
-    assert type(message) is Float32MultiArray
+    message = messages.new_message(make_mapping(tmp_path, address, Length=2, **cells))
+    assert type(message) is msg.Float32MultiArray
     assert (message.layout.dim[0].label, message.layout.dim[0].size) == (address, 2)
 
 
 @pytest.mark.parametrize(('address', 'cells'), [
     ('ST9:0', {}), ('A10:0', {'Length': 5, 'Type': 'string'})])
 def test_string_has_no_layout(tmp_path: Path, address: str, cells: dict[str, object]) -> None:
-    assert new_message(make_mapping(tmp_path, address, **cells)) == String()
+    assert messages.new_message(make_mapping(tmp_path, address, **cells)) == msg.String()
 
 
 def padded(wire: bytes) -> bytes:
@@ -127,7 +103,7 @@ def test_array_that_is_encoded_is_the_message(
         tmp_path: Path, address: str, cells: dict[str, object], values: list[float],
         length: int) -> None:
     mapping = make_mapping(tmp_path, address, Length=length, **cells)
-    encode, message = encoder(mapping), new_message(mapping)
+    encode, message = messages.encoder(mapping), messages.new_message(mapping)
     for given in (values[:length], values[-length:]):
         # As it comes from a PLC, not as the message would make it.
         read = mapping.codec.decode(mapping.codec.encode(given)) if mapping.address.bit is None \
@@ -141,39 +117,39 @@ def test_engineering_values_are_encoded(tmp_path: Path) -> None:
     mapping = make_mapping(tmp_path, 'N7:3', Length=2, Scale=0.5)
     assert mapping.scaling is not None
     values = mapping.scaling.publish(mapping.codec.decode(b'\x03\x00\xff\xff'))
-    message = deserialize_message(encoder(mapping)(values), Float32MultiArray)
+    message = deserialize_message(messages.encoder(mapping)(values), msg.Float32MultiArray)
     assert list(message.data) == [1.5, -0.5]
 
 
 def test_string_is_published_as_a_message(tmp_path: Path) -> None:
-    assert encoder(make_mapping(tmp_path, 'ST9:0'))('text') == String(data='text')
+    assert messages.encoder(make_mapping(tmp_path, 'ST9:0'))('text') == msg.String(data='text')
 
 
 @pytest.mark.parametrize(('text', 'arrived'), [
     ('Tank \xe4\t\x1b[2J\r\n', 'Tank \xe4\t\x1b[2J\r\n'), ('ab\0cd', 'ab')])
 def test_string_arrives_unchanged_up_to_a_nul(text: str, arrived: str) -> None:
-    wire = serialize_message(String(data=text))
-    assert deserialize_message(wire, String).data == arrived
+    wire = serialize_message(msg.String(data=text))
+    assert deserialize_message(wire, msg.String).data == arrived
 
 
 def test_values_of_arrays_and_strings() -> None:
-    assert values_of(Int16MultiArray(data=[-1, 2])) == array('h', [-1, 2])
-    assert values_of(String(data='text')) == 'text'
-    assert values_of(UInt8MultiArray()) == array('B')
+    assert messages.values_of(msg.Int16MultiArray(data=[-1, 2])) == array('h', [-1, 2])
+    assert messages.values_of(msg.String(data='text')) == 'text'
+    assert messages.values_of(msg.UInt8MultiArray()) == array('B')
 
 
 def test_values_that_do_not_start_at_the_beginning_are_refused() -> None:
-    message = Int16MultiArray(data=[1, 2], layout=MultiArrayLayout(data_offset=1))
+    message = msg.Int16MultiArray(data=[1, 2], layout=msg.MultiArrayLayout(data_offset=1))
     with pytest.raises(FormatError, match=r'^layout\.data_offset should be 0$'):
-        values_of(message)
+        messages.values_of(message)
 
 
 def test_read_topic_offers_its_stale_time(tmp_path: Path) -> None:
-    profile = read_qos(make_mapping(tmp_path, 'N7:0'), 0.75)
-    assert profile.reliability is ReliabilityPolicy.RELIABLE
-    assert profile.durability is DurabilityPolicy.TRANSIENT_LOCAL
-    assert (profile.history, profile.depth) == (HistoryPolicy.KEEP_LAST, 1)
-    assert profile.liveliness is LivelinessPolicy.MANUAL_BY_TOPIC
+    profile = messages.read_qos(make_mapping(tmp_path, 'N7:0'), 0.75)
+    assert profile.reliability is qos.ReliabilityPolicy.RELIABLE
+    assert profile.durability is qos.DurabilityPolicy.TRANSIENT_LOCAL
+    assert (profile.history, profile.depth) == (qos.HistoryPolicy.KEEP_LAST, 1)
+    assert profile.liveliness is qos.LivelinessPolicy.MANUAL_BY_TOPIC
     stale_time = Duration(nanoseconds=750_000_000)
     assert profile.lifespan == profile.deadline == stale_time
     assert profile.liveliness_lease_duration == stale_time
@@ -183,32 +159,32 @@ def test_read_topic_offers_its_stale_time(tmp_path: Path) -> None:
     ({'Publish': 'Change'}, 0.75), ({'Publish': 'Always'}, math.inf)])
 def test_topic_without_a_rhythm_promises_none(
         tmp_path: Path, cells: dict[str, object], stale_time: float) -> None:
-    profile = read_qos(make_mapping(tmp_path, 'N7:0', **cells), stale_time)
-    assert profile.durability is DurabilityPolicy.TRANSIENT_LOCAL
-    default = QoSProfile(depth=1)
+    profile = messages.read_qos(make_mapping(tmp_path, 'N7:0', **cells), stale_time)
+    assert profile.durability is qos.DurabilityPolicy.TRANSIENT_LOCAL
+    default = qos.QoSProfile(depth=1)
     assert profile.lifespan == default.lifespan
     assert profile.deadline == default.deadline
     assert profile.liveliness_lease_duration == default.liveliness_lease_duration
-    assert profile.liveliness is not LivelinessPolicy.MANUAL_BY_TOPIC
+    assert profile.liveliness is not qos.LivelinessPolicy.MANUAL_BY_TOPIC
 
 
 def test_result_is_not_repeated_to_a_subscriber_that_was_cut_off_for_its_lease() -> None:
-    profile = results_qos()
-    assert profile.reliability is ReliabilityPolicy.RELIABLE
-    assert profile.durability is DurabilityPolicy.VOLATILE
-    assert (profile.history, profile.depth) == (HistoryPolicy.KEEP_LAST, 1000)
+    profile = messages.results_qos()
+    assert profile.reliability is qos.ReliabilityPolicy.RELIABLE
+    assert profile.durability is qos.DurabilityPolicy.VOLATILE
+    assert (profile.history, profile.depth) == (qos.HistoryPolicy.KEEP_LAST, 1000)
     assert profile.lifespan == Duration(seconds=10)  # a lease is 20 s
 
 
 def test_write_topic_keeps_a_burst_but_nothing_from_before() -> None:
-    profile = write_qos()
-    assert profile.reliability is ReliabilityPolicy.RELIABLE
-    assert profile.durability is DurabilityPolicy.VOLATILE
+    profile = messages.write_qos()
+    assert profile.reliability is qos.ReliabilityPolicy.RELIABLE
+    assert profile.durability is qos.DurabilityPolicy.VOLATILE
     assert profile.depth >= 1000  # as many as may wait for the line
 
 
 def test_latched_topic_keeps_one() -> None:
-    profile = latched_qos()
-    assert profile.reliability is ReliabilityPolicy.RELIABLE
-    assert profile.durability is DurabilityPolicy.TRANSIENT_LOCAL
+    profile = messages.latched_qos()
+    assert profile.reliability is qos.ReliabilityPolicy.RELIABLE
+    assert profile.durability is qos.DurabilityPolicy.TRANSIENT_LOCAL
     assert profile.depth == 1

@@ -25,11 +25,7 @@ from abdf1_ros.ros.bridge.last_writes import LAST_WRITES, take_last_writes
 from abdf1_ros.ros.process import main
 import pytest
 from rclpy.duration import Infinite
-from std_msgs.msg import (  # noqa: I101
-    Int16MultiArray,
-    UInt8MultiArray,
-    UInt16MultiArray,
-)
+from std_msgs import msg
 from support.ros import (
     details,
     ERROR,
@@ -156,7 +152,7 @@ def test_user_without_a_home_is_told_what_to_set(monkeypatch: pytest.MonkeyPatch
 def test_trace_that_cannot_be_written_is_an_error_and_no_stop(
         observer: Observer, files: Files) -> None:
     trace = files.folder / 'nowhere' / 'field.cap'
-    speeds = observer.listen(Int16MultiArray, '/traced/read/speeds')
+    speeds = observer.listen(msg.Int16MultiArray, '/traced/read/speeds')
     with files.start_simulator() as simulator, \
             Process('node', *files.args(f'trace_file:={trace}'), '-r', '__node:=traced') as node:
         node.wait_for('[ERROR] ', 'trace_file: [Errno 2] No such file or directory: '
@@ -169,9 +165,9 @@ def test_trace_that_cannot_be_written_is_an_error_and_no_stop(
 
 def test_names_can_be_remapped(observer: Observer, files: Files) -> None:
     diagnostics = observer.diagnostics(files.port)
-    door = observer.listen(UInt8MultiArray, '/cell/door_closed')
-    bits = observer.listen(UInt8MultiArray, '/cell/line_a/read/bits')
-    active = observer.listen(UInt16MultiArray, '/cell/line_a/active_stations')
+    door = observer.listen(msg.UInt8MultiArray, '/cell/door_closed')
+    bits = observer.listen(msg.UInt8MultiArray, '/cell/line_a/read/bits')
+    active = observer.listen(msg.UInt16MultiArray, '/cell/line_a/active_stations')
     remaps = ('-r', '__ns:=/cell', '-r', '__node:=line_a', '-r', '~/read/door:=/cell/door_closed')
     with files.start_simulator() as simulator, \
             Process('node', *files.args('use_sim_time:=true', 'map.recipe.max:=5'),
@@ -199,8 +195,8 @@ def test_full_duplex_bridge_is_read_and_written_by_the_plc(
     write_csv(files.net, f'Mode,PLC_Type,{NET_HEADER}', [f'Peer,PLC5,{NET_ROW}'])
     write_csv(files.map, MAP_HEADER, [
         'speeds,Read,N7:0,1,PLC5,2,,,,,', 'orders,Serve,N7:50,5,PLC5,2,,,,,'])
-    speeds = observer.listen(Int16MultiArray, '/peer/read/speeds')
-    orders = observer.listen(Int16MultiArray, '/peer/read/orders')
+    speeds = observer.listen(msg.Int16MultiArray, '/peer/read/speeds')
+    orders = observer.listen(msg.Int16MultiArray, '/peer/read/orders')
     results = observer.results('/peer')
     arguments = ('--pty', str(files.port), '--data', str(files.simulator))
     with Process('simulator', *arguments, '--full-duplex', '1') as simulator:
@@ -215,8 +211,8 @@ def test_full_duplex_bridge_is_read_and_written_by_the_plc(
             simulator.say('msg 1 N7:50 11 -22')
             assert values_in(orders.first()) == [11, -22]
             simulator.wait_for('station 1: msg N7:50 confirmed')
-            publisher = observer.publisher(Int16MultiArray, '/peer/write/orders')
-            publisher.publish(Int16MultiArray(data=[3, 4]))
+            publisher = observer.publisher(msg.Int16MultiArray, '/peer/write/orders')
+            publisher.publish(msg.Int16MultiArray(data=[3, 4]))
             assert results.first().message == 'written'
             node.end()
         simulator.end()

@@ -19,20 +19,14 @@ from pathlib import Path
 import stat
 
 from abdf1_ros.problems import Problem
-from abdf1_ros.sniffer.capture import (
-    CaptureWriter,
-    Chunk,
-    Direction,
-    is_capture_line,
-    read_capture,
-)
+from abdf1_ros.sniffer import capture
 from hypothesis import given, strategies
 import pytest
 from support.cases import for_all
 
-CHUNKS = [Chunk(0.0, Direction.OUT, b'\x10\x05\x01\xff'),
-          Chunk(0.00421, Direction.IN, b'\x10\x04'),
-          Chunk(3600.5, Direction.UNKNOWN, b'\x00')]
+CHUNKS = [capture.Chunk(0.0, capture.Direction.OUT, b'\x10\x05\x01\xff'),
+          capture.Chunk(0.00421, capture.Direction.IN, b'\x10\x04'),
+          capture.Chunk(3600.5, capture.Direction.UNKNOWN, b'\x00')]
 TEXT = """\
 # abdf1_ros capture 1
 # baud: 19200
@@ -46,27 +40,27 @@ def lines_of(path: Path) -> list[str]:
     return path.read_text(encoding='ascii').splitlines()
 
 
-def chunks_of(path: Path) -> list[Chunk]:
-    return list(read_capture(str(path), lines_of(path), {}))
+def chunks_of(path: Path) -> list[capture.Chunk]:
+    return list(capture.read_capture(str(path), lines_of(path), {}))
 
 
 def test_capture_is_text_that_is_there_before_it_is_closed(tmp_path: Path) -> None:
-    writer = CaptureWriter(tmp_path / 'x', settings={'baud': '19200'})
+    writer = capture.CaptureWriter(tmp_path / 'x', settings={'baud': '19200'})
     for chunk in CHUNKS:
         writer.write(chunk)
     assert (tmp_path / 'x').read_text(encoding='ascii') == TEXT  # before it is closed
     writer.close()
     settings: dict[str, str] = {}
-    assert list(read_capture('x', TEXT.splitlines(), settings)) == CHUNKS
+    assert list(capture.read_capture('x', TEXT.splitlines(), settings)) == CHUNKS
     assert settings == {'baud': '19200'}
 
 
 @given(strategies.builds(
-    Chunk, strategies.integers(0, 10**12).map(lambda micros: micros / 1e6),
-    strategies.sampled_from(Direction), strategies.binary(min_size=1, max_size=50),
+    capture.Chunk, strategies.integers(0, 10**12).map(lambda micros: micros / 1e6),
+    strategies.sampled_from(capture.Direction), strategies.binary(min_size=1, max_size=50),
     strategies.just(False), strategies.just('')))
-def test_chunk_that_was_written_reads_back_the_same(chunk: Chunk) -> None:
-    (again,) = read_capture('x', ['# abdf1_ros capture 1', str(chunk)], {})
+def test_chunk_that_was_written_reads_back_the_same(chunk: capture.Chunk) -> None:
+    (again,) = capture.read_capture('x', ['# abdf1_ros capture 1', str(chunk)], {})
     assert again.time == pytest.approx(chunk.time, abs=1e-6)
     assert again[1:] == chunk[1:]
 
@@ -74,22 +68,23 @@ def test_chunk_that_was_written_reads_back_the_same(chunk: Chunk) -> None:
 def test_guest_is_told_with_the_next_chunk() -> None:
     text = ['# abdf1_ros capture 1', '# guest: 0001 tcp:a', '# guest: A40E pty:/tmp/hmi',
             '0.0 > 10', '0.1 > 05']
-    assert [chunk.guest for chunk in read_capture('x', text, {})] == ['A40E pty:/tmp/hmi', '']
+    guests = [chunk.guest for chunk in capture.read_capture('x', text, {})]
+    assert guests == ['A40E pty:/tmp/hmi', '']
 
 
 def test_blank_lines_remarks_and_a_second_head_may_stand_anywhere() -> None:
     head, *rest = TEXT.splitlines()
     text = [head, '', '# port lost', *rest, head, '# check: BCC', '   ', *rest]
     settings: dict[str, str] = {}
-    assert list(read_capture('x', text, settings)) == CHUNKS * 2
+    assert list(capture.read_capture('x', text, settings)) == CHUNKS * 2
     assert settings == {'baud': '19200', 'check': 'BCC'}
 
 
 def test_it_never_takes_more_than_the_limit(tmp_path: Path) -> None:
     path, old = tmp_path / 'x', tmp_path / 'x.1'
-    writer = CaptureWriter(path, 1000, {'baud': '9600'})
+    writer = capture.CaptureWriter(path, 1000, {'baud': '9600'})
     for count in range(200):
-        writer.write(Chunk(count / 10, Direction.IN, bytes((count,))))
+        writer.write(capture.Chunk(count / 10, capture.Direction.IN, bytes((count,))))
         size = path.stat().st_size + (old.stat().st_size if old.exists() else 0)
         assert size <= 1000
     writer.close()
@@ -102,9 +97,9 @@ def test_it_never_takes_more_than_the_limit(tmp_path: Path) -> None:
 
 def test_the_limit_counts_escapes(tmp_path: Path) -> None:
     path, old = tmp_path / 'x', tmp_path / 'x.1'
-    writer = CaptureWriter(path, 1000, {'port': '/dev/s\xe9rie' + 40 * '\xe9'})
+    writer = capture.CaptureWriter(path, 1000, {'port': '/dev/s\xe9rie' + 40 * '\xe9'})
     for count in range(50):
-        writer.write(Chunk(count / 10, Direction.IN, b'\x10\x04'))
+        writer.write(capture.Chunk(count / 10, capture.Direction.IN, b'\x10\x04'))
     writer.close()
     assert max(path.stat().st_size, old.stat().st_size) <= 500
 
@@ -112,7 +107,7 @@ def test_the_limit_counts_escapes(tmp_path: Path) -> None:
 def test_older_capture_is_put_aside(tmp_path: Path) -> None:
     path = tmp_path / 'x'
     for chunk in CHUNKS:
-        writer = CaptureWriter(path)
+        writer = capture.CaptureWriter(path)
         writer.write(chunk)
         writer.close()
     assert chunks_of(path) == CHUNKS[2:]
@@ -122,7 +117,7 @@ def test_older_capture_is_put_aside(tmp_path: Path) -> None:
 def test_others_cannot_read_a_capture(tmp_path: Path) -> None:
     before = os.umask(0)
     try:
-        CaptureWriter(tmp_path / 'x').close()
+        capture.CaptureWriter(tmp_path / 'x').close()
     finally:
         os.umask(before)
     assert stat.S_IMODE((tmp_path / 'x').stat().st_mode) == 0o640
@@ -132,18 +127,18 @@ def test_other_files_are_left_alone(tmp_path: Path) -> None:
     path = tmp_path / 'x'
     path.write_text('important', encoding='ascii')
     with pytest.raises(OSError, match='is not a capture; give another name'):
-        CaptureWriter(path)
+        capture.CaptureWriter(path)
     assert path.read_text(encoding='ascii') == 'important'
     path.rename(tmp_path / 'y.1')  # where an older part of a capture y goes
     with pytest.raises(OSError, match='y.1 exists and is not a capture'):
-        CaptureWriter(tmp_path / 'y')
+        capture.CaptureWriter(tmp_path / 'y')
     assert (tmp_path / 'y.1').read_text(encoding='ascii') == 'important'
     with pytest.raises(OSError, match='is not a capture'):
-        CaptureWriter(Path('/dev/null'))
+        capture.CaptureWriter(Path('/dev/null'))
     with pytest.raises(OSError, match='is not a capture'):
-        CaptureWriter(tmp_path)
+        capture.CaptureWriter(tmp_path)
     with pytest.raises(FileNotFoundError):
-        CaptureWriter(tmp_path / 'nowhere' / 'x')
+        capture.CaptureWriter(tmp_path / 'nowhere' / 'x')
 
 
 @for_all('line', [
@@ -151,20 +146,20 @@ def test_other_files_are_left_alone(tmp_path: Path) -> None:
     'nan > 10 04', '-inf > 10 04', '1_0.5 > 10 04'])
 def test_bad_line_is_named(line: str) -> None:
     with pytest.raises(Problem, match='should be seconds, ">", "<" or "[?]", and bytes') as caught:
-        list(read_capture('a.cap', ['# abdf1_ros capture 1', '', line], {}))
+        list(capture.read_capture('a.cap', ['# abdf1_ros capture 1', '', line], {}))
     assert str(caught.value).startswith('a.cap:3: ')
 
 
 def test_other_version_is_refused() -> None:
-    assert is_capture_line('# abdf1_ros capture 2')
-    assert not is_capture_line('# baud: 9600')
+    assert capture.is_capture_line('# abdf1_ros capture 2')
+    assert not capture.is_capture_line('# baud: 9600')
     with pytest.raises(Problem, match='a.cap:1: ".* capture 2" should be ".* capture 1"'):
-        list(read_capture('a.cap', ['# abdf1_ros capture 2'], {}))
+        list(capture.read_capture('a.cap', ['# abdf1_ros capture 2'], {}))
 
 
 def test_only_the_beginning_of_a_long_line_is_shown() -> None:
     for lines in (['# abdf1_ros capture' + 'x' * 500], [TEXT.splitlines()[0], 'x' * 500],
                   [TEXT.splitlines()[0], f'{"9" * 500} > 10']):
         with pytest.raises(Problem) as caught:
-            list(read_capture('a.cap', lines, {}))
+            list(capture.read_capture('a.cap', lines, {}))
         assert len(str(caught.value)) < 200

@@ -23,7 +23,7 @@ Time is virtual.
 
 from collections import deque
 from collections.abc import Callable, Collection, Generator
-from enum import auto, Enum
+from enum import Enum
 import heapq
 from itertools import count
 import runpy
@@ -41,134 +41,70 @@ _ACK_TIMEOUT = 1.0
 _COMMAND_TIMEOUT = 5.0
 
 
-class Habit(Enum):
-    """What an end does otherwise."""
-
+# What an end does otherwise.
+Habit = Enum('Habit', [
     # Of everybody who answers.
-    NO_ACK = auto()
-    TAKES_BAD_CHECK = auto()
-    TAKES_SHORT = auto()
-    LOST_AFTER_BROKEN_MESSAGE = auto()
-    LOST_AFTER_NOISE = auto()
-    EXECUTES_DUPLICATES = auto()
-    COUNTS_NOTHING = auto()
-    DUPLICATE_WITHOUT_ACK = auto()
-    DUPLICATE_BY_TNS = auto()
-    DUPLICATE_WITHOUT_SOURCE = auto()
-    DUPLICATE_BY_COMMAND_AND_SOURCE = auto()
-    REMEMBERS_99 = auto()
-    UNSTUFFED = auto()
-    BAD_CHECK_OF_HIGH_BYTES = auto()
-    CUTS_ECHO = auto()
-    CUTS_ECHO_AT_80 = auto()
-    SMALL_PACKETS = auto()
-    EXCHANGES_TNS = auto()
-    DOES_ALL_COMMANDS = auto()
-    DOES_ALL_FUNCTIONS = auto()
-    NO_IDENTITY = auto()
-    READS_SHORT = auto()
-    READS_ZEROS_BEYOND = auto()
-    WRITES_NOTHING = auto()
-    MASKS_NOTHING = auto()
-    REFUSES_AREA = auto()
-    SLOW = auto()  # each response and reply 300 ms late
-    LATE_REPLY = auto()  # 300 ms after the command
-    VERY_LATE_REPLY = auto()  # 1.5 s
-    EXECUTES_BAD_CHECK = auto()  # without a reply, whatever the response is
-    CHECKS_FIRST_BYTE_ONLY = auto()  # of the two of a CRC
-    CHECKS_LAST_BYTE_ONLY = auto()
-    DOUBLES_CHECK = auto()
-    REPLY_WITHOUT_BIT = auto()  # 6 of CMD
-    KEEPS_ADDRESSES = auto()  # of the command, in the reply
-    ADDS_BYTE_TO_ECHO = auto()
-    ACKS_TWICE = auto()
-    ALWAYS_STS = auto()  # 10
-    WORDS_REVERSED = auto()
-    WRITES_FIRST_WORD_ONLY = auto()
-    READS_NEXT_WORD = auto()
-    BYTES_EXCHANGED = auto()  # of words that are written
-    BIT_15_LOST = auto()
-    MASK_SETS_ONLY = auto()
-    MASK_CHANGES_NEXT_WORD = auto()
-    MASK_EXCHANGED = auto()  # with the bits
-    SENDS_COMMANDS = auto()  # of its own, as MSG does: 0.7 s after the last
-    FULL_AT_EVERY_THIRD = auto()  # message
+    'NO_ACK', 'TAKES_BAD_CHECK', 'TAKES_SHORT', 'LOST_AFTER_BROKEN_MESSAGE', 'LOST_AFTER_NOISE',
+    'EXECUTES_DUPLICATES', 'COUNTS_NOTHING', 'DUPLICATE_WITHOUT_ACK', 'DUPLICATE_BY_TNS',
+    'DUPLICATE_WITHOUT_SOURCE', 'DUPLICATE_BY_COMMAND_AND_SOURCE', 'REMEMBERS_99', 'UNSTUFFED',
+    'BAD_CHECK_OF_HIGH_BYTES', 'CUTS_ECHO', 'CUTS_ECHO_AT_80', 'SMALL_PACKETS', 'EXCHANGES_TNS',
+    'DOES_ALL_COMMANDS', 'DOES_ALL_FUNCTIONS', 'NO_IDENTITY', 'READS_SHORT', 'READS_ZEROS_BEYOND',
+    'WRITES_NOTHING', 'MASKS_NOTHING', 'REFUSES_AREA',
+    'SLOW',  # each response and reply 300 ms late
+    'LATE_REPLY',  # 300 ms after the command
+    'VERY_LATE_REPLY',  # 1.5 s
+    'EXECUTES_BAD_CHECK',  # without a reply, whatever the response is
+    'CHECKS_FIRST_BYTE_ONLY',  # of the two of a CRC
+    'CHECKS_LAST_BYTE_ONLY', 'DOUBLES_CHECK',
+    'REPLY_WITHOUT_BIT',  # 6 of CMD
+    'KEEPS_ADDRESSES',  # of the command, in the reply
+    'ADDS_BYTE_TO_ECHO', 'ACKS_TWICE',
+    'ALWAYS_STS',  # 10
+    'WORDS_REVERSED', 'WRITES_FIRST_WORD_ONLY', 'READS_NEXT_WORD',
+    'BYTES_EXCHANGED',  # of words that are written
+    'BIT_15_LOST', 'MASK_SETS_ONLY', 'MASK_CHANGES_NEXT_WORD',
+    'MASK_EXCHANGED',  # with the bits
+    'SENDS_COMMANDS',  # of its own, as MSG does: 0.7 s after the last
+    'FULL_AT_EVERY_THIRD',  # message
     # Of a slave.
-    NAKS_BAD_CHECK = auto()
-    ACK_TO_POLL = auto()
-    REPLIES_UNASKED = auto()
-    POLL_NOT_DOUBLED = auto()
-    CRC_WITHOUT_STATION = auto()
-    ANSWERS_BAD_POLL = auto()
-    ANSWERS_ALL_STATIONS = auto()
-    DROPS_WHAT_IT_SENT = auto()
-    KEEPS_WHAT_WAS_ACKNOWLEDGED = auto()
-    NEVER_GIVES_UP = auto()
-    LOSES_WHEN_FULL = auto()
-    NAKS_WHEN_FULL = auto()
-    ACKS_BROADCAST = auto()
-    REPLIES_TO_BROADCAST = auto()
-    IGNORES_NAK = auto()
-    NO_EOT = auto()
-    LAST_REPLY_FIRST = auto()
-    ONE_MESSAGE_ONLY = auto()  # is full as long as it owes a reply
-    EXECUTES_BAD_CHECK_LATER = auto()  # without DLE ACK; the reply comes at the next poll
-    EXECUTES_SHORT_LATER = auto()  # and so a message that is too short
-    EXECUTES_OTHER_STATION = auto()
-    ANSWERS_POLL_OF_ALL = auto()  # of station 255
-    ACK_OF_ANY = auto()  # drops what was sent, as KF2 4-31 has it
-    DROPS_AT_ANY_ACK = auto()  # also what was not sent
-    NEVER_FULL = auto()
-    TWO_REPLIES_TO_A_POLL = auto()
+    'NAKS_BAD_CHECK', 'ACK_TO_POLL', 'REPLIES_UNASKED', 'POLL_NOT_DOUBLED', 'CRC_WITHOUT_STATION',
+    'ANSWERS_BAD_POLL', 'ANSWERS_ALL_STATIONS', 'DROPS_WHAT_IT_SENT',
+    'KEEPS_WHAT_WAS_ACKNOWLEDGED', 'NEVER_GIVES_UP', 'LOSES_WHEN_FULL', 'NAKS_WHEN_FULL',
+    'ACKS_BROADCAST', 'REPLIES_TO_BROADCAST', 'IGNORES_NAK', 'NO_EOT', 'LAST_REPLY_FIRST',
+    'ONE_MESSAGE_ONLY',  # is full as long as it owes a reply
+    'EXECUTES_BAD_CHECK_LATER',  # without DLE ACK; the reply comes at the next poll
+    'EXECUTES_SHORT_LATER',  # and so a message that is too short
+    'EXECUTES_OTHER_STATION',
+    'ANSWERS_POLL_OF_ALL',  # of station 255
+    'ACK_OF_ANY',  # drops what was sent, as KF2 4-31 has it
+    'DROPS_AT_ANY_ACK',  # also what was not sent
+    'NEVER_FULL', 'TWO_REPLIES_TO_A_POLL',
     # Of a peer or client.
-    IGNORES_BAD_CHECK = auto()
-    NAK_AS_0F = auto()
-    ENQ_IN_MESSAGE_IGNORED = auto()
-    ENQ_IN_MESSAGE_ANSWERED = auto()  # with the last response, and the message goes on
-    ENQ_ALWAYS_NAK = auto()
-    ENQ_ALWAYS_ACK = auto()
-    ENQ_NOT_ANSWERED = auto()
-    RESPONSE_IS_DATA = auto()  # one inside a message
-    RESPONSE_INSIDE_IGNORED = auto()
-    EMBEDS_RESPONSES = auto()
-    NO_REPETITION = auto()
-    SILENCE_REPEATED = auto()  # the message instead of DLE ENQ
-    ENQUIRES_ALWAYS = auto()  # 100 ms after each message
-    ENQ_AFTER_NOISE_OLD = auto()  # DLE ENQ gets the response of before the noise
-    EMBEDDED_NAK_IGNORED = auto()
-    EMBEDDED_NAK_AS_ACK = auto()
-    ENQUIRES_FOR_EVER = auto()
-    ACK_TIMEOUT_OF_8 = auto()  # s
-    REPEATS_AFTER_ACK = auto()  # once, after 2 s
-    USES_REFUSED_REPLY = auto()
+    'IGNORES_BAD_CHECK', 'NAK_AS_0F', 'ENQ_IN_MESSAGE_IGNORED',
+    'ENQ_IN_MESSAGE_ANSWERED',  # with the last response, and the message goes on
+    'ENQ_ALWAYS_NAK', 'ENQ_ALWAYS_ACK', 'ENQ_NOT_ANSWERED',
+    'RESPONSE_IS_DATA',  # one inside a message
+    'RESPONSE_INSIDE_IGNORED', 'EMBEDS_RESPONSES', 'NO_REPETITION',
+    'SILENCE_REPEATED',  # the message instead of DLE ENQ
+    'ENQUIRES_ALWAYS',  # 100 ms after each message
+    'ENQ_AFTER_NOISE_OLD',  # DLE ENQ gets the response of before the noise
+    'EMBEDDED_NAK_IGNORED', 'EMBEDDED_NAK_AS_ACK', 'ENQUIRES_FOR_EVER',
+    'ACK_TIMEOUT_OF_8',  # s
+    'REPEATS_AFTER_ACK',  # once, after 2 s
+    'USES_REFUSED_REPLY',
     # Of a master or client.
-    SAME_TNS = auto()
-    NEW_TNS_FOR_REPETITION = auto()
-    STS_IN_COMMAND = auto()
-    POLL_WITH_CRC = auto()
-    DOES_NOT_POLL = auto()
-    EOT_ENDS_COMMAND = auto()
-    NAKS_BAD_REPLY = auto()
-    IMPATIENT = auto()
-    POLLS_BETWEEN_REPETITIONS = auto()
-    POLLS_OTHERS = auto()
-    POLLS_LATE = auto()
-    ACKS_BAD_REPLY = auto()  # and polls again
-    NAK_BEFORE_COMMAND = auto()
-    TAKES_ANY_TNS = auto()
-    TAKES_ANY_DESTINATION = auto()
-    REPEATS_FOR_EVER = auto()
-    STOPS_AFTER_10 = auto()  # commands
+    'SAME_TNS', 'NEW_TNS_FOR_REPETITION', 'STS_IN_COMMAND', 'POLL_WITH_CRC', 'DOES_NOT_POLL',
+    'EOT_ENDS_COMMAND', 'NAKS_BAD_REPLY', 'IMPATIENT', 'POLLS_BETWEEN_REPETITIONS', 'POLLS_OTHERS',
+    'POLLS_LATE',
+    'ACKS_BAD_REPLY',  # and polls again
+    'NAK_BEFORE_COMMAND', 'TAKES_ANY_TNS', 'TAKES_ANY_DESTINATION', 'REPEATS_FOR_EVER',
+    'STOPS_AFTER_10',  # commands
     # Of a radio modem node or client.
-    ACKNOWLEDGES = auto()
-    ANSWERS_SYMBOLS = auto()
-    REPLIES_FOR_OTHERS = auto()
-    EXECUTES_FOR_OTHERS = auto()  # in silence
-    REPEATS_REPLY = auto()
-    SENDS_ON = auto()
-    SENDS_ON_OWN = auto()
-    SENDS_ON_AGAIN = auto()  # whenever it is heard
-    TAKES_ANY_REPLY = auto()
+    'ACKNOWLEDGES', 'ANSWERS_SYMBOLS', 'REPLIES_FOR_OTHERS',
+    'EXECUTES_FOR_OTHERS',  # in silence
+    'REPEATS_REPLY', 'SENDS_ON', 'SENDS_ON_OWN',
+    'SENDS_ON_AGAIN',  # whenever it is heard
+    'TAKES_ANY_REPLY'])
 
 
 Symbol = tuple[object, ...]

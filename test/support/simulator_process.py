@@ -18,15 +18,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from std_msgs.msg import (  # noqa: I101
-    Float32MultiArray,
-    Int16MultiArray,
-    Int32MultiArray,
-    String,
-    UInt8MultiArray,
-    UInt16MultiArray,
-    UInt32MultiArray,
-)
+from std_msgs import msg
 from support.ros import Process, ros_args, write_csv
 
 NET_HEADER = 'NAK_Retries,ENQ_Retries,Cmd_Timeout,Baud,Timeout'
@@ -104,31 +96,31 @@ SIMULATOR_ROWS = (
 
 # Topic: type, label, values.
 READS: dict[str, tuple[Any, str, list[float] | str]] = {
-    'bits': (UInt8MultiArray, 'B3:0/2', [1, 0, 0, 1, 1, 0]),
-    'door': (UInt8MultiArray, 'I:017/12', [1]),
-    'rack': (UInt16MultiArray, 'I:017', [1 << 0o12]),
-    'speeds': (Int16MultiArray, 'N7:0', [1200, -800]),
-    'levels': (Float32MultiArray, 'F8:0', [12.5, 40.25, -3.5]),
-    'temperatures': (Float32MultiArray, 'N7:4', [21.5, -40.0]),
-    'weight': (Float32MultiArray, 'N7:6', [32769.0]),
-    'label': (String, '', 'abc'),
-    'timer': (Int16MultiArray, 'T4:1', [1 << 13, 500, 120]),
-    'timer/done': (UInt8MultiArray, 'T4:1/DN', [1]),
-    'counts': (Int16MultiArray, 'C5:0', [0, 0, 0, 0, 9, 8]),
-    'flags': (UInt8MultiArray, 'B3:4/1', [0, 0, 0]),
-    'flag_word': (UInt16MultiArray, 'B3:4', [0xFFF1]),
-    'parts': (Int16MultiArray, 'C5:2.ACC', [-17]),
-    'preset': (Int16MultiArray, 'C5:2.PRE', [0]),
-    'gripper': (UInt16MultiArray, 'I:1.0', [5, 40960]),
-    'lamp': (UInt8MultiArray, 'O:2.0/3', [0]),
-    'lamps': (UInt16MultiArray, 'O:2.0', [0x00F0]),
-    'total': (Int32MultiArray, 'L10:0', [-70000, 2000000000]),
-    'unsigned': (UInt32MultiArray, 'N7:40', [0x1FFFF]),
-    'name': (String, '', 'Tank 4'),
-    'digits': (UInt16MultiArray, 'N7:30', [1234, 99]),
-    'setpoint': (Float32MultiArray, 'F8:4', [21.5]),
-    'recipe': (Int16MultiArray, 'N7:10', [101, 102, 103, 104]),
-    'heartbeat': (Int16MultiArray, 'N7:60', [7]),
+    'bits': (msg.UInt8MultiArray, 'B3:0/2', [1, 0, 0, 1, 1, 0]),
+    'door': (msg.UInt8MultiArray, 'I:017/12', [1]),
+    'rack': (msg.UInt16MultiArray, 'I:017', [1 << 0o12]),
+    'speeds': (msg.Int16MultiArray, 'N7:0', [1200, -800]),
+    'levels': (msg.Float32MultiArray, 'F8:0', [12.5, 40.25, -3.5]),
+    'temperatures': (msg.Float32MultiArray, 'N7:4', [21.5, -40.0]),
+    'weight': (msg.Float32MultiArray, 'N7:6', [32769.0]),
+    'label': (msg.String, '', 'abc'),
+    'timer': (msg.Int16MultiArray, 'T4:1', [1 << 13, 500, 120]),
+    'timer/done': (msg.UInt8MultiArray, 'T4:1/DN', [1]),
+    'counts': (msg.Int16MultiArray, 'C5:0', [0, 0, 0, 0, 9, 8]),
+    'flags': (msg.UInt8MultiArray, 'B3:4/1', [0, 0, 0]),
+    'flag_word': (msg.UInt16MultiArray, 'B3:4', [0xFFF1]),
+    'parts': (msg.Int16MultiArray, 'C5:2.ACC', [-17]),
+    'preset': (msg.Int16MultiArray, 'C5:2.PRE', [0]),
+    'gripper': (msg.UInt16MultiArray, 'I:1.0', [5, 40960]),
+    'lamp': (msg.UInt8MultiArray, 'O:2.0/3', [0]),
+    'lamps': (msg.UInt16MultiArray, 'O:2.0', [0x00F0]),
+    'total': (msg.Int32MultiArray, 'L10:0', [-70000, 2000000000]),
+    'unsigned': (msg.UInt32MultiArray, 'N7:40', [0x1FFFF]),
+    'name': (msg.String, '', 'Tank 4'),
+    'digits': (msg.UInt16MultiArray, 'N7:30', [1234, 99]),
+    'setpoint': (msg.Float32MultiArray, 'F8:4', [21.5]),
+    'recipe': (msg.Int16MultiArray, 'N7:10', [101, 102, 103, 104]),
+    'heartbeat': (msg.Int16MultiArray, 'N7:60', [7]),
 }
 WRITES = {'levels', 'temperatures', 'weight', 'label', 'flags', 'preset', 'lamp', 'total', 'name',
           'digits', 'setpoint', 'recipe', 'reset'}

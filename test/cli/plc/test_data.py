@@ -18,19 +18,7 @@ from array import array
 from dataclasses import replace
 from typing import cast
 
-from abdf1_ros.cli.plc.data import (
-    labels,
-    length_of,
-    mapping_of,
-    parse_values,
-    processor_cell,
-    Radix,
-    rows,
-    tags_of,
-    unit_of,
-    value_texts,
-    Writing,
-)
+from abdf1_ros.cli.plc import data
 from abdf1_ros.cli.plc.session import Session
 from abdf1_ros.driver.write import Outcome, WriteResult
 from abdf1_ros.errors import FormatError, PortLost
@@ -49,7 +37,7 @@ from support.mappings import make_mapping
 
 def make(address: str, **cells: str) -> Mapping:
     common = {'Command': 'ReadWrite', 'Station': '1', 'PLC_Type': 'SLC'}
-    return mapping_of(address, common | cells)
+    return data.mapping_of(address, common | cells)
 
 
 def test_columns_are_those_of_a_map_file() -> None:
@@ -94,26 +82,26 @@ def test_address_of_an_element(address: str, kind: str, number: int, expected: s
 
 def test_rows_of_values() -> None:
     mapping = make('N7:3', Length='12')
-    assert list(rows(mapping, array('h', [*range(11), -100]), labels(mapping, None))) == [
+    assert [*data.rows(mapping, array('h', [*range(11), -100]), data.labels(mapping, None))] == [
         ('N7:3', '   0     1     2     3     4     5     6     7     8     9'),
         ('N7:13', '  10  -100')]
-    assert list(rows(make('F8:0'), array('f', [0.1]), ['F8:0'])) == [('F8:0', '0.1')]
-    assert list(rows(make('ST9:0'), 'a\nb', ['ST9:0'])) == [('ST9:0', r"'a\nb'")]
+    assert list(data.rows(make('F8:0'), array('f', [0.1]), ['F8:0'])) == [('F8:0', '0.1')]
+    assert list(data.rows(make('ST9:0'), 'a\nb', ['ST9:0'])) == [('ST9:0', r"'a\nb'")]
 
 
 def test_values_have_the_tags_of_their_own_addresses() -> None:
-    tags = tags_of(Rows([
+    tags = data.tags_of(Rows([
         make_mapping('N7:1', tag='speed'), make_mapping('N7:1', tag='speed'),
         make_mapping('N7:1', tag='a\nb'), make_mapping('N7:2', length=2, tag='words'),
         make_mapping('N7:4', length=2, kind='string', tag='text'),
         make_mapping('N7:0', station=2, tag='other'), make_mapping('N7:0/3', tag='bit'),
         make_mapping('N7:0', command='Serve', tag='ours')]), 1)
     mapping = make('N7:0', Length='6')
-    assert list(rows(mapping, array('h', range(6)), labels(mapping, tags))) == [
+    assert list(data.rows(mapping, array('h', range(6)), data.labels(mapping, tags))) == [
         ('N7:0', '0'), (r'N7:1 speed, a\nb', '1'), ('N7:2 words[0]', '2'),
         ('N7:3 words[1]', '3'), ('N7:4 text', '4'), ('N7:5', '5')]
     bits = make('N7:0/2', Length='2')
-    assert labels(bits, tags) == ['N7:0/2', 'N7:0/3 bit']
+    assert data.labels(bits, tags) == ['N7:0/2', 'N7:0/3 bit']
 
 
 @for_all(('address', 'kind', 'texts', 'values'), [
@@ -122,7 +110,7 @@ def test_values_have_the_tags_of_their_own_addresses() -> None:
     ('ST9:0', '', ['a b'], 'a b'), ('N7:0', 'bcd16', ['1234'], [1234])])
 def test_text_becomes_values_of_the_type(
         address: str, kind: str, texts: list[str], values: object) -> None:
-    assert parse_values(make(address, Type=kind), texts) == values
+    assert data.parse_values(make(address, Type=kind), texts) == values
 
 
 @for_all(('address', 'texts'), [
@@ -132,7 +120,7 @@ def test_text_becomes_values_of_the_type(
     ('F8:0', ['nan']), ('F8:0', ['1e39']), ('F8:0', ['1,000'])])
 def test_text_that_is_no_value_is_a_format_error(address: str, texts: list[str]) -> None:
     with pytest.raises(FormatError):
-        parse_values(make(address), texts)
+        data.parse_values(make(address), texts)
 
 
 @for_all(('address', 'text', 'right'), [
@@ -145,7 +133,7 @@ def test_text_that_is_no_value_is_a_format_error(address: str, texts: list[str])
     ('F8:0', '1,000', '"1,000" could be two numbers; write 1000 or 1.000')])
 def test_value_that_is_none_says_what_would_be_right(address: str, text: str, right: str) -> None:
     with pytest.raises(FormatError) as caught:
-        parse_values(make(address), [text])
+        data.parse_values(make(address), [text])
     assert str(caught.value) == right
 
 
@@ -168,7 +156,7 @@ class InterruptedSession:
 @for_all(('sent', 'outcome'), [(True, Outcome.UNKNOWN), (False, Outcome.NOT_SENT)])
 def test_write_that_is_interrupted_is_unknown_if_it_was_sent(
         sent: bool, outcome: Outcome) -> None:
-    result = Writing(make('N7:0'), ['5']).carry_out(cast(Session, InterruptedSession(sent)))
+    result = data.Writing(make('N7:0'), ['5']).carry_out(cast(Session, InterruptedSession(sent)))
     assert (result.outcome, result.detail) == (outcome, 'port lost: closed')
 
 
@@ -176,22 +164,22 @@ def test_write_that_is_interrupted_is_unknown_if_it_was_sent(
     (None, ''), (Processor.SLC_5_02, '5/02'), (Processor.SLC_5_03, ''),
     (Processor.ML1500, 'ML1500')])
 def test_processor_that_says_what_it_is(processor: Processor | None, cell: str) -> None:
-    assert processor_cell(processor) == cell
+    assert data.processor_cell(processor) == cell
 
 
 @for_all(('text', 'unit'), [
     ('Tank level [%]', '%'), ('speed [m/min]', 'm/min'), ('[bar]', 'bar'), ('[%] of tank', ''),
     ('a [\x1b]', r'\x1b'), ('b []', ''), ('a [plant with halls]', '')])
 def test_unit_of_a_description(text: str, unit: str) -> None:
-    assert unit_of(make('N7:0', Description=text)) == unit
+    assert data.unit_of(make('N7:0', Description=text)) == unit
 
 
 @given(st.integers(-32768, 32767))
 def test_whole_numbers_in_every_notation(value: int) -> None:
     mapping = make('N7:0')
-    assert parse_values(mapping, [str(value)]) == [value]
+    assert data.parse_values(mapping, [str(value)]) == [value]
     if value >= 0:
-        assert parse_values(mapping, [hex(value), bin(value), oct(value)]) == [value] * 3
+        assert data.parse_values(mapping, [hex(value), bin(value), oct(value)]) == [value] * 3
 
 
 @for_all(('address', 'kind', 'texts', 'length'), [
@@ -199,18 +187,18 @@ def test_whole_numbers_in_every_notation(value: int) -> None:
     ('N7:0', 'string', ['abcde'], 3), ('A10:0', 'string', [''], 1), ('st9:0', None, ['a', 'b'], 1)
 ])
 def test_length_of_a_write(address: str, kind: str | None, texts: list[str], length: int) -> None:
-    assert length_of(address, kind, texts) == length
+    assert data.length_of(address, kind, texts) == length
 
 
 @for_all(('kind', 'value', 'radix', 'text'), [
-    ('int16', -2, Radix.HEXADECIMAL, 'FFFE'), ('int16', 10, Radix.HEXADECIMAL, '000A'),
-    ('int16', -1, Radix.OCTAL, '177777'), ('uint16', 5, Radix.BINARY, '0000000000000101'),
-    ('int32', -1, Radix.HEXADECIMAL, 'FFFFFFFF'),
-    ('int16', -2, Radix.DECIMAL, '-2'),
-    ('float32', 1.5, Radix.HEXADECIMAL, '1.5')])
+    ('int16', -2, data.Radix.HEXADECIMAL, 'FFFE'), ('int16', 10, data.Radix.HEXADECIMAL, '000A'),
+    ('int16', -1, data.Radix.OCTAL, '177777'), ('int16', -2, data.Radix.DECIMAL, '-2'),
+    ('uint16', 5, data.Radix.BINARY, '0000000000000101'),
+    ('int32', -1, data.Radix.HEXADECIMAL, 'FFFFFFFF'),
+    ('float32', 1.5, data.Radix.HEXADECIMAL, '1.5')])
 def test_values_are_written_in_another_radix(
-        kind: str, value: float, radix: Radix, text: str) -> None:
+        kind: str, value: float, radix: data.Radix, text: str) -> None:
     mapping = make_mapping('F8:0' if kind == 'float32' else 'N7:0', kind=kind)
-    assert value_texts(mapping, [value], radix) == [text]
+    assert data.value_texts(mapping, [value], radix) == [text]
     scaled = replace(mapping, scaling=Scaling(0.5, 0))
-    assert value_texts(scaled, [value], radix) == [f'{value:g}']
+    assert data.value_texts(scaled, [value], radix) == [f'{value:g}']
