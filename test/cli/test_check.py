@@ -204,11 +204,16 @@ def test_warnings_come_first_and_long_tables_are_folded(check: Check) -> None:
     assert '... and 51 more; --json has them all' in lines and len(lines) < 70
 
 
-def test_row_without_a_period_has_the_default_one(check: Check) -> None:
+def test_row_without_a_period_has_the_default_one(
+        check: Check, files: Paths, capsys: Output) -> None:
     row = GOOD_ROW.removesuffix('1000')
     for options, period in (((), 100), (('--default-period', '2000'), 2000)):
         block, = json.loads(check(GOOD_NET, (row,), '--json', *options))['blocks']
         assert block['period_ms'] == period
+    write_csv(files[1], MAP_HEADER + ',While,While_Timeout', [  # the counter is read as often
+        'count,Read,N7:0,1,PLC5,,,,', 'door,Read,B3:0/0,1,PLC5,,,count,1000'])
+    assert main([*map(str, files), '--default-period', '2000']) == 2
+    assert '6000 ms would be enough' in capsys.readouterr().out
 
 
 def test_odd_settings_are_warnings_with_their_places(check: Check, files: Paths) -> None:

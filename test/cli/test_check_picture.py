@@ -85,6 +85,7 @@ def test_files_with_errors_have_a_picture_of_the_rest(tmp_path: Path, capsys: Ou
     assert said.status == 2
     found = elements(page)
     assert found.bars('ask') == 2 * len(ROWS)
+    assert ('p', {'class': 'verdict is-bad'}) in found.found
     assert any('map.csv:5:3' in text for text in found.texts)
     said, page = drawn(tmp_path, capsys, ROWS, '5,Nobody,9600,1')
     assert said.status == 2

@@ -91,20 +91,21 @@ def test_bar_begins_and_ends_as_its_bytes_did(tmp_path: Path, capsys: Output) ->
 
 def test_faults_come_as_episodes_that_lead_to_their_strip(tmp_path: Path, capsys: Output) -> None:
     found = drawn(tmp_path, capsys, capture(
-        tmp_path / 'line.cap', exchange(0.1, 1), silence(1.2), silence(1.4), silence(1.6),
-        exchange(2.0, 2, sts=0x10), [(30.0, '>', 2 * frames.poll_frame(3))], exchange(30.1, 3)))
-    assert '6 faults on the line' in found.texts
+        tmp_path / 'line.cap', exchange(0.1, 1), silence(1.2), exchange(2.0, 2, sts=0x10),
+        silence(5.4), silence(9.6), silence(9.7, station=4),
+        [(30.0, '>', 2 * frames.poll_frame(3))], exchange(30.1, 3)))
+    assert '7 faults on the line' in found.texts
     links = [attributes['href'] for tag, attributes in found.found if tag == 'a']
     names = {attributes['id'] for tag, attributes in found.found
              if tag == 'svg' and 'id' in attributes}
     assert {link.removeprefix('#') for link in links} <= names
     told = [text for text in found.texts if text.strip()]
     at = told.index('the first of them')
-    assert told[at + 1:at + 7] == ['1.202 s', '1.602 s', '14:05:10', '3', '3',
+    assert told[at + 1:at + 7] == ['1.202 s', '9.602 s', '14:05:10', '3', '3',
                                    'silence: no answer to the poll']
     assert [text for text in told[at + 7:] if text.startswith('reply: ')][0].startswith(
         'reply: 2 to 5, TNS 0002: STS 10')
-    assert told.count('silence: no answer to the poll') == 2
+    assert told.count('silence: no answer to the poll') == 3
     assert '30.000 s' in told  # two polls in one chunk
 
 
@@ -129,10 +130,11 @@ def test_long_recording_keeps_its_faults(
 
 
 def test_recordings_one_after_the_other_and_without_times(tmp_path: Path, capsys: Output) -> None:
-    first = capture(tmp_path / 'line.cap.1', exchange(50.0, 1))
-    second = capture(tmp_path / 'line.cap', exchange(0.1, 2))
+    first = capture(tmp_path / 'line.cap.1', silence(0.1), exchange(50.0, 1))
+    second = capture(tmp_path / 'line.cap', silence(0.1), exchange(0.5, 2))
     found = drawn(tmp_path, capsys, first, second)
     assert {'All of it', 'Recording 2'} <= {*found.texts}
+    assert found.texts.count('silence: no answer to the poll') == 2
     raw = tmp_path / 'raw'
     raw.write_bytes(b''.join(data for _, _, data in exchange(0.0, 1)))
     found = drawn(tmp_path, capsys, '--binary', str(raw))

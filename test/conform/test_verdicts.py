@@ -18,7 +18,7 @@ from abdf1_ros.conform import codec
 from abdf1_ros.conform.case import CaseResult, Target, Verdict
 from abdf1_ros.conform.cases import CASES
 from abdf1_ros.conform.codec import BlockCheck, Symbol, SymbolKind
-from abdf1_ros.conform.ends import AskingEnd, MasterEnd, PeerEnd
+from abdf1_ros.conform.ends import AskingEnd, MasterEnd, PeerEnd, SlaveEnd
 from abdf1_ros.conform.wire import Failed, Wire
 import pytest
 from support.cases import for_all
@@ -229,10 +229,12 @@ def skipped(results: list[CaseResult]) -> set[str]:
 def test_fault_is_found_by_the_case_that_names_it(fault: tuple[Target, Habit, str]) -> None:
     target, habit, name = fault
     end = ENDS[target]('CRC', habit)
+    for words in end.files:
+        words[:] = b'\7' * len(words)
     result, = results_of(end, target, 'CRC', only=name)
     assert result.verdict is Verdict.FAIL
-    # the case has restored the words of the PLC, which were 0
-    assert habit is Habit.MASK_CHANGES_NEXT_WORD or not any(map(any, end.files))
+    # the case has restored the words of the PLC
+    assert habit is Habit.MASK_CHANGES_NEXT_WORD or set().union(*end.files) <= {7}
 
 
 @pytest.mark.parametrize('first', [0, pytest.param(1, marks=pytest.mark.long)])
@@ -355,6 +357,15 @@ def test_numbers_of_commands_begin_again_after_the_last() -> None:
     line = Babble()
     end = PeerEnd(Wire(line, BlockCheck.CRC, line.clock, is_half_duplex=False), 1, 0, 0xFFFF)
     assert [end.command()[4:6] for _ in range(2)] == [b'\xFF\xFF', b'\0\0']
+
+
+@for_all('raw', [codec.poll(7), codec.master_message(7, bytes(8), BlockCheck.CRC)])
+def test_what_is_for_another_slave_is_neither_answered_nor_taken(raw: bytes) -> None:
+    line = Babble(raw)
+    end = SlaveEnd(Wire(line, BlockCheck.CRC, line.clock, is_half_duplex=True), 1, bytes)
+    with pytest.raises(Failed):
+        end.next_command('a command')
+    assert line.sent == b''
 
 
 @pytest.mark.parametrize('kind', [MasterEnd, PeerEnd])
