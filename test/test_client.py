@@ -348,21 +348,17 @@ def test_plc_without_diagnostic_status_needs_its_family(tmp_path: Path) -> None:
         here.read('N7:0')
 
 
-def test_client_talks_to_a_full_duplex_peer(peer: str) -> None:
-    with Client(peer) as here:
-        here.write('N7:0', [1, 2])
-        assert here.read('N7:0', 2) == [1, 2]
-        identity = here.identify()
-        assert (identity.model, identity.mode) == ('SLC 5/03', Mode.REMOTE_RUN)
-
-
-def test_example_of_the_page_runs(peer: str, capsys: pytest.CaptureFixture[str]) -> None:
+def test_example_runs_in_full_duplex(peer: str, capsys: pytest.CaptureFixture[str]) -> None:
     page = Path(__file__).parents[1] / 'docs' / 'library.md'
     example = page.read_text(encoding='utf-8').partition('```python\n')[2].partition('```')[0]
     names: dict[str, object] = {}
     exec(example.replace('/dev/ttyUSB0', peer), names)  # noqa: S102
     assert names['speeds'] == [0] * 10 and names['level'] == 0.0
     assert capsys.readouterr().out == 'SLC 5/03 series A revision 1, REM RUN\n'
+    with Client(peer) as here:
+        here.write('N7:0', [1, 2])
+        assert here.read('N7:0', 2) == [1, 2]
+        assert here.identify().mode is Mode.REMOTE_RUN
 
 
 @pytest.mark.parametrize('page', ['README.md', 'docs/library.md'])

@@ -218,11 +218,11 @@ class Speed:
         self._message = MESSAGES[mapping.message_type]
         self._publisher = node.create_publisher(self._message, f'/abdf1/write/{mapping.topic}', 1)
         self._next = math.inf
-        self.value = 0
+        self._value = 0
 
-    def live(self) -> None:
-        """Start with speed 0."""
-        self.value, self._next = 0, time.monotonic()
+    def command(self, value: int) -> None:
+        """Live, and publish a value from now on."""
+        self._value, self._next = value, time.monotonic()
 
     def die(self) -> None:
         """Publish nothing any more."""
@@ -232,7 +232,7 @@ class Speed:
         """Publish if it is time."""
         if time.monotonic() >= self._next:
             self._next = time.monotonic() + 0.2
-            self._publisher.publish(self._message(data=[self.value]))
+            self._publisher.publish(self._message(data=[self._value]))
 
 
 class Stage:
@@ -347,7 +347,7 @@ class Demo(Stage):
         if self._speed:
             self._say('a program publishes a speed; until its messages come, the node writes the '
                       'Fallback, 0')
-            self._speed.live()
+            self._speed.command(0)
         steps = self._steps()
         self.last_step = len(steps)
         for self.step, tell in enumerate(steps, 1):
@@ -437,7 +437,7 @@ class Demo(Stage):
     def _take_control(self) -> Speed:
         """Press reset at the PLC, and let the publisher command a speed."""
         assert self._speed is not None
-        self._speed.live()
+        self._speed.command(0)
         for _ in range(_RESETS):
             self._wait('a steady heartbeat', lambda: time.monotonic() > 4.5 + self._lamps.get(
                 Lamp.ALIVE, math.inf))
@@ -448,7 +448,7 @@ class Demo(Stage):
             raise Missed('a reset of the PLC has not given ROS control')
         self._wait('ROS to know it', self._is_in_control)
         self._say('/abdf1/read/in_control is [1]: from now on the PLC uses what ROS writes')
-        self._speed.value = 800
+        self._speed.command(800)
         self._wait('the speed in the PLC', lambda: self._used() == 800)
         self._say('800 is published to /abdf1/write/speed, and the program uses it: '
                   'used_speed is [800]')

@@ -15,7 +15,7 @@
 """Tables, colours and progress."""
 
 import argparse
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 import errno
 import io
 import os
@@ -31,6 +31,7 @@ from abdf1_ros.cli.terminal import (
     interruptible,
     is_terminal,
     NoPort,
+    number_option,
     prepare_output,
     Progress,
     reason_of,
@@ -43,6 +44,7 @@ from abdf1_ros.cli.terminal import (
 from abdf1_ros.errors import PortLost
 from abdf1_ros.problems import ConfigurationError, Problem
 import pytest
+from support.cases import for_all
 
 
 class Screen(io.StringIO):
@@ -69,9 +71,6 @@ def test_colour_is_for_terminals_that_want_it(monkeypatch: pytest.MonkeyPatch) -
     assert colour('bad', RED, io.StringIO()) == 'bad'
     monkeypatch.setenv('NO_COLOR', '')
     assert colour('bad', RED, Screen()) == 'bad'
-
-
-def test_dumb_terminal_is_none(monkeypatch: pytest.MonkeyPatch) -> None:
     assert is_terminal(Screen())
     monkeypatch.setenv('TERM', 'dumb')
     assert not is_terminal(Screen())
@@ -188,18 +187,17 @@ def test_end_of_a_command_is_told_and_is_its_status(
     assert bool(dropped) is (type(end) in (OSError, BrokenPipeError))
 
 
-def test_seconds_of_an_option_are_above_0() -> None:
-    assert seconds_option('0.5') == 0.5
-    for text in ('0', '-1', 'nan', 'inf', 'soon', '1_0', '\u0661'):
-        with pytest.raises(argparse.ArgumentTypeError, match='a number of seconds above 0'):
-            seconds_option(text)
-
-
-def test_whole_numbers_of_options() -> None:
-    assert whole_option('9600') == 9600
-    for text in ('', '96.5', '9_600', '\u0661', '9' * 5000):
-        with pytest.raises(argparse.ArgumentTypeError, match='should be a whole number$'):
-            whole_option(text)
+@for_all(('option', 'good', 'bad', 'right'), [
+    (seconds_option, ['0.5'], ['0', '-1', 'nan', 'inf', 'soon', '1_0', '\u0661'],
+     'a number of seconds above 0'),
+    (whole_option, ['9600'], ['', '96.5', '9_600', '\u0661', '9' * 5000], 'a whole number'),
+    (number_option('0 to 60', 0, 60), ['0', '60'], ['-0.1', '60.1'], '0 to 60')])
+def test_number_of_an_option(option: Callable[[str], float], good: list[str], bad: list[str],
+                             right: str) -> None:
+    assert [option(text) for text in good] == [float(text) for text in good]
+    for text in bad:
+        with pytest.raises(argparse.ArgumentTypeError, match=f'should be {right}$'):
+            option(text)
 
 
 @pytest.mark.parametrize(('error', 'text'), [

@@ -216,6 +216,15 @@ def test_write_that_has_waited_too_long_is_not_sent() -> None:
     assert result.latency == 2.001
 
 
+def test_equal_messages_that_wait_as_one_write_end_each_at_its_time() -> None:
+    bench = Bench(write_timeout=2.0)
+    for published in (0.0, 0.25, 0.5):
+        bench.write(BIT, 1, published)
+    for now, ended in ((2.1, 1), (2.3, 2), (2.5, 3)):
+        assert bench.begin_write(now, busy={1}) is None
+        assert len(bench.results) == ended
+
+
 def test_write_that_was_old_when_it_came_is_not_sent_late_behind_a_younger_one() -> None:
     bench = Bench(write_timeout=2.0)
     young = bench.write(WORD, 1, 1.0)

@@ -86,8 +86,7 @@ def test_write_of_two_packets(answers: list[Packet | LinkError], outcome: Outcom
     ([CommandTimeout(), CommandTimeout()], Outcome.UNKNOWN),
     ([reply(sts=0x10), reply()], Outcome.PARTLY),
     ([StationInactive(1), reply()], Outcome.PARTLY)])
-def test_own_write_sends_each_packet(
-        answers: list[Packet | LinkError], outcome: Outcome) -> None:
+def test_own_write_sends_each_packet(answers: list[Packet | LinkError], outcome: Outcome) -> None:
     mapping = make_mapping('N7:0', 'Write', plc='SLC', length=130)
     write = Write(mapping, [7] * 130, 0.0, is_own=True)
     requests, result = converse(carry_out(write, clock), answers)

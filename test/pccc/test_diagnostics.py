@@ -176,8 +176,7 @@ def test_older_families_tell_of_themselves_in_their_own_layout(
     (PlcType.PLC2, ('RUN', 'REM PROG', 'RUN', 'REM TEST'))])
 def test_every_setting_is_read_back(plc_type: PlcType, texts: tuple[str, ...]) -> None:
     settings = (Setting.RUN, Setting.PROGRAM, Setting.REMOTE, Setting.TEST)
-    identities = [decode_identity(encoded(plc_type, setting))
-                  for setting in settings]
+    identities = [decode_identity(encoded(plc_type, setting)) for setting in settings]
     assert tuple(identity.mode_text for identity in identities) == texts
     assert [identity.is_running for identity in identities] == [True, False, True, False]
     assert not any(identity.faults for identity in identities)

@@ -146,8 +146,7 @@ def test_opener_without_a_trace_gives_the_port_itself(tmp_path: Path) -> None:
     pty.close()
 
 
-def test_opener_records_across_openings(
-        tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_opener_records_across_openings(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     # the clock is asked once for the beginning
     monkeypatch.setattr(trace_module, 'time', SimpleNamespace(monotonic=iter([-1e6]).__next__))
     pty = Pty(tmp_path / 'line')

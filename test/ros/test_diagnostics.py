@@ -269,8 +269,7 @@ def test_fault_is_logged_when_it_begins_and_again_after_it_was_over(bench: Bench
     stations.heard(1, NOW + 16)
     text, = look(16.0)
     stations[1].returns = 0
-    assert (text[:24], look(16.0)) == ('station 1 answers polls,', [
-        'station 1 answers commands'])
+    assert (text[:24], look(16.0)) == ('station 1 answers polls,', ['station 1 answers commands'])
 
 
 @pytest.mark.parametrize(('mode', 'silent', 'is_fault'), [

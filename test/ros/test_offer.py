@@ -132,8 +132,7 @@ def test_values_of_a_line_that_was_lost_do_not_come_when_it_is_back() -> None:
     assert node.noted(topics.withdraw) == [f'-{tag}' for tag in tags]
     assert node.noted(topics.publish_later_values) == []
     assert node.noted(topics.read, row, array('h', [7])) == []
-    assert node.noted(topics.offer, points) == [
-        '+n0', 'n0', *(f'+{tag}' for tag in tags[1:])]
+    assert node.noted(topics.offer, points) == ['+n0', 'n0', *(f'+{tag}' for tag in tags[1:])]
     after = ReadTopics(node, published)
     after.open({row: points[row]})
     for gone in [f'-{tag}' for tag in tags[1:]], []:

@@ -103,6 +103,8 @@ def test_it_ends_after_the_time_it_is_given(simulator: Process, capsys: Output) 
     said = call(main, capsys, '--node', NODE, '--seconds', '1', '--period', '0.1')
     assert said.status == 0
     assert time.monotonic() - began > 0.9
+    # The time counts from when the bridge is found.
+    assert NODE in call(main, capsys, '--node', NODE, '--seconds', '0.01').out
 
 
 # On a terminal

@@ -154,8 +154,7 @@ class InterruptedSession:
 
 
 @for_all(('sent', 'outcome'), [(True, Outcome.UNKNOWN), (False, Outcome.NOT_SENT)])
-def test_write_that_is_interrupted_is_unknown_if_it_was_sent(
-        sent: bool, outcome: Outcome) -> None:
+def test_write_that_is_interrupted_is_unknown_if_it_was_sent(sent: bool, outcome: Outcome) -> None:
     result = data.Writing(make('N7:0'), ['5']).carry_out(cast(Session, InterruptedSession(sent)))
     assert (result.outcome, result.detail) == (outcome, 'port lost: closed')
 

@@ -45,7 +45,7 @@ PATIENT = ('--timeout', '2000', '--duplex', 'half')  # ms; a busy host may be la
 
 PLC5 = (('O:000', 2), ('S:0', 32), ('B3:0', 5), ('T4:0', 30), ('N7:0', 256), ('F8:0', 20),
         ('ST9:0', 84), ('A12:0', 7), ('D13:0', 1), ('C20:0', 3))
-SLC = (('I:3.0', 2), ('S:0', 64), ('B3:0', 1), ('N7:0', 100), ('F10:0', 8), ('L11:0', 4))
+SLC = (('I:3.0', 2), ('S:0', 64), ('B3:0', 1), ('N7:0', 100), ('F10:0', 8), ('L40:0', 4))
 
 
 @pytest.fixture(scope='module')
@@ -94,7 +94,7 @@ def test_rows_that_are_only_comments_are_good_rows_too(
     assert (len(mappings), problems) == (15, [])
     # What the SLC lists of its files; the PLC-5 has no such list.
     assert [cell_of(mapping, 'Address') for mapping in mappings if mapping.station == 2][5:] == [
-        'S2:0', 'B3:0', 'N7:0', 'F10:0', 'L11:0']
+        'S2:0', 'B3:0', 'N7:0', 'F10:0', 'L40:0']
     guarded = [mapping.tag for mapping in mappings if mapping.is_guarded]
     assert guarded == ['interlocks_1', 'interlocks_2']
 
@@ -189,10 +189,10 @@ def test_init_that_finds_nothing_leaves_no_folder(tmp_path: Path, capsys: Output
 @pytest.mark.parametrize(('station', 'found'), [
     ('1', {'O0': 0, 'S2': 32, 'B3': 5, 'T4': 10, 'N7': 256, 'F8': 10, 'ST9': 2, 'A12': 7,
            'D13': 1, 'C20': 1}),
-    ('2', {'I1': 2, 'S2': 64, 'B3': 1, 'N7': 100, 'F10': 4, 'L11': 2})])
+    ('2', {'I1': 2, 'S2': 64, 'B3': 1, 'N7': 100, 'F10': 4, 'L40': 2})])
 def test_files_are_found_with_type_and_length(
         port: str, station: str, found: dict[str, int], capsys: Output) -> None:
-    assert main(['files', station, '--port', port, '--files', '0-21']) == 0
+    assert main(['files', station, '--port', port, '--files', '0-40']) == 0
     lines = [line.split() for line in capsys.readouterr().out.splitlines()]
     assert {name: int(count) if count.isdigit() else 0 for name, count, *_ in lines} == found
 
@@ -240,7 +240,7 @@ def test_directory_takes_few_reads(port: str, capsys: Output) -> None:
     with Session(Network(com_port=port, baud=19200, timeout=300)) as session:
         found = [*find_files(session, 2, PlcType.SLC, Processor.SLC_5_03)]
         assert session.counters.commands_sent <= 10
-        by_reads = [*find_files(session, 2, PlcType.SLC, None, (7, 10))]
+        by_reads = [*find_files(session, 2, PlcType.SLC, None, (7, 40))]
         assert session.counters.commands_sent > 20
     assert {str(entry) for entry in by_reads} <= {str(entry) for entry in found}
 
