@@ -137,6 +137,12 @@ def test_rule_11_answered_write_of_a_guest_ends_the_pause() -> None:
     ended(0.3, Outcome.UNKNOWN, own)  # one failure is no reason for a pause
     ended(0.3, Outcome.UNKNOWN)  # nor is one of a guest
     assert plc.rank(one.row, 0.3) is not None
+    one.fallback(one.row.take(0.4), 0.5)
+    plc.plan()
+    plc.pause_end = 9.0
+    one.row.make_due(FallbackCause.RUN, 1.0)
+    plc.look_again(one.row)
+    assert plc.next_due(math.inf) < 9.0  # a first try does not wait for the end of a pause
 
 
 def test_rule_5_waiting_row_of_a_silent_plc_hides_no_earlier_time() -> None:
@@ -145,6 +151,8 @@ def test_rule_5_waiting_row_of_a_silent_plc_hides_no_earlier_time() -> None:
     stations.lost(1, 0.0)
     plc.due = 1.0
     assert plc.next_due(2.0) == 2.0
+    one.row.take(1.0)
+    assert plc.rank(one.row, 1.0) is None  # that was its try
 
 
 def test_rule_11_first_tries_go_first_then_plcs_that_answer() -> None:
@@ -167,6 +175,9 @@ def test_rule_11_first_tries_go_first_then_plcs_that_answer() -> None:
     one.row.make_due(FallbackCause.RUN, 5.0)
     one.fallback(one.row.take(5.0), 5.1, Outcome.UNKNOWN)
     assert plc.rank(one.row, 8.0) == (*left_alone[:3], 5.0)  # its first try again
+    stations.lost(1, 8.0)  # probes have a pause of their own
+    plc.pause_end = 99.0
+    assert plc.rank(one.row, 90.0) is not None
 
 
 def test_rule_7_message_refreshes_from_its_own_time_when_it_is_confirmed() -> None:
@@ -367,8 +378,10 @@ def test_rule_9_second_packet_of_a_message_is_not_sent_when_its_fallback_is_due(
         'only partly written: too old to be sent (after 1 of 2 packets were written)', TIMEOUT]
 
 
-def test_rule_9_write_of_another_row_to_the_same_words_holds_up_for_its_own_time_only() -> None:
-    recipe = speed_row(None, length=200, tag='recipe')  # of several packets
+@for_all('station', [1, 255])
+def test_rule_9_write_of_another_row_to_the_same_words_holds_up_for_its_own_time_only(
+        station: int) -> None:
+    recipe = make_mapping('N7:0', 'Write', station=station, length=200)  # of several packets
     speed = speed_row()
     cell = Cell(recipe, speed, run=1.0)
     cell.bench.write(speed, [3], run=AFTER - 0.01)
@@ -377,6 +390,7 @@ def test_rule_9_write_of_another_row_to_the_same_words_holds_up_for_its_own_time
     row, = cell.bench.driver.interlocks.fallbacks
     tasks = cell.bench.driver.tasks
     cell.bench.run_until(lambda: row.cause is not None and bool(tasks.under_way))
+    assert cell.bench.driver.interlocks.next_due() > cell.now
     cell.run(0.5)
     assert cell.results()[-1] == TIMEOUT
     assert cell.word('N7:0') == 7
@@ -425,6 +439,7 @@ def test_rule_10_after_an_unknown_write_it_is_written_once_more() -> None:
     # The message ended when station 1 had not answered its two frames of 0.2 s each.
     assert second == pytest.approx(unknown + 2 * 0.2 + 2 * 0.5, abs=0.05)
     assert len([result for result in cell.results() if result.startswith('fallback')]) == 2
+    assert cell.bench.listener.reasons == []  # no PLC has refused it
 
 
 def test_rule_10_plc_that_answers_has_its_fallback_before_those_that_do_not() -> None:
@@ -478,17 +493,21 @@ def test_rule_10_once_more_after_a_message_that_may_have_been_written(
     assert row.judge(60.0, -math.inf) is again
 
 
-def test_rule_8_0_that_a_guest_may_have_written_over_meanwhile_is_written_once_more() -> None:
+@for_all('is_known', [True, False])  # the words of its command; others are hardly these
+def test_rule_8_0_that_a_guest_may_have_written_over_meanwhile_is_written_once_more(
+        is_known: bool) -> None:
     words = OneRow().record.words_of(beat_row())
     beat = HeartbeatRow(words, 1, Random(0))
     beat.begin(0.0, is_new=True)
-    beat.take(0.0)
-    guest = Claim(1, [words.row.extent])
+    ours = Claim(1, [words.row.extent], beat.take(0.0), 0.0)
+    guest = Claim(1, ours.extents if is_known else None)
     guest.end(Outcome.UNKNOWN, 0.1, 1.0)
     words.ended(guest)
+    ours.end(Outcome.WRITTEN, 0.2, 0.0)
+    words.ended(ours)
     beat.ended(Outcome.WRITTEN, 0.2)
-    assert beat.judge(0.2, '', 0.2, {})
-    assert beat.is_first_try
+    assert beat.judge(0.2, '', 0.2, {}) is is_known
+    assert beat.is_first_try is is_known
 
 
 def test_rule_10_heartbeat_counts_after_a_0_that_is_written_once_more() -> None:

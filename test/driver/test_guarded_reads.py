@@ -183,6 +183,17 @@ def test_rule_14_counter_that_changes_between_two_packets_permits_the_next_read(
     assert values and all(value == [2] * 200 for value in values)
 
 
+def test_rule_15_row_is_withheld_or_has_failed() -> None:
+    guard = RunGuard()
+    point = ReadPoint(make_mapping('N11:0', condition=While(('RUN',))), 1.0, 3.0, guard)
+    point.fail('no reply')
+    for now in (0.0, 9.0):
+        point.withhold('its mode is not known', now)
+    assert (point.freshness(9.0), guard.withheld) == (Freshness.WITHHELD, {point})
+    point.fail('no reply')
+    assert (point.freshness(9.0), guard.withheld) == (Freshness.FAILED, set())
+
+
 def withheld(cell: Cell) -> list[str]:
     """Return what was told of withheld rows."""
     return [reason for _, reason in cell.bench.listener.reasons if reason.startswith('withheld')]

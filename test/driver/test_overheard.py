@@ -328,9 +328,10 @@ def test_what_lay_in_a_buffer_while_the_process_stood_still_is_dropped() -> None
 def test_row_that_no_node_reads_is_named_after_each_opening() -> None:
     mapping = row()
     bench = ListeningBench([mapping])
-    for _ in range(2):
+    for failures in (1, 4):
         bench.run(30.0)
         assert bench.driver.points[mapping].error == 'no other node reads it'
+        assert bench.driver.points[mapping].failures == failures
         bench.driver.ended(PortLost('unplugged'))
         assert bench.driver.points[mapping].error == 'port lost: unplugged'
         bench.machine.start(bench.now)

@@ -330,7 +330,7 @@ def test_rates_are_those_since_the_last_look(bench: Bench) -> None:
 
 def test_load_of_the_line_is_told_by_topic_the_largest_first(tmp_path: Path) -> None:
     bench = Bench(tmp_path, ('slow,Read,N9:0,1,PLC5,1000,1', 'short,Read,N7:0,1,PLC5,100,1',
-                             'long,Read,N7:1,1,PLC5,100,3'), header=f'{HEADER},Length')
+                             'long,Read,N7:2,1,PLC5,100,3'), header=f'{HEADER},Length')
     assert bench.details('link')['line load by topic'] == ''  # nothing was read twice
     for job in bench.driver.readings.reads.jobs:
         for now in (NOW, NOW + job.block.period):
@@ -707,8 +707,8 @@ def test_heartbeat_that_the_plc_does_not_confirm_does_not_count(make_bench: Benc
 
 def test_bit_of_the_plc_confirms_control_while_it_is_fresh_and_1(
         make_bench: Benches, monkeypatch: pytest.MonkeyPatch) -> None:
-    bench = make_bench('alive,Heartbeat,N10:0,1,PLC5,60000,',
-                       'ruled,Read,B12:0/2,1,PLC5,1000,alive', header=f'{HEADER},Confirms')
+    bench = make_bench('alive,Heartbeat,N10:0,1,PLC5,60000,,8',
+                       'ruled,Read,B12:0/2,1,PLC5,1000,alive,8', header=f'{HEADER},Confirms,Via')
     beat, bit = bench.driver.interlocks.heartbeats[0], bench.point('ruled')
     latest: dict[str, Values] = {}
     bench.seen.latest = latest
@@ -740,8 +740,8 @@ def test_bit_of_the_plc_confirms_control_while_it_is_fresh_and_1(
     beat.reason = ''
     assert station(1, NOW + 32) == (OK, 'in control for 0.0 s')
     stopped = Identity(PlcType.PLC5, 'PLC-5/40', mode=Mode.REMOTE_PROGRAM, mode_text='REM PROG')
-    monkeypatch.setattr(bench.driver.checks, 'known', lambda station: StationHealth(
-        'PLC-5/40', stopped, NOW + 33))
+    monkeypatch.setattr(bench.driver.checks, 'known', {
+        1: StationHealth('PLC-5/40', stopped, NOW + 33), 8: StationHealth('gateway')}.get)
     assert station(1, NOW + 33) == (
         WARN, 'not in control: ruled is 1, but the PLC is in program mode (REM PROG)')
 
@@ -858,3 +858,10 @@ def test_gateway_of_a_station_is_named(make_bench: Benches) -> None:
                        header='Tag,Command,Address,Station,PLC_Type,Period,Via')
     assert bench.details('station 1')['gateway'] == '8'
     assert 'gateway' not in bench.details('station 2')
+    assert stations_of(bench.driver.mappings) == {1, 2, 8}
+    said = []
+    for number in (1, 8):
+        bench.driver.stations.lost(number, NOW)
+        said.append(bench.says('station 1', NOW + 2)[1])
+    text = 'ERROR: station 1 inactive for 2.0 s'
+    assert said == [f'{text}; its gateway, station 8, answers', text]

@@ -396,6 +396,7 @@ def test_change_is_seen(file: Path, change: Callable[[Path], None]) -> None:
     watch = FileWatch([str(file), '/nowhere'])
     assert watch.changed(0.0) == []
     change(file)
+    assert watch.changed(1.9) == []  # it looks every 2 s
     assert watch.changed(10.0) == ['map.csv']
 
 
@@ -430,6 +431,11 @@ def test_map_without_rows_would_end_all_topics() -> None:
     assert refusal(configured(ROW), configured()) == (text, [])
     assert refusal(configured(), configured()) == ('', [])
     assert refusal(configured(ROW), configured(share='pty:/tmp/hmi')) == ('', [])
+
+
+def test_line_holds_its_ports_and_the_places_of_its_guests() -> None:
+    line = configured(share='pty:/a tcp:5000', listen_port='/dev/ttyS1')
+    assert line.held == ('/dev/ttyS0', 'pty:/a', 'tcp:5000', '/dev/ttyS1')
 
 
 def test_only_another_device_is_tried_and_only_by_a_line_that_runs() -> None:

@@ -24,7 +24,7 @@ from unittest.mock import Mock
 
 from abdf1_ros.ports.link_thread import PortState
 from abdf1_ros.ros.bridge.last_writes import LAST_WRITES
-from abdf1_ros.ros.bridge.node import end_together
+from abdf1_ros.ros.bridge.node import BridgeNode, end_together
 from abdf1_ros.ros.bridge.session import BridgeSession, tell_plcs
 from abdf1_ros.ros.callbacks import AnsweringNode, Callbacks
 from abdf1_ros.ros.diagnostics.log import MOST_ENTRIES
@@ -86,6 +86,7 @@ def order(calls: list[str]) -> list[str]:
 def test_each_line_is_checked_ten_times_a_second_and_looks_come_as_often(
         count: int, monkeypatch: pytest.MonkeyPatch) -> None:
     calls: dict[object, list[float]] = {}
+    limits: set[float] = set()
 
     class Ended:
         now = 0.0
@@ -102,12 +103,16 @@ def test_each_line_is_checked_ten_times_a_second_and_looks_come_as_often(
         def check(self) -> None:
             calls.setdefault(self, []).append(ended.now)
 
+        def end_callbacks(self, give_up: float) -> None:
+            limits.add(give_up)
+
     ended: Any = Ended()
     monkeypatch.setattr(Supervisor, 'look', lambda *_: calls.setdefault('threads', []).append(
         ended.now))
     lines = [Told() for _ in range(count)]
     Runner(lines, lambda: calls.setdefault('look', []).append(ended.now)).run(ended)
     assert calls.keys() == {*lines, 'look', 'threads'}
+    assert len(limits) == 1
     for times in calls.values():
         assert [later - time for time, later in pairwise(times[:10])] == pytest.approx([0.1] * 9)
 
@@ -148,6 +153,13 @@ def test_plcs_of_all_lines_have_one_limit_and_a_dead_link_is_not_waited_for(
         'driver.interlocks.is_over': False, '_surroundings.link.is_alive.return_value': False})
     BridgeSession.wait_for_plcs(session, 199.0, 'ends')
     clock.sleep.assert_not_called()
+
+
+def test_spare_does_not_look_for_the_line_while_it_ends() -> None:
+    node: Any = Mock(_is_ending=True)
+    BridgeNode.check(node)
+    assert node.session.check.called
+    assert not node.standby.look.called
 
 
 def test_table_of_active_stations_is_empty_without_a_port_and_each_change_is_published() -> None:

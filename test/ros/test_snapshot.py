@@ -41,7 +41,10 @@ def status_of(mapping: Mapping, values: array | str | None, *others: Mapping,
     points = {row: ReadPoint(row, 1.0, 3.0) for row in (mapping, *others)}
     if values is not None:
         points[mapping].last_good = now - age
-    points[mapping].error = error
+    if error == 'not in RUN':
+        points[mapping].withhold(error, now)
+    else:
+        points[mapping].error = error
     latest = {} if values is None else {mapping.topic: values}
     return Snapshot(points, latest).message(now).status[0]
 
@@ -78,6 +81,7 @@ def test_each_value_of_an_array_has_a_key(
     (array('h', [7]), 2.0, None, OK, 'OK: 7, 2.0 s ago'),  # late, and not stale yet
     (array('h', [7]), 9.0, None, STALE, 'STALE: 7, 9.0 s ago'),
     (array('h', [7]), 9.0, 'no reply', ERROR, 'ERROR: no reply; 7, 9.0 s ago'),
+    (array('h', [7]), 9.0, 'not in RUN', ERROR, 'ERROR: not in RUN; 7, 9.0 s ago'),
     (None, 0.0, None, STALE, 'STALE: waiting for the first read')])
 def test_value_that_is_not_fresh_says_so(
         values: array | None, age: float, error: str | None, level: bytes, message: str) -> None:

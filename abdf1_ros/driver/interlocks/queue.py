@@ -300,9 +300,7 @@ class Interlocks(WriteListener):
             row.ended(outcome, now)
         else:
             self._fallback_ended(row, write, outcome, now)
-        for beat in plc.heartbeats:  # they may depend on the fallback (rule 3 b)
-            beat.due = min(beat.due, now)
-        plc.plan()
+        plc.plan()  # the row is due, so its heartbeats are judged again, too (rule 3 b)
         if outcome is not Outcome.NOT_SENT:
             refusal = '' if outcome is Outcome.WRITTEN else str(claim.error)
             if isinstance(claim.error, RemoteError) and refusal != row.refusal:
