@@ -84,5 +84,4 @@ def test_map_of_a_folder_names_what_is_there(folder: str) -> None:
 
 def test_map_of_the_package_names_each_room() -> None:
     rooms = {path.name for path in PACKAGE.iterdir() if (path / '__init__.py').exists()}
-    named = set((abdf1_ros.__doc__ or '').split('``')[1::2])
-    assert rooms - named == set()
+    assert rooms - set((abdf1_ros.__doc__ or '').split('``')[1::2]) == set()

@@ -77,8 +77,7 @@ def _needed(result: CaseResult, target: Target) -> Permission:
 @pytest.mark.parametrize('family', ['SLC', 'PLC5'])
 @pytest.mark.parametrize('target', [Target.SLAVE, Target.PEER, Target.RADIO])
 def test_simulated_plc_conforms(target: Target, family: str, check: str) -> None:
-    line = ScriptedLine(plc_of(target, check, family))
-    results = results_of(line, target, check, family)
+    results = results_of(ScriptedLine(plc_of(target, check, family)), target, check, family)
     assert failures(results) == []
     assert [result.case.name for result in results
             if result.case.permission is not _needed(result, target)] == []

@@ -62,8 +62,7 @@ def test_full_duplex_alone_with_its_echo_hears_nobody(
                     timing=LineTiming(char_time(19200)))
     line = VirtualLine(node.machine, propagation=delay, chunk=chunk)
     line.echoes = True
-    tasks = run_alone(node, line)
-    assert all(isinstance(task.result, StationInactive) for task in tasks)
+    assert all(isinstance(task.result, StationInactive) for task in run_alone(node, line))
     assert node.served == []
     assert node.stations[PLC].last_heard is None
     assert set(node.counts()) <= {
@@ -78,8 +77,7 @@ def test_master_alone_with_its_echo_hears_nobody(polling: PollingSettings | None
                       timing=LineTiming(char_time(19200)))
     line = VirtualLine(node.machine)
     line.echoes = True
-    tasks = run_alone(node, line)
-    assert all(isinstance(task.result, StationInactive) for task in tasks)
+    assert all(isinstance(task.result, StationInactive) for task in run_alone(node, line))
     assert (node.served, node.stations[PLC].last_heard) == ([], None)
     assert node.machine.echoes
 

@@ -200,8 +200,7 @@ def test_symbol_breaks_into_a_multidrop_header(start: bytes) -> None:
 
 
 def test_etx_pair_among_the_check_bytes_is_check() -> None:
-    entry = vector('crc_low_equals_DLE')
-    (frame, ack) = decode(entry.frame + ACK, CRC, FULL, 1)
+    (frame, ack) = decode(vector('crc_low_equals_DLE').frame + ACK, CRC, FULL, 1)
     assert isinstance(frame, Frame) and frame.fault is None
     assert ack == Control(Code.ACK)
 
@@ -433,8 +432,7 @@ def test_duplicate_key_tells_messages_apart_by_src_cmd_and_tns(change: dict[str,
 
 
 def test_duplicate_key_passes_over_dst_sts_and_data() -> None:
-    other = COMMAND._replace(dst=99, sts=0x10, data=b'other')
-    assert other.duplicate_key == COMMAND.duplicate_key
+    assert COMMAND._replace(dst=99, sts=0x10, data=b'other').duplicate_key == COMMAND.duplicate_key
 
 
 @for_all(('packet', 'size', 'begins'), [

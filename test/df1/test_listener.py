@@ -126,8 +126,7 @@ def test_recording_that_begins_in_the_middle_is_half_duplex_after_all() -> None:
 def test_any_bytes_are_symbols_or_noise(chunks: list[bytes]) -> None:
     whole, pieces = ListeningDecoder(LineKind()), ListeningDecoder(LineKind())
     expected = symbols(whole, b''.join(chunks))
-    found = [symbol for chunk in chunks for symbol in symbols(pieces, chunk)]
-    assert found == expected
+    assert [symbol for chunk in chunks for symbol in symbols(pieces, chunk)] == expected
     assert pieces.noise == whole.noise
     assert pieces.finish() == whole.finish()
 

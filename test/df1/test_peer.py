@@ -216,8 +216,7 @@ def test_command_with_a_status_is_told_and_not_accepted() -> None:
 @for_all('more', [1, 2, 3, 50, 700])
 def test_message_too_long(byte: int, more: int) -> None:
     peer = bench()
-    command = THEIRS._replace(data=bytes((byte,)) * (MAX_LINK_DATA - 6 + more))
-    frame = peer.frame(command)
+    frame = peer.frame(THEIRS._replace(data=bytes((byte,)) * (MAX_LINK_DATA - 6 + more)))
     assert peer.hear(*single_bytes(frame[:-1])) == b''  # not in its middle (M 4-8)
     assert peer.hear(frame[-1:]) == NAK
     assert peer.numbers() == [(2512, MAX_LINK_DATA)]
@@ -347,8 +346,7 @@ def test_short_wait_is_for_an_inactive_station() -> None:
     """Timeout counts for the answer of an active station, as on a half-duplex line."""
     peer, task = acknowledged()
     answer(peer, task)
-    brief = peer.add(later(COMMAND, 1))
-    brief.answer_within = 0.1
+    peer.add(later(COMMAND, 1)).answer_within = 0.1
     peer.machine.wake(peer.now)
     assert peer.said() == peer.frame(later(COMMAND, 1))
     assert [round(at, 1) for at, data in peer.wait(1.05)] == [TIMEOUT]

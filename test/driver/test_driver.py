@@ -256,8 +256,7 @@ def test_address_that_the_plc_refuses_takes_down_only_its_own_mapping() -> None:
 
 
 def test_address_that_comes_into_being_is_read_with_its_neighbours_again() -> None:
-    mappings = [make_mapping(f'N9:{n}', plc='SLC') for n in range(8)]
-    bench = DriverBench(mappings)
+    bench = DriverBench([make_mapping(f'N9:{n}', plc='SLC') for n in range(8)])
     plc = bench.plc(1, 'SLC', ('N9:0', 6))
     bench.run(2.0)
     assert len(bench.driver.readings.blocks) == 3

@@ -120,8 +120,7 @@ def test_common_interface_file_of_an_slc() -> None:
 
 
 def test_long_read_of_a_plc3_carries_its_offset() -> None:
-    mapping = make_mapping('E3.1.8.10.0.0', plc='PLC3', length=342, period=60_000)
-    bench = DriverBench([mapping])
+    bench = DriverBench([make_mapping('E3.1.8.10.0.0', plc='PLC3', length=342, period=60_000)])
     bench.plc(1, 'PLC3', *PLC3_FILES)
     heard: list[bytes] = []
 

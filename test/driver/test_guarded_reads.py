@@ -52,8 +52,7 @@ def test_rule_13_run_guards_a_row() -> None:
 def test_rule_13_answer_about_the_mode_is_no_older_than_the_stale_time() -> None:
     row = make_mapping('N11:0', condition=While(('RUN',)))
     guard = RunGuard()
-    point = ReadPoint(row, 1.0, 3.0, guard)
-    why_not = partial(guard.why_not, point)
+    why_not = partial(guard.why_not, ReadPoint(row, 1.0, 3.0, guard))
     running = Identity(PlcType.SLC, 'SLC 5/03', mode=Mode.RUN, mode_text='RUN')
     assert why_not(9.0, 9.0) == 'not in RUN: its mode is not known'
     guard.told(running, 10.0)

@@ -116,8 +116,7 @@ def test_command_that_has_become_too_old_after_it_was_taken_is_not_sent() -> Non
     bench = bench_of()
     program = Program(bench, ShareAccess.WRITE)
     program.ask(WRITE_N7)
-    guests = bench.driver.guests
-    job = guests.next(bench.clock(), ())
+    job = bench.driver.guests.next(bench.clock(), ())
     assert job is not None
     assert bench.clock() < job.expires <= bench.clock() + DriverSettings().write_timeout
     program.guest.listener = told = Told()

@@ -42,8 +42,7 @@ LINE = LineModel(Checksum.CRC, Duplex.HALF, LineTiming(0.0001))
 
 @cache
 def make_block(period: int, text: str, length: int) -> Block:
-    mapping = make_mapping(text, plc='SLC', length=length, period=period)
-    block, = Planner(LINE, 0.1).plan([mapping])
+    block, = Planner(LINE, 0.1).plan([make_mapping(text, plc='SLC', length=length, period=period)])
     return block
 
 

@@ -300,8 +300,7 @@ def test_bits_that_the_other_end_writes(plc: str) -> None:
 
 def test_command_for_several_words_is_published_once_and_all_or_nothing() -> None:
     slc = Bench('SLC', row('B3:0', 'SLC', 2))
-    masked = bytes.fromhex('AB 04 03 85 00 00 0F 00 FF 00 FF 00')
-    assert slc.ask(0x0F, masked) == (0, b'')
+    assert slc.ask(0x0F, bytes.fromhex('AB 04 03 85 00 00 0F 00 FF 00 FF 00')) == (0, b'')
     assert slc.heard() == [('B3:0_5_Serve_2', [0x0F, 0x0F])]
     assert slc.ask(0x0F, bytes.fromhex('AB 04 03 85 01 00 0F 00 00 00 00 00')) == BAD_WORDS['SLC']
     assert slc.heard() == []
@@ -406,8 +405,7 @@ def test_topic_of_a_serve_row_has_no_other_reader_and_writers_of_its_length_only
 
 def write(element: int, value: int = 1, src: int = 1) -> Packet:
     """Return a typed write of one word to N7."""
-    data = bytes((0xAA, 2, 7, 0x89, element, 0, value, 0))
-    return Packet(5, src, 0x0F, 0, 1, data)
+    return Packet(5, src, 0x0F, 0, 1, bytes((0xAA, 2, 7, 0x89, element, 0, value, 0)))
 
 
 def test_other_values_and_later_times_are_the_same_command() -> None:

@@ -221,8 +221,7 @@ def test_what_they_have_accepted_of_ours_is_what_we_would_send(capture: Capture)
         function, *parameters = exchange.command.data
         read = _READ.get((exchange.command.cmd, function))
         if read is not None and not exchange.reply.sts:
-            encoded = read(Reader(bytes(parameters))).encode()
-            assert encoded == exchange.command.data, exchange.text
+            assert read(Reader(bytes(parameters))).encode() == exchange.command.data, exchange.text
             compared += 1
     assert compared
 

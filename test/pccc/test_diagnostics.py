@@ -132,8 +132,7 @@ def test_what_there_is_not_is_refused(plc_type: PlcType, data: bytes) -> None:
 def test_nobody_changes_the_mode(plc_type: PlcType, cmd: int, data: bytes) -> None:
     processor = EmulatedProcessor()
     server = Server(DataTable(plc_type), processor)
-    refusal = server.serve(Packet(1, 9, cmd, 0, 0x1234, data))
-    assert refusal.sts
+    assert server.serve(Packet(1, 9, cmd, 0, 0x1234, data)).sts
     assert processor == EmulatedProcessor()
 
 

@@ -331,8 +331,7 @@ def test_heartbeats_and_questions_for_run_are_counted_in_the_load() -> None:
 @pytest.mark.parametrize(('stale_after', 'period'), [(3.0, 1.0), (1.5, 0.5), (100.0, 100 / 3)])
 def test_rule_13_three_answers_about_the_mode_fit_into_the_stale_time(
         stale_after: float, period: float) -> None:
-    guarded = make_mapping('N7:0', period=1000, condition=While(('RUN',)))
-    rows = Rows([guarded])
+    rows = Rows([make_mapping('N7:0', period=1000, condition=While(('RUN',)))])
     assert mode_periods(rows, 0.1, stale_after) == {1: pytest.approx(period)}
     (_, asked), = own_work(line_model(QUICK), rows, 0.1, stale_after)
     bench = DriverBench(rows, settings=DriverSettings(stale_after=stale_after))

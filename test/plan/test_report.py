@@ -40,8 +40,7 @@ def report_of(*mappings: Mapping, period: float = 1.0, response: float = 0.01,
 
 
 def test_settings_that_are_odd_come_first_with_their_stations() -> None:
-    mapping = make_mapping('N7:0', station=3)
-    odd = replace(mapping, remarks=('map.csv:2:8 (Max): too much',))
+    odd = replace(make_mapping('N7:0', station=3), remarks=('map.csv:2:8 (Max): too much',))
     assert report_of(odd, data_bits=7).remarks()[:2] == [
         Remark(RemarkKind.SETTING, 'Data_Bits 7: DF1 sends bytes of 8 bits; with less the check '
                                    'of nearly every message fails'),

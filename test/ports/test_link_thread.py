@@ -266,10 +266,8 @@ def _fail_once(put: Callable[..., None]) -> Callable[..., None]:
 
 def test_busy_port_is_reported_and_opened_when_it_is_free(pty: Pty, link: Link) -> None:
     other = serial.Serial(str(pty.name), exclusive=True)
-    script = Script()
-    link.start(script.machine, pty.name)
-    state = link.state()
-    assert state == PortState(False, 'cannot open the port: another program has it open')
+    link.start(Script().machine, pty.name)
+    assert link.state() == PortState(False, 'cannot open the port: another program has it open')
     other.close()
     while not link.state().is_open:
         pass

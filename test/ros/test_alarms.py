@@ -102,8 +102,7 @@ def test_column() -> None:
 
 def test_check_names_the_rows() -> None:
     row = one(Command='Read', Address='B3:0/3', Alarm='ERROR')
-    report = make_report(Network(), [row], 0.1)
-    assert f'alarms on /diagnostics: {row.tag}' in report.notes()
+    assert f'alarms on /diagnostics: {row.tag}' in make_report(Network(), [row], 0.1).notes()
 
 
 def test_bridge_reports_the_alarm_of_a_plc(tmp_path: Path) -> None:

@@ -151,8 +151,7 @@ def test_network_that_was_there_at_the_start_may_come_and_go() -> None:
 def test_process_for_this_host_needs_no_network(
         monkeypatch: pytest.MonkeyPatch, name: str, value: str) -> None:
     monkeypatch.setenv(name, value)
-    links = DdsWatch(has_links=iter([False, True]).__next__)
-    assert links.look(1.0) == ''
+    assert DdsWatch(has_links=iter([False, True]).__next__).look(1.0) == ''
 
 
 @NEEDS_NAMESPACES

@@ -57,8 +57,7 @@ def logged(capfd: pytest.CaptureFixture[str]) -> Iterator[Logged]:
 
 
 def event(message: Message, station: int | None = 2) -> Event:
-    arguments = (1,) * len(re.findall('%', message.template))
-    return Event(message, arguments, station)
+    return Event(message, (1,) * len(re.findall('%', message.template)), station)
 
 
 @for_all('message', [entry for entry in Message if entry not in ROUTINE])

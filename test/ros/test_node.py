@@ -365,8 +365,7 @@ def test_internal_errors_are_told_and_the_third_is_the_end(
     bench.node.link.join()
     until_status(bench.diagnostics, 'link', ERROR, lambda status: status.message.startswith(
         'ERROR: internal error: TypeError('))
-    said = ''.join(capfd.readouterr())
-    assert said.count('; please report it\nTraceback') == 3
+    assert ''.join(capfd.readouterr()).count('; please report it\nTraceback') == 3
 
 
 # Starts that are refused

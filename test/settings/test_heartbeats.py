@@ -289,8 +289,7 @@ def test_rule_14_timeout_has_no_default_and_allows_three_reads() -> None:
 
 def test_rule_15_a_row_left_out_takes_along_what_depends_on_it() -> None:
     assert tags_of(row(**DOORS), row(**COUNTER | {'Address': 'N11:x'}), row(**WRITE)) == ['speed']
-    bad = WRITE | {'Length': '0'}
-    rows = (row(**bad), row(**BEAT, While='speed', While_Timeout='500'))
+    rows = (row(**WRITE | {'Length': '0'}), row(**BEAT, While='speed', While_Timeout='500'))
     assert tags_of(*rows) == []
     assert len(faults(*rows)) == 2
 

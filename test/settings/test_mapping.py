@@ -119,8 +119,7 @@ def test_every_column_is_there_once_and_described() -> None:
     ('PLC_Type', FAMILIES), ('Access', Access), ('Processor', Processor)])
 def test_every_choice_is_named(name: str, choices: type[Enum]) -> None:
     words = set(re.findall(r'[\w/]+', BY_NAME[name].description))
-    named = {choice.value for choice in choices}
-    assert named <= words
+    assert {choice.value for choice in choices} <= words
 
 
 @pytest.mark.parametrize('plc_type', [PlcType.PLC2, PlcType.PLC5, PlcType.SLC])

@@ -110,8 +110,7 @@ def test_mode_is_told_by_the_diagnostic_status(plcs: list[SimulatedPlc], setting
 
 def test_message_is_queued_and_its_end_reported(plcs: list[SimulatedPlc]) -> None:
     told: list[str] = []
-    text = execute('msg 12 N7:0 5 -6', plcs, True, told.append)
-    assert text == 'station 12: msg N7:0 5 -6'
+    assert execute('msg 12 N7:0 5 -6', plcs, True, told.append) == 'station 12: msg N7:0 5 -6'
     assert told == []
     sending = plcs[1].outbox.pop()
     assert (sending.command.dst, sending.command.src) == (5, 12)

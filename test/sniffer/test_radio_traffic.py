@@ -88,8 +88,7 @@ def chunks(told: Iterable[Said], is_recorded: bool) -> Iterator[Chunk]:
 
 
 def sniffed(heard: Iterable[Chunk], session: TrafficDecoder) -> list[Entry]:
-    entries = [entry for chunk in heard for entry in session.feed(chunk)]
-    return [*entries, *session.finish()]
+    return [*[entry for chunk in heard for entry in session.feed(chunk)], *session.finish()]
 
 
 @pytest.mark.parametrize('is_recorded', [True, False])

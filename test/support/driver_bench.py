@@ -157,8 +157,7 @@ class FarEnd(Machine):
                     station=first.station, checksum=network.checksum, also=plcs, seed=1,
                     cmd_timeout=self.answers_again,
                     avoids_collisions=network.line.avoids_collisions)
-                node = RadioNode(machine, settings, ActiveStationList(), serve)
-                return node.run(first)
+                return RadioNode(machine, settings, ActiveStationList(), serve).run(first)
             settings = LinkSettings(station=None, checksum=network.checksum)
             return FullDuplexPeer(machine, settings, ActiveStationList(), serve).run(first)
 

@@ -40,8 +40,7 @@ def counting(words: int) -> str:
 
 def words_at(words: DataTable, text: str, count: int = 1) -> str:
     """Return words of a table in hexadecimal."""
-    address = parse_address(text, words.plc_type)
-    return words.read(address, count).hex(' ').upper()
+    return words.read(parse_address(text, words.plc_type), count).hex(' ').upper()
 
 
 def ask(words: DataTable, data: str, cmd: int = 0x0F) -> tuple[int, str]:

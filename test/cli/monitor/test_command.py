@@ -100,8 +100,7 @@ def test_pictures_follow_the_loss_of_a_station(simulator: Process) -> None:
 
 def test_it_ends_after_the_time_it_is_given(simulator: Process, capsys: Output) -> None:
     began = time.monotonic()
-    said = call(main, capsys, '--node', NODE, '--seconds', '1', '--period', '0.1')
-    assert said.status == 0
+    assert call(main, capsys, '--node', NODE, '--seconds', '1', '--period', '0.1').status == 0
     assert time.monotonic() - began > 0.9
     # The time counts from when the bridge is found.
     assert NODE in call(main, capsys, '--node', NODE, '--seconds', '0.01').out

@@ -100,8 +100,7 @@ def test_values_have_the_tags_of_their_own_addresses() -> None:
     assert list(data.rows(mapping, array('h', range(6)), data.labels(mapping, tags))) == [
         ('N7:0', '0'), (r'N7:1 speed, a\nb', '1'), ('N7:2 words[0]', '2'),
         ('N7:3 words[1]', '3'), ('N7:4 text', '4'), ('N7:5', '5')]
-    bits = make('N7:0/2', Length='2')
-    assert data.labels(bits, tags) == ['N7:0/2', 'N7:0/3 bit']
+    assert data.labels(make('N7:0/2', Length='2'), tags) == ['N7:0/2', 'N7:0/3 bit']
 
 
 @for_all(('address', 'kind', 'texts', 'values'), [

@@ -164,8 +164,7 @@ def test_init_offers_a_map_of_what_another_master_reads(
     finally:
         master.over.set()
         master.join()
-    said = capsys.readouterr().out
-    assert 'station 1: protected typed logical read N7:0, 2 words: ' in said
+    assert 'station 1: protected typed logical read N7:0, 2 words: ' in capsys.readouterr().out
     assert (new / 'net.csv').read_text('utf-8').splitlines() == [
         'Mode,Error_Code,Com_Port,Listen_Port,Baud,Parity', f'Listen,CRC,{line.name},,19200,None']
     rows = [row for row in (new / 'map.csv').read_text('utf-8').splitlines() if row[0] != '#']

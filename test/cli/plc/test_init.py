@@ -127,8 +127,7 @@ def test_line_with_nothing_but_a_gateway_leads_to_the_nodes_behind_it(
                      '--check', 'CRC', '--timeout', '2000', *options]) == 0
         said = capsys.readouterr().out
         assert f'plc {scan} --net' in said and 'watch' not in said
-        net = str(tmp_path / 'net.csv')
-        assert main([*scan.split(), '--net', net, '--timeout', '2000']) == 0
+        assert main([*scan.split(), '--net', str(tmp_path / 'net.csv'), '--timeout', '2000']) == 0
     assert '\n      9 ' in capsys.readouterr().out
     rows = (tmp_path / 'map.csv').read_text(encoding='utf-8')
     assert f'#   plc {scan} --net net.csv' in rows and 'words_' not in rows

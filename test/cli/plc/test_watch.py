@@ -85,8 +85,7 @@ def shown(capsys: Output) -> list[str]:
 
 def test_every_change_is_shown_with_its_time(plcs: Plcs, capsys: Output) -> None:
     assert Counting(plcs).run(5) == 0
-    lines = shown(capsys)
-    assert lines[:5] == [f'N7:0  {number}' for number in range(5)]
+    assert shown(capsys)[:5] == [f'N7:0  {number}' for number in range(5)]
 
 
 def test_what_stays_is_shown_once(plcs: Plcs, capsys: Output) -> None:
