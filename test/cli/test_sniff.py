@@ -369,7 +369,9 @@ def test_full_disk_does_not_cut_a_tap(tmp_path: Path) -> None:
 @pytest.mark.parametrize(('way', 'goes_on'), [('--tap', True), ('--port', False)])
 def test_reader_that_leaves_does_not_cut_a_tap(tmp_path: Path, way: str, goes_on: bool) -> None:
     names = [str(tmp_path / name) for name in 'ab']
-    sniff = Forked('sniff', [way, *[f'pty:{name}' for name in names[:1 + goes_on]]])
+    saved = tmp_path / 'saved'
+    sniff = Forked('sniff', [way, *[f'pty:{name}' for name in names[:1 + goes_on]],
+                             '--save', str(saved)])
     sniff.stderr.readline()
     sniff.stdout.close()
     near, far = (os.open(name, os.O_RDWR | os.O_NOCTTY) for name in (names[0], names[goes_on]))
@@ -383,6 +385,8 @@ def test_reader_that_leaves_does_not_cut_a_tap(tmp_path: Path, way: str, goes_on
     else:
         os.write(near, SAID[0] + SAID[1])
     assert sniff.wait(PATIENCE) == 0
+    chunks = read_capture('saved', saved.read_text(encoding='ascii').splitlines(), {})
+    assert b''.join(chunk.data for chunk in chunks) == (1 + 2 * goes_on) * (SAID[0] + SAID[1])
 
 
 @pytest.mark.parametrize('args, text', [

@@ -172,11 +172,8 @@ def test_every_mapping_of_the_topic_has_to_be_written(answered: Answered) -> Non
 
 
 @for_all(('message', 'status'), [
-    ('written', 0),
-    (f'written: {REWRITTEN}', 0),
-    ('not written: superseded by a newer value', 1),
-    ('not written: the PLC refused it: STS 10', 1),
-    ('only partly written: ...', 3),
+    ('written', 0), (f'written: {REWRITTEN}', 0), ('not written: superseded by a newer value', 1),
+    ('not written: the PLC refused it: STS 10', 1), ('only partly written: ...', 3),
     ('unknown whether written: ...', 3),
     ('sent to all stations; no station confirms a broadcast', 3),
 ])

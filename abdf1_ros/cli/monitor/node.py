@@ -124,7 +124,7 @@ class NodeWatch(Listening):
         if time.monotonic() >= self._next_discovery:
             self._next_discovery = time.monotonic() + _DISCOVERY_PERIOD
             self._discover()
-        super().spin_once(min(seconds, _DISCOVERY_PERIOD))
+        super().spin_once(seconds)
 
     def bridges(self) -> list[str]:
         """Return the full names of the visible bridges."""

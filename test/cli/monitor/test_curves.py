@@ -43,6 +43,8 @@ def test_newest_value_stands_last_and_the_range_is_that_of_the_curve() -> None:
 
 def test_time_without_a_good_value_is_blank() -> None:
     assert drawn((20, [1]), (18, [2]), (2, [1]), (0, [2])).strip() == '▁██      ▁█'
+    # Good for 5 s, from the end of its step on.
+    assert drawn((0.1, [1]), promised=5.0, now=NOW + 6).strip() == '▁▁▁▁'
 
 
 def test_topic_that_promises_nothing_keeps_its_value() -> None:
@@ -57,7 +59,7 @@ def test_bit_is_drawn_between_0_and_1() -> None:
 
 
 def test_bit_that_blinks_faster_than_the_steps_is_seen() -> None:
-    blinking = [(second / 4, [second % 2]) for second in reversed(range(40))]
+    blinking = [(second / 4, [0, second % 2]) for second in reversed(range(40))]
     assert set(drawn(*blinking, is_bits=True).strip()) == {'▁', '█'}
 
 

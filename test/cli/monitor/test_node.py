@@ -19,6 +19,7 @@ import time
 from types import SimpleNamespace
 from typing import Any
 
+from abdf1_ros.cli.monitor import node
 from abdf1_ros.cli.monitor.node import full_name, NodeWatch
 from abdf1_ros.cli.monitor.view import NodeView, Reading, Style
 from abdf1_ros.errors import FormatError
@@ -161,16 +162,21 @@ def test_only_the_statuses_of_the_node_count(bridge: Bridge, watch: NodeWatch) -
 
 
 def test_spare_of_the_same_name_does_not_hide_the_owner_of_the_line(
-        bridge: Bridge, watch: NodeWatch) -> None:
+        bridge: Bridge, watch: NodeWatch, monkeypatch: pytest.MonkeyPatch) -> None:
     until(watch, lambda picture: picture.is_there and bridge.diagnostics.get_subscription_count())
     bridge.status('cell/line_a: standby', 'OK: waits', DiagnosticStatus.OK)
     until(watch, lambda picture: [status.section for status in picture.statuses] == ['standby'])
+    bridge.status('cell/line_a: standby', 'OK: still waits', DiagnosticStatus.OK)
+    until(watch, lambda picture: picture.statuses[0].message == 'OK: still waits')
     bridge.status('cell/line_a: link', 'OK: port open', DiagnosticStatus.OK)
     bridge.status('cell/line_a: standby', 'OK: waits', DiagnosticStatus.OK)
     bridge.status('cell/line_ab: link', 'OK', DiagnosticStatus.OK)
     until(watch, lambda picture: [status.section for status in picture.statuses] == ['link'])
     watch.spin_once(0.2)
     assert [status.section for status in watch.snapshot().statuses] == ['link']
+    monkeypatch.setattr(node, 'SILENCE', 0.0)  # the owner has been silent for so long
+    bridge.status('cell/line_a: standby', 'OK: waits', DiagnosticStatus.OK)
+    until(watch, lambda picture: [status.section for status in picture.statuses] == ['standby'])
 
 
 def test_stations_are_taken_from_the_bits_of_the_active_node_table(
@@ -188,23 +194,25 @@ def test_results_of_writes_are_kept_newest_first(bridge: Bridge, watch: NodeWatc
     results = until(watch, lambda picture: picture.results
                     and picture.results[0].message == 'number 11').results
     assert [result.message for result in results] == [f'number {n}' for n in range(11, 3, -1)]
-    assert results[0].style is Style.BAD
+    assert results[0].style is Style.BAD and results[0].received > time.monotonic() - PATIENCE
 
 
 def test_node_that_ends_is_gone_and_may_come_back_with_another_map(
         bridge: Bridge, watch: NodeWatch) -> None:
-    bridge.read(make_mapping('N7:0', tag='one'), [1])
-    bridge.read(make_mapping('N7:1', tag='two'), [2])
-    until(watch, lambda picture: len(heard(picture)) == 2)
+    for number in (2, 10, 11):
+        bridge.read(make_mapping('N7:0', tag=f'row{number}'), [number])
+    until(watch, lambda picture: len(heard(picture)) == 3)
     bridge.node.destroy_node()
     picture = until(watch, lambda picture: not picture.is_there)
-    assert set(heard(picture)) == {'one', 'two'}
+    assert [*heard(picture)] == ['row2', 'row10', 'row11']
     again = Bridge(bridge.observer)
-    again.read(make_mapping('ST9:0', tag='one', kind='string'), 'text')
-    picture = until(watch, lambda picture: set(heard(picture)) == {'one'}
-                    and heard(picture)['one'].values == 'text')
+    again.read(make_mapping('ST9:0', tag='row2', kind='string'), 'text')
+    again.read(make_mapping('N7:1', tag='row10', publish='Change'), [4])
+    picture = until(watch, lambda picture: [
+        [*(reading.values or ())] for reading in picture.readings] == [[*'text'], [4]])
     assert picture.is_there
-    assert [reading.topic for reading in picture.readings] == ['one']
+    assert {reading.topic: reading.promised for reading in picture.readings} == {
+        'row2': PROMISE, 'row10': None}
     again.node.destroy_node()
 
 

@@ -135,6 +135,7 @@ def test_curve_stands_beside_its_value() -> None:
       ShownStatus('link', Style.BAD, 'ERROR: port gone')), 'ERROR (1 of 2): port gone', Style.BAD),
     ((ShownStatus('writes', Style.WARNING, 'WARN: 1 lost'),), 'WARN: writes: 1 lost',
      Style.WARNING),
+    ((ShownStatus('standby', Style.GOOD, 'OK: waits'),), 'OK: standby: waits', Style.GOOD),
 ])
 def test_verdict_is_the_worst_that_is_told(
         statuses: tuple[ShownStatus, ...], verdict: str, style: Style) -> None:
@@ -200,6 +201,7 @@ def test_stations_are_told_from_the_active_node_table_and_the_diagnostics() -> N
     assert 'active stations: 1, 17' in '\n'.join(lines(picture))
     assert styles_of('  station 2    ERROR', picture) == [Style.BAD] * 2
     assert line_with('last answer  4.7 s ago', picture).style is Style.PLAIN
+    assert line_with('stations 2 silent', picture).style is Style.WARNING
     assert 'active stations: none' in '\n'.join(lines(snapshot(active=[])))
     assert 'active stations' not in '\n'.join(lines(snapshot(active=None)))
 
@@ -212,7 +214,8 @@ def test_no_sentence_is_cut_and_zeros_are_left_out() -> None:
     shown = lines(picture, 44)
     assert all(len(line) <= 44 for line in shown)
     assert text in ' '.join(' '.join(line.split()) for line in shown)
-    assert not [line for line in shown if 'line load' in line or '0 of 0' in line]
+    assert not [line for line in shown for zero in ('line load', '0 of 0', 'last error')
+                if zero in line]
 
 
 def test_mappings_name_what_is_wrong_and_leave_the_counts_to_the_summary() -> None:
@@ -234,9 +237,9 @@ def test_results_of_writes_are_shown_with_value_age_and_latency() -> None:
 
 def test_only_counters_that_have_counted_are_shown() -> None:
     picture = snapshot(statuses=[ShownStatus(
-        'counters', Style.GOOD, 'OK: 3', {'CNT_A': '3', 'CNT_B': '0', 'CNT_C': '1'})])
-    (line,) = [line for line in lines(picture) if 'CNT' in line]
-    assert line.split() == ['CNT_A', '3', 'CNT_C', '1']
+        'counters', Style.GOOD, 'OK', {'CNT_A': '3', 'CNT_B': '0', 'CNT_C': '1', 'CNT_D': '2'})])
+    found = [line.split() for line in lines(picture, 115) if 'CNT' in line]
+    assert found == [['CNT_A', '3', 'CNT_C', '1'], ['CNT_D', '2']]
 
 
 @for_all(('changes', 'text', 'style'), [
@@ -251,13 +254,9 @@ def test_what_is_missing_is_said(changes: dict[str, object], text: str, style: S
 
 
 @for_all(('values', 'width', 'text'), [
-    ([1, 0, 1], 20, '1 0 1'),
-    ([0.10000000149011612, -3.5], 20, '0.1 -3.5'),
-    (range(100), 20, '0 1 2 3 and 96 more'),
-    ([123456789], 6, '123...'),
-    ('Tank 4', 20, '"Tank 4"'),
-    ('a' * 30, 10, '"aaaaaa...'),
-    ([], 5, ''),
+    ([1, 0, 1], 20, '1 0 1'), ([0.10000000149011612, -3.5], 20, '0.1 -3.5'),
+    (range(100), 20, '0 1 2 3 and 96 more'), ([123456789], 6, '123...'),
+    ('Tank 4', 20, '"Tank 4"'), ('a' * 30, 10, '"aaaaaa...'), ([], 5, ''),
 ])
 def test_values_are_cut_to_what_fits(values: list[float], width: int, text: str) -> None:
     assert show(values, width) == text

@@ -87,8 +87,8 @@ def imported(folder: Path, text: str | bytes,
     ('"Plain","ST9:1",String,1,RO,100,,,,,,,,,,"",', {'Type': 'string'}),
     ('"Tank","N7:20",Word,1,RO,100,Linear,0,32767,0,3276.7,Float,1,1,V,"level",',
      {'Scale': '0.1', 'Offset': '0', 'Min': '', 'Description': 'level [V]'}),
-    ('"Set","N7:21",Short,1,R/W,100,Linear,4000,20000,-10,50,Float,1,1,degC,"",',
-     {'Scale': '0.00375', 'Offset': '-25', 'Min': '-10', 'Max': '50', 'Description': '[degC]'}),
+    ('"Set","N7:21",Short,1,R/W,100,Linear,4000,20000,-10,50,Float,0,1,degC,"",',
+     {'Scale': '0.00375', 'Offset': '-25', 'Min': '', 'Max': '50', 'Description': '[degC]'}),
     ('"Down","N7:22",Short,1,RO,100,Linear,0,100,0,10,Float,0,0,,"",1',
      {'Scale': '-0.1', 'Offset': '0'}),
     ('"Back","N7:24",Short,1,R/W,100,Linear,0,100,0,10,Float,1,1,,"",1',
@@ -176,8 +176,8 @@ def test_octal_addresses_are_for_a_plc5(tmp_path: Path) -> None:
 
 def test_text_of_windows_with_line_ends_in_cells_and_semicolons(tmp_path: Path) -> None:
     (mapping,), _ = imported(tmp_path, (
-        KEPSERVER.replace(',', ';') + '"Höhe";"N7:0";Short;1;RO;100;;;;;;;;;mm;"Höhe\nlinks";\n'
-        ).encode('cp1252'))
+        KEPSERVER.replace(',', ';').replace('Eng ', 'Engineering ')
+        + '"Höhe";"N7:0";Short;1;RO;100;;;;;;;;;mm;"Höhe\nlinks";\n').encode('cp1252'))
     assert (mapping.tag, mapping.name, mapping.description) == ('Höhe', 'H_he', 'Höhe links [mm]')
     rows = ('"Up","N7:0",Short,1,RO,100,,,,,,,,,,"Up\nleft",\n'
             '"Down","?",Short,1,RO,100,,,,,,,,,,"",\n')
@@ -185,8 +185,9 @@ def test_text_of_windows_with_line_ends_in_cells_and_semicolons(tmp_path: Path) 
 
 
 @pytest.mark.parametrize('code', [
-    lambda text: text.encode('utf-16'), lambda text: text.replace('\n', '\r').encode(),
-    lambda text: text.replace('Guard door', 'Guard; the; left; door; of; it').encode(),
+    lambda text: text.encode('utf-16'), lambda text: text.encode('utf-8-sig'),
+    lambda text: text.replace('\n', '\r').encode(), lambda text: f'{text},,,\n'.encode(),
+    lambda text: text.replace(',""\n', ',"; ; ; ; ; ; ; ; ;"\n').encode(),
     lambda text: text.replace('I:1.0/3', 'B3/5').encode()])
 def test_other_forms_of_text_are_read_as_well(
         tmp_path: Path, code: Callable[[str], bytes]) -> None:
@@ -281,8 +282,8 @@ def test_columns_of_a_list_are_found_by_their_names(tmp_path: Path) -> None:
     symbols = 'Address,Symbol,Description\nN7:0,SPEED,Conveyor speed\nB3:0/5,RUN,\n'
     assert told(imported(tmp_path, symbols)[0]) == [
         ('SPEED', 'Read', 'N7:0', 'Conveyor speed'), ('RUN', 'Read', 'B3:0/5', '')]
-    drawing = ('sep=;\nAddress;Description 1;Description 2;Wire No;Device Tag\n'
-               'I:1.0/0;START;CONVEYOR;1000;PB100\n')
+    drawing = ('sep=;\nAddress;Description 1;Description 2;Wire No;Name;Device Tag\n'
+               'I:1.0/0;START;CONVEYOR;1000;Button;PB100\n')
     assert told(imported(tmp_path, drawing)[0]) == [('PB100', 'Read', 'I:1.0/0', 'START CONVEYOR')]
     access = ('Tag Name,Data Type,Address,Read Only\na,INT,N7:0,no\nb,DINT,N7:2,Yes\n'
               'c,Real,F8:0,R/W\nd,Word,N7:4,perhaps\ne,LWORD,N7:5,no\n')
@@ -292,6 +293,9 @@ def test_columns_of_a_list_are_found_by_their_names(tmp_path: Path) -> None:
         ('d', 'Read', 'uint16')]
     assert len(left_out) == 1 and left_out[0].startswith(
         '6: e: the type "LWORD" has no counterpart; it can be default, bool, ')
+    assert +import_map(str(tmp_path / 'export.csv'), STATION_2).remarks == {
+        '"perhaps" says nothing of access: made Read rows': 1}
+    assert not +import_map(str(tmp_path / 'export.csv'), Wanted(read_only=True)).remarks
 
 
 def test_list_that_says_nothing_of_access_is_only_read(tmp_path: Path) -> None:
@@ -306,7 +310,7 @@ def test_list_that_says_nothing_of_access_is_only_read(tmp_path: Path) -> None:
 def test_columns_of_a_list_are_given_by_options(
         tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     source = tmp_path / 'list.csv'
-    source.write_text('Place,What,Kind,Text,May\nN7:0,speed,INT,Speed of 1,RW\n', encoding='utf-8')
+    source.write_text('Place,What,Kind,Text,May,Tag\nN7:0,speed,INT,Speed of 1,RW,7\n', 'utf-8')
     options = ['import', str(source), '--into', str(tmp_path), '--address', 'Place',
                '--type', 'Kind', '--access', 'may']
     assert main([*options, '--tag', 'Name']) == 2
@@ -336,6 +340,8 @@ def test_input_or_output_that_may_be_of_a_micrologix_is_only_read(tmp_path: Path
     result = import_map(str(tmp_path / 'export.csv'), Wanted())
     assert [(text.partition(',')[0], count) for text, count in result.remarks.items() if text] == [
         ('an input or output without its word', 2)]
+    text = KEPSERVER + '"Out","O:001",Word,1,R/W,500,,,,,,,,,,"",\n'
+    assert told(imported(tmp_path, text, Wanted(PlcType.PLC5))[0])[0][1] == 'ReadWrite'
 
 
 VIEW = (';Tag Type, Tag Name, Tag Description, Read Only, Data Source, Security Code, Alarmed, {} '
@@ -349,20 +355,26 @@ VIEW = (';Tag Type, Tag Name, Tag Description, Read Only, Data Source, Security 
     VIEW.format('Data Logged,', 'Node Name,')
     + '"A","Press\\Speed","Speed, left","F","D","*","F","F","D","F",0,100,0,0.1,-5,0,"1/min",,,,,,'
       '"PLC1","N7:0","A"\n"D","Press\\Run","","T","D","*","F","F",,,,,,,,,,"Off","On","Off",,,'
-      '"PLC1","B3:0/5","A"\n"A","mem","","F","M","*","F","F","D","F",0,1,0,1,0,0,,,,,,,,,\n',
+      '"PLC1","B3:0/5","A"\n"A","mem","","F","M","*","F","F","D","F",0,1,0,1,0,0,,,,,,,,,\n'
+      '"A","Level","","","D","*","F","F","D","F",0,100,0,1,0,0,,,,,,,"PLC1","N7:1","A"\n',
     VIEW.format('', 'Retentive,')
     + '"A","Press\\Speed","Speed, left","F","D","*","F","D","F",0,100,0,0.1,-5,0,"1/min",,,,,,0,'
       '"::[PLC1]N7:0"\nD,"Press\\Run",,"T","D","*","F",,,,,,,,,,"Off","On","Off",,,,'
-      '"{[PLC1]B3:0/5}"\n"S","mem","","F","M","*","F",,,,,,,,,,,,,82,"",0,\n'])
+      '"{[PLC1]B3:0/5}"\n"S","mem","","F","M","*","F",,,,,,,,,,,,,82,"",0,\n'
+      '"A","Level","","","D","*","F","D","F",0,100,0,1,0,0,,,,,,,0,"[PLC1]N7:1"\n'])
 def test_tags_of_rsview_and_factorytalk(tmp_path: Path, text: str) -> None:
     mappings, left_out = imported(tmp_path, text)
     assert (told(mappings), left_out) == ([
         ('Press/Speed', 'ReadWrite', 'N7:0', 'Speed, left [1/min]'),
-        ('Press/Run', 'Read', 'B3:0/5', '')], [])
+        ('Press/Run', 'Read', 'B3:0/5', ''), ('Level', 'Read', 'N7:1', '')], [])
+    assert (mappings[2].scaling, mappings[2].remarks) == (None, ())
     assert {column: cell_of(mappings[0], column) for column in ('Scale', 'Offset', 'Min', 'Max')
             } == {'Scale': '0.1', 'Offset': '-5', 'Min': '0', 'Max': '100'}
     ignored = import_map(str(tmp_path / 'export.csv'), Wanted()).ignored
     assert ignored['tags without a PLC (memory and system)'] == 1
+    text = text.replace('"PLC1","N7:1"', '"PLC2","N7:1"').replace('[PLC1]N7:1', '[PLC2]N7:1')
+    with pytest.raises(ConfigurationError, match='rows of several PLCs: PLC1, PLC2'):
+        imported(tmp_path, text)
 
 
 INTOUCH = (
@@ -383,6 +395,9 @@ def test_tags_of_intouch(tmp_path: Path) -> None:
             ('N7:1', 'Read', 'N7:1', '')], [])
         assert [cell_of(mappings[1], column) for column in ('Scale', 'Max')] == ['0.1', '100']
         assert mappings[2].scaling is None
+        assert [str(remark)[-5:] for remark in mappings[2].remarks] == [' N7_1']
+    unknown, _ = imported(tmp_path, INTOUCH.replace(',No\n', ',\n'))
+    assert {row[1] for row in told(unknown)} == {'Read'}
 
 
 def test_rows_of_several_plcs_are_not_mixed(tmp_path: Path) -> None:
@@ -391,8 +406,9 @@ def test_rows_of_several_plcs_are_not_mixed(tmp_path: Path) -> None:
         imported(tmp_path, text)
     (mapping,), left_out = imported(tmp_path, text, Wanted(node='PLC2'))
     assert (mapping.tag, left_out) == ('Other', [])
-    with pytest.raises(ConfigurationError, match='has no PLC "X"; it has PLC1, PLC2'):
-        imported(tmp_path, text, Wanted(node='X'))
+    for node in ('X', ''):
+        with pytest.raises(ConfigurationError, match=f'has no PLC "{node}"; it has PLC1, PLC2'):
+            imported(tmp_path, text, Wanted(node=node))
 
 
 def test_nothing_is_left_behind_where_no_row_can_be_used(
@@ -427,7 +443,7 @@ IGNITION = """\
      "opcServer": "Ignition OPC UA Server", "opcItemPath": "ns=1;s=[MLX]N7:0", "readOnly": false,
      "documentation": "Conveyor", "engUnit": "m/min", "scaleMode": "Linear", "rawLow": 0,
      "rawHigh": 100, "scaledLow": 0.0, "scaledHigh": 10.0},
-    {"name": "Shown", "tagType": "AtomicTag", "valueSource": "memory", "value": 1},
+    {"name": "Shown", "tagType": "AtomicTag", "valueSource": "expr", "value": 1},
     {"name": "Wait", "valueSource": "opc", "opcItemPath": "[MLX]T4:1.ACC"}]},
   {"name": "Root", "valueSource": "opc", "scaleMode": "SquareRoot", "opcItemPath": "[MLX]N7:1"},
   {"name": "Any", "valueSource": "opc", "opcItemPath": {"bindType": "parameter"}}]}
@@ -457,7 +473,7 @@ def test_json_of_something_else_is_no_file_of_ignition(tmp_path: Path) -> None:
 
 def test_list_with_comments_and_whole_timers(tmp_path: Path) -> None:
     rows, left_out = imported(tmp_path, (
-        '; of the press\nSymbol,Address,Description,DataType,Scope\n# global\n'
+        9 * '; of the press\n' + 'Symbol,Address,Description,DataType,Scope\n# global\n'
         'SPEED,N7:0,Conveyor,INT,Global\nMIX,T4:0,,TIMER,Global\nWAIT,T4:1.ACC,,,\n'))
     assert left_out == [] and [
         (row.tag, str(row.address), row.length) for row in rows] == [
