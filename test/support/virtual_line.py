@@ -191,11 +191,10 @@ class VirtualLine:
     def _advance(self, end: float = math.inf) -> bool:
         """Carry out the next event; return False when there is none up to ``end``."""
         arrivals, calls = self._arrivals, self._calls
-        arrival = arrivals[0][0] if arrivals else math.inf
         deadline = min(calls)
-        if min(arrival, deadline) > end or math.inf == deadline and not arrivals:
-            return False
-        if arrival <= deadline:
+        if arrivals and arrivals[0][0] <= deadline:
+            if arrivals[0][0] > end:
+                return False
             self.now, number, first, data = heapq.heappop(arrivals)
             machine, away = self._machines[first], self._away[first]
             if self.now < away:
@@ -206,6 +205,8 @@ class VirtualLine:
                 machine.handle_timeout(self.now)  # in the order of LinkThread
             machine.receive_data(data, self.now)
             self._away[first] = self.now + machine.spare_time
+        elif deadline > end or deadline == math.inf:
+            return False
         else:
             first = calls.index(deadline)
             self._idle = self._idle + 1 if deadline <= self.now else 0
