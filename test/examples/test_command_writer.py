@@ -129,8 +129,10 @@ def answered(write: Write) -> Iterator[Answered]:
                     'station 5': 'unknown: in_control is stale'}
         status = DiagnosticStatus(name='fake: interlocks', values=[
             KeyValue(key=key, value=value) for key, value in stations.items()])
+        other = DiagnosticStatus(name='other/fake: interlocks', values=[
+            KeyValue(key=key, value='in control for 9.0 s') for key in stations])
         observer.node.create_timer(
-            0.1, lambda: diagnostics.publish(DiagnosticArray(status=[status])))
+            0.1, lambda: diagnostics.publish(DiagnosticArray(status=[status, other])))
         answers: list[Answer] = []
 
         def take(message: Int16MultiArray) -> None:

@@ -66,6 +66,7 @@ def test_every_read_topic_is_recorded_until_a_signal(bridge: Process, tmp_path: 
         recorder.end(signal.SIGTERM)
     rows = rows_of(path)
     assert recorder.lines == [f'{len(rows)} messages in {path}']
+    assert len({(row[0], row[1]) for row in rows}) == len(rows)
     last = {row[1]: row for row in rows}
     assert last.keys() == READS.keys()
     for topic, (_, address, values) in READS.items():

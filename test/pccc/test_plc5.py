@@ -123,14 +123,10 @@ def test_limits_in_elements(letters: str, read: int, written: int) -> None:
     assert DIALECT.max_write(kind) == written * words
 
 
-def test_internal_words_of_a_timer_are_left_out() -> None:
-    timers = TypedData(5, 10, bytes(range(20))).encode()
-    assert DIALECT.read_data(at('T4:0'), 6, timers) == (bytes(range(6)) + bytes(range(10, 16)))
-
-
-def test_timer_of_six_bytes_is_taken_too() -> None:
-    timers = TypedData(5, 6, bytes(range(12))).encode()
-    assert DIALECT.read_data(at('T4:0'), 6, timers) == bytes(range(12))
+def test_internal_words_of_a_timer_are_left_out_and_six_bytes_are_taken_too() -> None:
+    for size, expected in ((10, bytes(range(6)) + bytes(range(10, 16))), (6, bytes(range(12)))):
+        timers = TypedData(5, size, bytes(range(2 * size))).encode()
+        assert DIALECT.read_data(at('T4:0'), 6, timers) == expected
 
 
 @for_all(('text', 'typed'), [

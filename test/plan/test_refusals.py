@@ -161,6 +161,16 @@ def test_what_recovers_while_a_block_is_divided_leaves_its_parts_alone() -> None
     assert plc.spans() == [(0, 12), (12, 13), (13, 20)]
 
 
+def test_row_that_fits_is_not_read_in_the_shorter_packets_of_another() -> None:
+    plc = Plc([make_mapping('N7:0', length=100, plc='SLC'),
+               make_mapping('N7:30', length=20, plc='SLC')])
+    plc.packet = 50
+    for missing in ((), (70,), ()):
+        plc.missing = {*missing}
+        plc.settle()
+    assert plc.spans() == [(0, 100), (30, 50)]
+
+
 def test_processor_that_is_exchanged_has_its_own_packets() -> None:
     refusals = Refusals(planner := Planner(LINE, 0.1))
     blocks = planner.plan([make_mapping(f'N7:{word}', plc='SLC') for word in range(100)])
