@@ -55,8 +55,7 @@ def imported(folder: str) -> set[str]:
 
 
 def test_rosdep_knows_every_key() -> None:
-    named = {entry.text for entry in MANIFEST if entry.tag.endswith('depend')}
-    assert named == KEYS.keys()
+    assert {entry.text for entry in MANIFEST if entry.tag.endswith('depend')} == KEYS.keys()
     assert set(KEYS.values()) == {'jazzy', 'python.yaml'}
     assert {key for key, source in KEYS.items() if source == 'python.yaml'} == {
         key for key in KEYS if key.startswith('python3-')}

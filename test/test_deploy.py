@@ -272,8 +272,7 @@ def test_image_is_the_official_one_and_runs_as_an_ordinary_user() -> None:
     assert ('USER', 'abdf1') in instructions()
     assert words.index('RUN') < words.index('USER') < words.index('ENTRYPOINT')
     assert ('STOPSIGNAL', 'SIGINT') in instructions()
-    script = next(rest for word, rest in instructions() if word == 'RUN')
-    assert 'rosdep install' in script
+    assert 'rosdep install' in next(rest for word, rest in instructions() if word == 'RUN')
 
 
 def test_first_word_is_the_executable(tmp_path: Path) -> None:

@@ -58,5 +58,4 @@ def test_every_status_of_a_node_belongs_to_its_entry(node: str) -> None:
             names = [status.name for status in inbox.first().status]
             process.end()
     assert {f'{node}: {what}' for what in ('link', 'counters', 'mappings', 'writes')} < set(names)
-    entry = namespace or 'abdf1'
-    assert [takers(name) for name in names] == [[entry]] * len(names)
+    assert [takers(name) for name in names] == [[namespace or 'abdf1']] * len(names)

@@ -263,8 +263,7 @@ def test_troubleshooting_quotes_what_is_printed() -> None:
               and not re.search(r'--| -\w|\.csv|/dev|make ', span)]
     assert len(quoted) > 10
     for span in quoted:
-        pieces = re.split(r'[:;"]|\.\.\.|\b[\dA-F]+\b|\d+ of \d+', span)
-        for piece in pieces:
+        for piece in re.split(r'[:;"]|\.\.\.|\b[\dA-F]+\b|\d+ of \d+', span):
             phrase = piece.strip(' :,(){}')
             if len(phrase.split()) > 1:
                 assert phrase in printed(), span

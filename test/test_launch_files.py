@@ -140,8 +140,7 @@ def test_log_level_is_that_of_the_node_alone(launch: Starter, namespace: str) ->
     process = launch('bridge.launch.py', *EXAMPLE, *given, 'port:=/dev/ttyS99', 'log_level:=debug')
     process.wait_for('/dev/ttyS99: cannot open the port')
     lines = [LOG_LINE.match(text) for text in ended(process).splitlines()]
-    loggers = {match[2] for match in lines if match}
-    assert loggers == {f'{namespace}.abdf1'.lstrip('.')}
+    assert {match[2] for match in lines if match} == {f'{namespace}.abdf1'.lstrip('.')}
 
 
 def test_log_level_reaches_a_node_below_a_pushed_namespace(

@@ -79,8 +79,7 @@ def test_example_is_collected_where_there_is_no_launch_testing() -> None:
 
 
 def test_test_of_the_tutorial_passes(abdf1_cell: Cells) -> None:  # noqa: F811
-    block = re.findall(r'```python\n(.*?)```', TUTORIAL, re.DOTALL)[1]
-    _run(block)['test_pressure'](abdf1_cell)
+    _run(re.findall(r'```python\n(.*?)```', TUTORIAL, re.DOTALL)[1])['test_pressure'](abdf1_cell)
 
 
 def test_what_never_happens_is_named(

@@ -234,8 +234,7 @@ def test_both_files_that_are_missing_are_named(tmp_path: Path, capsys: Output) -
 
 
 def test_what_stands_in_files_forges_no_line(check: Check) -> None:
-    row = '"a\x1b[2J\u2028error: x",Read,N7:0,1,PLC5,2,10'
-    out = check(GOOD_NET, (row,))
+    out = check(GOOD_NET, ('"a\x1b[2J\u2028error: x",Read,N7:0,1,PLC5,2,10',))
     assert '\x1b' not in out
     assert '\u2028' not in out
 

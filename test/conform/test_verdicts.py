@@ -357,8 +357,7 @@ def test_what_is_for_another_slave_is_neither_answered_nor_taken(raw: bytes) -> 
 @pytest.mark.parametrize('kind', [MasterEnd, PeerEnd])
 def test_line_that_is_never_quiet_keeps_no_case_waiting(kind: type[AskingEnd]) -> None:
     line = Babble(b'\x55')
-    wire = Wire(line, BlockCheck.CRC, line.clock, is_half_duplex=kind is MasterEnd)
-    end = kind(wire, 1, 0, 0)
+    end = kind(Wire(line, BlockCheck.CRC, line.clock, is_half_duplex=kind is MasterEnd), 1, 0, 0)
     end.owed.add(b'\1\0')
     end.settle()
     assert line.now <= 12.0

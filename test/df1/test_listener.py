@@ -40,8 +40,7 @@ def frame(checksum: Checksum, tns: int = 0) -> bytes:
 @for_all('vector', [
     vector for vector in MESSAGES if vector.valid and not vector.has_embedded_response])
 def test_every_vector_is_read_without_being_told_its_check(vector: Vector) -> None:
-    kind = LineKind()
-    decoder = ListeningDecoder(kind)
+    decoder = ListeningDecoder(LineKind())
     found = [*symbols(decoder, vector.frame), decoder.finish()]
     good = [symbol for symbol in found if isinstance(symbol, Frame)]
     assert [(symbol.data, symbol.station) for symbol in good] == [

@@ -95,8 +95,7 @@ def test_response_while_our_message_is_leaving_does_not_count(response: bytes) -
     unsent = 1
     Wire(peer.machine, unsent=lambda: unsent).attach(peer.now)
     task = peer.begin(COMMAND)
-    size = len(peer.said())
-    assert peer.wait(0.01 * size - 0.01) == []
+    assert peer.wait(0.01 * len(peer.said()) - 0.01) == []
     assert peer.hear(response) == b''
     assert peer.wait(0.01) == []
     unsent = 0

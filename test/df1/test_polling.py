@@ -300,8 +300,7 @@ def test_every_command_ends_once_and_order_per_station_is_kept(
     rig.start()
     rig.line.run(lambda: all(map(ended, tasks)), 60.0)
     for task in tasks:
-        kind = StationInactive if task.command.dst in dead else Packet
-        assert isinstance(task.result, kind)
+        assert isinstance(task.result, StationInactive if task.command.dst in dead else Packet)
     for number, slave in rig.slaves.items():
         mine = [task.command for task in tasks if task.command.dst == number]
         assert slave.served == ([] if number in dead else mine)

@@ -136,6 +136,13 @@ def test_command_is_not_repeated_that_has_its_reply_before_the_line_is_quiet() -
     assert bench.machine.counters.nak_retries == 0
 
 
+def test_node_with_our_number_is_told_of_at_the_station_that_it_asks() -> None:
+    bench = Bench()
+    bench.wait(11.0)  # until then it may be a packet of the last run
+    bench.hear(framed(COMMAND))
+    assert [event.station for event in bench.events] == [PLC]
+
+
 def test_command_that_has_become_too_old_is_not_repeated() -> None:
     bench = Bench()
     task = bench.begin(COMMAND)

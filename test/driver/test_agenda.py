@@ -53,8 +53,9 @@ def test_reads_come_when_they_are_due_and_the_period_counts_from_then() -> None:
     (None, 3.5, 2.5), (FALLBACK, 2.0, 0.0)])
 def test_message_has_its_patience_and_a_fallback_bounds_all_packets(
         fallback: Fallback | None, expires: float, patience: float) -> None:
-    bench = Bench()
-    bench.write(make_mapping('N7:5', 'Write', fallback=fallback), 1, 1.0)
+    bench, row = Bench(), make_mapping('N7:5', 'Write', fallback=fallback)
+    for published in (1.0, 0.75):  # equal ones; the younger counts
+        bench.write(row, 1, published)
     job = bench.writes.next(1.0)
     assert job is not None and (job.expires, job.patience) == (expires, patience)
 
@@ -178,6 +179,10 @@ def test_newer_value_does_not_overtake_what_was_asked_for_meanwhile_of_the_same_
     taken = [bench.next(0.5) for _ in range(4)]
     assert [taken[0], taken[1:]] == [old, [between, new, None]]
     assert bench.outcomes() == [Outcome.SUPERSEDED]
+    bench.add(Write(both, [5, 5], 0.4))
+    for value in (6, 7):  # of two values that come after it, the newer one alone
+        bench.write(WORD, value, 0.5)
+    assert bench.outcomes() == [Outcome.SUPERSEDED] * 2
 
 
 def test_topics_of_the_same_words_that_never_rest_share_the_line() -> None:
@@ -204,6 +209,21 @@ def test_writes_of_the_same_words_are_never_under_way_together() -> None:
     assert bench.begin_write(0.0) is second
     assert bench.begin_write(0.0) is behind
     assert bench.begin_write(0.0) is None
+
+
+def test_broadcast_keeps_its_place_among_the_writes_of_every_station() -> None:
+    bench = Bench()
+    writes = [bench.write(make_mapping(text, 'Write', station=station), 1, 0.0)
+              for text, station in (('N7:5', 1), ('N7:9', 255), ('N7:0', 2))]
+    assert bench.begin_write(0.0, busy={1}) is None
+    assert [bench.next_write(0.0) for _ in writes] == writes
+
+
+def test_youngest_message_is_the_one_published_last() -> None:
+    bench, row = Bench(), make_mapping('B3:0/5', 'Write', fallback=Fallback((0,), 500))
+    for value, published in ((1, 1.0), (0, 0.5)):
+        bench.write(row, value, published)
+    assert bench.writes.youngest() == {row: 1.0}
 
 
 def test_write_that_has_waited_too_long_is_not_sent() -> None:
@@ -234,6 +254,8 @@ def test_write_that_was_old_when_it_came_is_not_sent_late_behind_a_younger_one()
     assert bench.next(2.5) is None
     assert [str(result.mapping.address) for result in bench.results] == ['N7:6']
     assert bench.outcomes() == [Outcome.NOT_SENT]
+    young.stand_for(Write(WORD, [1], 0.5))
+    assert (young.requested, young.oldest) == (1.0, 0.5)
 
 
 def test_writes_that_were_too_old_do_not_use_up_the_turn_of_writes() -> None:

@@ -163,8 +163,7 @@ def test_calls_do_not_starve_a_full_line(period: int) -> None:
         line.run(0.1)
         states |= {line.driver.points[row].freshness(line.clock()) for row in rows}
     assert states <= {Freshness.FRESH, Freshness.LATE}
-    read = [row for _, row, _ in line.listener.reads[before:] if row in rows]
-    assert len(read) > 0.6 * alone
+    assert len([row for _, row, _ in line.listener.reads[before:] if row in rows]) > 0.6 * alone
     assert {*line.errors} == {''} and len(line.answers) > 5
 
 

@@ -261,8 +261,7 @@ def test_rule_3d_message_that_a_fallback_has_overruled_does_not_count() -> None:
     speed = speed_row()
     cell = Cell(beat_row(requires=['speed'], timeout=5000), speed, run=2.0)
     assert set(cell.written('N10:0')) == {0}
-    row = cell.bench.driver.interlocks.fallbacks[0]
-    row.sent = cell.now
+    cell.bench.driver.interlocks.fallbacks[0].sent = cell.now
     cell.bench.write(speed, [3], run=1.0, age=0.1)
     assert cell.results()[-1] == 'not written: not sent: fallback'
     assert set(cell.written('N10:0')) == {0}
@@ -345,8 +344,7 @@ def test_rule_19_two_bridges_end_with_0_and_say_who(
     assert cell.states() == 2 * [BeatState.CONFLICT]
     for bench in cell.benches:
         assert [conflict for _, _, conflict in bench.listener.foreign] == [False, True]
-        text = bench.listener.foreign[-1][1]
-        assert text.startswith('another program writes this word: ')
+        assert bench.listener.foreign[-1][1].startswith('another program writes this word: ')
         assert bench.driver.interlocks.heartbeats[0].why_not(bench.clock())
     cell.running = cell.benches[1:]  # nobody takes over what the other leaves
     cell.run(10.0)

@@ -84,6 +84,8 @@ def test_write_of_two_packets(answers: list[Packet | LinkError], outcome: Outcom
 @pytest.mark.parametrize('answers, outcome', [
     ([reply(), reply()], Outcome.WRITTEN), ([CommandTimeout(), reply()], Outcome.PARTLY),
     ([CommandTimeout(), CommandTimeout()], Outcome.UNKNOWN),
+    ([reply(sts=0x10), CommandTimeout()], Outcome.UNKNOWN),  # the second may still land
+    ([CommandTimeout(), reply(sts=0x10)], Outcome.UNKNOWN),
     ([reply(sts=0x10), reply()], Outcome.PARTLY),
     ([StationInactive(1), reply()], Outcome.PARTLY)])
 def test_own_write_sends_each_packet(answers: list[Packet | LinkError], outcome: Outcome) -> None:

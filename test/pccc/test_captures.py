@@ -93,8 +93,7 @@ def test_values_of_function_files() -> None:
                         ('HSC:0.ACC', 0), ('EII:5.IS', 5), ('STI:0.SPM', 0), ('PWM:0.OUT', -1)):
         place = families.parse_address(text, PlcType.SLC)
         at = 2 * place.offset
-        words = place.layout.value_words(place.word)
-        found = data[place.file_type.value][at:at + 2 * words]
+        found = data[place.file_type.value][at:at + 2 * place.layout.value_words(place.word)]
         assert int.from_bytes(found, 'little', signed=True) == value, text
 
 

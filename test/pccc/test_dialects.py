@@ -117,8 +117,7 @@ def test_every_value_of_every_file_type_goes_there_and_back(place: tuple[PlcType
         table = DataTable(family)
         table.create(start, 2 * layout.words)
         stored = bytearray(4 * layout.words)
-        values = range(layout.words) if kind.is_structure else (0,)
-        for word in filter(layout.value_words, values):
+        for word in filter(layout.value_words, range(layout.words) if kind.is_structure else (0,)):
             address = start.at_offset(start.offset + word)
             words = layout.value_words(word) if kind.is_structure else layout.words
             data = bytes(range(word + 1, word + 1 + 2 * words))

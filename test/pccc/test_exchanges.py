@@ -239,8 +239,7 @@ def test_command_that_lost_its_leading_00_changes_nothing(family: PlcType, tns: 
     words = table(family, **FILES[family])
     before = contents(words, family)
     dialect = dialect_of(family)
-    kinds = ['010'] if family == PlcType.PLC2 else ['N7:1', 'N7:0']
-    for text in kinds:
+    for text in ['010'] if family == PlcType.PLC2 else ['N7:1', 'N7:0']:
         place = parse_address(text, family)
         for cmd, body in (dialect.read(place, 2), dialect.write(place, b'\1\2\3\4'),
                           dialect.write_bits(place, 0xFFFF, 0x0F0F)):

@@ -86,8 +86,7 @@ def test_what_is_no_address(encoded: str) -> None:
     ('BT', '99 20 0C', 6, 12)])
 def test_descriptors_and_element_sizes(letters: str, descriptor: str, words: int,
                                        size: int) -> None:
-    address = Address(ADDRESSING, FileType(letters), 9, 0)
-    element = element_of(address, is_value=False)
+    element = element_of(Address(ADDRESSING, FileType(letters), 9, 0), is_value=False)
     assert (element.size, element.wire_size) == (2 * words, size)
     encoded = element.typed(bytes(4 * size)).encode()
     assert encoded.endswith(bytes.fromhex(descriptor) + bytes(4 * size))

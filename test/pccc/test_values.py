@@ -81,8 +81,7 @@ def test_bits_survive_a_round_trip_and_leave_their_neighbours_alone(
         assert bits & ~mask == 0
     ours = (1 << len(values)) - 1 << bit
     assert after & ~ours == before & ~ours
-    decoded = codec.decode(after.to_bytes(2 * codec.words, 'little'))
-    assert decoded == array('B', values)
+    assert codec.decode(after.to_bytes(2 * codec.words, 'little')) == array('B', values)
 
 
 @settings(max_examples=40)

@@ -63,8 +63,7 @@ def test_only_the_floats_of_a_pid_block_are_exchanged() -> None:
     order = [data[0] for data in words]
     for first in (*range(2, 50, 2),):
         order[first], order[first + 1] = order[first + 1], order[first]
-    line = in_line_order(at('PD10:1', 'PLC5'), b''.join(words))
-    assert list(line[::2]) == order
+    assert list(in_line_order(at('PD10:1', 'PLC5'), b''.join(words))[::2]) == order
 
 
 @pytest.mark.parametrize('text', ['F8:2', 'PD10:1', 'N7:0'])

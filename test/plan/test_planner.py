@@ -138,8 +138,7 @@ def test_nothing_is_bridged_across_files_stations_and_families(mappings: list[Ma
 @given(word_mappings(most=5))
 def test_no_other_plan_is_cheaper(mappings: list[Mapping]) -> None:
     planned = plan(*mappings)
-    dialect = planned[0].dialect
-    limit = dialect.max_read(mappings[0].address.file_type)
+    limit = planned[0].dialect.max_read(mappings[0].address.file_type)
     long = [block for block in planned if len(block.requests) > 1]
     short = [mapping for mapping in mappings if mapping.codec.words <= limit]
     best = float('inf')
@@ -284,8 +283,7 @@ def test_no_packet_ends_within_a_value(
     length = 60 if kind != 'uint16' else 120
     mapping = make_mapping('N7:1', plc='SLC', length=length, kind=kind)
     assert spans(plan(mapping)) == requests
-    halves = make_mapping('N7:1', plc='SLC', length=120)
-    assert set(spans(plan(halves, mapping))) >= set(requests)
+    assert set(spans(plan(make_mapping('N7:1', plc='SLC', length=120), mapping))) >= set(requests)
 
 
 def test_one_member_is_read_alone_and_two_as_the_whole_element() -> None:

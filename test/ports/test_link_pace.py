@@ -149,8 +149,7 @@ def test_work_that_can_wait_is_done_when_all_is_sent_and_never_left_undone() -> 
 def _script_of_a_reply() -> tuple[Script, bytes]:
     """Return a script that waits for a reply of 100 bytes, and the frame of that."""
     script = Script(Send(b'?', PATIENCE, reply_size=100), timing=LineTiming(char_time=0.001))
-    packet = Packet(1, 5, 0x0F, 0, 7).reply(bytes(100))
-    return script, message_frame(packet.encode(), Checksum.CRC)
+    return script, message_frame(Packet(1, 5, 0x0F, 0, 7).reply(bytes(100)).encode(), Checksum.CRC)
 
 
 @pytest.mark.parametrize('is_traced', [False, True])
@@ -278,6 +277,25 @@ def test_connection_that_babbles_does_not_keep_a_request_from_the_machine() -> N
                      on_state=lambda state: thread.wake())  # as soon as the port is open
     thread.run_out()
     assert script.next() is None
+
+
+class TwoReads(NoLine):
+    """A port with a byte, then with none."""
+
+    def __init__(self) -> None:
+        self.data = [b'x', b'']
+
+    def read(self, timeout: float | None, wake: int) -> bytes:
+        if not self.data:
+            raise OSError('the end')
+        return self.data.pop(0)
+
+
+def test_request_that_comes_together_with_bytes_is_taken_after_them() -> None:
+    script = Script(Rest(), Send(b'awake', None))
+    thread = Impatient(script.machine, TwoReads, 1, on_state=lambda state: thread.wake())
+    thread.run_out()
+    assert script.heard.get_nowait() is None
 
 
 def test_line_is_not_left_alone_after_a_frame() -> None:

@@ -116,8 +116,7 @@ def bridge(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Bridge]:
 
 
 def test_late_subscriber_gets_the_value_with_its_type_and_layout(bridge: Bridge) -> None:
-    inboxes = {tag: bridge.listen(tag) for tag in READS}
-    for tag, inbox in inboxes.items():
+    for tag, inbox in {tag: bridge.listen(tag) for tag in READS}.items():
         kind, label, values = READS[tag]
         message = inbox.first()
         assert values_in(message) == values, tag

@@ -135,8 +135,7 @@ def test_every_parameter_is_declared_read_only_with_a_description(
     node = make_node(files)
     before = set(node.get_parameters_by_prefix(''))
     configure(node)
-    names = set(node.get_parameters_by_prefix('')) - before
-    for name in names:
+    for name in set(node.get_parameters_by_prefix('')) - before:
         descriptor = node.describe_parameter(name)
         assert descriptor.read_only, name
         assert descriptor.description, name
@@ -322,8 +321,7 @@ def test_overrides_of_the_map_are_ignored_unless_they_repeat_it(
         make_node: Nodes, files: Files, is_exposed: bool) -> None:
     given = {'map.line.door.address': 'I:017/12', 'map.line.door.station': 1,  # of a dump
              'map.line.door.length': 2, 'map.gate.max': '', 'mapper.rate': 3}
-    node = make_node({**files, **given, 'expose_map_parameters': is_exposed})
-    configuration = configure(node)
+    configuration = configure(make_node({**files, **given, 'expose_map_parameters': is_exposed}))
     assert configuration.ignored == ['map.gate.max', 'map.line.door.length']
     assert configuration.mappings[1].length == 1
 

@@ -276,8 +276,7 @@ def test_scale_or_offset_make_the_message_float32(
     ('PLC3', '', 'WordRange'), ('PLC5', '', 'Typed'), ('PLC5', 'WORDRANGE', 'WordRange'),
     ('SLC', '', 'Slot'), ('SLC', 'flat', 'Flat')])
 def test_access_chooses_the_dialect(plc: str, text: str, access: str) -> None:
-    address = '020' if plc == 'PLC2' else 'N7:0'
-    mapping = one(PLC_Type=plc, Address=address, Access=text)
+    mapping = one(PLC_Type=plc, Address='020' if plc == 'PLC2' else 'N7:0', Access=text)
     assert (mapping.access, cell_of(mapping, 'Access')) == (Access(access), access)
     assert mapping.dialect is dialect_of(PlcType(plc), Access(access))
 

@@ -85,8 +85,7 @@ def test_it_never_takes_more_than_the_limit(tmp_path: Path) -> None:
     writer = capture.CaptureWriter(path, 1000, {'baud': '9600'})
     for count in range(200):
         writer.write(capture.Chunk(count / 10, capture.Direction.IN, bytes((count,))))
-        size = path.stat().st_size + (old.stat().st_size if old.exists() else 0)
-        assert size <= 1000
+        assert path.stat().st_size + (old.stat().st_size if old.exists() else 0) <= 1000
     writer.close()
     last = chunks_of(old) + chunks_of(path)
     assert [chunk.data[0] for chunk in last] == list(range(200 - len(last), 200))

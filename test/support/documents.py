@@ -56,6 +56,5 @@ def anchors(page: str) -> set[str]:
     """Return what links into a page may name."""
     found = set(re.findall(r'<a id="(.*?)">', page))
     for heading in re.findall(r'^#+ (.*)$', without_code(page), re.MULTILINE):
-        slug = re.sub(r'[^\w\- ]', '', heading.lower()).replace(' ', '-')
-        found.add(slug)
+        found.add(re.sub(r'[^\w\- ]', '', heading.lower()).replace(' ', '-'))
     return found

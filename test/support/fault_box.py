@@ -116,8 +116,7 @@ class FaultBox:
 
     def _turn(self) -> None:
         near, far = self._near, self._far
-        ends = [end for end in (near, far) if end is not None]
-        ready = select.select(ends, [], [], _TURN)[0]
+        ready = select.select([end for end in (near, far) if end is not None], [], [], _TURN)[0]
         if near is not None and near in ready:
             self._take_from_node(os.read(near.fileno(), 4096))
         if far is not None and far in ready:

@@ -69,8 +69,7 @@ def rungs_of(page: Path = HEARTBEATS_PAGE) -> list[str]:
 
 def parse(line: str) -> Series:
     """Return the instructions of a rung; raise ValueError where one is not known."""
-    text = line.partition(';')[0]
-    tokens = re.findall(r'[\[\]|]|[^\s\[\]|]+', text)[1:]
+    tokens = re.findall(r'[\[\]|]|[^\s\[\]|]+', line.partition(';')[0])[1:]
     found, rest = _series(tokens)
     if rest:
         raise ValueError(f'"{rest[0]}" is too much in "{line.strip()}"')

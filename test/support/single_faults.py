@@ -293,8 +293,7 @@ class Bench:
     def _judge_write(self, may_fail: bool) -> str:
         asked, told = (self.far, self.near) if self.kind == 'unsolicited' else (
             self.near, self.far)
-        row = self.taken if self.kind == 'unsolicited' else self.served
-        executed = told.listener.values(row)
+        executed = told.listener.values(self.taken if self.kind == 'unsolicited' else self.served)
         if self.kind == 'guest':
             sts = self.replies[0].sts
             least, most = (1, 1) if sts == 0 else (0, int(sts not in _NOT_SENT))

@@ -133,8 +133,7 @@ class Plant:
     @classmethod
     def drawn(cls, dice: Random, mode: str = '') -> Plant:
         """Return any plant."""
-        common = [name for name in MODES if name not in POLLED]
-        mode = mode or dice.choice([*MODES, *3 * common])
+        mode = mode or dice.choice([*MODES, *3 * [name for name in MODES if name not in POLLED]])
         stations = 1 if mode == 'Peer' or 'ateway' in mode else dice.choice([1, 1, 1, 2, 3])
         rows = dice.choice([1, 2, 2, 3])
         if mode == 'Slave':  # the polls of its master leave room for three outputs in all

@@ -52,7 +52,8 @@ def carry_out(write: Write, clock: Callable[[], float]) -> Steps[WriteResult]:
             detail = (yield from _send(write, packet)) or detail
             done += 1
         except (RemoteError, LinkError) as error:
-            failed = failed or error
+            if failed is None or _outcome_of(error) is Outcome.UNKNOWN:  # it may still land
+                failed = error
             if not write.is_own or not isinstance(error, _TAKEN_OR_NOT):
                 break
     if failed is not None:

@@ -181,8 +181,7 @@ def test_spare_of_the_same_name_does_not_hide_the_owner_of_the_line(
 
 def test_stations_are_taken_from_the_bits_of_the_active_node_table(
         bridge: Bridge, watch: NodeWatch) -> None:
-    words = [0b110, 1, *[0] * 13, 1 << 15]
-    bridge.active.publish(UInt16MultiArray(data=words))
+    bridge.active.publish(UInt16MultiArray(data=[0b110, 1, *[0] * 13, 1 << 15]))
     assert until(watch, lambda picture: picture.active).active == [1, 2, 16, 255]
 
 

@@ -104,8 +104,7 @@ def test_search_ends_with_the_first_answer(tmp_path: Path, duplex: Duplex, check
     trying = Trying()
     with plc_on(tmp_path / 'line', check, duplex) as network:
         # In half duplex nobody is at 4; with the second check only who was heard is tried.
-        stations = [1] if duplex is Duplex.FULL else [4, 1]
-        found = Search(network, stations, trying).run(BAUD_RATES)
+        found = Search(network, [1] if duplex is Duplex.FULL else [4, 1], trying).run(BAUD_RATES)
     assert found is not None
     assert found.settings == LineSettings(19200, mode, check)
     assert found.presence.station == 1
