@@ -94,8 +94,7 @@ def test_rule_13_questions_for_the_modes_of_many_plcs_have_their_share_of_a_full
         bench.plc(station, 'PLC5', ('N11:0', 1))
     bench.run(120.0)
     assert bench.listener.reasons == []
-    points = bench.driver.points
-    planned = points[rows[0]].stale_time / DriverSettings().stale_after
+    planned = bench.driver.points[rows[0]].stale_time / DriverSettings().stale_after
     counts = {mapping: len(bench.listener.values(mapping)) for mapping in rows}
     assert min(counts.values()) > 120.0 / planned > 0.6 * max(counts.values())
 

@@ -197,8 +197,7 @@ def test_unconfirmed_write_may_land_over_the_confirmed_one_that_follows() -> Non
         return write
 
     end(8, 1.0, Outcome.UNKNOWN, 1.0)
-    early = end(9, 1.2, WRITTEN, 0.0)
-    assert not standing.proof(early, 1.4)
+    assert not standing.proof(end(9, 1.2, WRITTEN, 0.0), 1.4)
     late = end(9, 2.1, WRITTEN, 0.0)  # confirmed at 2.2
     standing.words_read(block, bytes(8), 2.1)
     assert standing.proof(late, 2.69) and not standing.proof(late, 2.7)

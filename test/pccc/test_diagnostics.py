@@ -131,8 +131,7 @@ def test_what_there_is_not_is_refused(plc_type: PlcType, data: bytes) -> None:
     (0x0F, b'\x41'), (0x0F, b'\x11'), (0x0F, b'\x07'), (0x07, b'\0'), (0x07, b'\x03')])
 def test_nobody_changes_the_mode(plc_type: PlcType, cmd: int, data: bytes) -> None:
     processor = EmulatedProcessor()
-    server = Server(DataTable(plc_type), processor)
-    assert server.serve(Packet(1, 9, cmd, 0, 0x1234, data)).sts
+    assert Server(DataTable(plc_type), processor).serve(Packet(1, 9, cmd, 0, 0x1234, data)).sts
     assert processor == EmulatedProcessor()
 
 

@@ -79,15 +79,12 @@ def test_one_word_and_many_agree(text: str) -> None:
 PLC5 = PlcType.PLC5
 
 
-def test_floats_have_their_high_word_first() -> None:
+def test_floats_have_their_high_word_first_and_each_word_can_be_read_alone() -> None:
     memory = table(PLC5, F8_0='00 00 7A 44 00 00 C0 BF')
     assert ask(memory, '01 00 00 04 00 06 08 00 08') == (0, '7A 44 00 00 C0 BF 00 00')
     assert ask(memory, '01 01 00 04 00 06 08 00 04') == (0, '00 00 C0 BF')
     assert ask(memory, '00 02 00 04 00 06 08 00 20 41 00 01') == (0, '')
     assert words_at(memory, 'F8:0', 4) == '00 00 7A 44 00 01 20 41'
-
-
-def test_each_word_of_a_float_can_be_read_alone() -> None:
     memory = table(PLC5, F8_0='01 00 02 00 03 00 04 00')
     assert ask(memory, '01 00 00 01 00 06 08 00 02') == (0, '02 00')
     assert ask(memory, '01 00 00 01 00 0E 08 00 01 02') == (0, '01 00')

@@ -15,10 +15,12 @@
 """When the link thread looks at its port, and when it leaves the port alone."""
 
 from collections.abc import Sequence
+from itertools import count
 import math
 from pathlib import Path
 import socket
 import time
+from unittest.mock import Mock
 
 from abdf1_ros.df1.checksum import Checksum
 from abdf1_ros.df1.frames import ACK, Frame, message_frame
@@ -279,21 +281,17 @@ def test_connection_that_babbles_does_not_keep_a_request_from_the_machine() -> N
     assert script.next() is None
 
 
-class TwoReads(NoLine):
-    """A port with a byte, then with none."""
-
-    def __init__(self) -> None:
-        self.data = [b'x', b'']
-
-    def read(self, timeout: float | None, wake: int) -> bytes:
-        if not self.data:
-            raise OSError('the end')
-        return self.data.pop(0)
+def test_bytes_may_have_come_since_an_attempt_to_open_began() -> None:
+    thread = Impatient(Script().machine, Mock(side_effect=OSError('no client')), 1,
+                       clock=count(100.0).__next__)
+    thread.run_out()
+    assert thread.came_after == 101.0
 
 
 def test_request_that_comes_together_with_bytes_is_taken_after_them() -> None:
-    script = Script(Rest(), Send(b'awake', None))
-    thread = Impatient(script.machine, TwoReads, 1, on_state=lambda state: thread.wake())
+    script, port = Script(Rest(), Send(b'awake', None)), NoLine()
+    port.read = Mock(side_effect=[b'x', b'', OSError('the end')])  # type: ignore[method-assign]
+    thread = Impatient(script.machine, lambda: port, 1, on_state=lambda state: thread.wake())
     thread.run_out()
     assert script.heard.get_nowait() is None
 

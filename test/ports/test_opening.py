@@ -50,8 +50,7 @@ def made_up(monkeypatch: pytest.MonkeyPatch) -> Iterator[list[PortSettings]]:
 
 
 def test_scheme_is_a_file_and_a_word(made_up: list[PortSettings]) -> None:
-    checked = network.make_network({'com_port': ('pigeon://loft:7', 'test')})
-    settings = PortSettings.of(checked)
+    settings = PortSettings.of(network.make_network({'com_port': ('pigeon://loft:7', 'test')}))
     open_port(settings).close()
     assert made_up == [settings]
 

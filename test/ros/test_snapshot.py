@@ -57,8 +57,7 @@ def test_single_value_has_all_that_is_known_of_it() -> None:
     assert (status.level, status.hardware_id) == (OK, 'station 2 N7:10')
     assert status.message == 'OK: 1200, 0.5 s ago'
     values = details(status)
-    stamp = datetime.fromisoformat(values.pop('stamp')).timestamp()
-    assert begun - 0.51 < stamp < ended - 0.49
+    assert begun - 0.51 < datetime.fromisoformat(values.pop('stamp')).timestamp() < ended - 0.49
     assert values == {'value': '1200', 'age_ms': '500', 'address': 'N7:10', 'type': 'int16',
                       'topic': 'speed', 'description': 'of belt 3'}
 

@@ -188,8 +188,7 @@ def test_segments_that_come_out_of_order_lose_no_message(
                      for number in range(4))
     packets = [(float(at), ethernet(tcp(whole[first:end], 0xFFFFFFF0 + first)))
                for at, (first, end) in enumerate(cuts)]
-    found = chunks_of(tmp_path / 'x', pcap(packets))
-    assert [chunk.data[4] for chunk in found] == [*order]
+    assert [chunk.data[4] for chunk in chunks_of(tmp_path / 'x', pcap(packets))] == [*order]
 
 
 def test_two_plcs_whose_addresses_end_alike_are_two_stations(tmp_path: Path) -> None:

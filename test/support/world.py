@@ -321,8 +321,7 @@ class WatchedPlc:
         """Return until when its program showed a tick, a time long ago for never."""
         if tick == ticks(self.stopped):  # it stood so until it ran again
             return self.ran_again if self.plc.is_running else now
-        age = (ticks(now) - tick) % _TICKS
-        return min(now, (now // STEP - age + 1) * STEP)
+        return min(now, (now // STEP - (ticks(now) - tick) % _TICKS + 1) * STEP)
 
 
 def ticks(now: float) -> int:
