@@ -15,6 +15,7 @@
 """The demo beside others on the network, and what it says at its end."""
 
 from contextlib import suppress
+import os
 from pathlib import Path
 import signal
 from typing import Any
@@ -35,7 +36,7 @@ def test_others_on_the_network_are_not_taken_for_the_bridge() -> None:
             diagnostics.publish(DiagnosticArray(status=[
                 DiagnosticStatus(name=name, level=DiagnosticStatus.ERROR, hardware_id=name)
                 for name in ('arm', 'nav: planner', 'abdf1: link', 'abdf1: pump')]))
-            results.publish(DiagnosticStatus(name='speed', message='written'))
+            results.publish(DiagnosticStatus(name='recipe', message='written'))
             return not story.is_running
 
         observer.until(is_over, lambda: story.text)
@@ -45,6 +46,15 @@ def test_others_on_the_network_are_not_taken_for_the_bridge() -> None:
     refused = told.index(next(line for line in told if '5000] to' in line)) + 1
     assert 'result: not written: refused' in told[refused]
     assert 'pump' not in story.text
+
+
+def test_demo_stays_on_this_machine(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv('ROS_AUTOMATIC_DISCOVERY_RANGE', '')  # so that it is restored
+    monkeypatch.delenv('ROS_AUTOMATIC_DISCOVERY_RANGE')
+    monkeypatch.setattr(demo, 'Demo', lambda *_: None)
+    monkeypatch.setattr(demo, 'tell_steps', lambda *_: 0)
+    assert demo.main([]) == 0
+    assert os.environ['ROS_AUTOMATIC_DISCOVERY_RANGE'] == 'LOCALHOST'
 
 
 def test_bridge_and_folder_end_with_a_demo_that_is_killed(

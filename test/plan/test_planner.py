@@ -191,12 +191,9 @@ def test_line_time_is_that_of_the_real_frames(
 
 
 @for_all(('texts', 'length', 'expected'), [
-    ('1.SP', 1, [('PD9:1.SP', 2)]),
-    ('1.SP 7.SP', 1, [('PD9:1.SP', 2), ('PD9:7.SP', 2)]),
-    ('1.SP 1.KP', 1, [('PD9:1.KP', 2), ('PD9:1.SP', 2)]),
-    ('1.SP 1.SP', 1, [('PD9:1.SP', 2)]),
-    ('1.SP 1.KP 1.KI 1.KD 1.PV 1.ERR 1.OUT', 1, [('PD9:1', 82)]),
-    ('1.SP', 4, [('PD9:1', 82)])])
+    ('1.SP', 1, [('PD9:1.SP', 2)]), ('1.SP 7.SP', 1, [('PD9:1.SP', 2), ('PD9:7.SP', 2)]),
+    ('1.SP 1.KP', 1, [('PD9:1.KP', 2), ('PD9:1.SP', 2)]), ('1.SP 1.SP', 1, [('PD9:1.SP', 2)]),
+    ('1.SP 1.KP 1.KI 1.KD 1.PV 1.ERR 1.OUT', 1, [('PD9:1', 82)]), ('1.SP', 4, [('PD9:1', 82)])])
 def test_float_of_a_pid_is_read_alone_or_with_its_whole_element(
         texts: str, length: int, expected: list[tuple[str, int]]) -> None:
     rows = [make_mapping(f'PD9:{text}', length=length, tag=f'{number}')

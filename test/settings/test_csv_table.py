@@ -48,13 +48,10 @@ def problems_of(path: Path, content: str | bytes) -> list[str]:
 
 
 @for_all('content', [
-    'Tag,Address,Length\na,N7:0,2\nb,N7:1,3\n',
-    'Tag,Address,Length\na,N7:0,2\nb,N7:1,3',
+    'Tag,Address,Length\na,N7:0,2\nb,N7:1,3\n', 'Tag,Address,Length\na,N7:0,2\nb,N7:1,3',
     '\ufeffTag,Address,Length\na,N7:0,2\nb,N7:1,3\n',
-    'Tag,Address,Length\r\na,N7:0,2\r\nb,N7:1,3\r\n',
-    'Tag,Address,Length\ra,N7:0,2\rb,N7:1,3\r',
-    'Tag;Address;Length\na;N7:0;2\nb;N7:1;3\n',
-    'Tag\tAddress\tLength\na\tN7:0\t2\nb\tN7:1\t3\n',
+    'Tag,Address,Length\r\na,N7:0,2\r\nb,N7:1,3\r\n', 'Tag,Address,Length\ra,N7:0,2\rb,N7:1,3\r',
+    'Tag;Address;Length\na;N7:0;2\nb;N7:1;3\n', 'Tag\tAddress\tLength\na\tN7:0\t2\nb\tN7:1\t3\n',
     'Tag,Address,Length,,,\na,N7:0,2,,,\nb,N7:1,3,,,\n',
     'Tag,Address,Length\na,N7:0,2,,\nb,N7:1,3\n',
     '\n\nTag,Address,Length\n\na,N7:0,2\n  \n,,\nb,N7:1,3\n\n',
@@ -62,8 +59,7 @@ def problems_of(path: Path, content: str | bytes) -> list[str]:
     ' Tag , Address\t,Length \n a , N7:0,\t2\nb ,N7:1 , 3 \n',
     '"Tag","Address","Length"\n"a","N7:0","2"\n"b","N7:1","3"\n',
     '"Tag" , "Address" ,"Length"\n "a" , "N7:0" ,2\nb,N7:1,3\n',
-    'Length,Tag,Address\n2,a,N7:0\n3,b,N7:1\n',
-    'Tag,,Address,Length\na,,N7:0,2\nb,,N7:1,3\n',
+    'Length,Tag,Address\n2,a,N7:0\n3,b,N7:1\n', 'Tag,,Address,Length\na,,N7:0,2\nb,,N7:1,3\n',
     '# made by hand\nTag,Address,Length\n# one\na,N7:0,2\n  # two, with; signs\nb,N7:1,3\n#\n',
     '\ufeff# a comment first\nTag,Address,Length\na,N7:0,2\nb,N7:1,3\n',
     'Tag;Address;Length\n# commas, here,,,\na;N7:0;2\nb;N7:1;3\n',
