@@ -106,6 +106,8 @@ def test_what_can_never_come_is_told_at_once(abdf1_cell: Cells) -> None:  # noqa
     begun = time.monotonic()
     with pytest.raises(AssertionError, match='(?s)bridge has ended with 2.*Baud = "7"'):
         cell.ros.listen(Int16MultiArray, '/abdf1/read/pressure').first()
+    with pytest.raises(AssertionError, match='bridge has ended with 2'):
+        cell.ros.until(lambda: False, 'a condition that is only false')
     assert time.monotonic() - begun < PATIENCE - 5.0
 
 

@@ -118,9 +118,12 @@ def test_files_one_after_the_other(capsys: Output, capture: str) -> None:
         '  seen: 2 commands, 2 replies, 2 polls, 4 ACK'
 
 
-def test_options_win_over_the_head_of_a_capture(capsys: Output, capture: str) -> None:
+def test_options_and_bytes_win_over_the_head_of_a_capture(capsys: Output, capture: str) -> None:
     assert 'BCC BAD' in lines_of(capsys, '--check', 'bcc', capture)[0]
     assert 'full duplex' in lines_of(capsys, '--summary', '--duplex', 'FULL', capture)[0]
+    path = Path(capture)
+    path.write_text(path.read_text('ascii').replace('check: CRC', 'check: BCC'), 'ascii')
+    assert lines_of(capsys, capture)[:5] == LINES
 
 
 def test_bad_line_ends_with_file_and_line_and_the_summary_so_far(

@@ -29,7 +29,6 @@ HEAD = '# abdf1_ros capture 1', '# begun: 2026-03-01T14:05:09.000+01:00', '# bau
     '# check: CRC', '# duplex: half'
 EVIL = '<script>document.title=1</script>'
 
-
 Said = list[tuple[float, str, bytes]]
 
 

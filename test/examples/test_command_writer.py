@@ -113,7 +113,6 @@ def test_what_is_no_value_is_refused(
 
 Answer = Callable[[list[int]], list[tuple[str, str, str]]]
 
-
 Answered = Callable[..., tuple[int, list[str]]]
 
 

@@ -22,7 +22,6 @@ from abdf1_ros.pccc.data_table import DataTable, NoSuchFile, OutOfRange
 from abdf1_ros.pccc.extent import Extent
 from abdf1_ros.pccc.families import parse_address
 from abdf1_ros.pccc.file_types import FileType, PlcType
-from abdf1_ros.settings.mapping import Mapping
 import pytest
 from support.cases import for_all
 from support.mappings import make_mapping
@@ -124,8 +123,7 @@ def test_file_number_has_one_type() -> None:
 
 def extent(text: str, length: int = 1, station: int = 1) -> Extent:
     """Return the words of a mapping."""
-    row: Mapping = make_mapping(text, 'Write', plc='SLC', length=length, station=station)
-    return row.extent
+    return make_mapping(text, 'Write', plc='SLC', length=length, station=station).extent
 
 
 @for_all(('text', 'length', 'meets', 'holds'), [

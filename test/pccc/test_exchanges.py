@@ -267,7 +267,6 @@ requests = st.one_of(
     st.builds(lambda address, tail: bytes((address, 0)) + tail,  # commands without FNC
               st.integers(0, 9), st.binary(max_size=8)))
 
-
 FOUR = '00 00' * 4
 FILES = {
     PlcType.PLC2: {'000': FOUR},

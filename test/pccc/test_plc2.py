@@ -16,7 +16,7 @@
 
 from abdf1_ros.errors import FormatError
 from abdf1_ros.pccc.access import Access
-from abdf1_ros.pccc.address import Address, AddressRangeError, AddressSyntaxError
+from abdf1_ros.pccc.address import AddressRangeError, AddressSyntaxError
 from abdf1_ros.pccc.data_table import DataTable
 from abdf1_ros.pccc.families import parse_address
 from abdf1_ros.pccc.fields import Reader
@@ -27,7 +27,11 @@ import pytest
 from support.cases import for_all
 from support.tables import ask, counting, table, words_at
 
-PLC2 = PlcType.PLC2
+PLC2, PLC3, PLC5, SLC = PlcType.PLC2, PlcType.PLC3, PlcType.PLC5, PlcType.SLC
+UNPROTECTED = Plc2Dialect(Access.UNPROTECTED)
+PROTECTED = Plc2Dialect(Access.PROTECTED)
+CIF = Plc2Dialect(Access.CIF)
+WORD = parse_address('020', PLC2)
 
 
 @for_all(('text', 'word', 'bit', 'shown'), [
@@ -61,15 +65,6 @@ def test_more_than_60_bytes_are_no_bit_write() -> None:
         BasicBitWrite.read(Reader(one * 61))
 
 
-UNPROTECTED = Plc2Dialect(Access.UNPROTECTED)
-PROTECTED = Plc2Dialect(Access.PROTECTED)
-CIF = Plc2Dialect(Access.CIF)
-
-
-def at(text: str) -> Address:
-    return parse_address(text, PlcType.PLC2)
-
-
 @for_all(('mask', 'bits', 'encoded'), [
     (0x0001, 0x0001, '20 00 01 00'), (0x0080, 0x0000, '20 00 00 80'),
     (0x0100, 0x0100, '21 00 01 00'), (0x8000, 0x0000, '21 00 00 80'),
@@ -77,13 +72,13 @@ def at(text: str) -> Address:
 @for_all(('dialect', 'cmd'), [(UNPROTECTED, 0x05), (PROTECTED, 0x02)])
 def test_bits_from_10_octal_on_are_in_the_odd_byte(dialect: Plc2Dialect, cmd: int, mask: int,
                                                    bits: int, encoded: str) -> None:
-    assert dialect.write_bits(at('020'), mask, bits) == (cmd, bytes.fromhex(encoded))
+    assert dialect.write_bits(WORD, mask, bits) == (cmd, bytes.fromhex(encoded))
 
 
 def test_common_interface_file_has_no_bit_write() -> None:
     assert (UNPROTECTED.writes_bits, PROTECTED.writes_bits, CIF.writes_bits) == (True, True, False)
     with pytest.raises(FormatError, match='^a common interface file has no bit write$'):
-        CIF.write_bits(at('020'), 1, 1)
+        CIF.write_bits(WORD, 1, 1)
 
 
 @pytest.mark.parametrize(('dialect', 'read', 'write'), [
@@ -91,9 +86,6 @@ def test_common_interface_file_has_no_bit_write() -> None:
 def test_longest_read_and_write_are_those_of_the_family(
         dialect: Plc2Dialect, read: int, write: int) -> None:
     assert (dialect.max_read(FileType.BINARY), dialect.max_write(FileType.BINARY)) == (read, write)
-
-
-PLC2, PLC3, PLC5, SLC = PlcType.PLC2, PlcType.PLC3, PlcType.PLC5, PlcType.SLC
 
 
 def words(count: int = 16) -> DataTable:
@@ -130,9 +122,7 @@ def test_compatibility_file_of_a_plc5_has_the_number_of_the_station_that_asks() 
     assert ask(memory, '07 00 01 02', 0x02) == (0, '')
     assert words_at(memory, 'N5:2', 2) == 'AA BB 03 01'
     assert words_at(memory, 'N6:0') == 'FF FF'
-
-
-def test_structures_of_a_compatibility_file_are_words() -> None:
+    # Structures are words, too.
     assert ask(table(PLC5, C5_0=counting(9)), '08 00 04', 0x01) == (0, '04 00 05 00')
 
 

@@ -95,9 +95,6 @@ def test_extended_address_is_encoded_and_read_back(address: ExtendedAddress, enc
     assert ExtendedAddress.read(Reader(bytes.fromhex(encoded))) == address
 
 
-PLC3 = PlcType.PLC3
-
-
 def test_file_read_begins_at_the_first_word() -> None:
     assert ask(table(PLC3, B10_0=counting(4)), '04 00 00 01 00 2C 08 0A 01 02') == (0xF0, '06')
 

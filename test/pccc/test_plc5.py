@@ -32,6 +32,9 @@ import pytest
 from support.cases import for_all
 from support.tables import ask, counting, table, words_at
 
+PLC5 = PlcType.PLC5
+DIALECT = Plc5Dialect()
+
 
 def parameters(data: str | bytes) -> Reader:
     """Return a reader of hexadecimal bytes."""
@@ -104,10 +107,6 @@ def test_read_modify_write_takes_243_bytes() -> None:
         ReadModifyWrite.read(Reader(body + b'\0' * 3))
 
 
-PLC5 = PlcType.PLC5
-DIALECT = Plc5Dialect()
-
-
 def at(text: str) -> Address:
     return parse_address(text, PLC5)
 
@@ -142,9 +141,6 @@ def test_words_may_come_as_bits_characters_or_bcd(text: str, typed: TypedData) -
 def test_reply_that_is_no_part_of_a_structure(text: str, words: int, typed: TypedData) -> None:
     with pytest.raises(FormatError):
         DIALECT.read_data(at(text), words, typed.encode())
-
-
-PLC5 = PlcType.PLC5
 
 
 def test_plc5_timer_is_read_with_its_two_internal_words() -> None:

@@ -55,6 +55,9 @@ READERS: dict[int, Callable[[Reader], Command]] = {
     0xA9: partial(LogicalWrite.read, is_short=True), 0xAA: LogicalWrite.read,
     0xAB: MaskedWrite.read}
 
+SLC = PlcType.SLC
+DIALECT = SlcDialect()
+
 
 @for_all(('command', 'encoded'), [
     (LogicalRead(LogicalAddress(7, 0x89, 0, 0), 20), 'A2 14 07 89 00 00'),
@@ -85,10 +88,6 @@ def test_padding_behind_the_declared_size_is_passed_over(fnc: int, encoded: str)
 
 def test_limits_of_the_manual() -> None:
     assert (MAX_READ, MAX_WRITE) == (236, 234)
-
-
-SLC = PlcType.SLC
-DIALECT = SlcDialect()
 
 
 def at(text: str) -> Address:
@@ -223,9 +222,6 @@ def test_refused_directory_is_a_remote_error() -> None:
     next(steps)
     with pytest.raises(RemoteError):
         steps.send(Packet(0, 1, 0x4F, 0x10, 7, b''))
-
-
-SLC = PlcType.SLC
 
 
 @for_all(('data', 'sts'), [

@@ -35,6 +35,7 @@ from hypothesis import strategies as st
 import pytest
 from support.cases import for_all
 
+PLC3, PLC5, SLC = PlcType.PLC3, PlcType.PLC5, PlcType.SLC
 _NUMBERS: dict[ValueType, st.SearchStrategy[Any]] = {
     ValueType.INT16: st.integers(-32768, 32767),
     ValueType.UINT16: st.integers(0, 65535),
@@ -44,8 +45,6 @@ _NUMBERS: dict[ValueType, st.SearchStrategy[Any]] = {
     ValueType.BCD16: st.integers(0, 9999),
     ValueType.BCD12: st.integers(0, 999),
 }
-
-
 _LISTS = st.one_of(*(
     st.tuples(st.just(kind), st.lists(numbers, min_size=1, max_size=20))
     for kind, numbers in _NUMBERS.items()))
@@ -242,9 +241,6 @@ def test_string_length_that_no_plc_has() -> None:
     with pytest.raises(FormatError, match='^string length 83 is more than 82$'):
         decode_counted(b'\x53\0' + bytes(82))
     assert len(decode_counted(b'\x52\0' + bytes(82))) == 82
-
-
-PLC3, PLC5, SLC = PlcType.PLC3, PlcType.PLC5, PlcType.SLC
 
 
 def at(text: str, family: PlcType = PLC5) -> Address:

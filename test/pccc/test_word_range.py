@@ -25,7 +25,8 @@ import pytest
 from support.cases import for_all
 from support.tables import ask, counting, table, words_at
 
-FAMILIES = {PlcType.PLC3: PLC3, PlcType.PLC5: PLC5_WORD_RANGE}
+PLC5 = PlcType.PLC5
+FAMILIES = {PlcType.PLC3: PLC3, PLC5: PLC5_WORD_RANGE}
 
 
 def at(text: str, family: str = 'PLC3') -> Address:
@@ -74,9 +75,6 @@ def test_one_word_and_many_agree(text: str) -> None:
     for n in range(82):
         ours = word_on_line(address.at_offset(address.offset + n)).offset - address.offset
         assert line[2 * n:2 * n + 2] == data[2 * ours:2 * ours + 2]
-
-
-PLC5 = PlcType.PLC5
 
 
 def test_floats_have_their_high_word_first_and_each_word_can_be_read_alone() -> None:

@@ -15,6 +15,7 @@
 """The link thread, on pseudo-terminals and sockets."""
 
 from collections.abc import Callable
+from functools import partial
 import inspect
 import itertools
 import math
@@ -28,7 +29,7 @@ import time
 
 from abdf1_ros.df1.frames import ACK, Code, Control, EOT, Symbol
 from abdf1_ros.df1.machine import Listen, Rest, Send, Step
-from abdf1_ros.errors import PortLost
+from abdf1_ros.errors import INTERNAL_ERROR, PortLost
 from abdf1_ros.ports.clock import line_time
 from abdf1_ros.ports.descriptor import Port
 from abdf1_ros.ports.link_thread import LinkThread, PortState
@@ -252,6 +253,12 @@ def test_fault_ends_what_runs_and_the_next_port_has_a_fresh_procedure(
     pty.write(ACK)
     assert script.next() == Control(Code.ACK)
     assert not thread.has_failed
+
+
+def test_fault_outside_of_what_runs_is_the_reason_of_its_end(pty: Pty, link: Link) -> None:
+    script = Script(Listen(None))
+    link.start(script.machine, pty.name, while_sending=partial(_fail_once(print), None))
+    assert script.end() == repr(PortLost(INTERNAL_ERROR))
 
 
 def _fail_once(put: Callable[..., None]) -> Callable[..., None]:

@@ -14,6 +14,7 @@
 
 """The simulated PLC: its data file, its motions and its faults, on a clock of the test."""
 
+import math
 from pathlib import Path
 
 from abdf1_ros.df1 import frames
@@ -165,6 +166,7 @@ def test_message_of_a_plc2_and_a_plc3_writes_its_value_and_tells_that_it_is_conf
     assert sending is not None
     command = sending.command
     assert (command.cmd, command.dst, command.src) == (cmd, 5, 4)
+    assert sending.answer_within == math.inf  # also for a station that was silent
     assert command.data == bytes.fromhex(data)
     sending.reply(command.reply())
     assert said == ['confirmed']

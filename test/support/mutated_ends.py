@@ -106,7 +106,6 @@ Habit = Enum('Habit', [
     'SENDS_ON_AGAIN',  # whenever it is heard
     'TAKES_ANY_REPLY'])
 
-
 Symbol = tuple[object, ...]
 """(kind, ...): a code; 'poll', station, is_good; 'message', station, data, is_good; 'broken'."""
 

@@ -156,7 +156,6 @@ def _captured() -> Iterator[Captured]:
 
 CAPTURED = tuple(_captured())
 
-
 PROCESSORS: list[dict[str, Any]] = load_json('processors.json')['processors']
 
 

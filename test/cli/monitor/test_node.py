@@ -119,6 +119,7 @@ def test_value_of_a_topic_that_promises_nothing_is_as_old_as_its_publishing(
     after = time.monotonic()
     bridge.observer.until(lambda: time.monotonic() - after > 0.3, 'it to become older')
     with NodeWatch(NAME, []) as watch:
+        assert not any('parameter' in service.service_name for service in watch.node.services)
         picture = until(watch, lambda picture: len(heard(picture)) == 1)
     assert heard(picture)['ready'].promised is None
     assert published - 2.0 < heard(picture)['ready'].received <= after + 0.05

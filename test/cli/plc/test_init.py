@@ -44,7 +44,7 @@ from support.ptys import no_file_longer_than
 PATIENT = ('--timeout', '2000', '--duplex', 'half')  # ms; a busy host may be late
 
 PLC5 = (('O:000', 2), ('S:0', 32), ('B3:0', 5), ('T4:0', 30), ('N7:0', 256), ('F8:0', 20),
-        ('ST9:0', 84), ('A12:0', 7), ('D13:0', 1), ('C20:0', 3))
+        ('ST9:0', 84), ('A12:0', 7), ('D13:0', 2000), ('C20:0', 3))
 SLC = (('I:3.0', 2), ('S:0', 64), ('B3:0', 1), ('N7:0', 100), ('F10:0', 8), ('L40:0', 4))
 
 
@@ -187,7 +187,7 @@ def test_init_that_finds_nothing_leaves_no_folder(tmp_path: Path, capsys: Output
 
 @pytest.mark.parametrize(('station', 'found'), [
     ('1', {'O0': 0, 'S2': 32, 'B3': 5, 'T4': 10, 'N7': 256, 'F8': 10, 'ST9': 2, 'A12': 7,
-           'D13': 1, 'C20': 1}),
+           'D13': 2000, 'C20': 1}),
     ('2', {'I1': 2, 'S2': 64, 'B3': 1, 'N7': 100, 'F10': 4, 'L40': 2})])
 def test_files_are_found_with_type_and_length(
         port: str, station: str, found: dict[str, int], capsys: Output) -> None:

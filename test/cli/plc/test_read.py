@@ -197,6 +197,8 @@ def test_family_that_is_given_is_compared_with_what_the_plc_says(plc: Plc) -> No
     assert (said.status, said.lines, said.err) == (0, ['N7:10 101', 'N7:11 102'], told)
     said = plc('write', 'N7:19', '4', '--plc-type', 'PLC5', '--station', '2', '--yes')
     assert (said.status, said.err) == (0, told)
+    said = plc('write', 'N7:1999', '4', '--plc-type', 'PLC5', '--station', '2', '--yes')
+    assert (said.status, said.err.endswith(told)) == (1, True)
 
 
 def test_type_that_is_not_that_of_the_plc_is_named_once(plc: Plc) -> None:

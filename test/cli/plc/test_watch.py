@@ -26,7 +26,7 @@ import os
 from pathlib import Path
 import re
 
-from abdf1_ros.cli.plc.data import mapping_of, Tags
+from abdf1_ros.cli.plc.data import mapping_of, Radix, Tags
 from abdf1_ros.cli.plc.watch import curve_of, LiveValues, NoValue, WatchedRead
 from abdf1_ros.driver.checks import Checks, StationHealth
 from abdf1_ros.pccc.file_types import PlcType
@@ -183,11 +183,11 @@ def draw(monkeypatch: pytest.MonkeyPatch) -> Draw:
     """Return what gives the lines of the table of a watch after some news."""
     def lines_of(mappings: Sequence[Mapping], *news: tuple[Mapping, Values | NoValue],
                  size: tuple[int, int] = (100, 9), encoding: str = 'utf-8',
-                 tags: Tags | None = None) -> list[str]:
+                 tags: Tags | None = None, radix: Radix = Radix.DECIMAL) -> list[str]:
         screen = io.TextIOWrapper(io.BytesIO(), encoding, errors='backslashreplace')
         with monkeypatch.context() as patch:
             patch.setattr('abdf1_ros.cli.plc.watch.opened', lambda network: None)
-            watch = LiveValues(Network(), mappings, 0.01, tags=tags)
+            watch = LiveValues(Network(), mappings, 0.01, radix, tags=tags)
             patch.setattr('sys.stdout', screen)
             patch.setattr('shutil.get_terminal_size', lambda: os.terminal_size(size))
             for each in news:
@@ -285,6 +285,8 @@ def test_number_has_a_curve_where_it_fits_and_can_be_shown(draw: Draw) -> None:
     for other in ({'size': (74, 9)}, {'encoding': 'latin-1'}):
         head, line = draw([SPEED], *news, **other)
         assert (head.split()[-1], line.split()[-1]) == ('value', '12')
+    line = draw([SPEED], *news, radix=Radix.HEXADECIMAL)[1]
+    assert (line.split()[-4], line[-4:]) == ('0003', '0018')
 
 
 @for_all(('numbers', 'curve'), [
