@@ -62,10 +62,7 @@ decoders = st.builds(FrameDecoder, st.sampled_from(Checksum), st.sampled_from(Du
 
 def drain(decoder: FrameDecoder) -> list[Symbol]:
     """Return all symbols that are ready."""
-    symbols = []
-    while (symbol := decoder.next_symbol()) is not None:
-        symbols.append(symbol)
-    return symbols
+    return [*iter(decoder.next_symbol, None)]
 
 
 def decode(data: bytes, checksum: Checksum = CRC, duplex: Duplex = HALF,

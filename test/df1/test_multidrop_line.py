@@ -41,8 +41,7 @@ MODES = {
     'message': None,
     'single': PollingSettings(SLAVES),
     'multiple': PollingSettings((2, 16), priority=(1,), group_size=1, multiple=True),
-    'in sequence': PollingSettings((1, MASTER, 2, 16), in_sequence=True),
-}
+    'in sequence': PollingSettings((1, MASTER, 2, 16), in_sequence=True)}
 
 
 class Rig:

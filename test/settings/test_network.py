@@ -42,15 +42,13 @@ NUMBERS = [
     ('Data_Bits', 'data_bits', 8, ('5', '6', '7', '8'), ('4', '9', 'x')),
     ('Stop_Bits', 'stop_bits', 1, ('1', '2'), ('0', '3', '1.5')),
     ('Timeout', 'timeout', 1000, ('0', '360000'), ('-1', '360001', '1 s')),
-    ('TX_Delay', 'tx_delay', 0, ('0', '65535'), ('-1', '65536', '0.5')),
-]
+    ('TX_Delay', 'tx_delay', 0, ('0', '65535'), ('-1', '65536', '0.5'))]
 CHOICES = [
     ('Mode', 'mode', 'Master', MODE_NAMES),
     ('PLC_Type', 'plc_type', 'PLC5', ('PLC2', 'PLC3', 'PLC5', 'SLC')),
     ('Error_Code', 'error_code', 'CRC', ('BCC', 'CRC')),
     ('Parity', 'parity', 'None', ('None', 'Even', 'Odd')),
-    ('Handshake', 'handshake', 'No', ('Yes', 'No')),
-]
+    ('Handshake', 'handshake', 'No', ('Yes', 'No'))]
 
 
 @pytest.fixture

@@ -60,8 +60,7 @@ MODES = {
     'Standard': (('Master', 'Standard'), ('Slave', 'Message')),
     'Slave': (('Slave', 'Message'), ('Master', 'Standard')),
     'Peer': (('Peer', 'Message'), ('Peer', 'Message')),
-    'Radio': (('Radio', 'Message'), ('Radio', 'Message')),
-}
+    'Radio': (('Radio', 'Message'), ('Radio', 'Message'))}
 CHECKS = 'BCC', 'CRC'
 KINDS = 'read', 'two packets', 'write', 'bit', 'unsolicited', 'guest'
 
