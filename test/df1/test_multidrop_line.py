@@ -28,6 +28,7 @@ from abdf1_ros.pccc.families import dialect_of, parse_address
 from abdf1_ros.pccc.file_types import PlcType
 from abdf1_ros.pccc.server import Server
 import pytest
+from support.cases import long_unless
 from support.multidrop import CommandTasks, MasterNode, SlaveNode
 from support.peers import CommandTask
 from support.virtual_line import char_time, Noise, QUIET, VirtualLine
@@ -42,6 +43,7 @@ MODES = {
     'single': PollingSettings(SLAVES),
     'multiple': PollingSettings((2, 16), priority=(1,), group_size=1, multiple=True),
     'in sequence': PollingSettings((1, MASTER, 2, 16), in_sequence=True)}
+QUICK = long_unless(lambda mode: mode in ('message', 'multiple'), ((mode,) for mode in MODES))
 
 
 class Rig:
@@ -214,7 +216,7 @@ def test_counters_of_all_ends_agree_on_a_clean_line(mode: str, chunk: int) -> No
     assert_recovers(rig)
 
 
-@pytest.mark.parametrize('mode', MODES)
+@pytest.mark.parametrize('mode', QUICK)
 def test_noise_costs_time_but_no_result_is_wrong(mode: str) -> None:
     rig = Rig(mode, noise=noise_of(1e-2), seed=101, chunk=4)
     rig.run(15)
@@ -226,7 +228,7 @@ def test_noise_costs_time_but_no_result_is_wrong(mode: str) -> None:
     assert_exact(rig)
 
 
-@pytest.mark.parametrize('mode', MODES)
+@pytest.mark.parametrize('mode', QUICK)
 def test_line_that_goes_and_comes_again(mode: str) -> None:
     rig = Rig(mode, chunk=14)
     rig.run(2)

@@ -47,10 +47,12 @@ KINDS = [('Message', STATUS), ('Message', NOTHING), ('Message', NAK), ('Standard
          ('Radio', STATUS), ('Radio', NOTHING), ('Message', LATE), ('Standard', LATE),
          ('Peer', LATE), ('Radio', LATE), *(
              (mode, answer) for mode in _REMOTE for answer in (STATUS, NAK, LOSES, LATE))]
-# Three absent nodes behind each gateway, and a single one of some.
+# Three absent nodes behind each gateway, and a single one of some. Standard polling takes longest.
 CASES = long_unless(
-    lambda polling, answer, count: count == 3 or (polling, answer) in (
-        ('Message', NAK), ('Standard', NOTHING), ('Peer', STATUS), ('Radio', LATE)),
+    lambda polling, answer, count: count == 3 and polling in ('Message', *_MODES) or (
+        polling, answer, count) in (
+            ('Standard', NOTHING, 3), ('Remote Standard', NAK, 3), ('Remote Message', LOSES, 3),
+            ('Message', NAK, 1), ('Peer', STATUS, 1), ('Radio', LATE, 1)),
     [(*kind, count) for kind, count in product(KINDS, (1, 3))])
 
 

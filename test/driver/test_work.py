@@ -75,9 +75,12 @@ def work_of_a_transaction(fallback: Fallback | None) -> float:
     bench = DriverBench([*reads, *writes], network=Network(baud=115200, timeout=200))
     for station in STATIONS:
         bench.plc(station, 'PLC5', ('N7:0', COMMANDS), ('N9:0', 1))
-    bench.run(12.0)  # each fallback has been written
+    fallbacks = 0 if fallback is None else len(writes)
+    bench.run_until(lambda: len(bench.listener.results) == fallbacks)
+    bench.run(2.0)  # what comes at the start is over
+    begun = bench.clock()
     for number in range(30):
-        bench.at(12.0 + 0.02 * number, lambda number=number: bench.write(  # type: ignore[misc]
+        bench.at(begun + 0.02 * number, lambda number=number: bench.write(  # type: ignore[misc]
             writes[7 * number % len(writes)], [number]))
     before = bench.driver.tasks.transactions
     work = lines_run(lambda: bench.run(0.8), 'driver')

@@ -21,6 +21,7 @@ from collections import deque
 import pytest
 from soak.faulty_line import FaultyLine, FLOOD, MODES
 from soak.memory import container_lengths, kept_bytes
+from support.cases import long_unless
 
 # Bytes that tables with a bound (causes in the log, stations that messages name) still take.
 MOST_GROWTH = 30_000
@@ -29,9 +30,8 @@ MOST_GROWTH = 30_000
 MOST_AT_REST = 256
 
 
-@pytest.mark.parametrize('mode', [
-    pytest.param(mode, marks=pytest.mark.long) if mode in ('Standard', 'Radio') else mode
-    for mode in MODES])
+@pytest.mark.parametrize('mode', long_unless(
+    lambda mode: mode == 'Peer', ((mode,) for mode in MODES)))
 def test_faults_cannot_grow_memory(mode: str) -> None:
     rig = FaultyLine(mode, pause=2.0, longest=5.0)
     rig.disturb()  # fills caches, and what is learned at first
