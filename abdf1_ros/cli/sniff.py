@@ -305,29 +305,33 @@ def parse(args: Sequence[str] | None) -> argparse.Namespace:
 
 def _decode_files(options: argparse.Namespace, output: Output) -> int:
     status = 0
-    end = time.monotonic() + options.seconds
     try:
-        for name in options.files:
-            has_bytes = False
-            for recording, chunk in _recorded(name, options.binary):
-                if time.monotonic() >= end:
-                    output.end()
-                    return status
-                has_bytes = True
-                output.take(chunk, recording.settings)
-                output.show_progress(
-                    f'{name}: {recording.percent} %' if recording.has_size else name)
-            if not has_bytes:
-                _say(f'{name}: the file has no bytes')
+        _take_files(options, output)
     except KeyboardInterrupt:  # also during a read of a pipe without a writer
         output.sum_up()
-        return status
     except Problem as problem:
         status = EXIT_USAGE
         _say(str(problem))
-    if not status or not output.is_empty:
+        if not output.is_empty:
+            output.end()
+    else:
         output.end()
     return EXIT_USAGE if output.has_failed else status
+
+
+def _take_files(options: argparse.Namespace, output: Output) -> None:
+    """Take the bytes of all files, for ``seconds`` at most."""
+    end = time.monotonic() + options.seconds
+    for name in options.files:
+        has_bytes = False
+        for recording, chunk in _recorded(name, options.binary):
+            if time.monotonic() >= end:
+                return
+            has_bytes = True
+            output.take(chunk, recording.settings)
+            output.show_progress(f'{name}: {recording.percent} %' if recording.has_size else name)
+        if not has_bytes:
+            _say(f'{name}: the file has no bytes')
 
 
 def _recorded(name: str, is_binary: bool) -> Iterator[tuple[Recording, Chunk]]:

@@ -83,7 +83,7 @@ class _Stream:
 
     def feed(self, number: int, data: bytes) -> Iterator[bytes]:
         """Take a segment; yield the data of the EtherNet/IP messages that it completes."""
-        known = 0 if self._next is None else self._next - number & 0xFFFFFFFF
+        known = -self._distance(number) & 0xFFFFFFFF
         if known >= 1 << 31:  # a segment before it comes later, or was lost
             yield from self._take_early(number, data)
         elif not known or known < len(data):  # otherwise all its bytes came before
@@ -95,8 +95,12 @@ class _Stream:
         """Yield what is complete although bytes before it are missing."""
         while early := {*self._early, *self._taken}:
             self._waiting = b''
-            self._next = min(early)
+            self._next = min(early, key=self._distance)
             yield from self._follow()
+
+    def _distance(self, number: int) -> int:
+        """Return how many bytes after the next byte a segment begins; its numbers wrap."""
+        return 0 if self._next is None else number - self._next & 0xFFFFFFFF
 
     def _take_early(self, number: int, data: bytes) -> Iterator[bytes]:
         messages = [*_sent(_messages(data)[0])]

@@ -165,7 +165,8 @@ def test_anonymous_timeline_has_no_values_and_no_names(tmp_path: Path, capsys: O
 @pytest.mark.parametrize(('args', 'text'), [
     (('--anonymous',), '--anonymous is for --report and --html'),
     (('--html', 'line.html'), 'was not made by --html'),
-    (('--html', 'no/line.html'), 'sniff: --html: ')])
+    (('--html', 'no/line.html'), 'sniff: --html: '),
+    (('--html', 'no/line.html', '--seconds', '1e-9'), 'sniff: --html: ')])
 def test_timeline_that_cannot_be_written_is_told(
         tmp_path: Path, capsys: Output, monkeypatch: pytest.MonkeyPatch, args: tuple[str, ...],
         text: str) -> None:

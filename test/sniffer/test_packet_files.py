@@ -186,7 +186,7 @@ def test_segments_that_come_out_of_order_lose_no_message(
         tmp_path: Path, cuts: list[tuple[int, int]], order: tuple[int, ...]) -> None:
     whole = b''.join(encapsulated(cip(STATUS[:2] + bytes((number, 1)) + STATUS[4:]))
                      for number in range(4))
-    packets = [(float(at), ethernet(tcp(whole[first:end], 0xFFFFFFF0 + first)))
+    packets = [(float(at), ethernet(tcp(whole[first:end], 0xFFFFFF80 + first)))
                for at, (first, end) in enumerate(cuts)]
     assert [chunk.data[4] for chunk in chunks_of(tmp_path / 'x', pcap(packets))] == [*order]
 

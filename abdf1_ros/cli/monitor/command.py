@@ -287,7 +287,8 @@ def _parse(args: Sequence[str]) -> argparse.Namespace:
     parser.add_argument('--all', action='store_true', help='show all bridges, each on one line')
     parser.add_argument('--once', action='store_true', help='print one picture and end')
     parser.add_argument('--seconds', type=seconds_option, default=math.inf,
-                        help='end this number of seconds after the node is found')
+                        help='end this number of seconds after the node is found; with '
+                             '--all after the start')
     parser.add_argument('--period', type=seconds_option, default=1.0,
                         help='seconds between two printed pictures (default: %(default)g)')
     parser.add_argument('--wait', type=seconds_option, default=10.0,
