@@ -85,13 +85,17 @@ class Pair(BridgeCell):
     def publish(self, count: int) -> None:
         """Publish messages, as often as there are bridges that take them, and count results."""
         publisher = self.ros.publisher(Int16MultiArray, '/abdf1/write/recipe')
+        told = len(self._told)
         for number in range(count):
-            wanted = len(self.results) + 1
             publisher.publish(Int16MultiArray(data=[number]))
-            self.ros.until(lambda wanted=wanted: len(self.results) >= wanted,  # type: ignore[misc]
-                           'a result')
-        assert [result.message for result in self.results if result.name == 'recipe'][-count:] \
-            == ['written'] * count
+            self.ros.until(lambda wanted=told + number + 1:  # type: ignore[misc]
+                           len(self._told) >= wanted, 'a result')
+        assert self._told[told:] == ['written'] * count
+
+    @property
+    def _told(self) -> list[str]:
+        """Return the results of the messages; the fallback of another row has its own."""
+        return [result.message for result in self.results if result.name == 'recipe']
 
     def until_status(self, name: str, level: bytes, end: str = '') -> None:
         """Wait until any bridge has a status at a level, with a text that ends so."""

@@ -35,6 +35,7 @@ from abdf1_ros.df1.packet import Packet
 from abdf1_ros.pccc.families import dialect_of
 from abdf1_ros.pccc.file_types import PlcType
 import pytest
+from support.ptys import read_exactly
 
 _HERE = Path(__file__).resolve().parent
 
@@ -150,7 +151,7 @@ def test_a_damaged_message_is_refused_and_the_shim_goes_on(run: ModuleType) -> N
     end = time.monotonic() + 5
     assert line.receive(end) is None
     assert line.receive(end) == Packet.decode(b'\1\5\6\0\x34\x12\0')
-    assert os.read(ours, 4) == NAK + ACK
+    assert read_exactly(ours, 4) == NAK + ACK
     line.close()
     os.close(ours)
     os.close(theirs)
@@ -171,7 +172,7 @@ def test_a_port_behind_tcp_passes_bytes_both_ways(run: ModuleType) -> None:
     with run.device_server(os.ttyname(theirs)) as number, \
             socket.create_connection(('127.0.0.1', number), timeout=5) as connection:
         connection.sendall(b'\x10\x02\x03\x04\r')
-        assert os.read(ours, 5) == b'\x10\x02\x03\x04\r'
+        assert read_exactly(ours, 5) == b'\x10\x02\x03\x04\r'
         os.write(ours, b'\x10\x06\x11\n')
         assert connection.recv(4) == b'\x10\x06\x11\n'
     for descriptor in (ours, theirs):
