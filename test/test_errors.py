@@ -44,8 +44,7 @@ def test_what_callers_can_catch() -> None:
     (errors.WrongCommandCode(9, 0x41, 0x4F),
      '2505 ERR_BAD_FUNCTION_CODE: Response with wrong command code '
      '(slv=9, actual=65, expected=79)'),
-    (errors.PortLost('unplugged'), 'port lost: unplugged'),
-])
+    (errors.PortLost('unplugged'), 'port lost: unplugged')])
 def test_link_error_reads_as_its_numbered_text(error: errors.LinkError, text: str) -> None:
     assert str(error) == text
 
@@ -186,8 +185,7 @@ def test_what_can_be_seen_stays(text: str) -> None:
     ('\u202eabc\u2066', r'\u202eabc\u2066'),            # turns the direction of writing
     ('\u200b\ufeff\xad', r'\u200b\ufeff\xad'),          # shows nothing
     ('\udc80', r'\udc80'),            # what no encoding takes
-    ('\U000e0001', r'\U000e0001'),
-])
+    ('\U000e0001', r'\U000e0001')])
 def test_what_cannot_be_seen_is_escaped(text: str, shown: str) -> None:
     assert printable(text) == shown
 

@@ -211,8 +211,7 @@ def commands(text: str, values: list[float] | str, plc: str = 'PLC5', length: in
     ('SLC', 'F8:4', 1, [1.5], ['aa 04 08 8a 04 00 00 00 c0 3f']),
     ('SLC', 'L10:2', 1, [-2], ['aa 04 0a 91 02 00 fe ff ff ff']),
     ('SLC', 'I:1.2', 1, [7], ['aa 02 01 8c 01 02 07 00']),
-    ('SLC', 'O:3.0', 1, [7], ['aa 02 00 8b 03 00 07 00']),
-])
+    ('SLC', 'O:3.0', 1, [7], ['aa 02 00 8b 03 00 07 00'])])
 def test_bytes_of_a_write_of_words(
         plc: str, text: str, length: int, values: list[float], expected: list[str]) -> None:
     assert commands(text, values, plc, length) == expected
@@ -234,8 +233,7 @@ def test_bytes_of_a_write_of_words(
     ('B3:0/14', 4, [1, 1, 0, 1],
      ['ab 02 03 85 00 00 00 c0 00 c0', 'ab 02 03 85 01 00 03 00 02 00']),
     ('I:1.2/3', 1, [1], ['ab 02 01 8c 01 02 08 00 08 00']),
-    ('T4:7/DN', 1, [0], ['ab 02 04 86 07 00 00 20 00 00']),
-])
+    ('T4:7/DN', 1, [0], ['ab 02 04 86 07 00 00 20 00 00'])])
 def test_bits_are_a_read_modify_write_of_a_plc5_and_a_masked_write_of_an_slc(
         text: str, length: int, values: list[float], expected: list[str]) -> None:
     plc = 'PLC5' if expected[0].startswith('26') else 'SLC'

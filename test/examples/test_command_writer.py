@@ -100,8 +100,7 @@ def test_client_of_a_discovery_server_is_told_what_it_lacks(
 @pytest.mark.parametrize(('words', 'text'), [
     (('recipe', '1', '2', '3', 'x'), '1 2 3 x: cannot be sent: "x" should be a whole number'),
     (('recipe', '1', '2', '3', '70000'), '1 2 3 70000: cannot be sent: signed short integer'),
-    (('a b', '1'), "1: cannot be sent: topic name '/writing/abdf1/write/a b' is invalid"),
-])
+    (('a b', '1'), "1: cannot be sent: topic name '/writing/abdf1/write/a b' is invalid")])
 def test_what_is_no_value_is_refused(
         bridge: Process, write: Write, words: tuple[str, ...], text: str) -> None:
     status, (line,) = write(*words)
@@ -176,8 +175,7 @@ def test_every_mapping_of_the_topic_has_to_be_written(answered: Answered) -> Non
     ('written', 0), (f'written: {REWRITTEN}', 0), ('not written: superseded by a newer value', 1),
     ('not written: the PLC refused it: STS 10', 1), ('only partly written: ...', 3),
     ('unknown whether written: ...', 3),
-    ('sent to all stations; no station confirms a broadcast', 3),
-])
+    ('sent to all stations; no station confirms a broadcast', 3)])
 def test_text_of_a_result_decides_the_exit_status(message: str, status: int) -> None:
     assert runpy.run_path(str(EXAMPLE))['judge'](message) == status
 

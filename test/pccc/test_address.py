@@ -44,8 +44,7 @@ KINDS = st.sampled_from(BOTH)
     ('T4:0.1/3', 'T', 4, 0, 1, 3), ('T4:0.0/DN', 'T', 4, 0, 0, 13), ('t:3/tt', 'T', 4, 3, 0, 14),
     ('T4:0.ACC/7', 'T', 4, 0, 2, 7), ('C5:2.PRE', 'C', 5, 2, 1, None),
     ('C5:2/CU', 'C', 5, 2, 0, 15), ('R6:0.LEN', 'R', 6, 0, 1, None),
-    ('R6:0/FD', 'R', 6, 0, 0, 8), ('A12:3', 'A', 12, 3, 0, None), ('D13:3/15', 'D', 13, 3, 0, 15),
-])
+    ('R6:0/FD', 'R', 6, 0, 0, 8), ('A12:3', 'A', 12, 3, 0, None), ('D13:3/15', 'D', 13, 3, 0, 15)])
 def test_address_has_the_parts_that_its_text_names(
         family: PlcType, text: str, kind: str, file: int, element: int, word: int,
         bit: int | None) -> None:
@@ -79,8 +78,7 @@ def test_slc_io_is_slot_word_bit(text: str, file: int, slot: int, word: int,
     'ST:0', 'A:0', 'D:0', 'ST9:0/1', 'T4:0.XYZ', 'T4:0/XYZ', 'T4:0.DN/3', 'T4:0.ACC/DN',
     'T4:0.LEN', 'R6:0.ACC', 'ST9:0.1', 'X9:0', '%N7:0', 'N7:0\n1', '##N7:0',
     'T4:0.2/DN', 'T4:0.1/PRE', 'T4:0.2/PRE', 'C5:0.1/CU', 'R6:0.2/EN', 'T4:0.PRE/ACC',
-    'N7:\u0663', 'I:\u0668', 'I:1/\u0668', 'N\u0667:0',
-])
+    'N7:\u0663', 'I:\u0668', 'I:1/\u0668', 'N\u0667:0'])
 def test_what_is_no_address(family: PlcType, text: str) -> None:
     with pytest.raises(AddressSyntaxError):
         parse_address(text, family)
@@ -334,8 +332,7 @@ def test_number_after_a_timer_is_no_bit_unless_it_has_a_name(
     ('RTC:0.HR', SLC, 'RTC is a function file whose type code is not known (S:37 to S:42 may '
                       'show the clock, or 0); let the program copy what is needed into an N file'),
     ('CS0:4', SLC, 'CS is a function file whose type code is not known; let the program copy what '
-                   'is needed into an N file'),
-])
+                   'is needed into an N file')])
 def test_what_nothing_supports_and_other_forms_are_told_what_to_write(
         text: str, family: PlcType, expected: str) -> None:
     with pytest.raises(AddressSyntaxError) as fault:

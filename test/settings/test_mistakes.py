@@ -125,8 +125,7 @@ def test_address_that_cannot_be_used(tmp_path: Path, address: str, expected: str
         '1 int32 from N7:255 on take 2 words; the last word there can be is N7:255']),
     (f'{HEAD},Period\na,Read,N7:0,1,SLC,0.5\n', [
         '!2:6 (Period): Item: 1, Period = "0.5" should be a whole number from 0 to 86400000 ms, '
-        'or "on demand"']),
-])
+        'or "on demand"'])])
 def test_what_is_told_of_a_map(tmp_path: Path, text: str, expected: list[str]) -> None:
     assert told_of_map(tmp_path, text) == expected
 
@@ -167,8 +166,7 @@ def test_what_is_told_of_a_map(tmp_path: Path, text: str, expected: list[str]) -
         'tags that differ only in capital and small letters: Speed, speed']),
     (f'{HEAD}\na,Read,L9:0,1,SLC\n', [
         '2:3 (Address): L9:0: a 5/03, the default of Processor, has no such file; '
-        'ML1100, ML1200, ML1400, ML1500 may have it']),
-])
+        'ML1100, ML1200, ML1400, ML1500 may have it'])])
 def test_what_is_odd_in_a_map(tmp_path: Path, text: str, expected: list[str]) -> None:
     assert told_of_map(tmp_path, text) == expected
 
@@ -240,8 +238,7 @@ PORT = ('should be a number from 1, a device path such as /dev/ttyUSB0, socket:/
     ('Com_Port,Mode\n1,Peеr\n', [
         '!2:2 (Mode): 2553 CRT_BAD_DRIVER_MODE: Invalid Driver Mode (Peеr), should be one of '
         'Master, Slave, Peer, Radio, or Listen; character 3 is U+0435 CYRILLIC SMALL LETTER IE, '
-        'not "e"']),
-])
+        'not "e"'])])
 def test_what_is_told_of_a_net_file(tmp_path: Path, text: str, expected: list[str]) -> None:
     assert told_of_net(tmp_path, text) == expected
 
