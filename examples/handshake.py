@@ -60,6 +60,7 @@ from std_msgs.msg import Int16MultiArray, UInt8MultiArray
 DONE, NOT_BEGUN, UNKNOWN = 0, 1, 3
 
 _LAST_NUMBER = 32767
+_CONFIRMED = 'written', 'stands in the PLC', 'fallback value written'
 _PERIOD = 0.2  # s between two messages of a request; the first comes at once
 
 
@@ -148,13 +149,14 @@ class Handshake(Node):
         return step()
 
     def _take_back(self, seconds: float) -> bool:
-        """Write 0; return True if it was confirmed and a state has been read after it."""
+        """Write 0; return True if it stands confirmed and a state has been read after it."""
         self._is_at_rest = False
         if not self._publish_until(0, lambda: self._is_at_rest, seconds):
             return False
         # The next state may be older than the confirmation: the bridge may have read it before.
         states = self._states
-        return self._spin(lambda: self._states >= states + 2, seconds)
+        has_state = self._spin(lambda: self._states >= states + 2, seconds)
+        return has_state and self._is_at_rest  # a result of the time before may have come late
 
     def _publish_until(self, value: int, condition: Callable[[], bool], seconds: float) -> bool:
         """Publish at a steady rate until the condition holds; return False if time is over."""
@@ -179,8 +181,8 @@ class Handshake(Node):
             return
         self._result = result.message
         value = next((pair.value for pair in result.values if pair.key == 'value'), '')
-        if result.message.startswith(('written', 'fallback value written')):
-            self._is_at_rest = value == '[0]'
+        if not result.message.startswith('not written'):  # that changes nothing
+            self._is_at_rest = value == '[0]' and result.message.startswith(_CONFIRMED)
 
     def _spin(self, condition: Callable[[], bool], seconds: float) -> bool:
         end = time.monotonic() + seconds

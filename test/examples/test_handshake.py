@@ -17,6 +17,7 @@
 from collections.abc import Callable
 from pathlib import Path
 import runpy
+import threading
 
 from diagnostic_msgs.msg import DiagnosticStatus, KeyValue
 from rclpy.qos import DurabilityPolicy, QoSProfile
@@ -51,6 +52,9 @@ def run(plc: Plc, state: list[int], *args: str, result: str = 'written',
 
         def take(message: Int16MultiArray) -> None:
             requests.append(message.data[0])
+            if result != 'written' and len(requests) == 3:  # its host stands still
+                example.stop()
+                threading.Timer(3.0, example.go_on).start()
             before = [*state]
             if control == [1]:  # it is lost as soon as something is asked for
                 controls.publish(UInt8MultiArray(data=[0]))
