@@ -129,8 +129,7 @@ def _flipped(raw: bytes) -> bytes:
     (Target.PEER, 'bad-check-refused', _nothing, 'DLE NAK'),
     (Target.PEER, 'bad-check-refused', _replaced(codec.NAK, codec.ACK), 'DLE NAK'),
     (Target.PEER, 'enquiry-after-ack', _replaced(codec.ACK, codec.NAK), 'DLE ACK'),
-    (Target.PEER, 'stuffing', _flipped, 'the reply'),
-])
+    (Target.PEER, 'stuffing', _flipped, 'the reply')])
 def test_broken_rule_fails_its_case(target: Target, name: str, spoil: Callable[[bytes], bytes],
                                     expected: str) -> None:
     line = SpoiledLine(plc_of(target, 'CRC'))

@@ -72,8 +72,7 @@ def command(data: str, cmd: int = 0x0F) -> Packet:
     ('01 00 00 01 00 34 03 04 02 02', 'word range read T:4.ACC, 1 word'),
     ('00 00 00 02 00 07 00 07 05 01 00 FF FF', 'word range write N7:5 = 0001 FFFF'),
     ('02 07 00 03 01 08 00 01 00', 'bit write B3:1 set 0008 reset 0001'),
-    ('04 00 00 04 00 0C 08 0A 08', 'file read B10:0, 4 words'),
-])
+    ('04 00 00 04 00 0C 08 0A 08', 'file read B10:0, 4 words')])
 def test_data_table_commands(data: str, text: str) -> None:
     assert describe(command(data)) == text
     assert describe(command(data, 0x2F)) == text  # with high priority

@@ -68,8 +68,7 @@ DIALECT = SlcDialect()
      'A9 02 07 89 FF 2C 01 09 00'),
     (LogicalWrite(LogicalAddress(4, 0x86, 0, 1), b'\x2C\x01'), 'AA 02 04 86 00 01 2C 01'),
     (MaskedWrite(LogicalAddress(3, 0x85, 4, 0), 0x0108, b'\x00\x01'),
-     'AB 02 03 85 04 00 08 01 00 01'),
-])
+     'AB 02 03 85 04 00 08 01 00 01')])
 def test_encode_and_read(command: Command, encoded: str) -> None:
     data = bytes.fromhex(encoded)
     assert command.encode() == data

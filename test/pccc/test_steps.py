@@ -106,8 +106,7 @@ def failure(sts: int, data: bytes = b'', meanings: Meanings = USUAL_MEANINGS) ->
     (0xF0, b'\x00', 0x00, 'STS F0 EXT STS 00: unknown code'),
     (0xF0, b'', None, 'STS F0: extended status missing from the reply'),
     (0xD0, b'', None, 'STS D0: unknown code'),
-    (0x0F, b'', None, 'STS 0F: unknown code'),
-])
+    (0x0F, b'', None, 'STS 0F: unknown code')])
 def test_failure_in_words(sts: int, data: bytes, ext_sts: int | None, text: str) -> None:
     error = failure(sts, data)
     assert (error.sts, error.ext_sts, str(error)) == (sts, ext_sts, text)

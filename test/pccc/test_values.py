@@ -43,8 +43,7 @@ _NUMBERS: dict[ValueType, st.SearchStrategy[Any]] = {
     ValueType.UINT32: st.integers(0, 2**32 - 1),
     ValueType.FLOAT32: st.floats(width=32, allow_nan=False, allow_infinity=False),
     ValueType.BCD16: st.integers(0, 9999),
-    ValueType.BCD12: st.integers(0, 999),
-}
+    ValueType.BCD12: st.integers(0, 999)}
 _LISTS = st.one_of(*(
     st.tuples(st.just(kind), st.lists(numbers, min_size=1, max_size=20))
     for kind, numbers in _NUMBERS.items()))
@@ -135,8 +134,7 @@ def test_word_that_is_not_bcd(word: str, text: str) -> None:
     (ValueType.INT16, [math.nan, 0], 'value nan at index 0 is not a valid int16'),
     (ValueType.INT16, [1.0, 1.5], 'value 1.5 at index 1 is not a valid int16'),
     (ValueType.INT16, 'ab', "'ab' is not a valid int16"),
-    (ValueType.STRING, [65, 66], '[65, 66] is not a valid string'),
-])
+    (ValueType.STRING, [65, 66], '[65, 66] is not a valid string')])
 def test_values_that_cannot_be_written(
         kind: ValueType, values: list[float] | str, error: str) -> None:
     with pytest.raises(FormatError) as caught:
@@ -327,8 +325,7 @@ def test_end_names_what_is_too_much() -> None:
     (5, 10, '00 C2 0A 00 09 00 00 00 00 00',
      '99 09 0C 59 0A 00 C2 0A 00 09 00 00 00 00 00'),
     (6, 6, '01 02 03 04 05 06', '97 09 66 01 02 03 04 05 06'),
-    (7, 6, '01 02 03 04 05 06', '97 09 76 01 02 03 04 05 06'),
-])
+    (7, 6, '01 02 03 04 05 06', '97 09 76 01 02 03 04 05 06')])
 def test_encode_and_decode(type_id: int, size: int, data: str, encoded: str) -> None:
     values = TypedData(type_id, size, bytes.fromhex(data))
     assert values.encode() == bytes.fromhex(encoded)

@@ -244,8 +244,7 @@ def test_gap_is_bridged_exactly_while_that_is_cheaper(plc: str) -> None:
     (make_mapping('I:1.0', plc='SLC'), make_mapping('I:2.0', plc='SLC')),
     (make_mapping('I:000'), make_mapping('O:001')),
     (make_mapping('N7:0'), make_mapping('N7:1', access='WordRange')),
-    (make_mapping('000', plc='PLC2'), make_mapping('001', plc='PLC2', access='CIF')),
-])
+    (make_mapping('000', plc='PLC2'), make_mapping('001', plc='PLC2', access='CIF'))])
 def test_what_differs_in_period_station_or_file_is_not_read_together(
         one: Mapping, other: Mapping) -> None:
     assert len(plan(one, other)) == 2

@@ -15,6 +15,8 @@
 """Heartbeats, fallback values and guarded reads of a real node; named by the rules they show."""
 
 from collections.abc import Callable, Iterator
+from contextlib import suppress
+from itertools import count
 from pathlib import Path
 import signal
 import threading
@@ -272,7 +274,10 @@ def test_rule_8_broadcast_of_a_guest_over_a_fallback_is_told_and_written_over(
         cell.until_counting()
         written = watched(cell, 'N10:1')
         with cell.share(place) as hmi:
-            hmi.ask(255, write(AddressedValues.of('N10:1', PlcType.SLC), [99]))
+            for _ in range(ATTEMPTS):
+                with suppress(RemoteError):  # a busy host has no time for it
+                    hmi.ask(255, write(AddressedValues.of('N10:1', PlcType.SLC), [99]))
+                    break
         cell.until(lambda: 7 in written[written.index(99):] if 99 in written else None,
                    'the fallback after it')
     assert (f'guest pty:{place} has sent to station 255: protected typed logical write '
@@ -294,13 +299,15 @@ def test_rule_8_fallback_comes_when_the_publisher_is_gone(cell: Cell) -> None:
     cell.until_counting()
     publisher = cell.ros.publisher(Int16MultiArray, '/abdf1/write/speed')
     cell.until(lambda: fallbacks(cell.results)[:1] == ['start'], 'that of the start')
+    numbers = count(42)
 
     def falls_back() -> bool:
         """Publish once; tell whether that was sent and the fallback value has come after it."""
         cell.results.clear()
-        began = time.monotonic()
-        publisher.publish(Int16MultiArray(data=[42]))
-        if cell.results.first().message != 'written':
+        began, number = time.monotonic(), next(numbers)
+        publisher.publish(Int16MultiArray(data=[number]))
+        if cell.results.until(lambda result: details(result)['value'] == f'[{number}]',
+                              'its result').message != 'written':
             return False
         cell.until(lambda: cell.word('N10:1') == 7, 'the fallback value')
         assert time.monotonic() - began > 0.4  # Fallback_After
