@@ -70,19 +70,19 @@ class ReadCalls:
 
     def settle(self, mapping: Mapping, answer: ReadAnswer, started: float) -> None:
         """Answer the calls for a row that were taken before its read ``started`` (clock, s)."""
-        self._end(mapping, answer, lambda taken, until, demand: taken <= started)
+        self._end(mapping, answer, lambda taken, until: taken <= started)
 
     def fail(self, mappings: Iterable[Mapping], error: str) -> None:
         """Answer all calls for some rows with an error."""
         for mapping in mappings:
-            self._end(mapping, ReadAnswer(error=error), lambda taken, until, demand: True)
+            self._end(mapping, ReadAnswer(error=error), lambda taken, until: True)
 
     def expire(self, now: float) -> None:
         """Answer the calls that have waited too long."""
         answer = ReadAnswer(error=f'not read in time: no turn on the line for {self._patience:g} '
                                   's, or the read was broken off')
         for mapping in [*self.waiting]:
-            self._end(mapping, answer, lambda taken, until, demand: now >= until)
+            self._end(mapping, answer, lambda taken, until: now >= until)
         self.next_expiry = min((until for calls in self.waiting.values() for _, until, _ in calls),
                                default=math.inf)
 
@@ -93,10 +93,10 @@ class ReadCalls:
         self.fail([*self.waiting], error)
 
     def _end(self, mapping: Mapping, answer: ReadAnswer,
-             is_over: Callable[[float, float, ReadCall], bool]) -> None:
+             is_over: Callable[[float, float], bool]) -> None:
         calls = self.waiting.pop(mapping, ())
-        if kept := [call for call in calls if not is_over(*call)]:
+        if kept := [call for call in calls if not is_over(*call[:2])]:
             self.waiting[mapping] = kept
-        for call in calls:
-            if is_over(*call):
-                call[2].answer(answer)
+        for taken, until, demand in calls:
+            if is_over(taken, until):
+                demand.answer(answer)
