@@ -88,7 +88,8 @@ def test_crashed_worker_ends_the_run_with_a_failure(tmp_path: Path) -> None:
     for name in 'bcd':
         (tmp_path / f'test_{name}.py').write_text('def test_ok():\n    pass\n', encoding='utf-8')
     ended = subprocess.run(
-        [sys.executable, '-m', 'pytest', '-p', 'no:cacheprovider', *options, str(tmp_path)],
+        [sys.executable, '-m', 'pytest', '-p', 'no:cacheprovider', '-p', 'xdist', *options,
+         str(tmp_path)], env=os.environ | {'PYTEST_DISABLE_PLUGIN_AUTOLOAD': '1'},
         cwd=tmp_path, capture_output=True, text=True, timeout=100, check=False)
     assert ended.returncode == 1, ended.stdout
     assert re.search(r"worker 'gw\d' crashed while running", ended.stdout)

@@ -314,7 +314,8 @@ class TwoMasters:
 
 @pytest.mark.parametrize('target, habit', [
     (Target.PEER, Habit.ENQUIRES_FOR_EVER), (Target.SLAVE, Habit.KEEPS_WHAT_WAS_ACKNOWLEDGED),
-    (Target.PEER, Habit.VERY_LATE_REPLY), (Target.SLAVE, Habit.REPLY_WITHOUT_BIT),
+    (Target.PEER, Habit.VERY_LATE_REPLY),
+    pytest.param(Target.SLAVE, Habit.REPLY_WITHOUT_BIT, marks=pytest.mark.long),
     (Target.RADIO_CLIENT, Habit.NEVER_GIVES_UP), (Target.CLIENT, Habit.STOPS_AFTER_10),
     (Target.MASTER, Habit.STOPS_AFTER_10), (Target.MASTER, None)])
 def test_whole_run_ends_within_15_minutes(target: Target, habit: Habit | None) -> None:

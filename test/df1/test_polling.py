@@ -124,7 +124,7 @@ def test_value_is_never_older_than_its_transaction(
     rig.start()
     tasks = {number: rig.ask(number) for number in rig.slaves}
     count = 0
-    while rig.clock() < 150.0:
+    while rig.clock() < 75.0:
         rig.run(0.05)
         for number, task in tasks.items():
             if isinstance(task.result, Packet):

@@ -30,6 +30,7 @@ from abdf1_ros.settings.network import Network
 from abdf1_ros.simulator.gateway import SimulatedGateway
 from abdf1_ros.simulator.simulated_plc import SimulatedPlc
 import pytest
+from support.cases import long_unless
 from support.driver_bench import DriverBench, simulated_plc, store, stored
 from support.mappings import make_mapping
 
@@ -286,8 +287,9 @@ class Interlocked(DriverBench):
         return [value for when, value in self.seen[number] if when >= since]
 
 
-@pytest.mark.parametrize('polling', POLLING)
-@pytest.mark.parametrize('is_told', [True, False])  # by the gateway; otherwise nothing comes
+@pytest.mark.parametrize('polling, is_told', long_unless(  # by the gateway; or nothing comes
+    lambda polling, is_told: polling == 'Message' or is_told,
+    itertools.product(POLLING, (True, False))))
 def test_rule_11_plc_out_of_reach_does_not_take_the_line_from_the_other(
         is_told: bool, polling: str) -> None:
     bench = Interlocked(polling)

@@ -24,11 +24,13 @@ from support.cases import long_unless
 from support.deaths import Death, MODES, overdue, SAFE, STATION, with_broken_wire
 from support.virtual_line import Noise
 
-BEHIND = [(mode, False) for mode in MODES] + [('Master', True), ('Standard', True)]
+WIRES = pytest.mark.parametrize('mode, is_behind, dies_after', [
+    pytest.param(*case, dies_after, marks=() if at % 2 == (dies_after > 0) else pytest.mark.long)
+    for at, case in enumerate([*product(MODES, [False]), ('Master', True), ('Standard', True)])
+    for dies_after in (0.0, 5.0)])
 
 
-@pytest.mark.parametrize('mode, is_behind', BEHIND)
-@pytest.mark.parametrize('dies_after', [0.0, 5.0])
+@WIRES
 def test_plc_whose_replies_are_not_heard_holds_fallback_and_0(
         mode: str, dies_after: float, is_behind: bool) -> None:
     death = with_broken_wire(mode, dies_after, is_behind=is_behind)
@@ -57,8 +59,7 @@ def test_output_of_a_plc_that_is_not_heard_does_not_flap_while_messages_come(mod
     assert set(results) == {f'{Outcome.NOT_SENT.value}: fallback'}
 
 
-@pytest.mark.parametrize('mode, is_behind', BEHIND)
-@pytest.mark.parametrize('dies_after', [0.0, 5.0])
+@WIRES
 def test_end_writes_once_to_a_plc_that_is_not_heard(
         mode: str, dies_after: float, is_behind: bool) -> None:
     death = with_broken_wire(mode, dies_after, is_behind=is_behind)

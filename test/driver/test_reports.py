@@ -207,7 +207,7 @@ def test_processor_that_takes_shorter_packets_than_the_rows_say_is_read_all_the_
     assert {device.words[1, 7, number] for number in range(100)} == {5}
 
 
-@pytest.mark.parametrize('mode', POLLED)
+@pytest.mark.parametrize('mode', ['Message', pytest.param('Standard', marks=pytest.mark.long)])
 def test_slaves_without_power_leave_the_others_nine_tenths_of_their_reads(mode: str) -> None:
     dead = {3, 8, 12, 17}
     rows = [make_mapping('N7:0', plc='SLC', station=number, tag=f'n{number}', period=1000)

@@ -240,7 +240,7 @@ def test_rule_5_orderly_end_has_the_time_that_is_printed() -> None:
 
 @pytest.mark.parametrize(('mode', 'stations'), [
     ({}, 3), ({'polling': 'Standard'}, 3), ({'mode': 'Peer'}, 1), ({'mode': 'Radio'}, 1)])
-@pytest.mark.parametrize('timeout', [100, 1000])
+@pytest.mark.parametrize('timeout', [pytest.param(100, marks=pytest.mark.long), 1000])
 def test_rules_5_and_16_end_where_no_plc_answers_has_the_time_that_is_printed(
         mode: dict[str, str], stations: int, timeout: int) -> None:
     """Polls came in between: with Timeout 1000 most rows had no try within 6 s."""

@@ -70,7 +70,6 @@ STATION = 1
 MAPPING = block_of(STATION)
 NETWORK = Network(baud=115200)
 TRANSACTIONS = 0x10000
-_IN_MEMORY = 2000
 
 
 class Memory:
@@ -178,9 +177,9 @@ def _take_turns(line: BareLine, talk: Iterator[list[tuple[bytes, int]]],
     return done, time.monotonic() - begun
 
 
-def measure_without_waiting(loops: int = 7) -> tuple[float, float, float]:
+def measure_without_waiting(loops: int = 7, count: int = 2000) -> tuple[float, float, float]:
     """Return s of processor time, calls of Python functions and of C functions of each."""
-    replies = [reply for _, reply in map(_frames, range(1, _IN_MEMORY + 2))]
+    replies = [reply for _, reply in map(_frames, range(1, count + 2))]
     best = min(_time_in_memory(replies) for _ in range(loops))
     calls: Counter[str] = Counter()
     sys.setprofile(lambda frame, event, argument: calls.update((event,)))
@@ -188,7 +187,7 @@ def measure_without_waiting(loops: int = 7) -> tuple[float, float, float]:
         _time_in_memory(replies)
     finally:
         sys.setprofile(None)
-    return best, calls['call'] / _IN_MEMORY, calls['c_call'] / _IN_MEMORY
+    return best, calls['call'] / count, calls['c_call'] / count
 
 
 def _time_in_memory(replies: list[bytes]) -> float:
