@@ -84,7 +84,8 @@ def begin(bench: DriverBench, random: Random, counts: list[Program]) -> None:
 
 
 @pytest.mark.parametrize(('mode', 'polling'), [
-    ('Master', 'Message'), ('Master', 'Standard'), ('Peer', 'Message')])
+    ('Master', 'Message'), pytest.param('Master', 'Standard', marks=pytest.mark.long),
+    ('Peer', 'Message')])
 def test_ours_have_their_time_and_no_guest_changes_what_we_know(mode: str, polling: str) -> None:
     alone = made(mode, polling)
     before = len(alone.listener.reads)
