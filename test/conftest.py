@@ -16,11 +16,14 @@
 """What holds for all tests: the examples of property tests, and which files begin."""
 
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 import gc
 import os
 from pathlib import Path
 from typing import Any
 
+from abdf1_ros.cli.plc.detect import LineSettings
+from abdf1_ros.settings.network import Network
 from hypothesis import HealthCheck, settings
 import pytest
 from support.ptys import Pty
@@ -62,6 +65,18 @@ def ptys(tmp_path: Path) -> Iterator[list[Pty]]:
     yield lines
     for line in lines:
         line.close()
+
+
+@pytest.fixture
+def half_duplex_only(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Let searches wait for a short time where nobody answers: in full duplex."""
+    settled = LineSettings.on
+
+    def brief(settings: LineSettings, line: Network) -> Network:
+        network = settled(settings, line)
+        return replace(network, timeout=50, cmd_timeout=50) if settings.mode == 'Peer' else network
+
+    monkeypatch.setattr(LineSettings, 'on', brief)
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:

@@ -12,30 +12,15 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""A simulated line for tests of ``plc``, and a search for settings that is soon over."""
+"""A simulated line for tests of ``plc``."""
 
 from collections.abc import Iterator
-from dataclasses import replace
 
 from abdf1_ros.cli.plc.command import main
-from abdf1_ros.cli.plc.detect import LineSettings
-from abdf1_ros.settings.network import Network
 import pytest
 from support.commands import call, Output, PATIENT, Plc
 from support.ros import Process
 from support.simulator_process import Files, make_files
-
-
-@pytest.fixture
-def half_duplex_only(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Let searches wait for a short time where nobody answers: in full duplex."""
-    settled = LineSettings.on
-
-    def brief(settings: LineSettings, line: Network) -> Network:
-        network = settled(settings, line)
-        return replace(network, timeout=50, cmd_timeout=50) if settings.mode == 'Peer' else network
-
-    monkeypatch.setattr(LineSettings, 'on', brief)
 
 
 @pytest.fixture(scope='module')
