@@ -222,7 +222,7 @@ class Driver:
         """Report that values were not taken for any of ``mappings``."""
         for mapping in mappings:
             self._listener.written(
-                WriteResult(mapping, Outcome.REFUSED, reason, show(values), 0.0, request))
+                WriteResult(mapping, Outcome.REFUSED, reason, show(values), request=request))
 
     def _active_rows(self) -> Rows:
         """Return the rows that mean work on the line."""
@@ -321,7 +321,8 @@ class Driver:
         return f'{proof}; not written again'
 
     def _end_write(self, write: Write, outcome: Outcome, detail: str = '') -> None:
-        self._listener.written(write.result(outcome, detail, self.machine.now))
+        for result in write.result(outcome, detail).of(write.origins, self.machine.now):
+            self._listener.written(result)
 
     def serve(self, command: Packet) -> Packet:
         """Execute a command of a PLC or master, after all messages that came before it."""

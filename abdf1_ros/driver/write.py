@@ -64,15 +64,15 @@ class WriteResult:
 
     - ``detail``: why the write failed, or a remark on a confirmed write, mostly empty. For an
       unconfirmed write it also says what a later read has found, or why there was no read.
-    - ``latency``: seconds from the request.
-    - ``request``: the name that the requester gave.
+    - ``latency``: seconds from the request; ``of`` sets it.
+    - ``request``: the name that the requester gave; ``of`` sets it.
     """
 
     mapping: Mapping
     outcome: Outcome
     detail: str
     value: str
-    latency: float
+    latency: float = 0.0
     request: str = ''
     error: LinkError | RemoteError | None = field(default=None, compare=False)
 
@@ -171,12 +171,10 @@ class Write:
             return held == self.raw if isinstance(held, str) else [*held] == [*self.raw]
         return words == codec.encode(self.raw)
 
-    def result(self, outcome: Outcome, detail: str, now: float,
+    def result(self, outcome: Outcome, detail: str = '',
                error: LinkError | RemoteError | None = None) -> WriteResult:
-        """Return how this write ended, for the first of its messages."""
-        first = self.origins[0]
-        return WriteResult(self.mapping, outcome, detail, self.value, now - first.published,
-                           first.request, error)
+        """Return how this write ended, for all its messages."""
+        return WriteResult(self.mapping, outcome, detail, self.value, error=error)
 
 
 def show(values: Sequence[float] | str) -> str:

@@ -174,7 +174,7 @@ def test_rule_3_beat_is_not_sent_when_it_may_be_wrong_by_then() -> None:
         own = interlocks.next(now)
         assert own is not None
         assert own.write.mapping is beat.mapping
-        own.result = own.write.result(Outcome.NOT_SENT, '', now)
+        own.result = own.write.result(Outcome.NOT_SENT)
         own.ended(None)
         return own.expires
 

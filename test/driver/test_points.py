@@ -371,11 +371,11 @@ def test_writes_of_bits_are_pulses(text: str, pulse: bool) -> None:
 
 def test_result_tells_value_latency_and_request() -> None:
     write = Write(make_mapping(command='Write', length=2), [1, -2], 10.0, 'r7')
-    result = write.result(Outcome.UNKNOWN, 'no reply', 12.5)
+    result, = write.result(Outcome.UNKNOWN, 'no reply').of(write.origins, 12.5)
     assert (result.request, result.value, result.latency) == ('r7', '[1, -2]', 2.5)
     assert result.mapping is write.mapping
     assert str(result) == 'unknown whether written: no reply'
-    assert str(write.result(Outcome.WRITTEN, '', 10.5)) == 'written'
+    assert str(write.result(Outcome.WRITTEN)) == 'written'
 
 
 @for_all(('values', 'text'), [

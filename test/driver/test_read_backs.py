@@ -52,8 +52,8 @@ class Unconfirmed:
         self.line = StillClock(EARLY)
         self.backs = ReadBacks(self.line, PATIENCE, self.results.append)
         write = Write(mapping, values, EARLY)
-        lost = write.result(Outcome.UNKNOWN, 'lost', EARLY, CommandTimeout())
-        self.backs.add(write, lost, [self.block], EARLY)
+        lost = write.result(Outcome.UNKNOWN, 'lost', CommandTimeout())
+        self.backs.add(write, lost, [self.block])
 
     def read(self, data: bytes, started: float = EARLY) -> None:
         self.line.now = EARLY + 1

@@ -30,14 +30,7 @@ import pytest
 from support.cases import for_all
 from support.mappings import make_mapping
 
-LATER = 2.5
-
 STATUS = bytes.fromhex('00ee34490535 2f3033202020202020200000060000001000'.replace(' ', ''))
-
-
-def clock() -> float:
-    """Return when a write ends that has begun at 0."""
-    return LATER
 
 
 def reply(data: bytes = b'', sts: int = 0) -> Packet:
@@ -73,7 +66,7 @@ def unsent() -> LinkError:
     ([reply(), reply(sts=0x10)], Outcome.PARTLY)])
 def test_write_of_two_packets(answers: list[Packet | LinkError], outcome: Outcome) -> None:
     write = Write(make_mapping('N7:0', 'Write', plc='SLC', length=130), [7] * 130, 0.0)
-    requests, result = converse(carry_out(write, clock), answers)
+    requests, result = converse(carry_out(write), answers)
     assert isinstance(result, WriteResult)
     assert requests == write.commands[:len(requests)]
     assert result.outcome is outcome
@@ -91,7 +84,7 @@ def test_write_of_two_packets(answers: list[Packet | LinkError], outcome: Outcom
 def test_own_write_sends_each_packet(answers: list[Packet | LinkError], outcome: Outcome) -> None:
     mapping = make_mapping('N7:0', 'Write', plc='SLC', length=130)
     write = Write(mapping, [7] * 130, 0.0, is_own=True)
-    requests, result = converse(carry_out(write, clock), answers)
+    requests, result = converse(carry_out(write), answers)
     assert isinstance(result, WriteResult)
     assert requests == write.commands[:len(answers)]
     assert result.outcome is outcome
@@ -103,15 +96,15 @@ def test_own_write_sends_each_packet(answers: list[Packet | LinkError], outcome:
     ([reply(sts=0x02)], True), ([CommandTimeout()], True), ([reply(), CommandTimeout()], True)])
 def test_what_a_read_has_to_show(answers: list[Packet | LinkError], is_unconfirmed: bool) -> None:
     write = Write(make_mapping('N7:0', 'Write', plc='SLC', length=130), [7] * 130, 0.0)
-    _, result = converse(carry_out(write, clock), answers)
+    _, result = converse(carry_out(write), answers)
     assert isinstance(result, WriteResult)
     assert result.is_unconfirmed is is_unconfirmed
 
 
 def test_broadcast_is_confirmed_by_nobody() -> None:
     write = Write(make_mapping('N7:0', 'Write', station=255), [7], 0.0)
-    _, result = converse(carry_out(write, clock), [reply()])
-    assert result == write.result(Outcome.BROADCAST, '', LATER)
+    _, result = converse(carry_out(write), [reply()])
+    assert result == write.result(Outcome.BROADCAST)
 
 
 def bit_write(processor: str | None = '5/01') -> Write:
@@ -125,15 +118,15 @@ READ = (0x0F, bytes.fromhex('A2 02 03 85 04 00'))
 
 def test_refused_bits_are_written_by_reading_their_word_and_writing_it_back() -> None:
     write = bit_write()
-    requests, result = converse(carry_out(write, clock), [REFUSED, reply(b'\xFF\xFE'), reply()])
+    requests, result = converse(carry_out(write), [REFUSED, reply(b'\xFF\xFE'), reply()])
     assert requests == [*write.commands, READ, (0x0F, bytes.fromhex('AA 02 03 85 04 00 FF FD'))]
-    assert result == write.result(Outcome.WRITTEN, REWRITTEN, LATER)
+    assert result == write.result(Outcome.WRITTEN, REWRITTEN)
     assert 'a change that the PLC made in between is lost' in REWRITTEN
 
 
 @pytest.mark.parametrize('processor, sts', [(None, 0x10), ('5/03', 0x10), ('5/01', 0x50)])
 def test_other_refusals_of_bits_stay_failures(processor: str | None, sts: int) -> None:
-    requests, result = converse(carry_out(bit_write(processor), clock), [reply(sts=sts)])
+    requests, result = converse(carry_out(bit_write(processor)), [reply(sts=sts)])
     assert isinstance(result, WriteResult)
     assert (len(requests), result.outcome) == (1, Outcome.FAILED)
 
@@ -146,14 +139,14 @@ def test_other_refusals_of_bits_stay_failures(processor: str | None, sts: int) -
     ([reply(b'\1\2'), CommandTimeout()], Outcome.UNKNOWN),
     ([reply(b'\1\2'), unsent()], Outcome.NOT_SENT)])
 def test_writing_back_that_fails(answers: list[Packet | LinkError], outcome: Outcome) -> None:
-    _, result = converse(carry_out(bit_write(), clock), [REFUSED, *answers])
+    _, result = converse(carry_out(bit_write()), [REFUSED, *answers])
     assert isinstance(result, WriteResult)
     assert result.outcome is outcome
     assert result.error is not None
 
 
 def test_reason_for_a_word_that_cannot_be_read_names_both_refusals() -> None:
-    _, result = converse(carry_out(bit_write(), clock), [REFUSED, reply(sts=0x50)])
+    _, result = converse(carry_out(bit_write()), [REFUSED, reply(sts=0x50)])
     assert isinstance(result, WriteResult)
     assert result.detail == (
         'STS 10: illegal command, format or length, or the file does not exist; its word '
@@ -164,7 +157,7 @@ def test_reason_for_a_word_that_cannot_be_read_names_both_refusals() -> None:
 def test_bits_of_two_words_of_which_one_fails_are_partly_written() -> None:
     mapping = make_mapping('B3:4/15', 'Write', plc='SLC', length=2, processor='ML1000')
     write = Write(mapping, [1, 1], 0.0)
-    requests, result = converse(carry_out(write, clock), [
+    requests, result = converse(carry_out(write), [
         REFUSED, reply(b'\0\0'), reply(), REFUSED, CommandTimeout()])
     assert requests[3:] == [write.commands[1], (0x0F, bytes.fromhex('A2 02 03 85 05 00'))]
     assert isinstance(result, WriteResult)

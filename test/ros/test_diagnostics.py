@@ -794,7 +794,7 @@ def test_last_fallback_value_of_a_station_is_told_with_its_cause(make_bench: Ben
     bench = make_bench('speed,Write,N10:1,1,PLC5,')
     row, = bench.driver.mappings
     assert 'line_a: interlocks' not in [status.name for status in bench.diagnostics.statuses(NOW)]
-    told = Write(row, [0], NOW).result(Outcome.FALLBACK, FallbackCause.TIMEOUT.value, NOW)
+    told = Write(row, [0], NOW).result(Outcome.FALLBACK, FallbackCause.TIMEOUT.value)
     bench.written(told, NOW)
     assert bench.seen.last_fallbacks == {1: ('speed: timeout', NOW)}
 

@@ -230,7 +230,7 @@ class Writing:
         pending = Pending[WriteResult]()
         try:
             # Inside the try block: an interrupt may come while the command is on the line.
-            session.start(self.mapping.station, carry_out(self._write, time.monotonic), pending)
+            session.start(self.mapping.station, carry_out(self._write), pending)
             return session.wait(pending)
         except (KeyboardInterrupt, PortLost) as error:
             session.close()
@@ -239,7 +239,7 @@ class Writing:
             failure = pending.error or error
             is_sent = getattr(failure, 'sent', True)
             outcome = Outcome.UNKNOWN if is_sent else Outcome.NOT_SENT
-            return self._write.result(outcome, str(failure), time.monotonic())
+            return self._write.result(outcome, str(failure))
 
 
 def parse_values(mapping: Mapping, texts: Sequence[str]) -> Sequence[float] | str:

@@ -16,8 +16,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-
 from abdf1_ros.df1.packet import BROADCAST, is_local_status
 from abdf1_ros.driver.write import Outcome, Write, WriteResult
 from abdf1_ros.errors import (
@@ -39,9 +37,9 @@ REWRITTEN = ('by reading the word and writing it back; a change that the PLC mad
              'lost')
 
 
-def carry_out(write: Write, clock: Callable[[], float]) -> Steps[WriteResult]:
+def carry_out(write: Write) -> Steps[WriteResult]:
     """
-    Send every packet of a write, as long as each is confirmed; ``clock`` gives seconds.
+    Send every packet of a write, as long as each is confirmed.
 
     A write of our own continues after a packet that was refused or not answered: the PLC may
     execute the remaining packets.
@@ -57,10 +55,10 @@ def carry_out(write: Write, clock: Callable[[], float]) -> Steps[WriteResult]:
             if not write.is_own or not isinstance(error, _TAKEN_OR_NOT):
                 break
     if failed is not None:
-        return _ended_early(write, _outcome_of(failed), clock(), done, failed)
+        return _ended_early(write, _outcome_of(failed), done, failed)
     is_broadcast = write.mapping.station == BROADCAST
     outcome = Outcome.BROADCAST if is_broadcast else Outcome.WRITTEN
-    return write.result(outcome, detail, clock())
+    return write.result(outcome, detail)
 
 
 def _outcome_of(error: RemoteError | LinkError) -> Outcome:
@@ -98,9 +96,9 @@ def _rewrite(write: Write, packet: int,
     check_status((yield dialect.write(address, word(old & ~mask | bits & mask))))
 
 
-def _ended_early(write: Write, outcome: Outcome, now: float, done: int,
+def _ended_early(write: Write, outcome: Outcome, done: int,
                  error: LinkError | RemoteError) -> WriteResult:
     if not done:
-        return write.result(outcome, str(error), now, error)
+        return write.result(outcome, str(error), error)
     detail = f'{error} (after {done} of {len(write.commands)} packets were written)'
-    return write.result(Outcome.PARTLY, detail, now, error)
+    return write.result(Outcome.PARTLY, detail, error)

@@ -204,7 +204,7 @@ class WriteQueue:
     def _tell(self, write: Write, origins: Iterable[Origin], outcome: Outcome, detail: str,
               now: float) -> None:
         """Report the same result for several messages of a write."""
-        for result in write.result(outcome, detail, now).of(origins, now):
+        for result in write.result(outcome, detail).of(origins, now):
             self.report(result)
 
     def _expiry(self, write: Write) -> float:

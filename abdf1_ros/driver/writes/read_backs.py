@@ -48,9 +48,9 @@ class ReadBacks(WriteListener):
         self._waiting: dict[Write, tuple[WriteResult, float]] = {}
         self.next_expiry = math.inf
 
-    def add(self, write: Write, result: WriteResult, blocks: Iterable[Block],
-            now: float) -> None:
-        """Take an unconfirmed write; report at once if none of ``blocks`` reads its words."""
+    def add(self, write: Write, result: WriteResult, blocks: Iterable[Block]) -> None:
+        """Take a write that ends unconfirmed; report at once if no block reads its words."""
+        now = self._line.now
         if any(block.extent.holds(write.mapping.extent) for block in blocks):
             self._waiting[write] = result, now
             self._plan()

@@ -60,7 +60,7 @@ class WriteJob(Job):
         # This result stays only if a bug breaks the write off; the bug also ends the use of the
         # port.
         bug = PortLost(INTERNAL_ERROR)
-        self.result = self.write.result(Outcome.UNKNOWN, str(bug), now, error=bug)
+        self.result = self.write.result(Outcome.UNKNOWN, str(bug), bug)
         self.result = yield from self._writing.carry_out(self.write)
 
     def ended(self, error: Exception | None) -> None:
@@ -90,7 +90,7 @@ class WritesUnderWay:
     def carry_out(self, write: Write) -> Steps[WriteResult]:
         """Send a write in the packets that its station accepts."""
         write.speak(self._readings.planner.dialect(write.mapping))
-        return (yield from carry_out(write, lambda: self.line.now))
+        return (yield from carry_out(write))
 
     def ended(self, job: WriteJob) -> None:
         """Report the result of each message, then record the end of the write."""
@@ -113,7 +113,7 @@ class WritesUnderWay:
     def _tell(self, write: Write, result: WriteResult) -> None:
         """Report the result of each message; an unconfirmed result waits for a read."""
         if result.is_unconfirmed:
-            self.read_backs.add(write, result, self._readings.blocks, self.line.now)
+            self.read_backs.add(write, result, self._readings.blocks)
         else:
             for each in result.of(write.origins, self.line.now):
                 self._report(each)
