@@ -190,7 +190,7 @@ ALLOWED = [(target, habit, names) for targets, habit, names in [
     ((Target.SLAVE,), Habit.NO_EOT, {'poll-idle'}),
     ((Target.SLAVE,), Habit.LAST_REPLY_FIRST, set()),
     ((Target.SLAVE,), Habit.ONE_MESSAGE_ONLY, set()),
-    ((Target.PEER,), Habit.EMBEDS_RESPONSES, set()),
+    ((Target.PEER,), Habit.EMBEDS_RESPONSES, set()), ((Target.PEER,), Habit.NAKS_STRAY_ETX, set()),
     ((Target.MASTER,), Habit.POLLS_BETWEEN_REPETITIONS, set()),
     ((Target.MASTER,), Habit.POLLS_OTHERS, set()),
     ((Target.MASTER,), Habit.POLLS_LATE, set()),

@@ -58,7 +58,8 @@ TOOK = block_time(make_job().block)
 
 def make_queue(*jobs: ReadJob) -> ReadQueue:
     queue = ReadQueue()
-    queue.replace((), jobs, 0.0)
+    for job in jobs:  # as stations come, one after the other
+        queue.replace((), [job], 0.0)
     return queue
 
 

@@ -80,7 +80,7 @@ Habit = Enum('Habit', [
     'DROPS_AT_ANY_ACK',  # also what was not sent
     'NEVER_FULL', 'TWO_REPLIES_TO_A_POLL',
     # Of a peer or client.
-    'IGNORES_BAD_CHECK', 'NAK_AS_0F', 'ENQ_IN_MESSAGE_IGNORED',
+    'IGNORES_BAD_CHECK', 'NAK_AS_0F', 'NAKS_STRAY_ETX', 'ENQ_IN_MESSAGE_IGNORED',
     'ENQ_IN_MESSAGE_ANSWERED',  # with the last response, and the message goes on
     'ENQ_ALWAYS_NAK', 'ENQ_ALWAYS_ACK', 'ENQ_NOT_ANSWERED',
     'RESPONSE_IS_DATA',  # one inside a message
@@ -542,7 +542,7 @@ class _FullDuplex(Wire):
     def take(self, symbol: Symbol) -> None:
         """React to a symbol."""
         kind = symbol[0]
-        if kind == 'broken':
+        if kind == 'broken' or kind == _ETX and self.has(Habit.NAKS_STRAY_ETX):
             self._respond(_NAK)
         elif kind == 'message':
             assert isinstance(symbol[2], bytes)

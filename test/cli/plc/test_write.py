@@ -192,13 +192,14 @@ def test_what_no_plc_could_take_is_told_before_the_port_is_opened(
     assert capsys.readouterr().err == f'plc: {text}\n'
 
 
-@pytest.mark.parametrize(('fault', 'status', 'text'), [
-    ('error 2 F0 0B', 1, 'not written: the PLC refused it: STS F0 EXT STS 0B'),
-    ('slow 2 100000', 3, 'unknown whether written: 2508 ERR_COMMAND_TIMEOUT')])
+@pytest.mark.parametrize(('fault', 'what', 'status', 'text'), [
+    ('error 2 F0 0B', 'N7:0 1', 1, 'not written: the PLC refused it: STS F0 EXT STS 0B'),
+    ('normal 2', 'B3:3/15 1 1', 3, 'only partly written: '),  # its file has words 0 to 3
+    ('slow 2 100000', 'N7:0 1', 3, 'unknown whether written: 2508 ERR_COMMAND_TIMEOUT')])
 def test_write_that_fails_says_what_came_of_it(
-        plc: Plc, simulator: Process, fault: str, status: int, text: str) -> None:
+        plc: Plc, simulator: Process, fault: str, what: str, status: int, text: str) -> None:
     simulator.say(fault)
-    said = plc('write', 'N7:0', '1', '--yes', '--station', '2', '--plc-type', 'SLC')
+    said = plc('write', *what.split(), '--yes', '--station', '2', '--plc-type', 'SLC')
     assert said.status == status
     assert text in said.err
 
