@@ -459,15 +459,7 @@ def test_start_begins_afresh() -> None:
     assert (bench.machine.data_to_send(), bench.machine.deadline) == (FRAME, 13.0)
 
 
-def _deaf(machine: Machine) -> None:
-    machine.handle_timeout(0.0)
-
-
-def _stopped(machine: Machine) -> None:
-    machine.stop()
-
-
-@pytest.mark.parametrize('prepare', [_deaf, _stopped])
+@pytest.mark.parametrize('prepare', [lambda machine: machine.handle_timeout(0.0), Machine.stop])
 def test_characters_are_counted_in_both_directions(prepare: Callable[[Machine], None]) -> None:
     machine = Bench(Send(FRAME, None), Send(EOT, None), start=None).machine
     machine.start(0.0)

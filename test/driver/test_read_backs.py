@@ -146,19 +146,10 @@ def bench_of(text: str = 'N7:0', **cells: int) -> tuple[DriverBench, Mapping]:
     return bench, mapping
 
 
-def no_replies(data: bytes) -> bytes:
-    """Let no message through."""
-    return b'' if data.startswith(STX) else data
-
-
-def nothing(data: bytes) -> bytes:
-    """Let nothing through."""
-    return b''
-
-
 @pytest.mark.parametrize(('which', 'through', 'detail', 'held'), [
-    ('say', no_replies, 'read back: the PLC holds the value', b'\7\0'),
-    ('hear', nothing, 'read back: the PLC holds another value', b'\0\0')])
+    ('say', lambda data: b'' if data.startswith(STX) else data,
+     'read back: the PLC holds the value', b'\7\0'),
+    ('hear', lambda data: b'', 'read back: the PLC holds another value', b'\0\0')])
 def test_lost_reply_and_lost_command_are_told_apart(
         which: str, through: Callable[[bytes], bytes], detail: str, held: bytes) -> None:
     bench, mapping = bench_of()
@@ -175,7 +166,7 @@ def test_lost_reply_and_lost_command_are_told_apart(
 
 def test_lost_port_leaves_no_write_without_a_result() -> None:
     bench, mapping = bench_of()
-    bench.far.say = nothing
+    bench.far.say = lambda data: b''
     bench.write(mapping, [7], run=1.0)
     bench.lose_port()
     result, = bench.listener.results

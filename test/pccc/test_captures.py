@@ -187,16 +187,10 @@ _READ: dict[tuple[int, int], Callable[[Reader], Any]] = {
 _DIAGNOSTICS = 0x06  # what a processor says of itself depends on its state
 
 
-def server_of(capture: Capture) -> Server:
-    """Return a server that has the words of the capture's server."""
-    return Server(
-        capture.table(), EmulatedProcessor(is_full_duplex=True),
-        families.served_counters(Counters(), capture.family, 'Peer'))
-
-
 @pytest.mark.parametrize('capture', CAPTURES, ids=lambda capture: capture.name)
 def test_our_server_answers_as_it_was_answered(capture: Capture) -> None:
-    server = server_of(capture)
+    server = Server(capture.table(), EmulatedProcessor(is_full_duplex=True),
+                    families.served_counters(Counters(), capture.family, 'Peer'))
     compared = 0
     for exchange in capture.exchanges():
         reply = server.serve(exchange.command)

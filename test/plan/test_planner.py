@@ -88,17 +88,14 @@ def _longest(text: str) -> int:
     return 3 if '/' in text else 11 if text.startswith('PD') else 40
 
 
-def period_of(mapping: Mapping) -> float:
-    return 0.1 if mapping.period is None else mapping.period / 1000
-
-
 def check_plan(mappings: Sequence[Mapping], blocks: Sequence[Block]) -> None:
     """Check what every plan has to be."""
     served = [mapping for block in blocks for mapping in block.mappings]
     assert sorted(mapping.tag for mapping in served) == sorted(
         mapping.tag for mapping in mappings if mapping.reads)
     for block in blocks:
-        assert block.period == min(map(period_of, block.mappings))
+        assert block.period == min(0.1 if mapping.period is None else mapping.period / 1000
+                                   for mapping in block.mappings)
         first = block.mappings[0]
         limit = first.dialect.max_read(first.address.file_type)
         at = block.start.offset

@@ -69,15 +69,10 @@ print(has_network())
 """
 UNSET = ('ROS_AUTOMATIC_DISCOVERY_RANGE', 'ROS_LOCALHOST_ONLY')
 REHEARSAL = Path(__file__).parents[1] / 'lab' / 'rehearsal' / 'run.py'
-
-
-def has_namespaces() -> bool:
-    """Tell whether this user may make network namespaces here."""
-    return not os.geteuid() and shutil.which('ip') is not None and subprocess.run(
-        ['unshare', '--net', 'true'], check=False, capture_output=True).returncode == 0
-
-
-NEEDS_NAMESPACES = pytest.mark.skipif(not has_namespaces(), reason='namespaces need root')
+NEEDS_NAMESPACES = pytest.mark.skipif(
+    os.geteuid() or shutil.which('ip') is None or subprocess.run(
+        ['unshare', '--net', 'true'], check=False, capture_output=True).returncode,
+    reason='namespaces need root')
 
 
 def test_node_notices_that_its_files_are_gone() -> None:

@@ -19,7 +19,6 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
 
 from abdf1_ros.df1.checksum import Checksum
 from abdf1_ros.df1.packet import Packet
@@ -102,9 +101,7 @@ class Capture:
         return table
 
 
-def _capture(name: str, entry: dict[str, Any]) -> Capture:
-    return Capture(name, entry['client'], entry['server'], PlcType(entry['family']),
-                   Checksum(entry['check']), entry['words'], entry['replies'])
-
-
-CAPTURES = tuple(_capture(name, entry) for name, entry in load_json('captures/index.json').items())
+CAPTURES = tuple(
+    Capture(name, entry['client'], entry['server'], PlcType(entry['family']),
+            Checksum(entry['check']), entry['words'], entry['replies'])
+    for name, entry in load_json('captures/index.json').items())
