@@ -282,7 +282,6 @@ class GuestQueue:
             guest.waiting.append(command)
             if guest not in self.waiting:
                 self.waiting.append(guest)
-        self._look()
 
     @staticmethod
     def _give_up(command: GuestCommand, sts: int) -> None:
