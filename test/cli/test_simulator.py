@@ -26,8 +26,9 @@ import subprocess
 import sys
 import termios
 import time
+from unittest.mock import Mock
 
-from abdf1_ros.cli.simulator import main
+from abdf1_ros.cli.simulator import Cast, main, parse_options
 from abdf1_ros.df1 import frames
 from abdf1_ros.df1.checksum import Checksum
 import pytest
@@ -273,6 +274,17 @@ def test_on_a_port_of_a_device_server(start: Start) -> None:
             simulator.send(signal.SIGTERM)
             _ended(simulator)
         assert simulator.lines == [f'{READY}{name}, CRC']
+
+
+def test_timers_depend_on_the_speed_of_a_port_alone(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr('abdf1_ros.cli.simulator.LinkThread', links := Mock())
+    with socket.create_server(('127.0.0.1', 0)) as server:
+        port = f'--port=socket://127.0.0.1:{server.getsockname()[1]}'
+        for line in (port, '--tcp=127.0.0.1:0', '--baud=4800'):
+            for duplex in ('--full-duplex=1', '--radio'):
+                Cast(parse_options([line, duplex, '--baud=4800'])).close()
+    assert [call.args[0].timing.char_time for call in links.call_args_list] == [
+        10 / 4800, 10 / 4800, 0, 0, 0, 0]
 
 
 def test_simulator_goes_on_when_nobody_reads_it_and_ends_when_told(data: Path) -> None:

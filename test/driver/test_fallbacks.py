@@ -493,21 +493,22 @@ def test_rule_10_once_more_after_a_message_that_may_have_been_written(
     assert row.judge(60.0, -math.inf) is again
 
 
-@for_all('is_known', [True, False])  # the words of its command; others are hardly these
+@for_all(('is_known', 'done', 'is_again'), [  # the words of its command; others are hardly these
+    (True, 0.1, True), (False, 0.1, False), (True, 0.0, False)])  # 0.0: ours began just after it
 def test_rule_8_0_that_a_guest_may_have_written_over_meanwhile_is_written_once_more(
-        is_known: bool) -> None:
+        is_known: bool, done: float, is_again: bool) -> None:
     words = OneRow().record.words_of(beat_row())
     beat = HeartbeatRow(words, 1, Random(0))
     beat.begin(0.0, is_new=True)
     ours = Claim(1, [words.row.extent], beat.take(0.0), 0.0)
     guest = Claim(1, ours.extents if is_known else None)
-    guest.end(Outcome.UNKNOWN, 0.1, 1.0)
+    guest.end(Outcome.UNKNOWN, done, 1.0)
     words.ended(guest)
     ours.end(Outcome.WRITTEN, 0.2, 0.0)
     words.ended(ours)
     beat.ended(Outcome.WRITTEN, 0.2)
-    assert beat.judge(0.2, '', 0.2, {}) is is_known
-    assert beat.is_first_try is is_known
+    assert beat.judge(0.2, '', 0.2, {}) is is_again
+    assert beat.is_first_try is is_again
 
 
 def test_rule_10_heartbeat_counts_after_a_0_that_is_written_once_more() -> None:
