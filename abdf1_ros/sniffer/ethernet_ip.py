@@ -155,9 +155,12 @@ class _Connections:
         self._streams: defaultdict[bytes, _Stream] = defaultdict(_Stream)
         self._stations = _Stations()
 
-    def feed(self, ends: bytes, number: int, payload: bytes,
-             time: float | None) -> Iterator[Chunk]:
+    def feed(self, ends: bytes, number: int, payload: bytes, time: float | None, *,
+             is_first: bool) -> Iterator[Chunk]:
         """Take a segment between these addresses and ports; yield the PCCC that it completes."""
+        if is_first and ends in self._streams:  # an earlier connection had the same ports
+            yield from self._flush(ends, time)
+            del self._streams[ends]
         if len(self._streams) > _MOST_STREAMS:
             self._streams.clear()
         for message in self._streams[ends].feed(number, payload):
@@ -165,9 +168,12 @@ class _Connections:
 
     def flush(self, time: float | None) -> Iterator[Chunk]:
         """Yield what is complete although bytes before it are missing."""
-        for ends, stream in list(self._streams.items()):
-            for message in stream.flush():
-                yield from self._chunks(ends, message, time)
+        for ends in [*self._streams]:
+            yield from self._flush(ends, time)
+
+    def _flush(self, ends: bytes, time: float | None) -> Iterator[Chunk]:
+        for message in self._streams[ends].flush():
+            yield from self._chunks(ends, message, time)
 
     def _chunks(self, ends: bytes, message: bytes, time: float | None) -> Iterator[Chunk]:
         way = Direction.OUT if ends[10:12] == _PORT.to_bytes(2, 'big') else Direction.IN
@@ -209,18 +215,23 @@ def chunks_of(packets: Iterable[RecordedPacket], seen: SeenPackets) -> Iterator[
         elif link_type == _RTAC and len(data) > 12 and data[8] in _RTAC_EVENTS:
             yield Chunk(later, _RTAC_EVENTS[data[8]], data[12:])
         elif (segment := _tcp(link_type, data)) is not None:
-            ends, number, payload, is_cut = segment
+            ends, number, payload, is_first, is_cut = segment
             both = {int.from_bytes(ends[8:10], 'big'), int.from_bytes(ends[10:], 'big')}
             seen.ports |= both
             if _PORT in both and is_cut:
                 seen.cut.append(len(data))
             elif _PORT in both:
-                yield from connections.feed(ends, number, payload, later)
+                yield from connections.feed(
+                    ends, number, payload, later, is_first=is_first)
     yield from connections.flush(later)
 
 
-def _tcp(link_type: int, data: bytes) -> tuple[bytes, int, bytes, bool] | None:
-    """Return addresses with ports, sequence number, payload, and whether the segment is cut."""
+def _tcp(link_type: int, data: bytes) -> tuple[bytes, int, bytes, bool, bool] | None:
+    """
+    Return addresses with ports, sequence number and payload.
+
+    Also return whether the segment begins a connection, and whether it is cut.
+    """
     start, kind = _LINKS.get(link_type, (len(data), None))
     if kind is not None:
         while data[kind:kind + 2] in _TAGS:
@@ -236,9 +247,9 @@ def _tcp(link_type: int, data: bytes) -> tuple[bytes, int, bytes, bool] | None:
     if len(segment) < 20:
         return None
     ports, number = segment[:4], int.from_bytes(segment[4:8], 'big')
-    is_first = segment[13] & 0x02
+    is_first = bool(segment[13] & 0x02)
     payload = segment[4 * (segment[12] >> 4):]
-    return head[12:20] + ports, number + bool(is_first), payload, len(head) < end
+    return head[12:20] + ports, number + is_first, payload, is_first, len(head) < end
 
 
 def _pccc(message: bytes) -> Iterator[tuple[bool, bytes]]:
