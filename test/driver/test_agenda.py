@@ -281,7 +281,8 @@ def test_dropped_writes_all_have_their_result() -> None:
     assert bench.next(1.0) is None
 
 
-def test_read_that_shows_a_write_is_due_at_once() -> None:
+@pytest.mark.parametrize('outcome', [Outcome.WRITTEN, Outcome.PARTLY])
+def test_read_that_shows_a_write_is_due_at_once(outcome: Outcome) -> None:
     covers, beside = make_job('N7:5', period=10_000), make_job('N9:5', period=10_000)
     elsewhere = make_job('N7:5', station=2, period=10_000)
     bench = Bench(covers, beside, elsewhere)
@@ -289,7 +290,7 @@ def test_read_that_shows_a_write_is_due_at_once() -> None:
         bench.read(0.0)
     write = bench.write(WORD, 1, 1.0)
     assert bench.next(1.0) is write
-    bench.reads.write_ended(written(write, 1.5))
+    bench.reads.write_ended(written(write, 1.5, outcome))
     assert bench.agenda.next_due() == 1.5
     assert [bench.read(1.5), bench.read(1.5)] == [covers, None]
     assert bench.read(5.0) is None  # the entry of before is void

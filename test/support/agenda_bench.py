@@ -58,10 +58,11 @@ def make_job(text: str = 'N7:0', station: int = 1, period: int = 100) -> ReadJob
                    lambda job, words, error: None, math.inf)
 
 
-def written(write: Write, now: float) -> Claim:
-    """Return a write that has been confirmed."""
-    claim = Claim(write.mapping.station, [write.mapping.extent], write)
-    claim.done = claim.lands_until = now
+def written(write: Write, now: float, outcome: Outcome = Outcome.WRITTEN) -> Claim:
+    """Return a write that has ended, by default a confirmed one."""
+    record = WriteRecord(StillClock(now), 1.0)
+    claim = record.begin(write.mapping.station, [write.mapping.extent], write)
+    record.ended(claim, outcome)
     return claim
 
 
