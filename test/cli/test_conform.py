@@ -102,11 +102,15 @@ def test_simulator_is_a_node_of_a_radio_network_and_not_a_peer(
         tmp_path: Path, capsys: Output) -> None:
     port = str(tmp_path / 'plc')
     options = ('--port', port, '--only')
-    with running_simulator('--pty', port, '--radio'):
+    with running_simulator('--pty', port, '--radio') as simulator:
         assert main(['radio', *options, 'read-words']) == 0
         assert '1 passed, 0 failed, 0 skipped' in capsys.readouterr().out
         assert main(['peer', *options, 'message-acknowledged', '--answer-time', '0.1']) == 1
         assert 'FAIL  message-acknowledged' in capsys.readouterr().out
+        simulator.type('silent 1\n')
+        simulator.wait_for('simulator: station 1: silent')
+        assert main(['radio', *options, 'read-words', '--answer-time', '0.1']) == 1
+        assert 'no byte was received' in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(('args', 'status', 'text'), [
