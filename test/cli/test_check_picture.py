@@ -75,6 +75,7 @@ def test_periods_that_cannot_be_kept_are_red(tmp_path: Path, capsys: Output) -> 
     found = elements(page)
     assert found.bars('bad') == 2 * (len(ROWS) + 1)  # a line that is too busy keeps none
     assert found.bars('ask') == 1  # without a Period there is nothing to keep
+    assert found.found.count(('b', {'class': 'is-bad'})) == len(ROWS) + 1  # in the table
     assert any(text.startswith('4 of 5 reads cannot keep the Period') for text in found.texts)
     said, page = drawn(tmp_path, capsys)  # it replaces its own page
     assert (said.status, elements(page).bars('bad')) == (0, 0)

@@ -171,12 +171,14 @@ def test_segments_are_put_together_and_those_that_come_again_are_dropped(tmp_pat
     parts = [(b'', -1, 0x02), (data[:10], 0, 0x18), (data[:10], 0, 0x18), (data[5:30], 5, 0x18),
              (data[30:] + again, 30, 0x18),
              (b'lost before this', 9999, 0x18), (data, 20000, 0x18),
+             (data[:40], 21000, 0x18), (data[40:], 21040, 0x18),  # what is complete at its end
              (b'', 4999, 0x02), (data, 5000, 0x18)]  # the same ports in a later connection
     packets = [(float(at), ethernet(tcp(part, 0xFFFFFFF0 + number, flags=flags)))
                for at, (part, number, flags) in enumerate(parts)]
     found = chunks_of(tmp_path / 'x', pcap(packets))
     assert [(chunk.time, chunk.data[4:6].hex()) for chunk in found] == [
-        (4.0, '63c5'), (4.0, '0100'), (6.0, '63c5'), (8.0, '63c5')]
+        (4.0, '63c5'), (4.0, '0100'), (6.0, '63c5'), (9.0, '63c5'),
+        (10.0, '63c5')]
 
 
 @for_all(('cuts', 'order'), [  # 58 bytes a message
