@@ -61,6 +61,7 @@ def speed(after: int = 3000, command: str = 'Write', station: int = 1) -> Mappin
     # after which a frame has broken off.
     (Network(), 8.0 + 4 * (0.02 + 10 * 10 / 9600)), (QUICK, 1.1 + 2 * QUIET),
     (replace(QUICK, enq_retries=5), 1.9 + 6 * QUIET),
+    (replace(QUICK, cmd_timeout=50), 3 * 0.2 + 0.2 + 2 * QUIET),  # Timeout is longer
     (replace(QUICK, timeout=0), 3 * 0.02 + 0.5 + 2 * QUIET),  # not less is waited than that
     (replace(QUICK, mode='Peer', nak_retries=3), 1.5 + 4 * QUIET + 0.1 + 3 * 0.25),
     # Two tries: Cmd_Timeout and what comes in then; before it, as often as there are turns, 2 s of

@@ -242,6 +242,11 @@ def test_motion_goes_on_from_what_was_written(path: Path, clock: Clock) -> None:
     plc.handle(ACKNOWLEDGED)
     clock.now += 0.1
     assert master.number('N7:0') == 101
+    plc.set_mode(Setting.PROGRAM)
+    clock.now += 5.0  # no step of this time is made up for
+    plc.set_mode(Setting.REMOTE)
+    clock.now += 0.05
+    assert master.number('N7:0') == 102
 
 
 @pytest.fixture
