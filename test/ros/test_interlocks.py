@@ -66,7 +66,7 @@ Station,PLC_Type,Address,Length,Values,Motion,Period
 
 MARK = b'GUEST'  # what is easily known in a command
 
-ATTEMPTS = 8  # to be seen by a host that is not busy
+ATTEMPTS = 16  # to be seen by a host that is not busy
 
 
 class Cell(BridgeCell):

@@ -100,10 +100,9 @@ def listen(ros: Observer, tmp_path: Path, ptys: list[Pty], *, is_full: bool) -> 
         assert any(key == 'heard of station 1: protected typed logical read N7:0, 2 words'
                    for key in shown)
         if is_full:  # it takes 10 s
-            mappings = until_status(
-                diagnostics, 'mappings', ERROR,
-                lambda status: 'no other node reads it' in details(status).get('unread', ''))
-            assert 'levels' not in details(mappings)
+            until_status(  # on a busy host levels is stale at times
+                diagnostics, 'mappings', ERROR, lambda status: 'levels' not in details(status)
+                and 'no other node reads it' in details(status).get('unread', ''))
         answer = ros.call(Trigger, '/abdf1/read_link_counters', Trigger.Request())
         assert (answer.success, answer.message) == (False, 'Mode Listen: nothing is sent')
         master.is_over.set()
