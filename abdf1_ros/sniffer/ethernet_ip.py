@@ -221,8 +221,7 @@ def chunks_of(packets: Iterable[RecordedPacket], seen: SeenPackets) -> Iterator[
             if _PORT in both and is_cut:
                 seen.cut.append(len(data))
             elif _PORT in both:
-                yield from connections.feed(
-                    ends, number, payload, later, is_first=is_first)
+                yield from connections.feed(ends, number, payload, later, is_first=is_first)
     yield from connections.flush(later)
 
 
