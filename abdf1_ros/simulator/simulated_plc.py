@@ -228,6 +228,7 @@ class SimulatedPlc(TaskSource):
         """Switch power off and on: words stay, waiting messages are lost."""
         self.advance()
         self.slave.reset()
+        self.outbox.clear()
         self._set_ladder()
 
     def _set_ladder(self) -> None:

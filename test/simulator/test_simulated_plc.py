@@ -367,8 +367,10 @@ def test_power_cycle_keeps_words_and_begins_anew() -> None:
     clock, plc = _with_ladder()
     store(plc, 'N10:0', [5, 42])
     plc.handle(Frame(Packet(1, 5, 0x06, 0, 1, b'\x03').encode(), 1))
+    plc.send(parse_address('N7:0', plc.table.plc_type), [1], 5, lambda outcome: None)
     clock.now += 1.0
     plc.cycle_power()
+    assert plc.next_task(clock.now) is None
     assert plc.handle(Poll(1, True)) == frames.EOT
     plc.advance()
     assert stored(plc, 'N10:0', 2) == bytes([5, 0, 42, 0])
