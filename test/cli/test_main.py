@@ -142,6 +142,17 @@ def test_signal_before_a_command_has_its_own_handlers_ends_quietly(
     assert end.value.code == {**NAMES, 'conform': ('', 130)}[name][1]
 
 
+def test_process_with_threads_of_rclpy_or_pyserial_ends_at_once() -> None:
+    for name in COMMANDS:
+        program = (f'import atexit, sys, types; from abdf1_ros.cli.main import COMMANDS, run\n'
+                   f'sys.modules[COMMANDS["{name}"][0]] = types.SimpleNamespace(main=lambda: 3)\n'
+                   f'atexit.register(print, "later"); print("said"); sys.exit(run("{name}"))')
+        done = subprocess.run([sys.executable, '-c', program], text=True, stdout=subprocess.PIPE,
+                              timeout=PATIENCE, check=False)
+        ends_later = name not in ('node', 'lines', 'simulator')
+        assert (done.returncode, done.stdout) == (3, 'said\n' + 'later\n' * ends_later), name
+
+
 @pytest.mark.parametrize(('name', 'module', 'cure'), [
     ('node', 'rclpy', 'is ROS 2 sourced, as by ". /opt/ros/jazzy/setup.bash"?'),
     ('plc', 'serial', '"pip install pyserial", or "make setup" in a checkout'),
