@@ -107,9 +107,8 @@ def descriptor() -> Iterator[Callable[[Path], int]]:
 
 @pytest.mark.parametrize(('check', 'number'), [
     (Checksum.CRC, signal.SIGTERM), (Checksum.BCC, signal.SIGINT)])
-def test_on_a_pty_until_a_signal(
-        start: Start, tmp_path: Path, descriptor: Callable[[Path], int], check: Checksum,
-        number: signal.Signals) -> None:
+def test_on_a_pty_until_a_signal(start: Start, tmp_path: Path, descriptor: Callable[[Path], int],
+                                 check: Checksum, number: signal.Signals) -> None:
     name = tmp_path / 'plc'
     simulator = start('--pty', str(name), '--check', check.value)
     simulator.wait_for(f'{READY}{name}, {check.value}')

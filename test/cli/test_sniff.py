@@ -290,7 +290,8 @@ def test_pipe_into_which_nobody_writes_until_a_signal(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(('way', 'number'), [
-    ('file', signal.SIGTERM), ('--port', signal.SIGINT), ('--tap', signal.SIGTERM)])
+    ('file', signal.SIGTERM), ('--tap', signal.SIGINT),
+    pytest.param('--port', signal.SIGINT, marks=pytest.mark.long)])
 def test_signal_ends_it_while_its_output_is_not_taken(
         tmp_path: Path, capture: str, way: str, number: signal.Signals) -> None:
     """After Ctrl-S, or with ``| less``, it printed for ever."""

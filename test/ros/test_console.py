@@ -101,6 +101,8 @@ def test_fallback_and_end_come_in_time_where_nothing_reads_the_log(
 HANGS = """
 import sys, time
 from abdf1_ros.ros.bridge.node import BridgeNode
+from abdf1_ros.ros.process import main
+main._END_LIMIT = 2.0
 BridgeNode.begin_end = lambda node: time.sleep(99)
 from abdf1_ros.cli.main import run
 sys.exit(run('node'))

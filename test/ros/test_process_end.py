@@ -100,7 +100,8 @@ HANGS = {'held': 'ctypes.PyDLL(None).sleep(60)', 'slow': 'time.sleep(60)'}
 @pytest.mark.parametrize(('name', 'where', 'how', 'limit', 'status'), [
     ('node', 'destroy_node', 'slow', 'early', 0),  # PLCs and writes are done
     ('node', 'destroy_node', 'held', 'soon', 1),  # with the interpreter lock: no code of ours runs
-    ('node', 'check', 'slow', 'usual', 1), ('lines', 'check', 'slow', 'soon', 1)])
+    pytest.param('node', 'check', 'slow', 'usual', 1, marks=pytest.mark.long),
+    ('lines', 'check', 'slow', 'soon', 1)])
 def test_clock_ends_what_does_not_come_back(
         tmp_path: Path, name: str, where: str, how: str, limit: str, status: int) -> None:
     patch = (f'{LIMITS[limit]}from abdf1_ros.ros.bridge.node import BridgeNode\n'

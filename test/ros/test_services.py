@@ -264,10 +264,10 @@ def test_caller_of_a_killed_bridge_ends_by_its_own_limit(tmp_path: Path) -> None
         observer.until(lambda: observer.call(*HEARTBEAT).success, 'the PLC')
         simulator.say('delay 2 60000')
         callers = [threading.Thread(target=lambda client, name, kind: answers.update(
-            {name: client.call(kind.Request(), 4.0)}), args=call) for call in calls]
+            {name: client.call(kind.Request(), 2.0)}), args=call) for call in calls]
         for caller in callers:
             caller.start()
-        observer.wait(lambda: False, 1.0)
+        observer.wait(lambda: False, 0.5)
         node.send(signal.SIGKILL)
         assert node.result() == -signal.SIGKILL
         observer.until(lambda: not any(caller.is_alive() for caller in callers), 'their ends')

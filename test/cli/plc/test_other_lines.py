@@ -119,7 +119,7 @@ def test_detect_of_what_is_not_understood(tmp_path: Path, files: Files, capsys: 
     port = str(tmp_path / 'line')
     with running_simulator('--pty', port, '--data', str(files.simulator), '--check', 'BCC'):
         said = call(main, capsys, 'detect', '--port', port, '--stations', '2', '--check', 'CRC',
-                    '--duplex', 'half', '--baud', '9600', '--timeout', '2000')
+                    '--duplex', 'half', '--baud', '9600', '--timeout', '1000')
     assert said.status == 1
     assert told(said) == ['plc: nothing answers with any of these settings, tried 2 times',
                           'plc: 9600 baud, half duplex, CRC: 4 characters came',
@@ -169,9 +169,8 @@ def test_echo_alone_is_no_plc(echoing: Process, capsys: Output,
 
 
 @pytest.mark.parametrize('args', [('detect',), ('init', '--into', 'new')])
-def test_detect_finds_nobody_in_an_echo(
-        echoing: Process, capsys: Output, args: tuple[str, ...],
-        tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_detect_finds_nobody_in_an_echo(echoing: Process, capsys: Output, args: tuple[str, ...],
+                                        tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     for station in (1, 2):
         echoing.say(f'silent {station}')
@@ -198,7 +197,7 @@ def test_plcs_behind_a_radio_modem(tmp_path: Path, files: Files, capsys: Output)
         assert (watched.status, watched.lines[-1].split()[1:]) == (0, ['N7:0', '7'])
         assert call(main, capsys, 'status', '2', *line).lines[0].startswith('station 2: SLC 5/03')
         # 5 is ours usually.
-        found = call(main, capsys, 'scan', '1-2,5', '--timeout', '2000', *line)
+        found = call(main, capsys, 'scan', '1-2,5', '--timeout', '1000', *line)
         assert found.lines[-1] == '2 of 3 stations answer; silent stations were asked 2 times'
         process.say('silent 2')
         process.wait_for('station 2: silent')

@@ -89,9 +89,8 @@ def test_write_to_an_input_is_told(plc: Plc) -> None:
     ('N7:50', ('70000',), ('--type', 'int32'), ['N7:50 70000']),
     ('N7:52', ('abcde',), ('--type', 'string'), ["N7:52 'abcde'"]),
     ('C5:2.PRE', ('9',), (), ['C5:2.PRE 9'])])
-def test_write_is_read_back_and_shown(
-        plc: Plc, address: str, values: tuple[str, ...], options: tuple[str, ...], lines:
-        list[str]) -> None:
+def test_write_is_read_back_and_shown(plc: Plc, address: str, values: tuple[str, ...],
+                                      options: tuple[str, ...], lines: list[str]) -> None:
     said = plc('write', address, *values, '--yes', '--station', '2', *options)
     assert (said.status, said.lines, said.err) == (
         0, [f'{address} of station 2: written; now:', *lines], '')
