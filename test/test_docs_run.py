@@ -56,9 +56,8 @@ def expect(shown: list[str], said: list[str]) -> None:
 
 @pytest.mark.usefixtures('half_duplex_only')
 @pytest.mark.parametrize('name', PAGES)
-def test_marked_blocks_do_what_they_show(
-        name: str, port: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch,
-        capsys: Output) -> None:
+def test_marked_blocks_do_what_they_show(name: str, port: Path, tmp_path: Path,
+                                         monkeypatch: pytest.MonkeyPatch, capsys: Output) -> None:
     monkeypatch.chdir(tmp_path)
     script = tmp_path / 'plc'  # where the command has its short name
     script.write_text('#!/bin/sh\n# of abdf1_ros\n')

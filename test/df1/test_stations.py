@@ -235,9 +235,8 @@ def counted(counters: Counters) -> dict[str, int]:
     (FrameFault.TOO_SHORT, Checksum.BCC, 'invalid_messages', (2513, 6)),
     (FrameFault.TOO_LONG, Checksum.CRC, 'invalid_messages', (2512, 261))])
 @for_all('station', [None, 7])
-def test_fault_has_its_counter_and_its_event(
-        fault: FrameFault, checksum: Checksum, counter: str, event: tuple[int, ...], station: int |
-        None) -> None:
+def test_fault_has_its_counter_and_its_event(fault: FrameFault, checksum: Checksum, counter: str,
+                                             event: tuple[int, ...], station: int | None) -> None:
     counters = Counters()
     said = count_fault(Frame(b'', None, fault, 0x1234, 0xABCD), checksum, counters, station)
     assert counted(counters) == {counter: 1}

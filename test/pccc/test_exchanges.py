@@ -63,11 +63,7 @@ class Call:
 
 @dataclass(frozen=True, slots=True)
 class Exchange:
-    """
-    A command to a PLC of ``family`` and its reply.
-
-    ``before`` and ``after`` are words of its files by address.
-    """
+    """A command to a PLC of ``family`` and its reply; ``before``, ``after``: words of files."""
 
     name: str
     family: PlcType

@@ -79,8 +79,7 @@ def test_offset_leads_back_to_its_word(kind: FileType, data: st.DataObject,
         ('N7:10000', 'elements of N run from 0 to 9999'), ('N7:0/20', 'bits run from 0 to 17'),
         ('E3.1.8.0.0.10000', 'elements of B run from 0 to 9999'),
         ('I:10000', 'elements of I run from 0 to 7777 (octal)')))])
-def test_what_is_no_address_or_out_of_range(
-        error: type[Exception], text: str, right: str) -> None:
+def test_what_is_no_address_or_out_of_range(error: type[Exception], text: str, right: str) -> None:
     with pytest.raises(error) as fault:
         parse_address(text, PLC3)
     assert right in str(fault.value)

@@ -278,9 +278,8 @@ PIECES = strategies.tuples(
 
 @given(strategies.lists(PIECES, max_size=30),
        strategies.sampled_from([None, *Checksum]), strategies.sampled_from([None, *Duplex]))
-def test_any_bytes_in_any_chunks(
-        said: list[tuple[float, Direction, bytes]], checksum: Checksum | None,
-        duplex: Duplex | None) -> None:
+def test_any_bytes_in_any_chunks(said: list[tuple[float, Direction, bytes]],
+                                 checksum: Checksum | None, duplex: Duplex | None) -> None:
     session = TrafficDecoder(checksum, duplex)
     for chunk in said:
         for entry in session.feed(Chunk(*chunk)):

@@ -152,11 +152,7 @@ class Rig(HeardNode):
             {values_in(message)[0] for message in self.setpoint} <= {*setpoints}
 
     def kill_simulator(self) -> None:
-        """
-        Let the PLCs lose their power.
-
-        The name of their terminal goes first: it would stay, and soon lead to another test's.
-        """
+        """Cut the PLCs' power; their terminal's name goes first, before another test gets it."""
         self.files.port.unlink(missing_ok=True)
         self.simulator.send(signal.SIGKILL)
 
@@ -169,11 +165,7 @@ class Rig(HeardNode):
 @contextmanager
 def rigged(observer: Observer, files: Files, port: str, simulator: Process, *assignments: str,
            program: str | Path = 'node', name: str = 'abdf1') -> Iterator[Rig]:
-    """
-    Run the node on ``port`` while the block runs, against a simulator that runs already.
-
-    Two nodes at a time need different names.
-    """
+    """Run the node on ``port`` with a running simulator; two nodes at a time need two names."""
     rig = Rig(observer, name, port, files, simulator)
     arguments = ros_args(f'net_file:={files.net}', f'map_file:={files.map}', f'port:={port}',
                          OFTEN, *assignments)

@@ -26,11 +26,7 @@ from support.driver_bench import Recorder
 
 
 class ListeningBench:
-    """
-    A driver in Mode Listen, and the clock of its line.
-
-    With ``has_two_ports`` what the far side says comes from the second one.
-    """
+    """A driver in Mode Listen and its clock; ``has_two_ports``: the far side has its own."""
 
     def __init__(self, mappings: Sequence[Mapping], *, has_two_ports: bool = False,
                  check: str = 'CRC', cmd_timeout: int = 1000) -> None:

@@ -34,16 +34,12 @@ HEADER = ','.join(COLUMNS)
 _TYPES = {kind.value: kind for kind in ValueType}
 
 
-def make_mapping(text: str = 'N7:0', command: str = 'Read', *, station: int = 1,
-                 plc: str = 'PLC5', length: int = 1, kind: str | None = None,
-                 publish: str = 'Always', tag: str | None = None, topic: str | None = None,
-                 item: int = 1, word_order: str = 'Low', access: str | None = None,
-                 processor: str | None = None, **others: Any) -> Mapping:
-    """
-    Return what a row of these cells becomes; its name is the address unless told.
-
-    ``others`` are attributes of the mapping.
-    """
+def make_mapping(
+        text: str = 'N7:0', command: str = 'Read', *, station: int = 1, plc: str = 'PLC5',
+        length: int = 1, kind: str | None = None, publish: str = 'Always', tag: str | None = None,
+        topic: str | None = None, item: int = 1, word_order: str = 'Low',
+        access: str | None = None, processor: str | None = None, **others: Any) -> Mapping:
+    """Return what a row becomes, named by its address; ``others``: attributes of the mapping."""
     way = Access(access) if access else None
     address = parse_address(text, PlcType(plc), way)
     name = tag or f'{text}_{station}_{command}_{length}'

@@ -341,9 +341,9 @@ def details(status: DiagnosticStatus) -> dict[str, str]:
     return {value.key: value.value for value in status.values}
 
 
-def until_status(inbox: Inbox, name: str, level: bytes,
-                 condition: Callable[[DiagnosticStatus], bool] = lambda status: True,
-                 ) -> DiagnosticStatus:
+def until_status(
+        inbox: Inbox, name: str, level: bytes,
+        condition: Callable[[DiagnosticStatus], bool] = lambda status: True, ) -> DiagnosticStatus:
     """Wait until a status has a level and fulfils ``condition``; return it."""
     def matches(array: DiagnosticArray) -> bool:
         status = find_status(array, name)

@@ -202,11 +202,7 @@ class Plant:
 
 
 class Sent(NamedTuple):
-    """
-    A word that the driver has put on the line for a PLC.
-
-    ``is_again`` tells that it is the same command once more.
-    """
+    """A word that the driver has put on the line for a PLC; ``is_again``: sent once more."""
 
     when: float
     station: int
