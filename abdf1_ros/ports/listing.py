@@ -23,6 +23,7 @@ from pathlib import Path
 from serial.tools import list_ports
 
 BY_ID = Path('/dev/serial/by-id')
+TTYS = Path('/sys/class/tty')
 
 
 @dataclass(frozen=True, slots=True)
@@ -63,8 +64,7 @@ def _stable_names() -> dict[str, str]:
 
 def _has_uart(device: str) -> bool:
     """Tell whether a port has hardware: Linux has names for 32 ports that may not exist."""
-    path = Path('/sys/class/tty', Path(device).name, 'type')
     try:
-        return path.read_text(encoding='ascii').strip() != '0'
+        return (TTYS / Path(device).name / 'type').read_text(encoding='ascii').strip() != '0'
     except (OSError, UnicodeError):
         return False

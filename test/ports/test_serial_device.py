@@ -323,10 +323,15 @@ def test_adapters_come_first_with_a_name_that_stays(
     (tmp_path / 'by-id').mkdir()
     link = tmp_path / 'by-id' / 'usb-adapter'
     link.symlink_to(device)
+    for name, kind in (('ttyS0', '4\n'), ('ttyS31', '0\n')):  # as Linux writes it
+        (tmp_path / name).mkdir()
+        (tmp_path / name / 'type').write_text(kind)
     monkeypatch.setattr(listing, 'BY_ID', tmp_path / 'by-id')
+    monkeypatch.setattr(listing, 'TTYS', tmp_path)
     monkeypatch.setattr(listing.list_ports, 'comports', lambda: [
-        _port('/dev/ttyAMA0', 'ttyAMA0', 'PNP'), _port('/dev/ttyS31'),
+        _port('/dev/ttyAMA0', 'ttyAMA0', 'PNP'), _port('/dev/ttyS0'), _port('/dev/ttyS31'),
         _port(str(device), 'FT232R USB UART', 'USB VID:PID=0403:6001')])
-    first, second = listing.serial_ports()
+    first, second, third = listing.serial_ports()
     assert (first.stable, first.adapter, first.may_open) == (str(link), 'FT232R USB UART', True)
     assert (second.device, second.adapter, second.may_open) == ('/dev/ttyAMA0', '', False)
+    assert third.device == '/dev/ttyS0'
