@@ -94,7 +94,8 @@ class Messages(list[RosMessage]):
         """Wait for a message that fulfils ``condition``; return it."""
         return self.observer.until(
             lambda: next((message for message in self if condition(message)), None),
-            lambda: f'{what} on {self.topic}; got {list(self)[-3:]}')
+            lambda: f'{what} on {self.topic}; got {list(self)[-3:]} from '
+                    f'{self.observer.node.count_publishers(self.topic)} publishers')
 
     def first(self) -> RosMessage:
         """Wait for the first message."""

@@ -88,6 +88,8 @@ def test_what_never_happens_is_named(
     cell = abdf1_cell(*SMALL)
     with pytest.raises(AssertionError, match='waited for a word of 7'):
         cell.ros.until(lambda: cell.plcs.word('N7:0') == 7, 'a word of 7')
+    with pytest.raises(AssertionError, match=r'message on /none; got \[\] from 0 publishers'):
+        cell.ros.listen(Int16MultiArray, '/none').first()
     monkeypatch.undo()
     with pytest.raises(LookupError, match='there is no station 9; the data has 1'):
         cell.plcs.word('N7:0', station=9)
