@@ -260,6 +260,15 @@ def test_tx_delay_passes_before_each_transmission() -> None:
     assert (bench.machine.data_to_send(), bench.got) == (FRAME, [SAID_ACK])
 
 
+def test_what_comes_during_a_delay_in_full_duplex_is_delivered_at_its_end() -> None:
+    bench = Bench(Send(FRAME, 1.0), Listen(1.0), timing=LineTiming(tx_delay=0.25),
+                  duplex=Duplex.FULL)
+    bench.machine.receive_data(ACK + ACK, 0.1)
+    assert bench.got == []
+    bench.machine.handle_timeout(0.25)
+    assert bench.got == [SAID_ACK, SAID_ACK]
+
+
 @pytest.mark.parametrize(('tx_delay', 'delay', 'passes'), [
     (0.0, 0.25, 0.25), (0.5, 0.25, 0.5), (0.25, 0.5, 0.5)])
 def test_longer_of_the_two_delays_counts(tx_delay: float, delay: float, passes: float) -> None:
