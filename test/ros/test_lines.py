@@ -421,6 +421,8 @@ def test_internal_error_restarts_its_line_only_and_its_slow_end_holds_up_no_othe
     assert line_status(plant, ERROR)['/hall/b'] == 'is started again'
     ended.set()
     assert plant.speeds('b') == [7, ord('b')]
+    assert get_parameters(
+        plant.observer, 'net.com_port', node='/hall/b') == [plant.plcs['b'].port]
     assert {name for name in 'abc' if not before[name].link.is_alive()} == {'b'}
     assert line_status(plant, OK)['restarts'] == '1'
     said = capfd.readouterr().err
