@@ -37,8 +37,7 @@ TAKE_LONGEST = {'only_ack', 'low_byte_of_tns'}  # of message-based polling
 TRIES = 9  # of a reply: devices hold some back
 BYTE_TIME = 0.005  # s, where each byte comes by itself
 
-# Of this PLC, of its family, and of a line without CRC. In the second line, what some devices
-# cannot be asked for.
+# Of this PLC, its family, a line without CRC; then what some devices cannot be asked for.
 NOT_HERE = {'address-forms', 'poll-stuffing', 'crc-covers-station'}
 NOT_ASKED = {'loses_every_third_answer': {'other-ack-ignored'}, 'no_eot': {'poll-idle'}}
 

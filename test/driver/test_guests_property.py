@@ -104,7 +104,6 @@ def test_ours_have_their_time_and_no_guest_changes_what_we_know(mode: str, polli
         assert bench.listener.changes == [], case
         assert states == {BeatState.COUNTS}, case
         assert (station.active, station.overdue, station.local_status) == (True, 0, 0), case
-        # A quarter for commands, an eighth for stations that are silent, and one of each at most
-        # that has begun.
+        # A quarter for commands, an eighth for silent stations, and one of each that has begun.
         assert reads > 0.6 * usual, (case, reads, usual)
         assert sum(len(program.replies) for program in guests) > 0, case

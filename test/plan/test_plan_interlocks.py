@@ -76,8 +76,7 @@ def test_longest_transaction_is_that_of_the_settings(network: Network, seconds: 
 
 def write_time(network: Network, mapping: Mapping, response_time: float = 0.01) -> float:
     """Return the seconds that a write of a word takes, with its two answers."""
-    # DLE SOH STN DLE STX, 6 of the header, the body, DLE ETX CRC; ACK; poll; the reply, which is
-    # its header only; ACK.
+    # DLE SOH STN DLE STX, header (6), body, DLE ETX CRC; ACK; poll; a reply of a header; ACK.
     size = len(mapping.dialect.write(mapping.address, bytes(2))[1])
     characters = 5 + 6 + size + 4 + 2 + 4 + 2 + 6 + 4 + 2
     return characters * 10 / network.baud + 2 * response_time

@@ -205,8 +205,7 @@ class Bench:
         if (why := self.carry_out(())) or (why := self.carry_out(())):
             raise AssertionError(f'{mode} {check} {kind}, no fault at all: {why}')
         frames = self.line.frames  # of one transaction
-        # Each byte that may suffer, by who hears it. Of polls of an idle line that follow each
-        # other one is enough.
+        # Each byte that may suffer, by who hears it; one of the polls of an idle line is enough.
         self.places = [
             (side, begun + at) for number, (side, begun, data) in enumerate(frames)
             if number < 2 or frames[number - 2][::2] != (side, data)

@@ -93,8 +93,7 @@ def test_what_stays_is_shown_once(plcs: Plcs, capsys: Output) -> None:
     assert sorted(shown(capsys)) == ['N7:0  0', "ST9:0  'Tank'"]
 
 
-# Each on a line of its own: a watch may end with a command under way, and the next one would hear
-# its ACK or reply.
+# Each on a line of its own: after a watch that ends with a command under way its reply may come.
 @pytest.mark.parametrize(('tags', 'title', 'first', 'other'), [
     (None, '', '', ''), ({'N7:0': 'a, b'}, 'tag,', '"a, b",', '"",')])
 def test_each_read_is_a_line_of_csv_for_each_value(
