@@ -285,8 +285,10 @@ def line_status(plant: Plant, level: bytes) -> dict[str, str]:
 
 
 def test_each_line_is_a_node_of_its_own(plant: Plant) -> None:
-    plant.start(reads='abc')
-    assert get_parameters(plant.observer, 'net.com_port', node='/hall/b') == [plant.plcs['b'].port]
+    second = yaml_file(plant.folder / 'b', '/hall/b: {ros__parameters: {write_timeout: 3.5}}')
+    plant.start('--params-file', second, reads='abc')
+    assert get_parameters(plant.observer, 'net.com_port', 'write_timeout', node='/hall/b') == [
+        plant.plcs['b'].port, 3.5]
     diagnostics = plant.observer.diagnostics(plant.plcs['c'].port)
     assert until_status(diagnostics, 'link', OK).name == 'hall/c: link'
     assert line_status(plant, OK)['running'] == '3'
