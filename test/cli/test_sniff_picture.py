@@ -133,6 +133,7 @@ def test_recordings_one_after_the_other_and_without_times(tmp_path: Path, capsys
     second = capture(tmp_path / 'line.cap', silence(0.1), exchange(0.5, 2))
     found = drawn(tmp_path, capsys, first, second)
     assert {'All of it', 'Recording 2'} <= {*found.texts}
+    assert {'r1s0', 'r1s50', 'r2s0'} <= {element.get('id') for _, element in found.found}
     assert found.texts.count('silence: no answer to the poll') == 2
     raw = tmp_path / 'raw'
     raw.write_bytes(b''.join(data for _, _, data in exchange(0.0, 1)))

@@ -245,6 +245,7 @@ def test_serial_port_recorded_by_an_rtac_is_read(tmp_path: Path) -> None:
 @for_all(('content', 'fault'), [
     (pcap(exchange())[:-5], 'byte 311: the file ends inside a packet'),
     (pcap([])[:20], 'byte 20: the file ends inside a packet'),
+    (pcap([]) + bytes(7), 'byte 31: the file ends inside a packet'),
     (pcap([]) + struct.pack('<4I', 0, 0, 1 << 30, 0), 'a size of 1073741824 bytes'),
     (pcap([(0.0, b'x')]), 'byte 41: no packet up to here has DF1'),
     (pcapng([], '<', b'', 1e6) + block('<', 6, struct.pack('<5I', 7, 0, 0, 0, 0)),
