@@ -51,7 +51,7 @@ from abdf1_ros.sniffer.entries import Entry, Kind
 from abdf1_ros.sniffer.traffic import TrafficDecoder
 
 # Seconds without a reply or an EOT of a station after which it counts as silent.
-_SILENT = 10.0
+SILENT_AFTER = 10.0
 
 # Least number of bytes outside of frames that are treated as a damaged frame; fewer come when a
 # transmitter is switched on.
@@ -141,10 +141,10 @@ class Overheard:
         """Find stations that are not heard any more, and rows that no node reads."""
         for station in self._stations:
             heard = self._begun if station.last_heard is None else station.last_heard
-            if station.active and now - max(heard, self._begun) > _SILENT:
+            if station.active and now - max(heard, self._begun) > SILENT_AFTER:
                 self._stations.lost(station.number, now)
         for point in self._unread - self._told:
-            if now - self._begun > max(_SILENT, point.stale_time):
+            if now - self._begun > max(SILENT_AFTER, point.stale_time):
                 self._told.add(point)
                 self._readings.unreadable(point, self.why_unread(point))
 

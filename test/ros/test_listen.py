@@ -74,7 +74,7 @@ class ForeignMaster(threading.Thread):
 @pytest.mark.parametrize('is_full', [False, True])
 def test_values_come_from_the_traffic_of_another_master(
         tmp_path: Path, ptys: list[Pty], is_full: bool, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(overheard, '_SILENT', 4.0)
+    monkeypatch.setattr(overheard, 'SILENT_AFTER', 4.0)
     with Observer('observer') as ros:
         listen(ros, tmp_path, ptys, is_full=is_full)
 
