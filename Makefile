@@ -10,7 +10,7 @@ LONG_HOURS ?= 1
 HOURS ?= 1
 LONG_ARGS ?=
 PYTEST_ARGS ?=
-TEST_WORKERS ?= 6
+TEST_WORKERS ?= 8
 
 VENV := .venv
 PY := $(VENV)/bin/python
@@ -50,7 +50,7 @@ help: ## List the targets
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / {printf "%-14s %s\n", $$1, $$2}' $(firstword $(MAKEFILE_LIST))
 	@echo
 	@echo 'Variables: PYTHON (of setup), DEMO_SECONDS (of demo), PYTEST_ARGS (of test),'
-	@echo 'TEST_WORKERS (6: processes of test, more than processors, as many tests wait),'
+	@echo 'TEST_WORKERS (8: processes of test, more than processors, as many tests wait),'
 	@echo 'PART and MUTANTS (of mutate), HOURS (of simulate), FUZZ_SECONDS and FUZZ_ARGS (of fuzz; --draw 2), LONG_HOURS and LONG_ARGS (of long; LONG_ARGS=--help).'
 
 .PHONY: setup

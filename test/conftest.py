@@ -81,7 +81,7 @@ def half_duplex_only(monkeypatch: pytest.MonkeyPatch) -> None:
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     """
-    Put one file that computes after each three that wait, and then the others.
+    Put one file that computes after each two that wait, and then the others.
 
     Several workers, which take one file after the other, then have something to compute while
     others wait, and leave those enough of the processors to keep their times.
@@ -92,7 +92,7 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     waiting = _sorted([file for file in files if file.startswith(_WAITING)], _WAITING)
     computing = _sorted([file for file in files if not file.startswith(_WAITING)], _COMPUTING)
     place = {file: float(at) for at, file in enumerate(waiting)}
-    place.update((file, 3 * at + 2.5) for at, file in enumerate(computing))
+    place.update((file, 2 * at + 1.5) for at, file in enumerate(computing))
     items.sort(key=lambda item: place[names[item.path]])
 
 
