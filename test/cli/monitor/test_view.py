@@ -119,7 +119,7 @@ def test_curve_stands_beside_its_value() -> None:
     curve = Curve()
     for second in range(20):
         curve.take([5, second], NOW - 19 + second)
-    reading = Reading('ramp', [5, 19], 'N7:0', NOW, 1.5, curve)
+    reading = Reading('ramp', [5, 19], 'N7:0', NOW - 2, 1.5, curve)
     assert line_with('ramp', snapshot(readings=[reading])).text.endswith(
         f'  {curve.draw(NOW, 1.5)}  5 19')
     ascii_line = next(line.text for line in render(snapshot(readings=[reading]), NOW, 80, ASCII)
