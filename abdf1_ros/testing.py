@@ -94,8 +94,8 @@ class Messages(list[RosMessage]):
         """Wait for a message that fulfils ``condition``; return it."""
         return self.observer.until(
             lambda: next((message for message in self if condition(message)), None),
-            lambda: f'{what} on {self.topic}; got {list(self)[-3:]} from '
-                    f'{self.observer.node.count_publishers(self.topic)} publishers')
+            lambda: f'{what} on {self.topic}; got {list(self)[-3:]}, '
+                    f'publishers: {self.observer.node.count_publishers(self.topic)}')
 
     def first(self) -> RosMessage:
         """Wait for the first message."""
