@@ -63,16 +63,18 @@ class Master(threading.Thread):
         except BlockingIOError:
             return
         self.heard += data
-        data = data.removeprefix(b'\x10\x04')  # both come at once if the host stood still
-        if not data.startswith(b'\x10\x02'):
+        _, begins, message = data.partition(b'\x10\x02')  # after EOTs, if the host stood still
+        if not begins:
             return
-        dst, src, cmd, _, *tns = data[2:8]
+        dst, src, cmd, _, *tns = message.replace(b'\x10\x10', b'\x10')[:6]
         value = b'\x2a\x00' if dst == 1 else b''
         reply = bytes((src, dst, cmd | 0x40, 0 if dst == 1 else 2, *tns)) + value
         self._line.write(b'\x10\x06')
-        if self.over.wait(0.02):
-            return
-        self._line.write(frame(reply, station))
+        data = b''
+        while b'\x10\x06' not in data and not self.over.wait(0.02):
+            self._line.write(frame(reply, station))
+            if select.select([self._line], [], [], 0.5)[0]:
+                data = os.read(self._line.fileno(), 300)
 
 
 @contextmanager
