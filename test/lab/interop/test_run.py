@@ -35,7 +35,7 @@ from abdf1_ros.df1.packet import Packet
 from abdf1_ros.pccc.families import dialect_of
 from abdf1_ros.pccc.file_types import PlcType
 import pytest
-from support.ptys import read_exactly
+from support.ptys import PATIENCE, read_exactly
 
 _HERE = Path(__file__).resolve().parent
 
@@ -60,7 +60,7 @@ class Client:
         self._wanted = module.wanted
         self._family = setup.family
         self._dialect = dialect_of(setup.family)
-        self._line = module.DuplexLine(port, setup.check)
+        self._line = module.DuplexLine(port, setup.check, PATIENCE)
         self._tns = 0
 
     def read(self, case: Any) -> dict[str, Any]:
