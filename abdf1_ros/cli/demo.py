@@ -435,24 +435,32 @@ class Demo(Stage):
                   f'{show(self._watcher.values[tag])}')
 
     def _take_control(self) -> Speed:
-        """Press reset at the PLC, and let the publisher command a speed."""
+        """
+        Press reset at the PLC, and let the publisher command a speed.
+
+        On a busy machine the bridge may lose the control again before the speed is used.
+        """
         assert self._speed is not None
-        self._speed.command(0)
         for _ in range(_RESETS):
+            self._speed.command(0)
             self._wait('a steady heartbeat', lambda: time.monotonic() > 4.5 + self._lamps.get(
                 Lamp.ALIVE, math.inf))
             self._plcs.carry_out('reset 2')
-            if self._spin_until(lambda: Lamp.IN_CONTROL in self._lamps, 1.0):
-                break
-        else:
-            raise Missed('a reset of the PLC has not given ROS control')
-        self._wait('ROS to know it', self._is_in_control)
-        self._say('/abdf1/read/in_control is [1]: from now on the PLC uses what ROS writes')
-        self._speed.command(800)
-        self._wait('the speed in the PLC', lambda: self._used() == 800)
-        self._say('800 is published to /abdf1/write/speed, and the program uses it: '
-                  'used_speed is [800]')
-        return self._speed
+            self._spin_until(lambda: Lamp.IN_CONTROL in self._lamps, 1.0)
+            if not self._wait_in_control('ROS to know it', self._is_in_control):
+                continue
+            self._say('/abdf1/read/in_control is [1]: from now on the PLC uses what ROS writes')
+            self._speed.command(800)
+            if self._wait_in_control('the speed in the PLC', lambda: self._used() == 800):
+                self._say('800 is published to /abdf1/write/speed, and the program uses it: '
+                          'used_speed is [800]')
+                return self._speed
+        raise Missed('a reset of the PLC has not given ROS control')
+
+    def _wait_in_control(self, what: str, condition: Callable[[], bool]) -> bool:
+        """Wait for ``condition``; return False if ROS has no control any more."""
+        self._wait(what, lambda: Lamp.IN_CONTROL not in self._lamps or condition())
+        return Lamp.IN_CONTROL in self._lamps
 
     def _is_in_control(self) -> bool:
         return bool(self._watcher.values['in_control'][0])
@@ -504,16 +512,21 @@ class Demo(Stage):
         if self._used() or Lamp.IN_CONTROL in self._lamps:
             raise Missed('without a reset ROS should have no control')
 
+    def _are_all_ok(self) -> bool:
+        return all(status.level == _OK for status in self._watcher.statuses.values())
+
     def _show_diagnostics(self) -> None:
         self._title('Diagnostics: what `ros2 topic echo /diagnostics` says, in short')
         if self._speed:  # the bridge came back, but reset was not pressed
             self._wait('the reset to be missed', lambda: 'does not confirm' in
                        self._watcher.statuses['interlocks'].message)
             self._print_statuses('interlocks')
-            self._take_control()
+            for _ in range(_RESETS):
+                self._take_control()
+                if self._wait_in_control('all statuses to be OK', self._are_all_ok):
+                    break
         # If a busy machine has caused an unconfirmed write, a status is not OK for ten seconds.
-        self._wait('all statuses to be OK', lambda: all(
-            status.level == _OK for status in self._watcher.statuses.values()))
+        self._wait('all statuses to be OK', self._are_all_ok)
         self._print_statuses(*self._watcher.statuses)
         self._say('the counters of the line that are not 0:')
         for pair in self._watcher.statuses['counters'].values:

@@ -48,6 +48,20 @@ def test_others_on_the_network_are_not_taken_for_the_bridge() -> None:
     assert 'pump' not in story.text
 
 
+@pytest.mark.long
+def test_control_that_a_stall_of_the_bridge_takes_is_given_again() -> None:
+    with Process('demo', '--seconds', '1') as story:
+        for text in ('4. ', '6. ', '7. ', 'in_control is [1]'):
+            told = story.wait_for(text, after=story.lines.index(told) if text[0] == 'i' else 0)
+        after = len(story.lines)
+        bridge = int(Path(f'/proc/{story.number}/task/{story.number}/children').read_text())
+        os.kill(bridge, signal.SIGSTOP)
+        story.wait_for('ROS in control off', after=after)
+        os.kill(bridge, signal.SIGCONT)
+        story.wait_for('used_speed is [800]', after=after)
+    assert story.result() == 0, story.text
+
+
 def test_demo_stays_on_this_machine(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv('ROS_AUTOMATIC_DISCOVERY_RANGE', '')  # so that it is restored
     monkeypatch.delenv('ROS_AUTOMATIC_DISCOVERY_RANGE')
