@@ -119,3 +119,6 @@ def test_bridge_reports_the_alarm_of_a_plc(tmp_path: Path) -> None:
         cell.plcs.set('B3:0', 2)
         cell.diagnostics.until(lambda array: re.fullmatch(
             r'ERROR: B3:0/1 for \d+\.\d s, 1 time', text_of(array)) is not None, 'the alarm')
+        cell.diagnostics.clear()
+        cell.plcs.set('B3:0', 0)
+        cell.diagnostics.until(lambda array: text_of(array) == 'OK: no alarm', 'its end')

@@ -298,7 +298,8 @@ def test_each_line_is_a_node_of_its_own(plant: Plant) -> None:
 
 
 def test_process_has_a_name_of_its_own(plant: Plant) -> None:
-    plant.start('-r', 'lines:__node:=host_b', reads='a')
+    own = yaml_file(plant.folder / 'b', 'host_b: {ros__parameters: {strict_lines: true}}')
+    plant.start('-r', 'lines:__node:=host_b', '--params-file', own, reads='a')
     assert until_status(plant.observer.diagnostics(''), 'lines', OK).name == 'host_b: lines'
     assert plant.observer.call(Trigger, '/host_b/reload', Trigger.Request()).success
 
@@ -322,17 +323,24 @@ def test_process_may_open_as_many_files_as_the_system_allows(
     assert limits == [(5000, 5000)]
 
 
-def test_line_with_faulty_files_is_told_and_the_others_run(plant: Plant) -> None:
+def test_line_with_faulty_files_is_told_and_the_others_run(
+        plant: Plant, capfd: Output) -> None:
     (plant.folder / 'b_net.csv').write_text('Baud\n9601\n')
     plant.start(reads='ac')
     values = line_status(plant, ERROR)
     assert values['running'] == '2'
     assert values['/hall/b'].startswith(f'{plant.folder}/b_net.csv:2:1 (Baud): Baud = "9601"')
+    plant.observer.call(Trigger, '/lines/reload', Trigger.Request())
+    line_status(plant, ERROR)
+    assert capfd.readouterr().err.count('9601') == 2  # at the start, and when asked
     plant.write_net('b', plant.plcs['b'].port)
     plant.write_map('b', 'speed,Read,N7:0,1,PLC5,2')
     plant.observer.call(Trigger, '/lines/reload', Trigger.Request())
     assert plant.speeds('b') == [7, ord('b')]
+    before = {**plant.nodes}
+    plant.observer.call(Trigger, '/lines/reload', Trigger.Request())  # all lines run
     assert line_status(plant, OK)['running'] == '3'
+    assert plant.nodes == before
 
 
 def test_line_whose_name_ros_refuses_is_told_and_the_others_run(

@@ -51,7 +51,8 @@ class Pair(BridgeCell):
     """A bridge and a spare of one name at one port, both with ``standby``."""
 
     def __init__(self, folder: Path) -> None:
-        super().__init__(folder, DATA, ROWS, NET, 'standby:=true', 'write_timeout:=30.0')
+        super().__init__(folder, DATA, ROWS, NET, 'standby:=true', 'write_timeout:=30.0',
+                         f'net.share:="pty:{folder}/hmi"')
         self.spare: BridgeNode | None = None
 
     def start(self) -> None:
@@ -119,6 +120,10 @@ def test_spare_is_silent_while_the_other_has_the_line(pair: Pair) -> None:
     assert pair.counts == (1, 1)
     assert [pair.ros.node.count_publishers(f'/abdf1/{topic}') for topic in TOPICS] == [1] * 5
     assert pair.services() == dict.fromkeys(SERVICES, 1)
+    assert [bridge.session.guests.lines[0].link.is_alive() for bridge in (pair.node, pair.spare)
+            if bridge] == [True, False]
+    pair.diagnostics.clear()
+    pair.until_status('link', OK)  # nodes of one name are no fault here
 
 
 def test_spare_takes_the_line_over_and_offers_everything(pair: Pair) -> None:
@@ -177,7 +182,7 @@ def test_line_that_was_lost_for_a_moment_has_its_active_stations_again(pair: Pai
 
 @pytest.mark.parametrize(('port', 'heard', 'has_line'), [
     ('/dev/ttyS0', [None], True), ('socket://a:1', [None, 7.0], True),
-    ('socket://a:1', [None, 4.0], False)])
+    ('socket://a:1', [], True), ('socket://a:1', [None, 4.0], False)])
 def test_line_of_a_device_server_is_ours_when_any_station_has_answered_since_it_was_opened(
         port: str, heard: list[float | None], has_line: bool) -> None:
     session = SimpleNamespace(
