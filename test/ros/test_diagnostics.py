@@ -250,7 +250,8 @@ def test_link_of_a_node_with_a_duplicate_name(bench: Bench) -> None:
 
 def test_fault_is_logged_when_it_begins_and_again_after_it_was_over(bench: Bench) -> None:
     faults, stations = ['', LOST, LOST, '', LOST], bench.driver.stations
-    watches = watches_of(bench.diagnostics.line, PORT, bench.seen, (), lambda now: [],
+    guest: Any = SimpleNamespace(guest=Guest('pty:a'), fault='')
+    watches = watches_of(bench.diagnostics.line, PORT, bench.seen, (guest,), lambda now: [],
                          lambda now: [], lambda now: faults[int(now - NOW)])
 
     def look(now: float) -> list[str]:
@@ -270,6 +271,12 @@ def test_fault_is_logged_when_it_begins_and_again_after_it_was_over(bench: Bench
     text, = look(16.0)
     stations[1].returns = 0
     assert (text[:24], look(16.0)) == ('station 1 answers polls,', ['station 1 answers commands'])
+    guest.fault = 'in use'
+    bench.driver.checks.heard(1, Identity(PlcType.SLC, 'SLC 5/03'), NOW)
+    command = Packet(5, 2, 0x0F, 0, 7, b'\xAA')
+    bench.driver.refused.add(command, command.reply(sts=0x10), NOW)
+    assert [text[:24] for text in look(17.0)] == [
+        'guest pty:a: in use', 'refused a command of sta', 'station 1 is an SLC 5/03']
 
 
 @pytest.mark.parametrize(('mode', 'silent', 'is_fault'), [
@@ -851,6 +858,8 @@ def test_rows_whose_messages_fill_the_line_are_named_the_fullest_first() -> None
         'unchanged values')
     spent[rows[1]] = 11.0
     assert line.text(120.0) == ''
+    spent[make_mapping('N7:2', 'Write', tag='again', write_again=1000)] = 6.0
+    assert line.text(125.0) == 'messages fill 100% of the line: again (120%), w0 (0%), w1 (0%)'
 
 
 def test_gateway_of_a_station_is_named(make_bench: Benches) -> None:

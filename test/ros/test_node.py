@@ -215,15 +215,15 @@ def test_reply_to_a_command_of_an_earlier_run_is_no_error(
     bench.node.session.events.port_changed()
     for _ in range(2):
         bench.node.session.events.happened(left_over)
-    for number in (8, 9):
+    for number, heard in (7, 1.0), (8, None), (9, None):
         bench.node.session.port_changed(bench.node.link.state)
-        bench.node.session.events.station_changed(Station(number, active=False))
+        bench.node.session.events.station_changed(Station(number, False, heard))
     lines = [line.partition('[abdf1]: ')[2] for line in ''.join(capfd.readouterr()).splitlines()]
     told = str(left_over)
     assert f'{told}; it may answer a command sent before the port was opened' in lines
     assert told.startswith('2510') and lines.count(told) == 1
     assert sum(line.endswith(bench.node.link.state.text) for line in lines) == 1
-    assert sum(' has never been heard: ' in line for line in lines) == 1
+    assert [line[:9] for line in lines if ' has never been heard: ' in line] == ['station 8']
 
 
 def test_station_with_another_error_code_is_told_once(make_bench: Benches, capfd: Output) -> None:
@@ -243,14 +243,16 @@ def test_station_with_another_error_code_is_told_once(make_bench: Benches, capfd
 
 def test_level_that_changes_is_published_at_once(
         make_bench: Benches, monkeypatch: pytest.MonkeyPatch) -> None:
-    bench = make_bench(PULSES)
+    bench = make_bench(PULSES, parameters=('snapshot_period:=0.0',))
     bench.node.link.stop()
-    session, published = bench.node.session, []
+    session, published, looks = bench.node.session, [], []
     monkeypatch.setattr(session, 'publish_diagnostics', published.append)
+    monkeypatch.setattr(bench.node.writes.standstills, 'look', looks.append)
+    monkeypatch.setattr(bench.node.surroundings.snapshot, 'has_subscribers', pytest.fail)
     session.levels, session.next_diagnostics = [], math.inf
     for _ in range(2):
         session.check()
-    assert len(published) == 1
+    assert (len(published), len(looks)) == (1, 2)
 
 
 def test_end_waits_until_results_and_diagnostics_have_arrived(
@@ -347,13 +349,21 @@ def test_stop_ends_all_threads_and_gives_the_port_back(make_bench: Benches) -> N
     speed.next()
 
 
-def test_end_is_not_taken_back_by_a_request(make_bench: Benches) -> None:
+def test_end_is_not_taken_back_by_a_request(
+        make_bench: Benches, monkeypatch: pytest.MonkeyPatch, capfd: Output) -> None:
     bench = make_bench(SPEED)
-    bench.node.begin_end()
+    session, resume = bench.node.session, bench.node.session.driver.interlocks.resume
+    session.events.unreadable(session.driver.mappings[0], 'no such file')
+    monkeypatch.setattr(session.driver.interlocks, 'resume',
+                        lambda: (bench.node.begin_end(), resume()))  # it ends meanwhile
+    bench.node.set_polling(SetBool.Request(data=True), SetBool.Response())
+    assert 'no such file' in capfd.readouterr().err
     polling = bench.call(SetBool, 'polling', SetBool.Request(data=True))
     assert (polling.success, polling.message) == (False, 'this node ends')
     reload = bench.call(Trigger, 'reload', Trigger.Request())
     assert (reload.success, reload.message) == (False, 'this node ends')
+    assert session.driver.interlocks.is_ending
+    assert bench.node.hand_over(session.configuration)
     assert bench.node.session.driver.interlocks.is_ending
 
 
@@ -526,6 +536,12 @@ def test_load_that_the_line_cannot_carry_is_told_before_other_remarks(
     warnings = [line for line in ''.join(capfd.readouterr()).splitlines() if 'WARN' in line]
     assert re.search(r'the periods need \d+% of the time of the line at \d+ baud', warnings[0])
     assert '; or Period ' in warnings[0]
+
+
+def test_parameters_of_the_port_come_to_it(make_bench: Benches) -> None:
+    bench = make_bench(SPEED, parameters=('rs485:=true', 'low_latency:=false'))
+    settings = bench.node.surroundings.opener.settings
+    assert (settings.rs485, settings.low_latency) == (True, False)
 
 
 def test_map_without_a_row_is_told(make_bench: Benches, capfd: Output) -> None:

@@ -225,7 +225,8 @@ CROWD = '~/write/recipe has more than one publisher'
 
 
 def test_second_publisher_is_found_again(bench: Bench, capfd: Output) -> None:
-    write_csv(bench.map, f'{HEADER},Fallback,Fallback_After', [f'{RECIPE},0 0,60000'])
+    rows = [f'{RECIPE},,0 0,60000', 'south,Write,N7:8,1,PLC5,2,recipe,0 0,60000']
+    write_csv(bench.map, f'{HEADER},Topic,Fallback,Fallback_After', rows)
     publishers = []
     for _ in range(2):
         assert bench.reload()[0]
@@ -348,12 +349,14 @@ def test_files_are_read_again_while_the_port_is_left_to_others(bench: Bench) -> 
     assert values_in(bench.ros.listen(Float32MultiArray, '/abdf1/read/level').first()) == [1.5]
 
 
-def test_port_is_left_to_others_and_taken_again(bench: Bench) -> None:
+def test_port_is_left_to_others_and_taken_again(bench: Bench, capfd: Output) -> None:
     text = 'polling is off, so other programs may use the port'
     until_status(bench.diagnostics, 'link', OK)
     assert bench.polling(False) == (True, f'{bench.plcs.port}: {text}')
     open_port(PortSettings(bench.plcs.port)).close()  # which is exclusive
     assert until_status(bench.diagnostics, 'link', WARN).message == f'WARN: {text}'
+    line, = (line for line in capfd.readouterr().err.splitlines() if text in line)
+    assert line.startswith('[INFO] ')
     active = bench.ros.listen(UInt16MultiArray, '/abdf1/active_stations')
     assert values_in(active.first()) == 16 * [0]
     counters = bench.call(Trigger, 'read_link_counters', Trigger.Request())

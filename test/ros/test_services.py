@@ -23,7 +23,9 @@ import time
 from typing import Any, cast
 
 from abdf1_ros.driver.driver import Driver
+from abdf1_ros.driver.guests import ShareAccess
 from abdf1_ros.driver.reads.demands import ReadAnswer
+from abdf1_ros.driver.write import Outcome, WriteResult
 from abdf1_ros.ports.clock import line_time
 from abdf1_ros.ros.topics.services import RowServices
 from abdf1_ros.settings.mapping import Mapping
@@ -197,9 +199,11 @@ def test_reload_answers_who_waits_and_closes_what_is_gone(bench: Bench) -> None:
 
 def test_read_only_refuses_to_set_and_reads(tmp_path: Path) -> None:
     with Bench(tmp_path, DATA, '\n'.join((HEADER, *ROWS)), 'Baud,Timeout\n115200,300',
-               'read_only:=true') as bench:
+               'read_only:=true', f'net.share:="pty:{tmp_path}/hmi"',
+               'net.share_access:=Write') as bench:
         assert bench.put('horn', True) == (False, 'not written: refused: this node is read_only')
         assert bench.read('recipe')[0]
+        assert bench.node.session.guests.lines[0].guest.access is ShareAccess.READ
 
 
 @pytest.mark.parametrize(('most', 'expected'), [
@@ -243,13 +247,13 @@ def test_old_call_is_not_written_and_the_end_answers_who_waits(tmp_path: Path) -
         goes_on.join()
         assert late.result().message.startswith('not written: refused: it came ')
         simulator.say('delay 2 4000')
-        waiting = [client.call_async(SetBool.Request(data=True)),
-                   observer.node.create_client(
-                       Trigger, '/abdf1/read_now/heartbeat').call_async(Trigger.Request())]
+        waiting = [client.call_async(SetBool.Request(data=True)), *(
+            observer.node.create_client(Trigger, f'/abdf1/{name}').call_async(Trigger.Request())
+            for name in ('read_now/heartbeat', 'read_link_counters'))]
         observer.wait(lambda: False, 0.5)
         node.end(signal.SIGINT)
         observer.until(lambda: all(future.done() for future in waiting), 'the last answers')
-        assert [future.result().success for future in waiting] == [False, False]
+        assert [future.result().success for future in waiting] == [False] * 3
         simulator.say('normal 2')
 
 
@@ -338,35 +342,40 @@ class StandIn:
 
 def test_services_of_rows_that_are_gone_close_once_when_no_call_waits() -> None:
     rows = [make_mapping(f'N7:{number}', tag=f'n{number}') for number in range(3)]
-    node: Any = StandIn(*rows, make_mapping('B3:0/0', 'Write', tag='lamp'))
+    lamps = [make_mapping(f'B3:0/{bit}', 'Write', tag=f'l{bit}', topic='lamp') for bit in (0, 1)]
+    node: Any = StandIn(*rows, *lamps)
     woken: list[str] = []
     services = RowServices(node, node, lambda: woken.append('executor'))
 
     def reload(*left: Mapping) -> None:
         services.open(cast(Driver, StandIn(*left)), 100, 2.0, lambda: None)
 
-    def ended(call: Coroutine[Any, Any, Any]) -> str:
+    def ended(call: Coroutine[Any, Any, Any]) -> tuple[bool, str]:
         with pytest.raises(StopIteration) as end:
             call.send(None)
-        return str(end.value.value.message)
+        return end.value.value.success, end.value.value.message
 
     services.open(node, 100, 2.0, lambda: woken.append('link'))
     read = node.made['~/read_now/n0'](Trigger.Request(), Trigger.Response())
-    put = node.made['~/set/lamp'](SetBool.Request(), SetBool.Response())
-    for call in read, put:
+    puts = [node.made['~/set/lamp'](SetBool.Request(), SetBool.Response()) for _ in range(3)]
+    for call, count in (read, 0), (puts[0], 0), (puts[1], 1), (puts[2], 2):
         call.send(None)
-    assert woken == ['link']
+        for row in lamps[:count]:
+            services.take(WriteResult(row, Outcome.STANDS, '', '', request=[*services.calls][-1]))
+    assert woken == ['link', 'executor']
+    assert ended(puts[2]) == (True, 'l0: stands in the PLC; l1: stands in the PLC')
     longest = 2.0 + Network().line_mode.longest_transaction(Network().line, 0.0)
     services.look(line_time() + 2 * longest - 1.0)
-    assert woken == ['link']
+    assert woken == ['link', 'executor']
     reload(rows[1])
     reload()
     services.look(line_time())
     assert node.closed == []
     node.takes[0](ReadAnswer(error='late'))
-    assert ended(read) == 'late'
+    assert ended(read) == (False, 'late')
     services.withdraw()
-    assert ended(put) == 'unknown whether written: no result has come'
+    assert ended(puts[0]) == (False, 'unknown whether written: no result has come')
+    assert ended(puts[1]) == (False, 'l0: stands in the PLC')
     for _ in range(2):
         services.look(line_time())
     assert sorted(node.closed) == sorted(node.made)

@@ -103,7 +103,7 @@ class Taker:
                 'received_timestamp': now - int(waited * 1e9)})
 
     def get_publishers_info_by_topic(self, name: str) -> list[Any]:
-        return [SimpleNamespace(node_namespace='/cell', node_name='panel')]
+        return [SimpleNamespace(node_namespace='/', node_name='panel')]
 
     def lost(self, topic: str, count: int) -> None:
         self.said.append(f'{topic}: {count} lost')
@@ -150,7 +150,7 @@ def test_messages_wait_in_their_order_until_the_node_has_begun(
                'stood still or had just begun, or the clocks differ')
     assert node.said == ['a: 1 lost', 'a 1', f'b 2: it came 3.0 {too_old}', 'a 3',
                          'a 4 of 1.2 s ago', 'a 5 of 0.7 s ago', f'b 3: it came 7.4 {too_old}',
-                         'b 4', "b: ['/cell/panel'] ahead by 1.5 s",
+                         'b 4', "b: ['/panel'] ahead by 1.5 s",
                          'b 5: its time stamp is 2.6 s ahead of the clock here, write_timeout is '
                          '2 s; the clocks differ, so its age is unknown']
     assert topics.taken == 8
