@@ -191,6 +191,15 @@ def test_rule_7_message_refreshes_from_its_own_time_when_it_is_confirmed() -> No
     assert cell.results() == [START, 'written', TIMEOUT]
 
 
+def test_rule_7_time_of_a_message_after_an_unconfirmed_fallback_counts_once() -> None:
+    one = OneRow()
+    one.row.make_due(FallbackCause.TIMEOUT, 1.0)
+    one.fallback(one.row.take(1.0), 1.5, Outcome.UNKNOWN)
+    for begun in 2.0, 2.2:
+        one.message(begun, begun + 0.1, Outcome.UNKNOWN)
+    assert [one.row.judge(2.0 + AFTER + late, -math.inf) for late in (-0.1, 0.0)] == [False, True]
+
+
 @pytest.mark.parametrize('gap', [0.1, 0.002])  # s; slower, and faster, than transactions are
 def test_rule_7_messages_that_the_plc_refuses_do_not_keep_an_output_alive(gap: float) -> None:
     cell, speed = speed_cell()

@@ -258,6 +258,7 @@ def test_message_that_stands_feeds_its_fallback() -> None:
         bench.at(begun + number / 10, lambda: bench.write(row, [7]))
     cell.run(5.0)
     assert bench.listener.outcomes().count(STANDS) > 35
+    assert bench.listener.outcomes().count(Outcome.FALLBACK) == 1  # of the start
     assert stored(cell.plc, 'N7:0') == b'\x07\x00'
     cell.run(1.5)  # the last message was published at 4.9 s
     assert bench.listener.results[-1].outcome is Outcome.FALLBACK

@@ -538,12 +538,6 @@ def test_load_that_the_line_cannot_carry_is_told_before_other_remarks(
     assert '; or Period ' in warnings[0]
 
 
-def test_parameters_of_the_port_come_to_it(make_bench: Benches) -> None:
-    bench = make_bench(SPEED, parameters=('rs485:=true', 'low_latency:=false'))
-    settings = bench.node.surroundings.opener.settings
-    assert (settings.rs485, settings.low_latency) == (True, False)
-
-
 def test_map_without_a_row_is_told(make_bench: Benches, capfd: Output) -> None:
     make_bench()
     assert 'the map has no usable row' in ''.join(capfd.readouterr())

@@ -235,10 +235,13 @@ def test_csv_as_a_parameter_file_is_told(tmp_path: Path) -> None:
 
 def test_gateway_is_polled_for_the_stations_behind_it(
         configured: Configured, make_node: Nodes, files: Files, tmp_path: Path) -> None:
-    rows = [f'{tag},Read,N7:0,{station},PLC5,{via}'
-            for tag, station, via in (('a', 1, 8), ('b', 9, 8), ('c', 2, ''))]
+    rows = [f'{tag},Read,N7:0,{station},PLC5,{via}'  # c is read often enough
+            for tag, station, via in (('a', 1, '8,,'), ('b', 9, '8,,'), ('c', 2, ',,'),
+                                      ('d', 2, ',c,1000'))]
     files['map_file'] = str(write_csv(
-        tmp_path / 'via.csv', 'Tag,Command,Address,Station,PLC_Type,Via', rows))
+        tmp_path / 'via.csv', 'Tag,Command,Address,Station,PLC_Type,Via,While,While_Timeout',
+        rows))
+    assert configured().map_problems == []
     settings = configured().driver_settings()
     assert (settings.polling, settings.default_period) == (PollingSettings((2, 8)), 0.1)
     assert problems_of(make_node(files | {'poll_list': '8,9'})) == [
@@ -397,7 +400,7 @@ def test_number_that_yaml_takes_for_octal_is_told(
     ('camera:gain:=3', None), ('use_sim_time:=true', None), ('map.door.max:=7', None)])
 def test_parameter_of_the_command_line_is_for_this_node(
         make_node: Nodes, files: Files, rule: str, expected: str | None) -> None:
-    args = ['node', '--ros-args', '-p', rule]
+    args = ['node', '--ros-args', '--param' if rule.startswith('net') else '-p', rule]
     node = make_node(files, cli_args=args[1:])
     if expected is None:
         assert configure(node, Arguments.of(args)).mappings

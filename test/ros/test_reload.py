@@ -90,7 +90,7 @@ class Bench(BridgeCell):
 def bench(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Bench]:
     monkeypatch.setattr('abdf1_ros.ros.parameters.file_watch.PERIOD', 0.3)
     with Bench(tmp_path, DATA, '\n'.join((HEADER, SPEED, RECIPE)),
-               'Baud,Timeout\n115200,100') as bench:
+               'Baud,Timeout\n115200,100', 'rs485:=true') as bench:
         yield bench
 
 
@@ -307,7 +307,8 @@ def test_other_speed_opens_the_port_anew(bench: Bench, capfd: Output) -> None:
     assert bench.reload()[0]
     speeds = bench.ros.listen(Int16MultiArray, '/abdf1/read/speed', EVERYTHING)
     assert values_in(speeds.first()) == [7, 8]
-    assert bench.node.surroundings.opener.settings.baud == 19200
+    settings = bench.node.surroundings.opener.settings
+    assert (settings.baud, settings.rs485) == (19200, True)
 
 
 def test_file_that_has_changed_is_told_once(bench: Bench, capfd: Output) -> None:

@@ -24,7 +24,6 @@ from abdf1_ros.driver.settings import DriverSettings
 from abdf1_ros.pccc.file_types import PlcType
 from abdf1_ros.pccc.identity import Identity, Mode
 from abdf1_ros.pccc.processor import Processor
-from abdf1_ros.ports.link_thread import LinkThread
 from abdf1_ros.ros.diagnostics.line import LineView
 from abdf1_ros.ros.diagnostics.stations import health_values, LinkCounterService, processor_fault
 from abdf1_ros.settings.mapping import Mapping
@@ -115,8 +114,9 @@ class Desk:
         self.driver = Driver(Network(), mappings, DriverSettings(), Recorder(time.monotonic))
         self.driver.is_online = True
         self.driver.checks.begin(0.0)
-        self.link = LinkThread(self.driver.machine, lambda: pytest.fail('no port here'))
-        self.service = LinkCounterService(self.driver, self.link.wake)
+        self.woken: list[str] = []
+        self.service = LinkCounterService(self.driver, lambda: self.woken.append('link'),
+                                          lambda: self.woken.append('executor'))
         observer.node.create_service(Trigger, '~/read', self.service.answer,
                                      callback_group=MutuallyExclusiveCallbackGroup())
         client = observer.node.create_client(Trigger, '~/read')
@@ -150,16 +150,16 @@ class Desk:
 @pytest.fixture
 def desk() -> Iterator[Desk]:
     with Observer('desk') as observer:
-        desk = Desk(observer)
-        yield desk
-        desk.link.stop()
+        yield Desk(observer)
 
 
 def test_service_waits_without_holding_up_the_node(desk: Desk) -> None:
     desk.work({})
     desk.ticks_pass()
     assert not desk.answer.done()
+    assert desk.woken == ['link']
     desk.work({1: b'\1\2', 2: b'\3\4'})
+    assert desk.woken == ['link', 'executor']
     assert desk.result() == (True, 'station 1: bytes 01 02; station 2: bytes 03 04')
 
 
