@@ -282,6 +282,17 @@ def test_rule_8_row_is_fresh_by_a_confirmed_message_only(
     assert not row.why_held
 
 
+def test_rule_4_message_asks_a_silent_plc_whose_fallback_is_not_due() -> None:
+    speed = speed_row(Fallback((7,), 60_000))
+    cell = Cell(speed, run=3.0)
+    cell.publish(speed, 3, run=0.2)
+    cell.plc.faults.silent = True
+    cell.publish(speed, 4, run=0.8)
+    cell.plc.faults.silent = False
+    cell.publish(speed, 5, run=0.5)
+    assert (cell.results()[-1], cell.word('N7:0')) == ('written', 5)
+
+
 @pytest.mark.parametrize('silent', [0.4, 1.0])
 def test_rule_8_plc_that_comes_back_with_an_old_word_has_its_fallback_first(silent: float) -> None:
     beat, speed = beat_row(), speed_row(Fallback((7,), 800))
