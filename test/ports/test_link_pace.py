@@ -289,10 +289,12 @@ def test_bytes_may_have_come_since_an_attempt_to_open_began() -> None:
 
 
 def test_request_that_comes_together_with_bytes_is_taken_after_them() -> None:
-    script, port = Script(Rest(), Send(b'awake', None)), NoLine()
+    script, port = Script(Rest(), Send(b'awake', 3600.0)), NoLine()
     port.read = Mock(side_effect=[b'x', b'', OSError('the end')])  # type: ignore[method-assign]
-    thread = Impatient(script.machine, lambda: port, 1, on_state=lambda state: thread.wake())
+    thread = Impatient(script.machine, lambda: port, 1, longest_wait=0.25,
+                       on_state=lambda state: thread.wake())
     thread.run_out()
+    assert [call.args[0] for call in port.read.call_args_list] == [0.25] * 3
     assert script.heard.get_nowait() is None
 
 

@@ -235,7 +235,7 @@ def test_port_of_a_device_server_has_one_owner_until_he_leaves_it(server: int) -
         with pytest.raises(OSError, match='this program has it open, or has not ended its last'):
             open_port(PortSettings(url))
     port.close()
-    open_port(PortSettings(f'socket://127.1:{server}')).close()
+    open_port(PortSettings(f'SOCKET://127.1:{server}')).close()
 
 
 def test_port_of_a_device_server_is_refused_to_another_process(server: int) -> None:

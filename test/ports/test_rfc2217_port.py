@@ -15,6 +15,7 @@
 """Ports of device servers: connections, and the client of RFC 2217."""
 
 from collections.abc import Iterator
+from dataclasses import replace
 import os
 import socket
 import threading
@@ -80,15 +81,18 @@ def test_host_that_can_have_no_name() -> None:
         open_port(PortSettings(f'socket://{"x" * 70}.local:4001'))
 
 
-def test_settings_are_sent_and_their_answers_taken(ends: Ends) -> None:
+@pytest.mark.parametrize('handshake', [False, True])
+def test_settings_are_sent_and_their_answers_taken(ends: Ends, handshake: bool) -> None:
     port, server = ends
-    server.sendall(DO_COM_PORT + b'old data' + BAUD_115200 + REST)
-    port.negotiate(EVEN)
+    accepts = WILL_COM_PORT if handshake else DO_COM_PORT
+    server.sendall(accepts + b'old data' + BAUD_115200 + REST)
+    port.negotiate(replace(EVEN, handshake=handshake))
     said = server.recv(4096)
     assert said.startswith(bytes([255, 251, 0, 255, 251, 3]) + WILL_COM_PORT)
     for command in (bytes([1, 0, 1, 0xC2, 0]), b'\x02\x08', b'\x03\x03', b'\x04\x01',
-                    b'\x05\x01', b'\x05\x08', b'\x05\x0b', b'\x0c\x03'):
+                    b'\x05\x03' if handshake else b'\x05\x01', b'\x05\x08', b'\x0c\x03'):
         assert bytes([255, 250, 44]) + command + bytes([255, 240]) in said
+    assert (b'\x05\x0b\xff' in said) is not handshake  # RTS
 
 
 @pytest.mark.parametrize('short', [
@@ -182,7 +186,7 @@ def test_commands_count_for_whether_there_is_more(ends: Ends, wake: int, stream:
 def test_data_are_what_is_no_command(ends: Ends, wake: int, chunk: int) -> None:
     port, server = ends
     stream = b'a\xff\xffb' + bytes([255, 253, 1]) + b'c' + bytes([255, 241]) + \
-        bytes([255, 250, 44, 107, 255, 255, 255, 240]) + b'd\xff\xff'
+        bytes([255, 250, 44, 107, 255, 255, 7, 255, 240]) + b'd\xff\xff'
     data = b''
     for at in range(0, len(stream), chunk):
         server.sendall(stream[at:at + chunk])

@@ -15,6 +15,7 @@
 """Serial devices: how they are listed and opened, damaged characters, counts, and the end."""
 
 from collections.abc import Callable
+from contextlib import suppress
 import errno
 import fcntl
 import os
@@ -96,6 +97,18 @@ def test_option_that_a_port_has_is_set(pty: Pty, monkeypatch: pytest.MonkeyPatch
         fset=lambda port, settings: asked.append(settings.rts_level_for_tx)))
     assert told_by_open(PortSettings(str(pty.name), rs485=True)) == []
     assert asked == [True, True]
+
+
+@pytest.mark.parametrize('listens', [False, True])
+def test_format_of_characters_is_asked_of_the_system(
+        pty: Pty, listens: bool, monkeypatch: pytest.MonkeyPatch) -> None:
+    asked: list[int] = []
+    monkeypatch.setattr(termios, 'tcsetattr', lambda port, when, flags: asked.append(flags[2]))
+    with suppress(OSError):  # a pty has no parity
+        open_port(PortSettings(str(pty.name), 9600, 7, 'Odd', 2, True, listens=listens)).close()
+    assert asked[0] & (termios.CSIZE | termios.CSTOPB | termios.PARENB | termios.PARODD
+                       | termios.CRTSCTS) == termios.CS7 | termios.CSTOPB | termios.PARENB \
+        | termios.PARODD | (0 if listens else termios.CRTSCTS)
 
 
 # Damaged characters
@@ -334,4 +347,4 @@ def test_adapters_come_first_with_a_name_that_stays(
     first, second, third = listing.serial_ports()
     assert (first.stable, first.adapter, first.may_open) == (str(link), 'FT232R USB UART', True)
     assert (second.device, second.adapter, second.may_open) == ('/dev/ttyAMA0', '', False)
-    assert third.device == '/dev/ttyS0'
+    assert (third.device, third.adapter) == ('/dev/ttyS0', '')

@@ -15,9 +15,11 @@
 """Connections to device servers: a server that did not hear of the end of the last one."""
 
 from collections.abc import Iterator
+from errno import ETIMEDOUT
 import socket
 import threading
 import time
+from unittest.mock import Mock
 
 from abdf1_ros.ports.opening import open_port
 from abdf1_ros.ports.settings import PortSettings
@@ -136,7 +138,8 @@ def test_local_port_that_is_not_free_yet_is_no_obstacle(server: OneClientServer)
             assert time.monotonic() < give_up
 
 
-def test_client_that_is_thrown_out_again_and_again_is_told_of_the_other_one() -> None:
+def test_client_that_is_thrown_out_again_and_again_is_told_of_the_other_one(
+        monkeypatch: pytest.MonkeyPatch) -> None:
     server = NewestClientServer()
     url = 'socket://{}:{}'.format(*server.address)
     said = []
@@ -147,6 +150,11 @@ def test_client_that_is_thrown_out_again_and_again_is_told_of_the_other_one() ->
             port.read(PATIENCE, port.fileno())  # type: ignore[attr-defined]
         port.close()
         said.append(str(caught.value))
+    port = open_port(PortSettings(url))
+    monkeypatch.setattr('os.read', Mock(side_effect=TimeoutError(ETIMEDOUT, 'the network is cut')))
+    with pytest.raises(TimeoutError, match='the network is cut$'):
+        port.read(PATIENCE, port.fileno())  # type: ignore[attr-defined]
+    port.close()
     server.close()
     assert said[:2] == 2 * ['the other end has closed the connection']
     assert said[2:] == 2 * [

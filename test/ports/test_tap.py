@@ -18,6 +18,7 @@ import math
 import os
 from pathlib import Path
 
+from abdf1_ros.ports.opening import open_port
 from abdf1_ros.ports.settings import PortSettings
 from abdf1_ros.ports.tap import is_pty, Tap
 from abdf1_ros.sniffer.capture import Chunk, Direction
@@ -46,6 +47,7 @@ def test_one_port_is_listened_to(ptys: list[Pty]) -> None:
     with tap(ptys[0].name) as listening:
         ptys[0].write(b'\x10\x04')
         assert hear(listening, 2) == [Chunk(None, Direction.UNKNOWN, b'\x10\x04')]
+    open_port(PortSettings(str(ptys[0].name))).close()  # it is free again
 
 
 def test_everything_is_passed_on_both_ways(ptys: list[Pty]) -> None:
