@@ -24,6 +24,7 @@ from abdf1_ros.simulator.commands import CommandError, execute
 from abdf1_ros.simulator.ladder import Ladder
 from abdf1_ros.simulator.simulated_plc import InjectedFaults, SimulatedPlc
 import pytest
+from support.clock import Clock
 from support.driver_bench import simulated_plc
 
 
@@ -77,12 +78,13 @@ def test_counters_are_told(plcs: list[SimulatedPlc]) -> None:
       for text in ('much', '-0.1', '1.1', 'nan')),
     *((f'error 1 {text}', f'error 1 {text}: "{text}" should be a byte in hexadecimal such as 0B')
       for text in ('zz', '5', '500000', '\u0661\u0661')),
+    ('msg 1 N7:0 70000', 'msg N7:0: value 70000 at index 0 is not a valid int16'),
     ('error 1', '"error 1" is not a command'), ('normal 1 x', '"normal 1 x" is not a command')])
 def test_command_that_is_wrong_changes_nothing(
         plcs: list[SimulatedPlc], line: str, text: str) -> None:
     plcs[0].faults = before = InjectedFaults(slow=2)
     with pytest.raises(CommandError) as caught:
-        execute(line, plcs)
+        execute(line, plcs, line.startswith('msg'))
     assert str(caught.value).startswith(text)
     assert plcs[0].faults is before
 
@@ -138,12 +140,15 @@ def test_download_power_and_reset() -> None:
 
 
 def test_scan_time_of_a_ladder() -> None:
-    plc = simulated_plc(1, 'SLC', lambda: 0.0, ('N7:0', 4))
+    clock = Clock()
+    plc = simulated_plc(1, 'SLC', clock, ('N7:0', 4))
     with pytest.raises(CommandError, match='no ladder; start with --ladder 1'):
         execute('scan 1 60', [plc])
     plc.run_ladder(Ladder(plc.table))
     assert plc.ladder is not None
+    clock.now += 2.0
     assert execute('scan 1 60', [plc]) == 'station 1: scan 60'
+    assert plc.ladder.get(11, 3) > 10  # the scans of before had their own time
     assert plc.ladder.scan_time == 0.06
     for text in ('0', '1001', 'fast'):
         with pytest.raises(CommandError, match=f'"{text}" should be ms from 1 to 1000'):

@@ -162,14 +162,18 @@ def test_message_of_a_plc2_and_a_plc3_writes_its_value_and_tells_that_it_is_conf
     machine = simulated_plc(4, plc, clock, (text, 1))
     said: list[str] = []
     machine.send(parse_address(text, machine.table.plc_type), [7], 5, said.append)
-    sending = machine.next_task(0.0)
-    assert sending is not None
+    machine.send(parse_address(text, machine.table.plc_type), [8], 5, said.append)
+    assert machine.next_task(0.0, {5}) is None
+    sending, last = machine.next_task(0.0), machine.next_task(0.0)
+    assert sending is not None and last is not None
     command = sending.command
     assert (command.cmd, command.dst, command.src) == (cmd, 5, 4)
     assert sending.answer_within == math.inf  # also for a station that was silent
     assert command.data == bytes.fromhex(data)
     sending.reply(command.reply())
-    assert said == ['confirmed']
+    last.reply(last.command.reply(sts=0x10))
+    assert said[0] == 'confirmed' and said[1].startswith('STS 10: ')
+    assert last.command.tns == command.tns + 1
 
 
 @for_all(('row', 'text'), [
@@ -246,6 +250,9 @@ def test_motion_goes_on_from_what_was_written(path: Path, clock: Clock) -> None:
     clock.now += 5.0  # no step of this time is made up for
     plc.set_mode(Setting.REMOTE)
     clock.now += 0.05
+    for setting in (Setting.REMOTE, Setting.PROGRAM, Setting.REMOTE):  # at once: no step is due
+        assert master.number('N7:0') == 102
+        plc.set_mode(setting)
     assert master.number('N7:0') == 102
 
 
@@ -336,7 +343,7 @@ def _with_ladder() -> tuple[Clock, SimulatedPlc]:
 def test_program_stands_still_outside_of_run_but_tables_answer() -> None:
     clock, plc = _with_ladder()
     clock.now += 2.0
-    plc.advance()
+    plc.set_mode(Setting.PROGRAM)
     count = stored(plc, 'N11:3')
     assert count != bytes(2)
     for setting in (Setting.PROGRAM, Setting.TEST, Setting.FAULT):
@@ -370,6 +377,7 @@ def test_power_cycle_keeps_words_and_begins_anew() -> None:
     plc.send(parse_address('N7:0', plc.table.plc_type), [1], 5, lambda outcome: None)
     clock.now += 1.0
     plc.cycle_power()
+    assert stored(plc, 'N11:3') != bytes(2)
     assert plc.next_task(clock.now) is None
     assert plc.handle(Poll(1, True)) == frames.EOT
     plc.advance()
