@@ -44,9 +44,10 @@ from abdf1_ros.simulator.simulated_plc import SimulatedPlc
 import numpy
 import pytest
 from support.cases import for_all
+from support.counting import open_files
 from support.driver_bench import simulated_plc, store, stored
 from support.plc_line import machine_line, plc_line
-from support.ptys import PATIENCE
+from support.ptys import PATIENCE, wait_until
 
 PlcPair = tuple[SimulatedPlc, SimulatedPlc]
 FILES = (('N7:0', 250), ('B3:0', 4), ('F8:0', 8), ('T4:0', 9), ('ST9:0', 42), ('A10:0', 4))
@@ -76,7 +77,7 @@ def client_with(port: str, **more: Any) -> Client:
 @pytest.mark.parametrize(('station', 'plc_type'), [(1, 'SLC'), (1, None), (2, 'plc5'), (2, None)])
 def test_what_is_written_is_read(port: str, station: int, plc_type: str | None) -> None:
     with client(port, station, plc_type) as plc:
-        plc.write('N7:0', [-1, 32767])
+        plc.write('N7:0', [-1, 32767], 'int16')
         plc.write('N7:4', 70000, 'int32', word_order='High')
         plc.write('B3:0/1', True)
         plc.write('F8:1', 1.5)
@@ -87,6 +88,7 @@ def test_what_is_written_is_read(port: str, station: int, plc_type: str | None) 
         assert plc.read('N7:0', 3) == [-1, 32767, 0]
         assert plc.read('N7:0', 2, 'uint16') == [65535, 32767]
         assert plc.read('N7:4', kind='int32', word_order='High') == 70000
+        assert plc.read('N7:4', 2) == [1, 4464]
         assert plc.read('B3:0/1') is True
         assert plc.read('B3:0/0', 3) == [False, True, False]
         assert plc.read('F8:0', 2) == [0.0, 1.5]
@@ -113,7 +115,7 @@ def test_inputs_by_slot_and_flat(port: str, plcs: PlcPair) -> None:
     with client(port) as plc:
         assert plc.read('I:1.1') == 9
     with client_with(port, access='Flat') as plc:
-        assert plc.read('I:0', 2) == [7, 9]
+        assert plc.read('I:0', 2) == plc.read_many(['I:0-1'])['I:0-1'] == [7, 9]
 
 
 def test_errors_are_those_of_the_bridge(port: str) -> None:
@@ -165,6 +167,7 @@ def test_retries_trace_and_log_are_arguments(port: str, tmp_path: Path,
     timed, = (text for text in logged if text.endswith(' ms'))  # not the look at the address
     assert timed.startswith('N7:0 of station 1: ')
     assert logged[-1].startswith('N7:0 of station 9: 2509 ERR_INACTIVE_STATION')
+    wait_until(lambda: str(trace) not in {name for _, name in open_files()})
     assert sniff(['--summary', str(trace)]) == 0
     with pytest.raises(OSError, match='exists and is not a capture'):
         client_with(port, trace=__file__)
