@@ -19,15 +19,19 @@ from abdf1_ros.errors import FormatError, RemoteError
 from abdf1_ros.pccc import plc2, plc3, slc
 from abdf1_ros.pccc.access import Access
 from abdf1_ros.pccc.dialect import Steps
+from abdf1_ros.pccc.emulated import EmulatedProcessor, Setting
+from abdf1_ros.pccc.families import FAMILIES
+from abdf1_ros.pccc.file_search import is_there
 from abdf1_ros.pccc.file_types import PlcType
 from abdf1_ros.pccc.processor import Processor
 from abdf1_ros.pccc.status import check_status, is_address_fault, Meanings, USUAL_MEANINGS
-from abdf1_ros.pccc.steps import AddressedValues, read, write
+from abdf1_ros.pccc.steps import AddressedValues, identify, read, write
 from abdf1_ros.pccc.values import ValueType
 import pytest
 from support.cases import for_all
 
 SLC = PlcType.SLC
+FAULTED = FAMILIES[PlcType.PLC5].encode_identity(EmulatedProcessor(Setting.FAULT))
 
 
 def reply(data: bytes = b'', sts: int = 0) -> Packet:
@@ -57,6 +61,13 @@ def test_values_across_elements_are_read_in_whole_elements() -> None:
     assert requests_of(read(values), reply(bytes(12))) == ['A2 0C 04 86 01 00']
     assert requests_of(read(AddressedValues.of('T4:1.ACC', SLC)), reply(b'\1\0')) == [
         'A2 02 04 86 01 02']
+
+
+def test_refused_or_odd_reply_is_no_file_and_leaves_an_identity_as_it_was() -> None:
+    values = AddressedValues.of('N7:0', SLC)
+    for odd in (reply(b'\1'), reply(sts=0x10)):
+        assert len(requests_of(is_there(values.address, values.dialect), odd)) == 1
+        assert len(requests_of(identify(), reply(FAULTED), odd)) == 2  # an old PLC-5
 
 
 def test_write_stops_at_the_first_refusal() -> None:

@@ -356,6 +356,7 @@ def test_words_with_write_again_have_to_be_read_often(
                          fallback=Fallback((0,), after) if after else None)]
     if period:
         rows.append(make_mapping('N7:0', tag='r', length=4, period=period))
+    rows.append(make_mapping('N9:0', period=100))  # of other words
     found = texts(report_of(*rows), RemarkKind.SETTING)
     assert [expected in text for text in found] == [True] * bool(expected)
 

@@ -193,6 +193,8 @@ def test_rule_12_write_and_serve_rows_take_a_fallback(
     ({'Fallback': '0 0', 'Fallback_After': '500'}, 'Fallback has 2 values, Length is 1'),
     ({'Fallback': '40000', 'Fallback_After': '500'}, 'a number from -32768 to 32767'),
     ({'Fallback': '9', 'Max': '5', 'Fallback_After': '500'}, 'a number from -32768 to 5'),
+    ({'Min': '5', 'Fallback': '4', 'Fallback_After': '500'},
+     'Fallback "4" should be a number from 5 to 32767'),
     ({'Length': '2', 'Fallback': '0 stop', 'Fallback_After': '500'},
      'Fallback "stop" should be a number'),
     ({'Address': 'B3:0/1', 'Length': '2', 'Fallback': '0 1', 'Fallback_After': '500'},
