@@ -371,7 +371,7 @@ def _listen(options: argparse.Namespace, output: Output) -> int:
         _say(f'listening on {" and ".join(tap.names)}; Ctrl-C ends')
         status = _print_heard(tap, trace, output, settings, options)
         output.end()
-    return status
+    return status or EXIT_USAGE * output.has_failed
 
 
 def _print_heard(tap: Tap, trace: Trace | None, output: Output, settings: dict[str, str],

@@ -208,3 +208,5 @@ def test_live_line_is_drawn_at_the_end(tmp_path: Path, capsys: Output) -> None:
     said = call(main, capsys, '--port', 'pty', '--seconds', '0.3', '--html', str(page))
     assert said.status == 0, said
     assert 'no fault' in page.read_text(encoding='utf-8')
+    nowhere = str(page / 'line.html')
+    assert call(main, capsys, '--port', 'pty', '--seconds', '0.1', '--html', nowhere).status == 2
