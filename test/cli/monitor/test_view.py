@@ -90,6 +90,7 @@ WITHHELD = [
     ShownStatus('mappings', Style.BAD, 'ERROR: of 10 mappings 2 withheld', {
         'total': '10', 'row_1': 'withheld: the processor is in mode REM PROG',
         'row_2': 'withheld: the processor is in mode REM PROG'}),
+    ShownStatus('interlocks', Style.GOOD, 'OK: 1 of 1 confirmed'),
     ShownStatus('writes', Style.GOOD, 'OK: 0 of 0 writes confirmed')]
 
 
@@ -101,11 +102,12 @@ def test_verdict_values_and_what_is_wrong_fit_a_terminal_of_80_by_24_for_ten_row
     assert shown[1].split('   ') == [
         '  load 47 %', 'cycle 240 ms', 'stations 1 REM RUN, 2 REM PROG']
     assert [line.split()[0] for line in shown[3:13]] == [f'row_{number}' for number in range(10)]
-    assert shown[13:17] == [
+    assert shown[13:18] == [
         '  mappings     ERROR: of 10 mappings 2 withheld',
         '      row_1: withheld: the processor is in mode REM PROG',
         '      row_2: withheld: the processor is in mode REM PROG',
-        '  station 2    WARN: station 2 in mode REM PROG']
+        '  station 2    WARN: station 2 in mode REM PROG',
+        '  interlocks   OK: 1 of 1 confirmed']
 
 
 def test_load_of_the_line_is_shown_by_row() -> None:
@@ -188,6 +190,7 @@ def test_link_shows_load_and_poll_cycle() -> None:
             'port': 'open', 'settings': '19200 baud, CRC', 'line load': '61 %',
             'poll cycle with Periods': '240 ms',
             'period 100 ms': 'wanted 100 ms, kept 345 ms', 'last error': '2509 ERR'})])
+    assert lines(picture)[1] == '  load 61 %   cycle 240 ms'
     assert styles_of('  link         WARN: port open', picture) == [Style.WARNING] * 2
     assert line_with('settings', picture).text.split(maxsplit=1) == ['settings', '19200 baud, CRC']
     assert line_with('line load', picture).text.split() == ['line', 'load', '61', '%']
@@ -196,12 +199,12 @@ def test_link_shows_load_and_poll_cycle() -> None:
 
 
 def test_stations_are_told_from_the_active_node_table_and_the_diagnostics() -> None:
-    picture = snapshot(statuses=[ShownStatus(
+    picture = snapshot(statuses=[ShownStatus('station 1', Style.GOOD, 'OK'), ShownStatus(
         'station 2', Style.BAD, 'ERROR: station 2 inactive', {'last answer': '4.7 s ago'})])
     assert 'active stations: 1, 17' in '\n'.join(lines(picture))
     assert styles_of('  station 2    ERROR', picture) == [Style.BAD] * 2
     assert line_with('last answer  4.7 s ago', picture).style is Style.PLAIN
-    assert line_with('stations 2 silent', picture).style is Style.WARNING
+    assert line_with('stations 1 OK, 2 silent', picture).style is Style.WARNING
     assert 'active stations: none' in '\n'.join(lines(snapshot(active=[])))
     assert 'active stations' not in '\n'.join(lines(snapshot(active=None)))
 
@@ -254,7 +257,7 @@ def test_what_is_missing_is_said(changes: dict[str, object], text: str, style: S
 
 
 @for_all(('values', 'width', 'text'), [
-    ([1, 0, 1], 20, '1 0 1'), ([0.10000000149011612, -3.5], 20, '0.1 -3.5'),
+    ([1, 0, 1], 5, '1 0 1'), ([0.10000000149011612, -3.5], 20, '0.1 -3.5'),
     (range(100), 20, '0 1 2 3 and 96 more'), ([123456789], 6, '123...'),
     ('Tank 4', 20, '"Tank 4"'), ('a' * 30, 10, '"aaaaaa...'), ([], 5, ''),
 ])
