@@ -23,6 +23,7 @@ from abdf1_ros.df1.checksum import Checksum
 from abdf1_ros.df1.packet import Packet
 import pytest
 from support import browser
+from support.captures import FOLDER
 from support.commands import call, Output
 
 HEAD = '# abdf1_ros capture 1', '# begun: 2026-03-01T14:05:09.000+01:00', '# baud: 19200', \
@@ -63,11 +64,12 @@ def drawn(tmp_path: Path, capsys: Output, *args: str) -> browser.Elements:
 
 def test_each_message_is_a_bar_in_the_lane_of_its_station(tmp_path: Path, capsys: Output) -> None:
     found = drawn(tmp_path, capsys, capture(
-        tmp_path / 'line.cap', exchange(0.1, 1), exchange(0.2, 2, station=7)))
+        tmp_path / 'line.cap', exchange(0.1, 1), exchange(0.14, 2, station=7)))
     assert found.bars('ask') == 2
     assert found.bars('answer') == 2 + 2  # the overview has one for each station
     assert found.bars('small') == 2 * 3
     assert {'station 2', 'station 7', 'no fault'} <= {*found.texts}
+    assert 'Recording 2' not in found.texts  # two chunks have one time
     assert '0.100000 command: 5 to 2, TNS 0001: protected typed logical read N7:0, 2 words ' \
         '| CRC good' in found.texts
 
@@ -88,16 +90,18 @@ def test_bar_begins_and_ends_as_its_bytes_did(tmp_path: Path, capsys: Output) ->
                 if rect.get('class') == 'small' and 'x' in rect}) == 3 + 2
 
 
+def all_links_lead_to_a_strip(found: browser.Elements) -> bool:
+    names = {f'#{element["id"]}' for _, element in found.found if 'id' in element}
+    return {element['href'] for tag, element in found.found if tag == 'a'} <= names
+
+
 def test_faults_come_as_episodes_that_lead_to_their_strip(tmp_path: Path, capsys: Output) -> None:
     found = drawn(tmp_path, capsys, capture(
         tmp_path / 'line.cap', exchange(0.1, 1), silence(1.2), exchange(2.0, 2, sts=0x10),
         silence(5.4), silence(9.6), silence(9.7, station=4),
         [(30.0, '>', 2 * frames.poll_frame(3))], exchange(30.1, 3)))
     assert '7 faults on the line' in found.texts
-    links = [attributes['href'] for tag, attributes in found.found if tag == 'a']
-    names = {attributes['id'] for tag, attributes in found.found
-             if tag == 'svg' and 'id' in attributes}
-    assert {link.removeprefix('#') for link in links} <= names
+    assert all_links_lead_to_a_strip(found)
     told = [text for text in found.texts if text.strip()]
     at = told.index('the first of them')
     assert told[at + 1:at + 7] == ['1.202 s', '9.602 s', '14:05:10', '3', '3',
@@ -126,20 +130,32 @@ def test_long_recording_keeps_its_faults(
     assert [text for text in found.texts if 'not drawn' in text] == [
         '26 strips not drawn', '3 strips not drawn']
     assert found.bars('missing') == 2  # in its strip, and in the overview
+    assert all_links_lead_to_a_strip(found)
+
+
+def test_message_that_a_radio_modem_has_forwarded_is_no_fault(
+        tmp_path: Path, capsys: Output) -> None:
+    radio, = FOLDER.glob('radio*.cap')
+    assert '7 faults on the line' in drawn(tmp_path, capsys, str(radio)).texts
 
 
 def test_recordings_one_after_the_other_and_without_times(tmp_path: Path, capsys: Output) -> None:
-    first = capture(tmp_path / 'line.cap.1', silence(0.1), exchange(50.0, 1))
-    second = capture(tmp_path / 'line.cap', silence(0.1), exchange(0.5, 2))
+    broken = b'\x10\x02'
+    first = capture(tmp_path / 'line.cap.1', silence(0.1), exchange(50.0, 1), [(51, '>', broken)])
+    second = capture(tmp_path / 'line.cap', silence(0.1), exchange(0.5, 2),
+                     [(0.9, '<', broken), *silence(3.0), (3.1, '<', frames.EOT)])
     found = drawn(tmp_path, capsys, first, second)
     assert {'All of it', 'Recording 2'} <= {*found.texts}
     assert {'r1s0', 'r1s50', 'r2s0'} <= {element.get('id') for _, element in found.found}
     assert found.texts.count('silence: no answer to the poll') == 2
+    assert found.bars('ask') == 2
     raw = tmp_path / 'raw'
-    raw.write_bytes(b''.join(data for _, _, data in exchange(0.0, 1)))
+    raw.write_bytes(b''.join(
+        data for tns in (1, 2, 3) for _, _, data in silence(0.0) + exchange(0.1, tns)))
     found = drawn(tmp_path, capsys, '--binary', str(raw))
     assert 'bytes' in found.texts
-    assert found.bars('ask') == 1
+    assert [text for text in found.texts if text.startswith('byte ')] == ['byte 4', 'byte 102']
+    assert found.bars('ask') == 3
 
 
 def test_names_are_text_and_nothing_else(tmp_path: Path, capsys: Output) -> None:
