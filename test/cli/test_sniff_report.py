@@ -95,7 +95,7 @@ def test_anonymous_bundle_has_no_values_and_no_names(tmp_path: Path, capture: st
 NET = """\
 # Joe's line, ask jdoe
 Com_Port,Station,Baud,Mode,Share,Store_Forward,Timeout
-rfc2217://plc-gw.acme.example:4001,5,9600,Master,pty:/home/jdoe/hmi tcp:10.1.2.3:4002,,jdoe
+rfc2217://plc-gw.acme.example:4001,5,9600,Master,pty:/home/jdoe/hmi tcp:10.1.2.3:4002,jdoe,jdoe
 """
 MAP = """\
 sep=,
@@ -103,7 +103,7 @@ sep=,
 Tag,Command,Address,Station,PLC_Type,Topic,While,Confirms,Fallback,Description,Min,Via
 booth_alive,Read,N7:0,2,SLC,,,,,alive of the booth,,
 booth_speed,Read,N7:1,2,SLC,acme/speed,booth_alive,,,ask jdoe,,
-booth_ros,Heartbeat,N7:9,2,SLC,,acme/setpoint acme/door,,,,,
+booth_ros,Heartbeat,plc-gw:9,2,SLC,,acme/setpoint acme/door,,,,,
 booth_control,Read,B3:0/1,2,SLC,,Run,Booth_ROS,,,,
 setpoint,Write,N7:3-4,2,SLC,acme/setpoint,,,acme jdoe,,jdoe,plc-gw
 door,Read,plc-gw.acme.example,10.1.2.3,/home/jdoe,,,,,,,
@@ -142,12 +142,12 @@ def test_anonymous_bundle_has_no_name_of_a_host_user_path_or_port(
     assert [name for name in NAMES if name in everything] == []
     assert found['settings/net.csv'] == (
         'Station,Mode,Com_Port,Baud,Timeout,Share,Store_Forward\n'
-        '5,Master,rfc2217,9600,?,2 places,\n')
+        '5,Master,rfc2217,9600,?,2 places,?\n')
     assert found['settings/map.csv'] == found['settings/1_map.csv'] == (
         'Tag,Command,Address,Station,PLC_Type,Topic,Min,While,Confirms,Via\n'
         'tag_1,Read,N7:0,2,SLC,,,,,\n'
         'tag_2,Read,N7:1,2,SLC,topic_1,,tag_1,,\n'
-        'tag_3,Heartbeat,N7:9,2,SLC,,,topic_2 topic_3,,\n'
+        'tag_3,Heartbeat,?,2,SLC,,,topic_2 topic_3,,\n'
         'tag_4,Read,B3:0/1,2,SLC,,,Run,tag_3,\n'
         'tag_5,Write,N7:3-4,2,SLC,topic_2,?,,,?\n'
         'tag_6,Read,?,?,?,,,,,\n')
