@@ -16,6 +16,7 @@
 
 from collections.abc import Iterator
 from contextlib import suppress
+from io import BytesIO
 import json
 import os
 from pathlib import Path
@@ -25,13 +26,15 @@ import signal
 import subprocess
 import sys
 import time
+from unittest.mock import MagicMock, Mock
 
 from abdf1_ros.cli import sniff
 from abdf1_ros.cli.sniff import main
 from abdf1_ros.df1 import frames
 from abdf1_ros.df1.checksum import Checksum
 from abdf1_ros.df1.packet import Packet
-from abdf1_ros.sniffer.capture import read_capture
+from abdf1_ros.sniffer.capture import Chunk, Direction, read_capture
+from abdf1_ros.sniffer.packet_files import PacketFile
 import pytest
 from support.cases import for_all
 from support.commands import Output, running_simulator
@@ -178,10 +181,11 @@ def test_file_that_cannot_be_read_is_an_error_without_an_empty_summary(
 
 
 @pytest.mark.parametrize('text', ['', '# abdf1_ros capture 1\n# baud: 9600\n', '# a remark\n'])
-def test_file_without_bytes_is_told(capsys: Output, tmp_path: Path, text: str) -> None:
+def test_file_without_bytes_is_told(
+        capsys: Output, tmp_path: Path, capture: str, text: str) -> None:
     path = tmp_path / 'empty'
     path.write_text(text, encoding='ascii')
-    assert main([str(path)]) == 0
+    assert main([capture, str(path)]) == 0
     assert capsys.readouterr().err == f'sniff: {path}: the file has no bytes\n'
 
 
@@ -219,7 +223,7 @@ def test_packets_go_nowhere_else_than_into_pcapng(capsys: Output, capture: str) 
 @for_all('args', [
     [], ['x', '--port', 'y'], ['--port', 'x', '--tap', 'y', 'z'], ['x', '--save', 'y'],
     ['--port', 'x', '--binary'], ['--tap', 'x'], ['--tap', 'x', 'x'],
-    ['x', '--check', 'md5'], ['x', '--baud', '7'],
+    ['x', '--check', 'md5'], ['x', '--baud', '7'], ['x', '--conformance', 'y'],
     ['x', '--seconds', 'many'], ['x', '--seconds', '1_0'], ['x', '--baud', '9_600']])
 def test_option_that_is_wrong_is_told_with_status_2(capsys: Output, args: list[str]) -> None:
     with pytest.raises(SystemExit) as caught:
@@ -263,7 +267,10 @@ def test_tap_between_the_simulator_and_a_master(tmp_path: Path, capsys: Output) 
     assert not os.path.lexists(tap)
     assert lines_of(capsys, saved, '--pcapng', f'{packets}2')[:5] == said[:5]
     for path in (packets, f'{packets}2'):  # but for microseconds that a capture rounds
-        assert all(entry in Path(path).read_bytes() for entry in (SAID[0], SAID[2], heard))
+        content = Path(path).read_bytes()
+        assert all(entry in content for entry in (SAID[0], SAID[2], heard))
+        assert next(PacketFile(path, BytesIO(content)).packets()).time == pytest.approx(
+            time.time(), abs=600)
 
 
 def test_port_until_a_signal(tmp_path: Path) -> None:
@@ -329,6 +336,18 @@ def test_lost_port_ends_with_the_summary(tmp_path: Path) -> None:
         assert sniff.result() == 1
     assert _told(sniff)[1].startswith('sniff: a port was lost: ')
     assert _printed(sniff)[0].startswith('summary: ')
+
+
+def test_what_a_slow_output_has_lost_is_told_and_saved(
+        tmp_path: Path, capsys: Output, monkeypatch: pytest.MonkeyPatch) -> None:
+    tap = MagicMock(names=['x'], new_losses=Mock(side_effect=[0, 3]), chunks=lambda *args: iter(
+        Chunk(time, Direction.UNKNOWN, frames.poll_frame(2)) for time in (0.0, 0.1)))
+    monkeypatch.setattr(sniff, 'Tap', made := Mock(return_value=tap))
+    assert main(['--port', 'x', '--parity', 'Even', '--save', str(tmp_path / 'saved')]) == 0
+    told = '3 pieces of traffic were lost: this output was too slow for them\n'
+    assert capsys.readouterr().err.endswith(told)
+    assert (tmp_path / 'saved').read_text('ascii').endswith(told)
+    assert made.call_args.args[1].parity == 'Even'
 
 
 def test_colour_is_for_terminals_only(

@@ -221,7 +221,7 @@ def test_browser_shows_ten_thousand_frames_in_their_colours(
 
 def test_live_line_is_drawn_at_the_end(tmp_path: Path, capsys: Output) -> None:
     page = tmp_path / 'live.html'
-    said = call(main, capsys, '--port', 'pty', '--seconds', '0.3', '--html', str(page))
+    said = call(main, capsys, '--tap', 'pty', 'pty', '--seconds', '0.3', '--html', str(page))
     assert said.status == 0, said
     assert 'no fault' in page.read_text(encoding='utf-8')
     nowhere = str(page / 'line.html')
