@@ -165,6 +165,11 @@ def test_message_goes_out_though_nothing_comes_in(
     line = descriptor(tmp_path / 'plc')
     os.write(line, frames.ENQ)
     assert read_exactly(line, 2) == frames.NAK  # the simulator waits for bytes now
+    simulator.type('full 1\n')
+    simulator.wait_for('simulator: station 1: full')
+    for sent in (frames.message_frame(bytes.fromhex(PLC5_READ), Checksum.CRC), frames.ENQ):
+        os.write(line, sent)
+        assert read_exactly(line, 2) == frames.NAK  # and nothing else
     time.sleep(0.2)
     simulator.type('msg 1 N7:50 11\n')
     assert read_exactly(line, 5) == frames.STX + bytes((5, 1, 0x0F))
