@@ -156,3 +156,4 @@ def test_packet_that_was_sent_again_is_remembered_from_then_on() -> None:
         for number in range(15):
             copies.mark(again._replace(tns=tns + number), time, Direction.IN)
     assert marks == [None, Mark.RETRANSMISSION, Mark.FORWARDED]
+    assert copies.mark(again._replace(tns=314), -20.0, Direction.IN) is None  # another recording

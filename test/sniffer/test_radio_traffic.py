@@ -132,7 +132,7 @@ def test_mode_is_found_where_replies_come_without_symbols() -> None:
 @pytest.mark.parametrize('symbol', [ACK, NAK, ENQ])
 def test_full_duplex_stays_what_it_is_though_some_symbols_are_lost(symbol: bytes) -> None:
     session = TrafficDecoder()
-    sniffed([*plain(2, symbol), *plain(2), *plain(2, symbol)], session)
+    sniffed([*plain(2, symbol), *plain(2)], session)
     assert session.kind.duplex is Duplex.FULL
     sniffed([*plain(4), *plain(1, symbol)], session)  # taken for radio, and given up again
     assert session.kind.duplex is Duplex.FULL

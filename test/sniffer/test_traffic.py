@@ -102,6 +102,7 @@ def test_check_is_found_or_given(checksum: Checksum, given: bool) -> None:
     assert kinds(entries) == [Kind.COMMAND, Kind.ACK, Kind.POLL, Kind.REPLY, Kind.ACK]
     assert {entry.checksum for entry in entries if entry.packet} == {checksum}
     assert (session.kind.checksum, session.kind.duplex) == (checksum, Duplex.HALF)
+    assert [entry.direction for entry in decode(said)] == [OUT, IN, OUT, IN, OUT]
 
 
 def test_wrong_check_is_marked_and_taken_no_further() -> None:
@@ -192,9 +193,11 @@ def test_frame_that_breaks_off_does_not_swallow_what_comes_after_a_pause() -> No
     said = [(OUT, master(COMMAND)[:12]), (OUT, frames.poll_frame(1))]
     assert kinds(decode(said, pause=1.0)) == [Kind.DAMAGED, Kind.SILENCE, Kind.POLL]
     last, = decode(said[:1])
-    assert (last.kind, last.text, last.wire) == (
-        Kind.DAMAGED, 'broken off before DLE ETX', said[0][1])
+    assert (last.time, last.kind, last.text, last.wire) == (
+        0.0, Kind.DAMAGED, 'broken off before DLE ETX', said[0][1])
     assert kinds(decode(said, pause=0.1)) == [Kind.DAMAGED, Kind.SILENCE, Kind.POLL]
+    assert kinds(decode([(OUT, b'\x10'), said[1]], pause=-1.0)) == [
+        Kind.NOISE, Kind.POLL]
 
 
 def test_unknown_symbol_is_shown_with_its_code() -> None:
