@@ -64,8 +64,8 @@ def test_init_writes_files_that_the_node_takes(port: str, tmp_path: Path, capsys
     said = capsys.readouterr().out
     assert 'station 1: PLC-5/40' in said and 'station 2: SLC 5/03' in said
     network = load_network(str(tmp_path / 'net.csv'))
-    assert (network.port, network.baud, network.mode, network.error_code) == (
-        port, 19200, 'Master', 'CRC')
+    assert (network.port, network.baud, network.mode, network.error_code, network.station) == (
+        port, 19200, 'Master', 'CRC', Network().station)
     mappings, problems = load_mappings(str(tmp_path / 'map.csv'))
     assert problems == []
     assert [(mapping.tag, mapping.plc_type.value, mapping.station) for mapping in mappings] == [

@@ -49,8 +49,10 @@ def test_every_option_sets_its_field_of_the_network() -> None:
         mode='Peer')
 
 
-def test_peer_is_full_duplex() -> None:
+def test_peer_is_full_duplex_and_by_radio_a_timeout_is_for_the_reply() -> None:
     assert line_of('--port', '1', '--peer') == line_of('--port', '1', '--duplex', 'full')
+    radio = [line_of('--port', '1', '--radio', *timeout) for timeout in ((), ('--timeout', '150'))]
+    assert [line.cmd_timeout for line in radio] == [Network().cmd_timeout, 150]
 
 
 def test_gateway_in_full_duplex_has_no_address() -> None:
