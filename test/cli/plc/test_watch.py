@@ -25,6 +25,7 @@ from math import inf, nan
 import os
 from pathlib import Path
 import re
+import threading
 
 from abdf1_ros.cli.plc.data import mapping_of, Radix, Tags
 from abdf1_ros.cli.plc.watch import curve_of, LiveValues, NoValue, WatchedRead
@@ -65,8 +66,8 @@ def network_on(plcs: Plcs, timeout: int = 1000) -> Network:
 class Counting(LiveValues):
     """A watch that raises N7:0 by one after each read, and loses the line after some."""
 
-    def __init__(self, plcs: Plcs, reads: int = 1000) -> None:
-        super().__init__(network_on(plcs), [SPEED], 0.01)
+    def __init__(self, plcs: Plcs, reads: int = 1000, csv: bool = False) -> None:
+        super().__init__(network_on(plcs), [SPEED], 0.01, csv=csv)
         self._plcs = plcs
         self._left = reads
 
@@ -146,6 +147,11 @@ def test_lost_line_is_shown(plcs: Plcs, capsys: Output) -> None:
     assert lines[:3] == [f'N7:0  {number}' for number in range(3)]
     assert lines[3].startswith('N7:0  no value: ')
     assert len(lines) == 4
+
+
+def test_lost_line_is_a_row_of_csv_without_a_value(plcs: Plcs, capsys: Output) -> None:
+    assert Counting(plcs, reads=3, csv=True).run(4) == 1
+    assert capsys.readouterr().out.endswith(',1,N7:0,\n')
 
 
 def test_silent_station_is_shown(plcs: Plcs, capsys: Output) -> None:
@@ -249,10 +255,10 @@ def test_nothing_old_stays_below_a_table_that_shrinks(
 def test_table_marks_changes_and_says_what_does_not_fit(draw: Draw) -> None:
     words = make_mapping('N7:0', length=4), make_mapping('N7:9', item=2), SPEED
     lines = draw(words, (words[0], array('h', [1, 2, 3, 4])),
-                 (words[0], array('h', [-20000, 2, 3, 4])), (words[1], array('h', [5])),
+                 (words[0], array('h', [-200, 2, 3, 4])), (words[1], array('h', [5])),
                  size=(52, 5))
     assert [line.split() for line in lines[1:-1]] == [
-        ['N7:0', '1', 'int16', '*', '-20000', '2'], ['N7:2', '3', '4']]
+        ['N7:0', '1', 'int16', '*', '-200', '2', '3'], ['N7:3', '4']]
     assert lines[-1].startswith('+2 more')
 
 
@@ -309,7 +315,8 @@ def test_rows_of_a_map_have_their_own_tags_and_scaled_values(
     assert watch.run(1) == 0
     assert shown(capsys) == ['N7:1 height  10.5']
     assert capture.read_text('ascii').startswith('# abdf1_ros capture 1\n')
-    assert Recording(capture).chunks()
+    assert list(Recording(capture).chunks())
+    assert not [thread for thread in threading.enumerate() if thread.name == 'trace']
 
 
 @pytest.mark.parametrize(('mode', 'text'), [
@@ -321,9 +328,9 @@ def test_mode_of_each_plc_and_faults_of_the_line_stand_around_the_values(
                        mode_text=mode.value if mode else 'mode 0x0E')
     monkeypatch.setattr(Checks, 'known', lambda self, station: StationHealth(
         str(stopped), stopped))
-    lines = draw([SPEED], (SPEED, array('h', [5])))
+    lines = draw([SPEED, NAME], (SPEED, array('h', [5])))
     assert lines[0] == f'station 1: PLC-5/40, {text}'
-    assert lines[1].startswith('address') and len(lines) == 3
+    assert lines[1].startswith('address') and len(lines) == 4
     monkeypatch.setattr(LiveValues, 'faults_of_line', lambda self: ['line: 3 repeated, 1 damaged'])
     assert draw([SPEED], (SPEED, array('h', [5])))[-1] == 'line: 3 repeated, 1 damaged'
 
