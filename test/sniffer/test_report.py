@@ -117,7 +117,7 @@ def test_entries_are_counted_for_the_line_and_for_their_station() -> None:
             Entry(0, IN, Kind.REPLY, station=1, packet=GOOD, latency=0.25),
             Entry(0, IN, Kind.REPLY, station=1, packet=REFUSED, latency=0.75,
                   marks=(Mark.DUPLICATE,)),
-            Entry(0, IN, Kind.DAMAGED, station=2, valid=False),
+            Entry(0, IN, Kind.DAMAGED, station=2),  # broken off: there was no check
             Entry(0, IN, Kind.NOISE, size=7)):
         summary.add(entry)
     every, one, two = summary.all, summary.stations[1], summary.stations[2]

@@ -72,7 +72,7 @@ def test_tags_of_a_map_stand_beside_addresses(plc: Plc, tmp_path: Path) -> None:
 
 
 MAP_OF_TAGS = ('Tag,Command,Address,Station,PLC_Type,Length,Scale,Min,Max,Description', [
-    'speed,Read,N7:0-1,1,PLC5,,0.1,,,', 'level,ReadWrite,N7:30,2,SLC,,0.5,0,10,Tank 4 [%]',
+    'speed,Read,N7:0-1,1,PLC5,,0.1,,,Hall 3', 'level,ReadWrite,N7:30,2,SLC,,0.5,0,10,Tank 4 [%]',
     'order,Write,N7:31,2,SLC,,,,,'])
 
 
@@ -80,7 +80,7 @@ def test_rows_of_a_map_are_read_by_their_tags(plc: Plc, tmp_path: Path) -> None:
     path = write_csv(tmp_path / 'map.csv', *MAP_OF_TAGS)
     capture = tmp_path / 'line.cap'
     said = plc('read', 'speed', 'N7:0', '--map', str(path), '--record', str(capture))
-    assert (said.status, said.lines) == (0, ['N7:0 speed[0] 120', 'N7:1 speed[1] -80',
+    assert (said.status, said.lines) == (0, ['N7:0 speed[0] 120 Hall 3', 'N7:1 speed[1] -80',
                                              'N7:0 speed[0] (raw) 1200'])
     assert capture.read_text('ascii').startswith('# abdf1_ros capture 1\n')
     assert [line.split()[:2] for line in plc('read', '--map', str(path)).lines] == [
@@ -103,8 +103,8 @@ def test_map_says_of_each_tag_what_options_say_of_addresses(plc: Plc, tmp_path: 
     assert plc('read', 'level', 'speed', '--station', '2', '--map', path).err == (
         'plc: --station: the map has speed at station 1\n')
     assert plc('read', '--station', '2', '--map', path).lines == ['N7:30 level 2330 % Tank 4 [%]']
-    assert plc('read', '--station', '3', '--map', path).err == (
-        f'plc: {path}: has no row of station 3 that is read\n')
+    assert plc('read', '--station', '0', '--map', path).err == (
+        f'plc: {path}: has no row of station 0 that is read\n')
     assert plc('read', 'Level', '--map', path).err.endswith(
         'tags that are read: speed, level; did you mean level?\n')
     assert plc('read', 'level', '--map', path, '--own-station', '2').err == (
