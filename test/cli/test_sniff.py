@@ -269,8 +269,7 @@ def test_tap_between_the_simulator_and_a_master(tmp_path: Path, capsys: Output) 
     for path in (packets, f'{packets}2'):  # but for microseconds that a capture rounds
         content = Path(path).read_bytes()
         assert all(entry in content for entry in (SAID[0], SAID[2], heard))
-        assert next(PacketFile(path, BytesIO(content)).packets()).time == pytest.approx(
-            time.time(), abs=600)
+        assert next(PacketFile(path, BytesIO(content)).packets()).time > time.time() - 600
 
 
 def test_port_until_a_signal(tmp_path: Path) -> None:

@@ -138,7 +138,7 @@ def test_row_behind_a_gateway_is_asked_through_it(tmp_path: Path, args: tuple[st
 
 @pytest.mark.parametrize(('map_row', 'args', 'routes'), [
     ('near,Read,N7:0,3,SLC,', ('near', 'N7:1', '--station', '7', '--via', '9'), {3: 3, 7: 9}),
-    ('far,Read,N7:0,3,SLC,8', ('far', 'N7:1', '--station', '7', '--via', '9'), {3: 8, 7: 9}),
+    ('far,Read,N7:0,3,SLC,0', ('far', 'N7:1', '--station', '7', '--via', '9'), {3: 0, 7: 9}),
     ('far,Read,N7:0,7,SLC,8', ('N7:1', '--station', '7', '--via', '9'),
      'the map has station 7 behind gateway 8'),
     ('near,Read,N7:0,7,SLC,', ('N7:1', '--station', '7', '--via', '9'),
