@@ -36,7 +36,7 @@ REPLY = Entry(
     1.25, IN, Kind.REPLY, '1 to 5, TNS 1234: 01', 1, Checksum.CRC, True,
     Packet(5, 1, 0x46, 0, 0x1234, b'\x01'), 0.75)
 REFUSAL = Entry(1.0, IN, Kind.REPLY, 'STS 50: no', 1, Checksum.CRC, True,
-                Packet(5, 1, 0x46, 0x50, 0x1234))
+                Packet(5, 1, 0x46, 0x50, 0x1234), marks=(Mark.DUPLICATE,))
 DAMAGED = Entry(2.0, IN, Kind.DAMAGED, 'wrong check', 1, Checksum.BCC, False)
 POLL = Entry(None, Direction.UNKNOWN, Kind.POLL, '', 16, Checksum.BCC, True)
 NOISE = Entry(3.0, IN, Kind.NOISE, '2 bytes outside of any frame', size=2)
@@ -92,9 +92,9 @@ def test_summary_counts_what_was_seen_and_what_was_wrong(summary: Summary) -> No
                     'line load 50.0% at 9600 baud')
     assert seen == '  seen: 1 command, 2 replies, 1 of them with an error, 1 poll'
     assert faults == ('  faults: 1 damaged, 2 bytes of noise, 1 retransmissions, '
-                      '1 polls and messages without answer')
+                      '1 duplicates, 1 polls and messages without answer')
     assert latency == '  replies after: mean 750.0 ms, max 750.0 ms'
-    assert one.split() == ['1', '0', '0', '1', '2', '1', '1', '1', '0', '750.0', '750.0']
+    assert one.split() == ['1', '0', '0', '1', '2', '1', '1', '2', '0', '750.0', '750.0']
     assert sixteen.split() == ['16', '1', '1', *'000000', '-', '-']
 
 
@@ -106,7 +106,7 @@ def test_json_has_all_that_the_summary_tells(summary: Summary) -> None:
             'duplex': 'half', 'baud': 9600, 'load': 0.5, 'errors': 1, 'damaged': 1}
     assert found['stations']['1']['latency_ms'] == {'mean': 750.0, 'max': 750.0}
     assert found['stations']['16']['counts'] == {'poll': 1, 'silence': 1}
-    assert found['marks'] == {'retransmission': 1}
+    assert found['marks'] == {'retransmission': 1, 'duplicate': 1}
 
 
 def test_entries_are_counted_for_the_line_and_for_their_station() -> None:
