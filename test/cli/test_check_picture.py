@@ -54,6 +54,8 @@ def test_each_station_has_a_lane_and_each_read_a_bar_as_long_as_it_takes(
     assert {'station 1', 'station 2'} <= {*found.texts}
     assert found.bars('ask') == 2 * len(ROWS)  # in the cycle, and in what the Periods need
     assert found.bars('wait') == len(ROWS)
+    begins = {each['x'] for _, each in found.found if each.get('class') == 'ask' and 'x' in each}
+    assert len(begins) == 2 * len(ROWS) - 1  # both begin with a bar at 0
     assert found.bars('bad') == 0
     assert any(text.startswith('every Period can be kept; load') for text in found.texts)
     (told,) = {text for text in found.texts if text.startswith('station 1, F8:0 to F8:2: ')}
