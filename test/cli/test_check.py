@@ -312,11 +312,11 @@ def test_two_lines_of_a_folder_on_one_port_are_an_error(tmp_path: Path, capsys: 
     for name, port in (('glue', '/dev/ttyUSB0'), ('paint', 'socket://localhost:4001'),
                        ('press', 'rfc2217://127.1:4001')):
         write_csv(tmp_path / f'{name}_net.csv', NET_HEADER, [f'{GOOD_NET[:-1]}{port}'])
-        write_csv(tmp_path / f'{name}_map.csv', MAP_HEADER, [GOOD_ROW])
+        write_csv(tmp_path / f'{name}_map.csv', MAP_HEADER, [GOOD_ROW.replace('1000', '10')])
     assert main([str(tmp_path)]) == 2
     errors = [line for line in capsys.readouterr().out.splitlines() if 'error' in line]
     assert errors == [f'press: error: {tmp_path}/press_net.csv: rfc2217://127.1:4001 is the port '
-                      'of paint too', '3 lines: 2 good (0 of them with warnings), 1 with errors']
+                      'of paint too', '3 lines: 2 good (2 of them with warnings), 1 with errors']
 
 
 def test_json_of_a_folder(tmp_path: Path, capsys: Output) -> None:
@@ -375,3 +375,4 @@ def test_rows_that_a_recording_fills_are_told(tmp_path: Path, capsys: Output) ->
     assert any('word range read N7:7, 3 words' in text for text in content['reads'])
     assert main([str(net), str(rows), '--heard', str(tmp_path / 'none.cap')]) == 2
     assert 'No such file' in capsys.readouterr().out
+    assert main([str(rows), str(rows), '--heard', str(heard)]) == 2  # without a net file

@@ -104,7 +104,8 @@ def test_bridges_are_heard_and_others_are_not(publish: Publish) -> None:
                              KeyValue(key='/hall/b', value='b_net.csv:2:1: Baud')]
     with PlantWatch([]) as watch:
         publish(watch, lambda lines: set(lines) == {'/hall/a', '/hall/b'},
-                array('battery', link=OK), array('hall/a', link=OK, mappings=ERROR), down)
+                DiagnosticArray(), array('battery', link=OK),
+                array('hall/a', link=OK, mappings=ERROR), down)
         lines = {line.name: line.worst(line.told) for line in watch.lines()}
     assert lines['/hall/a'] == ShownStatus('mappings', Style.BAD, '')
     assert lines['/hall/b'] == ShownStatus('', Style.BAD, 'does not run: b_net.csv:2:1: Baud')
