@@ -47,7 +47,8 @@ def test_result_is_told_in_lines(port: str, capsys: Output) -> None:
 
 
 def test_run_in_which_nothing_was_tried_has_not_passed(port: str, capsys: Output) -> None:
-    assert main(['slave', '--port', port, '--only', 'nak-resets']) == 1
+    options = ('--only', 'nak-resets', '--only', 'write-and-read', '--words', 'N7:0')
+    assert main(['slave', '--port', port, *options]) == 1  # without --yes
     assert 'conform: no rule was tried: each case has its reason' in capsys.readouterr().err
 
 

@@ -89,8 +89,8 @@ def imported(folder: Path, text: str | bytes,
      {'Scale': '0.1', 'Offset': '0', 'Min': '', 'Description': 'level [V]'}),
     ('"Set","N7:21",Short,1,R/W,100,Linear,4000,20000,-10,50,Float,0,1,degC,"",',
      {'Scale': '0.00375', 'Offset': '-25', 'Min': '', 'Max': '50', 'Description': '[degC]'}),
-    ('"Down","N7:22",Short,1,RO,100,Linear,0,100,0,10,Float,0,0,,"",1',
-     {'Scale': '-0.1', 'Offset': '0'}),
+    ('"Down","N7:22",Short,1,RO,100,Linear,0,100,2,12,Float,0,0,,"",1',
+     {'Scale': '-0.1', 'Offset': '-2'}),
     ('"Back","N7:24",Short,1,R/W,100,Linear,0,100,0,10,Float,1,1,,"",1',
      {'Scale': '-0.1', 'Min': '-10', 'Max': '0'}),
     ('"#1 pump","N7:25",Short,1,RO,100,,,,,,,,,,"",', {'Tag': '#1 pump', 'Topic': 't1_pump'}),
@@ -437,7 +437,7 @@ def test_export_in_place_of_a_map_or_net_file_is_told(tmp_path: Path) -> None:
 
 
 IGNITION = """\
-{"name": "", "tagType": "Provider", "tags": [
+{"tagType": "Provider", "tags": [
   {"name": "Line 1", "tagType": "Folder", "tags": [
     {"name": "Speed", "tagType": "AtomicTag", "valueSource": "opc", "dataType": "Int4",
      "opcServer": "Ignition OPC UA Server", "opcItemPath": "ns=1;s=[MLX]N7:0", "readOnly": false,
@@ -460,7 +460,8 @@ def test_tags_of_ignition(tmp_path: Path) -> None:
     assert left_out == [
         '9: Root: scaleMode SquareRoot has no counterpart; Linear has',
         '10: Any: opcItemPath {"bindType": "parameter"} has no address, as in ns=1;s=[PLC]N7:0']
-    result = import_map(str(tmp_path / 'export.csv'), STATION_2)
+    result = import_map(str(tmp_path / 'export.csv'), Wanted(read_only=True))
+    assert 'ReadWrite' not in result.text
     assert +result.ignored == {'tags that are not of a PLC': 1}
     assert +result.remarks == {'readOnly is not in the file: made Read rows': 1}
 
