@@ -87,7 +87,7 @@ def imported(folder: Path, text: str | bytes,
     ('"Plain","ST9:1",String,1,RO,100,,,,,,,,,,"",', {'Type': 'string'}),
     ('"Tank","N7:20",Word,1,RO,100,Linear,0,32767,0,3276.7,Float,1,1,V,"level",',
      {'Scale': '0.1', 'Offset': '0', 'Min': '', 'Description': 'level [V]'}),
-    ('"Set","N7:21",Short,1,R/W,100,Linear,4000,20000,-10,50,Float,0,1,degC,"",',
+    ('"Set","N7:21",Short,1,R/W,100,Linear,4000,20000,-10,50,Float,0,1,degC,"",0',
      {'Scale': '0.00375', 'Offset': '-25', 'Min': '', 'Max': '50', 'Description': '[degC]'}),
     ('"Down","N7:22",Short,1,RO,100,Linear,0,100,2,12,Float,0,0,,"",1',
      {'Scale': '-0.1', 'Offset': '-2'}),
@@ -265,7 +265,7 @@ def test_command_writes_a_map_once_and_says_how_to_go_on(
     # What the columns of a list without a header mean is not guessed.
     ('N7:0,SPEED,Conveyor speed\n', 'is none of these: '),
     ('N7:0,1,SPEED\nN7:1,2,LEVEL\n', 'is none of these: '),
-    ('Tag,Command,Address,Station,PLC_Type\na,Read,N7:0,1,SLC\n', 'is a map already'),
+    ('Tag,Command,Address,Station,PLC_Type,Via\na,Read,N7:0,1,SLC,\n', 'is a map already'),
     ('Address,Function\nN7:0,Speed\n', 'which column is the tag. Say --tag COLUMN; columns: '
                                        'Address, Function'),
     ('Name,Place\nSpeed,N7:0\n', 'which column is the address. Say --address COLUMN')])
@@ -324,7 +324,7 @@ def test_characters_of_an_a_file_are_not_taken_for_words(tmp_path: Path) -> None
     rows = [('"a","A62:4/32",String', ''), ('"b","A62:0/5",String', 'or an even number'),
             ('"c","A27:10 [80]",Char Array', 'read A27:5 as uint16 instead'),
             ('"d","A9:20",Default', 'A9:20 counts characters, two in a word; read A9:10'),
-            ('"e","A9:21",Word', 'read A9:10 as uint16')]
+            ('"e","A9:21/4",String', 'read A9:10 as uint16')]
     text = KEPSERVER + ''.join(f'{row},1,R/W,100,,,,,,,,,,"",\n' for row, _ in rows)
     (mapping,), left_out = imported(tmp_path, text)
     assert (str(mapping.address), mapping.length, mapping.type.value) == ('A62:2', 16, 'string')
