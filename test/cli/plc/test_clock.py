@@ -65,8 +65,9 @@ def test_clock_is_told_with_its_drift(
 
 
 @pytest.mark.parametrize('station', [1, 2])
-def test_clock_is_set_when_that_is_wanted(port: str, plcs: tuple[SimulatedPlc, ...],
-                                          station: int, capsys: Output) -> None:
+def test_clock_is_set_when_that_is_wanted(
+        port: str, plcs: tuple[SimulatedPlc, ...], station: int, capsys: Output,
+        monkeypatch: pytest.MonkeyPatch) -> None:
     before = datetime(2001, 2, 3, 4, 5, 6)
     set_clock(plcs[station - 1], before)
     args = ('clock', str(station), '--set', '--port', port)
@@ -78,6 +79,10 @@ def test_clock_is_set_when_that_is_wanted(port: str, plcs: tuple[SimulatedPlc, .
     assert said.status == 0, said
     # The clock has whole seconds, and a busy host may take some more.
     assert re.search('(as|0:00:0[23] behind) this computer$', said.lines[0])
+    monkeypatch.setattr(Clock, 'write', lambda self: None)  # these words are not the clock
+    set_clock(plcs[station - 1], before)
+    said = call(main, capsys, *args, '--yes')
+    assert (said.status, 'its clock has not changed' in said.err) == (1, True)
 
 
 def test_drift_counts_from_the_middle_of_the_read(monkeypatch: pytest.MonkeyPatch) -> None:
