@@ -51,8 +51,9 @@ def test_others_on_the_network_are_not_taken_for_the_bridge() -> None:
 @pytest.mark.long
 def test_control_that_a_stall_of_the_bridge_takes_is_given_again() -> None:
     with Process('demo', '--seconds', '1') as story:
-        for text in ('4. ', '6. ', '7. ', 'in_control is [1]'):
-            told = story.wait_for(text, after=story.lines.index(told) if text[0] == 'i' else 0)
+        for title in ('4. ', '6. ', '7. '):  # each has the patience of one wait
+            line = story.wait_for(title)
+        story.wait_for('in_control is [1]', after=story.lines.index(line))
         after = len(story.lines)
         bridge = int(Path(f'/proc/{story.number}/task/{story.number}/children').read_text())
         os.kill(bridge, signal.SIGSTOP)
