@@ -240,6 +240,11 @@ def test_serial_port_recorded_by_an_rtac_is_read(tmp_path: Path) -> None:
     assert [entry.text for entry in commands] == [
         '0 to 0, TNS 3901: protected typed logical write N7:5 = 13385'] * 3
     assert not any(entry.kind is Kind.NOISE for entry in entries)
+    simple = chunks_of(tmp_path / 'simple', b''.join((  # whose packets are filled up to words
+        pcapng([], '<', b'', 1e6).partition(block('<', 1, struct.pack('<HHI', ETHERNET, 0, 0)))[0],
+        block('<', 1, struct.pack('<HHI', 250, 0, 0)),
+        *(block('<', 3, struct.pack('<I', len(data)) + data) for _, data in packets))))
+    assert b''.join(chunk.data for chunk in simple) == 3 * b''.join(sent)
 
 
 @for_all(('content', 'fault'), [
