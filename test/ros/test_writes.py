@@ -132,7 +132,10 @@ def topics(node: Taker) -> WriteTopics:
 
 
 def test_messages_wait_in_their_order_until_the_node_has_begun(
-        node: Taker, topics: WriteTopics) -> None:
+        node: Taker, topics: WriteTopics, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(time, 'time_ns', lambda: 1_800_000_000_000_000_000)
+    for place in 'test.ros.test_writes', 'abdf1_ros.ros.topics.writes':
+        monkeypatch.setattr(f'{place}.line_time', lambda: 100.0)
     node.publish('a', 1)
     node.publish('b', 2, age=3.0)
     for _ in range(2):
