@@ -274,14 +274,17 @@ def test_rule_8_broadcast_of_a_guest_over_a_fallback_is_told_and_written_over(
         cell.until_counting()
         written = watched(cell, 'N10:1')
         with cell.share(place) as hmi:
-            for _ in range(ATTEMPTS):
-                with suppress(RemoteError):  # a busy host has no time for it
-                    hmi.ask(255, write(AddressedValues.of('N10:1', PlcType.SLC), [99]))
-                    break
+            for word, value in ('N10:0', 1), ('N10:1', 99):
+                for _ in range(ATTEMPTS):
+                    with suppress(RemoteError):  # a busy host has no time for it
+                        hmi.ask(255, write(AddressedValues.of(word, PlcType.SLC), [value]))
+                        break
         cell.until(lambda: 7 in written[written.index(99):] if 99 in written else None,
                    'the fallback after it')
-    assert (f'guest pty:{place} has sent to station 255: protected typed logical write '
-            'N10:1 = 99, words of speed') in capfd.readouterr().err
+    said = capfd.readouterr().err
+    for what in ('N10:0 = 1, words of beat', 'N10:1 = 99, words of speed'):
+        assert (f'guest pty:{place} has sent to station 255: protected typed logical write '
+                f'{what}') in said
 
 
 def test_rule_5_new_files_are_a_new_start(cell: Cell) -> None:
