@@ -308,7 +308,7 @@ def test_simulator_answers_and_ends_while_its_output_is_not_taken(
     name = tmp_path / 'plc'
     with subprocess.Popen(
             [sys.executable, '-m', 'abdf1_ros', 'simulator', '--data', str(data), '--pty',
-             str(name), '--at', '0 silent 1', '--at', '0 normal 1'],
+             str(name), '--at', '0 normal 1', '--at', '0 normal 1'],
             stdin=subprocess.DEVNULL, stdout=writer) as simulator:
         give_up = time.monotonic() + PATIENCE
         while not name.is_symlink() and time.monotonic() < give_up:
