@@ -23,11 +23,10 @@ in a ROS domain that no other session of tests on this machine has.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import ExitStack, suppress
+from contextlib import ExitStack
 import os
 from pathlib import Path
 import signal
-import socket
 import subprocess
 import sys
 import threading
@@ -63,18 +62,7 @@ EVERYTHING = QoSProfile(history=HistoryPolicy.KEEP_ALL)
 _Result = TypeVar('_Result')
 
 
-def _claim_domain() -> tuple[int, socket.socket]:
-    """Return a domain that no other session on this machine has, and the socket that keeps it."""
-    claim = socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM)
-    for number in range(os.getpid(), os.getpid() + 100):
-        with suppress(OSError):  # another session has it
-            # an abstract name, without a file
-            claim.bind(f'\0abdf1_ros.test.domain.{1 + number % 100}')
-            return 1 + number % 100, claim
-    raise RuntimeError('all ROS domains are in use by other test sessions')
-
-
-_DOMAIN, _CLAIM = _claim_domain()
+_DOMAIN, _CLAIM = observer.claim_domain()
 
 # ROS reads these variables for the first context, here and in every child process.
 os.environ |= {'ROS_AUTOMATIC_DISCOVERY_RANGE': 'LOCALHOST', 'ROS_DOMAIN_ID': str(_DOMAIN)}

@@ -39,6 +39,7 @@ from typing import NamedTuple
 from xml.sax.saxutils import escape
 
 from abdf1_ros.cli.monitor.view import NodeView, render, Style, TextLine
+from abdf1_ros.ros.observer import claim_domain
 
 _ROOT = Path(__file__).resolve().parent.parent
 _NET, _MAP = 'config/net.csv', 'config/map.csv'
@@ -225,8 +226,10 @@ def main(args: Sequence[str] | None = None) -> int:
     parser.add_argument('file', type=Path, help='SVG to write')
     options = parser.parse_args(args)
     os.environ.setdefault('ROS_AUTOMATIC_DISCOVERY_RANGE', 'LOCALHOST')
-    os.environ.setdefault('ROS_DOMAIN_ID', str(1 + os.getpid() % 100))
-    options.file.write_text(watch(SHOT, STORY), encoding='utf-8')
+    domain, claim = claim_domain()
+    os.environ.setdefault('ROS_DOMAIN_ID', str(domain))
+    with claim:
+        options.file.write_text(watch(SHOT, STORY), encoding='utf-8')
     return 0
 
 

@@ -46,7 +46,7 @@ from abdf1_ros.cli.terminal import (
 from abdf1_ros.driver.write import show
 from abdf1_ros.paths import config_file
 from abdf1_ros.pccc.values import Values
-from abdf1_ros.ros.observer import ObservingNode
+from abdf1_ros.ros.observer import claim_domain, ObservingNode
 from abdf1_ros.ros.topics.messages import latched_qos, MESSAGES
 from abdf1_ros.ros.untyped import RosMessage
 from abdf1_ros.settings.map_file import load_mappings
@@ -544,10 +544,11 @@ def main(args: Sequence[str] | None = None) -> int:
                         help='show a full-duplex line, on which the PLC writes by itself')
     options = parser.parse_args(args)
     os.environ.setdefault('ROS_AUTOMATIC_DISCOVERY_RANGE', 'LOCALHOST')
-    os.environ.setdefault('ROS_DOMAIN_ID', str(1 + os.getpid() % 100))
+    domain, claim = claim_domain()
+    os.environ.setdefault('ROS_DOMAIN_ID', str(domain))
     scene = FULL_DUPLEX if options.peer else HALF_DUPLEX
     try:
-        with tempfile.TemporaryDirectory(prefix='abdf1_') as folder, interruptible():
+        with claim, tempfile.TemporaryDirectory(prefix='abdf1_') as folder, interruptible():
             return tell_steps(Demo(scene, Path(folder) / 'line'), options.seconds)
     except KeyboardInterrupt:  # before the first step, or after the last step
         return 0

@@ -17,8 +17,9 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from contextlib import ExitStack
+from contextlib import ExitStack, suppress
 import os
+import socket
 import time
 from typing import Self, TypeVar
 
@@ -27,6 +28,22 @@ from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node, NodeNameNonExistentError
 
 _Result = TypeVar('_Result')
+
+
+def claim_domain() -> tuple[int, socket.socket]:
+    """
+    Return a ROS domain for tests or a demo, and the socket that keeps it until it is closed.
+
+    No other test session or demo on this machine has this domain. Raises RuntimeError if all 100
+    domains are claimed.
+    """
+    claim = socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM)
+    for number in range(os.getpid(), os.getpid() + 100):
+        with suppress(OSError):  # another process has it
+            # an abstract name, without a file
+            claim.bind(f'\0abdf1_ros.test.domain.{1 + number % 100}')
+            return 1 + number % 100, claim
+    raise RuntimeError('all ROS domains are in use by other test sessions and demos')
 
 
 def graph_hint() -> str:

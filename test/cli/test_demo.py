@@ -66,10 +66,13 @@ def test_control_that_a_stall_of_the_bridge_takes_is_given_again() -> None:
 def test_demo_stays_on_this_machine(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv('ROS_AUTOMATIC_DISCOVERY_RANGE', '')  # so that it is restored
     monkeypatch.delenv('ROS_AUTOMATIC_DISCOVERY_RANGE')
+    ours = os.environ['ROS_DOMAIN_ID']
+    monkeypatch.delenv('ROS_DOMAIN_ID')
     monkeypatch.setattr(demo, 'Demo', lambda *_: None)
     monkeypatch.setattr(demo, 'tell_steps', lambda *_: 0)
     assert demo.main([]) == 0
     assert os.environ['ROS_AUTOMATIC_DISCOVERY_RANGE'] == 'LOCALHOST'
+    assert os.environ['ROS_DOMAIN_ID'] != ours  # nobody else's
 
 
 def test_bridge_and_folder_end_with_a_demo_that_is_killed(
