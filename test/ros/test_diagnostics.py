@@ -27,6 +27,7 @@ from abdf1_ros.df1.frames import message_frame
 from abdf1_ros.df1.machine import Machine
 from abdf1_ros.df1.packet import Packet
 from abdf1_ros.df1.slave_link import SlaveLink
+from abdf1_ros.df1.stations import Station
 from abdf1_ros.driver.checks import StationHealth
 from abdf1_ros.driver.driver import Driver
 from abdf1_ros.driver.guests import Guest
@@ -84,9 +85,10 @@ class Bench:
         self.seen = Seen()
         self.now = NOW
         self.results: list[DiagnosticStatus] = []
+        self.tables = 0  # how often the Active Node Table has changed
         self.events = LineEvents(
             get_logger('line_a'), PORT, stations_of(mappings), scans=True, seen=self.seen,
-            read=lambda mapping, values: None, results=self, table_changed=lambda: None,
+            read=lambda mapping, values: None, results=self, table_changed=self._count,
             clock=lambda: self.now)
         self.driver = Driver(Network(mode=mode), mappings, DriverSettings(), self.events)
         self.link = LinkThread(self.driver.machine, lambda: pytest.fail('no port here'))
@@ -94,6 +96,9 @@ class Bench:
         self.opener = PortOpener(PortSettings.of(Network(), PORT))
         self.diagnostics.line.attach(self.link, self.opener)
         self.set_port(True, 'open')
+
+    def _count(self) -> None:
+        self.tables += 1
 
     def publish(self, result: DiagnosticStatus) -> None:
         """Take the result of a write, as its publisher does."""
@@ -150,6 +155,12 @@ def make_bench(tmp_path: Path, request: pytest.FixtureRequest) -> Benches:
 @pytest.fixture
 def bench(make_bench: Benches) -> Bench:
     return make_bench()
+
+
+def test_table_changes_with_a_station_that_takes_no_commands(bench: Bench) -> None:
+    for is_active in (False, True):
+        bench.events.station_changed(Station(1, is_active, returns=5))
+    assert bench.tables == 2
 
 
 @pytest.mark.parametrize('mode, expected', [('Master', None), ('Radio', '2')])

@@ -14,6 +14,7 @@
 
 """Entries and summaries: what they count, as text and as JSON."""
 
+from dataclasses import replace
 import json
 
 from abdf1_ros.df1.checksum import Checksum
@@ -70,6 +71,7 @@ def test_entry_is_told_as_json_with_all_its_fields() -> None:
         'marks': ['retransmission'], 'dst': 1, 'src': 5, 'command': '06/00', 'sts': 0,
         'tns': 0x1234, 'data': '0001'}
     assert json.loads(json_line(REPLY))['latency_ms'] == 750.0
+    assert json.loads(json_line(replace(NOISE, time=0.0)))['time'] == 0.0
     assert json.loads(json_line(NOISE)) == {
         'time': 3.0, 'direction': '<', 'kind': 'noise', 'text': '2 bytes outside of any frame',
         'bytes': 2}
