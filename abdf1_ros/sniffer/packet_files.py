@@ -96,8 +96,8 @@ class PacketFile:
                 interfaces: list[tuple[int, float]]) -> RecordedPacket:
         try:
             if kind == _SIMPLE:
-                kept, = struct.unpack_from(f'{order}I', body)
-                return RecordedPacket(None, interfaces[0][0], body[4:4 + kept])
+                length, = struct.unpack_from(f'{order}I', body)  # the rest fills up a word
+                return RecordedPacket(None, interfaces[0][0], body[4:4 + length])
             which, high, low, kept, _ = struct.unpack_from(f'{order}5I', body)
             link_type, tick = interfaces[which]
         except (struct.error, IndexError):
