@@ -304,14 +304,22 @@ def test_process_has_a_name_of_its_own(plant: Plant) -> None:
     assert plant.observer.call(Trigger, '/host_b/reload', Trigger.Request()).success
 
 
-def test_second_process_of_the_same_name_is_a_warning(plant: Plant) -> None:
-    plant.start('-p', 'lines:=[a]', reads='a')
+def test_second_process_of_the_same_name_is_a_warning(plant: Plant, capfd: Output) -> None:
+    text = 'another node is called /lines too'
+    (plant.folder / 'b_net.csv').write_text('Baud\n9601\n')
+    plant.start('-p', 'lines:=[a, b]', reads='a')
+    shown = plant.observer.diagnostics('')
     other = Node('lines', context=plant.observer.context)
     try:
-        status = until_status(plant.observer.diagnostics(''), 'lines', WARN)
+        until_status(shown, 'lines', ERROR, lambda status: text in status.message)
+        plant.write_net('b', plant.plcs['b'].port)
+        plant.observer.call(Trigger, '/lines/reload', Trigger.Request())
+        status = until_status(shown, 'lines', WARN)
     finally:
         other.destroy_node()
-    assert status.message.startswith('WARN: 1 of 1 lines run; another node is called /lines too')
+    assert status.message.startswith(f'WARN: 2 of 2 lines run; {text}')
+    logged = capfd.readouterr().err
+    assert '1 of 2 lines run' in logged and text in logged
 
 
 def test_process_may_open_as_many_files_as_the_system_allows(
