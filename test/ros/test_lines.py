@@ -162,8 +162,10 @@ def test_lines_are_chosen_by_name() -> None:
     assert chosen([PRESS, PAINT], ['paint_plc']) == [PAINT]
     assert chosen([PRESS, PAINT], ['/press/press_plc', 'paint_plc']) == [PRESS, PAINT]
     assert chosen([PRESS, PAINT], ['paint']) == [PAINT]  # a part of its name, and of no other
+    both = ['/hall/a/plc', '/hall/b/plc']
+    assert chosen(both, ['plc']) == both
     with pytest.raises(ConfigurationError, match='no section is called hall'):
-        chosen(['/hall/a/plc_a', '/hall/b/plc_b'], ['hall'])
+        chosen(both, ['hall'])
     with pytest.raises(ConfigurationError, match='called glue; the sections are /press/'):
         chosen([PRESS, PAINT], ['press_plc', 'glue'])
     with pytest.raises(ConfigurationError, match='no line to run: give a parameter file'):
