@@ -41,14 +41,15 @@ from abdf1_ros.messages import Event, Message
 from abdf1_ros.pccc.file_types import PlcType
 from abdf1_ros.pccc.identity import Identity, Mode
 from abdf1_ros.pccc.values import Values
-from abdf1_ros.ports.link_thread import LinkThread, PortState
+from abdf1_ros.ports.link_thread import LinkThread, PortState, RELEASED
 from abdf1_ros.ports.settings import PortSettings
 from abdf1_ros.ports.trace import PortOpener
 from abdf1_ros.ros.bridge.session import stations_of
 from abdf1_ros.ros.diagnostics.dds import LOST
 from abdf1_ros.ros.diagnostics.events import LineEvents
 from abdf1_ros.ros.diagnostics.guests import GuestsStatus
-from abdf1_ros.ros.diagnostics.line import takes_in_silence
+from abdf1_ros.ros.diagnostics.line import LineView, takes_in_silence
+from abdf1_ros.ros.diagnostics.link import LinkStatus
 from abdf1_ros.ros.diagnostics.load import FullLine
 from abdf1_ros.ros.diagnostics.status import message_of, Seen
 from abdf1_ros.ros.diagnostics.statuses import Diagnostics
@@ -211,6 +212,8 @@ def test_link_without_a_port(bench: Bench) -> None:
     bench.set_port(False, 'cannot open the port: No such file or directory')
     assert bench.says('link') == (ERROR, 'ERROR: cannot open the port: No such file or directory')
     assert bench.details('link')['port'] == 'closed'
+    bench.link.is_released = True
+    assert bench.says('link') == (WARN, f'WARN: {RELEASED}')
 
 
 def test_link_is_as_good_as_its_stations(bench: Bench) -> None:
@@ -219,9 +222,18 @@ def test_link_is_as_good_as_its_stations(bench: Bench) -> None:
     assert bench.says('link') == (WARN, 'WARN: port open, 1 of 2 stations do not answer')
     bench.driver.stations.lost(1, NOW)
     assert bench.says('link') == (ERROR, 'ERROR: port open, but none of 2 stations answers')
+    behind = Diagnostics('line_a', bench.driver, 'socket://gate:4000', bench.events)
+    behind.line.attach(bench.link, bench.opener)
+    assert behind.statuses(NOW)[0].message.endswith(
+        ' answers, or the device server keeps this connection waiting')
     bench.driver.stations.heard(1, NOW)
     bench.driver.stations.heard(2, NOW)
     assert bench.says('link')[0] == OK
+
+
+def test_line_without_a_station_is_well(make_bench: Benches) -> None:
+    assert make_bench('all,Write,N7:0,255,PLC5,').says('link') == (
+        OK, 'OK: port open, 0 of 0 stations have answered')
 
 
 def test_station_that_takes_commands_and_never_replies_is_told(bench: Bench) -> None:
@@ -249,6 +261,8 @@ def test_plc_that_acknowledges_and_has_nothing_to_say_for_ever_takes_in_silence(
     plc.faults = InjectedFaults(slow=10**9)  # ACK of each command, EOT for each poll
     bench.run(5.0)
     assert station.active and takes_in_silence(station)
+    values = LinkStatus(LineView(bench.driver), PORT, Seen()).values(NOW)
+    assert ('normal poll scan' in values) is (polling == 'Standard')
 
 
 def test_link_of_a_node_with_a_duplicate_name(bench: Bench) -> None:
@@ -704,7 +718,9 @@ def test_fallback_value_is_no_message_and_usual_at_start_and_end(
     assert told == level
     assert '0 of 0 writes confirmed' in text
     bench.written(result(bench, Outcome.WRITTEN), NOW)
-    logged, = ''.join(capfd.readouterr()).splitlines()
+    bench.events.published_again(bench.mapping('speed'), 2.5)
+    logged, again = ''.join(capfd.readouterr()).splitlines()
+    assert again.endswith(' speed (N7:0 at station 1): published again after 2.5 s')
     assert logged.startswith('[INFO] ' if level == OK else '[WARN] ')
     assert logged.endswith(f': fallback value written: {cause.value}')
 
@@ -803,6 +819,8 @@ def test_heartbeat_that_another_program_writes_is_an_error_with_what_it_wrote(
     beat = bench.driver.interlocks.heartbeats[0]
     beat.confirmed, beat.state = NOW, BeatState.CONFLICT
     assert bench.says('interlocks')[0] == ERROR
+    bench.events.foreign_value(beat.mapping, 'one strange word', is_conflict=False)
+    assert not bench.seen.conflicts
     text = 'N10:0: another program writes this word: 7 was read where 3 was written'
     bench.events.foreign_value(beat.mapping, text.removeprefix('N10:0: '), is_conflict=True)
     assert bench.details('interlocks')['station 1'] == f'not in control: {text}'

@@ -170,9 +170,10 @@ def test_names_can_be_remapped(observer: Observer, files: Files) -> None:
     active = observer.listen(msg.UInt16MultiArray, '/cell/line_a/active_stations')
     remaps = ('-r', '__ns:=/cell', '-r', '__node:=line_a', '-r', '~/read/door:=/cell/door_closed')
     with files.start_simulator() as simulator, \
-            Process('node', *files.args('use_sim_time:=true', 'map.recipe.max:=5'),
-                    *remaps) as node:
+            Process('node', *files.args('use_sim_time:=true', 'map.recipe.max:=5',
+                                        'send_in_sequence:=true'), *remaps) as node:
         node.wait_for('[WARN] ', 'without effect', ': map.recipe.max')
+        node.wait_for('[WARN] ', 'send_in_sequence without effect: only for Mode Master')
         assert values_in(door.first()) == [1]
         assert values_in(bits.first()) == [1, 0, 0, 1, 1, 0]
         assert active.first().data[0] == 0b110
