@@ -23,7 +23,7 @@ from abdf1_ros.df1.frames import Symbol
 from abdf1_ros.df1.packet import Packet
 from abdf1_ros.df1.settings import LinkSettings
 from abdf1_ros.df1.slave import HalfDuplexSlave
-from abdf1_ros.driver.checks import ECHO_PERIOD
+from abdf1_ros.driver.checks import CheckKind, ECHO_PERIOD
 from abdf1_ros.driver.reads.point import Freshness
 from abdf1_ros.driver.settings import DriverSettings
 from abdf1_ros.driver.write import Outcome
@@ -386,7 +386,8 @@ def test_packets_are_those_of_the_processor_that_a_station_says_to_be(network: N
 def test_counters_are_read_once_for_each_request_and_never_else(network: Network) -> None:
     bench, (plc,), (ears,) = make_bench(word(), network=network, run=2.0)
     assert ears.times(COUNTERS) == []
-    bench.driver.checks.request_counters(1)
+    for _ in range(2):
+        bench.driver.checks.request_counters(1)
     assert bench.driver.checks.counters_wanted == {1}
     before = plc.counters.messages_received
     bench.run(0.5)
@@ -398,6 +399,9 @@ def test_counters_are_read_once_for_each_request_and_never_else(network: Network
     bench.run(10.0)
     assert len(ears.times(COUNTERS)) == 1
     assert bench.driver.checks.known(1).counters == counters
+    bench.driver.checks.request_counters(1)
+    bench.run(0.5)
+    assert len(ears.times(COUNTERS)) == 2
 
 
 def test_counters_that_a_station_refuses_and_those_of_an_absent_station() -> None:
@@ -409,10 +413,15 @@ def test_counters_that_a_station_refuses_and_those_of_an_absent_station() -> Non
     assert (known.counters, known.no_counters) == (
         {}, 'STS 10: illegal command, format or length, or the file does not exist')
     assert bench.driver.checks.counters_wanted == set()
-    plc.faults = InjectedFaults(silent=True)
+    bench.driver.checks.request_counters(1)
+    bench.run_until(lambda: bool(bench.driver.tasks.under_way) and math.inf in (
+        check.due for check in bench.driver.checks.jobs if check.kind is CheckKind.COUNTERS))
+    plc.faults = InjectedFaults(silent=True)  # while the question is on the line
     bench.run(5.0)
+    assert bench.driver.checks.known(1).no_counters.startswith('2509 ')
     bench.driver.checks.request_counters(1)
     bench.run(1.0)
+    bench.lose_port()
     assert bench.driver.checks.known(1).no_counters == 'the station does not answer'
     assert bench.driver.checks.counters_wanted == set()
 
@@ -430,3 +439,7 @@ def test_lost_port_ends_a_request_that_waits_for_its_turn(is_taken: bool) -> Non
     assert health.counters_wanted == set()
     bench.open(run=2.0)
     assert ears.times(COUNTERS) == []  # nobody waits for them any more
+    health.request_counters(1)
+    assert health.find_due(bench.clock())
+    bench.driver.stations.lost(1, bench.clock())
+    assert health.counters_wanted == set()

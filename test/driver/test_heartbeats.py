@@ -78,12 +78,19 @@ def test_rule_2_the_0_of_a_first_contact_stands_for_a_period_and_half_a_second(
 
 
 def test_rule_3a_value_that_is_not_confirmed_is_repeated() -> None:
-    cell = Cell(beat_row(), run=1.05)
+    cell = Cell(beat_row(), start=False)
+    cell.refused = {'N10:0'}
+    cell.bench.open(run=0.15)
+    beat, = cell.bench.driver.interlocks.heartbeats
+    assert beat.why_not(cell.now).startswith('STS 10: ')
+    cell.refused = set()
+    cell.run(1.05)
     cell.refused = {'N10:0'}
     cell.run(1.0)
     last = cell.written('N10:0')[-1]
-    beat, = cell.bench.driver.interlocks.heartbeats
     assert beat.why_not(cell.now).startswith('not confirmed for 1.1 s: STS 10: ')
+    assert beat.confirmed is not None
+    assert [bool(beat.why_not(beat.confirmed + silent)) for silent in (0.59, 0.61)] == [0, 1]
     cell.refused = set()
     since = cell.now
     cell.run(0.5)
@@ -183,6 +190,9 @@ def test_rule_3_beat_is_not_sent_when_it_may_be_wrong_by_then() -> None:
     assert expires(now + 9.0, now + 9.0) == now + 3.0  # of the fallback: a message waits
     interlocks.message_came(Write(speed, [3], now))  # an older one that came late
     assert interlocks.conditions.messages['speed'] == now + 9.0
+    beat.take(now)
+    interlocks.contact(1, now)
+    assert interlocks.next(now) is None  # the 0 waits for the end of the beat
 
 
 @pytest.mark.parametrize(('period', 'lost'), [(100, 0.0), (100, 0.35), (200, 0.2), (500, 0.2)])
