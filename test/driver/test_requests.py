@@ -55,11 +55,12 @@ class Ends:
 class Bench:
     """Requests at one end, an SLC that is station 1 at the other."""
 
-    def __init__(self, absent: tuple[int, ...] = (), slave: Responder | None = None) -> None:
+    def __init__(self, absent: tuple[int, ...] = (), slave: Responder | None = None,
+                 **options: bool) -> None:
         stations = ActiveStationList(absent)
         for number in absent:
             stations.lost(number, 0.0)
-        self.requests = Requests(NETWORK.line_mode, NETWORK.line, stations, first_tns=7)
+        self.requests = Requests(NETWORK.line_mode, NETWORK.line, stations, 7, **options)
         self.plc = simulated_plc(1, 'SLC', lambda: self.line.now, ('N7:0', 10))
         self.far = Machine(multidrop([slave or self.plc]), checksum=NETWORK.checksum)
         self.line = VirtualLine(self.requests.machine, self.far, baud=115200)
@@ -119,6 +120,17 @@ def test_errors_end_only_their_own_request() -> None:
     assert isinstance(absent, StationInactive)
     assert [str(bug) for bug in bugs] == ['a bug', 'a bug']
     assert bench.ends.results == [None]
+
+
+def test_rule_26_port_that_may_store_gets_a_question_before_the_first_write_and_after_a_failure(
+        ) -> None:
+    bench, sent = Bench(may_store=True), list[int]()
+    for station in (1, 1, 9, 1):
+        before = bench.requests.counters.commands_sent
+        bench.add(station, (write for write in [(0x0F, bytes.fromhex('AA 02 07 89 00 00 34 12'))]))
+        bench.run()
+        sent.append(bench.requests.counters.commands_sent - before)
+    assert (sent, len(bench.ends.results)) == ([2, 1, 1, 2], 3)
 
 
 def test_present_station_gets_every_retry_and_an_absent_one_a_single_poll() -> None:

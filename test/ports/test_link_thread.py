@@ -227,6 +227,15 @@ def test_three_faults_within_a_minute_end_the_thread() -> None:
     assert thread.pauses == [0.5, 0.5]
 
 
+def test_fault_outside_of_the_machine_is_told_and_ends_the_thread() -> None:
+    faults = list[Exception]()
+    thread = LinkThread(Script().machine, NoLine, on_state=lambda state: print(1 / 0),
+                        on_fault=faults.append)
+    thread.run()
+    thread.stop()
+    assert (thread.has_failed, thread.state.text) == (True, f'internal error: {faults[0]!r}')
+
+
 @pytest.mark.parametrize('apart, fails', [(29.0, True), (31.0, False)])
 def test_faults_that_are_rare_do_not_end_the_thread(apart: float, fails: bool) -> None:
     broken, now = Broken(), [0.0]
