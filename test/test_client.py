@@ -15,7 +15,7 @@
 """The blocking client on a line with simulated PLCs, and what it does without."""
 
 from collections.abc import Callable, Iterator
-from contextlib import ExitStack, suppress
+from contextlib import closing, ExitStack, suppress
 from inspect import signature
 import logging
 import math
@@ -38,6 +38,8 @@ from abdf1_ros.df1.tasks import TaskSource
 from abdf1_ros.errors import FormatError, LinkError, RemoteError
 from abdf1_ros.open_line import Pending
 from abdf1_ros.pccc.identity import Mode
+from abdf1_ros.ports.opening import open_port
+from abdf1_ros.ports.settings import PortSettings
 from abdf1_ros.problems import ConfigurationError
 from abdf1_ros.settings.network import FIELDS, Network
 from abdf1_ros.simulator.simulated_plc import SimulatedPlc
@@ -194,7 +196,10 @@ def test_entries_of_the_log_that_nothing_takes_are_counted(
     caplog.set_level('DEBUG', 'abdf1_ros')
     with client_with(port, timeout=0.05, retries=2) as plc, pytest.raises(LinkError):
         plc.read('N7:0', station=9)
-    assert re.search(r'\d entries were lost here: nothing was asked meanwhile', caplog.text)
+    said = caplog.text
+    assert re.search(r'\d entries were lost here: nothing was asked meanwhile', said)
+    plc.close()
+    assert caplog.text == said
 
 
 @for_all(('address', 'arguments', 'text'), [
@@ -261,6 +266,8 @@ def test_forgotten_close_is_told_and_closed_client_refuses(port: str) -> None:
         plc.close()
     with client(port, plc_type='SLC') as plc:
         assert plc.read('N7:0') == 0
+    with closing(open_port(PortSettings(port))), pytest.raises(OSError, match='another program'):
+        client(port)
 
 
 def test_line_that_comes_back_is_used_again(tmp_path: Path, plcs: PlcPair) -> None:

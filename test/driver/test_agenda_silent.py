@@ -30,8 +30,11 @@ def test_reads_of_an_inactive_station_are_set_aside() -> None:
     dead, living = make_job(station=1), make_job('N9:0', station=2)
     bench = Bench(dead, living)
     assert bench.next_read(0.0) is dead
+    for when in (0.1, 0.2):
+        dead.done(when)
     bench.stations.lost(1, 0.5)
     bench.finish(dead, 0.0, 0.5)
+    assert dead.intervals.last is None  # no read is counted over the outage
     assert bench.read(0.5) is living
     assert [bench.read(0.5 + n / 10) for n in range(1, 35)] == [living] * 34
     assert bench.read(4.0) is dead  # 7 times the probe time after the last

@@ -212,6 +212,9 @@ def close_with(pty: Pty, monkeypatch: pytest.MonkeyPatch) -> Callable[..., list[
 
         true = fcntl.ioctl
         descriptor = os.open(pty.name, os.O_RDWR | os.O_NOCTTY)
+        attributes = termios.tcgetattr(descriptor)
+        attributes[2] |= termios.CRTSCTS
+        termios.tcsetattr(descriptor, termios.TCSANOW, attributes)
         port = SerialDevice(descriptor, lambda: done.append('closed'))
         monkeypatch.setattr(fcntl, 'ioctl', ioctl)
         monkeypatch.setattr(serial_device, 'LAST_BYTES', 0.05 if unsent[-1] else PATIENCE)
