@@ -36,7 +36,7 @@ from abdf1_ros.df1.peer import PEER
 from abdf1_ros.df1.stations import ActiveStationList
 from abdf1_ros.df1.tasks import TaskSource
 from abdf1_ros.errors import FormatError, LinkError, RemoteError
-from abdf1_ros.open_line import Pending
+from abdf1_ros.open_line import OpenLine, Pending
 from abdf1_ros.pccc.identity import Mode
 from abdf1_ros.ports.opening import open_port
 from abdf1_ros.ports.settings import PortSettings
@@ -85,7 +85,7 @@ def test_what_is_written_is_read(port: str, station: int, plc_type: str | None) 
         plc.write('F8:1', 1.5)
         plc.write('T4:1.PRE', 500)
         plc.write('ST9:0', 'recipe 7')
-        plc.write('A10:0', 'wxyz', 'string')
+        plc.write('A10:0', 'vwxyz', 'string')
         assert plc.read('N7:0') == -1
         assert plc.read('N7:0', 3) == [-1, 32767, 0]
         assert plc.read('N7:0', 2, 'uint16') == [65535, 32767]
@@ -100,16 +100,17 @@ def test_what_is_written_is_read(port: str, station: int, plc_type: str | None) 
         assert plc.read('T4:1.PRE') == 500
         assert plc.read('T4:0.ACC', 4) == [0, 0, 500, 0]  # to T4:1.ACC, past a control word
         assert plc.read('ST9:0') == 'recipe 7'
-        assert plc.read('A10:0', 2, 'string') == 'wxyz'
+        assert plc.read('A10:0', 3, 'string').rstrip('\0') == 'vwxyz'
 
 
 def test_values_of_several_packets_are_written_and_read(port: str, plcs: PlcPair) -> None:
-    values = [*range(-125, 125)]
     with client(port) as plc:
         for station in (1, 2):
+            values = [*range(-station, 250 - station)]
             plc.write('N7:0', values, station=station)
             assert plc.read('N7:0', 250, station=station) == values
-    assert stored(plcs[1], 'N7:249') == (124).to_bytes(2, 'little')
+            assert plc.read_many(['N7:0-249'], station=station) == {'N7:0-249': values}
+    assert stored(plcs[1], 'N7:249') == (247).to_bytes(2, 'little')
 
 
 def test_inputs_by_slot_and_flat(port: str, plcs: PlcPair) -> None:
@@ -118,6 +119,9 @@ def test_inputs_by_slot_and_flat(port: str, plcs: PlcPair) -> None:
         assert plc.read('I:1.1') == 9
     with client_with(port, access='Flat') as plc:
         assert plc.read('I:0', 2) == plc.read_many(['I:0-1'])['I:0-1'] == [7, 9]
+    with client_with(port, processor='5/02') as plc:
+        assert len(plc.read('N7:0', 100)) == len(plc.read_many(['N7:0-99'])['N7:0-99']) == 100
+        assert plc.counters.commands_sent == 6  # at most 82 bytes in a reply
 
 
 def test_errors_are_those_of_the_bridge(port: str) -> None:
@@ -253,6 +257,19 @@ def test_arguments_of_the_line(tmp_path: Path) -> None:
         Client(None)  # type: ignore[arg-type]
     with pytest.raises(OSError, match='none'):
         Client(Path(port), parity='odd', timeout=60)
+
+
+def test_arguments_of_the_line_and_gateways_reach_it(
+        tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    given: list[Any] = []
+    monkeypatch.setattr(OpenLine, '__init__', lambda self, *rest, **named: given.extend(rest))
+    Client('/dev/x', baud=19200, parity='even', check='bcc', own_station=6, retries=2)
+    Client.from_files(*files(tmp_path, '/dev/x', 'Tag,Command,Address,Station,Via,PLC_Type\n'
+                                                 'far,Read,N7:0,9,3,SLC\n'))
+    _, link, port, *_, stations = given
+    assert (link.checksum.value, link.station, link.nak_retries, link.enq_retries) == (
+        'BCC', 6, 2, 2)
+    assert (port.baud, port.parity, stations.via(9)) == (19200, 'Even', 3)
 
 
 def test_forgotten_close_is_told_and_closed_client_refuses(port: str) -> None:
