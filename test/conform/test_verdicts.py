@@ -338,6 +338,10 @@ def test_wait_for_a_symbol_ends_though_others_come_for_ever() -> None:
     with pytest.raises(Failed, match='nothing of the kind in 2 s'):
         wire.until(lambda symbol: False, 'a poll', 2.0)
     assert (line.now, line.sent) == (pytest.approx(2.0), b'')
+    line.data = b'\x55'
+    with pytest.raises(Failed, match='got bytes outside of any'):
+        wire.expect(SymbolKind.ACK)
+    assert wire.noise > 0
 
 
 def test_numbers_of_commands_begin_again_after_the_last() -> None:
