@@ -30,6 +30,8 @@ from abdf1_ros.cli.terminal import (
     command_parser,
     interruptible,
     is_terminal,
+    is_wanted,
+    may_replace,
     NoPort,
     number_option,
     prepare_output,
@@ -39,6 +41,7 @@ from abdf1_ros.cli.terminal import (
     run_command,
     seconds_option,
     table,
+    tell,
     whole_option,
 )
 from abdf1_ros.errors import PortLost
@@ -74,6 +77,21 @@ def test_colour_is_for_terminals_that_want_it(monkeypatch: pytest.MonkeyPatch) -
     assert is_terminal(Screen())
     monkeypatch.setenv('TERM', 'dumb')
     assert not is_terminal(Screen())
+
+
+def test_question_without_a_terminal_and_text_without_a_colour_are_only_told(
+        monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
+    monkeypatch.setattr('sys.stdin', io.StringIO('y\n'))
+    monkeypatch.setattr('sys.stderr', Screen())
+    assert not is_wanted('set it')
+    tell('tool', 'text')
+    assert (capsys.readouterr().out, sys.stderr.getvalue()) == ('would set it\n', 'tool: text\n')
+
+
+def test_empty_file_may_be_replaced(tmp_path: Path) -> None:
+    (tmp_path / 'new').touch()
+    assert may_replace(str(tmp_path / 'new'), lambda place: False)
+    assert not may_replace(__file__, lambda place: False)
 
 
 def test_columns_of_a_table_are_aligned() -> None:
@@ -180,9 +198,11 @@ def test_end_of_a_command_is_told_and_is_its_status(
             raise end
         return 3
 
-    dropped = []
+    dropped, flushed = [], []
     monkeypatch.setattr(terminal, 'drop_output', lambda: dropped.append(True))
+    monkeypatch.setattr(sys.stdout, 'flush', lambda: flushed.append(True))
     assert run_command('tool', work, interrupted=130, unread=7) == status
+    assert bool(flushed) is (end is None)  # or a full disk would not be told
     assert capsys.readouterr().err == told
     assert bool(dropped) is (type(end) in (OSError, BrokenPipeError))
 
