@@ -75,6 +75,7 @@ def test_bundle_has_all_that_a_report_needs(
     assert set(json.loads(files['versions.json'])) == {'abdf1_ros', 'python', 'system'}
     for name in ('capture/', 'entries.txt', 'settings/'):
         assert name in files['README.txt']
+    assert '--anonymous leaves all these out' in files['README.txt']
     assert 'look through the bundle' in capsys.readouterr().err
 
 
@@ -162,8 +163,10 @@ def test_anonymous_bundle_has_no_name_of_a_host_user_path_or_port(
 def test_processor_is_named(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     path = tmp_path / 'status.cap'
     lines = ['# abdf1_ros capture 1', '# check: CRC', '# duplex: full']
-    said = pair('diag_status_slc504')
-    lines += [f'{count}.0 {"><"[count]} '
+    said = [*pair('diag_status_slc504')]
+    said.append(said[0]._replace(dst=9, tns=said[0].tns + 1))
+    said.append(said[2].reply(b'')._replace(sts=0x10))
+    lines += [f'{count}.0 {"><"[count % 2]} '
               f'{frames.message_frame(packet.encode(), Checksum.CRC).hex()}'
               for count, packet in enumerate(said)]
     path.write_text('\n'.join([*lines, '']), encoding='ascii')
@@ -172,6 +175,7 @@ def test_processor_is_named(tmp_path: Path, capsys: pytest.CaptureFixture[str]) 
     with ZipFile(report) as bundle:
         text = bundle.read('processors.txt').decode()
     assert text.startswith(f'station {said[1].src}: SLC 5/04 series B revision 3, RUN; status ')
+    assert 'station 9' not in text  # it has refused the question
     assert main([str(path), '--summary', '--report', str(report), '--anonymous']) == 0
     with ZipFile(report) as bundle:
         assert 'status ' not in bundle.read('processors.txt').decode()

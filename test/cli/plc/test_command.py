@@ -21,8 +21,10 @@ import pty
 import signal
 import subprocess
 import sys
+from unittest.mock import Mock
 
 from abdf1_ros.cli.plc.command import main
+from abdf1_ros.errors import FormatError
 import pytest
 from support.cases import for_all
 from support.commands import call, FAST, Output, PATIENT, Plc, running_simulator
@@ -86,6 +88,13 @@ def test_ping_of_nobody_has_status_1_and_says_that_nothing_came(plc: Plc) -> Non
     assert said.err.count('not one character came') == said.err.count('plc: sent: ') == 1
     assert said.err.endswith('plc: sent: 1 command, 1 poll, 3 repetitions included; received: '
                              '0 characters, 0 damaged frames, 0 NAK\n')
+
+
+def test_ping_of_which_one_fails_is_a_failure(plc: Plc, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr('abdf1_ros.cli.plc.presence.ping', Mock(
+        side_effect=[FormatError('other bytes came'), 0.001]))
+    said = plc('ping', '1', '--count', '2')
+    assert (said.status, said.lines[1][:19]) == (1, '2 sent, 1 answered;')
 
 
 def test_scan_lists_who_answers_and_counts_them(plc: Plc) -> None:

@@ -70,6 +70,8 @@ def test_scan_in_full_duplex_tells_what_it_cannot_know(peer: str, capsys: Output
     assert scanned.good_lines[-2:] == [
         '2 of 2 stations answer', 'in full duplex most PLCs answer to every station '
         'number, so these may be one PLC']
+    alone = call(main, capsys, 'scan', '2', '--port', peer, *FULL_DUPLEX)
+    assert alone.good_lines[-1] == '1 of 1 stations answer'
 
 
 def test_detect_finds_a_full_duplex_port(peer: str, capsys: Output) -> None:

@@ -209,13 +209,16 @@ def test_type_that_is_not_that_of_the_plc_is_named_once(plc: Plc) -> None:
     assert said.err.splitlines()[1].endswith('; --plc-type says SLC')
 
 
-def test_read_goes_on_after_a_refusal(plc: Plc) -> None:
+def test_read_goes_on_after_a_refusal(plc: Plc, tmp_path: Path) -> None:
     said = plc('read', 'N99:0', 'N7:0')
     assert (said.status, said.lines) == (1, ['N7:0 1200'])
     assert said.err.startswith('plc: N99:0 of station 1: STS F0 EXT STS')
     assert '"plc files 1" lists its data files and their lengths' in said.err
     said = plc('read', 'N99:0', 'N98:0')
     assert said.err.count('of station 1: STS F0') == 2 and said.err.count('"plc files 1"') == 1
+    path = write_csv(tmp_path / 'map.csv', 'Tag,Command,Address,Station,PLC_Type',
+                     ['near,Read,N7:0,1,PLC5', 'far,Read,N99:0,2,SLC'])
+    assert plc('read', '--map', str(path)).err.startswith('plc: far (N99:0) of station 2: STS ')
 
 
 def test_read_in_another_radix(plc: Plc) -> None:
