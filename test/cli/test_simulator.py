@@ -221,6 +221,9 @@ def test_faults_of_a_data_file_are_told_with_their_cells(capsys: Output, tmp_pat
         'SLC',
         f'simulator: {path}:5:3 (Address): SLC has no Q files; file types: O, I, S, B, T, C, R, '
         'N, F, ST, A, D, L, PD, MG, HSC, PTO, PWM, STI, EII']
+    path.write_text(DATA + '2,SLC,F10:0,,,,\n', encoding='utf-8')
+    told = _refused(capsys, '--data', str(path), '--ladder', '2')
+    assert told.startswith('simulator: --ladder 2: ') and 'it needs N10, ' in told
 
 
 def test_name_is_not_shared_and_what_a_killed_simulator_left_is_taken_by_the_next_and_removed(
