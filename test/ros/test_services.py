@@ -358,7 +358,7 @@ def test_services_of_rows_that_are_gone_close_once_when_no_call_waits() -> None:
 
     services.open(node, 100, 2.0, lambda: woken.append('link'))
     read = node.made['~/read_now/n0'](Trigger.Request(), Trigger.Response())
-    puts = [node.made['~/set/lamp'](SetBool.Request(), SetBool.Response()) for _ in range(3)]
+    puts = [node.made['~/set/lamp'](SetBool.Request(), SetBool.Response()) for _ in range(4)]
     for call, count in (read, 0), (puts[0], 0), (puts[1], 1), (puts[2], 2):
         call.send(None)
         for row in lamps[:count]:
@@ -368,6 +368,10 @@ def test_services_of_rows_that_are_gone_close_once_when_no_call_waits() -> None:
     longest = 2.0 + Network().line_mode.longest_transaction(Network().line, 0.0)
     services.look(line_time() + 2 * longest - 1.0)
     assert woken == ['link', 'executor']
+    services.look(line_time() + 2 * longest)
+    assert ended(puts[0]) == (False, 'unknown whether written: no result has come')
+    assert ended(puts[1]) == (False, 'l0: stands in the PLC')
+    puts[3].send(None)
     reload(rows[1])
     reload()
     services.look(line_time())
@@ -375,8 +379,7 @@ def test_services_of_rows_that_are_gone_close_once_when_no_call_waits() -> None:
     node.takes[0](ReadAnswer(error='late'))
     assert ended(read) == (False, 'late')
     services.withdraw()
-    assert ended(puts[0]) == (False, 'unknown whether written: no result has come')
-    assert ended(puts[1]) == (False, 'l0: stands in the PLC')
+    assert ended(puts[3]) == (False, 'unknown whether written: no result has come')
     for _ in range(2):
         services.look(line_time())
     assert sorted(node.closed) == sorted(node.made)
