@@ -35,6 +35,7 @@ from abdf1_ros.settings.heartbeats import Fallback, LONGEST_END, While
 from abdf1_ros.settings.mapping import Mapping
 from abdf1_ros.settings.network import Network
 from abdf1_ros.settings.rows import Rows
+from abdf1_ros.text import milliseconds
 import pytest
 from support.cases import for_all
 from support.counting import lines_run
@@ -120,6 +121,10 @@ def test_rule_16_standard_polling_adds_its_scans_and_slave_has_no_bound() -> Non
     # Of each station a poll and a command with all their retries, in two scans a transaction;
     # three transactions: what is under way, a read and the fallback.
     assert standard.seconds - message.seconds > 3 * 2 * 11 * 4 * 0.2
+    rows.append(make_mapping('N7:1', 'Write', fallback=Fallback((0,), 3000)))
+    one, _ = Times(replace(QUICK, polling='Standard'), Rows(rows[:-2] + rows[-1:])).bounds()
+    two, *_ = Times(replace(QUICK, polling='Standard'), Rows(rows)).bounds()
+    assert one.usual and two.usual and two.usual > one.usual  # a read between the writes of one
     slave, = Times(Network(mode='Slave'), Rows(rows[:1])).bounds()
     assert (slave.seconds, str(slave)) == (
         None, 'fallback of speed, station 1: no bound, because the master of '
@@ -183,8 +188,12 @@ def test_rule_16_says_which_setting_shortens_the_times_most(network: Network, wa
     for row in (speed(200), beat(100)):
         advice = list(Times(network, Rows([row])).advice())
         assert len(advice) == bool(way)
-        assert all(text.startswith(f'{way} would shorten the longest of these times most, from ')
-                   for text in advice)
+        for text in advice:
+            assert text.startswith(f'{way} would shorten the longest of these times most, from ')
+            name, value = way.split()
+            kind = type(getattr(network, name.lower()))
+            better = Times(replace(network, **{name.lower(): kind(value)}), Rows([row])).worst
+            assert text.endswith(f' to {milliseconds(better)}')
 
 
 @pytest.mark.parametrize('forwards, count', [('', 1), ('1,2', 2)])
@@ -198,7 +207,9 @@ def test_rule_16_conditions_of_bounds_by_radio_are_told(forwards: str, count: in
 
 
 def test_rule_16_period_shorter_than_a_scan_is_warned_of() -> None:
-    assert [text for text in remarks(QUICK, Rows([beat(150)])) if 'shorter than a scan' in text]
+    rows = [beat(150), beat(200, 'slow'), make_mapping('N7:0', period=100)]
+    (text,) = [text for text in remarks(QUICK, Rows(rows)) if 'shorter than a scan' in text]
+    assert text.startswith('beat: a Period of 150 ms')
 
 
 def test_rule_16_transactions_longer_than_period_or_fallback_after_are_warned_of() -> None:
@@ -331,7 +342,8 @@ def test_heartbeats_and_questions_for_run_are_counted_in_the_load() -> None:
 @pytest.mark.parametrize(('stale_after', 'period'), [(3.0, 1.0), (1.5, 0.5), (100.0, 100 / 3)])
 def test_rule_13_three_answers_about_the_mode_fit_into_the_stale_time(
         stale_after: float, period: float) -> None:
-    rows = Rows([make_mapping('N7:0', period=1000, condition=While(('RUN',)))])
+    rows = Rows([make_mapping('N7:0', period=period, condition=While(('RUN',)))
+                 for period in (5000, 1000, 5000)])
     assert mode_periods(rows, 0.1, stale_after) == {1: pytest.approx(period)}
     (_, asked), = own_work(line_model(QUICK), rows, 0.1, stale_after)
     bench = DriverBench(rows, settings=DriverSettings(stale_after=stale_after))
@@ -341,12 +353,14 @@ def test_rule_13_three_answers_about_the_mode_fit_into_the_stale_time(
 def test_rule_8_mode_of_a_plc_that_we_write_to_by_ourselves_is_asked_every_two_seconds() -> None:
     guarded = make_mapping('N7:0', period=9000, condition=While(('RUN',)))
     assert mode_periods(Rows([guarded, speed()]), 0.1, 3.0) == {1: MODE_PERIOD}
+    without = make_mapping('N7:0', period=0, condition=While(('RUN',)))
+    assert mode_periods(Rows([without]), 0.1, 3.0) == {1: 0.01}
     assert mode_periods(Rows([make_mapping(), make_mapping(command='Write')]), 0.1, 3.0) == {}
 
 
 @for_all(('rows', 'command', 'after', 'is_late'), [
     (5, 'Write', None, False), (40, 'Write', None, True), (5, 'Write', 3000, False),
-    (5, 'Write', 300, True), (40, 'Serve', None, False)])
+    (4, 'Write', 300, True), (3, 'Write', 300, False), (40, 'Serve', None, False)])
 def test_newest_state_that_may_be_too_old_on_a_full_line_is_named(
         rows: int, command: str, after: int | None, is_late: bool) -> None:
     map_rows = Rows([make_mapping(

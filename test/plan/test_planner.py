@@ -218,6 +218,7 @@ def test_blocks_are_as_long_as_the_processor_takes_them(name: str, limit: int) -
         assert max(length for _, length in spans(planner.plan(words))) <= limit
         planner.processors[1] = told
     assert all(len(block.requests) == 1 and block.words <= 41 for block in planner.plan(words))
+    assert spans(planner.plan([make_mapping('N7:0', length=110)])) == [('N7:0', 110)]  # a PLC-5
 
 
 @pytest.mark.parametrize('plc', ['PLC5', 'SLC'])
@@ -335,8 +336,11 @@ def test_slow_mapping_beside_a_fast_one_is_read_with_it_while_that_is_cheaper() 
         return sum(blocks(gap, period) == 1 for gap in range(1, 60))
 
     assert blocks(1, 10_000) == 2
-    assert [block.period for block in plan(make_mapping('N7:1', period=200),
-                                           make_mapping('N7:0', period=100))] == [0.1]
+    rows = [make_mapping('N7:1', period=200, tag='beside'), make_mapping('N7:0', period=100),
+            make_mapping('N7:0', period=90_000, length=90, tag='around'),
+            make_mapping('N7:99', period=200, tag='alone')]
+    check_plan(rows, plan(*rows))
+    assert sorted(block.period for block in plan(*rows)) == [0.1, 0.2, 90]
     assert 1 < words(1000) < words(500) < words(200) < words(100) < 40
 
 

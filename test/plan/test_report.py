@@ -120,7 +120,8 @@ def test_node_behind_a_gateway_may_be_octal_on_its_panel(station: int, octal: in
         text, = found
         assert 'on Data Highway Plus node numbers are octal' in text
         assert text.endswith(f'if {station} is what a panel there shows, write {octal}')
-    assert texts(report_of(make_mapping('N7:0', station=station)), RemarkKind.STATION) == []
+    assert texts(report_of(make_mapping('N7:0'), make_mapping('N7:0', station=station)),
+                 RemarkKind.STATION) == []
 
 
 def test_nodes_of_a_full_duplex_gateway_may_be_octal_too() -> None:
@@ -149,6 +150,8 @@ def test_period_that_another_baud_rate_can_keep() -> None:
     assert report.needed_baud() == 19200  # 27.1 ms and 20 ms of 50 ms
     slow = report_of(make_mapping('N7:0', length=2, period=50), response=0.02)
     assert slow.needed_baud() == 57600  # 9.0 ms and 40 ms
+    rare = make_mapping('N9:0', period=10_000)
+    assert report_of(rare, *report.mappings).needed_period() == 100
     assert texts(report, RemarkKind.LOAD) == [
         'the periods need 148% of the time of the line at 9600 baud, so reads come late; '
         '19200 baud would be enough; or Period 100 in place of shorter ones']
@@ -174,6 +177,8 @@ def test_baud_rate_has_to_do_for_heartbeats_and_questions_too() -> None:
     assert needed == 19200
     assert f'{needed} baud would be enough' in texts(report, RemarkKind.LOAD)[0]
     assert report_of(*rows, baud=needed).load <= 1
+    text, = texts(report_of(replace(rows[1], period=50)), RemarkKind.LOAD)
+    assert 'Period' not in text  # it is no read
 
 
 def test_together_the_periods_may_be_too_short_though_none_is() -> None:
