@@ -59,6 +59,10 @@ def test_packets_are_those_of_the_processor() -> None:
 def test_values_across_elements_are_read_in_whole_elements() -> None:
     values = AddressedValues.of('T4:1.ACC', SLC, 3)
     assert requests_of(read(values), reply(bytes(12))) == ['A2 0C 04 86 01 00']
+    steps = read(values)
+    next(steps)
+    with pytest.raises(StopIteration, match=r'\[1284, 1798, 2312\]'):  # words 2 to 4 of the six
+        steps.send(reply(bytes(range(12))))
     assert requests_of(read(AddressedValues.of('T4:1.ACC', SLC)), reply(b'\1\0')) == [
         'A2 02 04 86 01 02']
 

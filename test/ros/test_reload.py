@@ -19,11 +19,12 @@ from dataclasses import replace
 import os
 from pathlib import Path
 from typing import Any
+from unittest.mock import Mock
 
 from abdf1_ros.ports.link_thread import LinkThread
 from abdf1_ros.ports.opening import open_port
 from abdf1_ros.ports.settings import PortSettings
-from abdf1_ros.problems import ConfigurationError
+from abdf1_ros.problems import ConfigurationError, Problem
 from abdf1_ros.ros.bridge.guests import GuestPlaces
 from abdf1_ros.ros.bridge.reload import changes, refuse_harm
 from abdf1_ros.ros.bridge.session import BridgeSession
@@ -185,7 +186,7 @@ def test_files_that_would_stop_the_line_change_nothing(bench: Bench) -> None:
 
 
 def test_place_that_is_no_longer_shared_is_free_for_another_line(
-        bench: Bench, tmp_path: Path) -> None:
+        bench: Bench, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     places = [f'pty:{tmp_path}/{name}' for name in ('first', 'second')]
     for place in places:
         write_csv(bench.net, 'Baud,Timeout,Share', [f'115200,100,{place}'])
@@ -193,6 +194,11 @@ def test_place_that_is_no_longer_shared_is_free_for_another_line(
     bench.port_owners.hold('/other', places[0])
     with pytest.raises(ConfigurationError):
         bench.port_owners.hold('/other', places[1])
+    refusal = ConfigurationError([Problem('port', 'cannot be opened')])
+    monkeypatch.setattr('abdf1_ros.ros.bridge.node.refuse_harm', Mock(side_effect=refusal))
+    write_csv(bench.net, 'Baud,Timeout,Share', [f'115200,100,{places[0]}new'])
+    assert bench.reload() == (False, 'goes on as before: port: cannot be opened')
+    bench.port_owners.hold('/other', f'{places[0]}new')
 
 
 def test_link_that_does_not_take_the_files_is_the_end(
