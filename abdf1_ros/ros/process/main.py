@@ -202,10 +202,7 @@ def _begin(given: list[str]) -> None:
     try:
         rclpy.init(args=[*given, '--ros-args', _NO_LOG_FILE],
                    signal_handler_options=SignalHandlerOptions.NO)
-    except RuntimeError as error:
-        if isinstance(error, REFUSALS):
-            raise
-        # for example an error of the log
+    except RuntimeError as error:  # for example an error of the log
         raise rclpy_implementation.RCLError(str(error)) from error
 
 
