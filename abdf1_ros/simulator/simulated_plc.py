@@ -202,7 +202,7 @@ class SimulatedPlc(TaskSource):
     @property
     def is_running(self) -> bool:
         """Return True if the program runs and drives outputs; not in PROGRAM and TEST."""
-        return bool(self.processor.mode.is_running) and not self.processor.is_faulted
+        return self.processor.mode.is_running
 
     def run_ladder(self, ladder: Ladder) -> None:
         """Run a program from now on; a download restores the present words of the tables."""
@@ -289,7 +289,7 @@ class SimulatedPlc(TaskSource):
         """Execute a command and return its reply."""
         now = self.clock()
         self._polls_to_refuse = self.faults.slow
-        self._ready = now + self.faults.delay if self.faults.delay else -math.inf
+        self._ready = now + self.faults.delay
         self.advance()
         if self.faults.status:
             sts, *ext_sts = self.faults.status

@@ -468,7 +468,7 @@ def test_changes_are_named() -> None:
     before = configured(ROW, make_mapping('N7:9', tag='gone'))
     assert changes(before, before) == 'nothing has changed'
     after = configured(make_mapping('N7:1', tag='speed'), make_mapping('N7:2', tag='new'),
-                       port='/dev/ttyS1', baud=19200, share='pty:/tmp/hmi')
+                       port='/dev/ttyS1', baud=19200, com_port='2', share='pty:/tmp/hmi')
     assert changes(before, after) == (
         'port /dev/ttyS1 (was /dev/ttyS0); Baud 19200 (was 9600); Share pty:/tmp/hmi (was '
         'empty); new: new; gone: gone; changed: speed')

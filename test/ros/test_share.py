@@ -71,7 +71,8 @@ def test_what_is_not_allowed_and_who_is_turned_away_is_told_once(tmp_path: Path)
         address = OWN_HOST, int(free.getsockname()[1])
     place = f'{OWN_HOST}:{address[1]}'
     with (files.start_simulator(), Observer() as observer,
-          Process('node', *files.args(f'net.share:="tcp:{place}"')) as node):
+          Process('node', *files.args(f'net.share:="tcp:{place}"', 'net.share_access:=Write',
+                                      'read_only:=true')) as node):
         diagnostics = observer.diagnostics(files.port)
         observer.listen(Float32MultiArray, '/abdf1/read/setpoint').values([21.5])
         until_status(diagnostics, 'guests', OK)  # another thread opens the place

@@ -39,6 +39,7 @@ def plcs() -> list[SimulatedPlc]:
     ('  slow   12  3 \n', InjectedFaults(slow=3), 'station 12: slow 3'),
     ('delay 12 50', InjectedFaults(delay=0.05), 'station 12: delay 50'),
     ('noise 12 0.01', InjectedFaults(noise=0.01), 'station 12: noise 0.01'),
+    ('noise 12 0', InjectedFaults(), 'station 12: noise 0'),
     ('noise 12 1', InjectedFaults(noise=1.0), 'station 12: noise 1'),
     ('delay 12 3600000', InjectedFaults(delay=3600.0), 'station 12: delay 3600000'),
     ('error 12 50', InjectedFaults(status=(0x50,)), 'station 12: error 50'),

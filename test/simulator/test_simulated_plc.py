@@ -355,6 +355,9 @@ def test_program_stands_still_outside_of_run_but_tables_answer() -> None:
     clock.now += 1.0
     plc.advance()
     assert stored(plc, 'N11:3') != count
+    plc.set_mode(Setting.RUN)  # the key is turned, and the program runs on
+    plc.advance()
+    assert stored(plc, 'S:1')[1] >> 7 == 0
 
 
 def test_download_brings_back_the_words_of_the_start() -> None:
@@ -399,6 +402,10 @@ def test_plcs_behind_a_gateway_are_one_station_of_the_line(tmp_path: Path) -> No
         reply = plc.serve(identify)
         assert gateway.handle(Poll(10, True)) == frames.message_frame(reply.encode(), Checksum.CRC)
         gateway.handle(ACKNOWLEDGED)
+    echo = Packet(10, 5, 0x06, 0, 9, b'\0\7')  # for itself
+    gateway.handle(Frame(echo.encode(), 10))
+    assert gateway.handle(Poll(10, True)) == frames.message_frame(
+        echo.reply(b'\7').encode(), Checksum.CRC)
 
 
 @for_all(('first', 'second', 'text'), [
