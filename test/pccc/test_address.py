@@ -77,8 +77,8 @@ def test_slc_io_is_slot_word_bit(text: str, file: int, slot: int, word: int,
     'N7:0 /1', 'N7:0.1', 'N7:0.ACC', 'N7:0/DN', 'S/3', 'F8/3', 'T4/3', 'B3/DN', 'F8:0/1', 'L:0',
     'ST:0', 'A:0', 'D:0', 'ST9:0/1', 'T4:0.XYZ', 'T4:0/XYZ', 'T4:0.DN/3', 'T4:0.ACC/DN',
     'T4:0.LEN', 'R6:0.ACC', 'ST9:0.1', 'X9:0', '%N7:0', 'N7:0\n1', '##N7:0',
-    'T4:0.EN/DN', 'T4:0.2/DN', 'T4:0.1/PRE', 'T4:0.2/PRE', 'C5:0.1/CU', 'R6:0.2/EN', 'T4:0.PRE/ACC',
-    'N7:\u0663', 'I:\u0668', 'I:1/\u0668', 'N\u0667:0'])
+    'T4:0.2/DN', 'T4:0.1/PRE', 'T4:0.2/PRE', 'C5:0.1/CU', 'R6:0.2/EN', 'T4:0.PRE/ACC',
+    'T4:0.EN/DN', 'N7:\u0663', 'I:\u0668', 'I:1/\u0668', 'N\u0667:0'])
 def test_what_is_no_address(family: PlcType, text: str) -> None:
     with pytest.raises(AddressSyntaxError):
         parse_address(text, family)

@@ -119,6 +119,7 @@ def test_another_recording_begins(talk: Talk) -> None:
     talk.now = 100.0
     talk.out(COMMAND)
     talk.out(Packet(2, 5, 0x0F, 0, 7))
+    assert list(talk.expired(None)) == []  # a line without a time
     assert list(talk.expired(100.0)) == []  # the ports of a tap are not exactly together
     talk.now = 0.0
     assert talk.back(REPLY) == MessageFacts(COMMAND, None)

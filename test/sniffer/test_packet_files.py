@@ -69,7 +69,7 @@ def tcp(payload: bytes, number: int, to_plc: bool = True, flags: int = 0x18,
     ports = 50000, 44818
     ways = (hosts, ports) if to_plc else (hosts[::-1], ports[::-1])
     segment = struct.pack('>HHIIBBHHH', *ways[1], number & 0xFFFFFFFF, 0, 0x50, flags, 0, 0, 0)
-    return (struct.pack('>BBHIBBH', 0x45, 0, 40 + len(payload), 0, 64, 6, 0) + b''.join(ways[0])
+    return (struct.pack('>BBHIBBH', 0x45, 0, 40 + len(payload), 0x4000, 64, 6, 0) + b''.join(ways[0])
             + segment + payload)
 
 
@@ -161,7 +161,7 @@ def test_pccc_comes_connected_and_through_a_backplane(tmp_path: Path, data: byte
     (LOOPBACK, b'\2\0\0\0'), (101, b''), (COOKED, bytes(14) + b'\x08\0'),
     (276, b'\x08\0' + bytes(18))])
 def test_packets_come_over_any_usual_link(tmp_path: Path, link_type: int, head: bytes) -> None:
-    packet = head + tcp(encapsulated(cip(STATUS)), 1)
+    packet = head + tcp(encapsulated(cip(STATUS + bytes(240))), 1)
     assert len(chunks_of(tmp_path / 'x', pcap([(0.0, packet)], link_type))) == 1
 
 
@@ -179,6 +179,10 @@ def test_segments_are_put_together_and_those_that_come_again_are_dropped(tmp_pat
     assert [(chunk.time, chunk.data[4:6].hex()) for chunk in found] == [
         (4.0, '63c5'), (4.0, '0100'), (6.0, '63c5'), (9.0, '63c5'),
         (10.0, '63c5')]
+    halves = [(0.0, ethernet(tcp(data, 0))), *(
+        (float(at), ethernet(tcp([data[29:], data[:29]][at % 2], 1000 + 29 * at)))
+        for at in range(1, 11))]  # after a loss, nobody waits for more than eight segments
+    assert [chunk.time for chunk in chunks_of(tmp_path / 'x', pcap(halves))] == [0, *4 * [9], 10]
 
 
 @for_all(('cuts', 'order'), [  # 58 bytes a message
@@ -269,6 +273,7 @@ def test_csp_is_named(tmp_path: Path) -> None:
 
 
 @for_all('packet', [
+    ethernet(tcp(encapsulated(cip(STATUS)), 0).replace(b'\x40\0\x40', b'\x20\0\x40')),  # a part
     b'', bytes(14), ethernet(b''), ethernet(bytes(60)), ethernet(tcp(b'', 0)[:30]),
     ethernet(tcp(bytes(100), 0)), ethernet(tcp(encapsulated(b''), 0)),
     ethernet(tcp(encapsulated(bytes.fromhex('4B 02 20 67 24 01')), 0)),

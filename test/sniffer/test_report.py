@@ -62,6 +62,7 @@ def test_entry_has_its_line_of_text(entry: Entry, text: str) -> None:
     (NOISE, '\x1b[31m')])
 def test_line_has_the_colour_of_its_kind(entry: Entry, shade: str) -> None:
     assert text_line(entry, colour=True) == f'{shade}{text_line(entry)}\x1b[0m'
+    assert text_line(REPLY, colour=True) == text_line(REPLY)
 
 
 def test_entry_is_told_as_json_with_all_its_fields() -> None:
@@ -109,6 +110,8 @@ def test_json_has_all_that_the_summary_tells(summary: Summary) -> None:
     assert found['stations']['1']['latency_ms'] == {'mean': 750.0, 'max': 750.0}
     assert found['stations']['16']['counts'] == {'poll': 1, 'silence': 1}
     assert found['marks'] == {'retransmission': 1, 'duplicate': 1}
+    nothing = json.loads(summary_json(Summary(), LineKind(None, None)))
+    assert (nothing['check'], nothing['duplex'], nothing['load']) == (None, None, None)
 
 
 def test_entries_are_counted_for_the_line_and_for_their_station() -> None:
