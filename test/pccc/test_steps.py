@@ -25,7 +25,7 @@ from abdf1_ros.pccc.file_search import is_there
 from abdf1_ros.pccc.file_types import PlcType
 from abdf1_ros.pccc.processor import Processor
 from abdf1_ros.pccc.status import check_status, is_address_fault, Meanings, USUAL_MEANINGS
-from abdf1_ros.pccc.steps import AddressedValues, identify, read, write
+from abdf1_ros.pccc.steps import AddressedValues, echo, identify, read, write
 from abdf1_ros.pccc.values import ValueType
 import pytest
 from support.cases import for_all
@@ -74,6 +74,14 @@ def test_refused_or_odd_reply_is_no_file_and_leaves_an_identity_as_it_was() -> N
         assert len(requests_of(identify(), reply(FAULTED), odd)) == 2  # an old PLC-5
 
 
+def test_echo_is_what_was_sent() -> None:
+    for told, expected in ((b'\1\2', StopIteration), (b'\1\3', FormatError), (b'', FormatError)):
+        steps = echo(b'\1\2')
+        next(steps)
+        with pytest.raises(expected):
+            steps.send(reply(told))
+
+
 def test_write_stops_at_the_first_refusal() -> None:
     steps = write(AddressedValues.of('N7:0', SLC, 250), [*range(250)])
     assert next(steps)[1][:2] == bytes((0xAA, 234))
@@ -85,6 +93,8 @@ def test_write_stops_at_the_first_refusal() -> None:
 def test_what_must_not_be_written_is_refused_before_the_first_step() -> None:
     with pytest.raises(FormatError, match='HSC:0.ACC belongs to the processor'):
         write(AddressedValues.of('HSC:0.ACC', SLC), [1])
+    with pytest.raises(FormatError, match='^25 float32 from PD9:0.SP reach to PD9:0.50'):
+        AddressedValues.of('PD9:0.SP', PlcType.PLC5, 25)
     with pytest.raises(FormatError, match='2 values'):
         write(AddressedValues.of('N7:0', SLC), [1, 2])
 
