@@ -69,8 +69,8 @@ def tcp(payload: bytes, number: int, to_plc: bool = True, flags: int = 0x18,
     ports = 50000, 44818
     ways = (hosts, ports) if to_plc else (hosts[::-1], ports[::-1])
     segment = struct.pack('>HHIIBBHHH', *ways[1], number & 0xFFFFFFFF, 0, 0x50, flags, 0, 0, 0)
-    return (struct.pack('>BBHIBBH', 0x45, 0, 40 + len(payload), 0x4000, 64, 6, 0) + b''.join(ways[0])
-            + segment + payload)
+    return (struct.pack('>BBHIBBH', 0x45, 0, 40 + len(payload), 0x4000, 64, 6, 0)
+            + b''.join(ways[0]) + segment + payload)
 
 
 def ethernet(ip: bytes, vlan: bool = False) -> bytes:
