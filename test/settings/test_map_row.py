@@ -150,8 +150,9 @@ def test_command_says_whether_a_row_reads_and_writes(text: str, reads: bool, wri
      '16 (Access): Item: 1, Access = "CIF" of a PLC5 should be one of Typed, WordRange'),
     ({'Access': 'Typed', 'Command': 'Serve'}, '16 (Access): Item: 1, Access = "Typed" of a Serve '
      'row should be Read, for words that the other end cannot write, or empty'),
-    ({'PLC_Type': 'PLC2', 'Address': '020/05', 'Access': 'CIF'}, '3 (Address): Item: 1, Access '
-     'CIF has no command that changes single bits; write the whole word, or only read'),
+    *(({'PLC_Type': 'PLC2', 'Access': 'CIF'} | place, '3 (Address): Item: 1, Access CIF has no '
+       'command that changes single bits; write the whole word, or only read')
+      for place in ({'Address': '020/05'}, {'Address': '020', 'Type': 'bcd12'})),
     ({'PLC_Type': 'SLC', 'Processor': '5/06'}, '17 (Processor): Item: 1, Processor = "5/06" '
      'should be one of 5/01, 5/02, 5/03, 5/04, 5/05, ML1000, ML1100, ML1200, ML1400, ML1500'),
     ({'Processor': '5/03'}, '17 (Processor): Item: 1, Processor is for PLCs of type SLC that we '

@@ -305,10 +305,12 @@ def test_place_is_one_however_it_is_written(tmp_path: Path) -> None:
         with pytest.raises(ValueError, match='there twice, also as'):
             share_places(f'{one} tcp:99 {other}')
     assert len(share_places('tcp:4501 tcp:4502 tcp:10.0.0.1:4501')) == 3
+    assert len(share_places(' '.join(f'tcp:{port}' for port in range(4000, 4016)))) == 16
 
 
 @pytest.mark.parametrize(('port', 'place'), [
     ('{0}/tty', '{0}/link?baud=9600'), ('{0}/link', '{0}/tty'), ('{0}/new', 'pty:{0}//new'),
+    ('{0}/link', 'pty:{0}/link'),
     ('socket://127.0.0.1:4501', 'tcp:4501'), ('1', '/dev/ttyS0')])
 def test_port_of_the_line_is_no_place(port: str, place: str, tmp_path: Path) -> None:
     (tmp_path / 'tty').touch()
