@@ -51,8 +51,7 @@ from abdf1_ros.simulator.gateway import SimulatedGateway
 from abdf1_ros.simulator.simulated_plc import SimulatedPlc
 import pytest
 from support.cases import long_unless
-from support.driver_bench import DriverBench, simulated_plc
-from support.guests import Program
+from support.driver_bench import DriverBench, Program, simulated_plc
 from support.losses import AirLosses, Losses, Lost
 from support.mappings import make_mapping
 

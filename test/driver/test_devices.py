@@ -23,8 +23,7 @@ from abdf1_ros.simulator.simulated_plc import SimulatedPlc
 import pytest
 from support.cases import for_all
 from support.devices import Device, DEVICES, link_of, WRONG
-from support.driver_bench import DriverBench, store, stored
-from support.guests import Program, READ_N7
+from support.driver_bench import DriverBench, Program, READ_N7, store, stored
 from support.mappings import make_mapping
 from support.odd_device import OddDevice, Wiring
 

@@ -32,8 +32,7 @@ from abdf1_ros.settings.network import Network
 from abdf1_ros.settings.rows import Rows
 import pytest
 from support.cases import for_all
-from support.driver_bench import DriverBench, store, stored
-from support.guests import Program, READ_N7
+from support.driver_bench import DriverBench, Program, READ_N7, store, stored
 from support.mappings import make_mapping
 
 WRITE_N7 = bytes.fromhex('AA 02 07 89 00 00 34 12')

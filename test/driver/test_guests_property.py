@@ -25,8 +25,7 @@ from abdf1_ros.driver.guests import ShareAccess
 from abdf1_ros.driver.interlocks.heartbeat import BeatState
 from abdf1_ros.settings.network import Network
 import pytest
-from support.driver_bench import DriverBench
-from support.guests import Program, READ_N7
+from support.driver_bench import DriverBench, Program, READ_N7
 from support.mappings import make_mapping
 
 SECONDS = 10.0

@@ -28,9 +28,9 @@ from abdf1_ros.df1.packet import Packet
 from abdf1_ros.errors import LinkError
 import pytest
 from std_msgs.msg import Int16MultiArray
+from support.device_server import QueueingServer
 from support.fault_box import FaultBox
 from support.fault_rig import boxed, HeardNode, is_unanswered, NOT_SENT, Rig, SETPOINT, UNKNOWN
-from support.queueing_server import QueueingServer
 from support.renewed import Renewed
 from support.ros import ERROR, Observer, Process, ros_args, write_csv
 

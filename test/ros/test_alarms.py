@@ -24,8 +24,8 @@ from abdf1_ros.ros.diagnostics.alarms import Alarms, AlarmStatus
 from abdf1_ros.ros.diagnostics.status import ERROR, OK, WARN
 from abdf1_ros.settings.network import Network
 import pytest
-from support.cell import BridgeCell
 from support.mappings import cell_of, fault, one
+from support.ros import BridgeCell
 
 STALE = 0.6
 

@@ -34,9 +34,9 @@ import pytest
 from rclpy.clock import ClockType
 from std_msgs.msg import Int16MultiArray
 from std_srvs.srv import SetBool, Trigger
-from support.cell import BridgeCell
 from support.commands import Output, running_simulator
 from support.ros import (
+    BridgeCell,
     details,
     ERROR,
     Inbox,

@@ -52,9 +52,9 @@ from std_msgs.msg import (  # noqa: I101
     UInt8MultiArray,
 )
 from std_srvs.srv import SetBool, Trigger
-from support.cell import BridgeCell
 from support.commands import Output
 from support.ros import (
+    BridgeCell,
     details,
     ERROR,
     EXAMPLE_FILES,

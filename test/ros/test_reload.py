@@ -40,10 +40,10 @@ from rclpy.node import Node
 from rclpy.parameter import parameter_value_to_python
 from std_msgs.msg import Float32MultiArray, Int16MultiArray, UInt16MultiArray
 from std_srvs.srv import SetBool, Trigger
-from support.cell import BridgeCell
 from support.commands import Output
 from support.mappings import make_mapping
 from support.ros import (
+    BridgeCell,
     details,
     EVERYTHING,
     find_status,

@@ -35,9 +35,8 @@ import pytest
 from rclpy.qos import QoSProfile
 from std_msgs.msg import Int16MultiArray, UInt8MultiArray
 from std_srvs.srv import SetBool, Trigger
-from support.cell import BridgeCell
 from support.mappings import make_mapping
-from support.ros import details, Observer, Process, write_csv
+from support.ros import BridgeCell, details, Observer, Process, write_csv
 from support.simulator_process import make_files
 
 DATA = """Station,PLC_Type,Address,Length,Values

@@ -27,9 +27,8 @@ from abdf1_ros.settings.mapping import Mapping
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 import pytest
 from support.cases import for_all
-from support.cell import BridgeCell
 from support.mappings import make_mapping
-from support.ros import details, EVERYTHING, Inbox
+from support.ros import BridgeCell, details, EVERYTHING, Inbox
 
 OK, STALE, ERROR = DiagnosticStatus.OK, DiagnosticStatus.STALE, DiagnosticStatus.ERROR
 

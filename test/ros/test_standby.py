@@ -29,8 +29,7 @@ from diagnostic_msgs.msg import DiagnosticStatus
 import pytest
 from std_msgs.msg import Int16MultiArray, UInt16MultiArray
 from std_srvs.srv import SetBool, Trigger
-from support.cell import BridgeCell
-from support.ros import Observer, OK, ros_args, WARN, write_csv
+from support.ros import BridgeCell, Observer, OK, ros_args, WARN, write_csv
 
 NET = 'NAK_Retries,ENQ_Retries,Cmd_Timeout,Baud,Timeout\n1,1,5000,115200,3000\n'
 ROWS = """\

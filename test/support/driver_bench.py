@@ -17,7 +17,7 @@
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 import heapq
-import itertools
+from itertools import count
 from typing import Any
 
 from abdf1_ros.df1.frames import Duplex
@@ -29,6 +29,7 @@ from abdf1_ros.df1.settings import LinkSettings
 from abdf1_ros.df1.slave import multidrop, Responder
 from abdf1_ros.df1.stations import ActiveStationList, Station
 from abdf1_ros.driver.driver import Driver, Listener
+from abdf1_ros.driver.guests import Guest, GuestCommand, ShareAccess
 from abdf1_ros.driver.settings import DriverSettings
 from abdf1_ros.driver.write import Outcome, WriteResult
 from abdf1_ros.errors import PortLost
@@ -41,6 +42,8 @@ from abdf1_ros.settings.mapping import Mapping
 from abdf1_ros.settings.network import Network
 from abdf1_ros.simulator.simulated_plc import SimulatedPlc
 from support.virtual_line import VirtualLine
+
+READ_N7 = bytes.fromhex('A2 02 07 89 00 00')
 
 _WHOLE_FRAMES = 1000
 
@@ -199,7 +202,7 @@ class DriverBench:
         self.far = far or FarEnd(self.far_stations, self.network)
         self.line = VirtualLine(self.driver.machine, self.far, baud=self.network.baud, chunk=chunk)
         self._actions: list[tuple[float, int, Callable[[], object]]] = []
-        self._count = itertools.count()
+        self._count = count()
         self.mappings = mappings
         self.is_alive = True
         if self.network.duplex is Duplex.HALF:
@@ -272,3 +275,42 @@ class DriverBench:
     def run_until(self, condition: Callable[[], bool], limit: float = 60.0) -> None:
         """Let time pass until something is so; it has to be before the limit."""
         self.line.run(condition, limit)
+
+
+class Program:
+    """A program at a place of its own, which asks with ``src`` as its station."""
+
+    def __init__(self, bench: DriverBench, access: ShareAccess = ShareAccess.READ,
+                 src: int = 9) -> None:
+        self.guest = Guest(f'pty:/tmp/{src}', access)
+        self.replies: list[tuple[float, Packet]] = []
+        self._again: Callable[[], object] | None = None
+        self._pause = 0.0
+        self._bench, self._src, self._tns = bench, src, count(1)
+
+    def ask(self, data: bytes, dst: int = 1, cmd: int = 0x0F) -> Packet:
+        """Send a command."""
+        command = Packet(dst, self._src, cmd, 0, next(self._tns), data)
+        bench = self._bench
+        bench.driver.guests.put(GuestCommand(self.guest, command, bench.clock(), self._answered))
+        bench.line.wake(bench.driver.machine)
+        return command
+
+    def keep_asking(self, data: bytes, dst: int = 1) -> None:
+        """Send the next command 1 ms after the last has its reply."""
+        self.go_on(lambda: self.ask(data, dst))
+
+    def go_on(self, ask: Callable[[], object], pause: float = 0.001) -> None:
+        """Ask now, and again a pause (s) after each reply."""
+        self._again, self._pause = ask, pause
+        ask()
+
+    def _answered(self, reply: Packet) -> None:
+        self.replies.append((self._bench.clock(), reply))
+        if self._again is not None:
+            self._bench.at(self._bench.clock() + self._pause, self._again)
+
+    @property
+    def statuses(self) -> list[int]:
+        """Return the STS of all replies."""
+        return [reply.sts for _, reply in self.replies]

@@ -36,6 +36,7 @@ from typing import Any
 from abdf1_ros import testing
 from abdf1_ros.paths import config_file
 from abdf1_ros.ros.bridge.node import BridgeNode, end_together
+from abdf1_ros.ros.bridge.port_owners import PortOwners
 from abdf1_ros.ros.topics.messages import latched_qos
 from abdf1_ros.testing import EVERYTHING, PATIENCE
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
@@ -365,3 +366,32 @@ EXAMPLE_FILES = tuple(f'{name}_file:={config_file(f"{name}.csv")}' for name in (
 def ros_args(*assignments: str) -> list[str]:
     """Return the arguments that set parameters, each given as ``name:=value``."""
     return ['--ros-args', *(word for text in assignments for word in ('-p', text))]
+
+
+class BridgeCell(testing.SimulatedCell):
+    """What ``abdf1_cell`` makes, with the bridge in the executor of ``ros``."""
+
+    observer = Observer
+    ros: Observer
+
+    def __init__(self, folder: Path, data: str, rows: str, net: str, *assignments: str) -> None:
+        super().__init__(folder, data, rows, net, parameters=assignments)
+        self.net, self.map = folder / 'net.csv', folder / 'map.csv'
+
+    def start(self) -> None:
+        """Start the bridge; wait for its port."""
+        self.results = self.ros.results()
+        self.diagnostics = self.ros.diagnostics(self.plcs.port)
+        self.port_owners = PortOwners()
+        self.node = BridgeNode(context=self.ros.context, use_global_arguments=False,
+                               port_owners=self.port_owners, cli_args=ros_args(*self.assignments))
+        self.ros.run(self.node)
+        self.ros.until(lambda: self.node.session.driver.is_online, 'the port')
+
+    def end(self, number: signal.Signals = signal.SIGTERM) -> int:
+        """End the bridge in order, if it runs."""
+        self.ros.end(self.node)
+        return 0
+
+    def call(self, kind: Any, name: str, request: Any) -> Any:
+        return self.ros.call(kind, f'/abdf1/{name}', request)
