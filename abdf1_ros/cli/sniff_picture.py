@@ -38,7 +38,7 @@ from abdf1_ros.sniffer.summary import BITS_PER_CHARACTER, Summary
 from abdf1_ros.text import counted
 
 MOST_DRAWN = 20_000  # entries; then up to the same number again, only in strips with faults
-_MOST_EPISODES = 200
+MOST_EPISODES = 200  # shown in the table
 _PAUSE = 5.0  # s; after a longer pause the same fault starts a new episode
 _MOST_LANES = 40
 _BUCKETS = 260  # bars in a lane of the overview
@@ -193,7 +193,7 @@ class Timeline:
         told = _told(entry.kind, self._words(entry))
         episode = self._latest[what] = _Episode(
             station, text_of(told), link, recording.clock(place), place)
-        if len(self._episodes) < _MOST_EPISODES:
+        if len(self._episodes) <= MOST_EPISODES:  # one more than we show
             self._episodes.append(episode)
 
     def _words(self, entry: Entry) -> str:
@@ -236,10 +236,10 @@ class Timeline:
                 yield from _overview(recording)
         if self._episodes:
             yield '<h2>Faults</h2>'
-            rows = (episode.cells() for episode in self._episodes)
+            rows = (episode.cells() for episode in self._episodes[:MOST_EPISODES])
             yield cells(('from', 'to', 'clock', 'station', 'times', 'the first of them'), rows,
                         right=(0, 1, 3, 4))
-            if len(self._episodes) == _MOST_EPISODES:
+            if len(self._episodes) > MOST_EPISODES:
                 yield '<p>and more</p>'
         yield '<h2>In figures</h2>'
         told = '\n'.join(map(text_of, summary_lines(summary, kind)))

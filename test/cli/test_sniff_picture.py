@@ -112,6 +112,18 @@ def test_faults_come_as_episodes_that_lead_to_their_strip(tmp_path: Path, capsys
     assert '7 faults on the line' in drawn(tmp_path, capsys, str(radio)).texts
 
 
+@pytest.mark.parametrize(('episodes', 'is_more'), [(3, False), (4, True)])
+def test_table_of_episodes_tells_that_there_are_more(
+        tmp_path: Path, capsys: Output, monkeypatch: pytest.MonkeyPatch, episodes: int,
+        is_more: bool) -> None:
+    monkeypatch.setattr(sniff_picture, 'MOST_EPISODES', 3)
+    found = drawn(tmp_path, capsys, capture(
+        tmp_path / 'line.cap', *(silence(8.0 * number) for number in range(1, 2 + episodes))))
+    told = found.texts[:found.texts.index('In figures')]
+    assert told.count('silence: no answer to the poll') == 3
+    assert ('and more' in told) is is_more
+
+
 def test_no_answer_is_drawn_as_long_as_it_was_waited_for(tmp_path: Path, capsys: Output) -> None:
     found = drawn(tmp_path, capsys, capture(
         tmp_path / 'line.cap', silence(0.1), silence(0.6), silence(1.2)))
