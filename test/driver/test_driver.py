@@ -276,6 +276,15 @@ def test_slow_mapping_that_is_read_with_fast_ones_is_published_at_its_own_pace()
     assert bench.listener.values(slow)[6:] == [[5]]
 
 
+def test_plc_that_acknowledges_and_does_not_reply_has_no_row_that_looks_well() -> None:
+    rows = [make_mapping('N7:0', period=100), make_mapping('F8:0', period=3_600_000)]
+    bench, plc = make_bench(*rows, run=1.0)
+    plc.faults.slow = 10**9  # ACK of each command, EOT for each poll
+    bench.run(5.0)
+    assert bench.driver.stations[1].active
+    assert [bench.driver.points[row].error is None for row in rows] == [False] * 2
+
+
 def test_plc_in_trouble_fails_the_points_and_divides_nothing() -> None:
     mappings = [make_mapping('N7:0'), make_mapping('N7:1')]
     bench, plc = make_bench(*mappings)
