@@ -340,7 +340,7 @@ def test_rule_8_earliest_fallback_that_stands_of_a_station_that_is_not_busy_goes
 
 @pytest.mark.parametrize(('event', 'waits'), [
     ('', False), ('message', True), ('message after a failure', False),
-    ('write of its words', True), ('silence', True)])
+    ('write of its words', True), ('silence', True), ('late replies', True)])
 def test_rule_8_fallback_that_stands_is_put_off(event: str, waits: bool) -> None:
     one, stations = OneRow(), ActiveStationList([1], probe_time=1.0)
     row = one.row
@@ -352,6 +352,7 @@ def test_rule_8_fallback_that_stands_is_put_off(event: str, waits: bool) -> None
         one.record.begin(1, [one.mapping.extent])
     elif event == 'silence':
         stations.lost(1, 2.0)
+    stations[1].overdue = 2 * (event == 'late replies')
     youngest = {one.mapping: 5.0} if 'message' in event else {}
     assert plc.to_refresh(youngest, 6.0) is (None if waits else row)
     assert row.refresh_at == 6.0 + waits * row.after
