@@ -93,6 +93,14 @@ def test_files_of_the_package_are_good_and_follow_our_own_advice(
     assert content['errors'] == content['warnings'] == []
     assert {block['station'] for block in content['blocks']} <= {1, 2}
     assert not [note for note in content['notes'] if 'without While' in note]
+    assert main(names) == 0
+    said = capsys.readouterr().out
+    assert ('orderly end: {end_ms:.0f} ms where no frame gets lost, {end_in_silence_ms:.0f} ms '
+            'where no PLC answers' if content['end_ms'] else '').format(**content) in said
+    for bound in content['bounds']:  # presets, or both times
+        assert ('presets {presets[0]} (watchdog, rung 3) and {presets[1]} '
+                if bound['presets'] else
+                'after {ms:.0f} ms at most, {usual_ms:.0f} ms where').format(**bound) in said
 
 
 def test_every_error_of_both_files_at_once(check: Check, files: Paths) -> None:
@@ -187,7 +195,7 @@ def test_json_of_a_plan(check: Check) -> None:
     # One float of an SLC is 4 bytes as two words are: 45 characters, and 40 ms.
     assert content['scan_time_ms'] == pytest.approx(94.167 + 86.875, abs=0.01)
     assert content['load'] == pytest.approx(0.0942 + 1.7375, abs=0.001)
-    assert content['needed_baud'] == 115200
+    assert (content['needed_baud'], content['response_time_ms']) == (115200, 20.0)
 
 
 def test_many_tags_of_a_block(check: Check) -> None:
@@ -197,12 +205,16 @@ def test_many_tags_of_a_block(check: Check) -> None:
     assert block['tags'] == [f't{number}' for number in range(10)]
 
 
-def test_warnings_come_first_and_long_tables_are_folded(check: Check) -> None:
+def test_warnings_come_first_and_long_tables_are_folded(
+        check: Check, monkeypatch: pytest.MonkeyPatch) -> None:
     rows = tuple(f't{number},Read,N7:{number},1,PLC5,,100' for number in range(90))
     lines = check(GOOD_NET, (*rows, 't90,Read,B3:0,1,PLC5,,20')).splitlines()
     assert lines[0].startswith('warning: ')
     folded = lines.index('... and 51 more; --json has them all')
     assert lines[folded - 1].startswith('t39 ') and len(lines) < 70
+    monkeypatch.setattr(sys.stdout, 'isatty', lambda: True)
+    monkeypatch.setenv('COLUMNS', '40')
+    assert max(len(line) for line in check(GOOD_NET, rows).splitlines() if line[0:1] == 't') == 40
 
 
 def test_row_without_a_period_has_the_default_one(
@@ -338,9 +350,11 @@ def test_folder_without_lines_is_refused(tmp_path: Path, capsys: Output) -> None
 
 def test_one_file_is_not_enough(files: Paths, capsys: Output) -> None:
     write_csv(files[0], NET_HEADER, [GOOD_NET])
-    with pytest.raises(SystemExit):
-        main([str(files[0])])
-    assert f'{files[0]} is not a folder, so a map CSV must follow' in capsys.readouterr().err
+    for args, told in (([], f'{files[0]} is not a folder, so a map CSV must follow'),
+                       (['--heard', 'x.cap'], '--heard is for one line')):
+        with pytest.raises(SystemExit):
+            main([str(files[0]), *args])
+        assert told in capsys.readouterr().err
 
 
 def test_folder_of_this_place_has_its_own_name(
@@ -354,7 +368,7 @@ def test_folder_of_this_place_has_its_own_name(
 
 def test_rows_that_a_recording_fills_are_told(tmp_path: Path, capsys: Output) -> None:
     net, rows = tmp_path / 'net.csv', tmp_path / 'map.csv'
-    net.write_text('Mode,Com_Port\nListen,/dev/ttyUSB0\n', encoding='utf-8')
+    net.write_text('Mode,Com_Port,Listen_Port\nListen,/dev/ttyS0,/dev/ttyS1\n', encoding='utf-8')
     rows.write_text(
         'Tag,Command,Address,Station,PLC_Type,Length,Period\n'
         'read,Read,N7:8,2,PLC5,2,500\nlonger,Read,N7:8,2,PLC5,3,500\n'
@@ -363,6 +377,7 @@ def test_rows_that_a_recording_fills_are_told(tmp_path: Path, capsys: Output) ->
         heard = VECTOR_FOLDER / 'captures' / f'{capture}.cap'
         assert main([str(net), str(rows), '--heard', str(heard)]) == 0
         said = capsys.readouterr().out
+        assert '/dev/ttyS0 and /dev/ttyS1: Mode Listen, ' in said
         assert 'warning: unread is not filled: no other node reads it' in said
         assert 'warning: longer is not filled: no reply has all of its words; "word range read' \
             in said

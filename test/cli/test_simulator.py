@@ -31,6 +31,7 @@ from unittest.mock import Mock
 from abdf1_ros.cli.simulator import Cast, main, parse_options
 from abdf1_ros.df1 import frames
 from abdf1_ros.df1.checksum import Checksum
+from abdf1_ros.ports.link_thread import PortKind, PortState
 import pytest
 from support.cases import for_all
 from support.commands import call, Output
@@ -285,13 +286,36 @@ def test_on_a_port_of_a_device_server(start: Start) -> None:
 
 def test_timers_depend_on_the_speed_of_a_port_alone(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr('abdf1_ros.cli.simulator.LinkThread', links := Mock())
-    with socket.create_server(('127.0.0.1', 0)) as server:
-        port = f'--port=socket://127.0.0.1:{server.getsockname()[1]}'
-        for line in (port, '--tcp=127.0.0.1:0', '--baud=4800'):
-            for duplex in ('--full-duplex=1', '--radio'):
-                Cast(parse_options([line, duplex, '--baud=4800'])).close()
+    monkeypatch.setattr('abdf1_ros.cli.simulator.SerialEndpoint', ports := Mock())
+    for line in ('--port=/dev/ttyS0', '--tcp=127.0.0.1:0', '--baud=4800'):
+        for duplex in ('--full-duplex=1', '--radio'):
+            Cast(parse_options([line, duplex, '--baud=4800'])).close()
+    assert [call.args[0].baud for call in ports.call_args_list] == [4800, 4800]
     assert [call.args[0].timing.char_time for call in links.call_args_list] == [
         10 / 4800, 10 / 4800, 0, 0, 0, 0]
+    monkeypatch.setattr(sys, 'stdin', None)
+    assert main(['--seconds', '0.1']) == 1  # the thread says that it has failed, for it is a Mock
+
+
+def test_outage_is_told_once_and_faults_of_a_full_duplex_plc_are_those_of_its_line(
+        monkeypatch: pytest.MonkeyPatch, data: Path) -> None:
+    monkeypatch.setattr('abdf1_ros.cli.simulator.LinkThread', links := Mock())
+    monkeypatch.setattr('abdf1_ros.cli.simulator.SerialEndpoint', lines := Mock())
+    cast = Cast(parse_options(['--data', str(data), '--port=/dev/ttyS0', '--full-duplex=1']))
+    said: list[str] = []
+    cast.say = said.append
+    is_open, lost = PortState(True, 'open'), PortState(False, 'lost')
+    for state in (is_open, lost, lost, PortState(False, 'x', PortKind.NO_CLIENT), is_open, lost):
+        links.call_args.kwargs['on_state'](state)
+    assert said == ['lost', 'lost']
+    line, port = lines.return_value.open.return_value, links.call_args.args[1]()
+    line.read.return_value = b'x'
+    for fault, heard in (('silent 1', b''), ('normal 1', b'x'), ('noise 1 1', b'x')):
+        cast.carry_out(fault)
+        assert port.read(0.0, 0) == heard
+        port.write(b'x')
+    first, second = (call.args[0] for call in line.write.call_args_list)  # a silent PLC sends none
+    assert first == b'x' != second
 
 
 def test_simulator_goes_on_when_nobody_reads_it_and_ends_when_told(data: Path) -> None:
@@ -326,7 +350,7 @@ def test_simulator_answers_and_ends_while_its_output_is_not_taken(
 def test_input_goes_on_when_a_job_comes_back_from_the_background(
         data: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """The first EIO was taken for the end of the input, so "fg" led to a deaf terminal."""
-    texts: list[bytes | OSError] = [OSError(errno.EIO, 'Input/output error'), b'silent 1\nquit\n']
+    texts: list[bytes | OSError] = [OSError(errno.EIO, 'Input/output error'), b'\xFF\nquit\n']
 
     real_read = os.read
 
