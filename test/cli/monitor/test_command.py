@@ -26,6 +26,7 @@ import signal
 import termios
 import time
 from typing import Any
+from unittest.mock import MagicMock, Mock
 
 from abdf1_ros.cli.monitor.command import main, Screen
 from abdf1_ros.cli.monitor.view import TextLine
@@ -203,6 +204,8 @@ def test_picture_is_drawn_in_place_and_keys_lead_to_its_parts(simulator: Process
         screen.resize(8, 60)
         screen.redraw_until(NODE)
         screen.redraw_until('counters', 'c')
+        screen.redraw_until('115200 baud', 'l')
+        screen.redraw_until('active stations', 's')
         screen.redraw_until(NODE, 'v')
         screen.press('q')
         assert screen.result() == 0
@@ -246,6 +249,10 @@ class Window:
 
     def __init__(self) -> None:
         self.keys: list[int] = []
+        self.drawn: dict[int, tuple[str, int]] = {}
+
+    def addnstr(self, row: int, column: int, text: str, width: int, look: int) -> None:
+        self.drawn[row] = text, look
 
     def getmaxyx(self) -> tuple[int, int]:
         return 24, 80
@@ -256,7 +263,7 @@ class Window:
     def _ignore(self, *args: object) -> None:
         pass
 
-    nodelay = erase = addnstr = refresh = clearok = _ignore
+    nodelay = erase = refresh = clearok = _ignore
 
 
 def test_mark_stays_at_its_line_where_others_come(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -279,6 +286,15 @@ def test_mark_stays_at_its_line_where_others_come(monkeypatch: pytest.MonkeyPatc
     for key in (curses.KEY_HOME, curses.KEY_NPAGE):
         assert chosen(plant, key) == ''
     assert chosen(plant, ord('\n')) == 'line21'
+    assert {('line20', 0), ('line21', curses.A_REVERSE)} <= {*window.drawn.values()}
+
+
+def test_line_stays_marked_while_its_picture_is_shown(monkeypatch: pytest.MonkeyPatch) -> None:
+    for name in ('PlantWatch', 'NodeWatch', '_is_screen'):
+        monkeypatch.setattr(f'abdf1_ros.cli.monitor.command.{name}', MagicMock())
+    monkeypatch.setattr('curses.wrapper', drawn := Mock(side_effect=['/b', None, '']))
+    assert main(['--all']) == 0
+    assert [call.args[3:] for call in drawn.call_args_list] == [('',), (), ('/b',)]
 
 
 def test_signal_gives_the_terminal_back(simulator: Process) -> None:

@@ -107,21 +107,26 @@ def test_values_come_with_address_and_promise(bridge: Bridge, watch: NodeWatch) 
 def test_strings_and_topics_under_other_names_are_heard(bridge: Bridge, watch: NodeWatch) -> None:
     bridge.read(make_mapping('ST9:0', tag='name', kind='string'), 'Tank 4')
     bridge.read(make_mapping('N7:0', tag='door'), [1], '/elsewhere/door')
-    readings = heard(until(watch, lambda picture: len(heard(picture)) == 2))
+    bridge.read(make_mapping('B3:0/0', tag='bit'), [1])
+    readings = heard(until(watch, lambda picture: len(heard(picture)) == 3))
     assert readings['name'].values == 'Tank 4'
     assert list(readings['/elsewhere/door'].values or ()) == [1]
+    assert [curve.draw(time.monotonic(), None)[-1] if (curve := readings[name].curve) else ''
+            for name in ('name', '/elsewhere/door', 'bit')] == ['', '▁', '█']
 
 
 def test_value_of_a_topic_that_promises_nothing_is_as_old_as_its_publishing(
         bridge: Bridge) -> None:
     published = time.monotonic()
     bridge.read(make_mapping('N7:0', tag='ready', publish='Change'), [1])
+    bridge.read(make_mapping('N7:1', tag='speed'), [2])
     after = time.monotonic()
     bridge.observer.until(lambda: time.monotonic() - after > 0.3, 'it to become older')
     with NodeWatch(NAME, []) as watch:
         assert not any('parameter' in service.service_name for service in watch.node.services)
-        picture = until(watch, lambda picture: len(heard(picture)) == 1)
+        picture = until(watch, lambda picture: len(heard(picture)) == 2)
     assert heard(picture)['ready'].promised is None
+    assert heard(picture)['speed'].received > after + 0.3  # whatever the bridge's clock says
     assert published - 2.0 < heard(picture)['ready'].received <= after + 0.05
 
 
@@ -250,7 +255,7 @@ def test_bad_names_are_refused_with_a_good_one(text: str) -> None:
 
 
 def test_bridges_are_named_in_the_order_of_their_numbers() -> None:
-    topics = [(f'/line{number}/active_stations', ['x']) for number in (10, 2, 1)]
+    topics = [(f'/line{number}/active_stations', ['x']) for number in (10, 3, 2, 1)]
     watch: Any = SimpleNamespace(node=SimpleNamespace(
-        get_topic_names_and_types=lambda: topics, count_publishers=lambda topic: 1))
+        get_topic_names_and_types=lambda: topics, count_publishers=lambda topic: '3' not in topic))
     assert NodeWatch.bridges(watch) == ['/line1', '/line2', '/line10']
