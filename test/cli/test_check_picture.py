@@ -15,6 +15,7 @@
 """The picture of a plan: what is drawn, in a real browser too, and what cannot get into it."""
 
 from pathlib import Path
+import re
 
 from abdf1_ros.cli.check import main
 from abdf1_ros.cli.lanes import Bar, drawing, Lane, Look, NAMES
@@ -54,9 +55,16 @@ def test_each_station_has_a_lane_and_each_read_a_bar_as_long_as_it_takes(
     assert {'station 1', 'station 2'} <= {*found.texts}
     assert found.bars('ask') == 2 * len(ROWS)  # in the cycle, and in what the Periods need
     assert found.bars('wait') == len(ROWS)
-    begins = {each['x'] for _, each in found.found if each.get('class') == 'ask' and 'x' in each}
-    assert len(begins) == 2 * len(ROWS) - 1  # both begin with a bar at 0
-    assert found.bars('bad') == 0
+    asked, waited = ([each for _, each in found.found if each.get('class') == look and 'x' in each]
+                     for look in ('ask', 'wait'))
+    assert len({each['x'] for each in asked}) == 2 * len(ROWS) - 1  # both begin with a bar at 0
+    assert float(asked[1]['x']) == pytest.approx(
+        float(waited[0]['x']) + float(waited[0]['width']), abs=0.2)
+    assert found.bars('bad') == found.bars('small') == 0
+    shares = [float(share[1]) for text in found.texts
+              if (share := re.search(r'; ([\d.]+)% of the time; ', text))]
+    assert shares[-len(ROWS):] == sorted(shares[-len(ROWS):], reverse=True)
+    assert ('p', {'class': 'verdict is-good'}) in found.found
     assert any(text.startswith('every Period can be kept; load') for text in found.texts)
     (told,) = {text for text in found.texts if text.startswith('station 1, F8:0 to F8:2: ')}
     assert told.endswith(' of the time; level')
@@ -64,12 +72,16 @@ def test_each_station_has_a_lane_and_each_read_a_bar_as_long_as_it_takes(
 
 def test_bars_are_in_proportion_to_their_times() -> None:
     svg = browser.Elements(drawing([Lane('a', [
-        Bar(0, 25, Look.ASK, 'x'), Bar(25, 100, Look.WAIT, 'y')])], 0, 100, 'ms'))
-    (first,), (second,) = ([rect for _, rect in svg.found if rect.get('class') == look]
-                           for look in ('ask', 'wait'))
+        Bar(25, 45, Look.ASK, 'x', ('much too long' * 4, 'fits')),
+        Bar(45, 105, Look.WAIT, 'y', row=1)], rows=2)], 25, 105, 'ms', limit=45))
+    (first,), (second,), (limit,) = ([rect for _, rect in svg.found if rect.get('class') == look]
+                                     for look in ('ask', 'wait', 'limit'))
     assert float(first['x']) == NAMES
     assert float(second['x']) == pytest.approx(NAMES + float(first['width']), abs=0.2)
     assert float(second['width']) == pytest.approx(3 * float(first['width']), abs=0.2)
+    assert (int(second['y']) - int(first['y']), limit['x1']) == (14, second['x'])
+    assert {*svg.texts} >= {'a', 'fits', 'ms', *map(str, range(30, 101, 10))}
+    assert not {'20', '110', 'much too long' * 4} & {*svg.texts}
 
 
 def test_periods_that_cannot_be_kept_are_red(tmp_path: Path, capsys: Output) -> None:
@@ -78,6 +90,8 @@ def test_periods_that_cannot_be_kept_are_red(tmp_path: Path, capsys: Output) -> 
     assert found.bars('bad') == 2 * (len(ROWS) + 1)  # a line that is too busy keeps none
     assert found.bars('ask') == 1  # without a Period there is nothing to keep
     assert found.found.count(('b', {'class': 'is-bad'})) == len(ROWS) + 1  # in the table
+    assert ('p', {'class': 'verdict is-bad'}) in found.found
+    assert 'Reads with Period 0 have the time that is left.' in found.texts
     assert any(text.startswith('4 of 5 reads cannot keep the Period') for text in found.texts)
     said, page = drawn(tmp_path, capsys)  # it replaces its own page
     assert (said.status, elements(page).bars('bad')) == (0, 0)
