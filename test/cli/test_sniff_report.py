@@ -106,7 +106,7 @@ booth_alive,Read,N7:0,2,SLC,,,,,alive of the booth,,
 booth_speed,Read,N7:1,2,SLC,acme/speed,booth_alive,,,ask jdoe,,
 booth_ros,Heartbeat,plc-gw:9,2,SLC,,acme/setpoint acme/door,,,,,
 booth_control,Read,B3:0/1,2,SLC,,Run,Booth_ROS,,,,
-setpoint,Write,N7:3-4,2,SLC,acme/setpoint,,,acme jdoe,,jdoe,plc-gw
+run,Write,N7:3-4,2,SLC,acme/setpoint,,,acme jdoe,,jdoe,plc-gw
 door,Read,plc-gw.acme.example,10.1.2.3,/home/jdoe,,,,,,,
 """
 RESULT = {

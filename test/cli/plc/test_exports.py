@@ -114,6 +114,8 @@ def test_tag_of_kepserver_becomes_a_row(
     (f'"Long","N7:0 [{"9" * 5000}]",Word Array,1,RO,100,,,,,,,,,,"",',
      'write type, file, ":", element, as in N7:0, B3:1/5, T4:0.ACC or I:1.0/3'),
     ('"Word","N7:0",Word,1,never,100,,,,,,,,,,"",', 'Client Access "never" has no counterpart'),
+    (f'"Word","N7:0",{"x" * 100},1,RO,100,,,,,,,,,,"",',
+     f'Data Type "{"x" * 100}" has no counterpart'),
     (f'"Word","N7:0",{"x" * 5000},1,RO,100,,,,,,,,,,"",',
      f'Data Type "{"x" * 100}..." has no counterpart'),
     ('"Meter","400101",Word,1,RO,100,,,,,,,,,,"",',

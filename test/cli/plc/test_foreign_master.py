@@ -25,11 +25,16 @@ from types import SimpleNamespace
 
 from abdf1_ros import client
 from abdf1_ros.cli import check
+from abdf1_ros.cli.overhearing import map_of
 from abdf1_ros.cli.plc import line, overhear
 from abdf1_ros.cli.plc.command import main
+from abdf1_ros.df1.packet import Packet
 from abdf1_ros.driver import requests
+from abdf1_ros.driver.overheard import Carried
+from abdf1_ros.pccc.describe import describe
 from abdf1_ros.settings.network import Network
 import pytest
+from support.cases import for_all
 from support.commands import Output
 from support.odd_device import frame
 from support.ptys import Pty
@@ -183,6 +188,22 @@ def test_init_offers_a_map_of_what_another_master_reads(
     assert main(['init', '--net', str(new / 'net.csv'), '--into', str(tmp_path / 'again')]) == 1
     assert 'no read with its reply was heard, so no file was written' in capsys.readouterr().err
     line.close()
+
+
+@for_all(('cmd', 'data', 'times', 'row'), [
+    (0x0F, 'A1 04 07 89 00', 1, 'n7_0_2_of_3,Read,N7:0,3,SLC,2,10000'),
+    (0x0F, 'A2 08 0A 91 00 00', 2, 'l10_0_2_of_3,Read,L10:0,3,SLC,2,5000'),
+    (0x2F, '68 00 00 02 00 06 07 00 02 00', 3, 'n7_0_2_of_3,Read,N7:0,3,PLC5,2,5000'),
+    (0x01, '20 00 04', 4, '020_2_of_3,Read,020,3,PLC2,2,2000'),
+    (0x0F, 'A2 06 04 86 00 02', 1, '# station 3: protected typed logical read T4:0.ACC, 3 words: '
+     '1 time'), (0x0F, '01 00 00 04 00 06 08 00 08', 2, '# station 3: word range read F8:0, 4 '
+                 'words: 2 times')])
+def test_row_of_a_read_has_type_length_and_twice_the_interval(
+        cmd: int, data: str, times: int, row: str) -> None:
+    command = Packet(3, 0, cmd, 0, 7, bytes.fromhex(data))
+    carried = Carried(3, describe(command), command, 2.0, 2.0 + 2.4 * (times > 1), times)
+    first, second = map_of([carried, carried]).splitlines()[-2:]
+    assert first == row and second.startswith(f'# station 3: {carried.text}: ')
 
 
 class Asking(threading.Thread):

@@ -105,6 +105,7 @@ def test_plc_of_an_unknown_family_leaves_no_later_one_out() -> None:
     rows = ''.join(map_rows([Presence(number, 0.1, identity, None, True, True)
                              for number, identity in ((1, unknown), (2, known))], {}))
     assert '# words_1,' in rows and '\nstatus_2,Read,S:0,2,SLC,' in rows
+    assert ',8,250,,,\n' in rows  # a PLC that does not tell its mode is not guarded by it
 
 
 def test_gateway_leads_to_the_nodes_behind_it() -> None:
@@ -241,6 +242,10 @@ def test_directory_takes_few_reads(port: str, capsys: Output) -> None:
         assert session.counters.commands_sent <= 10
         by_reads = [*find_files(session, 2, PlcType.SLC, None, (7, 40))]
         assert session.counters.commands_sent > 20
+        warned: list[str] = []  # a PLC-5, which refuses that
+        assert not [*find_files(session, 1, PlcType.SLC, Processor.SLC_5_03, (7,),
+                                warn=warned.append)]
+        assert [text[:38] for text in warned] == ['its file directory cannot be read (STS']
     assert {str(entry) for entry in by_reads} <= {str(entry) for entry in found}
 
 

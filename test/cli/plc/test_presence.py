@@ -82,6 +82,8 @@ def test_silence_and_noise(tmp_path: Path, mode: str) -> None:
         assert seen.error is not None
         assert hint(session, seen.error).startswith(f'{asked}3 characters came, but no answer')
         assert hint(session, FormatError('x')) == ''
+        session.counters.acks_received = 1  # somebody understands us
+        assert hint(session, seen.error) == ''
     line.close()
 
 

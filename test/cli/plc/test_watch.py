@@ -66,8 +66,8 @@ def network_on(plcs: Plcs, timeout: int = 1000) -> Network:
 class Counting(LiveValues):
     """A watch that raises N7:0 by one after each read, and loses the line after some."""
 
-    def __init__(self, plcs: Plcs, reads: int = 1000, csv: bool = False) -> None:
-        super().__init__(network_on(plcs), [SPEED], 0.01, csv=csv)
+    def __init__(self, plcs: Plcs, reads: int = 1000) -> None:
+        super().__init__(network_on(plcs), [SPEED], 0.01)
         self._plcs = plcs
         self._left = reads
 
@@ -147,11 +147,6 @@ def test_lost_line_is_shown(plcs: Plcs, capsys: Output) -> None:
     assert lines[:3] == [f'N7:0  {number}' for number in range(3)]
     assert lines[3].startswith('N7:0  no value: ')
     assert len(lines) == 4
-
-
-def test_lost_line_is_a_row_of_csv_without_a_value(plcs: Plcs, capsys: Output) -> None:
-    assert Counting(plcs, reads=3, csv=True).run(4) == 1
-    assert capsys.readouterr().out.endswith(',1,N7:0,\n')
 
 
 def test_silent_station_is_shown(plcs: Plcs, capsys: Output) -> None:
@@ -250,6 +245,10 @@ def test_nothing_old_stays_below_a_table_that_shrinks(
         'address station type age s value', 'N7:0 1 int16 * 5', 'C5:0.ACC 1 int16 * 5']
     # What a narrower window did with the lines before is not known: it begins at its top.
     assert show((52, 9)) == healed[1:]
+    watch.counters.nak_retries, watch.counters.enq_retries = 1, 2
+    watch.counters.bcc_errors, watch.counters.crc_errors = 3, 4
+    monkeypatch.setattr('abdf1_ros.cli.plc.watch._MARKED', 0.0)  # as after its second
+    assert show((60, 9))[-2:] == ['C5:0.ACC 1 int16 5', 'line: 3 repeated, 7 damaged']
 
 
 def test_table_marks_changes_and_says_what_does_not_fit(draw: Draw) -> None:
