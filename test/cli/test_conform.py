@@ -14,13 +14,15 @@
 
 """The command ``conform``, against a simulated PLC on a pseudo-terminal."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 import json
 from pathlib import Path
 import re
 import time
 
 from abdf1_ros.cli.conform import main
+from abdf1_ros.conform.case import Case, CaseResult, Permission, Verdict
+from abdf1_ros.conform.wire import Wire
 import pytest
 from support.cases import for_all
 from support.commands import Output, running_simulator
@@ -76,6 +78,29 @@ def test_report_is_markdown(port: str, capsys: Output) -> None:
     assert '| serial | CRC, 9600 | conform slave: 2 passed, 0 failed, 1 skipped |' in row
     assert port not in text
     assert '| PASS | poll-idle | KF2 4-31 |  |' in text
+
+
+def test_failures_skips_noise_and_early_enquiries_are_told(
+        port: str, capsys: Output, monkeypatch: pytest.MonkeyPatch) -> None:
+    def results(cases: Sequence[Case], wire: Wire, end: object,
+                allowed: frozenset[Permission]) -> Iterator[CaseResult]:
+        assert allowed == permissions
+        wire.noise, wire.enquired_after, wire.has_heard = 3, 0.6, True
+        yield CaseResult(cases[0], Verdict.FAIL, 0.1, 'ACK', 'NAK', ('we   10 05',))
+        yield CaseResult(cases[0], Verdict.SKIP, got='needs a word')
+
+    monkeypatch.setattr('abdf1_ros.cli.conform.run_cases', results)
+    permissions = {*Permission}
+    for options, missing, *told in (
+            (['--yes', '--words', 'N7:0'], set(), 'we   10 05\n', ' skipped: needs a word\n'),
+            (['--yes', '--report'], {Permission.WRITE}, ' | expected ACK, got NAK |'),
+            (['--report'], {Permission.RESET}, ' | needs a word |')):
+        permissions -= missing
+        assert main(['slave', '--port', port, *options]) == 1
+        said = capsys.readouterr()
+        assert all(text in said.out for text in told)
+        assert 'conform: 3 bytes outside of any symbol were' in said.err
+        assert '--answer-time 1 that may look like a fault: try --answer-time 0.3\n' in said.err
 
 
 def test_nobody_there_is_said(tmp_path: Path, capsys: Output) -> None:

@@ -16,6 +16,7 @@
 
 from collections.abc import Callable
 from functools import cache
+import re
 
 from abdf1_ros.conform import codec
 from abdf1_ros.conform.case import CaseResult, Permission, run_cases, Target, Verdict
@@ -188,13 +189,25 @@ def test_other_family_refuses(family: str, outcome: tuple[Verdict, str, str], na
     assert (result.verdict, result.expected, result.got) == outcome
 
 
-def test_case_that_needs_leave_is_skipped() -> None:
+@pytest.mark.parametrize('name', ['write-and-read', 'word-order', 'masked-write'])
+def test_words_that_a_case_has_overwritten_are_restored(name: str) -> None:
+    result, = results_of(
+        ScriptedLine(plc_of(Target.SLAVE, 'CRC')), Target.SLAVE, 'CRC', only=name)
+    *_, last = (entry for entry in result.transcript if re.search(' we .* AA 0[26] 07', entry))
+    assert re.search(' AA 0[26] 07 89 02 00( 00)+ 10 03 ', last)
+
+
+def test_case_that_needs_leave_or_comes_too_late_is_skipped(
+        monkeypatch: pytest.MonkeyPatch) -> None:
     line = ScriptedLine(plc_of(Target.SLAVE, 'CRC'))
     wire = Wire(line, BlockCheck.CRC, line.clock, is_half_duplex=True)
     case = next(case for case in CASES if case.name == 'nak-resets')
     result, = run_cases([case], wire, MasterEnd(wire, 1, 5, first_tns=1),
                         frozenset((Permission.NOTHING,)))
     assert (result.verdict, result.got[:11]) == (Verdict.SKIP, 'needs --yes')
+    monkeypatch.setattr('abdf1_ros.conform.case.LONGEST_RUN', -1.0)
+    result, = run_cases([case], wire, MasterEnd(wire, 1, 5, first_tns=1), frozenset(Permission))
+    assert result.got == 'not tried: the run has taken too long'
 
 
 def test_every_case_cites_its_source() -> None:
