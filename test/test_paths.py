@@ -15,6 +15,7 @@
 """Where the files of the package are found, and the end that a signal asks for."""
 
 from pathlib import Path
+import signal
 import subprocess
 import sys
 from types import SimpleNamespace
@@ -88,6 +89,19 @@ def test_second_signal_does_not_begin_the_end_again() -> None:
         end.set()
     assert begun == [end.when]
     assert end.is_set()
+
+
+def test_signals_of_others_do_not_begin_the_end() -> None:
+    numbers = signal.SIGUSR1, signal.SIGTERM
+    before = [signal.signal(number, lambda number, frame: None) for number in numbers]
+    with EndRequest(numbers[1:]) as end:
+        ended = []
+        for number, seconds in zip(numbers, (0.2, 30.0), strict=True):
+            signal.raise_signal(number)
+            ended.append(end.wait(seconds))
+    for number, handler in zip(numbers, before, strict=True):
+        signal.signal(number, handler)
+    assert ended == [False, True]
 
 
 def test_alarm_of_the_last_output_does_not_kill_a_slow_end() -> None:

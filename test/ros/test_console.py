@@ -24,6 +24,7 @@ import subprocess
 import sys
 import termios
 import time
+from types import SimpleNamespace
 from typing import Any
 
 from abdf1_ros import console
@@ -124,19 +125,22 @@ def test_lines_that_nothing_takes_are_counted_and_told_when_they_are_taken_again
     for number in range(10):
         sink.put(b'line %d\n' % number)  # 7 bytes: five fit
     sink.start()
-    sink.end()
     text = b''
     while b'lost' not in text:
         text += os.read(reader, 65536).replace(b'\0', b'')
+    sink.put(b'again\n')  # there is room for it now
+    sink.end()
     sink.join(PATIENCE)
-    assert text == b''.join(b'line %d\n' % number for number in range(5)) + LOST % 5
+    text += os.read(reader, 65536)
+    assert text == b''.join(b'line %d\n' % number for number in range(5)) + LOST % 5 + b'again\n'
     for descriptor in (reader, writer):
         os.close(descriptor)
 
 
 def test_count_of_lost_lines_outlives_a_write_that_fails(monkeypatch: pytest.MonkeyPatch) -> None:
     """A full disk took the count of the lines before with it."""
-    monkeypatch.setattr(console, 'PAUSE', 0.01)
+    slept: list[float] = []
+    monkeypatch.setattr(console, 'time', SimpleNamespace(sleep=slept.append))
     taken: list[bytes] = []
     answers: list[int | OSError] = [7, OSError(errno.ENOSPC, 'No space left on device')]
 
@@ -156,12 +160,24 @@ def test_count_of_lost_lines_outlives_a_write_that_fails(monkeypatch: pytest.Mon
         time.sleep(0.01)
     sink.end()
     sink.join(PATIENCE)
-    assert b''.join(taken) == b'line 0\n' + LOST % 5
+    assert (b''.join(taken), slept) == (b'line 0\n' + LOST % 5, [console.PAUSE])
+
+
+def test_log_file_gets_no_colours(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    for module, name in ((os, '_exit'), (signal, 'signal')):
+        monkeypatch.setattr(module, name, lambda *args: None)
+    paths = source, out, log = [tmp_path / name for name in ('source', 'out', 'log')]
+    source.write_bytes(b'\x1b[33mwarning\x1b[0m\n')
+    with ExitStack() as stack:
+        numbers = [stack.enter_context(path.open('ab+')).fileno() for path in paths]
+        os.lseek(numbers[0], 0, os.SEEK_SET)
+        console.relay(['{}:{},{}'.format(*numbers)])
+    assert (out.read_bytes(), log.read_bytes()) == (source.read_bytes(), b'warning\n')
 
 
 def test_line_that_is_too_long_is_counted(tmp_path: Path) -> None:
     text = tmp_path / 'text'
-    text.write_bytes(b'before\n' + b'x' * 2_500_000 + b'\nafter\n')
+    text.write_bytes(b'before\n' + b'x' * 2_500_000 + b'\nafter')
     reader, writer = os.pipe()
     sink = Sink(writer)
     with text.open('rb') as source:
