@@ -38,6 +38,7 @@ from support.commands import call, Output
 from support.forked import Forked
 from support.ptys import full_pipe, PATIENCE, read_exactly
 from support.ros import Process
+from support.scripted_line import ScriptedLine
 
 DATA = """\
 Station,PLC_Type,Address,Length,Values,Motion,Period
@@ -316,6 +317,18 @@ def test_outage_is_told_once_and_faults_of_a_full_duplex_plc_are_those_of_its_li
         port.write(b'x')
     first, second = (call.args[0] for call in line.write.call_args_list)  # a silent PLC sends none
     assert first == b'x' != second
+
+
+def test_broadcast_by_radio_reaches_every_plc(
+        monkeypatch: pytest.MonkeyPatch, data: Path) -> None:
+    monkeypatch.setattr('abdf1_ros.cli.simulator.LinkThread', links := Mock())
+    Cast(parse_options(['--data', str(data), '--radio'])).close()
+    line = ScriptedLine(links.call_args.args[0])
+    write, read, reply = (frames.message_frame(bytes.fromhex(text), Checksum.CRC) for text in (
+        'ff 05 0f 00 11 02 aa 02 07 89 00 00 2a 00', SLC_READ, '05 02 4f 00 10 02 2a 00 fe ff'))
+    line.write(write)
+    line.write(read)
+    assert line.read(1.0) == reply
 
 
 def test_simulator_goes_on_when_nobody_reads_it_and_ends_when_told(data: Path) -> None:
