@@ -93,6 +93,8 @@ def imported(folder: Path, text: str | bytes,
      {'Scale': '-0.1', 'Offset': '-2'}),
     ('"Back","N7:24",Short,1,R/W,100,Linear,0,100,0,10,Float,1,1,,"",1',
      {'Scale': '-0.1', 'Min': '-10', 'Max': '0'}),
+    ('"Comma","N7:27",Short,1,R/W,100,Linear,0,100,"0,5","10,5",Float,0,1,,"",',
+     {'Scale': '0.1', 'Offset': '0.5', 'Max': '10.5'}),
     ('"#1 pump","N7:25",Short,1,RO,100,,,,,,,,,,"",', {'Tag': '#1 pump', 'Topic': 't1_pump'}),
     ('"\x1b[1mBold\0","N7:26",Short,1,RO,100,,,,,,,,,,"a\x1bb",',
      {'Tag': '[1mBold', 'Description': 'a b'}),
@@ -206,14 +208,16 @@ def test_bit_addresses_alone_are_an_export_too(tmp_path: Path) -> None:
 def test_read_only_rows_of_several_stations_with_a_longer_period(tmp_path: Path) -> None:
     rows = ('"Speed","N7:0",Short,1,R/W,100,Linear,0,100,0,10,Float,1,1,,"",\n'
             '"Slow","N7:1",Short,1,RO,5000,,,,,,,,,,"",\n'
-            '"Out","N7:2",Short,1,WO,100,,,,,,,,,,"",\n')
+            '"Out","N7:2",Short,1,WO,100,,,,,,,,,,"",\n'
+            '"Slow","N7:3",Short,1,RO,100,,,,,,,,,,"",\n')
     mappings, left_out = imported(
         tmp_path, KEPSERVER + rows, Wanted(stations=(1, 3), read_only=True, period=2000))
     assert [(row.topic, row.station, row.period) for row in mappings] == [
         ('station_1/Speed', 1, 2000), ('station_3/Speed', 3, 2000),
         ('station_1/Slow', 1, 5000), ('station_3/Slow', 3, 5000)]
     assert {(row.command.value, row.maximum) for row in mappings} == {('Read', math.inf)}
-    assert left_out == ['4: Out: cannot be read, and --read-only is given']
+    assert left_out == ['4: Out: cannot be read, and --read-only is given',
+                        '5: Slow: the name station_1/Slow is that of line 3']
 
 
 def test_command_suggests_a_period_that_the_line_can_keep(
@@ -307,6 +311,8 @@ def test_list_that_says_nothing_of_access_is_only_read(tmp_path: Path) -> None:
         'the file has no column about access: made Read rows (--access COLUMN)': 1}
     empty = KEPSERVER + '"Speed","N7:0",Short,1,,100,,,,,,,,,,"",\n'
     assert told(imported(tmp_path, empty)[0]) == [('Speed', 'Read', 'N7:0', '')]
+    assert import_map(str(tmp_path / 'export.csv'), Wanted()).remarks == {
+        'Client Access is empty: made Read rows': 1}
 
 
 def test_columns_of_a_list_are_given_by_options(
@@ -360,7 +366,7 @@ VIEW = (';Tag Type, Tag Name, Tag Description, Read Only, Data Source, Security 
       '"PLC1","B3:0/5","A"\n"A","mem","","F","M","*","F","F","D","F",0,1,0,1,0,0,,,,,,,,,\n'
       '"A","Level","","","D","*","F","F","D","F",0,100,0,1,0,0,,,,,,,"PLC1","N7:1","A"\n',
     VIEW.format('', 'Retentive,')
-    + '"A","Press\\Speed","Speed, left","F","D","*","F","D","F",0,100,0,0.1,-5,0,"1/min",,,,,,0,'
+    + '"a","Press\\Speed","Speed, left","F","D","*","F","D","F",0,100,0,0.1,-5,0,"1/min",,,,,,0,'
       '"::[PLC1]N7:0"\nD,"Press\\Run",,"T","D","*","F",,,,,,,,,,"Off","On","Off",,,,'
       '"{[PLC1]B3:0/5}"\n"S","mem","","F","M","*","F",,,,,,,,,,,,,82,"",0,\n'
       '"A","Level","","","D","*","F","D","F",0,100,0,1,0,0,,,,,,,0,"[PLC1]N7:1"\n'])
@@ -386,7 +392,7 @@ INTOUCH = (
     '"Run","$System","motor runs","PLC1",No,"B3:0/5",No\n'
     ':IOInt,Group,Comment,MinEU,MaxEU,MinRaw,MaxRaw,Conversion,AccessName,ItemUseTagname,ItemName,'
     'ReadOnly\n"Speed","$System","speed",0,100,0,1000,Linear,"PLC1",No,"N7:0",No\n'
-    '"N7:1","$System","","0",10,0,10,Linear,"PLC1",Yes,"",Yes\n')
+    '"N7:1","$System","","0",10,0,10,,"PLC1",Yes,"",Yes\n')
 
 
 def test_tags_of_intouch(tmp_path: Path) -> None:
