@@ -39,7 +39,7 @@ import pytest
 from support.cases import for_all
 from support.commands import Output, running_simulator
 from support.forked import Forked
-from support.ptys import full_pipe, PATIENCE, Pty, read_exactly, wait_until
+from support.ptys import full_pipe, no_file_longer_than, PATIENCE, Pty, read_exactly, wait_until
 from support.ros import Process
 
 COMMAND = Packet(2, 5, 0x0F, 0, 0x1234, bytes.fromhex('A2 04 07 89 00 00'))
@@ -218,6 +218,9 @@ def test_packets_go_nowhere_else_than_into_pcapng(capsys: Output, capture: str) 
     assert refused(capsys, '--pcapng', '/nowhere/x', capture).endswith(
         'sniff: --pcapng: /nowhere/x: No such file or directory\n')
     assert 'exists and was not made by --pcapng' in refused(capsys, '--pcapng', capture, capture)
+    with no_file_longer_than(200):
+        assert main(['--pcapng', f'{capture}.pcapng', capture]) == 2
+    assert 'File too large; no more packets are written\n' in capsys.readouterr().err
 
 
 @for_all('args', [
@@ -347,6 +350,11 @@ def test_what_a_slow_output_has_lost_is_told_and_saved(
     assert capsys.readouterr().err.endswith(told)
     assert (tmp_path / 'saved').read_text('ascii').endswith(told)
     assert made.call_args.args[1].parity == 'Even'
+    assert '# baud: 9600\n' in (tmp_path / 'saved').read_text('ascii')
+    tap.new_losses = Mock(return_value=0)
+    options = '--save', str(tmp_path / 'of_pty'), '--html', str(tmp_path / 'no' / 'page.html')
+    assert main(['--port', 'pty', *options]) == 2  # for the page; a pseudo-terminal has no speed
+    assert 'baud' not in (tmp_path / 'of_pty').read_text('ascii')
 
 
 def test_colour_is_for_terminals_only(
