@@ -149,9 +149,11 @@ def test_plc_that_has_our_usual_number_is_found(tmp_path: Path, capsys: Output) 
 def test_plc_that_falls_silent_after_it_was_found(
         port: str, tmp_path: Path, capsys: Output, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr('abdf1_ros.cli.plc.presence.scan', lambda *_, **options: [])
-    assert main(['init', '--port', port, '--into', str(tmp_path), '--baud', '19200',
+    _with_ports(monkeypatch, SerialPortInfo('/dev/ttyUSB0', port, 'the only adapter', True))
+    assert main(['init', '--into', str(tmp_path), '--baud', '19200',
                  '--stations', '1', *PATIENT]) == 0
     assert 'watch S:0 --station 1 --net' in capsys.readouterr().out
+    assert load_network(str(tmp_path / 'net.csv')).port == port  # the name that stays
     mappings, _ = load_mappings(str(tmp_path / 'map.csv'))
     assert [mapping.station for mapping in mappings] == [1]  # not a map for nobody
 
