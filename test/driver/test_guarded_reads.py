@@ -26,6 +26,7 @@ from abdf1_ros.pccc.identity import Identity, Mode
 from abdf1_ros.settings.heartbeats import While
 from abdf1_ros.settings.mapping import Mapping
 from abdf1_ros.settings.network import Network
+import pytest
 from support.driver_bench import DriverBench, store
 from support.interlocks import beat_row, Cell
 from support.mappings import make_mapping
@@ -190,6 +191,15 @@ def test_rule_15_row_is_withheld_or_has_failed() -> None:
     assert (point.freshness(9.0), guard.withheld) == (Freshness.WITHHELD, {point})
     point.fail('no reply')
     assert (point.freshness(9.0), guard.withheld) == (Freshness.FAILED, set())
+
+
+@pytest.mark.parametrize(('condition', 'patience'), [
+    (While(('RUN',)), 3.0), (While(('alive',), 9000), 9.0), (While(('alive',), 500), 0.5)])
+def test_rule_14_start_is_waited_for_as_long_as_the_condition_allows(
+        condition: While, patience: float) -> None:
+    point = ReadPoint(make_mapping('N11:0', condition=condition), 1.0, 3.0)
+    assert [point.withhold('unknown', now) for now in (0.0, patience - 0.1, patience)] == [
+        False, False, True]
 
 
 def withheld(cell: Cell) -> list[str]:

@@ -167,6 +167,15 @@ class Counted(Wake):
         super().wait(milliseconds)
 
 
+def test_wake_lasts_until_it_is_taken() -> None:
+    wake = Wake()
+    wake.set()
+    for _ in range(2):
+        wake.wait(0)
+    assert [wake.take(), wake.take()] == [True, False]
+    wake.close()
+
+
 def test_missing_port_is_waited_for_asleep(monkeypatch: pytest.MonkeyPatch) -> None:
     """A thread that looks at the clock over and over would take a whole core."""
     attempts = []

@@ -181,7 +181,8 @@ def test_octal_addresses_are_for_a_plc5(tmp_path: Path) -> None:
 def test_text_of_windows_with_line_ends_in_cells_and_semicolons(tmp_path: Path) -> None:
     (mapping,), _ = imported(tmp_path, (
         KEPSERVER.replace(',', ';').replace('Eng ', 'Engineering ')
-        + '"Höhe";"N7:0";Short;1;RO;100;;;;;;;;;mm;"Höhe\nlinks";\n').encode('cp1252').replace(b'ks', b'ks\x8F'))
+        + '"Höhe";"N7:0";Short;1;RO;100;;;;;;;;;mm;"Höhe\nlinks";\n'
+    ).encode('cp1252').replace(b'ks', b'ks\x8F'))
     assert (mapping.tag, mapping.name, mapping.description) == (
         'Höhe', 'H_he', 'Höhe links\N{REPLACEMENT CHARACTER} [mm]')
     rows = ('"Up","N7:0",Short,1,RO,100,,,,,,,,,,"Up\nleft",\n'
