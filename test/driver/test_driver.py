@@ -20,6 +20,7 @@ import random
 from abdf1_ros.df1 import frames
 from abdf1_ros.df1.frames import Frame, Poll, Symbol
 from abdf1_ros.df1.packet import Packet
+from abdf1_ros.driver.reads.demands import ReadAnswer
 from abdf1_ros.driver.reads.point import Freshness
 from abdf1_ros.driver.settings import DriverSettings
 from abdf1_ros.driver.write import Outcome
@@ -199,11 +200,13 @@ def test_read_goes_on_after_the_driver_itself_has_failed() -> None:
 
 def test_points_have_failed_when_the_port_is_lost_and_the_first_read_is_published() -> None:
     mapping, slow = make_mapping('N7:0', publish='Change'), make_mapping('F8:0', period=60_000)
-    bench, _ = make_bench(mapping, slow, run=1.0)
+    own = make_mapping('N9:0', 'Serve', station=0)
+    bench, _ = make_bench(mapping, slow, own, run=1.0)
     bench.lose_port('unplugged')
     point = bench.driver.points[mapping]
     assert (point.freshness(bench.clock()), point.error) == (
         Freshness.FAILED, 'port lost: unplugged')
+    assert bench.driver.points[own].error is None  # its words are here
     bench.open(run=1.0)
     assert bench.listener.values(mapping) == bench.listener.values(slow) == [[0], [0]]
 
@@ -287,13 +290,14 @@ def test_plc_that_acknowledges_and_does_not_reply_has_no_row_that_looks_well() -
 
 def test_plc_in_trouble_fails_the_points_and_divides_nothing() -> None:
     mappings = [make_mapping('N7:0'), make_mapping('N7:1')]
-    bench, plc = make_bench(*mappings)
+    bench, plc = make_bench(*mappings, run=1.0)
     plc.faults.status = (0x70,)
     bench.run(1.0)
     assert len(bench.driver.readings.blocks) == 1
     assert [bench.driver.points[mapping].error for mapping in mappings] == [
         'STS 70: processor is in program mode'] * 2
     assert [address for address, _ in bench.listener.reasons] == ['N7:0', 'N7:1']
+    assert bench.driver.readings.reads.poll_cycle is None
     plc.faults.status = ()
     bench.run(1.0)
     assert all(bench.driver.points[mapping].error is None for mapping in mappings)
@@ -307,6 +311,10 @@ def test_value_that_is_none_fails_only_its_own_mapping() -> None:
     assert bench.listener.values(digits) == []
     assert bench.driver.points[digits].error == 'word 000A is not BCD'
     assert len(bench.listener.values(word)) >= 9
+    answers: list[ReadAnswer] = []
+    bench.driver.read_now(digits, answers.append)
+    bench.run(1.0)
+    assert [answer.error for answer in answers] == ['word 000A is not BCD']
 
 
 def test_all_points_of_a_station_fail_with_it_and_are_read_again_with_it() -> None:
@@ -404,8 +412,9 @@ def test_write_does_not_wait_for_all_packets_of_a_long_read() -> None:
 def test_stale_time_follows_the_period_or_the_line() -> None:
     fast, slow = make_mapping('N7:0', period=10), make_mapping('F8:0', period=1000)
     wanted = make_mapping('N9:0', is_on_demand=True)
+    own = make_mapping('N10:0', 'Serve', station=0, period=1000)
     bench, _ = make_bench(
-        fast, slow, wanted, stale_after=5.0, network=Network(baud=1200), start=False)
+        fast, slow, wanted, own, stale_after=5.0, network=Network(baud=1200), start=False)
     scan = bench.driver.readings.expected_poll_cycle
     blocks = bench.driver.readings.blocks
     assert scan == pytest.approx(sum(block.line_time + 0.02 for block in blocks))
@@ -416,6 +425,7 @@ def test_stale_time_follows_the_period_or_the_line() -> None:
     assert bench.driver.points[fast].stale_time == pytest.approx(5 * 0.01 * needed + longest)
     assert bench.driver.points[slow].stale_time == pytest.approx(5 * (1.0 + scan) + longest)
     assert bench.driver.points[wanted].stale_time == 5.0  # as if it were read once a second
+    assert bench.driver.points[own].stale_time == 5.0
 
 
 def test_slow_rows_do_not_make_the_stale_time_of_fast_ones_longer() -> None:

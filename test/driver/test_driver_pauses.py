@@ -91,6 +91,7 @@ def test_no_value_is_older_than_it_looks_and_no_array_mixes_ages(
         assert max(ages) < USUAL_AGE + 0.5 * (length > 1), when
     assert len(bench.listener.reads) > 25
     assert bench.driver.points[read].error is None
+    assert bench.driver.points[read].failures  # each read that was too old
 
 
 @pytest.mark.parametrize('polling, length', long_unless(

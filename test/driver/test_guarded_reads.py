@@ -33,8 +33,9 @@ from support.mappings import make_mapping
 
 
 def test_rule_13_run_guards_a_row() -> None:
-    read = make_mapping('N11:0', period=100, condition=While(('RUN',)))
-    cell = Cell(read, run=3.0)
+    read, other = (make_mapping(f'N11:{number}', period=100, condition=While(('RUN',)))
+                   for number in (0, 1))
+    cell = Cell(read, other, run=3.0)
     assert len(cell.bench.listener.reads) > 20
     cell.plc.processor.setting = Setting.PROGRAM
     cell.run(1.0)
@@ -42,9 +43,11 @@ def test_rule_13_run_guards_a_row() -> None:
     point = cell.bench.driver.points[read]
     cell.run(2.0)
     assert [when for when in cell.bench.listener.times(read) if when >= since] == []
-    assert point.freshness(cell.now) is Freshness.WITHHELD
+    assert {each.freshness(cell.now) for each in cell.bench.driver.points.values()} == {
+        Freshness.WITHHELD}
     assert point.withheld.startswith('not in RUN: it is in ')
-    assert cell.bench.listener.reasons[-1][1] == 'withheld: not in RUN: it is in REM PROG'
+    assert cell.bench.listener.reasons[-1][1] == (
+        'withheld: not in RUN: it is in REM PROG; so are all 2 rows that depend on it')
     cell.plc.processor.setting = Setting.RUN
     cell.run(2.0)
     assert point.freshness(cell.now) is Freshness.FRESH

@@ -205,6 +205,7 @@ def is_last_packet_read(job: ReadJob, now: float) -> bool:
 
 def test_packets_that_took_too_long_together_are_no_value() -> None:
     clock = StillClock()
+    clock.late = 9.0  # the process stood still, but before the read
     job = ReadJob(make_block(100, 'N7:0', 236), [], clock, lambda job, words, error: None, 0.5)
     assert not is_last_packet_read(job, 1.0)
     clock.now = 1.6
