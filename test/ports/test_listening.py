@@ -143,6 +143,11 @@ def test_both_ports_are_for_one_program(ptys: list[Pty]) -> None:
     with pytest.raises(OSError, match='No such file'):
         open_port(PortSettings(str(ptys[0].name), listens=True, second='/nowhere/tty'))
     open_port(listening_to(ptys[0])).close()
+    other = os.open(ptys[0].name, os.O_RDWR | os.O_NOCTTY)
+    fcntl.flock(other, fcntl.LOCK_EX)  # as other programs reserve a device
+    with pytest.raises(OSError, match='another program has it open'):
+        open_port(listening_to(ptys[0]))
+    os.close(other)
 
 
 @pytest.mark.parametrize(('name', 'text'), [
@@ -153,9 +158,15 @@ def test_port_that_cannot_be_opened(name: str, text: str) -> None:
         open_port(PortSettings(name, listens=True))
 
 
-def test_pty_has_no_parity(ptys: list[Pty]) -> None:
-    with pytest.raises(OSError, match='this port has no such parity'):
-        open_port(listening_to(ptys[0], parity='Even'))
+def test_character_format_is_set_and_a_pty_has_no_parity(
+        ptys: list[Pty], monkeypatch: pytest.MonkeyPatch) -> None:
+    asked: list[int] = []
+    monkeypatch.setattr(termios, 'tcsetattr', lambda *args: asked.append(args[2][2]))
+    for parity in ('Even', 'Odd'):
+        with pytest.raises(OSError, match='this port has no such parity'):
+            open_port(listening_to(ptys[0], parity=parity, data_bits=7, stop_bits=2))
+    even = termios.CREAD | termios.CLOCAL | termios.CS7 | termios.CSTOPB | termios.PARENB
+    assert [flags & ~termios.HUPCL for flags in asked] == [even, even | termios.PARODD]
 
 
 def test_damaged_characters_of_either_port_are_damaged(ptys: list[Pty], wake: int) -> None:

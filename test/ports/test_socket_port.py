@@ -15,12 +15,13 @@
 """Connections to device servers: a server that did not hear of the end of the last one."""
 
 from collections.abc import Iterator
-from errno import ETIMEDOUT
+from errno import EPIPE, ETIMEDOUT
 import socket
 import threading
 import time
 from unittest.mock import Mock
 
+from abdf1_ros.ports import socket_port
 from abdf1_ros.ports.opening import open_port
 from abdf1_ros.ports.settings import PortSettings
 import pytest
@@ -143,29 +144,43 @@ def test_client_that_is_thrown_out_again_and_again_is_told_of_the_other_one(
     server = NewestClientServer()
     url = 'socket://{}:{}'.format(*server.address)
     said = []
-    for _ in range(4):
+    for seconds in (10.0, 10.0, 10.0, 10.0, 0.0):  # the last three ends are further apart
+        monkeypatch.setattr(socket_port, '_ENDS_PERIOD', seconds)
         port = open_port(PortSettings(url))
         assert port.read(PATIENCE, port.fileno()) == b'!'  # type: ignore[attr-defined]
         with socket.create_connection(server.address), pytest.raises(OSError) as caught:
             port.read(PATIENCE, port.fileno())  # type: ignore[attr-defined]
         port.close()
         said.append(str(caught.value))
+    monkeypatch.setattr(socket_port, '_ENDS_PERIOD', 10.0)
     port = open_port(PortSettings(url))
+    monkeypatch.setattr('os.write', Mock(side_effect=BrokenPipeError(EPIPE, 'Broken pipe')))
+    with pytest.raises(OSError, match='Broken pipe, 3 times within 10 s: another client'):
+        port.write(b'?')
     monkeypatch.setattr('os.read', Mock(side_effect=TimeoutError(ETIMEDOUT, 'the network is cut')))
     with pytest.raises(TimeoutError, match='the network is cut$'):
         port.read(PATIENCE, port.fileno())  # type: ignore[attr-defined]
     port.close()
     server.close()
-    assert said[:2] == 2 * ['the other end has closed the connection']
-    assert said[2:] == 2 * [
+    assert [*said[:2], said[4]] == 3 * ['the other end has closed the connection']
+    assert said[2:4] == 2 * [
         'the other end has closed the connection, 3 times within 10 s: another client has this '
         'line, or takes it each time (then let the device server refuse a second client), or the '
         'inactivity time of the server is too short']
 
 
+def test_host_is_tried_at_each_of_its_addresses(monkeypatch: pytest.MonkeyPatch) -> None:
+    with socket.create_server(('127.0.0.1', 0)) as listening:
+        addresses = [('127.0.0.1', 1), listening.getsockname()]
+        monkeypatch.setattr(socket, 'getaddrinfo', lambda *args, **others: [
+            (socket.AF_INET, socket.SOCK_STREAM, 0, '', address) for address in addresses])
+        open_port(PortSettings('socket://plc-gate:4001')).close()
+
+
 @for_all(('pieces', 'is_telnet'), [
     ([b'\xFF\xFD\x03\xFF\xFB\x01'], True), ([b'\xFF\xFB\x2C'], True),
-    ([b'\x10\x06', b'\xFF\xFD\x03'], False), ([b'\xFF\xFF\x03'], False)])
+    ([b'\x10\x06', b'\xFF\xFD\x03'], False), ([b'\xFF\xFF\x03'], False),
+    ([b'\x10\x06\xFF\xFD\x03'], False)])
 def test_telnet_port_is_named(pieces: list[bytes], is_telnet: bool) -> None:
     """A device server begins a telnet connection with options; DF1 has such bytes inside data."""
     with socket.create_server(('127.0.0.1', 0)) as listening:

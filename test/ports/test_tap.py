@@ -17,6 +17,7 @@
 import math
 import os
 from pathlib import Path
+import termios
 
 from abdf1_ros.ports.opening import open_port
 from abdf1_ros.ports.settings import PortSettings
@@ -44,7 +45,8 @@ def hear(listening: Tap, count: int) -> list[Chunk]:
 
 
 def test_one_port_is_listened_to(ptys: list[Pty]) -> None:
-    with tap(ptys[0].name) as listening:
+    with Tap([str(ptys[0].name)], PortSettings('', 1200)) as listening:
+        assert termios.tcgetattr(ptys[0].fileno())[4] == termios.B1200
         ptys[0].write(b'\x10\x04')
         assert hear(listening, 2) == [Chunk(None, Direction.UNKNOWN, b'\x10\x04')]
     open_port(PortSettings(str(ptys[0].name))).close()  # it is free again

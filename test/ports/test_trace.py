@@ -104,8 +104,9 @@ def test_trace_that_cannot_grow_costs_neither_the_port_nor_its_whole_lines(tmp_p
     assert (tmp_path / 'x').read_bytes().endswith(b'10 05\n')
 
 
+@pytest.mark.parametrize('has_ended', [False, True])
 def test_line_does_not_wait_for_a_disk_that_stands_still(
-        tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+        tmp_path: Path, monkeypatch: pytest.MonkeyPatch, has_ended: bool) -> None:
     errors: list[str] = []
     is_stuck, goes_on, is_told = threading.Event(), threading.Event(), threading.Event()
     write = CaptureWriter.write
@@ -127,6 +128,10 @@ def test_line_does_not_wait_for_a_disk_that_stands_still(
     assert is_stuck.wait(PATIENCE)
     for _ in range(5):  # none of them waits
         port.write(b'\x02')
+    if has_ended:
+        monkeypatch.setattr(trace_module, '_LAST_CHUNKS', 0.0)
+        trace.close()
+        monkeypatch.undo()
     goes_on.set()
     assert is_told.wait(PATIENCE)  # and once: not when it ends
     trace.close()
