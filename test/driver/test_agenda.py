@@ -18,7 +18,7 @@ from __future__ import annotations
 
 from collections import Counter
 
-from abdf1_ros.driver.agenda import MAX_WRITES_IN_A_ROW
+from abdf1_ros.driver.agenda import MAX_WRITES_IN_A_ROW, QUESTION_PERIOD
 from abdf1_ros.driver.job_tasks import Job
 from abdf1_ros.driver.reads.job import ReadJob
 from abdf1_ros.driver.write import Outcome, Write
@@ -98,6 +98,7 @@ def test_connection_that_is_unheard_again_has_its_quick_questions_again() -> Non
     for _ in range(2):
         bench.tasks.connect()
         assert [ask() for _ in range(12)] == 10 * [True] + 2 * [False]
+        assert bench.agenda.next_due() == QUESTION_PERIOD
         bench.tasks.is_heard = True
         assert ask()
 

@@ -105,6 +105,12 @@ def test_change_between_reading_and_writing_back_is_lost_as_the_result_says() ->
     bench.write(mapping, [1], run=0.5)
     assert str(bench.listener.results[0]).endswith('a change that the PLC made in between is lost')
     assert stored(plc, 'B3:1') == bytes.fromhex('10 00')
+    bench.write(mapping, [0], run=0.5)
+    assert stored(plc, 'B3:1') == bytes(2)
+    plc.meanwhile = lambda function: setattr(
+        plc.faults, 'silent', function == slc.LOGICAL_READ)  # then nothing has been changed
+    bench.write(mapping, [1], run=10.0)
+    assert bench.listener.outcomes()[-1] is Outcome.NOT_SENT
 
 
 def test_flat_io_is_read_and_written_through_the_slots() -> None:

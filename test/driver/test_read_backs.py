@@ -22,7 +22,7 @@ from abdf1_ros.driver.record import Claim
 from abdf1_ros.driver.settings import DriverSettings
 from abdf1_ros.driver.write import Outcome, Write, WriteResult
 from abdf1_ros.driver.writes.read_backs import ReadBacks
-from abdf1_ros.errors import CommandTimeout
+from abdf1_ros.errors import CommandTimeout, RemoteError
 from abdf1_ros.plan.forecast import line_model
 from abdf1_ros.plan.planner import Block, Planner
 from abdf1_ros.settings.mapping import Mapping
@@ -91,6 +91,12 @@ def test_what_is_read_is_compared(cells: dict[str, str], values: list[float] | s
     assert unconfirmed.results[0].latency == 1.0
     unconfirmed.read(data)
     assert len(unconfirmed.results) == 1
+
+
+@for_all(('sts', 'expected'), [(0x02, True), (0x10, False)])
+def test_status_of_a_gateway_confirms_nothing(sts: int, expected: bool) -> None:
+    write = Write(make_mapping(command='Write'), [1], EARLY)
+    assert write.result(Outcome.UNKNOWN, '', RemoteError(sts, None, '')).is_unconfirmed is expected
 
 
 def test_words_are_found_within_a_larger_block() -> None:

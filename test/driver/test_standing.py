@@ -133,14 +133,15 @@ def test_without_a_read_every_message_is_written() -> None:
     assert line.outcomes == [WRITTEN] * 10
 
 
-def test_read_that_is_too_old_proves_nothing() -> None:
-    row = make_mapping('N7:0', 'Write', write_again=60_000)
+@pytest.mark.parametrize(('fallback', 'holds'), [(None, 2.0), (Fallback((0,), 1000), 1.0)])
+def test_read_that_is_too_old_proves_nothing(fallback: Fallback | None, holds: float) -> None:
+    row = make_mapping('N7:0', 'Write', write_again=60_000, fallback=fallback)
     line = Line(row, make_mapping('N7:0', length=4, period=10_000))  # write_timeout is 2 s
     line.keep_saying(row, [7], 9.0, rate=10)
     line.run(9.2)
-    # The read after each write holds for 2 s.
+    # The read after each write holds for 2 s, or for Fallback_After.
     gaps = [later - earlier for earlier, later in pairwise(line.executed)]
-    assert len(gaps) >= 3 and max(gaps) < 2.3, gaps
+    assert len(gaps) >= 3 and max(gaps) < holds + 0.3, gaps
     assert line.outcomes.count(STANDS) > 60
 
 
@@ -197,7 +198,7 @@ def test_unconfirmed_write_may_land_over_the_confirmed_one_that_follows() -> Non
         return write
 
     end(8, 1.0, Outcome.UNKNOWN, 1.0)
-    assert not standing.proof(end(9, 1.2, WRITTEN, 0.0), 1.4)
+    assert not standing.proof(end(9, 2.05, WRITTEN, 0.0), 2.2)
     late = end(9, 2.1, WRITTEN, 0.0)  # confirmed at 2.2
     standing.words_read(block, bytes(8), 2.1)
     assert standing.proof(late, 2.69) and not standing.proof(late, 2.7)
