@@ -282,7 +282,7 @@ def test_dropped_writes_all_have_their_result() -> None:
     assert bench.next(1.0) is None
 
 
-@pytest.mark.parametrize('outcome', [Outcome.WRITTEN, Outcome.PARTLY])
+@pytest.mark.parametrize('outcome', [Outcome.WRITTEN, Outcome.PARTLY, Outcome.BROADCAST])
 def test_read_that_shows_a_write_is_due_at_once(outcome: Outcome) -> None:
     covers, beside = make_job('N7:5', period=10_000), make_job('N9:5', period=10_000)
     elsewhere = make_job('N7:5', station=2, period=10_000)
