@@ -24,7 +24,6 @@ from abdf1_ros.conform.cases import CASES
 from abdf1_ros.conform.codec import BlockCheck
 from abdf1_ros.conform.ends import MasterEnd
 from abdf1_ros.conform.wire import Wire
-from abdf1_ros.df1.machine import Machine
 from abdf1_ros.df1.packet import Packet
 from abdf1_ros.driver.driver import Driver
 from abdf1_ros.driver.settings import DriverSettings
@@ -37,46 +36,10 @@ from support.conformance import failures, plc_of, results_of
 from support.conversations import Conversation, CONVERSATIONS
 from support.driver_bench import Recorder
 from support.mappings import make_mapping
+from support.scripted_line import ScriptedLine
 
 CHECKS = ['BCC', 'CRC']
 ASKING = {Target.MASTER: 'Master', Target.CLIENT: 'Peer', Target.RADIO_CLIENT: 'Radio'}
-
-
-class ScriptedLine:
-    """What ``machine`` sends is read, what is written it receives; the clock jumps."""
-
-    def __init__(self, machine: Machine) -> None:
-        self.now = 0.0
-        self._machine = machine
-        self._unread = b''
-        machine.start(0.0)
-
-    def clock(self) -> float:
-        return self.now
-
-    def write(self, data: bytes) -> None:
-        """Send bytes, which are there at once."""
-        self._take()
-        self._machine.receive_data(data, self.now)
-        self._take()
-
-    def read(self, timeout: float) -> bytes:
-        """Let time pass until the machine has sent something, at most ``timeout`` s."""
-        end = self.now + timeout
-        self._take()
-        while not self._unread:
-            deadline = self._machine.deadline
-            if deadline is None or deadline > end:
-                self.now = end
-                break
-            self.now = max(self.now, deadline)
-            self._machine.handle_timeout(self.now)
-            self._take()
-        data, self._unread = self._unread, b''
-        return data
-
-    def _take(self) -> None:
-        self._unread += self._machine.data_to_send()
 
 
 class SpoiledLine(ScriptedLine):
