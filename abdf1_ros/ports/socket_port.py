@@ -49,9 +49,9 @@ _LOCAL_PORT_TAKEN = (errno.EADDRINUSE, errno.EADDRNOTAVAIL)
 _local_ports: dict[tuple[object, ...], int] = {}
 
 # If the server ends this number of connections within this time (s), they have a common cause.
-_MOST_ENDS, _ENDS_PERIOD = 3, 10.0
+_MOST_ENDS, ENDS_PERIOD = 3, 10.0
 _ENDS_CAUSE = (
-    f'{_MOST_ENDS} times within {_ENDS_PERIOD:.0f} s: another client has this line, or takes it '
+    f'{_MOST_ENDS} times within {ENDS_PERIOD:.0f} s: another client has this line, or takes it '
     'each time (then let the device server refuse a second client), or the inactivity time of the '
     'server is too short')
 
@@ -89,7 +89,7 @@ class ServerPort(DescriptorPort):
         ends = _ends.setdefault(self._url, deque(maxlen=_MOST_ENDS))
         ends.append(time.monotonic())
         if error.errno == errno.ETIMEDOUT or len(ends) < _MOST_ENDS or (
-                ends[-1] - ends[0] > _ENDS_PERIOD):
+                ends[-1] - ends[0] > ENDS_PERIOD):
             return error
         return OSError(f'{error.strerror or error}, {_ENDS_CAUSE}')
 

@@ -34,7 +34,7 @@ from abdf1_ros.sniffer.capture import CaptureWriter, Chunk, Direction, setting_l
 # Most chunks that wait for the disk: some minutes of a busy line.
 MOST_WAITING = 10_000
 
-_LAST_CHUNKS = 1.0  # s; longest wait for the disk at the end
+LAST_CHUNKS = 1.0  # s; longest wait for the disk at the end
 
 
 def begun_now() -> str:
@@ -71,7 +71,7 @@ class Trace:
     def close(self) -> None:
         """End the capture; wait at most 1 s for the disk."""
         self._waiting.put(None)
-        self._thread.join(_LAST_CHUNKS)
+        self._thread.join(LAST_CHUNKS)
 
     def _run(self) -> None:
         """Write until ``close``, or until a write fails."""

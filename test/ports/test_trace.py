@@ -129,7 +129,7 @@ def test_line_does_not_wait_for_a_disk_that_stands_still(
     for _ in range(5):  # none of them waits
         port.write(b'\x02')
     if has_ended:
-        monkeypatch.setattr(trace_module, '_LAST_CHUNKS', 0.0)
+        monkeypatch.setattr(trace_module, 'LAST_CHUNKS', 0.0)
         trace.close()
         monkeypatch.undo()
     goes_on.set()

@@ -255,7 +255,7 @@ def _run_all(options: argparse.Namespace, words: list[str], has_ended: _Ending) 
     marked = ''
     while True:
         with PlantWatch(words) as plant:
-            if options.once or not _is_screen():
+            if options.once or not is_screen():
                 return _print_all(plant, options, has_ended)
             marked = curses.wrapper(_draw_all, plant, has_ended, marked)
         if not marked:
@@ -321,7 +321,7 @@ def _not_found(watch: NodeWatch, seconds: float) -> str:
 
 
 def _show(watch: NodeWatch, options: argparse.Namespace, has_ended: _Ending) -> None:
-    if not options.once and _is_screen():
+    if not options.once and is_screen():
         curses.wrapper(_draw, watch, has_ended)
         return
     # Time for the values that topics promise.
@@ -336,7 +336,7 @@ def _picture(watch: NodeWatch, width: int) -> list[TextLine]:
     return render(watch.snapshot(), time.monotonic(), width, BARS if has_blocks else ASCII)
 
 
-def _is_screen() -> bool:
+def is_screen() -> bool:
     """Return True if a picture can be renewed in place; prepare curses for that."""
     if not sys.stdout.isatty():
         return False

@@ -53,7 +53,7 @@ MAX_NEWS = 1000
 _MODE_PERIOD = 3.0
 
 # Time (s) that a changed value stays marked.
-_MARKED = 1.0
+MARKED = 1.0
 
 # Least width of a row of values, in characters; also in a narrow window.
 _LEAST_ROOM = 16
@@ -243,7 +243,7 @@ class LiveValues:
         """Return the text between an address and its values."""
         now = self._driver.machine.now
         age = self._driver.points[mapping].age(now)
-        is_new = now - self._changed.get(mapping, -math.inf) < _MARKED
+        is_new = now - self._changed.get(mapping, -math.inf) < MARKED
         return (str(mapping.station), mapping.type.value,
                 '' if age is None else f'{max(age, 0.0):.1f}', '*' if is_new else '')
 

@@ -290,7 +290,7 @@ def test_mark_stays_at_its_line_where_others_come(monkeypatch: pytest.MonkeyPatc
 
 
 def test_line_stays_marked_while_its_picture_is_shown(monkeypatch: pytest.MonkeyPatch) -> None:
-    for name in ('PlantWatch', 'NodeWatch', '_is_screen'):
+    for name in ('PlantWatch', 'NodeWatch', 'is_screen'):
         monkeypatch.setattr(f'abdf1_ros.cli.monitor.command.{name}', MagicMock())
     monkeypatch.setattr('curses.wrapper', drawn := Mock(side_effect=['/b', None, '']))
     assert main(['--all']) == 0

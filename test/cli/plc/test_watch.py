@@ -247,7 +247,7 @@ def test_nothing_old_stays_below_a_table_that_shrinks(
     assert show((52, 9)) == healed[1:]
     watch.counters.nak_retries, watch.counters.enq_retries = 1, 2
     watch.counters.bcc_errors, watch.counters.crc_errors = 3, 4
-    monkeypatch.setattr('abdf1_ros.cli.plc.watch._MARKED', 0.0)  # as after its second
+    monkeypatch.setattr('abdf1_ros.cli.plc.watch.MARKED', 0.0)  # as after its second
     assert show((60, 9))[-2:] == ['C5:0.ACC 1 int16 5', 'line: 3 repeated, 7 damaged']
 
 
