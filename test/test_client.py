@@ -197,9 +197,12 @@ def test_link_does_not_wait_for_a_handler_of_the_log(port: str) -> None:
 def test_entries_of_the_log_that_nothing_takes_are_counted(
         port: str, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture) -> None:
     monkeypatch.setattr('abdf1_ros.open_line.MOST_ENTRIES', 1)
-    caplog.set_level('DEBUG', 'abdf1_ros')
-    with client_with(port, timeout=0.05, retries=2) as plc, pytest.raises(LinkError):
-        plc.read('N7:0', station=9)
+    with client_with(port, timeout=0.05, retries=2) as plc:
+        for station, level, told in (9, 'DEBUG', 1), (8, 'DEBUG', 2), (7, 'WARNING', 2):
+            caplog.set_level(level, 'abdf1_ros')  # at the end none is lost
+            with pytest.raises(LinkError):
+                plc.read('N7:0', station=station)
+            assert caplog.text.count(' entries were lost here') == told
     said = caplog.text
     assert re.search(r'\d entries were lost here: nothing was asked meanwhile', said)
     plc.close()

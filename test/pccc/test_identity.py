@@ -162,6 +162,7 @@ def test_words_of_the_texts_of_faults() -> None:
 
 
 @for_all(('identity', 'faults', 'remarks'), [
+    (changed(SLC, byte17=0, byte18=0, byte20=0x20), ('major error 0x0000, processor halted',), ()),
     (changed(SLC, byte17=0x34, byte20=0xDF), (),
      ('last major error 0x0034 (negative timer preset or accumulator)',)),
     (changed(SLC, byte1=0xC0, byte17=0x20, byte19=0x66, byte24=0xFD), (), (

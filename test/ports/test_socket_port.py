@@ -169,6 +169,22 @@ def test_client_that_is_thrown_out_again_and_again_is_told_of_the_other_one(
         'inactivity time of the server is too short']
 
 
+def test_server_that_answers_nothing_is_given_up_after_a_second() -> None:
+    with socket.socket() as full:
+        full.bind(('127.0.0.1', 0))
+        full.listen(0)
+        others = [socket.socket() for _ in range(3)]  # more than it lets wait
+        for other in others:
+            other.setblocking(False)
+            other.connect_ex(full.getsockname())
+        begun = time.monotonic()
+        with pytest.raises(OSError, match='timed out'):
+            open_port(PortSettings(f'socket://127.0.0.1:{full.getsockname()[1]}'))
+        assert time.monotonic() - begun < PATIENCE
+        for other in others:
+            other.close()
+
+
 def test_host_is_tried_at_each_of_its_addresses(monkeypatch: pytest.MonkeyPatch) -> None:
     with socket.create_server(('127.0.0.1', 0)) as listening:
         addresses = [('127.0.0.1', 1), listening.getsockname()]

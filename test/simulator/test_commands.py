@@ -14,6 +14,8 @@
 
 """The commands that the simulator takes while it runs."""
 
+from unittest.mock import Mock
+
 from abdf1_ros.df1.packet import Packet
 from abdf1_ros.errors import LinkError
 from abdf1_ros.pccc.diagnostics import STATUS_REQUEST
@@ -124,10 +126,12 @@ def test_message_is_queued_and_its_end_reported(plcs: list[SimulatedPlc]) -> Non
 
 @pytest.mark.parametrize(('verb', 'setting'), [
     ('program', Setting.PROGRAM), ('test', Setting.TEST), ('run', Setting.REMOTE)])
-def test_modes_have_commands_of_their_own(verb: str, setting: Setting) -> None:
+def test_modes_have_commands_of_their_own(
+        verb: str, setting: Setting, monkeypatch: pytest.MonkeyPatch) -> None:
     plc = simulated_plc(1, 'SLC', lambda: 0.0, ('N7:0', 4))
+    monkeypatch.setattr(SimulatedPlc, 'set_mode', set_mode := Mock())  # it sets more than a word
     assert execute(f'{verb} 1', [plc]) == f'station 1: mode {setting.value}'
-    assert plc.processor.setting is setting
+    set_mode.assert_called_once_with(setting)
 
 
 def test_download_power_and_reset() -> None:
