@@ -225,7 +225,8 @@ def test_served_words_and_broadcasts_clash_with_nothing() -> None:
 
 def test_two_plc_types_at_one_station() -> None:
     report = report_of(make_mapping('N7:0', tag='a'), make_mapping('F8:0', 'Write', tag='b'),
-                       make_mapping('B3:0', plc='SLC', tag='c', item=2))
+                       make_mapping('B3:0', plc='SLC', tag='c', item=2),
+                       make_mapping('020', plc='PLC2', access='CIF', item=3))  # of the SLC
     assert texts(report, RemarkKind.STATION) == [
         'station 1 has more than one PLC_Type: PLC5 (a, b), SLC (c)']
 

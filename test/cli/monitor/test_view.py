@@ -259,6 +259,7 @@ def test_what_is_missing_is_said(changes: dict[str, object], text: str, style: S
 @for_all(('values', 'width', 'text'), [
     ([1, 0, 1], 5, '1 0 1'), ([0.10000000149011612, -3.5], 20, '0.1 -3.5'),
     (range(100), 20, '0 1 2 3 and 96 more'), ([123456789], 6, '123...'),
+    (range(12345, 12355), 16, '12345 and 9 more'),
     ('Tank 4', 20, '"Tank 4"'), ('a' * 30, 10, '"aaaaaa...'), ([], 5, ''),
 ])
 def test_values_are_cut_to_what_fits(values: list[float], width: int, text: str) -> None:
