@@ -353,6 +353,8 @@ def test_rule_13_three_answers_about_the_mode_fit_into_the_stale_time(
 def test_rule_8_mode_of_a_plc_that_we_write_to_by_ourselves_is_asked_every_two_seconds() -> None:
     guarded = make_mapping('N7:0', period=9000, condition=While(('RUN',)))
     assert mode_periods(Rows([guarded, speed()]), 0.1, 3.0) == {1: MODE_PERIOD}
+    usual = make_mapping('N7:0', condition=While(('RUN',)))
+    assert mode_periods(Rows([usual]), 0.1, 3.0) == {1: pytest.approx(0.1)}
     without = make_mapping('N7:0', period=0, condition=While(('RUN',)))
     assert mode_periods(Rows([without]), 0.1, 3.0) == {1: 0.01}
     assert mode_periods(Rows([make_mapping(), make_mapping(command='Write')]), 0.1, 3.0) == {}

@@ -344,6 +344,12 @@ def test_slow_mapping_beside_a_fast_one_is_read_with_it_while_that_is_cheaper() 
     assert 1 < words(1000) < words(500) < words(200) < words(100) < 40
 
 
+def test_slow_row_within_a_fast_block_is_served_by_it_and_not_by_its_slow_neighbour() -> None:
+    near, within, fast = (make_mapping(f'N7:{first}', length=length, period=period) for
+                          first, length, period in ((0, 1, 2000), (100, 1, 2000), (100, 20, 100)))
+    assert [block.mappings for block in plan(near, within, fast)] == [(near,), (within, fast)]
+
+
 def test_line_that_is_full_anyhow_reads_a_slow_mapping_with_a_fast_one() -> None:
     pair = [make_mapping('N7:0', period=100), make_mapping('N7:20', period=10_000)]
     others = [make_mapping(f'N{file}:0', length=100) for file in range(9, 59)]

@@ -54,6 +54,8 @@ def test_write_over_what_another_row_reads_is_odd() -> None:
         'map.csv:5: rip writes B3:2/2, which il reads, so a message overwrites the value '
         'of the PLC; if you mean that, use one ReadWrite row, otherwise another address'), 1)]
     assert report_of(bits, make_mapping('B3:1', 'Write', length=2)).remarks()
+    written = make_mapping('N7:0', 'Write', tag='w')
+    assert len(report_of(written, make_mapping('N7:0', item=2)).remarks()) == 1
     # Other bits, other stations and all of them, and rows that say that they do both.
     for address, command, station in (
             ('B3:2/3', 'Write', 1), ('B3:3', 'Write', 1), ('B3:2/0', 'ReadWrite', 1),
@@ -129,6 +131,7 @@ def test_nodes_of_a_full_duplex_gateway_may_be_octal_too() -> None:
     text, = [text for text in texts(report_of(*rows, mode='Peer'), RemarkKind.STATION)
              if 'octal' in text]
     assert 'station 10 of' in text and text.endswith('write 8')
+    assert report_of(rows[1], mode='Peer').remarks() == []  # one PLC needs no gateway
 
 
 @pytest.mark.parametrize('mode', ['Peer', 'Slave'])
@@ -157,6 +160,19 @@ def test_period_that_another_baud_rate_can_keep() -> None:
         '19200 baud would be enough; or Period 100 in place of shorter ones']
     assert texts(report, RemarkKind.PERIOD) == [
         'speed: a read takes 74.2 ms, the period is 50.0 ms']
+    text, = texts(report_of(make_mapping('N7:0', period=1)), RemarkKind.LOAD)
+    assert text.endswith('; no baud rate is enough, only longer periods; or Period 100 in place '
+                         'of shorter ones')
+
+
+def test_plcs_of_a_radio_network_work_on_their_answers_at_a_time() -> None:
+    rows = [make_mapping('N7:0', station=1), make_mapping('N7:0', station=2),
+            make_mapping('N9:0', 'Heartbeat', period=1000)]  # which is read every 500 ms
+    quick, slow = (report_of(*rows, response=response, mode='Radio', collision_avoidance=True)
+                   for response in (0.0, 1.0))
+    assert slow.poll_cycle == pytest.approx(quick.poll_cycle + 3 * 1.0 / 2)
+    # Four reads a second, a heartbeat, and half a question for the mode.
+    assert slow.load == pytest.approx(quick.load + 5.5 * 1.0 / 2) == slow.intervals()[1.0]
 
 
 def test_guarded_rows_of_a_full_line_are_named() -> None:
@@ -262,6 +278,12 @@ def test_gap_that_costs_a_second_read() -> None:
     assert remark.text == (
         'station 1, N7:0 to N7:200: 2 reads with 0 words that no tag needs take 144.2 ms; '
         'side by side in the PLC the tags would take 74.2 ms')
+
+
+def test_side_by_side_as_many_words_as_a_packet_takes_are_one_read() -> None:
+    report = report_of(*(make_mapping(f'N7:{first}', length=55) for first in (0, 200)))
+    packet = report_of(make_mapping('N7:0', length=110)).poll_cycle
+    assert report.remarks()[0].text.endswith(f'the tags would take {packet * 1000:.1f} ms')
 
 
 def test_members_of_structures_apart_are_compared_with_whole_elements() -> None:

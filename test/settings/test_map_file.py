@@ -128,7 +128,7 @@ def test_rows_that_clash(first: dict[str, str], second: dict[str, str], text: st
 @for_all('rows', [
     [{'Topic': 't', 'Command': 'Read'}, T | {'Address': 'N7:9', 'Type': 'uint16'}],
     [T, T | {'Station': '2'}, T | {'Command': 'ReadWrite', 'Address': 'N7:50', 'PLC_Type': 'SLC'}],
-    [{}, {}],
+    [{}, {}], [SLC | {'Processor': 'ML1000'}, {}],
     [SLC, SLC | {'Processor': '5/03'}, {}, SLC | {'Station': '2', 'Processor': '5/01'},
      SLC | {'Station': '255', 'Command': 'Write'},
      SLC | {'Station': '255', 'Command': 'Write', 'Processor': '5/01'}]])

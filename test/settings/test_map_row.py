@@ -335,7 +335,7 @@ def test_row_on_demand_is_no_counter() -> None:
     ({'Period': 'on demand', 'Command': 'Heartbeat'},
      'Period = "on demand" should be ms from 100 to 60000'),
     ({'Period': 'on demand', 'Publish': 'Change'},
-     'a row with Period "on demand" is published each time it is read'),
+     'a row with Period "on demand" is published each time it is read; leave the cell empty'),
     ({'Period': 'on demand', 'Address': 'B3:0/0', 'Command': 'Read', 'Alarm': 'WARN'},
      'Alarm needs a row that is read again and again, not one with Period "on demand"')])
 def test_what_write_again_is_for_and_a_row_on_demand_cannot_have(
