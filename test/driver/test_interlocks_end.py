@@ -130,6 +130,15 @@ def test_rule_5_end_waits_for_the_second_write_of_rule_10(is_followed: bool) -> 
     assert cell.word('N7:0') == 7
 
 
+def test_rule_5_end_of_a_plc_that_never_answered_has_one_whole_try_of_each_row() -> None:
+    cell = Cell(beat_row(), speed_row(), start=False)
+    cell.plc.faults.silent = True
+    cell.bench.open(run=5.0)
+    sent = cell.bench.driver.counters.commands_sent
+    end(cell, 5.0)
+    assert cell.bench.driver.counters.commands_sent == sent + 2
+
+
 def test_rule_5_end_waits_for_a_plc_that_does_not_answer_for_a_moment() -> None:
     speed = speed_row()
     cell = Cell(beat_row(), speed)

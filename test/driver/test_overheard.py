@@ -240,6 +240,7 @@ def test_commands_that_may_have_changed_a_value(station: int, asked: str, cmd: i
 
 @pytest.mark.parametrize(('plc', 'text', 'cmd', 'asked', 'answered', 'sts'), [
     ('SLC', 'N7:0', 0x0F, READ_N7_0, '', 0x10),
+    ('SLC', 'N7:0', 0x0F, READ_N7_0, VALUES + ' 00', 0),
     ('SLC', 'N9:0', 0x01, '00 00 04', '01 00 02 00', 0),  # S:2/8 decides which words these are
     ('PLC5', 'N7:0', 0x0F, '68 00 00 02 00 06 07 00 02 00', '99', 0)])
 def test_refused_read_and_reply_without_known_words_fill_nothing(

@@ -16,6 +16,7 @@
 
 from collections.abc import Sequence
 from itertools import pairwise
+import math
 
 from abdf1_ros.df1.packet import Packet
 from abdf1_ros.df1.settings import LinkSettings
@@ -215,6 +216,15 @@ def test_unconfirmed_write_may_land_over_the_confirmed_one_that_follows() -> Non
     end(7, 3.2, Outcome.UNKNOWN, 0.5)  # the write before it may land after it
     assert not standing.proof(end(9, 4.0, WRITTEN, 0.0), 4.2)
     assert standing.proof(end(9, 8.2, WRITTEN, 0.0), 8.4)
+
+
+def test_write_that_has_ended_may_have_changed_words_unless_it_cannot_land() -> None:
+    claim = Claim(1, [WORD.extent])
+    found = [claim.has_changed]
+    for may_land_for in (-math.inf, 0.0, 9.0):
+        claim.end(Outcome.UNKNOWN, 1.0, may_land_for)
+        found.append(claim.has_changed)
+    assert found == [False, False, True, True]
 
 
 def test_write_between_two_packets_of_a_read_stands_all_the_same() -> None:
