@@ -202,11 +202,10 @@ class FallbackRow:
         return now - self._due_since if was_due else None
 
     def write_ended(self, claim: Claim, now: float) -> None:
-        """Record how a write of a message or a guest to these words ended."""
+        """Record how a message of this row, or a write of a guest to these words, ended."""
         if claim.write is not None:
-            if claim.write.mapping is self.mapping and not claim.write.is_own:
-                assert claim.outcome is not None
-                self.message_ended(claim.write.requested, claim.outcome)
+            assert claim.outcome is not None
+            self.message_ended(claim.write.requested, claim.outcome)
         elif claim.has_changed and self.stands:
             if claim.extents is None:  # its words are unknown, hardly these
                 self.refresh_at = now
