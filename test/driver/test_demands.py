@@ -223,6 +223,7 @@ def test_station_that_dies_during_the_read_is_told() -> None:
         assert answer.error[:4] in (INACTIVE, '2508')
         line.there.faults.silent = False
         line.run(10.0)
+        assert bool(line.listener.values(row)) is not row.is_on_demand
         line.ask(row, run=1.0)
         assert line.errors[-1] == ''
         assert line.driver.points[row].freshness(line.clock()) is Freshness.FRESH
