@@ -219,7 +219,8 @@ def test_unconfirmed_write_may_land_over_the_confirmed_one_that_follows() -> Non
 
 
 def test_write_that_has_ended_may_have_changed_words_unless_it_cannot_land() -> None:
-    claim = Claim(1, [WORD.extent])
+    claim = Claim(1, [WORD.extent, make_mapping('N9:0').extent])
+    assert claim.meets(WORD.extent) and not Claim(2, None).meets(WORD.extent)
     found = [claim.has_changed]
     for may_land_for in (-math.inf, 0.0, 9.0):
         claim.end(Outcome.UNKNOWN, 1.0, may_land_for)
