@@ -434,11 +434,13 @@ def test_lost_port_ends_a_request_that_waits_for_its_turn(is_taken: bool) -> Non
     if is_taken:
         assert health.find_due(bench.clock())  # it is among the checks, and not on the line yet
     bench.lose_port()
+    begun = bench.clock()
     health.request_counters(1)
     assert health.known(1).no_counters == 'port lost: unplugged'
     assert health.counters_wanted == set()
     bench.open(run=2.0)
     assert ears.times(COUNTERS) == []  # nobody waits for them any more
+    assert ears.times(STATUS)[-1] > begun
     health.request_counters(1)
     assert health.find_due(bench.clock())
     bench.driver.stations.lost(1, bench.clock())

@@ -86,6 +86,7 @@ def test_row_is_filled_from_a_reply_that_has_more_words() -> None:
     exchange(bench, 8, 'A2 02 07 89 04 00', '05 00')
     assert bench.values(longer) == []
     assert point_of(bench, whole) is Freshness.FRESH
+    assert bench.driver.points[whole].stale_time == 3 * 0.5  # no read of ours waits for the line
 
 
 @for_all(('plc', 'text', 'cmd', 'asked', 'answered', 'values'), [
@@ -281,11 +282,25 @@ def test_run_holds_only_from_a_status_reply_that_was_heard() -> None:
         assert len(bench.values(mapping)) == 2 * (tns == 10)
         exchange(bench, tns + 100, READ_N7_0, VALUES)
     assert len(bench.values(mapping)) == 3
+    exchange(bench, 90, '00', status.replace('00 06', '00 11'), cmd=0x06)  # an echo
+    identity = bench.driver.checks.known(1).identity
+    assert identity is not None and identity.is_running
     for tns in range(200, 206):  # nobody asks any more
         bench.run(0.5)
         exchange(bench, tns, READ_N7_0, VALUES)
     assert len(bench.values(mapping)) in (6, 7)
     assert point_of(bench, mapping) is Freshness.WITHHELD
+
+
+def test_counter_that_is_heard_to_change_guards_a_row() -> None:
+    counter = row('N9:0', 1, tag='counter')
+    mapping = row(length=4, condition=While(('counter',), 2000))
+    bench = ListeningBench([counter, mapping])
+    for number in range(4):
+        exchange(bench, number, 'A2 02 09 89 00 00', f'0{number} 00')
+        exchange(bench, 50 + number, READ_N7_0, VALUES)
+        bench.run(0.5)
+    assert (len(bench.values(counter)), len(bench.values(mapping))) == (4, 2)
 
 
 def test_read_now_is_refused() -> None:

@@ -79,7 +79,7 @@ class Line(DriverBench):
 
 
 def test_unchanged_value_is_written_again_after_its_time_only() -> None:
-    line = Line(WORD, READ)
+    line = Line(WORD, READ, make_mapping('B3:0', period=100))
     line.keep_saying(WORD, [7], 10.0)
     line.run(10.2)
     assert len(line.outcomes) == 500 and {*line.outcomes} == {WRITTEN, STANDS}
