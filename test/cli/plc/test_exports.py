@@ -137,8 +137,13 @@ def test_tag_that_cannot_be_used_is_left_out_and_stays_as_a_comment(
 
 def test_each_row_of_a_name_says_where_it_is_used(tmp_path: Path) -> None:
     rows = ''.join(f'"Speed","N7:{number}",Short,1,R/W,100,,,,,,,,,,"",\n' for number in range(3))
-    assert imported(tmp_path, KEPSERVER + rows)[1] == [
-        f'{line}: Speed: the name Speed is that of line 2' for line in (3, 4)]
+    fault = ': the name Speed is that of line 2'
+    assert imported(tmp_path, KEPSERVER + rows)[1] == [f'{line}: Speed{fault}' for line in (3, 4)]
+    assert (tmp_path / 'map.csv').read_bytes().decode().split('\n') == [
+        'Tag,Command,Address,Station,PLC_Type,Length,Type,Period,Scale,Offset,Min,Max,Description',
+        'Speed,ReadWrite,N7:0,2,SLC,,int16,100,,,,,',
+        *(f'# line {row + 2}: Speed,N7:{row},Short,1,R/W,100,,,,,,,,,,,{fault}' for row in (1, 2)),
+        '']
 
 
 def test_symbols_of_rslogix_become_rows_and_the_rest_is_told(tmp_path: Path) -> None:
@@ -155,7 +160,7 @@ def test_symbols_of_rslogix_become_rows_and_the_rest_is_told(tmp_path: Path) -> 
 
 
 def test_all_five_descriptions_of_rslogix_are_kept(tmp_path: Path) -> None:
-    row = '"N7:0","Global","SPEED","one","two","three","four","five"\n'
+    row = '"N7:0","Global","SPEED","one","two","three","four","five","no more"\n'
     assert imported(tmp_path, row)[0][0].description == 'one two three four five'
 
 
@@ -273,6 +278,8 @@ def test_command_writes_a_map_once_and_says_how_to_go_on(
     # What the columns of a list without a header mean is not guessed.
     ('N7:0,SPEED,Conveyor speed\n', 'is none of these: '),
     ('N7:0,1,SPEED\nN7:1,2,LEVEL\n', 'is none of these: '),
+    ('N7:0,,SPEED\nN7:1\n', 'is none of these: '),
+    ('Tag,Command,Address,Station,PLC_Type\na,Read,N7:0,1,SLC\n', 'is a map already'),
     ('Tag,Command,Address,Station,PLC_Type,Via\na,Read,N7:0,1,SLC,\n', 'is a map already'),
     ('Address,Function\nN7:0,Speed\n', 'which column is the tag. Say --tag COLUMN; columns: '
                                        'Address, Function'),
@@ -380,8 +387,11 @@ def test_tags_of_rsview_and_factorytalk(tmp_path: Path, text: str) -> None:
     assert (mappings[2].scaling, mappings[2].remarks) == (None, ())
     assert {column: cell_of(mappings[0], column) for column in ('Scale', 'Offset', 'Min', 'Max')
             } == {'Scale': '0.1', 'Offset': '-5', 'Min': '0', 'Max': '100'}
-    ignored = import_map(str(tmp_path / 'export.csv'), Wanted()).ignored
-    assert ignored['tags without a PLC (memory and system)'] == 1
+    result = import_map(str(tmp_path / 'export.csv'), Wanted(period=700))
+    assert +result.ignored == {'tags without a PLC (memory and system)': 1}
+    assert result.lines[1] == 'Press/Run,Read,B3:0/5,1,SLC,,,700,,,,,'
+    assert imported(tmp_path, text.replace(',0.1,', ',ten,'))[1] == [
+        '7: Press/Speed: "ten" should be a number']
     text = text.replace('"PLC1","N7:1"', '"PLC2","N7:1"').replace('[PLC1]N7:1', '[PLC2]N7:1')
     with pytest.raises(ConfigurationError, match='rows of several PLCs: PLC1, PLC2'):
         imported(tmp_path, text)
@@ -406,8 +416,12 @@ def test_tags_of_intouch(tmp_path: Path) -> None:
         assert [cell_of(mappings[1], column) for column in ('Scale', 'Max')] == ['0.1', '100']
         assert mappings[2].scaling is None
         assert [str(remark)[-5:] for remark in mappings[2].remarks] == [' N7_1']
-    unknown, _ = imported(tmp_path, INTOUCH.replace(',No\n', ',\n'))
-    assert {row[1] for row in told(unknown)} == {'Read'}
+    unknown, _ = imported(tmp_path, INTOUCH.replace(',No\n', ',\n'), Wanted(period=700))
+    assert {(row.command.value, row.period) for row in unknown} == {('Read', 700)}
+    assert imported(tmp_path, INTOUCH.replace('Linear', 'Square Root'))[1] == [
+        '9: Speed: Conversion "Square Root" has no counterpart; Linear has']
+    assert +import_map(str(tmp_path / 'export.csv'), Wanted()).ignored == {
+        'tags without a PLC (memory, groups, trends)': 1}
 
 
 def test_rows_of_several_plcs_are_not_mixed(tmp_path: Path) -> None:
@@ -416,6 +430,8 @@ def test_rows_of_several_plcs_are_not_mixed(tmp_path: Path) -> None:
         imported(tmp_path, text)
     (mapping,), left_out = imported(tmp_path, text, Wanted(node='PLC2'))
     assert (mapping.tag, left_out) == ('Other', [])
+    ignored = import_map(str(tmp_path / 'export.csv'), Wanted(node='PLC2')).ignored
+    assert ignored['rows of other PLCs'] == 3
     for node in ('X', ''):
         with pytest.raises(ConfigurationError, match=f'has no PLC "{node}"; it has PLC1, PLC2'):
             imported(tmp_path, text, Wanted(node=node))
@@ -470,8 +486,8 @@ def test_tags_of_ignition(tmp_path: Path) -> None:
     assert left_out == [
         '9: Root: scaleMode SquareRoot has no counterpart; Linear has',
         '10: Any: opcItemPath {"bindType": "parameter"} has no address, as in ns=1;s=[PLC]N7:0']
-    result = import_map(str(tmp_path / 'export.csv'), Wanted(read_only=True))
-    assert 'ReadWrite' not in result.text
+    result = import_map(str(tmp_path / 'export.csv'), Wanted(read_only=True, period=700))
+    assert result.lines[0] == 'Line 1/Speed,Read,N7:0,1,SLC,,,700,0.1,0,,,Conveyor [m/min]'
     assert +result.ignored == {'tags that are not of a PLC': 1}
     assert +result.remarks == {'readOnly is not in the file: made Read rows': 1}
 
@@ -485,10 +501,12 @@ def test_json_of_something_else_is_no_file_of_ignition(tmp_path: Path) -> None:
 def test_list_with_comments_and_whole_timers(tmp_path: Path) -> None:
     rows, left_out = imported(tmp_path, (
         9 * '; of the press\n' + 'Symbol,Address,Description,DataType,Scope\n# global\n'
-        'SPEED,N7:0,Conveyor,INT,Global\nMIX,T4:0,,TIMER,Global\nWAIT,T4:1.ACC,,,\n'))
+        'SPEED,N7:0,Conveyor,INT,Global\nMIX,T4:0,,TIMER,Global\nWAIT,T4:1.ACC,,,\n'
+        'LEVEL,F8:0,,,\n'), Wanted(period=700))
     assert left_out == [] and [
-        (row.tag, str(row.address), row.length) for row in rows] == [
-            ('SPEED', 'N7:0', 1), ('MIX', 'T4:0', 3), ('WAIT', 'T4:1.ACC', 1)]
+        (row.tag, str(row.address), row.length, row.period) for row in rows] == [
+            ('SPEED', 'N7:0', 1, 700), ('MIX', 'T4:0', 3, 700), ('WAIT', 'T4:1.ACC', 1, 700),
+            ('LEVEL', 'F8:0', 1, 700)]
 
 
 @pytest.mark.parametrize('text, told', [
