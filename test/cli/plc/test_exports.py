@@ -30,7 +30,7 @@ import math
 from pathlib import Path
 
 from abdf1_ros.cli.plc.command import main
-from abdf1_ros.cli.plc.exports.form import Wanted
+from abdf1_ros.cli.plc.exports.form import scaling, Unusable, Wanted
 from abdf1_ros.cli.plc.exports.imported import import_map
 from abdf1_ros.cli.terminal import called
 from abdf1_ros.pccc.file_types import PlcType
@@ -135,6 +135,13 @@ def test_tag_that_cannot_be_used_is_left_out_and_stays_as_a_comment(
     assert f'# line 3: {row.split(",")[0].strip(chr(34))},' in (tmp_path / 'map.csv').read_text()
 
 
+@for_all('ends', [
+    ('', '5', '0', '9'), ('0', 'x', '0', '9'), ('0', '5', '-', '9'), ('0', '5', '0', '')])
+def test_scale_has_four_numbers(ends: tuple[str, ...]) -> None:
+    with pytest.raises(Unusable, match='the ends of its scale should be numbers, .* differ: 0?,'):
+        scaling(ends)
+
+
 def test_each_row_of_a_name_says_where_it_is_used(tmp_path: Path) -> None:
     rows = ''.join(f'"Speed","N7:{number}",Short,1,R/W,100,,,,,,,,,,"",\n' for number in range(3))
     fault = ': the name Speed is that of line 2'
@@ -196,7 +203,7 @@ def test_text_of_windows_with_line_ends_in_cells_and_semicolons(tmp_path: Path) 
 
 
 @pytest.mark.parametrize('code', [
-    lambda text: text.encode('utf-16'), lambda text: text.encode('utf-8-sig'),
+    lambda text: text.encode('utf-16'), lambda text: text.replace(',', ', ').encode('utf-8-sig'),
     lambda text: text.replace('\n', '\r').encode(), lambda text: f'{text},,,\n'.encode(),
     lambda text: text.replace(',""\n', ',"; ; ; ; ; ; ; ; ;"\n').encode(),
     lambda text: text.replace('I:1.0/3', 'B3/5').encode()])
@@ -277,7 +284,7 @@ def test_command_writes_a_map_once_and_says_how_to_go_on(
     ('a,b\n1,2\n', 'is none of these: tags of KEPServerEX '), ('', 'is none of these: '),
     # What the columns of a list without a header mean is not guessed.
     ('N7:0,SPEED,Conveyor speed\n', 'is none of these: '),
-    ('N7:0,1,SPEED\nN7:1,2,LEVEL\n', 'is none of these: '),
+    ('N7:0,Global,SPEED\nN7:1,2,LEVEL\n', 'is none of these: '),
     ('N7:0,,SPEED\nN7:1\n', 'is none of these: '),
     ('Tag,Command,Address,Station,PLC_Type\na,Read,N7:0,1,SLC\n', 'is a map already'),
     ('Tag,Command,Address,Station,PLC_Type,Via\na,Read,N7:0,1,SLC,\n', 'is a map already'),
@@ -496,6 +503,13 @@ def test_json_of_something_else_is_no_file_of_ignition(tmp_path: Path) -> None:
     for text in ('{"opcItemPath"', '[' * 100_000 + '"opcItemPath"', '{"tags": []}'):
         with pytest.raises(ConfigurationError, match='is none of these'):
             imported(tmp_path, text)
+
+
+def test_tags_in_too_many_folders_are_passed_over(tmp_path: Path) -> None:
+    tag = '{"name": "a", "valueSource": "opc", "opcItemPath": "[P]N7:0"}'
+    for folders, tags in ((49, ['a']), (50, []), (300, [])):
+        text = '{"tags": [' * folders + tag + ']}' * folders
+        assert [row.tag for row in imported(tmp_path, text)[0]] == tags
 
 
 def test_list_with_comments_and_whole_timers(tmp_path: Path) -> None:
