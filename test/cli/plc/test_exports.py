@@ -258,11 +258,12 @@ def test_command_writes_a_map_once_and_says_how_to_go_on(
         monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     source, target = tmp_path / 'symbols.csv', tmp_path / 'line' / 'map.csv'
-    source.write_text(RSLOGIX, encoding='utf-8')
+    source.write_text(f'{RSLOGIX}"DFILE:N7","","","Numbers"\n', encoding='utf-8')
     options = ['import', str(source), '--into', str(target.parent), '--station', '3']
     assert main(options) == 0
     assert capsys.readouterr().out.splitlines() == [
-        f'written: {target}: 4 rows', f'next: {called("check")} net.csv {target}',
+        'ignored: 1 DFILE rows', f'written: {target}: 4 rows',
+        f'next: {called("check")} net.csv {target}',
         f'net.csv is not there yet: {called("plc")} init --into ANOTHER_FOLDER makes one']
     assert {mapping.station for mapping in load_mappings(str(target))[0]} == {3}
     assert main(options) == 2
@@ -288,6 +289,7 @@ def test_command_writes_a_map_once_and_says_how_to_go_on(
     ('N7:0,,SPEED\nN7:1\n', 'is none of these: '),
     ('Tag,Command,Address,Station,PLC_Type\na,Read,N7:0,1,SLC\n', 'is a map already'),
     ('Tag,Command,Address,Station,PLC_Type,Via\na,Read,N7:0,1,SLC,\n', 'is a map already'),
+    (f'Tag,Address\n{"x" * 200_000},N7:0\n', 'export.csv:2: field larger than field limit'),
     ('Address,Function\nN7:0,Speed\n', 'which column is the tag. Say --tag COLUMN; columns: '
                                        'Address, Function'),
     ('Name,Place\nSpeed,N7:0\n', 'which column is the address. Say --address COLUMN')])
@@ -334,14 +336,17 @@ def test_list_that_says_nothing_of_access_is_only_read(tmp_path: Path) -> None:
 def test_columns_of_a_list_are_given_by_options(
         tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     source = tmp_path / 'list.csv'
-    source.write_text('Place,What,Kind,Text,May,Tag\nN7:0,speed,INT,Speed of 1,RW,7\n', 'utf-8')
+    source.write_text('Place,What,Kind,Text,May,Tag\nN7:0,speed,INT,Speed of 1,RW,7\n'
+                      'N7:1,up,INT,,yes,8\n', 'utf-8')
     options = ['import', str(source), '--into', str(tmp_path), '--address', 'Place',
                '--type', 'Kind', '--access', 'may']
     assert main([*options, '--tag', 'Name']) == 2
     assert '--tag "Name" is not a column; columns: Place, What' in capsys.readouterr().err
     assert main([*options, '--tag', 'what', '--description', 'Text']) == 0
+    assert capsys.readouterr().err == (
+        'plc: 1 row: "yes" says nothing of access: made Read rows\n')
     assert told(load_mappings(str(tmp_path / 'map.csv'))[0]) == [
-        ('speed', 'ReadWrite', 'N7:0', 'Speed of 1')]
+        ('speed', 'ReadWrite', 'N7:0', 'Speed of 1'), ('up', 'Read', 'N7:1', '')]
 
 
 def test_characters_of_an_a_file_are_not_taken_for_words(tmp_path: Path) -> None:
@@ -397,8 +402,9 @@ def test_tags_of_rsview_and_factorytalk(tmp_path: Path, text: str) -> None:
     result = import_map(str(tmp_path / 'export.csv'), Wanted(period=700))
     assert +result.ignored == {'tags without a PLC (memory and system)': 1}
     assert result.lines[1] == 'Press/Run,Read,B3:0/5,1,SLC,,,700,,,,,'
-    assert imported(tmp_path, text.replace(',0.1,', ',ten,'))[1] == [
-        '7: Press/Speed: "ten" should be a number']
+    bad = text.replace(',0.1,', ',ten,').replace('"D","F",0,100,0,1,', '"X","F",0,100,0,1,')
+    assert imported(tmp_path, bad)[1] == ['7: Press/Speed: "ten" should be a number',
+                                          '10: Level: Native Type "x" has no counterpart']
     text = text.replace('"PLC1","N7:1"', '"PLC2","N7:1"').replace('[PLC1]N7:1', '[PLC2]N7:1')
     with pytest.raises(ConfigurationError, match='rows of several PLCs: PLC1, PLC2'):
         imported(tmp_path, text)

@@ -132,8 +132,9 @@ def test_lost_port_ends_the_order_and_those_after_it(line: Pty) -> None:
         line.close()
         with pytest.raises(PortLost):
             session.wait(pending)
-        with pytest.raises(PortLost):
-            session.ask(1, identify())
+        for ask in (session.ask, session.attempt):
+            with pytest.raises(PortLost):
+                ask(1, identify())
 
 
 def test_close_ends_what_is_under_way(line: Pty) -> None:

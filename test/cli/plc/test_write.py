@@ -20,8 +20,10 @@ import pty
 import signal
 import subprocess
 import sys
+from unittest.mock import Mock
 
 from abdf1_ros.cli.plc.command import main
+from abdf1_ros.errors import FormatError
 import pytest
 from support.cases import for_all
 from support.commands import Output, PATIENT, Plc
@@ -80,6 +82,9 @@ def test_write_to_an_input_is_told(plc: Plc) -> None:
     said = plc('write', 'I:1.0', '5', '--station', '2')
     assert said.err.splitlines()[0] == (
         'plc: I:1.0 is an input: the PLC overwrites what is written there with its next scan')
+    assert plc('write', 'B3:1', '5', '--station', '2').err == (
+        'plc: B3:1 is a word: this writes its 16 bits; a bit is B3:1/0\n'
+        'plc: nothing was written; --yes writes\n')
 
 
 @pytest.mark.parametrize('address, values, options, lines', [
@@ -103,6 +108,20 @@ def test_write_without_yes_writes_nothing(plc: Plc) -> None:
     assert said.lines == ['now:', *before, 'would write [55, 66] to N7:20 of station 2']
     assert said.err == 'plc: nothing was written; --yes writes\n'
     assert plc('read', 'N7:20', '--length', '2', '--station', '2').lines == before
+
+
+def test_write_of_what_cannot_be_read(plc: Plc, monkeypatch: pytest.MonkeyPatch) -> None:
+    fault = FormatError('too short')
+    monkeypatch.setattr('abdf1_ros.cli.plc.data.read', Mock(side_effect=[
+        fault, fault, KeyboardInterrupt]))
+    write, written = ('write', 'N7:22', '5', '--station', '2'), 'N7:22 of station 2: written; now:'
+    for words, status, line, err in (
+            ((), 2, 'would write [5] to N7:22 of station 2', 'plc: N7:22 of station 2: too short\n'
+             'plc: nothing was written; --yes writes\n'),
+            (('--yes',), 0, written, 'plc: cannot be read back: too short\n'),
+            (('--yes',), 0, written, '')):
+        said = plc(*write, *words)
+        assert (said.status, said.lines[-1], said.err) == (status, line, err)
 
 
 def _into(path: str, line: str, *args: str) -> tuple[int, str]:
