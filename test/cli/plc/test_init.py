@@ -20,13 +20,15 @@ import time
 
 from abdf1_ros.cli.plc.command import main
 from abdf1_ros.cli.plc.files import find_files
+from abdf1_ros.cli.plc.files import map_rows as draft_rows
 from abdf1_ros.cli.plc.init import map_rows, NewFiles
 from abdf1_ros.cli.plc.presence import Presence
 from abdf1_ros.cli.plc.session import Session
 from abdf1_ros.cli.plc.verbs import init
 from abdf1_ros.cli.plc.verbs import ports as ports_verb
 from abdf1_ros.pccc import gateways
-from abdf1_ros.pccc.file_types import PlcType
+from abdf1_ros.pccc.file_search import DataFile
+from abdf1_ros.pccc.file_types import FileType, PlcType
 from abdf1_ros.pccc.identity import Identity
 from abdf1_ros.pccc.processor import Processor
 from abdf1_ros.ports.listing import SerialPortInfo
@@ -189,33 +191,36 @@ def test_init_that_finds_nothing_leaves_no_folder(tmp_path: Path, capsys: Output
 
 
 @pytest.mark.parametrize(('station', 'found'), [
-    ('1', {'O0': 0, 'S2': 32, 'B3': 5, 'T4': 10, 'N7': 256, 'F8': 10, 'ST9': 2, 'A12': 7,
-           'D13': 2000, 'C20': 1}),
-    ('2', {'I1': 2, 'S2': 64, 'B3': 1, 'N7': 100, 'F10': 4, 'L40': 2})])
+    ('1', 'O0 by rack or slot, S2 32, B3 5, T4 10, N7 256, F8 10, ST9 2, A12 7, D13 2000, C20 1'),
+    ('2', 'I1 2 words, S2 64, B3 1, N7 100, F10 4, L40 2')])
 def test_files_are_found_with_type_and_length(
-        port: str, station: str, found: dict[str, int], capsys: Output) -> None:
+        port: str, station: str, found: str, capsys: Output) -> None:
     assert main(['files', station, '--port', port, '--files', '0-40']) == 0
-    lines = [line.split() for line in capsys.readouterr().out.splitlines()]
-    assert {name: int(count) if count.isdigit() else 0 for name, count, *_ in lines} == found
+    lines = [' '.join(line.split()) for line in capsys.readouterr().out.splitlines()]
+    assert ', '.join(lines).replace(' elements', '') == found
 
 
-def test_file_that_is_longer_than_its_row(port: str, capsys: Output) -> None:
-    assert main(['files', '1', '--port', port, '--files', '7', '--map']) == 0
-    comment, row = capsys.readouterr().out.splitlines()[1:]
-    length = row.split(',')[6]
-    assert int(length) < 256
-    assert comment == f'# N7 has 256 elements; this row of one packet reads {length}'
-
-
-@pytest.mark.parametrize('station', ['1', '2'])
-def test_files_become_rows_of_a_map(
-        port: str, station: str, tmp_path: Path, capsys: Output) -> None:
-    assert main(['files', station, '--port', port, '--files', '2-13', '--map']) == 0
-    path = tmp_path / 'map.csv'
-    path.write_text(capsys.readouterr().out, encoding='utf-8')
+@pytest.mark.parametrize(('station', 'rows', 'comments'), [
+    ('1', 's2 S2:0 32, b3 B3:0 5, t4 T4:0 30, n7 N7:0 110, f8 F8:0 10, st9 ST9:0 1, a12 A12:0 7, '
+     'd13 D13:0 110', ['O0: addressed by rack or slot', *(
+         f'{name} elements; this row of one packet reads 110' for name in (
+             'N7 has 256', 'D13 has 2000'))]),
+    ('2', 's2 S2:0 64, b3 B3:0 1, n7 N7:0 100, f10 F10:0 4', ['I1: addressed by rack or slot'])])
+def test_files_become_rows_of_a_map(port: str, station: str, rows: str, comments: list[str],
+                                    tmp_path: Path, capsys: Output) -> None:
+    assert main(['files', station, '--port', port, '--files', '0-13', '--map']) == 0
+    path, text = tmp_path / 'map.csv', capsys.readouterr().out
+    path.write_text(text, encoding='utf-8')
     mappings, problems = load_mappings(str(path))
-    assert problems == [] and all(row.address.file < 14 for row in mappings)
-    assert {mapping.tag for mapping in mappings} >= {'s2', 'b3', 'n7'}
+    assert problems == [] and rows == ', '.join(
+        f'{row.tag} {row.address} {row.length}' for row in mappings)
+    assert {(str(row.station), row.period) for row in mappings} == {(station, 5000)}
+    assert [line[2:] for line in text.splitlines() if line[0] == '#'] == comments
+
+
+def test_function_file_has_no_row_of_its_own() -> None:
+    assert [*draft_rows([DataFile(FileType.HSC, 0, 1)], 1, PlcType.SLC, '')] == [
+        '# HSC: addressed by the names of its words']
 
 
 def test_rows_of_a_map_that_lie_outside_of_the_files(
