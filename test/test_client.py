@@ -21,6 +21,7 @@ import logging
 import math
 from pathlib import Path
 import re
+import socket
 import subprocess
 import sys
 import threading
@@ -28,16 +29,22 @@ from threading import Thread
 import time
 from types import FrameType
 from typing import Any
+from unittest.mock import Mock
 
 from abdf1_ros.cli.sniff import main as sniff
 from abdf1_ros.client import Client
 from abdf1_ros.counters import Counters
+from abdf1_ros.df1.checksum import Checksum
+from abdf1_ros.df1.machine import LineTiming
+from abdf1_ros.df1.master import MASTER
 from abdf1_ros.df1.peer import PEER
+from abdf1_ros.df1.settings import LinkSettings
 from abdf1_ros.df1.stations import ActiveStationList
 from abdf1_ros.df1.tasks import TaskSource
-from abdf1_ros.errors import FormatError, LinkError, RemoteError
-from abdf1_ros.open_line import OpenLine, Pending
-from abdf1_ros.pccc.identity import Mode
+from abdf1_ros.errors import FormatError, LinkError, PortLost, RemoteError
+from abdf1_ros.open_line import kind_of, OpenLine, Pending
+from abdf1_ros.pccc.identity import Identity, Mode
+from abdf1_ros.pccc.steps import identify
 from abdf1_ros.ports.opening import open_port
 from abdf1_ros.ports.settings import PortSettings
 from abdf1_ros.problems import ConfigurationError
@@ -170,11 +177,15 @@ def test_retries_trace_and_log_are_arguments(port: str, tmp_path: Path,
             plc.read('N7:0', station=9)
         assert plc.counters.nak_retries == 1
     logged = [record.getMessage() for record in caplog.records if record.name == 'abdf1_ros']
+    assert {(record.levelname, record.getMessage()[5:8]) for record in caplog.records
+            if record.getMessage()[:1] == '2'} == {('DEBUG', 'NTC'), ('INFO', 'ERR')}
     timed, = (text for text in logged if text.endswith(' ms'))  # not the look at the address
     assert timed.startswith('N7:0 of station 1: ')
     assert logged[-1].startswith('N7:0 of station 9: 2509 ERR_INACTIVE_STATION')
     wait_until(lambda: str(trace) not in {name for _, name in open_files()})
     assert sniff(['--summary', str(trace)]) == 0
+    assert trace.read_text('ascii').splitlines()[2:6] == [
+        f'# port: {port}', '# baud: 115200', '# check: CRC', '# duplex: half']
     with pytest.raises(OSError, match='exists and is not a capture'):
         client_with(port, trace=__file__)
 
@@ -252,7 +263,8 @@ def test_arguments_of_the_line(tmp_path: Path) -> None:
             ({'retries': 11}, 'retries 11 should be a whole number from 0 to 10'),
             ({'timeout': 300}, 'timeout 300 should be seconds above 0, up to 60; 0.3 for 300 ms'),
             ({'cmd_timeout': '1'}, "cmd_timeout '1' should be seconds above 0, up to 60$"),
-            ({'timeout': 0}, 'timeout 0 '), ({'timeout': math.nan}, 'timeout nan'),
+            ({'timeout': 60001}, ' 60$'), ({'timeout': 0}, 'timeout 0 '),
+            ({'timeout': math.nan}, 'timeout nan'),
             ({'processor': '5/02'}, 'processor needs plc_type')):
         with pytest.raises(FormatError, match=text):
             Client(port, **wrong)  # type: ignore[arg-type]
@@ -265,14 +277,19 @@ def test_arguments_of_the_line(tmp_path: Path) -> None:
 def test_arguments_of_the_line_and_gateways_reach_it(
         tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     given: list[Any] = []
-    monkeypatch.setattr(OpenLine, '__init__', lambda self, *rest, **named: given.extend(rest))
-    Client('/dev/x', baud=19200, parity='even', check='bcc', own_station=6, retries=2)
+    monkeypatch.setattr(OpenLine, '__init__', lambda self, *rest, **named: given.append(
+        (*rest, named)))
+    more: dict[str, Any] = {'trace': '/x/line.cap', 'logger': logging.Logger('other')}
+    Client('/dev/x', baud=19200, parity='even', check='bcc', station=254, own_station=254,
+           retries=10, timeout=0.25, cmd_timeout=0.75, duplex='HALF', **more)
     Client.from_files(*files(tmp_path, '/dev/x', 'Tag,Command,Address,Station,Via,PLC_Type\n'
-                                                 'far,Read,N7:0,9,3,SLC\n'))
-    _, link, port, *_, stations = given
-    assert (link.checksum.value, link.station, link.nak_retries, link.enq_retries) == (
-        'BCC', 6, 2, 2)
-    assert (port.baud, port.parity, stations.via(9)) == (19200, 'Even', 3)
+                                                 'far,Read,N7:0,9,3,SLC\n'), **more)
+    port = PortSettings('/dev/x', 19200, parity='Even')
+    assert given[0] == (MASTER, LinkSettings(
+        station=254, checksum=Checksum.BCC, timing=LineTiming(port.char_time), nak_retries=10,
+        enq_retries=10, timeout=0.25, cmd_timeout=0.75), port, more)
+    *_, stations, named = given[1]
+    assert (stations.via(9), stations.via(8), named) == (3, 8, more)
 
 
 def test_forgotten_close_is_told_and_closed_client_refuses(port: str) -> None:
@@ -356,6 +373,10 @@ def test_faults_of_the_files_are_told_before_the_port_is_opened(tmp_path: Path) 
     with pytest.raises(ConfigurationError) as error:
         Client.from_files(*files(tmp_path, '/dev/none', rows))
     assert [problem.place.line for problem in error.value.problems] == [8, 9]
+    with pytest.raises(ConfigurationError, match='^Mode: in Mode Listen nothing may be sent on'):
+        Client.from_files(*files(
+            tmp_path, '/dev/none', 'Tag,Command,Address,Station,PLC_Type,Period\n'
+            'speed,Read,N7:0,1,SLC,9\n', 'Listen'))
 
 
 @pytest.fixture
@@ -376,6 +397,34 @@ def test_plc_without_diagnostic_status_needs_its_family(tmp_path: Path) -> None:
     with plc_line(tmp_path / 'line', plc) as name, Client(name, duplex='half') as here, \
             pytest.raises(FormatError, match=r'does not identify itself \(STS 10 .*name plc_type'):
         here.read('N7:0')
+    with pytest.raises(FormatError, match='^it is "type 7", and its family is not known; say it$'):
+        kind_of(lambda: Identity(None, 'type 7'), 'say it', 'it ')
+    with pytest.raises(RemoteError):  # a gateway answers, and knows nothing of the PLC
+        kind_of(Mock(side_effect=RemoteError(2, None, 'not there')), '')
+
+
+def test_write_through_a_device_server_follows_an_answer() -> None:
+    with socket.create_server(('127.0.0.1', 0)) as server, Client(
+            f'socket://127.0.0.1:{server.getsockname()[1]}', plc_type='SLC', timeout=0.1,
+            retries=0) as here, server.accept()[0] as far:
+        with pytest.raises(LinkError) as error:
+            here.write('N7:0', 1)
+        assert (error.value.sent, far.recv(100)[4]) == (False, 0x06)  # an echo
+
+
+def test_bug_in_the_thread_of_the_link_is_logged_and_ends_what_waits(port: str) -> None:
+    class Broken(logging.Logger):
+
+        def isEnabledFor(self, level: int) -> bool:  # noqa: N802
+            return level == logging.CRITICAL or 1 // 0
+
+    logger, log = Broken('broken'), list[str]()
+    logger.addHandler(Mock(level=0, handle=lambda record: log.append(
+        f'{record.levelname} {record.getMessage()} {record.exc_info[0].__name__}')))
+    with client_with(port, timeout=0.05, logger=logger) as here, \
+            pytest.raises(PortLost, match='^port lost: internal error, see the log$'):
+        here.wait(here.start(9, identify()))
+    assert log == ['CRITICAL internal error ZeroDivisionError']
 
 
 def test_example_runs_in_full_duplex(peer: str, capsys: pytest.CaptureFixture[str]) -> None:

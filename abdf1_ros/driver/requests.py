@@ -33,7 +33,7 @@ from abdf1_ros.df1.stations import ActiveStationList
 from abdf1_ros.df1.tasks import Task, TaskSource
 from abdf1_ros.driver.inbox import Inbox
 from abdf1_ros.driver.job_tasks import Job, JobTasks
-from abdf1_ros.errors import LinkError, PortLost
+from abdf1_ros.errors import INTERNAL_ERROR, LinkError, PortLost
 from abdf1_ros.messages import Event, Message
 from abdf1_ros.pccc.data_table import DataTable
 from abdf1_ros.pccc.describe import effect_of
@@ -174,8 +174,8 @@ class Requests(TaskSource):
         self._waiting.open()
         try:
             yield from self._link.run(self)
-        except PortLost as error:
-            self._end(error)
+        except Exception as error:  # also a bug
+            self._end(error if isinstance(error, PortLost) else PortLost(INTERNAL_ERROR))
             raise
 
     def _end(self, error: LinkError) -> None:
