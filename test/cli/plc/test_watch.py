@@ -80,8 +80,10 @@ class Counting(LiveValues):
 
 
 def shown(capsys: Output) -> list[str]:
-    """Return the lines without their times."""
-    return [line.partition('  ')[2] for line in capsys.readouterr().out.splitlines()]
+    """Return the lines without their times, which have milliseconds."""
+    lines = capsys.readouterr().out.splitlines()
+    assert all(re.match(r'\d\d:\d\d:\d\d\.\d{3}  ', line) for line in lines)
+    return [line[14:] for line in lines]
 
 
 def test_every_change_is_shown_with_its_time(plcs: Plcs, capsys: Output) -> None:
@@ -124,7 +126,7 @@ def test_reads_that_the_output_does_not_take_are_counted_and_others_keep_their_t
     assert capsys.readouterr() == ('', '')
     times, values = zip(*((line.split(',')[0], line.split(',')[-1])
                           for line in said.splitlines()), strict=True)
-    assert values == ('3', '4')
+    assert (values, {len(time) for time in times}) == (('3', '4'), {23})  # with milliseconds
     assert max(map(datetime.fromisoformat, times)) <= shown
 
 
@@ -246,6 +248,7 @@ def test_nothing_old_stays_below_a_table_that_shrinks(
     # What a narrower window did with the lines before is not known: it begins at its top.
     assert show((52, 9)) == healed[1:]
     watch.counters.nak_retries, watch.counters.enq_retries = 1, 2
+    assert show((52, 9))[-1] == 'line: 3 repeated, 0 damaged'
     watch.counters.bcc_errors, watch.counters.crc_errors = 3, 4
     monkeypatch.setattr('abdf1_ros.cli.plc.watch.MARKED', 0.0)  # as after its second
     assert show((60, 9))[-2:] == ['C5:0.ACC 1 int16 5', 'line: 3 repeated, 7 damaged']
@@ -253,19 +256,21 @@ def test_nothing_old_stays_below_a_table_that_shrinks(
 
 def test_table_marks_changes_and_says_what_does_not_fit(draw: Draw) -> None:
     words = make_mapping('N7:0', length=4), make_mapping('N7:9', item=2), SPEED
-    lines = draw(words, (words[0], array('h', [1, 2, 3, 4])),
-                 (words[0], array('h', [-200, 2, 3, 4])), (words[1], array('h', [5])),
-                 size=(52, 5))
-    assert [line.split() for line in lines[1:-1]] == [
-        ['N7:0', '1', 'int16', '*', '-200', '2', '3'], ['N7:3', '4']]
-    assert lines[-1].startswith('+2 more')
+    news = [(words[0], array('h', [1, 2, 3, 4])), (words[0], array('h', [-200, 2, 3, 4])),
+            *2 * [(words[1], array('h', [5]))]]
+    _, *lines = draw(words, *news, size=(52, 6))
+    assert lines == ['N7:0           1  int16         *  -200     2     3',
+                     'N7:3                                  4',
+                     'N7:9           1  int16            5', 'N7:0           1  int16']
+    assert draw(words, *news, size=(52, 5))[1:] == [
+        *lines[:2], '+2 more; a higher window shows them']
 
 
 def test_table_has_tags_beside_addresses(draw: Draw) -> None:
     cells = {'Command': 'Read', 'Station': '1', 'PLC_Type': 'PLC5'}
     words, speed = mapping_of('N7:8-10', cells), mapping_of('N7:0', cells, 2)
     lines = draw([words, speed], (words, array('h', [9, 2, 3])), (words, array('h', [1, 2, 3])),
-                 tags={'N7:0': 'speed', 'N7:10': 'a_long_tag'})
+                 tags={'N7:0': 'speed', 'N7:10': 'a_long_tag'}, size=(100, 6))
     assert [(line[:16], line[18:].split()[-1:]) for line in lines] == [
         ('address         ', ['value']), ('N7:8            ', ['1']), ('N7:9            ', ['2']),
         ('N7:10 a_long_tag', ['3']), ('N7:0 speed      ', ['int16'])]
@@ -320,14 +325,15 @@ def test_rows_of_a_map_have_their_own_tags_and_scaled_values(
 
 @pytest.mark.parametrize(('mode', 'text'), [
     (Mode.PROGRAM, 'PROG: its program does not run, values may stand still; memory lost'),
-    (Mode.RUN, 'RUN; memory lost'), (None, 'mode 0x0E; memory lost')])
+    (Mode.RUN, 'RUN'), (None, 'mode 0x0E; memory lost')])
 def test_mode_of_each_plc_and_faults_of_the_line_stand_around_the_values(
         draw: Draw, monkeypatch: pytest.MonkeyPatch, mode: Mode | None, text: str) -> None:
-    stopped = Identity(PlcType.PLC5, 'PLC-5/40', mode=mode, faults=('memory lost',),
+    stopped = Identity(PlcType.PLC5, 'PLC-5/40', mode=mode,
+                       faults=() if mode is Mode.RUN else ('memory lost',),
                        mode_text=mode.value if mode else 'mode 0x0E')
     monkeypatch.setattr(Checks, 'known', lambda self, station: StationHealth(
         str(stopped), stopped))
-    lines = draw([SPEED, NAME], (SPEED, array('h', [5])))
+    lines = draw([SPEED, NAME], (SPEED, array('h', [5])), (NAME, 'Tank'))
     assert lines[0] == f'station 1: PLC-5/40, {text}'
     assert lines[1].startswith('address') and len(lines) == 4
     monkeypatch.setattr(LiveValues, 'faults_of_line', lambda self: ['line: 3 repeated, 1 damaged'])
