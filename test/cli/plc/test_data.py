@@ -15,6 +15,7 @@
 """Addresses and values of the command line."""
 
 from array import array
+from collections.abc import Callable
 from dataclasses import replace
 from typing import cast
 
@@ -100,7 +101,9 @@ def test_values_have_the_tags_of_their_own_addresses() -> None:
     assert list(data.rows(mapping, array('h', range(6)), data.labels(mapping, tags))) == [
         ('N7:0', '0'), (r'N7:1 speed, a\nb', '1'), ('N7:2 words[0]', '2'),
         ('N7:3 words[1]', '3'), ('N7:4 text', '4'), ('N7:5', '5')]
-    assert data.labels(make('N7:0/2', Length='2'), tags) == ['N7:0/2', 'N7:0/3 bit']
+    bits = make('N7:0/2', Length='2')
+    assert list(data.rows(bits, [1, 0], data.labels(bits, tags))) == [
+        ('N7:0/2', '1'), ('N7:0/3 bit', '0')]
 
 
 @for_all(('address', 'kind', 'texts', 'values'), [
@@ -139,23 +142,28 @@ def test_value_that_is_none_says_what_would_be_right(address: str, text: str, ri
 class InterruptedSession:
     """A session that is interrupted when its command is on the line already, or before."""
 
-    def __init__(self, sent: bool) -> None:
-        self._sent = sent
+    def __init__(self, end: Callable[[Pending[WriteResult]], None]) -> None:
+        self._end = end
 
     def start(self, station: int, steps: object, pending: Pending[WriteResult]) -> None:
         self._pending = pending
         raise KeyboardInterrupt
 
     def close(self) -> None:
-        error = PortLost('closed')
-        error.sent = self._sent
-        self._pending.fail(error)
+        self._end(self._pending)
 
 
-@for_all(('sent', 'outcome'), [(True, Outcome.UNKNOWN), (False, Outcome.NOT_SENT)])
-def test_write_that_is_interrupted_is_unknown_if_it_was_sent(sent: bool, outcome: Outcome) -> None:
-    result = data.Writing(make('N7:0'), ['5']).carry_out(cast(Session, InterruptedSession(sent)))
-    assert (result.outcome, result.detail) == (outcome, 'port lost: closed')
+@for_all(('end', 'outcome', 'detail'), [
+    (lambda pending: pending.fail(PortLost('closed')), Outcome.UNKNOWN, 'port lost: closed'),
+    (lambda pending: pending.fail(PortLost('closed', sent=False)), Outcome.NOT_SENT,
+     'port lost: closed'),
+    (lambda pending: None, Outcome.UNKNOWN, ''),
+    (lambda pending: pending.succeed(WriteResult(make('N7:0'), Outcome.WRITTEN, 'ok', '5')),
+     Outcome.WRITTEN, 'ok')])
+def test_write_that_is_interrupted_is_unknown_if_it_was_sent_and_has_no_result(
+        end: Callable[[Pending[WriteResult]], None], outcome: Outcome, detail: str) -> None:
+    result = data.Writing(make('N7:0'), ['5']).carry_out(cast(Session, InterruptedSession(end)))
+    assert (result.outcome, result.detail) == (outcome, detail)
 
 
 @for_all(('processor', 'cell'), [

@@ -92,7 +92,9 @@ def test_list_of_stations_has_ranges_and_numbers() -> None:
     ('watch', 'N7:0', '--period', '1_0'), ('ping', '\u0661'),
     ('scan', '1', '--peer', '--duplex', 'half'), ('scan', '1', '--duplex', 'half', '--peer'),
     ('write', 'N7:0'), ('fly',), ('write', 'N7:0', '1', '--ye'),
-    ('read', 'N7:0', '--type', 'int8')])
+    *(('read', 'N7:0', f'--{option}', value) for option, value in (
+        ('type', 'int8'), ('radix', '9'), ('plc-type', 'S7'), ('processor', '5/99'),
+        ('access', 'x'), ('word-order', 'x'), ('station', '300'), ('via', '1-2')))])
 def test_command_line_that_is_wrong_ends_with_status_2(args: tuple[str, ...]) -> None:
     with pytest.raises(SystemExit) as ending:
         parse(*args)

@@ -40,7 +40,9 @@ from support.simulator_process import Files
     (1, 'T4:1-1', (), ['T4:1 8192 DN', 'T4:1.PRE 500', 'T4:1.ACC 120']),
     (1, 'T4:1', (), ['T4:1 8192 DN', 'T4:1.PRE 500', 'T4:1.ACC 120']),
     (1, 'T4:1.ACC', (), ['T4:1.ACC 120']),
-    (1, 'N7:0', ('--radix', 'bin'), ['N7:0 0000010010110000 /4 /5 /7 /10']),
+    (1, 'N7:0-1', ('--radix', 'bin'), ['N7:0 0000010010110000 /4 /5 /7 /10',
+                                       'N7:1 1111110011100000 /5 /6 /7 /10 /11 /12 /13 /14 /15']),
+    (1, 'T4:1', ('--length', '2'), ['T4:1 8192 DN', 'T4:1.PRE 500']),
     (1, 'I:017', ('--radix', 'bin'), ['I:017 0000010000000000 /12']),
     (1, 'T4:1/DN', (), ['T4:1/DN 1']), (2, 'C5:2.ACC', (), ['C5:2.ACC -17']),
     (2, 'I:1.0', ('--length', '2'), ['I:1.0 5 40960']), (2, 'O:2.0/4', (), ['O:2.0/4 1']),
@@ -57,7 +59,9 @@ def test_read_shows_address_and_values(
 def test_read_shows_rows_with_their_addresses(plc: Plc) -> None:
     said = plc('read', 'N7:10', 'B3:0/15', '--length', '18', '--station', '2')
     assert [line.split()[0] for line in said.lines] == ['N7:10', 'N7:20', 'B3:0/15', 'B3:1/15']
-    assert said.lines[0] == 'N7:10 101 102 103 104 0 0 0 0 0 0'
+    assert said.out.splitlines()[:2] == [
+        'N7:10  101  102  103  104    0    0    0    0    0    0',
+        'N7:20    0    0    0    0    0    0    0    0']
 
 
 def test_tags_of_a_map_stand_beside_addresses(plc: Plc, tmp_path: Path) -> None:
@@ -222,7 +226,7 @@ def test_read_goes_on_after_a_refusal(plc: Plc, tmp_path: Path) -> None:
 
 
 def test_read_in_another_radix(plc: Plc) -> None:
-    said = plc('read', 'N7:10', '--length', '3', '--station', '2', '--radix', 'hex')
+    said = plc('read', 'N7:10', '--length', '3', '--station', '2', '--radix', 'HEX')
     assert said.lines == ['N7:10 0065 0066 0067']
 
 
