@@ -93,7 +93,10 @@ def test_what_is_written_is_read(port: str, station: int, plc_type: str | None) 
         plc.write('T4:1.PRE', 500)
         plc.write('ST9:0', 'recipe 7')
         plc.write('A10:0', 'vwxyz', 'string')
+        plc.write('A10:0', 'ab', 'string')
+        before = plc.counters.commands_sent
         assert plc.read('N7:0') == -1
+        assert plc.counters.commands_sent == before + 1  # it is known what the PLC is
         assert plc.read('N7:0', 3) == [-1, 32767, 0]
         assert plc.read('N7:0', 2, 'uint16') == [65535, 32767]
         assert plc.read('N7:4', kind='int32', word_order='High') == 70000
@@ -107,7 +110,7 @@ def test_what_is_written_is_read(port: str, station: int, plc_type: str | None) 
         assert plc.read('T4:1.PRE') == 500
         assert plc.read('T4:0.ACC', 4) == [0, 0, 500, 0]  # to T4:1.ACC, past a control word
         assert plc.read('ST9:0') == 'recipe 7'
-        assert plc.read('A10:0', 3, 'string').rstrip('\0') == 'vwxyz'
+        assert plc.read('A10:0', 3, 'string').rstrip('\0') == 'abxyz'
 
 
 def test_values_of_several_packets_are_written_and_read(port: str, plcs: PlcPair) -> None:
@@ -268,8 +271,9 @@ def test_arguments_of_the_line(tmp_path: Path) -> None:
             ({'processor': '5/02'}, 'processor needs plc_type')):
         with pytest.raises(FormatError, match=text):
             Client(port, **wrong)  # type: ignore[arg-type]
-    with pytest.raises(FormatError, match='port None should be a text'):
-        Client(None)  # type: ignore[arg-type]
+    for name, right in ((None, 'port None'), ('', "port ''")):
+        with pytest.raises(FormatError, match=f'{right} should be a text'):
+            Client(name)  # type: ignore[arg-type]
     with pytest.raises(OSError, match='none'):
         Client(Path(port), parity='odd', timeout=60)
 
