@@ -271,7 +271,7 @@ def test_arguments_of_the_line(tmp_path: Path) -> None:
             ({'processor': '5/02'}, 'processor needs plc_type')):
         with pytest.raises(FormatError, match=text):
             Client(port, **wrong)  # type: ignore[arg-type]
-    for name, right in ((None, 'port None'), ('', "port ''")):
+    for name, right in ((None, 'port None'), (5, 'port 5'), ('', "port ''")):
         with pytest.raises(FormatError, match=f'{right} should be a text'):
             Client(name)  # type: ignore[arg-type]
     with pytest.raises(OSError, match='none'):

@@ -25,9 +25,12 @@ from types import SimpleNamespace
 
 from abdf1_ros import client
 from abdf1_ros.cli import check
-from abdf1_ros.cli.overhearing import map_of
+from abdf1_ros.cli.overhearing import map_of, texts_of
 from abdf1_ros.cli.plc import line, overhear
 from abdf1_ros.cli.plc.command import main
+from abdf1_ros.cli.plc.verbs import init
+from abdf1_ros.cli.terminal import called
+from abdf1_ros.df1.checksum import Checksum
 from abdf1_ros.df1.packet import Packet
 from abdf1_ros.driver import requests
 from abdf1_ros.driver.overheard import Carried
@@ -188,6 +191,27 @@ def test_init_offers_a_map_of_what_another_master_reads(
     assert main(['init', '--net', str(new / 'net.csv'), '--into', str(tmp_path / 'again')]) == 1
     assert 'no read with its reply was heard, so no file was written' in capsys.readouterr().err
     line.close()
+
+
+@pytest.mark.parametrize(('check', 'right'), [(Checksum.BCC, 'BCC'), (None, 'CRC')])
+def test_files_of_a_line_that_is_heard_have_its_speed_and_its_check_if_that_is_known(
+        tmp_path: Path, capsys: Output, monkeypatch: pytest.MonkeyPatch,
+        check: Checksum | None, right: str) -> None:
+    command = Packet(3, 0, 0x0F, 0, 7, bytes.fromhex('A1 04 07 89 00'))
+    read = Carried(3, describe(command), command, 2.0, 4.4, 2)
+    heard: list[Network] = []
+    monkeypatch.setattr(init, 'found_settings', lambda *_: overhear.ForeignMaster(
+        1200, [3], check))
+    monkeypatch.setattr(overhear, 'heard_reads', lambda network, seconds: (
+        heard.append(network), [read])[1])
+    assert main(['init', '--port', '/dev/x', '--parity', 'Even', '--into', str(tmp_path)]) == 0
+    net, rows = (str(tmp_path / name) for name in ('net.csv', 'map.csv'))
+    assert capsys.readouterr().out.splitlines() == [
+        f'another master polls station 3, 1200 baud, {check.value if check else "check unknown"}: '
+        'we send nothing', *texts_of([read]), f'written: {net}, {rows}',
+        f'next: {called("check")} {net} {rows}']
+    assert Path(net).read_text('utf-8').splitlines()[1] == f'Listen,{right},/dev/x,,1200,Even'
+    assert [(line.mode, line.baud, line.error_code) for line in heard] == [('Listen', 1200, right)]
 
 
 @for_all(('cmd', 'data', 'times', 'row'), [
