@@ -33,7 +33,7 @@ from abdf1_ros.plan.usable_rows import line_problems
 from abdf1_ros.problems import ConfigurationError, Problem
 from abdf1_ros.settings.hints import looks_like_address
 from abdf1_ros.settings.map_file import load_mappings
-from abdf1_ros.settings.mapping import Command, Mapping
+from abdf1_ros.settings.mapping import Command, Mapping, Publish
 from abdf1_ros.settings.network import Network
 from abdf1_ros.settings.rows import Rows
 from abdf1_ros.text import first, printable, shown
@@ -85,7 +85,8 @@ def to_read(options: argparse.Namespace) -> Targets:
             'ADDRESS', 'give an address such as N7:0, or --map FILE for all rows of a map')])
     cells = _cells(options, Command.READ, options.length)
     mappings = rows_of_map(options.map)
-    rows = {row.tag: replace(row, is_on_demand=False) for row in mappings.of_plcs if row.polls}
+    rows = {row.tag: replace(row, is_on_demand=False, condition=None, publish=Publish.ALWAYS)
+            for row in mappings.of_plcs if row.polls}  # nothing is withheld from the user
     entries: list[Mapping | str] = [rows.get(word, word) for word in options.addresses]
     if not entries:
         entries = [row for row in rows.values() if options.station in (None, row.station)]

@@ -116,11 +116,16 @@ def test_map_says_of_each_tag_what_options_say_of_addresses(plc: Plc, tmp_path: 
         'station of the PLC here\n')
 
 
-@pytest.mark.parametrize('args', [('read',), ('read', 'recipe'), ('watch', '--count', '1')])
-def test_row_that_a_bridge_reads_on_demand_is_read(
-        plc: Plc, tmp_path: Path, args: tuple[str, ...]) -> None:
-    path = write_csv(tmp_path / 'map.csv', 'Tag,Command,Address,Station,PLC_Type,Period',
-                     ['recipe,Read,N7:0,1,PLC5,on demand'])
+@pytest.mark.parametrize(('cells', 'args'), [
+    ('on demand,,,', ('read',)), ('on demand,,,', ('read', 'recipe')),
+    ('on demand,,,', ('watch', '--count', '1')), *(
+        (row, ('watch', 'recipe', '--count', '3')) for row in ('50,,,Change', '50,alive,1000,'))])
+def test_row_that_a_bridge_does_not_always_read_or_publish_is_shown(
+        plc: Plc, tmp_path: Path, cells: str, args: tuple[str, ...]) -> None:
+    path = write_csv(tmp_path / 'map.csv', 'Tag,Command,Address,Station,PLC_Type,Period,While,'
+                     'While_Timeout,Publish', [
+                         f'recipe,Read,N7:0,1,PLC5,{cells}',
+                         *['alive,Read,N7:2,1,PLC5,,,,'] * ('alive' in cells)])
     assert plc(*args, '--map', str(path)).lines[-1].split()[-3:] == ['N7:0', 'recipe', '1200']
 
 
