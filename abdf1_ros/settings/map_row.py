@@ -187,7 +187,7 @@ class RowReader:
 
     def _cut_comma(self, column: str) -> str:
         """Return the advice for "0,1" that the delimiter has cut in two, empty for other cells."""
-        number = self._row.columns[column]
+        number = self._row.columns.get(column, 0)  # none in a row that was not read from a file
         after = next((self._row.get(name) for name, place in self._row.columns.items()
                       if place == number + 1), '')
         text = self._row.get(column)
