@@ -240,7 +240,7 @@ def test_entries_of_the_log_that_nothing_takes_are_counted(
         ('T4:0.CON', 1, 'T4:0 belongs to the processor'), ('ST9:0', 5, 'not a valid string'),
         ('N7:0', None, 'None should be a number, several, or a text'),
         ('N7:0', [[1]], 'should be a'), ('N7:0', {1: 2}, 'should be a'),
-        ('N7:0', b'1', 'should be a'), ('N7:0', ['1'], 'should be')))])
+        ('N7:0', b'1', 'should be a'), ('N7:0', [1, '1'], 'should be')))])
 def test_what_is_wrong_in_a_call_is_told_before_anything_is_sent(
         port: str, address: Any, arguments: dict[str, Any], text: str) -> None:
     with client(port, plc_type='SLC') as plc:

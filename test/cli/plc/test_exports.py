@@ -112,6 +112,7 @@ def test_tag_of_kepserver_becomes_a_row(
      'Scaling "Square Root" has no counterpart; Linear has'),
     ('"Flat","N7:0",Word,1,RO,100,Linear,5,5,0,10,Float,0,0,,"",',
      'the ends of its scale should be numbers, and both raw ones differ: 5, 5, 0, 10'),
+    ('"Still","N7:0",Word,1,RO,100,Linear,0,100,7,7,Float,0,0,,"",', 'Scale should not be 0'),
     ('"Char","N7:0",Char,1,RO,100,,,,,,,,,,"",', 'Data Type "Char" has no counterpart'),
     (f'"Long","N7:0 [{"9" * 5000}]",Word Array,1,RO,100,,,,,,,,,,"",',
      'write type, file, ":", element, as in N7:0, B3:1/5, T4:0.ACC or I:1.0/3'),
@@ -480,7 +481,7 @@ IGNITION = """\
   {"name": "Line 1", "tagType": "Folder", "tags": [
     {"name": "Speed", "tagType": "AtomicTag", "valueSource": "opc", "dataType": "Int4",
      "opcServer": "Ignition OPC UA Server", "opcItemPath": "ns=1;s=[MLX]N7:0", "readOnly": false,
-     "documentation": "Conveyor", "engUnit": "m/min", "scaleMode": "Linear", "rawLow": 0,
+     "documentation": "Conveyor\\nnorth", "engUnit": "m/min", "scaleMode": "Linear", "rawLow": 0,
      "rawHigh": 100, "scaledLow": 0.0, "scaledHigh": 10.0},
     {"name": "Shown", "tagType": "AtomicTag", "valueSource": "expr", "value": 1},
     {"name": "Wait", "valueSource": "opc", "opcItemPath": "[MLX]T4:1.ACC"}]},
@@ -493,14 +494,14 @@ def test_tags_of_ignition(tmp_path: Path) -> None:
     (speed, wait), left_out = imported(tmp_path, IGNITION)
     assert [cell_of(speed, column) for column in (
         'Tag', 'Command', 'Address', 'Type', 'Scale', 'Offset', 'Description')] == [
-            'Line 1/Speed', 'ReadWrite', 'N7:0', 'int16', '0.1', '0', 'Conveyor [m/min]']
+            'Line 1/Speed', 'ReadWrite', 'N7:0', 'int16', '0.1', '0', 'Conveyor north [m/min]']
     assert [cell_of(wait, column) for column in ('Tag', 'Command', 'Address')] == [
         'Line 1/Wait', 'Read', 'T4:1.ACC']
     assert left_out == [
         '9: Root: scaleMode SquareRoot has no counterpart; Linear has',
         '10: Any: opcItemPath {"bindType": "parameter"} has no address, as in ns=1;s=[PLC]N7:0']
     result = import_map(str(tmp_path / 'export.csv'), Wanted(read_only=True, period=700))
-    assert result.lines[0] == 'Line 1/Speed,Read,N7:0,1,SLC,,,700,0.1,0,,,Conveyor [m/min]'
+    assert result.lines[0] == 'Line 1/Speed,Read,N7:0,1,SLC,,,700,0.1,0,,,Conveyor north [m/min]'
     assert +result.ignored == {'tags that are not of a PLC': 1}
     assert +result.remarks == {'readOnly is not in the file: made Read rows': 1}
 

@@ -39,7 +39,7 @@ from abdf1_ros.cli.plc.exports.form import (
     Unusable,
     Wanted,
 )
-from abdf1_ros.cli.plc.exports.records import Record
+from abdf1_ros.cli.plc.exports.records import one_line, Record
 from abdf1_ros.text import shown
 
 _MARK = 'opcItemPath'
@@ -63,8 +63,8 @@ def records_of(text: str) -> list[Record]:
         cells = [tag.get(field, '') for field in _FIELDS]
         found = text.find(f'"{_MARK}"', start) if _MARK in tag else -1
         start = start if found < 0 else found + 1
-        records.append(Record(text.count('\n', 0, start) + 1, (
-            name, *(cell if isinstance(cell, str) else json.dumps(cell) for cell in cells))))
+        records.append(Record(text.count('\n', 0, start) + 1, (one_line(name), *(
+            one_line(cell) if isinstance(cell, str) else json.dumps(cell) for cell in cells))))
     return records
 
 

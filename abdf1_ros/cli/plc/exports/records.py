@@ -55,12 +55,17 @@ def _records(path: str, text: str) -> Iterator[Record]:
     line = 1
     try:
         for record in reader:
-            cells = [' '.join(re.sub('[\0-\x1f\x7f]', ' ', cell).split()) for cell in record]
+            cells = tuple(map(one_line, record))
             if any(cells):
-                yield Record(line, tuple(cells))
+                yield Record(line, cells)
             line = reader.line_num + 1
     except csv.Error as error:
         raise ConfigurationError([Problem(Place(path, line), str(error))]) from None
+
+
+def one_line(cell: str) -> str:
+    """Return a cell with a blank for each run of blanks, line ends and control characters."""
+    return ' '.join(re.sub('[\0-\x1f\x7f]', ' ', cell).split())
 
 
 def text_of(path: str) -> str:
