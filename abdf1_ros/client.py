@@ -47,7 +47,17 @@ from abdf1_ros.df1.slave_link import SLAVE
 from abdf1_ros.df1.stations import MAX_STATION
 from abdf1_ros.errors import FormatError
 from abdf1_ros.numbers import member_of, one_of, ValueKind
-from abdf1_ros.open_line import kind_of, LOG, OpenLine, plain, PlcValue, single, text_of, values_of
+from abdf1_ros.open_line import (
+    kind_of,
+    LOG,
+    OpenLine,
+    path_of,
+    plain,
+    PlcValue,
+    single,
+    text_of,
+    values_of,
+)
 from abdf1_ros.pccc import steps
 from abdf1_ros.pccc.access import Access
 from abdf1_ros.pccc.address_range import AddressRange
@@ -116,7 +126,7 @@ class Client(OpenLine):
         if speed not in BAUD_RATES:
             raise FormatError(f'baud {speed} should be one of {", ".join(map(str, BAUD_RATES))}')
         settings = PortSettings(
-            text_of('port', port), speed,
+            path_of('port', port), speed,
             parity=_choice('parity', _PARITY, parity))
         times = _whole('retries', retries, 0, _MOST_RETRIES)
         super().__init__(_choice('duplex', _DUPLEX, duplex), LinkSettings(
@@ -125,7 +135,7 @@ class Client(OpenLine):
             station=_whole('own_station', own_station, 0, MAX_STATION),
             timing=LineTiming(settings.char_time), timeout=_seconds('timeout', timeout),
             cmd_timeout=_seconds('cmd_timeout', cmd_timeout)), settings,
-            trace=None if trace is None else text_of('trace', trace), logger=logger)
+            trace=None if trace is None else path_of('trace', trace), logger=logger)
 
     @staticmethod
     def from_files(net_file: str | os.PathLike[str], map_file: str | os.PathLike[str], *,
@@ -133,8 +143,8 @@ class Client(OpenLine):
                    logger: logging.Logger = LOG) -> TaggedClient:
         """Return a client that reads and writes the rows of a map CSV by their tags."""
         from abdf1_ros.tagged_client import TaggedClient  # only a program with files needs it
-        return TaggedClient(text_of('net_file', net_file), text_of('map_file', map_file),
-                            None if trace is None else text_of('trace', trace), logger)
+        return TaggedClient(path_of('net_file', net_file), path_of('map_file', map_file),
+                            None if trace is None else path_of('trace', trace), logger)
 
     @overload
     def read(self, address: str, length: None = None, *, kind: Whole,

@@ -323,9 +323,11 @@ def values_of(values: object) -> Sequence[float] | str:
     raise FormatError(f'{shown(repr(values))} should be a number, several, or a text')
 
 
+def path_of(name: str, value: object) -> str:
+    return text_of(name, os.fspath(value) if isinstance(value, os.PathLike) else value)
+
+
 def text_of(name: str, value: object) -> str:
-    if isinstance(value, os.PathLike):
-        value = os.fspath(value)
     if not isinstance(value, str) or not value:
         raise FormatError(f'{name} {shown(repr(value))} should be a text')
     return value

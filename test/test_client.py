@@ -230,10 +230,14 @@ def test_entries_of_the_log_that_nothing_takes_are_counted(
     ('F8:0', {'kind': 'int16'}, 'F8:0 can be float32'),
     ('N7:0', {'kind': 'int'}, "kind 'int' should be one of bool, int16"),
     ('N7:0', {'kind': 7}, 'kind 7 should be one of'), (None, {}, 'address None should be a text'),
+    (Path('N7:0'), {}, 'address .* should be a text'),
     ('N7:0', {'length': 3.0}, '^length 3.0 should be a whole number$'),
     ('N7:0', {'length': '3'}, "length '3' should be a whole number"),
     ('N7:0', {'station': '1'}, "station '1' should be"),
     ('N7:0', {'word_order': None}, 'word_order None should be one of Low, High'),
+    *((address, {'word_order': 'High', **more}, f'word order High is for int32, .* not for {kind}')
+      for address, more, kind in (('N7:0', {'length': 4}, 'int16'), ('F8:0', {}, 'float32'),
+                                  ('N7:0', {'values': [1, 2]}, 'int16'))),
     ('T4:0.PRE', {'length': 2, 'kind': 'string'}, 'T4:0.PRE can be int16, uint16'),
     *((address, {'values': values}, text) for address, values, text in (
         ('N7:0', 70000, 'value 70000 at index 0 is not a valid int16'),

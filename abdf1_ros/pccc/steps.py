@@ -30,7 +30,7 @@ from abdf1_ros.pccc.file_types import FileType, PlcType
 from abdf1_ros.pccc.identity import Identity
 from abdf1_ros.pccc.processor import Processor
 from abdf1_ros.pccc.status import check_status, is_address_fault, STS_ILLEGAL_COMMAND
-from abdf1_ros.pccc.structures import type_fault, write_fault, wrong_type
+from abdf1_ros.pccc.structures import order_fault, type_fault, write_fault, wrong_type
 from abdf1_ros.pccc.values import Codec, types_of, Values, ValueType, WordOrder
 
 # From reports of libplctag's users about an SLC 5/05 and MicroLogix (its issues 121, 479 and 657).
@@ -61,6 +61,8 @@ class AddressedValues:
         codec = Codec(kind, length, address.bit or 0, word_order, packed)
         if fault := wrong_type(address, kind):
             raise FormatError(fault)
+        if fault := order_fault(address, kind, word_order):
+            raise FormatError(f'word order {fault}')
         if length < 1 or address.offset + codec.words > address.area_size:
             last = address.at_offset(address.area_size - 1)
             raise FormatError(f'{length} elements do not fit at {address}; the last word there '

@@ -20,7 +20,7 @@ from collections.abc import Iterable
 from dataclasses import replace
 
 from abdf1_ros.pccc.address import Address, BITS
-from abdf1_ros.pccc.values import types_of, ValueType
+from abdf1_ros.pccc.values import types_of, ValueType, WordOrder
 
 
 def wrong_type(address: Address, kind: ValueType) -> str | None:
@@ -36,6 +36,14 @@ def wrong_type(address: Address, kind: ValueType) -> str | None:
     if values := ', '.join(value_addresses(address)):
         return f'{text}: it is a bit; the values of this element are {values}'
     return f'{text}: it is a bit; its word is {replace(address, bit=None)}'
+
+
+def order_fault(address: Address, kind: ValueType, order: WordOrder) -> str | None:
+    """Return why values at an address cannot have this order of words, None if they can."""
+    if order is WordOrder.LOW or kind.words == 2 and types_of(address)[0].words == 1:
+        return None
+    return ('High is for int32, uint32 and float32 over words of 16 bits such as N7:0, not for '
+            f'{kind.value} at {address}')
 
 
 def value_addresses(address: Address) -> list[str]:

@@ -30,8 +30,8 @@ from abdf1_ros.pccc.families import FAMILIES, parse_range
 from abdf1_ros.pccc.file_types import FileType, PlcType
 from abdf1_ros.pccc.processor import Processor
 from abdf1_ros.pccc.spellings import family_name
-from abdf1_ros.pccc.structures import type_fault, write_fault, wrong_type
-from abdf1_ros.pccc.values import types_of, ValueType, WordOrder
+from abdf1_ros.pccc.structures import order_fault, type_fault, write_fault, wrong_type
+from abdf1_ros.pccc.values import types_of, ValueType
 from abdf1_ros.problems import Problem
 from abdf1_ros.settings.columns import COMMAND, MAP_COLUMNS, NEEDED
 from abdf1_ros.settings.conditions import with_conditions
@@ -142,7 +142,7 @@ class RowReader:
             return None
         # ``values`` can have more than the given cells: an address range sets the Length.
         period = values.get('Period')
-        told = {'type': _natural_type(values['Address'])} | {
+        told = {'type': types_of(values['Address'])[0]} | {
             column.attribute: values[column.name] for column in MAP_COLUMNS
             if column.name in values and column.attribute in Mapping.__slots__}
         return Mapping(**told, item=self._row.item, place=self._row.where(), name=name,
@@ -292,11 +292,8 @@ class RowReader:
 
     def _check_values(self, mapping: Mapping) -> None:
         """Check the conversion of raw values to values of the topic."""
-        if mapping.word_order is WordOrder.HIGH and (
-                mapping.type.words != 2 or _natural_type(mapping.address).words != 1):
-            self._fault('Word_Order', 'Word_Order High is for int32, uint32 and float32 over '
-                                      'words of 16 bits such as N7:0, not for '
-                                      f'{mapping.type.value} at {mapping.address}')
+        if order := order_fault(mapping.address, mapping.type, mapping.word_order):
+            self._fault('Word_Order', f'Word_Order {order}')
         fault = mapping.scaling and mapping.scaling.fault(mapping.type)
         if fault:
             self._fault('Scale' if self._row.get('Scale') else 'Offset', fault)
@@ -326,7 +323,3 @@ class RowReader:
         fault = None if mapping.serves else write_fault(address, mapping.type, mapping.length)
         if fault:
             self._fault('Address', fault)
-
-
-def _natural_type(address: Address) -> ValueType:
-    return types_of(address)[0]
