@@ -86,12 +86,12 @@ def test_usual_baud_rates_come_first_and_none_is_left_out() -> None:
 def test_everything_is_tried_on_a_silent_line(tmp_path: Path) -> None:
     line = Pty(tmp_path / 'line')
     trying = Trying()
-    search = Search(Network(com_port=str(line.name), timeout=20), [3, 1], trying)
+    search = Search(Network(com_port=str(line.name), timeout=20), [3, 1, 4], trying)
     assert search.run((19200, 9600)) is None
     line.close()
     one_speed = ['full duplex, CRC, station 3', 'full duplex, CRC, station 1',
                  'full duplex, BCC, station 3', 'full duplex, BCC, station 1',
-                 'half duplex, CRC, station 3', 'half duplex, CRC, station 1']
+                 *(f'half duplex, CRC, station {number}' for number in (3, 1, 4))]
     assert trying == 2 * [f'{baud} baud, {text}' for baud in (19200, 9600) for text in one_speed]
     assert search.traces == []
 
