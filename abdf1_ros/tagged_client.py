@@ -74,7 +74,7 @@ class TaggedClient(OpenLine):
         For several tags it returns the values by tag, read in as few packets as possible. The
         values do not belong to one instant: each packet is a transaction of its own.
         """
-        if isinstance(tag, str):
+        if isinstance(tag, str) or not isinstance(tag, Iterable):
             row = self._row(tag, 'read', lambda row: row.polls)
             with self.naming(_named(row)):
                 return _shown(row, self.ask(row.station, steps.read(row.target)))

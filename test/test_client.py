@@ -371,6 +371,7 @@ def test_rows_of_a_map_are_read_and_written_by_their_tags(
                 (lambda: plant.write('speed', 51), 'value 51 at index 0 is outside Min 0, Max 50'),
                 (lambda: plant.read('recipe'), "'recipe' should be .* that is read: speed, doors"),
                 (lambda: plant.write('doors', [1, 1, 1]), 'that is written: speed, recipe, name'),
+                (lambda: plant.read(None), 'tag None should be a text'),
                 (lambda: plant.read('N7:0'), "tag 'N7:0' should be that of a row")):
             with pytest.raises(FormatError, match=text):
                 call()
