@@ -29,6 +29,7 @@ from abdf1_ros.cli.terminal import EXIT_FAILED
 from abdf1_ros.errors import Abdf1Error, LinkError, PortLost, RemoteError
 from abdf1_ros.open_line import kind_of
 from abdf1_ros.pccc import steps
+from abdf1_ros.pccc.families import FAMILIES
 from abdf1_ros.pccc.file_types import PlcType
 from abdf1_ros.pccc.processor import Processor
 from abdf1_ros.pccc.status import is_address_fault
@@ -97,7 +98,8 @@ def failed(options: argparse.Namespace, session: Session, error: Abdf1Error, pla
     if options.is_assumed and isinstance(error, LinkError):
         _advise(session, f'no station was given, so {station} was asked; "plc scan" lists the '
                          'stations that answer')
-    if place and isinstance(error, RemoteError) and is_address_fault(error):
+    lists_files = row is None or FAMILIES[row.plc_type].file_search is not None
+    if place and lists_files and isinstance(error, RemoteError) and is_address_fault(error):
         _advise(session, f'"plc files {station}" lists its data files and their lengths')
     return EXIT_FAILED
 

@@ -110,6 +110,12 @@ def test_clock_that_holds_no_time_or_is_not_known(
     assert (said.status, said.err) == (1, f'plc: {text}\n')
 
 
+def test_files_are_not_offered_of_a_plc_that_cannot_list_them(port: str, capsys: Output) -> None:
+    for station, address, count in (('3', '0777', 0), ('4', 'S:40', 1)):
+        said = call(main, capsys, 'read', address, '--station', station, '--port', port)
+        assert (said.status, said.err.count('"plc files ')) == (1, count), said.err
+
+
 @pytest.mark.parametrize(('processor', 'text'), [
     (Processor.ML1400, 'is a ML1400: S:37 to S:42 are the clock of an SLC 5/03, 5/04 or 5/05. '
      'The clock of a MicroLogix is its function file RTC, whose type code is not known; let the '

@@ -313,13 +313,14 @@ def test_machine_without_ports_says_so(monkeypatch: pytest.MonkeyPatch, capsys: 
     assert 'no serial port' in capsys.readouterr().err
 
 
-@pytest.mark.parametrize('ports', [(), (ADAPTER, OTHER)])
+@pytest.mark.parametrize(('ports', 'told'), [
+    ((), 'this machine has none'), ((ADAPTER, OTHER), '/dev/ttyUSB0, /dev/ttyS0')])
 def test_init_asks_for_the_port_where_it_is_not_plain(
         monkeypatch: pytest.MonkeyPatch, tmp_path: Path, capsys: Output,
-        ports: tuple[SerialPortInfo, ...]) -> None:
+        ports: tuple[SerialPortInfo, ...], told: str) -> None:
     _with_ports(monkeypatch, *ports)
     assert main(['init', '--into', str(tmp_path)]) == 2
-    assert 'name the port' in capsys.readouterr().err
+    assert capsys.readouterr().err == f'plc: --port: name the port: {told}\n'
 
 
 def test_port_that_is_not_there_leads_to_the_list(capsys: Output) -> None:

@@ -79,6 +79,7 @@ def test_detect_finds_a_full_duplex_port(peer: str, capsys: Output) -> None:
                  *PATIENT)
     assert found.status == 0, found.err
     assert found.lines[0].partition(':')[0] == '9600 baud, full duplex, BCC'
+    assert f'plc read N7:0 --peer --station 2 --port {peer} --baud 9600' in found.out
 
 
 @pytest.mark.usefixtures('half_duplex_only')
