@@ -97,6 +97,7 @@ def test_files_of_the_package_are_good_and_follow_our_own_advice(
     said = capsys.readouterr().out
     assert ('orderly end: {end_ms:.0f} ms where no frame gets lost, {end_in_silence_ms:.0f} ms '
             'where no PLC answers' if content['end_ms'] else '').format(**content) in said
+    assert ('orderly end' in said) is bool(content['end_ms'])
     for bound in content['bounds']:  # presets, or both times
         assert ('presets {presets[0]} (watchdog, rung 3) and {presets[1]} '
                 if bound['presets'] else
@@ -149,15 +150,20 @@ def test_json_of_errors_names_place_and_number_of_each(check: Check, files: Path
 def test_rows_tell_what_a_ros_user_gets(files: Paths, capsys: Output) -> None:
     write_csv(files[0], NET_HEADER, [GOOD_NET])
     write_csv(files[1], 'Tag,Command,Address,Station,PLC_Type,Topic,Scale,Offset', [
-        'level,ReadWrite,N7:1,1,PLC5,tank/level,0.1,-40', 'alive,Heartbeat,N10:0,1,PLC5,,,'])
+        'level,ReadWrite,N7:1,1,PLC5,tank/level,0.1,-40', 'alive,Heartbeat,N10:0,1,PLC5,,,',
+        'speed,Read,N7:2,1,PLC5,,0.5,'])
     assert main([*map(str, files), '--json']) == 0
-    level, alive = json.loads(capsys.readouterr().out)['rows']
+    level, alive, speed = json.loads(capsys.readouterr().out)['rows']
     assert level == {
         'tag': 'level', 'command': 'ReadWrite', 'address': 'N7:1', 'station': 1,
         'topics': ['~/read/tank/level', '~/write/tank/level'], 'message': 'Float32MultiArray',
         'length': 1, 'value': 'int16 * 0.1 -40', 'stale_ms': level['stale_ms'], 'description': ''}
     assert 300 < level['stale_ms'] < 600
     assert (alive['topics'], alive['message'], alive['stale_ms']) == ([], '', None)
+    assert speed['value'] == 'int16 * 0.5'
+    assert main([*map(str, files)]) == 0
+    row, = (line for line in capsys.readouterr().out.splitlines() if line.startswith('alive '))
+    assert row.split() == ['alive', 'N10:0', '1', '1', 'int16']
 
 
 def test_notes_are_no_warnings(check: Check) -> None:
@@ -212,6 +218,7 @@ def test_warnings_come_first_and_long_tables_are_folded(
     assert lines[0].startswith('warning: ')
     folded = lines.index('... and 51 more; --json has them all')
     assert lines[folded - 1].startswith('t39 ') and len(lines) < 70
+    assert 'more; ' not in check(GOOD_NET, rows[:40])
     monkeypatch.setattr(sys.stdout, 'isatty', lambda: True)
     monkeypatch.setenv('COLUMNS', '40')
     assert max(len(line) for line in check(GOOD_NET, rows).splitlines() if line[0:1] == 't') == 40
@@ -327,9 +334,13 @@ def test_two_lines_of_a_folder_on_one_port_are_an_error(tmp_path: Path, capsys: 
         write_csv(tmp_path / f'{name}_net.csv', NET_HEADER, [f'{GOOD_NET[:-1]}{port}'])
         write_csv(tmp_path / f'{name}_map.csv', MAP_HEADER, [GOOD_ROW.replace('1000', '10')])
     assert main([str(tmp_path)]) == 2
-    errors = [line for line in capsys.readouterr().out.splitlines() if 'error' in line]
-    assert errors == [f'press: error: {tmp_path}/press_net.csv: rfc2217://127.1:4001 is the port '
-                      'of paint too', '3 lines: 2 good (2 of them with warnings), 1 with errors']
+    times = 'poll cycle 74 ms, load 742%, 2 warnings'
+    assert capsys.readouterr().out.splitlines() == [
+        f'glue: 1 row, port /dev/ttyUSB0, {times}',
+        f'paint: 1 row, port socket://localhost:4001, {times}',
+        f'press: error: {tmp_path}/press_net.csv: rfc2217://127.1:4001 is the port of paint too',
+        f'press: 1 row, port rfc2217://127.1:4001, {times}',
+        '3 lines: 2 good (2 of them with warnings), 1 with errors']
 
 
 def test_json_of_a_folder(tmp_path: Path, capsys: Output) -> None:
@@ -392,3 +403,6 @@ def test_rows_that_a_recording_fills_are_told(tmp_path: Path, capsys: Output) ->
     assert main([str(net), str(rows), '--heard', str(tmp_path / 'none.cap')]) == 2
     assert 'No such file' in capsys.readouterr().out
     assert main([str(rows), str(rows), '--heard', str(heard)]) == 2  # without a net file
+    net.write_text('Com_Port,Error_Code\n/dev/ttyS0,BCC\n', encoding='utf-8')
+    assert main([str(net), str(rows), '--heard', str(heard)]) == 0
+    assert 'the recording fills 0 of 3 rows' in capsys.readouterr().out

@@ -141,7 +141,7 @@ def test_simulator_is_a_node_of_a_radio_network_and_not_a_peer(
 
 @pytest.mark.parametrize(('args', 'status', 'text'), [
     (['slave', '--port', '/nowhere/at/all'], 1, '/nowhere/at/all: No such file'),
-    (['slave'], 2, '--port'), (['master', '--pty', '/dev/null'], 1, '/dev/null'),
+    (['slave'], 2, '--port'), (['master', '--pty', '/proc/stat'], 1, '/proc/stat'),
     (['master', '--tcp', '127.0.0.1:0', '--data', '/none'], 2, '/none: cannot be read'),
     (['client', '--tcp', '[::1]:0', '--station', '9'], 2, 'the example data has stations')])
 def test_port_that_cannot_be_opened_is_one_and_what_is_wrong_in_options_two(

@@ -203,7 +203,7 @@ def _refused(capsys: Output, *options: str, status: int = 2) -> str:
     (('--full-duplex', '7'), 2, '--full-duplex: name a station (1, 2)'),
     (('--data', '/nowhere'), 2, '/nowhere: cannot be read: No such file or directory'),
     (('--pty', '/nowhere/plc'), 1, '/nowhere/plc cannot be made: No such file or directory'),
-    (('--pty', '/dev/null'), 1, '/dev/null exists already, and no simulator has made it; '
+    (('--pty', '/proc/stat'), 1, '/proc/stat exists already, and no simulator has made it; '
      'give another name'),
     (('--tcp', '192.0.2.1:0'), 1, '--tcp "192.0.2.1:0": Cannot assign requested address'),
     (('--port', '/nowhere/tty'), 1, '/nowhere/tty: No such file or directory'),

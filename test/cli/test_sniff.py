@@ -159,10 +159,13 @@ def test_endless_file_does_not_fill_the_memory(
 
 def test_progress_has_a_percentage_where_the_size_is_known(
         capsys: Output, capture: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(sniff, 'PROGRESS_PERIOD', 0.0)
-    monkeypatch.setattr(sys.stderr, 'isatty', lambda: True)
-    assert main(['--summary', capture]) == 0
-    assert capsys.readouterr().err.splitlines()[-1] == f'sniff: {capture}: 100 %, 45 bytes so far'
+    for period, is_terminal, count in ((9.0, True, 0), (0.0, False, 0), (0.0, True, 5)):
+        monkeypatch.setattr(sniff, 'PROGRESS_PERIOD', period)
+        monkeypatch.setattr(sys.stderr, 'isatty', lambda: is_terminal)  # noqa: B023
+        assert main(['--summary', capture]) == 0
+        told = capsys.readouterr().err.splitlines()
+        assert len(told) == count
+    assert told[-1] == f'sniff: {capture}: 100 %, 45 bytes so far'
     assert main(['--summary', '--binary', '--seconds', '0.2', '/dev/zero']) == 0
     assert re.match('sniff: /dev/zero, [0-9]+ bytes so far\n', capsys.readouterr().err)
 
@@ -345,7 +348,7 @@ def test_what_a_slow_output_has_lost_is_told_and_saved(
     tap = MagicMock(names=['x'], new_losses=Mock(side_effect=[0, 3]), chunks=lambda *args: iter(
         Chunk(time, Direction.UNKNOWN, frames.poll_frame(2)) for time in (0.0, 0.1)))
     monkeypatch.setattr(sniff, 'Tap', made := Mock(return_value=tap))
-    assert main(['--port', 'x', '--parity', 'Even', '--save', str(tmp_path / 'saved')]) == 0
+    assert main(['--tap', 'x', 'pty', '--parity', 'Even', '--save', str(tmp_path / 'saved')]) == 0
     told = '3 pieces of traffic were lost: this output was too slow for them\n'
     assert capsys.readouterr().err.endswith(told)
     assert (tmp_path / 'saved').read_text('ascii').endswith(told)
@@ -355,6 +358,8 @@ def test_what_a_slow_output_has_lost_is_told_and_saved(
     options = '--save', str(tmp_path / 'of_pty'), '--html', str(tmp_path / 'no' / 'page.html')
     assert main(['--port', 'pty', *options]) == 2  # for the page; a pseudo-terminal has no speed
     assert 'baud' not in (tmp_path / 'of_pty').read_text('ascii')
+    assert main(['--port', 'x', '--baud', '19200']) == 0
+    assert made.call_args.args[1].baud == 19200
 
 
 def test_colour_is_for_terminals_only(

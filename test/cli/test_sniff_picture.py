@@ -80,6 +80,7 @@ def test_bar_begins_and_ends_as_its_bytes_did(tmp_path: Path, capsys: Output) ->
     (ask,), (_, answer) = ([rect for _, rect in found.found
                             if rect.get('class') == look and 'x' in rect]
                            for look in ('ask', 'answer'))
+    assert int(answer['y']) - int(ask['y']) == 14  # in the lower row
     scale = sniff_picture.drawing.__globals__
     second = scale['WIDTH'] - scale['NAMES'] - scale['_RIGHT']
     # The command begins at 0.1 s, with 20 characters; the reply ends at 0.13 s.
@@ -107,6 +108,7 @@ def test_faults_come_as_episodes_that_lead_to_their_strip(tmp_path: Path, capsys
     assert [text for text in told[at + 7:] if text.startswith('reply: ')][0].startswith(
         'reply: 2 to 5, TNS 0002: STS 10')
     assert told.count('silence: no answer to the poll') == 3
+    assert found.found.count(('td', {'class': 'number'})) == 4 * 4
     assert '30.000 s' in told  # two polls in one chunk
     radio, = FOLDER.glob('radio*.cap')  # 38 messages are forwarded, which is no fault
     assert '7 faults on the line' in drawn(tmp_path, capsys, str(radio)).texts
@@ -122,6 +124,28 @@ def test_table_of_episodes_tells_that_there_are_more(
     told = found.texts[:found.texts.index('In figures')]
     assert told.count('silence: no answer to the poll') == 3
     assert ('and more' in told) is is_more
+
+
+def test_overview_has_the_worst_of_each_moment_and_a_link_to_it(
+        tmp_path: Path, capsys: Output) -> None:
+    found = drawn(tmp_path, capsys, capture(
+        tmp_path / 'line.cap', exchange(10.1, 1), exchange(15.1, 2, sts=0x10),
+        exchange(17.2, 3, station=7), silence(17.9), exchange(2100.5, 4)), '--baud', '4800')
+    # A strip has 4 s at this speed, and a bar three of 524 strips.
+    assert [text for text in found.texts if ' seen, ' in text] == [
+        'station 2, 8 to 16 s 14:05:17: 10 seen, 1 fault',
+        'station 2, 2100 to 2104 s 14:40:09: 5 seen, 0 faults',
+        'station 3, 16 to 20 s 14:05:25: 1 seen, 0 faults',
+        'station 3, 2100 to 2104 s 14:40:09: 1 seen, 1 fault',
+        'station 7, 16 to 20 s 14:05:25: 5 seen, 0 faults']
+    links = [each['href'] for tag, each in found.found if tag == 'a'][:5]
+    assert links == ['#r1s3', '#r1s525', '#r1s4', '#r1s525', '#r1s4']
+    assert [(each['class'], each['x'], each['y'], each['width']) for _, each in found.found
+            if each.get('class', 'lane') != 'lane' and 'y' in each][:5] == [
+        ('bad', '110.0', '1', '3.9'), ('answer', '1138.0', '1', '2.0'),
+        ('small', '113.9', '29', '2.0'), ('missing', '1138.0', '29', '2.0'),
+        ('answer', '113.9', '57', '2.0')]
+    assert found.texts.count('14:05:17') == 2  # of the overview, and of its first strip
 
 
 def test_no_answer_is_drawn_as_long_as_it_was_waited_for(tmp_path: Path, capsys: Output) -> None:
@@ -142,6 +166,8 @@ def test_long_recording_keeps_its_faults(
     assert [text for text in found.texts if 'not drawn' in text] == [
         '26 strips not drawn', '3 strips not drawn']
     assert found.bars('missing') == 2  # in its strip, and in the overview
+    many = capture(tmp_path / 'line.cap', *(silence(0.1, station) for station in range(41)))
+    assert 'and 1 station more' in drawn(tmp_path, capsys, many).texts
 
 
 def test_recordings_one_after_the_other_and_without_times(tmp_path: Path, capsys: Output) -> None:
@@ -156,11 +182,12 @@ def test_recordings_one_after_the_other_and_without_times(tmp_path: Path, capsys
     assert found.bars('ask') == 2
     raw = tmp_path / 'raw'
     raw.write_bytes(b''.join(
-        data for tns in (1, 2, 3) for _, _, data in silence(0.0) + exchange(0.1, tns)))
+        data for tns in range(45) for _, _, data in silence(0.0) + exchange(0.1, tns)))
     found = drawn(tmp_path, capsys, '--binary', str(raw))
     assert 'bytes' in found.texts
-    assert [text for text in found.texts if text.startswith('byte ')] == ['byte 4', 'byte 102']
-    assert found.bars('ask') == 3
+    assert [text for text in found.texts if text.startswith('byte ')] == ['byte 4', 'byte 2162']
+    assert found.bars('ask') == 45
+    assert {'r1s0', 'r1s1'} <= {element.get('id') for _, element in found.found}
 
 
 def test_names_are_text_and_nothing_else(tmp_path: Path, capsys: Output) -> None:
@@ -181,7 +208,7 @@ def test_anonymous_timeline_has_no_values_and_no_names(tmp_path: Path, capsys: O
     for name in ('secret', str(tmp_path), 'home', 'hmi', 'moxa', '4660', 'N7:0', '1234'):
         assert name not in page, name
     assert 'command: 0F/A2' in page
-    assert 'STS 10' in page
+    assert 'STS 10' in page and 'STS 00' not in page
 
 
 @pytest.mark.parametrize(('args', 'text'), [

@@ -54,10 +54,10 @@ def bundle_of(tmp_path: Path, capture: str, *options: str) -> dict[str, str]:
     (tmp_path / 'map.csv').write_text(
         '# line of the paint shop\nTag,Command,Address,Station,PLC_Type,Topic\n'
         'paint_booth,Read,N7:0,2,SLC,booth\n', encoding='utf-8')
-    (tmp_path / 'result.json').write_text('{"target": "slave"}', encoding='utf-8')
+    (tmp_path / 'slave.json').write_text('{"target": "slave"}', encoding='utf-8')
     path = str(tmp_path / 'report.zip')
     assert main([capture, '--summary', '--report', path, '--settings', str(tmp_path / 'map.csv'),
-                 '--conformance', str(tmp_path / 'result.json'), *options]) == 0
+                 '--conformance', str(tmp_path / 'slave.json'), *options]) == 0
     with ZipFile(path) as bundle:
         return {name: bundle.read(name).decode() for name in bundle.namelist()}
 
@@ -67,7 +67,7 @@ def test_bundle_has_all_that_a_report_needs(
     files = bundle_of(tmp_path, capture)
     assert set(files) == {
         'README.txt', 'summary.txt', 'summary.json', 'processors.txt', 'versions.json',
-        'entries.txt', 'capture/line.cap', 'settings/map.csv', 'conformance/result.json'}
+        'entries.txt', 'capture/line.cap', 'settings/map.csv', 'conformance/slave.json'}
     assert files['capture/line.cap'].startswith('# abdf1_ros capture 1\n')
     assert '1234 -2' in files['entries.txt']
     assert 'paint_booth' in files['settings/map.csv']

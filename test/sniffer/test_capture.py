@@ -132,10 +132,10 @@ def test_other_files_are_left_alone(tmp_path: Path) -> None:
     with pytest.raises(OSError, match='y.1 exists and is not a capture'):
         capture.CaptureWriter(tmp_path / 'y')
     assert (tmp_path / 'y.1').read_text(encoding='ascii') == 'important'
-    with pytest.raises(OSError, match='is not a capture'):
-        capture.CaptureWriter(Path('/dev/null'))
-    with pytest.raises(OSError, match='is not a capture'):
-        capture.CaptureWriter(tmp_path)
+    (tmp_path / 'device').symlink_to('/dev/null')  # a fault here must not rename that of the host
+    for place in (tmp_path / 'device', tmp_path):
+        with pytest.raises(OSError, match='is not a capture'):
+            capture.CaptureWriter(place)
     with pytest.raises(FileNotFoundError):
         capture.CaptureWriter(tmp_path / 'nowhere' / 'x')
 
