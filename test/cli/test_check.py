@@ -17,6 +17,7 @@
 from collections.abc import Callable, Sequence
 import json
 from pathlib import Path
+import re
 import shlex
 import subprocess
 import sys
@@ -215,7 +216,7 @@ def test_warnings_come_first_and_long_tables_are_folded(
         check: Check, monkeypatch: pytest.MonkeyPatch) -> None:
     rows = tuple(f't{number},Read,N7:{number},1,PLC5,,100' for number in range(90))
     lines = check(GOOD_NET, (*rows, 't90,Read,B3:0,1,PLC5,,20')).splitlines()
-    assert lines[0].startswith('warning: ')
+    assert lines[0].startswith('warning: ') and 'no errors, no warnings' not in lines
     folded = lines.index('... and 51 more; --json has them all')
     assert lines[folded - 1].startswith('t39 ') and len(lines) < 70
     assert 'more; ' not in check(GOOD_NET, rows[:40])
@@ -384,8 +385,14 @@ def test_rows_that_a_recording_fills_are_told(tmp_path: Path, capsys: Output) ->
         'Tag,Command,Address,Station,PLC_Type,Length,Period\n'
         'read,Read,N7:8,2,PLC5,2,500\nlonger,Read,N7:8,2,PLC5,3,500\n'
         'unread,Read,N10:0,2,PLC5,1,500\n', encoding='utf-8')
-    for capture in ('libplctag_client_crc_plc5', 'libplctag_client_crc_plc5_half_duplex'):
-        heard = VECTOR_FOLDER / 'captures' / f'{capture}.cap'
+    half, full = (VECTOR_FOLDER / 'captures' / f'libplctag_client_crc_plc5{duplex}.cap'
+                  for duplex in ('_half_duplex', ''))
+    said = full.read_text('ascii')
+    at_once, dump = tmp_path / 'both_ends_at_once.cap', tmp_path / 'without_times.hex'
+    at_once.write_text(re.sub(r'(\S+) < ((?:\S\S ){4})(.+)\n(\S+) (> .+)\n',
+                              r'\1 < \2\n\4 \5\n\4 < \3\n', said), 'ascii')
+    dump.write_text(re.sub(r'(?m)^\S+ [<>] ', '', said.partition('\n')[2]), 'ascii')
+    for heard in (half, at_once, dump, full):
         assert main([str(net), str(rows), '--heard', str(heard)]) == 0
         said = capsys.readouterr().out
         assert '/dev/ttyS0 and /dev/ttyS1: Mode Listen, ' in said
@@ -397,7 +404,7 @@ def test_rows_that_a_recording_fills_are_told(tmp_path: Path, capsys: Output) ->
         assert 'station 2: word range read N7:7, 3 words: ' in said
     assert main([str(net), str(rows), '--json', '--heard', str(heard)]) == 0
     content = json.loads(capsys.readouterr().out)['heard']
-    assert content['rows']['read'] == ''
+    assert content['rows']['read'] == '' and content['reads'] == sorted(content['reads'])
     assert content['rows']['unread'] == 'no other node reads it'
     assert any('word range read N7:7, 3 words' in text for text in content['reads'])
     assert main([str(net), str(rows), '--heard', str(tmp_path / 'none.cap')]) == 2

@@ -108,6 +108,8 @@ def test_json_has_one_object_a_line_and_the_summary_last(capsys: Output, capture
         'command', 'ACK', 'poll', 'reply', 'ACK', 'summary']
     assert objects[3]['latency_ms'] == 30.0
     assert objects[5]['counts'] == {'poll': 1, 'command': 1, 'reply': 1, 'ACK': 2}
+    assert [json.loads(line) for line in lines_of(capsys, '--json', '--summary', capture)] == \
+        objects[5:]
 
 
 def test_summary_alone_shows_the_load_at_a_baud_rate(capsys: Output, capture: str) -> None:

@@ -166,6 +166,7 @@ def test_long_recording_keeps_its_faults(
     assert [text for text in found.texts if 'not drawn' in text] == [
         '26 strips not drawn', '3 strips not drawn']
     assert found.bars('missing') == 2  # in its strip, and in the overview
+    assert ('a', {'href': '#r1s20'}) not in found.found  # there is no such strip
     many = capture(tmp_path / 'line.cap', *(silence(0.1, station) for station in range(41)))
     assert 'and 1 station more' in drawn(tmp_path, capsys, many).texts
 

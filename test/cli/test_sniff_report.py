@@ -126,7 +126,8 @@ def test_anonymous_bundle_has_no_name_of_a_host_user_path_or_port(
              'booth_map.csv': MAP, 'map2.csv': MAP.replace(',', ';'),
              'plc-gw.txt': 'Port of jdoe\n',
              'export.csv': 'Tag Name,Address,Client Access\njdoe,,\n',
-             'jdoe.json': json.dumps(RESULT), 'issue.md': '- port: /dev/ttyACME\n'}
+             'empty.csv': 'Tag,Command\n', 'jdoe.json': json.dumps(RESULT),
+             'issue.md': '- port: /dev/ttyACME\n'}
     for name, text in files.items():
         (folder / name).write_text(text, encoding='utf-8')
     recorded = folder / 'acme.cap'
@@ -136,7 +137,7 @@ def test_anonymous_bundle_has_no_name_of_a_host_user_path_or_port(
     report = tmp_path / 'report.zip'
     paths = [str(folder / name) for name in files]
     assert main([str(recorded), '--summary', '--report', str(report), '--anonymous',
-                 '--settings', *paths[:6], '--conformance', *paths[6:]]) == 0
+                 '--settings', *paths[:7], '--conformance', *paths[7:]]) == 0
     with ZipFile(report) as bundle:
         found = {name: bundle.read(name).decode() for name in bundle.namelist()}
     everything = '\n'.join([*found, *found.values()]).lower()
@@ -152,6 +153,7 @@ def test_anonymous_bundle_has_no_name_of_a_host_user_path_or_port(
         'tag_4,Read,B3:0/1,2,SLC,,,Run,tag_3,\n'
         'tag_5,Write,N7:3-4,2,SLC,topic_2,?,,,?\n'
         'tag_6,Read,?,?,?,,,,,\n')
+    assert found['settings/2_map.csv'] == '\n'
     assert found['settings/unread.txt'].startswith('left out: ')
     assert json.loads(found['conformance/result.json']) == {
         'target': 'slave', 'check': 'CRC', 'station': '2', 'cases': [{

@@ -221,11 +221,13 @@ def test_files_of_a_line_that_is_heard_have_its_speed_and_its_check_if_that_is_k
     (0x01, '20 00 04', 4, '020_2_of_3,Read,020,3,PLC2,2,2000'),
     (0x0F, 'A2 06 04 86 00 02', 1, '# station 3: protected typed logical read T4:0.ACC, 3 words: '
      '1 time'), (0x0F, '01 00 00 04 00 06 08 00 08', 2, '# station 3: word range read F8:0, 4 '
-                 'words: 2 times')])
+                 'words: 2 times'), (0x06, '03', 1, '# station 3: diagnostic status: 1 time'),
+    *((0x0F, f'A2 {code} 00 00', 1, f'# station 3: protected typed logical read {address}, '
+       '1 element: 1 time') for code, address in (('54 09 8D', 'ST9:0'), ('06 05 87', 'C5:0')))])
 def test_row_of_a_read_has_type_length_and_twice_the_interval(
         cmd: int, data: str, times: int, row: str) -> None:
     command = Packet(3, 0, cmd, 0, 7, bytes.fromhex(data))
-    carried = Carried(3, describe(command), command, 2.0, 2.0 + 2.4 * (times > 1), times)
+    carried = Carried(3, describe(command), command, 2.0, 2.0 + 2.5 * (times > 1), times)
     first, second = map_of([carried, carried]).splitlines()[-2:]
     assert first == row and second.startswith(f'# station 3: {carried.text}: ')
 
