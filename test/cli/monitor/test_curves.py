@@ -63,6 +63,10 @@ def test_bit_that_blinks_faster_than_the_steps_is_seen() -> None:
     assert set(drawn(*blinking, is_bits=True).strip()) == {'▁', '█'}
 
 
+def test_peak_within_a_step_is_seen() -> None:
+    assert drawn((3, [0]), (1.9, [0]), (1.5, [1]), (1, [0])).strip() == '▁█▁'
+
+
 def test_value_that_comes_late_in_a_step_holds_from_then_on() -> None:
     # Both come in the first of five steps.
     assert drawn((7.5, [0]), (7, [9]), promised=12.0).strip() == '▁████'

@@ -100,10 +100,10 @@ def publish() -> Iterator[Publish]:
 
 def test_bridges_are_heard_and_others_are_not(publish: Publish) -> None:
     down = array('lines', lines=ERROR)
-    down.status[0].values = [KeyValue(key='running', value='1'),
+    down.status[0].values = [KeyValue(key='running', value='1'), KeyValue(key='/hall/c'),
                              KeyValue(key='/hall/b', value='b_net.csv:2:1: Baud')]
     with PlantWatch([]) as watch:
-        publish(watch, lambda lines: set(lines) == {'/hall/a', '/hall/b'},
+        publish(watch, lambda lines: set(lines) == {'/hall/a', '/hall/b', '/hall/c'},
                 DiagnosticArray(), array('battery', link=OK),
                 array('hall/a', link=OK, mappings=ERROR), down)
         lines = {line.name: line.worst(line.told) for line in watch.lines()}
