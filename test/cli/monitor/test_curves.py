@@ -38,6 +38,7 @@ def ramp(count: int) -> list[tuple[float, list[float]]]:
 
 def test_newest_value_stands_last_and_the_range_is_that_of_the_curve() -> None:
     assert drawn(*ramp(8)) == ' ' * (WIDTH - 8) + BARS
+    assert drawn(*ramp(20))[0] == BARS[0]
     assert drawn(*ramp(6), bars=ASCII) == ' ' * (WIDTH - 6) + ASCII
 
 
@@ -64,7 +65,8 @@ def test_bit_that_blinks_faster_than_the_steps_is_seen() -> None:
 
 
 def test_peak_within_a_step_is_seen() -> None:
-    assert drawn((3, [0]), (1.9, [0]), (1.5, [1]), (1, [0])).strip() == '▁█▁'
+    assert drawn((3, [5]), (1.9, [4]), (1.5, [9]), (1, [8])).strip() == '▁█▆'
+    assert drawn((3, [9]), (1.9, [9]), (1.5, [1]), (1, [2])).strip() == '█▁▂'
 
 
 def test_value_that_comes_late_in_a_step_holds_from_then_on() -> None:

@@ -68,7 +68,8 @@ def test_value_is_the_last_column_to_go() -> None:
         statuses=[ShownStatus('link', Style.GOOD, 'OK', {'line load by topic': 'old 2.5%'})],
         readings=[Reading('old', range(7, 13), 'N7:10/12', NOW - 5, 1.0, curve),
                   Reading('new', None, promised=1.0)])
-    assert lines(picture, 38)[2:4] == ['  old      5.0 s  STALE  7 and 5 more', '  new             no']
+    assert lines(picture, 38)[2:4] == [
+        '  old      5.0 s  STALE  7 and 5 more', '  new             no']
     shown = '  old      5.0 s  STALE  7 8 9 10 11 12'
     for width, row in (
             (44, '  old      5.0 s  STALE     7 8 9 10 11 12'),
@@ -88,7 +89,7 @@ def test_value_is_the_last_column_to_go() -> None:
 def test_every_part_can_be_found_by_its_first_line() -> None:
     picture = snapshot(statuses=[
         ShownStatus('mappings', Style.BAD, 'ERROR', {'a': 'failed'}),
-        ShownStatus('writes', Style.GOOD, 'OK', {'total': '1'}),
+        ShownStatus('writes', Style.GOOD, 'OK', {'total': '1', 'lost': '0'}),
         ShownStatus('counters', Style.GOOD, 'OK', {'A': '1'})])
     found = {line.section: line.text for line in render(picture, NOW, WIDTH) if line.section}
     assert {name: found[name].split()[0] for name in ('reasons', 'writes', 'counters')} == {
@@ -220,6 +221,8 @@ def test_stations_are_told_from_the_active_node_table_and_the_diagnostics() -> N
     assert styles_of('  station 2    ERROR', picture) == [Style.BAD] * 2
     assert line_with('last answer  4.7 s ago', picture).style is Style.PLAIN
     assert line_with('stations 1 OK, 2 silent', picture).style is Style.WARNING
+    picture = snapshot(statuses=[ShownStatus('station 1', Style.GOOD, 'OK')])
+    assert line_with('stations 1 OK', picture).style is Style.PLAIN
     assert 'active stations: none' in '\n'.join(lines(snapshot(active=[])))
     assert 'active stations' not in '\n'.join(lines(snapshot(active=None)))
 
@@ -256,13 +259,15 @@ def test_results_of_writes_are_shown_with_value_age_and_latency() -> None:
 def test_only_counters_that_have_counted_are_shown() -> None:
     picture = snapshot(statuses=[ShownStatus(
         'counters', Style.GOOD, 'OK', {'CNT_A': '3', 'CNT_B': '0', 'CNT_C': '1', 'CNT_D': '2'})])
-    found = [line.split() for line in lines(picture, 115) if 'CNT' in line]
-    assert found == [['CNT_A', '3', 'CNT_C', '1'], ['CNT_D', '2']]
+    narrow, wide = ([line.split() for line in lines(picture, width) if 'CNT' in line]
+                    for width in (77, 78))
+    assert narrow == [['CNT_A', '3'], ['CNT_C', '1'], ['CNT_D', '2']]
+    assert wide == [['CNT_A', '3', 'CNT_C', '1'], ['CNT_D', '2']]
 
 
 @for_all(('changes', 'text', 'style'), [
     ({'is_there': False}, 'the node is gone', Style.BAD),
-    ({'told': None}, 'no diagnostics yet', Style.WARNING),
+    ({'told': None}, 'no diagnostics yet; if /diagnostics is remapped', Style.WARNING),
     ({'told': NOW - 5}, 'no diagnostics for 5.0 s', Style.BAD),
     ({'readings': []}, 'no read topic found', Style.WARNING),
     ({'readings': [], 'hint': '; set X'}, 'no read topic found; set X', Style.WARNING),
@@ -295,6 +300,7 @@ def test_no_line_is_wider_than_the_terminal(width: int, name: str, text: str) ->
     picture = snapshot(
         readings=[Reading(name, text, name, NOW, 1.0)],
         statuses=[ShownStatus('link', Style.GOOD, text, {'settings': text}),
-                  ShownStatus('mappings', Style.GOOD, text, {name: text})])
+                  *(ShownStatus(part, Style.GOOD, text, {name: text})
+                    for part in ('mappings', 'counters'))])
     widths = [len(line) for line in lines(picture, max(width, 20))]
     assert max(widths) <= max(width, 20)
