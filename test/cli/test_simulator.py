@@ -32,6 +32,7 @@ from abdf1_ros.cli.simulator import Cast, main, parse_options
 from abdf1_ros.df1 import frames
 from abdf1_ros.df1.checksum import Checksum
 from abdf1_ros.ports.link_thread import PortKind, PortState
+from abdf1_ros.simulator.ladder import Lamp
 import pytest
 from support.cases import for_all
 from support.commands import call, Output
@@ -329,6 +330,28 @@ def test_broadcast_by_radio_reaches_every_plc(
     line.write(write)
     line.write(read)
     assert line.read(1.0) == reply
+
+
+def test_lamps_of_a_ladder_are_told_though_no_command_comes(
+        monkeypatch: pytest.MonkeyPatch) -> None:
+    now, said, lamps = 0.0, list[str](), list[tuple[str, Lamp, bool]]()
+    monkeypatch.setattr('abdf1_ros.cli.simulator.LinkThread', links := Mock())
+    monkeypatch.setattr('abdf1_ros.cli.simulator.time', Mock(monotonic=lambda: now))
+    cast = Cast(parse_options(['--radio', '--ladder', '2']), lambda *lamp: lamps.append(lamp))
+    cast.say = said.append
+    cast.advance()
+    now = 1.0
+    ScriptedLine(links.call_args.args[0]).write(frames.message_frame(bytes.fromhex(
+        '02 05 0f 00 11 02 aa 02 0a 89 00 00 07 00'), Checksum.CRC))
+    for now in (1.1, 4.5):
+        cast.advance()
+    cast.close()
+    changes = [(Lamp.STOPPED, True), (Lamp.ALIVE, True), (Lamp.STOPPED, False),
+               (Lamp.ALIVE, False), (Lamp.LOST, True)]
+    assert lamps == [('2', *change) for change in changes]
+    assert said == ['station 2: ROS stopped (heartbeat 0) on', 'station 2: ROS alive on',
+                    'station 2: ROS stopped (heartbeat 0) off', 'station 2: ROS alive off',
+                    'station 2: ROS lost (heartbeat stands still) on']
 
 
 def test_simulator_goes_on_when_nobody_reads_it_and_ends_when_told(data: Path) -> None:

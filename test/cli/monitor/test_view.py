@@ -166,6 +166,7 @@ def test_value_that_does_not_come_here_is_in_the_verdict_though_the_bridge_is_co
     for reading in (Reading('a', [1], received=NOW - 5, promised=1.0), Reading('a', promised=1.0)):
         told = lines(snapshot(statuses=good, readings=[reading, Reading('b', [1])]))
         assert told[0] == '/cell/abdf1  ERROR: topics: 1 of 2 topics without a fresh value here'
+    assert lines(snapshot(statuses=good, readings=[Reading('a')]))[0].endswith('2 fresh')
 
 
 @for_all(('reading', 'state'), [
@@ -208,9 +209,12 @@ def test_link_shows_load_and_poll_cycle() -> None:
             'period 100 ms': 'wanted 100 ms, kept 345 ms', 'last error': '2509 ERR'})])
     assert lines(picture)[1] == '  load 61 %   cycle 240 ms'
     assert styles_of('  link         WARN: port open', picture) == [Style.WARNING] * 2
-    assert line_with('settings', picture).text.split(maxsplit=1) == ['settings', '19200 baud, CRC']
-    assert line_with('line load', picture).text.split() == ['line', 'load', '61', '%']
-    assert 'wanted 100 ms, kept 345 ms' in line_with('period 100 ms', picture).text
+    assert lines(picture)[-7:-1] == [
+        '  link         WARN: port open',
+        '      settings                 19200 baud, CRC',
+        '      line load                61 %',
+        '      poll cycle with Periods  240 ms',
+        '      period 100 ms            wanted 100 ms, kept 345 ms', '      last error: 2509 ERR']
     assert line_with('last error: 2509 ERR', picture).style is Style.WARNING
 
 
