@@ -334,16 +334,16 @@ def test_broadcast_by_radio_reaches_every_plc(
 
 def test_lamps_of_a_ladder_are_told_though_no_command_comes(
         monkeypatch: pytest.MonkeyPatch) -> None:
-    now, said, lamps = 0.0, list[str](), list[tuple[str, Lamp, bool]]()
+    now, said, lamps = [0.0], list[str](), list[tuple[str, Lamp, bool]]()
     monkeypatch.setattr('abdf1_ros.cli.simulator.LinkThread', links := Mock())
-    monkeypatch.setattr('abdf1_ros.cli.simulator.time', Mock(monotonic=lambda: now))
+    monkeypatch.setattr('abdf1_ros.cli.simulator.time', Mock(monotonic=lambda: now[0]))
     cast = Cast(parse_options(['--radio', '--ladder', '2']), lambda *lamp: lamps.append(lamp))
     cast.say = said.append
     cast.advance()
-    now = 1.0
+    now[0] = 1.0
     ScriptedLine(links.call_args.args[0]).write(frames.message_frame(bytes.fromhex(
         '02 05 0f 00 11 02 aa 02 0a 89 00 00 07 00'), Checksum.CRC))
-    for now in (1.1, 4.5):
+    for now[0] in (1.1, 4.5):
         cast.advance()
     cast.close()
     changes = [(Lamp.STOPPED, True), (Lamp.ALIVE, True), (Lamp.STOPPED, False),

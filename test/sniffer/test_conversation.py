@@ -157,4 +157,6 @@ def test_packet_that_was_sent_again_is_remembered_from_then_on() -> None:
         for number in range(15):
             copies.mark(again._replace(tns=tns + number), time, Direction.IN)
     assert marks == [None, Mark.RETRANSMISSION, Mark.FORWARDED]
+    assert copies.mark(again._replace(tns=100), 1.6, Direction.IN) is None  # too many since then
     assert copies.mark(again._replace(tns=314), -20.0, Direction.IN) is None  # another recording
+    assert copies.mark(again._replace(tns=314), None, Direction.IN) is Mark.RETRANSMISSION

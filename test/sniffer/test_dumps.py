@@ -77,6 +77,7 @@ def test_lines_left_out_by_hexdump() -> None:
     data = b'\x10\x05' + bytes(100)
     assert '*' in hexdump(data)
     assert joined(hexdump(data)) == data
+    assert joined(['00000000']) == bytes(4)  # there is no offset without bytes before it
     data = bytes(160)  # the last line is whole, so the offset alone ends the repetition
     assert hexdump(data)[1:] == ['*', '000000a0']
     assert joined(hexdump(data)) == data
@@ -93,9 +94,10 @@ def test_offset_that_cannot_follow_what_was_left_out(offset: str) -> None:
 
 @for_all('line', ['10 5', 'hello', '0000000 0510 ff01', '1 2 3', '*'])
 def test_bad_line_is_named(line: str) -> None:
-    with pytest.raises(Problem, match='is not a hexadecimal dump; write bytes as in') as caught:
-        joined(['10 04', line])
-    assert str(caught.value).startswith('x:2: ')
+    for before in {'10 04', '00000000: 1004  ..'} if line != '*' else {'10 04'}:
+        with pytest.raises(Problem, match='is not a hexadecimal dump; write bytes as') as caught:
+            joined([before, line])
+        assert str(caught.value).startswith('x:2: ')
 
 
 def chunks(path: Path, content: bytes, is_binary: bool = False) -> list[Chunk]:

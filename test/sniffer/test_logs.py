@@ -205,8 +205,10 @@ def test_time_of_day_goes_on_after_midnight() -> None:
 
 
 def test_direction_holds_for_lines_without_one_until_the_next() -> None:
-    lines = ['TX 1.250 10 02', '01 02', 'RX 23:59:59 10 06', 'uint8_t tx[] = { 0x10, 0x04 };']
-    assert [chunk.direction for chunk in read(iter(lines))] == [OUT, OUT, IN, OUT]
+    lines = ['TX 1.250 10 02', '01 02', 'RX 23:59:59 10 06', '[00:00:01] 10 15',
+             'uint8_t tx[] = { 0x10, 0x04 };']
+    assert [(chunk.direction, chunk.data.hex()) for chunk in read(iter(lines))] == [
+        (OUT, '1002'), (OUT, '0102'), (IN, '1006'), (IN, '1015'), (OUT, '1004')]
 
 
 @for_all('line', [

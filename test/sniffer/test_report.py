@@ -59,7 +59,7 @@ def test_entry_has_its_line_of_text(entry: Entry, text: str) -> None:
 
 @for_all(('entry', 'shade'), [
     (COMMAND, '\x1b[33m'), (REFUSAL, '\x1b[31m'), (DAMAGED, '\x1b[31m'), (POLL, '\x1b[2m'),
-    (NOISE, '\x1b[31m')])
+    (NOISE, '\x1b[31m'), (replace(POLL, valid=False), '\x1b[31m')])
 def test_line_has_the_colour_of_its_kind(entry: Entry, shade: str) -> None:
     assert text_line(entry, colour=True) == f'{shade}{text_line(entry)}\x1b[0m'
     assert text_line(REPLY, colour=True) == text_line(REPLY)
@@ -154,6 +154,8 @@ def test_load_is_known_where_baud_and_duplex_are(
 
 
 def test_recordings_one_after_the_other() -> None:
-    summary = _heard(_heard(Summary(9600)))
+    summary = _heard(Summary(9600))
+    summary.take(Chunk(None, OUT, b''))  # of one without times
+    _heard(summary)
     assert summary.seconds == 2.0
     assert summary.load(Duplex.HALF) == 0.5

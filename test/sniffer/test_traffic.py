@@ -110,7 +110,8 @@ def test_wrong_check_is_marked_and_taken_no_further() -> None:
     damaged[7] ^= 0x01
     bad, silence, good = decode([(OUT, bytes(damaged)), (OUT, master(COMMAND))],
                                 TrafficDecoder(Checksum.CRC))[:3]
-    assert (bad.kind, bad.valid, bad.checksum) == (Kind.DAMAGED, False, Checksum.CRC)
+    assert (bad.kind, bad.valid, bad.checksum, bad.station) == (
+        Kind.DAMAGED, False, Checksum.CRC, 1)
     assert bad.text.startswith('wrong check: ')
     assert '; reads like ' in bad.text
     assert silence.kind is Kind.SILENCE
@@ -185,8 +186,9 @@ def test_frames_of_real_processors(said: tuple[str, ...], told: list[str]) -> No
 
 def test_noise_is_counted_and_told_once() -> None:
     entries = decode([(IN, b'\x01\x02'), (IN, b'\x03'), (IN, frames.EOT), (IN, b'\xff')])
-    assert [(entry.kind, entry.size) for entry in entries] == [
-        (Kind.NOISE, 3), (Kind.EOT, 0), (Kind.NOISE, 1)]
+    assert [(entry.kind, entry.size, entry.text) for entry in entries] == [
+        (Kind.NOISE, 3, '3 bytes outside of any frame'), (Kind.EOT, 0, 'nothing to send'),
+        (Kind.NOISE, 1, 'a byte outside of any frame')]
 
 
 def test_frame_that_breaks_off_does_not_swallow_what_comes_after_a_pause() -> None:
