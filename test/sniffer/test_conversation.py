@@ -134,6 +134,8 @@ def test_tns_used_for_something_else_gives_the_first_command_up(talk: Talk) -> N
     for now, given_up in ((talk.now, [COMMAND]), (talk.now, []), (talk.now + 9.7, [other])):
         assert [entry.command for entry in talk.expired(now)] == given_up
     assert [entry.command for entry in talk.unanswered()] == [later]
+    assert talk.out(other).marks == (Mark.RETRANSMISSION,)
+    assert talk.back(other.reply()) == MessageFacts(other, 0.5)  # since it came again
     talk.back(later.reply())
     talk.out(COMMAND)
     assert list(talk.expired(talk.now)) == []

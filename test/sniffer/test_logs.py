@@ -184,7 +184,7 @@ def test_words_whose_offsets_do_not_fit_are_refused(lines: list[str], text: str)
 
 @for_all('line', [
     'TX 02 10 06',  # a count and two bytes, or three bytes
-    'TX 10 06    ABCD', 'TX: 10 0', 'TX 10 06 and more', 'COM1 opened', 'TX: 10:06', 'RX 1006 1'])
+    'TX 10 06    ABCD', 'TX  41 42 43  A-C', 'TX: 10 0', 'TX 10 06 and more', 'COM1 opened', 'TX: 10:06', 'RX 1006 1'])
 def test_what_can_be_read_in_two_ways_is_refused(line: str) -> None:
     with pytest.raises(Problem, match='is not a hexadecimal dump'):
         assert read(iter(['TX: 10 05', line])) == []
@@ -212,7 +212,7 @@ def test_direction_holds_for_lines_without_one_until_the_next() -> None:
 
 
 @for_all('line', [
-    '19:00:00.100 ttyS1', 'written and read:', 'in, out: 10 06',
+    '19:00:00.100', '19:00:00.100 ttyS1', 'written and read:', 'in, out: 10 06',
     'uint8_t data[] = { 0x10, 0x06 };'])
 def test_direction_does_not_hold_beyond_a_line_that_does_not_say_which(line: str) -> None:
     chunks = read(iter(['TX: 10 02', line, '10 06']))

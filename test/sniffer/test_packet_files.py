@@ -173,7 +173,7 @@ def test_segments_are_put_together_and_those_that_come_again_are_dropped(tmp_pat
              (b'lost before this', 9999, 0x18), (data, 20000, 0x18),
              (data[:40], 21000, 0x18), (data[40:], 21040, 0x18),  # what is complete at its end
              (b'', 4999, 0x02), (data, 5000, 0x18)]  # the same ports in a later connection
-    packets = [(float(at), ethernet(tcp(part, 0xFFFFFFF0 + number, flags=flags)))
+    packets = [(100.0 + at, ethernet(tcp(part, 0xFFFFFFF0 + number, flags=flags)))
                for at, (part, number, flags) in enumerate(parts)]
     found = chunks_of(tmp_path / 'x', pcap(packets))
     assert [(chunk.time, chunk.data[4:6].hex()) for chunk in found] == [
@@ -239,6 +239,7 @@ def test_serial_port_recorded_by_an_rtac_is_read(tmp_path: Path) -> None:
     head = bytes.fromhex('5BBE0468 00016378')
     packets = [(at + count * 32.0, head + bytes((event, 0, 0, 0)) + part) for count in range(3)
                for at, event, part in ((0.0, 4, sent[0]), (0.001, 4, sent[1]), (1.0, 0, b'x'))]
+    packets.append((100.0, b'short'))
     entries = entries_of(chunks_of(tmp_path / 'x', pcap(packets, link_type=250)))
     commands = [entry for entry in entries if entry.kind is Kind.COMMAND]
     assert [entry.text for entry in commands] == [

@@ -204,7 +204,7 @@ def test_frame_that_breaks_off_does_not_swallow_what_comes_after_a_pause() -> No
 
 def test_unknown_symbol_is_shown_with_its_code() -> None:
     (entry,) = decode([(IN, b'\x10\x1b')])
-    assert (entry.kind, entry.text) == (Kind.UNKNOWN, 'DLE 1B')
+    assert (entry.kind, entry.text, entry.station) == (Kind.UNKNOWN, 'DLE 1B', None)
 
 
 def test_master_resets_the_line() -> None:
