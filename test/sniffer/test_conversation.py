@@ -162,3 +162,6 @@ def test_packet_that_was_sent_again_is_remembered_from_then_on() -> None:
     assert copies.mark(again._replace(tns=100), 1.6, Direction.IN) is None  # too many since then
     assert copies.mark(again._replace(tns=314), -20.0, Direction.IN) is None  # another recording
     assert copies.mark(again._replace(tns=314), None, Direction.IN) is Mark.RETRANSMISSION
+    copies = Copies()  # of a node that repeats its own message soon
+    assert [copies.mark(again, time, Direction.OUT) for time in (0.0, 0.5)] == [
+        None, Mark.RETRANSMISSION]

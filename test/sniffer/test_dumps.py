@@ -78,6 +78,7 @@ def test_lines_left_out_by_hexdump() -> None:
     assert '*' in hexdump(data)
     assert joined(hexdump(data)) == data
     assert joined(['00000000']) == bytes(4)  # there is no offset without bytes before it
+    assert joined([*xxd(b'\x10\x05'), '0601ff10']) == bytes.fromhex('1005 0601ff10')
     data = bytes(160)  # the last line is whole, so the offset alone ends the repetition
     assert hexdump(data)[1:] == ['*', '000000a0']
     assert joined(hexdump(data)) == data
@@ -92,7 +93,7 @@ def test_offset_that_cannot_follow_what_was_left_out(offset: str) -> None:
             next(chunks)
 
 
-@for_all('line', ['10 5', 'hello', '0000000 0510 ff01', '1 2 3', '*'])
+@for_all('line', ['10 5', 'hello', '0000000 0510 ff01', '1 2 3', '*', '00000000: 1x'])
 def test_bad_line_is_named(line: str) -> None:
     for before in {'10 04', '00000000: 1004  ..'} if line != '*' else {'10 04'}:
         with pytest.raises(Problem, match='is not a hexadecimal dump; write bytes as') as caught:
@@ -117,6 +118,9 @@ def test_kinds_of_files_are_told_apart(tmp_path: Path) -> None:
 
 def test_binary_of_any_size_is_read_whole(tmp_path: Path) -> None:
     assert b''.join(chunk.data for chunk in chunks(tmp_path / 'x', DATA * 100, True)) == DATA * 100
+    recording = Recording(tmp_path / 'x', is_binary=True)
+    first, *_, last = (recording.percent for _ in recording.chunks())
+    assert (first, last) == (15, 100)
 
 
 def test_line_of_1_mb_is_read_and_a_longer_one_refused(tmp_path: Path) -> None:

@@ -184,7 +184,8 @@ def test_words_whose_offsets_do_not_fit_are_refused(lines: list[str], text: str)
 
 @for_all('line', [
     'TX 02 10 06',  # a count and two bytes, or three bytes
-    'TX 10 06    ABCD', 'TX  41 42 43  A-C', 'TX: 10 0', 'TX 10 06 and more', 'COM1 opened', 'TX: 10:06', 'RX 1006 1'])
+    'TX 10 06    ABCD', 'TX  41 42 43  A-C', 'TX: 10 0', 'TX 10 06 and more', 'COM1, opened',
+    'TX: 10:06', 'RX 1006 1'])
 def test_what_can_be_read_in_two_ways_is_refused(line: str) -> None:
     with pytest.raises(Problem, match='is not a hexadecimal dump'):
         assert read(iter(['TX: 10 05', line])) == []

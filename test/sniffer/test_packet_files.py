@@ -185,17 +185,21 @@ def test_segments_are_put_together_and_those_that_come_again_are_dropped(tmp_pat
     assert [chunk.time for chunk in chunks_of(tmp_path / 'x', pcap(halves))] == [0, *4 * [9], 10]
 
 
-@for_all(('cuts', 'order'), [  # 58 bytes a message
-    ([(0, 30), (90, 200), (30, 60), (60, 90), (200, 232)], (0, 1, 2, 3)),
-    ([(0, 30), (116, 174), (116, 174), (30, 116), (174, 232)], (2, 0, 1, 3)),  # whole, twice
-    ([(0, 30), (58, 200), (200, 232)], (1, 2, 3))])  # the rest of the first is lost
+@for_all(('cuts', 'found'), [  # 58 bytes a message; found are messages, and their times
+    ([(0, 30), (90, 200), (30, 60), (60, 90), (200, 232)], ((0, 2), (1, 3), (2, 3), (3, 4))),
+    ([(0, 30), (116, 174), (116, 174), (30, 116), (174, 200), (200, 232)],  # whole, twice
+     ((2, 1), (0, 3), (1, 3), (3, 5))),
+    ([(0, 30), *((at, at) for at in range(99, 109)), (30, 99), (99, 232)],  # without data
+     ((0, 11), (1, 12), (2, 12), (3, 12))),
+    ([(0, 30), (58, 200), (200, 232)], ((1, 2), (2, 2), (3, 2)))])  # the rest of 0 is lost
 def test_segments_that_come_out_of_order_lose_no_message(
-        tmp_path: Path, cuts: list[tuple[int, int]], order: tuple[int, ...]) -> None:
+        tmp_path: Path, cuts: list[tuple[int, int]], found: tuple[tuple[int, int], ...]) -> None:
     whole = b''.join(encapsulated(cip(STATUS[:2] + bytes((number, 1)) + STATUS[4:]))
                      for number in range(4))
     packets = [(float(at), ethernet(tcp(whole[first:end], 0xFFFFFF80 + first)))
                for at, (first, end) in enumerate(cuts)]
-    assert [chunk.data[4] for chunk in chunks_of(tmp_path / 'x', pcap(packets))] == [*order]
+    assert [(chunk.data[4], chunk.time)
+            for chunk in chunks_of(tmp_path / 'x', pcap(packets))] == [*found]
 
 
 def test_two_plcs_whose_addresses_end_alike_are_two_stations(tmp_path: Path) -> None:
@@ -280,6 +284,7 @@ def test_csp_is_named(tmp_path: Path) -> None:
     ethernet(tcp(encapsulated(bytes.fromhex('4B 02 20 67 24 01')), 0)),
     ethernet(tcp(encapsulated(bytes.fromhex('52 02 20 06 24 01 05 F9 00 00')), 0)),
     ethernet(tcp(encapsulated(cip(b'\x06')), 0)),
+    ethernet(tcp(encapsulated(cip(STATUS).replace(b'\x4B\x02', b'\x4C\x02')), 0)),
     ethernet(tcp(encapsulated(cip(STATUS).replace(b'\x20\x67', b'\x20\x04')), 0)),
     ethernet(tcp(encapsulated(cip(STATUS, is_reply=True)), 0, to_plc=False)),
     ethernet(tcp(encapsulated(cip(STATUS)), 0).replace(b'\xAF\x12', b'\x01\x02'))])

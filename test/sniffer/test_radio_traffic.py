@@ -121,7 +121,7 @@ def plain(count: int, *between: bytes) -> Iterator[Chunk]:
 
 def test_mode_is_found_where_replies_come_without_symbols() -> None:
     session = TrafficDecoder()
-    sniffed(plain(2), session)
+    sniffed([*plain(2), [*plain(2)][-1]], session)  # the same reply again shows nothing
     assert session.kind.duplex is Duplex.FULL
     sniffed(plain(3), session)
     assert session.kind.duplex is Duplex.RADIO

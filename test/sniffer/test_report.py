@@ -114,6 +114,15 @@ def test_json_has_all_that_the_summary_tells(summary: Summary) -> None:
     assert (nothing['check'], nothing['duplex'], nothing['load']) == (None, None, None)
 
 
+def test_what_is_not_known_is_left_out() -> None:
+    summary = Summary()
+    summary.take(Chunk(None, IN, b'x'))
+    assert [*summary_lines(summary, LineKind(None, None))] == [
+        'summary: 1 bytes', '  seen: none', '  faults: none']
+    assert json.loads(json_line(POLL)) == {
+        'direction': '?', 'kind': 'poll', 'station': 16, 'check': 'BCC', 'valid': True}
+
+
 def test_entries_are_counted_for_the_line_and_for_their_station() -> None:
     summary = Summary()
     for entry in (
