@@ -111,6 +111,9 @@ def test_older_capture_is_put_aside(tmp_path: Path) -> None:
         writer.close()
     assert chunks_of(path) == CHUNKS[2:]
     assert chunks_of(tmp_path / 'x.1') == CHUNKS[1:2]
+    path.unlink()
+    capture.CaptureWriter(path).close()
+    assert chunks_of(tmp_path / 'x.1') == CHUNKS[1:2]
 
 
 def test_others_cannot_read_a_capture(tmp_path: Path) -> None:

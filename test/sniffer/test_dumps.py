@@ -113,7 +113,10 @@ def test_kinds_of_files_are_told_apart(tmp_path: Path) -> None:
     assert chunks(path, b'# abdf1_ros capture 1\r\n0.5 > 10 05 01 FF\r\n') == [
         Chunk(0.5, Direction.OUT, poll.data)]
     assert chunks(path, b'\x1f\x8b', True)[0].data == b'\x1f\x8b'  # though gzip begins so
+    assert chunks(path, b'0000000 0510 ff01\n0000004\n') == [poll]
     assert chunks(path, b'') == []
+    with pytest.raises(Problem, match='x:2: this is not text; for a file of raw bytes give --bin'):
+        chunks(path, b'10 05\n\xe9\n')
 
 
 def test_binary_of_any_size_is_read_whole(tmp_path: Path) -> None:

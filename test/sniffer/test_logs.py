@@ -185,7 +185,7 @@ def test_words_whose_offsets_do_not_fit_are_refused(lines: list[str], text: str)
 @for_all('line', [
     'TX 02 10 06',  # a count and two bytes, or three bytes
     'TX 10 06    ABCD', 'TX  41 42 43  A-C', 'TX: 10 0', 'TX 10 06 and more', 'COM1, opened',
-    'TX: 10:06', 'RX 1006 1'])
+    'TX: 10:06', 'RX 1006 1', 'port 10 06'])
 def test_what_can_be_read_in_two_ways_is_refused(line: str) -> None:
     with pytest.raises(Problem, match='is not a hexadecimal dump'):
         assert read(iter(['TX: 10 05', line])) == []
@@ -197,6 +197,7 @@ def test_characters_that_look_like_bytes_stay_characters() -> None:
                  f'TX   0000  {data.hex(" ")}   {characters(data)}'):
         chunk, = read(iter([line]))
         assert (chunk.data, chunk.direction) == (data, OUT)
+    assert [chunk.data for chunk in read(iter(['TX  41 10 43  A_C']))] == [b'A\x10C']
 
 
 def test_time_of_day_goes_on_after_midnight() -> None:

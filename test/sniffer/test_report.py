@@ -59,7 +59,8 @@ def test_entry_has_its_line_of_text(entry: Entry, text: str) -> None:
 
 @for_all(('entry', 'shade'), [
     (COMMAND, '\x1b[33m'), (REFUSAL, '\x1b[31m'), (DAMAGED, '\x1b[31m'), (POLL, '\x1b[2m'),
-    (NOISE, '\x1b[31m'), (replace(POLL, valid=False), '\x1b[31m')])
+    (NOISE, '\x1b[31m'), (Entry(0.0, IN, Kind.SILENCE), '\x1b[33m'),
+    (replace(POLL, valid=False), '\x1b[31m')])
 def test_line_has_the_colour_of_its_kind(entry: Entry, shade: str) -> None:
     assert text_line(entry, colour=True) == f'{shade}{text_line(entry)}\x1b[0m'
     assert text_line(REPLY, colour=True) == text_line(REPLY)
@@ -153,7 +154,7 @@ def _heard(summary: Summary) -> Summary:
 
 @for_all(('baud', 'duplex', 'load'), [
     (9600, Duplex.HALF, 0.5), (9600, Duplex.FULL, 0.3125), (9600, None, 0.5),
-    (4800, Duplex.HALF, 1.0), (1200, Duplex.HALF, None), (None, Duplex.HALF, None)])
+    (4800, Duplex.HALF, 1.0), (4000, Duplex.HALF, None), (None, Duplex.HALF, None)])
 def test_load_is_known_where_baud_and_duplex_are(
         baud: int | None, duplex: Duplex | None, load: float | None) -> None:
     summary = _heard(Summary(baud))

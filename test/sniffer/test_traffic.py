@@ -195,8 +195,8 @@ def test_frame_that_breaks_off_does_not_swallow_what_comes_after_a_pause() -> No
     said = [(OUT, master(COMMAND)[:12]), (OUT, frames.poll_frame(1))]
     assert kinds(decode(said, pause=1.0)) == [Kind.DAMAGED, Kind.SILENCE, Kind.POLL]
     last, = decode(said[:1])
-    assert (last.time, last.kind, last.text, last.wire) == (
-        0.0, Kind.DAMAGED, 'broken off before DLE ETX', said[0][1])
+    assert (last.time, last.kind, last.station, last.text, last.wire) == (
+        0.0, Kind.DAMAGED, 1, 'broken off before DLE ETX', said[0][1])
     assert kinds(decode(said, pause=0.1)) == [Kind.DAMAGED, Kind.SILENCE, Kind.POLL]
     assert kinds(decode([(OUT, b'\x10'), said[1]], pause=-1.0)) == [
         Kind.NOISE, Kind.POLL]
@@ -205,6 +205,8 @@ def test_frame_that_breaks_off_does_not_swallow_what_comes_after_a_pause() -> No
 def test_unknown_symbol_is_shown_with_its_code() -> None:
     (entry,) = decode([(IN, b'\x10\x1b')])
     assert (entry.kind, entry.text, entry.station) == (Kind.UNKNOWN, 'DLE 1B', None)
+    *_, entry = decode([(UNKNOWN, frames.poll_frame(1)), (UNKNOWN, b'\x10\x1b')])
+    assert (entry.direction, entry.station) == (UNKNOWN, 1)
 
 
 def test_master_resets_the_line() -> None:
