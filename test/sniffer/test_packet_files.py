@@ -301,7 +301,8 @@ HEAD = bytes.fromhex(
 
 def written(path: Path, *entries: Entry, begun: str = '') -> bytes:
     writer = PcapngWriter(str(path))
-    writer.begin(begun)
+    for moment in ('2000-01-01T00:00:00+00:00', begun):
+        writer.begin(moment)
     for entry in entries:
         writer.write(entry)
     writer.close()

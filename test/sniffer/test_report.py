@@ -116,7 +116,7 @@ def test_json_has_all_that_the_summary_tells(summary: Summary) -> None:
 
 
 def test_what_is_not_known_is_left_out() -> None:
-    summary = Summary()
+    summary = Summary(9600)
     summary.take(Chunk(None, IN, b'x'))
     assert [*summary_lines(summary, LineKind(None, None))] == [
         'summary: 1 bytes', '  seen: none', '  faults: none']

@@ -163,6 +163,8 @@ def test_full_duplex_traffic_is_told_in_both_directions() -> None:
     assert [entry.text for entry in entries[4:6]] == [
         'refuses the message', 'asks for the last answer']
     assert [entry.station for entry in entries if entry.packet] == [1, 1, 5, 5]
+    entries = decode(one_wire([(OUT, message(COMMAND)), (IN, frames.ACK), (IN, whole)]))
+    assert [entry.direction for entry in entries] == [UNKNOWN] * 3
 
 
 # Full duplex with CRC, as public pages print what real processors said: triplc.com, forum topic
