@@ -266,6 +266,28 @@ class Window:
     nodelay = erase = refresh = clearok = _ignore
 
 
+def test_keys_move_the_picture(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr('curses.has_colors', lambda: False)
+    window = Window()
+    screen = Screen(window)  # type: ignore[arg-type]
+    picture = [TextLine(f'line {number}', section='link' * (number == 30)) for number in range(60)]
+    for keys, first, last in (
+            ([], 0, 22), ([curses.KEY_DOWN, curses.KEY_DOWN], 2, 24), ([curses.KEY_UP], 1, 23),
+            ([curses.KEY_NPAGE], 23, 45), ([ord(' ')], 37, 59), ([curses.KEY_PPAGE], 15, 37),
+            ([ord('l')], 30, 52), ([ord('v'), ord('x'), -1, ord('q')], 30, 52),
+            ([curses.KEY_END], 37, 59), ([curses.KEY_HOME, curses.KEY_UP], 0, 22)):
+        window.keys = keys
+        assert not screen.wants_end()
+        screen.show(picture)
+        assert [window.drawn[row][0] for row in (0, 22, 23)] == [
+            f'line {first}', f'line {last}', f'{first + 1}-{last + 1} of 60  q:end v:values '
+            'r:reasons w:writes l:link s:stations c:counters']
+    window.keys = [ord('x'), ord('q')]
+    assert screen.wants_end()
+    screen.show(picture[:3])
+    assert window.drawn[23][0].startswith('1-3 of 3  ')
+
+
 def test_mark_stays_at_its_line_where_others_come(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr('curses.has_colors', lambda: False)
     window = Window()
