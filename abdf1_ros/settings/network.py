@@ -49,6 +49,7 @@ MODE_NAMES = tuple(dict.fromkeys(mode.name for mode in MODES))
 _Cell = TypeVar('_Cell', int, str, bool)
 POLLING_MODES = tuple(mode.polling for mode in MODES if mode.polling)
 _HOST = re.compile(r'(?P<scheme>\w+://)?(?P<host>(?!tcp:)[\w.-]+?)(?P<port>:\d{2,5})?')
+_MOST_PORT = 65535
 PLC_TYPES = tuple(entry.value for entry in FAMILIES)
 # Schemes of the URLs of device servers; each has a module in ``ports``.
 DEVICE_SERVERS = ('socket', 'rfc2217')
@@ -327,6 +328,8 @@ def _port_fault(text: str) -> str:
     match = _HOST.fullmatch(text)
     if match and match['port'] and not _is_host(match['host']):
         advice = f'"{shown(match["host"])}" is not the name of a host'
+    elif match and match['port'] and int(match['port'][1:]) > _MOST_PORT:
+        advice = f'a port is at most {_MOST_PORT}'
     elif match and match['port']:
         advice = f'write socket://{shown(match["host"])}{match["port"]}'
     elif match and match['scheme']:

@@ -209,6 +209,7 @@ def _refused(capsys: Output, *options: str, status: int = 2) -> str:
     (('--tcp', '192.0.2.1:0'), 1, '--tcp "192.0.2.1:0": Cannot assign requested address'),
     (('--port', '/nowhere/tty'), 1, '/nowhere/tty: No such file or directory'),
     (('--port', '/dev/null'), 1, '/dev/null: this is not a serial port'),
+    (('--port', 'socket://x'), 2, '--port: Com_Port = "socket://x" should be '),
     (('--port', 'socket://127.0.0.1:1'), 1, 'socket://127.0.0.1:1: Connection refused')])
 def test_what_cannot_be_had_is_told_at_once(
         capsys: Output, data: Path, options: tuple[str, ...], status: int, text: str) -> None:

@@ -224,6 +224,8 @@ PORT = ('should be a number from 1, a device path such as /dev/ttyUSB0, socket:/
                                       'write socket://192.168.0.9:4001']),
     ('Com_Port\ntcp://plc:4001\n', [f'!2:1 (Com_Port): Com_Port = "tcp://plc:4001" {PORT}; '
                                     'write socket://plc:4001']),
+    ('Com_Port\nsocket://plc:65536\n', [
+        f'!2:1 (Com_Port): Com_Port = "socket://plc:65536" {PORT}; a port is at most 65535']),
     ('Com_Port\nsocket://192.168.0.9\n', [
         f'!2:1 (Com_Port): Com_Port = "socket://192.168.0.9" {PORT}; the port is missing, as in '
         'socket://192.168.0.9:4001']),
