@@ -79,13 +79,15 @@ def test_colour_is_for_terminals_that_want_it(monkeypatch: pytest.MonkeyPatch) -
     assert not is_terminal(Screen())
 
 
-def test_question_without_a_terminal_and_text_without_a_colour_are_only_told(
+def test_question_without_a_terminal_is_only_told_and_text_has_its_colour(
         monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
     monkeypatch.setattr('sys.stdin', io.StringIO('y\n'))
     monkeypatch.setattr('sys.stderr', Screen())
     assert not is_wanted('set it')
     tell('tool', 'text')
-    assert (capsys.readouterr().out, sys.stderr.getvalue()) == ('would set it\n', 'tool: text\n')
+    tell('tool', 'bad', RED)
+    assert (capsys.readouterr().out, sys.stderr.getvalue()) == (
+        'would set it\n', 'tool: text\n\x1b[31mtool: bad\x1b[0m\n')
 
 
 def test_empty_file_may_be_replaced(tmp_path: Path) -> None:
@@ -241,7 +243,8 @@ def test_port_that_cannot_be_opened_leads_to_the_cure(number: int, text: str) ->
     (['--baudrate=9600'], '--baudrate=9600; did you mean --baud?'),
     (['-p'], '-p; did you mean --port or --parity?'), (['--zzz'], '--zzz'),
     (['more'], 'more; it takes only options'),
-    (['/dev/x'], '/dev/x; did you mean --port /dev/x?')])
+    (['/dev/x'], '/dev/x; did you mean --port /dev/x?'),
+    (['ttyS0'], 'ttyS0; did you mean --port ttyS0?')])
 def test_option_that_may_be_meant(
         given: list[str], meant: str, capsys: pytest.CaptureFixture[str]) -> None:
     parser = command_parser('tool', None)
@@ -259,6 +262,7 @@ def test_option_that_may_be_meant(
     ('?', 'STATIONS', ['1', '2', '3'], '2 3; it takes one STATIONS; a list has commas, as '
                                        'in 1,2,3'),
     ('?', 'STATION', ['1', '2'], '2; it takes one STATION'),
+    ('?', 'STATION', ['--station', '1'], '--station; did you mean STATION without --station?'),
     ('+', 'ADDRESS', ['a', '--net', 'n', 'b'], 'b; these stand together, before or after all '
                                                'options')])
 def test_words_that_are_too_many_are_told_where_they_belong(
