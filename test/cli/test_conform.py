@@ -15,14 +15,18 @@
 """The command ``conform``, against a simulated PLC on a pseudo-terminal."""
 
 from collections.abc import Iterator, Sequence
+from contextlib import suppress
 import json
 from pathlib import Path
 import re
+import threading
 import time
 
 from abdf1_ros.cli.conform import main
+from abdf1_ros.client import Client
 from abdf1_ros.conform.case import Case, CaseResult, Permission, Verdict
 from abdf1_ros.conform.wire import Wire
+from abdf1_ros.errors import Abdf1Error
 import pytest
 from support.cases import for_all
 from support.commands import Output, running_simulator
@@ -71,8 +75,10 @@ def test_failure_is_the_exit_status_and_shows_the_bytes(
 def test_report_is_markdown(port: str, capsys: Output) -> None:
     assert main(['slave', '--port', port, '--report', *QUICK]) == 0
     text = capsys.readouterr().out
-    assert text.startswith('### Conformance run\n')
-    assert '- processor: SLC 5/0' in text
+    assert text.startswith(
+        '### Conformance run\n\n- target: slave\n- processor: SLC 5/03 series A revision 1, REM '
+        'RUN\n- station: 1\n- check: CRC\n- port: serial\n- baud: 9600\n- parity: None\n'
+        '- answer time: 1 s\n- abdf1_ros: ')
     row = text.splitlines()[-1]
     assert row.startswith('| SLC 5/0') and row.count('|') == 8
     assert '| serial | CRC, 9600 | conform slave: 2 passed, 0 failed, 1 skipped |' in row
@@ -137,6 +143,31 @@ def test_simulator_is_a_node_of_a_radio_network_and_not_a_peer(
         simulator.wait_for('simulator: station 1: silent')
         assert main(['radio', *options, 'read-words', '--answer-time', '0.1']) == 1
         assert 'no byte was received' in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(('target', 'duplex', 'case'), [
+    ('master', 'half', 'poll-form'), ('client', 'full', 'reply-acknowledged')])
+def test_program_that_reads_is_answered_as_a_plc_answers(
+        tmp_path: Path, target: str, duplex: str, case: str, capsys: Output) -> None:
+    link, over, read = str(tmp_path / 'line'), threading.Event(), list[object]()
+
+    def ask() -> None:
+        while not over.wait(0.02):
+            with suppress(Abdf1Error), Client(link, plc_type='SLC', station=2,
+                                              duplex=duplex) as plc:
+                while not over.is_set():
+                    read.append(plc.read('N7:0'))
+
+    asking = threading.Thread(target=ask)
+    asking.start()
+    try:
+        assert main([target, '--pty', link, '--station', '2', '--only', case]) == 0
+    finally:
+        over.set()
+        asking.join()
+    said = capsys.readouterr()
+    assert said.out.endswith('1 passed, 0 failed, 0 skipped\n') and link in said.err
+    assert read
 
 
 @pytest.mark.parametrize(('args', 'status', 'text'), [
