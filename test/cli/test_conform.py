@@ -112,8 +112,9 @@ def test_failures_skips_noise_and_early_enquiries_are_told(
 def test_nobody_there_is_said(tmp_path: Path, capsys: Output) -> None:
     dead = Pty(tmp_path / 'dead')
     assert main(['slave', '--port', str(dead.name), '--answer-time', '0.05', '--only',
-                 'poll-idle']) == 1
-    assert 'no byte was received' in capsys.readouterr().err
+                 'poll-idle', '--report']) == 1
+    said = capsys.readouterr()
+    assert 'no byte was received' in said.err and '\n- processor: not known\n' in said.out
     dead.close()
 
 
