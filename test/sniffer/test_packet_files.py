@@ -202,6 +202,16 @@ def test_segments_that_come_out_of_order_lose_no_message(
             for chunk in chunks_of(tmp_path / 'x', pcap(packets))] == [*found]
 
 
+@pytest.mark.parametrize(('count', 'found'), [(1000, 1), (1001, 0)])
+def test_unfinished_messages_of_a_thousand_connections_are_kept(
+        tmp_path: Path, count: int, found: int) -> None:
+    data = encapsulated(cip(STATUS))
+    parts = [*((port, data[:40], 0) for port in range(count)), (0, data[40:], 40)]
+    packets = [(0.0, ethernet(tcp(part, number).replace(b'\xC3\x50', port.to_bytes(2, 'big'))))
+               for port, part, number in parts]
+    assert len(chunks_of(tmp_path / 'x', pcap([*packets, exchange()[0]]))) == found + 1
+
+
 def test_two_plcs_whose_addresses_end_alike_are_two_stations(tmp_path: Path) -> None:
     packets = [(0.0, ethernet(tcp(encapsulated(cip(STATUS)), 1))),
                (0.1, ethernet(tcp(encapsulated(cip(STATUS)), 1, net=7))),
