@@ -76,7 +76,7 @@ def test_bars_are_in_proportion_to_their_times() -> None:
         Bar(40, 100, Look.WAIT, 'y', row=1)], rows=2)], 20, 100, 'ms', limit=40))
     (first,), (second,), (limit,) = ([rect for _, rect in svg.found if rect.get('class') == look]
                                      for look in ('ask', 'wait', 'limit'))
-    assert float(first['x']) == NAMES
+    assert (float(first['x']), svg.found[0][1]['height']) == (NAMES, '54')
     assert float(second['x']) == pytest.approx(NAMES + float(first['width']), abs=0.2)
     assert float(second['width']) == pytest.approx(3 * float(first['width']), abs=0.2)
     assert (int(second['y']) - int(first['y']), limit['x1']) == (14, second['x'])

@@ -95,8 +95,9 @@ def test_faults_come_as_episodes_that_lead_to_their_strip(tmp_path: Path, capsys
     found = drawn(tmp_path, capsys, capture(
         tmp_path / 'line.cap', exchange(0.1, 1), silence(1.2), exchange(2.0, 2, sts=0x10),
         silence(5.4), silence(9.6), silence(9.7, station=4),
-        [(30.0, '>', 2 * frames.poll_frame(3))], exchange(30.1, 3)))
-    assert '7 faults on the line' in found.texts
+        [(30.0, '>', 2 * frames.poll_frame(3))], exchange(30.1, 3), [(31.0, '<', b'\x55')],
+        exchange(31.1, 4)))
+    assert '8 faults on the line' in found.texts and 'None' not in found.texts
     links = [attributes['href'] for tag, attributes in found.found if tag == 'a']
     names = {attributes['id'] for tag, attributes in found.found
              if tag == 'svg' and 'id' in attributes}
@@ -108,7 +109,7 @@ def test_faults_come_as_episodes_that_lead_to_their_strip(tmp_path: Path, capsys
     assert [text for text in told[at + 7:] if text.startswith('reply: ')][0].startswith(
         'reply: 2 to 5, TNS 0002: STS 10')
     assert told.count('silence: no answer to the poll') == 3
-    assert found.found.count(('td', {'class': 'number'})) == 4 * 4
+    assert found.found.count(('td', {'class': 'number'})) == 4 * 5
     assert '30.000 s' in told  # two polls in one chunk
     radio, = FOLDER.glob('radio*.cap')  # 38 messages are forwarded, which is no fault
     assert '7 faults on the line' in drawn(tmp_path, capsys, str(radio)).texts
@@ -129,22 +130,24 @@ def test_table_of_episodes_tells_that_there_are_more(
 def test_overview_has_the_worst_of_each_moment_and_a_link_to_it(
         tmp_path: Path, capsys: Output) -> None:
     found = drawn(tmp_path, capsys, capture(
-        tmp_path / 'line.cap', exchange(10.1, 1), exchange(15.1, 2, sts=0x10),
+        tmp_path / 'line.cap', exchange(10.1, 1, station=7), exchange(15.1, 2, sts=0x10),
         exchange(17.2, 3, station=7), silence(17.9), exchange(2100.5, 4)), '--baud', '4800')
     # A strip has 4 s at this speed, and a bar three of 524 strips.
     assert [text for text in found.texts if ' seen, ' in text] == [
-        'station 2, 8 to 16 s 14:05:17: 10 seen, 1 fault',
+        'station 2, 12 to 16 s 14:05:21: 5 seen, 1 fault',
         'station 2, 2100 to 2104 s 14:40:09: 5 seen, 0 faults',
         'station 3, 16 to 20 s 14:05:25: 1 seen, 0 faults',
         'station 3, 2100 to 2104 s 14:40:09: 1 seen, 1 fault',
-        'station 7, 16 to 20 s 14:05:25: 5 seen, 0 faults']
+        'station 7, 8 to 20 s 14:05:17: 10 seen, 0 faults']
+    assert found.texts[found.texts.index('station 2'):][:6:2] == [
+        'station 2', 'station 3', 'station 7']
     links = [each['href'] for tag, each in found.found if tag == 'a'][:5]
-    assert links == ['#r1s3', '#r1s525', '#r1s4', '#r1s525', '#r1s4']
+    assert links == ['#r1s3', '#r1s525', '#r1s4', '#r1s525', '#r1s2']
     assert [(each['class'], each['x'], each['y'], each['width']) for _, each in found.found
             if each.get('class', 'lane') != 'lane' and 'y' in each][:5] == [
-        ('bad', '110.0', '1', '3.9'), ('answer', '1138.0', '1', '2.0'),
+        ('bad', '112.0', '1', '2.0'), ('answer', '1138.0', '1', '2.0'),
         ('small', '113.9', '29', '2.0'), ('missing', '1138.0', '29', '2.0'),
-        ('answer', '113.9', '57', '2.0')]
+        ('answer', '110.0', '57', '5.9')]
     assert found.texts.count('14:05:17') == 2  # of the overview, and of its first strip
 
 
@@ -189,6 +192,10 @@ def test_recordings_one_after_the_other_and_without_times(tmp_path: Path, capsys
     assert [text for text in found.texts if text.startswith('byte ')] == ['byte 4', 'byte 2162']
     assert found.bars('ask') == 45
     assert {'r1s0', 'r1s1'} <= {element.get('id') for _, element in found.found}
+    raw.write_bytes(exchange(0.1, 1)[3][2])  # a reply without its command, in the lower row
+    found = drawn(tmp_path, capsys, '--binary', '--duplex', 'full', str(raw))
+    assert [each['y'] for _, each in found.found if each.get('class') == 'odd'
+            and 'y' in each] == ['1', '15']
 
 
 def test_names_are_text_and_nothing_else(tmp_path: Path, capsys: Output) -> None:
