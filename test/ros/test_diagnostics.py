@@ -16,7 +16,9 @@
 
 from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
+import re
 import time
 from types import SimpleNamespace
 from typing import Any, cast
@@ -41,13 +43,13 @@ from abdf1_ros.messages import Event, Message
 from abdf1_ros.pccc.file_types import PlcType
 from abdf1_ros.pccc.identity import Identity, Mode
 from abdf1_ros.pccc.values import Values
+from abdf1_ros.plan.bounds import Times
 from abdf1_ros.ports.link_thread import LinkThread, PortState, RELEASED
 from abdf1_ros.ports.settings import PortSettings
 from abdf1_ros.ports.trace import PortOpener
 from abdf1_ros.ros.bridge.session import stations_of
 from abdf1_ros.ros.diagnostics.dds import LOST
 from abdf1_ros.ros.diagnostics.events import LineEvents
-from abdf1_ros.ros.diagnostics.guests import GuestsStatus
 from abdf1_ros.ros.diagnostics.line import LineView, takes_in_silence
 from abdf1_ros.ros.diagnostics.link import LinkStatus
 from abdf1_ros.ros.diagnostics.load import FullLine
@@ -58,7 +60,6 @@ from abdf1_ros.ros.diagnostics.writes import WriteLog
 from abdf1_ros.settings.map_file import load_mappings
 from abdf1_ros.settings.mapping import Command, Mapping
 from abdf1_ros.settings.network import Network
-from abdf1_ros.share.guest_line import GuestLine
 from abdf1_ros.simulator.simulated_plc import InjectedFaults
 from diagnostic_msgs.msg import DiagnosticStatus
 import pytest
@@ -158,10 +159,59 @@ def bench(make_bench: Benches) -> Bench:
     return make_bench()
 
 
-def test_table_changes_with_a_station_that_takes_no_commands(bench: Bench) -> None:
-    for is_active in (False, True):
-        bench.events.station_changed(Station(1, is_active, returns=5))
-    assert bench.tables == 2
+def test_each_event_is_logged_once_with_its_level(
+        bench: Bench, capfd: pytest.CaptureFixture[str]) -> None:
+    events, level = bench.events, bench.mapping('level')
+    bench.happened(Message.NTC_REPLY_MSG_RCVD, (7,), 2)
+    for station in (1, 1, 2):
+        bench.happened(Message.ERR_WRONG_MESSAGE, (station, 0, 7), station)
+    events.port_changed()
+    bench.happened(Message.NTC_NAK_LIMIT_EXCEEDED, (3,), 2)
+    bench.happened(Message.ERR_WRONG_MESSAGE, (2, 0, 8), 2)
+    for station, heard in ((1, NOW), (8, None), (9, None)):
+        bench.happened(Message.ERR_INACTIVE_STATION, (station,), station)
+        events.station_changed(Station(station, False, heard))
+    for returns in (5, 1):
+        events.station_changed(Station(1, True, returns=returns))
+    for tns in (8, 9):
+        bench.happened(Message.ERR_WRONG_MESSAGE, (1, 0, tns), 1)
+    assert bench.tables == 5
+    events.lost('level', 3)
+    events.ahead('level', 1.9, ['/a', '/b', '/c', '/d', '/e'])
+    events.ahead('lamp', 1.9, [])
+    bench.now = NOW + 3.0
+    events.unreadable(level, 'no file')
+    events.unreadable_rows.look(NOW + 3.9)
+    events.published_again(level, 2.5)
+    for is_conflict in (False, True):
+        events.foreign_value(level, 'odd', is_conflict)
+    wrong, early = '2510 ERR_WRONG_MESSAGE: Wrong Message Received Src:0x0', (
+        '; it may answer a command sent before the port was opened')
+    clock = 'is 1.90 s ahead of the clock here, so old messages look new'
+    logged = re.sub(r' \[[0-9.]+\] \[line_a\]:', '', ''.join(capfd.readouterr()))
+    assert logged.splitlines() == [
+        f'[INFO] {wrong}1, Dst:0x00, Tns:0x0007 [station 1]{early}',
+        f'[ERROR] {wrong}1, Dst:0x00, Tns:0x0007 [station 1]',
+        f'[ERROR] {wrong}2, Dst:0x00, Tns:0x0007 [station 2]',
+        '[INFO] 2519 NTC_NAK_LIMIT_EXCEEDED: NAK Retry Limit (3) exceeded [station 2]',
+        f'[INFO] {wrong}2, Dst:0x00, Tns:0x0008 [station 2]{early}',
+        '[ERROR] 2509 ERR_INACTIVE_STATION: Slave Station (1) Inactive',
+        '[ERROR] 2509 ERR_INACTIVE_STATION: Slave Station (8) Inactive [station 8]',
+        '[ERROR] 2509 ERR_INACTIVE_STATION: Slave Station (8) Inactive',
+        '[INFO] station 8 has never been heard: stop the node and run "plc detect" to find the '
+        'settings of the line, or "plc scan" to find the stations that answer',
+        '[ERROR] 2509 ERR_INACTIVE_STATION: Slave Station (9) Inactive [station 9]',
+        '[ERROR] 2509 ERR_INACTIVE_STATION: Slave Station (9) Inactive',
+        '[INFO] station 1 answers again',
+        f'[INFO] {wrong}1, Dst:0x00, Tns:0x0008 [station 1]{early}',
+        f'[ERROR] {wrong}1, Dst:0x00, Tns:0x0009 [station 1]',
+        '[WARN] ~/write/level: 3 messages were lost on their way here and have no result: the '
+        'publisher is too fast for this node, or the network was cut',
+        f'[WARN] ~/write/level: the clock of /a or /b or /c or /d {clock}',
+        f'[WARN] ~/write/lamp: the clock of a node that is gone {clock}',
+        '[ERROR] level (F8:4 at station 2): no file',
+        '[INFO] level (F8:4 at station 2): published again after 2.5 s',
+        '[WARN] level (F8:4 at station 2): odd', '[ERROR] level (F8:4 at station 2): odd']
 
 
 @pytest.mark.parametrize('mode, expected', [('Master', None), ('Radio', '2')])
@@ -351,10 +401,10 @@ def test_rates_are_those_since_the_last_look(bench: Bench) -> None:
     bench.status('link', NOW)
     bench.driver.tasks.transactions += 30
     bench.driver.counters.chars_sent += 480
-    bench.driver.counters.chars_received += 480
+    bench.driver.counters.chars_received += 960
     values = bench.details('link', NOW + 2)
-    assert values['transactions per second'] == '15.0'
-    assert values['line load'] == '50 %'  # 960 characters of 10 bits at 9600 baud, in 2 s
+    assert (values['port'], values['transactions per second']) == ('open', '15.0')
+    assert values['line load'] == '75 %'  # 1440 characters of 10 bits at 9600 baud, in 2 s
     assert values['settings'] == '9600 baud, 8 data bits, parity None, 1 stop bits, CRC'
     values = bench.details('link', NOW + 3)
     assert (values['transactions per second'], values['line load']) == ('0.0', '0 %')
@@ -471,8 +521,8 @@ def test_station_that_answers_polls_and_no_command(bench: Bench) -> None:
     assert bench.says('link') == (
         WARN, 'WARN: port open, but 1 of 2 stations answer polls and no command')
     stations.lost(1, NOW)  # it comes and goes
-    assert bench.says('station 1') == told
-    assert bench.says('station 1', NOW + 11) == (ERROR, 'ERROR: station 1 inactive for 11.0 s')
+    assert bench.says('station 1', NOW + 9.9) == told
+    assert bench.says('station 1', NOW + 10) == (ERROR, 'ERROR: station 1 inactive for 10.0 s')
     stations.heard(1, NOW + 12)
     stations[1].returns = 0  # by a reply
     assert bench.says('station 1', NOW + 12)[0] == OK
@@ -586,21 +636,22 @@ def test_mappings_from_the_start_until_they_are_stale(bench: Bench) -> None:
 def test_rows_that_cannot_keep_their_period_are_named_with_one_that_would_do(
         make_bench: Benches) -> None:
     bench = make_bench('fast,Read,N7:0,1,PLC5,100', 'slow,Read,N7:100,1,PLC5,1000',
-                       'free,Read,N9:0,1,PLC5,0', 'faster,Read,N9:100,1,PLC5,50')
+                       'free,Read,N9:0,1,PLC5,0', 'faster,Read,N9:100,1,PLC5,50',
+                       'asked,Read,N9:200,1,PLC5,on demand')
 
     def read_until(end: float, intervals: dict[str, float]) -> None:
         for tag, interval in intervals.items():
             for number in range(40, -1, -1):
                 bench.point(tag).update(b'\x01\x00', end - number * interval)
 
-    read_until(NOW, {'fast': 0.405, 'slow': 1.3, 'free': 2.0, 'faster': 0.206})
+    read_until(NOW, {'fast': 0.405, 'slow': 1.3, 'free': 2.0, 'faster': 0.206, 'asked': 9.0})
     assert bench.says('mappings', NOW) == (WARN, (
-        'WARN: of 4 mappings 4 fresh; Period not kept: faster (Period 50 ms, kept 206 ms), '
+        'WARN: of 5 mappings 5 fresh; Period not kept: faster (Period 50 ms, kept 206 ms), '
         'fast (Period 100 ms, kept 405 ms); the line can keep Period 1000'))
     assert 'Period' not in bench.says('mappings', NOW + 50)[1]  # no row is read any more
     read_until(NOW + 100, {'fast': 0.1, 'slow': 1.0, 'free': 2.0, 'faster': 0.1})
     assert bench.says('mappings', NOW + 100) == (WARN, (
-        'WARN: of 4 mappings 4 fresh; Period not kept: faster (Period 50 ms, kept 101 ms); '
+        'WARN: of 5 mappings 5 fresh; Period not kept: faster (Period 50 ms, kept 101 ms); '
         'the line can keep Period 200'))
 
 
@@ -718,20 +769,21 @@ def test_fallback_value_is_no_message_and_usual_at_start_and_end(
     assert told == level
     assert '0 of 0 writes confirmed' in text
     bench.written(result(bench, Outcome.WRITTEN), NOW)
-    bench.events.published_again(bench.mapping('speed'), 2.5)
-    logged, again = ''.join(capfd.readouterr()).splitlines()
-    assert again.endswith(' speed (N7:0 at station 1): published again after 2.5 s')
+    logged, = ''.join(capfd.readouterr()).splitlines()
     assert logged.startswith('[INFO] ' if level == OK else '[WARN] ')
     assert logged.endswith(f': fallback value written: {cause.value}')
 
 
 def test_heartbeat_that_the_plc_does_not_confirm_does_not_count(make_bench: Benches) -> None:
     bench = make_bench('alive,Heartbeat,N10:0,1,PLC5,500')
-    assert bench.says('interlocks')[1].endswith('alive: heartbeat does not count')
+    assert bench.says('interlocks')[1] == (
+        'WARN: 0 of 1 heartbeats count; alive: heartbeat does not count')
     beat = bench.driver.interlocks.heartbeats[0]
     beat.confirmed, beat.state, beat.value = NOW, BeatState.COUNTS, 1
     assert bench.says('interlocks', NOW) == (OK, 'OK: 1 of 1 heartbeats count')
-    assert bench.details('interlocks', NOW + 1.5)['station 1'] == 'heartbeat counts (for 1.5 s)'
+    values = bench.details('interlocks', NOW + 1.5)
+    assert values['station 1'] == 'heartbeat counts (for 1.5 s)'
+    assert values['alive'] == 'heartbeat 1, 1.5 s ago; counts'
     assert bench.says('interlocks', NOW + 1.6)[0] == WARN
     values = bench.details('interlocks', NOW + 4)
     assert values['alive'] == 'heartbeat 1, 4.0 s ago; does not count: not confirmed for 4.0 s'
@@ -780,18 +832,32 @@ def test_bit_of_the_plc_confirms_control_while_it_is_fresh_and_1(
         WARN, 'not in control: ruled is 1, but the PLC is in program mode (REM PROG)')
 
 
-def test_guests_that_are_connected_are_counted() -> None:
-    guests = [Guest('pty:a', is_connected=True), Guest('tcp:7')]
-    lines = [SimpleNamespace(guest=guest, fault='') for guest in guests]
-    status = GuestsStatus(cast(list[GuestLine], lines), PORT)
-    assert status.judge(NOW) == (OK, '1 of 2 guests are connected')
+def test_guests_are_counted_and_told_of(bench: Bench) -> None:
+    guests = [Guest('pty:a', is_connected=True, commands=1, slowest=0.25), Guest('tcp:7')]
+    lines: Any = [SimpleNamespace(guest=guest, fault='', state='open') for guest in guests]
+    bench.diagnostics = Diagnostics('line_a', bench.driver, PORT, bench.events, guests=lines)
+    status = bench.status('guests')
+    assert (status.level, status.message, status.hardware_id) == (
+        OK, 'OK: 1 of 2 guests are connected', PORT)
+    guests[1].commands = guests[1].refused = guests[1].collisions = 1
+    guests[0].refused = guests[0].unanswered = 2
+    guests[0].waiting.extend(cast(Any, range(3)))
+    assert bench.says('guests') == (WARN, (
+        'WARN: 1 of 2 guests are connected; 3 commands not allowed; 1 write to words of this '
+        'bridge'))
+    assert bench.details('guests') == {
+        'pty:a': 'open; 1 command, 2 not allowed, 2 without reply, 3 waiting, slowest 250 ms',
+        'tcp:7': 'open; 1 command, 1 not allowed, 0 without reply, 0 waiting, slowest unknown'}
     lines[1].fault = 'in use'
-    assert status.judge(NOW) == (ERROR, 'tcp:7: in use')
+    assert bench.says('guests') == (ERROR, 'ERROR: tcp:7: in use')
 
 
 def test_value_of_a_guest_over_a_fallback_is_a_warning(make_bench: Benches) -> None:
-    bench = make_bench('speed,Write,N10:1,1,PLC5,7,500',
-                       header='Tag,Command,Address,Station,PLC_Type,Fallback,Fallback_After')
+    line = partial(make_bench, 'speed,Write,N10:1,1,PLC5,7,500',
+                   header='Tag,Command,Address,Station,PLC_Type,Fallback,Fallback_After')
+    assert line(mode='Slave').details('interlocks') == {
+        'speed': 'a message stands', 'bound of speed': 'none: the master of the line decides'}
+    bench = line()
     row, = bench.driver.interlocks.fallbacks
     row.state = FallbackState.STANDS
     assert bench.says('interlocks')[0] == OK
@@ -800,7 +866,11 @@ def test_value_of_a_guest_over_a_fallback_is_a_warning(make_bench: Benches) -> N
     row.write_ended(guest, NOW)
     assert bench.says('interlocks') == (WARN, (
         'WARN: 0 of 0 heartbeats count; speed: a guest has written over the fallback value'))
-    assert bench.details('interlocks')['speed'] == 'a guest has written over the fallback value'
+    bound, = Times(bench.driver.network, bench.driver.mappings).bounds()
+    row.cause, row.refusal = FallbackCause.TIMEOUT, 'STS 10'
+    assert bench.details('interlocks') == {
+        'speed': 'a guest has written over the fallback value (timeout): STS 10',
+        'bound of speed': str(bound).partition(': ')[2]}
 
 
 def test_station_is_told_by_the_worst_of_its_heartbeats(make_bench: Benches) -> None:
@@ -824,6 +894,8 @@ def test_heartbeat_that_another_program_writes_is_an_error_with_what_it_wrote(
     text = 'N10:0: another program writes this word: 7 was read where 3 was written'
     bench.events.foreign_value(beat.mapping, text.removeprefix('N10:0: '), is_conflict=True)
     assert bench.details('interlocks')['station 1'] == f'not in control: {text}'
+    beat.state, beat.value = BeatState.COUNTS, 1
+    assert bench.details('interlocks')['station 1'].startswith('heartbeat counts')
 
 
 def test_last_fallback_value_of_a_station_is_told_with_its_cause(make_bench: Benches) -> None:

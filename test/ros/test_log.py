@@ -109,7 +109,7 @@ def test_cause_is_news_after_a_quiet_minute_and_its_repetitions_are_counted(
     text = '2508 ERR_COMMAND_TIMEOUT: Command Timed Out [station 2]'
     log.add(event(Message.ERR_COMMAND_TIMEOUT))
     for _ in range(3):
-        clock.now += 59.9
+        clock.now += 59.5
         log.add(event(Message.ERR_COMMAND_TIMEOUT))
     assert logged() == [('ERROR', text)]
     clock.now += 60.0

@@ -68,7 +68,7 @@ def has_network() -> bool:
     """Return True if a link other than loopback is up, has a carrier and an IPv4 address."""
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as asker:
         for _, name in socket.if_nameindex():
-            request = _REQUEST.pack(name.encode()[:15], 0)
+            request = _REQUEST.pack(name.encode(), 0)
             with suppress(OSError):  # the link has gone, or has no address
                 _, flags = _REQUEST.unpack(fcntl.ioctl(asker, _GET_FLAGS, request))
                 fcntl.ioctl(asker, _GET_ADDRESS, request)

@@ -82,13 +82,12 @@ class LinkStatus:
             return ERROR, f'port open, but none of {total} stations answers' + (
                 ', or the device server keeps this connection waiting' if '://' in self.hardware_id
                 else '')
-        unreached = sum(station.active and station.local_status != 0 for station in stations)
         silent = sum(map(takes_in_silence, stations))
         if silent and silent == active:
             return ERROR, f'port open, but none of {total} stations replies to commands'
         if active < total:
             return WARN, f'port open, {total - active} of {total} stations do not answer'
-        if unreached:
+        if unreached := sum(station.local_status != 0 for station in stations):
             return WARN, (f'port open, {unreached} of {total} stations are not reached by their '
                           'gateway')
         if silent:
