@@ -352,6 +352,8 @@ def test_fault_is_logged_when_it_begins_and_again_after_it_was_over(bench: Bench
     bench.driver.refused.add(command, command.reply(sts=0x10), NOW)
     assert [text[:24] for text in look(17.0)] == [
         'guest pty:a: in use', 'refused a command of sta', 'station 1 is an SLC 5/03']
+    assert bench.says('station 1', NOW + 17.0) == (
+        WARN, 'WARN: station 1 is an SLC 5/03, map.csv:2 says PLC5')
 
 
 @pytest.mark.parametrize(('mode', 'silent', 'is_fault'), [
@@ -904,6 +906,7 @@ def test_last_fallback_value_of_a_station_is_told_with_its_cause(make_bench: Ben
     assert 'line_a: interlocks' not in [status.name for status in bench.diagnostics.statuses(NOW)]
     told = Write(row, [0], NOW).result(Outcome.FALLBACK, FallbackCause.TIMEOUT.value)
     bench.written(told, NOW)
+    bench.written(Write(row, [0], NOW).result(Outcome.WRITTEN), NOW + 1)
     assert bench.seen.last_fallbacks == {1: ('speed: timeout', NOW)}
 
 

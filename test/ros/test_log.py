@@ -233,7 +233,7 @@ def test_only_a_few_lines_a_minute_are_about_one_thing(
 
 
 def test_rows_of_a_file_that_fail_for_one_reason_are_one_line(
-        lines: LimitedLog, logged: Logged) -> None:
+        lines: LimitedLog, clock: Clock, logged: Logged) -> None:
     rows = UnreadableRows(lines)
     mappings: dict[tuple[str, int], Mapping] = {}
     for now, address, station, reason in (
@@ -255,3 +255,10 @@ def test_rows_of_a_file_that_fail_for_one_reason_are_one_line(
         entries = logged()
         assert bool(entries) is (tick == 100)
     assert len(entries) == MOST_ENTRIES
+    for number in range(10_001):  # one more than are kept
+        rows.add(30.0, mapping, f'{number}')
+    clock.now += 60.0
+    rows.tell()
+    clock.now += 60.0
+    lines.error('N7:5', 'last')
+    assert logged()[-1] == ('ERROR', 'last (9990 more about N7:5 were not logged)')
