@@ -266,10 +266,10 @@ def test_end_waits_until_results_and_diagnostics_have_arrived(
         return False
 
     monkeypatch.setattr(Publisher, 'wait_for_all_acked', wait)
-    end_together([bench.node], 0.3)
+    end_together([bench.node], 5.0)
     (first, patience), (second, rest) = waits
     assert (first, second) == ('/abdf1/write_results', '/diagnostics')
-    assert patience <= 0.3 and 0.0 <= rest <= 0.2  # of a subscriber that is stuck, for both
+    assert patience <= 5.0 and 0.0 < rest <= 4.9  # of a subscriber that is stuck, for both
     assert 'trace' not in {thread.name for thread in threading.enumerate()}
 
 

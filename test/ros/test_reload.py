@@ -91,7 +91,7 @@ class Bench(BridgeCell):
 def bench(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Bench]:
     monkeypatch.setattr('abdf1_ros.ros.parameters.file_watch.PERIOD', 0.3)
     with Bench(tmp_path, DATA, '\n'.join((HEADER, SPEED, RECIPE)),
-               'Baud,Timeout\n115200,100', 'rs485:=true') as bench:
+               'Baud,Timeout\n115200,100', 'rs485:=true', 'low_latency:=false') as bench:
         yield bench
 
 
@@ -183,6 +183,8 @@ def test_files_that_would_stop_the_line_change_nothing(bench: Bench) -> None:
     assert bench.node.session is session
     with pytest.raises(ConfigurationError, match='is the port of /abdf1'):
         bench.port_owners.hold('/other', *session.configuration.held)
+    bench.end()
+    bench.port_owners.hold('/other', *session.configuration.held)
 
 
 def test_place_that_is_no_longer_shared_is_free_for_another_line(
@@ -314,7 +316,7 @@ def test_other_speed_opens_the_port_anew(bench: Bench, capfd: Output) -> None:
     speeds = bench.ros.listen(Int16MultiArray, '/abdf1/read/speed', EVERYTHING)
     assert values_in(speeds.first()) == [7, 8]
     settings = bench.node.surroundings.opener.settings
-    assert (settings.baud, settings.rs485) == (19200, True)
+    assert (settings.baud, settings.rs485, settings.low_latency) == (19200, True, False)
 
 
 def test_file_that_has_changed_is_told_once(bench: Bench, capfd: Output) -> None:

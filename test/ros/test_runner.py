@@ -149,10 +149,13 @@ def test_plcs_of_all_lines_have_one_limit_and_a_dead_link_is_not_waited_for(
     sessions: Any = [Mock(), Mock()]
     tell_plcs(sessions, 'ends', 6.0)
     assert [each.wait_for_plcs.call_args.args for each in sessions] == 2 * [(106.0, 'ends')]
-    session: Any = Mock(is_waiting=True, **{
-        'driver.interlocks.is_over': False, '_surroundings.link.is_alive.return_value': False})
+    link = Mock(**{'is_alive.side_effect': [False, *4 * [True]]})
+    session: Any = Mock(is_waiting=True, _surroundings=Mock(link=link), **{
+        'driver.interlocks.is_over': False})
     BridgeSession.wait_for_plcs(session, 199.0, 'ends')
     clock.sleep.assert_not_called()
+    BridgeSession.wait_for_plcs(session, 104.0, 'ends')
+    assert clock.sleep.call_count == 3  # after 101, 102 and 103
 
 
 def test_spare_does_not_look_for_the_line_while_it_ends() -> None:

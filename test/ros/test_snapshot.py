@@ -17,6 +17,7 @@
 from array import array
 from collections.abc import Iterator
 from datetime import datetime
+from itertools import pairwise
 from pathlib import Path
 import time
 
@@ -99,11 +100,17 @@ def inbox(tmp_path: Path) -> Iterator[Inbox]:
         yield cell.ros.listen(DiagnosticArray, '/abdf1/snapshot', EVERYTHING)
 
 
-def test_snapshot_comes_to_who_subscribes(inbox: Inbox) -> None:
+def test_snapshot_comes_to_who_subscribes(
+        inbox: Inbox, monkeypatch: pytest.MonkeyPatch) -> None:
     message = inbox.until(lambda array: array.status[0].level == OK, 'the values')
     (status,) = message.status  # a row that is written alone has no value
     assert status.message.startswith('OK: 4.5, ')
     assert message.header.stamp.sec > 0
+    made, original = list[float](), Snapshot.message
+    monkeypatch.setattr(Snapshot, 'message', lambda snapshot, now: (
+        made.append(now), original(snapshot, now))[1])
+    inbox.observer.until(lambda: len(made) > 3, 'four more')
+    assert min(later - now for now, later in pairwise(made)) >= 0.2  # its period
 
 
 def test_snapshot_is_made_for_nobody(inbox: Inbox, monkeypatch: pytest.MonkeyPatch) -> None:

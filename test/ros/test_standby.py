@@ -167,6 +167,8 @@ def test_line_that_is_lost_is_offered_no_longer(pair: Pair) -> None:
     pair.plcs.lose()
     pair.ros.until(lambda: pair.counts == (0, 0), 'both to wait')
     pair.ros.until(lambda: not pair.services(), 'no services')
+    count = pair.ros.node.count_publishers
+    pair.ros.until(lambda: not any(count(f'/abdf1/{topic}') for topic in TOPICS), 'no topics')
 
 
 def test_line_that_was_lost_for_a_moment_has_its_active_stations_again(pair: Pair) -> None:
