@@ -381,6 +381,8 @@ def test_two_lines_have_not_one_port_nor_one_place_of_guests(plant: Plant) -> No
     faults = line_status(plant, ERROR)
     assert faults['/hall/b'] == f'port: {other_name} is the port of /hall/a'
     assert faults['/hall/c'] == f'port: pty:{plant.folder}//hmi is the place of /hall/a'
+    plant.observer.until(lambda: not {'b', 'c'} & {*plant.observer.node.get_node_names()},
+                         'the end of both nodes')
 
 
 def test_new_files_do_not_make_a_line_the_second_master_on_the_port_of_another(

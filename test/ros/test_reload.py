@@ -204,11 +204,12 @@ def test_place_that_is_no_longer_shared_is_free_for_another_line(
 
 
 def test_link_that_does_not_take_the_files_is_the_end(
-        bench: Bench, monkeypatch: pytest.MonkeyPatch) -> None:
+        bench: Bench, monkeypatch: pytest.MonkeyPatch, capfd: Output) -> None:
     monkeypatch.setattr(LinkThread, 'exchange', lambda *arguments: False)
     bench.write_map(SPEED, RECIPE, LEVEL)
     assert bench.reload() == (False, 'ends: the link does not accept the new files')
     assert bench.node.has_failed
+    assert '[abdf1]: ends: the link does not accept the new files' in capfd.readouterr().err
 
 
 def test_files_that_cannot_be_taken_leave_messages_to_the_old_driver(

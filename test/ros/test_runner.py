@@ -137,8 +137,8 @@ def test_all_plcs_are_told_before_a_link_stops_and_results_come_before_the_last_
     assert order(calls) == [
         'begin', 'PLCs: ends', 'ask link', *('stop link', 'answer calls') * 3, '3 last writes',
         *['last words'] * (words > 0)]
-    assert [calls.count(what) for what in ('PLCs: ends', 'stop link', 'last words')] == [
-        2, 3, words]
+    assert [calls.count(what) for what in ('begin', 'PLCs: ends', 'stop link', 'last words')] == [
+        3 + 2, 2, 3, words]  # nodes, and sessions whose link is alive
     assert [node.limit for node in nodes] == 3 * [passed + 5.0 if words else 0.0]
 
 
@@ -175,6 +175,8 @@ def test_table_of_active_stations_is_empty_without_a_port_and_each_change_is_pub
         session.port_changed(around.link.state)
     tables = around.active_stations.publish.call_args_list
     assert [call.args[0].data[0] for call in tables] == [6, 0, 6]
+    session.begin_end()  # the last commands do not wait for the next poll
+    assert around.link.wake.called
 
 
 def test_failures_of_the_executor_end_it_only_in_a_row(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -171,7 +171,8 @@ def test_line_that_is_lost_is_offered_no_longer(pair: Pair) -> None:
     pair.ros.until(lambda: not any(count(f'/abdf1/{topic}') for topic in TOPICS), 'no topics')
 
 
-def test_line_that_was_lost_for_a_moment_has_its_active_stations_again(pair: Pair) -> None:
+def test_line_that_was_lost_for_a_moment_has_its_active_stations_again(
+        pair: Pair, capfd: pytest.CaptureFixture[str]) -> None:
     """The table is latched, and the new publisher has nothing of what the old one published."""
     bridge = pair.node
     pair.ros.until(lambda: bridge.surroundings.active_words == [2] + 15 * [0], 'station 1')
@@ -179,6 +180,8 @@ def test_line_that_was_lost_for_a_moment_has_its_active_stations_again(pair: Pai
     pair.ros.until(left.done, 'the line to be left')
     pair.ros.until(lambda: pair.counts == (1, 1), 'the bridge to have the line again')
     pair.ros.listen(UInt16MultiArray, '/abdf1/active_stations').values([2] + 15 * [0])
+    said = ''.join(capfd.readouterr())
+    assert said.count('has lost the line: waits') == said.count('has got the line: begins') == 1
 
 
 @pytest.mark.parametrize(('port', 'heard', 'has_line'), [
