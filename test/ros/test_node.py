@@ -26,10 +26,8 @@ import threading
 import time
 from typing import Any
 
-from abdf1_ros.df1.stations import Station
 from abdf1_ros.driver.driver import Driver
 from abdf1_ros.driver.writes.queue import MAX_WAITING_WRITES
-from abdf1_ros.messages import Event, Message
 from abdf1_ros.pccc.families import parse_address
 from abdf1_ros.pccc.file_types import PlcType
 from abdf1_ros.ports.link_thread import PortState
@@ -205,25 +203,6 @@ def test_results_of_all_writes_that_wait_fit_into_their_queue(make_bench: Benche
     depths = {publisher.topic_name: publisher.qos_profile.depth
               for publisher in make_bench(PULSES).node.publishers}
     assert depths['/abdf1/write_results'] == MAX_WAITING_WRITES
-
-
-def test_reply_to_a_command_of_an_earlier_run_is_no_error(
-        make_bench: Benches, capfd: Output) -> None:
-    bench = make_bench(SPEED)
-    left_over = Event(Message.ERR_WRONG_MESSAGE, (1, 0, 7), 1)
-    bench.node.link.stop()  # nothing else comes, which would show that the station answers us
-    bench.node.session.events.port_changed()
-    for _ in range(2):
-        bench.node.session.events.happened(left_over)
-    for number, heard in (7, 1.0), (8, None), (9, None):
-        bench.node.session.port_changed(bench.node.link.state)
-        bench.node.session.events.station_changed(Station(number, False, heard))
-    lines = [line.partition('[abdf1]: ')[2] for line in ''.join(capfd.readouterr()).splitlines()]
-    told = str(left_over)
-    assert f'{told}; it may answer a command sent before the port was opened' in lines
-    assert told.startswith('2510') and lines.count(told) == 1
-    assert sum(line.endswith(bench.node.link.state.text) for line in lines) == 1
-    assert [line[:9] for line in lines if ' has never been heard: ' in line] == ['station 8']
 
 
 def test_station_with_another_error_code_is_told_once(make_bench: Benches, capfd: Output) -> None:

@@ -193,6 +193,8 @@ def test_place_that_is_no_longer_shared_is_free_for_another_line(
     for place in places:
         write_csv(bench.net, 'Baud,Timeout,Share', [f'115200,100,{place}'])
         assert bench.reload()[0]
+        bench.ros.until(Path(place.removeprefix('pty:')).is_symlink, 'the place')
+    assert not (tmp_path / 'first').is_symlink()
     bench.port_owners.hold('/other', places[0])
     with pytest.raises(ConfigurationError):
         bench.port_owners.hold('/other', places[1])

@@ -22,7 +22,6 @@ import time
 from typing import Any
 from unittest.mock import Mock
 
-from abdf1_ros.ports.link_thread import PortState
 from abdf1_ros.ros.bridge.last_writes import LAST_WRITES
 from abdf1_ros.ros.bridge.node import BridgeNode, end_together
 from abdf1_ros.ros.bridge.session import BridgeSession, tell_plcs
@@ -163,20 +162,6 @@ def test_spare_does_not_look_for_the_line_while_it_ends() -> None:
     BridgeNode.check(node)
     assert node.session.check.called
     assert not node.standby.look.called
-
-
-def test_table_of_active_stations_is_empty_without_a_port_and_each_change_is_published() -> None:
-    around = Mock(active_words=None)
-    session: Any = object.__new__(BridgeSession)
-    vars(session).update(_surroundings=around, _port_text='', events=Mock(), configuration=Mock(),
-                         driver=Mock(**{'stations.words.return_value': [6]}))
-    for is_open in (True, False, True):
-        around.link.state = PortState(is_open, str(is_open))
-        session.port_changed(around.link.state)
-    tables = around.active_stations.publish.call_args_list
-    assert [call.args[0].data[0] for call in tables] == [6, 0, 6]
-    session.begin_end()  # the last commands do not wait for the next poll
-    assert around.link.wake.called
 
 
 def test_failures_of_the_executor_end_it_only_in_a_row(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -20,6 +20,7 @@ from pathlib import Path
 import socket
 from types import SimpleNamespace
 from typing import Any
+from unittest.mock import MagicMock, Mock
 
 from abdf1_ros.ports.link_thread import PortState
 from abdf1_ros.ros.bridge.node import BridgeNode
@@ -188,12 +189,28 @@ def test_line_that_was_lost_for_a_moment_has_its_active_stations_again(
     ('/dev/ttyS0', [None], True), ('socket://a:1', [None, 7.0], True),
     ('socket://a:1', [], True), ('socket://a:1', [None, 4.0], False)])
 def test_line_of_a_device_server_is_ours_when_any_station_has_answered_since_it_was_opened(
-        port: str, heard: list[float | None], has_line: bool) -> None:
-    session = SimpleNamespace(
-        port=port, _opened=5.0, driver=SimpleNamespace(stations=[
-            SimpleNamespace(last_heard=when) for when in heard]),
-        _surroundings=SimpleNamespace(link=SimpleNamespace(state=PortState(True, 'open'))))
-    assert BridgeSession.has_line.fget(session) is has_line  # type: ignore[attr-defined]
+        port: str, heard: list[float | None], has_line: bool,
+        monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr('abdf1_ros.ros.bridge.session.line_time', lambda: 5.0)
+    events, session = Mock(), object.__new__(BridgeSession)
+    around = Mock(active_words=None, **{'link.is_released': False})
+    stations = MagicMock(**{'words.return_value': [6], '__iter__.side_effect': lambda: iter(
+        [SimpleNamespace(last_heard=when) for when in heard])})
+    vars(session).update(_surroundings=around, _port_text='', events=events,
+                         driver=Mock(stations=stations), configuration=Mock(port=port))
+    for is_open in (True, False, True):
+        around.link.state = PortState(is_open, str(is_open))
+        for _ in range(2):
+            session.port_changed(around.link.state)
+        assert session.has_line is (is_open and has_line)
+    tables = around.active_stations.publish.call_args_list
+    assert [call.args[0].data[0] for call in tables] == [6, 0, 6]  # no station without a port
+    assert events.port_changed.call_count == 3  # late replies are no errors
+    assert [*map(str, events.notes.mock_calls)] == [
+        f"call.{level}('the port', '{port}: {is_open}')"
+        for level, is_open in (('info', True), ('error', False), ('info', True))]
+    session.begin_end()
+    assert around.link.wake.called  # the last commands do not wait for the next poll
 
 
 def test_change_that_waits_for_the_executor_is_not_begun_again() -> None:
