@@ -27,6 +27,7 @@ from abdf1_ros.driver.guests import ShareAccess
 from abdf1_ros.driver.reads.demands import ReadAnswer
 from abdf1_ros.driver.write import Outcome, WriteResult
 from abdf1_ros.ports.clock import line_time
+from abdf1_ros.ros.topics.interlocks import count_owners
 from abdf1_ros.ros.topics.services import RowServices
 from abdf1_ros.settings.mapping import Mapping
 from abdf1_ros.settings.network import Network
@@ -219,7 +220,8 @@ def test_map_of_many_rows_has_the_services_that_matter(
 
 def test_publisher_and_caller_of_one_fallback_row_are_two_owners(bench: Bench) -> None:
     client = bench.ros.node.create_client(SetBool, SET + 'motor')
-    bench.ros.until(client.service_is_ready, 'the service')
+    bench.ros.until(lambda: count_owners(bench.node, 'motor') == 1, 'the caller')
+    assert bench.node.session.owners.look(float('inf')) == ()
     publisher = bench.ros.publisher(UInt8MultiArray, '/abdf1/write/motor')
     bench.ros.until(lambda: bench.node.session.owners.look(float('inf')) == ('motor',),
                     'both owners')
@@ -370,15 +372,28 @@ def test_services_of_rows_that_are_gone_close_once_when_no_call_waits() -> None:
     services.look(line_time() + 2 * longest)
     assert ended(puts[0]) == (False, 'unknown whether written: no result has come')
     assert ended(puts[1]) == (False, 'l0: stands in the PLC')
+    *crowd, late = (node.made['~/read_now/n2'](Trigger.Request(), Trigger.Response())
+                    for _ in range(100))
+    for call in crowd:
+        call.send(None)
+    assert ended(late) == (False, 'refused: 100 calls wait already')
+    for take in node.takes[1:]:
+        take(ReadAnswer(error='no'))
+    assert {*map(ended, crowd)} == {(False, 'no')}
     puts[3].send(None)
+    last = node.made['~/read_now/n1'](Trigger.Request(), Trigger.Response())
+    last.send(None)
     reload(rows[1])
     reload()
     services.look(line_time())
+    gone = node.made['~/set/lamp'](SetBool.Request(), SetBool.Response())
+    assert ended(gone) == (False, 'refused: the map has no such row any more')
     assert node.closed == []
     node.takes[0](ReadAnswer(error='late'))
     assert ended(read) == (False, 'late')
     services.withdraw()
     assert ended(puts[3]) == (False, 'unknown whether written: no result has come')
+    assert ended(last) == (False, 'this node ends')
     for _ in range(2):
         services.look(line_time())
     assert sorted(node.closed) == sorted(node.made)

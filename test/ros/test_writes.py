@@ -36,7 +36,7 @@ from support.ros import Observer
     ([1, 2, 3, 4], 1, [0, 0, 0, 0]), ([51, 52, 53], 1, [0, 0, 0]),  # published before we came
     ([1, 2, 5, 6, 10], 1, [0, 0, 2, 0, 3]), ([7, 8, 9, 1, 2, 3, 5], 1, [0, 0, 0, 0, 0, 0, 1]),
     ([1, 101, 2, 102, 103, 3], 2, [0] * 6), ([1, 101, 2, 105, 3, 106], 2, [0, 0, 0, 3, 0, 0]),
-    ([None, None], 1, [0, 0])])  # a middleware without numbers
+    ([1, 2, 5], 2, [0, 0, 0]), ([None, None], 1, [0, 0])])  # a middleware without numbers
 def test_messages_that_are_missing_before_each(
         numbers: Sequence[int | None], publishers: int, lost: list[int]) -> None:
     counter = LossCounter(lambda: publishers)
@@ -55,7 +55,8 @@ class Taker:
     """A node and a driver in one, which remembers what it is asked to write or refuse."""
 
     def __init__(self, *tags: str) -> None:
-        self.mappings = [make_mapping('N7:0', 'Write', tag=tag) for tag in tags]
+        self.mappings = [*(make_mapping('N7:0', 'Write', tag=tag) for tag in tags),
+                         make_mapping('N7:9', tag='read')]
         self.executor, self.tasks, self.said = self, list[Callable[[], None]](), list[str]()
         self.stamps, self.requests = list[str](), list[str]()
         self.callbacks: dict[str, Callable[[Any, Any], None]] = {}
@@ -103,7 +104,7 @@ class Taker:
                 'received_timestamp': now - int(waited * 1e9)})
 
     def get_publishers_info_by_topic(self, name: str) -> list[Any]:
-        return [SimpleNamespace(node_namespace='/', node_name='panel')]
+        return [SimpleNamespace(node_namespace='/', node_name=f'panel_{name[-1]}')]
 
     def lost(self, topic: str, count: int) -> None:
         self.said.append(f'{topic}: {count} lost')
@@ -153,7 +154,7 @@ def test_messages_wait_in_their_order_until_the_node_has_begun(
                'stood still or had just begun, or the clocks differ')
     assert node.said == ['a: 1 lost', 'a 1', f'b 2: it came 3.0 {too_old}', 'a 3',
                          'a 4 of 1.2 s ago', 'a 5 of 0.7 s ago', f'b 3: it came 7.4 {too_old}',
-                         'b 4', "b: ['/panel'] ahead by 1.5 s",
+                         'b 4', "b: ['/panel_b'] ahead by 1.5 s",
                          'b 5: its time stamp is 2.6 s ahead of the clock here, write_timeout is '
                          '2 s; the clocks differ, so its age is unknown']
     assert topics.taken == 8
