@@ -88,6 +88,13 @@ def test_value_that_is_not_fresh_says_so(
     assert (status.level, status.message) == (level, message)
 
 
+def test_value_that_the_link_is_about_to_publish_is_not_missed() -> None:
+    row, now = make_mapping('N7:0'), line_time()
+    point = ReadPoint(row, 1.0, 3.0)
+    point.last_good = now
+    assert Snapshot({row: point}, {}).message(now).status[0].message == 'OK: fresh'
+
+
 # On its topic
 
 
