@@ -195,7 +195,9 @@ def test_link_parameters_are_read_as_the_file_is(
     ({'port': 7}, '/dev/ttyS6')])
 def test_port_is_the_parameter_or_else_com_port(
         configured: Configured, values: dict[str, Any], port: str) -> None:
-    assert configured(**values).port == port
+    configuration = configured(**values)
+    assert configuration.port == port
+    assert configuration.driver_settings().may_store is ('://' in port)
 
 
 @pytest.mark.parametrize(('name', 'value', 'expected'), [
@@ -234,7 +236,9 @@ def test_csv_as_a_parameter_file_is_told(tmp_path: Path) -> None:
 
 
 def test_gateway_is_polled_for_the_stations_behind_it(
-        configured: Configured, make_node: Nodes, files: Files, tmp_path: Path) -> None:
+        configured: Configured, make_node: Nodes, files: Files, tmp_path: Path,
+        monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr('random.randrange', lambda stop: stop - 1)
     rows = [f'{tag},Read,N7:0,{station},PLC5,{via}'  # c is read often enough
             for tag, station, via in (('a', 1, '8,,'), ('b', 9, '8,,'), ('c', 2, ',,'),
                                       ('d', 2, ',c,1000'))]
@@ -243,7 +247,8 @@ def test_gateway_is_polled_for_the_stations_behind_it(
         rows))
     assert configured().map_problems == []
     settings = configured().driver_settings()
-    assert (settings.polling, settings.default_period) == (PollingSettings((2, 8)), 0.1)
+    assert (settings.polling, settings.default_period, settings.first_tns) == (
+        PollingSettings((2, 8)), 0.1, 0xFFFF)
     assert problems_of(make_node(files | {'poll_list': '8,9'})) == [
         'parameter poll_list: station 9 is behind gateway 8, which is polled in its place']
     assert problems_of(make_node(files | {'priority_poll_list': '1'})) == [
@@ -262,6 +267,8 @@ def test_gateway_is_polled_for_the_stations_behind_it(
     ('read_only', 1, 'read_only = 1 should be true or false'),
     ('strict_map', 'on', "strict_map = 'on' should be true or false"),
     ('map_file', [1, 2], 'map_file = [1, 2] should be text'),
+    ('poll_list', '1,300', '"300" should be a station from 0 to 254, or a range such as 3-5; '
+                           'put commas between them'),
     ('port', 'ttyUSB0', 'Com_Port = "ttyUSB0" should be a number from 1, a device path such as '
      '/dev/ttyUSB0, socket://host:port or rfc2217://host:port; "plc ports" '
      'lists the devices'),
